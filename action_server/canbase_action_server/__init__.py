@@ -1,0 +1,1 @@
+"""DriveDistance: the motion profile, the goal, the action server and its client."""

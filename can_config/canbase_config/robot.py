@@ -1,0 +1,274 @@
+"""The model of robot.yaml: every key with its type, unit, range and default. Reading the file is `load.py`.
+
+Conventions: names carry their unit; a length, speed or time without a default must be given. No timeout can be
+switched off: each has a range that excludes 0 and infinity. Frames and units follow REP 103 and REP 105.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+DRIVER_NODE_ID = 127
+"""CANopen node id of the motor driver: its heartbeat is COB-ID 77Fh."""
+WATCHDOG_NODE_ID = 126
+"""CANopen node id of the watchdog: its heartbeat is COB-ID 77Eh, its state 1FEh, its reset request 27Eh."""
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
+Topic = Annotated[str, Field(pattern=r"^/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*$", max_length=128)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+
+VelocityUnit = Literal["rpm", "0.1rpm", "0.001rpm", "rev/s", "0.001rev/s", "counts/s", "0.1counts/s"]
+"""What one bit of 60FFh and 606Ch means, always at the motor shaft (before the gear)."""
+
+
+class Section(BaseModel):
+    """Base of all sections: immutable, no unknown keys, no silent conversion of types."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, ser_json_inf_nan="constants")
+
+
+class Bus(Section):
+    """The CAN bus as python-can opens it."""
+
+    interface: Annotated[str, Field(min_length=1, description="python-can interface: socketcan, udp_multicast, …")]
+    channel: Annotated[str, Field(min_length=1, description="can0, or the multicast group of a virtual bus")]
+    bitrate: Annotated[int, Field(ge=10_000, le=1_000_000, description="[bit/s]")] = 500_000
+    extra: Annotated[dict[str, Any], Field(description="further arguments of can.Bus for this interface")] = {}
+
+    def arguments(self) -> dict[str, Any]:
+        """Keyword arguments for `can.Bus`. The bit rate of a socketcan interface is set by the system, not here."""
+        given: dict[str, Any] = {"interface": self.interface, "channel": self.channel}
+        if self.interface not in ("socketcan", "udp_multicast", "virtual"):
+            given["bitrate"] = self.bitrate
+        return given | self.extra
+
+
+class Identity(Section):
+    """What object 1018h must say; a key that is not given is not compared."""
+
+    vendor_id: Annotated[int, Field(ge=0, le=0xFFFF_FFFF, description="1018h:1")] | None = None
+    product_code: Annotated[int, Field(ge=0, le=0xFFFF_FFFF, description="1018h:2")] | None = None
+    revision: Annotated[int, Field(ge=0, le=0xFFFF_FFFF, description="1018h:3")] | None = None
+    serial: Annotated[int, Field(ge=0, le=0xFFFF_FFFF, description="1018h:4")] | None = None
+
+
+class Drive(Section):
+    """One axis of one motor drive, and the wheel that it turns."""
+
+    joint: Annotated[Name, Field(description="name in joint_states")]
+    node_id: Annotated[int, Field(ge=1, le=125, description="CANopen node id; 126 and 127 are ours")]
+    axis: Annotated[int, Field(ge=0, le=1, description="axis in the node; its objects are at 6000h + 800h × axis")] = 0
+    side: Annotated[Literal["left", "right"], Field(description="side of the base")]
+    direction: Annotated[
+        Literal[1, -1], Field(description="+1: a positive motor velocity drives the base forward; -1: mounted mirrored")
+    ] = 1
+    gear_ratio: Annotated[float, Field(gt=0.0, le=10_000.0, description="motor revolutions per wheel revolution")]
+    counts_per_motor_rev: Annotated[
+        int, Field(ge=1, le=2**31 - 1, description="increments of 6064h per motor revolution")
+    ]
+    velocity_unit: Annotated[VelocityUnit, Field(description="one bit of 60FFh and 606Ch, at the motor shaft")] = "rpm"
+    identity: Identity = Identity()
+
+
+class Base(Section):
+    """The two-wheeled base."""
+
+    wheel_radius_m: Annotated[float, Field(gt=0.005, le=1.0, description="[m]")]
+    track_m: Annotated[float, Field(gt=0.02, le=5.0, description="distance between the wheels' contact points [m]")]
+    odom_frame: Annotated[str, Field(min_length=1, description="REP 105")] = "odom"
+    base_frame: Annotated[str, Field(min_length=1, description="REP 105")] = "base_link"
+    standstill_mps: Annotated[
+        float, Field(gt=0.0, le=0.05, description="a wheel whose rim is slower stands [m/s]")
+    ] = 0.005
+
+
+class Limits(Section):
+    """What the base may do at most. Magnitudes: they hold forward and backward, left and right."""
+
+    linear_mps: Annotated[float, Field(gt=0.0, le=5.0, description="[m/s]")]
+    angular_radps: Annotated[float, Field(gt=0.0, le=20.0, description="[rad/s]")]
+    acceleration_mps2: Annotated[float, Field(gt=0.0, le=10.0, description="[m/s²]")]
+    deceleration_mps2: Annotated[float, Field(gt=0.0, le=10.0, description="ordinary stop [m/s²]")]
+    emergency_deceleration_mps2: Annotated[
+        float, Field(gt=0.0, le=20.0, description="quick stop of the drives, 6085h; not below the ordinary one [m/s²]")
+    ]
+    angular_acceleration_radps2: Annotated[float, Field(gt=0.0, le=50.0, description="[rad/s²]")]
+    angular_deceleration_radps2: Annotated[float, Field(gt=0.0, le=50.0, description="[rad/s²]")]
+    jerk_mps3: Annotated[float, Field(gt=0.0, le=1000.0, description="[m/s³]")] = 10.0
+
+    @model_validator(mode="after")
+    def _emergency_is_the_hardest(self) -> Limits:
+        if self.emergency_deceleration_mps2 < self.deceleration_mps2:
+            raise ValueError("emergency_deceleration_mps2 must not be below deceleration_mps2")
+        return self
+
+
+class Rates(Section):
+    """How often things happen."""
+
+    control_hz: Annotated[float, Field(ge=20.0, le=200.0, description="SYNC cycle of the driver [Hz]")] = 100.0
+    odometry_hz: Annotated[float, Field(ge=1.0, le=100.0, description="odom, tf and joint_states [Hz]")] = 50.0
+    status_hz: Annotated[float, Field(ge=1.0, le=50.0, description="motor_driver/status [Hz]")] = 10.0
+    command_hz: Annotated[float, Field(ge=20.0, le=100.0, description="cmd_vel_mux and cmd_vel at least [Hz]")] = 50.0
+
+
+class Timeouts(Section):
+    """Ages are measured from the local monotonic receive time. None of them can be switched off."""
+
+    command_s: Annotated[float, Field(ge=0.05, le=0.5, description="cmd_vel at the driver [s]")] = 0.2
+    lease_s: Annotated[float, Field(ge=0.05, le=0.5, description="lease at the watchdog [s]")] = 0.25
+    drive_heartbeat_s: Annotated[
+        float, Field(ge=0.05, le=1.0, description="heartbeat of watchdog and driver as the drives watch it, 1016h [s]")
+    ] = 0.3
+    feedback_s: Annotated[float, Field(ge=0.02, le=0.5, description="status TPDO of an enabled drive [s]")] = 0.1
+    watchdog_s: Annotated[float, Field(ge=0.05, le=0.5, description="watchdog's state frame at the driver [s]")] = 0.2
+    standstill_s: Annotated[
+        float, Field(ge=0.1, le=10.0, description="from the order to stop until the driver gives up the ramp [s]")
+    ] = 3.0
+    sdo_s: Annotated[float, Field(ge=0.05, le=5.0, description="one SDO answer [s]")] = 0.3
+    boot_s: Annotated[float, Field(ge=1.0, le=600.0, description="until a missing drive is reported as an error [s]")] = 10.0
+    odometry_s: Annotated[float, Field(ge=0.05, le=1.0, description="odom at the action server [s]")] = 0.2
+
+
+class MuxSource(Section):
+    """One source of velocity commands."""
+
+    topic: Annotated[Topic, Field(description="relative to the node's namespace")]
+    priority: Annotated[int, Field(ge=0, le=255, description="the higher wins; no two alike")]
+    timeout_s: Annotated[float, Field(ge=0.05, le=2.0, description="silent for longer: holds no more [s]")]
+    stamped: Annotated[bool, Field(description="true: TwistStamped, false: Twist")] = True
+
+
+DEFAULT_SOURCES = {
+    "joystick": MuxSource(topic="cmd_vel_joy", priority=100, timeout_s=0.3),
+    "navigation": MuxSource(topic="cmd_vel_nav", priority=50, timeout_s=0.5),
+    "action": MuxSource(topic="cmd_vel_action", priority=40, timeout_s=0.3),
+}
+
+
+class Mux(Section):
+    """Who may drive."""
+
+    sources: Annotated[dict[Name, MuxSource], Field(min_length=1)] = DEFAULT_SOURCES
+
+    @model_validator(mode="after")
+    def _no_two_alike(self) -> Mux:
+        for what in ("priority", "topic"):
+            seen: dict[object, str] = {}
+            for name, source in self.sources.items():
+                other = seen.setdefault(getattr(source, what), name)
+                if other != name:
+                    raise ValueError(f"sources {other} and {name} have the same {what}; each needs its own")
+        return self
+
+
+class Scan(Section):
+    """The laser scanner that the safety filter looks at."""
+
+    required: Annotated[bool, Field(description="true: without a fresh scan nothing moves")]
+    topic: Topic = "scan"
+    timeout_s: Annotated[float, Field(ge=0.05, le=1.0, description="[s]")] = 0.3
+    x_m: Annotated[float, Field(ge=-5.0, le=5.0, description="scanner in base_link [m]")] = 0.0
+    y_m: Annotated[float, Field(ge=-5.0, le=5.0, description="scanner in base_link [m]")] = 0.0
+    yaw_rad: Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi, description="scanner in base_link [rad]")] = 0.0
+
+
+class Estop(Section):
+    """The software emergency stop topic (std_msgs/Bool, true = stop). Not a safety function: STO is."""
+
+    required: Annotated[bool, Field(description="true: a silent topic counts as pressed")]
+    topic: Topic = "estop_state"
+    timeout_s: Annotated[float, Field(ge=0.05, le=2.0, description="[s]")] = 0.5
+
+
+class Footprint(Section):
+    """Rectangle around the base in base_link, distances from its origin, all positive."""
+
+    front_m: Annotated[float, Field(gt=0.0, le=5.0, description="[m]")]
+    rear_m: Annotated[float, Field(gt=0.0, le=5.0, description="[m]")]
+    left_m: Annotated[float, Field(gt=0.0, le=5.0, description="[m]")]
+    right_m: Annotated[float, Field(gt=0.0, le=5.0, description="[m]")]
+
+
+class Safety(Section):
+    """The last place where a command is decided."""
+
+    footprint: Footprint
+    scan: Scan
+    estop: Estop
+    command_timeout_s: Annotated[float, Field(ge=0.05, le=0.5, description="cmd_vel_mux at the filter [s]")] = 0.2
+    stop_distance_m: Annotated[float, Field(gt=0.0, le=5.0, description="free way below: stop [m]")] = 0.15
+    slow_distance_m: Annotated[float, Field(gt=0.0, le=10.0, description="free way below: slow down [m]")] = 0.6
+
+    @model_validator(mode="after")
+    def _slow_before_stop(self) -> Safety:
+        if self.slow_distance_m <= self.stop_distance_m:
+            raise ValueError("slow_distance_m must be greater than stop_distance_m")
+        return self
+
+
+class Lease(Section):
+    """The Unix datagram socket on which the safety filter tells the watchdog what it ordered."""
+
+    socket: Annotated[str, Field(min_length=1, max_length=100, description="path; its folder is made if missing")]
+
+
+class Action(Section):
+    """The DriveDistance action server."""
+
+    min_distance_m: Annotated[float, Field(gt=0.0, le=1.0, description="[m]")] = 0.01
+    max_distance_m: Annotated[float, Field(gt=0.0, le=1000.0, description="[m]")] = 5.0
+    min_speed_mps: Annotated[float, Field(gt=0.0, le=1.0, description="[m/s]")] = 0.02
+    max_speed_mps: Annotated[float, Field(gt=0.0, le=5.0, description="[m/s]")] = 0.5
+    tolerance_m: Annotated[float, Field(gt=0.0, le=0.1, description="a goal that ends nearer has succeeded [m]")] = 0.005
+    control_hz: Annotated[float, Field(ge=10.0, le=100.0, description="cmd_vel_action [Hz]")] = 50.0
+    feedback_hz: Annotated[float, Field(ge=1.0, le=50.0, description="[Hz]")] = 10.0
+    progress_timeout_s: Annotated[float, Field(ge=0.2, le=60.0, description="no motion for so long: NO_PROGRESS [s]")] = 2.0
+    overall_factor: Annotated[
+        float, Field(ge=1.1, le=100.0, description="overall timeout = factor × the ideal time of the goal + overall_extra_s")
+    ] = 2.0
+    overall_extra_s: Annotated[float, Field(ge=0.5, le=600.0, description="[s]")] = 5.0
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Action:
+        if self.min_distance_m >= self.max_distance_m or self.min_speed_mps >= self.max_speed_mps:
+            raise ValueError("each minimum must be below its maximum")
+        return self
+
+
+class Robot(Section):
+    """The whole of robot.yaml."""
+
+    name: Annotated[Name, Field(description="used in log lines and diagnostics")] = "robot"
+    bus: Bus
+    drives: Annotated[tuple[Drive, ...], Field(min_length=2, max_length=8, strict=False)]
+    base: Base
+    limits: Limits
+    rates: Rates = Rates()
+    timeouts: Timeouts = Timeouts()
+    mux: Mux = Mux()
+    safety: Safety
+    lease: Lease
+    action: Action = Action()
+
+    @model_validator(mode="after")
+    def _drives_fit_together(self) -> Robot:
+        joints = [drive.joint for drive in self.drives]
+        for joint in joints:
+            if joints.count(joint) > 1:
+                raise ValueError(f"two drives have the joint {joint!r}; each needs its own")
+        places = [(drive.node_id, drive.axis) for drive in self.drives]
+        for node_id, axis in places:
+            if places.count((node_id, axis)) > 1:
+                raise ValueError(f"two drives are on node {node_id}, axis {axis}; each needs its own")
+        if {drive.side for drive in self.drives} != {"left", "right"}:
+            raise ValueError("a base needs at least one drive on the left and one on the right")
+        return self
+
+    def drive_indexes(self, side: Literal["left", "right"]) -> tuple[int, ...]:
+        """Positions in `drives` of the wheels on one side."""
+        return tuple(i for i, drive in enumerate(self.drives) if drive.side == side)

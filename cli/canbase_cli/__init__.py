@@ -1,0 +1,1 @@
+"""The `canbase` command: thin, each file a subcommand that calls the other packages."""

@@ -1,0 +1,1 @@
+"""Who may drive, and how fast: the velocity mux and the safety filter."""
