@@ -1,0 +1,124 @@
+"""What the driver knows at one moment, as plain frozen data: the core makes it, `messages.py` turns it into ROS messages.
+
+No ROS, no behaviour. Units are SI at the wheel and the base; ages are local monotonic seconds, NaN: nothing received yet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+
+Covariance = tuple[float, ...]
+"""36 numbers: 6 × 6, row by row, in the order x, y, z, rotation about x, y, z (geometry_msgs, REP 103)."""
+
+
+class DriverState(IntEnum):
+    """State of the whole driver; the numbers are those of canbase/msg/DriverStatus."""
+
+    OFFLINE = 0
+    BOOTING = 1
+    DISARMED = 2
+    ENABLING = 3
+    ENABLED = 4
+    STOPPING = 5
+    LATCHED = 6
+
+
+class WatchdogView(Enum):
+    """What the driver sees of the watchdog; the words are those of canbase/msg/DriverStatus."""
+
+    OK = "ok"
+    MISSING = "missing"
+    TRIPPED = "tripped"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveSnapshot:
+    """One axis and its wheel. Positive: the wheel drives the base forward."""
+
+    joint: str
+    """Joint name of robot.yaml."""
+    node_id: int
+    """CANopen node id, 1..127."""
+    axis: int
+    """Axis in that node, 0..7."""
+    nmt_state: str
+    """CiA 301: initialising, pre-operational, operational, stopped, unknown."""
+    state: str
+    """CiA 402 state in words: "operation enabled", "fault", …"""
+    statusword: int
+    """6041h as received, u16."""
+    error_code: int
+    """603Fh or the code of the last emergency message, u16; 0: none."""
+    error_text: str
+    """The same in words; empty when there is none."""
+    target_radps: float
+    """Setpoint at the wheel [rad/s]."""
+    velocity_radps: float
+    """Measured at the wheel, 606Ch [rad/s]; 0 until the first feedback."""
+    position_rad: float
+    """Wheel angle since the first feedback, unwrapped [rad]; 0 until then."""
+    feedback_age_s: float
+    """Since the last status TPDO [s]; NaN: none yet."""
+    heartbeat_age_s: float
+    """Since its last heartbeat [s]; NaN: none yet."""
+    stops_by_itself: bool
+    """It watches the watchdog's heartbeat: 1016h was written and read back."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriverSnapshot:
+    """The driver, its drives, the watchdog as it sees it, and the base's pose and motion."""
+
+    time_s: float
+    """Local monotonic time of the snapshot [s]."""
+    state: DriverState
+    cause: str
+    """Why it is not ENABLED; "none" when it is."""
+    detail: str
+    """One sentence with the values."""
+    clears_on: str
+    """What ends it; empty when ENABLED."""
+    watchdog: WatchdogView
+    watchdog_cause: str
+    """Cause of its trip; "none"."""
+    watchdog_age_s: float
+    """Since its last state frame [s]; NaN: none yet."""
+    standstill: bool
+    """All wheels are measured below base.standstill_mps."""
+    command_age_s: float
+    """Age of cmd_vel by local receive time [s]; NaN: none yet."""
+    command_fresh: bool
+    """command_age_s is within timeouts.command_s."""
+    commands_refused: int
+    """Commands that were not finite, since start."""
+    cycles: int
+    """Cycles of the SYNC loop since start."""
+    overruns: int
+    """Cycles that began more than half a period late, since start."""
+    cycle_lateness_max_s: float
+    """Greatest lateness of a cycle in the last second [s]."""
+    frames_dropped: int
+    """Received frames that could not be understood, since start."""
+    send_errors: int
+    """Frames that could not be sent in time, since start."""
+    drives: tuple[DriveSnapshot, ...]
+    """In the order of robot.yaml."""
+    x_m: float
+    """Pose of base_frame in odom_frame, forward at the start [m]."""
+    y_m: float
+    """To the left at the start [m]."""
+    yaw_rad: float
+    """Counter-clockwise, not wrapped [rad]."""
+    linear_mps: float
+    """Measured velocity of the base, forward positive [m/s]."""
+    angular_radps: float
+    """Measured, counter-clockwise positive [rad/s]."""
+    pose_covariance: Covariance
+    twist_covariance: Covariance
+    odometry_valid: bool
+    """Every wheel has fresh feedback and the pose contains all of its travel; otherwise nothing of it is published."""
+    odom_frame: str = "odom"
+    """REP 105."""
+    base_frame: str = "base_link"
+    """REP 105."""
