@@ -1,0 +1,133 @@
+"""CiA 402, power state machine: statusword 6041h to state, state and goal to controlword 6040h. No frames, no time.
+
+Rules of the goals
+1. OFF and QUICK_STOP are the same word in every state, an unknown one included: stopping needs no knowledge.
+   They never set bit 3 (enable operation), so no way down leads through OPERATION ENABLED.
+2. OFF is disable voltage: the motor coasts. Whoever holds it brings the wheels to a stand first.
+3. ON goes up one step at a time and stays in OPERATION ENABLED. It never interrupts a quick stop: in QUICK STOP ACTIVE
+   it keeps the word; a drive that stays there when it stands (605Ah = 5…8) needs OFF first. In an unknown state it is
+   a quick stop too.
+4. ON never resets a fault. Only RESET sets bit 7, and only in FAULT; in every other state RESET is OFF.
+5. The drive acts on the 0 → 1 edge of bit 7 (transition 15), not on its level. Before RESET hold OFF, which keeps
+   bit 7 at 0, for FAULT_RESET_CYCLES; then hold RESET until the state is no longer FAULT, at least FAULT_RESET_CYCLES.
+   Each further try needs OFF again.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+AXIS_OFFSET = 0x800
+"""The objects of axis n are at 6000h + 800h × n (CiA 402-2)."""
+
+FAULT_RESET_CYCLES = 3
+"""SYNC cycles for each level of bit 7: synchronous RPDOs act one SYNC late, some drives need three to see an edge."""
+
+REMOTE = 1 << 9
+"""Statusword bit 9: 0 means that the drive is in local mode and ignores the controlword."""
+
+
+def axis_object(index: int, axis: int) -> int:
+    """Index of a 6000h…67FFh object on axis 0 or 1. Raises ValueError outside of these."""
+    if not 0x6000 <= index <= 0x67FF or axis not in (0, 1):
+        raise ValueError(f"{index:04X}h on axis {axis}: expected 6000h…67FFh and axis 0 or 1")
+    return index + AXIS_OFFSET * axis
+
+
+class DriveState(Enum):
+    """State of the power drive system; the value is its name in CiA 402-2."""
+
+    NOT_READY_TO_SWITCH_ON = "not ready to switch on"
+    SWITCH_ON_DISABLED = "switch on disabled"
+    READY_TO_SWITCH_ON = "ready to switch on"
+    SWITCHED_ON = "switched on"
+    OPERATION_ENABLED = "operation enabled"
+    QUICK_STOP_ACTIVE = "quick stop active"
+    FAULT_REACTION_ACTIVE = "fault reaction active"
+    FAULT = "fault"
+
+    @property
+    def text(self) -> str:
+        """The state in the standard's words."""
+        return self.value
+
+    @property
+    def has_torque(self) -> bool:
+        """Whether the drive may be turning the motor by itself: enabled, or on its way down a ramp."""
+        return self in _WITH_TORQUE
+
+
+_WITH_TORQUE = frozenset((DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE))
+
+STATUSWORD_STATES = (
+    (0x4F, 0x00, DriveState.NOT_READY_TO_SWITCH_ON),
+    (0x4F, 0x40, DriveState.SWITCH_ON_DISABLED),
+    (0x6F, 0x21, DriveState.READY_TO_SWITCH_ON),
+    (0x6F, 0x23, DriveState.SWITCHED_ON),
+    (0x6F, 0x27, DriveState.OPERATION_ENABLED),
+    (0x6F, 0x07, DriveState.QUICK_STOP_ACTIVE),
+    (0x4F, 0x0F, DriveState.FAULT_REACTION_ACTIVE),
+    (0x4F, 0x08, DriveState.FAULT),
+)
+"""(mask, value, state) of CiA 402-2, statusword 6041h. No word matches two rows."""
+
+
+def decode_statusword(word: int) -> DriveState | None:
+    """State that statusword 6041h shows; None when its bits match no state. Only bits 0…3, 5 and 6 count."""
+    return _BY_BITS[word & 0x6F]
+
+
+_BY_BITS = tuple(
+    next((state for mask, value, state in STATUSWORD_STATES if bits & mask == value), None) for bits in range(0x70)
+)
+
+
+class Command(Enum):
+    """Controlword 6040h for each command of CiA 402-2. Halt (bit 8) stays 0 throughout."""
+
+    DISABLE_VOLTAGE = 0x00
+    QUICK_STOP = 0x02
+    SHUTDOWN = 0x06
+    SWITCH_ON = 0x07
+    ENABLE_OPERATION = 0x0F
+    FAULT_RESET = 0x80
+
+
+class PowerGoal(Enum):
+    """Where one axis is to be taken. The rules are at the head of this file."""
+
+    OFF = "off"
+    """Switch on disabled: no torque."""
+    ON = "on"
+    """Operation enabled."""
+    QUICK_STOP = "quick stop"
+    """Down the ramp 6085h and then, with 605Ah = 2, to switch on disabled."""
+    RESET = "fault reset"
+    """Out of fault, to switch on disabled."""
+
+
+_UP = {
+    None: Command.QUICK_STOP,
+    DriveState.NOT_READY_TO_SWITCH_ON: Command.DISABLE_VOLTAGE,
+    DriveState.SWITCH_ON_DISABLED: Command.SHUTDOWN,
+    DriveState.READY_TO_SWITCH_ON: Command.SWITCH_ON,
+    DriveState.SWITCHED_ON: Command.ENABLE_OPERATION,
+    DriveState.OPERATION_ENABLED: Command.ENABLE_OPERATION,
+    DriveState.QUICK_STOP_ACTIVE: Command.QUICK_STOP,
+    DriveState.FAULT_REACTION_ACTIVE: Command.DISABLE_VOLTAGE,
+    DriveState.FAULT: Command.DISABLE_VOLTAGE,
+}
+_STATES: tuple[DriveState | None, ...] = (None, *DriveState)
+
+COMMANDS: dict[PowerGoal, dict[DriveState | None, Command]] = {
+    PowerGoal.OFF: dict.fromkeys(_STATES, Command.DISABLE_VOLTAGE),
+    PowerGoal.ON: _UP,
+    PowerGoal.QUICK_STOP: dict.fromkeys(_STATES, Command.QUICK_STOP),
+    PowerGoal.RESET: dict.fromkeys(_STATES, Command.DISABLE_VOLTAGE) | {DriveState.FAULT: Command.FAULT_RESET},
+}
+"""The command for each goal in each state (None: unknown statusword, or none received)."""
+
+
+def next_controlword(state: DriveState | None, goal: PowerGoal) -> int:
+    """Controlword 6040h that takes an axis one step from `state` (None: unknown) towards `goal`, or keeps it there."""
+    return COMMANDS[goal][state].value
