@@ -16,13 +16,35 @@ DRIVER_NODE_ID = 127
 WATCHDOG_NODE_ID = 126
 """CANopen node id of the watchdog: its heartbeat is COB-ID 77Eh, its state 1FEh, its reset request 27Eh."""
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
-Topic = Annotated[str, Field(pattern=r"^/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*$", max_length=128)]
+Name = Annotated[
+    str,
+    Field(
+        pattern=r"^[A-Za-z][A-Za-z0-9_]*$",
+        max_length=64,
+        json_schema_extra={"form": "letters, digits and _, first a letter"},
+    ),
+]
+Topic = Annotated[
+    str,
+    Field(
+        pattern=r"^/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*$",
+        max_length=128,
+        json_schema_extra={"form": "letters, digits and _, joined by /, each part first a letter"},
+    ),
+]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 VelocityUnit = Literal["rpm", "0.1rpm", "0.001rpm", "rev/s", "0.001rev/s", "counts/s", "0.1counts/s"]
 """What one bit of 60FFh and 606Ch means, always at the motor shaft (before the gear)."""
+
+
+class MisfitError(ValueError):
+    """Values that are each allowed do not fit together. `at`: where the offender may be, below the raising section."""
+
+    def __init__(self, message: str, *at: tuple[str | int, ...]) -> None:
+        super().__init__(message)
+        self.at = at
 
 
 class Section(BaseModel):
@@ -81,9 +103,9 @@ class Base(Section):
     track_m: Annotated[float, Field(gt=0.02, le=5.0, description="distance between the wheels' contact points [m]")]
     odom_frame: Annotated[str, Field(min_length=1, description="REP 105")] = "odom"
     base_frame: Annotated[str, Field(min_length=1, description="REP 105")] = "base_link"
-    standstill_mps: Annotated[
-        float, Field(gt=0.0, le=0.05, description="a wheel whose rim is slower stands [m/s]")
-    ] = 0.005
+    standstill_mps: Annotated[float, Field(gt=0.0, le=0.05, description="a wheel whose rim is slower stands [m/s]")] = (
+        0.005
+    )
 
 
 class Limits(Section):
@@ -103,7 +125,10 @@ class Limits(Section):
     @model_validator(mode="after")
     def _emergency_is_the_hardest(self) -> Limits:
         if self.emergency_deceleration_mps2 < self.deceleration_mps2:
-            raise ValueError("emergency_deceleration_mps2 must not be below deceleration_mps2")
+            message = (
+                f"{self.emergency_deceleration_mps2} must not be below deceleration_mps2, {self.deceleration_mps2}"
+            )
+            raise MisfitError(message, ("emergency_deceleration_mps2",))
         return self
 
 
@@ -130,7 +155,9 @@ class Timeouts(Section):
         float, Field(ge=0.1, le=10.0, description="from the order to stop until the driver gives up the ramp [s]")
     ] = 3.0
     sdo_s: Annotated[float, Field(ge=0.05, le=5.0, description="one SDO answer [s]")] = 0.3
-    boot_s: Annotated[float, Field(ge=1.0, le=600.0, description="until a missing drive is reported as an error [s]")] = 10.0
+    boot_s: Annotated[
+        float, Field(ge=1.0, le=600.0, description="until a missing drive is reported as an error [s]")
+    ] = 10.0
     odometry_s: Annotated[float, Field(ge=0.05, le=1.0, description="odom at the action server [s]")] = 0.2
 
 
@@ -162,7 +189,8 @@ class Mux(Section):
             for name, source in self.sources.items():
                 other = seen.setdefault(getattr(source, what), name)
                 if other != name:
-                    raise ValueError(f"sources {other} and {name} have the same {what}; each needs its own")
+                    message = f"sources {other} and {name} have the same {what}; each needs its own"
+                    raise MisfitError(message, ("sources", name, what))
         return self
 
 
@@ -207,7 +235,9 @@ class Safety(Section):
     @model_validator(mode="after")
     def _slow_before_stop(self) -> Safety:
         if self.slow_distance_m <= self.stop_distance_m:
-            raise ValueError("slow_distance_m must be greater than stop_distance_m")
+            slow, stop = self.slow_distance_m, self.stop_distance_m
+            message = f"slow_distance_m ({slow}) must be greater than stop_distance_m ({stop})"
+            raise MisfitError(message, ("slow_distance_m",), ("stop_distance_m",))
         return self
 
 
@@ -224,19 +254,26 @@ class Action(Section):
     max_distance_m: Annotated[float, Field(gt=0.0, le=1000.0, description="[m]")] = 5.0
     min_speed_mps: Annotated[float, Field(gt=0.0, le=1.0, description="[m/s]")] = 0.02
     max_speed_mps: Annotated[float, Field(gt=0.0, le=5.0, description="[m/s]")] = 0.5
-    tolerance_m: Annotated[float, Field(gt=0.0, le=0.1, description="a goal that ends nearer has succeeded [m]")] = 0.005
+    tolerance_m: Annotated[float, Field(gt=0.0, le=0.1, description="a goal that ends nearer has succeeded [m]")] = (
+        0.005
+    )
     control_hz: Annotated[float, Field(ge=10.0, le=100.0, description="cmd_vel_action [Hz]")] = 50.0
     feedback_hz: Annotated[float, Field(ge=1.0, le=50.0, description="[Hz]")] = 10.0
-    progress_timeout_s: Annotated[float, Field(ge=0.2, le=60.0, description="no motion for so long: NO_PROGRESS [s]")] = 2.0
+    progress_timeout_s: Annotated[
+        float, Field(ge=0.2, le=60.0, description="no motion for so long: NO_PROGRESS [s]")
+    ] = 2.0
     overall_factor: Annotated[
-        float, Field(ge=1.1, le=100.0, description="overall timeout = factor × the ideal time of the goal + overall_extra_s")
+        float,
+        Field(ge=1.1, le=100.0, description="overall timeout = factor × the ideal time of the goal + overall_extra_s"),
     ] = 2.0
     overall_extra_s: Annotated[float, Field(ge=0.5, le=600.0, description="[s]")] = 5.0
 
     @model_validator(mode="after")
     def _ordered(self) -> Action:
-        if self.min_distance_m >= self.max_distance_m or self.min_speed_mps >= self.max_speed_mps:
-            raise ValueError("each minimum must be below its maximum")
+        for low, high in (("min_distance_m", "max_distance_m"), ("min_speed_mps", "max_speed_mps")):
+            if getattr(self, low) >= getattr(self, high):
+                message = f"{high} ({getattr(self, high)}) must be greater than {low} ({getattr(self, low)})"
+                raise MisfitError(message, (high,), (low,))
         return self
 
 
@@ -257,16 +294,19 @@ class Robot(Section):
 
     @model_validator(mode="after")
     def _drives_fit_together(self) -> Robot:
-        joints = [drive.joint for drive in self.drives]
-        for joint in joints:
-            if joints.count(joint) > 1:
-                raise ValueError(f"two drives have the joint {joint!r}; each needs its own")
-        places = [(drive.node_id, drive.axis) for drive in self.drives]
-        for node_id, axis in places:
-            if places.count((node_id, axis)) > 1:
-                raise ValueError(f"two drives are on node {node_id}, axis {axis}; each needs its own")
+        joints: dict[str, int] = {}
+        places: dict[tuple[int, int], int] = {}
+        for i, drive in enumerate(self.drives):
+            if joints.setdefault(drive.joint, i) != i:
+                raise MisfitError(
+                    f"two drives have the joint {drive.joint}; each needs its own", ("drives", i, "joint")
+                )
+            if places.setdefault((drive.node_id, drive.axis), i) != i:
+                message = f"two drives are on node {drive.node_id}, axis {drive.axis}; each needs its own"
+                raise MisfitError(message, ("drives", i, "node_id"))
         if {drive.side for drive in self.drives} != {"left", "right"}:
-            raise ValueError("a base needs at least one drive on the left and one on the right")
+            message = f"all drives are on the {self.drives[0].side}; a base needs at least one on each side"
+            raise MisfitError(message, ("drives", 1, "side"))
         return self
 
     def drive_indexes(self, side: Literal["left", "right"]) -> tuple[int, ...]:

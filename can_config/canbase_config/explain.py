@@ -1,0 +1,136 @@
+"""Turns what pydantic found wrong into problems that a person can act on: line, key path, found, expected, hint."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Final
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from canbase_config.errors import Loc, Problem, key_path
+from canbase_config.robot import MisfitError
+from canbase_config.schema import Shape, expected, homes, keys_at, sections, shape_at
+from canbase_config.yaml_file import YamlFile
+
+
+def explain(error: ValidationError, file: YamlFile) -> tuple[Problem, ...]:
+    """One problem for each error, in the order of the file's lines; those of the whole file first."""
+    problems = [_explain(details, file) for details in error.errors(include_url=False)]
+    return tuple(sorted(problems, key=lambda problem: problem.line or 0))
+
+
+def _explain(details: ErrorDetails, file: YamlFile) -> Problem:
+    return _EXPLAINERS.get(details["type"], _wrong_value)(details, file)
+
+
+def _missing(details: ErrorDetails, file: YamlFile) -> Problem:
+    loc = details["loc"]
+    return Problem(str(file.path), file.line(loc), key_path(loc), "missing", expected(shape_at(loc)))
+
+
+def _unknown_key(details: ErrorDetails, file: YamlFile) -> Problem:
+    *section, key = details["loc"]
+    hint = _key_hint(str(key), tuple(section))
+    return Problem(str(file.path), file.line(details["loc"]), key_path(details["loc"]), "unknown key", hint=hint)
+
+
+def _bad_key(details: ErrorDetails, file: YamlFile) -> Problem:
+    *section, key = details["loc"]
+    what = f"the key {found(key)} is no text"
+    return Problem(str(file.path), file.line(tuple(section)), key_path(tuple(section)), what, hint="put it in quotes")
+
+
+def _misfit(details: ErrorDetails, file: YamlFile) -> Problem:
+    error = details["ctx"]["error"]
+    places = [(*details["loc"], *at) for at in error.at] if isinstance(error, MisfitError) else []
+    loc = next((place for place in places if place in file.lines), details["loc"])
+    return Problem(str(file.path), file.line(loc), key_path(loc), str(error))
+
+
+def _wrong_value(details: ErrorDetails, file: YamlFile) -> Problem:
+    loc, value = details["loc"], details["input"]
+    if loc[-1:] == ("[key]",):
+        return _wrong_name(details, file)
+    shape = shape_at(loc)
+    words = expected(shape) if shape else details["msg"]
+    what, hint = f"got {found(value)}", _value_hint(value, shape)
+    return Problem(str(file.path), file.line(loc), key_path(loc), what, words, hint)
+
+
+def _wrong_name(details: ErrorDetails, file: YamlFile) -> Problem:
+    """A key that the user chooses, such as the name of a source, has the wrong form."""
+    loc = details["loc"][:-1]
+    names = "letters, digits and _, first a letter, at most 64 characters"
+    return Problem(str(file.path), file.line(loc), key_path(loc), f"got the name {found(loc[-1])}", names)
+
+
+_EXPLAINERS: Final[Mapping[str, Callable[[ErrorDetails, YamlFile], Problem]]] = {
+    "missing": _missing,
+    "extra_forbidden": _unknown_key,
+    "invalid_key": _bad_key,
+    "value_error": _misfit,
+}
+
+
+def found(value: Any) -> str:
+    """`value` as it may have stood in the file; never long."""
+    match value:
+        case None:
+            return "nothing"
+        case bool():
+            return "true" if value else "false"
+        case float() if not math.isfinite(value):
+            return {"inf": ".inf", "-inf": "-.inf"}.get(str(value), ".nan")
+        case str():
+            return f'"{value}"' if len(value) <= 60 else f'"{value[:60]}…"'
+        case dict():
+            return "a section"
+        case list() | tuple():
+            return "a list of 1 entry" if len(value) == 1 else f"a list of {len(value)} entries"
+    return str(value)[:60]
+
+
+def _value_hint(value: Any, shape: Shape) -> str:
+    kind = shape.get("type")
+    if "enum" in shape:
+        return _did_you_mean(str(value), [str(choice) for choice in shape["enum"]])
+    if kind in ("number", "integer") and isinstance(value, str) and re.match(r"[-+.]?\d", value):
+        return "write the number alone: no quotes, no unit, a point for the decimals"
+    if kind == "integer" and isinstance(value, float) and value.is_integer():
+        return f"write {int(value)}"
+    if kind == "boolean" and str(value).lower() in ("yes", "no", "on", "off", "0", "1", "true", "false"):
+        return "YAML 1.2 knows no other words for it, and no quotes around them"
+    if kind == "string" and isinstance(value, (bool, int, float)):
+        return f'write it in quotes: "{found(value)}"'
+    return ""
+
+
+def _key_hint(key: str, section: Loc) -> str:
+    """The nearest key of this section, and where a key of this name does belong."""
+    here = keys_at(section)
+    hints = [_did_you_mean(key, here), _belongs(key)]
+    if not any(hints):
+        hints.append(_near_elsewhere(key))
+    if not any(hints) and here:
+        hints.append("the keys here are " + ", ".join(here))
+    return "; ".join(hint for hint in hints if hint)
+
+
+def _did_you_mean(word: str, choices: Iterable[str]) -> str:
+    near = difflib.get_close_matches(word.lower().replace("-", "_"), choices, n=1, cutoff=0.65)
+    return f"did you mean {near[0]}?" if near else ""
+
+
+def _belongs(key: str) -> str:
+    places = [path or "the top of the file, not indented" for path in homes(key)]
+    return f"{key} belongs in {' or '.join(places)}" if places else ""
+
+
+def _near_elsewhere(key: str) -> str:
+    everywhere = {name: path for path, names in sections() for name in sorted(names)}
+    near = difflib.get_close_matches(key.lower(), everywhere, n=1, cutoff=0.75)
+    return f"did you mean {near[0]}, which {_belongs(near[0]).removeprefix(near[0] + ' ')}?" if near else ""

@@ -1,0 +1,59 @@
+"""Reads a robot.yaml into a validated `Robot`, and finds the sample files. What is wrong in a file: `errors.py`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from canbase_config.errors import ConfigError, Loc
+from canbase_config.explain import explain
+from canbase_config.robot import Robot
+from canbase_config.yaml_file import read_yaml
+
+
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """A robot and where it came from. `given` and `defaults` share out all leaf keys of the effective configuration."""
+
+    robot: Robot
+    path: Path
+    given: frozenset[Loc]
+    defaults: frozenset[Loc]
+
+
+def load_robot(path: str | Path) -> Loaded:
+    """The robot that the YAML file at `path` describes. Raises ConfigError, which carries all problems found."""
+    file = read_yaml(path)
+    try:
+        robot = Robot.model_validate(file.values)
+    except ValidationError as error:
+        raise ConfigError(explain(error, file)) from error
+    keys = frozenset(leaf_keys(robot.model_dump()))
+    given = keys & file.lines.keys()
+    return Loaded(robot, file.path, given, keys - given)
+
+
+def sample(name: str) -> Path:
+    """Path of a robot file that comes with canbase: `bench` or `example_can0`. Raises ValueError for another name."""
+    folder = Path(str(resources.files("canbase_config"))) / "robots"
+    names = sorted(file.stem for file in folder.glob("*.yaml"))
+    if name not in names:
+        raise ValueError(f"there is no sample {name!r}, expected one of {', '.join(names)}")
+    return folder / f"{name}.yaml"
+
+
+def leaf_keys(value: Any, loc: Loc = ()) -> Iterator[Loc]:
+    """Every place in nested mappings and lists that holds a plain value or something empty."""
+    if isinstance(value, dict) and value:
+        for key, inner in value.items():
+            yield from leaf_keys(inner, (*loc, key))
+    elif isinstance(value, (list, tuple)) and value:
+        for index, inner in enumerate(value):
+            yield from leaf_keys(inner, (*loc, index))
+    else:
+        yield loc

@@ -1,0 +1,132 @@
+"""What may stand where in a robot.yaml, in words, read from the JSON schema of the model. For error texts."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+from typing import Any
+
+from canbase_config.errors import Loc
+from canbase_config.robot import Robot
+
+Shape = dict[str, Any]
+"""One node of the JSON schema, references resolved; empty: anything may stand there, or nothing is known."""
+
+
+@functools.cache
+def _schema() -> Shape:
+    return Robot.model_json_schema()
+
+
+def shape_at(loc: Loc) -> Shape:
+    """What the model says about the value at `loc`."""
+    shape = _schema()
+    for part in loc:
+        shape = _child(shape, part)
+    return shape
+
+
+def keys_at(loc: Loc) -> tuple[str, ...]:
+    """The keys of the section at `loc`, those first that must be given."""
+    shape = shape_at(loc)
+    required = tuple(shape.get("required", ()))
+    return required + tuple(key for key in shape.get("properties", ()) if key not in required)
+
+
+def homes(key: str) -> tuple[str, ...]:
+    """The sections that have `key`: `limits`, `drives[…]`, `mux.sources.…`; `` is the top of the file."""
+    return tuple(path for path, keys in sections() if key in keys)
+
+
+@functools.cache
+def sections() -> tuple[tuple[str, frozenset[str]], ...]:
+    """Every section of the file: its path and its keys."""
+    return tuple(_sections(_schema(), ""))
+
+
+def expected(shape: Shape) -> str:
+    """Type, range, allowed values and meaning of what should stand there, as the end of a sentence."""
+    words = _kind(shape)
+    meaning = shape.get("description", "") if shape.get("type") != "object" else ""
+    if meaning.startswith("["):
+        return f"{words} {meaning}"
+    return f"{words} ({meaning})" if meaning else words
+
+
+def _child(shape: Shape, part: str | int) -> Shape:
+    if isinstance(part, int):
+        return _resolved(shape.get("items", {}))
+    if part in shape.get("properties", {}):
+        return _resolved(shape["properties"][part])
+    return _resolved(_free_keys(shape))
+
+
+def _free_keys(shape: Shape) -> Shape:
+    """What stands under the keys of a mapping whose keys the user chooses."""
+    for free in shape.get("patternProperties", {}).values():
+        return dict(free)
+    free = shape.get("additionalProperties", {})
+    return dict(free) if isinstance(free, dict) else {}
+
+
+def _resolved(shape: Shape) -> Shape:
+    """`shape` with its reference followed, and for an optional value the shape that is not null."""
+    if "$ref" in shape:
+        return {**_schema()["$defs"][shape["$ref"].rpartition("/")[2]], **shape}
+    for option in shape.get("anyOf", ()):
+        if option.get("type") != "null":
+            return {**_resolved(option), **shape}
+    return shape
+
+
+def _sections(shape: Shape, path: str) -> Iterator[tuple[str, frozenset[str]]]:
+    if "properties" in shape:
+        yield path, frozenset(shape["properties"])
+    for key, inner in shape.get("properties", {}).items():
+        yield from _sections(_resolved(inner), f"{path}.{key}".removeprefix("."))
+    if "items" in shape:
+        yield from _sections(_resolved(shape["items"]), f"{path}[…]")
+    if free := _free_keys(shape):
+        yield from _sections(_resolved(free), f"{path}.…")
+
+
+def _kind(shape: Shape) -> str:
+    if "enum" in shape:
+        return "one of " + ", ".join(str(value) for value in shape["enum"])
+    match shape.get("type"):
+        case "number":
+            return "a number" + _range(shape)
+        case "integer":
+            return "a whole number" + _range(shape)
+        case "boolean":
+            return "true or false"
+        case "string":
+            return "text" + _form(shape)
+        case "array":
+            return f"a list of {shape.get('minItems', 0)} to {shape.get('maxItems', 'any number of')} entries"
+        case "object":
+            return _section_words(shape)
+    return "another value"
+
+
+def _range(shape: Shape) -> str:
+    signs = {"exclusiveMinimum": ">", "minimum": ">=", "exclusiveMaximum": "<", "maximum": "<="}
+    bounds = [f"{sign} {_number(shape[name])}" for name, sign in signs.items() if name in shape]
+    return " " + " and ".join(bounds) if bounds else ""
+
+
+def _number(value: float) -> str:
+    return str(int(value)) if float(value).is_integer() else repr(value)
+
+
+def _form(shape: Shape) -> str:
+    """What the text must look like; models give it in words beside their patterns, under `form`."""
+    form = f" of {shape['form']}" if "form" in shape else ""
+    if "maxLength" in shape:
+        return f"{form}, at most {shape['maxLength']} characters"
+    return form or (", not empty" if shape.get("minLength") else "")
+
+
+def _section_words(shape: Shape) -> str:
+    keys = shape.get("properties", ())
+    return "a section with the keys " + ", ".join(keys) if keys else "a section of keys and values"

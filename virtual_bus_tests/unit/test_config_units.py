@@ -1,0 +1,102 @@
+"""What one bit of 60FFh means, and what the watchdog is told: the arithmetic by hand."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from canbase_config.derive import max_wheel_mps, mps_per_bit, watchdog_config
+from canbase_config.load import load_robot, sample
+from canbase_config.robot import Drive, VelocityUnit
+from canbase_config.units import motor_rev_per_s
+from canbase_config.watchdog import WatchdogConfig
+
+UNITS: list[tuple[VelocityUnit, int, float]] = [
+    ("rpm", 4096, 0.016666666666666666),  # 1 / 60 rev/s
+    ("0.1rpm", 4096, 0.0016666666666666668),  # 0.1 / 60
+    ("0.001rpm", 4096, 1.6666666666666667e-05),  # 0.001 / 60
+    ("rev/s", 4096, 1.0),
+    ("0.001rev/s", 4096, 0.001),
+    ("counts/s", 4096, 0.000244140625),  # 1 / 4096
+    ("0.1counts/s", 4096, 0.0000244140625),  # 0.1 / 4096
+    ("counts/s", 1, 1.0),  # one count is one revolution
+    ("counts/s", 10_000, 0.0001),
+    ("rpm", 1, 0.016666666666666666),  # no counts in it
+]
+
+
+@pytest.mark.parametrize(("unit", "counts", "expected"), UNITS)
+def test_one_bit_in_revolutions_of_the_motor_per_second(unit: VelocityUnit, counts: int, expected: float) -> None:
+    assert motor_rev_per_s(unit, counts) == pytest.approx(expected, rel=1e-12)
+
+
+def test_less_than_one_count_per_revolution_is_refused() -> None:
+    with pytest.raises(ValueError, match="counts_per_motor_rev is 0, expected at least 1"):
+        motor_rev_per_s("counts/s", 0)
+
+
+def test_an_unknown_unit_is_refused_with_those_that_exist() -> None:
+    with pytest.raises(ValueError, match="'furlong' is unknown, expected one of rpm, 0.1rpm"):
+        motor_rev_per_s("furlong", 4096)  # type: ignore[arg-type]
+
+
+def drive(direction: int, gear_ratio: float, unit: VelocityUnit) -> Drive:
+    return Drive.model_validate(
+        {
+            "joint": "wheel",
+            "node_id": 1,
+            "side": "left",
+            "direction": direction,
+            "gear_ratio": gear_ratio,
+            "counts_per_motor_rev": 4096,
+            "velocity_unit": unit,
+        }
+    )
+
+
+def test_rim_speed_for_one_bit() -> None:
+    # 1 rev/s of the motor / 20 = 0.05 rev/s of the wheel, × 2π × 0.1 m = 0.0314159 m/s
+    assert mps_per_bit(drive(1, 20.0, "rev/s"), 0.1) == pytest.approx(0.031415926535897934, rel=1e-12)
+
+
+def test_a_mirrored_drive_counts_backward() -> None:
+    assert mps_per_bit(drive(-1, 20.0, "rev/s"), 0.1) == pytest.approx(-0.031415926535897934, rel=1e-12)
+
+
+def test_full_speed_of_the_bench_in_bits() -> None:
+    # 0.8 m/s / (2π × 0.1 m) = 1.27324 rev/s of the wheel, × 20 × 60 = 1527.887 rpm of the motor = 15278.87 × 0.1 rpm
+    assert 0.8 / mps_per_bit(drive(1, 20.0, "0.1rpm"), 0.1) == pytest.approx(15278.874536821953, rel=1e-9)
+
+
+def test_the_watchdog_is_told_what_the_bench_sample_says() -> None:
+    config = watchdog_config(load_robot(sample("bench")).robot)
+
+    assert config.bus_arguments == {
+        "interface": "udp_multicast",
+        "channel": "239.74.163.2",
+        "port": 43113,
+        "hop_limit": 0,
+    }
+    assert [(d.joint, d.node_id, d.axis, d.side) for d in config.drives] == [
+        ("left_wheel", 1, 0, "left"),
+        ("right_wheel", 2, 0, "right"),
+    ]
+    # 0.1 / 60 rev/s / 20 × 2π × 0.1 m = 52.3599 µm/s; the right one is mounted mirrored
+    assert [d.mps_per_bit for d in config.drives] == pytest.approx([5.2359877e-05, -5.2359877e-05], rel=1e-7)
+    assert (config.track_m, config.standstill_mps) == (0.5, 0.005)
+    assert (config.acceleration_mps2, config.deceleration_mps2) == (0.8, 1.0)
+    assert (config.lease_timeout_s, config.drive_heartbeat_s, config.feedback_timeout_s) == (0.25, 0.3, 0.1)
+    assert config.lease_socket == "/tmp/canbase-bench/lease.sock"
+
+
+def test_the_fastest_wheel_is_on_the_outside_of_the_tightest_turn() -> None:
+    # 0.8 m/s + 2.0 rad/s × 0.5 m / 2 = 1.3 m/s
+    assert max_wheel_mps(load_robot(sample("bench")).robot) == pytest.approx(1.3, rel=1e-12)
+
+
+def test_the_watchdogs_configuration_survives_its_way_over_the_command_line() -> None:
+    config = watchdog_config(load_robot(sample("example_can0")).robot)
+
+    assert WatchdogConfig.from_json(config.to_json()) == config
+    assert math.copysign(1.0, config.drives[1].mps_per_bit) == -1.0
