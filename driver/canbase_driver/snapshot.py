@@ -1,6 +1,6 @@
-"""What the driver knows at one moment, as plain frozen data: the core makes it, `messages.py` turns it into ROS messages.
+"""What the driver knows at one moment, as plain frozen data: the core makes it, `messages.py` makes ROS messages of it.
 
-No ROS, no behaviour. Units are SI at the wheel and the base; ages are local monotonic seconds, NaN: nothing received yet.
+No ROS, no behaviour. SI units at the wheel and the base; ages are local monotonic seconds, NaN: nothing received yet.
 """
 
 from __future__ import annotations
