@@ -108,7 +108,7 @@ class WheelTravel:
         self._suspects = 0
 
     def update(self, raw: int, cycles: int = 1) -> float:
-        """Take in a new sample; the travel after it [m]. `cycles`: control cycles since the sample before, 1 or more."""
+        """Take in a new sample; the travel after it [m]. `cycles`: control cycles since the sample before, from 1."""
         if cycles < 1:
             raise ValueError(f"a new sample is at least one cycle younger than the one before, not {cycles}")
         if self._accepted_raw is None:
