@@ -19,8 +19,13 @@ from canbase_config.yaml_file import YamlFile
 
 def explain(error: ValidationError, file: YamlFile) -> tuple[Problem, ...]:
     """One problem for each error, in the order of the file's lines; those of the whole file first."""
-    problems = [_explain(details, file) for details in error.errors(include_url=False)]
+    problems = [_explain(details, file) for details in error.errors(include_url=False) if not _is_echo(details)]
     return tuple(sorted(problems, key=lambda problem: problem.line or 0))
+
+
+def _is_echo(details: ErrorDetails) -> bool:
+    """A list is called too short although it is long enough: its entries are wrong, and those are told on their own."""
+    return details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"]
 
 
 def _explain(details: ErrorDetails, file: YamlFile) -> Problem:
@@ -41,7 +46,8 @@ def _unknown_key(details: ErrorDetails, file: YamlFile) -> Problem:
 def _bad_key(details: ErrorDetails, file: YamlFile) -> Problem:
     *section, key = details["loc"]
     what = f"the key {found(key)} is no text"
-    return Problem(str(file.path), file.line(tuple(section)), key_path(tuple(section)), what, hint="put it in quotes")
+    line = file.line((*section, str(key)))
+    return Problem(str(file.path), line, key_path(tuple(section)), what, hint=f'put it in quotes: "{found(key)}"')
 
 
 def _misfit(details: ErrorDetails, file: YamlFile) -> Problem:
@@ -64,6 +70,8 @@ def _wrong_value(details: ErrorDetails, file: YamlFile) -> Problem:
 def _wrong_name(details: ErrorDetails, file: YamlFile) -> Problem:
     """A key that the user chooses, such as the name of a source, has the wrong form."""
     loc = details["loc"][:-1]
+    if not isinstance(loc[-1], str):
+        return _bad_key({**details, "loc": loc}, file)
     names = "letters, digits and _, first a letter, at most 64 characters"
     return Problem(str(file.path), file.line(loc), key_path(loc), f"got the name {found(loc[-1])}", names)
 
@@ -88,9 +96,9 @@ def found(value: Any) -> str:
         case str():
             return f'"{value}"' if len(value) <= 60 else f'"{value[:60]}…"'
         case dict():
-            return "a section"
+            return "a section" if value else "an empty section"
         case list() | tuple():
-            return "a list of 1 entry" if len(value) == 1 else f"a list of {len(value)} entries"
+            return {0: "an empty list", 1: "a list of 1 entry"}.get(len(value), f"a list of {len(value)} entries")
     return str(value)[:60]
 
 
@@ -117,7 +125,7 @@ def _key_hint(key: str, section: Loc) -> str:
         hints.append(_near_elsewhere(key))
     if not any(hints) and here:
         hints.append("the keys here are " + ", ".join(here))
-    return "; ".join(hint for hint in hints if hint)
+    return " ".join(hint for hint in hints if hint)
 
 
 def _did_you_mean(word: str, choices: Iterable[str]) -> str:
@@ -126,7 +134,7 @@ def _did_you_mean(word: str, choices: Iterable[str]) -> str:
 
 
 def _belongs(key: str) -> str:
-    places = [path or "the top of the file, not indented" for path in homes(key)]
+    places = [path or "the top level (not indented)" for path in homes(key)]
     return f"{key} belongs in {' or '.join(places)}" if places else ""
 
 

@@ -128,5 +128,8 @@ def _form(shape: Shape) -> str:
 
 
 def _section_words(shape: Shape) -> str:
-    keys = shape.get("properties", ())
-    return "a section with the keys " + ", ".join(keys) if keys else "a section of keys and values"
+    if shape.get("required"):
+        return "a section with " + ", ".join(shape["required"])
+    if "properties" in shape:
+        return "a section with some of " + ", ".join(shape["properties"])
+    return "a section with at least one entry" if shape.get("minProperties") else "a section of keys and values"

@@ -6,18 +6,31 @@ import difflib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from ruamel.yaml import YAML
-from ruamel.yaml.constructor import DuplicateKeyError
+from ruamel.yaml.constructor import DuplicateKeyError, SafeConstructor
 from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
 from canbase_config.errors import ConfigError, Loc, Problem
 
-_MERGE_TAG = "tag:yaml.org,2002:merge"
-_TOO_DEEP = "nested too deeply, or an alias (*name) contains itself"
+_TAG: Final = "tag:yaml.org,2002:"
+_MERGE_TAG: Final = f"{_TAG}merge"
+_TOO_DEEP: Final = "nested too deeply, or an alias (*name) contains itself"
+
+
+class _CoreConstructor(SafeConstructor):
+    """Builds the types of YAML 1.2's core schema, which are those of JSON; a date stays the text that it is."""
+
+
+_CORE_TYPES: Final = ("null", "bool", "int", "float", "str", "seq", "map")
+_CoreConstructor.yaml_constructors = {
+    **{f"{_TAG}{name}": SafeConstructor.yaml_constructors[f"{_TAG}{name}"] for name in _CORE_TYPES},
+    f"{_TAG}timestamp": SafeConstructor.yaml_constructors[f"{_TAG}str"],
+    None: SafeConstructor.yaml_constructors[None],
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +54,7 @@ def read_yaml(path: str | Path) -> YamlFile:
     path = Path(path)
     text = _text(path)
     yaml = YAML(typ="safe", pure=True)
+    yaml.Constructor = _CoreConstructor
     try:
         root = yaml.compose(text)
         values = yaml.load(text)

@@ -37,7 +37,7 @@ def test_less_than_one_count_per_revolution_is_refused() -> None:
 
 
 def test_an_unknown_unit_is_refused_with_those_that_exist() -> None:
-    with pytest.raises(ValueError, match="'furlong' is unknown, expected one of rpm, 0.1rpm"):
+    with pytest.raises(ValueError, match="unknown, expected one of rpm, "):
         motor_rev_per_s("furlong", 4096)  # type: ignore[arg-type]
 
 

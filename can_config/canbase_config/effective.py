@@ -1,0 +1,53 @@
+"""The whole effective configuration as YAML text that loads again, each value that is a default marked as one."""
+
+from __future__ import annotations
+
+import io
+from typing import Any, Final
+
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.nodes import ScalarNode
+from ruamel.yaml.representer import RoundTripRepresenter
+
+from canbase_config.errors import Loc
+from canbase_config.load import Loaded
+
+DEFAULT_MARK: Final = "default"
+"""The comment behind a value that the file does not give."""
+_MARK_COLUMN: Final = 44
+
+
+class _Representer(RoundTripRepresenter):
+    """Writes None as `null`, where ruamel.yaml would write nothing at all."""
+
+    def represent_none(self, data: Any) -> ScalarNode:
+        return self.represent_scalar("tag:yaml.org,2002:null", "null")
+
+
+_Representer.add_representer(type(None), _Representer.represent_none)
+
+
+def effective(loaded: Loaded) -> str:
+    """The configuration as the processes see it, as a robot.yaml with `# default` behind every default."""
+    yaml = YAML()
+    yaml.Representer = _Representer
+    yaml.indent(mapping=2, sequence=4, offset=2)
+    yaml.width = 4096
+    text = io.StringIO()
+    yaml.dump(_marked(loaded.robot.model_dump(), (), loaded.defaults), text)
+    return text.getvalue()
+
+
+def _marked(value: Any, loc: Loc, defaults: frozenset[Loc]) -> Any:
+    """`value` in ruamel.yaml's mappings, which carry comments: the mark behind each entry that is among `defaults`."""
+    if isinstance(value, (list, tuple)):
+        return [_marked(inner, (*loc, index), defaults) for index, inner in enumerate(value)]
+    if not isinstance(value, dict) or not value:
+        return value
+    marked = CommentedMap()
+    for key, inner in value.items():
+        marked[key] = _marked(inner, (*loc, key), defaults)
+        if (*loc, key) in defaults:
+            marked.yaml_add_eol_comment(DEFAULT_MARK, key, column=_MARK_COLUMN)
+    return marked
