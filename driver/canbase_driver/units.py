@@ -1,0 +1,57 @@
+"""The one place of raw drive units: increments of 6064h and bits of 60FFh, 606Ch, 6083h–6085h to SI and back.
+
+The mounting direction of the motor is taken in here: everything above is positive when the base drives forward.
+"""
+
+from __future__ import annotations
+
+import math
+
+from canbase_config.robot import Base, Drive
+from canbase_config.units import motor_rev_per_s
+
+INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
+UINT32_MAX = 2**32 - 1
+
+
+class AxisUnits:
+    """Conversions of one axis. Speeds and distances are those of the rim of its wheel."""
+
+    def __init__(self, drive: Drive, base: Base) -> None:
+        rim_m_per_motor_rev = 2.0 * math.pi * base.wheel_radius_m / drive.gear_ratio
+        one_bit_rev_per_s = motor_rev_per_s(drive.velocity_unit, drive.counts_per_motor_rev)
+        self._direction = drive.direction
+        self._mps_per_bit = one_bit_rev_per_s * rim_m_per_motor_rev
+        self._m_per_count = rim_m_per_motor_rev / drive.counts_per_motor_rev
+        self._wheel_radius_m = base.wheel_radius_m
+
+    def velocity_raw(self, rim_mps: float) -> int:
+        """Target for 60FFh: nearest value to `rim_mps` [m/s], saturated to 32 bits.
+
+        Raises ValueError when the speed is not finite.
+        """
+        if not math.isfinite(rim_mps):
+            raise ValueError(f"a target velocity of {rim_mps} m/s cannot be sent; expected a finite number")
+        raw = round(self._direction * rim_mps / self._mps_per_bit)
+        return min(max(raw, INT32_MIN), INT32_MAX)
+
+    def velocity_mps(self, raw: int) -> float:
+        """Speed of the rim [m/s] for a value of 606Ch or 60FFh."""
+        return self._direction * raw * self._mps_per_bit
+
+    def position_m(self, counts: int) -> float:
+        """Distance of the rim [m] for a number of increments of 6064h, which may be wider than 32 bits."""
+        return self._direction * counts * self._m_per_count
+
+    def wheel_rad(self, counts: int) -> float:
+        """Angle of the wheel [rad] for a number of increments of 6064h, forward positive."""
+        return self.position_m(counts) / self._wheel_radius_m
+
+    def acceleration_raw(self, mps2: float) -> int:
+        """Value for 6083h, 6084h, 6085h: the velocity unit per second. A magnitude, 1…2³²-1, never 0.
+
+        Raises ValueError unless `mps2` [m/s²] is positive and finite.
+        """
+        if not (math.isfinite(mps2) and mps2 > 0.0):
+            raise ValueError(f"an acceleration of {mps2} m/s² cannot be set; expected a positive number")
+        return min(max(round(mps2 / self._mps_per_bit), 1), UINT32_MAX)
