@@ -1,0 +1,47 @@
+"""The `canbase` command. Each subcommand lives in a file of its own and imports what it runs only when it runs."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+import typer
+
+from canbase_cli import config, process
+from canbase_cli.options import RosCommand
+
+app = typer.Typer(
+    name="canbase",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from canbase_cli.version import installed_version
+
+        typer.echo(f"canbase {installed_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def canbase(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """A CANopen motor driver stack for ROS 2 mobile bases.
+
+    Exit codes: 0 success, 1 it did not work out, 2 a wrong command line or a wrong robot.yaml.
+    """
+
+
+_ROS_USAGE: Final = "[OPTIONS] [--ros-args …]"
+
+app.add_typer(config.app, name="config")
+app.command("driver", cls=RosCommand, options_metavar=_ROS_USAGE)(process.driver)
+app.command("velocity", cls=RosCommand, options_metavar=_ROS_USAGE)(process.velocity)
+app.command("action-server", cls=RosCommand, options_metavar=_ROS_USAGE)(process.action_server)
+app.command("watchdog", cls=RosCommand)(process.watchdog)
+app.command("sim", cls=RosCommand)(process.sim)
