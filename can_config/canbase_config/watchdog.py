@@ -21,7 +21,11 @@ class WatchedDrive:
 
 @dataclass(frozen=True)
 class WatchdogConfig:
-    """Everything that the watchdog knows. Times in seconds, speeds in m/s at the rim of the wheel."""
+    """Everything that the watchdog knows. Times in seconds, speeds in m/s at the rim of the wheel.
+
+    `lease_uid`: the only user whose leases count, None: the watchdog's own. `loop_late_s`: the watchdog trips when its
+    own loop stood still for longer while a drive is enabled.
+    """
 
     bus_arguments: dict[str, Any]
     drives: tuple[WatchedDrive, ...]
@@ -35,6 +39,7 @@ class WatchdogConfig:
     acceleration_mps2: float
     max_wheel_mps: float
     lease_uid: int | None = None
+    loop_late_s: float = 0.1
 
     def to_json(self) -> str:
         """One line of JSON that `from_json` reads back."""

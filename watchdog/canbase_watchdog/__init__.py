@@ -1,1 +1,1 @@
-"""The independent watchdog process: standard library, python-can and one plain dataclass. Never ROS, never the driver."""
+"""The independent watchdog process: standard library, python-can and one plain dataclass. No ROS, no driver."""

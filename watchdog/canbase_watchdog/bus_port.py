@@ -1,0 +1,82 @@
+"""The watchdog's own handle on the CAN bus (python-can): errors are counted, never raised; no frame is sent late."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import can
+
+from canbase_watchdog.frames import Frame
+
+BATCH = 256
+"""Frames taken in before the loop looks at the clock again."""
+
+
+class BusError(Exception):
+    """The bus cannot be opened."""
+
+
+class BusPort:
+    """Sends and receives data frames with 11-bit identifiers on one bus. Use it in a `with` statement."""
+
+    def __init__(self, arguments: dict[str, Any]) -> None:
+        """Opens `can.Bus(**arguments)`. Raises BusError with what to look at."""
+        try:
+            self._bus = can.Bus(**arguments)
+        except (can.CanError, OSError, ValueError, TypeError, ImportError, NotImplementedError) as error:
+            raise BusError(
+                f"the CAN bus {arguments} cannot be opened: {error}. "
+                "Check `bus` in robot.yaml, and that the interface is up (ip -details link show)."
+            ) from error
+        self._waiting: can.Message | None = None
+        self.send_errors = 0
+        self.receive_errors = 0
+        self.works = True
+        """False from a failed send until the next one that succeeds."""
+
+    def __enter__(self) -> BusPort:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._bus.shutdown()
+
+    def fileno(self) -> int | None:
+        """What to wait on with select, or None for a bus that has no such thing (`virtual`)."""
+        try:
+            return self._bus.fileno()
+        except NotImplementedError:
+            return None
+
+    def wait(self, timeout_s: float) -> None:
+        """Wait for a frame on a bus without a fileno. It is kept for `receive`."""
+        self._waiting = self._take(timeout_s)
+
+    def receive(self) -> Iterator[tuple[int, bytes]]:
+        """Identifier and data of what has arrived, at most BATCH; without error, remote and 29-bit frames."""
+        for _ in range(BATCH):
+            message, self._waiting = self._waiting or self._take(0.0), None
+            if message is None:
+                return
+            if not (message.is_error_frame or message.is_remote_frame or message.is_extended_id):
+                yield message.arbitration_id, bytes(message.data)
+
+    def send(self, frame: Frame) -> None:
+        """Send now or never: a frame that the bus does not take at once is counted and dropped."""
+        message = can.Message(arbitration_id=frame.cob_id, data=frame.data, is_extended_id=False)
+        try:
+            self._bus.send(message)
+        except (can.CanError, OSError):
+            self.send_errors += 1
+            self.works = False
+        else:
+            self.works = True
+
+    def _take(self, timeout_s: float) -> can.Message | None:
+        try:
+            return self._bus.recv(timeout_s)
+        except (can.CanError, OSError):
+            self.receive_errors += 1
+            time.sleep(0.001)
+            return None

@@ -1,0 +1,158 @@
+"""The few CAN frames that the watchdog reads and writes, byte by byte. Sources: CiA 301, CiA 402 and docs/bus.md.
+
+Written a second time on purpose, apart from the driver's: a wrong byte order there must not be wrong here too.
+"""
+
+from __future__ import annotations
+
+import enum
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+NMT = 0x000
+SYNC = 0x080
+EMCY = 0x080
+STATE = 0x1FE
+RESET_REQUEST = 0x27E
+SDO_ANSWER = 0x580
+SDO_REQUEST = 0x600
+HEARTBEAT = 0x700
+DRIVER_HEARTBEAT = 0x77F
+WATCHDOG_HEARTBEAT = 0x77E
+
+STATUS_TPDO = (0x180, 0x380)
+"""6041h u16, 6064h i32 of the node's first and second axis."""
+VELOCITY_TPDO = (0x280, 0x480)
+"""606Ch i32 of the node's first and second axis."""
+SETPOINT_RPDO = (0x200, 0x300)
+"""6040h u16, 60FFh i32 of the node's first and second axis, sent by the driver."""
+QUICK_STOP_RPDO = 0x500
+"""6040h u16 of every used axis, sent by the watchdog."""
+
+BOOT_UP = 0
+PRE_OPERATIONAL_COMMAND = 0x80
+OPERATIONAL = 5
+
+CONTROLWORD = 0x6040
+STATUSWORD = 0x6041
+VELOCITY = 0x606C
+AXIS_OFFSET = 0x800
+QUICK_STOP_WORD = 0x0002
+DISABLE_VOLTAGE_WORD = 0x0000
+
+LEASE_AGE_UNKNOWN = 0xFFFF
+
+_STATUS = struct.Struct("<Hi")
+_I32 = struct.Struct("<i")
+_U16 = struct.Struct("<H")
+_SDO_HEAD = struct.Struct("<BHB")
+_STATE = struct.Struct("<BBBBHBB")
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A data frame with an 11-bit identifier."""
+
+    cob_id: int
+    data: bytes
+
+
+class DriveState(enum.Enum):
+    """States of CiA 402, object 6041h: (mask, value) of the statusword."""
+
+    NOT_READY_TO_SWITCH_ON = (0x4F, 0x00)
+    SWITCH_ON_DISABLED = (0x4F, 0x40)
+    READY_TO_SWITCH_ON = (0x6F, 0x21)
+    SWITCHED_ON = (0x6F, 0x23)
+    OPERATION_ENABLED = (0x6F, 0x27)
+    QUICK_STOP_ACTIVE = (0x6F, 0x07)
+    FAULT_REACTION_ACTIVE = (0x4F, 0x0F)
+    FAULT = (0x4F, 0x08)
+
+
+def decode_state(statusword: int) -> DriveState | None:
+    """The state that a statusword 6041h tells; None: bits that no state has."""
+    for state in DriveState:
+        mask, value = state.value
+        if statusword & mask == value:
+            return state
+    return None
+
+
+def asks_for_power(controlword: int) -> bool:
+    """True for the command "enable operation" (6040h bits 7, 3, 2, 1, 0 = 0 1 1 1 1)."""
+    return controlword & 0x8F == 0x0F
+
+
+def decode_status(data: bytes) -> int | None:
+    """Statusword 6041h of a status TPDO; None: not 6 bytes."""
+    if len(data) != _STATUS.size:
+        return None
+    return int(_STATUS.unpack(data)[0])
+
+
+def decode_velocity(data: bytes) -> int | None:
+    """Velocity 606Ch of a velocity TPDO in the drive's own unit; None: not 4 bytes."""
+    if len(data) != _I32.size:
+        return None
+    return int(_I32.unpack(data)[0])
+
+
+def decode_setpoint(data: bytes) -> tuple[int, int] | None:
+    """Controlword 6040h and target 60FFh of the driver's RPDO, in the drive's own unit; None: not 6 bytes."""
+    if len(data) != _STATUS.size:
+        return None
+    controlword, target = _STATUS.unpack(data)
+    return controlword, target
+
+
+def decode_sdo(data: bytes) -> tuple[int, int] | None:
+    """Index and signed value of an expedited upload answer (CiA 301: byte 0 = 0100nn1s) with sub-index 0, else None."""
+    if len(data) != 8 or data[0] & 0xF2 != 0x42:
+        return None
+    _, index, sub_index = _SDO_HEAD.unpack_from(data)
+    if sub_index != 0:
+        return None
+    size = 4 - (data[0] >> 2 & 0x03) if data[0] & 0x01 else 4
+    return index, int.from_bytes(data[4 : 4 + size], "little", signed=True)
+
+
+def decode_reset_request(data: bytes) -> int | None:
+    """Number (1–255) of a reset request; None: it is none."""
+    if len(data) != 4 or data[1:] != b"RST" or data[0] == 0:
+        return None
+    return data[0]
+
+
+def heartbeat() -> Frame:
+    """The watchdog's own heartbeat: operational."""
+    return Frame(WATCHDOG_HEARTBEAT, bytes([OPERATIONAL]))
+
+
+def state(number: int, cause: int, rung: int, node_id: int, lease_age_s: float, reset: tuple[int, int]) -> Frame:
+    """The state frame. `lease_age_s` above 65.534 s (infinity too) is sent as unknown; `reset`: number, answer."""
+    age_ms = int(max(lease_age_s, 0.0) * 1000.0) if lease_age_s < 65.535 else LEASE_AGE_UNKNOWN
+    return Frame(STATE, _STATE.pack(number, cause, rung, node_id, age_ms, *reset))
+
+
+def quick_stop(node_id: int, axis_count: int) -> Frame:
+    """Quick stop for every used axis of a node, by the PDO that is the watchdog's own."""
+    return Frame(QUICK_STOP_RPDO + node_id, _U16.pack(QUICK_STOP_WORD) * axis_count)
+
+
+def pre_operational(node_id: int) -> Frame:
+    """NMT: the node leaves OPERATIONAL, so that nobody's PDO counts there any more."""
+    return Frame(NMT, bytes([PRE_OPERATIONAL_COMMAND, node_id]))
+
+
+def write_controlword(node_id: int, axis: int, word: int) -> Frame:
+    """SDO request: expedited download of two bytes to 6040h of an axis."""
+    head = _SDO_HEAD.pack(0x2B, CONTROLWORD + axis * AXIS_OFFSET, 0)
+    return Frame(SDO_REQUEST + node_id, head + _U16.pack(word) + bytes(2))
+
+
+def read_feedback(node_id: int, axis: int) -> Sequence[Frame]:
+    """SDO requests: uploads of statusword 6041h and velocity 606Ch of an axis."""
+    heads = (_SDO_HEAD.pack(0x40, index + axis * AXIS_OFFSET, 0) for index in (STATUSWORD, VELOCITY))
+    return tuple(Frame(SDO_REQUEST + node_id, head + bytes(4)) for head in heads)

@@ -1,0 +1,81 @@
+"""The Unix datagram socket on which leases arrive, each with the user that sent it (SO_PASSCRED, unix(7))."""
+
+from __future__ import annotations
+
+import os
+import socket
+import stat
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+
+BATCH = 64
+"""Datagrams taken in before the loop looks at the clock again."""
+
+_CREDENTIALS = struct.Struct("iII")
+_ROOM = socket.CMSG_SPACE(_CREDENTIALS.size)
+
+
+class LeaseSocketError(Exception):
+    """The lease socket cannot be bound."""
+
+
+class LeaseSocket:
+    """Bound while it is open, removed when it is closed. Use it in a `with` statement."""
+
+    def __init__(self, path: str, uid: int) -> None:
+        """Binds `path` for the user `uid` to send to; makes its folder. Raises LeaseSocketError with what to do."""
+        self._path = Path(path)
+        foreign = uid != os.getuid()
+        try:
+            self._path.parent.mkdir(mode=0o755 if foreign else 0o700, parents=True, exist_ok=True)
+            _remove_stale(self._path)
+            self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
+            self._socket.setblocking(False)
+            self._socket.bind(path)
+            self._path.chmod(0o666 if foreign else 0o600)
+        except OSError as error:
+            raise LeaseSocketError(f"the lease socket {path} cannot be bound: {error}. Check lease.socket.") from error
+
+    def __enter__(self) -> LeaseSocket:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._socket.close()
+        self._path.unlink(missing_ok=True)
+
+    def fileno(self) -> int:
+        """What to wait on with select."""
+        return self._socket.fileno()
+
+    def receive(self) -> Iterator[tuple[bytes, int | None]]:
+        """What has arrived, at most BATCH: datagram and its sender's user id (None: the system did not tell)."""
+        for _ in range(BATCH):
+            try:
+                datagram, ancillary, _, _ = self._socket.recvmsg(256, _ROOM)
+            except BlockingIOError:
+                return
+            yield datagram, _sender(ancillary)
+
+
+def _sender(ancillary: list[tuple[int, int, bytes]]) -> int | None:
+    for level, kind, data in ancillary:
+        if (level, kind) == (socket.SOL_SOCKET, socket.SCM_CREDENTIALS) and len(data) == _CREDENTIALS.size:
+            return int(_CREDENTIALS.unpack(data)[1])
+    return None
+
+
+def _remove_stale(path: Path) -> None:
+    """Remove what a killed watchdog left behind. Raises LeaseSocketError when somebody uses the path."""
+    if not path.exists():
+        return
+    if not stat.S_ISSOCK(path.stat().st_mode):
+        raise LeaseSocketError(f"{path} is not a socket. Remove it, or choose another lease.socket.")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(str(path))
+        except ConnectionRefusedError:
+            path.unlink()
+            return
+    raise LeaseSocketError(f"another watchdog listens on {path}. End it, or choose another lease.socket.")

@@ -1,0 +1,95 @@
+"""The watchdog's one thread: waits for frames, leases and the next tick, and hands them to watchdog.py."""
+
+from __future__ import annotations
+
+import gc
+import select
+import time
+from collections.abc import Callable
+
+from canbase_watchdog.bus_port import BusPort
+from canbase_watchdog.lease_socket import LeaseSocket
+from canbase_watchdog.report import Reporter
+from canbase_watchdog.watchdog import State, Watchdog
+
+TICK_S = 0.005
+BUS_DEAD_S = 1.0
+"""Without one sent frame for so long the process gives up: systemd starts it again."""
+END_S = 1.0
+"""How long it goes on stopping the drives after it was asked to end."""
+COLLECT_S = 10.0
+
+
+class BusDeadError(Exception):
+    """No frame could be sent for BUS_DEAD_S."""
+
+
+class Loop:
+    """Ticks at absolute times every TICK_S, and once more just when a timeout runs out."""
+
+    def __init__(self, watchdog: Watchdog, bus: BusPort, leases: LeaseSocket) -> None:
+        """Owns none of them: the caller opens and closes."""
+        self._watchdog = watchdog
+        self._bus = bus
+        self._leases = leases
+        self._reporter = Reporter(watchdog)
+        self._bus_fd = bus.fileno()
+        self._due = self._sent_at = self._collected_at = time.monotonic()
+
+    def run(self, asked_to_end: Callable[[], bool]) -> None:
+        """Until `asked_to_end` is true and the wheels stand, at most END_S later. Raises BusDeadError."""
+        while not asked_to_end():
+            self._turn()
+        now = time.monotonic()
+        self._watchdog.end(now)
+        while not self._at_rest() and time.monotonic() < now + END_S:
+            self._turn()
+
+    def _turn(self) -> None:
+        """One wait, and what it brought."""
+        now = time.monotonic()
+        wake = min(self._due, self._watchdog.next_expiry(now))
+        self._wait(max(wake - now, 0.0))
+        now = self._take_in()
+        if now >= wake:
+            self._act(now)
+            self._due = max(self._due, now - TICK_S) + TICK_S if now >= self._due else self._due
+
+    def _wait(self, timeout_s: float) -> None:
+        if self._bus_fd is None:
+            self._bus.wait(timeout_s)
+        else:
+            select.select([self._bus_fd, self._leases.fileno()], [], [], timeout_s)
+
+    def _take_in(self) -> float:
+        """Everything that has arrived, leases first. Returns the time [s] of it."""
+        now = time.monotonic()
+        for datagram, uid in self._leases.receive():
+            self._watchdog.on_lease(datagram, uid, now)
+        for cob_id, data in self._bus.receive():
+            self._watchdog.on_frame(cob_id, data, now)
+        return now
+
+    def _act(self, now: float) -> None:
+        for frame in self._watchdog.tick(now):
+            self._bus.send(frame)
+        self._check_bus(now)
+        errors = {"send errors": self._bus.send_errors, "receive errors": self._bus.receive_errors}
+        self._reporter.tick(errors, self._bus.works, now)
+        self._collect(now)
+
+    def _check_bus(self, now: float) -> None:
+        if self._bus.works:
+            self._sent_at = now
+        elif now >= self._sent_at + BUS_DEAD_S:
+            raise BusDeadError(f"no frame could be sent for {BUS_DEAD_S:.1f} s. Is the interface up, the cable in?")
+
+    def _at_rest(self) -> bool:
+        status = self._watchdog.status
+        return status.state is not State.TRIPPED or status.settled
+
+    def _collect(self, now: float) -> None:
+        """The collector is off in the loop; what little there is, it takes here, after the frames are out."""
+        if now >= self._collected_at + COLLECT_S:
+            self._collected_at = now
+            gc.collect()

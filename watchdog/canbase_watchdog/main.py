@@ -1,0 +1,73 @@
+"""Command line of the watchdog process: `python -m canbase_watchdog --config-json JSON`."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import logging
+import os
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from types import FrameType
+
+from canbase_config.watchdog import WatchdogConfig
+from canbase_watchdog import realtime
+from canbase_watchdog.bus_port import BusError, BusPort
+from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
+from canbase_watchdog.loop import BusDeadError, Loop
+from canbase_watchdog.notify import notify
+from canbase_watchdog.watchdog import Watchdog
+
+_log = logging.getLogger("canbase.watchdog")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run until SIGINT or SIGTERM. Exit code 0: ended as asked; 1: bus or socket failed; 2: bad configuration."""
+    logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    parser = argparse.ArgumentParser(prog="canbase_watchdog", description="the independent watchdog of a canbase robot")
+    parser.add_argument("--config-json", required=True, help="WatchdogConfig.to_json() of the robot")
+    text = parser.parse_args(arguments).config_json
+    try:
+        config = WatchdogConfig.from_json(text)
+    except (TypeError, ValueError, KeyError, AttributeError) as error:
+        _log.error("--config-json is no watchdog configuration: %s. Use what WatchdogConfig.to_json() writes.", error)
+        return 2
+    try:
+        return _serve(config)
+    except (BusError, LeaseSocketError, BusDeadError) as error:
+        _log.error("%s", error)
+        return 1
+
+
+def _serve(config: WatchdogConfig) -> int:
+    asked: list[int] = []
+
+    def on_signal(number: int, _: FrameType | None) -> None:
+        asked.append(number)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
+    uid = os.getuid() if config.lease_uid is None else config.lease_uid
+    config = dataclasses.replace(config, lease_uid=uid)
+    with BusPort(config.bus_arguments) as bus, LeaseSocket(config.lease_socket, uid) as leases:
+        watchdog = Watchdog(config, time.monotonic())
+        try:
+            _guard(watchdog, bus, leases, asked)
+        except BaseException:
+            for frame in watchdog.quick_stops():
+                bus.send(frame)
+            raise
+    _log.info("ended by %s", signal.Signals(asked[0]).name)
+    return 0
+
+
+def _guard(watchdog: Watchdog, bus: BusPort, leases: LeaseSocket, asked: list[int]) -> None:
+    complaint = realtime.prepare()
+    if complaint is not None:
+        _log.warning("%s", complaint)
+    loop = Loop(watchdog, bus, leases)
+    notify("READY=1")
+    loop.run(lambda: bool(asked))
+    notify("STOPPING=1")

@@ -1,0 +1,75 @@
+"""What the watchdog writes to its log and tells systemd: one line per change with the values, never one per cycle."""
+
+from __future__ import annotations
+
+import enum
+import logging
+
+from canbase_watchdog.notify import notify
+from canbase_watchdog.watchdog import Answer, State, Status, Watchdog
+
+COUNTERS_PERIOD_S = 10.0
+ALIVE_PERIOD_S = 0.2
+
+_log = logging.getLogger("canbase.watchdog")
+
+
+class Reporter:
+    """Compares with what it said last."""
+
+    def __init__(self, watchdog: Watchdog) -> None:
+        """Reports about this watchdog."""
+        self._watchdog = watchdog
+        self._status: Status | None = None
+        self._counters: dict[str, int] = {}
+        self._counters_due = self._alive_due = 0.0
+
+    def tick(self, bus_errors: dict[str, int], bus_works: bool, now: float) -> None:
+        """Say what changed. systemd hears that we live only while the bus works."""
+        if self._watchdog.status != self._status:
+            self._tell_status(self._watchdog.status)
+        if now >= self._alive_due and bus_works:
+            self._alive_due = now + ALIVE_PERIOD_S
+            notify("WATCHDOG=1")
+        if now >= self._counters_due:
+            self._tell_counters(bus_errors, now)
+
+    def _tell_status(self, status: Status) -> None:
+        old, self._status = self._status, status
+        if old is None or (old.state, old.verdict) != (status.state, status.verdict):
+            text = _state_line(status)
+            _log.log(logging.WARNING if status.state is State.TRIPPED else logging.INFO, text)
+            notify(f"STATUS={text}")
+        if status.state is State.TRIPPED and old is not None:
+            _tell_ladder(old, status)
+        number, answer = status.reset
+        if answer is not Answer.NONE and (old is None or old.reset != status.reset):
+            _log.info("reset request %d: %s", number, _words(answer))
+
+    def _tell_counters(self, bus_errors: dict[str, int], now: float) -> None:
+        counters = bus_errors | {"frames not understood": self._watchdog.dropped_frames}
+        counters |= {f"leases refused, {why.value}": n for why, n in self._watchdog.refused_leases.items()}
+        changed = {name: n for name, n in counters.items() if n != self._counters.get(name, 0)}
+        if not changed:
+            return
+        self._counters, self._counters_due = counters, now + COUNTERS_PERIOD_S
+        _log.warning("since the start: %s", "; ".join(f"{name}: {n}" for name, n in changed.items()))
+
+
+def _words(name: enum.Enum) -> str:
+    return name.name.lower().replace("_", " ")
+
+
+def _tell_ladder(old: Status, status: Status) -> None:
+    if old.step is not status.step:
+        _log.warning("ladder: %s", _words(status.step))
+    if status.settled and not old.settled:
+        _log.warning("all drives stand")
+
+
+def _state_line(status: Status) -> str:
+    if status.state is not State.TRIPPED:
+        return _words(status.state)
+    cause = _words(status.verdict.cause)
+    about = f", node {status.verdict.node_id}" if status.verdict.node_id else ""
+    return f"tripped: {cause}{about}: {status.verdict.detail}"

@@ -1,0 +1,111 @@
+"""The frames that stop one node, rung by rung, and those that ask whether it stands. Rules: ladder.py."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from canbase_config.watchdog import WatchdogConfig
+from canbase_watchdog import frames
+from canbase_watchdog.frames import Frame
+from canbase_watchdog.ladder import Climb, Look, Step, advance, first
+from canbase_watchdog.observer import NEVER, Axis, View
+
+QUICK_STOP_PERIOD_S = 0.01
+NMT_PERIOD_S = 0.05
+SDO_PERIOD_S = 0.01
+"""One SDO request at a time: most drives have a single SDO server that keeps one request."""
+IDLE_SDO_PERIOD_S = 0.05
+
+_WORD_BY_STEP = {
+    Step.PRE_OPERATIONAL: frames.QUICK_STOP_WORD,
+    Step.DISABLE_VOLTAGE: frames.DISABLE_VOLTAGE_WORD,
+    Step.HEARTBEAT_WITHHELD: frames.DISABLE_VOLTAGE_WORD,
+}
+
+
+class Stopper:
+    """Stops one node and keeps it stopped, from the trip until the reset."""
+
+    def __init__(self, node_id: int, config: WatchdogConfig, view: View, now: float) -> None:
+        """Begins at the foot of the ladder at the monotonic time `now` [s]."""
+        self._node_id = node_id
+        self._config = config
+        self._numbers = sorted(drive.axis for drive in config.drives if drive.node_id == node_id)
+        self._seen = self._look(view)
+        self.climb: Climb = first(self._seen, now)
+        self._quick_stop_at = self._nmt_at = self._sdo_at = NEVER
+        self._sdo_turn = 0
+
+    @property
+    def settled(self) -> bool:
+        """True when the node stands and is off or held, as its feedback said, or when there is no such node."""
+        return self.climb.stopped or not self._seen.present
+
+    def tick(self, view: View, now: float) -> list[Frame]:
+        """Look at the node, climb where the rules say so, and return the frames that are due."""
+        self._seen = self._look(view)
+        before = self.climb
+        self.climb = advance(before, self._seen, self._config.deceleration_mps2, now)
+        if self.climb.step is not before.step:
+            self._quick_stop_at = self._nmt_at = self._sdo_at = NEVER
+        defied = self._defied(view, now)
+        out: list[Frame] = []
+        if not self.climb.stopped or defied:
+            out += self._quick_stop(now) + self._pre_operational(now)
+        return out + self._sdo(view, defied, now)
+
+    def _axes(self, view: View) -> list[Axis]:
+        return [axis for axis in view.axes if axis.drive.node_id == self._node_id]
+
+    def _look(self, view: View) -> Look:
+        axes = self._axes(view)
+        node = view.node(self._node_id)
+        return Look(
+            enabled=any(axis.enabled for axis in axes),
+            powered=any(axis.powered for axis in axes),
+            standing=all(abs(axis.velocity_mps) <= self._config.standstill_mps for axis in axes),
+            speed_mps=max(max(abs(axis.velocity_mps), abs(axis.target_mps)) for axis in axes),
+            seen_at=min(axis.fed_at for axis in axes),
+            present=node.heard_at > NEVER or any(axis.command_at > NEVER for axis in axes),
+        )
+
+    def _defied(self, view: View, now: float) -> bool:
+        """Somebody goes on commanding motion."""
+        recent = now - self._config.lease_timeout_s
+        return any(axis.command_at > recent and axis.target_mps != 0.0 for axis in self._axes(view))
+
+    def _quick_stop(self, now: float) -> list[Frame]:
+        if now < self._quick_stop_at + QUICK_STOP_PERIOD_S:
+            return []
+        self._quick_stop_at = now
+        return [frames.quick_stop(self._node_id, len(self._numbers))]
+
+    def _pre_operational(self, now: float) -> list[Frame]:
+        if self.climb.step < Step.PRE_OPERATIONAL or now < self._nmt_at + NMT_PERIOD_S:
+            return []
+        self._nmt_at = now
+        return [frames.pre_operational(self._node_id)]
+
+    def _sdo(self, view: View, defied: bool, now: float) -> list[Frame]:
+        """The next request in turn. A stopped node that nobody commands is left alone: the driver may configure it."""
+        period_s = IDLE_SDO_PERIOD_S if self.climb.stopped else SDO_PERIOD_S
+        if now < self._sdo_at + period_s or (self.climb.stopped and not defied):
+            return []
+        requests = self._requests(view, now)
+        if not requests:
+            return []
+        self._sdo_at = now
+        self._sdo_turn += 1
+        return [requests[self._sdo_turn % len(requests)]]
+
+    def _requests(self, view: View, now: float) -> Sequence[Frame]:
+        """Writes of this rung, and readings of what TPDOs do not tell (no SYNC, or pre-operational)."""
+        word = None if self.climb.stopped else _WORD_BY_STEP.get(self.climb.step)
+        requests: list[Frame] = []
+        for axis in self._axes(view):
+            number = axis.drive.axis
+            if word is not None:
+                requests.append(frames.write_controlword(self._node_id, number, word))
+            if word is not None or now >= axis.fed_at + self._config.feedback_timeout_s:
+                requests += frames.read_feedback(self._node_id, number)
+        return requests

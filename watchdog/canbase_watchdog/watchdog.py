@@ -1,0 +1,188 @@
+"""The watchdog without sockets and clock: frames and leases in, frames out. States and answers: docs/bus.md."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+from canbase_config.watchdog import WatchdogConfig
+from canbase_watchdog import frames, policy
+from canbase_watchdog.frames import Frame
+from canbase_watchdog.ladder import Step
+from canbase_watchdog.lease import LeaseBook, Refusal
+from canbase_watchdog.observer import Observer, View
+from canbase_watchdog.policy import Cause, Verdict
+from canbase_watchdog.stopper import Stopper
+
+STATE_PERIOD_S = 0.05
+REPEATED_REQUEST_S = 1.0
+"""A reset request with the number of the last one is a copy of it for so long, and a new one after."""
+
+
+class State(enum.IntEnum):
+    """Byte 0 of the state frame."""
+
+    STARTING = 0
+    WATCHING = 1
+    TRIPPED = 2
+
+
+class Answer(enum.IntEnum):
+    """Byte 7 of the state frame."""
+
+    NONE = 0
+    DONE = 1
+    CAUSE_STANDS = 2
+    VELOCITY_ORDERED = 3
+    NOT_TRIPPED = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """What the watchdog tells about itself, apart from ages and counters. `reset`: last request and its answer."""
+
+    state: State
+    verdict: Verdict
+    step: Step
+    settled: bool
+    reset: tuple[int, Answer]
+
+
+class Watchdog:
+    """Trips when policy.py says so and then stops every drive until a reset. All times are monotonic seconds.
+
+    States: STARTING until it has listened for as long as a heartbeat may take (it trips already), then WATCHING;
+    TRIPPED from the first cause on, latched: only an accepted reset request leads back to WATCHING.
+    """
+
+    def __init__(self, config: WatchdogConfig, now: float) -> None:
+        """`config.lease_uid` None: leases of any user count, so the caller puts in its own."""
+        self._config = config
+        self._observer = Observer(config)
+        self._leases = LeaseBook(config.lease_timeout_s, config.lease_uid)
+        self._started_at = self._ticked_at = now
+        self._view = self._observer.view(now, None, -math.inf, 0.0)
+        self._state = State.STARTING
+        self._verdict = policy.FINE
+        self._stoppers: list[Stopper] = []
+        self._reset = (0, Answer.NONE)
+        self._reset_at = -math.inf
+        self._heartbeat_due = self._state_due = now
+        self._told: Status | None = None
+
+    @property
+    def status(self) -> Status:
+        """State, cause and rung as of now."""
+        return Status(self._state, self._verdict, self._step, self._settled, self._reset)
+
+    @property
+    def refused_leases(self) -> dict[Refusal, int]:
+        """Datagrams that were no lease, by reason, since the start."""
+        return self._leases.refused
+
+    @property
+    def dropped_frames(self) -> int:
+        """Frames of watched identifiers that could not be understood, since the start."""
+        return self._observer.dropped
+
+    def on_frame(self, cob_id: int, data: bytes, now: float) -> None:
+        """Take in a received frame. Never raises for what is on the bus; own frames that come back change nothing."""
+        if cob_id == frames.RESET_REQUEST:
+            self._on_reset_request(data, now)
+        else:
+            self._observer.on_frame(cob_id, data, now)
+
+    def on_lease(self, datagram: bytes, uid: int | None, now: float) -> Refusal | None:
+        """Take in a datagram from the lease socket, sent by the user `uid`. Returns why it does not count."""
+        return self._leases.take(datagram, uid, now)
+
+    def tick(self, now: float) -> list[Frame]:
+        """Judge and act. Returns the frames to send at once, the stop first. To be called at least every 5 ms."""
+        self._view = self._look(now, tick_gap_s=now - self._ticked_at)
+        self._ticked_at = now
+        if self._state is State.TRIPPED:
+            return self._stop(now) + self._tell(now)
+        if self._state is State.STARTING and now >= self._started_at + self._config.drive_heartbeat_s:
+            self._state = State.WATCHING
+        verdict = policy.decide(self._view, self._config, now)
+        if verdict.cause is Cause.NONE:
+            return self._tell(now)
+        self._trip(verdict, now)
+        return self._stop(now) + self._tell(now)
+
+    def next_expiry(self, now: float) -> float:
+        """When the next timeout would run out [s]: a tick just then stops without delay."""
+        return policy.next_expiry(self._look(now, 0.0), self._config, now)
+
+    def end(self, now: float) -> None:
+        """The process is asked to end: with a wheel in motion it must not leave without stopping it."""
+        view = self._look(now, 0.0)
+        axis = policy.in_motion(view, self._config)
+        if self._state is State.TRIPPED or axis is None:
+            return
+        detail = f"asked to end while {axis.drive.joint} turns at {axis.velocity_mps:.3f} m/s"
+        self._trip(Verdict(Cause.ENDED, 0, detail), now)
+
+    def quick_stops(self) -> list[Frame]:
+        """A quick stop for every node, whatever the state: for a way out on which nothing else can be trusted."""
+        nodes = [drive.node_id for drive in self._config.drives]
+        return [frames.quick_stop(node_id, nodes.count(node_id)) for node_id in dict.fromkeys(nodes)]
+
+    def _look(self, now: float, tick_gap_s: float) -> View:
+        return self._observer.view(self._started_at, self._leases.last, self._leases.valid_at, tick_gap_s)
+
+    def _trip(self, verdict: Verdict, now: float) -> None:
+        self._state = State.TRIPPED
+        self._verdict = verdict
+        nodes = dict.fromkeys(drive.node_id for drive in self._config.drives)
+        self._stoppers = [Stopper(node_id, self._config, self._view, now) for node_id in nodes]
+
+    def _stop(self, now: float) -> list[Frame]:
+        return [frame for stopper in self._stoppers for frame in stopper.tick(self._view, now)]
+
+    @property
+    def _settled(self) -> bool:
+        return all(stopper.settled for stopper in self._stoppers)
+
+    @property
+    def _step(self) -> Step:
+        return max((stopper.climb.step for stopper in self._stoppers), default=Step.NONE)
+
+    def _tell(self, now: float) -> list[Frame]:
+        out: list[Frame] = []
+        if now >= self._heartbeat_due and self._step is not Step.HEARTBEAT_WITHHELD:
+            self._heartbeat_due = now + self._config.drive_heartbeat_s / 3.0
+            out.append(frames.heartbeat())
+        status = self.status
+        if now >= self._state_due or status != self._told:
+            self._state_due = now + STATE_PERIOD_S
+            self._told = status
+            out.append(self._state_frame(status, now))
+        return out
+
+    def _state_frame(self, status: Status, now: float) -> Frame:
+        age_s = now - self._leases.valid_at
+        verdict = status.verdict
+        return frames.state(status.state, verdict.cause, status.step, verdict.node_id, age_s, status.reset)
+
+    def _on_reset_request(self, data: bytes, now: float) -> None:
+        number = frames.decode_reset_request(data)
+        if number is None:
+            self._observer.dropped += 1
+        elif number != self._reset[0] or now >= self._reset_at + REPEATED_REQUEST_S:
+            self._reset = (number, self._answer(now))
+            self._reset_at = now
+
+    def _answer(self, now: float) -> Answer:
+        if self._state is not State.TRIPPED:
+            return Answer.NOT_TRIPPED
+        view = self._look(now, 0.0)
+        if not self._settled or policy.stands(self._verdict, view, self._config, now):
+            return Answer.CAUSE_STANDS
+        if policy.velocity_ordered(view, self._config, now):
+            return Answer.VELOCITY_ORDERED
+        self._state = State.WATCHING
+        self._verdict = policy.FINE
+        self._stoppers = []
+        return Answer.DONE
