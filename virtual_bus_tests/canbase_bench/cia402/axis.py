@@ -1,0 +1,263 @@
+"""One axis of a simulated drive: controlword, option codes, modes 3 and 9, statusword (CiA 402-2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from canopen import SdoAbortedError
+
+from canbase_bench.cia301 import abort
+from canbase_bench.cia301.dictionary import AXIS_STRIDE, Dictionary
+from canbase_bench.cia402.states import (
+    POWERED,
+    TRANSITIONS,
+    Bit,
+    Command,
+    Event,
+    State,
+    Transition,
+    after,
+    decode,
+)
+from canbase_bench.cia402.units import Scale
+from canbase_bench.plant.motor import AT_ONCE, Motor
+
+PROFILE_VELOCITY, CYCLIC_VELOCITY, NO_MODE = 3, 9, 0
+"""6060h. Without a mode the drive does not enable."""
+STAYS_IN_QUICK_STOP = range(5, 9)
+"""605Ah: after the stop QUICK STOP ACTIVE stays, and transition 16 is open."""
+
+
+@dataclass(slots=True)
+class AxisFaults:
+    """What is broken in one axis; plain switches for tests."""
+
+    frozen_position: int | None = None
+    """6064h shows this and no longer moves."""
+    stuck_velocity: int | None = None
+    """606Ch shows this."""
+    ignores_setpoints: bool = False
+    """60FFh is taken, and has no effect on the motor."""
+
+
+@dataclass(slots=True)
+class Axis:
+    """Axis `number` of a node. `travel_m` gives the way of its motor, `on_change` hears every transition."""
+
+    dictionary: Dictionary
+    number: int
+    motor: Motor
+    scale: Scale
+    travel_m: Callable[[], float]
+    encoder_offset: int
+    tell_error: Callable[[int], None]
+    tell_clear: Callable[[int], None]
+    on_change: Callable[[State, Transition], None]
+    state: State = State.NOT_READY_TO_SWITCH_ON
+    faults: AxisFaults = field(default_factory=AxisFaults)
+    causes: set[int] = field(default_factory=set)
+    """Error codes whose cause still holds; no fault reset before it is empty."""
+    _base: int = field(default=0, init=False)
+    _error: int = field(default=0, init=False)
+    _pending: Transition | None = field(default=None, init=False)
+    _halted: bool = field(default=False, init=False)
+    _controlword: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        self._base = 0x6000 + AXIS_STRIDE * self.number
+        d, at = self.dictionary, self._base
+        d.on_write(at + 0x40, lambda subindex, value: self._on_controlword(value))
+        for offset in (0xFF, 0x83, 0x84):
+            d.on_write(at + offset, lambda subindex, value: self._steer())
+        d.on_write(at + 0x72, lambda subindex, value: self.motor.limit_force(value / 1000.0))
+        d.guard(at + 0x60, self._check_mode)
+
+    # What the node orders
+
+    def boot(self) -> None:
+        """Transitions 0 and 1: self-test, then SWITCH ON DISABLED."""
+        self._go(after(self.state, Event.BOOTED))
+
+    def restart(self) -> None:
+        """Power on or NMT reset node: power stage off, everything forgotten."""
+        self.motor.power_off()
+        self.motor.limit_force(self._value(0x72) / 1000.0)
+        self.state, self._pending, self._controlword, self._halted = State.NOT_READY_TO_SWITCH_ON, None, 0, False
+        self._error = 0
+        self.causes.clear()
+
+    def fail(self, code: int) -> None:
+        """A fault: transition 13, reaction by 605Eh, then 14. `code` is 603Fh and the EMCY code."""
+        self._error = code
+        self.tell_error(code)
+        if self.state in (State.FAULT_REACTION_ACTIVE, State.FAULT):
+            return
+        self._pending = None
+        self._go(after(self.state, Event.ERROR))
+        if not self.motor.powered:
+            self._reaction_done()
+        else:
+            self._stop(self._value(0x5E), self._reaction_done)
+
+    def abort_connection(self, code: int) -> None:
+        """The connection is lost: 6007h chooses nothing, fault, disable voltage or quick stop."""
+        option = self._value(0x07)
+        if option == 1:
+            self.fail(code)
+        elif option == 2:
+            self._command(Command.DISABLE_VOLTAGE)
+        elif option == 3:
+            self._command(Command.QUICK_STOP)
+
+    def refresh(self) -> None:
+        """Bring statusword, position, velocities and torque in the dictionary up to date."""
+        values, base, motor, faults = self.dictionary.values, self._base << 8, self.motor, self.faults
+        position, velocity = faults.frozen_position, faults.stuck_velocity
+        actual = self.scale.raw(motor.speed_mps) if velocity is None else velocity
+        values[base + 0x6400] = self.position() if position is None else position
+        values[base + 0x6C00] = actual
+        values[base + 0x4100] = self._statusword(actual)
+        values[base + 0x6B00] = self.scale.raw(motor.demand_mps)
+        values[base + 0x7700] = int(1000.0 * motor.force_n / motor.peak_force_n)
+        values[base + 0x6100] = values[base + 0x6000]
+        values[base + 0x3F00] = self._error
+
+    def position(self) -> int:
+        """6064h as the encoder has it."""
+        return self.scale.counts(self.travel_m(), self.encoder_offset)
+
+    # The state machine
+
+    def _on_controlword(self, value: int) -> None:
+        rose = value & ~self._controlword & Bit.FAULT_RESET
+        self._controlword = value
+        if rose and self.state is State.FAULT and not self.causes:
+            self.tell_clear(self._error)
+            self._error = 0
+            self._go(after(self.state, Event.FAULT_RESET))
+        self._obey()
+
+    def _obey(self) -> None:
+        """The controlword is a level: obey it until it changes nothing more."""
+        while self._command(decode(self._controlword)):
+            pass
+        halted = bool(self._controlword & Bit.HALT)
+        if halted is not self._halted:
+            self._halted = halted
+            self._steer()
+
+    def _command(self, command: Command) -> bool:
+        """Do one transition if the table and the option codes allow it."""
+        transition = TRANSITIONS.get((self.state, command))
+        if transition is None or not self._open(transition, command):
+            return False
+        number = transition.number
+        if number in (5, 8) and self._value(0x5C if number == 5 else 0x5B) == 1:
+            self._pending = transition
+            self._stop(1, self._finish_pending)
+            return False
+        self._pending = None
+        self._go(transition)
+        if number in (4, 16):
+            self._enable()
+        elif number == 11:
+            self._quick_stop()
+        return True
+
+    def _open(self, transition: Transition, command: Command) -> bool:
+        if self._pending is not None:
+            return command in (Command.DISABLE_VOLTAGE, Command.QUICK_STOP)
+        if transition.number == 4:
+            return self._value(0x60) != NO_MODE
+        return transition.number != 16 or self._value(0x5A) in STAYS_IN_QUICK_STOP
+
+    def _go(self, transition: Transition) -> None:
+        """Take the new state; outside of the powered states the power stage is off."""
+        before, self.state = self.state, transition.target
+        if self.state not in POWERED:
+            self.motor.power_off()
+        self.on_change(before, transition)
+
+    def _finish_pending(self) -> None:
+        transition, self._pending = self._pending, None
+        if transition is not None:
+            self._go(transition)
+            self._obey()
+
+    def _reaction_done(self) -> None:
+        self._go(after(self.state, Event.REACTION_DONE))
+
+    def _quick_stop_done(self) -> None:
+        if self._value(0x5A) not in STAYS_IN_QUICK_STOP:
+            self._go(after(self.state, Event.STOP_DONE))
+            self._obey()
+
+    # What the motor is told
+
+    def _enable(self) -> None:
+        if not self.motor.powered:
+            self.motor.power_on()
+        self._steer()
+
+    def _steer(self) -> None:
+        """Give the motor its goal: the target velocity, or zero while halt is set."""
+        if self.state is not State.OPERATION_ENABLED or self._pending is not None:
+            return
+        if self._halted:
+            self._stop(self._value(0x5D), _stay)
+        elif self.faults.ignores_setpoints:
+            self.motor.run(self.motor.goal_mps, AT_ONCE, AT_ONCE)
+        elif self._value(0x60) == CYCLIC_VELOCITY:
+            self.motor.run(self._value(0xFF) * self.scale.mps_per_raw, AT_ONCE, AT_ONCE)
+        else:
+            scale = self.scale.mps_per_raw
+            self.motor.run(self._value(0xFF) * scale, self._value(0x83) * scale, self._value(0x84) * scale)
+
+    def _quick_stop(self) -> None:
+        option = self._value(0x5A)
+        self._stop((option - 1) % 4 + 1 if option else 0, self._quick_stop_done)
+
+    def _stop(self, option: int, then: Callable[[], None]) -> None:
+        """Stop as 605Ah to 605Eh count: 0 coast, 1 ramp 6084h, 2 quick-stop ramp 6085h, 3 and 4 at the torque limit."""
+        if option == 0:
+            self.motor.power_off()
+            then()
+            return
+        ramps = {1: self._value(0x84), 2: self._value(0x85)}
+        slope = ramps[option] * self.scale.mps_per_raw if option in ramps else AT_ONCE
+        self.motor.stop(slope, then)
+
+    # What the bus sees
+
+    def _statusword(self, actual: int) -> int:
+        word = self.state.value | Bit.VOLTAGE_ENABLED | Bit.REMOTE
+        if self.motor.saturated:
+            word |= Bit.INTERNAL_LIMIT
+        if self.state is State.OPERATION_ENABLED and self._value(0x60) == CYCLIC_VELOCITY:
+            return word if self._halted else word | Bit.MODE_SPECIFIC
+        if self._reached(actual):
+            word |= Bit.TARGET_REACHED
+        if self._value(0x60) == PROFILE_VELOCITY and abs(actual) <= self._value(0x6F):
+            word |= Bit.MODE_SPECIFIC
+        return word
+
+    def _reached(self, actual: int) -> bool:
+        """Bit 10: the target is reached; in a halt and in QUICK STOP ACTIVE the target is zero."""
+        if self.state is State.QUICK_STOP_ACTIVE or self._halted:
+            return abs(actual) <= self._value(0x6F)
+        return self.state is State.OPERATION_ENABLED and abs(actual - self._value(0xFF)) <= self._value(0x6D)
+
+    def _check_mode(self, subindex: int, value: int) -> None:
+        if value not in (NO_MODE, PROFILE_VELOCITY, CYCLIC_VELOCITY):
+            raise SdoAbortedError(abort.INVALID_VALUE)
+        if self.state in POWERED and value != self._value(0x60):
+            raise SdoAbortedError(abort.DEVICE_STATE)
+
+    def _value(self, offset: int) -> int:
+        """The value of object 60xxh of this axis."""
+        return self.dictionary.values[(self._base + offset) << 8]
+
+
+def _stay() -> None:
+    """The halt has ended: OPERATION ENABLED stays."""

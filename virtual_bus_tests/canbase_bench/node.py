@@ -1,0 +1,303 @@
+"""A simulated motor controller: the CiA 301 services and one or two CiA 402 axes, wired together. Pure.
+
+`on_frame` takes what is on the bus, `tick` returns what the node says. The world moves the wheels in between.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from canopen import SdoAbortedError
+
+from canbase_bench.cia301 import abort, emcy, heartbeat, nmt, sdo
+from canbase_bench.cia301.dictionary import AXIS_STRIDE, Dictionary, key
+from canbase_bench.cia301.nmt import NmtCommand, NmtState
+from canbase_bench.cia301.rpdo import Rpdo
+from canbase_bench.cia301.tpdo import Tpdo
+from canbase_bench.cia402.axis import Axis
+from canbase_bench.cia402.states import State, Transition
+from canbase_bench.cia402.units import Scale
+from canbase_bench.frame import Frame
+from canbase_bench.plant.motor import Motor
+
+COMMUNICATION_FAULT = 0x7500
+"""603Fh when NMT stop or a reset meets an axis with 6007h = 1."""
+RESET_S = 0.01
+"""From NMT reset communication to the boot-up message [s]."""
+SIGNATURES = {0x1010: 0x65766173, 0x1011: 0x64616F6C}
+""""save" and "load": what 1010h and 1011h take (CiA 301)."""
+OFFSET_STEP = 1_000_003
+"""The encoder shows other counts after each power cycle: it has no battery."""
+
+
+@dataclass(frozen=True, slots=True)
+class AxisParts:
+    """What one axis is built from. `travel_m` gives the way of its motor since the start of the world."""
+
+    motor: Motor
+    scale: Scale
+    travel_m: Callable[[], float]
+    encoder_offset: int
+
+
+@dataclass(frozen=True, slots=True)
+class StateChange:
+    """One transition of one axis."""
+
+    node_id: int
+    axis: int
+    before: State
+    number: int
+    after: State
+
+
+class SimulatedNode:
+    """One node on the bus. `silent` and `cut` are faults: sends nothing; neither sends nor receives."""
+
+    def __init__(
+        self,
+        node_id: int,
+        axes: Sequence[AxisParts],
+        now: float,
+        boot_delay_s: float = 0.1,
+        fixed: Mapping[int, int] | None = None,
+    ) -> None:
+        self.node_id, self.boot_delay_s = node_id, boot_delay_s
+        self.silent = self.cut = False
+        self.state = NmtState.INITIALISING
+        self.changes: deque[StateChange] = deque(maxlen=1000)
+        self._out: list[Frame] = []
+        d = self.dictionary = Dictionary(node_id, len(axes), fixed)
+        d.before_read = self._refresh
+        self.emcy = emcy.EmcyService(d, self._send_emcy)
+        self._sdo = sdo.SdoService(node_id, d, self._send)
+        self._producer = heartbeat.HeartbeatProducer(d)
+        self._consumer = heartbeat.HeartbeatConsumer(d, self._on_lost, self._on_alive)
+        self.axes = tuple(self._axis(number, parts) for number, parts in enumerate(axes))
+        self._rpdos = [Rpdo(n, d, self.emcy, self._operational, self._on_deadline) for n in range(1, 5)]
+        self._tpdos = [Tpdo(n, d, self._send, self._operational) for n in range(1, 5)]
+        d.guard(0x1010, lambda subindex, value: _check_signature(0x1010, value))
+        d.guard(0x1011, lambda subindex, value: _check_signature(0x1011, value))
+        d.on_write(0x1010, lambda subindex, value: self._store(keep=True))
+        d.on_write(0x1011, lambda subindex, value: self._store(keep=False))
+        d.on_write(0x1005, lambda subindex, value: self._route())
+        self._power_up(now, 0.0)
+
+    # The bus
+
+    def on_frame(self, cob_id: int, data: bytes, now: float) -> None:
+        """One frame from the bus, at `now`. What the node does not understand is ignored."""
+        if self.cut:
+            return
+        take = self._routes.get(cob_id)
+        if take is not None:
+            take(data, now)
+        elif cob_id > heartbeat.COB_ID and self.state is not NmtState.INITIALISING:
+            self._consumer.receive(cob_id - heartbeat.COB_ID, data, now)
+
+    def tick(self, now: float) -> list[Frame]:
+        """Whatever is due by `now`, and every frame since the last call, in order."""
+        if self.state is NmtState.INITIALISING:
+            if now >= self._boot_at:
+                self._boot()
+        else:
+            self._consumer.tick(now)
+            if self._producer.due(now):
+                self._send(Frame(heartbeat.COB_ID + self.node_id, bytes([self.state])))
+        if self.state is NmtState.OPERATIONAL:
+            self._tick_pdos(now)
+        if not self._out:
+            return []
+        sent, self._out = self._out, []
+        return sent
+
+    # Faults for tests
+
+    def power_cycle(self, now: float, off_s: float = 0.5) -> None:
+        """Supply off, and on again after `off_s`: motors coast, objects as saved, the encoder starts elsewhere."""
+        for axis in self.axes:
+            axis.encoder_offset = (axis.encoder_offset + OFFSET_STEP + 2**31) % 2**32 - 2**31
+        self._power_up(now, off_s)
+
+    def fail(self, axis: int, code: int, holds: bool = False) -> None:
+        """A fault of one axis with EMCY `code`; while it `holds`, fault resets are in vain (see `heal`)."""
+        if holds:
+            self.axes[axis].causes.add(code)
+        self.axes[axis].fail(code)
+
+    def heal(self, axis: int) -> None:
+        """The causes of the faults of one axis are gone; it still needs a fault reset."""
+        self.axes[axis].causes.clear()
+
+    # NMT
+
+    def _on_nmt(self, data: bytes, now: float) -> None:
+        command = nmt.command_for(self.node_id, data)
+        if command is None:
+            return
+        if command is NmtCommand.RESET_NODE:
+            self._power_up(now, 0.0)
+        elif command is NmtCommand.RESET_COMMUNICATION:
+            self._abort_connection(COMMUNICATION_FAULT)
+            self._reset_communication(now + RESET_S)
+        else:
+            self._enter(nmt.ENTERS[command])
+
+    def _enter(self, state: NmtState) -> None:
+        if state is self.state:
+            return
+        self.state = state
+        pdos: list[Rpdo | Tpdo] = [*self._rpdos, *self._tpdos]
+        for pdo in pdos:
+            pdo.start() if state is NmtState.OPERATIONAL else pdo.stop()
+        self._on_sync_tpdos = [t for t in self._tpdos if t.on_sync_active]
+        self._on_event_tpdos = [t for t in self._tpdos if t.on_event_active]
+        self._active_rpdos = [r for r in self._rpdos if r.cob_id is not None]
+        self._route()
+        self._producer.restart()
+        if state is NmtState.STOPPED:
+            self._abort_connection(COMMUNICATION_FAULT)
+
+    def _boot(self) -> None:
+        self._enter(NmtState.PRE_OPERATIONAL)
+        self._send(Frame(heartbeat.COB_ID + self.node_id, bytes([NmtState.INITIALISING])))
+        for axis in self.axes:
+            if axis.state is State.NOT_READY_TO_SWITCH_ON:
+                axis.boot()
+
+    def _power_up(self, now: float, off_s: float) -> None:
+        self.dictionary.reset(0x6000, 0x9FFF)
+        for axis in self.axes:
+            axis.restart()
+        self._reset_communication(now + off_s + self.boot_delay_s)
+
+    def _reset_communication(self, boot_at: float) -> None:
+        self._enter(NmtState.INITIALISING)
+        self._out.clear()
+        self.dictionary.reset(0x1000, 0x1FFF)
+        self.emcy.reset()
+        self._sdo.reset()
+        self._consumer.configure()
+        self._boot_at = boot_at
+        self._route()
+
+    def _route(self) -> None:
+        """Who listens to which COB-ID in this NMT state."""
+        self._routes: dict[int, Callable[[bytes, float], None]] = {}
+        if self.state is NmtState.INITIALISING:
+            return
+        if self.state is NmtState.OPERATIONAL:
+            self._routes |= {r.cob_id: r.receive for r in self._active_rpdos if r.cob_id is not None}
+        if self.state in nmt.HAS_SDO:
+            self._routes[self._sdo.rx_cobid] = lambda data, now: self._sdo.receive(data)
+            self._routes[self.dictionary.values[key(0x1005)] & 0x7FF] = self._on_sync
+        self._routes[nmt.COB_ID] = self._on_nmt
+
+    # PDO
+
+    def _on_sync(self, data: bytes, now: float) -> None:
+        """Feedback is sampled at the SYNC, then the setpoints that came before it take effect."""
+        if data:
+            self.emcy.raise_error(emcy.SYNC_LENGTH)
+            return
+        self.emcy.clear_error(emcy.SYNC_LENGTH)
+        if self.state is not NmtState.OPERATIONAL:
+            return
+        self._refresh()
+        for tpdo in self._on_sync_tpdos:
+            tpdo.on_sync()
+        for rpdo in self._active_rpdos:
+            rpdo.on_sync()
+
+    def _tick_pdos(self, now: float) -> None:
+        for rpdo in self._active_rpdos:
+            rpdo.tick(now)
+        if self._on_event_tpdos:
+            self._refresh()
+            for tpdo in self._on_event_tpdos:
+                tpdo.tick(now)
+
+    def _operational(self) -> bool:
+        return self.state is NmtState.OPERATIONAL
+
+    def _refresh(self) -> None:
+        for axis in self.axes:
+            axis.refresh()
+
+    # Loss of the connection
+
+    def _on_lost(self, producer: int) -> None:
+        """A heartbeat is gone: EMCY 8130h, 6007h for the motors, 1029h:1 for the NMT state."""
+        self.emcy.raise_error(emcy.HEARTBEAT_LOST, producer)
+        for axis in self.axes:
+            axis.causes.add(emcy.HEARTBEAT_LOST)
+        self._abort_connection(emcy.HEARTBEAT_LOST)
+        behaviour = self.dictionary.values[key(0x1029, 1)]
+        if behaviour == 2:
+            self._enter(NmtState.STOPPED)
+        elif behaviour == 0 and self.state is NmtState.OPERATIONAL:
+            self._enter(NmtState.PRE_OPERATIONAL)
+
+    def _on_alive(self, producer: int) -> None:
+        self.emcy.clear_error(emcy.HEARTBEAT_LOST, producer)
+        if not self._consumer.any_lost:
+            for axis in self.axes:
+                axis.causes.discard(emcy.HEARTBEAT_LOST)
+
+    def _on_deadline(self) -> None:
+        """An RPDO's event timer ran out; the EMCY is sent, the motors act as on any lost connection."""
+        self._abort_connection(emcy.RPDO_TIMEOUT)
+
+    def _abort_connection(self, code: int) -> None:
+        for axis in self.axes:
+            axis.abort_connection(code)
+
+    # Wiring
+
+    def _axis(self, number: int, parts: AxisParts) -> Axis:
+        def on_change(before: State, transition: Transition) -> None:
+            self.changes.append(StateChange(self.node_id, number, before, *transition))
+
+        return Axis(
+            self.dictionary,
+            number,
+            parts.motor,
+            parts.scale,
+            parts.travel_m,
+            parts.encoder_offset,
+            tell_error=lambda code: self._tell_fault(code, number),
+            tell_clear=lambda code: self.emcy.clear_error(code, number),
+            on_change=on_change,
+        )
+
+    def _tell_fault(self, code: int, axis: int) -> None:
+        """EMCY of an axis' fault; 81xxh and 82xxh were told by the service that found them."""
+        if code >> 8 not in (0x81, 0x82):
+            self.emcy.raise_error(code, axis)
+
+    def _store(self, keep: bool) -> None:
+        self.dictionary.values[key(0x1010, 1)] = self.dictionary.values[key(0x1011, 1)] = 1
+        if keep:
+            self.dictionary.save()
+        else:
+            self.dictionary.forget()
+
+    def _send(self, frame: Frame) -> None:
+        if not (self.silent or self.cut):
+            self._out.append(frame)
+
+    def _send_emcy(self, frame: Frame) -> None:
+        if self.state in nmt.HAS_SDO:
+            self._send(frame)
+
+
+def _check_signature(index: int, value: int) -> None:
+    if value != SIGNATURES[index]:
+        raise SdoAbortedError(abort.CANNOT_STORE)
+
+
+def axis_key(axis: int, index: int, subindex: int = 0) -> int:
+    """Address of an axis' object in the dictionary, for faults and tests: `index` as on the first axis."""
+    return key(index + AXIS_STRIDE * axis, subindex)

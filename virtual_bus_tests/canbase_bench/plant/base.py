@@ -1,0 +1,200 @@
+"""The robot under the drives: mass and yaw inertia couple two sides of wheels; friction, slip, true pose. SI, REP 103.
+
+Wheels of one side turn together. Each step applies the motors' forces and viscous friction, and then Coulomb friction
+as the impulse, within its bound, that leaves the least kinetic energy: so friction alone never moves anything, and an
+unpowered robot never gains speed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, pi, sin
+
+from canbase_bench.plant.motor import Motor
+
+
+@dataclass(frozen=True, slots=True)
+class PlantParameters:
+    """The robot's body. Forces are per wheel and at the rim. Raises ValueError for a body that cannot be."""
+
+    mass_kg: float = 30.0
+    """Mass of the empty robot."""
+    payload_factor: float = 1.0
+    """Mass and yaw inertia with load, in multiples of the empty robot's; the drives are tuned for the empty one."""
+    yaw_gyration_m: float = 0.2
+    """Yaw inertia = mass × this²."""
+    wheel_mass_kg: float = 3.0
+    """Rotor, gear and wheel inertia of one wheel, as mass at its rim."""
+    coulomb_n: float = 6.0
+    """Dry friction of one wheel [N]."""
+    viscous_nspm: float = 8.0
+    """Friction of one wheel that grows with speed [N·s/m]."""
+    peak_force_n: float = 90.0
+    """Force of one wheel at its motor's torque limit [N]."""
+    bandwidth_radps: float = 200.0
+    """Velocity loop of the drives [rad/s]."""
+    slip_left: float = 0.0
+    """Share of the left rim's way that does not move the robot, below 1; negative: larger wheel than configured."""
+    slip_right: float = 0.0
+    """The same on the right."""
+    step_s: float = 0.001
+    """Fixed inner step [s]."""
+
+    def __post_init__(self) -> None:
+        positive = (self.mass_kg, self.payload_factor, self.yaw_gyration_m, self.wheel_mass_kg, self.peak_force_n)
+        if not all(0.0 < value < 1e6 for value in (*positive, self.bandwidth_radps, self.step_s)):
+            raise ValueError("masses, factor, gyration, force, bandwidth and step must be above 0 and finite")
+        if not all(0.0 <= value < 1e6 for value in (self.coulomb_n, self.viscous_nspm)):
+            raise ValueError("frictions must not be negative")
+        if not all(-1.0 < value < 1.0 for value in (self.slip_left, self.slip_right)):
+            raise ValueError("slip must be between -1 and 1")
+        if self.bandwidth_radps * self.step_s > 0.5:
+            raise ValueError("step_s is too long for bandwidth_radps: their product must not exceed 0.5")
+
+    def motor(self, wheels: int) -> Motor:
+        """The servo of one of `wheels` wheels, tuned for its share of the empty robot."""
+        mass = self.mass_kg / wheels + self.wheel_mass_kg
+        return Motor(mass, self.bandwidth_radps, self.peak_force_n, self.step_s)
+
+
+@dataclass(frozen=True, slots=True)
+class MountedWheel:
+    """A motor at its place: `direction` +1 where positive motor speed drives the base forward, else -1."""
+
+    motor: Motor
+    direction: int
+
+
+class Base:
+    """The moving robot. All fields are ground truth: pose in the frame where it started, rim speeds, ways."""
+
+    __slots__ = (
+        "_cross",
+        "_h",
+        "_inverse_left",
+        "_inverse_right",
+        "_left",
+        "_parameters",
+        "_right",
+        "_standstill",
+        "_track",
+        "path_m",
+        "resting",
+        "time_of_motion",
+        "travel_left_m",
+        "travel_m",
+        "travel_right_m",
+        "v_left_mps",
+        "v_right_mps",
+        "x_m",
+        "y_m",
+        "yaw_rad",
+    )
+
+    def __init__(
+        self,
+        parameters: PlantParameters,
+        track_m: float,
+        standstill_mps: float,
+        left: Sequence[MountedWheel],
+        right: Sequence[MountedWheel],
+        now: float,
+    ) -> None:
+        self._parameters, self._h = parameters, parameters.step_s
+        self._track, self._standstill = track_m, standstill_mps
+        self._left, self._right = ([(w.motor, float(w.direction)) for w in side] for side in (left, right))
+        self._invert_mass_matrix()
+        self.x_m = self.y_m = self.yaw_rad = 0.0
+        self.v_left_mps = self.v_right_mps = 0.0
+        self.travel_left_m = self.travel_right_m = 0.0
+        self.travel_m = self.path_m = 0.0
+        self.time_of_motion = now
+        self.resting = True
+
+    @property
+    def v_mps(self) -> float:
+        """True forward speed of the base."""
+        p = self._parameters
+        return (self.v_left_mps * (1.0 - p.slip_left) + self.v_right_mps * (1.0 - p.slip_right)) / 2.0
+
+    @property
+    def w_radps(self) -> float:
+        """True yaw rate, counter-clockwise positive."""
+        p = self._parameters
+        return (self.v_right_mps * (1.0 - p.slip_right) - self.v_left_mps * (1.0 - p.slip_left)) / self._track
+
+    @property
+    def kinetic_energy_j(self) -> float:
+        """Of body and wheels together, without slip."""
+        a, b = self._inverse_left, self._inverse_right
+        c = self._cross
+        vl, vr = self.v_left_mps, self.v_right_mps
+        return (b * vl * vl - 2.0 * c * vl * vr + a * vr * vr) / (a * b - c * c) / 2.0
+
+    def step(self, now: float) -> None:
+        """Advance by one inner step that ends at `now`."""
+        vl, vr, h, p = self.v_left_mps, self.v_right_mps, self._h, self._parameters
+        push_left = push_right = 0.0
+        for motor, direction in self._left:
+            push_left += direction * motor.step(direction * vl)
+        for motor, direction in self._right:
+            push_right += direction * motor.step(direction * vr)
+        push_left -= p.viscous_nspm * len(self._left) * vl
+        push_right -= p.viscous_nspm * len(self._right) * vr
+        a, b, c = self._inverse_left, self._inverse_right, self._cross
+        new_left = vl + (a * push_left + c * push_right) * h
+        new_right = vr + (c * push_left + b * push_right) * h
+        self._move(*self._rub(new_left, new_right), now)
+
+    def _rub(self, vl: float, vr: float) -> tuple[float, float]:
+        """Coulomb friction: sweeps over both sides until the impulses no longer change much. Each lowers the energy."""
+        a, b, c = self._inverse_left, self._inverse_right, self._cross
+        bound = self._parameters.coulomb_n * self._h
+        bound_left, bound_right = bound * len(self._left), bound * len(self._right)
+        impulse_left = impulse_right = 0.0
+        for _ in range(8):
+            wanted = impulse_left - vl / a
+            wanted = bound_left if wanted > bound_left else -bound_left if wanted < -bound_left else wanted
+            change, impulse_left = wanted - impulse_left, wanted
+            vl += a * change
+            vr += c * change
+            wanted = impulse_right - vr / b
+            wanted = bound_right if wanted > bound_right else -bound_right if wanted < -bound_right else wanted
+            moved, impulse_right = wanted - impulse_right, wanted
+            vl += c * moved
+            vr += b * moved
+            if moved * c == 0.0 or (abs(vl) > 1e-6 and abs(vr) > 1e-6):
+                break
+        return (0.0 if abs(vl) < 1e-9 else vl), (0.0 if abs(vr) < 1e-9 else vr)
+
+    def _move(self, vl: float, vr: float, now: float) -> None:
+        h = self._h
+        mean_left, mean_right = (self.v_left_mps + vl) * h / 2.0, (self.v_right_mps + vr) * h / 2.0
+        self.travel_left_m += mean_left
+        self.travel_right_m += mean_right
+        true_left = mean_left * (1.0 - self._parameters.slip_left)
+        true_right = mean_right * (1.0 - self._parameters.slip_right)
+        way, turn = (true_left + true_right) / 2.0, (true_right - true_left) / self._track
+        heading = self.yaw_rad + turn / 2.0
+        self.x_m += way * cos(heading)
+        self.y_m += way * sin(heading)
+        self.yaw_rad = (self.yaw_rad + turn + pi) % (2.0 * pi) - pi
+        self.travel_m += way
+        self.path_m += abs(way)
+        self.resting = vl == 0.0 == vr and self.v_left_mps == 0.0 == self.v_right_mps
+        self.v_left_mps, self.v_right_mps = vl, vr
+        if abs(vl) > self._standstill or abs(vr) > self._standstill:
+            self.time_of_motion = now
+
+    def _invert_mass_matrix(self) -> None:
+        """Kinetic energy = ½ (vl, vr) A (vl, vr)ᵀ; kept is the inverse of A."""
+        p = self._parameters
+        body = p.mass_kg * p.payload_factor
+        turning = body * p.yaw_gyration_m**2 / self._track**2
+        left = body / 4.0 + turning + p.wheel_mass_kg * len(self._left)
+        right = body / 4.0 + turning + p.wheel_mass_kg * len(self._right)
+        cross = body / 4.0 - turning
+        determinant = left * right - cross * cross
+        self._inverse_left, self._inverse_right = right / determinant, left / determinant
+        self._cross = -cross / determinant

@@ -1,0 +1,162 @@
+"""The bench: the simulated drives of one robot.yaml and the robot on them, stepped together. Pure.
+
+Works in virtual time (call `on_frame` and `tick` with any rising `now`) and in real time (`loop.py` does).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from canbase_bench.cia301.dictionary import AXIS_STRIDE, key
+from canbase_bench.cia402.units import Scale
+from canbase_bench.frame import Frame
+from canbase_bench.node import AxisParts, SimulatedNode, StateChange
+from canbase_bench.plant.base import Base, MountedWheel, PlantParameters
+from canbase_config.robot import Drive, Robot
+
+DEFAULT_BODY = PlantParameters()
+"""An empty robot of 30 kg on dry floor."""
+
+
+@dataclass(frozen=True, slots=True)
+class BenchParameters:
+    """What robot.yaml does not say about the drives."""
+
+    boot_delay_s: float = 0.1
+    """From power on to the boot-up message [s]."""
+    encoder_offset: int = 123_456
+    """6064h at the start; each further axis is at a multiple of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """What the robot really does. Pose in the frame where it started (REP 103), rim speeds forward positive."""
+
+    time_s: float
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    linear_mps: float
+    angular_radps: float
+    v_left_mps: float
+    v_right_mps: float
+    travel_m: float
+    """Signed way of the base's centre, forward positive."""
+    path_m: float
+    """Way of the base's centre, backward counted positive too."""
+    standing_s: float
+    """Since a rim last moved faster than base.standstill_mps."""
+
+
+class Bench:
+    """Simulated nodes, axes and body of `robot`. `nodes` (by node id) and `base` are open to tests and faults."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        now: float = 0.0,
+        body: PlantParameters = DEFAULT_BODY,
+        parameters: BenchParameters | None = None,
+    ) -> None:
+        self._robot, self._parameters = robot, parameters or BenchParameters()
+        self._start, self._steps, self._h = now, 0, body.step_s
+        self._motors = [body.motor(len(robot.drives)) for _ in robot.drives]
+        self.base = Base(
+            body,
+            robot.base.track_m,
+            robot.base.standstill_mps,
+            left=self._wheels("left"),
+            right=self._wheels("right"),
+            now=now,
+        )
+        node_ids = sorted({drive.node_id for drive in robot.drives})
+        self.nodes = {node_id: self._node(node_id, now) for node_id in node_ids}
+        self._all_nodes = tuple(self.nodes.values())
+
+    def on_frame(self, frame: Frame, now: float) -> None:
+        """A frame from the bus: the world moves up to `now`, then every node hears it."""
+        self._advance(now)
+        for node in self._all_nodes:
+            node.on_frame(frame.cob_id, frame.data, now)
+
+    def tick(self, now: float) -> list[Frame]:
+        """The world moves up to `now`; the frames that the nodes have to say, in order."""
+        self._advance(now)
+        return [frame for node in self._all_nodes for frame in node.tick(now)]
+
+    def truth(self, now: float) -> Truth:
+        """The state of the world at `now`."""
+        self._advance(now)
+        b = self.base
+        return Truth(
+            now,
+            b.x_m,
+            b.y_m,
+            b.yaw_rad,
+            b.v_mps,
+            b.w_radps,
+            b.v_left_mps,
+            b.v_right_mps,
+            b.travel_m,
+            b.path_m,
+            max(0.0, now - b.time_of_motion),
+        )
+
+    def state_changes(self) -> list[StateChange]:
+        """The transitions of all axes since the last call."""
+        changes = [change for node in self._all_nodes for change in node.changes]
+        for node in self._all_nodes:
+            node.changes.clear()
+        return changes
+
+    def _advance(self, now: float) -> None:
+        """Inner steps lie on a fixed grid from the start, so the result does not depend on when one looks."""
+        target = int((now - self._start) / self._h + 1e-6)
+        base, h, start = self.base, self._h, self._start
+        while self._steps < target:
+            if base.resting and all(motor.at_rest for motor in self._motors):
+                self._steps = target
+                return
+            self._steps += 1
+            base.step(start + self._steps * h)
+
+    def _wheels(self, side: str) -> list[MountedWheel]:
+        pairs = zip(self._motors, self._robot.drives, strict=True)
+        return [MountedWheel(motor, drive.direction) for motor, drive in pairs if drive.side == side]
+
+    def _node(self, node_id: int, now: float) -> SimulatedNode:
+        mounted = {d.axis: i for i, d in enumerate(self._robot.drives) if d.node_id == node_id}
+        parts = [self._axis(mounted.get(axis)) for axis in range(max(mounted) + 1)]
+        fixed = {key(0x1018, 4): node_id}
+        for axis, i in mounted.items():
+            drive = self._robot.drives[i]
+            fixed[key(0x608F + axis * AXIS_STRIDE, 1)] = drive.counts_per_motor_rev
+            fixed |= _identity(drive)
+        return SimulatedNode(node_id, parts, now, self._parameters.boot_delay_s, fixed)
+
+    def _axis(self, i: int | None) -> AxisParts:
+        """The axis of drive `i`; None: an axis of the controller to which nothing is connected."""
+        if i is None:
+            idle = DEFAULT_BODY.motor(1)
+            return AxisParts(idle, Scale.of(self._robot.drives[0], self._robot.base.wheel_radius_m), _nowhere, 0)
+        drive = self._robot.drives[i]
+        scale = Scale.of(drive, self._robot.base.wheel_radius_m)
+        return AxisParts(self._motors[i], scale, self._travel(drive), self._parameters.encoder_offset * (i + 1))
+
+    def _travel(self, drive: Drive) -> Callable[[], float]:
+        base, direction = self.base, drive.direction
+        if drive.side == "left":
+            return lambda: direction * base.travel_left_m
+        return lambda: direction * base.travel_right_m
+
+
+def _identity(drive: Drive) -> dict[int, int]:
+    """1018h as robot.yaml expects it: the bench stands in for that drive."""
+    known = drive.identity
+    given = {1: known.vendor_id, 2: known.product_code, 3: known.revision, 4: known.serial}
+    return {key(0x1018, subindex): value for subindex, value in given.items() if value is not None}
+
+
+def _nowhere() -> float:
+    return 0.0
