@@ -1,0 +1,92 @@
+"""Fixtures of the tests over DDS. Each test has a ROS domain, a UDP port and a lease socket of its own."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ruamel.yaml import YAML
+
+from canbase_config.load import load_robot
+from canbase_config.robot import Robot
+from ros.harness import Process, TestNode, merged, python_argv, reserve_domain, robot_values
+
+Spawn = Callable[..., Process]
+MakeRobot = Callable[[Mapping[str, Any]], Path]
+
+_starts = itertools.count(os.getpid())
+
+
+@pytest.fixture(autouse=True)
+def domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """ROS_DOMAIN_ID of this test, in its environment and in that of every process that it starts."""
+    domain, holder = reserve_domain(next(_starts))
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    yield domain
+    holder.close()
+
+
+@pytest.fixture
+def short_folder() -> Iterator[Path]:
+    """A new folder with a path short enough for Unix sockets (108 bytes)."""
+    with tempfile.TemporaryDirectory(prefix="canbase-", dir="/tmp") as name:
+        yield Path(name)
+
+
+@pytest.fixture
+def make_robot(short_folder: Path) -> MakeRobot:
+    """make_robot({"limits": {"linear_mps": 0.5}}): path of a robot.yaml with these changes to `robot_values`.
+
+    All files of one test share its UDP port and lease socket, unless the changes say otherwise.
+    """
+    base = robot_values(short_folder)
+    numbers = itertools.count()
+
+    def make(changes: Mapping[str, Any]) -> Path:
+        path = short_folder / f"robot{next(numbers)}.yaml"
+        YAML(typ="safe").dump(merged(base, changes), path)
+        return path
+
+    return make
+
+
+@pytest.fixture
+def robot_yaml(make_robot: MakeRobot) -> Path:
+    """A robot.yaml as `robot_values` gives it."""
+    return make_robot({})
+
+
+@pytest.fixture
+def robot(robot_yaml: Path) -> Robot:
+    """What `robot_yaml` describes."""
+    return load_robot(robot_yaml).robot
+
+
+@pytest.fixture
+def spawn(tmp_path: Path) -> Iterator[Spawn]:
+    """spawn("python code" or [argv], env={…}): a `Process` that ends with the test at the latest."""
+    processes: list[Process] = []
+
+    def start(command: str | Sequence[str], env: Mapping[str, str] | None = None) -> Process:
+        argv = python_argv(command) if isinstance(command, str) else command
+        process = Process(argv, tmp_path / f"process{len(processes)}.log", env)
+        processes.append(process)
+        return process
+
+    yield start
+    for process in processes:
+        process.close()
+        print(f"--- {process.log_path.name}, exit code {process.exit_code} ---\n{process.log()}")
+
+
+@pytest.fixture
+def test_node() -> Iterator[TestNode]:
+    """A `TestNode` in the test's domain."""
+    with TestNode() as node:
+        yield node
