@@ -164,9 +164,10 @@ def _loop_entry(snapshot: DriverSnapshot, previous: DriverSnapshot, robot: str) 
 def _driver_state(snapshot: DriverSnapshot) -> tuple[bytes, str]:
     if snapshot.state is DriverState.ENABLED:
         return DiagnosticStatus.OK, "All drives are enabled."
-    clears = f" It ends with: {snapshot.clears_on}." if snapshot.clears_on else ""
     level = DiagnosticStatus.WARN if snapshot.state in _TRANSIENT else DiagnosticStatus.ERROR
-    return level, f"{snapshot.state.name.capitalize()} ({snapshot.cause}): {snapshot.detail.rstrip('.')}.{clears}"
+    detail = f": {snapshot.detail.rstrip('.')}" if snapshot.detail else ""
+    clears = f" It ends with: {snapshot.clears_on}." if snapshot.clears_on else ""
+    return level, f"{snapshot.state.name.capitalize()} ({snapshot.cause}){detail}.{clears}"
 
 
 def _watchdog_entry(snapshot: DriverSnapshot, robot: str) -> DiagnosticStatus:

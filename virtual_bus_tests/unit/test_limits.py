@@ -1,0 +1,388 @@
+"""The limits, as drives with times on them and as properties over all admissible limits, motions and cycle times."""
+
+import math
+from itertools import pairwise, product
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from canbase_config.robot import Limits
+from canbase_driver.kinematics import Twist2D, wheel_speeds
+from canbase_driver.limits import MAX_STEP_S, Limiter, MotionState
+
+property_of_all = settings(deadline=None, max_examples=100)
+DT_S = 0.01
+TRACK_M = 0.4
+LIMITS = Limits(
+    linear_mps=1.0,
+    angular_radps=2.0,
+    acceleration_mps2=0.5,
+    deceleration_mps2=1.0,
+    emergency_deceleration_mps2=2.0,
+    angular_acceleration_radps2=2.0,
+    angular_deceleration_radps2=4.0,
+    jerk_mps3=10.0,
+)
+LIMITER = Limiter(LIMITS, TRACK_M)
+NO_JERK = Limiter(LIMITS.model_copy(update={"jerk_mps3": 1e9}), TRACK_M)
+"""The plain ramp, to be counted by hand: its jerk limit is over within a nanosecond."""
+
+
+def drive(
+    limiter: Limiter, start: MotionState, target: Twist2D, duration_s: float, *, emergency: bool = False
+) -> list[MotionState]:
+    """The start and every 10 ms after it."""
+    states = [start]
+    for _ in range(round(duration_s / DT_S)):
+        states.append(limiter.step(states[-1], target, DT_S, emergency=emergency))
+    return states
+
+
+def steps_until(limiter: Limiter, start: MotionState, target: Twist2D, most: int, *, emergency: bool = False) -> int:
+    """Number of 10 ms steps until the limited target is ordered exactly and held; `most` when it never is."""
+    state, arrived = start, MotionState(limiter.limit(target))
+    for step in range(most):
+        if state == arrived:
+            return step
+        state = limiter.step(state, target, DT_S, emergency=emergency)
+    return most
+
+
+def linear(states: list[MotionState]) -> list[float]:
+    return [state.twist.linear_mps for state in states]
+
+
+def way(states: list[MotionState]) -> float:
+    return sum(abs(a + b) / 2.0 * DT_S for a, b in pairwise(linear(states)))
+
+
+# Speed limits
+
+
+@pytest.mark.parametrize(
+    ("target", "limited"),
+    [
+        (Twist2D(1.0, 0.0), Twist2D(1.0, 0.0)),
+        (Twist2D(-1.0, 0.0), Twist2D(-1.0, 0.0)),
+        (Twist2D(1.0 + 1e-9, 0.0), Twist2D(1.0, 0.0)),
+        (Twist2D(-30.0, 0.0), Twist2D(-1.0, 0.0)),
+        (Twist2D(0.0, 2.0), Twist2D(0.0, 2.0)),
+        (Twist2D(0.0, -2.0 - 1e-9), Twist2D(0.0, -2.0)),
+        (Twist2D(0.1, 4.0), Twist2D(0.05, 2.0)),  # half as fast on the same circle
+        (Twist2D(0.8, 1.0), Twist2D(0.8, 1.0)),  # the outer wheel at 0.8 + 1.0 × 0.2 = 1.0 m/s
+        (Twist2D(1.6, 2.0), Twist2D(0.8, 1.0)),
+        (Twist2D(1.0, 2.0), Twist2D(1.0 / 1.4, 2.0 / 1.4)),  # within both, but the outer wheel would run at 1.4 m/s
+        (Twist2D.ZERO, Twist2D.ZERO),
+    ],
+)
+def test_a_fast_target_is_scaled_as_a_whole(target: Twist2D, limited: Twist2D) -> None:
+    got = LIMITER.limit(target)
+    assert (got.linear_mps, got.angular_radps) == pytest.approx((limited.linear_mps, limited.angular_radps), rel=1e-12)
+
+
+def test_a_wheel_may_run_as_fast_as_straight_on_or_a_turn_in_place_needs() -> None:
+    assert Limiter(LIMITS, 0.4).wheel_mps == 1.0
+    assert Limiter(LIMITS, 1.0).wheel_mps == 1.0
+    assert Limiter(LIMITS, 1.5).wheel_mps == 1.5
+    assert Limiter(LIMITS, 1.5).limit(Twist2D(0.0, 2.0)) == Twist2D(0.0, 2.0)
+
+
+@property_of_all
+@given(st.floats(allow_nan=False, allow_infinity=False), st.floats(allow_nan=False, allow_infinity=False))
+def test_no_target_gets_beyond_a_speed_limit_or_onto_another_circle(linear_mps: float, angular_radps: float) -> None:
+    got = LIMITER.limit(Twist2D(linear_mps, angular_radps))
+    assert abs(got.linear_mps) <= 1.0
+    assert abs(got.angular_radps) <= 2.0
+    assert max(map(abs, wheel_speeds(got, TRACK_M))) <= LIMITER.wheel_mps * (1.0 + 1e-12)
+    scale = max(abs(linear_mps), abs(angular_radps), 1.0)
+    assert got.linear_mps * (angular_radps / scale) == pytest.approx(
+        got.angular_radps * (linear_mps / scale), rel=1e-9, abs=1e-300
+    )
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_what_is_not_finite_is_refused_and_nothing_else_is_done(bad: float) -> None:
+    for twist in (Twist2D(bad, 0.0), Twist2D(0.0, bad)):
+        with pytest.raises(ValueError, match="must be finite"):
+            LIMITER.limit(twist)
+        with pytest.raises(ValueError, match="must be finite"):
+            LIMITER.step(MotionState.AT_REST, twist, DT_S)
+        with pytest.raises(ValueError, match="current motion"):
+            LIMITER.step(MotionState(twist), Twist2D.ZERO, DT_S)
+    with pytest.raises(ValueError, match="current motion"):
+        LIMITER.step(MotionState(Twist2D.ZERO, bad), Twist2D.ZERO, DT_S)
+    with pytest.raises(ValueError, match="time step"):
+        LIMITER.step(MotionState.AT_REST, Twist2D.ZERO, bad)
+
+
+# Time steps
+
+
+def test_no_time_changes_nothing_and_time_does_not_run_backwards() -> None:
+    state = MotionState(Twist2D(0.3, 0.1), 0.2)
+    assert LIMITER.step(state, Twist2D(1.0, 0.0), 0.0) is state
+    with pytest.raises(ValueError, match="not negative"):
+        LIMITER.step(state, Twist2D.ZERO, -1e-9)
+
+
+def test_a_cycle_that_comes_a_second_late_is_a_step_of_a_tenth() -> None:
+    start = MotionState(Twist2D(0.2, 0.0))
+    assert LIMITER.step(start, Twist2D(1.0, 0.0), 1.0) == LIMITER.step(start, Twist2D(1.0, 0.0), MAX_STEP_S)
+
+
+@property_of_all
+@given(st.lists(st.floats(1e-4, 0.1), min_size=1, max_size=8))
+def test_the_ramp_depends_on_the_time_and_not_on_how_it_was_cut(cuts_s: list[float]) -> None:
+    irregular, regular = MotionState.AT_REST, MotionState.AT_REST
+    for cut_s in cuts_s:
+        irregular = LIMITER.step(irregular, Twist2D(0.9, 0.2), cut_s)
+        for _ in range(10):
+            regular = LIMITER.step(regular, Twist2D(0.9, 0.2), cut_s / 10.0)
+    assert irregular.twist.linear_mps == pytest.approx(regular.twist.linear_mps, abs=1e-12)
+    assert irregular.acceleration_mps2 == pytest.approx(regular.acceleration_mps2, abs=1e-9)
+
+
+# Acceleration and deceleration
+
+
+@pytest.mark.parametrize(
+    ("start", "target", "seconds"),
+    [
+        (Twist2D.ZERO, Twist2D(1.0, 0.0), 2.0),  # 1.0 / 0.5
+        (Twist2D.ZERO, Twist2D(-1.0, 0.0), 2.0),
+        (Twist2D(1.0, 0.0), Twist2D.ZERO, 1.0),  # 1.0 / 1.0
+        (Twist2D(-1.0, 0.0), Twist2D(-0.5, 0.0), 0.5),
+        (Twist2D(-0.5, 0.0), Twist2D(-1.0, 0.0), 1.0),
+        (Twist2D.ZERO, Twist2D(0.0, 2.0), 1.0),  # 2.0 / 2.0
+        (Twist2D(0.0, -2.0), Twist2D.ZERO, 0.5),  # 2.0 / 4.0
+        (Twist2D(0.0, 1.0), Twist2D(0.0, -1.0), 1.0),  # through zero with the smaller limit: 2.0 / 2.0
+        (Twist2D.ZERO, Twist2D(0.1, 1.0), 0.5),  # the turn is the slower one: 1.0 / 2.0 against 0.1 / 0.5
+        (Twist2D(0.1, 2.0), Twist2D.ZERO, 0.5),  # 2.0 / 4.0 against 0.1 / 1.0
+    ],
+)
+def test_how_long_a_ramp_takes(start: Twist2D, target: Twist2D, seconds: float) -> None:
+    steps = round(seconds / DT_S)
+    before = drive(NO_JERK, MotionState(start), target, seconds)[-2].twist
+    assert before != target
+    assert steps_until(NO_JERK, MotionState(start), target, steps + 10) in (steps, steps + 1)
+
+
+def test_a_reversal_brakes_to_an_exact_zero_and_accelerates_from_there() -> None:
+    speeds = linear(drive(LIMITER, MotionState(Twist2D(0.4, 0.2)), Twist2D(-0.4, 0.2), 2.0))
+    zero = speeds.index(0.0)
+    assert zero == 50  # 0.4 / 1.0 s and 1.0 / 10.0 s for the jerk
+    assert speeds.index(-0.4) == zero + 85  # 0.4 / 0.5 s and 0.5 / 10.0 s
+    assert all(speed > 0.0 for speed in speeds[:zero])
+    assert all(speed < 0.0 for speed in speeds[zero + 1 :])
+    assert speeds[-1] == -0.4
+
+
+def test_braking_does_not_wait_for_a_turn_that_grows() -> None:
+    states = drive(NO_JERK, MotionState(Twist2D(0.5, 0.0)), Twist2D(0.0, 2.0), 1.2)
+    assert linear(states)[51] == 0.0  # 0.5 / 1.0 s, though the turn needs 2.0 / 2.0 s
+    assert states[50].twist.angular_radps == pytest.approx(1.0, abs=0.03)
+    assert states[-1].twist == Twist2D(0.0, 2.0)
+
+
+def test_a_stop_follows_the_circle_that_the_base_is_on() -> None:
+    states = drive(LIMITER, MotionState(Twist2D(0.6, 0.9)), Twist2D.ZERO, 1.0)
+    moving = [state.twist for state in states if state.twist != Twist2D.ZERO]
+    assert len(moving) == 70
+    assert [twist.angular_radps / twist.linear_mps for twist in moving] == pytest.approx([1.5] * 70, rel=1e-9)
+
+
+# Jerk
+
+
+def test_the_acceleration_grows_and_falls_by_the_jerk_limit() -> None:
+    states = drive(LIMITER, MotionState.AT_REST, Twist2D(1.0, 0.0), 2.05)
+    slopes = [state.acceleration_mps2 for state in states]
+    assert slopes[:7] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.5])
+    assert slopes[-7:] == pytest.approx([0.5, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0], abs=1e-6)
+    assert states[-1] == MotionState(Twist2D(1.0, 0.0))
+
+
+def test_a_stop_ordered_in_full_acceleration_brakes_from_the_next_cycle_on() -> None:
+    speeding_up = drive(LIMITER, MotionState.AT_REST, Twist2D(1.0, 0.0), 1.0)[-1]
+    assert speeding_up.acceleration_mps2 == pytest.approx(0.5)
+    slower = LIMITER.step(speeding_up, Twist2D.ZERO, DT_S)
+    assert slower.twist.linear_mps < speeding_up.twist.linear_mps
+    assert slower.acceleration_mps2 == pytest.approx(-0.1)
+
+
+def test_a_target_that_comes_too_near_for_the_jerk_limit_is_reached_and_not_passed() -> None:
+    speeding_up = drive(LIMITER, MotionState.AT_REST, Twist2D(1.0, 0.0), 1.0)[-1]
+    near = Twist2D(speeding_up.twist.linear_mps + 0.005, 0.0)  # the jerk limit alone would pass it by 7.5 mm/s
+    speeds = linear(drive(LIMITER, speeding_up, near, 0.1))
+    assert speeds == sorted(speeds)
+    assert speeds[-1] == near.linear_mps
+
+
+def test_a_target_that_trembles_around_the_speed_is_followed_exactly() -> None:
+    state = drive(LIMITER, MotionState.AT_REST, Twist2D(0.5, 0.0), 1.5)[-1]
+    for _ in range(50):
+        for speed_mps in (0.5 + 1e-6, 0.5 - 1e-6):
+            state = LIMITER.step(state, Twist2D(speed_mps, 0.0), DT_S)
+            assert state == MotionState(Twist2D(speed_mps, 0.0))
+
+
+@property_of_all
+@given(st.floats(-1.0, 1.0), st.floats(-2.0, 2.0), st.floats(2.0, 1000.0))
+def test_from_a_steady_speed_the_acceleration_never_leaps(start_mps: float, angular_radps: float, jerk: float) -> None:
+    limiter = Limiter(LIMITS.model_copy(update={"jerk_mps3": jerk}), TRACK_M)
+    twist = limiter.limit(Twist2D(start_mps, angular_radps))
+    ways = [drive(limiter, MotionState(twist), Twist2D.ZERO, 3.0), drive(limiter, MotionState.AT_REST, twist, 3.0)]
+    for states in ways:
+        leaps = [abs(after.acceleration_mps2 - before.acceleration_mps2) for before, after in pairwise(states)]
+        assert max(leaps) <= jerk * DT_S * (1.0 + 1e-6) + 1e-6
+
+
+# Emergency
+
+
+@pytest.mark.parametrize(
+    ("start", "steps"),
+    [
+        (Twist2D(1.0, 0.0), 50),  # 1.0 / 2.0 s
+        (Twist2D(-1.0, 0.0), 50),
+        (Twist2D(0.0, 2.0), 25),  # 2.0 / 4.0 s, shortened like the linear one by 1.0 / 2.0
+        (Twist2D(0.5, 1.0), 25),
+    ],
+)
+def test_an_emergency_stop_takes_its_own_deceleration_and_no_time_for_jerk(start: Twist2D, steps: int) -> None:
+    speeding_up = MotionState(start, 0.5)
+    assert steps_until(LIMITER, speeding_up, Twist2D.ZERO, 100, emergency=True) in (steps, steps + 1)
+
+
+def test_an_emergency_stop_keeps_the_circle_and_ignores_the_target() -> None:
+    start = MotionState(Twist2D(0.6, 0.9))
+    states = drive(LIMITER, start, Twist2D(1.0, 0.0), 0.4, emergency=True)
+    assert states == drive(LIMITER, start, Twist2D.ZERO, 0.4, emergency=True)
+    assert states[10].twist.linear_mps == pytest.approx(0.4)
+    assert states[10].twist.angular_radps == pytest.approx(0.6)
+    assert states[-1] == MotionState.AT_REST
+
+
+# Properties, over limits as robot.yaml allows them
+
+
+@st.composite
+def limiters(draw: st.DrawFn) -> Limiter:
+    deceleration = draw(st.floats(0.2, 5.0))
+    limits = Limits(
+        linear_mps=draw(st.floats(0.1, 5.0)),
+        angular_radps=draw(st.floats(0.1, 10.0)),
+        acceleration_mps2=draw(st.floats(0.2, 5.0)),
+        deceleration_mps2=deceleration,
+        emergency_deceleration_mps2=deceleration * draw(st.floats(1.0, 4.0)),
+        angular_acceleration_radps2=draw(st.floats(0.5, 20.0)),
+        angular_deceleration_radps2=draw(st.floats(0.5, 20.0)),
+        jerk_mps3=draw(st.floats(2.0, 1000.0)),
+    )
+    return Limiter(limits, draw(st.floats(0.1, 1.5)))
+
+
+TWISTS = st.builds(Twist2D, st.floats(-6.0, 6.0), st.floats(-12.0, 12.0))
+
+
+@st.composite
+def drives(draw: st.DrawFn) -> tuple[Limiter, list[MotionState], list[float]]:
+    """A drive through changing targets with irregular cycles, stops and reversals in it."""
+    limiter = draw(limiters())
+    states, steps_s = [MotionState(limiter.limit(draw(TWISTS)))], [0.0]
+    for target in draw(st.lists(st.one_of(TWISTS, st.just(Twist2D.ZERO)), min_size=1, max_size=4)):
+        for step_s in draw(st.lists(st.floats(1e-4, 0.1), min_size=1, max_size=12)):
+            states.append(limiter.step(states[-1], target, step_s))
+            steps_s.append(step_s)
+    return limiter, states, steps_s
+
+
+@property_of_all
+@given(drives())
+def test_on_every_drive_speed_and_acceleration_stay_within_their_limits(
+    driven: tuple[Limiter, list[MotionState], list[float]],
+) -> None:
+    limiter, states, steps_s = driven
+    limits = limiter.limits
+    slack = 1.0 + 1e-9
+    for (before, after), step_s in zip(pairwise(states), steps_s[1:], strict=True):
+        old, new = before.twist, after.twist
+        assert abs(new.linear_mps) <= limits.linear_mps * slack
+        assert abs(new.angular_radps) <= limits.angular_radps * slack
+        assert max(map(abs, wheel_speeds(new, limiter.track_m))) <= limiter.wheel_mps * slack
+        most_mps2 = limits.acceleration_mps2
+        if abs(new.linear_mps) < abs(old.linear_mps):
+            most_mps2 = limits.deceleration_mps2
+        assert abs(new.linear_mps - old.linear_mps) <= most_mps2 * step_s * slack + 1e-9
+        most_radps2 = limits.angular_acceleration_radps2
+        if abs(new.angular_radps) < abs(old.angular_radps):
+            most_radps2 = limits.angular_deceleration_radps2
+        assert abs(new.angular_radps - old.angular_radps) <= most_radps2 * step_s * slack + 1e-9
+        assert old.linear_mps * new.linear_mps >= 0.0  # never through zero within one step
+
+
+def ramp_s(limits: Limits, start: Twist2D, target: Twist2D) -> float:
+    """A bound by hand: each axis with its smaller limit, one after the other; twice the jerk's share; rounding."""
+    linear_mps2 = min(limits.acceleration_mps2, limits.deceleration_mps2)
+    angular_radps2 = min(limits.angular_acceleration_radps2, limits.angular_deceleration_radps2)
+    return (
+        abs(target.linear_mps - start.linear_mps) / linear_mps2
+        + abs(target.angular_radps - start.angular_radps) / angular_radps2
+        + 2.0 * max(limits.acceleration_mps2, limits.deceleration_mps2) / limits.jerk_mps3
+        + 5 * DT_S
+    )
+
+
+@property_of_all
+@given(limiters(), TWISTS, TWISTS)
+def test_every_target_is_reached_exactly_in_the_time_that_the_limits_allow(
+    limiter: Limiter, start: Twist2D, wanted: Twist2D
+) -> None:
+    begin, target = MotionState(limiter.limit(start)), limiter.limit(wanted)
+    most = math.ceil(ramp_s(limiter.limits, begin.twist, target) / DT_S)
+    assert steps_until(limiter, begin, wanted, most + 1) <= most
+
+
+@property_of_all
+@given(limiters(), TWISTS, st.floats(-5.0, 5.0))
+def test_a_stop_keeps_its_circle_its_time_and_its_distance(limiter: Limiter, start: Twist2D, slope: float) -> None:
+    limits, twist = limiter.limits, limiter.limit(start)
+    plain_s = max(
+        abs(twist.linear_mps) / limits.deceleration_mps2, abs(twist.angular_radps) / limits.angular_deceleration_radps2
+    )
+    jerk_s = limits.deceleration_mps2 / limits.jerk_mps3
+    states = drive(limiter, MotionState(twist, slope), Twist2D.ZERO, plain_s + jerk_s + 2 * DT_S)
+    assert states[-1] == MotionState.AT_REST
+    assert way(states) <= abs(twist.linear_mps) * (plain_s + jerk_s + DT_S) / 2.0 + 1e-9
+    for state in states:
+        assert state.twist.linear_mps * twist.angular_radps == pytest.approx(
+            state.twist.angular_radps * twist.linear_mps, rel=1e-9, abs=1e-12
+        )
+    speeds = [abs(speed) for speed in linear(states)]
+    assert speeds == sorted(speeds, reverse=True)
+
+
+@property_of_all
+@given(limiters(), TWISTS, st.floats(-5.0, 5.0))
+def test_an_emergency_stop_is_never_longer_than_an_ordinary_one(limiter: Limiter, start: Twist2D, slope: float) -> None:
+    begin = MotionState(limiter.limit(start), slope)
+    ordinary = steps_until(limiter, begin, Twist2D.ZERO, 10_000)
+    assert steps_until(limiter, begin, Twist2D.ZERO, 10_000, emergency=True) <= ordinary
+
+
+@property_of_all
+@given(limiters(), TWISTS, TWISTS)
+def test_neither_axis_passes_its_target_or_turns_back(limiter: Limiter, start: Twist2D, wanted: Twist2D) -> None:
+    states = drive(limiter, MotionState(limiter.limit(start)), wanted, 1.0)
+    for axis in (linear(states), [state.twist.angular_radps for state in states]):
+        changes = [later - earlier for earlier, later in pairwise(axis)]
+        assert min(max(changes), -min(changes)) <= 1e-12  # all of one sign
+
+
+@pytest.mark.parametrize(
+    ("speed_mps", "distance_mps"), list(product([0.0, 0.3, 1.0], [1e-300, 1e-15, 1e-9, 2e-9, 1e-6, 1e-3]))
+)
+def test_the_smallest_changes_arrive_exactly(speed_mps: float, distance_mps: float) -> None:
+    target = Twist2D(speed_mps - distance_mps, 0.0)
+    assert steps_until(LIMITER, MotionState(Twist2D(speed_mps, 0.0)), target, 10) <= 3
