@@ -114,7 +114,7 @@ class Axis:
         """Bring statusword, position, velocities and torque in the dictionary up to date."""
         values, base, motor, faults = self.dictionary.values, self._base << 8, self.motor, self.faults
         position, velocity = faults.frozen_position, faults.stuck_velocity
-        actual = self.scale.raw(motor.speed_mps) if velocity is None else velocity
+        actual = self.velocity() if velocity is None else velocity
         values[base + 0x6400] = self.position() if position is None else position
         values[base + 0x6C00] = actual
         values[base + 0x4100] = self._statusword(actual)
@@ -126,6 +126,10 @@ class Axis:
     def position(self) -> int:
         """6064h as the encoder has it."""
         return self.scale.counts(self.travel_m(), self.encoder_offset)
+
+    def velocity(self) -> int:
+        """606Ch as the drive measures it."""
+        return self.scale.raw(self.motor.speed_mps)
 
     # The state machine
 

@@ -1,0 +1,80 @@
+"""Faults by name, as the control socket and the campaigns order them. Each is a plain field or method of the node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from canbase_bench.cia402.axis import AxisFaults
+from canbase_bench.node import SimulatedNode
+
+DEFAULT_CODE = 0x7305
+"""603Fh of a fault without a code: encoder."""
+
+
+class FaultError(ValueError):
+    """The order names no known fault, no node or axis of this robot, or an argument that the fault does not take."""
+
+
+def _silent(node: SimulatedNode, now: float) -> None:
+    node.silent = True
+
+
+def _cut(node: SimulatedNode, now: float) -> None:
+    node.cut = True
+
+
+def _drive_fault(node: SimulatedNode, now: float, axis: int = 0, code: int = DEFAULT_CODE, holds: bool = False) -> None:
+    node.fail(axis, code, holds)
+
+
+def _power_cycle(node: SimulatedNode, now: float, off_s: float = 0.5) -> None:
+    node.power_cycle(now, off_s)
+
+
+def _frozen_encoder(node: SimulatedNode, now: float, axis: int = 0) -> None:
+    node.axes[axis].faults.frozen_position = node.axes[axis].position()
+
+
+def _stuck_velocity(node: SimulatedNode, now: float, axis: int = 0, raw: int | None = None) -> None:
+    node.axes[axis].faults.stuck_velocity = node.axes[axis].velocity() if raw is None else raw
+
+
+def _ignores_setpoints(node: SimulatedNode, now: float, axis: int = 0) -> None:
+    node.axes[axis].faults.ignores_setpoints = True
+
+
+def _heal(node: SimulatedNode, now: float) -> None:
+    node.silent = node.cut = False
+    for number, axis in enumerate(node.axes):
+        axis.faults = AxisFaults()
+        node.heal(number)
+
+
+KINDS: Mapping[str, Callable[..., None]] = {
+    "silent": _silent,
+    "cut": _cut,
+    "fault": _drive_fault,
+    "power_cycle": _power_cycle,
+    "frozen_encoder": _frozen_encoder,
+    "stuck_velocity": _stuck_velocity,
+    "ignores_setpoints": _ignores_setpoints,
+    "heal": _heal,
+}
+"""silent: sends nothing. cut: neither sends nor receives. fault: axis, code, holds. power_cycle: off_s.
+frozen_encoder: axis. stuck_velocity: axis, raw. ignores_setpoints: axis. heal: all of them are over; a drive fault
+still needs its reset."""
+
+
+def apply(nodes: Mapping[int, SimulatedNode], node: int, kind: str, now: float, arguments: Mapping[str, Any]) -> None:
+    """Make `nodes[node]` suffer `kind`. Raises FaultError and changes nothing when the order makes no sense."""
+    if node not in nodes:
+        raise FaultError(f"there is no node {node!r}, expected one of {sorted(nodes)}")
+    if kind not in KINDS:
+        raise FaultError(f"there is no fault {kind!r}, expected one of {', '.join(KINDS)}")
+    if not 0 <= arguments.get("axis", 0) < len(nodes[node].axes):
+        raise FaultError(f"node {node} has no axis {arguments['axis']!r}, expected below {len(nodes[node].axes)}")
+    try:
+        KINDS[kind](nodes[node], now, **arguments)
+    except TypeError as error:
+        raise FaultError(f"{kind} does not take {dict(arguments)}: {error}") from error
