@@ -25,6 +25,9 @@ from canbase_bench.plant.motor import AT_ONCE, Motor
 
 PROFILE_VELOCITY, CYCLIC_VELOCITY, NO_MODE = 3, 9, 0
 """6060h. Without a mode the drive does not enable."""
+_ENABLED = State.OPERATION_ENABLED
+_ALWAYS = int(Bit.VOLTAGE_ENABLED | Bit.REMOTE)
+_SATURATED, _REACHED, _SPECIFIC = int(Bit.INTERNAL_LIMIT), int(Bit.TARGET_REACHED), int(Bit.MODE_SPECIFIC)
 STAYS_IN_QUICK_STOP = range(5, 9)
 """605Ah: after the stop QUICK STOP ACTIVE stays, and transition 16 is open."""
 
@@ -59,7 +62,7 @@ class Axis:
     causes: set[int] = field(default_factory=set)
     """Error codes whose cause still holds; no fault reset before it is empty."""
     _base: int = field(default=0, init=False)
-    _error: int = field(default=0, init=False)
+    _state_bits: int = field(default=0, init=False)
     _pending: Transition | None = field(default=None, init=False)
     _halted: bool = field(default=False, init=False)
     _controlword: int = field(default=0, init=False)
@@ -72,6 +75,7 @@ class Axis:
             d.on_write(at + offset, lambda subindex, value: self._steer())
         d.on_write(at + 0x72, lambda subindex, value: self.motor.limit_force(value / 1000.0))
         d.guard(at + 0x60, self._check_mode)
+        d.on_write(at + 0x60, lambda subindex, value: self._show_mode())
 
     # What the node orders
 
@@ -83,13 +87,14 @@ class Axis:
         """Power on or NMT reset node: power stage off, everything forgotten."""
         self.motor.power_off()
         self.motor.limit_force(self._value(0x72) / 1000.0)
-        self.state, self._pending, self._controlword, self._halted = State.NOT_READY_TO_SWITCH_ON, None, 0, False
-        self._error = 0
+        self.state, self._state_bits = State.NOT_READY_TO_SWITCH_ON, State.NOT_READY_TO_SWITCH_ON.value
+        self._pending, self._controlword, self._halted = None, 0, False
+        self._show_mode()
         self.causes.clear()
 
     def fail(self, code: int) -> None:
         """A fault: transition 13, reaction by 605Eh, then 14. `code` is 603Fh and the EMCY code."""
-        self._error = code
+        self._put(0x3F, code)
         self.tell_error(code)
         if self.state in (State.FAULT_REACTION_ACTIVE, State.FAULT):
             return
@@ -120,8 +125,6 @@ class Axis:
         values[base + 0x4100] = self._statusword(actual)
         values[base + 0x6B00] = self.scale.raw(motor.demand_mps)
         values[base + 0x7700] = int(1000.0 * motor.force_n / motor.peak_force_n)
-        values[base + 0x6100] = values[base + 0x6000]
-        values[base + 0x3F00] = self._error
 
     def position(self) -> int:
         """6064h as the encoder has it."""
@@ -134,11 +137,13 @@ class Axis:
     # The state machine
 
     def _on_controlword(self, value: int) -> None:
+        if value == self._controlword and self.state is _ENABLED:
+            return
         rose = value & ~self._controlword & Bit.FAULT_RESET
         self._controlword = value
         if rose and self.state is State.FAULT and not self.causes:
-            self.tell_clear(self._error)
-            self._error = 0
+            self.tell_clear(self._value(0x3F))
+            self._put(0x3F, 0)
             self._go(after(self.state, Event.FAULT_RESET))
         self._obey()
 
@@ -179,6 +184,7 @@ class Axis:
     def _go(self, transition: Transition) -> None:
         """Take the new state; outside of the powered states the power stage is off."""
         before, self.state = self.state, transition.target
+        self._state_bits = self.state.value
         if self.state not in POWERED:
             self.motor.power_off()
         self.on_change(before, transition)
@@ -206,7 +212,7 @@ class Axis:
 
     def _steer(self) -> None:
         """Give the motor its goal: the target velocity, or zero while halt is set."""
-        if self.state is not State.OPERATION_ENABLED or self._pending is not None:
+        if self.state is not _ENABLED or self._pending is not None:
             return
         if self._halted:
             self._stop(self._value(0x5D), _stay)
@@ -235,28 +241,35 @@ class Axis:
     # What the bus sees
 
     def _statusword(self, actual: int) -> int:
-        word = self.state.value | Bit.VOLTAGE_ENABLED | Bit.REMOTE
+        word = self._state_bits | _ALWAYS
         if self.motor.saturated:
-            word |= Bit.INTERNAL_LIMIT
-        if self.state is State.OPERATION_ENABLED and self._value(0x60) == CYCLIC_VELOCITY:
-            return word if self._halted else word | Bit.MODE_SPECIFIC
+            word |= _SATURATED
+        if self.state is _ENABLED and self._value(0x60) == CYCLIC_VELOCITY:
+            return word if self._halted else word | _SPECIFIC
         if self._reached(actual):
-            word |= Bit.TARGET_REACHED
+            word |= _REACHED
         if self._value(0x60) == PROFILE_VELOCITY and abs(actual) <= self._value(0x6F):
-            word |= Bit.MODE_SPECIFIC
+            word |= _SPECIFIC
         return word
 
     def _reached(self, actual: int) -> bool:
         """Bit 10: the target is reached; in a halt and in QUICK STOP ACTIVE the target is zero."""
         if self.state is State.QUICK_STOP_ACTIVE or self._halted:
             return abs(actual) <= self._value(0x6F)
-        return self.state is State.OPERATION_ENABLED and abs(actual - self._value(0xFF)) <= self._value(0x6D)
+        return self.state is _ENABLED and abs(actual - self._value(0xFF)) <= self._value(0x6D)
 
     def _check_mode(self, subindex: int, value: int) -> None:
         if value not in (NO_MODE, PROFILE_VELOCITY, CYCLIC_VELOCITY):
             raise SdoAbortedError(abort.INVALID_VALUE)
         if self.state in POWERED and value != self._value(0x60):
             raise SdoAbortedError(abort.DEVICE_STATE)
+
+    def _show_mode(self) -> None:
+        self._put(0x61, self._value(0x60))
+
+    def _put(self, offset: int, value: int) -> None:
+        """Set object 60xxh of this axis."""
+        self.dictionary.values[(self._base + offset) << 8] = value
 
     def _value(self, offset: int) -> int:
         """The value of object 60xxh of this axis."""

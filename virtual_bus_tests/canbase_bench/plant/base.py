@@ -13,6 +13,11 @@ from math import cos, pi, sin
 
 from canbase_bench.plant.motor import Motor
 
+SWEEPS = 8
+"""Passes over both sides until friction's impulses settle; each passes on less than half of the last one's change."""
+AT_REST_MPS = 1e-7
+"""A side that friction leaves slower than this stands [m/s]."""
+
 
 @dataclass(frozen=True, slots=True)
 class PlantParameters:
@@ -38,7 +43,7 @@ class PlantParameters:
     """Share of the left rim's way that does not move the robot, below 1; negative: larger wheel than configured."""
     slip_right: float = 0.0
     """The same on the right."""
-    step_s: float = 0.001
+    step_s: float = 0.002
     """Fixed inner step [s]."""
 
     def __post_init__(self) -> None:
@@ -69,29 +74,6 @@ class MountedWheel:
 class Base:
     """The moving robot. All fields are ground truth: pose in the frame where it started, rim speeds, ways."""
 
-    __slots__ = (
-        "_cross",
-        "_h",
-        "_inverse_left",
-        "_inverse_right",
-        "_left",
-        "_parameters",
-        "_right",
-        "_standstill",
-        "_track",
-        "path_m",
-        "resting",
-        "time_of_motion",
-        "travel_left_m",
-        "travel_m",
-        "travel_right_m",
-        "v_left_mps",
-        "v_right_mps",
-        "x_m",
-        "y_m",
-        "yaw_rad",
-    )
-
     def __init__(
         self,
         parameters: PlantParameters,
@@ -101,11 +83,14 @@ class Base:
         right: Sequence[MountedWheel],
         now: float,
     ) -> None:
-        self._parameters, self._h = parameters, parameters.step_s
+        self._h = parameters.step_s
         self._track, self._standstill = track_m, standstill_mps
         self._left, self._right = ([(w.motor, float(w.direction)) for w in side] for side in (left, right))
-        self._invert_mass_matrix()
-        self.x_m = self.y_m = self.yaw_rad = 0.0
+        self._viscous_left, self._viscous_right = (parameters.viscous_nspm * len(side) for side in (left, right))
+        self._bound_left, self._bound_right = (parameters.coulomb_n * self._h * len(side) for side in (left, right))
+        self._grip_left, self._grip_right = 1.0 - parameters.slip_left, 1.0 - parameters.slip_right
+        self._invert_mass_matrix(parameters)
+        self.x_m = self.y_m = self.turned_rad = 0.0
         self.v_left_mps = self.v_right_mps = 0.0
         self.travel_left_m = self.travel_right_m = 0.0
         self.travel_m = self.path_m = 0.0
@@ -115,14 +100,17 @@ class Base:
     @property
     def v_mps(self) -> float:
         """True forward speed of the base."""
-        p = self._parameters
-        return (self.v_left_mps * (1.0 - p.slip_left) + self.v_right_mps * (1.0 - p.slip_right)) / 2.0
+        return (self.v_left_mps * self._grip_left + self.v_right_mps * self._grip_right) / 2.0
 
     @property
     def w_radps(self) -> float:
         """True yaw rate, counter-clockwise positive."""
-        p = self._parameters
-        return (self.v_right_mps * (1.0 - p.slip_right) - self.v_left_mps * (1.0 - p.slip_left)) / self._track
+        return (self.v_right_mps * self._grip_right - self.v_left_mps * self._grip_left) / self._track
+
+    @property
+    def yaw_rad(self) -> float:
+        """True heading, -π to π."""
+        return (self.turned_rad + pi) % (2.0 * pi) - pi
 
     @property
     def kinetic_energy_j(self) -> float:
@@ -134,62 +122,61 @@ class Base:
 
     def step(self, now: float) -> None:
         """Advance by one inner step that ends at `now`."""
-        vl, vr, h, p = self.v_left_mps, self.v_right_mps, self._h, self._parameters
-        push_left = push_right = 0.0
+        vl, vr, h = self.v_left_mps, self.v_right_mps, self._h
+        push_left, push_right = -self._viscous_left * vl, -self._viscous_right * vr
         for motor, direction in self._left:
             push_left += direction * motor.step(direction * vl)
         for motor, direction in self._right:
             push_right += direction * motor.step(direction * vr)
-        push_left -= p.viscous_nspm * len(self._left) * vl
-        push_right -= p.viscous_nspm * len(self._right) * vr
         a, b, c = self._inverse_left, self._inverse_right, self._cross
         new_left = vl + (a * push_left + c * push_right) * h
         new_right = vr + (c * push_left + b * push_right) * h
         self._move(*self._rub(new_left, new_right), now)
 
     def _rub(self, vl: float, vr: float) -> tuple[float, float]:
-        """Coulomb friction: sweeps over both sides until the impulses no longer change much. Each lowers the energy."""
+        """The speeds after Coulomb friction. While both sides slide on, both impulses are at their bounds."""
+        impulse_left = -self._bound_left if vl > 0.0 else self._bound_left
+        impulse_right = -self._bound_right if vr > 0.0 else self._bound_right
+        new_left = vl + self._inverse_left * impulse_left + self._cross * impulse_right
+        new_right = vr + self._cross * impulse_left + self._inverse_right * impulse_right
+        if new_left * vl > 0.0 and new_right * vr > 0.0:
+            return new_left, new_right
+        return self._stick(vl, vr)
+
+    def _stick(self, vl: float, vr: float) -> tuple[float, float]:
+        """The same where a side comes to rest: minimise the energy over one impulse after the other."""
         a, b, c = self._inverse_left, self._inverse_right, self._cross
-        bound = self._parameters.coulomb_n * self._h
-        bound_left, bound_right = bound * len(self._left), bound * len(self._right)
         impulse_left = impulse_right = 0.0
-        for _ in range(8):
-            wanted = impulse_left - vl / a
-            wanted = bound_left if wanted > bound_left else -bound_left if wanted < -bound_left else wanted
+        for _ in range(SWEEPS):
+            wanted = _clamp(impulse_left - vl / a, self._bound_left)
             change, impulse_left = wanted - impulse_left, wanted
-            vl += a * change
-            vr += c * change
-            wanted = impulse_right - vr / b
-            wanted = bound_right if wanted > bound_right else -bound_right if wanted < -bound_right else wanted
-            moved, impulse_right = wanted - impulse_right, wanted
-            vl += c * moved
-            vr += b * moved
-            if moved * c == 0.0 or (abs(vl) > 1e-6 and abs(vr) > 1e-6):
-                break
-        return (0.0 if abs(vl) < 1e-9 else vl), (0.0 if abs(vr) < 1e-9 else vr)
+            vl, vr = vl + a * change, vr + c * change
+            wanted = _clamp(impulse_right - vr / b, self._bound_right)
+            change, impulse_right = wanted - impulse_right, wanted
+            vl, vr = vl + c * change, vr + b * change
+        return (0.0 if abs(vl) < AT_REST_MPS else vl), (0.0 if abs(vr) < AT_REST_MPS else vr)
 
     def _move(self, vl: float, vr: float, now: float) -> None:
-        h = self._h
-        mean_left, mean_right = (self.v_left_mps + vl) * h / 2.0, (self.v_right_mps + vr) * h / 2.0
-        self.travel_left_m += mean_left
-        self.travel_right_m += mean_right
-        true_left = mean_left * (1.0 - self._parameters.slip_left)
-        true_right = mean_right * (1.0 - self._parameters.slip_right)
-        way, turn = (true_left + true_right) / 2.0, (true_right - true_left) / self._track
-        heading = self.yaw_rad + turn / 2.0
+        half = self._h / 2.0
+        left, right = (self.v_left_mps + vl) * half, (self.v_right_mps + vr) * half
+        self.travel_left_m += left
+        self.travel_right_m += right
+        left *= self._grip_left
+        right *= self._grip_right
+        way, turn = (left + right) / 2.0, (right - left) / self._track
+        heading = self.turned_rad + turn / 2.0
         self.x_m += way * cos(heading)
         self.y_m += way * sin(heading)
-        self.yaw_rad = (self.yaw_rad + turn + pi) % (2.0 * pi) - pi
+        self.turned_rad += turn
         self.travel_m += way
         self.path_m += abs(way)
-        self.resting = vl == 0.0 == vr and self.v_left_mps == 0.0 == self.v_right_mps
+        self.resting = vl == 0.0 == vr and left == 0.0 == right
         self.v_left_mps, self.v_right_mps = vl, vr
         if abs(vl) > self._standstill or abs(vr) > self._standstill:
             self.time_of_motion = now
 
-    def _invert_mass_matrix(self) -> None:
+    def _invert_mass_matrix(self, p: PlantParameters) -> None:
         """Kinetic energy = ½ (vl, vr) A (vl, vr)ᵀ; kept is the inverse of A."""
-        p = self._parameters
         body = p.mass_kg * p.payload_factor
         turning = body * p.yaw_gyration_m**2 / self._track**2
         left = body / 4.0 + turning + p.wheel_mass_kg * len(self._left)
@@ -198,3 +185,7 @@ class Base:
         determinant = left * right - cross * cross
         self._inverse_left, self._inverse_right = right / determinant, left / determinant
         self._cross = -cross / determinant
+
+
+def _clamp(value: float, bound: float) -> float:
+    return bound if value > bound else -bound if value < -bound else value

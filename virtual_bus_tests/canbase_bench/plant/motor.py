@@ -19,25 +19,6 @@ class Motor:
     Gains give a double pole at half of `bandwidth_radps` for the mass that the wheel carries.
     """
 
-    __slots__ = (
-        "_down",
-        "_dt",
-        "_integral",
-        "_ki_dt",
-        "_kp",
-        "_limit",
-        "_on_stopped",
-        "_stopping",
-        "_up",
-        "demand_mps",
-        "force_n",
-        "goal_mps",
-        "peak_force_n",
-        "powered",
-        "saturated",
-        "speed_mps",
-    )
-
     def __init__(self, mass_kg: float, bandwidth_radps: float, peak_force_n: float, dt: float) -> None:
         self._dt = dt
         self._kp = mass_kg * bandwidth_radps
