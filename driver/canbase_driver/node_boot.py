@@ -1,0 +1,121 @@
+"""Runs the boot sequence of one node against the bus: frames and the time go in, frames and the result come out."""
+
+from __future__ import annotations
+
+from canbase_config.robot import Drive, Robot
+from canbase_driver.boot import BootReport, boot
+from canbase_driver.boot_steps import BootError, Pause, SendNmt, Step, WaitBootUp
+from canbase_driver.cia301 import NmtState, nmt, parse_heartbeat
+from canbase_driver.frame import Frame
+from canbase_driver.sdo import Read, SdoClient, SdoError, Write
+
+SDO_ATTEMPTS = 3
+
+
+class NodeBoot:
+    """One boot of one node; for another try make a new one. `drives` are the axes of the node, one or two.
+
+    Give it every frame by `on_frame`, then, and at least every 10 ms, call `tick` and send what it returns. It has
+    ended when `report` or `error` is set. One boot takes about a hundred SDO transfers: calling `tick` right after
+    `on_frame` makes them follow each other without waiting.
+    """
+
+    def __init__(self, node_id: int, drives: tuple[Drive, ...], robot: Robot) -> None:
+        self.node_id = node_id
+        self.report: BootReport | None = None
+        self.error: BootError | None = None
+        self._name = f"node {node_id} ({', '.join(drive.joint for drive in drives)})"
+        self._sequence = boot(node_id, drives, robot)
+        self._client = SdoClient(node_id, robot.timeouts.sdo_s, SDO_ATTEMPTS)
+        self._step: Step | None = None
+        self._wake_at = 0.0
+        self._was_reset = False
+        self._outbox: list[Frame] = []
+
+    @property
+    def done(self) -> bool:
+        """Whether it has ended, well or not."""
+        return self.report is not None or self.error is not None
+
+    @property
+    def waiting_for(self) -> str:
+        """What the node is to do next, for people; empty when the boot has ended."""
+        return "" if self.done else f"waiting for {self._name}: {_awaited(self._step)}"
+
+    @property
+    def dropped(self) -> int:
+        """SDO frames of this node that answered nothing."""
+        return self._client.dropped
+
+    def on_frame(self, frame: Frame, now: float) -> None:
+        """Take a frame from the bus, at `now` [s, monotonic]; those of other nodes do nothing."""
+        if self.done or self._step is None:
+            return
+        if parse_heartbeat(frame) == (self.node_id, NmtState.INITIALISING):
+            self._on_boot_up(now)
+        elif isinstance(self._step, Read | Write):
+            self._outbox += self._client.on_frame(frame, now)
+            self._take_answer(now)
+
+    def tick(self, now: float) -> list[Frame]:
+        """Let time pass until `now` [s, monotonic]. The frames to send, in order. The first call begins the boot."""
+        if self._step is None:
+            if not self.done:
+                self._advance(None, now)
+        elif isinstance(self._step, Read | Write):
+            self._outbox += self._client.tick(now)
+            self._take_answer(now)
+        elif now >= self._wake_at:
+            self._advance(False, now)
+        frames, self._outbox = self._outbox, []
+        return frames
+
+    def _on_boot_up(self, now: float) -> None:
+        if isinstance(self._step, WaitBootUp):
+            self._advance(True, now)
+        elif self._was_reset:
+            problem = f"it started anew while it was being configured ({_awaited(self._step)} was due)"
+            self._end(error=BootError(self.node_id, problem, "Check its supply voltage; the boot begins again"))
+
+    def _take_answer(self, now: float) -> None:
+        if self._client.busy or self.done:
+            return
+        try:
+            answer = self._client.answer()
+        except SdoError as error:
+            self._advance(error, now)
+        else:
+            self._advance(answer, now)
+
+    def _advance(self, answer: bytes | bool | SdoError | None, now: float) -> None:
+        self._was_reset = self._was_reset or isinstance(self._step, WaitBootUp)
+        try:
+            step = self._sequence.throw(answer) if isinstance(answer, SdoError) else self._sequence.send(answer)
+        except StopIteration as end:
+            self._end(report=end.value)
+        except BootError as error:
+            self._end(error=error)
+        else:
+            self._begin(step, now)
+
+    def _begin(self, step: Step, now: float) -> None:
+        self._step = step
+        if isinstance(step, Read | Write):
+            self._outbox.append(self._client.start(step, now))
+        elif isinstance(step, SendNmt):
+            self._outbox.append(nmt(step.command, self.node_id))
+            self._advance(None, now)
+        else:
+            self._wake_at = now + (step.duration_s if isinstance(step, Pause) else step.timeout_s)
+
+    def _end(self, report: BootReport | None = None, error: BootError | None = None) -> None:
+        self.report, self.error = report, error
+        self._step = None
+
+
+def _awaited(step: Step | None) -> str:
+    if isinstance(step, Read | Write):
+        return f"the answer to {step}"
+    if isinstance(step, WaitBootUp):
+        return "its boot-up message"
+    return step.until if isinstance(step, Pause) else "the first step"

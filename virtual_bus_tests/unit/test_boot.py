@@ -1,0 +1,611 @@
+"""The boot of a node against a drive of a few lines that keeps CiA 301's rules for PDOs, in virtual time."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from canbase_config.robot import Drive, Identity, Robot
+from canbase_driver.frame import Frame
+from canbase_driver.node_boot import NodeBoot
+
+Key = tuple[int, int]
+OFF = 0x8000_0000
+
+NO_OBJECT, NO_SUB, READ_ONLY, WRITE_ONLY, UNSUPPORTED = 0x06020000, 0x06090011, 0x06010002, 0x06010001, 0x06010000
+INVALID, DEVICE_STATE = 0x06090030, 0x08000022
+
+
+def u8(value: int) -> bytes:
+    return value.to_bytes(1, "little")
+
+
+def u16(value: int) -> bytes:
+    return value.to_bytes(2, "little")
+
+
+def u32(value: int) -> bytes:
+    return value.to_bytes(4, "little")
+
+
+def factory_objects(axes: tuple[int, ...] = (0,), pdos: int = 4, consumers: int = 2) -> dict[Key, bytes]:
+    """What a drive has when it comes out of its box: every PDO on, with something else in it."""
+    objects = {
+        (0x1000, 0): u32(0x0002_0192),
+        (0x1016, 0): u8(consumers),
+        (0x1017, 0): u16(0),
+        (0x1018, 1): u32(0x1111),
+        (0x1018, 2): u32(0x2222),
+        (0x1018, 3): u32(0x0001_0002),
+        (0x1018, 4): u32(0x4444),
+        (0x1029, 1): u8(1),
+    }
+    objects |= {(0x1016, 1 + i): u32(0) for i in range(consumers)}
+    for axis in axes:
+        base = 0x6000 + 0x800 * axis
+        objects |= {(base + 0x07, 0): u16(0), (base + 0x40, 0): u16(0), (base + 0x41, 0): u16(0x0240)}
+        objects |= {(base + 0x5A, 0): u16(6), (base + 0x5E, 0): u16(0), (base + 0x60, 0): u8(1)}
+        objects |= {(base + 0x6C, 0): u32(0), (base + 0xFF, 0): u32(777)}
+        objects |= {(base + ramp, 0): u32(10) for ramp in (0x83, 0x84, 0x85)}
+    for i in range(pdos):
+        for communication, cob_id in ((0x1400, 0x4000_0200), (0x1800, 0x4000_0180)):
+            objects |= {(communication + i, 1): u32(cob_id + 0x100 * i + 1), (communication + i, 2): u8(254)}
+            objects |= {(communication + 0x200 + i, sub): u32(0) for sub in range(1, 5)}
+            objects |= {(communication + 0x200 + i, 0): u8(1), (communication + 0x200 + i, 1): u32(0x20000020)}
+    return objects
+
+
+@dataclass
+class FakeDrive:
+    """An SDO server with CiA 301's rules for PDOs. `refuse` aborts writes, `on_write` may have side effects."""
+
+    node_id: int = 1
+    objects: dict[Key, bytes] = field(default_factory=factory_objects)
+    refuse: dict[Key, int] = field(default_factory=dict)
+    refuse_read: dict[Key, int] = field(default_factory=dict)
+    on_write: dict[Key, Callable[["FakeDrive", bytes], None]] = field(default_factory=dict)
+    answers_nmt_reset: bool = True
+    powered: bool = True
+    writes: list[tuple[int, int, int]] = field(default_factory=list)
+    nmt: list[int] = field(default_factory=list)
+    transfers: int = 0
+
+    def on_frame(self, frame: Frame) -> list[Frame]:
+        if not self.powered:
+            return []
+        if frame.cob_id == 0x000 and frame.data[1] == self.node_id:
+            self.nmt.append(frame.data[0])
+            is_reset = frame.data[0] == 0x82 and self.answers_nmt_reset
+            return [Frame(0x700 + self.node_id, b"\0")] if is_reset else []
+        if frame.cob_id != 0x600 + self.node_id or frame.data[0] == 0x80:
+            return []
+        self.transfers += 1
+        return [Frame(0x580 + self.node_id, self._serve(frame.data))]
+
+    def _serve(self, data: bytes) -> bytes:
+        key = (int.from_bytes(data[1:3], "little"), data[3])
+        is_read = data[0] == 0x40
+        abort = self._abort_of_read(key) if is_read else self._write(key, data[4 : 8 - (data[0] >> 2 & 3)])
+        if abort:
+            return b"\x80" + data[1:4] + u32(abort)
+        if is_read:
+            value = self.objects[key]
+            return u8(0x43 | (4 - len(value)) << 2) + data[1:4] + value.ljust(4, b"\0")
+        return b"\x60" + data[1:4] + bytes(4)
+
+    def _abort_of_read(self, key: Key) -> int:
+        if key in self.objects:
+            return self.refuse_read.get(key, 0)
+        return NO_SUB if any(key[0] == index for index, _ in self.objects) else NO_OBJECT
+
+    def _write(self, key: Key, data: bytes) -> int:
+        missing = key not in self.objects and self._abort_of_read(key)
+        abort = missing or self.refuse.get(key) or self._refused_by_pdo_rules(key, data)
+        if not abort:
+            self.objects[key] = data
+            self.writes.append((*key, int.from_bytes(data, "little")))
+            if key in self.on_write:
+                self.on_write[key](self, data)
+        return abort
+
+    def _refused_by_pdo_rules(self, key: Key, data: bytes) -> int:
+        index, sub = key
+        if index in range(0x1600, 0x1800) or index in range(0x1A00, 0x1C00):
+            is_on = not self.number(index - 0x200, 1) & OFF
+            return UNSUPPORTED if is_on or (sub and self.number(index, 0)) else 0
+        if index in range(0x1400, 0x1C00) and sub == 1:
+            new, old = int.from_bytes(data, "little"), self.number(index, 1)
+            changes_id = not (new | old) & OFF and (new ^ old) & 0x7FF
+            is_empty = not new & OFF and not self.number(index + 0x200, 0)
+            return INVALID if changes_id or is_empty or (new ^ old) & 0x4000_0000 else 0
+        return 0
+
+    def number(self, index: int, sub: int = 0) -> int:
+        return int.from_bytes(self.objects[index, sub], "little")
+
+
+class Bench:
+    """One node's boot and its drive, joined by a wire without delay; the clock moves in steps of 10 ms."""
+
+    def __init__(self, drive: FakeDrive, robot: Robot, drives: tuple[Drive, ...] | None = None) -> None:
+        self.boot = NodeBoot(drive.node_id, drives or robot.drives[:1], robot)
+        self.drive = drive
+        self.now = 100.0
+
+    def run(self, seconds: float = 30.0) -> NodeBoot:
+        for _ in range(round(seconds / 0.01)):
+            self._exchange()
+            if self.boot.done:
+                break
+            self.now += 0.01
+        return self.boot
+
+    def _exchange(self) -> None:
+        while sent := self.boot.tick(self.now):
+            for frame in sent:
+                for answer in self.drive.on_frame(frame):
+                    self.boot.on_frame(answer, self.now)
+
+
+def robot(**identity: int) -> Robot:
+    wheel = {"gear_ratio": 20.0, "counts_per_motor_rev": 4096}
+    return Robot.model_validate(
+        {
+            "bus": {"interface": "virtual", "channel": "test"},
+            "drives": (
+                {"joint": "left", "node_id": 1, "side": "left", "identity": Identity(**identity), **wheel},
+                {"joint": "right", "node_id": 1, "axis": 1, "side": "right", "direction": -1, **wheel},
+            ),
+            "base": {"wheel_radius_m": 0.1, "track_m": 0.5},
+            "limits": {
+                "linear_mps": 1.0,
+                "angular_radps": 2.0,
+                "acceleration_mps2": 0.5,
+                "deceleration_mps2": 0.5,
+                "emergency_deceleration_mps2": 1.5,
+                "angular_acceleration_radps2": 2.0,
+                "angular_deceleration_radps2": 6.0,
+            },
+            "safety": {
+                "footprint": {"front_m": 0.3, "rear_m": 0.3, "left_m": 0.3, "right_m": 0.3},
+                "scan": {"required": False},
+                "estop": {"required": False},
+            },
+            "lease": {"socket": "/run/test/lease"},
+        }
+    )
+
+
+def boot_one_axis(drive: FakeDrive) -> NodeBoot:
+    return Bench(drive, robot()).run()
+
+
+def error_of(boot: NodeBoot) -> str:
+    assert boot.report is None
+    assert boot.error is not None
+    return str(boot.error)
+
+
+def notes_of(boot: NodeBoot) -> tuple[str, ...]:
+    assert boot.error is None
+    assert boot.report is not None
+    return boot.report.notes
+
+
+def test_a_drive_out_of_its_box_is_made_ready_without_a_note() -> None:
+    drive = FakeDrive()
+    bench = Bench(drive, robot())
+    boot = bench.run()
+    assert notes_of(boot) == ()
+    assert boot.report is not None
+    assert boot.report.stops_by_itself
+    assert boot.report.identity == Identity(vendor_id=0x1111, product_code=0x2222, revision=0x10002, serial=0x4444)
+    assert drive.nmt == [0x82, 0x80]  # reset communication, enter pre-operational; starting it is not ours
+    assert boot.waiting_for == ""
+    assert bench.now == 100.0  # nothing had to be waited for
+
+
+def test_every_write_in_its_order() -> None:
+    drive = FakeDrive()
+    boot_one_axis(drive)
+    assert drive.writes == [
+        # how it moves: the target of an earlier life is gone before anything can enable the drive
+        (0x6060, 0, 3),
+        (0x60FF, 0, 0),
+        (0x6083, 0, 2865),  # 1.5 m/s² at the rim in rpm/s: harder than 0.5 + 2.0 × 0.25 of a curve
+        (0x6084, 0, 3820),  # 0.5 + 6.0 × 0.25 = 2.0 m/s²
+        (0x6085, 0, 2865),
+        # heartbeat every 100 ms; watchdog and driver are watched with 300 ms
+        (0x1017, 0, 100),
+        (0x1016, 1, 0x007E_012C),
+        (0x1016, 2, 0x007F_012C),
+        (0x1029, 1, 0),
+        (0x6007, 0, 3),
+        (0x605A, 0, 2),
+        (0x605E, 0, 2),
+        # every PDO off, bit 30 kept
+        (0x1400, 1, 0xC000_0201),
+        (0x1401, 1, 0xC000_0301),
+        (0x1402, 1, 0xC000_0401),
+        (0x1403, 1, 0xC000_0501),
+        (0x1800, 1, 0xC000_0181),
+        (0x1801, 1, 0xC000_0281),
+        (0x1802, 1, 0xC000_0381),
+        (0x1803, 1, 0xC000_0481),
+        # RPDO1: 6040h, 60FFh with SYNC
+        (0x1600, 0, 0),
+        (0x1600, 1, 0x6040_0010),
+        (0x1600, 2, 0x60FF_0020),
+        (0x1600, 0, 2),
+        (0x1400, 2, 1),
+        (0x1400, 1, 0x4000_0201),
+        # RPDO4: 6040h at once, for the watchdog's quick stop
+        (0x1603, 0, 0),
+        (0x1603, 1, 0x6040_0010),
+        (0x1603, 0, 1),
+        (0x1403, 2, 255),
+        (0x1403, 1, 0x4000_0501),
+        # TPDO1: 6041h, 6064h
+        (0x1A00, 0, 0),
+        (0x1A00, 1, 0x6041_0010),
+        (0x1A00, 2, 0x6064_0020),
+        (0x1A00, 0, 2),
+        (0x1800, 2, 1),
+        (0x1800, 1, 0x4000_0181),
+        # TPDO2: 606Ch
+        (0x1A01, 0, 0),
+        (0x1A01, 1, 0x606C_0020),
+        (0x1A01, 0, 1),
+        (0x1801, 2, 1),
+        (0x1801, 1, 0x4000_0281),
+    ]
+
+
+def test_unused_pdos_are_off_in_the_end_even_those_beyond_the_fourth() -> None:
+    drive = FakeDrive(objects=factory_objects(pdos=8))
+    boot_one_axis(drive)
+    off = [index for index in (*range(0x1400, 0x1408), *range(0x1800, 0x1808)) if drive.number(index, 1) & OFF]
+    assert off == [0x1401, 0x1402, 0x1404, 0x1405, 0x1406, 0x1407, *range(0x1802, 0x1808)]
+
+
+def test_two_axes_on_one_node() -> None:
+    drive = FakeDrive(objects=factory_objects(axes=(0, 1)))
+    both = robot()
+    boot = Bench(drive, both, drives=both.drives[::-1]).run()
+    assert notes_of(boot) == ()
+    assert [drive.number(0x1600, sub) for sub in range(3)] == [2, 0x6040_0010, 0x60FF_0020]
+    assert [drive.number(0x1601, sub) for sub in range(3)] == [2, 0x6840_0010, 0x68FF_0020]
+    assert [drive.number(0x1603, sub) for sub in range(3)] == [2, 0x6040_0010, 0x6840_0010]
+    assert [drive.number(0x1A02, sub) for sub in range(3)] == [2, 0x6841_0010, 0x6864_0020]
+    assert [drive.number(index) for index in (0x6807, 0x685A, 0x685E, 0x6860, 0x68FF)] == [3, 2, 2, 3, 0]
+    assert [drive.number(index, 1) for index in (0x1401, 0x1802, 0x1803)] == [0x4000_0301, 0x4000_0381, 0x4000_0481]
+
+
+def test_a_boot_is_about_a_hundred_transfers() -> None:
+    drive = FakeDrive()
+    boot_one_axis(drive)
+    assert drive.transfers <= 120
+
+
+def test_a_second_boot_of_the_same_drive_changes_nothing() -> None:
+    drive = FakeDrive()
+    boot_one_axis(drive)
+    before = dict(drive.objects)
+    boot_one_axis(drive)
+    assert drive.objects == before
+
+
+# -- waiting
+
+
+def test_a_missing_drive_is_waited_for_and_may_come_late() -> None:
+    drive = FakeDrive(powered=False)
+    bench = Bench(drive, robot())
+    boot = bench.run(seconds=20.0)
+    assert not boot.done
+    assert boot.waiting_for == "waiting for node 1 (left): the answer to 1000h:0"
+    drive.powered = True
+    bench.run(seconds=1.0)
+    assert boot.report is not None
+
+
+def test_a_stopped_node_is_sent_to_pre_operational_to_be_heard() -> None:
+    drive = FakeDrive()
+    bench = Bench(drive, robot())
+    serve = drive.on_frame
+
+    def stopped_at_first(frame: Frame) -> list[Frame]:
+        is_deaf = 0x80 not in drive.nmt and frame.cob_id != 0x000
+        return [] if is_deaf else serve(frame)
+
+    drive.on_frame = stopped_at_first  # type: ignore[method-assign]
+    boot = bench.run()
+    assert boot.report is not None
+    assert drive.nmt == [0x80, 0x82, 0x80]
+
+
+def test_a_boot_up_message_that_never_comes_is_a_note() -> None:
+    bench = Bench(FakeDrive(answers_nmt_reset=False), robot())
+    assert bench.run(seconds=4.9).waiting_for == "waiting for node 1 (left): its boot-up message"
+    assert notes_of(bench.run()) == ("no boot-up message within 5 s of NMT reset communication",)
+
+
+def test_a_drive_that_falls_silent_in_the_middle_is_an_error_that_names_the_object() -> None:
+    drive = FakeDrive(on_write={(0x6060, 0): lambda drive, _: setattr(drive, "powered", False)})
+    boot = boot_one_axis(drive)
+    assert error_of(boot) == (
+        "node 1: 6060h:0: no answer to 3 requests, 0.3 s each. "
+        "Check power, cable and bit rate, and that no other program uses the SDO channel of this node."
+    )
+
+
+def test_a_drive_that_starts_anew_in_the_middle_has_forgotten_everything() -> None:
+    drive = FakeDrive(on_write={(0x6060, 0): lambda drive, _: setattr(drive, "powered", False)})
+    bench = Bench(drive, robot())
+    bench.run(seconds=0.2)
+    bench.boot.on_frame(Frame(0x701, b"\0"), bench.now)
+    assert "it started anew while it was being configured" in error_of(bench.boot)
+    assert bench.boot.tick(bench.now + 10.0) == []
+
+
+def test_boot_up_messages_before_the_reset_are_normal() -> None:
+    drive = FakeDrive(powered=False)
+    bench = Bench(drive, robot())
+    bench.run(seconds=0.1)
+    bench.boot.on_frame(Frame(0x701, b"\0"), bench.now)  # its boot loader
+    bench.boot.on_frame(Frame(0x701, b"\0"), bench.now)  # its firmware
+    drive.powered = True
+    assert bench.run().report is not None
+
+
+# -- who it is
+
+
+def test_the_configured_identity_is_compared() -> None:
+    boot = Bench(FakeDrive(), robot(vendor_id=0x1111, product_code=0x9999)).run()
+    assert error_of(boot) == (
+        "node 1: 1018h:2 (product_code) is 00002222h, expected 00009999h. "
+        "Another drive has this node id, or `identity` in robot.yaml is wrong."
+    )
+
+
+def test_nothing_is_written_to_the_wrong_drive() -> None:
+    drive = FakeDrive()
+    Bench(drive, robot(vendor_id=1)).run()
+    assert (drive.writes, drive.nmt) == ([], [])
+
+
+def test_an_identity_that_the_drive_does_not_have() -> None:
+    drive = FakeDrive()
+    del drive.objects[0x1018, 4]
+    assert "1018h:4 (serial) is missing, expected 00000007h" in error_of(Bench(drive, robot(serial=7)).run())
+
+
+def test_a_strange_device_type_is_a_note_only() -> None:
+    drive = FakeDrive()
+    drive.objects[0x1000, 0] = u32(0x000F_0191)
+    assert notes_of(boot_one_axis(drive)) == ("1000h:0 is 000F0191h, not the profile 402 (0192h) of a motor drive",)
+
+
+# -- a drive that is still running
+
+
+def running_drive(after_quick_stop: int) -> FakeDrive:
+    """A drive at 955 rpm in operation enabled, that takes 10 readings of 606Ch to stop."""
+    drive = FakeDrive()
+    drive.objects[0x6041, 0] = u16(0x1637)
+    drive.objects[0x606C, 0] = u32(955)
+
+    def control(drive: FakeDrive, data: bytes) -> None:
+        drive.objects[0x6041, 0] = u16({0x02: after_quick_stop, 0x00: 0x0240}[data[0]])
+        drive.objects[0x606C, 0] = u32(0)
+
+    drive.on_write[0x6040, 0] = control
+    return drive
+
+
+def test_a_running_drive_is_quick_stopped_before_its_communication_is_reset() -> None:
+    drive = running_drive(after_quick_stop=0x0240)
+    assert boot_one_axis(drive).report is not None
+    assert drive.writes[:2] == [(0x6040, 0, 0x02), (0x6060, 0, 3)]
+
+
+def test_a_drive_that_stays_in_quick_stop_is_disabled_when_it_stands() -> None:
+    drive = running_drive(after_quick_stop=0x0217)
+    bench = Bench(drive, robot())
+    assert bench.run().report is not None
+    assert drive.writes[:2] == [(0x6040, 0, 0x02), (0x6040, 0, 0x00)]
+    assert bench.now == pytest.approx(100.1, abs=0.011)  # five polls of 20 ms
+
+
+def test_a_drive_that_is_switched_on_but_not_enabled_is_disabled() -> None:
+    drive = FakeDrive()
+    drive.objects[0x6041, 0] = u16(0x0233)
+    assert boot_one_axis(drive).report is not None
+    assert drive.writes[0] == (0x6040, 0, 0x00)
+
+
+def test_a_drive_that_does_not_stop_loses_its_voltage_and_is_an_error() -> None:
+    drive = FakeDrive()
+    drive.objects[0x6041, 0] = u16(0x1637)
+    drive.objects[0x606C, 0] = u32(2**32 - 955)  # backward
+    bench = Bench(drive, robot())
+    boot = bench.run()
+    assert "left did not stand 3 s after a quick stop. Its voltage is now disabled" in error_of(boot)
+    assert drive.nmt == [0x80]
+    assert drive.writes == [(0x6040, 0, 0x02), (0x6040, 0, 0x00)]
+    assert bench.now == pytest.approx(103.0, abs=0.02)
+
+
+def test_both_axes_get_their_quick_stop_before_either_is_waited_for() -> None:
+    drive = FakeDrive(objects=factory_objects(axes=(0, 1)))
+    drive.objects[0x6041, 0] = drive.objects[0x6841, 0] = u16(0x1637)
+    drive.objects[0x606C, 0] = drive.objects[0x686C, 0] = u32(955)
+    both = robot()
+    Bench(drive, both, drives=both.drives).run(seconds=1.0)
+    assert drive.writes == [(0x6040, 0, 0x02), (0x6840, 0, 0x02)]
+
+
+# -- what real drives lack
+
+
+@pytest.mark.parametrize(
+    ("index", "sub", "note"),
+    [
+        (0x1017, 0, "1017h:0: 0602 0000h the object does not exist"),
+        (0x1029, 1, "1029h:1: 0602 0000h the object does not exist"),
+        (0x605A, 0, "605Ah:0: 0602 0000h the object does not exist"),
+        (0x605E, 0, "605Eh:0: 0602 0000h the object does not exist"),
+        (0x6084, 0, "6084h:0: 0602 0000h the object does not exist"),
+    ],
+)
+def test_a_missing_option_is_a_note(index: int, sub: int, note: str) -> None:
+    drive = FakeDrive()
+    del drive.objects[index, sub]
+    boot = boot_one_axis(drive)
+    assert notes_of(boot) == (note,)
+    assert boot.report is not None
+    assert boot.report.stops_by_itself
+
+
+def test_a_drive_without_6007h_does_not_stop_by_itself() -> None:
+    drive = FakeDrive()
+    del drive.objects[0x6007, 0]
+    boot = boot_one_axis(drive)
+    assert notes_of(boot) == ("6007h:0: 0602 0000h the object does not exist",)
+    assert boot.report is not None
+    assert not boot.report.stops_by_itself
+
+
+def test_a_drive_without_1016h_does_not_stop_by_itself() -> None:
+    drive = FakeDrive()
+    for sub in range(3):
+        del drive.objects[0x1016, sub]
+    boot = boot_one_axis(drive)
+    assert notes_of(boot) == ("1016h: the drive watches no heartbeat, it will not stop by itself",)
+    assert boot.report is not None
+    assert not boot.report.stops_by_itself
+
+
+def test_with_one_entry_the_watchdog_is_watched() -> None:
+    drive = FakeDrive(objects=factory_objects(consumers=1))
+    boot = boot_one_axis(drive)
+    assert drive.number(0x1016, 1) == 0x007E_012C
+    assert boot.report is not None
+    assert boot.report.stops_by_itself
+
+
+def test_stored_entries_of_an_earlier_life_go_first() -> None:
+    drive = FakeDrive(objects=factory_objects(consumers=4))
+    drive.objects |= {(0x1016, 1): u32(0x007F_0064), (0x1016, 2): u32(0x007E_0064), (0x1016, 4): u32(0x0001_0064)}
+    boot_one_axis(drive)
+    consumers = [(sub, value) for index, sub, value in drive.writes if index == 0x1016]
+    assert consumers == [(2, 0), (4, 0), (1, 0x007E_012C), (2, 0x007F_012C)]
+
+
+def test_an_option_that_the_drive_changes_is_a_note() -> None:
+    def clamp(drive: FakeDrive, _: bytes) -> None:
+        drive.objects[0x6083, 0] = u32(1000)
+
+    assert notes_of(boot_one_axis(FakeDrive(on_write={(0x6083, 0): clamp}))) == (
+        "6083h:0 is 000003E8h, expected 00000B31h",
+    )
+
+
+def test_a_read_only_option_passes_when_it_is_right_and_is_a_note_when_not() -> None:
+    drive = FakeDrive(refuse={(0x605A, 0): READ_ONLY, (0x605E, 0): READ_ONLY})
+    drive.objects[0x605A, 0] = u16(2)
+    assert notes_of(boot_one_axis(drive)) == ("605Eh:0 is 0000h, expected 0002h (0601 0002h the object is read-only)",)
+
+
+def test_a_mode_that_can_only_be_written_is_believed() -> None:
+    assert notes_of(boot_one_axis(FakeDrive(refuse_read={(0x6060, 0): WRITE_ONLY}))) == ()
+
+
+def test_a_fixed_mapping_that_is_right_is_left_alone() -> None:
+    fixed = {(0x1A01, sub): READ_ONLY for sub in range(5)}
+    drive = FakeDrive(refuse=fixed)
+    drive.objects |= {(0x1A01, 0): u8(1), (0x1A01, 1): u32(0x606C_0020)}
+    assert notes_of(boot_one_axis(drive)) == ()
+
+
+# -- what no drive may lack
+
+
+@pytest.mark.parametrize(
+    ("key", "abort", "problem", "hint"),
+    [
+        ((0x6060, 0), INVALID, "6060h:0: 0609 0030h value not valid", "must support profile velocity"),
+        ((0x60FF, 0), DEVICE_STATE, "60FFh:0: 0800 0022h", "Switch the drive off and on again"),
+        ((0x1600, 2), 0x06040041, "1600h:2: 0604 0041h the object cannot be mapped", "the manual of the drive"),
+        ((0x1A00, 0), READ_ONLY, "1A00h:0: 0601 0002h the object is read-only", "the manual of the drive"),
+    ],
+)
+def test_a_refused_necessity_is_an_error(key: Key, abort: int, problem: str, hint: str) -> None:
+    text = error_of(boot_one_axis(FakeDrive(refuse={key: abort})))
+    assert problem in text
+    assert hint in text
+
+
+def test_a_target_that_does_not_become_0_is_an_error() -> None:
+    def stuck(drive: FakeDrive, _: bytes) -> None:
+        drive.objects[0x60FF, 0] = u32(777)
+
+    text = error_of(boot_one_axis(FakeDrive(on_write={(0x60FF, 0): stuck})))
+    assert "60FFh:0 is 00000309h, expected 00000000h" in text
+
+
+def test_a_mapping_that_reads_back_differently_is_an_error() -> None:
+    def other(drive: FakeDrive, _: bytes) -> None:
+        drive.objects[0x1A00, 2] = u32(0x6063_0020)
+
+    text = error_of(boot_one_axis(FakeDrive(on_write={(0x1A00, 2): other})))
+    assert "TPDO1 reads back another mapping than was written to 1A00h" in text
+
+
+def test_a_missing_pdo_is_an_error() -> None:
+    text = error_of(boot_one_axis(FakeDrive(objects=factory_objects(pdos=3))))
+    assert "it has no RPDO4 (1403h)" in text
+
+
+def test_an_unused_pdo_that_stays_on_is_a_note() -> None:
+    boot = boot_one_axis(FakeDrive(refuse={(0x1402, 1): READ_ONLY}))
+    assert notes_of(boot) == ("1402h:1 is 40000401h, expected C0000401h (0601 0002h the object is read-only)",)
+
+
+# -- anything may be on the bus
+
+frames = st.builds(
+    Frame, st.sampled_from([0x000, 0x080, 0x081, 0x181, 0x581, 0x601, 0x701, 0x77E]), st.binary(max_size=8)
+)
+
+
+@settings(max_examples=50)
+@given(st.lists(st.lists(frames, max_size=4), max_size=150))
+def test_no_frame_raises(noise: list[list[Frame]]) -> None:
+    drive = FakeDrive()
+    boot = NodeBoot(1, robot().drives[:1], robot())
+    for cycle, strays in enumerate(noise):
+        now = 0.01 * cycle
+        for frame in [answer for sent in boot.tick(now) for answer in drive.on_frame(sent)] + strays:
+            boot.on_frame(frame, now)
+
+
+def test_a_frame_before_the_first_tick_does_nothing() -> None:
+    boot = NodeBoot(1, robot().drives[:1], robot())
+    boot.on_frame(Frame(0x701, b"\0"), now=0.0)
+    assert boot.tick(now=0.0) == [Frame(0x601, bytes.fromhex("40 00 10 00 00 00 00 00"))]
+
+
+def test_other_answers_on_the_channel_are_counted() -> None:
+    boot = NodeBoot(1, robot().drives[:1], robot())
+    boot.tick(now=0.0)
+    boot.on_frame(Frame(0x581, bytes.fromhex("4B 41 60 00 37 06 00 00")), now=0.0)
+    assert boot.dropped == 1
+
+
+def test_axes_that_no_node_has_raise_at_once() -> None:
+    with pytest.raises(ValueError, match="axes"):
+        NodeBoot(1, (), robot())
