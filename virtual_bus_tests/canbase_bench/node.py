@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from canopen import SdoAbortedError
 
@@ -83,6 +84,9 @@ class SimulatedNode:
         d.on_write(0x1010, lambda subindex, value: self._store(keep=True))
         d.on_write(0x1011, lambda subindex, value: self._store(keep=False))
         d.on_write(0x1005, lambda subindex, value: self._route())
+        for n in range(4):
+            d.on_write(0x1400 + n, partial(self._pdo_written, self._rpdos[n]))
+            d.on_write(0x1800 + n, partial(self._pdo_written, self._tpdos[n]))
         self._power_up(now, 0.0)
 
     # The bus
@@ -152,13 +156,21 @@ class SimulatedNode:
         pdos: list[Rpdo | Tpdo] = [*self._rpdos, *self._tpdos]
         for pdo in pdos:
             pdo.start() if state is NmtState.OPERATIONAL else pdo.stop()
+        self._list_pdos()
+        self._producer.restart()
+        if state is NmtState.STOPPED:
+            self._abort_connection(COMMUNICATION_FAULT)
+
+    def _pdo_written(self, pdo: Rpdo | Tpdo, subindex: int, value: int) -> None:
+        """In OPERATIONAL the only write that passes the guard switches the PDO off; elsewhere it is off anyway."""
+        pdo.stop()
+        self._list_pdos()
+
+    def _list_pdos(self) -> None:
         self._on_sync_tpdos = [t for t in self._tpdos if t.on_sync_active]
         self._on_event_tpdos = [t for t in self._tpdos if t.on_event_active]
         self._active_rpdos = [r for r in self._rpdos if r.cob_id is not None]
         self._route()
-        self._producer.restart()
-        if state is NmtState.STOPPED:
-            self._abort_connection(COMMUNICATION_FAULT)
 
     def _boot(self) -> None:
         self._enter(NmtState.PRE_OPERATIONAL)

@@ -22,6 +22,9 @@ EDS_FILE = "eds/canbase_cia402.eds"
 AXIS_STRIDE = 0x800
 """Objects of axis n are at 6000h + n × 800h (CiA 402-1)."""
 
+VOLATILE = frozenset({0x1003, 0x6040, 0x60FF, 0x6840, 0x68FF})
+"""Writable objects that 1010h does not keep: error history, controlwords and targets."""
+
 CODECS = {
     datatypes.INTEGER8: "b",
     datatypes.INTEGER16: "h",
@@ -127,7 +130,7 @@ class Dictionary:
 
     def save(self) -> None:
         """Keep the writable values over resets and power cycles, as 1010h:1 orders."""
-        self._saved = {k: v for k, v in self.values.items() if self.entries[k].writable}
+        self._saved = {k: v for k, v in self.values.items() if self.entries[k].writable and k >> 8 not in VOLATILE}
 
     def forget(self) -> None:
         """Drop what was saved, as 1011h:1 orders; it counts from the next reset."""

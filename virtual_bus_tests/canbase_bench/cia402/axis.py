@@ -63,6 +63,7 @@ class Axis:
     """Error codes whose cause still holds; no fault reset before it is empty."""
     _base: int = field(default=0, init=False)
     _state_bits: int = field(default=0, init=False)
+    _told: list[int] = field(default_factory=list, init=False)
     _pending: Transition | None = field(default=None, init=False)
     _halted: bool = field(default=False, init=False)
     _controlword: int = field(default=0, init=False)
@@ -84,17 +85,19 @@ class Axis:
         self._go(after(self.state, Event.BOOTED))
 
     def restart(self) -> None:
-        """Power on or NMT reset node: power stage off, everything forgotten."""
+        """Transition 0, power on or NMT reset node: power stage off, everything forgotten."""
         self.motor.power_off()
         self.motor.limit_force(self._value(0x72) / 1000.0)
-        self.state, self._state_bits = State.NOT_READY_TO_SWITCH_ON, State.NOT_READY_TO_SWITCH_ON.value
+        self._go(Transition(0, State.NOT_READY_TO_SWITCH_ON))
         self._pending, self._controlword, self._halted = None, 0, False
         self._show_mode()
         self.causes.clear()
+        self._told.clear()
 
     def fail(self, code: int) -> None:
         """A fault: transition 13, reaction by 605Eh, then 14. `code` is 603Fh and the EMCY code."""
         self._put(0x3F, code)
+        self._told.append(code)
         self.tell_error(code)
         if self.state in (State.FAULT_REACTION_ACTIVE, State.FAULT):
             return
@@ -142,10 +145,15 @@ class Axis:
         rose = value & ~self._controlword & Bit.FAULT_RESET
         self._controlword = value
         if rose and self.state is State.FAULT and not self.causes:
-            self.tell_clear(self._value(0x3F))
-            self._put(0x3F, 0)
-            self._go(after(self.state, Event.FAULT_RESET))
+            self._reset_fault()
         self._obey()
+
+    def _reset_fault(self) -> None:
+        for code in self._told:
+            self.tell_clear(code)
+        self._told.clear()
+        self._put(0x3F, 0)
+        self._go(after(self.state, Event.FAULT_RESET))
 
     def _obey(self) -> None:
         """The controlword is a level: obey it until it changes nothing more."""
@@ -217,7 +225,7 @@ class Axis:
         if self._halted:
             self._stop(self._value(0x5D), _stay)
         elif self.faults.ignores_setpoints:
-            self.motor.run(self.motor.goal_mps, AT_ONCE, AT_ONCE)
+            return
         elif self._value(0x60) == CYCLIC_VELOCITY:
             self.motor.run(self._value(0xFF) * self.scale.mps_per_raw, AT_ONCE, AT_ONCE)
         else:
