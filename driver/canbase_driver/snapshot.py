@@ -122,3 +122,17 @@ class DriverSnapshot:
     """REP 105."""
     base_frame: str = "base_link"
     """REP 105."""
+
+
+@dataclass(frozen=True, slots=True)
+class StopRecord:
+    """One stop of a moving or enabled base, for the topic stop_events."""
+
+    stopped_by: str
+    """motor_driver or watchdog."""
+    cause: str
+    detail: str
+    """One sentence with the values."""
+    latched: bool
+    """It needs a reset."""
+    clears_on: str

@@ -1,0 +1,86 @@
+"""One axis at run time: what its drive said last, in SI, and the setpoint frame for the next cycle. Decides nothing."""
+
+from __future__ import annotations
+
+import math
+
+from canbase_config.robot import Drive, Robot
+from canbase_driver.cia402 import DriveState, PowerGoal, decode_statusword, next_controlword
+from canbase_driver.frame import Frame
+from canbase_driver.limits import Limiter
+from canbase_driver.odometry import WheelTravel
+from canbase_driver.pdo import NodeLayout, pack_setpoint, unpack_status, unpack_velocity
+from canbase_driver.units import AxisUnits
+
+STEP_MARGIN = 3.0
+"""An encoder step in one cycle is possible up to this many times the fastest wheel: cycles come early and late."""
+
+
+class Axis:
+    """Feedback and setpoint of one wheel. Speeds are those of the rim [m/s], forward positive."""
+
+    def __init__(self, drive: Drive, layout: NodeLayout, robot: Robot) -> None:
+        self.drive = drive
+        self.units = AxisUnits(drive, robot.base)
+        self.statusword = 0
+        self.state: DriveState | None = None
+        self.velocity_mps = 0.0
+        self.target_mps = 0.0
+        self.status_at = -math.inf
+        self.has_new_sample = False
+        metres_per_count = self.units.position_m(1)
+        step_m = STEP_MARGIN * Limiter(robot.limits, robot.base.track_m).wheel_mps / robot.rates.control_hz
+        self.travel = WheelTravel(metres_per_count, max(1.0, step_m / abs(metres_per_count)))
+        self._setpoint_cob_id = layout.setpoint_cob_id(drive.axis)
+        self._wheel_radius_m = robot.base.wheel_radius_m
+        self._sampled_cycle = 0
+        self._status_is_new = False
+
+    @property
+    def position_rad(self) -> float:
+        """Angle of the wheel since its first feedback [rad]."""
+        return self.travel.travel_m / self._wheel_radius_m
+
+    def age_s(self, now: float) -> float:
+        """Seconds since the last status; infinity: none since the last `forget`."""
+        return now - self.status_at
+
+    def forget(self) -> None:
+        """What was heard no longer counts: the drive restarted, or its bus did."""
+        self.status_at = -math.inf
+        self.state = None
+        self.velocity_mps = 0.0
+        self.travel.reset_reference()
+        self._status_is_new = self.has_new_sample = False
+
+    def on_status(self, data: bytes, now: float, cycle: int) -> bool:
+        """Take 6041h and 6064h. False: wrong length, to be dropped and counted."""
+        status = unpack_status(data)
+        if status is None:
+            return False
+        self.statusword, counts = status
+        self.state = decode_statusword(self.statusword)
+        self.status_at = now
+        self.travel.update(counts, max(1, cycle - self._sampled_cycle))
+        self._sampled_cycle = cycle
+        self._status_is_new = True
+        return True
+
+    def on_velocity(self, data: bytes) -> bool:
+        """Take 606Ch, which follows the status of the same SYNC. False: wrong length, to be dropped and counted."""
+        raw = unpack_velocity(data)
+        if raw is None:
+            return False
+        self.velocity_mps = self.units.velocity_mps(raw)
+        self.has_new_sample = self._status_is_new
+        return True
+
+    def sample_taken(self) -> None:
+        """The core has taken the new sample into the odometry."""
+        self._status_is_new = self.has_new_sample = False
+
+    def setpoint(self, goal: PowerGoal, rim_mps: float) -> Frame:
+        """The frame with 6040h and 60FFh: one step towards `goal`; the target is zero unless the goal is ON."""
+        self.target_mps = rim_mps if goal is PowerGoal.ON else 0.0
+        controlword = next_controlword(self.state, goal)
+        return Frame(self._setpoint_cob_id, pack_setpoint(controlword, self.units.velocity_raw(self.target_mps)))

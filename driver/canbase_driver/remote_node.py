@@ -1,0 +1,162 @@
+"""One CANopen node of the base at run time: its NMT state and heartbeat, its emergency messages, its boot, its axes.
+
+GONE ──begin_boot──► BOOTING ──boot report──► STARTING ──operational, all axes heard──► READY
+  ▲                     │ error                  │ too late                               │
+  └─────────────────────┴────────────────────────┴── boot-up or other NMT state heard ────┘
+"""
+
+from __future__ import annotations
+
+import math
+from enum import Enum
+
+from canbase_config.robot import Robot
+from canbase_driver.axis import Axis
+from canbase_driver.cia301 import NmtCommand, NmtState, nmt, parse_heartbeat
+from canbase_driver.emcy import Emcy, parse_emcy
+from canbase_driver.frame import Frame
+from canbase_driver.node_boot import NodeBoot
+from canbase_driver.pdo import NodeLayout
+
+START_TIMEOUT_S = 1.0
+"""From NMT start to a heartbeat "operational" and a status of every axis."""
+RETRY_S = 1.0
+"""Between two boots of a node that failed."""
+
+
+class Presence(Enum):
+    """How far a node is; see the drawing at the head of this file."""
+
+    GONE = "gone"
+    BOOTING = "booting"
+    STARTING = "starting"
+    READY = "ready"
+
+
+class RemoteNode:
+    """A node and its one or two axes."""
+
+    def __init__(self, node_id: int, robot: Robot) -> None:
+        self.node_id = node_id
+        self._robot = robot
+        self._drives = tuple(drive for drive in robot.drives if drive.node_id == node_id)
+        self.layout = NodeLayout(node_id, tuple(sorted(drive.axis for drive in self._drives)))
+        self.axes = tuple(Axis(drive, self.layout, robot) for drive in self._drives)
+        self.presence = Presence.GONE
+        self.nmt_state: NmtState | None = None
+        self.heartbeat_at = -math.inf
+        self.emcy: Emcy | None = None
+        self.stops_by_itself = False
+        self.boot_error = ""
+        self.notes: tuple[str, ...] = ()
+        self._boot: NodeBoot | None = None
+        self._since_s = -math.inf
+        self._why_gone = "not booted yet"
+
+    @property
+    def name(self) -> str:
+        """ "node 1 (left_wheel_joint)" """
+        return f"node {self.node_id} ({', '.join(drive.joint for drive in self._drives)})"
+
+    @property
+    def has_pdos(self) -> bool:
+        """It was configured and started: setpoints may be sent to it, and its feedback counts."""
+        return self.presence in (Presence.STARTING, Presence.READY)
+
+    def waiting_for(self, now: float) -> str:
+        """What keeps it from being ready; empty when it is, or when it is gone and not being booted."""
+        if self.presence is Presence.BOOTING and self._boot is not None:
+            return self._boot.waiting_for + (f" (last try: {self.boot_error})" if self.boot_error else "")
+        if self.presence is Presence.STARTING:
+            return f"{self.name}: waiting for its first feedback since {now - self._since_s:.1f} s"
+        return ""
+
+    def absent(self) -> str:
+        """Why it is gone; empty when it is not."""
+        return f"{self.name} {self._why_gone}" if self.presence is Presence.GONE else ""
+
+    def silent(self, now: float) -> str:
+        """A sentence when its feedback or its heartbeat is too old; only a node that is ready can be silent."""
+        if self.presence is not Presence.READY:
+            return ""
+        for axis in self.axes:
+            if axis.age_s(now) > self._robot.timeouts.feedback_s:
+                return f"{self.name}: no status for {axis.age_s(now):.2f} s"
+        if now - self.heartbeat_at > self._robot.timeouts.drive_heartbeat_s:
+            return f"{self.name}: no heartbeat for {now - self.heartbeat_at:.2f} s"
+        return ""
+
+    def begin_boot(self, now: float) -> None:
+        """Boot it (again). Does nothing while a boot runs, and not more often than every RETRY_S after a failed one."""
+        if self.presence is not Presence.GONE or (self.boot_error and now - self._since_s < RETRY_S):
+            return
+        self._boot = NodeBoot(self.node_id, self._drives, self._robot)
+        self._go(Presence.BOOTING, now)
+
+    def lose(self, why: str, now: float) -> None:
+        """It must be booted again before it counts: `why` completes the sentence that begins with its name."""
+        for axis in self.axes:
+            axis.forget()
+        self._why_gone = why
+        self._boot = None
+        self.stops_by_itself = False
+        self._go(Presence.GONE, now)
+
+    def on_heartbeat(self, frame: Frame, now: float) -> bool:
+        """Take a frame 700h + id. False: not a heartbeat."""
+        parsed = parse_heartbeat(frame)
+        if parsed is None or parsed[1] is None:
+            return False
+        self.nmt_state = parsed[1]
+        self.heartbeat_at = now
+        if self.presence is Presence.READY and self.nmt_state is NmtState.INITIALISING:
+            self.lose("restarted (boot-up message)", now)
+        elif self.presence is Presence.READY and self.nmt_state is not NmtState.OPERATIONAL:
+            self.lose(f"left NMT operational ({self.nmt_state.text})", now)
+        elif self._boot is not None:
+            self._boot.on_frame(frame, now)
+        return True
+
+    def on_emcy(self, frame: Frame, _now: float) -> bool:
+        """Take a frame 080h + id. False: not an emergency message."""
+        emcy = parse_emcy(frame)
+        if emcy is None:
+            return False
+        self.emcy = None if emcy.is_reset else emcy
+        return True
+
+    def on_sdo(self, frame: Frame, now: float) -> bool:
+        """Take an SDO answer; without a boot it is somebody else's (a tool's) and fine."""
+        if self._boot is not None:
+            self._boot.on_frame(frame, now)
+        return True
+
+    def tick(self, now: float) -> list[Frame]:
+        """Let the boot go on. The frames to send."""
+        if self.presence is Presence.STARTING:
+            self._check_started(now)
+        if self._boot is None:
+            return []
+        frames = self._boot.tick(now)
+        if self._boot.error is not None:
+            self.boot_error = str(self._boot.error)
+            self.lose(f"could not be booted: {self.boot_error}", now)
+        elif self._boot.report is not None:
+            self.boot_error = ""
+            self.stops_by_itself = self._boot.report.stops_by_itself
+            self.notes = self._boot.report.notes
+            self._boot = None
+            self.nmt_state = None
+            self._go(Presence.STARTING, now)
+            frames.append(nmt(NmtCommand.START, self.node_id))
+        return frames
+
+    def _check_started(self, now: float) -> None:
+        heard = all(axis.age_s(now) <= self._robot.timeouts.feedback_s for axis in self.axes)
+        if heard and self.nmt_state is NmtState.OPERATIONAL:
+            self._go(Presence.READY, now)
+        elif now - self._since_s > START_TIMEOUT_S:
+            self.lose(f"gave no feedback within {START_TIMEOUT_S:.1f} s of NMT start", now)
+
+    def _go(self, presence: Presence, now: float) -> None:
+        self.presence, self._since_s = presence, now

@@ -1,0 +1,124 @@
+"""The driver's view of the watchdog: its state frame (1FEh) and the reset request (27Eh), laid out in docs/bus.md.
+
+The watchdog has these layouts a second time, on purpose; a test compares both. Pure: time is an argument.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+
+from canbase_config.robot import WATCHDOG_NODE_ID
+from canbase_driver.frame import Frame
+from canbase_driver.snapshot import WatchdogView
+
+STATE_COB_ID = 0x180 + WATCHDOG_NODE_ID
+RESET_COB_ID = 0x200 + WATCHDOG_NODE_ID
+STATE_LAYOUT = struct.Struct("<BBBBHBB")
+RESET_KEY = b"RST"
+
+STARTING, WATCHING, TRIPPED = 0, 1, 2
+
+CAUSES = {
+    0: "none",
+    1: "lease lost",
+    2: "driver silent",
+    3: "drive silent",
+    4: "target outside the envelope",
+    5: "motion outside the envelope",
+    6: "overspeed",
+    7: "drive in fault while another moves",
+    8: "foreign master",
+    9: "bus failed",
+    10: "own loop late",
+}
+ANSWERS = {
+    1: "reset done",
+    2: "the cause stands",
+    3: "a velocity is ordered",
+    4: "not tripped",
+}
+ACCEPTED = (1, 4)
+"""Answers after which the watchdog is not tripped."""
+
+
+@dataclass(frozen=True, slots=True)
+class WatchdogState:
+    """One state frame. `lease_age_ms`: FFFFh when there is none."""
+
+    state: int
+    cause: int
+    rung: int
+    node_id: int
+    lease_age_ms: int
+    answered: int
+    answer: int
+
+    @property
+    def cause_text(self) -> str:
+        """The cause in words; a number that this version does not know is given as it is."""
+        return CAUSES.get(self.cause, f"cause {self.cause}")
+
+
+def parse_state(frame: Frame) -> WatchdogState | None:
+    """The watchdog's state, or None when the frame is not one."""
+    if frame.cob_id != STATE_COB_ID or len(frame.data) != STATE_LAYOUT.size:
+        return None
+    state = WatchdogState(*STATE_LAYOUT.unpack(frame.data))
+    return state if state.state in (STARTING, WATCHING, TRIPPED) else None
+
+
+class WatchdogLink:
+    """What the watchdog said last, how long ago, and our requests to it."""
+
+    def __init__(self, timeout_s: float) -> None:
+        """`timeout_s`: a state frame older than this is none (timeouts.watchdog_s)."""
+        self._timeout_s = timeout_s
+        self._state: WatchdogState | None = None
+        self._received_s = -math.inf
+        self._request = 0
+
+    def on_frame(self, frame: Frame, now: float) -> bool:
+        """Take a frame 1FEh. False: it was not understood."""
+        state = parse_state(frame)
+        if state is None:
+            return False
+        self._state, self._received_s = state, now
+        return True
+
+    def age_s(self, now: float) -> float:
+        """Seconds since the last state frame; NaN: none yet."""
+        return now - self._received_s if self._state else math.nan
+
+    @property
+    def cause(self) -> str:
+        """Cause of the trip in words; "none" when it has not tripped or was never heard."""
+        return self._state.cause_text if self._state else "none"
+
+    def view(self, now: float) -> tuple[WatchdogView, str]:
+        """Whether it watches, and a sentence when it does not."""
+        if self._state is None:
+            return WatchdogView.MISSING, "not heard yet; start it with `canbase watchdog`"
+        age_s = now - self._received_s
+        if age_s > self._timeout_s:
+            return WatchdogView.MISSING, f"silent for {age_s:.2f} s (timeout {self._timeout_s:.2f} s)"
+        if self._state.state == TRIPPED:
+            about = f", node {self._state.node_id}" if self._state.node_id else ""
+            return WatchdogView.TRIPPED, self._state.cause_text + about
+        if self._state.state == STARTING:
+            return WatchdogView.MISSING, "still starting"
+        return WatchdogView.OK, ""
+
+    def request_reset(self) -> Frame:
+        """A reset request with a new number. Send the same frame again until `answer` is not None."""
+        self._request = self._request % 255 + 1
+        if self._state is not None and self._request == self._state.answered:
+            self._request = self._request % 255 + 1
+        return Frame(RESET_COB_ID, bytes([self._request]) + RESET_KEY)
+
+    def answer(self) -> int | None:
+        """The answer to the last request (ANSWERS), None while there is none."""
+        if self._state is None or self._request == 0 or self._state.answered != self._request:
+            return None
+        return self._state.answer
