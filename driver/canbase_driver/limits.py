@@ -5,7 +5,8 @@ Three rules, in the order of their weight:
    the straight line from the present to the target in the (v, w) plane. A stop follows the arc that the base is on.
 2. Braking is never put off: an acceleration away from a new target is dropped at once, a turn that grows is not waited
    for, and the jerk limit lengthens a stop by deceleration / jerk at most. A reversal brakes to an exact zero first.
-3. The target is reached exactly and never passed: where a target came too near for the jerk limit, the jerk gives way.
+3. The target is reached exactly and never passed: when it comes too near for the jerk limit, the acceleration drops at
+   once to what the jerk limit can still take back in time.
 """
 
 from __future__ import annotations
@@ -131,7 +132,7 @@ def _slows(current: float, goal: float) -> bool:
 
 
 def _axis_ramp_s(current: float, goal: float, acceleration: float, deceleration: float) -> float:
-    """Time of one axis. One that goes through zero on the way uses the smaller limit, as the line has one speed."""
+    """Time of one axis. One that goes through zero uses the smaller limit until it is there: the line has one speed."""
     if _slows(current, goal):
         limit = deceleration
     elif current * goal < 0.0:
@@ -162,12 +163,9 @@ def _s_curve(distance: float, initial: float, rate: float, jerk: float, t_s: flo
     """What is gained after `t_s` of the quickest rise by `distance`, and the slope then; the slope ends at 0.
 
     `initial` and `rate` are the first and the greatest slope, 0 ≤ initial ≤ rate. The slope rises with `jerk`, stays at
-    its peak, falls with `jerk`. An initial slope that is too steep to end in time falls evenly from the start.
+    its peak, falls with `jerk`. An initial slope that is too steep for that is cut to the steepest one that is not.
     """
-    if initial * initial >= 2.0 * jerk * distance:
-        total_s, fall = 2.0 * distance / initial, initial * initial / (2.0 * distance)
-        left_s = max(total_s - t_s, 0.0)
-        return distance - fall * left_s * left_s / 2.0, fall * left_s
+    initial = min(initial, math.sqrt(2.0 * jerk * distance))
     peak = min(rate, math.sqrt(jerk * distance + initial * initial / 2.0))
     rise_s, fall_s = (peak - initial) / jerk, peak / jerk
     if t_s < rise_s:

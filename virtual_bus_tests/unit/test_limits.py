@@ -86,6 +86,8 @@ def test_a_wheel_may_run_as_fast_as_straight_on_or_a_turn_in_place_needs() -> No
     assert Limiter(LIMITS, 1.0).wheel_mps == 1.0
     assert Limiter(LIMITS, 1.5).wheel_mps == 1.5
     assert Limiter(LIMITS, 1.5).limit(Twist2D(0.0, 2.0)) == Twist2D(0.0, 2.0)
+    slow = Limiter(LIMITS.model_copy(update={"linear_mps": 0.5}), 1.5)
+    assert slow.limit(Twist2D(1.4, 0.0)) == Twist2D(0.5, 0.0)  # the base, though the wheels may run at 1.5 m/s
 
 
 @property_of_all
@@ -178,6 +180,31 @@ def test_a_reversal_brakes_to_an_exact_zero_and_accelerates_from_there() -> None
     assert speeds[-1] == -0.4
 
 
+def test_a_reversal_goes_through_zero_where_the_straight_line_does() -> None:
+    states = drive(LIMITER, MotionState(Twist2D(0.4, 0.2)), Twist2D(-0.2, 0.8), 2.0)
+    at_zero = states[linear(states).index(0.0)].twist
+    assert at_zero.angular_radps == pytest.approx(0.6)  # 0.2 + 0.6 × 0.4 / 0.6
+
+
+def test_a_robot_that_brakes_gently_still_starts_briskly() -> None:
+    gentle = {"deceleration_mps2": 0.25, "angular_deceleration_radps2": 1.0}
+    limiter = Limiter(NO_JERK.limits.model_copy(update=gentle), TRACK_M)
+    assert steps_until(limiter, MotionState.AT_REST, Twist2D(0.5, 0.0), 200) in (100, 101)
+    assert steps_until(limiter, MotionState(Twist2D(0.5, 0.0)), Twist2D.ZERO, 300) in (200, 201)
+    assert steps_until(limiter, MotionState.AT_REST, Twist2D(0.0, 1.0), 200) in (50, 51)
+    assert steps_until(limiter, MotionState(Twist2D(0.0, 1.0)), Twist2D(0.0, -1.0), 300) in (
+        150,
+        151,
+    )  # 1.0 s and 0.5 s
+
+
+@pytest.mark.parametrize("share", [0.9, 0.99, 0.999, 1.0 - 1e-9, 1.0])
+def test_a_ramp_that_ends_within_a_step_ends_at_the_target(share: float) -> None:
+    turning, rolling = MotionState(Twist2D(0.0, 0.04 * share)), MotionState(Twist2D(0.02 * share, 0.0))
+    assert LIMITER.step(turning, Twist2D.ZERO, DT_S) == MotionState.AT_REST  # 4.0 rad/s² × 10 ms
+    assert LIMITER.step(rolling, Twist2D.ZERO, DT_S, emergency=True) == MotionState.AT_REST  # 2.0 m/s² × 10 ms
+
+
 def test_braking_does_not_wait_for_a_turn_that_grows() -> None:
     states = drive(NO_JERK, MotionState(Twist2D(0.5, 0.0)), Twist2D(0.0, 2.0), 1.2)
     assert linear(states)[51] == 0.0  # 0.5 / 1.0 s, though the turn needs 2.0 / 2.0 s
@@ -216,7 +243,7 @@ def test_a_target_that_comes_too_near_for_the_jerk_limit_is_reached_and_not_pass
     near = Twist2D(speeding_up.twist.linear_mps + 0.005, 0.0)  # the jerk limit alone would pass it by 7.5 mm/s
     speeds = linear(drive(LIMITER, speeding_up, near, 0.1))
     assert speeds == sorted(speeds)
-    assert speeds[-1] == near.linear_mps
+    assert speeds.index(near.linear_mps) == 4  # 5 mm/s at 10 m/s³ take √(2 × 0.005 / 10) s = 32 ms
 
 
 def test_a_target_that_trembles_around_the_speed_is_followed_exactly() -> None:
