@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 NMT = 0x000
 SYNC = 0x080
-EMCY = 0x080
 STATE = 0x1FE
 RESET_REQUEST = 0x27E
 SDO_ANSWER = 0x580
@@ -30,7 +29,6 @@ SETPOINT_RPDO = (0x200, 0x300)
 QUICK_STOP_RPDO = 0x500
 """6040h u16 of every used axis, sent by the watchdog."""
 
-BOOT_UP = 0
 PRE_OPERATIONAL_COMMAND = 0x80
 OPERATIONAL = 5
 

@@ -74,7 +74,7 @@ def advance(climb: Climb, look: Look, deceleration_mps2: float, now: float) -> C
     1. stopped, and enabled again: next rung, somebody works against us;
     2. stopped, and moving: not stopped, same rung from the start;
     3. not enabled and standing, by feedback that came on this rung: stopped;
-    4. never heard of and never commanded: stays, there is nothing to climb for;
+    4. never heard of, and not told to have power: stays, there is nothing to climb for;
     5. still enabled or unseen when `obey_s` has passed: next rung;
     6. still powered and moving, or unseen, when braking time + `stand_s` has passed: next rung;
     7. stays. A wheel that rolls without power is waited for: no rung can brake it.

@@ -146,16 +146,8 @@ class Observer:
     def _on_heartbeat(self, node_id: int, data: bytes, now: float) -> bool:
         if len(data) != 1:
             return False
-        if data[0] == frames.BOOT_UP:
-            self._forget(node_id)
         self._nodes[node_id] = Node(node_id, heartbeat_at=now, heard_at=now)
         return True
-
-    def _forget(self, node_id: int) -> None:
-        """A drive that booted has lost its power stage and its targets, whatever was known before."""
-        for key, axis in self._axes.items():
-            if key[0] == node_id:
-                self._axes[key] = Axis(axis.drive)
 
     def _on_status(self, key: tuple[int, int], data: bytes, now: float) -> bool:
         statusword = frames.decode_status(data)

@@ -48,6 +48,7 @@ class Stopper:
         self.climb = advance(before, self._seen, self._config.deceleration_mps2, now)
         if self.climb.step is not before.step:
             self._quick_stop_at = self._nmt_at = self._sdo_at = NEVER
+            self._sdo_turn = 0
         defied = self._defied(view, now)
         out: list[Frame] = []
         if not self.climb.stopped or defied:
@@ -66,7 +67,7 @@ class Stopper:
             standing=all(abs(axis.velocity_mps) <= self._config.standstill_mps for axis in axes),
             speed_mps=max(max(abs(axis.velocity_mps), abs(axis.target_mps)) for axis in axes),
             seen_at=min(axis.fed_at for axis in axes),
-            present=node.heard_at > NEVER or any(axis.command_at > NEVER for axis in axes),
+            present=node.heard_at > NEVER or any(axis.asks_for_power for axis in axes),
         )
 
     def _defied(self, view: View, now: float) -> bool:
@@ -96,7 +97,7 @@ class Stopper:
             return []
         self._sdo_at = now
         self._sdo_turn += 1
-        return [requests[self._sdo_turn % len(requests)]]
+        return [requests[(self._sdo_turn - 1) % len(requests)]]
 
     def _requests(self, view: View, now: float) -> Sequence[Frame]:
         """Writes of this rung, and readings of what TPDOs do not tell (no SYNC, or pre-operational)."""

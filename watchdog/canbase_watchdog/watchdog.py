@@ -151,12 +151,13 @@ class Watchdog:
 
     def _tell(self, now: float) -> list[Frame]:
         out: list[Frame] = []
+        period_s = self._config.drive_heartbeat_s / 3.0
         if now >= self._heartbeat_due and self._step is not Step.HEARTBEAT_WITHHELD:
-            self._heartbeat_due = now + self._config.drive_heartbeat_s / 3.0
+            self._heartbeat_due = max(self._heartbeat_due, now - period_s) + period_s
             out.append(frames.heartbeat())
         status = self.status
         if now >= self._state_due or status != self._told:
-            self._state_due = now + STATE_PERIOD_S
+            self._state_due = max(self._state_due, now - STATE_PERIOD_S) + STATE_PERIOD_S
             self._told = status
             out.append(self._state_frame(status, now))
         return out

@@ -1,0 +1,107 @@
+"""The watchdog's frames, byte by byte, against docs/bus.md, CiA 301 and CiA 402."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from canbase_watchdog import frames
+from canbase_watchdog.frames import DriveState, Frame
+
+
+def frame(cob_id: int, data: str) -> Frame:
+    return Frame(cob_id, bytes.fromhex(data))
+
+
+def test_stopping_frames() -> None:
+    assert frames.quick_stop(1, 1) == frame(0x501, "02 00")
+    assert frames.quick_stop(0x7D, 2) == frame(0x57D, "02 00 02 00")
+    assert frames.pre_operational(5) == frame(0x000, "80 05")
+    assert frames.write_controlword(5, 0, 0x0002) == frame(0x605, "2b 40 60 00 02 00 00 00")
+    assert frames.write_controlword(5, 1, 0x0000) == frame(0x605, "2b 40 68 00 00 00 00 00")
+    assert list(frames.read_feedback(5, 0)) == [
+        frame(0x605, "40 41 60 00 00 00 00 00"),
+        frame(0x605, "40 6c 60 00 00 00 00 00"),
+    ]
+    assert list(frames.read_feedback(5, 1))[1] == frame(0x605, "40 6c 68 00 00 00 00 00")
+
+
+def test_own_frames() -> None:
+    assert frames.heartbeat() == frame(0x77E, "05")
+    assert frames.state(2, 3, 1, 7, 0.2519, (9, 2)) == frame(0x1FE, "02 03 01 07 fb 00 09 02")
+
+
+@pytest.mark.parametrize(
+    ("age_s", "data"),
+    [(-0.004, "00 00"), (0.0, "00 00"), (0.0011, "01 00"), (65.5341, "fe ff"), (65.535, "ff ff"), (math.inf, "ff ff")],
+)
+def test_age_of_the_lease_in_the_state_frame(age_s: float, data: str) -> None:
+    assert frames.state(1, 0, 0, 0, age_s, (0, 0)).data[4:6] == bytes.fromhex(data)
+
+
+# Bits 4, 5 where free, 7, 8 and above vary: they are set in the second word of each pair.
+@pytest.mark.parametrize(
+    ("words", "state"),
+    [
+        ((0x0000, 0xFFB0), DriveState.NOT_READY_TO_SWITCH_ON),
+        ((0x0040, 0xFFF0), DriveState.SWITCH_ON_DISABLED),
+        ((0x0021, 0xFFB1), DriveState.READY_TO_SWITCH_ON),
+        ((0x0023, 0xFFB3), DriveState.SWITCHED_ON),
+        ((0x0027, 0xFFB7), DriveState.OPERATION_ENABLED),
+        ((0x0007, 0xFF97), DriveState.QUICK_STOP_ACTIVE),
+        ((0x000F, 0xFFBF), DriveState.FAULT_REACTION_ACTIVE),
+        ((0x0008, 0xFFB8), DriveState.FAULT),
+        ((0x0041, 0x0005), None),
+        ((0x0001, 0x0003), None),
+    ],
+)
+def test_states_of_the_statusword(words: tuple[int, int], state: DriveState | None) -> None:
+    assert [frames.decode_state(word) for word in words] == [state, state]
+
+
+@pytest.mark.parametrize(
+    ("word", "asks"),
+    [(0x0F, True), (0x1F, True), (0x10F, True), (0x07, False), (0x06, False), (0x02, False), (0x0B, False), (0x8F, False)],
+)
+def test_controlwords_that_ask_for_power(word: int, asks: bool) -> None:
+    assert frames.asks_for_power(word) is asks
+
+
+def test_feedback_and_setpoints() -> None:
+    assert frames.decode_status(bytes.fromhex("37 02 ff ff ff ff")) == 0x0237
+    assert frames.decode_velocity(bytes.fromhex("0c fe ff ff")) == -500
+    assert frames.decode_setpoint(bytes.fromhex("0f 00 0c fe ff ff")) == (0x0F, -500)
+
+
+@pytest.mark.parametrize("length", [0, 1, 5, 7, 8])
+def test_other_lengths_are_none_of_them(length: int) -> None:
+    data = bytes(length)
+    assert frames.decode_status(data) is None
+    assert frames.decode_velocity(data) is None
+    assert frames.decode_setpoint(data) is None
+
+
+@pytest.mark.parametrize(
+    ("data", "answer"),
+    [
+        ("4b 41 60 00 37 02 00 00", (0x6041, 0x0237)),
+        ("43 6c 60 00 0c fe ff ff", (0x606C, -500)),
+        ("42 6c 68 00 0c fe ff ff", (0x686C, -500)),  # size not shown: four bytes
+        ("4f 61 60 00 ff 00 00 00", (0x6061, -1)),
+        ("4b 41 60 01 37 02 00 00", None),  # another sub-index
+        ("80 41 60 00 00 00 02 06", None),  # abort
+        ("60 40 60 00 00 00 00 00", None),  # answer to a write
+        ("41 08 10 00 10 00 00 00", None),  # begin of a segmented upload
+        ("4b 41 60 00 37 02 00", None),
+    ],
+)
+def test_sdo_answers(data: str, answer: tuple[int, int] | None) -> None:
+    assert frames.decode_sdo(bytes.fromhex(data)) == answer
+
+
+@pytest.mark.parametrize(
+    ("data", "number"),
+    [("01 52 53 54", 1), ("ff 52 53 54", 255), ("00 52 53 54", None), ("01 52 53 55", None), ("01 52 53", None)],
+)
+def test_reset_requests(data: str, number: int | None) -> None:
+    assert frames.decode_reset_request(bytes.fromhex(data)) == number

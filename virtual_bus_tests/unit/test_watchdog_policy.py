@@ -1,0 +1,268 @@
+"""The table of checks: each row trips just when its time is over, and only while somebody could move."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from canbase_watchdog.frames import DriveState
+from canbase_watchdog.lease import Lease
+from canbase_watchdog.observer import NEVER, Axis, Node, View
+from canbase_watchdog.policy import (
+    CHECKS,
+    FINE,
+    Cause,
+    Verdict,
+    commanded,
+    decide,
+    in_motion,
+    moving,
+    next_expiry,
+    stands,
+    velocity_ordered,
+)
+from unit.watchdog_story import config
+
+CONFIG = config()
+NOW = 100.0
+LEFT = Axis(
+    CONFIG.drives[0],
+    state=DriveState.OPERATION_ENABLED,
+    status_at=99.99,
+    enabled_since=90.0,
+    velocity_mps=0.3,
+    velocity_at=99.99,
+    target_mps=0.3,
+    asks_for_power=True,
+    command_at=99.99,
+)
+RIGHT = replace(LEFT, drive=CONFIG.drives[1])
+WELL = View(
+    axes=(LEFT, RIGHT),
+    nodes=(Node(1, 99.95, 99.99), Node(2, 99.95, 99.99)),
+    started_at=80.0,
+    driver_at=99.95,
+    sync_at=99.99,
+    sync_since=90.0,
+    lease=Lease(1, 99_990_000_000, 0.3, 0.0, 0),
+    lease_at=99.99,
+)
+OFF = replace(LEFT, state=DriveState.SWITCH_ON_DISABLED, velocity_mps=0.0, target_mps=0.0, asks_for_power=False)
+AT_REST = replace(LEFT, velocity_mps=0.0, target_mps=0.0)
+
+
+def of(*axes: Axis, **changes: object) -> View:
+    others = tuple(replace(OFF, drive=drive) for drive in CONFIG.drives[len(axes) :])
+    return replace(WELL, axes=axes + others, **changes)
+
+
+def cause(view: View) -> Cause:
+    return decide(view, CONFIG, NOW).cause
+
+
+def test_ordinary_driving_does_not_trip() -> None:
+    assert decide(WELL, CONFIG, NOW) == FINE
+
+
+def test_one_row_for_each_cause_that_the_bus_can_show() -> None:
+    assert [check.cause for check in CHECKS] == [1, 2, 3, 10]
+
+
+# --- lease lost
+
+
+@pytest.mark.parametrize(("age_s", "trips"), [(0.249, 0), (0.2499, 0), (0.2501, 1), (0.251, 1), (math.inf, 1)])
+def test_a_moving_wheel_needs_a_lease_no_older_than_the_timeout(age_s: float, trips: int) -> None:
+    assert cause(replace(WELL, lease_at=NOW - age_s)) == trips
+
+
+@pytest.mark.parametrize(("listening_s", "trips"), [(0.249, 0), (0.251, 1)])
+def test_a_watchdog_that_just_started_gives_the_first_lease_as_long(listening_s: float, trips: int) -> None:
+    assert cause(replace(WELL, lease_at=NEVER, started_at=NOW - listening_s)) == trips
+
+
+@pytest.mark.parametrize(
+    ("velocity_mps", "target_mps", "trips"),
+    [
+        (0.0, 0.0, 0),
+        (0.00499, 0.0, 0),
+        (0.00501, 0.0, 1),
+        (-0.00499, 0.0, 0),
+        (-0.00501, 0.0, 1),
+        (0.0, 0.001, 1),  # one bit is an order
+        (0.0, -0.001, 1),
+    ],
+)
+def test_what_counts_as_motion(velocity_mps: float, target_mps: float, trips: int) -> None:
+    axis = replace(LEFT, velocity_mps=velocity_mps, target_mps=target_mps)
+    assert cause(of(axis, lease_at=90.0)) == trips
+
+
+@pytest.mark.parametrize(
+    ("state", "turns"),
+    [
+        (DriveState.NOT_READY_TO_SWITCH_ON, False),
+        (DriveState.SWITCH_ON_DISABLED, False),
+        (DriveState.READY_TO_SWITCH_ON, False),
+        (DriveState.SWITCHED_ON, False),
+        (DriveState.OPERATION_ENABLED, True),
+        (DriveState.QUICK_STOP_ACTIVE, True),
+        (DriveState.FAULT_REACTION_ACTIVE, True),
+        (DriveState.FAULT, False),
+        (None, False),
+    ],
+)
+def test_only_a_wheel_under_power_moves_by_itself(state: DriveState | None, turns: bool) -> None:
+    assert moving(replace(LEFT, state=state), CONFIG) is turns
+
+
+@pytest.mark.parametrize(
+    ("state", "asks", "silence_s", "counts"),
+    [
+        (DriveState.OPERATION_ENABLED, False, 0.0, True),
+        (DriveState.QUICK_STOP_ACTIVE, True, 0.0, False),
+        (DriveState.SWITCH_ON_DISABLED, True, 0.099, False),
+        (DriveState.SWITCH_ON_DISABLED, True, 0.101, True),  # told to be on, and says nothing: it may be
+        (DriveState.SWITCH_ON_DISABLED, False, 0.101, False),
+        (None, True, math.inf, True),
+    ],
+)
+def test_orders_count_for_a_drive_that_is_enabled_or_may_be(
+    state: DriveState | None, asks: bool, silence_s: float, counts: bool
+) -> None:
+    axis = replace(LEFT, state=state, asks_for_power=asks, status_at=LEFT.command_at - silence_s)
+    assert commanded(axis, CONFIG) is counts
+    assert not commanded(replace(axis, target_mps=0.0), CONFIG)
+
+
+def test_in_motion_names_the_wheel() -> None:
+    view = replace(WELL, axes=(AT_REST, RIGHT))
+    assert in_motion(view, CONFIG) is RIGHT
+    assert in_motion(of(AT_REST), CONFIG) is None
+
+
+def test_the_sentence_has_the_values() -> None:
+    verdict = decide(replace(WELL, lease_at=99.7), CONFIG, NOW)
+    assert verdict.detail == (
+        "no valid lease for 0.300 s (allowed 0.250 s) while wheel_1_0 turns at 0.300 m/s, ordered 0.300 m/s"
+    )
+
+
+# --- driver silent
+
+
+@pytest.mark.parametrize(("age_s", "trips"), [(0.299, 0), (0.301, 2), (math.inf, 2)])
+def test_an_enabled_drive_needs_the_drivers_heartbeat_and_its_sync(age_s: float, trips: int) -> None:
+    assert cause(of(AT_REST, driver_at=NOW - age_s)) == trips
+    assert cause(of(AT_REST, sync_at=NOW - age_s)) == trips
+
+
+@pytest.mark.parametrize(("enabled_s", "trips"), [(0.299, 0), (0.301, 2)])
+def test_the_driver_has_the_heartbeat_time_from_when_the_drive_was_enabled(enabled_s: float, trips: int) -> None:
+    assert cause(of(replace(AT_REST, enabled_since=NOW - enabled_s), driver_at=NEVER)) == trips
+
+
+@pytest.mark.parametrize(("listening_s", "trips"), [(0.299, 0), (0.301, 2)])
+def test_a_watchdog_that_just_started_gives_the_driver_as_long(listening_s: float, trips: int) -> None:
+    assert cause(of(AT_REST, driver_at=NEVER, started_at=NOW - listening_s)) == trips
+
+
+def test_without_an_enabled_drive_nobody_needs_the_driver() -> None:
+    assert cause(of(OFF, driver_at=NEVER, sync_at=NEVER)) == 0
+    assert cause(of(replace(AT_REST, state=DriveState.QUICK_STOP_ACTIVE), driver_at=NEVER)) == 0
+
+
+# --- drive silent
+
+
+@pytest.mark.parametrize(("age_s", "trips"), [(0.099, 0), (0.101, 3)])
+def test_an_enabled_drive_answers_the_syncs_with_state_and_velocity(age_s: float, trips: int) -> None:
+    assert cause(of(replace(AT_REST, status_at=NOW - age_s))) == trips
+    assert cause(of(replace(AT_REST, velocity_at=NOW - age_s))) == trips
+
+
+def test_feedback_may_be_old_when_syncs_are_or_have_just_begun_or_the_drive_was_just_enabled() -> None:
+    unfed = replace(AT_REST, status_at=99.8)
+    assert cause(of(unfed)) == 3
+    assert cause(of(unfed, sync_at=99.899)) == 0
+    assert cause(of(unfed, sync_at=99.901)) == 3
+    assert cause(of(unfed, sync_since=99.901)) == 0
+    assert cause(of(unfed, sync_since=99.899)) == 3
+    assert cause(of(replace(unfed, enabled_since=99.901))) == 0
+
+
+@pytest.mark.parametrize(("age_s", "trips"), [(0.299, 0), (0.301, 3), (math.inf, 3)])
+def test_an_enabled_drive_beats(age_s: float, trips: int) -> None:
+    nodes = (Node(1, NOW - age_s, 99.99), Node(2, 99.95, 99.99))
+    assert cause(of(AT_REST, nodes=nodes)) == trips
+    assert cause(of(replace(AT_REST, enabled_since=99.701), nodes=nodes)) == 0
+
+
+def test_a_silent_drive_is_named() -> None:
+    view = replace(WELL, axes=(LEFT, replace(RIGHT, status_at=99.0)))
+    assert decide(view, CONFIG, NOW).node_id == 2
+
+
+def test_a_drive_that_is_off_may_be_silent() -> None:
+    assert cause(of(replace(OFF, status_at=NEVER), nodes=(Node(1), Node(2)))) == 0
+
+
+# --- own loop late
+
+
+@pytest.mark.parametrize(("gap_s", "trips"), [(0.005, 0), (0.0999, 0), (0.1, 0), (0.1001, 10), (5.0, 10)])
+def test_the_own_loop_may_not_stand_still_while_a_drive_is_enabled(gap_s: float, trips: int) -> None:
+    assert cause(of(AT_REST, tick_gap_s=gap_s)) == trips
+    assert cause(of(OFF, tick_gap_s=gap_s)) == 0
+
+
+# --- what keeps a reset away
+
+
+@pytest.mark.parametrize(
+    ("tripped_by", "changes", "still"),
+    [
+        (Cause.LEASE_LOST, {"lease_at": NOW - 0.249}, False),
+        (Cause.LEASE_LOST, {"lease_at": NOW - 0.251}, True),
+        (Cause.DRIVER_SILENT, {"driver_at": NOW - 0.299}, False),
+        (Cause.DRIVER_SILENT, {"driver_at": NOW - 0.301}, True),
+        (Cause.DRIVER_SILENT, {"sync_at": NEVER}, False),  # it boots the drives first
+        (Cause.DRIVE_SILENT, {"nodes": (Node(1, NEVER, NOW - 0.299),)}, False),
+        (Cause.DRIVE_SILENT, {"nodes": (Node(1, NEVER, NOW - 0.301),)}, True),
+        (Cause.LOOP_LATE, {"tick_gap_s": 5.0}, False),
+        (Cause.ENDED, {}, False),
+    ],
+)
+def test_a_cause_stands_even_while_nothing_moves(tripped_by: Cause, changes: dict[str, object], still: bool) -> None:
+    assert stands(Verdict(tripped_by, 1), of(OFF, **changes), CONFIG, NOW) is still
+
+
+@pytest.mark.parametrize(
+    ("target_mps", "command_at", "linear", "lease_at", "ordered"),
+    [
+        (0.0, 99.99, 0.0, 99.99, False),
+        (0.001, 99.751, 0.0, 99.99, True),
+        (0.001, 99.749, 0.0, 99.99, False),  # nobody sends that any more
+        (0.0, 99.99, 0.1, 99.751, True),
+        (0.0, 99.99, 0.1, 99.749, False),
+    ],
+)
+def test_orders_of_the_last_moments(
+    target_mps: float, command_at: float, linear: float, lease_at: float, ordered: bool
+) -> None:
+    axis = replace(OFF, target_mps=target_mps, command_at=command_at)
+    view = of(axis, lease=Lease(1, 1, linear, 0.0, 0), lease_at=lease_at)
+    assert velocity_ordered(view, CONFIG, NOW) is ordered
+
+
+def test_without_any_lease_the_filter_orders_nothing() -> None:
+    assert not velocity_ordered(of(OFF, lease=None, lease_at=NEVER), CONFIG, NOW)
+
+
+def test_the_loop_wakes_when_the_first_timeout_runs_out() -> None:
+    assert next_expiry(WELL, CONFIG, NOW) == pytest.approx(100.24)  # the lease
+    assert next_expiry(replace(WELL, sync_at=99.71), CONFIG, NOW) == pytest.approx(100.01)
+    assert next_expiry(replace(WELL, lease_at=90.0), CONFIG, NOW) == pytest.approx(100.25)  # the driver
+    over = replace(WELL, lease_at=NEVER, driver_at=NEVER, sync_at=NEVER)
+    assert next_expiry(over, CONFIG, NOW) == pytest.approx(100.25)
