@@ -1,0 +1,69 @@
+"""Whether a goal may start: each reason against it, with the value, what was expected, and what to do next."""
+
+from __future__ import annotations
+
+import math
+
+from canbase_action_server.inputs import ENABLED, ESTOP_CAUSES, WATCHDOG_OK, Inputs, age_s
+from canbase_config.robot import Robot
+
+STATE_TIMEOUT_S = 1.5
+"""Older than this, the state of another node says nothing: three periods of the slowest one (velocity_mux/state, 2 Hz)."""
+
+
+def action_source(robot: Robot) -> str:
+    """Name under mux.sources of the source on topic cmd_vel_action; ValueError when there is none."""
+    for name, source in robot.mux.sources.items():
+        if source.topic == "cmd_vel_action":
+            return name
+    raise ValueError("mux.sources has no source with topic cmd_vel_action: the action server could never drive; add it")
+
+
+def range_reason(robot: Robot, distance_m: float, max_speed_mps: float) -> str | None:
+    """Why the numbers of a goal are refused; None: they are good."""
+    action = robot.action
+    for name, value, low, high in (
+        ("|distance_m|", abs(distance_m), action.min_distance_m, action.max_distance_m),
+        ("max_speed_mps", max_speed_mps, action.min_speed_mps, action.max_speed_mps),
+    ):
+        if not math.isfinite(value):
+            return f"{name} is {value}; expected a finite number from {low} to {high}"
+        # The interface carries float32: a limit that arrives rounded is still that limit.
+        if not low * (1 - 1e-6) <= value <= high * (1 + 1e-6):
+            return f"{name} is {value:.6g}, outside {low} to {high} (action.* in robot.yaml)"
+    return None
+
+
+def state_reason(robot: Robot, inputs: Inputs, now: float) -> str | None:
+    """Why the robot cannot start a goal now; None: it can."""
+    if inputs.shutdown:
+        return "the action server is shutting down"
+    return _silence(robot, inputs, now) or _condition(robot, inputs)
+
+
+def _silence(robot: Robot, inputs: Inputs, now: float) -> str | None:
+    odometry, safety, driver, mux = inputs.odometry, inputs.safety, inputs.driver, inputs.mux
+    for topic, node, received, timeout_s in (
+        ("odom", "motor_driver", odometry.received if odometry else None, robot.timeouts.odometry_s),
+        ("motor_driver/status", "motor_driver", driver.received if driver else None, STATE_TIMEOUT_S),
+        ("safety_filter/state", "safety_filter", safety.received if safety else None, STATE_TIMEOUT_S),
+        ("velocity_mux/state", "velocity_mux", mux.received if mux else None, STATE_TIMEOUT_S),
+    ):
+        if received is None:
+            return f"nothing received on {topic} yet; is {node} running?"
+        if age_s(received, now) > timeout_s:
+            return f"{topic} is silent for {age_s(received, now):.2f} s (timeout {timeout_s} s); is {node} running?"
+    return None
+
+
+def _condition(robot: Robot, inputs: Inputs) -> str | None:
+    safety, driver, mux = inputs.safety, inputs.driver, inputs.mux
+    if safety and (safety.estop or safety.cause in ESTOP_CAUSES):
+        return f"emergency stop holds: {safety.detail}; release it and reset"
+    if driver and driver.watchdog != WATCHDOG_OK:
+        return f"watchdog is {driver.watchdog} (cause {driver.watchdog_cause}); start or reset it"
+    if driver and driver.state != ENABLED:
+        return f"motor_driver is {driver.state}, not enabled: {driver.detail}"
+    if mux and mux.active not in ("", action_source(robot)):
+        return f"{mux.active} drives now; let go of it first"
+    return None

@@ -1,0 +1,163 @@
+"""Why a goal ends: one row per cause, in the order of precedence.
+
+Rules. Several rows hold at once: the first in the table wins, because it explains those below it (a tripped watchdog
+disables the drives, which ends odometry, which ends progress). While the base is being stopped, the rows marked
+`while_stopping` go on counting, and one that stands above the cause so far replaces it: a stop that goes wrong must not
+be reported as a success. A row returns its sentence, or None while it does not hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from canbase_action_server.inputs import (
+    ENABLED,
+    ESTOP_CAUSES,
+    SCAN_LOST_CAUSE,
+    WATCHDOG_OK,
+    Inputs,
+    age_s,
+)
+from canbase_action_server.outcome import ErrorCode
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What the rows look at: the inputs, the limits of time, and what the goal itself has measured."""
+
+    inputs: Inputs
+    now: float
+    own_source: str
+    odometry_timeout_s: float
+    odometry_jumped: bool
+    obstacle_age_s: float
+    """For how long the filter has been stopping this motion for an obstacle; 0: it does not."""
+    obstacle_patience_s: float
+    no_progress_s: float
+    progress_timeout_s: float
+    running_s: float
+    overall_timeout_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """A row that holds."""
+
+    code: ErrorCode
+    message: str
+
+
+def _estop(s: Situation) -> str | None:
+    safety = s.inputs.safety
+    if safety is None or not (safety.estop or safety.cause in ESTOP_CAUSES):
+        return None
+    return f"emergency stop: {safety.detail}; release it, reset, and send a new goal"
+
+
+def _watchdog(s: Situation) -> str | None:
+    driver = s.inputs.driver
+    if driver is None or driver.watchdog == WATCHDOG_OK:
+        return None
+    return f"watchdog {driver.watchdog}, cause {driver.watchdog_cause}; find the cause, then reset"
+
+
+def _drive_fault(s: Situation) -> str | None:
+    driver = s.inputs.driver
+    if driver is None or driver.state == ENABLED:
+        return None
+    return f"motor_driver is {driver.state}, cause {driver.cause}: {driver.detail}"
+
+
+def _odometry_lost(s: Situation) -> str | None:
+    odometry = s.inputs.odometry
+    age = age_s(odometry.received if odometry else None, s.now)
+    if s.odometry_jumped:
+        return "odometry jumped farther than the base can move: it was reset, or another node publishes odom"
+    if age <= s.odometry_timeout_s:
+        return None
+    return f"no odometry for {age:.2f} s (timeout {s.odometry_timeout_s} s); is motor_driver running?"
+
+
+def _taken_over(s: Situation) -> str | None:
+    mux = s.inputs.mux
+    if mux is None or mux.active in ("", s.own_source):
+        return None
+    return f"{mux.active} drives now, it has priority; the base follows it"
+
+
+def _scan_lost(s: Situation) -> str | None:
+    safety = s.inputs.safety
+    if safety is None or safety.cause != SCAN_LOST_CAUSE:
+        return None
+    return f"laser scan lost: {safety.detail}; is the scanner running?"
+
+
+def _blocked(s: Situation) -> str | None:
+    if s.obstacle_age_s < s.obstacle_patience_s or s.inputs.safety is None:
+        return None
+    return f"obstacle in the way: {s.inputs.safety.detail}; clear the way and send a new goal for the rest"
+
+
+def _canceled(s: Situation) -> str | None:
+    return "canceled by request" if s.inputs.cancel_requested else None
+
+
+def _shutdown(s: Situation) -> str | None:
+    return "the action server is shutting down" if s.inputs.shutdown else None
+
+
+def _no_progress(s: Situation) -> str | None:
+    if s.no_progress_s <= s.progress_timeout_s:
+        return None
+    return f"ordered to move, but no progress for {s.no_progress_s:.1f} s; is the base stuck, or slowed down to zero?"
+
+
+def _timeout(s: Situation) -> str | None:
+    if s.running_s <= s.overall_timeout_s:
+        return None
+    return f"not there after {s.running_s:.1f} s (overall timeout {s.overall_timeout_s:.1f} s)"
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One cause: its code, its test, and whether it counts while the base is being stopped."""
+
+    code: ErrorCode
+    test: Callable[[Situation], str | None]
+    while_stopping: bool
+
+
+TABLE: tuple[Row, ...] = (
+    Row(ErrorCode.ESTOP, _estop, while_stopping=True),
+    Row(ErrorCode.WATCHDOG, _watchdog, while_stopping=True),
+    Row(ErrorCode.DRIVE_FAULT, _drive_fault, while_stopping=True),
+    Row(ErrorCode.ODOMETRY_LOST, _odometry_lost, while_stopping=True),
+    Row(ErrorCode.TAKEN_OVER, _taken_over, while_stopping=True),
+    Row(ErrorCode.SCAN_LOST, _scan_lost, while_stopping=False),
+    Row(ErrorCode.BLOCKED, _blocked, while_stopping=False),
+    Row(ErrorCode.CANCELED, _canceled, while_stopping=True),
+    Row(ErrorCode.SHUTDOWN, _shutdown, while_stopping=True),
+    Row(ErrorCode.NO_PROGRESS, _no_progress, while_stopping=False),
+    Row(ErrorCode.TIMEOUT, _timeout, while_stopping=False),
+)
+PRECEDENCE = {row.code: place for place, row in enumerate(TABLE)} | {ErrorCode.OK: len(TABLE)}
+
+
+def cause_while_driving(situation: Situation) -> Cause | None:
+    """The first row that holds."""
+    return _first(TABLE, situation)
+
+
+def cause_while_stopping(situation: Situation, so_far: ErrorCode) -> Cause | None:
+    """The first row that holds, counts while stopping, and stands above `so_far`."""
+    above = TABLE[: PRECEDENCE[so_far]]
+    return _first(tuple(row for row in above if row.while_stopping), situation)
+
+
+def _first(rows: tuple[Row, ...], situation: Situation) -> Cause | None:
+    for row in rows:
+        message = row.test(situation)
+        if message is not None:
+            return Cause(row.code, message)
+    return None

@@ -1,0 +1,208 @@
+"""One goal from its acceptance to its outcome: DRIVING → STOPPING → ENDED. Knows no ROS and reads no clock.
+
+Rules. Every ending passes through STOPPING: zero is ordered, and the goal ends when the base is known to stand. A goal
+that comes to stand short of the distance drives on. `causes.py` says why a goal ends, `standstill.py` whether the base stands.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+from canbase_action_server.admission import action_source
+from canbase_action_server.causes import Cause, Situation, cause_while_driving, cause_while_stopping
+from canbase_action_server.inputs import OBSTACLE_CAUSE, Inputs, Odometry
+from canbase_action_server.motion import STOP, StraightMotion, Twist
+from canbase_action_server.outcome import ErrorCode, Outcome
+from canbase_action_server.profile import ProfileLimits
+from canbase_action_server.standstill import Standstill, StandstillLimits, Verdict
+from canbase_config.robot import Robot
+
+OBSTACLE_PATIENCE_S = 0.3
+"""The filter stops at once; the goal gives up when the obstacle is still there after this, not for one bad scan."""
+PROGRESS_M = 0.001
+"""Less than this farther than ever before is not progress."""
+DRIVES_LAG_S = 0.03
+"""Typical time constant of a velocity-controlled drive."""
+
+
+class Phase(Enum):
+    """Where the goal is."""
+
+    DRIVING = "driving"
+    STOPPING = "stopping"
+    ENDED = "ended"
+
+
+TRANSITIONS = {
+    (Phase.DRIVING, Phase.STOPPING): "the distance is driven, or a cause ends the goal",
+    (Phase.STOPPING, Phase.DRIVING): "the base stands short of the distance and nothing else ended the goal",
+    (Phase.STOPPING, Phase.ENDED): "the base stands, or had its time to",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Feedback:
+    """What the client reads on the way."""
+
+    traveled_m: float
+    remaining_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """The result of one control cycle."""
+
+    twist: Twist
+    feedback: Feedback | None = None
+    end: Outcome | None = None
+
+
+def chain_latency_s(robot: Robot) -> float:
+    """From a velocity order to the motion of the wheels: mux and filter, 1.5 cycles of the driver, lag of the drives."""
+    return 0.5 / robot.rates.command_hz + 1.5 / robot.rates.control_hz + DRIVES_LAG_S
+
+
+def profile_limits(robot: Robot, max_speed_mps: float) -> ProfileLimits:
+    """What a goal with this max_speed_mps keeps to on this robot."""
+    return ProfileLimits(
+        speed_mps=min(max_speed_mps, robot.limits.linear_mps),
+        acceleration_mps2=robot.limits.acceleration_mps2,
+        deceleration_mps2=robot.limits.deceleration_mps2,
+        jerk_mps3=robot.limits.jerk_mps3,
+        crawl_mps=0.5 * robot.action.min_speed_mps,
+        chain_latency_s=chain_latency_s(robot),
+    )
+
+
+def standstill_limits(robot: Robot) -> StandstillLimits:
+    """When this robot stands."""
+    return StandstillLimits(
+        linear_mps=robot.base.standstill_mps,
+        angular_radps=2.0 * robot.base.standstill_mps / robot.base.track_m,
+        odometry_timeout_s=robot.timeouts.odometry_s,
+        deceleration_mps2=robot.limits.deceleration_mps2,
+        give_up_s=robot.timeouts.standstill_s,
+    )
+
+
+class GoalRun:
+    """A goal that owns the base. `tick` once per control cycle until it gives an end."""
+
+    def __init__(self, robot: Robot, distance_m: float, max_speed_mps: float, start: Odometry, now: float) -> None:
+        self._robot = robot
+        self._motion = StraightMotion(start, distance_m, profile_limits(robot, max_speed_mps))
+        self._distance_m = distance_m
+        self._own_source = action_source(robot)
+        self._overall_s = robot.action.overall_factor * self._motion.ideal_s + robot.action.overall_extra_s
+        self._started = now
+        self._phase = Phase.DRIVING
+        self._cause = Cause(ErrorCode.OK, "")
+        self._standstill: Standstill | None = None
+        self._last_odometry = start
+        self._jumped = False
+        self._obstacle_since: float | None = None
+        self._best_remaining_m = self._motion.remaining_m
+        self._progress_time = now
+        self._next_feedback = now
+
+    @property
+    def phase(self) -> Phase:
+        """Where the goal is now."""
+        return self._phase
+
+    @property
+    def traveled_m(self) -> float:
+        """Along the start heading, signed [m]."""
+        return self._motion.traveled_m
+
+    def tick(self, inputs: Inputs, now: float) -> Order:
+        """What to order now, what to tell the client, and whether this was the end. RuntimeError after the end."""
+        if self._phase is Phase.ENDED:
+            raise RuntimeError("the goal has ended: it orders nothing any more")
+        self._observe(inputs, now)
+        order = self._drive(inputs, now) if self._phase is Phase.DRIVING else self._stop(inputs, now)
+        return replace(order, feedback=self._feedback(now))
+
+    def _observe(self, inputs: Inputs, now: float) -> None:
+        odometry, safety = inputs.odometry, inputs.safety
+        if odometry and odometry.received > self._last_odometry.received:
+            self._jumped = self._jumped or not self._motion.observe(odometry)
+            self._last_odometry = odometry
+        if self._best_remaining_m - self._motion.remaining_m >= PROGRESS_M:
+            self._best_remaining_m, self._progress_time = self._motion.remaining_m, now
+        blocked = safety is not None and safety.stops and safety.cause == OBSTACLE_CAUSE
+        since = now if self._obstacle_since is None else self._obstacle_since
+        self._obstacle_since = since if blocked else None
+
+    def _situation(self, inputs: Inputs, now: float) -> Situation:
+        return Situation(
+            inputs=inputs,
+            now=now,
+            own_source=self._own_source,
+            odometry_timeout_s=self._robot.timeouts.odometry_s,
+            odometry_jumped=self._jumped,
+            obstacle_age_s=0.0 if self._obstacle_since is None else now - self._obstacle_since,
+            obstacle_patience_s=OBSTACLE_PATIENCE_S,
+            no_progress_s=now - self._progress_time,
+            progress_timeout_s=self._robot.action.progress_timeout_s,
+            running_s=now - self._started,
+            overall_timeout_s=self._overall_s,
+        )
+
+    def _drive(self, inputs: Inputs, now: float) -> Order:
+        cause = cause_while_driving(self._situation(inputs, now))
+        if cause and cause.code is ErrorCode.NO_PROGRESS and self._near_enough():
+            cause = Cause(ErrorCode.OK, "")
+        twist = None if cause else self._motion.order(now)
+        if twist is not None:
+            return Order(twist)
+        self._cause = cause or Cause(ErrorCode.OK, "")
+        self._go(Phase.STOPPING)
+        self._standstill = Standstill(standstill_limits(self._robot), now, self._last_odometry.linear_mps)
+        return Order(self._motion.stop(now))
+
+    def _stop(self, inputs: Inputs, now: float) -> Order:
+        self._motion.stop(now)
+        self._cause = cause_while_stopping(self._situation(inputs, now), self._cause.code) or self._cause
+        verdict = self._standstill.judge(inputs, now) if self._standstill else Verdict.WAIT
+        if self._cause.code is ErrorCode.TAKEN_OVER:
+            verdict = Verdict.STANDS  # the base is another's now, and may well be moving
+        if verdict is Verdict.WAIT:
+            return Order(STOP)
+        if self._stands_short(verdict):
+            self._go(Phase.DRIVING)
+            self._progress_time = now
+            return Order(STOP)
+        self._go(Phase.ENDED)
+        return Order(STOP, end=self._outcome(verdict))
+
+    def _near_enough(self) -> bool:
+        return abs(self._motion.remaining_m) <= self._robot.action.tolerance_m
+
+    def _stands_short(self, verdict: Verdict) -> bool:
+        wanted = self._cause.code is ErrorCode.OK and verdict is Verdict.STANDS
+        return wanted and self._motion.remaining_m > self._robot.action.tolerance_m
+
+    def _outcome(self, verdict: Verdict) -> Outcome:
+        motion, cause = self._motion, self._cause
+        if verdict is Verdict.STILL_MOVES and cause.code in (ErrorCode.OK, ErrorCode.CANCELED):
+            cause = Cause(ErrorCode.DRIVE_FAULT, "ordered to stand, but the base still moves; use the emergency stop")
+        elif cause.code is ErrorCode.OK and motion.overshoot_m > self._robot.action.tolerance_m:
+            cause = Cause(ErrorCode.DRIVE_FAULT, "the drives did not stop at the distance: too fast for load or slope")
+        elif verdict is not Verdict.STANDS:
+            cause = Cause(cause.code, f"{cause.message}; the base {verdict.value}")
+        went = f"{motion.traveled_m:+.4f} m of {self._distance_m:+.4f} m, {motion.lateral_m:+.4f} m beside the line"
+        text = f"{cause.message}; drove {went}" if cause.message else f"drove {went}, and stands"
+        return Outcome(cause.code, motion.traveled_m, max(0.0, motion.overshoot_m), text)
+
+    def _feedback(self, now: float) -> Feedback | None:
+        if now < self._next_feedback:
+            return None
+        self._next_feedback = now + 1.0 / self._robot.action.feedback_hz
+        return Feedback(self._motion.traveled_m, self._motion.remaining_m)
+
+    def _go(self, phase: Phase) -> None:
+        if (self._phase, phase) not in TRANSITIONS:
+            raise RuntimeError(f"a goal cannot go from {self._phase.value} to {phase.value}")
+        self._phase = phase

@@ -1,0 +1,82 @@
+"""What the goal sees of the rest of the robot, as plain data. All times are local monotonic receive times [s].
+
+The node fills these from its topics; None means: nothing received yet.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from canbase_action_server.along_track import Pose
+
+ENABLED = "enabled"
+"""State of motor_driver in which commands move the wheels (DriverStatus.ENABLED)."""
+WATCHDOG_OK = "ok"
+ESTOP_CAUSES = ("estop", "estop_stale")
+SCAN_LOST_CAUSE = "scan_stale"
+OBSTACLE_CAUSE = "obstacle"
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """One message of odom."""
+
+    received: float
+    pose: Pose
+    linear_mps: float
+    angular_radps: float
+
+    def finite(self) -> bool:
+        """No field is NaN or infinite."""
+        values = (self.pose.x_m, self.pose.y_m, self.pose.yaw_rad, self.linear_mps, self.angular_radps)
+        return all(math.isfinite(value) for value in values)
+
+
+@dataclass(frozen=True, slots=True)
+class Safety:
+    """One message of safety_filter/state."""
+
+    received: float
+    stops: bool
+    cause: str
+    detail: str
+    estop: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Driver:
+    """One message of motor_driver/status; `state` in lower case as in DriverStatus."""
+
+    received: float
+    state: str
+    cause: str
+    detail: str
+    watchdog: str
+    watchdog_cause: str
+    standstill: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Mux:
+    """One message of velocity_mux/state: the name of the source that drives, empty for none."""
+
+    received: float
+    active: str
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """Everything at one moment."""
+
+    odometry: Odometry | None = None
+    safety: Safety | None = None
+    driver: Driver | None = None
+    mux: Mux | None = None
+    cancel_requested: bool = False
+    shutdown: bool = False
+
+
+def age_s(received: float | None, now: float) -> float:
+    """Time since `received`; infinite when nothing was received."""
+    return math.inf if received is None else now - received

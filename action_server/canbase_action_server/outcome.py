@@ -1,0 +1,54 @@
+"""How a goal can end: the status of the ROS 2 action protocol, and the error code of the DriveDistance result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class Status(IntEnum):
+    """Final states of a goal, numbered as in action_msgs/GoalStatus."""
+
+    SUCCEEDED = 4
+    CANCELED = 5
+    ABORTED = 6
+
+
+class ErrorCode(IntEnum):
+    """Error codes, numbered as in DriveDistance.action; a test compares both."""
+
+    OK = 0
+    BLOCKED = 1
+    ODOMETRY_LOST = 2
+    ESTOP = 3
+    NO_PROGRESS = 4
+    TIMEOUT = 5
+    DRIVE_FAULT = 6
+    WATCHDOG = 7
+    TAKEN_OVER = 8
+    PREEMPTED = 9
+    CLIENT_LOST = 10
+    SCAN_LOST = 11
+    SHUTDOWN = 12
+    CANCELED = 13
+    INTERNAL = 14
+
+    @property
+    def status(self) -> Status:
+        """The final status that belongs to this code."""
+        return {ErrorCode.OK: Status.SUCCEEDED, ErrorCode.CANCELED: Status.CANCELED}.get(self, Status.ABORTED)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The end of a goal, as the client will read it."""
+
+    code: ErrorCode
+    traveled_m: float
+    overshoot_m: float
+    message: str
+
+    @property
+    def status(self) -> Status:
+        """SUCCEEDED, CANCELED or ABORTED, by the code."""
+        return self.code.status

@@ -1,0 +1,82 @@
+"""Does the base stand, after it was ordered to? By odometry, else by the driver's own word, else only by waiting.
+
+A sample counts only when it was received after the order had time to reach the wheels: what stood before a motion began
+proves nothing about its end.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from canbase_action_server.inputs import Driver, Inputs, Odometry, age_s
+
+HOLD_S = 0.1
+"""The base must be seen standing for this long."""
+SETTLE_S = 0.15
+"""From the order to stand until it must show at the wheels."""
+DRIVER_AGE_S = 0.5
+"""motor_driver/status older than this does not tell whether the base stands."""
+BRAKING_RESERVE_S = 0.5
+"""Added to the time that braking takes when nothing can be measured."""
+
+
+class Verdict(Enum):
+    """What is known about the base now."""
+
+    WAIT = "not known to stand yet"
+    STANDS = "seen standing"
+    NOT_MEASURED = "had the time to stop, but nothing told whether it did"
+    STILL_MOVES = "still moves after the time in which it must stop"
+
+
+@dataclass(frozen=True, slots=True)
+class StandstillLimits:
+    """Numbers of robot.yaml that the judgement needs."""
+
+    linear_mps: float
+    angular_radps: float
+    odometry_timeout_s: float
+    deceleration_mps2: float
+    give_up_s: float
+
+
+class Standstill:
+    """Watches one stop, ordered at `began` from a speed of `speed_mps`."""
+
+    def __init__(self, limits: StandstillLimits, began: float, speed_mps: float) -> None:
+        self._limits = limits
+        self._counts_from = began + SETTLE_S
+        self._give_up = began + limits.give_up_s
+        self._braked = self._counts_from + abs(speed_mps) / limits.deceleration_mps2 + BRAKING_RESERVE_S
+        self._standing_since: float | None = None
+
+    def judge(self, inputs: Inputs, now: float) -> Verdict:
+        """Call once per control cycle."""
+        odometry, driver = inputs.odometry, inputs.driver
+        if odometry and age_s(odometry.received, now) <= self._limits.odometry_timeout_s:
+            stands = self._seen_standing(odometry)
+            return self._or_give_up(stands, now)
+        self._standing_since = None
+        if driver and age_s(driver.received, now) <= DRIVER_AGE_S:
+            return self._or_give_up(self._driver_says_so(driver), now)
+        return Verdict.NOT_MEASURED if now >= self._braked else Verdict.WAIT
+
+    def _seen_standing(self, odometry: Odometry) -> bool:
+        limits = self._limits
+        if abs(odometry.linear_mps) > limits.linear_mps or abs(odometry.angular_radps) > limits.angular_radps:
+            self._standing_since = None
+            return False
+        if odometry.received < self._counts_from:
+            return False
+        if self._standing_since is None:
+            self._standing_since = odometry.received
+        return odometry.received - self._standing_since >= HOLD_S
+
+    def _driver_says_so(self, driver: Driver) -> bool:
+        return driver.standstill and driver.received >= self._counts_from
+
+    def _or_give_up(self, stands: bool, now: float) -> Verdict:
+        if stands:
+            return Verdict.STANDS
+        return Verdict.STILL_MOVES if now >= self._give_up else Verdict.WAIT
