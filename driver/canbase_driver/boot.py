@@ -79,7 +79,7 @@ class _Boot:
             yield from self._configure_motion(drive)
         stops_by_itself = yield from self._configure_loss_of_heartbeat()
         yield from configure_pdos(self._node, self._layout)
-        return BootReport(self._node.node_id, identity, stops_by_itself, tuple(self._node.notes))
+        return BootReport(self._node.node_id, identity, stops_by_itself, tuple(dict.fromkeys(self._node.notes)))
 
     # -- what is there
 
@@ -144,6 +144,10 @@ class _Boot:
 
     def _reset_communication(self) -> Steps[None]:
         """Forgets what earlier masters set. Some drives keep a fault for a lost heartbeat until then."""
+        for drive in self._drives:
+            # With 6007h = 1 a drive takes the reset for the loss of its master, and goes into fault.
+            if (yield from self._node.read_if_present(_on_loss(drive).index)) is not None:
+                yield from self._node.set_if_present(_on_loss(drive))
         yield SendNmt(NmtCommand.RESET_COMMUNICATION)
         if not (yield WaitBootUp(BOOT_UP_TIMEOUT_S)):
             self._node.notes.append(f"no boot-up message within {BOOT_UP_TIMEOUT_S:g} s of NMT reset communication")
@@ -179,8 +183,7 @@ class _Boot:
         stops = yield from self._watch_heartbeats(timeout_ms)
         yield from node.set_if_present(Write(ERROR_BEHAVIOUR, 1, ENTER_PRE_OPERATIONAL_ON_LOSS, 1))
         for drive in self._drives:
-            on_loss = Write(axis_object(ABORT_CONNECTION_OPTION, drive.axis), 0, QUICK_STOP_ON_LOSS, 2)
-            stops = (yield from node.set_if_present(on_loss)) and stops
+            stops = (yield from node.set_if_present(_on_loss(drive))) and stops
             for index in (QUICK_STOP_OPTION, FAULT_REACTION_OPTION):
                 ramp = Write(axis_object(index, drive.axis), 0, DOWN_THE_QUICK_STOP_RAMP, 2)
                 yield from node.set_if_present(ramp)
@@ -212,6 +215,10 @@ def _state(drive: Drive) -> Steps[DriveState | None]:
 
 def _has_torque(state: DriveState | None) -> bool:
     return state is None or state.has_torque
+
+
+def _on_loss(drive: Drive) -> Write:
+    return Write(axis_object(ABORT_CONNECTION_OPTION, drive.axis), 0, QUICK_STOP_ON_LOSS, 2)
 
 
 def _control(drive: Drive, command: Command) -> Write:

@@ -211,6 +211,8 @@ def test_every_write_in_its_order() -> None:
     drive = FakeDrive()
     boot_one_axis(drive)
     assert drive.writes == [
+        # the reset that follows is no loss of the master
+        (0x6007, 0, 3),
         # how it moves: the target of an earlier life is gone before anything can enable the drive
         (0x6060, 0, 3),
         (0x60FF, 0, 0),
@@ -409,7 +411,7 @@ def running_drive(after_quick_stop: int) -> FakeDrive:
 def test_a_running_drive_is_quick_stopped_before_its_communication_is_reset() -> None:
     drive = running_drive(after_quick_stop=0x0240)
     assert boot_one_axis(drive).report is not None
-    assert drive.writes[:2] == [(0x6040, 0, 0x02), (0x6060, 0, 3)]
+    assert drive.writes[:2] == [(0x6040, 0, 0x02), (0x6007, 0, 3)]
 
 
 def test_a_drive_that_stays_in_quick_stop_is_disabled_when_it_stands() -> None:
