@@ -1,0 +1,62 @@
+"""What the safety filter decides, in words: actions by severity and causes as in interfaces/msg/SafetyState.msg."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+from canbase_velocity.twist import Twist
+
+
+class Action(enum.IntEnum):
+    """What is done with a command. The greater number is the more severe, and the most severe wins."""
+
+    PASS = 0
+    LIMIT = 1
+    SLOW = 2
+    STOP = 3
+
+
+class Cause(str, enum.Enum):
+    """Why. The values are the CAUSE_ constants of SafetyState.msg."""
+
+    NONE = "none"
+    COMMAND_STALE = "command_stale"
+    COMMAND_INVALID = "command_invalid"
+    ESTOP = "estop"
+    ESTOP_STALE = "estop_stale"
+    SCAN_STALE = "scan_stale"
+    OBSTACLE = "obstacle"
+    OBSTACLE_NEAR = "obstacle_near"
+    SPEED = "speed_ceiling"
+    SHUTDOWN = "shutdown"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One reason to do something. `factor`: the share of the commanded speed that it leaves, 0 to 1."""
+
+    action: Action
+    cause: Cause
+    detail: str
+    clears_on: str
+    factor: float
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """The order, what was done to the command, why, and what ends it. `twist` is always finite."""
+
+    action: Action
+    cause: Cause
+    detail: str
+    clears_on: str
+    twist: Twist
+
+
+PASSED = Finding(Action.PASS, Cause.NONE, "", "", 1.0)
+
+
+def stop(cause: Cause, detail: str, clears_on: str) -> Finding:
+    """A reason to stand still."""
+    return Finding(Action.STOP, cause, detail, clears_on, 0.0)

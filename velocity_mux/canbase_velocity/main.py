@@ -1,0 +1,83 @@
+"""The process of velocity_mux and safety_filter: two nodes, one thread, one executor. Owns signals and the way out."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
+
+import rclpy
+from rclpy.experimental import EventsExecutor
+from rclpy.signals import SignalHandlerOptions
+
+from canbase_config.robot import Robot
+from canbase_velocity.filter_node import FilterNode
+from canbase_velocity.mux_node import MuxNode
+
+SHUTDOWN_CYCLES = 5
+"""So many zeros go out at least at the end, one per command period."""
+WAKE_S = 0.1
+
+
+def run(robot: Robot, ros_args: Sequence[str]) -> int:
+    """Runs mux and filter until SIGINT or SIGTERM; then orders zero until the base stands and returns 0.
+
+    `ros_args`: arguments for rclpy, such as ["--ros-args", "-r", "__ns:=/robot2"]. An exception in a callback ends the
+    process too: zeros go out, and it is raised here. Call from the main thread (signals).
+    """
+    with _stop_signals() as received:
+        rclpy.init(args=list(ros_args), signal_handler_options=SignalHandlerOptions.NO)
+        try:
+            _run_nodes(robot, received)
+        finally:
+            rclpy.shutdown()
+    return 0
+
+
+def _run_nodes(robot: Robot, received: list[int]) -> None:
+    mux, safety = MuxNode(robot), FilterNode(robot)
+    executor = EventsExecutor()
+    executor.add_node(mux)
+    executor.add_node(safety)
+    period_s = 1.0 / robot.rates.command_hz
+    try:
+        while not received:
+            executor.spin_once(timeout_sec=WAKE_S)
+        patience_s = time.monotonic() + robot.timeouts.standstill_s
+        _order_zero(mux, safety, period_s, min(safety.stands_from_s, patience_s))
+    except BaseException:
+        # What failed may fail again: no waiting for standstill, the driver and the watchdog see to it.
+        _order_zero(mux, safety, period_s, 0.0)
+        raise
+    finally:
+        executor.shutdown()
+        safety.destroy_node()
+        mux.destroy_node()
+
+
+def _order_zero(mux: MuxNode, safety: FilterNode, period_s: float, until_s: float) -> None:
+    """Zeros and leases, until `until_s` (time.monotonic), so that an orderly end does not trip the watchdog."""
+    cycles = 0
+    while cycles < SHUTDOWN_CYCLES or time.monotonic() < until_s:
+        mux.shut_down()
+        safety.shut_down()
+        time.sleep(period_s)
+        cycles += 1
+
+
+@contextmanager
+def _stop_signals() -> Iterator[list[int]]:
+    """Collects SIGINT and SIGTERM instead of dying from them. They are seen between two callbacks, never inside one."""
+    received: list[int] = []
+
+    def note(number: int, frame: FrameType | None) -> None:
+        received.append(number)
+
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield received
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,97 @@
+"""ROS messages from and to the plain values of this package. No node, no clock."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from canbase.msg import MuxSource, MuxState, SafetyState, StopEvent
+from geometry_msgs.msg import Twist as TwistMessage
+from geometry_msgs.msg import TwistStamped
+from sensor_msgs.msg import LaserScan
+
+from canbase_velocity.clearance import Scan
+from canbase_velocity.decision import Cause, Decision
+from canbase_velocity.mux import MuxDecision, SourceView, Standing
+from canbase_velocity.safety_filter import Inputs
+from canbase_velocity.twist import Twist
+
+NAN = math.nan
+
+
+def twist_of(message: TwistMessage) -> Twist:
+    """x and yaw of a command. NaN or infinity on an axis that a two-wheeled base does not have spoils the whole too."""
+    unused = (message.linear.y, message.linear.z, message.angular.x, message.angular.y)
+    if not all(map(math.isfinite, unused)):
+        return Twist(NAN, NAN)
+    return Twist(message.linear.x, message.angular.z)
+
+
+def twist_message(twist: Twist, stamp: Time, frame_id: str) -> TwistStamped:
+    """A command in `frame_id` (REP 105: base_link)."""
+    message = TwistStamped()
+    message.header.stamp = stamp
+    message.header.frame_id = frame_id
+    message.twist.linear.x = twist.linear_mps
+    message.twist.angular.z = twist.angular_radps
+    return message
+
+
+def scan_of(message: LaserScan) -> Scan:
+    """The part of a scan that clearances need."""
+    return Scan(message.ranges, message.angle_min, message.angle_increment, message.range_min, message.range_max)
+
+
+def mux_state(decision: MuxDecision, stamp: Time) -> MuxState:
+    """velocity_mux/state."""
+    sources = [_mux_source(source) for source in decision.sources]
+    return MuxState(stamp=stamp, active=decision.active or "", sources=sources)
+
+
+def _mux_source(source: SourceView) -> MuxSource:
+    return MuxSource(
+        name=source.name,
+        topic=source.topic,
+        priority=source.priority,
+        active=source.standing is Standing.ACTIVE,
+        age_s=_or_nan(source.age_s),
+        timeout_s=source.timeout_s,
+        received=source.received,
+        refused=source.refused,
+        reason=source.reason,
+    )
+
+
+def safety_state(decision: Decision, inputs: Inputs, scan_is_fresh: bool, stamp: Time) -> SafetyState:
+    """safety_filter/state, without what the node knows of its leases."""
+    clearances = inputs.clearances if scan_is_fresh else None
+    return SafetyState(
+        stamp=stamp,
+        action=int(decision.action),
+        cause=decision.cause.value,
+        detail=decision.detail,
+        clears_on=decision.clears_on,
+        estop=stopped_by_estop(decision),
+        clearance_ahead_m=NAN if clearances is None else clearances.ahead_m,
+        clearance_behind_m=NAN if clearances is None else clearances.behind_m,
+        command_age_s=_or_nan(inputs.command_age_s),
+        scan_age_s=_or_nan(inputs.scan_age_s),
+        ordered_linear_mps=decision.twist.linear_mps,
+        ordered_angular_radps=decision.twist.angular_radps,
+    )
+
+
+def stop_event(decision: Decision, stamp: Time) -> StopEvent:
+    """One message on stop_events: the filter's stops clear by themselves, none is latched."""
+    values: dict[str, Any] = {"cause": decision.cause.value, "detail": decision.detail, "clears_on": decision.clears_on}
+    return StopEvent(stamp=stamp, stopped_by="safety_filter", latched=False, **values)
+
+
+def stopped_by_estop(decision: Decision) -> bool:
+    """Whether the emergency stop, or its silence, holds the base."""
+    return decision.cause in (Cause.ESTOP, Cause.ESTOP_STALE)
+
+
+def _or_nan(value: float | None) -> float:
+    return NAN if value is None else value

@@ -1,0 +1,147 @@
+"""Who drives, told as stories with times [s]."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from canbase_config.robot import DEFAULT_SOURCES, MuxSource
+from canbase_velocity.mux import Mux, MuxDecision, Standing
+from canbase_velocity.twist import ZERO, Twist
+from hypothesis import given
+from hypothesis import strategies as st
+
+SLOW = Twist(0.1, 0.0)
+FAST = Twist(0.5, 0.2)
+TIMEOUTS_S = {name: source.timeout_s for name, source in DEFAULT_SOURCES.items()}
+
+
+@pytest.fixture
+def mux() -> Mux:
+    return Mux(DEFAULT_SOURCES)
+
+
+def reasons(decision: MuxDecision) -> dict[str, str]:
+    return {source.name: source.reason for source in decision.sources}
+
+
+def test_before_any_command_zero_is_ordered_and_each_source_says_why(mux: Mux) -> None:
+    decision = mux.decide(0.0)
+    assert decision.active is None
+    assert decision.twist == ZERO
+    assert reasons(decision) == dict.fromkeys(("joystick", "navigation", "action"), "never received")
+    assert [source.age_s for source in decision.sources] == [None, None, None]
+
+
+def test_sources_are_listed_by_falling_priority_whatever_their_order_in_the_file() -> None:
+    sources = {
+        "low": MuxSource(topic="a", priority=0, timeout_s=0.3),
+        "high": MuxSource(topic="b", priority=255, timeout_s=0.3),
+        "middle": MuxSource(topic="c", priority=7, timeout_s=0.3),
+    }
+    assert [source.name for source in Mux(sources).decide(0.0).sources] == ["high", "middle", "low"]
+
+
+def test_priority_0_drives_when_it_is_alone() -> None:
+    mux = Mux({"low": MuxSource(topic="a", priority=0, timeout_s=0.3)})
+    mux.on_command("low", SLOW, 1.0)
+    assert mux.decide(1.0).twist == SLOW
+
+
+def test_the_joystick_takes_over_at_once_and_gives_back_only_to_a_source_that_still_talks(mux: Mux) -> None:
+    mux.on_command("action", SLOW, 10.0)
+    assert mux.decide(10.0).active == "action"
+    mux.on_command("joystick", FAST, 10.1)  # somebody takes the joystick
+    decision = mux.decide(10.1)
+    assert (decision.active, decision.twist) == ("joystick", FAST)
+    assert reasons(decision)["action"] == "joystick has priority"
+    mux.on_command("joystick", ZERO, 10.25)  # let go: it still holds, with zero
+    assert mux.decide(10.30) == mux.decide(10.30)
+    assert (mux.decide(10.30).active, mux.decide(10.30).twist) == ("joystick", ZERO)
+    decision = mux.decide(10.56)  # the joystick is silent; so is the action, whose old command must not come back
+    assert (decision.active, decision.twist) == (None, ZERO)
+    assert reasons(decision)["joystick"] == "silent for 0.31 s (timeout 0.30 s)"
+    assert reasons(decision)["action"] == "silent for 0.56 s (timeout 0.30 s)"
+    mux.on_command("action", SLOW, 10.60)  # a new command of its own
+    assert mux.decide(10.60).active == "action"
+
+
+def test_a_lower_source_that_kept_talking_drives_on_with_its_newest_command(mux: Mux) -> None:
+    mux.on_command("joystick", FAST, 0.0)
+    mux.on_command("navigation", SLOW, 0.1)
+    mux.on_command("navigation", Twist(0.3, 0.0), 0.3)
+    assert mux.decide(0.3).active == "joystick"
+    decision = mux.decide(0.301)
+    assert (decision.active, decision.twist) == ("navigation", Twist(0.3, 0.0))
+
+
+@pytest.mark.parametrize("name", TIMEOUTS_S)
+def test_a_source_holds_until_exactly_its_timeout(mux: Mux, name: str) -> None:
+    mux.on_command(name, FAST, 0.0)
+    assert mux.decide(TIMEOUTS_S[name]).twist == FAST
+    assert mux.decide(math.nextafter(TIMEOUTS_S[name], math.inf)).twist == ZERO
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
+def test_a_command_that_is_not_finite_is_refused_counted_and_keeps_nobody_fresh(mux: Mux, number: float) -> None:
+    assert mux.on_command("joystick", FAST, 0.0) is True
+    assert mux.on_command("joystick", Twist(number, 0.0), 0.2) is False
+    assert mux.on_command("joystick", Twist(0.0, number), 0.3) is False
+    joystick = mux.decide(0.3).sources[0]
+    assert (joystick.received, joystick.refused, joystick.age_s) == (1, 2, 0.3)
+    assert mux.decide(0.3).twist == FAST
+    assert mux.decide(0.31).active is None
+
+
+def test_a_source_that_the_configuration_does_not_name_is_our_own_error(mux: Mux) -> None:
+    with pytest.raises(KeyError, match="gamepad"):
+        mux.on_command("gamepad", FAST, 0.0)
+
+
+def test_a_mux_without_sources_is_refused() -> None:
+    with pytest.raises(ValueError, match="at least one source"):
+        Mux({})
+
+
+def test_at_shutdown_zero_is_ordered_whoever_wants_to_drive(mux: Mux) -> None:
+    mux.on_command("joystick", FAST, 0.0)
+    decision = mux.shutdown(0.1)
+    assert (decision.active, decision.twist) == (None, ZERO)
+    assert set(decision.standings) == {Standing.SHUTDOWN}
+    assert reasons(decision)["joystick"] == "shutdown"
+
+
+def test_standings_change_with_the_reason_and_not_with_the_age(mux: Mux) -> None:
+    mux.on_command("navigation", SLOW, 0.0)
+    first, later, silent = mux.decide(0.1), mux.decide(0.2), mux.decide(0.6)
+    assert first.standings == later.standings == (Standing.NEVER_RECEIVED, Standing.ACTIVE, Standing.NEVER_RECEIVED)
+    assert silent.standings == (Standing.NEVER_RECEIVED, Standing.SILENT, Standing.NEVER_RECEIVED)
+
+
+commands = st.lists(
+    st.tuples(
+        st.sampled_from(sorted(DEFAULT_SOURCES)),
+        st.builds(Twist, st.floats(), st.floats()),
+        st.floats(0.0, 0.6),  # pause before it [s]
+    ),
+    max_size=30,
+)
+
+
+@given(commands=commands, pause_s=st.floats(0.0, 1.0))
+def test_the_order_is_the_newest_valid_command_of_the_highest_fresh_source_or_zero(
+    commands: list[tuple[str, Twist, float]], pause_s: float
+) -> None:
+    mux, now, newest = Mux(DEFAULT_SOURCES), 0.0, dict[str, tuple[Twist, float]]()
+    for name, twist, before_s in commands:
+        now += before_s
+        mux.on_command(name, twist, now)
+        if twist.is_finite:
+            newest[name] = (twist, now)
+    now += pause_s
+    fresh = [name for name, (_, at_s) in newest.items() if now - at_s <= TIMEOUTS_S[name]]
+    expected = max(fresh, key=lambda name: DEFAULT_SOURCES[name].priority, default=None)
+    decision = mux.decide(now)
+    assert decision.active == expected
+    assert decision.twist == newest.get(expected or "", (ZERO, 0.0))[0]
+    assert [source.name for source in decision.sources if source.reason == ""] == [expected] * (expected is not None)
