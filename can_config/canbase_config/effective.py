@@ -19,13 +19,17 @@ _MARK_COLUMN: Final = 44
 
 
 class _Representer(RoundTripRepresenter):
-    """Writes None as `null`, where ruamel.yaml would write nothing at all."""
+    """Writes None as `null`, not as nothing, and quotes text with line ends and the like, which YAML would fold."""
 
     def represent_none(self, data: Any) -> ScalarNode:
         return self.represent_scalar("tag:yaml.org,2002:null", "null")
 
+    def represent_str(self, data: str) -> ScalarNode:
+        return self.represent_scalar("tag:yaml.org,2002:str", data, style=None if data.isprintable() else '"')
+
 
 _Representer.add_representer(type(None), _Representer.represent_none)
+_Representer.add_representer(str, _Representer.represent_str)
 
 
 def effective(loaded: Loaded) -> str:

@@ -1,0 +1,102 @@
+"""Any valid robot, written as its effective configuration and read again, is the same robot."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from canbase_config.effective import effective
+from canbase_config.load import Loaded, leaf_keys, load_robot
+from canbase_config.robot import Robot
+
+Values = dict[str, Any]
+
+TEXT = st.text(st.characters(codec="utf-8"), max_size=12)
+PLAIN = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | TEXT
+JSON = st.recursive(
+    PLAIN, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(TEXT, inner, max_size=3), max_leaves=6
+)
+
+
+def from_schema(shape: Values, definitions: Values) -> st.SearchStrategy[Any]:
+    """Values that the JSON schema `shape` allows; keys that are not required come and go."""
+    if "$ref" in shape:
+        return from_schema(definitions[shape["$ref"].rpartition("/")[2]], definitions)
+    if "anyOf" in shape:
+        return st.one_of([from_schema(option, definitions) for option in shape["anyOf"]])
+    if "enum" in shape:
+        return st.sampled_from(shape["enum"])
+    if shape["type"] == "object":
+        return objects(shape, definitions)
+    if shape["type"] == "array":
+        return st.lists(from_schema(shape["items"], definitions), min_size=shape["minItems"], max_size=4)
+    return scalars(shape)
+
+
+def objects(shape: Values, definitions: Values) -> st.SearchStrategy[Any]:
+    for pattern, inner in shape.get("patternProperties", {}).items():
+        names = matching(pattern, max_length=64)
+        return st.dictionaries(names, from_schema(inner, definitions), min_size=1, max_size=3)
+    if "properties" not in shape:
+        return st.dictionaries(TEXT, JSON, max_size=3)
+    keys = {key: from_schema(inner, definitions) for key, inner in shape["properties"].items()}
+    required = shape.get("required", ())
+    return st.fixed_dictionaries(
+        {key: keys[key] for key in required}, optional={key: keys[key] for key in keys if key not in required}
+    )
+
+
+def scalars(shape: Values) -> st.SearchStrategy[Any]:
+    match shape["type"]:
+        case "number":
+            low = shape.get("minimum", shape.get("exclusiveMinimum"))
+            return st.floats(low, shape["maximum"], exclude_min="exclusiveMinimum" in shape)
+        case "integer":
+            return st.integers(shape["minimum"], shape["maximum"])
+        case "boolean":
+            return st.booleans()
+        case "null":
+            return st.none()
+    if "pattern" in shape:
+        return matching(shape["pattern"], shape["maxLength"])
+    return st.text(st.characters(codec="utf-8"), min_size=shape["minLength"], max_size=shape.get("maxLength", 30))
+
+
+def matching(pattern: str, max_length: int) -> st.SearchStrategy[str]:
+    """Text of `pattern`; without the line end that Python's `$` allows behind it, unlike pydantic's."""
+    return st.from_regex(pattern, fullmatch=True).filter(lambda text: len(text) <= max_length and "\n" not in text)
+
+
+def made_consistent(values: Values) -> Values:
+    """`values` changed where two of them may contradict each other, as the model's own checks demand."""
+    for index, drive in enumerate(values["drives"]):
+        drive |= {"joint": f"{drive['joint'][:60]}_{index}", "node_id": index + 1, "side": ("left", "right")[index % 2]}
+    limits, safety, action = values["limits"], values["safety"], values.get("action", {})
+    limits["emergency_deceleration_mps2"] = max(limits["emergency_deceleration_mps2"], limits["deceleration_mps2"])
+    safety["stop_distance_m"] = min(safety.get("stop_distance_m", 0.15), 4.0)
+    safety["slow_distance_m"] = safety["stop_distance_m"] + 0.5
+    for what in ("distance_m", "speed_mps"):
+        action.pop(f"max_{what}", None)
+        action[f"min_{what}"] = min(action.get(f"min_{what}", 0.01), 0.4)
+    for index, source in enumerate(values.get("mux", {}).get("sources", {}).values()):
+        source |= {"priority": index, "topic": f"{source['topic'][:100].rstrip('/')}_{index}"}
+    return values
+
+
+SCHEMA = Robot.model_json_schema()
+ROBOTS = from_schema(SCHEMA, SCHEMA["$defs"]).map(made_consistent).map(Robot.model_validate)
+
+
+@settings(max_examples=60, deadline=None)
+@given(ROBOTS)
+def test_any_valid_robot_survives_being_written_and_read(robot: Robot) -> None:
+    text = effective(Loaded(robot, Path("robot.yaml"), frozenset(), frozenset(leaf_keys(robot.model_dump()))))
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "robot.yaml"
+        file.write_text(text, encoding="utf-8", newline="")
+        assert load_robot(file).robot == robot
