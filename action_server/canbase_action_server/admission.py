@@ -8,7 +8,7 @@ from canbase_action_server.inputs import ENABLED, ESTOP_CAUSES, WATCHDOG_OK, Inp
 from canbase_config.robot import Robot
 
 STATE_TIMEOUT_S = 1.5
-"""Older than this, the state of another node says nothing: three periods of the slowest one (velocity_mux/state, 2 Hz)."""
+"""A state that is older says nothing: three periods of the slowest one (velocity_mux/state, 2 Hz)."""
 
 
 def action_source(robot: Robot) -> str:

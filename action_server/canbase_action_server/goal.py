@@ -1,7 +1,7 @@
 """One goal from its acceptance to its outcome: DRIVING → STOPPING → ENDED. Knows no ROS and reads no clock.
 
 Rules. Every ending passes through STOPPING: zero is ordered, and the goal ends when the base is known to stand. A goal
-that comes to stand short of the distance drives on. `causes.py` says why a goal ends, `standstill.py` whether the base stands.
+that comes to stand short of the distance drives on. `causes.py`: why a goal ends; `standstill.py`: does the base stand.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Order:
 
 
 def chain_latency_s(robot: Robot) -> float:
-    """From a velocity order to the motion of the wheels: mux and filter, 1.5 cycles of the driver, lag of the drives."""
+    """From a velocity order to the wheels' motion: mux and filter, 1.5 cycles of the driver, lag of the drives."""
     return 0.5 / robot.rates.command_hz + 1.5 / robot.rates.control_hz + DRIVES_LAG_S
 
 

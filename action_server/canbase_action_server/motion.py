@@ -15,7 +15,7 @@ LATERAL_GAIN_PER_M = 4.0
 STEERING_RADPM = 0.5
 """Largest curvature that the correction may order [rad per m driven]: it never turns a standing base."""
 JUMP_M = 0.1
-"""A pose that is farther from the last one than twice the limits explain, plus this, is not motion: odometry was reset."""
+"""A pose farther from the last one than twice the speed explains, plus this, is no motion: odometry was reset."""
 
 
 @dataclass(frozen=True, slots=True)

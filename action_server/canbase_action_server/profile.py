@@ -1,7 +1,7 @@
-"""How fast to go now, so that the base stands at the distance: acceleration with a jerk limit, a braking curve, a gentle end.
+"""How fast to go now, so that the base stands at the distance: a ramp with a jerk limit, a braking curve, a gentle end.
 
 What was ordered during the latency of the loop has not been seen by the odometry yet, but will be driven: it counts as
-driven already. So neither old odometry nor slow drives make the base overshoot. Magnitudes only: the sign is `motion.py`'s.
+driven already, so that neither old odometry nor slow drives make the base overshoot. Magnitudes only: no signs here.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class ProfileLimits:
     crawl_mps: float
     """Least speed that is ordered before the end: slow enough to stop within half a millimetre, fast enough to move."""
     chain_latency_s: float
-    """From an order to the wheels' motion, without the age of the odometry: mux, filter, cycle and lag of the drives."""
+    """From an order to the wheels' motion, without the odometry's age: mux, filter, cycle and lag of the drives."""
 
     def __post_init__(self) -> None:
         for name in self.__slots__:

@@ -6,7 +6,7 @@ from typing import Annotated, Final
 
 import typer
 
-from canbase_cli import config, process
+from canbase_cli import config, drive, process
 from canbase_cli.options import RosCommand
 
 app = typer.Typer(
@@ -43,5 +43,6 @@ app.add_typer(config.app, name="config")
 app.command("driver", cls=RosCommand, options_metavar=_ROS_USAGE)(process.driver)
 app.command("velocity", cls=RosCommand, options_metavar=_ROS_USAGE)(process.velocity)
 app.command("action-server", cls=RosCommand, options_metavar=_ROS_USAGE)(process.action_server)
+app.command("drive", cls=drive.DriveCommand, options_metavar=_ROS_USAGE)(drive.drive)
 app.command("watchdog", cls=RosCommand)(process.watchdog)
 app.command("sim", cls=RosCommand)(process.sim)

@@ -1,4 +1,4 @@
-"""A base in virtual time for the tests of the action server: ramp, dead time, lag, and odometry that is late and uneven."""
+"""A base in virtual time for the tests of the action server: ramp, dead time, lag, late and uneven odometry."""
 
 from __future__ import annotations
 

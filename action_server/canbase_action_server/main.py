@@ -1,0 +1,74 @@
+"""The process drive_distance_server: ROS up, signals, the loop, and a way out that always stops the base."""
+
+from __future__ import annotations
+
+import signal
+import time
+from types import FrameType
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+
+from canbase_action_server.node import DriveDistanceServer
+from canbase_config.robot import Robot
+
+STANDSTILL_S = 2.0
+"""On the way out the base has this long to stand; then the goal ends without it."""
+DELIVERY_S = 0.2
+"""After the last result, for the middleware to hand it over."""
+SLICE_S = 0.1
+
+
+def run(robot: Robot, ros_args: list[str]) -> int:
+    """Serve until SIGINT or SIGTERM; 0 after an orderly end, 1 after a defect. `ros_args` as for rclpy.init."""
+    rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)
+    executor = SingleThreadedExecutor()
+    node = DriveDistanceServer(robot)
+    executor.add_node(node)
+    asked_to_end = _catch_signals()
+    try:
+        _serve(executor, node, asked_to_end)
+        _end(executor, node)
+    finally:
+        node.order_stop()
+        executor.shutdown()
+        node.destroy_node()
+        rclpy.try_shutdown()
+    return 0 if node.failure is None else 1
+
+
+def _catch_signals() -> list[int]:
+    """A list that receives the number of each SIGINT and SIGTERM."""
+    received: list[int] = []
+
+    def remember(number: int, _frame: FrameType | None) -> None:
+        received.append(number)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, remember)
+    return received
+
+
+def _serve(executor: SingleThreadedExecutor, node: DriveDistanceServer, asked_to_end: list[int]) -> None:
+    while not asked_to_end and node.failure is None:
+        _spin(executor, node)
+
+
+def _spin(executor: SingleThreadedExecutor, node: DriveDistanceServer) -> None:
+    try:
+        executor.spin_once(timeout_sec=SLICE_S)
+    except Exception as error:  # noqa: BLE001  a defect in the action's callbacks ends here; the base must stop
+        node.fail(error)
+
+
+def _end(executor: SingleThreadedExecutor, node: DriveDistanceServer) -> None:
+    node.shut_down()
+    give_up = time.monotonic() + STANDSTILL_S
+    while node.busy and time.monotonic() < give_up:
+        _spin(executor, node)
+    node.give_up("the process ends; whether the base stands was not confirmed in time")
+    node.order_stop()
+    deliver_until = time.monotonic() + DELIVERY_S
+    while time.monotonic() < deliver_until:
+        _spin(executor, node)
