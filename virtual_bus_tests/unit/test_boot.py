@@ -395,7 +395,7 @@ def test_a_strange_device_type_is_a_note_only() -> None:
 
 
 def running_drive(after_quick_stop: int) -> FakeDrive:
-    """A drive at 955 rpm in operation enabled, that takes 10 readings of 606Ch to stop."""
+    """A drive at 955 rpm in operation enabled; a quick stop ends at once, with statusword `after_quick_stop`."""
     drive = FakeDrive()
     drive.objects[0x6041, 0] = u16(0x1637)
     drive.objects[0x606C, 0] = u32(955)
@@ -412,6 +412,13 @@ def test_a_running_drive_is_quick_stopped_before_its_communication_is_reset() ->
     drive = running_drive(after_quick_stop=0x0240)
     assert boot_one_axis(drive).report is not None
     assert drive.writes[:2] == [(0x6040, 0, 0x02), (0x6007, 0, 3)]
+
+
+def test_a_statusword_that_shows_no_state_may_be_a_running_drive() -> None:
+    drive = running_drive(after_quick_stop=0x0240)
+    drive.objects[0x6041, 0] = u16(0x0011)
+    assert boot_one_axis(drive).report is not None
+    assert drive.writes[0] == (0x6040, 0, 0x02)
 
 
 def test_a_drive_that_stays_in_quick_stop_is_disabled_when_it_stands() -> None:
