@@ -9,17 +9,17 @@ import math
 from collections.abc import Mapping
 
 from builtin_interfaces.msg import Time
-from canbase.msg import DriverStatus, DriveStatus
+from canbase.msg import DriverStatus, DriveStatus, StopEvent
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Quaternion, TransformStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 
 from canbase_driver.odometry import wrap_angle
-from canbase_driver.snapshot import DriverSnapshot, DriverState, DriveSnapshot, WatchdogView
+from canbase_driver.snapshot import DriverSnapshot, DriverState, DriveSnapshot, StopRecord, WatchdogView
 
 try:
-    from tf2_msgs.msg import TFMessage
+    from tf2_msgs.msg import TFMessage as TFMessage
 except ModuleNotFoundError:  # The ROS wheels on PyPI do not have tf2_msgs; ROS 2 from apt does.
     TFMessage = None
 
@@ -92,6 +92,18 @@ def status_message(snapshot: DriverSnapshot, stamp: Time) -> DriverStatus:
         frames_dropped=_u32(snapshot.frames_dropped),
         send_errors=_u32(snapshot.send_errors),
         drives=[_drive_status(drive) for drive in snapshot.drives],
+    )
+
+
+def stop_event_message(stop: StopRecord, stamp: Time) -> StopEvent:
+    """One stop for the topic stop_events."""
+    return StopEvent(
+        stamp=stamp,
+        stopped_by=stop.stopped_by,
+        cause=stop.cause,
+        detail=stop.detail,
+        latched=stop.latched,
+        clears_on=stop.clears_on,
     )
 
 

@@ -230,10 +230,11 @@ class Supervisor:
             self._end(_as_cause(SHUTDOWN, situation))
 
     def _stop(self, hazard: Hazard, situation: Situation) -> None:
-        self.state = DriverState.STOPPING
         self._step = Step.QUICK if hazard.quick else Step.RAMP
         self._latch = self._latch or hazard.latched
-        self.cause = _as_cause(hazard, situation)
+        if self.state is not DriverState.STOPPING:
+            self.cause = _as_cause(hazard, situation)
+        self.state = DriverState.STOPPING
 
     def _end(self, cause: Cause) -> None:
         self.cause = cause

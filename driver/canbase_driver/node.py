@@ -1,0 +1,119 @@
+"""The ROS node motor_driver: cmd_vel in; odom, tf, joint_states, status, diagnostics and stop events out.
+
+Threads: the executor's (main) takes commands; `publisher` waits for snapshots and publishes them; `services` answers
+motor_driver/reset and motor_driver/stop, which wait for the control thread. None of them touches the bus.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+
+from canbase.msg import DriverStatus, StopEvent
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+
+from canbase_config.robot import Robot
+from canbase_driver import messages
+from canbase_driver.kinematics import Twist2D
+from canbase_driver.loop import ControlLoop
+from canbase_driver.snapshot import DriverSnapshot, StopRecord
+
+COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
+STATE_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
+EVENT_QOS = QoSProfile(depth=50, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+DIAGNOSTICS_PERIOD_S = 1.0
+
+
+class MotorDriverNode(Node):
+    """Talks ROS for a `ControlLoop`."""
+
+    def __init__(self, robot: Robot, loop: ControlLoop) -> None:
+        super().__init__("motor_driver")
+        self._robot = robot
+        self._loop = loop
+        self._odom = self.create_publisher(Odometry, "odom", 10)
+        self._tf = self.create_publisher(messages.TFMessage, "tf", 100) if messages.TFMessage is not None else None
+        self._joints = self.create_publisher(JointState, "joint_states", 10)
+        self._status = self.create_publisher(DriverStatus, "motor_driver/status", STATE_QOS)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._stop_events = self.create_publisher(StopEvent, "stop_events", EVENT_QOS)
+        self.create_subscription(TwistStamped, "cmd_vel", self._on_command, COMMAND_QOS)
+        self._previous: DriverSnapshot | None = None
+        self._diagnosed: DriverSnapshot | None = None
+        self._status_at = 0.0
+        if self._tf is None:
+            self.get_logger().warning("tf2_msgs is not installed: no transform is published on tf")
+
+    def publish(self, snapshot: DriverSnapshot, stops: list[StopRecord]) -> None:
+        """Publish a snapshot; called by the publisher's thread alone."""
+        stamp = self.get_clock().now().to_msg()
+        for stop in stops:
+            self._stop_events.publish(messages.stop_event_message(stop, stamp))
+        if snapshot.odometry_valid:
+            self._odom.publish(messages.odometry_message(snapshot, stamp))
+            self._joints.publish(messages.joint_state_message(snapshot, stamp))
+            if self._tf is not None:
+                self._tf.publish(messages.tf_message(snapshot, stamp))
+        self._publish_status(snapshot, stamp)
+        self._log_change(snapshot)
+        self._previous = snapshot
+
+    def _on_command(self, message: TwistStamped) -> None:
+        received_at = time.monotonic()
+        twist = Twist2D(message.twist.linear.x, message.twist.angular.z)
+        if not twist.is_finite:
+            self.get_logger().error(f"cmd_vel refused: {twist} is not finite", throttle_duration_sec=1.0)
+        self._loop.command(twist, received_at)
+
+    def _publish_status(self, snapshot: DriverSnapshot, stamp: object) -> None:
+        previous = self._previous
+        changed = previous is None or (previous.state, previous.cause) != (snapshot.state, snapshot.cause)
+        if changed or snapshot.time_s - self._status_at >= 1.0 / self._robot.rates.status_hz:
+            self._status_at = snapshot.time_s
+            self._status.publish(messages.status_message(snapshot, stamp))
+        if self._diagnosed is None or snapshot.time_s - self._diagnosed.time_s >= DIAGNOSTICS_PERIOD_S:
+            before, self._diagnosed = self._diagnosed or snapshot, snapshot
+            self._diagnostics.publish(
+                messages.diagnostics_message(snapshot, stamp, robot=self._robot.name, previous=before)
+            )
+
+    def _log_change(self, snapshot: DriverSnapshot) -> None:
+        previous = self._previous
+        if previous is not None and (previous.state, previous.cause) == (snapshot.state, snapshot.cause):
+            return
+        why = f": {snapshot.cause}" if snapshot.cause not in ("none", snapshot.state.name.lower()) else ""
+        detail = f" ({snapshot.detail})" if snapshot.detail else ""
+        clears = f"; ends on: {snapshot.clears_on}" if snapshot.clears_on else ""
+        text = f"{snapshot.state.name}{why}{detail}{clears}"
+        if snapshot.cause in ("none", "booting", "enabling", "shutdown"):
+            self.get_logger().info(text)
+        else:
+            self.get_logger().warning(text)
+
+
+class Publisher(threading.Thread):
+    """Publishes every snapshot as soon as the control thread hands it over."""
+
+    def __init__(self, node: MotorDriverNode, loop: ControlLoop) -> None:
+        super().__init__(name="publisher", daemon=True)
+        self._node = node
+        self._loop = loop
+        self.failure: BaseException | None = None
+
+    def run(self) -> None:
+        """The thread's body: until the control thread has ended and its last snapshot is out."""
+        try:
+            while True:
+                alive = self._loop.is_alive()
+                snapshot, stops = self._loop.next_snapshot(timeout_s=0.1)
+                if snapshot is not None:
+                    self._node.publish(snapshot, stops)
+                elif not alive:
+                    return
+        except BaseException as error:  # noqa: BLE001 - main sees it, stops the robot and ends the process
+            self.failure = error
