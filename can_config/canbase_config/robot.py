@@ -32,8 +32,6 @@ Topic = Annotated[
         json_schema_extra={"form": "letters, digits and _, joined by /, each part first a letter"},
     ),
 ]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 VelocityUnit = Literal["rpm", "0.1rpm", "0.001rpm", "rev/s", "0.001rev/s", "counts/s", "0.1counts/s"]
 """What one bit of 60FFh and 606Ch means, always at the motor shaft (before the gear)."""

@@ -75,7 +75,7 @@ def read_yaml(path: str | Path) -> YamlFile:
 def _text(path: Path) -> str:
     """The file as text. Raises ConfigError if it cannot be had."""
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        return path.read_bytes().decode("utf-8")
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
         what = f"byte {error.object[error.start]:02X}h is no UTF-8"

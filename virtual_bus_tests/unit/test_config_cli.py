@@ -111,10 +111,13 @@ def test_a_mistyped_option_before_the_ros_arguments_is_an_error(monkeypatch: pyt
     assert "No such option: --confg" in result.stderr
 
 
-def test_the_exit_code_of_the_process_is_that_of_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
-    stand_in(monkeypatch, "canbase_driver.main", exit_code=7)
+@pytest.mark.parametrize(("command", "module"), [*ROS_COMMANDS, ("sim", "canbase_bench.main")])
+def test_the_exit_code_of_the_process_is_that_of_the_command(
+    command: str, module: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stand_in(monkeypatch, module, exit_code=7)
 
-    assert CliRunner().invoke(app, ["driver"]).exit_code == 7
+    assert CliRunner().invoke(app, [command]).exit_code == 7
 
 
 @pytest.mark.parametrize("command", ["driver", "velocity", "action-server", "sim", "watchdog"])
@@ -145,6 +148,7 @@ def test_the_watchdog_replaces_the_process_and_skips_the_start_up_hook(
 ) -> None:
     calls: list[tuple[str, list[str], dict[str, str]]] = []
     monkeypatch.setattr(os, "execve", lambda *arguments: calls.append(arguments))
+    monkeypatch.delenv("_ROS_WHEELS_BOOTSTRAP_COMPLETE", raising=False)
     file = write(tmp_path, {})
 
     CliRunner().invoke(app, ["watchdog", "--config", str(file)])

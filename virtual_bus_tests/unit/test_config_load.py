@@ -117,11 +117,11 @@ def test_the_effective_configuration_is_a_robot_yaml_in_which_all_is_given(name:
 
 
 def test_line_ends_in_a_text_survive_the_effective_configuration(tmp_path: Path) -> None:
-    loaded = load(tmp_path, {3: r'  channel: "a\nb\N \t"'})  # \N is the next-line character U+0085
+    loaded = load(tmp_path, {2: r'  interface: "a\nb \t"', 3: r'  channel: "\N"'})  # \N: the next-line character
     file = tmp_path / "effective.yaml"
     file.write_text(effective(loaded), encoding="utf-8")
 
-    assert loaded.robot.bus.channel == "a\nb\x85 \t"
+    assert (loaded.robot.bus.interface, loaded.robot.bus.channel) == ("a\nb \t", "\x85")
     assert load_robot(file).robot == loaded.robot
 
 
