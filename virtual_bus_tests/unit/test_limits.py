@@ -189,6 +189,8 @@ def test_a_reversal_goes_through_zero_where_the_straight_line_does() -> None:
 def test_a_robot_that_brakes_gently_still_starts_briskly() -> None:
     gentle = {"deceleration_mps2": 0.25, "angular_deceleration_radps2": 1.0}
     limiter = Limiter(NO_JERK.limits.model_copy(update=gentle), TRACK_M)
+    first = limiter.step(MotionState.AT_REST, Twist2D(0.5, 1.0), DT_S).twist
+    assert (first.linear_mps, first.angular_radps) == pytest.approx((0.005, 0.01))  # 0.5 m/s² × 10 ms
     assert steps_until(limiter, MotionState.AT_REST, Twist2D(0.5, 0.0), 200) in (100, 101)
     assert steps_until(limiter, MotionState(Twist2D(0.5, 0.0)), Twist2D.ZERO, 300) in (200, 201)
     assert steps_until(limiter, MotionState.AT_REST, Twist2D(0.0, 1.0), 200) in (50, 51)
