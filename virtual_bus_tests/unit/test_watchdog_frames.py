@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+
 from canbase_watchdog import frames
 from canbase_watchdog.frames import DriveState, Frame
 
@@ -61,7 +62,16 @@ def test_states_of_the_statusword(words: tuple[int, int], state: DriveState | No
 
 @pytest.mark.parametrize(
     ("word", "asks"),
-    [(0x0F, True), (0x1F, True), (0x10F, True), (0x07, False), (0x06, False), (0x02, False), (0x0B, False), (0x8F, False)],
+    [
+        (0x0F, True),
+        (0x1F, True),
+        (0x10F, True),
+        (0x07, False),
+        (0x06, False),
+        (0x02, False),
+        (0x0B, False),
+        (0x8F, False),
+    ],
 )
 def test_controlwords_that_ask_for_power(word: int, asks: bool) -> None:
     assert frames.asks_for_power(word) is asks

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+
 from canbase_watchdog.ladder import RUNGS, Climb, Look, Step, advance, first
 
 BRAKING = Look(enabled=False, powered=True, standing=False, speed_mps=0.5, seen_at=10.0, present=True)

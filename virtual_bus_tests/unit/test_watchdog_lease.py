@@ -7,9 +7,10 @@ import struct
 import zlib
 
 import pytest
-from canbase_watchdog.lease import Lease, LeaseBook, Refusal, judge, parse
 from hypothesis import given
 from hypothesis import strategies as st
+
+from canbase_watchdog.lease import Lease, LeaseBook, Refusal, judge, parse
 from unit.watchdog_story import lease
 
 # Sequence 7 at 1.5 s orders 0.25 m/s and -0.5 rad/s, flag 1.

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
+
 from canbase_watchdog.frames import DriveState
 from canbase_watchdog.lease import Lease
 from canbase_watchdog.observer import NEVER, Axis, Node, View
@@ -52,7 +54,7 @@ OFF = replace(LEFT, state=DriveState.SWITCH_ON_DISABLED, velocity_mps=0.0, targe
 AT_REST = replace(LEFT, velocity_mps=0.0, target_mps=0.0)
 
 
-def of(*axes: Axis, **changes: object) -> View:
+def of(*axes: Axis, **changes: Any) -> View:
     others = tuple(replace(OFF, drive=drive) for drive in CONFIG.drives[len(axes) :])
     return replace(WELL, axes=axes + others, **changes)
 
@@ -234,7 +236,7 @@ def test_the_own_loop_may_not_stand_still_while_a_drive_is_enabled(gap_s: float,
         (Cause.ENDED, {}, False),
     ],
 )
-def test_a_cause_stands_even_while_nothing_moves(tripped_by: Cause, changes: dict[str, object], still: bool) -> None:
+def test_a_cause_stands_even_while_nothing_moves(tripped_by: Cause, changes: dict[str, Any], still: bool) -> None:
     assert stands(Verdict(tripped_by, 1), of(OFF, **changes), CONFIG, NOW) is still
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 
 import pytest
+
 from canbase_watchdog.frames import Frame
 from canbase_watchdog.ladder import Step
 from canbase_watchdog.policy import Cause
@@ -22,8 +23,16 @@ def cause(story: Story) -> Cause:
     return story.watchdog.status.verdict.cause
 
 
+def state(story: Story) -> State:
+    return story.watchdog.status.state
+
+
+def step(story: Story) -> Step:
+    return story.watchdog.status.step
+
+
 def tripped(story: Story) -> bool:
-    return story.watchdog.status.state is State.TRIPPED
+    return state(story) is State.TRIPPED
 
 
 def speeds(story: Story) -> list[float]:
@@ -57,7 +66,7 @@ def driving(*drives: FakeDrive, bits: int = 300) -> Story:
 # --- ordinary days
 
 
-def test_an_hour_of_driving_to_and_fro_does_not_trip() -> None:
+def test_a_minute_of_driving_to_and_fro_does_not_trip() -> None:
     story = Story()
     for bits in itertools.islice(itertools.cycle((300, 0, -300, 150)), 24):
         story.drive_at(bits, 2.5)
@@ -65,15 +74,15 @@ def test_an_hour_of_driving_to_and_fro_does_not_trip() -> None:
     story.run(0.5)
     story.driver = story.filter = False
     story.run(2.0)
-    assert story.watchdog.status.state is State.WATCHING
+    assert state(story) is State.WATCHING
 
 
 def test_it_is_starting_until_it_has_listened_for_a_heartbeats_time() -> None:
     story = Story()
     story.run(0.299)
-    assert story.watchdog.status.state is State.STARTING
+    assert state(story) is State.STARTING
     story.run(0.001)
-    assert story.watchdog.status.state is State.WATCHING
+    assert state(story) is State.WATCHING
 
 
 def test_heartbeat_every_100_ms_and_state_every_50_ms() -> None:
@@ -92,7 +101,7 @@ def test_a_wheel_without_power_may_be_pushed() -> None:
     story.drives[0].speed[0] = 300
     story.drives[0].brakes = False
     story.run(1.0)
-    assert story.watchdog.status.state is State.WATCHING
+    assert state(story) is State.WATCHING
 
 
 # --- the filter dies:   last lease ──── 0.25 s ──── quick stop ── 0.3 s of braking ── standstill
@@ -183,7 +192,7 @@ def test_a_silent_drive_stops_the_other_one_without_making_it_coast() -> None:
     status = story.watchdog.status
     assert (status.verdict.cause, status.verdict.node_id) == (Cause.DRIVE_SILENT, 1)
     story.run(0.6)
-    assert story.watchdog.status.step is Step.HEARTBEAT_WITHHELD
+    assert step(story) is Step.HEARTBEAT_WITHHELD
     assert right.speed[0] == 0
     nmt = {frame.data for _, frame in story.since(begin, 0x000)}
     assert nmt == {b"\x80\x01"}
@@ -291,7 +300,7 @@ def test_a_drive_that_is_enabled_again_and_again_is_taken_out_of_operational() -
     until_still(story)
     story.run(3.0)
     assert speeds(story) == [0]
-    assert story.watchdog.status.step is Step.PRE_OPERATIONAL
+    assert step(story) is Step.PRE_OPERATIONAL
 
 
 def test_a_driver_that_starts_the_drives_again_is_answered_by_the_next_rung() -> None:
@@ -300,7 +309,7 @@ def test_a_driver_that_starts_the_drives_again_is_answered_by_the_next_rung() ->
     story.run(0.5)
     story.put(Frame(0x000, b"\x01\x01"))
     story.run(0.1)
-    assert story.watchdog.status.step is Step.DISABLE_VOLTAGE
+    assert step(story) is Step.DISABLE_VOLTAGE
     story.run(1.0)
     assert speeds(story) == [0]
     assert story.drives[0].words[0] == SOD
@@ -323,9 +332,9 @@ def test_a_drive_that_says_quick_stop_and_does_not_brake_climbs_after_its_brakin
     drive.brakes = story.filter = story.obedient = False
     until_tripped(story)
     story.run(0.59)
-    assert story.watchdog.status.step is Step.QUICK_STOP
+    assert step(story) is Step.QUICK_STOP
     story.run(0.03)
-    assert story.watchdog.status.step is Step.PRE_OPERATIONAL
+    assert step(story) is Step.PRE_OPERATIONAL
 
 
 def test_a_drive_that_hears_nothing_at_all_loses_the_heartbeat_until_the_reset() -> None:
@@ -335,7 +344,7 @@ def test_a_drive_that_hears_nothing_at_all_loses_the_heartbeat_until_the_reset()
     story.filter = False
     until_tripped(story)
     story.run(0.5)
-    assert story.watchdog.status.step is Step.HEARTBEAT_WITHHELD
+    assert step(story) is Step.HEARTBEAT_WITHHELD
     withheld = story.t
     story.run(1.0)
     assert story.since(withheld, HEARTBEAT) == []

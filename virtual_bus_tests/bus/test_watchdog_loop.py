@@ -1,0 +1,188 @@
+"""The watchdog's loop in real time on python-can's `virtual` bus; fake drives, driver and filter in a thread."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import can
+import pytest
+
+from bus.watchdog_live import LiveRobot
+from canbase_watchdog.bus_port import BusError, BusPort
+from canbase_watchdog.frames import Frame
+from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
+from canbase_watchdog.loop import BusDeadError, Loop
+from canbase_watchdog.policy import Cause
+from canbase_watchdog.watchdog import Watchdog
+from unit.watchdog_story import config
+
+pytestmark = pytest.mark.bus
+
+QUICK_STOP = Frame(0x501, bytes.fromhex("02 00"))
+
+
+class Rig:
+    """A watchdog's loop in a thread, and the robot that it watches."""
+
+    def __init__(self, channel: str, path: str) -> None:
+        arguments = {"interface": "virtual", "channel": channel}
+        self.config = replace(config(), bus_arguments=arguments, lease_socket=path)
+        self.watchdog = Watchdog(self.config, time.monotonic())
+        self.robot = LiveRobot(arguments, path)
+        self.asked = threading.Event()
+        self.thread = threading.Thread(target=self._run)
+
+    def _run(self) -> None:
+        with BusPort(self.config.bus_arguments) as bus, LeaseSocket(self.config.lease_socket, 0) as leases:
+            Loop(self.watchdog, bus, leases).run(self.asked.is_set)
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Iterator[Rig]:
+    it = Rig(str(tmp_path), str(tmp_path / "run" / "lease"))
+    it.thread.start()
+    with it.robot:
+        it.robot.first(0x1FE, 0.0)
+        yield it
+        it.asked.set()
+        it.thread.join(timeout=3.0)
+    assert not it.thread.is_alive()
+
+
+def cause(rig: Rig) -> Cause:
+    return rig.watchdog.status.verdict.cause
+
+
+def test_driving_with_leases_goes_on(rig: Rig) -> None:
+    rig.robot.drive_at(300)
+    time.sleep(1.0)
+    assert cause(rig) is Cause.NONE
+
+
+# last lease ── 0.25 s ── quick stop on the bus, and the wheels brake for 0.3 s
+def test_leases_end_at_speed(rig: Rig) -> None:
+    rig.robot.drive_at(300)
+    begin = time.monotonic()
+    rig.robot.filter = False
+    at, frame = rig.robot.first(0x501, begin)
+    assert frame == QUICK_STOP
+    assert at - rig.robot.last_lease == pytest.approx(0.25, abs=0.02)
+    assert rig.robot.wait_until_still() - begin < 1.0
+    assert cause(rig) is Cause.LEASE_LOST
+
+
+def test_the_driver_stops_beating_at_speed(rig: Rig) -> None:
+    rig.robot.drive_at(300)
+    begin = time.monotonic()
+    rig.robot.driver = False
+    at, frame = rig.robot.first(0x501, begin)
+    assert frame == QUICK_STOP
+    assert at - rig.robot.last_heartbeat == pytest.approx(0.3, abs=0.03)
+    assert rig.robot.wait_until_still() - begin < 1.0
+    assert cause(rig) is Cause.DRIVER_SILENT
+    rig.robot.wait_for(lambda: rig.watchdog.status.settled, 1.0)
+
+
+def test_asked_to_end_at_speed_it_stops_the_wheels_before_it_goes(rig: Rig) -> None:
+    rig.robot.drive_at(300)
+    rig.asked.set()
+    rig.thread.join(timeout=2.0)
+    assert not rig.thread.is_alive()
+    assert [drive.speed[0] for drive in rig.robot.drives] == pytest.approx([0, 0], abs=5)
+
+
+def test_every_change_is_one_line_in_the_log(rig: Rig, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.INFO):
+        rig.robot.drive_at(300)
+        rig.robot.filter = False
+        rig.robot.wait_until_still()
+        rig.robot.wait_for(lambda: rig.watchdog.status.settled, 1.0)
+        time.sleep(0.05)
+    lines = [record.message for record in caplog.records if record.name == "canbase.watchdog"]
+    trips = [line for line in lines if line.startswith("tripped: lease lost: no valid lease for 0.2")]
+    assert (len(trips), lines.count("ladder: quick stop"), lines.count("all drives stand")) == (1, 1, 1)
+    assert len(lines) <= 4
+
+
+# --- the shell's parts
+
+
+class DeadBus(can.BusABC):
+    """Everything that is asked of it fails."""
+
+    channel_info = "dead"
+
+    def __init__(self, channel: str, **kwargs: object) -> None:
+        super().__init__(channel)
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        raise can.CanOperationError("Network is down", 100)
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        raise can.CanOperationError("Network is down", 100)
+
+
+def test_a_bus_that_takes_nothing_for_a_second_ends_the_loop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("can.Bus", lambda **arguments: DeadBus("x"))
+    begin = time.monotonic()
+    with BusPort({}) as bus, LeaseSocket(str(tmp_path / "lease"), 0) as leases:
+        loop = Loop(Watchdog(config(), begin), bus, leases)
+        with pytest.raises(BusDeadError, match=r"no frame could be sent for 1\.0 s"):
+            loop.run(lambda: False)
+        assert time.monotonic() - begin == pytest.approx(1.05, abs=0.1)
+        assert bus.send_errors >= 10
+        assert 100 <= bus.receive_errors <= 1500
+
+
+def test_a_bus_that_cannot_be_opened_says_what_to_look_at() -> None:
+    with pytest.raises(BusError, match=r"Check `bus` in robot\.yaml"):
+        BusPort({"interface": "nonsense", "channel": "can0"})
+
+
+def test_only_data_frames_with_11_bits_are_taken_in() -> None:
+    with BusPort({"interface": "virtual", "channel": "kinds"}) as port, can.Bus("kinds", interface="virtual") as other:
+        for kind in ({"is_extended_id": True}, {"is_remote_frame": True}, {"is_error_frame": True}, {}):
+            other.send(can.Message(arbitration_id=0x701, data=b"", **{"is_extended_id": False} | kind))
+        assert list(port.receive()) == [(0x701, b"")]
+
+
+def test_the_lease_socket_is_for_its_owner_and_goes_with_the_process(tmp_path: Path) -> None:
+    path = tmp_path / "run" / "lease"
+    with LeaseSocket(str(path), 0):
+        assert (path.stat().st_mode & 0o777, path.parent.stat().st_mode & 0o777) == (0o600, 0o700)
+    assert not path.exists()
+
+
+def test_the_lease_socket_of_another_user_can_be_written_by_it(tmp_path: Path) -> None:
+    path = tmp_path / "run" / "lease"
+    with LeaseSocket(str(path), 12345):
+        assert (path.stat().st_mode & 0o777, path.parent.stat().st_mode & 0o777) == (0o666, 0o755)
+
+
+def test_a_socket_that_a_killed_watchdog_left_is_taken_over(tmp_path: Path) -> None:
+    path = tmp_path / "lease"
+    left = LeaseSocket(str(path), 0)
+    left._socket.close()
+    with LeaseSocket(str(path), 0):
+        assert path.is_socket()
+
+
+def test_a_socket_in_use_and_a_file_are_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "lease"
+    with LeaseSocket(str(path), 0), pytest.raises(LeaseSocketError, match="another watchdog listens"):
+        LeaseSocket(str(path), 0)
+    path.write_text("something")
+    with pytest.raises(LeaseSocketError, match="is not a socket"):
+        LeaseSocket(str(path), 0)
+    assert path.read_text() == "something"
+
+
+def test_a_path_that_cannot_be_made_says_so(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(LeaseSocketError, match=r"Check lease\.socket"):
+        LeaseSocket(str(tmp_path / "file" / "lease"), 0)

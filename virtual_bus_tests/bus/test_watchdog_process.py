@@ -1,0 +1,185 @@
+"""The real process `python -m canbase_watchdog` over udp_multicast and its lease socket, killed and asked to end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from bus.watchdog_live import LiveRobot
+from canbase_watchdog.frames import Frame
+from unit.watchdog_story import config
+
+pytestmark = pytest.mark.bus
+
+QUICK_STOP = Frame(0x501, bytes.fromhex("02 00"))
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("", 0))
+        return int(probe.getsockname()[1])
+
+
+class Watched:
+    """The process, the robot, and a stand-in for systemd's notify socket."""
+
+    def __init__(self, folder: Path) -> None:
+        bus = {"interface": "udp_multicast", "channel": "239.74.163.2", "port": free_port(), "hop_limit": 0}
+        self.config = replace(config(), bus_arguments=bus, lease_socket=str(folder / "run" / "lease"))
+        self.systemd = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.systemd.bind(str(folder / "notify"))
+        self.systemd.setblocking(False)
+        self.robot = LiveRobot(bus, self.config.lease_socket)
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "canbase_watchdog", "--config-json", self.config.to_json()],
+            env=os.environ | {"NOTIFY_SOCKET": str(folder / "notify"), "_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"},
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def notified(self) -> list[str]:
+        lines = []
+        while True:
+            try:
+                lines.append(self.systemd.recv(1024).decode())
+            except BlockingIOError:
+                return lines
+
+    def end(self, number: signal.Signals) -> tuple[int, str]:
+        self.process.send_signal(number)
+        _, log = self.process.communicate(timeout=5.0)
+        return self.process.returncode, log
+
+
+@pytest.fixture
+def watched(tmp_path: Path) -> Iterator[Watched]:
+    it = Watched(tmp_path)
+    try:
+        with it.robot:
+            it.robot.first(0x1FE, 0.0, timeout_s=10.0)
+            yield it
+    finally:
+        it.process.kill()
+        it.process.communicate()
+        it.systemd.close()
+
+
+# last lease ── 0.25 s ── quick stop on the bus
+def test_leases_end_at_speed(watched: Watched) -> None:
+    watched.robot.drive_at(300)
+    begin = time.monotonic()
+    watched.robot.filter = False
+    at, frame = watched.robot.first(0x501, begin)
+    assert frame == QUICK_STOP
+    assert at - watched.robot.last_lease == pytest.approx(0.25, abs=0.03)
+    assert watched.robot.wait_until_still() - begin < 1.0
+    code, log = watched.end(signal.SIGTERM)
+    assert (code, "tripped: lease lost" in log) == (0, True)
+
+
+def test_the_driver_dies_at_speed(watched: Watched) -> None:
+    watched.robot.drive_at(300)
+    begin = time.monotonic()
+    watched.robot.driver = False
+    at, _ = watched.robot.first(0x501, begin)
+    assert at - watched.robot.last_heartbeat == pytest.approx(0.3, abs=0.05)
+    assert watched.robot.wait_until_still() - begin < 1.0
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_asked_to_end_at_speed_it_stops_first_and_then_ends_well(watched: Watched, number: signal.Signals) -> None:
+    watched.robot.drive_at(300)
+    begin = time.monotonic()
+    code, log = watched.end(number)
+    assert code == 0
+    assert watched.robot.first(0x501, begin)[1] == QUICK_STOP
+    assert "tripped: ended" in log
+    assert f"ended by {number.name}" in log
+    watched.robot.wait_until_still(timeout_s=0.1)
+
+
+def test_asked_to_end_at_rest_it_just_ends(watched: Watched) -> None:
+    begin = time.monotonic()
+    code, log = watched.end(signal.SIGTERM)
+    assert (code, "tripped" in log) == (0, False)
+    assert [frame for at, frame in watched.robot.heard if at > begin and frame.cob_id == 0x501] == []
+    assert not Path(watched.config.lease_socket).exists()
+
+
+def test_stopped_and_continued_at_speed_it_trips_because_it_was_away(watched: Watched) -> None:
+    watched.robot.drive_at(300)
+    watched.process.send_signal(signal.SIGSTOP)
+    time.sleep(0.2)
+    begin = time.monotonic()
+    watched.process.send_signal(signal.SIGCONT)
+    assert watched.robot.first(0x501, begin)[0] - begin < 0.1
+    assert watched.end(signal.SIGTERM)[1].count("own loop stood still") == 1
+
+
+def test_systemd_is_told_ready_alive_and_the_state(watched: Watched) -> None:
+    time.sleep(1.0)
+    lines = watched.notified()
+    assert lines[0] == "READY=1"
+    assert "STATUS=watching" in lines
+    assert 3 <= lines.count("WATCHDOG=1") <= 8
+    watched.end(signal.SIGTERM)
+    assert "STOPPING=1" in watched.notified()
+
+
+def test_a_second_watchdog_on_the_same_socket_leaves_the_first_alone(watched: Watched) -> None:
+    second = subprocess.run(
+        [sys.executable, "-m", "canbase_watchdog", "--config-json", watched.config.to_json()],
+        capture_output=True,
+        text=True,
+        timeout=10.0,
+        check=False,
+    )
+    assert (second.returncode, "another watchdog listens" in second.stderr) == (1, True)
+    begin = time.monotonic()
+    watched.robot.first(0x1FE, begin)
+
+
+# --- starting badly
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "canbase_watchdog", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
+
+
+def test_a_bus_that_cannot_be_opened(tmp_path: Path) -> None:
+    bad = replace(config(), bus_arguments={"interface": "nonsense"}, lease_socket=str(tmp_path / "lease"))
+    done = run("--config-json", bad.to_json())
+    assert (done.returncode, "Check `bus` in robot.yaml" in done.stderr) == (1, True)
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"drives": []}', '{"drives": [1]}'])
+def test_a_configuration_that_is_none(text: str) -> None:
+    done = run("--config-json", text)
+    assert (done.returncode, "no watchdog configuration" in done.stderr) == (2, True)
+    assert "Traceback" not in done.stderr
+
+
+def test_the_process_loads_nothing_but_the_standard_library_python_can_and_the_dataclass() -> None:
+    loaded = subprocess.run(
+        [sys.executable, "-c", "import sys, canbase_watchdog.main; print(*sys.modules)"],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=os.environ | {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"},
+    ).stdout.split()
+    ours = {name for name in loaded if name.startswith("canbase") and not name.startswith("canbase_watchdog")}
+    assert ours == {"canbase_config", "canbase_config.watchdog"}
+    packages = {name.partition(".")[0] for name in loaded}
+    assert "can" in packages
+    assert packages & {"rclpy", "canopen", "pydantic", "ruamel", "numpy", "typer", "rich", "sdnotify"} == set()

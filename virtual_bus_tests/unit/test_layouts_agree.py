@@ -1,0 +1,100 @@
+"""Driver, filter and watchdog write the frames that they share apart from each other; here both sides are compared.
+
+What docs/bus.md says is tested in bytes on each side; this finds the side that was changed alone.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID
+from canbase_driver import cia301, cia402, pdo, watchdog_link
+from canbase_driver.frame import Frame as DriverFrame
+from canbase_velocity.lease import lease_datagram
+from canbase_velocity.twist import Twist
+from canbase_watchdog import frames, lease
+from canbase_watchdog.ladder import Step
+from canbase_watchdog.policy import Cause
+from canbase_watchdog.watchdog import Answer, State
+
+
+@pytest.mark.parametrize(
+    ("linear", "angular", "stops", "estop", "flags"),
+    [(0.0, 0.0, True, False, 1), (0.25, -1.5, False, False, 0), (-1e-9, 1e9, True, True, 3)],
+)
+def test_the_watchdog_reads_the_lease_that_the_filter_writes(
+    linear: float, angular: float, stops: bool, estop: bool, flags: int
+) -> None:
+    datagram = lease_datagram(2**40, 2**50, Twist(linear, angular), stops=stops, estop=estop)
+    assert lease.parse(datagram) == lease.Lease(2**40, 2**50, linear, angular, flags)
+
+
+@pytest.mark.parametrize("state", list(State))
+def test_the_driver_reads_the_state_frame_that_the_watchdog_writes(state: State) -> None:
+    ours = frames.state(state, Cause.DRIVE_SILENT, Step.PRE_OPERATIONAL, 7, 0.251, (9, Answer.CAUSE_STANDS))
+    read = watchdog_link.parse_state(DriverFrame(ours.cob_id, ours.data))
+    assert read == watchdog_link.WatchdogState(int(state), 3, 2, 7, 251, 9, 2)
+
+
+def test_states_and_answers_have_the_same_numbers() -> None:
+    numbers = (watchdog_link.STARTING, watchdog_link.WATCHING, watchdog_link.TRIPPED)
+    assert numbers == tuple(State)
+    assert set(watchdog_link.ANSWERS) == set(Answer) - {Answer.NONE}
+    assert set(watchdog_link.ACCEPTED) == {Answer.DONE, Answer.NOT_TRIPPED}
+
+
+@pytest.mark.parametrize("cause", [Cause.NONE, Cause.LEASE_LOST, Cause.DRIVER_SILENT, Cause.DRIVE_SILENT])
+def test_causes_have_the_same_names(cause: Cause) -> None:
+    assert watchdog_link.CAUSES[cause] == cause.name.lower().replace("_", " ")
+
+
+def test_the_watchdog_reads_the_reset_request_that_the_driver_writes() -> None:
+    request = watchdog_link.WatchdogLink(0.2).request_reset()
+    assert request.cob_id == frames.RESET_REQUEST
+    assert frames.decode_reset_request(bytes(request.data)) == request.data[0]
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_the_pdos_that_the_driver_maps_are_those_that_the_watchdog_reads_and_writes(place: int) -> None:
+    node_id = 5
+    mapped = {(p.kind, p.number): p for p in pdo.NodeLayout(node_id, (0, 1)).pdos()}
+    assert mapped["TPDO", 1 + 2 * place].cob_id == frames.STATUS_TPDO[place] + node_id
+    assert mapped["TPDO", 2 + 2 * place].cob_id == frames.VELOCITY_TPDO[place] + node_id
+    assert mapped["RPDO", 1 + place].cob_id == frames.SETPOINT_RPDO[place] + node_id
+    assert mapped["RPDO", 4].cob_id == frames.QUICK_STOP_RPDO + node_id
+    assert mapped["RPDO", 4].mapping == (0x60400010, 0x68400010)
+
+
+def test_status_velocity_and_setpoints_mean_the_same_on_both_sides() -> None:
+    setpoint = pdo.pack_setpoint(0x0F, -300)
+    assert frames.decode_setpoint(setpoint) == (0x0F, -300)
+    status, velocity = bytes.fromhex("37 02 fe ff ff ff"), bytes.fromhex("d4 fe ff ff")
+    both = pdo.unpack_status(status)
+    assert both is not None
+    assert frames.decode_status(status) == both[0]
+    assert frames.decode_velocity(velocity) == pdo.unpack_velocity(velocity)
+
+
+def test_node_ids_heartbeats_and_nmt_are_the_same() -> None:
+    driver = cia301.heartbeat(DRIVER_NODE_ID, cia301.NmtState.OPERATIONAL)
+    watchdog = cia301.heartbeat(WATCHDOG_NODE_ID, cia301.NmtState.OPERATIONAL)
+    assert driver.cob_id == frames.DRIVER_HEARTBEAT
+    assert frames.heartbeat() == frames.Frame(watchdog.cob_id, bytes(watchdog.data))
+    assert cia301.SYNC.cob_id == frames.SYNC
+    stop = cia301.nmt(cia301.NmtCommand.ENTER_PRE_OPERATIONAL, 5)
+    assert frames.pre_operational(5) == frames.Frame(stop.cob_id, bytes(stop.data))
+    assert (cia301.SDO_TO_CLIENT, cia301.SDO_TO_SERVER) == (frames.SDO_ANSWER, frames.SDO_REQUEST)
+
+
+def test_every_statusword_is_the_same_state_on_both_sides() -> None:
+    for word in range(0x10000):
+        theirs, ours = cia402.decode_statusword(word), frames.decode_state(word)
+        assert getattr(theirs, "name", None) == getattr(ours, "name", None), f"{word:04X}h"
+
+
+def test_the_words_that_stop_are_the_same() -> None:
+    assert cia402.Command.QUICK_STOP.value == frames.QUICK_STOP_WORD
+    assert cia402.Command.DISABLE_VOLTAGE.value == frames.DISABLE_VOLTAGE_WORD
+    assert [command for command in cia402.Command if frames.asks_for_power(command.value)] == [
+        cia402.Command.ENABLE_OPERATION
+    ]

@@ -1,0 +1,167 @@
+"""What the watchdog makes of the frames on the bus, and that no noise can make it raise, forget or give way."""
+
+from __future__ import annotations
+
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from canbase_watchdog.frames import DriveState
+from canbase_watchdog.lease import Refusal
+from canbase_watchdog.observer import NEVER, Axis, Observer, View
+from canbase_watchdog.watchdog import State, Watchdog
+from unit.watchdog_story import Story, config
+
+WATCHED = [0x080, 0x77F, 0x27E, 0x701, 0x702, 0x581, 0x582, 0x181, 0x182, 0x281, 0x282, 0x201, 0x202]
+
+
+def observer(*drives: tuple[int, int]) -> Observer:
+    return Observer(config(*drives))
+
+
+def look(it: Observer) -> View:
+    return it.view(0.0, None, NEVER, 0.0)
+
+
+def rx(it: Observer, cob_id: int, data: str, now: float = 1.0) -> Axis:
+    """A frame, and the first axis after it."""
+    it.on_frame(cob_id, bytes.fromhex(data), now)
+    return look(it).axes[0]
+
+
+def test_status_velocity_and_setpoint_of_a_single_axis() -> None:
+    it = observer()
+    axis = rx(it, 0x181, "37 02 10 00 00 00", 1.0)
+    assert (axis.state, axis.status_at, axis.enabled_since) == (DriveState.OPERATION_ENABLED, 1.0, 1.0)
+    axis = rx(it, 0x281, "d4 fe ff ff", 2.0)
+    assert axis.velocity_mps == pytest.approx(-0.3)
+    assert axis.velocity_at == 2.0
+    axis = rx(it, 0x201, "0f 00 2c 01 00 00", 3.0)
+    assert axis.target_mps == pytest.approx(0.3)
+    assert (axis.asks_for_power, axis.command_at) == (True, 3.0)
+    assert axis.fed_at == 1.0
+    assert look(it).node(1).heard_at == 2.0
+    assert look(it).node(2).heard_at == NEVER
+
+
+def test_the_second_axis_of_a_node_has_pdos_of_its_own() -> None:
+    it = observer((5, 1), (5, 0))
+    it.on_frame(0x385, bytes.fromhex("37 02 00 00 00 00"), 1.0)
+    it.on_frame(0x485, bytes.fromhex("2c 01 00 00"), 1.0)
+    it.on_frame(0x305, bytes.fromhex("0f 00 64 00 00 00"), 1.0)
+    second, first = look(it).axes
+    assert second.enabled
+    assert [second.velocity_mps, second.target_mps] == pytest.approx([0.3, 0.1])
+    assert first == Axis(config((5, 1), (5, 0)).drives[1])
+
+
+def test_an_only_axis_1_uses_the_pdos_of_the_first() -> None:
+    it = observer((5, 1), (6, 0))
+    assert rx(it, 0x185, "37 02 00 00 00 00").enabled
+
+
+def test_enabled_since_begins_with_each_time_that_it_is_enabled() -> None:
+    it = observer()
+    rx(it, 0x181, "37 02 00 00 00 00", 1.0)
+    assert rx(it, 0x181, "37 02 00 00 00 00", 2.0).enabled_since == 1.0
+    rx(it, 0x181, "40 02 00 00 00 00", 3.0)
+    assert rx(it, 0x181, "37 02 00 00 00 00", 4.0).enabled_since == 4.0
+
+
+def test_answers_to_sdo_readings_count_as_feedback() -> None:
+    it = observer((5, 0), (5, 1))
+    assert rx(it, 0x585, "4b 41 60 00 17 02 00 00", 1.0).state is DriveState.QUICK_STOP_ACTIVE
+    assert rx(it, 0x585, "43 6c 60 00 2c 01 00 00", 1.5).velocity_mps == pytest.approx(0.3)
+    rx(it, 0x585, "43 6c 68 00 64 00 00 00", 2.0)
+    assert look(it).axes[1].velocity_mps == pytest.approx(0.1)
+    assert look(it).node(5).heard_at == 2.0
+
+
+def test_other_sdo_answers_only_show_that_the_node_lives() -> None:
+    it = observer()
+    before = look(it).axes
+    for data in ("60 40 60 00 00 00 00 00", "80 41 60 00 00 00 02 06", "43 18 10 01 00 00 00 00", "00"):
+        it.on_frame(0x581, bytes.fromhex(data), 1.0)
+    assert look(it).axes == before
+    assert (look(it).node(1).heard_at, it.dropped) == (1.0, 0)
+
+
+# SYNC: | | | |              | | |       a gap of 0.1 s begins a new run
+@pytest.mark.parametrize(("gap_s", "since"), [(0.01, 1.0), (0.099, 1.0), (0.101, 1.101), (3.0, 4.0)])
+def test_runs_of_syncs(gap_s: float, since: float) -> None:
+    it = observer()
+    it.on_frame(0x080, b"", 1.0)
+    it.on_frame(0x080, b"\x07", 1.0 + gap_s)  # with a counter
+    assert (look(it).sync_at, look(it).sync_since) == (1.0 + gap_s, since)
+
+
+def test_heartbeats() -> None:
+    it = observer()
+    it.on_frame(0x701, b"\x05", 1.0)
+    it.on_frame(0x77F, b"\x05", 2.0)
+    view = look(it)
+    assert (view.node(1).heartbeat_at, view.node(1).heard_at, view.driver_at) == (1.0, 1.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("cob_id", "data"),
+    [
+        (0x080, "00 00"),
+        (0x77F, ""),
+        (0x77F, "05 05"),
+        (0x701, ""),
+        (0x181, "37 02"),
+        (0x181, "41 02 00 00 00 00"),  # no state has these bits
+        (0x281, "00 00 00"),
+        (0x201, "0f 00 00 00 00"),
+        (0x581, "4b 41 60 00 41 02 00 00"),
+    ],
+)
+def test_frames_that_make_no_sense_are_counted_and_change_no_axis(cob_id: int, data: str) -> None:
+    it = observer()
+    before = look(it)
+    rx(it, cob_id, data)
+    assert it.dropped == 1
+    assert (look(it).axes, look(it).driver_at, look(it).sync_at) == (before.axes, NEVER, NEVER)
+
+
+def test_frames_of_others_are_ignored_without_a_count() -> None:
+    it = observer()
+    before = look(it)
+    for cob_id in (0x000, 0x081, 0x183, 0x501, 0x601, 0x77E, 0x1FE, 0x7E5):
+        it.on_frame(cob_id, bytes(8), 1.0)
+    assert (look(it), it.dropped) == (before, 0)
+
+
+frames_on_the_bus = st.tuples(st.sampled_from(WATCHED) | st.integers(0, 0x7FF), st.binary(max_size=8))
+
+
+@settings(max_examples=200)
+@given(st.lists(frames_on_the_bus, max_size=60))
+def test_noise_never_raises(noise: list[tuple[int, bytes]]) -> None:
+    watchdog = Watchdog(config(), 0.0)
+    for n, (cob_id, data) in enumerate(noise):
+        watchdog.on_frame(cob_id, data, n / 200)
+        watchdog.on_lease(data, None, n / 200)
+        assert all(len(frame.data) <= 8 for frame in watchdog.tick(n / 200))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_noise_untrips(seed: int) -> None:
+    story = Story()
+    story.drive_at(300)
+    story.filter = False
+    story.run(0.5)
+    random, t = Random(seed), story.t
+    for _ in range(10_000):
+        cob_id = random.choice(WATCHED) if random.random() < 0.9 else random.randrange(0x800)
+        data = random.randbytes(random.choice((0, 1, 4, 4, 6, 8)))
+        t += 0.0005
+        story.watchdog.on_frame(cob_id, data if data[1:] != b"RST" else b"", t)
+        story.watchdog.on_lease(random.randbytes(random.choice((0, 43, 44, 45))), None, t)
+        story.watchdog.tick(t)
+    assert story.watchdog.status.state is State.TRIPPED
+    refused = story.watchdog.refused_leases
+    assert refused[Refusal.LENGTH] + refused[Refusal.MAGIC] == 10_000
