@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
 from canbase_config.robot import Footprint
 from canbase_config.robot import Scan as ScanConfig
 from canbase_velocity.clearance import FREE, ClearanceReader, Clearances, Scan, swept_radius_m
-from hypothesis import given
-from hypothesis import strategies as st
 
 FOOTPRINT = Footprint(front_m=0.4, rear_m=0.2, left_m=0.3, right_m=0.25)
 QUARTER_RAD = math.pi / 2

@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
+
 from canbase_velocity.io import LeaseSender
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.twist import ZERO, Twist

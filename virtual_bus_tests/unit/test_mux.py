@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
 from canbase_config.robot import DEFAULT_SOURCES, MuxSource
 from canbase_velocity.mux import Mux, MuxDecision, Standing
 from canbase_velocity.twist import ZERO, Twist
-from hypothesis import given
-from hypothesis import strategies as st
 
 SLOW = Twist(0.1, 0.0)
 FAST = Twist(0.5, 0.2)

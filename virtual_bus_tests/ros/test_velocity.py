@@ -1,0 +1,345 @@
+"""velocity_mux and safety_filter as a real process over DDS: what comes in, what goes out, and every way out."""
+
+from __future__ import annotations
+
+import math
+import socket
+import struct
+import time
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from canbase.msg import MuxState, SafetyState, StopEvent
+from geometry_msgs.msg import Twist, TwistStamped
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Bool
+
+from canbase_config.robot import Robot
+from ros.harness import Process, Recorder, TestNode
+
+pytestmark = pytest.mark.ros
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LEASE = struct.Struct("<4sQQddII")
+START_S = 15.0
+RUN = """
+import sys
+from canbase_config.load import load_robot
+from canbase_velocity.main import run
+sys.exit(run(load_robot({path!r}).robot, {ros_args!r}))
+"""
+
+
+def drive(linear_mps: float, angular_radps: float = 0.0) -> TwistStamped:
+    message = TwistStamped()
+    message.twist.linear.x, message.twist.angular.z = linear_mps, angular_radps
+    return message
+
+
+def scan(ahead_m: float = math.inf, behind_m: float = math.inf) -> LaserScan:
+    """720 beams all around, all free but for one ahead and one behind, from base_link."""
+    ranges = [math.inf] * 720
+    ranges[0], ranges[360] = ahead_m, behind_m
+    return LaserScan(angle_min=0.0, angle_increment=math.pi / 360, range_min=0.05, range_max=10.0, ranges=ranges)
+
+
+class Chain:
+    """The process, everything that it says, and the sources that a test can move."""
+
+    def __init__(self, node: TestNode, process: Process, watchdog: socket.socket) -> None:
+        self.node, self.process, self.watchdog = node, process, watchdog
+        self.orders: Recorder[TwistStamped] = node.record(TwistStamped, "cmd_vel")
+        self.mux: Recorder[MuxState] = node.record(MuxState, "velocity_mux/state", LATCHED)
+        self.state: Recorder[SafetyState] = node.record(SafetyState, "safety_filter/state", LATCHED)
+        self.events: Recorder[StopEvent] = node.record(StopEvent, "stop_events")
+        self.joystick = node.repeat(TwistStamped, "cmd_vel_joy", 50.0)
+        self.action = node.repeat(TwistStamped, "cmd_vel_action", 50.0)
+        self.scan = node.repeat(LaserScan, "scan", 20.0, qos_profile_sensor_data)
+        self.estop = node.repeat(Bool, "estop_state", 20.0)
+        for repeater in (self.joystick, self.action, self.scan, self.estop):
+            node.wait_for_subscriber(repeater.publisher, START_S)
+        node.wait_for(lambda: self.mux.last is not None and self.state.last is not None, START_S, "the first states")
+        self.scan.message = scan()
+        self.wait_for_cause(SafetyState.CAUSE_NONE)
+
+    @property
+    def ordered(self) -> tuple[float, float]:
+        """The newest order on cmd_vel [m/s, rad/s]."""
+        last = self.orders.last
+        assert last is not None
+        return last.twist.linear.x, last.twist.angular.z
+
+    def wait_for_order(self, linear_mps: float, timeout_s: float = 3.0) -> float:
+        """Until that is ordered; returns how long it took [s]."""
+        started_s = time.monotonic()
+        what = f"{linear_mps} m/s on cmd_vel"
+        self.node.wait_for(lambda: self.ordered[0] == pytest.approx(linear_mps), timeout_s, what)
+        return time.monotonic() - started_s
+
+    def wait_for_cause(self, cause: str) -> SafetyState:
+        def state() -> SafetyState | None:
+            last = self.state.last
+            return last if last is not None and last.cause == cause else None
+
+        found = self.node.wait_for(state, 3.0, f"cause {cause}, state is {self.state.last}")
+        assert found is not None
+        return found
+
+    def leases(self) -> list[tuple[Any, ...]]:
+        """All leases that wait at the socket."""
+        found = []
+        while True:
+            try:
+                data = self.watchdog.recv(100)
+            except BlockingIOError:
+                return found
+            assert zlib.crc32(data[:40]) == LEASE.unpack(data)[-1]
+            found.append(LEASE.unpack(data))
+
+
+@pytest.fixture
+def watchdog(robot: Robot) -> Iterator[socket.socket]:
+    """The socket at which leases arrive."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(robot.lease.socket)
+        receiver.setblocking(False)
+        yield receiver
+
+
+@pytest.fixture
+def start(
+    spawn: Callable[..., Process],
+    make_robot: Callable[[Mapping[str, Any]], Path],
+    test_node: TestNode,
+    watchdog: socket.socket,
+) -> Callable[[Mapping[str, Any]], Chain]:
+    """start({changes of robot.yaml}): the chain, ready to drive."""
+
+    def start_chain(changes: Mapping[str, Any]) -> Chain:
+        process = spawn(RUN.format(path=str(make_robot(changes)), ros_args=[]))
+        return Chain(test_node, process, watchdog)
+
+    return start_chain
+
+
+@pytest.fixture
+def chain(start: Callable[[Mapping[str, Any]], Chain]) -> Chain:
+    return start({})
+
+
+def test_the_higher_priority_drives_and_silence_ends_in_explicit_zeros(chain: Chain) -> None:
+    assert chain.ordered == (0.0, 0.0)  # before anybody spoke
+    chain.action.message = drive(0.2, 0.1)
+    chain.wait_for_order(0.2)
+    assert chain.ordered == pytest.approx((0.2, 0.1))
+    chain.joystick.message = drive(-0.3)
+    assert chain.wait_for_order(-0.3) < 0.5
+    state = chain.mux.last
+    assert state is not None
+    assert state.active == "joystick"
+    assert {source.name: source.reason for source in state.sources} == {
+        "joystick": "", "navigation": "never received", "action": "joystick has priority",
+    }  # fmt: skip
+    chain.action.message = None
+    chain.node.spin_for(0.4)  # the old command of the action is stale when the joystick is let go
+    chain.joystick.message = None
+    chain.orders.clear()
+    chain.node.wait_for(lambda: chain.orders.last is not None, 1.0)
+    took_s = chain.wait_for_order(0.0)
+    assert 0.2 <= took_s <= 0.6
+    assert 0.2 not in [message.twist.linear.x for message in chain.orders.messages]
+    chain.orders.clear()
+    chain.node.spin_for(0.5)
+    assert 20 <= len(chain.orders.messages) <= 30  # zeros at command_hz, 50 Hz
+    assert {message.twist.linear.x for message in chain.orders.messages} == {0.0}
+    assert chain.mux.last is not None
+    assert chain.mux.last.active == ""
+
+
+def test_orders_carry_the_base_frame_and_a_stamp_of_their_own(chain: Chain) -> None:
+    chain.action.message = drive(0.2)
+    chain.wait_for_order(0.2)
+    order = chain.orders.last
+    assert order is not None
+    assert order.header.frame_id == "base_link"
+    stamp_s = order.header.stamp.sec + order.header.stamp.nanosec * 1e-9
+    assert abs(time.time() - stamp_s) < 2.0
+
+
+def test_a_source_at_the_timers_rate_is_not_doubled(chain: Chain) -> None:
+    chain.action.message = drive(0.2)
+    chain.wait_for_order(0.2)
+    chain.orders.clear()
+    chain.node.spin_for(2.0)
+    assert 80 <= len(chain.orders.messages) <= 180  # 50 Hz each
+
+
+def test_nan_is_refused_and_counted(chain: Chain) -> None:
+    chain.joystick.message = drive(math.nan)
+
+    def refused() -> bool:
+        return any(source.refused > 0 for source in chain.mux.messages[-1].sources)
+
+    chain.node.wait_for(refused, 3.0, "a refused command in velocity_mux/state")
+    assert chain.ordered == (0.0, 0.0)
+
+
+def test_a_plain_twist_drives_beside_stamped_sources(start: Callable[[Mapping[str, Any]], Chain]) -> None:
+    sources = {
+        "joystick": {"topic": "cmd_vel_joy", "priority": 100, "timeout_s": 0.3},
+        "teleop": {"topic": "cmd_vel_teleop", "priority": 60, "timeout_s": 0.3, "stamped": False},
+        "action": {"topic": "cmd_vel_action", "priority": 40, "timeout_s": 0.3},
+    }
+    chain = start({"mux": {"sources": sources}})
+    teleop = chain.node.repeat(Twist, "cmd_vel_teleop", 50.0)
+    chain.node.wait_for_subscriber(teleop.publisher)
+    teleop.message = drive(0.25).twist
+    chain.wait_for_order(0.25)
+
+
+def test_the_emergency_stop_stops_and_needs_a_zero_command_after_it(chain: Chain) -> None:
+    chain.action.message = drive(0.2)
+    chain.wait_for_order(0.2)
+    chain.estop.message = Bool(data=True)
+    state = chain.wait_for_cause(SafetyState.CAUSE_ESTOP)
+    assert state.estop is True
+    assert chain.ordered == (0.0, 0.0)
+    chain.node.wait_for(lambda: chain.events.last is not None, 2.0, "a stop event")
+    assert [(event.stopped_by, event.cause) for event in chain.events.messages] == [("safety_filter", "estop")]
+    chain.estop.message = Bool(data=False)
+    chain.orders.clear()
+    chain.node.spin_for(0.3)
+    assert {message.twist.linear.x for message in chain.orders.messages} == {0.0}  # no jump at release
+    chain.action.message = drive(0.0)
+    chain.wait_for_cause(SafetyState.CAUSE_NONE)
+    chain.action.message = drive(0.2)
+    chain.wait_for_order(0.2)
+
+
+def test_an_obstacle_ahead_blocks_the_way_ahead_but_not_the_way_back(chain: Chain) -> None:
+    chain.scan.message = scan(ahead_m=0.4)  # 0.10 m before the footprint, stop distance 0.15 m
+    chain.action.message = drive(0.2)
+    state = chain.wait_for_cause(SafetyState.CAUSE_OBSTACLE)
+    assert state.action == SafetyState.STOP
+    assert state.clearance_ahead_m == pytest.approx(0.1, abs=1e-6)
+    assert state.clearance_behind_m == math.inf
+    assert chain.ordered == (0.0, 0.0)
+    chain.action.message = drive(-0.2)
+    chain.wait_for_order(-0.2)
+    chain.scan.message = scan(ahead_m=0.6)  # 0.30 m free
+    chain.action.message = drive(1.0)
+    chain.wait_for_cause(SafetyState.CAUSE_OBSTACLE_NEAR)
+    assert 0.0 < chain.ordered[0] <= math.sqrt(2 * 1.0 * 0.15)
+
+
+def test_a_stale_scan_stops(chain: Chain) -> None:
+    chain.action.message = drive(0.2)
+    chain.wait_for_order(0.2)
+    chain.scan.message = None
+    assert chain.wait_for_order(0.0) < 0.8
+    state = chain.wait_for_cause(SafetyState.CAUSE_SCAN_STALE)
+    assert math.isnan(state.clearance_ahead_m)
+    chain.scan.message = LaserScan(ranges=[math.nan] * 720, angle_increment=0.01, range_max=10.0)  # blind
+    chain.node.spin_for(0.3)
+    assert chain.ordered == (0.0, 0.0)
+    chain.scan.message = scan()
+    chain.wait_for_order(0.2)
+
+
+def test_every_order_has_its_lease_in_rising_sequence(chain: Chain) -> None:
+    chain.action.message = drive(0.2, 0.1)
+    chain.wait_for_order(0.2)
+    chain.leases()
+    chain.orders.clear()
+    before_ns = time.monotonic_ns()
+    leases: list[tuple[Any, ...]] = []
+    chain.node.wait_for(lambda: bool(leases.extend(chain.leases())) or len(leases) >= 25, 3.0, "25 leases")
+    sequences = [lease[1] for lease in leases]
+    assert sequences == list(range(sequences[0], sequences[0] + len(leases)))
+    assert len(chain.orders.messages) == pytest.approx(len(leases), abs=5)
+    for magic, _, sent_ns, linear_mps, angular_radps, flags, _ in leases:
+        assert (magic, flags) == (b"CBL1", 0)
+        assert (linear_mps, angular_radps) == pytest.approx((0.2, 0.1))
+        assert before_ns - 1e9 < sent_ns <= time.monotonic_ns()
+    chain.estop.message = Bool(data=True)
+    chain.wait_for_cause(SafetyState.CAUSE_ESTOP)
+    assert chain.leases()[-1][3:6] == (0.0, 0.0, 3)  # stops, emergency stop
+    state = chain.state.last
+    assert state is not None
+    assert state.lease_sequence >= sequences[-1]
+
+
+@pytest.mark.parametrize("ask", [Process.terminate, Process.interrupt])
+def test_sigterm_and_sigint_end_with_zeros_until_the_base_can_stand(
+    chain: Chain, ask: Callable[[Process], None]
+) -> None:
+    chain.action.message = drive(0.5)
+    chain.wait_for_order(0.5)
+    asked_s = time.monotonic()
+    ask(chain.process)
+    chain.node.wait_for(lambda: chain.process.exit_code is not None, 5.0, "its end")
+    ended_s = time.monotonic()
+    assert chain.process.exit_code == 0, chain.process.log()
+    chain.node.spin_for(0.2)
+    assert 0.4 < ended_s - asked_s < 2.0  # 0.5 m/s on a ramp of 1 m/s² takes 0.5 s
+    zeros = [message.twist.linear.x for message in chain.orders.since(asked_s + 0.1)]
+    assert len(zeros) >= 10
+    assert set(zeros) == {0.0}
+    assert chain.state.last is not None
+    assert (chain.state.last.cause, chain.state.last.action) == ("shutdown", SafetyState.STOP)
+    assert chain.mux.last is not None
+    assert [source.reason for source in chain.mux.last.sources] == ["shutdown"] * 3
+    assert chain.leases()[-1][3:6] == (0.0, 0.0, 1)
+    assert "Traceback" not in chain.process.log()
+
+
+def test_an_exception_in_a_callback_ends_the_process_with_zeros_and_the_traceback(
+    spawn: Callable[..., Process], robot_yaml: Path, test_node: TestNode, watchdog: socket.socket
+) -> None:
+    broken = "\n".join((
+        "from canbase_velocity.mux import Mux",
+        "taken = Mux.on_command",
+        "def on_command(self, name, twist, now):",
+        "    if name == 'joystick': raise RuntimeError('a defect')",
+        "    return taken(self, name, twist, now)",
+        "Mux.on_command = on_command",
+        RUN.format(path=str(robot_yaml), ros_args=[]),
+    ))  # fmt: skip
+    chain = Chain(test_node, spawn(broken), watchdog)
+    chain.action.message = drive(0.2)
+    chain.wait_for_order(0.2)
+    chain.joystick.message = drive(0.1)
+    chain.node.wait_for(lambda: chain.process.exit_code is not None, 5.0, "its end")
+    assert chain.process.exit_code == 1
+    assert "RuntimeError: a defect" in chain.process.log()
+    chain.node.spin_for(0.2)
+    assert [message.twist.linear.x for message in chain.orders.messages[-3:]] == [0.0, 0.0, 0.0]
+
+
+def test_a_process_that_hangs_falls_silent_on_cmd_vel_and_at_the_watchdog(chain: Chain) -> None:
+    chain.action.message = drive(0.2)
+    chain.wait_for_order(0.2)
+    chain.process.stop()
+    chain.node.spin_for(0.2)
+    chain.leases()
+    chain.orders.clear()
+    chain.node.spin_for(0.5)
+    assert chain.orders.messages == []
+    assert chain.leases() == []
+
+
+def test_a_namespace_gives_a_second_robot(
+    spawn: Callable[..., Process], robot_yaml: Path, test_node: TestNode, watchdog: socket.socket
+) -> None:
+    spawn(RUN.format(path=str(robot_yaml), ros_args=["--ros-args", "-r", "__ns:=/robot2"]))
+    chain_of_the_other = test_node.record(TwistStamped, "/robot2/cmd_vel")
+    ours = test_node.record(TwistStamped, "/cmd_vel")
+    for topic in ("cmd_vel_action", "scan"):
+        test_node.wait_for(lambda t=topic: test_node.node.count_subscribers(f"/robot2/{t}") == 1, START_S, topic)
+    test_node.wait_for(lambda: len(chain_of_the_other.messages) > 5, START_S, "zeros of /robot2")
+    assert ours.messages == []
+    assert watchdog.recv(100).startswith(b"CBL1")
