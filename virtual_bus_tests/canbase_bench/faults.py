@@ -51,19 +51,27 @@ def _heal(node: SimulatedNode, now: float) -> None:
         node.heal(number)
 
 
-KINDS: Mapping[str, Callable[..., None]] = {
-    "silent": _silent,
-    "cut": _cut,
-    "fault": _drive_fault,
-    "power_cycle": _power_cycle,
-    "frozen_encoder": _frozen_encoder,
-    "stuck_velocity": _stuck_velocity,
-    "ignores_setpoints": _ignores_setpoints,
-    "heal": _heal,
+KINDS: Mapping[str, tuple[Callable[..., None], frozenset[str]]] = {
+    "silent": (_silent, frozenset()),
+    "cut": (_cut, frozenset()),
+    "fault": (_drive_fault, frozenset({"axis", "code", "holds"})),
+    "power_cycle": (_power_cycle, frozenset({"off_s"})),
+    "frozen_encoder": (_frozen_encoder, frozenset({"axis"})),
+    "stuck_velocity": (_stuck_velocity, frozenset({"axis", "raw"})),
+    "ignores_setpoints": (_ignores_setpoints, frozenset({"axis"})),
+    "heal": (_heal, frozenset()),
 }
-"""silent: sends nothing. cut: neither sends nor receives. fault: axis, code, holds. power_cycle: off_s.
-frozen_encoder: axis. stuck_velocity: axis, raw. ignores_setpoints: axis. heal: all of them are over; a drive fault
-still needs its reset."""
+"""Each fault and the arguments that it takes. silent: sends nothing. cut: neither sends nor receives. heal: all of them
+are over; a drive fault still needs its reset."""
+
+RANGES: Mapping[str, tuple[type, float, float]] = {
+    "axis": (int, 0, 1),
+    "code": (int, 1, 0xFFFF),
+    "holds": (bool, 0, 1),
+    "off_s": (float, 0.0, 3600.0),
+    "raw": (int, -(2**31), 2**31 - 1),
+}
+"""Type, least and greatest value of each argument."""
 
 
 def apply(nodes: Mapping[int, SimulatedNode], node: int, kind: str, now: float, arguments: Mapping[str, Any]) -> None:
@@ -72,9 +80,18 @@ def apply(nodes: Mapping[int, SimulatedNode], node: int, kind: str, now: float, 
         raise FaultError(f"there is no node {node!r}, expected one of {sorted(nodes)}")
     if kind not in KINDS:
         raise FaultError(f"there is no fault {kind!r}, expected one of {', '.join(KINDS)}")
-    if not 0 <= arguments.get("axis", 0) < len(nodes[node].axes):
-        raise FaultError(f"node {node} has no axis {arguments['axis']!r}, expected below {len(nodes[node].axes)}")
-    try:
-        KINDS[kind](nodes[node], now, **arguments)
-    except TypeError as error:
-        raise FaultError(f"{kind} does not take {dict(arguments)}: {error}") from error
+    do, takes = KINDS[kind]
+    for name, value in arguments.items():
+        if name not in takes:
+            raise FaultError(f"{kind} does not take {name!r}, expected {', '.join(sorted(takes)) or 'no argument'}")
+        _check(name, value)
+    if arguments.get("axis", 0) >= len(nodes[node].axes):
+        raise FaultError(f"node {node} has no axis {arguments['axis']}, expected below {len(nodes[node].axes)}")
+    do(nodes[node], now, **arguments)
+
+
+def _check(name: str, value: object) -> None:
+    kind, least, greatest = RANGES[name]
+    fits = type(value) is kind or (kind is float and type(value) is int)
+    if not (fits and isinstance(value, (int, float)) and least <= value <= greatest):
+        raise FaultError(f"{name} = {value!r}: expected {kind.__name__} from {least} to {greatest}")

@@ -18,7 +18,7 @@ from canbase_bench.cia301.nmt import NmtCommand, NmtState
 from canbase_bench.cia301.rpdo import Rpdo
 from canbase_bench.cia301.tpdo import Tpdo
 from canbase_bench.cia402.axis import Axis
-from canbase_bench.cia402.states import State, Transition
+from canbase_bench.cia402.states import POWERED, State, Transition
 from canbase_bench.cia402.units import Scale
 from canbase_bench.frame import Frame
 from canbase_bench.plant.motor import Motor
@@ -73,7 +73,7 @@ class SimulatedNode:
         d = self.dictionary = Dictionary(node_id, len(axes), fixed)
         d.before_read = self._refresh
         self.emcy = emcy.EmcyService(d, self._send_emcy)
-        self._sdo = sdo.SdoService(node_id, d, self._send)
+        self.sdo = sdo.SdoService(node_id, d, self._send)
         self._producer = heartbeat.HeartbeatProducer(d)
         self._consumer = heartbeat.HeartbeatConsumer(d, self._on_lost, self._on_alive)
         self.axes = tuple(self._axis(number, parts) for number, parts in enumerate(axes))
@@ -88,6 +88,11 @@ class SimulatedNode:
             d.on_write(0x1400 + n, partial(self._pdo_written, self._rpdos[n]))
             d.on_write(0x1800 + n, partial(self._pdo_written, self._tpdos[n]))
         self._power_up(now, 0.0)
+
+    @property
+    def refused_rpdo_values(self) -> int:
+        """Values that came by RPDO and that their objects did not take."""
+        return sum(rpdo.refused for rpdo in self._rpdos)
 
     # The bus
 
@@ -144,7 +149,7 @@ class SimulatedNode:
         if command is NmtCommand.RESET_NODE:
             self._power_up(now, 0.0)
         elif command is NmtCommand.RESET_COMMUNICATION:
-            self._abort_connection(COMMUNICATION_FAULT)
+            self._leave_bus()
             self._reset_communication(now + RESET_S)
         else:
             self._enter(nmt.ENTERS[command])
@@ -159,7 +164,7 @@ class SimulatedNode:
         self._list_pdos()
         self._producer.restart()
         if state is NmtState.STOPPED:
-            self._abort_connection(COMMUNICATION_FAULT)
+            self._leave_bus()
 
     def _pdo_written(self, pdo: Rpdo | Tpdo, subindex: int, value: int) -> None:
         """In OPERATIONAL the only write that passes the guard switches the PDO off; elsewhere it is off anyway."""
@@ -190,7 +195,7 @@ class SimulatedNode:
         self._out.clear()
         self.dictionary.reset(0x1000, 0x1FFF)
         self.emcy.reset()
-        self._sdo.reset()
+        self.sdo.reset()
         self._consumer.configure()
         self._boot_at = boot_at
         self._route()
@@ -203,7 +208,7 @@ class SimulatedNode:
         if self.state is NmtState.OPERATIONAL:
             self._routes |= {r.cob_id: r.receive for r in self._active_rpdos if r.cob_id is not None}
         if self.state in nmt.HAS_SDO:
-            self._routes[self._sdo.rx_cobid] = lambda data, now: self._sdo.receive(data)
+            self._routes[self.sdo.rx_cobid] = lambda data, now: self.sdo.receive(data)
             self._routes[self.dictionary.values[key(0x1005)] & 0x7FF] = self._on_sync
         self._routes[nmt.COB_ID] = self._on_nmt
 
@@ -261,6 +266,12 @@ class SimulatedNode:
     def _on_deadline(self) -> None:
         """An RPDO's event timer ran out; the EMCY is sent, the motors act as on any lost connection."""
         self._abort_connection(emcy.RPDO_TIMEOUT)
+
+    def _leave_bus(self) -> None:
+        """NMT stop or reset communication: 6007h, for the axes that move or could; the others have nothing to abort."""
+        for axis in self.axes:
+            if axis.state in POWERED:
+                axis.abort_connection(COMMUNICATION_FAULT)
 
     def _abort_connection(self, code: int) -> None:
         for axis in self.axes:

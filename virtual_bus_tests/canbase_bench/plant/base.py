@@ -14,9 +14,9 @@ from math import cos, pi, sin
 from canbase_bench.plant.motor import Motor
 
 SWEEPS = 8
-"""Passes over both sides until friction's impulses settle; each passes on less than half of the last one's change."""
-AT_REST_MPS = 1e-7
-"""A side that friction leaves slower than this stands [m/s]."""
+"""Passes over both sides until friction's impulses settle."""
+AT_REST_MPS = 1e-5
+"""A side that friction leaves slower than this sticks: static friction is a little more than sliding friction [m/s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,7 @@ class Base:
         impulse_right = -self._bound_right if vr > 0.0 else self._bound_right
         new_left = vl + self._inverse_left * impulse_left + self._cross * impulse_right
         new_right = vr + self._cross * impulse_left + self._inverse_right * impulse_right
-        if new_left * vl > 0.0 and new_right * vr > 0.0:
+        if new_left * vl > AT_REST_MPS**2 and new_right * vr > AT_REST_MPS**2:
             return new_left, new_right
         return self._stick(vl, vr)
 

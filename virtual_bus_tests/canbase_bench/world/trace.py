@@ -20,15 +20,15 @@ class Trace:
 
     def __init__(self, bench: Bench, now: float) -> None:
         self._bench = bench
-        self._next = now
+        self._start, self._taken = now, 0
         self._rows: deque[Row] = deque(maxlen=int(RATE_HZ * KEPT_S))
 
     def tick(self, now: float) -> None:
         """Take the samples that are due; `now` may be late, the samples are not."""
-        while self._next <= now:
-            t = self._bench.truth(self._next)
+        while (due := self._start + self._taken / RATE_HZ) <= now:
+            t = self._bench.truth(due)
             self._rows.append((t.time_s, t.x_m, t.y_m, t.yaw_rad, t.v_left_mps, t.v_right_mps))
-            self._next += 1.0 / RATE_HZ
+            self._taken += 1
 
     def since(self, time_s: float) -> list[Row]:
         """The samples from `time_s` on."""
