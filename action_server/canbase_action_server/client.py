@@ -2,7 +2,7 @@
 
 A goal is sent once. When its result is lost it may still have run: nothing here sends it again.
 
-    drive = DriveClient(node).send(1.0, 0.2)      # NoServerError, NoResponseError or RejectedError when it does not start
+    drive = DriveClient(node).send(1.0, 0.2)      # raises NoServerError, NoResponseError, RejectedError
     result = drive.wait()                         # read result.status first
 """
 
@@ -126,9 +126,7 @@ class DriveClient:
         response = self._client.send_goal_async(goal, feedback_callback=_feedback_to(on_feedback))
         if not self.spin_until(response.done, response_timeout_s):
             response.add_done_callback(_cancel_late)
-            raise NoResponseError(
-                f"{self.action} did not answer within {response_timeout_s} s; the goal may run or not"
-            )
+            raise NoResponseError(f"{self.action} did not answer within {response_timeout_s} s; the goal may run")
         handle: ClientGoalHandle = response.result()
         if not handle.accepted:
             raise RejectedError(f"{self.action} rejects the goal; the log of drive_distance_server says why")
@@ -187,9 +185,7 @@ class Drive:
         self._seen = time.monotonic()
         self._client.spin_until(lambda: self._result.done() or until() or self._server_lost(), timeout_s)
         if not self._result.done() and self._server_lost():
-            raise ServerLostError(
-                "the action server went away; the result is unknown. Watch the base before sending again"
-            )
+            raise ServerLostError("the action server went away; the result is unknown. Look at the base first")
         return self.result
 
     def cancel(self, timeout_s: float = 5.0) -> bool:

@@ -36,6 +36,8 @@ from canbase_config.robot import Robot
 SENSOR_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 STATUS_QOS = QoSProfile(depth=1)
 LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+SERVICE_QOS = QoSProfile(depth=100)
+"""With the usual depth of 10, of more requests at once the oldest are lost, and their clients wait for ever."""
 
 T = TypeVar("T")
 
@@ -84,6 +86,9 @@ class DriveDistanceServer(Node):
             goal_callback=self._on_goal,
             handle_accepted_callback=self._on_accepted,
             cancel_callback=self._on_cancel,
+            goal_service_qos_profile=SERVICE_QOS,
+            result_service_qos_profile=SERVICE_QOS,
+            cancel_service_qos_profile=SERVICE_QOS,
         )
         # The steady clock: setting the computer's time must not stretch a control cycle.
         period_s = 1.0 / robot.action.control_hz

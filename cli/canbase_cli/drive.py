@@ -53,8 +53,8 @@ class Interrupts:
 
 def drive(
     ctx: typer.Context,
-    distance_m: Annotated[float, typer.Argument(metavar="DISTANCE", help="[m], negative: backward")],
-    speed_mps: Annotated[float, typer.Option("--speed", "-s", metavar="SPEED", help="highest speed [m/s]")] = 0.2,
+    distance_m: Annotated[float, typer.Argument(metavar="DISTANCE", help="in m, negative: backward")],
+    speed_mps: Annotated[float, typer.Option("--speed", "-s", metavar="SPEED", help="highest speed, m/s")] = 0.2,
     timeout_s: Annotated[
         float | None, typer.Option("--timeout", metavar="SECONDS", min=0.1, help="then cancel it", show_default="none")
     ] = None,
@@ -66,8 +66,8 @@ def drive(
 
     Ctrl-C cancels and waits until the base stands; a second Ctrl-C stops waiting.
 
-    Exit codes: 0 succeeded, 2 wrong command line, 3 canceled, 4 aborted, 5 rejected, 6 no server (or it went away, or
-    does not answer), 1 anything else.
+    Exit codes: 0 succeeded, 2 wrong command line, 3 canceled, 4 aborted, 5 rejected, 6 no server, or it
+    went away, or does not answer, 1 anything else.
     """
     with ros_needed():
         import rclpy

@@ -1,0 +1,151 @@
+"""`canbase drive`, the Python client, and the flow of a hand-written client, against the real server."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any
+
+import pytest
+from canbase.action import DriveDistance
+from canbase.msg import DriverStatus
+from rclpy.action import ActionClient
+
+from canbase_action_server.client import DriveClient, NoServerError, ServerLostError
+from ros.conftest import MakeRobot, Spawn
+from ros.fake_base import FakeBase, server_code
+from ros.harness import Process, TestNode
+
+pytestmark = pytest.mark.ros
+
+CANBASE = (sys.executable, "-c", "from canbase_cli.main import app; app()")
+
+
+class Stage:
+    """A running server before a base."""
+
+    def __init__(self, test_node: TestNode, spawn: Spawn, make_robot: MakeRobot) -> None:
+        self.node = test_node
+        self.spawn = spawn
+        code = server_code(make_robot({"timeouts": {"odometry_s": 0.5}}))
+        self.server = spawn(code)
+        self.base = FakeBase(test_node)
+        self.client = DriveClient(test_node.node, test_node.executor)
+        self.client.wait_for_server(20.0)
+        test_node.spin_for(1.0)
+
+    def canbase_drive(self, *arguments: str) -> Process:
+        """`canbase drive …`, started."""
+        return self.spawn([*CANBASE, "drive", *arguments])
+
+    def exit_code(self, process: Process, timeout_s: float = 20.0) -> int:
+        """Of a process that ends by itself, while the base goes on."""
+        self.node.wait_for(lambda: process.exit_code is not None, timeout_s, f"the end of it:\n{process.log()}")
+        return process.wait(1.0)
+
+    def wait_until_moving(self) -> None:
+        """The base is on its way."""
+        self.node.wait_for(lambda: abs(self.base.speed_mps) > 0.1, 10.0, "the base to move")
+
+
+@pytest.fixture
+def stage(test_node: TestNode, spawn: Spawn, make_robot: MakeRobot) -> Stage:
+    return Stage(test_node, spawn, make_robot)
+
+
+def test_exit_codes_tell_the_ends_apart(stage: Stage) -> None:
+    forward = stage.canbase_drive("0.3", "--speed", "0.3")
+    assert stage.exit_code(forward) == 0, forward.log()
+    assert "SUCCEEDED (OK)" in forward.log()
+    assert "m left" in forward.log()  # no terminal: lines instead of a bar
+    assert "\x1b" not in forward.log()
+
+    backward = stage.canbase_drive("-0.3", "--json")
+    assert stage.exit_code(backward) == 0, backward.log()
+    told = json.loads(backward.log())
+    assert (told["status"], told["code"]) == ("SUCCEEDED", "OK")
+    assert told["traveled_m"] == pytest.approx(-0.3, abs=0.005)
+
+    assert stage.exit_code(stage.canbase_drive("100", "--speed", "9")) == 5
+    assert stage.exit_code(stage.canbase_drive("far")) == 2
+    assert stage.exit_code(stage.canbase_drive("1", "--wait", "1", "--namespace", "elsewhere")) == 6
+
+    aborted = stage.canbase_drive("2", "--speed", "0.3")
+    stage.wait_until_moving()
+    stage.base.driver.state = DriverStatus.LATCHED
+    assert stage.exit_code(aborted) == 4
+    assert "DRIVE_FAULT" in aborted.log()
+
+
+def test_ctrl_c_cancels_and_waits_until_the_base_stands(stage: Stage) -> None:
+    drive = stage.canbase_drive("3", "--speed", "0.4")
+    stage.wait_until_moving()
+    drive.interrupt()
+    assert stage.exit_code(drive) == 3, drive.log()
+    assert abs(stage.base.speed_mps) < 0.02
+    assert "CANCELED" in drive.log()
+
+
+def test_the_timeout_of_the_command_cancels(stage: Stage) -> None:
+    drive = stage.canbase_drive("3", "--speed", "0.2", "--timeout", "1.0")
+    assert stage.exit_code(drive) == 3, drive.log()
+    assert abs(stage.base.speed_mps) < 0.02
+
+
+def test_a_second_ctrl_c_gives_up_waiting_and_says_so(stage: Stage) -> None:
+    drive = stage.canbase_drive("3", "--speed", "0.4")
+    stage.wait_until_moving()
+    stage.server.stop()  # hangs: no final status will come
+    drive.interrupt()
+    stage.node.spin_for(0.5)
+    drive.interrupt()
+    assert stage.exit_code(drive) in (1, 6)
+    assert "may still move" in drive.log()
+    stage.server.resume()
+
+
+def test_a_server_that_dies_is_told_and_the_goal_is_not_sent_again(stage: Stage) -> None:
+    drive = stage.client.send(2.0, 0.3)
+    stage.wait_until_moving()
+    stage.server.kill()
+    with pytest.raises(ServerLostError):
+        drive.wait(30.0)
+    stage.node.spin_for(0.5)
+    assert stage.base.speed_mps == pytest.approx(0.0, abs=0.001)
+
+
+def test_no_server_is_an_error_of_its_own(test_node: TestNode) -> None:
+    with pytest.raises(NoServerError, match="drive_distance"):
+        DriveClient(test_node.node, test_node.executor).wait_for_server(0.5)
+
+
+def test_a_namespace_is_another_robot(test_node: TestNode, spawn: Spawn, make_robot: MakeRobot) -> None:
+    spawn([sys.executable, "-c", server_code(make_robot({})), "--ros-args", "-r", "__ns:=/robot1"])
+    there = ActionClient(test_node.node, DriveDistance, "/robot1/drive_distance")
+    here = ActionClient(test_node.node, DriveDistance, "drive_distance")
+    test_node.wait_for(there.server_is_ready, 20.0, "the server in /robot1")
+    assert not here.server_is_ready()
+
+
+def test_the_flow_of_a_client_with_callbacks(stage: Stage) -> None:
+    # send_goal_async → done callback → get_result_async → done callback, as in every rclpy tutorial.
+    told: dict[str, Any] = {"feedback": []}
+    client = ActionClient(stage.node.node, DriveDistance, "drive_distance")
+
+    def on_response(future: Any) -> None:
+        told["handle"] = future.result()
+        told["handle"].get_result_async().add_done_callback(on_result)
+
+    def on_result(future: Any) -> None:
+        told["result"] = future.result()
+
+    assert client.wait_for_server(timeout_sec=5.0)
+    goal = DriveDistance.Goal(distance_m=0.5, max_speed_mps=0.4)
+    future = client.send_goal_async(goal, feedback_callback=lambda message: told["feedback"].append(message.feedback))
+    future.add_done_callback(on_response)
+    stage.node.wait_for(lambda: "result" in told, 15.0, "the result")
+    assert told["handle"].accepted
+    assert told["result"].status == 4
+    assert told["result"].result.traveled_m == pytest.approx(0.5, abs=0.005)
+    remaining = [feedback.remaining_m for feedback in told["feedback"]]
+    assert remaining[0] > remaining[-1]

@@ -1,0 +1,79 @@
+"""Which goals may start: numbers dense at the limits, and each reason against a robot that is not ready."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from canbase_action_server.admission import STATE_TIMEOUT_S, action_source, range_reason, state_reason
+from canbase_action_server.inputs import Inputs
+from canbase_config.robot import Mux, MuxSource
+from unit.action_plant import GOOD_DRIVER, GOOD_MUX, GOOD_SAFETY, Plant, bench_robot, replaced
+
+ROBOT = bench_robot()  # action.*: 0.01 to 5 m, 0.02 to 0.5 m/s
+READY = Inputs(Plant().odometry(0.0), GOOD_SAFETY, GOOD_DRIVER, GOOD_MUX)
+
+
+@pytest.mark.parametrize("distance_m", [0.01, -0.01, 0.011, 5.0, -5.0, 1.0])
+@pytest.mark.parametrize("speed_mps", [0.02, 0.5, 0.3])
+def test_numbers_within_the_limits_are_good(distance_m: float, speed_mps: float) -> None:
+    assert range_reason(ROBOT, distance_m, speed_mps) is None
+
+
+def test_a_limit_that_float32_rounded_outward_is_still_the_limit() -> None:
+    assert range_reason(ROBOT, 0.009999999776482582, 0.019999999552965164) is None  # float32(0.01), float32(0.02)
+
+
+@pytest.mark.parametrize("distance_m", [0.0, -0.0, 0.00999, -0.00999, 5.0001, -5.0001, math.inf, -math.inf, math.nan])
+def test_a_distance_outside_is_refused_with_its_range(distance_m: float) -> None:
+    reason = range_reason(ROBOT, distance_m, 0.2)
+    assert reason is not None
+    assert "|distance_m|" in reason
+    assert "0.01 to 5.0" in reason
+
+
+@pytest.mark.parametrize("speed_mps", [0.0, -0.2, 0.0199, 0.5001, math.inf, -math.inf, math.nan])
+def test_a_speed_outside_is_refused_with_its_range(speed_mps: float) -> None:
+    reason = range_reason(ROBOT, 1.0, speed_mps)
+    assert reason is not None
+    assert "max_speed_mps" in reason
+    assert "0.02 to 0.5" in reason
+
+
+def test_a_robot_that_is_ready_has_no_reason_against_it() -> None:
+    assert state_reason(ROBOT, READY, 0.0) is None
+    assert state_reason(ROBOT, replaced(READY, mux=replace(GOOD_MUX, active="action")), 0.0) is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"shutdown": True}, "shutting down"),
+        ({"odometry": None}, "nothing received on odom"),
+        ({"safety": None}, "nothing received on safety_filter/state"),
+        ({"driver": None}, "nothing received on motor_driver/status"),
+        ({"mux": None}, "nothing received on velocity_mux/state"),
+        ({"safety": replace(GOOD_SAFETY, estop=True)}, "emergency stop"),
+        ({"safety": replace(GOOD_SAFETY, cause="estop_stale")}, "emergency stop"),
+        ({"driver": replace(GOOD_DRIVER, state="latched")}, "latched, not enabled"),
+        ({"driver": replace(GOOD_DRIVER, watchdog="missing")}, "watchdog is missing"),
+        ({"mux": replace(GOOD_MUX, active="joystick")}, "joystick drives"),
+    ],
+)
+def test_each_thing_that_is_missing_is_named(changes: dict[str, object], reason: str) -> None:
+    assert reason in str(state_reason(ROBOT, replaced(READY, **changes), 0.0))
+
+
+def test_old_messages_are_no_messages() -> None:
+    # odom may be 0.2 s old, the states 1.5 s.
+    assert state_reason(ROBOT, READY, 0.2) is None
+    assert "odom is silent for 0.21 s" in str(state_reason(ROBOT, READY, 0.21))
+    fresh = replaced(READY, odometry=Plant().odometry(1.6))
+    assert "motor_driver/status is silent" in str(state_reason(ROBOT, fresh, STATE_TIMEOUT_S + 0.1))
+
+
+def test_the_action_server_must_be_a_source_of_the_mux() -> None:
+    assert action_source(ROBOT) == "action"
+    alone = Mux(sources={"joystick": MuxSource(topic="cmd_vel_joy", priority=1, timeout_s=0.3)})
+    with pytest.raises(ValueError, match="cmd_vel_action"):
+        action_source(ROBOT.model_copy(update={"mux": alone}))

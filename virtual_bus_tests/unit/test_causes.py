@@ -1,0 +1,108 @@
+"""The table of causes: each row alone, the order among them, and which of them count during a stop."""
+
+from dataclasses import replace
+
+import pytest
+from canbase.action import DriveDistance
+
+from canbase_action_server.causes import TABLE, Situation, cause_while_driving, cause_while_stopping
+from canbase_action_server.inputs import Inputs
+from canbase_action_server.outcome import ErrorCode, Status
+from unit.action_plant import GOOD_DRIVER, GOOD_MUX, GOOD_SAFETY, Plant, replaced
+
+GOOD = Situation(
+    inputs=Inputs(Plant().odometry(10.0), GOOD_SAFETY, GOOD_DRIVER, GOOD_MUX),
+    now=10.0,
+    own_source="action",
+    odometry_timeout_s=0.2,
+    odometry_jumped=False,
+    obstacle_age_s=0.0,
+    obstacle_patience_s=0.3,
+    no_progress_s=0.0,
+    progress_timeout_s=2.0,
+    running_s=0.0,
+    overall_timeout_s=20.0,
+)
+
+
+def with_inputs(situation: Situation, **changes: object) -> Situation:
+    return replace(situation, inputs=replaced(situation.inputs, **changes))
+
+
+# One way to provoke each row, in the order of the table.
+PROVOKED = {
+    ErrorCode.ESTOP: lambda s: with_inputs(s, safety=replace(GOOD_SAFETY, estop=True)),
+    ErrorCode.WATCHDOG: lambda s: with_inputs(s, driver=replace(s.inputs.driver, watchdog="tripped")),
+    ErrorCode.DRIVE_FAULT: lambda s: with_inputs(s, driver=replace(s.inputs.driver, state="latched")),
+    ErrorCode.ODOMETRY_LOST: lambda s: replace(s, now=10.21),
+    ErrorCode.TAKEN_OVER: lambda s: with_inputs(s, mux=replace(GOOD_MUX, active="joystick")),
+    ErrorCode.SCAN_LOST: lambda s: with_inputs(s, safety=replace(GOOD_SAFETY, cause="scan_stale")),
+    ErrorCode.BLOCKED: lambda s: replace(s, obstacle_age_s=0.3),
+    ErrorCode.CANCELED: lambda s: with_inputs(s, cancel_requested=True),
+    ErrorCode.SHUTDOWN: lambda s: with_inputs(s, shutdown=True),
+    ErrorCode.NO_PROGRESS: lambda s: replace(s, no_progress_s=2.01),
+    ErrorCode.TIMEOUT: lambda s: replace(s, running_s=20.01),
+}
+
+
+def test_nothing_wrong_is_no_cause() -> None:
+    assert cause_while_driving(GOOD) is None
+    almost = replace(GOOD, now=10.2, obstacle_age_s=0.299, no_progress_s=2.0, running_s=20.0)
+    assert cause_while_driving(almost) is None
+    assert cause_while_driving(with_inputs(GOOD, mux=replace(GOOD_MUX, active="action"))) is None
+
+
+@pytest.mark.parametrize("code", PROVOKED)
+def test_each_row_alone(code: ErrorCode) -> None:
+    cause = cause_while_driving(PROVOKED[code](GOOD))
+    assert cause is not None
+    assert cause.code is code
+    assert len(cause.message) > 15
+
+
+def test_the_table_is_in_this_order() -> None:
+    assert [row.code for row in TABLE] == list(PROVOKED)
+
+
+@pytest.mark.parametrize("place", range(len(TABLE) - 1))
+def test_of_two_that_hold_the_upper_one_wins(place: int) -> None:
+    upper, lower = TABLE[place].code, TABLE[place + 1].code
+    cause = cause_while_driving(PROVOKED[upper](PROVOKED[lower](GOOD)))
+    assert cause is not None
+    assert cause.code is upper
+
+
+def test_a_jump_of_the_odometry_is_a_loss_of_it() -> None:
+    cause = cause_while_driving(replace(GOOD, odometry_jumped=True))
+    assert cause is not None
+    assert cause.code is ErrorCode.ODOMETRY_LOST
+
+
+STOPPING = {ErrorCode.ESTOP, ErrorCode.WATCHDOG, ErrorCode.DRIVE_FAULT, ErrorCode.ODOMETRY_LOST, ErrorCode.TAKEN_OVER,
+            ErrorCode.CANCELED, ErrorCode.SHUTDOWN}  # fmt: skip
+
+
+@pytest.mark.parametrize("code", PROVOKED)
+def test_during_the_stop_of_a_goal_that_arrived_only_some_rows_count(code: ErrorCode) -> None:
+    cause = cause_while_stopping(PROVOKED[code](GOOD), ErrorCode.OK)
+    assert (cause is not None) == (code in STOPPING)
+
+
+def test_during_a_stop_only_an_upper_row_replaces_the_cause() -> None:
+    tripped = PROVOKED[ErrorCode.WATCHDOG](PROVOKED[ErrorCode.DRIVE_FAULT](GOOD))
+    cause = cause_while_stopping(tripped, ErrorCode.DRIVE_FAULT)
+    assert cause is not None
+    assert cause.code is ErrorCode.WATCHDOG
+    assert cause_while_stopping(tripped, ErrorCode.WATCHDOG) is None
+    assert cause_while_stopping(PROVOKED[ErrorCode.CANCELED](GOOD), ErrorCode.BLOCKED) is None
+
+
+def test_codes_are_those_of_the_interface() -> None:
+    assert {code.name: code.value for code in ErrorCode} == {
+        code.name: getattr(DriveDistance.Result, code.name) for code in ErrorCode
+    }
+
+
+def test_only_arriving_succeeds_and_only_a_cancel_is_canceled() -> None:
+    assert {code for code in ErrorCode if code.status is Status.SUCCEEDED} == {ErrorCode.OK}
+    assert {code for code in ErrorCode if code.status is Status.CANCELED} == {ErrorCode.CANCELED}
