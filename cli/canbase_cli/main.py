@@ -6,7 +6,7 @@ from typing import Annotated, Final
 
 import typer
 
-from canbase_cli import config, drive, process
+from canbase_cli import config, demo, drive, process, trigger, up
 from canbase_cli.options import RosCommand
 
 app = typer.Typer(
@@ -39,10 +39,14 @@ def canbase(
 
 _ROS_USAGE: Final = "[OPTIONS] [--ros-args …]"
 
+app.command("demo")(demo.demo)
+app.command("up", cls=RosCommand, options_metavar=_ROS_USAGE)(up.up)
+app.command("drive", cls=drive.DriveCommand, options_metavar=_ROS_USAGE)(drive.drive)
+app.command("stop", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.stop)
+app.command("reset", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.reset)
 app.add_typer(config.app, name="config")
 app.command("driver", cls=RosCommand, options_metavar=_ROS_USAGE)(process.driver)
 app.command("velocity", cls=RosCommand, options_metavar=_ROS_USAGE)(process.velocity)
 app.command("action-server", cls=RosCommand, options_metavar=_ROS_USAGE)(process.action_server)
-app.command("drive", cls=drive.DriveCommand, options_metavar=_ROS_USAGE)(drive.drive)
 app.command("watchdog", cls=RosCommand)(process.watchdog)
 app.command("sim", cls=RosCommand)(process.sim)

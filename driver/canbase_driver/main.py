@@ -49,17 +49,20 @@ def run(robot: Robot, ros_args: Sequence[str]) -> int:
     rclpy.init(args=list(ros_args), signal_handler_options=SignalHandlerOptions.NO)
     loop = ControlLoop(DriverCore(robot), bus, robot.rates.control_hz, robot.rates.odometry_hz)
     node = MotorDriverNode(robot, loop)
-    threads = (loop, Publisher(node, loop), DriverServices(loop))
+    publisher, services = Publisher(node, loop), DriverServices(loop)
+    threads = (loop, publisher, services)
     gc.collect()
     gc.freeze()  # what is there now lives for ever: later collections need not look at it
     for thread in threads:
         thread.start()
     try:
         failure = _spin(node, loop, threads, received)
-        _end(loop, robot.timeouts.standstill_s + END_MARGIN_S)
-        threads[1].join(1.0)
+        loop.request_shutdown()
+        loop.join(robot.timeouts.standstill_s + END_MARGIN_S)
+        publisher.join(1.0)
     finally:
         rclpy.shutdown()
+        services.join(1.0)
     failure = failure or loop.failure
     if failure is not None:
         node.get_logger().fatal(f"ended by {type(failure).__name__}: {failure}")
@@ -76,21 +79,26 @@ def _spin(
     """Until a signal or a failure; the failure."""
     executor = EventsExecutor()
     executor.add_node(node)
-    while not received:
-        try:
+    try:
+        while not received:
             executor.spin_once(timeout_sec=WAKE_S)
-        except Exception as error:  # noqa: BLE001 - the base is ramped down, then the process ends by it
-            return error
-        for thread in threads:
-            if thread.failure is not None:
-                return thread.failure
-            if not thread.is_alive():
-                return RuntimeError(f"thread {thread.name} ended by itself")
-        if time.monotonic() - loop.cycle_at > LOOP_TIMEOUT_S:
-            return TimeoutError(f"the control thread has made no cycle for {LOOP_TIMEOUT_S} s")
+            failure = _failure(loop, threads)
+            if failure is not None:
+                return failure
+    except Exception as error:  # noqa: BLE001 - the base is ramped down, then the process ends by it
+        return error
+    finally:
+        executor.shutdown()
     return None
 
 
-def _end(loop: ControlLoop, timeout_s: float) -> None:
-    loop.request_shutdown()
-    loop.join(timeout_s)
+def _failure(loop: ControlLoop, threads: tuple[ControlLoop, Publisher, DriverServices]) -> BaseException | None:
+    """Why the process must end: a thread that failed, ended, or hangs."""
+    for thread in threads:
+        if thread.failure is not None:
+            return thread.failure
+        if not thread.is_alive():
+            return RuntimeError(f"thread {thread.name} ended by itself")
+    if time.monotonic() - loop.cycle_at > LOOP_TIMEOUT_S:
+        return TimeoutError(f"the control thread has made no cycle for {LOOP_TIMEOUT_S} s")
+    return None

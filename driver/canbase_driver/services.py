@@ -22,8 +22,8 @@ class DriverServices(threading.Thread):
         super().__init__(name="services", daemon=True)
         self._loop = loop
         self._node = Node("motor_driver_services")
-        self._node.create_service(Trigger, "motor_driver/reset", self._reset)
-        self._node.create_service(Trigger, "motor_driver/stop", self._stop)
+        self._node.create_service(Trigger, "motor_driver/reset", self._on_reset)
+        self._node.create_service(Trigger, "motor_driver/stop", self._on_stop)
         self.failure: BaseException | None = None
 
     def run(self) -> None:
@@ -37,13 +37,13 @@ class DriverServices(threading.Thread):
         except BaseException as error:  # noqa: BLE001 - main sees it, stops the robot and ends the process
             self.failure = error
 
-    def _reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         outcome = self._loop.reset()
         response.success, response.message = outcome.done, outcome.sentence
         self._node.get_logger().info(f"reset: {outcome.sentence}")
         return response
 
-    def _stop(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _on_stop(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._loop.request_stop()
         response.success, response.message = True, "stopping; nothing moves until motor_driver/reset"
         self._node.get_logger().warning("stop requested")

@@ -173,12 +173,13 @@ class Supervisor:
         self._latch = False
         self.state = DriverState.DISARMED
 
-    def _booting(self, situation: Situation, _now: float) -> None:
+    def _booting(self, situation: Situation, now: float) -> None:
         self.cause = Cause("booting", situation.booting or situation.bus, "drives booted")
         if situation.shutdown_requested:
             self._end(_as_cause(SHUTDOWN, situation))
         elif not situation.booting and not situation.bus:
             self.state = DriverState.DISARMED
+            self._disarmed(situation, now)
 
     def _disarmed(self, situation: Situation, _now: float) -> None:
         blocker = _first(BLOCKERS, situation)
