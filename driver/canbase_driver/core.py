@@ -9,20 +9,20 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 from canbase_config.robot import DRIVER_NODE_ID, Robot
 from canbase_driver.axis import Axis
 from canbase_driver.cia301 import EMCY, HEARTBEAT, SDO_TO_CLIENT, SYNC, NmtCommand, NmtState, heartbeat, nmt
 from canbase_driver.cia402 import DriveState, PowerGoal
-from canbase_driver.emcy import emcy_text
+from canbase_driver.drives import Drives, age_s
 from canbase_driver.frame import Frame
 from canbase_driver.kinematics import Twist2D, base_twist, wheel_speeds
 from canbase_driver.limits import Limiter, MotionState
 from canbase_driver.odometry import Odometry
 from canbase_driver.remote_node import RemoteNode
 from canbase_driver.reset import Outcome, Reset, refusal
-from canbase_driver.snapshot import DriverSnapshot, DriverState, DriveSnapshot, StopRecord
+from canbase_driver.snapshot import DriverSnapshot, DriverState, StopRecord
 from canbase_driver.supervisor import Cause, Drive, Orders, Situation, Supervisor
 from canbase_driver.watchdog_link import STATE_COB_ID, WatchdogLink
 
@@ -37,10 +37,7 @@ class DriverCore:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._nodes = tuple(RemoteNode(node_id, robot) for node_id in sorted({d.node_id for d in robot.drives}))
-        self._axes = tuple(_axis_of(self._nodes, drive.joint) for drive in robot.drives)
-        self._left = tuple(self._axes[i] for i in robot.drive_indexes("left"))
-        self._right = tuple(self._axes[i] for i in robot.drive_indexes("right"))
+        self._drives = Drives(robot)
         self._watchdog = WatchdogLink(robot.timeouts.watchdog_s)
         self._supervisor = Supervisor(robot.timeouts.standstill_s)
         self._limiter = Limiter(robot.limits, robot.base.track_m)
@@ -108,7 +105,7 @@ class DriverCore:
     def on_bus(self, problem: str, now: float) -> None:
         """The bus failed (a sentence), or works again (empty): then every node is booted anew."""
         if self._bus_problem and not problem:
-            for node in self._nodes:
+            for node in self._drives.nodes:
                 node.lose("was cut off from the bus", now)
         self._bus_problem = problem
 
@@ -137,7 +134,7 @@ class DriverCore:
         self._ticked_at = now
         self._note_lateness(now, lateness_s)
         frames = self._heartbeat(now)
-        for node in self._nodes:
+        for node in self._drives.nodes:
             frames += node.tick(now)
             if self._supervisor.state in NO_POWER and not self._shutdown_requested:
                 node.begin_boot(now)
@@ -147,12 +144,12 @@ class DriverCore:
         frames += self._setpoints(orders, now, dt_s)
         if self.finished:
             # Reset communication forgets 1016h: a drive must not report a lost heartbeat after an orderly end.
-            frames += [nmt(NmtCommand.RESET_COMMUNICATION, node.node_id) for node in self._nodes]
+            frames += [nmt(NmtCommand.RESET_COMMUNICATION, node.node_id) for node in self._drives.nodes]
         return frames
 
     def stop_frames(self) -> list[Frame]:
         """Quick stop for all axes in any state: the way out after a defect. Needs no knowledge, cannot fail."""
-        return [axis.setpoint(PowerGoal.QUICK_STOP, 0.0) for axis in self._axes] + [SYNC]
+        return [axis.setpoint(PowerGoal.QUICK_STOP, 0.0) for axis in self._drives.axes] + [SYNC]
 
     def _judge(self, situation: Situation, now: float) -> Orders:
         before = self._supervisor.state
@@ -166,20 +163,20 @@ class DriverCore:
         return orders
 
     def _setpoints(self, orders: Orders, now: float, dt_s: float) -> list[Frame]:
-        if not any(node.has_pdos for node in self._nodes) or self._bus_problem:
+        if not any(node.has_pdos for node in self._drives.nodes) or self._bus_problem:
             self._motion = MotionState.AT_REST
             return []
         target = self._target(orders, now)
         if orders.drive is Drive.ZERO:
             self._motion = MotionState.AT_REST
         else:
-            self._motion = self._limiter.step(self._motion, self._limiter.limit(target), dt_s)
+            self._motion = self._limiter.step(self._motion, target, dt_s)
         if self._motion.twist != Twist2D.ZERO or target != Twist2D.ZERO:
             self._zero_since = now
         left_mps, right_mps = wheel_speeds(self._motion.twist, self._robot.base.track_m)
         frames = [
-            axis.setpoint(self._goal(axis, orders), left_mps if axis in self._left else right_mps)
-            for node in self._nodes
+            axis.setpoint(self._goal(axis, orders), left_mps if axis in self._drives.left else right_mps)
+            for node in self._drives.nodes
             if node.has_pdos
             for axis in node.axes
         ]
@@ -219,32 +216,20 @@ class DriverCore:
         watchdog, watchdog_detail = self._watchdog.view(now)
         return Situation(
             bus=self._bus_problem,
-            booting=_first(node.waiting_for(now) for node in self._nodes),
-            fault=_first(self._fault(node) for node in self._nodes),
-            absent=_first(node.absent() for node in self._nodes),
-            silent=_first(node.silent(now) for node in self._nodes),
-            disabled=_first(self._disabled(axis) for axis in self._axes),
+            booting=self._drives.booting(now),
+            fault=self._drives.fault(),
+            absent=self._drives.absent(),
+            silent=self._drives.silent(now),
+            disabled=self._drives.disabled(),
             watchdog=watchdog,
             watchdog_detail=watchdog_detail,
             commanded=self._commanded(now),
             overdue=self._overdue(now),
-            standstill=self._stands(now),
-            powered=any(self._may_have_power(axis, now) for axis in self._axes),
+            standstill=self._drives.stand(now),
+            powered=self._drives.may_have_power(now),
             stop_requested=self._stop_requested,
             shutdown_requested=self._shutdown_requested,
         )
-
-    def _fault(self, node: RemoteNode) -> str:
-        for axis in node.axes:
-            if axis.state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
-                return f"{axis.drive.joint} (node {node.node_id}): {node.emcy.text if node.emcy else 'no code given'}"
-        return ""
-
-    def _disabled(self, axis: Axis) -> str:
-        if axis.state is DriveState.OPERATION_ENABLED:
-            return ""
-        text = axis.state.text if axis.state else "in no state known"
-        return f"{axis.drive.joint} (node {axis.drive.node_id}) is {text}"
 
     def _commanded(self, now: float) -> str:
         if not self._command_is_fresh(now) or self._command == Twist2D.ZERO:
@@ -252,30 +237,18 @@ class DriverCore:
         return f"cmd_vel orders {self._command.linear_mps:.3f} m/s, {self._command.angular_radps:.3f} rad/s"
 
     def _overdue(self, now: float) -> str:
-        if self._supervisor.state is not DriverState.ENABLED or self._stands(now):
+        if self._supervisor.state is not DriverState.ENABLED or self._drives.stand(now):
             return ""
         elapsed_s = now - self._zero_since
         if elapsed_s <= self._robot.timeouts.standstill_s:
             return ""
-        fastest = max(self._axes, key=lambda axis: abs(axis.velocity_mps))
+        fastest = self._drives.fastest()
         return (
             f"{fastest.drive.joint} turns at {fastest.velocity_mps:.3f} m/s, {elapsed_s:.1f} s after zero was ordered"
         )
 
     def _command_is_fresh(self, now: float) -> bool:
         return now - self._command_at <= self._robot.timeouts.command_s
-
-    def _is_fresh(self, axis: Axis, now: float) -> bool:
-        return axis.age_s(now) <= self._robot.timeouts.feedback_s
-
-    def _stands(self, now: float) -> bool:
-        return all(
-            self._is_fresh(axis, now) and abs(axis.velocity_mps) <= self._robot.base.standstill_mps
-            for axis in self._axes
-        )
-
-    def _may_have_power(self, axis: Axis, now: float) -> bool:
-        return not self._is_fresh(axis, now) or axis.state is None or axis.state.has_torque
 
     def _note_lateness(self, now: float, lateness_s: float) -> None:
         self.cycles += 1
@@ -291,16 +264,16 @@ class DriverCore:
 
     def _on_velocity(self, axis: Axis, frame: Frame, now: float) -> bool:
         understood = axis.on_velocity(frame.data)
-        if all(each.has_new_sample for each in self._axes):
+        if all(each.has_new_sample for each in self._drives.axes):
             self._take_sample(now)
         return understood
 
     def _take_sample(self, now: float) -> None:
-        for axis in self._axes:
+        for axis in self._drives.axes:
             axis.sample_taken()
-        if not all(axis.travel.referenced for axis in self._axes) or now <= self._odometry_at:
+        if not self._drives.have_references() or now <= self._odometry_at:
             return
-        self._odometry.update(_mean_travel(self._left), _mean_travel(self._right), min(now - self._odometry_at, 1.0))
+        self._odometry.update(*self._drives.travel_m(), min(now - self._odometry_at, 1.0))
         self._odometry_at = now
         self.odometry_serial += 1
 
@@ -308,7 +281,7 @@ class DriverCore:
         table: dict[int, tuple[RemoteNode | None, Callable[[Frame, float], bool]]] = {
             STATE_COB_ID: (None, self._watchdog.on_frame)
         }
-        for node in self._nodes:
+        for node in self._drives.nodes:
             table[EMCY + node.node_id] = (None, node.on_emcy)
             table[HEARTBEAT + node.node_id] = (node, node.on_heartbeat)
             table[SDO_TO_CLIENT + node.node_id] = (node, node.on_sdo)
@@ -320,9 +293,7 @@ class DriverCore:
     def snapshot(self, now: float) -> DriverSnapshot:
         """What the driver knows now."""
         watchdog, _detail = self._watchdog.view(now)
-        left_mps = sum(axis.velocity_mps for axis in self._left) / len(self._left)
-        right_mps = sum(axis.velocity_mps for axis in self._right) / len(self._right)
-        measured = base_twist(left_mps, right_mps, self._robot.base.track_m)
+        measured = base_twist(*self._drives.speeds_mps(), self._robot.base.track_m)
         pose, cause = self._odometry.pose, self._supervisor.cause
         return DriverSnapshot(
             time_s=now,
@@ -333,8 +304,8 @@ class DriverCore:
             watchdog=watchdog,
             watchdog_cause=self._watchdog.cause,
             watchdog_age_s=self._watchdog.age_s(now),
-            standstill=self._stands(now),
-            command_age_s=_age(now, self._command_at),
+            standstill=self._drives.stand(now),
+            command_age_s=age_s(now, self._command_at),
             command_fresh=self._command_is_fresh(now),
             commands_refused=self.commands_refused,
             cycles=self.cycles,
@@ -342,7 +313,7 @@ class DriverCore:
             cycle_lateness_max_s=self._lateness[0][1] if self._lateness else 0.0,
             frames_dropped=self.frames_dropped,
             send_errors=self.send_errors,
-            drives=tuple(self._drive_snapshot(node, axis, now) for node in self._nodes for axis in node.axes),
+            drives=self._drives.snapshots(now),
             x_m=pose.x_m,
             y_m=pose.y_m,
             yaw_rad=pose.yaw_rad,
@@ -350,47 +321,11 @@ class DriverCore:
             angular_radps=measured.angular_radps,
             pose_covariance=self._odometry.pose_covariance(),
             twist_covariance=self._odometry.twist_covariance(),
-            odometry_valid=all(self._is_fresh(axis, now) and axis.travel.referenced for axis in self._axes),
+            odometry_valid=self._drives.are_fresh(now) and self._drives.have_references(),
             odom_frame=self._robot.base.odom_frame,
             base_frame=self._robot.base.base_frame,
         )
 
-    def _drive_snapshot(self, node: RemoteNode, axis: Axis, now: float) -> DriveSnapshot:
-        radius_m = self._robot.base.wheel_radius_m
-        code = node.emcy.code if node.emcy else 0
-        return DriveSnapshot(
-            joint=axis.drive.joint,
-            node_id=node.node_id,
-            axis=axis.drive.axis,
-            nmt_state=node.nmt_state.text if node.nmt_state is not None else "unknown",
-            state=axis.state.text if axis.state else "unknown",
-            statusword=axis.statusword,
-            error_code=code,
-            error_text=emcy_text(code) if code else "",
-            target_radps=axis.target_mps / radius_m,
-            velocity_radps=axis.velocity_mps / radius_m,
-            position_rad=axis.position_rad,
-            feedback_age_s=_age(now, axis.status_at),
-            heartbeat_age_s=_age(now, node.heartbeat_at),
-            stops_by_itself=node.stops_by_itself,
-        )
-
-
-def _axis_of(nodes: tuple[RemoteNode, ...], joint: str) -> Axis:
-    return next(axis for node in nodes for axis in node.axes if axis.drive.joint == joint)
-
 
 def _bind(handler: Callable[[Axis, Frame, float], bool], axis: Axis) -> Callable[[Frame, float], bool]:
     return lambda frame, now: handler(axis, frame, now)
-
-
-def _first(sentences: Iterable[str]) -> str:
-    return next((sentence for sentence in sentences if sentence), "")
-
-
-def _mean_travel(axes: tuple[Axis, ...]) -> float:
-    return sum(axis.travel.travel_m for axis in axes) / len(axes)
-
-
-def _age(now: float, then: float) -> float:
-    return now - then if then > -math.inf else math.nan

@@ -6,6 +6,7 @@ only put requests into the inbox. However the thread ends, its last act on the b
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
 import time
@@ -39,8 +40,8 @@ class ControlLoop(threading.Thread):
         self._stops: list[StopRecord] = []
         self._published = (0, core.state)
         self._handed_over_at = 0.0
-        self.cycle_at = time.monotonic()
-        """When the last cycle began: a thread that hangs is seen by it."""
+        self.cycle_at = math.inf
+        """When the last cycle began [s, monotonic]: a thread that hangs is seen by it. Infinity before the first."""
         self.failure: BaseException | None = None
 
     def command(self, twist: Twist2D, received_at: float) -> None:
@@ -85,7 +86,7 @@ class ControlLoop(threading.Thread):
             self._hand_over(time.monotonic())
 
     def _cycle_until_finished(self) -> None:
-        cycle_at = time.monotonic()
+        cycle_at = self.cycle_at = time.monotonic()
         while not self._core.finished:
             cycle_at += self._period_s
             self._take_in_until(cycle_at)

@@ -147,9 +147,7 @@ class SdoClient:
 
     def __init__(self, node_id: int, timeout_s: float, attempts: int) -> None:
         if not 1 <= node_id <= MAX_NODE_ID or timeout_s <= 0.0 or attempts < 1:
-            raise ValueError(
-                f"node {node_id}, {timeout_s} s, {attempts} attempts: expected 1…127, more than 0 of each"
-            )
+            raise ValueError(f"node {node_id}, {timeout_s} s, {attempts} attempts: expected 1…127, more than 0 of each")
         self.node_id = node_id
         self.dropped = 0
         self._timeout_s = timeout_s

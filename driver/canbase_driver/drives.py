@@ -1,0 +1,134 @@
+"""All drives of the base as one: what keeps them from being ready, whether they stand, how far each side has rolled.
+
+Sentences name joint, node and values and are empty when there is nothing to tell. No decisions: `supervisor.py`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from canbase_config.robot import Robot
+from canbase_driver.axis import Axis
+from canbase_driver.cia402 import DriveState
+from canbase_driver.emcy import emcy_text
+from canbase_driver.remote_node import RemoteNode
+from canbase_driver.snapshot import DriveSnapshot
+
+
+class Drives:
+    """Nodes by node id, axes in the order of robot.yaml."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self.nodes = tuple(RemoteNode(node_id, robot) for node_id in sorted({drive.node_id for drive in robot.drives}))
+        by_joint = {axis.drive.joint: axis for node in self.nodes for axis in node.axes}
+        self.axes = tuple(by_joint[drive.joint] for drive in robot.drives)
+        self.left = tuple(axis for axis in self.axes if axis.drive.side == "left")
+        self.right = tuple(axis for axis in self.axes if axis.drive.side == "right")
+
+    def booting(self, now: float) -> str:
+        """What a node that is being booted or started is waiting for."""
+        return _first(node.waiting_for(now) for node in self.nodes)
+
+    def absent(self) -> str:
+        """Why a node must be booted again."""
+        return _first(node.absent() for node in self.nodes)
+
+    def silent(self, now: float) -> str:
+        """Which node gives no fresh status or heartbeat."""
+        return _first(node.silent(now) for node in self.nodes)
+
+    def fault(self) -> str:
+        """Which axis is in fault or in its reaction to one, and the code that the drive gave."""
+        return _first(_fault(node) for node in self.nodes)
+
+    def disabled(self) -> str:
+        """Which axis is not in operation enabled."""
+        return _first(_disabled(axis) for axis in self.axes)
+
+    def are_fresh(self, now: float) -> bool:
+        """Every axis has given its status in time."""
+        return all(self._is_fresh(axis, now) for axis in self.axes)
+
+    def stand(self, now: float) -> bool:
+        """Measured, and fresh: no rim is faster than base.standstill_mps."""
+        limit_mps = self._robot.base.standstill_mps
+        return self.are_fresh(now) and all(abs(axis.velocity_mps) <= limit_mps for axis in self.axes)
+
+    def may_have_power(self, now: float) -> bool:
+        """Some axis has torque, or does not tell."""
+        return any(not self._is_fresh(axis, now) or axis.state is None or axis.state.has_torque for axis in self.axes)
+
+    def have_references(self) -> bool:
+        """The travel of every wheel is known since its first sample."""
+        return all(axis.travel.referenced for axis in self.axes)
+
+    def travel_m(self) -> tuple[float, float]:
+        """Travel of the rims, left and right, since the start [m]; several wheels on a side are averaged."""
+        return _mean(axis.travel.travel_m for axis in self.left), _mean(axis.travel.travel_m for axis in self.right)
+
+    def speeds_mps(self) -> tuple[float, float]:
+        """Measured speeds of the rims, left and right [m/s]; several wheels on a side are averaged."""
+        return _mean(axis.velocity_mps for axis in self.left), _mean(axis.velocity_mps for axis in self.right)
+
+    def fastest(self) -> Axis:
+        """The axis with the greatest measured speed."""
+        return max(self.axes, key=lambda axis: abs(axis.velocity_mps))
+
+    def snapshots(self, now: float) -> tuple[DriveSnapshot, ...]:
+        """One per axis, in the order of robot.yaml."""
+        node_of = {axis.drive.joint: node for node in self.nodes for axis in node.axes}
+        return tuple(_snapshot(node_of[axis.drive.joint], axis, self._robot, now) for axis in self.axes)
+
+    def _is_fresh(self, axis: Axis, now: float) -> bool:
+        return axis.age_s(now) <= self._robot.timeouts.feedback_s
+
+
+def age_s(now: float, then: float) -> float:
+    """Seconds since `then`; NaN when that never was (minus infinity)."""
+    return now - then if then > -math.inf else math.nan
+
+
+def _snapshot(node: RemoteNode, axis: Axis, robot: Robot, now: float) -> DriveSnapshot:
+    radius_m = robot.base.wheel_radius_m
+    code = node.emcy.code if node.emcy else 0
+    return DriveSnapshot(
+        joint=axis.drive.joint,
+        node_id=node.node_id,
+        axis=axis.drive.axis,
+        nmt_state=node.nmt_state.text if node.nmt_state is not None else "unknown",
+        state=axis.state.text if axis.state else "unknown",
+        statusword=axis.statusword,
+        error_code=code,
+        error_text=emcy_text(code) if code else "",
+        target_radps=axis.target_mps / radius_m,
+        velocity_radps=axis.velocity_mps / radius_m,
+        position_rad=axis.position_rad,
+        feedback_age_s=age_s(now, axis.status_at),
+        heartbeat_age_s=age_s(now, node.heartbeat_at),
+        stops_by_itself=node.stops_by_itself,
+    )
+
+
+def _fault(node: RemoteNode) -> str:
+    for axis in node.axes:
+        if axis.state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
+            return f"{axis.drive.joint} (node {node.node_id}): {node.emcy.text if node.emcy else 'no code given'}"
+    return ""
+
+
+def _disabled(axis: Axis) -> str:
+    if axis.state is DriveState.OPERATION_ENABLED:
+        return ""
+    text = axis.state.text if axis.state else "in no state known"
+    return f"{axis.drive.joint} (node {axis.drive.node_id}) is {text}"
+
+
+def _first(sentences: Iterable[str]) -> str:
+    return next((sentence for sentence in sentences if sentence), "")
+
+
+def _mean(values: Iterable[float]) -> float:
+    listed = list(values)
+    return sum(listed) / len(listed)
