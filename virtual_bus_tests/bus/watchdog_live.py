@@ -48,11 +48,11 @@ class LiveRobot:
     def drive_at(self, bits: int, timeout_s: float = 5.0) -> None:
         """Enable, and return when both wheels turn so fast."""
         self.word, self.speed = 0x0F, bits
-        self.wait_for(lambda: all(drive.speed[0] == bits for drive in self.drives), timeout_s)
+        self.wait_for(lambda: all(abs(drive.speed[0] - bits) < 1 for drive in self.drives), timeout_s)
 
     def wait_until_still(self, timeout_s: float = 3.0) -> float:
         """Monotonic time [s] at which both wheels stood."""
-        self.wait_for(lambda: all(drive.speed[0] == 0 for drive in self.drives), timeout_s)
+        self.wait_for(lambda: all(abs(drive.speed[0]) < 1 for drive in self.drives), timeout_s)
         return time.monotonic()
 
     def wait_for(self, condition: Callable[[], object], timeout_s: float) -> None:

@@ -151,6 +151,17 @@ def test_the_sentence_has_the_values() -> None:
     )
 
 
+def test_the_sentences_about_silence_have_the_ages() -> None:
+    verdict = decide(of(AT_REST, driver_at=99.5, sync_at=99.25), CONFIG, NOW)
+    assert verdict.detail == (
+        "driver's heartbeat is 0.500 s old, its SYNC 0.750 s (allowed 0.300 s) while wheel_1_0 is enabled"
+    )
+    verdict = decide(of(replace(AT_REST, velocity_at=99.75), nodes=(Node(1, 99.5, 99.99), Node(2))), CONFIG, NOW)
+    assert verdict.detail == (
+        "wheel_1_0 is enabled, its feedback is 0.250 s old (allowed 0.100 s), its heartbeat 0.500 s (allowed 0.300 s)"
+    )
+
+
 # --- driver silent
 
 
@@ -268,3 +279,45 @@ def test_the_loop_wakes_when_the_first_timeout_runs_out() -> None:
     assert next_expiry(replace(WELL, lease_at=90.0), CONFIG, NOW) == pytest.approx(100.25)  # the driver
     over = replace(WELL, lease_at=NEVER, driver_at=NEVER, sync_at=NEVER)
     assert next_expiry(over, CONFIG, NOW) == pytest.approx(100.25)
+
+
+# --- the very moment: a time that is just over is over. Binary fractions, so that nothing is rounded.
+
+EXACT = replace(CONFIG, lease_timeout_s=0.25, drive_heartbeat_s=0.5, feedback_timeout_s=0.125, standstill_mps=0.0078125)
+
+
+def exactly(view: View) -> Cause:
+    return decide(view, EXACT, NOW).cause
+
+
+def test_at_the_very_moment_it_trips() -> None:
+    assert exactly(replace(WELL, lease_at=99.75)) is Cause.LEASE_LOST
+    assert exactly(of(AT_REST, driver_at=99.5)) is Cause.DRIVER_SILENT
+    assert exactly(of(replace(AT_REST, status_at=99.875))) is Cause.DRIVE_SILENT
+    assert exactly(of(AT_REST, nodes=(Node(1, 99.5, 99.99), Node(2)))) is Cause.DRIVE_SILENT
+
+
+def test_at_the_very_moment_syncs_have_stopped() -> None:
+    assert exactly(of(replace(AT_REST, status_at=99.0), sync_at=99.875)) is Cause.NONE
+
+
+def test_at_the_very_speed_a_wheel_stands() -> None:
+    assert not moving(replace(LEFT, velocity_mps=0.0078125), EXACT)
+
+
+def test_at_the_very_moment_a_drive_that_says_nothing_may_be_on() -> None:
+    assert commanded(replace(LEFT, state=None, status_at=90.0, command_at=90.125), EXACT)
+
+
+def test_at_the_very_moment_a_cause_stands_and_an_order_is_over() -> None:
+    assert stands(Verdict(Cause.LEASE_LOST), of(OFF, lease_at=99.75), EXACT, NOW)
+    assert stands(Verdict(Cause.DRIVER_SILENT), of(OFF, driver_at=99.5), EXACT, NOW)
+    assert stands(Verdict(Cause.DRIVE_SILENT, 1), of(OFF, nodes=(Node(1, NEVER, 99.5),)), EXACT, NOW)
+    old_target = of(replace(OFF, target_mps=0.1, command_at=99.75), lease=None)
+    assert not velocity_ordered(old_target, EXACT, NOW)
+    old_lease = of(OFF, lease=Lease(1, 1, 0.3, 0.0, 0), lease_at=99.75)
+    assert not velocity_ordered(old_lease, EXACT, NOW)
+
+
+def test_what_ends_just_now_is_not_waited_for() -> None:
+    assert next_expiry(replace(WELL, lease_at=99.75, driver_at=99.75, sync_at=99.75), EXACT, NOW) == 100.25

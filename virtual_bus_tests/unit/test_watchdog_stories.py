@@ -385,6 +385,18 @@ def test_two_axes_of_one_node_are_stopped_together() -> None:
     assert asked == {"4160", "6c60", "4168", "6c68"}
 
 
+def test_a_target_for_one_of_two_axes_is_enough_to_stop_their_node() -> None:
+    story = Story(FakeDrive(5, axes=(0, 1)))
+    story.drive_at(300)
+    story.filter = False
+    until_tripped(story)
+    story.run(1.5)
+    quiet, story.driver = story.t, False
+    story.put(Frame(0x305, bytes.fromhex("06 00 01 00 00 00")))
+    story.run(0.1)
+    assert len(story.since(quiet, 0x505)) >= 8
+
+
 def test_a_configured_drive_that_was_never_there_does_not_hold_up_the_rest() -> None:
     story = Story(FakeDrive(1), FakeDrive(9, mute=True))
     story.run(0.5)
