@@ -36,9 +36,8 @@ class FilterNode(Node):
         self._clearances = ClearanceReader(robot.safety.footprint, robot.safety.scan)
         self._leases = LeaseSender(robot.lease.socket)
         self._lease_sequence = 0
-        self._period_s = 1.0 / robot.rates.command_hz
         self._decision = self._filter.decide(time.monotonic())
-        self._sent_at_s = self._state_at_s = -math.inf
+        self._state_at_s = -math.inf
         self._stands_from_s = -math.inf
         self._commands = self.create_publisher(TwistStamped, "cmd_vel", COMMAND)
         self._states = self.create_publisher(SafetyState, "safety_filter/state", STATE)
@@ -46,7 +45,7 @@ class FilterNode(Node):
         self.create_subscription(TwistStamped, "cmd_vel_mux", self._on_command, COMMAND)
         self.create_subscription(LaserScan, robot.safety.scan.topic, self._on_scan, SCAN)
         self.create_subscription(Bool, robot.safety.estop.topic, self._on_estop, COMMAND)
-        self.create_timer(self._period_s, self._tick)
+        self._timer = self.create_timer(1.0 / robot.rates.command_hz, self._tick)
 
     def shut_down(self) -> None:
         """Orders zero once, with its lease, and says so in the state. Called several times: one may be lost."""
@@ -65,6 +64,7 @@ class FilterNode(Node):
     def _on_command(self, message: TwistStamped) -> None:
         now = time.monotonic()
         self._filter.on_command(twist_of(message.twist), now)
+        self._timer.reset()  # a mux faster than the timer is not doubled by it
         self._issue(self._filter.decide(now), now)
 
     def _on_estop(self, message: Bool) -> None:
@@ -79,11 +79,9 @@ class FilterNode(Node):
             self._filter.on_scan(clearances, time.monotonic())
 
     def _tick(self) -> None:
-        """Repeats, and issues a change at once; not right after a command: a mux at the timer's rate is not doubled."""
+        """Nothing was issued for a period: decides again, for ages have grown and scans have come."""
         now = time.monotonic()
-        decision = self._filter.decide(now)
-        if now - self._sent_at_s >= self._period_s / 2 or decision.twist != self._decision.twist:
-            self._issue(decision, now)
+        self._issue(self._filter.decide(now), now)
 
     def _issue(self, decision: Decision, now: float) -> None:
         """The lease goes first: the watchdog knows what is allowed before a wheel can move."""
@@ -95,7 +93,7 @@ class FilterNode(Node):
         if self._filter.begins_stop(decision):
             self._events.publish(stop_event(decision, stamp))
         self._tell(decision, now)
-        self._decision, self._sent_at_s = decision, now
+        self._decision = decision
 
     def _send_lease(self, decision: Decision) -> None:
         self._lease_sequence += 1

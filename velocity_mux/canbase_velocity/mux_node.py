@@ -26,16 +26,15 @@ class MuxNode(Node):
         super().__init__("velocity_mux")
         self._mux = Mux(robot.mux.sources)
         self._frame_id = robot.base.base_frame
-        self._period_s = 1.0 / robot.rates.command_hz
         self._decision = self._mux.decide(time.monotonic())
-        self._sent_at_s = self._state_at_s = -math.inf
+        self._state_at_s = -math.inf
         self._commands = self.create_publisher(TwistStamped, "cmd_vel_mux", COMMAND)
         self._states = self.create_publisher(MuxState, "velocity_mux/state", STATE)
         for name, source in robot.mux.sources.items():
             kind = TwistStamped if source.stamped else TwistMessage
             callback = self._on_stamped if source.stamped else self._on_plain
             self.create_subscription(kind, source.topic, functools.partial(callback, name), COMMAND)
-        self.create_timer(self._period_s, self._tick)
+        self._timer = self.create_timer(1.0 / robot.rates.command_hz, self._tick)
 
     def shut_down(self) -> None:
         """Sends one zero and says so in the state. Called several times: one may be lost."""
@@ -50,14 +49,13 @@ class MuxNode(Node):
             self.get_logger().warning(f"{name} refused: NaN or infinity", throttle_duration_sec=5.0)
         decision = self._mux.decide(now)
         if decision.active == name or decision.active != self._decision.active:
+            self._timer.reset()  # a source faster than the timer is not doubled by it
             self._send(decision, now)
 
     def _tick(self) -> None:
-        """Repeats; not right after a message, so that one source at the timer's rate is not doubled."""
+        """Nothing was sent for a period: repeats what holds, or zero."""
         now = time.monotonic()
-        decision = self._mux.decide(now)
-        if now - self._sent_at_s >= self._period_s / 2 or decision.active != self._decision.active:
-            self._send(decision, now)
+        self._send(self._mux.decide(now), now)
 
     def _send(self, decision: MuxDecision, now: float) -> None:
         self._commands.publish(twist_message(decision.twist, self.get_clock().now().to_msg(), self._frame_id))
@@ -67,4 +65,4 @@ class MuxNode(Node):
             self._state_at_s = now
         if decision.active != self._decision.active:
             self.get_logger().info(f"{decision.active or 'nobody'} drives, before {self._decision.active or 'nobody'}")
-        self._decision, self._sent_at_s = decision, now
+        self._decision = decision

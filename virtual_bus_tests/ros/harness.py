@@ -122,12 +122,14 @@ class Repeater(Generic[T]):
 
     def __init__(self, node: Node, kind: type[T], topic: str, rate_hz: float, qos: QoSProfile | int) -> None:
         self.message: T | None = None
+        self.sent = 0
         self.publisher = node.create_publisher(kind, topic, qos)
         self._timer = node.create_timer(1.0 / rate_hz, self._tick)
 
     def _tick(self) -> None:
         if self.message is not None:
             self.publisher.publish(self.message)
+            self.sent += 1
 
 
 class TestNode:

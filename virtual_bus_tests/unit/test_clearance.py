@@ -23,7 +23,7 @@ def read(ranges_m: list[float], **changes: float) -> Clearances | None:
     """Clearances of beams 90° apart, the first to the rear, the second to the right, then ahead, then left."""
     geometry = {"angle_min_rad": -math.pi, "angle_increment_rad": QUARTER_RAD, "range_min_m": 0.05, "range_max_m": 10.0}
     pose = {key: changes.pop(key) for key in ("x_m", "y_m", "yaw_rad") if key in changes}
-    reader = ClearanceReader(FOOTPRINT, ScanConfig(required=True, **pose))
+    reader = ClearanceReader(FOOTPRINT, ScanConfig.model_validate({"required": True, **pose}))
     return reader.read(Scan(ranges_m, **(geometry | changes)))
 
 
@@ -61,6 +61,11 @@ def test_nothing_seen_is_free() -> None:
 def test_only_the_corridor_of_the_footprint_counts(y_m: float, blocks: bool) -> None:
     assert (points((1.0, y_m)).ahead_m < INF) is blocks
     assert (points((-1.0, y_m)).behind_m < INF) is blocks
+
+
+@pytest.mark.parametrize("y_m", [0.3, -0.25])
+def test_a_point_exactly_on_the_edge_of_the_corridor_is_in_it(y_m: float) -> None:
+    assert read([1.0], angle_min_rad=0.0, y_m=y_m) == Clearances(approx(0.6), INF, INF)
 
 
 def test_a_point_ahead_is_not_behind_and_the_other_way_round() -> None:

@@ -67,6 +67,12 @@ def test_the_joystick_takes_over_at_once_and_gives_back_only_to_a_source_that_st
     assert mux.decide(10.60).active == "action"
 
 
+def test_a_silent_source_is_told_as_silent_though_a_higher_one_drives(mux: Mux) -> None:
+    mux.on_command("navigation", SLOW, 0.0)
+    mux.on_command("joystick", FAST, 0.6)
+    assert reasons(mux.decide(0.6))["navigation"] == "silent for 0.60 s (timeout 0.50 s)"
+
+
 def test_a_lower_source_that_kept_talking_drives_on_with_its_newest_command(mux: Mux) -> None:
     mux.on_command("joystick", FAST, 0.0)
     mux.on_command("navigation", SLOW, 0.1)
