@@ -135,4 +135,4 @@ class Story:
 def replaced(inputs: Inputs, **changes: object) -> Inputs:
     """`inputs` with other fields."""
     values = {name: getattr(inputs, name) for name in Inputs.__slots__}
-    return Inputs(**{**values, **changes})  # type: ignore[arg-type]
+    return Inputs(**{**values, **changes})

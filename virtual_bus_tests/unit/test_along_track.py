@@ -20,7 +20,8 @@ def test_one_forward_and_two_left_of_the_frame_seen_along_each_heading(
     yaw_rad: float, along_m: float, lateral_m: float
 ) -> None:
     seen = displacement(Pose(5.0, -3.0, yaw_rad), Pose(6.0, -1.0, yaw_rad))
-    assert (seen.along_m, seen.lateral_m) == (pytest.approx(along_m), pytest.approx(lateral_m))
+    assert seen.along_m == pytest.approx(along_m)
+    assert seen.lateral_m == pytest.approx(lateral_m)
     assert seen.heading_rad == 0.0
 
 

@@ -124,30 +124,35 @@ def test_a_base_that_sticks_within_the_tolerance_has_arrived() -> None:
     assert end.traveled_m == pytest.approx(0.3, abs=0.005)
 
 
-def test_a_base_that_stands_short_drives_on() -> None:
-    # The filter holds the base for a moment at the end: orders that were counted as driven were not.
-    slow = replace(GOOD_SAFETY, stops=True, cause="command_stale")
+def test_a_base_that_was_pushed_back_at_the_end_drives_on() -> None:
+    def push_back(story: Story) -> None:
+        story.plant.x_m -= 0.02  # heading 0.3 rad: 0.019 m along the line
 
-    def hold(story: Story) -> None:
-        story.plant.stuck = True
-        safety(story, slow)
-
-    def release(story: Story) -> None:
-        story.plant.stuck = False
-        safety(story, GOOD_SAFETY)
-
-    story = Story(Plant(), 0.3, 0.3, at={0.9: hold, 1.4: release})
+    probe = Story(Plant(), 0.3, 0.3)
+    probe.run()
+    story = Story(Plant(), 0.3, 0.3, at={probe.ended_at - 0.1: push_back})
     end = story.run()
     assert end.code is ErrorCode.OK
     assert end.traveled_m == pytest.approx(0.3, abs=0.005)
+    assert story.ended_at > probe.ended_at + 0.3
+
+
+def test_odometry_that_jumps_is_not_driven_on() -> None:
+    def jump(story: Story) -> None:
+        story.plant.x_m -= 0.5
+
+    end = Story(Plant(), 3.0, 0.3, at={2.0: jump}).run()
+    assert end.code is ErrorCode.ODOMETRY_LOST
+    assert "jumped" in end.message
 
 
 def test_a_base_that_rolls_over_the_distance_is_not_a_success() -> None:
     def brakes_fade(story: Story) -> None:
-        story.plant.deceleration_mps2 = 0.1
+        story.plant.deceleration_mps2 = 0.3
 
     end = Story(Plant(), 1.0, 0.5, at={1.5: brakes_fade}).run()
     assert end.code is ErrorCode.DRIVE_FAULT
+    assert "did not stop at the distance" in end.message
     assert end.overshoot_m > 0.005
     assert end.traveled_m == pytest.approx(1.0 + end.overshoot_m, abs=0.001)
 
