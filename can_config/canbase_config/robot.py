@@ -306,7 +306,3 @@ class Robot(Section):
             message = f"all drives are on the {self.drives[0].side}; a base needs at least one on each side"
             raise MisfitError(message, ("drives", 1, "side"))
         return self
-
-    def drive_indexes(self, side: Literal["left", "right"]) -> tuple[int, ...]:
-        """Positions in `drives` of the wheels on one side."""
-        return tuple(i for i, drive in enumerate(self.drives) if drive.side == side)
