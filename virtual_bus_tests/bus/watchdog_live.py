@@ -25,6 +25,7 @@ class LiveRobot:
     def __init__(self, bus_arguments: dict[str, Any], lease_socket: str) -> None:
         self._bus = can.Bus(**bus_arguments)
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
         self._path = lease_socket
         self._thread = threading.Thread(target=self._run)
         self._going = True
@@ -115,7 +116,7 @@ class LiveRobot:
     def _lease(self, sequence: int, now: float) -> None:
         try:
             self._socket.sendto(lease(sequence, now, self.speed / 1000), self._path)
-        except (FileNotFoundError, ConnectionRefusedError):
+        except (FileNotFoundError, ConnectionRefusedError, BlockingIOError):
             return
         self.last_lease = now
 
