@@ -32,6 +32,7 @@ CAUSES = {
     8: "foreign master",
     9: "bus failed",
     10: "own loop late",
+    11: "told to end while a wheel turned",
 }
 ANSWERS = {
     1: "reset done",
