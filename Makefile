@@ -50,14 +50,21 @@ $(VENV)/made:
 	python -m pip install --quiet --upgrade 'pip>=25.1'
 	@touch $@
 
-# What pyproject.toml lists under [build-system], so that CMake runs in the environment itself: faster than pip's own
-# copy, and colcon works too.
-$(VENV)/requirements: pyproject.toml $(VENV)/made
-	@python -c 'from pip._vendor import tomli; \
-	  print(*tomli.load(open("pyproject.toml", "rb"))["build-system"]["requires"], sep="\n")' > $@.txt
+# All that pyproject.toml asks for, what builds canbase too: CMake then runs in the environment itself, which is faster
+# than in pip's own copy, and colcon works as well.
+define REQUIREMENTS
+from pip._vendor import tomli
+file = tomli.load(open("pyproject.toml", "rb"))
+project = file["project"]
+print(*file["build-system"]["requires"], *project["dependencies"], *project["optional-dependencies"]["ros"], sep="\n")
+endef
+export REQUIREMENTS
+
+$(VENV)/requirements: pyproject.toml Makefile $(VENV)/made
+	@python -c "$$REQUIREMENTS" > $@.txt
 	python -m pip install --quiet --requirement $@.txt --group dev
 	@touch $@
 
-$(VENV)/ready: $(VENV)/requirements pyproject.toml CMakeLists.txt package.xml $(INTERFACES)
-	python -m pip install --quiet --no-build-isolation --config-settings build-dir=$(VENV)/build --editable '.[ros]'
+$(VENV)/ready: $(VENV)/requirements CMakeLists.txt package.xml $(INTERFACES)
+	python -m pip install --quiet --no-deps --no-build-isolation --config-settings build-dir=$(VENV)/build --editable .
 	@touch $@
