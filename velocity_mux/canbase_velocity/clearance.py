@@ -69,7 +69,7 @@ class ClearanceReader:
         range_min. NaN, and finite below range_min (dust, the housing): no reading.
         """
         ranges_m = np.asarray(scan.ranges_m, dtype=np.float64)
-        if not _is_sound(scan, ranges_m):
+        if not _is_sound(scan):
             return None
         ranges_m = np.where(np.isneginf(ranges_m), scan.range_min_m, ranges_m)
         usable = ranges_m >= scan.range_min_m
@@ -105,10 +105,10 @@ class ClearanceReader:
         )
 
 
-def _is_sound(scan: Scan, ranges_m: Floats) -> bool:
+def _is_sound(scan: Scan) -> bool:
     """Geometry from which points can be computed, and limits that can be compared with."""
     numbers = (scan.angle_min_rad, scan.angle_increment_rad, scan.range_min_m)
-    return ranges_m.size > 0 and all(map(math.isfinite, numbers)) and scan.range_max_m > scan.range_min_m >= 0.0
+    return all(map(math.isfinite, numbers)) and scan.range_max_m > scan.range_min_m >= 0.0
 
 
 def _least(distances_m: Floats) -> float:

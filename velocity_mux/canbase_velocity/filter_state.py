@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from canbase_velocity.clearance import Clearances
+from canbase_velocity.clearance import FREE, Clearances
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.safety_filter import FilterConfig, Inputs, decide, estop_holds
 from canbase_velocity.twist import ZERO, Twist
@@ -15,7 +15,7 @@ class SafetyFilter:
         self._config = config
         self._command = ZERO
         self._command_at_s: float | None = None
-        self._clearances: Clearances | None = None
+        self._clearances = FREE
         self._scan_at_s: float | None = None
         self._estop = False
         self._estop_at_s: float | None = None

@@ -65,7 +65,6 @@ def _mux_source(source: SourceView) -> MuxSource:
 
 def safety_state(decision: Decision, inputs: Inputs, scan_is_fresh: bool, stamp: Time) -> SafetyState:
     """safety_filter/state, without what the node knows of its leases."""
-    clearances = inputs.clearances if scan_is_fresh else None
     return SafetyState(
         stamp=stamp,
         action=int(decision.action),
@@ -73,8 +72,8 @@ def safety_state(decision: Decision, inputs: Inputs, scan_is_fresh: bool, stamp:
         detail=decision.detail,
         clears_on=decision.clears_on,
         estop=stopped_by_estop(decision),
-        clearance_ahead_m=NAN if clearances is None else clearances.ahead_m,
-        clearance_behind_m=NAN if clearances is None else clearances.behind_m,
+        clearance_ahead_m=inputs.clearances.ahead_m if scan_is_fresh else NAN,
+        clearance_behind_m=inputs.clearances.behind_m if scan_is_fresh else NAN,
         command_age_s=_or_nan(inputs.command_age_s),
         scan_age_s=_or_nan(inputs.scan_age_s),
         ordered_linear_mps=decision.twist.linear_mps,

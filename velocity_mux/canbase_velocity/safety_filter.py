@@ -39,11 +39,14 @@ class FilterConfig:
 
 @dataclass(frozen=True, slots=True)
 class Inputs:
-    """What is known when a decision is made. Ages are of local receive times [s]; None: nothing received yet."""
+    """What is known when a decision is made. Ages are of local receive times [s]; None: nothing received yet.
+
+    `clearances` are of the last scan that said something; they count only while that scan is fresh.
+    """
 
     command: Twist
     command_age_s: float | None
-    clearances: Clearances | None
+    clearances: Clearances
     scan_age_s: float | None
     estop: bool
     estop_age_s: float | None
@@ -145,10 +148,10 @@ def _within(twist: Twist, limits: Limits) -> Twist:
 
 def _obstacle(twist: Twist, inputs: Inputs, config: FilterConfig) -> Finding:
     """Compares with a fresh scan only: a required one that is stale has stopped the base before."""
-    clearances, age_s = inputs.clearances, inputs.scan_age_s
-    if clearances is None or age_s is None or age_s > config.safety.scan.timeout_s:
+    age_s = inputs.scan_age_s
+    if age_s is None or age_s > config.safety.scan.timeout_s:
         return PASSED
-    ways = (_straight(twist, clearances, age_s, config), _turning(twist, clearances, age_s, config))
+    ways = (_straight(twist, inputs.clearances, age_s, config), _turning(twist, inputs.clearances, age_s, config))
     return min(ways, key=lambda finding: finding.factor)
 
 

@@ -137,9 +137,11 @@ class TestNode:
 
     __test__ = False  # its name makes pytest look for tests in it
 
-    def __init__(self, name: str = "test_node", namespace: str = "") -> None:
+    def __init__(self, name: str = "test_node", namespace: str = "", domain_id: int | None = None) -> None:
+        """`domain_id` None: that of the environment."""
         self.context = Context()
-        rclpy.init(args=[], context=self.context, signal_handler_options=SignalHandlerOptions.NO)
+        no_signals = SignalHandlerOptions.NO
+        rclpy.init(args=[], context=self.context, domain_id=domain_id, signal_handler_options=no_signals)
         self.node = Node(name, namespace=namespace, context=self.context, enable_rosout=False)
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)

@@ -76,6 +76,7 @@ def test_a_point_ahead_is_not_behind_and_the_other_way_round() -> None:
 def test_a_point_inside_the_footprint_touches_it_on_its_half() -> None:
     assert points((0.39, 0.1)) == Clearances(0.0, INF, 0.0)
     assert points((-0.1, 0.1)) == Clearances(INF, 0.0, 0.0)
+    assert read([1.0], angle_min_rad=0.0, x_m=-1.0) == Clearances(INF, 0.0, 0.0)  # exactly in the middle
 
 
 def test_turning_sees_the_points_inside_the_swept_circle_by_their_distance_from_the_rectangle() -> None:

@@ -89,7 +89,7 @@ def test_actions_and_causes_are_those_of_the_message() -> None:
         ({"command_age_s": 0.25}, Cause.COMMAND_STALE, "cmd_vel_mux silent for 0.25 s (timeout 0.20 s)"),
         ({"command": Twist(NAN, 0.0)}, Cause.COMMAND_INVALID, "cmd_vel_mux carries"),
         ({"command": Twist(0.0, INF)}, Cause.COMMAND_INVALID, "cmd_vel_mux carries"),
-        ({"scan_age_s": None, "clearances": None}, Cause.SCAN_STALE, "nothing received on scan yet"),
+        ({"scan_age_s": None}, Cause.SCAN_STALE, "nothing received on scan yet"),
         ({"scan_age_s": 0.35}, Cause.SCAN_STALE, "scan silent for 0.35 s (timeout 0.30 s)"),
         ({"estop": True}, Cause.ESTOP, "the emergency stop is pressed"),
         ({"estop_age_s": None}, Cause.ESTOP_STALE, "nothing received on estop_state yet"),
@@ -122,7 +122,7 @@ def test_an_input_is_fresh_until_exactly_its_timeout(key: str, timeout_s: float,
 
 def test_what_is_not_required_may_be_silent_but_is_obeyed_while_it_talks() -> None:
     relaxed = config(scan=False, estop=False)
-    silent = given_that(scan_age_s=None, clearances=None, estop_age_s=None)
+    silent = given_that(scan_age_s=None, estop_age_s=None)
     assert decide(silent, relaxed).twist == GOOD.command
     assert decide(given_that(estop=True, estop_age_s=100.0), relaxed).cause is Cause.ESTOP  # nobody released it
     wall = free(ahead_m=0.0)
@@ -238,6 +238,12 @@ def test_turning_stops_for_what_the_corners_would_hit(twist: Twist, around_m: fl
     assert decide(given_that(command=twist, clearances=free(around_m=around_m)), config()).action is action
 
 
+def test_a_turn_is_slowed_by_the_ordinary_ramp_of_the_farthest_corner() -> None:
+    """4 rad/s² at 0.5 m are 2 m/s²; 0.05 m of free way more than the stop distance: sqrt(0.2) m/s at the corner."""
+    decision = decide(given_that(command=Twist(0.0, -2.0), clearances=free(around_m=0.15)), config())
+    assert decision.twist.angular_radps == pytest.approx(-math.sqrt(0.2) / 0.5)
+
+
 def test_ceiling_and_obstacle_together_tell_the_more_severe_and_order_the_slower() -> None:
     decision = decide(given_that(command=Twist(4.0, 0.0), clearances=free(ahead_m=0.35)), config())
     assert (decision.action, decision.cause) == (Action.SLOW, Cause.OBSTACLE_NEAR)
@@ -315,6 +321,25 @@ def test_a_stale_zero_command_does_not_free_the_emergency_stop() -> None:
     assert safety.decide(0.31).cause is Cause.ESTOP
 
 
+def test_the_zero_command_counts_until_exactly_its_timeout() -> None:
+    safety = fed(0.0, ZERO, pressed=True)
+    safety.on_estop(False, 0.2)
+    safety.on_scan(FREE, 0.2)
+    assert safety.decide(0.2).cause is Cause.NONE
+
+
+def test_without_an_emergency_stop_nothing_waits_for_a_zero_command() -> None:
+    safety = SafetyFilter(config(scan=False, estop=False))
+    safety.on_command(Twist(0.5, 0.0), 0.0)
+    assert safety.decide(0.0).twist == Twist(0.5, 0.0)
+
+
+def test_a_filter_that_starts_stopped_begins_no_stop() -> None:
+    safety = SafetyFilter(config())
+    safety.on_command(Twist(0.5, 0.0), 0.0)
+    assert safety.begins_stop(safety.decide(0.0)) is False
+
+
 def test_a_stop_begins_once_and_only_for_a_command_to_move() -> None:
     drive = Twist(0.5, 0.0)
     safety = fed(0.0, ZERO)
@@ -335,7 +360,7 @@ all_inputs = st.builds(
     Inputs,
     command=st.builds(Twist, numbers, numbers),
     command_age_s=ages_s,
-    clearances=st.none() | st.builds(Clearances, ways_m, ways_m, ways_m),
+    clearances=st.builds(Clearances, ways_m, ways_m, ways_m),
     scan_age_s=ages_s,
     estop=st.booleans(),
     estop_age_s=ages_s,
@@ -392,7 +417,6 @@ def test_it_stops_whenever_a_required_input_is_stale_or_the_emergency_stop_holds
 @given(inputs=moving_inputs)
 def test_from_every_ordered_speed_the_base_can_stand_before_the_stop_distance(inputs: Inputs) -> None:
     order, clearances = decide(inputs, config()).twist, inputs.clearances
-    assert clearances is not None
     way_m = clearances.ahead_m if order.linear_mps > 0.0 else clearances.behind_m
     speed_mps = abs(order.linear_mps)
     needed_m = speed_mps**2 / (2 * LIMITS.deceleration_mps2)
