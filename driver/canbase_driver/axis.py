@@ -14,6 +14,8 @@ from canbase_driver.units import AxisUnits
 
 STEP_MARGIN = 3.0
 """An encoder step in one cycle is possible up to this many times the fastest wheel: cycles come early and late."""
+GAP_MAX_S = 60.0
+"""A gap in the feedback counts as this long at most: what a wheel can have done in it stays far from a wrap."""
 
 
 class Axis:
@@ -33,7 +35,8 @@ class Axis:
         self.travel = WheelTravel(metres_per_count, max(1.0, step_m / abs(metres_per_count)))
         self._setpoint_cob_id = layout.setpoint_cob_id(drive.axis)
         self._wheel_radius_m = robot.base.wheel_radius_m
-        self._sampled_cycle = 0
+        self._control_hz = robot.rates.control_hz
+        self._restarts = 0
         self._status_is_new = False
 
     @property
@@ -41,28 +44,34 @@ class Axis:
         """Angle of the wheel since its first feedback [rad]."""
         return self.travel.travel_m / self._wheel_radius_m
 
+    @property
+    def losses(self) -> int:
+        """How often the travel went on from a new reference: what the wheel rolled meanwhile is unknown."""
+        return self._restarts + self.travel.losses
+
     def age_s(self, now: float) -> float:
         """Seconds since the last status; infinity: none since the last `forget`."""
         return now - self.status_at
 
     def forget(self) -> None:
         """What was heard no longer counts: the drive restarted, or its bus did."""
+        self._restarts += self.status_at > -math.inf
         self.status_at = -math.inf
         self.state = None
         self.velocity_mps = 0.0
         self.travel.reset_reference()
         self._status_is_new = self.has_new_sample = False
 
-    def on_status(self, data: bytes, now: float, cycle: int) -> bool:
+    def on_status(self, data: bytes, now: float) -> bool:
         """Take 6041h and 6064h. False: wrong length, to be dropped and counted."""
         status = unpack_status(data)
         if status is None:
             return False
         self.statusword, counts = status
         self.state = decode_statusword(self.statusword)
+        gap_s = min(self.age_s(now), GAP_MAX_S)
+        self.travel.update(counts, max(1, round(gap_s * self._control_hz)))
         self.status_at = now
-        self.travel.update(counts, max(1, cycle - self._sampled_cycle))
-        self._sampled_cycle = cycle
         self._status_is_new = True
         return True
 

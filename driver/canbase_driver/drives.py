@@ -26,6 +26,8 @@ class Drives:
         self.axes = tuple(by_joint[drive.joint] for drive in robot.drives)
         self.left = tuple(axis for axis in self.axes if axis.drive.side == "left")
         self.right = tuple(axis for axis in self.axes if axis.drive.side == "right")
+        node_of = {node.node_id: node for node in self.nodes}
+        self._with_node = tuple((node_of[axis.drive.node_id], axis) for axis in self.axes)
 
     def booting(self, now: float) -> str:
         """What a node that is being booted or started is waiting for."""
@@ -64,6 +66,15 @@ class Drives:
         """The travel of every wheel is known since its first sample."""
         return all(axis.travel.referenced for axis in self.axes)
 
+    def forget_emcys(self) -> None:
+        """After a reset: what the drives told before it is no news any more; some never take it back."""
+        for node in self.nodes:
+            node.emcy = None
+
+    def losses(self) -> int:
+        """How often the travel of some wheel went on from a new reference, since the start."""
+        return sum(axis.losses for axis in self.axes)
+
     def travel_m(self) -> tuple[float, float]:
         """Travel of the rims, left and right, since the start [m]; several wheels on a side are averaged."""
         return _mean(axis.travel.travel_m for axis in self.left), _mean(axis.travel.travel_m for axis in self.right)
@@ -78,8 +89,7 @@ class Drives:
 
     def snapshots(self, now: float) -> tuple[DriveSnapshot, ...]:
         """One per axis, in the order of robot.yaml."""
-        node_of = {axis.drive.joint: node for node in self.nodes for axis in node.axes}
-        return tuple(_snapshot(node_of[axis.drive.joint], axis, self._robot, now) for axis in self.axes)
+        return tuple(_snapshot(node, axis, self._robot, now) for node, axis in self._with_node)
 
     def _is_fresh(self, axis: Axis, now: float) -> bool:
         return axis.age_s(now) <= self._robot.timeouts.feedback_s

@@ -21,6 +21,9 @@ from canbase_driver.snapshot import DriverSnapshot, StopRecord
 
 RESET_TIMEOUT_S = 15.0
 """Longer than a reset can take, with drives that boot."""
+POLL_S = 0.1
+FRAMES_WHEN_LATE = 100
+"""So many waiting frames are taken in before a cycle that is already late: more than a bus brings in one cycle."""
 LAST_WORDS = 3
 """How often the quick stop is sent on the way out."""
 
@@ -60,10 +63,15 @@ class ControlLoop(threading.Thread):
         """Reset and wait for the outcome; never call it from the control thread."""
         outcomes: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
         self._inbox.put(lambda now: self._core.request_reset(now, outcomes.put))
-        try:
-            return outcomes.get(timeout=RESET_TIMEOUT_S)
-        except queue.Empty:
-            return Outcome(False, f"the control loop did not answer within {RESET_TIMEOUT_S:.0f} s")
+        deadline = time.monotonic() + RESET_TIMEOUT_S
+        while time.monotonic() < deadline:
+            alive = self.is_alive()
+            try:
+                return outcomes.get(timeout=POLL_S)
+            except queue.Empty:
+                if not alive:
+                    return Outcome(False, "refused: the control loop has ended")
+        return Outcome(False, f"the control loop did not answer within {RESET_TIMEOUT_S:.0f} s")
 
     def next_snapshot(self, timeout_s: float) -> tuple[DriverSnapshot | None, list[StopRecord]]:
         """Wait for a new snapshot; (None, []) when none came. Stops since the last call come with it."""
@@ -77,13 +85,12 @@ class ControlLoop(threading.Thread):
         """The thread's body."""
         try:
             self._cycle_until_finished()
+            self._hand_over(time.monotonic())
         except BaseException as error:  # noqa: BLE001 - whatever it is, the drives are stopped and the process ends by it
             self.failure = error
+            self._send(self._core.stop_frames() * LAST_WORDS)
         finally:
-            if self.failure is not None:
-                self._send(self._core.stop_frames() * LAST_WORDS)
             self._bus.close()
-            self._hand_over(time.monotonic())
 
     def _cycle_until_finished(self) -> None:
         cycle_at = self.cycle_at = time.monotonic()
@@ -92,20 +99,25 @@ class ControlLoop(threading.Thread):
             self._take_in_until(cycle_at)
             self._empty_inbox()
             now = self.cycle_at = time.monotonic()
-            self._core.on_bus(self._bus.problem, now)
-            self._core.send_errors = self._bus.send_errors
+            self._core.on_bus(self._bus.problem, now, self._bus.send_errors, self._bus.dropped)
             self._send(self._core.tick(now, now - cycle_at))
             self._hand_over_if_due(now)
             if now - cycle_at > self._period_s:
                 cycle_at = now  # cycles that were missed are not made up for
 
     def _take_in_until(self, cycle_at: float) -> None:
-        while (wait_s := cycle_at - time.monotonic()) > 0.0:
-            frame = self._bus.receive(wait_s)
+        """Until then; in a cycle that is late already, what waits: feedback must not starve."""
+        left = FRAMES_WHEN_LATE
+        while left > 0:
+            wait_s = cycle_at - time.monotonic()
+            frame = self._bus.receive(max(0.0, wait_s))
             if frame is not None:
                 now = time.monotonic()
                 self._send(self._core.on_frame(frame, now))
                 self._hand_over_if_due(now)
+            elif wait_s <= 0.0:
+                return
+            left -= wait_s <= 0.0
 
     def _empty_inbox(self) -> None:
         while True:

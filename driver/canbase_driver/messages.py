@@ -23,7 +23,7 @@ try:
 except ModuleNotFoundError:  # The ROS wheels on PyPI do not have tf2_msgs; ROS 2 from apt does.
     TFMessage = None
 
-_COUNTERS = ("commands_refused", "overruns", "frames_dropped", "send_errors")
+_COUNTERS = ("commands_refused", "overruns", "frames_dropped", "send_errors", "travel_losses")
 _TRANSIENT = {DriverState.BOOTING, DriverState.DISARMED, DriverState.ENABLING, DriverState.STOPPING}
 
 

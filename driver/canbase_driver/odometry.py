@@ -176,11 +176,15 @@ class Odometry:
         self._distance_m = 0.0
         self._rotation_rad = 0.0
 
+    def lose_reference(self) -> None:
+        """The next update is a reference and no motion: what is rolled until then does not enter the pose."""
+        self._last_m = None
+
     def update(self, left_m: float, right_m: float, dt_s: float) -> Twist2D:
         """Take in the travel of both sides since their start [m]; the mean velocity since the update before.
 
-        The first call is the reference and no motion. Raises ValueError, with nothing changed, for a travel that is
-        not finite and for a `dt_s` that is not positive.
+        The first call, and the first after `lose_reference`, is the reference and no motion. Raises ValueError, with
+        nothing changed, for a travel that is not finite and for a `dt_s` that is not positive.
         """
         if not (math.isfinite(left_m) and math.isfinite(right_m)):
             raise ValueError(f"the travel must be finite, not {left_m} m and {right_m} m")

@@ -1,8 +1,10 @@
 """One CANopen node of the base at run time: its NMT state and heartbeat, its emergency messages, its boot, its axes.
 
 GONE ──begin_boot──► BOOTING ──boot report──► STARTING ──operational, all axes heard──► READY
-  ▲                     │ error                  │ too late                               │
+  ▲                     │ error                  │ too late, or boot-up heard             │
   └─────────────────────┴────────────────────────┴── boot-up or other NMT state heard ────┘
+
+What a node says before it is STARTING comes from an earlier life, with a layout of its own: none of it counts.
 """
 
 from __future__ import annotations
@@ -109,7 +111,8 @@ class RemoteNode:
             return False
         self.nmt_state = parsed[1]
         self.heartbeat_at = now
-        if self.presence is Presence.READY and self.nmt_state is NmtState.INITIALISING:
+        if self.has_pdos and self.nmt_state is NmtState.INITIALISING:
+            self.emcy = None
             self.lose("restarted (boot-up message)", now)
         elif self.presence is Presence.READY and self.nmt_state is not NmtState.OPERATIONAL:
             self.lose(f"left NMT operational ({self.nmt_state.text})", now)
@@ -117,8 +120,16 @@ class RemoteNode:
             self._boot.on_frame(frame, now)
         return True
 
+    def on_status(self, axis: Axis, frame: Frame, now: float) -> bool:
+        """Take 6041h and 6064h of one of its axes. False: not understood."""
+        return not self.has_pdos or axis.on_status(frame.data, now)
+
+    def on_velocity(self, axis: Axis, frame: Frame) -> bool:
+        """Take 606Ch of one of its axes. False: not understood."""
+        return not self.has_pdos or axis.on_velocity(frame.data)
+
     def on_emcy(self, frame: Frame, _now: float) -> bool:
-        """Take a frame 080h + id. False: not an emergency message."""
+        """Take a frame 080h + id. False: not an emergency message. It tells; only the statusword stops anything."""
         emcy = parse_emcy(frame)
         if emcy is None:
             return False

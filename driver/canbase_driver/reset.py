@@ -1,14 +1,18 @@
-"""One reset on its way: the watchdog first, then the drives, then the supervisor. It never gives power to anything.
+"""One reset on its way: the watchdog first, then the drives, then their faults. It never gives power to anything.
 
-Rules: refused while a velocity is commanded, while a wheel turns, or while the bus or the watchdog is dead. Each step
-has a deadline; the sentence of a failed reset says which step failed and what to do. Pure: time is an argument.
+Rules: refused or broken off while a velocity is commanded, while a wheel turns, or while the bus or the watchdog is
+dead. Each step has a deadline; the sentence of a failed reset says which step failed and what to do. Pure: time is an
+argument.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from typing import ClassVar
 
+from canbase_driver.cia402 import FAULT_RESET_CYCLES
 from canbase_driver.snapshot import WatchdogView
 from canbase_driver.supervisor import Situation
 from canbase_driver.watchdog_link import ACCEPTED, ANSWERS
@@ -21,7 +25,7 @@ FAULT_TIMEOUT_S = 1.0
 
 
 class Phase(Enum):
-    """Where the reset is."""
+    """Where the reset is, in this order; without a fault the edges are left out."""
 
     WATCHDOG = "waiting for the watchdog"
     DRIVES = "waiting for the drives to boot"
@@ -38,78 +42,106 @@ class Outcome:
     sentence: str
 
 
+_BUS_OR_COMMAND: tuple[Callable[[Situation], str], ...] = (
+    lambda s: f"{s.commanded}; let go of the joystick or cancel the goal first" if s.commanded else "",
+    lambda s: s.bus,
+)
+_WATCHDOG: tuple[Callable[[Situation], str], ...] = (
+    lambda s: f"watchdog: {s.watchdog_detail}" if s.watchdog is not WatchdogView.OK else "",
+)
+_DRIVES: tuple[Callable[[Situation], str], ...] = (lambda s: s.unready,)
+
+REFUSALS: tuple[Callable[[Situation], str], ...] = (
+    lambda s: "the driver is ending" if s.shutdown_requested else "",
+    lambda s: "a reset is under way" if s.resetting else "",
+    lambda s: "a wheel turns" if not s.standstill and not s.unready else "",
+    *_BUS_OR_COMMAND,
+    lambda s: f"watchdog: {s.watchdog_detail}" if s.watchdog is WatchdogView.MISSING else "",
+)
+"""Why a reset may not even begin. A drive that is not heard cannot be seen to stand; it is waited for instead."""
+
+BREAKS: dict[Phase, tuple[Callable[[Situation], str], ...]] = {
+    Phase.WATCHDOG: _BUS_OR_COMMAND,
+    Phase.DRIVES: _BUS_OR_COMMAND + _WATCHDOG,
+    Phase.EDGE_LOW: _BUS_OR_COMMAND + _WATCHDOG + _DRIVES,
+    Phase.EDGE_HIGH: _BUS_OR_COMMAND + _WATCHDOG + _DRIVES,
+    Phase.FAULTS: _BUS_OR_COMMAND + _WATCHDOG + _DRIVES,
+}
+"""What ends a reset in each phase: what an earlier phase has found to be well must stay so."""
+
+
 def refusal(situation: Situation, stopped: bool) -> str | None:
     """Why a reset may not even begin; None when it may. `stopped`: the supervisor has taken all power away."""
     if not stopped:
-        return "there is power on the drives: stop first (service motor_driver/stop)"
-    if situation.commanded:
-        return f"refused: {situation.commanded}; let go of the joystick or cancel the goal first"
-    if not situation.standstill and not situation.silent and not situation.absent:
-        return "refused: a wheel turns"
-    if situation.bus:
-        return f"refused: {situation.bus}"
-    if situation.watchdog is WatchdogView.MISSING:
-        return f"refused: watchdog {situation.watchdog_detail}"
-    return None
+        return "refused: there is power on the drives; stop first (service motor_driver/stop)"
+    problem = _first(REFUSALS, situation)
+    return f"refused: {problem}" if problem else None
 
 
 class Reset:
-    """The sequence, stepped once a cycle until `outcome` is there."""
+    """The sequence, stepped once a cycle until it has an outcome."""
 
-    def __init__(self, now: float) -> None:
+    def __init__(self, now: float, cycle_s: float) -> None:
+        """`cycle_s`: period of the setpoints; each level of the fault reset bit lasts FAULT_RESET_CYCLES at least."""
         self.phase = Phase.WATCHDOG
-        self.outcome: Outcome | None = None
+        self._edge_s = max(EDGE_S, FAULT_RESET_CYCLES * cycle_s)
         self._since_s = now
-
-    @property
-    def asks_watchdog(self) -> bool:
-        """The core shall send the reset request to the watchdog in this cycle."""
-        return self.phase is Phase.WATCHDOG and self.outcome is None
 
     @property
     def fault_reset_bit(self) -> bool:
         """Bit 7 of the controlword of the drives in fault, in this cycle."""
-        return self.phase is Phase.EDGE_HIGH and self.outcome is None
+        return self.phase is Phase.EDGE_HIGH
 
-    def step(self, situation: Situation, answer: int | None, now: float) -> None:
-        """Judge the situation and move on. `answer`: the watchdog's answer to our request, None while there is none."""
-        elapsed_s = now - self._since_s
-        if situation.commanded:
-            self._fail(f"refused: {situation.commanded}")
-        elif self.phase is Phase.WATCHDOG:
-            self._watchdog(situation, answer, elapsed_s, now)
-        elif self.phase is Phase.DRIVES:
-            self._drives(situation, elapsed_s, now)
-        elif self.phase is Phase.EDGE_LOW and elapsed_s >= EDGE_S:
-            self._go(Phase.EDGE_HIGH, now)
-        elif self.phase is Phase.EDGE_HIGH and elapsed_s >= EDGE_S:
-            self._go(Phase.FAULTS, now)
-        elif self.phase is Phase.FAULTS:
-            self._faults(situation, elapsed_s)
+    def step(self, situation: Situation, answer: int | None, now: float) -> Outcome | None:
+        """Judge the situation and move on; the outcome when it has ended.
 
-    def _watchdog(self, situation: Situation, answer: int | None, elapsed_s: float, now: float) -> None:
+        `answer`: the watchdog's answer to our request, None while there is none.
+        """
+        problem = _first(BREAKS[self.phase], situation)
+        if problem:
+            return Outcome(False, f"broken off: {problem}")
+        return self._RULES[self.phase](self, situation, answer, now)
+
+    def _watchdog(self, situation: Situation, answer: int | None, now: float) -> Outcome | None:
         if answer is not None and answer not in ACCEPTED:
-            self._fail(f"the watchdog refused: {ANSWERS.get(answer, f'answer {answer}')}")
-        elif answer is not None and situation.watchdog is WatchdogView.OK:
+            return Outcome(False, f"the watchdog refused: {ANSWERS.get(answer, f'answer {answer}')}")
+        if answer is not None and situation.watchdog is WatchdogView.OK:
             self._go(Phase.DRIVES, now)
-        elif elapsed_s > WATCHDOG_TIMEOUT_S:
-            self._fail(f"the watchdog did not answer within {WATCHDOG_TIMEOUT_S} s; is it running?")
+        elif now - self._since_s > WATCHDOG_TIMEOUT_S:
+            detail = situation.watchdog_detail or "no answer"
+            return Outcome(False, f"the watchdog is not ready after {WATCHDOG_TIMEOUT_S} s ({detail}); reset again")
+        return None
 
-    def _drives(self, situation: Situation, elapsed_s: float, now: float) -> None:
-        waiting = situation.booting or situation.absent or situation.silent
-        if not waiting:
+    def _drives(self, situation: Situation, _answer: int | None, now: float) -> Outcome | None:
+        if not situation.unready:
             self._go(Phase.EDGE_LOW if situation.fault else Phase.FAULTS, now)
-        elif elapsed_s > DRIVES_TIMEOUT_S:
-            self._fail(f"{waiting}; check its power and its cable, then reset again")
+        elif now - self._since_s > DRIVES_TIMEOUT_S:
+            return Outcome(False, f"{situation.unready}; check its power and its cable, then reset again")
+        return None
 
-    def _faults(self, situation: Situation, elapsed_s: float) -> None:
+    def _edge(self, _situation: Situation, _answer: int | None, now: float) -> Outcome | None:
+        if now - self._since_s >= self._edge_s:
+            self._go(Phase.EDGE_HIGH if self.phase is Phase.EDGE_LOW else Phase.FAULTS, now)
+        return None
+
+    def _faults(self, situation: Situation, _answer: int | None, now: float) -> Outcome | None:
         if not situation.fault:
-            self.outcome = Outcome(True, "reset done; the drives get power once the command is zero")
-        elif elapsed_s > FAULT_TIMEOUT_S:
-            self._fail(f"{situation.fault}: it does not clear; remove its cause, then reset again")
+            return Outcome(True, "reset done; the drives get power once the command is zero")
+        if now - self._since_s > FAULT_TIMEOUT_S:
+            return Outcome(False, f"{situation.fault}: it does not clear; remove its cause, then reset again")
+        return None
 
     def _go(self, phase: Phase, now: float) -> None:
         self.phase, self._since_s = phase, now
 
-    def _fail(self, sentence: str) -> None:
-        self.outcome = Outcome(False, sentence)
+    _RULES: ClassVar[dict[Phase, Callable[[Reset, Situation, int | None, float], Outcome | None]]] = {
+        Phase.WATCHDOG: _watchdog,
+        Phase.DRIVES: _drives,
+        Phase.EDGE_LOW: _edge,
+        Phase.EDGE_HIGH: _edge,
+        Phase.FAULTS: _faults,
+    }
+
+
+def _first(checks: tuple[Callable[[Situation], str], ...], situation: Situation) -> str:
+    return next((problem for check in checks if (problem := check(situation))), "")

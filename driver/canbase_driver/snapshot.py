@@ -117,7 +117,13 @@ class DriverSnapshot:
     pose_covariance: Covariance
     twist_covariance: Covariance
     odometry_valid: bool
-    """Every wheel has fresh feedback and the pose contains all of its travel; otherwise nothing of it is published."""
+    """Every wheel has fresh feedback and a reference: the pose moves as the wheels do. Otherwise it is not published.
+
+    It is about now. What was rolled while a wheel had no reference never enters the pose, that of no wheel: the pose
+    goes on without a jump from where it was, and `travel_losses` tells that it is a little behind.
+    """
+    travel_losses: int = 0
+    """How often the pose missed some travel since start: a drive restarted, or an encoder jumped for good."""
     odom_frame: str = "odom"
     """REP 105."""
     base_frame: str = "base_link"

@@ -1,11 +1,13 @@
 """When the drives may have power, and what takes it away: the driver's own state machine, above CiA 402.
 
 Rules
-1. Nothing gets power unless every condition holds: drives booted and heard, watchdog alive and not tripped, standstill,
-   no velocity commanded.
-2. While there is power, the first hazard of HAZARDS that holds stops the base: by the ramp, or by quick stop at once.
+1. Nothing gets power while one of BLOCKERS holds: drives booted and heard, watchdog alive and not tripped, standstill,
+   no velocity commanded, no reset under way. The first that holds is the state and the cause.
+2. While there is power, the first of HAZARDS that holds stops the base: by the ramp, or by quick stop at once. On the
+   way to operation enabled nothing follows a command yet, so there it is always the quick stop.
 3. A stop goes down one way only: ramp, quick stop, power off. Each step ends by measured standstill or by its deadline.
 4. A latched cause is forgotten by `reset` alone, and only when nothing has power.
+5. A shutdown ends in every state: at once without power, after the stop with it.
 
 Pure: time is an argument, `Situation` says everything that was measured. It sends nothing; `Orders` says what to do.
 """
@@ -15,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 from canbase_driver.cia402 import PowerGoal
 from canbase_driver.snapshot import DriverState, WatchdogView
@@ -44,8 +46,14 @@ class Situation:
     overdue: str = ""  # zero was ordered, and the wheels still turn
     standstill: bool = True  # measured, on all wheels
     powered: bool = False  # some axis may produce torque
+    resetting: bool = False
     stop_requested: bool = False
     shutdown_requested: bool = False
+
+    @property
+    def unready(self) -> str:
+        """A drive that is being booted, must be booted or is not heard: nothing of it is measured."""
+        return self.booting or self.absent or self.silent
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,50 +81,78 @@ class Orders:
     drive: Drive
 
 
+Seen = Callable[[Situation], str]
+"""A sentence when it is so, else empty."""
+
+
 @dataclass(frozen=True, slots=True)
-class Hazard:
-    """One reason to stop. `quick`: the drives' quick stop at once; otherwise the driver's ramp first."""
+class Blocker:
+    """One reason why nothing gets power, and the state that shows it."""
 
     name: str
-    seen: Callable[[Situation], str]
+    seen: Seen
+    state: DriverState
+    clears_on: str
+
+
+@dataclass(frozen=True, slots=True)
+class Hazard:
+    """One reason to stop what has power. `quick`: the drives' quick stop at once; otherwise the driver's ramp first."""
+
+    name: str
+    seen: Seen
     quick: bool
     latched: bool
     clears_on: str
 
 
-def _watchdog(view: WatchdogView, text: str) -> Callable[[Situation], str]:
-    return lambda s: f"{text}{s.watchdog_detail}" if s.watchdog is view else ""
+Reason = TypeVar("Reason", Blocker, Hazard)
 
 
-SHUTDOWN = Hazard(
-    "shutdown", lambda s: "the driver is ending" if s.shutdown_requested else "", False, False, "a new start"
+def _watchdog(view: WatchdogView) -> Seen:
+    return lambda s: f"watchdog: {s.watchdog_detail}" if s.watchdog is view else ""
+
+
+def _stop_requested(s: Situation) -> str:
+    return "service motor_driver/stop" if s.stop_requested else ""
+
+
+SHUTDOWN = "shutdown"
+_MISSING, _TRIPPED = _watchdog(WatchdogView.MISSING), _watchdog(WatchdogView.TRIPPED)
+
+BLOCKERS: tuple[Blocker, ...] = (
+    Blocker("stop requested", _stop_requested, DriverState.LATCHED, "reset"),
+    Blocker("bus failed", lambda s: s.bus, DriverState.OFFLINE, "the bus working"),
+    Blocker("booting", lambda s: s.booting or s.absent, DriverState.BOOTING, "drives booted"),
+    Blocker("drive fault", lambda s: s.fault, DriverState.LATCHED, "reset, with the drive's cause gone"),
+    Blocker("drive silent", lambda s: s.silent, DriverState.DISARMED, "the drive answering"),
+    Blocker("watchdog tripped", _TRIPPED, DriverState.DISARMED, "reset"),
+    Blocker("watchdog missing", _MISSING, DriverState.DISARMED, "the watchdog alive"),
+    Blocker("resetting", lambda s: "a reset is under way" if s.resetting else "", DriverState.DISARMED, "its end"),
+    Blocker("command not zero", lambda s: s.commanded, DriverState.DISARMED, "a zero command"),
+    Blocker("not standing", lambda s: "" if s.standstill else "a wheel turns", DriverState.DISARMED, "standstill"),
 )
+"""What keeps the power off while nothing is latched, the most telling first. Nothing moved: most go by themselves."""
 
 HAZARDS: tuple[Hazard, ...] = (
     Hazard("bus failed", lambda s: s.bus, True, True, "reset, with the bus working"),
     Hazard("drive fault", lambda s: s.fault, True, True, "reset, with the drive's cause gone"),
     Hazard("drive restarted", lambda s: s.absent, True, True, "reset"),
     Hazard("drive silent", lambda s: s.silent, True, True, "reset, with the drive answering"),
-    Hazard("watchdog tripped", _watchdog(WatchdogView.TRIPPED, "watchdog: "), True, True, "reset"),
-    Hazard(
-        "watchdog missing", _watchdog(WatchdogView.MISSING, "watchdog: "), False, True, "reset, with the watchdog alive"
-    ),
+    Hazard("watchdog tripped", _TRIPPED, True, True, "reset"),
+    Hazard("watchdog missing", _MISSING, False, True, "reset, with the watchdog alive"),
     Hazard("drive disabled", lambda s: s.disabled, True, True, "reset"),
     Hazard("did not stop", lambda s: s.overdue, True, True, "reset"),
-    Hazard("stop requested", lambda s: "service motor_driver/stop" if s.stop_requested else "", False, True, "reset"),
-    SHUTDOWN,
+    Hazard("stop requested", _stop_requested, False, True, "reset"),
+    Hazard(SHUTDOWN, lambda s: "the driver is ending" if s.shutdown_requested else "", False, False, "a new start"),
 )
 """All reasons to stop, the most telling first: when several hold, the first one is the cause that is reported."""
 
-BLOCKERS: tuple[Hazard, ...] = (
-    *(hazard for hazard in HAZARDS if hazard.name not in ("drive disabled", "did not stop")),
-    Hazard("command not zero", lambda s: s.commanded, False, False, "a zero command"),
-    Hazard("not standing", lambda s: "" if s.standstill else "a wheel turns", False, False, "standstill"),
-)
-"""What keeps the power off while there is none."""
+_HAZARDS_WHILE_ENABLING = tuple(hazard for hazard in HAZARDS if hazard.name != "drive disabled")
+_QUICK_HAZARDS = tuple(hazard for hazard in HAZARDS if hazard.quick)
 
-LATCHED_WITHOUT_POWER = ("drive fault", "stop requested")
-"""Of the blockers, those that need a reset though nothing had power. The others go by themselves: nothing moved."""
+
+NO_POWER = (DriverState.OFFLINE, DriverState.BOOTING, DriverState.DISARMED, DriverState.LATCHED)
 
 
 class Step(Enum):
@@ -148,15 +184,12 @@ class Supervisor:
         self.state = DriverState.BOOTING
         self.cause = Cause("booting", "", "drives booted")
         self.finished = False
+        """A shutdown was asked for, and the way down is at its end."""
+        self.latches = False
+        """The stop that is under way, or the last one, needs a reset."""
         self._step = Step.OFF
         self._since_s = 0.0
-        self._latch = False
         self._ramp_timeout_s = ramp_timeout_s
-
-    @property
-    def latches(self) -> bool:
-        """The stop that is under way, or the last one, needs a reset."""
-        return self._latch
 
     def step(self, situation: Situation, now: float) -> Orders:
         """Judge the situation, move on, and say what to do in this cycle."""
@@ -170,91 +203,88 @@ class Supervisor:
         """Forget a latched cause. Raises RuntimeError while there may be power: then the stop comes first."""
         if self.state not in (DriverState.LATCHED, DriverState.DISARMED):
             raise RuntimeError(f"reset in state {self.state.name}: only LATCHED and DISARMED can be reset")
-        self._latch = False
+        self.latches = False
         self.state = DriverState.DISARMED
 
-    def _booting(self, situation: Situation, now: float) -> None:
-        self.cause = Cause("booting", situation.booting or situation.bus, "drives booted")
-        if situation.shutdown_requested:
-            self._end(_as_cause(SHUTDOWN, situation))
-        elif not situation.booting and not situation.bus:
-            self.state = DriverState.DISARMED
-            self._disarmed(situation, now)
-
-    def _disarmed(self, situation: Situation, _now: float) -> None:
+    def _without_power(self, situation: Situation, _now: float) -> None:
         blocker = _first(BLOCKERS, situation)
-        if situation.booting:
-            self.state, self.cause = DriverState.BOOTING, Cause("booting", situation.booting, "drives booted")
+        if situation.shutdown_requested:
+            self._finish()
         elif blocker is None:
             self.state, self.cause = DriverState.ENABLING, Cause("enabling", "", "operation enabled on all drives")
-        elif blocker is SHUTDOWN:
-            self._end(_as_cause(blocker, situation))
         else:
-            self.cause = _as_cause(blocker, situation)
-            if blocker.name in LATCHED_WITHOUT_POWER:
-                self.state = DriverState.LATCHED
+            self.state, self.cause = blocker.state, _cause(blocker, situation)
+            self.latches = blocker.state is DriverState.LATCHED
 
     def _enabling(self, situation: Situation, now: float) -> None:
-        hazard = _first([hazard for hazard in HAZARDS if hazard.name != "drive disabled"], situation)
+        hazard = _first(_HAZARDS_WHILE_ENABLING, situation)
         if hazard is not None:
-            self._stop(hazard, situation)
+            self._stop(Step.QUICK, _cause(hazard, situation), hazard.latched)
         elif not situation.disabled:
             self.state, self.cause = DriverState.ENABLED, Cause()
         elif now - self._since_s > ENABLE_TIMEOUT_S:
-            self._latch = True
-            self.state, self._step = DriverState.STOPPING, Step.OFF
-            self.cause = Cause("enable timeout", f"{situation.disabled} after {ENABLE_TIMEOUT_S:.1f} s", "reset")
+            late = Cause("enable timeout", f"{situation.disabled} after {ENABLE_TIMEOUT_S:.1f} s", "reset")
+            self._stop(Step.QUICK, late, latched=True)
 
     def _enabled(self, situation: Situation, _now: float) -> None:
         hazard = _first(HAZARDS, situation)
         if hazard is not None:
-            self._stop(hazard, situation)
+            self._stop(Step.QUICK if hazard.quick else Step.RAMP, _cause(hazard, situation), hazard.latched)
+
+    def _stop(self, step: Step, cause: Cause, latched: bool) -> None:
+        self.state, self._step = DriverState.STOPPING, step
+        self.cause, self.latches = cause, latched
 
     def _stopping(self, situation: Situation, now: float) -> None:
-        elapsed_s = now - self._since_s
-        worse = _first([hazard for hazard in HAZARDS if hazard.quick], situation)
-        if self._step is Step.RAMP:
-            if worse is not None:
-                self._stop(worse, situation)
-            elif situation.standstill:
-                self._step = Step.OFF
-            elif elapsed_s > self._ramp_timeout_s:
-                self._step = Step.QUICK
-        elif self._step is Step.QUICK:
-            if elapsed_s > 0.0 and (situation.standstill or elapsed_s > QUICK_STOP_TIMEOUT_S):
-                self._step = Step.OFF
-        elif not situation.powered or elapsed_s > POWER_OFF_TIMEOUT_S:
-            self._end(self.cause)
+        self._STEPS[self._step](self, situation, now - self._since_s)
+
+    def _ramp(self, situation: Situation, elapsed_s: float) -> None:
+        worse = _first(_QUICK_HAZARDS, situation)
+        if worse is not None:
+            self._step, self.latches = Step.QUICK, True
+        elif situation.standstill:
+            self._step = Step.OFF
+        elif elapsed_s > self._ramp_timeout_s:
+            self._step = Step.QUICK
+
+    def _quick(self, situation: Situation, elapsed_s: float) -> None:
+        if situation.standstill or elapsed_s > QUICK_STOP_TIMEOUT_S:
+            self._step = Step.OFF
+
+    def _off(self, situation: Situation, elapsed_s: float) -> None:
+        if situation.powered and elapsed_s <= POWER_OFF_TIMEOUT_S:
+            return
+        self.state = DriverState.LATCHED if self.latches else DriverState.DISARMED
+        if situation.shutdown_requested:
+            self._finish()
 
     def _latched(self, situation: Situation, _now: float) -> None:
         if situation.shutdown_requested:
-            self._end(_as_cause(SHUTDOWN, situation))
+            self._finish()
 
-    def _stop(self, hazard: Hazard, situation: Situation) -> None:
-        self._step = Step.QUICK if hazard.quick else Step.RAMP
-        self._latch = self._latch or hazard.latched
-        if self.state is not DriverState.STOPPING:
-            self.cause = _as_cause(hazard, situation)
-        self.state = DriverState.STOPPING
-
-    def _end(self, cause: Cause) -> None:
-        self.cause = cause
-        self.finished = cause.name == SHUTDOWN.name
-        self.state = DriverState.LATCHED if self._latch else DriverState.DISARMED
+    def _finish(self) -> None:
+        self.finished = True
+        self.cause = Cause(SHUTDOWN, "the driver is ending", "a new start")
 
     _RULES: ClassVar[dict[DriverState, Callable[[Supervisor, Situation, float], None]]] = {
-        DriverState.BOOTING: _booting,
-        DriverState.DISARMED: _disarmed,
+        DriverState.OFFLINE: _without_power,
+        DriverState.BOOTING: _without_power,
+        DriverState.DISARMED: _without_power,
         DriverState.ENABLING: _enabling,
         DriverState.ENABLED: _enabled,
         DriverState.STOPPING: _stopping,
         DriverState.LATCHED: _latched,
     }
+    _STEPS: ClassVar[dict[Step, Callable[[Supervisor, Situation, float], None]]] = {
+        Step.RAMP: _ramp,
+        Step.QUICK: _quick,
+        Step.OFF: _off,
+    }
 
 
-def _first(hazards: tuple[Hazard, ...] | list[Hazard], situation: Situation) -> Hazard | None:
-    return next((hazard for hazard in hazards if hazard.seen(situation)), None)
+def _first(reasons: tuple[Reason, ...], situation: Situation) -> Reason | None:
+    return next((reason for reason in reasons if reason.seen(situation)), None)
 
 
-def _as_cause(hazard: Hazard, situation: Situation) -> Cause:
-    return Cause(hazard.name, hazard.seen(situation), hazard.clears_on)
+def _cause(reason: Blocker | Hazard, situation: Situation) -> Cause:
+    return Cause(reason.name, reason.seen(situation), reason.clears_on)

@@ -1,0 +1,33 @@
+"""How regular the cycle is: its count, how many cycles began late, and the worst of the last second. No clock."""
+
+from __future__ import annotations
+
+from collections import deque
+
+WINDOW_S = 1.0
+
+
+class CycleStats:
+    """Fed once a cycle."""
+
+    def __init__(self, period_s: float) -> None:
+        self._late_s = period_s / 2.0
+        self._peaks: deque[tuple[float, float]] = deque()
+        self.cycles = 0
+        self.overruns = 0
+        """Cycles that began more than half a period late."""
+
+    def note(self, now: float, lateness_s: float) -> None:
+        """One cycle began at `now`, `lateness_s` after its time."""
+        self.cycles += 1
+        self.overruns += lateness_s > self._late_s
+        while self._peaks and self._peaks[-1][1] <= lateness_s:
+            self._peaks.pop()
+        self._peaks.append((now, lateness_s))
+        while self._peaks[0][0] < now - WINDOW_S:
+            self._peaks.popleft()
+
+    @property
+    def worst_s(self) -> float:
+        """Greatest lateness in the last WINDOW_S before the last cycle [s]; 0 before the first."""
+        return self._peaks[0][1] if self._peaks else 0.0
