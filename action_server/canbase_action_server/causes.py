@@ -30,6 +30,8 @@ class Situation:
     now: float
     own_source: str
     odometry_timeout_s: float
+    gap_s: float
+    """Since the control cycle before this one."""
     odometry_jumped: bool
     obstacle_age_s: float
     """For how long the filter has been stopping this motion for an obstacle; 0: it does not."""
@@ -74,6 +76,10 @@ def _odometry_lost(s: Situation) -> str | None:
     age = age_s(odometry.received if odometry else None, s.now)
     if s.odometry_jumped:
         return "odometry jumped farther than the base can move: it was reset, or another node publishes odom"
+    if s.gap_s > s.odometry_timeout_s:  # what arrives now may look fresh: the base was driven without it
+        return (
+            f"the action server itself stood still for {s.gap_s:.2f} s and saw no odometry; is the computer overloaded?"
+        )
     if age <= s.odometry_timeout_s:
         return None
     return f"no odometry for {age:.2f} s (timeout {s.odometry_timeout_s} s); is motor_driver running?"

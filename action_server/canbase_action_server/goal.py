@@ -95,7 +95,8 @@ class GoalRun:
         self._distance_m = distance_m
         self._own_source = action_source(robot)
         self._overall_s = robot.action.overall_factor * self._motion.ideal_s + robot.action.overall_extra_s
-        self._started = now
+        self._started = self._ticked_at = now
+        self._gap_s = 0.0
         self._phase = Phase.DRIVING
         self._cause = Cause(ErrorCode.OK, "")
         self._standstill: Standstill | None = None
@@ -120,6 +121,7 @@ class GoalRun:
         """What to order now, what to tell the client, and whether this was the end. RuntimeError after the end."""
         if self._phase is Phase.ENDED:
             raise RuntimeError("the goal has ended: it orders nothing any more")
+        self._gap_s, self._ticked_at = now - self._ticked_at, now
         self._observe(inputs, now)
         order = self._drive(inputs, now) if self._phase is Phase.DRIVING else self._stop(inputs, now)
         return replace(order, feedback=self._feedback(now))
@@ -141,6 +143,7 @@ class GoalRun:
             now=now,
             own_source=self._own_source,
             odometry_timeout_s=self._robot.timeouts.odometry_s,
+            gap_s=self._gap_s,
             odometry_jumped=self._jumped,
             obstacle_age_s=0.0 if self._obstacle_since is None else now - self._obstacle_since,
             obstacle_patience_s=OBSTACLE_PATIENCE_S,

@@ -15,6 +15,7 @@ GOOD = Situation(
     now=10.0,
     own_source="action",
     odometry_timeout_s=0.2,
+    gap_s=0.02,
     odometry_jumped=False,
     obstacle_age_s=0.0,
     obstacle_patience_s=0.3,
@@ -47,7 +48,7 @@ PROVOKED = {
 
 def test_nothing_wrong_is_no_cause() -> None:
     assert cause_while_driving(GOOD) is None
-    almost = replace(GOOD, now=10.2, obstacle_age_s=0.299, no_progress_s=2.0, running_s=20.0)
+    almost = replace(GOOD, now=10.2, gap_s=0.2, obstacle_age_s=0.299, no_progress_s=2.0, running_s=20.0)
     assert cause_while_driving(almost) is None
     assert cause_while_driving(with_inputs(GOOD, mux=replace(GOOD_MUX, active="action"))) is None
 
@@ -76,6 +77,13 @@ def test_a_jump_of_the_odometry_is_a_loss_of_it() -> None:
     cause = cause_while_driving(replace(GOOD, odometry_jumped=True))
     assert cause is not None
     assert cause.code is ErrorCode.ODOMETRY_LOST
+
+
+@pytest.mark.parametrize(("gap_s", "lost"), [(0.2, False), (0.201, True), (3.0, True)])
+def test_a_server_that_stood_still_trusts_no_fresh_odometry(gap_s: float, lost: bool) -> None:
+    cause = cause_while_driving(replace(GOOD, gap_s=gap_s))
+    assert (cause is not None) == lost
+    assert [found.code for found in (cause,) if found] == [ErrorCode.ODOMETRY_LOST] * lost
 
 
 STOPPING = {ErrorCode.ESTOP, ErrorCode.WATCHDOG, ErrorCode.DRIVE_FAULT, ErrorCode.ODOMETRY_LOST, ErrorCode.TAKEN_OVER,

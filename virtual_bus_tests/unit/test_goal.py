@@ -87,6 +87,18 @@ def test_odometry_and_driver_lost_ends_after_the_braking_time_and_says_that_noth
     assert story.coast() < 0.0002
 
 
+def test_a_server_that_stood_still_does_not_drive_on_with_what_arrives_then() -> None:
+    # It hangs from 1.0 s to 3.0 s. Then the newest odometry is taken in first, and looks fresh.
+    robot, plant = bench_robot(), Plant()
+    goal = GoalRun(robot, 3.0, 0.3, plant.odometry(0.0), 0.0)
+    inputs = Story(plant, 3.0, 0.3).inputs
+    for tick in range(51):
+        goal.tick(replaced(inputs, odometry=plant.odometry(tick * 0.02)), tick * 0.02)
+    order = goal.tick(replaced(inputs, odometry=plant.odometry(3.0)), 3.0)
+    assert order.twist == Twist()
+    assert goal.phase is Phase.STOPPING
+
+
 def test_a_fault_during_the_stop_of_a_cancel_is_the_cause() -> None:
     at = {2.0: cancel, 2.1: lambda s: driver(s, state="latched", cause="drive_fault", detail="left 2310h")}
     end = Story(Plant(), 3.0, 0.5, at=at).run()
