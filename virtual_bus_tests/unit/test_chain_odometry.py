@@ -1,0 +1,98 @@
+"""The whole chain in virtual time: the pose over restarts, wraps and jumps, and robots with other drives."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+
+from canbase_bench.world.bench import BenchParameters
+from canbase_config.robot import Robot
+from canbase_driver.kinematics import Twist2D
+from canbase_driver.snapshot import DriverState
+from unit.chain_world import World, robot_of
+
+OVERCURRENT = 0x2310
+
+
+@pytest.fixture
+def world() -> World:
+    """At 0.3 m/s."""
+    world = World()
+    world.drive()
+    return world
+
+
+def test_a_drive_that_was_switched_off_and_on_is_booted_again_and_waits_for_a_reset(world: World) -> None:
+    world.node.power_cycle(world.now, off_s=0.5)
+    world.run(1.5)
+    before = world.snapshot
+    assert not before.odometry_valid
+    world.run(1.5)
+    after = world.snapshot
+    assert after.state is DriverState.LATCHED
+    assert after.odometry_valid
+    assert after.drives[0].nmt_state == "operational"
+    assert world.powered == [False, False]
+    # its encoder starts anew elsewhere: no jump of the pose, and the way that nobody could measure is reported
+    assert (after.x_m, after.y_m, after.yaw_rad) == pytest.approx((before.x_m, before.y_m, before.yaw_rad), abs=1e-3)
+    assert after.travel_losses >= 1
+    assert world.recovered()
+    assert world.snapshot.yaw_rad == pytest.approx(before.yaw_rad, abs=0.01)
+
+
+def test_the_pose_never_jumps_while_a_drive_is_switched_off_and_on(world: World) -> None:
+    world.node.power_cycle(world.now, off_s=0.3)
+    poses = []
+    for _ in range(300):
+        world.run(0.01)
+        poses.append(world.snapshot)
+    steps = [abs(b.x_m - a.x_m) + abs(b.yaw_rad - a.yaw_rad) for a, b in itertools.pairwise(poses)]
+    assert max(steps) < 0.3 * 0.01 * 1.5 + 0.01
+
+
+@pytest.mark.parametrize(
+    "robot",
+    [
+        robot_of((1, 0, "left"), (1, 1, "right")),
+        robot_of((1, 0, "right"), (1, 1, "left")),
+        robot_of((1, 0, "left"), (2, 0, "right"), (3, 0, "left"), (4, 0, "right")),
+        robot_of((1, 0, "left"), (1, 1, "right"), (2, 0, "left"), (2, 1, "right")),
+    ],
+    ids=["two axes on a node", "the other way round", "four wheels", "four wheels on two nodes"],
+)
+def test_other_robots_drive_their_arc_and_stop_all_wheels_for_the_fault_of_one(robot: Robot) -> None:
+    world = World(robot)
+    world.drive(Twist2D(0.3, 0.5), seconds=1.0)
+    truth, snapshot = world.truth, world.snapshot
+    assert (truth.linear_mps, truth.angular_radps) == pytest.approx((0.3, 0.5), abs=0.01)
+    assert (snapshot.x_m, snapshot.y_m, snapshot.yaw_rad) == pytest.approx(
+        (truth.x_m, truth.y_m, truth.yaw_rad), abs=1e-3
+    )
+    world.node.fail(0, OVERCURRENT)
+    assert world.stands_after() < 0.25
+    assert world.core.state is DriverState.LATCHED
+    assert world.recovered()
+
+
+@pytest.mark.parametrize("offset", [2**31 - 2000, -(2**31) + 2000])
+def test_the_encoder_goes_round_at_32_bits_while_driving_and_nobody_sees_it(offset: int) -> None:
+    world = World(parameters=BenchParameters(encoder_offset=offset))
+    first = world.node.axes[0].position()
+    world.drive(Twist2D(0.3 if offset > 0 else -0.3, 0.0), seconds=1.0)
+    assert world.node.axes[0].position() * first < 0  # it went round
+    world.command = Twist2D.ZERO
+    world.run(1.0)
+    assert world.snapshot.x_m == pytest.approx(world.truth.x_m, abs=1e-4)
+    assert world.snapshot.travel_losses == 0
+
+
+def test_an_encoder_that_jumps_for_good_is_no_motion_of_the_base_and_is_reported(world: World) -> None:
+    before = world.snapshot
+    world.node.axes[0].encoder_offset += 1_000_000  # 7.7 m at the rim
+    world.run(0.5)
+    after = world.snapshot
+    assert after.x_m == pytest.approx(before.x_m + 0.15, abs=0.02)
+    assert after.yaw_rad == pytest.approx(before.yaw_rad, abs=0.01)
+    assert after.travel_losses == 1
+    assert after.odometry_valid
