@@ -8,34 +8,82 @@ from canbase_config.robot import Drive, Robot
 from canbase_config.units import motor_rev_per_s
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 
+CYCLES_TO_SETPOINT = 2
+"""A command waits for the driver's next cycle, and its age is looked at only there."""
+
 
 def mps_per_bit(drive: Drive, wheel_radius_m: float) -> float:
     """Speed of the wheel's rim [m/s] for one bit of the drive's 60FFh and 606Ch; the sign makes forward positive."""
-    wheel_rev_per_s = motor_rev_per_s(drive.velocity_unit, drive.counts_per_motor_rev) / drive.gear_ratio
-    return drive.direction * wheel_rev_per_s * 2.0 * math.pi * wheel_radius_m
+    motor_rev_s = motor_rev_per_s(drive.velocity_unit, drive.counts_per_motor_rev)
+    return motor_rev_s * _m_per_motor_rev(drive, wheel_radius_m)
+
+
+def m_per_count(drive: Drive, wheel_radius_m: float) -> float:
+    """Travel of the wheel's rim [m] for one increment of the drive's 6064h; the sign makes forward positive."""
+    return _m_per_motor_rev(drive, wheel_radius_m) / drive.counts_per_motor_rev
 
 
 def max_wheel_mps(robot: Robot) -> float:
-    """The fastest that a wheel's rim may turn [m/s]: full speed ahead on the outside of the tightest turn."""
-    return robot.limits.linear_mps + robot.limits.angular_radps * robot.base.track_m / 2.0
+    """The fastest that the driver lets a wheel's rim turn [m/s]: straight on or in place, each at its limit."""
+    return max(robot.limits.linear_mps, robot.limits.angular_radps * robot.base.track_m / 2.0)
+
+
+def order_hold_s(robot: Robot) -> float:
+    """How long the driver may follow an order that another one has replaced [s].
+
+    Its command timeout, two cycles, the latency on the way to it, and what the jerk limit adds to a change of speed,
+    which never is more than it takes the driver to give up its ramp.
+    """
+    limits = robot.limits
+    jerk_s = max(limits.acceleration_mps2, limits.deceleration_mps2) / limits.jerk_mps3
+    waiting_s = robot.timeouts.command_s + CYCLES_TO_SETPOINT / robot.rates.control_hz + robot.watchdog.latency_s
+    return waiting_s + min(jerk_s, robot.timeouts.standstill_s)
 
 
 def watchdog_config(robot: Robot) -> WatchdogConfig:
     """Everything that the watchdog process is told about the robot."""
+    limits, timeouts, watchdog = robot.limits, robot.timeouts, robot.watchdog
     return WatchdogConfig(
         bus_arguments=robot.bus.arguments(),
         drives=tuple(_watched(drive, robot.base.wheel_radius_m) for drive in robot.drives),
         track_m=robot.base.track_m,
+        control_hz=robot.rates.control_hz,
         lease_socket=robot.lease.socket,
-        lease_timeout_s=robot.timeouts.lease_s,
-        drive_heartbeat_s=robot.timeouts.drive_heartbeat_s,
-        feedback_timeout_s=robot.timeouts.feedback_s,
+        lease_timeout_s=timeouts.lease_s,
+        drive_heartbeat_s=timeouts.drive_heartbeat_s,
+        feedback_timeout_s=timeouts.feedback_s,
+        loop_late_s=watchdog.loop_late_s,
+        bus_failed_s=watchdog.bus_failed_s,
         standstill_mps=robot.base.standstill_mps,
-        deceleration_mps2=robot.limits.deceleration_mps2,
-        acceleration_mps2=robot.limits.acceleration_mps2,
+        linear_mps=limits.linear_mps,
+        angular_radps=limits.angular_radps,
+        acceleration_mps2=limits.acceleration_mps2,
+        deceleration_mps2=limits.deceleration_mps2,
+        angular_acceleration_radps2=limits.angular_acceleration_radps2,
+        angular_deceleration_radps2=limits.angular_deceleration_radps2,
         max_wheel_mps=max_wheel_mps(robot),
+        order_hold_s=order_hold_s(robot),
+        drive_lag_s=watchdog.drive_lag_s,
+        target_tolerance_mps=watchdog.target_tolerance_mps,
+        target_tolerance_share=watchdog.target_tolerance_share,
+        motion_tolerance_mps=watchdog.motion_tolerance_mps,
+        motion_tolerance_share=watchdog.motion_tolerance_share,
+        feedback_samples=watchdog.feedback_samples,
+        overspeed_factor=watchdog.overspeed_factor,
+        travel_tolerance_m=watchdog.travel_tolerance_m,
     )
 
 
 def _watched(drive: Drive, wheel_radius_m: float) -> WatchedDrive:
-    return WatchedDrive(drive.joint, drive.node_id, drive.axis, drive.side, mps_per_bit(drive, wheel_radius_m))
+    return WatchedDrive(
+        drive.joint,
+        drive.node_id,
+        drive.axis,
+        drive.side,
+        mps_per_bit(drive, wheel_radius_m),
+        m_per_count(drive, wheel_radius_m),
+    )
+
+
+def _m_per_motor_rev(drive: Drive, wheel_radius_m: float) -> float:
+    return drive.direction * 2.0 * math.pi * wheel_radius_m / drive.gear_ratio

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 DRIVER_NODE_ID = 127
 """CANopen node id of the motor driver: its heartbeat is COB-ID 77Fh."""
@@ -245,8 +245,60 @@ class Lease(Section):
     socket: Annotated[str, Field(min_length=1, max_length=100, description="path; its folder is made if missing")]
 
 
+class Watchdog(Section):
+    """How much the watchdog forgives. No tolerance can be switched off, and none is unlimited."""
+
+    latency_s: Annotated[
+        float,
+        Field(ge=0.02, le=0.5, description="an order on its way to the driver, on top of timeouts.command_s [s]"),
+    ] = 0.05
+    drive_lag_s: Annotated[
+        float, Field(ge=0.01, le=0.5, description="so long a wheel may keep the speed of an older setpoint [s]")
+    ] = 0.1
+    target_tolerance_mps: Annotated[
+        float, Field(gt=0.0, le=0.2, description="a setpoint beyond what the leases allow, at the rim [m/s]")
+    ] = 0.03
+    target_tolerance_share: Annotated[
+        float, Field(ge=0.0, le=0.2, description="the same as a share of the allowed speed, added to it")
+    ] = 0.03
+    motion_tolerance_mps: Annotated[
+        float, Field(gt=0.0, le=0.5, description="a wheel beyond what its setpoints allow, at the rim [m/s]")
+    ] = 0.05
+    motion_tolerance_share: Annotated[
+        float, Field(ge=0.0, le=0.5, description="the same as a share of the allowed speed, added to it")
+    ] = 0.1
+    feedback_samples: Annotated[
+        int, Field(ge=1, le=20, description="so many velocity samples in a row must be bad before they stop the base")
+    ] = 5
+    overspeed_factor: Annotated[
+        float, Field(ge=1.05, le=2.0, description="a wheel may be so many times as fast as the limits allow")
+    ] = 1.2
+    travel_tolerance_m: Annotated[
+        float, Field(ge=0.005, le=0.5, description="encoder and measured velocity apart, within about 0.5 s [m]")
+    ] = 0.05
+    bus_failed_s: Annotated[float, Field(ge=0.06, le=0.5, description="the bus takes no frames for so long [s]")] = 0.1
+    loop_late_s: Annotated[
+        float, Field(ge=0.02, le=0.5, description="the watchdog's own loop stands still for so long [s]")
+    ] = 0.1
+
+
+def _no_parallel(policy: object) -> object:
+    if policy == "parallel":
+        raise MisfitError(
+            "there is one base, and two goals would both order its speed; choose reject, queue or preempt"
+        )
+    return policy
+
+
 class Action(Section):
-    """The DriveDistance action server."""
+    """The action server: drive_distance and rotate_angle."""
+
+    goal_policy: Annotated[
+        Literal["reject", "queue", "preempt"],
+        BeforeValidator(_no_parallel),
+        Field(description="a new goal while one runs: refused, waits for its turn, or takes the base after a stop"),
+    ] = "reject"
+    queue_length: Annotated[int, Field(ge=1, le=100, description="so many goals may wait with goal_policy: queue")] = 8
 
     min_distance_m: Annotated[float, Field(gt=0.0, le=1.0, description="[m]")] = 0.01
     max_distance_m: Annotated[float, Field(gt=0.0, le=1000.0, description="[m]")] = 5.0
@@ -288,6 +340,7 @@ class Robot(Section):
     mux: Mux = Mux()
     safety: Safety
     lease: Lease
+    watchdog: Watchdog = Watchdog()
     action: Action = Action()
 
     @model_validator(mode="after")

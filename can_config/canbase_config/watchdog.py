@@ -10,36 +10,65 @@ from typing import Any
 
 @dataclass(frozen=True)
 class WatchedDrive:
-    """One axis on the bus. `mps_per_bit`: rim speed of its wheel, forward positive, for one bit of 60FFh and 606Ch."""
+    """One axis on the bus. `mps_per_bit`: rim speed of its wheel, forward positive, for one bit of 60FFh and 606Ch.
+
+    `m_per_count`: travel of the rim, forward positive, for one increment of 6064h.
+    """
 
     joint: str
     node_id: int
     axis: int
     side: str
     mps_per_bit: float
+    m_per_count: float
 
 
 @dataclass(frozen=True)
 class WatchdogConfig:
-    """Everything that the watchdog knows. Times in seconds, speeds in m/s at the rim of the wheel.
-
-    `lease_uid`: the only user whose leases count, None: the watchdog's own. `loop_late_s`: the watchdog trips when its
-    own loop stood still for longer while a drive is enabled.
-    """
+    """Everything that the watchdog knows. Times in seconds, speeds in m/s at the rim of the wheel."""
 
     bus_arguments: dict[str, Any]
     drives: tuple[WatchedDrive, ...]
     track_m: float
+    control_hz: float
+    """SYNCs of the driver per second."""
+
     lease_socket: str
     lease_timeout_s: float
     drive_heartbeat_s: float
     feedback_timeout_s: float
+    loop_late_s: float
+    """It trips when its own loop stood still for longer while a drive is enabled."""
+    bus_failed_s: float
+    """It trips when the bus takes no frames for so long while a drive is enabled."""
+
     standstill_mps: float
-    deceleration_mps2: float
+    linear_mps: float
+    angular_radps: float
     acceleration_mps2: float
+    deceleration_mps2: float
+    angular_acceleration_radps2: float
+    angular_deceleration_radps2: float
     max_wheel_mps: float
+    """The fastest that the driver lets a wheel turn."""
+
+    order_hold_s: float
+    """How long the driver may go on to follow an order that another one has replaced."""
+    drive_lag_s: float
+    """How long a wheel may keep the speed of a setpoint that another one has replaced."""
+    target_tolerance_mps: float
+    target_tolerance_share: float
+    """Of the allowed speed, on top of target_tolerance_mps; 0.05: 5 %."""
+    motion_tolerance_mps: float
+    motion_tolerance_share: float
+    feedback_samples: int
+    """So many velocity samples in a row must be bad before they count."""
+    overspeed_factor: float
+    travel_tolerance_m: float
+    """How far encoder and measured velocity may drift apart."""
+
     lease_uid: int | None = None
-    loop_late_s: float = 0.1
+    """The only user whose leases count, None: the watchdog's own."""
 
     def to_json(self) -> str:
         """One line of JSON that `from_json` reads back."""

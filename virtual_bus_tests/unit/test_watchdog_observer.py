@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from canbase_watchdog.frames import DriveState
 from canbase_watchdog.lease import Refusal
-from canbase_watchdog.observer import NEVER, Axis, Observer, View
+from canbase_watchdog.observer import Observer
 from canbase_watchdog.watchdog import State, Watchdog
 from unit.watchdog_story import Story, config
 

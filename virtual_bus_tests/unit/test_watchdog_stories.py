@@ -16,7 +16,7 @@ from canbase_watchdog.watchdog import Answer, State
 from unit.watchdog_story import ENABLED, FAULT, SOD, FakeDrive, Story, lease
 
 QUICK_STOP = Frame(0x501, bytes.fromhex("02 00"))
-HEARTBEAT, STATE = 0x77E, 0x1FE
+HEARTBEAT, STATE, COUNTERS = 0x77E, 0x1FE, 0x2FE
 
 
 def cause(story: Story) -> Cause:
@@ -163,13 +163,13 @@ def test_the_driver_dies_and_leases_go_on(bits: int) -> None:
     assert {frame.data[1:3] for _, frame in story.since(begin, 0x601)} == {b"\x41\x60", b"\x6c\x60"}
 
 
-def test_after_standstill_it_is_quiet_except_for_heartbeat_and_state() -> None:
+def test_after_standstill_it_is_quiet_except_for_heartbeat_state_and_counters() -> None:
     story = driving()
     story.driver = False
     story.run(1.5)
     quiet = story.t
     story.run(1.0)
-    assert {frame.cob_id for at, frame in story.sent if at > quiet} == {HEARTBEAT, STATE}
+    assert {frame.cob_id for at, frame in story.sent if at > quiet} == {HEARTBEAT, STATE, COUNTERS}
 
 
 @pytest.mark.parametrize("lost", ["heartbeat", "sync"])

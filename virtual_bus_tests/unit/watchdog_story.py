@@ -20,22 +20,38 @@ PRE_OPERATIONAL, OPERATIONAL = 0x7F, 0x05
 
 
 def config(*drives: tuple[int, int], uid: int | None = None) -> WatchdogConfig:
-    """Drives as (node id, axis), 1 mm/s per bit, with the default times of robot.yaml."""
+    """Drives as (node id, axis), 1 mm/s per bit, 0.1 mm per count, with the default times of robot.yaml."""
     sides = ("left", "right")
     places = drives or ((1, 0), (2, 0))
-    watched = tuple(WatchedDrive(f"wheel_{n}_{a}", n, a, sides[i % 2], 0.001) for i, (n, a) in enumerate(places))
+    watched = tuple(WatchedDrive(f"wheel_{n}_{a}", n, a, sides[i % 2], 0.001, 0.0001) for i, (n, a) in enumerate(places))
     return WatchdogConfig(
         bus_arguments={"interface": "virtual", "channel": "none"},
         drives=watched,
         track_m=0.4,
+        control_hz=100.0,
         lease_socket="/nowhere",
         lease_timeout_s=0.25,
         drive_heartbeat_s=0.3,
         feedback_timeout_s=0.1,
+        loop_late_s=0.1,
+        bus_failed_s=0.1,
         standstill_mps=0.005,
-        deceleration_mps2=1.0,
+        linear_mps=1.0,
+        angular_radps=4.0,
         acceleration_mps2=1.0,
+        deceleration_mps2=1.0,
+        angular_acceleration_radps2=5.0,
+        angular_deceleration_radps2=5.0,
         max_wheel_mps=1.0,
+        order_hold_s=0.35,
+        drive_lag_s=0.1,
+        target_tolerance_mps=0.03,
+        target_tolerance_share=0.03,
+        motion_tolerance_mps=0.05,
+        motion_tolerance_share=0.1,
+        feedback_samples=5,
+        overspeed_factor=1.2,
+        travel_tolerance_m=0.05,
         lease_uid=uid,
     )
 
@@ -62,13 +78,14 @@ class FakeDrive:
     nmt: int = OPERATIONAL
     words: dict[int, int] = field(default_factory=dict)
     speed: dict[int, float] = field(default_factory=dict)
+    travel: dict[int, float] = field(default_factory=dict)
     target: dict[int, int] = field(default_factory=dict)
     pending: dict[int, tuple[int, int]] = field(default_factory=dict)
     beat_at: float = 0.0
 
     def __post_init__(self) -> None:
         for axis in self.axes:
-            self.words[axis], self.speed[axis], self.target[axis] = SOD, 0.0, 0
+            self.words[axis], self.speed[axis], self.travel[axis], self.target[axis] = SOD, 0.0, 0.0, 0
 
     def control(self, axis: int, word: int) -> None:
         """The controlword, as far as the watchdog is concerned; a live driver enables from SOD in one step here."""
@@ -106,9 +123,18 @@ class FakeDrive:
             if axis in self.pending:
                 word, self.target[axis] = self.pending.pop(axis)
                 self.control(axis, word)
-            out.append(Frame((0x180, 0x380)[place] + self.node_id, struct.pack("<Hi", self.words[axis], 0)))
-            out.append(Frame((0x280, 0x480)[place] + self.node_id, struct.pack("<i", round(self.speed[axis]))))
+            status = struct.pack("<Hi", self.words[axis], self.position(axis))
+            out.append(Frame((0x180, 0x380)[place] + self.node_id, status))
+            out.append(Frame((0x280, 0x480)[place] + self.node_id, struct.pack("<i", self.velocity(axis))))
         return [] if self.mute else out
+
+    def position(self, axis: int) -> int:
+        """6064h: 0.1 mm per count."""
+        return round(self.travel[axis] * 10)
+
+    def velocity(self, axis: int) -> int:
+        """606Ch: 1 mm/s per bit."""
+        return round(self.speed[axis])
 
     def _answer(self, data: bytes) -> list[Frame]:
         index = int.from_bytes(data[1:3], "little")
@@ -120,7 +146,7 @@ class FakeDrive:
         elif index == 0x6041:
             out = b"\x4b" + out + struct.pack("<HH", self.words[axis], 0)
         else:
-            out = b"\x43" + out + struct.pack("<i", round(self.speed[axis]))
+            out = b"\x43" + out + struct.pack("<i", self.velocity(axis))
         return [] if self.mute else [Frame(0x580 + self.node_id, out)]
 
     def step(self, dt: float, now: float) -> list[Frame]:
@@ -129,6 +155,7 @@ class FakeDrive:
             goal = self.target[axis] if self.words[axis] == ENABLED else 0
             change = max(-1000 * dt, min(1000 * dt, goal - self.speed[axis]))
             self.speed[axis] += change if self.brakes else 0.0
+            self.travel[axis] += self.speed[axis] * dt
             if self.words[axis] == QUICK_STOP and self.speed[axis] == 0 and self.option < 5:
                 self.words[axis] = SOD
         if now < self.beat_at or self.mute:
@@ -149,6 +176,7 @@ class Story:
         self.word, self.speed, self.sequence = 0x06, 0, 0
         self.driver = self.heartbeat = self.sync = self.filter = self.ticking = True
         self.ordered_mps: float | None = None
+        self.leased = 0.0
         self.obedient = True
         self.sent: list[tuple[float, Frame]] = []
         self.on_step: Callable[[], None] = lambda: None
@@ -186,10 +214,10 @@ class Story:
     def _step(self) -> None:
         self.ms += 1
         self.on_step()
-        if self.filter and self.ms % 20 == 0:
-            self.sequence += 1
-            speed = self.speed / BITS_PER_MPS if self.ordered_mps is None else self.ordered_mps
-            self.watchdog.on_lease(lease(self.sequence, self.t, speed), 1000, self.t)
+        ordered = self.speed / BITS_PER_MPS if self.ordered_mps is None else self.ordered_mps
+        if self.filter and (self.ms % 20 == 0 or ordered != self.leased):
+            self.sequence, self.leased = self.sequence + 1, ordered
+            self.watchdog.on_lease(lease(self.sequence, self.t, ordered), 1000, self.t)
         if self.driver:
             self._driver()
         for drive in self.drives:

@@ -8,6 +8,7 @@ from typing import Any
 
 import can
 
+from canbase_watchdog.bus_health import BusHealth
 from canbase_watchdog.frames import Frame
 
 BATCH = 256
@@ -31,10 +32,7 @@ class BusPort:
                 "Check `bus` in robot.yaml, and that the interface is up (ip -details link show)."
             ) from error
         self._waiting: can.Message | None = None
-        self.send_errors = 0
-        self.receive_errors = 0
-        self.works = True
-        """False from a failed send until the next one that succeeds."""
+        self.health = BusHealth()
 
     def __enter__(self) -> BusPort:
         return self
@@ -59,7 +57,11 @@ class BusPort:
             message, self._waiting = self._waiting or self._take(0.0), None
             if message is None:
                 return
-            if not (message.is_error_frame or message.is_remote_frame or message.is_extended_id):
+            if message.is_error_frame:
+                self.health.on_error_frame(message.arbitration_id, bytes(message.data), time.monotonic())
+                continue
+            self.health.on_data()
+            if not (message.is_remote_frame or message.is_extended_id):
                 yield message.arbitration_id, bytes(message.data)
 
     def send(self, frame: Frame) -> None:
@@ -68,15 +70,14 @@ class BusPort:
         try:
             self._bus.send(message)
         except (can.CanError, OSError):
-            self.send_errors += 1
-            self.works = False
+            self.health.on_send_error(time.monotonic())
         else:
-            self.works = True
+            self.health.on_sent()
 
     def _take(self, timeout_s: float) -> can.Message | None:
         try:
             return self._bus.recv(timeout_s)
         except (can.CanError, OSError):
-            self.receive_errors += 1
+            self.health.on_receive_error(time.monotonic())
             time.sleep(0.001)
             return None

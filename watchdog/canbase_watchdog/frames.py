@@ -6,6 +6,7 @@ Written a second time on purpose, apart from the driver's: a wrong byte order th
 from __future__ import annotations
 
 import enum
+import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 NMT = 0x000
 SYNC = 0x080
 STATE = 0x1FE
+COUNTERS = 0x2FE
 RESET_REQUEST = 0x27E
 SDO_ANSWER = 0x580
 SDO_REQUEST = 0x600
@@ -31,10 +33,13 @@ QUICK_STOP_RPDO = 0x500
 
 PRE_OPERATIONAL_COMMAND = 0x80
 OPERATIONAL = 5
+NMT_COMMANDS = (0x01, 0x02, 0x80, 0x81, 0x82)
 
 CONTROLWORD = 0x6040
 STATUSWORD = 0x6041
+MODE = 0x6060
 VELOCITY = 0x606C
+TARGET = 0x60FF
 AXIS_OFFSET = 0x800
 QUICK_STOP_WORD = 0x0002
 DISABLE_VOLTAGE_WORD = 0x0000
@@ -46,6 +51,7 @@ _I32 = struct.Struct("<i")
 _U16 = struct.Struct("<H")
 _SDO_HEAD = struct.Struct("<BHB")
 _STATE = struct.Struct("<BBBBHBB")
+_COUNTERS = struct.Struct("<HHHBB")
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +75,10 @@ class DriveState(enum.Enum):
     FAULT = (0x4F, 0x08)
 
 
+POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
+"""States in which the motor has current."""
+
+
 def decode_state(statusword: int) -> DriveState | None:
     """The state that a statusword 6041h tells; None: bits that no state has."""
     for state in DriveState:
@@ -83,11 +93,12 @@ def asks_for_power(controlword: int) -> bool:
     return controlword & 0x8F == 0x0F
 
 
-def decode_status(data: bytes) -> int | None:
-    """Statusword 6041h of a status TPDO; None: not 6 bytes."""
+def decode_status(data: bytes) -> tuple[int, int] | None:
+    """Statusword 6041h and position 6064h of a status TPDO; None: not 6 bytes."""
     if len(data) != _STATUS.size:
         return None
-    return int(_STATUS.unpack(data)[0])
+    statusword, counts = _STATUS.unpack(data)
+    return statusword, counts
 
 
 def decode_velocity(data: bytes) -> int | None:
@@ -116,6 +127,20 @@ def decode_sdo(data: bytes) -> tuple[int, int] | None:
     return index, int.from_bytes(data[4 : 4 + size], "little", signed=True)
 
 
+def decode_sdo_download(data: bytes) -> int | None:
+    """Index that an SDO request begins to write (CiA 301: initiate download, byte 0 = 001xxxxx), else None."""
+    if len(data) != 8 or data[0] & 0xE0 != 0x20:
+        return None
+    return int(_SDO_HEAD.unpack_from(data)[1])
+
+
+def decode_nmt(data: bytes) -> tuple[int, int] | None:
+    """Command and node (0: all) of an NMT frame; None: CiA 301 knows no such command."""
+    if len(data) != 2 or data[0] not in NMT_COMMANDS:
+        return None
+    return data[0], data[1]
+
+
 def decode_reset_request(data: bytes) -> int | None:
     """Number (1–255) of a reset request; None: it is none."""
     if len(data) != 4 or data[1:] != b"RST" or data[0] == 0:
@@ -132,6 +157,12 @@ def state(number: int, cause: int, rung: int, node_id: int, lease_age_s: float, 
     """The state frame. `lease_age_s` above 65.534 s (infinity too) is sent as unknown; `reset`: number, answer."""
     age_ms = int(max(lease_age_s, 0.0) * 1000.0) if lease_age_s < 65.535 else LEASE_AGE_UNKNOWN
     return Frame(STATE, _STATE.pack(number, cause, rung, node_id, age_ms, *reset))
+
+
+def counters(refused: int, dropped: int, bus_errors: int, trips: int, gap_s: float) -> Frame:
+    """The frame of counters; each stays at its greatest number when it has come so far. `gap_s`: longest pause."""
+    words = (min(number, 0xFFFF) for number in (refused, dropped, bus_errors))
+    return Frame(COUNTERS, _COUNTERS.pack(*words, min(trips, 0xFF), min(math.ceil(gap_s * 1000.0), 0xFF)))
 
 
 def quick_stop(node_id: int, axis_count: int) -> Frame:

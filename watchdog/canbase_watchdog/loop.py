@@ -71,15 +71,16 @@ class Loop:
         return now
 
     def _act(self, now: float) -> None:
+        health = self._bus.health
+        self._watchdog.on_bus(health.failed_since, health.errors)
         for frame in self._watchdog.tick(now):
             self._bus.send(frame)
         self._check_bus(now)
-        errors = {"send errors": self._bus.send_errors, "receive errors": self._bus.receive_errors}
-        self._reporter.tick(errors, self._bus.works, now)
+        self._reporter.tick(health, now)
         self._collect(now)
 
     def _check_bus(self, now: float) -> None:
-        if self._bus.works:
+        if self._bus.health.takes_frames:
             self._sent_at = now
         elif now >= self._sent_at + BUS_DEAD_S:
             raise BusDeadError(f"no frame could be sent for {BUS_DEAD_S:.1f} s. Is the interface up, the cable in?")

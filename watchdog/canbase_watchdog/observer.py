@@ -5,93 +5,87 @@ Ages count from the local monotonic receive time. A frame that cannot be underst
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from functools import partial
 
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 from canbase_watchdog import frames
+from canbase_watchdog.feedback import FeedbackWatch
+from canbase_watchdog.foreign import Foreign
 from canbase_watchdog.frames import DriveState
-from canbase_watchdog.lease import Lease
+from canbase_watchdog.view import NEVER, Axis, BusView, Node
 
-NEVER = -math.inf
-"""Receive time of what has not come yet."""
-
-
-@dataclass(frozen=True, slots=True)
-class Axis:
-    """One wheel as the bus shows it. Speeds in m/s at its rim, forward positive; times monotonic in s."""
-
-    drive: WatchedDrive
-    state: DriveState | None = None
-    status_at: float = NEVER
-    enabled_since: float = NEVER
-    velocity_mps: float = 0.0
-    velocity_at: float = NEVER
-    target_mps: float = 0.0
-    asks_for_power: bool = False
-    command_at: float = NEVER
-
-    @property
-    def enabled(self) -> bool:
-        """True when its last statusword said OPERATION ENABLED."""
-        return self.state is DriveState.OPERATION_ENABLED
-
-    @property
-    def powered(self) -> bool:
-        """True when its last statusword said a state in which the motor has current."""
-        return self.state in _POWERED
-
-    @property
-    def fed_at(self) -> float:
-        """When both statusword and velocity were last known."""
-        return min(self.status_at, self.velocity_at)
+ENABLED = DriveState.OPERATION_ENABLED
+_Key = tuple[int, int]
+"""Node id and axis."""
 
 
-_POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
+class _Record:
+    """The last values of one axis, as they come."""
 
+    __slots__ = (
+        "asks_for_power",
+        "command_at",
+        "disabled_since",
+        "drive",
+        "enabled_since",
+        "feedback",
+        "fresh",
+        "setpoint_at",
+        "setpoint_mps",
+        "state",
+        "status_at",
+        "target_mps",
+        "velocity_at",
+        "velocity_mps",
+    )
 
-@dataclass(frozen=True, slots=True)
-class Node:
-    """One drive on the bus: when its last heartbeat and its last frame of any kind came."""
+    def __init__(self, drive: WatchedDrive, feedback: FeedbackWatch) -> None:
+        self.drive = drive
+        self.feedback = feedback
+        self.state: DriveState | None = None
+        self.status_at = self.enabled_since = self.disabled_since = NEVER
+        self.velocity_mps, self.velocity_at = 0.0, NEVER
+        self.target_mps, self.command_at = 0.0, NEVER
+        self.setpoint_mps, self.setpoint_at = 0.0, NEVER
+        self.asks_for_power = self.fresh = False
 
-    node_id: int
-    heartbeat_at: float = NEVER
-    heard_at: float = NEVER
-
-
-@dataclass(frozen=True, slots=True)
-class View:
-    """All that the policy decides from. `sync_since`: start of the present run of SYNCs without a gap."""
-
-    axes: tuple[Axis, ...]
-    nodes: tuple[Node, ...]
-    started_at: float
-    driver_at: float = NEVER
-    sync_at: float = NEVER
-    sync_since: float = NEVER
-    lease: Lease | None = None
-    lease_at: float = NEVER
-    tick_gap_s: float = 0.0
-
-    def node(self, node_id: int) -> Node:
-        """The node with this id. Raises StopIteration for one that is not configured."""
-        return next(node for node in self.nodes if node.node_id == node_id)
+    def axis(self) -> Axis:
+        return Axis(
+            self.drive,
+            self.state,
+            self.status_at,
+            self.enabled_since,
+            self.disabled_since,
+            self.velocity_mps,
+            self.velocity_at,
+            self.target_mps,
+            self.asks_for_power,
+            self.command_at,
+            self.setpoint_mps,
+            self.setpoint_at,
+            self.feedback.last,
+        )
 
 
 class Observer:
     """Keeps the last values of everything on the bus that concerns the configured drives."""
 
-    def __init__(self, config: WatchdogConfig) -> None:
+    def __init__(self, config: WatchdogConfig, now: float) -> None:
         """Listens for the drives in `config`; the lower axis number of a node uses the PDOs of its first axis."""
         self._gap_s = config.feedback_timeout_s
-        self._axes = {(drive.node_id, drive.axis): Axis(drive) for drive in config.drives}
-        self._nodes = {node_id: Node(node_id) for node_id, _ in self._axes}
+        self._records = {
+            (drive.node_id, drive.axis): _Record(drive, FeedbackWatch(drive, config, now)) for drive in config.drives
+        }
+        self._heartbeat_at = {node_id: NEVER for node_id, _ in self._records}
+        self._heard_at = dict(self._heartbeat_at)
+        self._foreign = Foreign(config)
         self._driver_at = self._sync_at = self._sync_since = NEVER
         self._routes: dict[int, Callable[[bytes, float], bool]] = {}
         self.dropped = 0
         """Frames with a watched identifier that could not be understood."""
+        self.commands_are_ours = False
+        """NMT, quick stop PDO and SDO on the bus are our own frames that come back: not signs of another master."""
         self._add_routes()
 
     def on_frame(self, cob_id: int, data: bytes, now: float) -> None:
@@ -100,38 +94,48 @@ class Observer:
         if route is not None and not route(data, now):
             self.dropped += 1
 
-    def view(self, started_at: float, lease: Lease | None, lease_at: float, tick_gap_s: float) -> View:
-        """Everything as it stands, with what the caller knows of leases and of its own loop."""
-        return View(
-            tuple(self._axes.values()),
-            tuple(self._nodes.values()),
-            started_at,
+    def look(self) -> BusView:
+        """Everything as it stands."""
+        return BusView(
+            tuple([record.axis() for record in self._records.values()]),
+            tuple([Node(node_id, at, self._heard_at[node_id]) for node_id, at in self._heartbeat_at.items()]),
             self._driver_at,
             self._sync_at,
             self._sync_since,
-            lease,
-            lease_at,
-            tick_gap_s,
+            self._foreign.last,
         )
 
+    @property
+    def driver_at(self) -> float:
+        """When the older one of the driver's heartbeat and SYNC came."""
+        return min(self._driver_at, self._sync_at)
+
     def _add_routes(self) -> None:
+        self._routes[frames.NMT] = self._on_nmt
         self._routes[frames.SYNC] = self._on_sync
         self._routes[frames.DRIVER_HEARTBEAT] = self._on_driver_heartbeat
-        for node_id in self._nodes:
+        for node_id in self._heard_at:
             self._routes[frames.HEARTBEAT + node_id] = partial(self._on_heartbeat, node_id)
-            self._routes[frames.SDO_ANSWER + node_id] = partial(self._on_sdo, node_id)
-            for place, key in enumerate(sorted(key for key in self._axes if key[0] == node_id)):
+            self._routes[frames.SDO_ANSWER + node_id] = partial(self._on_sdo_answer, node_id)
+            self._routes[frames.SDO_REQUEST + node_id] = partial(self._on_sdo_request, node_id)
+            self._routes[frames.QUICK_STOP_RPDO + node_id] = partial(self._on_quick_stop, node_id)
+            for place, key in enumerate(sorted(key for key in self._records if key[0] == node_id)):
                 self._add_axis_routes(place, key)
 
-    def _add_axis_routes(self, place: int, key: tuple[int, int]) -> None:
-        node_id = key[0]
-        self._routes[frames.STATUS_TPDO[place] + node_id] = partial(self._on_status, key)
-        self._routes[frames.VELOCITY_TPDO[place] + node_id] = partial(self._on_velocity, key)
-        self._routes[frames.SETPOINT_RPDO[place] + node_id] = partial(self._on_setpoint, key)
+    def _add_axis_routes(self, place: int, key: _Key) -> None:
+        node_id, record = key[0], self._records[key]
+        setpoint = frames.SETPOINT_RPDO[place] + node_id
+        self._routes[frames.STATUS_TPDO[place] + node_id] = partial(self._on_status, record)
+        self._routes[frames.VELOCITY_TPDO[place] + node_id] = partial(self._on_velocity, record)
+        self._routes[setpoint] = partial(self._on_setpoint, record, setpoint)
 
     def _on_sync(self, data: bytes, now: float) -> bool:
         if len(data) > 1:
             return False
+        self._foreign.on_sync(now)
+        for record in self._records.values():
+            if record.fresh:
+                record.setpoint_mps, record.setpoint_at, record.fresh = record.target_mps, now, False
         if now >= self._sync_at + self._gap_s:
             self._sync_since = now
         self._sync_at = now
@@ -140,64 +144,95 @@ class Observer:
     def _on_driver_heartbeat(self, data: bytes, now: float) -> bool:
         if len(data) != 1:
             return False
+        self._foreign.on_heartbeat(now)
         self._driver_at = now
         return True
 
     def _on_heartbeat(self, node_id: int, data: bytes, now: float) -> bool:
         if len(data) != 1:
             return False
-        self._nodes[node_id] = Node(node_id, heartbeat_at=now, heard_at=now)
+        self._heartbeat_at[node_id] = self._heard_at[node_id] = now
         return True
 
-    def _on_status(self, key: tuple[int, int], data: bytes, now: float) -> bool:
-        statusword = frames.decode_status(data)
-        return statusword is not None and self._note_state(key, statusword, now)
+    def _on_status(self, record: _Record, data: bytes, now: float) -> bool:
+        status = frames.decode_status(data)
+        if status is None or not self._note_state(record, status[0], now):
+            return False
+        record.feedback.on_position(status[1])
+        return True
 
-    def _note_state(self, key: tuple[int, int], statusword: int, now: float) -> bool:
+    def _note_state(self, record: _Record, statusword: int, now: float) -> bool:
         state = frames.decode_state(statusword)
         if state is None:
             return False
-        axis = self._axes[key]
-        newly = state is DriveState.OPERATION_ENABLED and not axis.enabled
-        since = now if newly else axis.enabled_since
-        self._axes[key] = replace(axis, state=state, status_at=now, enabled_since=since)
-        self._hear(key[0], now)
+        if state is ENABLED and record.state is not ENABLED:
+            record.enabled_since = now
+        elif state is not ENABLED and record.state is ENABLED:
+            record.disabled_since = now
+        record.state, record.status_at = state, now
+        self._heard_at[record.drive.node_id] = now
         return True
 
-    def _on_velocity(self, key: tuple[int, int], data: bytes, now: float) -> bool:
+    def _on_velocity(self, record: _Record, data: bytes, now: float) -> bool:
         bits = frames.decode_velocity(data)
-        return bits is not None and self._note_velocity(key, bits, now)
-
-    def _note_velocity(self, key: tuple[int, int], bits: int, now: float) -> bool:
-        axis = self._axes[key]
-        self._axes[key] = replace(axis, velocity_mps=bits * axis.drive.mps_per_bit, velocity_at=now)
-        self._hear(key[0], now)
+        if bits is None:
+            return False
+        self._note_velocity(record, bits, now)
+        record.feedback.on_velocity(record.velocity_mps, record.state in frames.POWERED, now)
         return True
 
-    def _on_setpoint(self, key: tuple[int, int], data: bytes, now: float) -> bool:
+    def _note_velocity(self, record: _Record, bits: int, now: float) -> None:
+        record.velocity_mps, record.velocity_at = bits * record.drive.mps_per_bit, now
+        self._heard_at[record.drive.node_id] = now
+
+    def _on_setpoint(self, record: _Record, cob_id: int, data: bytes, now: float) -> bool:
         setpoint = frames.decode_setpoint(data)
         if setpoint is None:
             return False
+        self._foreign.on_setpoint(cob_id, record.drive.node_id, data, now)
         word, bits = setpoint
-        axis = self._axes[key]
-        target_mps = bits * axis.drive.mps_per_bit
-        power = frames.asks_for_power(word)
-        self._axes[key] = replace(axis, target_mps=target_mps, asks_for_power=power, command_at=now)
+        record.target_mps, record.command_at, record.fresh = bits * record.drive.mps_per_bit, now, True
+        record.asks_for_power = frames.asks_for_power(word)
+        record.feedback.on_target(record.target_mps, now)
         return True
 
-    def _on_sdo(self, node_id: int, data: bytes, now: float) -> bool:
+    def _on_sdo_answer(self, node_id: int, data: bytes, now: float) -> bool:
         """Answers to anybody's reading of 6041h and 606Ch are as true as a TPDO; all others are not for us."""
-        self._hear(node_id, now)
+        self._heard_at[node_id] = now
         answer = frames.decode_sdo(data)
-        for key in self._axes:
+        for key, record in self._records.items():
             offset = key[1] * frames.AXIS_OFFSET
             if answer is None or key[0] != node_id:
                 continue
             if answer[0] == frames.STATUSWORD + offset:
-                return self._note_state(key, answer[1], now)
+                return self._note_state(record, answer[1], now)
             if answer[0] == frames.VELOCITY + offset:
-                return self._note_velocity(key, answer[1], now)
+                self._note_velocity(record, answer[1], now)
         return True
 
-    def _hear(self, node_id: int, now: float) -> None:
-        self._nodes[node_id] = replace(self._nodes[node_id], heard_at=now)
+    def _on_nmt(self, data: bytes, now: float) -> bool:
+        command = frames.decode_nmt(data)
+        if command is None:
+            return False
+        for node_id in self._heard_at:
+            if command[1] in (0, node_id):
+                self._note_foreign(node_id, f"NMT command {command[0]} for node {command[1]}", now)
+        return True
+
+    def _on_quick_stop(self, node_id: int, data: bytes, now: float) -> bool:
+        self._note_foreign(node_id, f"the watchdog's quick stop PDO with {data.hex(' ')}", now)
+        return True
+
+    def _on_sdo_request(self, node_id: int, data: bytes, now: float) -> bool:
+        written = frames.decode_sdo_download(data)
+        if written is not None and written % frames.AXIS_OFFSET in _COMMANDS:
+            self._note_foreign(node_id, f"an SDO that writes {written:04X}h", now)
+        return True
+
+    def _note_foreign(self, node_id: int, detail: str, now: float) -> None:
+        enabled = any(record.state is ENABLED for key, record in self._records.items() if key[0] == node_id)
+        if enabled and not self.commands_are_ours:
+            self._foreign.note(node_id, f"{detail}, while it is enabled", now)
+
+
+_COMMANDS = frozenset(index % frames.AXIS_OFFSET for index in (frames.CONTROLWORD, frames.MODE, frames.TARGET))

@@ -10,18 +10,29 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from canbase_config.watchdog import WatchdogConfig
-from canbase_watchdog.observer import Axis, Node, View
+from canbase_watchdog.view import Axis, Node, View
 
 
 class Cause(enum.IntEnum):
-    """Byte 1 of the state frame. The numbers between are kept free by docs/bus.md."""
+    """Byte 1 of the state frame, see docs/bus.md."""
 
     NONE = 0
     LEASE_LOST = 1
     DRIVER_SILENT = 2
     DRIVE_SILENT = 3
+    TARGET_OUTSIDE = 4
+    MOTION_OUTSIDE = 5
+    OVERSPEED = 6
+    DRIVE_DOWN = 7
+    FOREIGN_MASTER = 8
+    BUS_FAILED = 9
     LOOP_LATE = 10
     ENDED = 11
+    FEEDBACK_IMPLAUSIBLE = 12
+
+
+SIGN_S = 1.0
+"""A sign of another master counts for so long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,14 +87,15 @@ def _lease_lost(view: View, config: WatchdogConfig, now: float) -> Verdict:
 
 def _driver_is_silent(view: View, since: float, config: WatchdogConfig, now: float) -> bool:
     """Its heartbeat or its SYNC is missing: both come from its control loop itself."""
-    return now >= max(min(view.driver_at, view.sync_at), since) + config.drive_heartbeat_s
+    return now >= max(min(view.bus.driver_at, view.bus.sync_at), since) + config.drive_heartbeat_s
 
 
 def _driver_silent(view: View, config: WatchdogConfig, now: float) -> Verdict:
     for axis in view.axes:
         if axis.enabled and _driver_is_silent(view, max(axis.enabled_since, view.started_at), config, now):
+            bus = view.bus
             detail = (
-                f"driver's heartbeat is {now - view.driver_at:.3f} s old, its SYNC {now - view.sync_at:.3f} s "
+                f"driver's heartbeat is {now - bus.driver_at:.3f} s old, its SYNC {now - bus.sync_at:.3f} s "
                 f"(allowed {config.drive_heartbeat_s:.3f} s) while {axis.drive.joint} is enabled"
             )
             return Verdict(Cause.DRIVER_SILENT, 0, detail)
@@ -91,13 +103,13 @@ def _driver_silent(view: View, config: WatchdogConfig, now: float) -> Verdict:
 
 
 def _driver_still_silent(view: View, node_id: int, config: WatchdogConfig, now: float) -> bool:
-    return now >= view.driver_at + config.drive_heartbeat_s
+    return now >= view.bus.driver_at + config.drive_heartbeat_s
 
 
 def _unfed(axis: Axis, view: View, config: WatchdogConfig, now: float) -> bool:
     """SYNCs go on and its TPDOs do not answer them."""
-    synced = now < view.sync_at + config.feedback_timeout_s
-    return synced and now >= max(axis.fed_at, axis.enabled_since, view.sync_since) + config.feedback_timeout_s
+    synced = now < view.bus.sync_at + config.feedback_timeout_s
+    return synced and now >= max(axis.fed_at, axis.enabled_since, view.bus.sync_since) + config.feedback_timeout_s
 
 
 def _beatless(node: Node, axis: Axis, config: WatchdogConfig, now: float) -> bool:
@@ -117,33 +129,149 @@ def _drive_silent(view: View, config: WatchdogConfig, now: float) -> Verdict:
     return FINE
 
 
+def _allowed(axis: Axis, view: View, config: WatchdogConfig) -> tuple[float, float]:
+    """Least and greatest target of a wheel [m/s] by the leases, without tolerance."""
+    low, high = view.bounds.wheel(config.track_m / 2.0 if axis.drive.side == "right" else -config.track_m / 2.0)
+    return max(low, -config.max_wheel_mps), min(high, config.max_wheel_mps)
+
+
+def _target_outside(view: View, config: WatchdogConfig, now: float) -> Verdict:
+    """Not debounced: a setpoint is a number that the driver computed, without noise."""
+    for axis in view.axes:
+        low, high = _allowed(axis, view, config)
+        share = config.target_tolerance_share * max(-low, high)
+        slack = config.target_tolerance_mps + abs(axis.drive.mps_per_bit) + share
+        if (axis.enabled or axis.asks_for_power) and not low - slack <= axis.target_mps <= high + slack:
+            detail = (
+                f"{axis.drive.joint} is ordered {axis.target_mps:.3f} m/s, "
+                f"the leases allow {low:.3f} to {high:.3f} m/s (tolerance {slack:.3f} m/s)"
+            )
+            return Verdict(Cause.TARGET_OUTSIDE, axis.drive.node_id, detail)
+    if view.skew:
+        return Verdict(Cause.TARGET_OUTSIDE, 0, f"left and right wheels are ordered {view.skew}")
+    return FINE
+
+
+def _motion_outside(view: View, config: WatchdogConfig, now: float) -> Verdict:
+    for axis in view.axes:
+        feedback = axis.feedback
+        if axis.powered and feedback.outside >= config.feedback_samples:
+            detail = (
+                f"{axis.drive.joint} turns at {axis.velocity_mps:.3f} m/s, "
+                f"its setpoints allow {feedback.low_mps:.3f} to {feedback.high_mps:.3f} m/s"
+            )
+            return Verdict(Cause.MOTION_OUTSIDE, axis.drive.node_id, detail)
+    return FINE
+
+
+def _overspeed(view: View, config: WatchdogConfig, now: float) -> Verdict:
+    for axis in view.axes:
+        if axis.powered and axis.feedback.overspeed >= config.feedback_samples:
+            limit_mps = config.overspeed_factor * config.max_wheel_mps
+            detail = f"{axis.drive.joint} turns at {axis.velocity_mps:.3f} m/s (allowed {limit_mps:.3f} m/s)"
+            return Verdict(Cause.OVERSPEED, axis.drive.node_id, detail)
+    return FINE
+
+
+def _feedback_implausible(view: View, config: WatchdogConfig, now: float) -> Verdict:
+    for axis in view.axes:
+        if axis.powered and axis.feedback.implausible >= config.feedback_samples:
+            detail = (
+                f"{axis.drive.joint} reports {axis.velocity_mps:.3f} m/s, and its encoder tells otherwise: "
+                f"{axis.feedback.drift_m:.3f} m apart (allowed {config.travel_tolerance_m:.3f} m)"
+            )
+            return Verdict(Cause.FEEDBACK_IMPLAUSIBLE, axis.drive.node_id, detail)
+    return FINE
+
+
+def _drive_down(view: View, config: WatchdogConfig, now: float) -> Verdict:
+    """The driver has `feedback_timeout_s` to stop the others by itself. Fault or off: the base turns all the same."""
+    driven = [axis for axis in view.axes if axis.enabled and (moving(axis, config) or commanded(axis, config))]
+    for axis in view.axes:
+        for other in driven:
+            since = max(axis.disabled_since, other.enabled_since)
+            if not axis.enabled and now >= since + config.feedback_timeout_s:
+                state = "unknown" if axis.state is None else axis.state.name.lower().replace("_", " ")
+                detail = (
+                    f"{axis.drive.joint} is not enabled (state: {state}) while {other.drive.joint} turns at "
+                    f"{other.velocity_mps:.3f} m/s, ordered {other.target_mps:.3f} m/s"
+                )
+                return Verdict(Cause.DRIVE_DOWN, axis.drive.node_id, detail)
+    return FINE
+
+
+def _foreign_is_near(view: View, node_id: int, config: WatchdogConfig, now: float) -> bool:
+    return view.bus.foreign is not None and now < view.bus.foreign.at + SIGN_S
+
+
+def _foreign_master(view: View, config: WatchdogConfig, now: float) -> Verdict:
+    sign = view.bus.foreign
+    if sign is None or now >= sign.at + SIGN_S or not view.enabled:
+        return FINE
+    return Verdict(Cause.FOREIGN_MASTER, sign.node_id, f"another master is on the bus: {sign.detail}")
+
+
+def _bus_is_failed(view: View, node_id: int, config: WatchdogConfig, now: float) -> bool:
+    return now >= view.bus_failed_since + config.bus_failed_s
+
+
+def _bus_failed(view: View, config: WatchdogConfig, now: float) -> Verdict:
+    if not view.enabled or not _bus_is_failed(view, 0, config, now):
+        return FINE
+    detail = f"the bus takes no frames for {now - view.bus_failed_since:.3f} s (allowed {config.bus_failed_s:.3f} s)"
+    return Verdict(Cause.BUS_FAILED, 0, detail)
+
+
 def _loop_late(view: View, config: WatchdogConfig, now: float) -> Verdict:
-    if view.tick_gap_s <= config.loop_late_s or not any(axis.enabled for axis in view.axes):
+    if view.tick_gap_s <= config.loop_late_s or not view.enabled:
         return FINE
     detail = f"own loop stood still for {view.tick_gap_s:.3f} s (allowed {config.loop_late_s:.3f} s)"
     return Verdict(Cause.LOOP_LATE, 0, detail)
 
 
+def _over(view: View, node_id: int, config: WatchdogConfig, now: float) -> bool:
+    """Nothing is left of the cause when the wheels stand and nothing is ordered, which each reset needs anyway."""
+    return False
+
+
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One row: `trips` finds the cause; `stands` tells, for the node that it was about, whether it is still there."""
+    """One row: `trips` finds the cause; `stands` tells, for the node that it was about, whether it is still there.
+
+    `clears_on`: what a reset needs besides standing wheels and no ordered velocity, in words.
+    """
 
     cause: Cause
     trips: Callable[[View, WatchdogConfig, float], Verdict]
     stands: Callable[[View, int, WatchdogConfig, float], bool]
+    clears_on: str
 
 
 CHECKS = (
-    Check(Cause.LEASE_LOST, _lease_lost, lambda view, node_id, config, now: _lease_is_lost(view, config, now)),
-    Check(Cause.DRIVER_SILENT, _driver_silent, _driver_still_silent),
+    Check(Cause.BUS_FAILED, _bus_failed, _bus_is_failed, "the bus takes frames again"),
+    Check(Cause.LOOP_LATE, _loop_late, _over, "nothing else"),
+    Check(Cause.FOREIGN_MASTER, _foreign_master, _foreign_is_near, "the other master is silent for 1 s"),
+    Check(
+        Cause.LEASE_LOST,
+        _lease_lost,
+        lambda view, node_id, config, now: _lease_is_lost(view, config, now),
+        "leases arrive",
+    ),
+    Check(Cause.DRIVER_SILENT, _driver_silent, _driver_still_silent, "the driver's heartbeat is back"),
     Check(
         Cause.DRIVE_SILENT,
         _drive_silent,
         lambda view, node_id, config, now: now >= view.node(node_id).heard_at + config.drive_heartbeat_s,
+        "the drive is heard again",
     ),
-    Check(Cause.LOOP_LATE, _loop_late, lambda view, node_id, config, now: False),
+    Check(Cause.DRIVE_DOWN, _drive_down, _over, "nothing else; the driver resets the drive's fault after it"),
+    Check(Cause.FEEDBACK_IMPLAUSIBLE, _feedback_implausible, _over, "nothing else; look at the encoder first"),
+    Check(Cause.TARGET_OUTSIDE, _target_outside, _over, "nothing else"),
+    Check(Cause.OVERSPEED, _overspeed, _over, "nothing else"),
+    Check(Cause.MOTION_OUTSIDE, _motion_outside, _over, "nothing else"),
 )
-"""The first row that trips is the cause. A cause without a row does not stand: nothing of it is left to see."""
+"""The first row that trips is the cause: where one failure shows in several rows, the one that explains it most comes
+first. A cause without a row does not stand: nothing of it is left to see."""
 
 
 def decide(view: View, config: WatchdogConfig, now: float) -> Verdict:
@@ -161,11 +289,12 @@ def stands(verdict: Verdict, view: View, config: WatchdogConfig, now: float) -> 
     return any(check.stands(view, verdict.node_id, config, now) for check in rows)
 
 
-def next_expiry(view: View, config: WatchdogConfig, now: float) -> float:
+def clears_on(verdict: Verdict) -> str:
+    """What a reset needs besides standing wheels and no ordered velocity."""
+    return next((check.clears_on for check in CHECKS if check.cause is verdict.cause), "nothing else")
+
+
+def next_expiry(lease_at: float, driver_at: float, config: WatchdogConfig, now: float) -> float:
     """When the lease or the driver times out next if nothing comes [s]: a tick just then stops without delay."""
-    ends = (
-        view.lease_at + config.lease_timeout_s,
-        view.driver_at + config.drive_heartbeat_s,
-        view.sync_at + config.drive_heartbeat_s,
-    )
+    ends = (lease_at + config.lease_timeout_s, driver_at + config.drive_heartbeat_s)
     return min((end for end in ends if end > now), default=now + config.lease_timeout_s)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import enum
 import logging
 
+from canbase_watchdog import policy
+from canbase_watchdog.bus_health import BusHealth
 from canbase_watchdog.notify import notify
 from canbase_watchdog.watchdog import Answer, State, Status, Watchdog
 
@@ -24,15 +26,15 @@ class Reporter:
         self._counters: dict[str, int] = {}
         self._counters_due = self._alive_due = 0.0
 
-    def tick(self, bus_errors: dict[str, int], bus_works: bool, now: float) -> None:
+    def tick(self, health: BusHealth, now: float) -> None:
         """Say what changed. systemd hears that we live only while the bus works."""
         if self._watchdog.status != self._status:
             self._tell_status(self._watchdog.status)
-        if now >= self._alive_due and bus_works:
+        if now >= self._alive_due and health.takes_frames:
             self._alive_due = now + ALIVE_PERIOD_S
             notify("WATCHDOG=1")
         if now >= self._counters_due:
-            self._tell_counters(bus_errors, now)
+            self._tell_counters(health, now)
 
     def _tell_status(self, status: Status) -> None:
         old, self._status = self._status, status
@@ -46,8 +48,13 @@ class Reporter:
         if answer is not Answer.NONE and (old is None or old.reset != status.reset):
             _log.info("reset request %d: %s", number, _words(answer))
 
-    def _tell_counters(self, bus_errors: dict[str, int], now: float) -> None:
-        counters = bus_errors | {"frames not understood": self._watchdog.dropped_frames}
+    def _tell_counters(self, health: BusHealth, now: float) -> None:
+        counters = {
+            "send errors": health.send_errors,
+            "receive errors": health.receive_errors,
+            "error frames": health.error_frames,
+            "frames not understood": self._watchdog.dropped_frames,
+        }
         counters |= {f"leases refused, {why.value}": n for why, n in self._watchdog.refused_leases.items()}
         changed = {name: n for name, n in counters.items() if n != self._counters.get(name, 0)}
         if not changed:
@@ -72,4 +79,5 @@ def _state_line(status: Status) -> str:
         return _words(status.state)
     cause = _words(status.verdict.cause)
     about = f", node {status.verdict.node_id}" if status.verdict.node_id else ""
-    return f"tripped: {cause}{about}: {status.verdict.detail}"
+    clears = policy.clears_on(status.verdict)
+    return f"tripped: {cause}{about}: {status.verdict.detail}; a reset needs standing wheels, zero orders and: {clears}"

@@ -8,7 +8,7 @@ from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog import frames
 from canbase_watchdog.frames import Frame
 from canbase_watchdog.ladder import Climb, Look, Step, advance, first
-from canbase_watchdog.observer import NEVER, Axis, View
+from canbase_watchdog.view import NEVER, Axis, View
 
 QUICK_STOP_PERIOD_S = 0.01
 NMT_PERIOD_S = 0.05

@@ -8,14 +8,18 @@ from dataclasses import dataclass
 
 from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog import frames, policy
+from canbase_watchdog.envelope import Envelope
 from canbase_watchdog.frames import Frame
 from canbase_watchdog.ladder import Step
 from canbase_watchdog.lease import LeaseBook, Refusal
-from canbase_watchdog.observer import Observer, View
+from canbase_watchdog.observer import Observer
+from canbase_watchdog.pair import PairWatch
 from canbase_watchdog.policy import Cause, Verdict
 from canbase_watchdog.stopper import Stopper
+from canbase_watchdog.view import View
 
 STATE_PERIOD_S = 0.05
+COUNTERS_PERIOD_S = 0.5
 REPEATED_REQUEST_S = 1.0
 """A reset request with the number of the last one is a copy of it for so long, and a new one after."""
 
@@ -59,17 +63,23 @@ class Watchdog:
     def __init__(self, config: WatchdogConfig, now: float) -> None:
         """`config.lease_uid` None: leases of any user count, so the caller puts in its own."""
         self._config = config
-        self._observer = Observer(config)
+        self._observer = Observer(config, now)
+        self._envelope = Envelope(config, now)
+        self._pair = PairWatch(config)
         self._leases = LeaseBook(config.lease_timeout_s, config.lease_uid)
         self._started_at = self._ticked_at = now
-        self._view = self._observer.view(now, None, -math.inf, 0.0)
+        self._bus_failed_since, self._bus_errors = math.inf, 0
+        self._view = self._look(now)
         self._state = State.STARTING
         self._verdict = policy.FINE
         self._stoppers: list[Stopper] = []
         self._reset = (0, Answer.NONE)
         self._reset_at = -math.inf
-        self._heartbeat_due = self._state_due = now
+        self._heartbeat_due = self._state_due = self._counters_due = now
         self._told: Status | None = None
+        self._longest_gap_s = 0.0
+        self.trips = 0
+        """Since the start."""
 
     @property
     def status(self) -> Status:
@@ -95,11 +105,20 @@ class Watchdog:
 
     def on_lease(self, datagram: bytes, uid: int | None, now: float) -> Refusal | None:
         """Take in a datagram from the lease socket, sent by the user `uid`. Returns why it does not count."""
-        return self._leases.take(datagram, uid, now)
+        refusal = self._leases.take(datagram, uid, now)
+        lease = self._leases.last
+        if refusal is None and lease is not None:
+            self._envelope.order(lease.linear_mps, lease.angular_radps, now)
+        return refusal
+
+    def on_bus(self, failed_since: float, errors: int) -> None:
+        """How the bus does: since when it has failed [s], infinity when it works, and its errors since the start."""
+        self._bus_failed_since, self._bus_errors = failed_since, errors
 
     def tick(self, now: float) -> list[Frame]:
         """Judge and act. Returns the frames to send at once, the stop first. To be called at least every 5 ms."""
-        self._view = self._look(now, tick_gap_s=now - self._ticked_at)
+        self._view = self._look(now)
+        self._longest_gap_s = max(self._longest_gap_s, self._view.tick_gap_s)
         self._ticked_at = now
         if self._state is State.TRIPPED:
             return self._stop(now) + self._tell(now)
@@ -113,11 +132,11 @@ class Watchdog:
 
     def next_expiry(self, now: float) -> float:
         """When the next timeout would run out [s]: a tick just then stops without delay."""
-        return policy.next_expiry(self._look(now, 0.0), self._config, now)
+        return policy.next_expiry(self._leases.valid_at, self._observer.driver_at, self._config, now)
 
     def end(self, now: float) -> None:
         """The process is asked to end: with a wheel in motion it must not leave without stopping it."""
-        view = self._look(now, 0.0)
+        view = self._look(now)
         axis = policy.in_motion(view, self._config)
         if self._state is State.TRIPPED or axis is None:
             return
@@ -129,12 +148,18 @@ class Watchdog:
         nodes = [drive.node_id for drive in self._config.drives]
         return [frames.quick_stop(node_id, nodes.count(node_id)) for node_id in dict.fromkeys(nodes)]
 
-    def _look(self, now: float, tick_gap_s: float) -> View:
-        return self._observer.view(self._started_at, self._leases.last, self._leases.valid_at, tick_gap_s)
+    def _look(self, now: float) -> View:
+        bus, bounds = self._observer.look(), self._envelope.advance(now)
+        skew = self._pair.look(bus, bounds)
+        gap_s = now - self._ticked_at
+        leases, failed = self._leases, self._bus_failed_since
+        return View(bus, bounds, self._started_at, leases.last, leases.valid_at, skew, gap_s, failed)
 
     def _trip(self, verdict: Verdict, now: float) -> None:
         self._state = State.TRIPPED
         self._verdict = verdict
+        self.trips += 1
+        self._observer.commands_are_ours = True
         nodes = dict.fromkeys(drive.node_id for drive in self._config.drives)
         self._stoppers = [Stopper(node_id, self._config, self._view, now) for node_id in nodes]
 
@@ -160,12 +185,20 @@ class Watchdog:
             self._state_due = max(self._state_due, now - STATE_PERIOD_S) + STATE_PERIOD_S
             self._told = status
             out.append(self._state_frame(status, now))
+        if now >= self._counters_due:
+            self._counters_due = max(self._counters_due, now - COUNTERS_PERIOD_S) + COUNTERS_PERIOD_S
+            out.append(self._counters_frame())
         return out
 
     def _state_frame(self, status: Status, now: float) -> Frame:
         age_s = now - self._leases.valid_at
         verdict = status.verdict
         return frames.state(status.state, verdict.cause, status.step, verdict.node_id, age_s, status.reset)
+
+    def _counters_frame(self) -> Frame:
+        refused, gap_s = sum(self._leases.refused.values()), self._longest_gap_s
+        self._longest_gap_s = 0.0
+        return frames.counters(refused, self._observer.dropped, self._bus_errors, self.trips, gap_s)
 
     def _on_reset_request(self, data: bytes, now: float) -> None:
         number = frames.decode_reset_request(data)
@@ -178,7 +211,7 @@ class Watchdog:
     def _answer(self, now: float) -> Answer:
         if self._state is not State.TRIPPED:
             return Answer.NOT_TRIPPED
-        view = self._look(now, 0.0)
+        view = self._look(now)
         if not self._settled or policy.stands(self._verdict, view, self._config, now):
             return Answer.CAUSE_STANDS
         if policy.velocity_ordered(view, self._config, now):
@@ -186,4 +219,5 @@ class Watchdog:
         self._state = State.WATCHING
         self._verdict = policy.FINE
         self._stoppers = []
+        self._observer.commands_are_ours = False
         return Answer.DONE

@@ -1,0 +1,169 @@
+"""What the leases of the recent past allow: bounds of the base's velocity, and of each wheel's target from them.
+
+Rules
+1. An order allows itself and everything between it and zero at once: stopping is always allowed.
+2. It goes on to be allowed for `order_hold_s` after the next order took its place or its lease ran out: so long may
+   the driver still follow it (its command timeout, its cycle, latency, and the time that the jerk limit adds).
+3. Then a bound falls to what is ordered now. As the driver keeps the curvature while it slows down, linear and angular
+   bounds wait for each other: braking for a turn that has to end as well, a turn for braking, and also for a linear
+   velocity that grows or is reversed.
+4. Before the watchdog started anything within the limits may have been ordered.
+
+Pure; written apart from the driver's limits.py on purpose.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+from canbase_config.watchdog import WatchdogConfig
+
+
+class Peak:
+    """The greatest of the values that were in force within the last `hold_s` [s]; without any, 0 is in force."""
+
+    def __init__(self, hold_s: float) -> None:
+        """Nothing was in force yet."""
+        self._hold_s = hold_s
+        self._past: deque[tuple[float, float]] = deque()
+        """Value and when it ended, only those that may still be the greatest: the values fall, their ends rise."""
+        self._value, self._end = 0.0, -math.inf
+
+    def set(self, value: float, now: float, until: float) -> None:
+        """From `now` on `value` is in force, until the next one or until the time `until`, whichever is earlier."""
+        self._keep(self._value, min(self._end, now))
+        if self._end < now:
+            self._keep(0.0, now)
+        self._value, self._end = value, until
+
+    def greatest(self, now: float) -> float:
+        """The greatest value at the time `now`, which may not be before that of the last call."""
+        past, since = self._past, now - self._hold_s
+        while past and past[0][1] < since:
+            past.popleft()
+        before = past[0][0] if past else -math.inf
+        if self._end >= since:
+            before = max(before, self._value)
+        return before if self._end >= now else max(before, 0.0)
+
+    def _keep(self, value: float, end: float) -> None:
+        past = self._past
+        while past and past[-1][0] <= value:
+            past.pop()
+        past.append((value, end))
+
+
+class Way:
+    """One way to go (forward, backward, to the left, to the right): what is ordered that way, and what is allowed."""
+
+    def __init__(self, ceiling: float, hold_s: float, now: float) -> None:
+        """Up to `ceiling` may have been ordered before the time `now`."""
+        self._ceiling = ceiling
+        self._high, self._low = Peak(hold_s), Peak(hold_s)
+        self._high.set(ceiling, now, now)
+        self.level = self.most = ceiling
+        self.least = 0.0
+
+    def order(self, value: float, now: float, until: float) -> None:
+        """An order, negative for the opposite way; above the ceiling it allows no more than the ceiling."""
+        value = min(max(value, 0.0), self._ceiling)
+        self._high.set(value, now, until)
+        self._low.set(-value, now, until)
+
+    def look(self, now: float) -> None:
+        """Bring the most and the least of what was ordered up to date."""
+        self.most, self.least = self._high.greatest(now), -self._low.greatest(now)
+        self.level = max(self.level, self.most)
+
+    def fall(self, kept: float) -> None:
+        """Keep this share of what is allowed beyond the most that was ordered."""
+        self.level = self.most + (self.level - self.most) * kept
+
+    @property
+    def excess(self) -> float:
+        """What is allowed beyond all orders: it falls."""
+        return self.level - self.most
+
+    @property
+    def span(self) -> float:
+        """What is allowed beyond the least order: so far the driver may be from where it goes."""
+        return self.level - self.least
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """What the base may be ordered to do. Each range contains 0. Linear [m/s], angular [rad/s] (REP 103)."""
+
+    linear_low: float
+    linear_high: float
+    angular_low: float
+    angular_high: float
+
+    def wheel(self, arm_m: float) -> tuple[float, float]:
+        """Least and greatest speed [m/s] of a wheel that is `arm_m` to the right of the middle (left: negative)."""
+        turns = (arm_m * self.angular_low, arm_m * self.angular_high)
+        return self.linear_low + min(turns), self.linear_high + max(turns)
+
+    def pair(self, left_mps: float, right_mps: float, track_m: float, tolerance_mps: float) -> str:
+        """Why two wheels that are each allowed are not so together, empty when they are."""
+        linear, angular = (left_mps + right_mps) / 2.0, (right_mps - left_mps) / track_m
+        slack = 2.0 * tolerance_mps / track_m
+        if not self.linear_low - tolerance_mps <= linear <= self.linear_high + tolerance_mps:
+            return f"{linear:.3f} m/s together, allowed {self.linear_low:.3f} to {self.linear_high:.3f} m/s"
+        if not self.angular_low - slack <= angular <= self.angular_high + slack:
+            return f"{angular:.3f} rad/s together, allowed {self.angular_low:.3f} to {self.angular_high:.3f} rad/s"
+        return ""
+
+
+class Envelope:
+    """The bounds as they rise with each order and fall with time."""
+
+    def __init__(self, config: WatchdogConfig, now: float) -> None:
+        """Rule 4: open at the monotonic time `now` [s]."""
+        self._config = config
+        ceilings = (config.linear_mps, config.linear_mps, config.angular_radps, config.angular_radps)
+        self._ways = tuple(Way(ceiling, config.order_hold_s, now) for ceiling in ceilings)
+        self._at = now
+
+    def order(self, linear_mps: float, angular_radps: float, now: float) -> None:
+        """A lease that counts. What it orders above the configured limits allows no more than they do."""
+        until = now + self._config.lease_timeout_s
+        values = (linear_mps, -linear_mps, angular_radps, -angular_radps)
+        for way, value in zip(self._ways, values, strict=True):
+            way.order(value, now, until)
+
+    def advance(self, now: float) -> Bounds:
+        """The bounds at the monotonic time `now` [s], which may not be before that of the last call."""
+        elapsed_s, self._at = now - self._at, now
+        for way in self._ways:
+            way.look(now)
+        forward, backward, left, right = self._ways
+        linear_s, angular_s = self._falling_s()
+        forward.fall(_kept(elapsed_s, linear_s))
+        backward.fall(_kept(elapsed_s, linear_s))
+        left.fall(_kept(elapsed_s, angular_s))
+        right.fall(_kept(elapsed_s, angular_s))
+        return Bounds(-backward.level, forward.level, -right.level, left.level)
+
+    def _falling_s(self) -> tuple[float, float]:
+        """How long the linear and the angular bounds still take to fall to what is ordered (rule 3)."""
+        config = self._config
+        forward, backward, left, right = self._ways
+        braking, turning = config.deceleration_mps2, config.angular_deceleration_radps2
+        reversing = min(config.angular_acceleration_radps2, turning)
+        linear_s = max(forward.excess, backward.excess) / braking
+        waits_s = max(left.span, right.span) / turning
+        angular_s = max(
+            left.excess / (reversing if right.most > 0.0 else turning),
+            right.excess / (reversing if left.most > 0.0 else turning),
+            max(forward.span, backward.span) / braking,
+        )
+        growth_s = max(forward.most, backward.most) / min(config.acceleration_mps2, braking)
+        return max(linear_s, waits_s), angular_s + growth_s
+
+
+def _kept(elapsed_s: float, falling_s: float) -> float:
+    """The share of an excess that is left after `elapsed_s` of a straight fall to nothing in `falling_s`."""
+    return 1.0 - elapsed_s / falling_s if elapsed_s < falling_s else 0.0

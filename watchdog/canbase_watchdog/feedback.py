@@ -1,0 +1,97 @@
+"""Whether what one drive reports fits its setpoints and itself: three counts of bad samples in a row. No judgement.
+
+The wheel follows its setpoints: it may have the speed of any setpoint of the last `drive_lag_s` and less, and after
+that it falls with the configured deceleration. Encoder and velocity tell the same way, but for a small drift.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from canbase_config.watchdog import WatchdogConfig, WatchedDrive
+from canbase_watchdog.envelope import Peak
+
+DRIFT_S = 0.5
+"""Differences between encoder and velocity are forgotten with this time constant: noise and filters have no memory."""
+_WRAP = 2**32
+
+
+@dataclass(frozen=True, slots=True)
+class Feedback:
+    """What the last velocity sample showed. The allowed range is without tolerance [m/s]; drift in m."""
+
+    low_mps: float = 0.0
+    high_mps: float = 0.0
+    outside: int = 0
+    """Samples in a row outside the range and its tolerance."""
+    overspeed: int = 0
+    """Samples in a row above the greatest speed of any wheel."""
+    implausible: int = 0
+    """Samples in a row at which encoder and velocity had drifted apart."""
+    drift_m: float = 0.0
+    """Travel by velocity minus travel by encoder."""
+
+
+class FeedbackWatch:
+    """Follows the setpoints and samples of one axis. Speeds at the rim, forward positive [m/s]."""
+
+    def __init__(self, drive: WatchedDrive, config: WatchdogConfig, now: float) -> None:
+        """Before the monotonic time `now` [s] the wheel may have had any setpoint within the limits."""
+        self._config = config
+        self._m_per_count = drive.m_per_count
+        self._fixed_mps = config.motion_tolerance_mps + abs(drive.mps_per_bit)
+        self._fastest_mps = config.overspeed_factor * config.max_wheel_mps
+        self._forward, self._backward = Peak(config.drive_lag_s), Peak(config.drive_lag_s)
+        self._high = self._low = config.max_wheel_mps
+        for peak in (self._forward, self._backward):
+            peak.set(config.max_wheel_mps, now, now)
+        self._at = now
+        self._velocity_mps = 0.0
+        self._counts: int | None = None
+        self._counts_before: int | None = None
+        self.last = Feedback()
+
+    def on_target(self, target_mps: float, now: float) -> None:
+        """A setpoint, which stays until the next one."""
+        self._forward.set(target_mps, now, math.inf)
+        self._backward.set(-target_mps, now, math.inf)
+
+    def on_position(self, counts: int) -> None:
+        """6064h of a status TPDO; the velocity of the same SYNC follows."""
+        self._counts = counts
+
+    def on_velocity(self, velocity_mps: float, powered: bool, now: float) -> None:
+        """606Ch of a velocity TPDO. A wheel without power may be pushed: nothing of it is bad."""
+        elapsed_s, self._at = now - self._at, now
+        self._follow(elapsed_s, now)
+        drift_m = self._drift(velocity_mps, elapsed_s)
+        self._velocity_mps, self._counts_before = velocity_mps, self._counts
+        if not powered:
+            self.last = Feedback(-self._low, self._high)
+            return
+        config, last = self._config, self.last
+        slack = self._fixed_mps + config.motion_tolerance_share * max(self._low, self._high)
+        inside = -self._low - slack <= velocity_mps <= self._high + slack
+        self.last = Feedback(
+            low_mps=-self._low,
+            high_mps=self._high,
+            outside=0 if inside else last.outside + 1,
+            overspeed=last.overspeed + 1 if abs(velocity_mps) > self._fastest_mps else 0,
+            implausible=last.implausible + 1 if abs(drift_m) > config.travel_tolerance_m else 0,
+            drift_m=drift_m,
+        )
+
+    def _follow(self, elapsed_s: float, now: float) -> None:
+        fallen_mps = elapsed_s * self._config.deceleration_mps2
+        self._high = max(self._high - fallen_mps, self._forward.greatest(now), 0.0)
+        self._low = max(self._low - fallen_mps, self._backward.greatest(now), 0.0)
+
+    def _drift(self, velocity_mps: float, elapsed_s: float) -> float:
+        """Begins anew after a gap: what the wheel did in it was not measured."""
+        if self._counts is None or self._counts_before is None or elapsed_s >= self._config.feedback_timeout_s:
+            return 0.0
+        steps = (self._counts - self._counts_before + _WRAP // 2) % _WRAP - _WRAP // 2
+        by_velocity_m = (velocity_mps + self._velocity_mps) / 2.0 * elapsed_s
+        left = max(1.0 - elapsed_s / DRIFT_S, 0.0)
+        return self.last.drift_m * left + by_velocity_m - steps * self._m_per_count

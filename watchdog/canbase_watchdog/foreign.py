@@ -1,0 +1,88 @@
+"""Signs of a second master. CAN frames carry no sender: only what one driver alone cannot have sent tells of another.
+
+Signs, each while a drive that it concerns is enabled or at any time where that does not matter
+1. two different setpoints for one axis between two SYNCs, or a SYNC without any setpoint before it: three times in 1 s,
+   as a frame that is lost looks the same once;
+2. more SYNCs or driver's heartbeats than half as many again as configured. Counted over a window that is long against
+   any burst: a loaded machine delivers late, yet not more;
+3. once: an NMT command to an enabled drive, a quick stop PDO, or an SDO that writes its controlword, target or mode.
+   The driver does none of them there. The watchdog does, but only after a trip, when nobody looks for signs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+from canbase_config.watchdog import WatchdogConfig
+
+DISORDER_COUNT, DISORDER_S = 3, 1.0
+EXCESS = 1.5
+SYNC_WINDOW_S = 0.5
+HEARTBEATS_PER_TIMEOUT = 3
+HEARTBEAT_PERIODS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Sign:
+    """The last sign of another master: when [s], about which node (0: all), and what it was."""
+
+    at: float
+    node_id: int
+    detail: str
+
+
+class Pace:
+    """Tells when `count` events have come within `window_s`."""
+
+    def __init__(self, count: int, window_s: float) -> None:
+        """`count` is 2 or more."""
+        self._times: deque[float] = deque(maxlen=count)
+        self._window_s = window_s
+
+    def too_fast(self, now: float) -> bool:
+        """Note an event at the monotonic time `now` [s]. True: it and the last ones were too many."""
+        times = self._times
+        times.append(now)
+        return len(times) == times.maxlen and now - times[0] < self._window_s
+
+
+class Foreign:
+    """Remembers the last sign of another master."""
+
+    def __init__(self, config: WatchdogConfig) -> None:
+        """Knows from `config` how often the driver sends what."""
+        period_s = config.drive_heartbeat_s / HEARTBEATS_PER_TIMEOUT
+        self._syncs = Pace(math.ceil(EXCESS * SYNC_WINDOW_S * config.control_hz) + 1, SYNC_WINDOW_S)
+        self._heartbeats = Pace(math.ceil(EXCESS * HEARTBEAT_PERIODS) + 1, HEARTBEAT_PERIODS * period_s)
+        self._disorder = Pace(DISORDER_COUNT, DISORDER_S)
+        self._control_hz, self._period_s = config.control_hz, period_s
+        self._setpoints: dict[int, bytes] = {}
+        """COB-ID and data of the setpoints since the last SYNC."""
+        self.last: Sign | None = None
+
+    def on_setpoint(self, cob_id: int, node_id: int, data: bytes, now: float) -> None:
+        """An RPDO of the driver, or of somebody else."""
+        other = self._setpoints.setdefault(cob_id, data)
+        if other != data:
+            self._setpoints[cob_id] = data
+            if self._disorder.too_fast(now):
+                self.note(node_id, f"two different setpoints {cob_id:03X}h between two SYNCs", now)
+
+    def on_sync(self, now: float) -> None:
+        """A SYNC of the driver, or of somebody else."""
+        if not self._setpoints and self._disorder.too_fast(now):
+            self.note(0, "SYNCs without setpoints", now)
+        self._setpoints.clear()
+        if self._syncs.too_fast(now):
+            self.note(0, f"more SYNCs than the driver's {self._control_hz:g} per second", now)
+
+    def on_heartbeat(self, now: float) -> None:
+        """A heartbeat of the driver's node, or of somebody else who uses its number."""
+        if self._heartbeats.too_fast(now):
+            self.note(0, f"more heartbeats 77Fh than one each {self._period_s:.3f} s", now)
+
+    def note(self, node_id: int, detail: str, now: float) -> None:
+        """A sign of which once is enough."""
+        self.last = Sign(now, node_id, detail)

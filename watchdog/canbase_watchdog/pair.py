@@ -1,0 +1,48 @@
+"""Whether the setpoints of the left and the right side go together: what each wheel may do alone, both may not.
+
+Looked at per SYNC, for only the SYNC makes setpoints effective: between the two frames of one cycle new and old mix.
+It takes two SYNCs in a row, as one lost frame leaves an old setpoint beside a new one.
+"""
+
+from __future__ import annotations
+
+from canbase_config.watchdog import WatchdogConfig
+from canbase_watchdog.envelope import Bounds
+from canbase_watchdog.view import NEVER, Axis, BusView
+
+SYNCS = 2
+
+
+class PairWatch:
+    """Remembers whether the setpoints of the last SYNCs went together."""
+
+    def __init__(self, config: WatchdogConfig) -> None:
+        """Tolerances are those of a single target."""
+        self._config = config
+        self._coarsest_mps = max(abs(drive.mps_per_bit) for drive in config.drives)
+        self._sync_at = NEVER
+        self._bad = 0
+
+    def look(self, bus: BusView, bounds: Bounds) -> str:
+        """Why they have not gone together for SYNCS in a row, empty when they have."""
+        if bus.sync_at == self._sync_at:
+            return ""
+        self._sync_at = bus.sync_at
+        misfit = self._misfit(bus, bounds)
+        self._bad = self._bad + 1 if misfit else 0
+        return misfit if self._bad >= SYNCS else ""
+
+    def _misfit(self, bus: BusView, bounds: Bounds) -> str:
+        """Setpoints that did not come for this SYNC, or do not count in their drive, say nothing."""
+        if not all(axis.enabled and axis.setpoint_at == bus.sync_at for axis in bus.axes):
+            return ""
+        lefts, rights = _speeds(bus.axes, "left"), _speeds(bus.axes, "right")
+        config, low_high = self._config, bounds.wheel(self._config.track_m / 2.0)
+        share = config.target_tolerance_share * max(abs(speed) for speed in low_high)
+        tolerance_mps = config.target_tolerance_mps + self._coarsest_mps + share
+        reasons = (bounds.pair(left, right, config.track_m, tolerance_mps) for left in lefts for right in rights)
+        return next((reason for reason in reasons if reason), "")
+
+
+def _speeds(axes: tuple[Axis, ...], side: str) -> list[float]:
+    return [axis.setpoint_mps for axis in axes if axis.drive.side == side]

@@ -1,0 +1,103 @@
+"""What the policy decides from: the bus, the leases and the watchdog itself at one moment, as plain values."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from canbase_config.watchdog import WatchedDrive
+from canbase_watchdog.envelope import Bounds
+from canbase_watchdog.feedback import Feedback
+from canbase_watchdog.foreign import Sign
+from canbase_watchdog.frames import POWERED, DriveState
+from canbase_watchdog.lease import Lease
+
+NEVER = -math.inf
+"""Receive time of what has not come yet."""
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """One wheel as the bus shows it. Speeds in m/s at its rim, forward positive; times monotonic in s.
+
+    `target_mps` came last, at `command_at`; `setpoint_mps` is the one that a SYNC made effective, at `setpoint_at`.
+    """
+
+    drive: WatchedDrive
+    state: DriveState | None = None
+    status_at: float = NEVER
+    enabled_since: float = NEVER
+    disabled_since: float = NEVER
+    velocity_mps: float = 0.0
+    velocity_at: float = NEVER
+    target_mps: float = 0.0
+    asks_for_power: bool = False
+    command_at: float = NEVER
+    setpoint_mps: float = 0.0
+    setpoint_at: float = NEVER
+    feedback: Feedback = Feedback()  # noqa: RUF009 - immutable
+
+    @property
+    def enabled(self) -> bool:
+        """True when its last statusword said OPERATION ENABLED."""
+        return self.state is DriveState.OPERATION_ENABLED
+
+    @property
+    def powered(self) -> bool:
+        """True when its last statusword said a state in which the motor has current."""
+        return self.state in POWERED
+
+    @property
+    def fed_at(self) -> float:
+        """When both statusword and velocity were last known."""
+        return min(self.status_at, self.velocity_at)
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """One drive on the bus: when its last heartbeat and its last frame of any kind came."""
+
+    node_id: int
+    heartbeat_at: float = NEVER
+    heard_at: float = NEVER
+
+
+@dataclass(frozen=True, slots=True)
+class BusView:
+    """What came over the bus. `sync_since`: start of the present run of SYNCs without a gap."""
+
+    axes: tuple[Axis, ...]
+    nodes: tuple[Node, ...]
+    driver_at: float = NEVER
+    sync_at: float = NEVER
+    sync_since: float = NEVER
+    foreign: Sign | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """All that the policy decides from."""
+
+    bus: BusView
+    bounds: Bounds
+    started_at: float
+    lease: Lease | None = None
+    lease_at: float = NEVER
+    skew: str = ""
+    """Why the setpoints of both sides do not go together, for two SYNCs in a row; empty when they do."""
+    tick_gap_s: float = 0.0
+    bus_failed_since: float = math.inf
+
+    @property
+    def axes(self) -> tuple[Axis, ...]:
+        """All wheels."""
+        return self.bus.axes
+
+    @property
+    def enabled(self) -> bool:
+        """True when any drive is enabled."""
+        return any(axis.enabled for axis in self.bus.axes)
+
+    def node(self, node_id: int) -> Node:
+        """The node with this id. Raises StopIteration for one that is not configured."""
+        return next(node for node in self.bus.nodes if node.node_id == node_id)
