@@ -1,8 +1,6 @@
-"""Whether a goal may start: each reason against it, with the value, what was expected, and what to do next."""
+"""Whether the robot can start a goal now: each reason against it, with what to do next."""
 
 from __future__ import annotations
-
-import math
 
 from canbase_action_server.inputs import ENABLED, ESTOP_CAUSES, WATCHDOG_OK, Inputs, age_s
 from canbase_config.robot import Robot
@@ -17,21 +15,6 @@ def action_source(robot: Robot) -> str:
         if source.topic == "cmd_vel_action":
             return name
     raise ValueError("mux.sources has no source with topic cmd_vel_action: the action server could never drive; add it")
-
-
-def range_reason(robot: Robot, distance_m: float, max_speed_mps: float) -> str | None:
-    """Why the numbers of a goal are refused; None: they are good."""
-    action = robot.action
-    for name, value, low, high in (
-        ("|distance_m|", abs(distance_m), action.min_distance_m, action.max_distance_m),
-        ("max_speed_mps", max_speed_mps, action.min_speed_mps, action.max_speed_mps),
-    ):
-        if not math.isfinite(value):
-            return f"{name} is {value}; expected a finite number from {low} to {high}"
-        # The interface carries float32: a limit that arrives rounded is still that limit.
-        if not low * (1 - 1e-6) <= value <= high * (1 + 1e-6):
-            return f"{name} is {value:.6g}, outside {low} to {high} (action.* in robot.yaml)"
-    return None
 
 
 def state_reason(robot: Robot, inputs: Inputs, now: float) -> str | None:

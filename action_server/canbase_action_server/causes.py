@@ -109,6 +109,10 @@ def _canceled(s: Situation) -> str | None:
     return "canceled by request" if s.inputs.cancel_requested else None
 
 
+def _preempted(s: Situation) -> str | None:
+    return "a newer goal takes its place (action.goal_policy is preempt)" if s.inputs.preempted else None
+
+
 def _shutdown(s: Situation) -> str | None:
     return "the action server is shutting down" if s.inputs.shutdown else None
 
@@ -143,6 +147,7 @@ TABLE: tuple[Row, ...] = (
     Row(ErrorCode.SCAN_LOST, _scan_lost, while_stopping=False),
     Row(ErrorCode.BLOCKED, _blocked, while_stopping=False),
     Row(ErrorCode.CANCELED, _canceled, while_stopping=True),
+    Row(ErrorCode.PREEMPTED, _preempted, while_stopping=False),
     Row(ErrorCode.SHUTDOWN, _shutdown, while_stopping=True),
     Row(ErrorCode.NO_PROGRESS, _no_progress, while_stopping=False),
     Row(ErrorCode.TIMEOUT, _timeout, while_stopping=False),

@@ -1,7 +1,7 @@
 """One goal from its acceptance to its outcome: DRIVING → STOPPING → ENDED. Knows no ROS and reads no clock.
 
 Rules. Every ending passes through STOPPING: zero is ordered, and the goal ends when the base is known to stand. A goal
-that comes to stand short of the distance drives on. `causes.py`: why a goal ends; `standstill.py`: does the base stand.
+that comes to stand short of its goal goes on. `causes.py`: why a goal ends; `standstill.py`: does the base stand.
 """
 
 from __future__ import annotations
@@ -12,18 +12,16 @@ from enum import Enum
 from canbase_action_server.admission import action_source
 from canbase_action_server.causes import Cause, Situation, cause_while_driving, cause_while_stopping
 from canbase_action_server.inputs import OBSTACLE_CAUSE, Inputs, Odometry
-from canbase_action_server.motion import STOP, StraightMotion, Twist
+from canbase_action_server.limits import standstill_limits
+from canbase_action_server.motion import STOP, Motion, Twist
 from canbase_action_server.outcome import ErrorCode, Outcome
-from canbase_action_server.profile import ProfileLimits
-from canbase_action_server.standstill import Standstill, StandstillLimits, Verdict
+from canbase_action_server.standstill import Standstill, Verdict
 from canbase_config.robot import Robot
 
 OBSTACLE_PATIENCE_S = 0.3
 """The filter stops at once; the goal gives up when the obstacle is still there after this, not for one bad scan."""
 PROGRESS_M = 0.001
 """Less than this farther than ever before is not progress."""
-DRIVES_LAG_S = 0.03
-"""Typical time constant of a velocity-controlled drive."""
 
 
 class Phase(Enum):
@@ -35,15 +33,15 @@ class Phase(Enum):
 
 
 TRANSITIONS = {
-    (Phase.DRIVING, Phase.STOPPING): "the distance is driven, or a cause ends the goal",
-    (Phase.STOPPING, Phase.DRIVING): "the base stands short of the distance and nothing else ended the goal",
+    (Phase.DRIVING, Phase.STOPPING): "the way is gone, or a cause ends the goal",
+    (Phase.STOPPING, Phase.DRIVING): "the base stands short of the goal and nothing else ended the goal",
     (Phase.STOPPING, Phase.ENDED): "the base stands, or had its time to",
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """What the client reads on the way."""
+    """What the client reads on the way; of a turn, the way of the wheels on their circle."""
 
     traveled_m: float
     remaining_m: float
@@ -58,41 +56,13 @@ class Order:
     end: Outcome | None = None
 
 
-def chain_latency_s(robot: Robot) -> float:
-    """From a velocity order to the wheels' motion: mux and filter, 1.5 cycles of the driver, lag of the drives."""
-    return 0.5 / robot.rates.command_hz + 1.5 / robot.rates.control_hz + DRIVES_LAG_S
-
-
-def profile_limits(robot: Robot, max_speed_mps: float) -> ProfileLimits:
-    """What a goal with this max_speed_mps keeps to on this robot."""
-    return ProfileLimits(
-        speed_mps=min(max_speed_mps, robot.limits.linear_mps),
-        acceleration_mps2=robot.limits.acceleration_mps2,
-        deceleration_mps2=robot.limits.deceleration_mps2,
-        jerk_mps3=robot.limits.jerk_mps3,
-        crawl_mps=0.5 * robot.action.min_speed_mps,
-        chain_latency_s=chain_latency_s(robot),
-    )
-
-
-def standstill_limits(robot: Robot) -> StandstillLimits:
-    """When this robot stands."""
-    return StandstillLimits(
-        linear_mps=robot.base.standstill_mps,
-        angular_radps=2.0 * robot.base.standstill_mps / robot.base.track_m,
-        odometry_timeout_s=robot.timeouts.odometry_s,
-        deceleration_mps2=robot.limits.deceleration_mps2,
-        give_up_s=robot.timeouts.standstill_s,
-    )
-
-
 class GoalRun:
     """A goal that owns the base. `tick` once per control cycle until it gives an end."""
 
-    def __init__(self, robot: Robot, distance_m: float, max_speed_mps: float, start: Odometry, now: float) -> None:
+    def __init__(self, robot: Robot, motion: Motion, start: Odometry, now: float) -> None:
+        """`motion` begins at `start`."""
         self._robot = robot
-        self._motion = StraightMotion(start, distance_m, profile_limits(robot, max_speed_mps))
-        self._distance_m = distance_m
+        self._motion = motion
         self._own_source = action_source(robot)
         self._overall_s = robot.action.overall_factor * self._motion.ideal_s + robot.action.overall_extra_s
         self._started = self._ticked_at = now
@@ -114,7 +84,7 @@ class GoalRun:
 
     @property
     def traveled_m(self) -> float:
-        """Along the start heading, signed [m]."""
+        """Along the way, signed [m]."""
         return self._motion.traveled_m
 
     def tick(self, inputs: Inputs, now: float) -> Order:
@@ -162,7 +132,8 @@ class GoalRun:
             return Order(twist)
         self._cause = cause or Cause(ErrorCode.OK, "")
         self._go(Phase.STOPPING)
-        self._standstill = Standstill(standstill_limits(self._robot), now, self._last_odometry.linear_mps)
+        limits = standstill_limits(self._robot, self._motion.deceleration_mps2)
+        self._standstill = Standstill(limits, now, self._motion.speed_mps(self._last_odometry))
         return Order(self._motion.stop(now))
 
     def _stop(self, inputs: Inputs, now: float) -> Order:
@@ -189,14 +160,14 @@ class GoalRun:
 
     def _outcome(self, verdict: Verdict) -> Outcome:
         motion, cause = self._motion, self._cause
-        if verdict is Verdict.STILL_MOVES and cause.code in (ErrorCode.OK, ErrorCode.CANCELED):
+        if verdict is Verdict.STILL_MOVES and cause.code.leaves_the_base_standing:
             cause = Cause(ErrorCode.DRIVE_FAULT, "ordered to stand, but the base still moves; use the emergency stop")
         elif cause.code is ErrorCode.OK and motion.overshoot_m > self._robot.action.tolerance_m:
-            cause = Cause(ErrorCode.DRIVE_FAULT, "the drives did not stop at the distance: too fast for load or slope")
+            cause = Cause(ErrorCode.DRIVE_FAULT, "the drives did not stop at the goal: too fast for load or slope")
         elif verdict is not Verdict.STANDS:
             cause = Cause(cause.code, f"{cause.message}; the base {verdict.value}")
-        went = f"{motion.traveled_m:+.4f} m of {self._distance_m:+.4f} m, {motion.lateral_m:+.4f} m beside the line"
-        text = f"{cause.message}; drove {went}" if cause.message else f"drove {went}, and stands"
+        went = motion.report()
+        text = f"{cause.message}; {went}" if cause.message else f"{went}, and stands"
         return Outcome(cause.code, motion.traveled_m, max(0.0, motion.overshoot_m), text)
 
     def _feedback(self, now: float) -> Feedback | None:

@@ -74,6 +74,8 @@ class Inputs:
     driver: Driver | None = None
     mux: Mux | None = None
     cancel_requested: bool = False
+    preempted: bool = False
+    """A newer goal waits for the base."""
     shutdown: bool = False
 
 

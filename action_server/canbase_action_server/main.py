@@ -10,6 +10,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
+from canbase_action_server.drive_messages import drive_binding
 from canbase_action_server.node import DriveDistanceServer
 from canbase_config.robot import Robot
 
@@ -24,7 +25,7 @@ def run(robot: Robot, ros_args: list[str]) -> int:
     """Serve until SIGINT or SIGTERM; 0 after an orderly end, 1 after a defect. `ros_args` as for rclpy.init."""
     rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)
     executor = SingleThreadedExecutor()
-    node = DriveDistanceServer(robot)
+    node = DriveDistanceServer(robot, [drive_binding()])
     executor.add_node(node)
     asked_to_end = _catch_signals()
     try:

@@ -1,17 +1,14 @@
-"""ROS messages in, plain inputs out, and back. The only module here that knows the fields of messages."""
+"""Topics in, plain inputs out, and the order back. The actions' own messages: `drive_messages.py`."""
 
 from __future__ import annotations
 
-from canbase.action import DriveDistance
 from canbase.msg import DriverStatus, MuxState, SafetyState
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry as OdometryMessage
 
 from canbase_action_server.along_track import Pose, yaw_of_quaternion
-from canbase_action_server.goal import Feedback
 from canbase_action_server.inputs import Driver, Mux, Odometry, Safety
 from canbase_action_server.motion import Twist
-from canbase_action_server.outcome import Outcome
 
 DRIVER_STATES = {
     DriverStatus.OFFLINE: "offline",
@@ -62,18 +59,3 @@ def twist_out(twist: Twist, frame: str) -> TwistStamped:
     message.header.frame_id = frame
     message.twist.linear.x, message.twist.angular.z = twist.linear_mps, twist.angular_radps
     return message
-
-
-def feedback_out(feedback: Feedback) -> DriveDistance.Feedback:
-    """For the client on the way."""
-    return DriveDistance.Feedback(traveled_m=feedback.traveled_m, remaining_m=feedback.remaining_m)
-
-
-def result_out(outcome: Outcome) -> DriveDistance.Result:
-    """For the client at the end."""
-    return DriveDistance.Result(
-        error_code=int(outcome.code),
-        traveled_m=outcome.traveled_m,
-        overshoot_m=outcome.overshoot_m,
-        message=outcome.message,
-    )

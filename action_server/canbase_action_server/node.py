@@ -1,7 +1,7 @@
-"""The ROS node drive_distance_server: topics in, a timer that ticks the goal, the action's callbacks, log lines.
+"""The ROS node drive_distance_server: topics in, a timer that ticks the goals, the actions' callbacks, log lines.
 
 Runs in one thread (SingleThreadedExecutor, docs/decisions/0003-executor.md): no callback blocks, and none can come
-between the acceptance of a goal and its taking of the base.
+between the decision on a goal and its admission.
 """
 
 from __future__ import annotations
@@ -9,12 +9,11 @@ from __future__ import annotations
 import json
 import time
 import traceback
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Any, TypeVar
 
-from action_msgs.msg import GoalStatus
-from canbase.action import DriveDistance
 from canbase.msg import DriverStatus, MuxState, SafetyState
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry as OdometryMessage
@@ -23,14 +22,15 @@ from rclpy.action.server import ServerGoalHandle
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.task import Future
 
 from canbase_action_server import messages
-from canbase_action_server.goal import Order, Phase
+from canbase_action_server.binding import Binding
+from canbase_action_server.goal import Phase
 from canbase_action_server.inputs import Inputs
-from canbase_action_server.motion import STOP
-from canbase_action_server.outcome import ErrorCode, Outcome, Status
-from canbase_action_server.owner import Owner
+from canbase_action_server.motion import STOP, Twist
+from canbase_action_server.open_goal import OpenGoal, numbers, uuid_of
+from canbase_action_server.outcome import ErrorCode, Outcome
+from canbase_action_server.reception import Cycle, Reception
 from canbase_config.robot import Robot
 
 SENSOR_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -42,35 +42,15 @@ SERVICE_QOS = QoSProfile(depth=100)
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
-class Active:
-    """The goal that owns the base, as ROS sees it."""
-
-    handle: ServerGoalHandle
-    ended: Future
-    """Completed by the timer with the outcome."""
-    began: float
-
-    @property
-    def uuid(self) -> str:
-        """Of the goal, in hex."""
-        return uuid_of(self.handle)
-
-
-def uuid_of(handle: ServerGoalHandle) -> str:
-    """UUID of a goal in hex."""
-    return bytes(handle.goal_id.uuid).hex()
-
-
 class DriveDistanceServer(Node):
-    """Action server drive_distance, and the publisher of cmd_vel_action."""
+    """The action servers, and the publisher of cmd_vel_action."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, bindings: Sequence[Binding]) -> None:
         super().__init__("drive_distance_server")
         self._robot = robot
-        self._owner = Owner(robot)
+        self._reception = Reception(robot)
         self._inputs = Inputs()
-        self._active: Active | None = None
+        self._open: dict[str, OpenGoal] = {}
         self.failure: Exception | None = None
         """The first exception that a callback raised; the process must end with an error."""
         self._orders = self.create_publisher(TwistStamped, "cmd_vel_action", 1)
@@ -78,49 +58,34 @@ class DriveDistanceServer(Node):
         self._listen(SafetyState, "safety_filter/state", LATCHED_QOS, self._on_safety)
         self._listen(DriverStatus, "motor_driver/status", STATUS_QOS, self._on_driver)
         self._listen(MuxState, "velocity_mux/state", LATCHED_QOS, self._on_mux)
-        self._server = ActionServer(
-            self,
-            DriveDistance,
-            "drive_distance",
-            execute_callback=self._execute,
-            goal_callback=self._on_goal,
-            handle_accepted_callback=self._on_accepted,
-            cancel_callback=self._on_cancel,
-            goal_service_qos_profile=SERVICE_QOS,
-            result_service_qos_profile=SERVICE_QOS,
-            cancel_service_qos_profile=SERVICE_QOS,
-        )
+        self._servers = [self._serve(binding) for binding in bindings]
         # The steady clock: setting the computer's time must not stretch a control cycle.
         period_s = 1.0 / robot.action.control_hz
         self.create_timer(period_s, self._guarded(self._on_timer), clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @property
     def busy(self) -> bool:
-        """A goal runs, or its result is not out yet."""
-        return self._owner.busy or self._active is not None
+        """A goal waits or runs, or its result is not out yet."""
+        return self._reception.busy or bool(self._open)
 
     def shut_down(self) -> None:
-        """From now on no goal is accepted, and the one that runs stops and ends with SHUTDOWN."""
+        """From now on no goal is accepted, and all that wait or run end with SHUTDOWN."""
         self._inputs = replace(self._inputs, shutdown=True)
 
     def give_up(self, message: str) -> None:
-        """Ends the goal now, whether the base stands or not. For the end of the process."""
+        """Ends all goals now, whether the base stands or not. For the end of the process."""
         code = ErrorCode.SHUTDOWN if self.failure is None else ErrorCode.INTERNAL
-        order = self._owner.give_up(code, message, time.monotonic())
-        if order is not None:
-            self._carry_out(order)
+        self._carry_out(self._reception.give_up(code, message, time.monotonic()))
 
     def order_stop(self) -> None:
         """Zero on cmd_vel_action. Needs no goal and no state."""
-        message = messages.twist_out(STOP, self._robot.base.base_frame)
-        message.header.stamp = self.get_clock().now().to_msg()
-        self._orders.publish(message)
+        self._order(STOP)
 
     def fail(self, error: Exception) -> None:
-        """A callback raised: stop, end the goal with INTERNAL, and let the process end."""
+        """A callback raised: stop, end all goals with INTERNAL, and let the process end."""
         self.order_stop()
         self.failure = self.failure or error
-        self._owner.fail(error, self._inputs, time.monotonic())
+        self._reception.fail(error, time.monotonic())
         self.shut_down()
         self.get_logger().fatal("".join(traceback.format_exception(error)))
 
@@ -150,88 +115,96 @@ class DriveDistanceServer(Node):
     def _on_mux(self, message: MuxState) -> None:
         self._inputs = replace(self._inputs, mux=messages.mux_in(message, time.monotonic()))
 
-    def _on_goal(self, goal: DriveDistance.Goal) -> GoalResponse:
-        reason = self._owner.refusal(goal.distance_m, goal.max_speed_mps, self._inputs, time.monotonic())
-        if reason is None and self._active is None:
+    def _serve(self, binding: Binding) -> ActionServer:
+        return ActionServer(
+            self,
+            binding.type,
+            binding.name,
+            execute_callback=self._execute,
+            goal_callback=partial(self._on_goal, binding),
+            handle_accepted_callback=partial(self._on_accepted, binding),
+            cancel_callback=self._on_cancel,
+            goal_service_qos_profile=SERVICE_QOS,
+            result_service_qos_profile=SERVICE_QOS,
+            cancel_service_qos_profile=SERVICE_QOS,
+        )
+
+    def _on_goal(self, binding: Binding, goal: Any) -> GoalResponse:
+        reason = self._reception.refusal(binding.request(goal), self._inputs, time.monotonic())
+        if reason is None:
             return GoalResponse.ACCEPT
         # rclpy does not tell the UUID of a goal that is not accepted yet.
-        wanted = {"distance_m": goal.distance_m, "max_speed_mps": goal.max_speed_mps}
-        self._log("rejected", None, reason=reason or "busy: the last goal's result is just going out", **wanted)
+        self._log("rejected", None, action=binding.name, reason=reason, **numbers(goal))
         return GoalResponse.REJECT
 
-    def _on_accepted(self, handle: ServerGoalHandle) -> None:
-        goal, now = handle.request, time.monotonic()
-        self._owner.take(goal.distance_m, goal.max_speed_mps, self._inputs, now)
-        self._active = Active(handle, Future(), now)
-        self._log("accepted", self._active.uuid, distance_m=goal.distance_m, max_speed_mps=goal.max_speed_mps)
-        handle.execute()
+    def _on_accepted(self, binding: Binding, handle: ServerGoalHandle) -> None:
+        goal, now, uuid = handle.request, time.monotonic(), uuid_of(handle)
+        self._reception.admit(uuid, binding.request(goal), self._inputs, now)
+        self._open[uuid] = OpenGoal(handle, binding, now)
+        self._log("accepted", uuid, action=binding.name, **numbers(goal))
 
     def _on_cancel(self, handle: ServerGoalHandle) -> CancelResponse:
         self._log("cancel requested", uuid_of(handle))
         return CancelResponse.ACCEPT
 
-    async def _execute(self, handle: ServerGoalHandle) -> DriveDistance.Result:
+    async def _execute(self, handle: ServerGoalHandle) -> Any:
         try:
-            return await self._run(handle)
+            return await self._run(uuid_of(handle))
         except Exception as error:
             self.fail(error)  # rclpy would log it, abort the goal, and leave the base moving
             raise
 
-    async def _run(self, handle: ServerGoalHandle) -> DriveDistance.Result:
-        active = self._active
-        if active is None or active.handle is not handle:
-            raise RuntimeError(f"goal {uuid_of(handle)} is executed, but does not own the base")
-        self._log("started", active.uuid)
-        outcome: Outcome = await active.ended
-        self._active = None
-        self._finish(handle, outcome)
-        self._log_end(active, outcome)
-        return messages.result_out(outcome)
-
-    @staticmethod
-    def _finish(handle: ServerGoalHandle, outcome: Outcome) -> None:
-        match outcome.status:
-            case Status.SUCCEEDED:
-                handle.succeed()
-            case Status.CANCELED:
-                handle.canceled()
-            case Status.ABORTED:
-                handle.abort()
+    async def _run(self, uuid: str) -> Any:
+        goal = self._open[uuid]
+        outcome: Outcome = await goal.outcome
+        result = goal.finish(outcome)
+        del self._open[uuid]
+        self._log_end(uuid, goal, outcome, result)
+        return result
 
     def _on_timer(self) -> None:
-        active = self._active
-        canceling = active is not None and active.handle.status == GoalStatus.STATUS_CANCELING
-        before = self._owner.phase
-        order = self._owner.tick(replace(self._inputs, cancel_requested=canceling), time.monotonic())
-        if order is not None:
-            self._carry_out(order)
-        after = self._owner.phase
-        if active and before is not after and after is not Phase.ENDED:
-            self._log(after.value, active.uuid)
+        for uuid, goal in self._open.items():
+            if goal.handle.is_cancel_requested:
+                self._reception.cancel(uuid)
+        running, before = self._reception.running, self._reception.phase
+        cycle = self._reception.tick(self._inputs, time.monotonic())
+        if self._reception.phase is not before:
+            self._log_phase(running, before)
+        self._carry_out(cycle)
 
-    def _carry_out(self, order: Order) -> None:
-        message = messages.twist_out(order.twist, self._robot.base.base_frame)
+    def _carry_out(self, cycle: Cycle) -> None:
+        if cycle.twist is not None:
+            self._order(cycle.twist)
+        if cycle.began is not None:
+            self._open[cycle.began].execute()
+            self._log("started", cycle.began)
+        if cycle.feedback is not None:
+            uuid, feedback = cycle.feedback
+            self._open[uuid].tell(feedback)
+        for end in cycle.ends:
+            self._open[end.key].end(end.outcome)
+
+    def _order(self, twist: Twist) -> None:
+        message = messages.twist_out(twist, self._robot.base.base_frame)
         message.header.stamp = self.get_clock().now().to_msg()
         self._orders.publish(message)
-        if self._active is None:
-            return
-        if order.feedback is not None:
-            self._active.handle.publish_feedback(messages.feedback_out(order.feedback))
-        if order.end is not None:
-            self._log("standstill", self._active.uuid)
-            self._active.ended.set_result(order.end)
 
     def _log(self, step: str, uuid: str | None, **fields: Any) -> None:
         self.get_logger().info(json.dumps({"uuid": uuid, "step": step, **fields}))
 
-    def _log_end(self, active: Active, outcome: Outcome) -> None:
+    def _log_phase(self, uuid: str | None, before: Phase) -> None:
+        if self._reception.phase is Phase.STOPPING:
+            self._log("stopping", self._reception.running)
+        elif before is Phase.STOPPING and self._reception.phase is Phase.ENDED:
+            self._log("standstill", uuid)
+
+    def _log_end(self, uuid: str, goal: OpenGoal, outcome: Outcome, result: Any) -> None:
         self._log(
             "ended",
-            active.uuid,
+            uuid,
             status=outcome.status.name,
             error_code=outcome.code.name,
-            traveled_m=round(outcome.traveled_m, 5),
-            overshoot_m=round(outcome.overshoot_m, 5),
-            duration_s=round(time.monotonic() - active.began, 3),
+            **numbers(result),
+            duration_s=round(time.monotonic() - goal.accepted, 3),
             message=outcome.message,
         )

@@ -1,4 +1,4 @@
-"""How a goal can end: the status of the ROS 2 action protocol, and the error code of the DriveDistance result."""
+"""How a goal can end: the status of the ROS 2 action protocol, and the error code of the result."""
 
 from __future__ import annotations
 
@@ -38,6 +38,11 @@ class ErrorCode(IntEnum):
         """The final status that belongs to this code."""
         return {ErrorCode.OK: Status.SUCCEEDED, ErrorCode.CANCELED: Status.CANCELED}.get(self, Status.ABORTED)
 
+    @property
+    def leaves_the_base_standing(self) -> bool:
+        """An end with this code says that the base was seen standing, where it was told to: another goal may follow."""
+        return self in (ErrorCode.OK, ErrorCode.CANCELED, ErrorCode.PREEMPTED)
+
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
@@ -45,6 +50,7 @@ class Outcome:
 
     code: ErrorCode
     traveled_m: float
+    """Along the way, signed; of a turn, the way of the wheels on their circle."""
     overshoot_m: float
     message: str
 

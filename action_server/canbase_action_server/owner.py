@@ -1,18 +1,18 @@
-"""Who owns the base: nobody, or one goal. Judges each goal, runs the one that was accepted, ends it exactly once.
+"""Who owns the base: nobody, or one goal. Runs the goal that took it, and ends it exactly once.
 
-Knows no ROS. `refusal` and `take` are called one after the other, without another call in between: so no two goals
-can both be accepted. After `fail` the goal only stops, and ends with INTERNAL.
+Who may take it, and when, is decided in `reception.py`. After `fail` the goal only stops, and ends with INTERNAL.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from canbase_action_server.admission import range_reason, state_reason
-from canbase_action_server.goal import GoalRun, Order, Phase, standstill_limits
+from canbase_action_server.goal import GoalRun, Order, Phase
 from canbase_action_server.inputs import Inputs
+from canbase_action_server.limits import standstill_limits
 from canbase_action_server.motion import STOP
 from canbase_action_server.outcome import ErrorCode, Outcome
+from canbase_action_server.request import Request
 from canbase_action_server.standstill import Standstill, Verdict
 from canbase_config.robot import Robot
 
@@ -47,18 +47,12 @@ class Owner:
         """Of the goal that owns the base; ENDED when there is none."""
         return self._goal.phase if self._goal else Phase.ENDED
 
-    def refusal(self, distance_m: float, max_speed_mps: float, inputs: Inputs, now: float) -> str | None:
-        """Why a goal with these numbers is rejected; None: it may `take` the base."""
-        busy = "busy: another goal owns the base; wait for its result, or cancel it" if self.busy else None
-        wrong = range_reason(self._robot, distance_m, max_speed_mps)
-        return wrong or busy or state_reason(self._robot, inputs, now)
-
-    def take(self, distance_m: float, max_speed_mps: float, inputs: Inputs, now: float) -> None:
-        """The base now belongs to this goal. RuntimeError when `refusal` would have refused it."""
-        reason = self.refusal(distance_m, max_speed_mps, inputs, now)
-        if reason is not None or inputs.odometry is None:
-            raise RuntimeError(f"a goal took the base that was refused: {reason}")
-        self._goal = GoalRun(self._robot, distance_m, max_speed_mps, inputs.odometry, now)
+    def take(self, request: Request, inputs: Inputs, now: float) -> None:
+        """The base now belongs to this goal. RuntimeError when it has an owner, or was never seen."""
+        if self.busy or inputs.odometry is None:
+            raise RuntimeError("a goal took a base that is not free, or of which no odometry was received")
+        start = inputs.odometry
+        self._goal = GoalRun(self._robot, request.motion(self._robot, start), start, now)
 
     def tick(self, inputs: Inputs, now: float) -> Order | None:
         """One control cycle. None: nothing is to be ordered, the source stays silent."""
@@ -72,11 +66,12 @@ class Owner:
             self._release(now)
         return order
 
-    def fail(self, error: Exception, inputs: Inputs, now: float) -> None:
+    def fail(self, error: Exception, now: float) -> None:
         """Something in the server broke: from now on the goal only stops. The first failure stays."""
         if self._goal is not None and self._failure is None:
-            speed_mps = inputs.odometry.linear_mps if inputs.odometry else self._robot.limits.linear_mps
-            self._failure = Failure(error, Standstill(standstill_limits(self._robot), now, speed_mps))
+            limits = self._robot.limits
+            stop = standstill_limits(self._robot, limits.deceleration_mps2)
+            self._failure = Failure(error, Standstill(stop, now, limits.linear_mps))
 
     def give_up(self, code: ErrorCode, message: str, now: float) -> Order | None:
         """Ends the goal at once, standing or not, because the process has no more time. None: there was no goal."""

@@ -6,13 +6,15 @@ import math
 import random
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from canbase_action_server.along_track import Pose
 from canbase_action_server.goal import GoalRun
 from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
 from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.outcome import Outcome
+from canbase_action_server.request import DriveRequest, Request
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 
@@ -78,13 +80,19 @@ GOOD_DRIVER = Driver(
 GOOD_MUX = Mux(received=0.0, active="")
 
 
+def good_inputs(odometry: Odometry) -> Inputs:
+    """A healthy robot, everything received together with `odometry`."""
+    at = odometry.received
+    safety, driver = replace(GOOD_SAFETY, received=at), replace(GOOD_DRIVER, received=at)
+    return Inputs(odometry, safety, driver, replace(GOOD_MUX, received=at))
+
+
 @dataclass
 class Story:
     """One goal on one plant. `at` holds what happens when: a function that changes the inputs, or the plant."""
 
     plant: Plant
-    distance_m: float
-    speed_mps: float
+    request: Request
     robot: Robot = field(default_factory=bench_robot)
     odometry_hz: float = 50.0
     jitter: random.Random = field(default_factory=lambda: random.Random(1))
@@ -98,7 +106,8 @@ class Story:
     def run(self, limit_s: float = 120.0) -> Outcome:
         """From the acceptance to the outcome, then half a second more to see whether something still moves."""
         self.inputs = replaced(self.inputs, odometry=self.plant.odometry(0.0))
-        goal = GoalRun(self.robot, self.distance_m, self.speed_mps, self.plant.odometry(0.0), 0.0)
+        start = self.plant.odometry(0.0)
+        goal = GoalRun(self.robot, self.request.motion(self.robot, start), start, 0.0)
         control_s, pending = 1.0 / self.robot.action.control_hz, sorted(self.at)
         next_control = next_odometry = 0.0
         transit: deque[tuple[float, Odometry]] = deque()
@@ -130,6 +139,16 @@ class Story:
         for tick in range(1000):
             self.plant.step(self.ended_at + tick * STEP_S)
         return math.dist(before, (self.plant.x_m, self.plant.y_m))
+
+
+def drive(plant: Plant, distance_m: float, speed_mps: float, **others: Any) -> Story:
+    """A straight one."""
+    return Story(plant, DriveRequest(distance_m, speed_mps), **others)
+
+
+def goal_run(robot: Robot, distance_m: float, speed_mps: float, start: Odometry) -> GoalRun:
+    """A straight one that begins at 0.0 s."""
+    return GoalRun(robot, DriveRequest(distance_m, speed_mps).motion(robot, start), start, 0.0)
 
 
 def replaced(inputs: Inputs, **changes: object) -> Inputs:

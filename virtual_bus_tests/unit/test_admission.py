@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from canbase_action_server.admission import STATE_TIMEOUT_S, action_source, range_reason, state_reason
+from canbase_action_server.admission import STATE_TIMEOUT_S, action_source, state_reason
 from canbase_action_server.inputs import Inputs
+from canbase_action_server.request import DriveRequest
 from canbase_config.robot import Mux, MuxSource
 from unit.action_plant import GOOD_DRIVER, GOOD_MUX, GOOD_SAFETY, Plant, bench_robot, replaced
 
@@ -17,16 +18,17 @@ READY = Inputs(Plant().odometry(0.0), GOOD_SAFETY, GOOD_DRIVER, GOOD_MUX)
 @pytest.mark.parametrize("distance_m", [0.01, -0.01, 0.011, 5.0, -5.0, 1.0])
 @pytest.mark.parametrize("speed_mps", [0.02, 0.5, 0.3])
 def test_numbers_within_the_limits_are_good(distance_m: float, speed_mps: float) -> None:
-    assert range_reason(ROBOT, distance_m, speed_mps) is None
+    assert DriveRequest(distance_m, speed_mps).range_reason(ROBOT) is None
 
 
 def test_a_limit_that_float32_rounded_outward_is_still_the_limit() -> None:
-    assert range_reason(ROBOT, 0.009999999776482582, 0.019999999552965164) is None  # float32(0.01), float32(0.02)
+    smallest = DriveRequest(0.009999999776482582, 0.019999999552965164)  # float32(0.01), float32(0.02)
+    assert smallest.range_reason(ROBOT) is None
 
 
 @pytest.mark.parametrize("distance_m", [0.0, -0.0, 0.00999, -0.00999, 5.0001, -5.0001, math.inf, -math.inf, math.nan])
 def test_a_distance_outside_is_refused_with_its_range(distance_m: float) -> None:
-    reason = range_reason(ROBOT, distance_m, 0.2)
+    reason = DriveRequest(distance_m, 0.2).range_reason(ROBOT)
     assert reason is not None
     assert "|distance_m|" in reason
     assert "0.01 to 5.0" in reason
@@ -34,7 +36,7 @@ def test_a_distance_outside_is_refused_with_its_range(distance_m: float) -> None
 
 @pytest.mark.parametrize("speed_mps", [0.0, -0.2, 0.0199, 0.5001, math.inf, -math.inf, math.nan])
 def test_a_speed_outside_is_refused_with_its_range(speed_mps: float) -> None:
-    reason = range_reason(ROBOT, 1.0, speed_mps)
+    reason = DriveRequest(1.0, speed_mps).range_reason(ROBOT)
     assert reason is not None
     assert "max_speed_mps" in reason
     assert "0.02 to 0.5" in reason

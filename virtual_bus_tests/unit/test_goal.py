@@ -6,13 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from canbase_action_server.goal import GoalRun, Phase
+from canbase_action_server.goal import Phase
 from canbase_action_server.inputs import Driver, Inputs, Safety
 from canbase_action_server.motion import Twist
 from canbase_action_server.outcome import ErrorCode, Status
-from canbase_action_server.owner import FAREWELL_S, Owner
 from canbase_action_server.standstill import Standstill, StandstillLimits, Verdict
-from unit.action_plant import GOOD_SAFETY, Plant, Story, bench_robot, replaced
+from unit.action_plant import GOOD_SAFETY, Plant, Story, bench_robot, drive, goal_run, replaced
 
 OBSTACLE = replace(GOOD_SAFETY, stops=True, cause="obstacle", detail="0.12 m ahead")
 
@@ -40,7 +39,7 @@ def zero_from(story: Story, start_s: float) -> bool:
 
 def test_a_cancel_at_full_speed_ends_after_the_ramp_and_not_before() -> None:
     # 0.5 m/s at 1.0 m/s² need 0.5 s; then 0.1 s of standing are watched.
-    story = Story(Plant(), 3.0, 0.5, at={2.0: cancel})
+    story = drive(Plant(), 3.0, 0.5, at={2.0: cancel})
     end = story.run()
     assert (end.status, end.code) == (Status.CANCELED, ErrorCode.CANCELED)
     assert 2.6 <= story.ended_at <= 3.0
@@ -51,7 +50,7 @@ def test_a_cancel_at_full_speed_ends_after_the_ramp_and_not_before() -> None:
 
 def test_a_cancel_before_the_first_motion_still_waits_for_what_was_ordered() -> None:
     # At 0.05 s orders are on their way, and odometry has seen nothing: that the base stands proves nothing yet.
-    story = Story(Plant(dead_time_s=0.04, lag_s=0.05), 3.0, 0.5, at={0.05: cancel})
+    story = drive(Plant(dead_time_s=0.04, lag_s=0.05), 3.0, 0.5, at={0.05: cancel})
     assert story.run().code is ErrorCode.CANCELED
     assert story.ended_at >= 0.05 + 0.25
     assert story.coast() < 0.0002
@@ -59,8 +58,8 @@ def test_a_cancel_before_the_first_motion_still_waits_for_what_was_ordered() -> 
 
 def test_an_obstacle_that_stays_ends_the_goal_and_one_bad_scan_does_not() -> None:
     glitch = {2.0: lambda s: safety(s, OBSTACLE), 2.2: lambda s: safety(s, GOOD_SAFETY)}
-    assert Story(Plant(), 1.0, 0.3, at=glitch).run().code is ErrorCode.OK
-    story = Story(Plant(), 3.0, 0.3, at={2.0: lambda s: safety(s, OBSTACLE)})
+    assert drive(Plant(), 1.0, 0.3, at=glitch).run().code is ErrorCode.OK
+    story = drive(Plant(), 3.0, 0.3, at={2.0: lambda s: safety(s, OBSTACLE)})
     end = story.run()
     assert end.code is ErrorCode.BLOCKED
     assert "0.12 m ahead" in end.message
@@ -70,7 +69,7 @@ def test_an_obstacle_that_stays_ends_the_goal_and_one_bad_scan_does_not() -> Non
 def test_odometry_lost_ends_on_the_word_of_the_driver() -> None:
     # Lost at 2.0, noticed at 2.2; the driver goes on telling that the base stands.
     at = {2.0: lose_odometry, 2.6: lambda s: driver(s, received=2.6, standstill=True)}
-    story = Story(Plant(), 3.0, 0.3, at=at)
+    story = drive(Plant(), 3.0, 0.3, at=at)
     end = story.run()
     assert end.code is ErrorCode.ODOMETRY_LOST
     assert "nothing told" not in end.message
@@ -78,7 +77,7 @@ def test_odometry_lost_ends_on_the_word_of_the_driver() -> None:
 
 
 def test_odometry_and_driver_lost_ends_after_the_braking_time_and_says_that_nothing_was_measured() -> None:
-    story = Story(Plant(), 3.0, 0.3, at={2.0: lose_odometry})
+    story = drive(Plant(), 3.0, 0.3, at={2.0: lose_odometry})
     end = story.run()
     assert end.code is ErrorCode.ODOMETRY_LOST
     assert "nothing told whether it did" in end.message
@@ -90,8 +89,8 @@ def test_odometry_and_driver_lost_ends_after_the_braking_time_and_says_that_noth
 def test_a_server_that_stood_still_does_not_drive_on_with_what_arrives_then() -> None:
     # It hangs from 1.0 s to 3.0 s. Then the newest odometry is taken in first, and looks fresh.
     robot, plant = bench_robot(), Plant()
-    goal = GoalRun(robot, 3.0, 0.3, plant.odometry(0.0), 0.0)
-    inputs = Story(plant, 3.0, 0.3).inputs
+    goal = goal_run(robot, 3.0, 0.3, plant.odometry(0.0))
+    inputs = drive(plant, 3.0, 0.3).inputs
     for tick in range(51):
         goal.tick(replaced(inputs, odometry=plant.odometry(tick * 0.02)), tick * 0.02)
     order = goal.tick(replaced(inputs, odometry=plant.odometry(3.0)), 3.0)
@@ -101,7 +100,7 @@ def test_a_server_that_stood_still_does_not_drive_on_with_what_arrives_then() ->
 
 def test_a_fault_during_the_stop_of_a_cancel_is_the_cause() -> None:
     at = {2.0: cancel, 2.1: lambda s: driver(s, state="latched", cause="drive_fault", detail="left 2310h")}
-    end = Story(Plant(), 3.0, 0.5, at=at).run()
+    end = drive(Plant(), 3.0, 0.5, at=at).run()
     assert (end.status, end.code) == (Status.ABORTED, ErrorCode.DRIVE_FAULT)
     assert "left 2310h" in end.message
 
@@ -111,7 +110,7 @@ def test_a_base_that_does_not_stop_is_not_called_canceled() -> None:
         cancel(story)
         story.plant.deceleration_mps2 = 1e-6
 
-    story = Story(Plant(), 3.0, 0.3, at={2.0: runaway})
+    story = drive(Plant(), 3.0, 0.3, at={2.0: runaway})
     end = story.run()
     assert end.code is ErrorCode.DRIVE_FAULT
     assert "still moves" in end.message
@@ -119,7 +118,7 @@ def test_a_base_that_does_not_stop_is_not_called_canceled() -> None:
 
 
 def test_a_base_that_is_stuck_makes_no_progress() -> None:
-    story = Story(Plant(stuck=True), 1.0, 0.3)
+    story = drive(Plant(stuck=True), 1.0, 0.3)
     assert story.run().code is ErrorCode.NO_PROGRESS
     assert 2.0 < story.ended_at < 2.5
 
@@ -128,9 +127,9 @@ def test_a_base_that_sticks_within_the_tolerance_has_arrived() -> None:
     def stick(story: Story) -> None:
         story.plant.stuck = True
 
-    probe = Story(Plant(), 0.3, 0.3)
+    probe = drive(Plant(), 0.3, 0.3)
     probe.run()
-    story = Story(Plant(), 0.3, 0.3, at={probe.ended_at - 0.45: stick})
+    story = drive(Plant(), 0.3, 0.3, at={probe.ended_at - 0.45: stick})
     end = story.run()
     assert end.code is ErrorCode.OK
     assert end.traveled_m == pytest.approx(0.3, abs=0.005)
@@ -140,9 +139,9 @@ def test_a_base_that_was_pushed_back_at_the_end_drives_on() -> None:
     def push_back(story: Story) -> None:
         story.plant.x_m -= 0.02  # heading 0.3 rad: 0.019 m along the line
 
-    probe = Story(Plant(), 0.3, 0.3)
+    probe = drive(Plant(), 0.3, 0.3)
     probe.run()
-    story = Story(Plant(), 0.3, 0.3, at={probe.ended_at - 0.1: push_back})
+    story = drive(Plant(), 0.3, 0.3, at={probe.ended_at - 0.1: push_back})
     end = story.run()
     assert end.code is ErrorCode.OK
     assert end.traveled_m == pytest.approx(0.3, abs=0.005)
@@ -153,7 +152,7 @@ def test_odometry_that_jumps_is_not_driven_on() -> None:
     def jump(story: Story) -> None:
         story.plant.x_m -= 0.5
 
-    end = Story(Plant(), 3.0, 0.3, at={2.0: jump}).run()
+    end = drive(Plant(), 3.0, 0.3, at={2.0: jump}).run()
     assert end.code is ErrorCode.ODOMETRY_LOST
     assert "jumped" in end.message
 
@@ -162,16 +161,16 @@ def test_a_base_that_rolls_over_the_distance_is_not_a_success() -> None:
     def brakes_fade(story: Story) -> None:
         story.plant.deceleration_mps2 = 0.3
 
-    end = Story(Plant(), 1.0, 0.5, at={1.5: brakes_fade}).run()
+    end = drive(Plant(), 1.0, 0.5, at={1.5: brakes_fade}).run()
     assert end.code is ErrorCode.DRIVE_FAULT
-    assert "did not stop at the distance" in end.message
+    assert "did not stop at the goal" in end.message
     assert end.overshoot_m > 0.005
     assert end.traveled_m == pytest.approx(1.0 + end.overshoot_m, abs=0.001)
 
 
 def test_an_ended_goal_orders_nothing() -> None:
     robot, start = bench_robot(), Plant().odometry(0.0)
-    goal = GoalRun(robot, 1.0, 0.3, start, 0.0)
+    goal = goal_run(robot, 1.0, 0.3, start)
     inputs = Inputs(odometry=start, shutdown=True)
     now, end = 0.0, None
     while end is None:
@@ -185,7 +184,7 @@ def test_an_ended_goal_orders_nothing() -> None:
 
 def test_feedback_comes_at_its_rate() -> None:
     robot, plant = bench_robot(), Plant()
-    goal = GoalRun(robot, 1.0, 0.3, plant.odometry(0.0), 0.0)
+    goal = goal_run(robot, 1.0, 0.3, plant.odometry(0.0))
     orders = [goal.tick(Inputs(odometry=plant.odometry(cycle * 0.02)), cycle * 0.02) for cycle in range(100)]
     assert 17 <= len([order for order in orders if order.feedback]) <= 21  # 2 s at 10 Hz
 
@@ -219,60 +218,3 @@ def test_an_old_word_of_the_driver_is_no_word() -> None:
     watch = Standstill(STILL, began=0.0, speed_mps=0.1)
     assert watch.judge(Inputs(driver=told), 0.5) is Verdict.WAIT  # received before the order could act
     assert watch.judge(Inputs(driver=replace(told, received=0.4)), 0.5) is Verdict.STANDS
-
-
-def test_the_base_has_one_owner_and_is_free_again_after_it() -> None:
-    robot, plant, owner = bench_robot(), Plant(), Owner(bench_robot())
-    good = Story(plant, 1.0, 0.2, robot).inputs
-
-    def at(now: float) -> Inputs:
-        fresh = {name: replace(getattr(good, name), received=now) for name in ("safety", "driver", "mux")}
-        return replaced(good, odometry=plant.odometry(now), cancel_requested=now > 0.1, **fresh)
-
-    assert owner.tick(at(0.0), 0.0) is None  # nobody drives: silence
-    assert owner.refusal(1.0, 0.2, at(0.0), 0.0) is None
-    owner.take(1.0, 0.2, at(0.0), 0.0)
-    assert "busy" in str(owner.refusal(1.0, 0.2, at(0.0), 0.0))
-    assert "outside" in str(owner.refusal(100.0, 0.2, at(0.0), 0.0))
-    with pytest.raises(RuntimeError, match="refused"):
-        owner.take(1.0, 0.2, at(0.0), 0.0)
-    now = 0.0
-    while owner.busy:
-        now += 0.02
-        order = owner.tick(at(now), now)
-    assert order is not None
-    assert order.end is not None
-    farewell, silence = owner.tick(at(now), now + 0.1), owner.tick(at(now), now + FAREWELL_S + 0.01)
-    assert farewell is not None
-    assert (farewell.twist, farewell.end) == (Twist(), None)
-    assert silence is None
-    assert owner.refusal(1.0, 0.2, at(now), now) is None
-
-
-def test_after_a_defect_the_goal_only_stops_and_ends_as_internal() -> None:
-    robot, plant, owner = bench_robot(), Plant(), Owner(bench_robot())
-    good = Story(plant, 1.0, 0.2, robot).inputs
-    start = replaced(good, odometry=plant.odometry(0.0))
-    owner.take(1.0, 0.2, start, 0.0)
-    owner.fail(ZeroDivisionError("a defect"), start, 0.0)
-    now, twists, end = 0.0, set(), None
-    while end is None:
-        now += 0.02
-        order = owner.tick(replaced(good, odometry=plant.odometry(now)), now)
-        assert order is not None
-        twists.add(order.twist)
-        end = order.end
-    assert twists == {Twist()}
-    assert end.code is ErrorCode.INTERNAL
-    assert "ZeroDivisionError('a defect')" in end.message
-
-
-def test_a_process_out_of_time_ends_its_goal_at_once() -> None:
-    owner, start = Owner(bench_robot()), replaced(Story(Plant(), 1.0, 0.2).inputs, odometry=Plant().odometry(0.0))
-    assert owner.give_up(ErrorCode.SHUTDOWN, "no time", 0.0) is None
-    owner.take(1.0, 0.2, start, 0.0)
-    order = owner.give_up(ErrorCode.SHUTDOWN, "no time", 0.1)
-    assert order is not None
-    assert order.end is not None
-    assert (order.twist, order.end.code) == (Twist(), ErrorCode.SHUTDOWN)
-    assert not owner.busy

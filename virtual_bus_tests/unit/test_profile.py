@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from canbase_action_server.outcome import ErrorCode
 from canbase_action_server.profile import Profile, ProfileLimits, braking_speed_mps, ideal_time_s
-from unit.action_plant import Plant, Story
+from unit.action_plant import Plant, drive
 
 LIMITS = ProfileLimits(
     speed_mps=0.5, acceleration_mps2=1.0, deceleration_mps2=1.0, jerk_mps3=10.0, crawl_mps=0.01, chain_latency_s=0.05
@@ -99,7 +99,7 @@ def test_every_goal_ends_at_its_distance_whatever_the_base(
     seed: int,
 ) -> None:
     plant = Plant(dead_time_s=dead_time_s, lag_s=lag_s, slip=slip)
-    story = Story(plant, sign * distance_m, speed_mps, odometry_hz=odometry_hz, jitter=random.Random(seed))
+    story = drive(plant, sign * distance_m, speed_mps, odometry_hz=odometry_hz, jitter=random.Random(seed))
     end = story.run()
     assert end.code is ErrorCode.OK
     assert end.traveled_m == pytest.approx(sign * distance_m, abs=TOLERANCE_M)
@@ -111,7 +111,7 @@ def test_every_goal_ends_at_its_distance_whatever_the_base(
 @pytest.mark.parametrize("distance_m", [3.0, -3.0])
 def test_a_base_that_pulls_to_one_side_is_led_back_to_the_line(distance_m: float) -> None:
     # Uncorrected, 0.1 rad/m over 3 m ends 0.1 × 3²/2 = 0.45 m beside the line.
-    story = Story(Plant(slip=0.1), distance_m, 0.4)
+    story = drive(Plant(slip=0.1), distance_m, 0.4)
     assert "beside the line" in story.run().message
     plant = story.plant
     beside_m = math.cos(0.3) * plant.y_m - math.sin(0.3) * plant.x_m

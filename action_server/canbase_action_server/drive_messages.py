@@ -1,0 +1,32 @@
+"""The action drive_distance: its messages, and what they mean to the machinery."""
+
+from __future__ import annotations
+
+from canbase.action import DriveDistance
+
+from canbase_action_server.binding import Binding
+from canbase_action_server.goal import Feedback
+from canbase_action_server.outcome import Outcome
+from canbase_action_server.request import DriveRequest
+
+
+def drive_binding() -> Binding:
+    """For the server."""
+    return Binding("drive_distance", DriveDistance, _request, _feedback, _result)
+
+
+def _request(goal: DriveDistance.Goal) -> DriveRequest:
+    return DriveRequest(goal.distance_m, goal.max_speed_mps)
+
+
+def _feedback(feedback: Feedback) -> DriveDistance.Feedback:
+    return DriveDistance.Feedback(traveled_m=feedback.traveled_m, remaining_m=feedback.remaining_m)
+
+
+def _result(outcome: Outcome) -> DriveDistance.Result:
+    return DriveDistance.Result(
+        error_code=int(outcome.code),
+        traveled_m=outcome.traveled_m,
+        overshoot_m=outcome.overshoot_m,
+        message=outcome.message,
+    )

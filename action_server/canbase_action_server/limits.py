@@ -1,0 +1,38 @@
+"""What motions and their stops keep to on this robot: the numbers of robot.yaml as profile and standstill want them."""
+
+from __future__ import annotations
+
+from canbase_action_server.profile import ProfileLimits
+from canbase_action_server.standstill import StandstillLimits
+from canbase_config.robot import Robot
+
+DRIVES_LAG_S = 0.03
+"""Typical time constant of a velocity-controlled drive."""
+
+
+def chain_latency_s(robot: Robot) -> float:
+    """From a velocity order to the wheels' motion: mux and filter, 1.5 cycles of the driver, lag of the drives."""
+    return 0.5 / robot.rates.command_hz + 1.5 / robot.rates.control_hz + DRIVES_LAG_S
+
+
+def profile_limits(robot: Robot, max_speed_mps: float) -> ProfileLimits:
+    """For a straight motion with this max_speed_mps."""
+    return ProfileLimits(
+        speed_mps=min(max_speed_mps, robot.limits.linear_mps),
+        acceleration_mps2=robot.limits.acceleration_mps2,
+        deceleration_mps2=robot.limits.deceleration_mps2,
+        jerk_mps3=robot.limits.jerk_mps3,
+        crawl_mps=0.5 * robot.action.min_speed_mps,
+        chain_latency_s=chain_latency_s(robot),
+    )
+
+
+def standstill_limits(robot: Robot, deceleration_mps2: float) -> StandstillLimits:
+    """When this robot stands after a motion that brakes with `deceleration_mps2`."""
+    return StandstillLimits(
+        linear_mps=robot.base.standstill_mps,
+        angular_radps=2.0 * robot.base.standstill_mps / robot.base.track_m,
+        odometry_timeout_s=robot.timeouts.odometry_s,
+        deceleration_mps2=deceleration_mps2,
+        give_up_s=robot.timeouts.standstill_s,
+    )

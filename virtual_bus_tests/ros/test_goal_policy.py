@@ -1,0 +1,150 @@
+"""The goal policies over DDS: one owner of the base, whatever several clients send and cancel at the same time."""
+
+from __future__ import annotations
+
+import json
+import random
+from typing import Any
+
+import pytest
+from canbase.action import DriveDistance
+from rclpy.action import ActionClient
+
+from canbase_action_server.client import DriveClient
+from canbase_action_server.outcome import ErrorCode, Status
+from ros.conftest import MakeRobot, Spawn
+from ros.fake_base import FakeBase, server_code
+from ros.harness import Process, TestNode
+
+pytestmark = pytest.mark.ros
+
+
+class Crowd:
+    """A server, its base, and several clients that neither wait nor ask twice."""
+
+    def __init__(self, node: TestNode, spawn: Spawn, make_robot: MakeRobot, **action: Any) -> None:
+        self.node = node
+        # A loaded test machine may hold the test's base up for longer than the 0.2 s of a robot.
+        robot = make_robot({"timeouts": {"odometry_s": 1.0}, "action": {"progress_timeout_s": 5.0, **action}})
+        self.server: Process = spawn(server_code(robot))
+        self.base = FakeBase(node)
+        self.clients = [ActionClient(node.node, DriveDistance, "drive_distance") for _ in range(4)]
+        DriveClient(node.node, node.executor).wait_for_server(20.0)
+        node.wait_for(lambda: all(client.server_is_ready() for client in self.clients), 10.0, "all clients")
+        node.wait_for(lambda: node.node.count_subscribers("odom") > 0, 10.0, "the server to listen")
+        node.spin_for(0.5)
+        self.results: dict[str, list[Any]] = {}
+        self.handles: dict[str, Any] = {}
+        self.sent = self.answered = 0
+
+    def send(self, distance_m: float, speed_mps: float, client: int = 0) -> None:
+        """A goal of this client; what becomes of it goes to `handles` and `results`."""
+        self.sent += 1
+        goal = DriveDistance.Goal(distance_m=distance_m, max_speed_mps=speed_mps)
+        self.clients[client].send_goal_async(goal).add_done_callback(self._on_answer)
+
+    def accepted(self, count: int) -> list[str]:
+        """The UUIDs of the accepted goals, in their order, when there are that many."""
+        self.node.wait_for(lambda: len(self.handles) >= count, 10.0, f"{count} accepted goals")
+        return list(self.handles)
+
+    def wait_for_the_end(self, timeout_s: float = 30.0) -> None:
+        """Every goal was answered, and every accepted goal has its result."""
+        self.node.wait_for(lambda: self.answered == self.sent, timeout_s, "all answers")
+        self.node.wait_for(lambda: len(self.results) == len(self.handles), timeout_s, "all results")
+
+    def end(self, uuid: str) -> tuple[Status, ErrorCode]:
+        """Status and error code of a goal that ended once."""
+        (wrapped,) = self.results[uuid]
+        return Status(wrapped.status), ErrorCode(wrapped.result.error_code)
+
+    def steps(self) -> list[dict[str, Any]]:
+        """The structured lines of the server's log."""
+        lines = (line for line in self.server.log().splitlines() if '{"uuid"' in line)
+        return [json.loads(line[line.index("{") :]) for line in lines]
+
+    def _on_answer(self, future: Any) -> None:
+        self.answered += 1
+        handle = future.result()
+        if handle.accepted:
+            uuid = bytes(handle.goal_id.uuid).hex()
+            self.handles[uuid] = handle
+            result = handle.get_result_async()
+            result.add_done_callback(lambda done: self.results.setdefault(uuid, []).append(done.result()))
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("policy", ["reject", "queue", "preempt"])
+def test_200_goals_and_cancels_of_several_clients_each_end_once_and_rightly(
+    policy: str, test_node: TestNode, spawn: Spawn, make_robot: MakeRobot
+) -> None:
+    crowd = Crowd(test_node, spawn, make_robot, goal_policy=policy, queue_length=3)
+    chance, canceled = random.Random(1), set()
+    for _ in range(200):
+        way_m = chance.choice((-1, 1)) * chance.uniform(0.01, 0.1)
+        crowd.send(way_m, chance.uniform(0.1, 0.5), client=chance.randrange(4))
+        test_node.spin_for(chance.choice((0.0, 0.01, 0.05, 0.3)))
+        living = [uuid for uuid in crowd.handles if uuid not in crowd.results]
+        if living and chance.random() < 0.5:
+            canceled.add(living[-1])
+            crowd.handles[living[-1]].cancel_goal_async()
+    crowd.wait_for_the_end()
+    allowed = {
+        (Status.SUCCEEDED, ErrorCode.OK): set(crowd.handles),
+        (Status.CANCELED, ErrorCode.CANCELED): canceled,
+        (Status.ABORTED, ErrorCode.PREEMPTED): set(crowd.handles) if policy == "preempt" else set(),
+    }
+    assert [uuid for uuid in crowd.handles if uuid not in allowed.get(crowd.end(uuid), set())] == []
+    assert one_at_a_time(crowd.steps())
+    assert len(crowd.handles) > 10
+    assert test_node.node.count_publishers("cmd_vel_action") == 1
+
+
+def one_at_a_time(steps: list[dict[str, Any]]) -> bool:
+    """In the server's own log no goal starts before the one that started before it has ended, and each ends once."""
+    running: set[str] = set()
+    ended: list[str] = []
+    for step in steps:
+        if step["step"] == "started":
+            if running - set(ended):
+                return False
+            running.add(step["uuid"])
+        elif step["step"] == "ended":
+            ended.append(step["uuid"])
+    return len(ended) == len(set(ended))
+
+
+def test_a_queue_drives_in_order_and_a_queued_goal_can_be_canceled(
+    test_node: TestNode, spawn: Spawn, make_robot: MakeRobot
+) -> None:
+    crowd = Crowd(test_node, spawn, make_robot, goal_policy="queue", queue_length=2)
+    for distance_m in (0.3, 0.2, -0.1):
+        crowd.send(distance_m, 0.3)
+        test_node.wait_for(lambda: crowd.answered == crowd.sent, 5.0, "the answer")
+        test_node.spin_for(0.1)
+    first, second, third = crowd.accepted(3)
+    crowd.send(0.1, 0.3)  # one runs, two wait: no place
+    crowd.handles[second].cancel_goal_async()
+    test_node.wait_for(lambda: second in crowd.results, 5.0, "the end of the queued goal")
+    assert first not in crowd.results
+    crowd.wait_for_the_end()
+    assert crowd.sent - len(crowd.handles) == 1
+    assert [crowd.end(uuid)[0] for uuid in (first, second, third)] == [
+        Status.SUCCEEDED,
+        Status.CANCELED,
+        Status.SUCCEEDED,
+    ]
+    assert crowd.base.x_m == pytest.approx(0.2, abs=0.01)
+
+
+def test_a_newer_goal_gets_the_base_after_a_stop(test_node: TestNode, spawn: Spawn, make_robot: MakeRobot) -> None:
+    crowd = Crowd(test_node, spawn, make_robot, goal_policy="preempt")
+    crowd.send(2.0, 0.3)
+    (old,) = crowd.accepted(1)
+    test_node.wait_for(lambda: crowd.base.speed_mps > 0.15, 5.0, "the base to move")
+    crowd.send(-0.1, 0.3)
+    test_node.wait_for(lambda: old in crowd.results, 5.0, "the end of the old goal")
+    assert abs(crowd.base.speed_mps) < 0.02
+    assert crowd.end(old) == (Status.ABORTED, ErrorCode.PREEMPTED)
+    crowd.wait_for_the_end()
+    assert crowd.end(crowd.accepted(2)[1]) == (Status.SUCCEEDED, ErrorCode.OK)
