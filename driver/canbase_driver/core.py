@@ -16,7 +16,7 @@ from functools import partial
 from canbase_config.robot import DRIVER_NODE_ID, Robot
 from canbase_driver.axis import Axis
 from canbase_driver.cia301 import EMCY, HEARTBEAT, SDO_TO_CLIENT, SYNC, NmtCommand, NmtState, heartbeat, nmt
-from canbase_driver.cia402 import DriveState, PowerGoal
+from canbase_driver.cia402 import PowerGoal
 from canbase_driver.command import Command
 from canbase_driver.cycle_stats import CycleStats
 from canbase_driver.drives import Drives, age_s
@@ -61,8 +61,8 @@ class DriverCore:
         self._command = Command(robot.timeouts.command_s)
         self._stats = CycleStats(self._period_s)
         self._motion = MotionState.AT_REST
-        self._eased_at = -math.inf
-        """When motion was last ordered, or standstill measured."""
+        self._eased_at = math.inf
+        """When motion was last ordered, or standstill measured; infinity before the first standstill."""
         self._reset: _ResetCall | None = None
         self._bus_problem = ""
         self._stop_requested = self._shutdown_requested = False
@@ -181,17 +181,15 @@ class DriverCore:
             self._motion = self._limiter.step(self._motion, target, dt_s)
         if self._bus_problem or not started:
             return []
+        resets = self._reset is not None and self._reset.sequence.fault_reset_bit
+        goal = PowerGoal.RESET if resets else orders.goal  # to an axis without a fault RESET is OFF
         left_mps, right_mps = wheel_speeds(self._motion.twist, self._robot.base.track_m)
         frames = [
-            axis.setpoint(self._goal(axis, orders), left_mps if axis.drive.side == "left" else right_mps)
+            axis.setpoint(goal, left_mps if axis.drive.side == "left" else right_mps)
             for node in started
             for axis in node.axes
         ]
         return [*frames, SYNC]
-
-    def _goal(self, axis: Axis, orders: Orders) -> PowerGoal:
-        resets = self._reset is not None and self._reset.sequence.fault_reset_bit
-        return PowerGoal.RESET if resets and axis.state is DriveState.FAULT else orders.goal
 
     def _go_on_with_reset(self, situation: Situation, now: float) -> list[Frame]:
         if self._reset is None:
@@ -241,7 +239,7 @@ class DriverCore:
 
     def _overdue(self, now: float) -> str:
         elapsed_s = now - self._eased_at
-        if self._supervisor.state is not DriverState.ENABLED or elapsed_s <= self._robot.timeouts.standstill_s:
+        if elapsed_s <= self._robot.timeouts.standstill_s:
             return ""
         fastest = self._drives.fastest()
         return (

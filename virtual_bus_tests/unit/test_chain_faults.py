@@ -130,18 +130,34 @@ def test_a_watchdog_that_restarts_unnoticed_stops_the_base_while_it_is_starting(
     assert (world.core.state, world.core.cause.name) == (DriverState.STOPPING, "watchdog missing")
 
 
-def test_a_wheel_that_does_not_stop_is_quick_stopped_and_latched(world: World) -> None:
+def run_beside_a_blind_watchdog(world: World, seconds: float) -> None:
+    """A watchdog that says that all is well whatever it sees: what the driver does by itself."""
+    world.watchdog = None
+    for _ in range(round(seconds / 0.05)):
+        world.inject(0x77E, "05")
+        world.inject(0x1FE, "01 00 00 00 14 00 00 00")
+        world.run(0.05)
+
+
+def test_a_wheel_that_does_not_stop_is_quick_stopped_and_latched_by_the_driver_alone(world: World) -> None:
     world.node.axes[0].faults.ignores_setpoints = True
     world.command = Twist2D.ZERO
-    world.run(3.2)
+    run_beside_a_blind_watchdog(world, 3.2)
     assert not world.core.stops
     assert world.truth.v_left_mps > 0.1
-    world.run(0.3)
+    run_beside_a_blind_watchdog(world, 0.3)
     assert world.core.cause.name == "did not stop"
     assert world.core.cause.detail.startswith("left_wheel turns at 0.3")
-    world.run(2.0)
+    run_beside_a_blind_watchdog(world, 2.0)
     assert world.core.state is DriverState.LATCHED
     assert world.truth.standing_s > 1.0
+
+
+def test_a_wheel_that_does_not_stop_is_stopped_by_whoever_notices_first(world: World) -> None:
+    world.node.axes[0].faults.ignores_setpoints = True
+    world.command = Twist2D.ZERO
+    assert world.stands_after(6.0) < 4.0
+    assert world.core.state is DriverState.LATCHED
 
 
 def test_a_push_against_the_standing_base_is_held_and_no_reason_to_stop(world: World) -> None:

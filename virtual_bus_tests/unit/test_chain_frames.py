@@ -58,7 +58,8 @@ def test_two_axes_on_one_node_have_two_setpoints_before_one_sync() -> None:
     assert [name for name in names(world.ticks[-2]) if name != "77F"] == ["201", "301", "080"]
 
 
-def test_no_setpoint_before_the_node_is_started(world: World) -> None:
+def test_no_setpoint_before_the_node_is_started_though_the_other_one_is(world: World) -> None:
+    world.bench.nodes[2].power_cycle(world.now, off_s=0.5)
     world.enable()
     seen = [frame for _, frame in world.log]
     for node_id in (1, 2):

@@ -198,3 +198,11 @@ def test_a_bus_that_fails_without_power_is_offline_and_goes_on_by_itself() -> No
     world.run_until(DriverState.BOOTING, within_s=0.02)
     world.command = Twist2D.ZERO
     world.run_until(DriverState.ENABLED, within_s=1.5)
+
+
+def test_an_emergency_message_that_its_drive_never_takes_back_goes_with_the_reset(world: World) -> None:
+    latched(world)
+    world.inject(0x081, "10 23 02 00 00 00 00 00")
+    assert world.snapshot.drives[0].error_code == OVERCURRENT
+    assert world.recovered()
+    assert world.snapshot.drives[0].error_code == 0

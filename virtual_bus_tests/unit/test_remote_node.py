@@ -239,3 +239,17 @@ def test_a_boot_up_before_the_boot_is_no_loss() -> None:
     story = Story()
     story.heartbeat(BOOT_UP)
     assert story.node.absent() == "node 1 (left_wheel) not booted yet"
+
+
+def test_a_heartbeat_from_before_the_nmt_start_is_no_answer_to_it() -> None:
+    story = Story()
+    story.node.begin_boot(story.now)
+    while story.node.presence is not STARTING:
+        story.heartbeat(OPERATIONAL)  # a drive that starts by itself, or an old one in the queue
+        story.wait(0.01)
+    story.status()
+    story.wait(0.01)
+    assert story.node.presence is STARTING
+    story.heartbeat(OPERATIONAL)
+    story.wait(0.01)
+    assert story.node.presence is READY
