@@ -236,30 +236,62 @@ def test_the_stop_request_and_the_reset_from_another_thread(driver: Driver) -> N
     driver.enabled()
 
 
-def test_a_loop_that_is_always_late_still_takes_in_what_waits(robot: Robot, arguments: dict[str, Any]) -> None:
-    taken: list[Frame] = []
+def test_the_last_snapshot_is_handed_over_though_the_state_is_the_same(driver: Driver) -> None:
+    driver.enabled()
+    driver.loop.request_stop()
+    driver.order(Twist2D.ZERO, 3.0, lambda snapshot: snapshot.state is DriverState.LATCHED)
+    driver.loop.request_shutdown()
+    driver.loop.join(6.0)
+    last, _ = driver.loop.next_snapshot(timeout_s=0.1)
+    assert last is not None
+    assert (last.state, last.cause) == (DriverState.LATCHED, "shutdown")
 
-    class Slow(DriverCore):
-        """Each cycle takes longer than the period."""
 
-        def on_frame(self, frame: Frame, now: float) -> list[Frame]:
-            taken.append(frame)
-            return []
+class SlowCore(DriverCore):
+    """Its cycles take as long as `naps_s` says, one after the other; the last one for ever."""
 
-        def tick(self, now: float, lateness_s: float = 0.0) -> list[Frame]:
-            time.sleep(0.015)
-            return super().tick(now, lateness_s)
+    def __init__(self, robot: Robot, *naps_s: float) -> None:
+        super().__init__(robot)
+        self._naps_s = list(naps_s)
+        self.ticked_at: list[float] = []
+        self.taken = 0
 
-    loop = ControlLoop(Slow(robot), BusPort(arguments), robot.rates.control_hz, robot.rates.odometry_hz)
+    def on_frame(self, frame: Frame, now: float) -> list[Frame]:
+        self.taken += 1
+        return []
+
+    def tick(self, now: float, lateness_s: float = 0.0) -> list[Frame]:
+        self.ticked_at.append(now)
+        time.sleep(self._naps_s.pop(0) if len(self._naps_s) > 1 else self._naps_s[0])
+        return super().tick(now, lateness_s)
+
+
+def run_for(core: DriverCore, robot: Robot, arguments: dict[str, Any], seconds: float, frames: int = 0) -> None:
+    """Run the loop; after 0.1 s so many frames arrive at once."""
+    loop = ControlLoop(core, BusPort(arguments), robot.rates.control_hz, robot.rates.odometry_hz)
     with VirtualBus(arguments["channel"]) as other:
-        for _ in range(5 * FRAMES_WHEN_LATE):
-            other.send(can.Message(arbitration_id=0x181, data=bytes(6), is_extended_id=False))
         loop.start()
-        time.sleep(0.5)
+        time.sleep(0.1)
+        for _ in range(frames):
+            other.send(can.Message(arbitration_id=0x181, data=bytes(6), is_extended_id=False))
+        time.sleep(seconds)
         loop.request_shutdown()
         loop.join(5.0)
     assert loop.failure is None
-    assert len(taken) == 5 * FRAMES_WHEN_LATE
+    assert not loop.is_alive()
+
+
+def test_a_loop_that_is_always_late_still_takes_in_what_waits(robot: Robot, arguments: dict[str, Any]) -> None:
+    core = SlowCore(robot, 0.015)
+    run_for(core, robot, arguments, 0.5, frames=5 * FRAMES_WHEN_LATE)
+    assert core.taken == 5 * FRAMES_WHEN_LATE
+
+
+def test_cycles_that_were_missed_are_not_made_up_for(robot: Robot, arguments: dict[str, Any]) -> None:
+    core = SlowCore(robot, 0.0, 0.5, 0.0)
+    run_for(core, robot, arguments, 1.0)
+    after = core.ticked_at[1] + 0.5
+    assert len([at for at in core.ticked_at if after < at < after + 0.1]) <= 13
 
 
 def test_a_bus_that_cannot_be_opened_says_what_to_look_at(arguments: dict[str, Any]) -> None:

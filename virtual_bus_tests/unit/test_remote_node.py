@@ -243,10 +243,12 @@ def test_a_boot_up_before_the_boot_is_no_loss() -> None:
 
 def test_a_heartbeat_from_before_the_nmt_start_is_no_answer_to_it() -> None:
     story = Story()
-    story.node.begin_boot(story.now)
-    while story.node.presence is not STARTING:
-        story.heartbeat(OPERATIONAL)  # a drive that starts by itself, or an old one in the queue
-        story.wait(0.01)
+
+    def beat(_drive: FakeDrive, _data: bytes) -> None:
+        story.heartbeat(OPERATIONAL)  # a drive that starts by itself
+
+    story.drive.on_write[0x60FF, 0] = beat
+    story.started()
     story.status()
     story.wait(0.01)
     assert story.node.presence is STARTING
