@@ -21,7 +21,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from canbase_cli.drive import CANCELED, REJECTED
+from canbase_cli.goal import CANCELED, REJECTED
 from canbase_cli.options import FAILED, fail, ros_needed
 from canbase_cli.stack import Stack
 
@@ -34,6 +34,7 @@ TRUTH_TOLERANCE_M: Final = 0.010
 READY_S: Final = 30.0
 CANCEL_AFTER_M: Final = 0.3
 RUN_S: Final = 60.0
+DOMAINS: Final = range(215, 232)
 QUIET_S: Final = 1.0
 """For so long after a result nothing may move."""
 
@@ -75,19 +76,17 @@ def demo(
 
     Exit code: 0 when everything that it shows held, 1 otherwise.
     """
-    with ros_needed():
-        import rclpy  # noqa: F401 - fails here, with advice, rather than in five processes
     console = Console()
     with tempfile.TemporaryDirectory(prefix="canbase-demo-") as folder, _environment() as env:
+        with ros_needed():
+            import rclpy  # noqa: F401 - fails here, with advice, rather than in five processes
         config = _robot_file(Path(folder))
-        stack = Stack(config, sim=True, logs=Path(folder), env=env)
         report = Report()
-        try:
-            stack.start()
+        with Stack(config, sim=True, logs=Path(folder), env=env) as stack:
             _show(console, stack, config, report, speed_mps)
-        finally:
             codes = stack.stop()
-        report.check("every process ended well", str(codes), set(codes.values()) == {0})
+        bad = ", ".join(f"{part} {code}" for part, code in codes.items() if code != 0)
+        report.check("every process ended well", f"exit code {bad or '0 of all'}", not bad)
         console.print(report.table())
         if not report.good:
             for part in codes:
@@ -97,7 +96,7 @@ def demo(
 
 
 def _show(console: Console, stack: Stack, config: Path, report: Report, speed_mps: float) -> None:
-    from canbase_bench.control import control_path
+    from canbase_bench.control import ControlError, SimControl, control_path
     from canbase_config.load import load_robot
 
     with console.status("starting: simulated drives, watchdog, velocity, driver, action server"):
@@ -107,10 +106,13 @@ def _show(console: Console, stack: Stack, config: Path, report: Report, speed_mp
         report.check("drives enabled", f"{time.monotonic() - started:.1f} s after the start", ready)
     if not ready:
         return
-    with _connected(control_path(load_robot(config).robot)) as sim:
-        _drive_one_metre(console, observer, sim, report, speed_mps)
-        _refused(console, report)
-        _cancelled(console, sim, report)
+    try:
+        with SimControl(control_path(load_robot(config).robot)) as sim:
+            _drive_one_metre(console, observer, sim, report, speed_mps)
+            _refused(console, report)
+            _cancelled(console, sim, report)
+    except ControlError as error:
+        report.check("the simulation answers", str(error), False)
     observer.close()
 
 
@@ -238,27 +240,34 @@ class _Observer:
 
 
 @contextmanager
-def _connected(path: Path) -> Iterator[SimControl]:
-    from canbase_bench.control import SimControl
-
-    with SimControl(path) as sim:
-        yield sim
+def _environment() -> Iterator[dict[str, str]]:
+    """ROS on this machine alone, in a domain of its own; for this process and those that it starts."""
+    with _domain() as domain:
+        ours = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": str(domain)}
+        before = {name: os.environ.get(name) for name in ours}
+        os.environ.update(ours)
+        try:
+            yield dict(os.environ)
+        finally:
+            for name, value in before.items():
+                if value is None:
+                    del os.environ[name]
+                else:
+                    os.environ[name] = value
 
 
 @contextmanager
-def _environment() -> Iterator[dict[str, str]]:
-    """ROS on this machine alone, in a domain of its own; for this process and those that it starts."""
-    ours = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": str(random.randint(102, 200))}
-    before = {name: os.environ.get(name) for name in ours}
-    os.environ.update(ours)
-    try:
-        yield dict(os.environ)
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+def _domain() -> Iterator[int]:
+    """A ROS domain that no other demo holds, with ports above those that Linux gives out by itself."""
+    for domain in random.sample(DOMAINS, len(DOMAINS)):
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as holder:
+            try:
+                holder.bind(f"\0canbase-demo-domain-{domain}")
+            except OSError:
+                continue
+            yield domain
+            return
+    fail(f"{len(DOMAINS)} demos run on this machine already", FAILED)
 
 
 def _robot_file(folder: Path) -> Path:

@@ -17,6 +17,7 @@ from canbase_cli.options import (
     ros_arguments,
     ros_needed,
 )
+from canbase_cli.priority import raise_priority
 
 
 def driver(ctx: typer.Context, config: ConfigOption = None, namespace: NamespaceOption = "") -> None:
@@ -27,6 +28,7 @@ def driver(ctx: typer.Context, config: ConfigOption = None, namespace: Namespace
     robot = load_config(config).robot
     with ros_needed():
         from canbase_driver.main import run
+    raise_priority("driver")
     raise typer.Exit(run(robot, ros_arguments(ctx, namespace)))
 
 
@@ -38,6 +40,7 @@ def velocity(ctx: typer.Context, config: ConfigOption = None, namespace: Namespa
     robot = load_config(config).robot
     with ros_needed():
         from canbase_velocity.main import run
+    raise_priority("velocity")
     raise typer.Exit(run(robot, ros_arguments(ctx, namespace)))
 
 
@@ -49,6 +52,7 @@ def action_server(ctx: typer.Context, config: ConfigOption = None, namespace: Na
     robot = load_config(config).robot
     with ros_needed():
         from canbase_action_server.main import run
+    raise_priority("action-server")
     raise typer.Exit(run(robot, ros_arguments(ctx, namespace)))
 
 
@@ -63,6 +67,7 @@ def sim(
     from canbase_bench.main import run
 
     robot = load_config(config).robot
+    raise_priority("sim")
     raise typer.Exit(run(robot, None if control is None else str(control)))
 
 

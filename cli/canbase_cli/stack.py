@@ -1,29 +1,28 @@
 """The processes of one robot, started and ended together. Used by `canbase up` and `canbase demo`.
 
-Each part is a process of its own that gets SIGTERM when this one dies, however it dies. The order of the end: who
-commands ends first, who stops the robot last.
+Each part is a process of its own (`child.py`) that gets SIGTERM when this one dies, however it dies. The order of the
+end: who commands ends first, who stops the robot last.
 """
 
 from __future__ import annotations
 
-import ctypes
 import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Final
+from types import TracebackType
+from typing import Final
 
 START_ORDER: Final = ("sim", "watchdog", "velocity", "driver", "action-server")
 END_ORDER: Final = ("action-server", "velocity", "driver", "watchdog", "sim")
+WITHOUT_ROS: Final = ("sim", "watchdog")
 GRACE_S: Final = 10.0
 """A part that still runs so long after SIGTERM is killed; the driver needs the time of its ramp."""
 POLL_S: Final = 0.02
-_PR_SET_PDEATHSIG: Final = 1
-_LIBC = ctypes.CDLL(None, use_errno=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +33,13 @@ class Death:
     exit_code: int
 
     def __str__(self) -> str:
-        how = f"was ended by {signal.Signals(-self.exit_code).name}" if self.exit_code < 0 else "ended by itself"
-        return f"{self.part} {how}" + (f" with exit code {self.exit_code}" if self.exit_code >= 0 else "")
+        if self.exit_code < 0:
+            return f"{self.part} was ended by {signal.Signals(-self.exit_code).name}"
+        return f"{self.part} ended by itself with exit code {self.exit_code}"
 
 
 class Stack:
-    """Runs the parts. `logs`: a folder for their output, one file each; None: they write to this terminal."""
+    """Runs the parts. With `with` they are ended at the latest when the block is left."""
 
     def __init__(
         self,
@@ -51,6 +51,8 @@ class Stack:
         logs: Path | None = None,
         env: Mapping[str, str] | None = None,
     ) -> None:
+        """`sim`: simulated drives too. `ros_args`: for the parts with ROS. `logs`: a folder for the parts' output, one
+        file each; None: they write to this terminal. `env`: their environment; None: that of this process."""
         self._options = ["--config", str(config), *(["--namespace", namespace] if namespace else [])]
         self._ros_args = list(ros_args)
         self._parts = [part for part in START_ORDER if sim or part != "sim"]
@@ -58,15 +60,25 @@ class Stack:
         self._env = None if env is None else dict(env)
         self._running: dict[str, subprocess.Popen[bytes]] = {}
 
+    def __enter__(self) -> Stack:
+        self.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
     @property
     def pids(self) -> dict[str, int]:
         """Process ids of the parts that were started."""
         return {part: process.pid for part, process in self._running.items()}
 
     def start(self) -> None:
-        """Starts all parts; they find each other by themselves, in whatever order they get ready."""
+        """Starts the parts that do not run; they find each other by themselves, in whatever order they get ready."""
         for part in self._parts:
-            self._running[part] = self._spawn(part)
+            if part not in self._running:
+                self._running[part] = self._spawn(part)
 
     def death(self) -> Death | None:
         """The first part found that has ended, None while all run."""
@@ -78,50 +90,38 @@ class Stack:
 
     def stop(self) -> dict[str, int]:
         """Ends all parts in order, the robot standing; exit codes. A part that does not end in time is killed."""
-        codes = {}
-        for part in END_ORDER:
-            process = self._running.pop(part, None)
-            if process is not None:
-                codes[part] = _end(process)
-        return codes
+        return {part: self.end(part) for part in END_ORDER if part in self._running}
+
+    def end(self, part: str) -> int:
+        """Ends one part; its exit code. `start` starts it again."""
+        return _end(self._running.pop(part))
 
     def log(self, part: str) -> str:
         """What a part has written, where output goes to files."""
         return "" if self._logs is None else (self._logs / f"{part}.log").read_text(errors="replace")
 
     def _spawn(self, part: str) -> subprocess.Popen[bytes]:
-        argv = [sys.executable, "-m", "canbase_cli", part, *self._options]
-        if self._ros_args and part not in ("sim", "watchdog"):
+        argv = [sys.executable, "-m", "canbase_cli.child", str(os.getpid()), part, *self._options]
+        if part not in WITHOUT_ROS:
             argv += self._ros_args
-        if self._logs is None:
-            return self._popen(argv, None)
-        with (self._logs / f"{part}.log").open("wb") as log:
-            return self._popen(argv, log)
-
-    def _popen(self, argv: list[str], log: IO[bytes] | None) -> subprocess.Popen[bytes]:
-        return subprocess.Popen(
-            argv,
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=None if log is None else subprocess.STDOUT,
-            preexec_fn=_as_child,
-            env=self._env,
-        )
-
-
-def _as_child() -> None:
-    """In the child: a session of its own, so that Ctrl-C reaches the parent alone; SIGTERM when the parent dies."""
-    os.setsid()
-    _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+        with ExitStack() as opened:
+            log = None if self._logs is None else opened.enter_context((self._logs / f"{part}.log").open("ab"))
+            # A session of its own: Ctrl-C reaches this process alone, and this one ends the parts in order.
+            return subprocess.Popen(
+                argv,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=None if log is None else subprocess.STDOUT,
+                start_new_session=True,
+                env=self._env,
+            )
 
 
 def _end(process: subprocess.Popen[bytes]) -> int:
-    deadline = time.monotonic() + GRACE_S
-    if process.poll() is None:
-        process.send_signal(signal.SIGCONT)
-        process.terminate()
-    while process.poll() is None and time.monotonic() < deadline:
-        time.sleep(POLL_S)
-    if process.poll() is None:
+    process.terminate()
+    process.send_signal(signal.SIGCONT)  # a stopped process gets its SIGTERM only then
+    try:
+        return process.wait(GRACE_S)
+    except subprocess.TimeoutExpired:
         process.kill()
-    return process.wait()
+        return process.wait()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Annotated, Final
 
 import typer
@@ -11,6 +12,8 @@ from canbase_cli.options import FAILED, NamespaceOption, colour, fail, ros_argum
 NO_DRIVER: Final = 6
 ANSWER_S: Final = 16.0
 """A reset may have to boot the drives first."""
+SLICE_S: Final = 0.1
+"""Ctrl-C is heard after this at the latest."""
 WaitOption = Annotated[float, typer.Option("--wait", metavar="SECONDS", min=0.1, help="for the motor driver")]
 
 
@@ -37,17 +40,19 @@ def reset(ctx: typer.Context, wait_s: WaitOption = 5.0, namespace: NamespaceOpti
 def _call(service: str, ros_args: list[str], wait_s: float) -> None:
     with ros_needed():
         import rclpy
+        from rclpy.signals import SignalHandlerOptions
         from std_srvs.srv import Trigger
 
-    rclpy.init(args=ros_args)
+    rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)  # Ctrl-C ends it as any command
     try:
         node = rclpy.create_node("canbase_trigger", enable_rosout=False)
         client = node.create_client(Trigger, service)
         if not client.wait_for_service(wait_s):
             fail(f"no motor driver offers {client.srv_name}; is it running (canbase up), in this namespace?", NO_DRIVER)
-        future = client.call_async(Trigger.Request())
-        rclpy.spin_until_future_complete(node, future, timeout_sec=ANSWER_S)
-        answer = future.result()
+        future, deadline = client.call_async(Trigger.Request()), time.monotonic() + ANSWER_S
+        while not future.done() and time.monotonic() < deadline:
+            rclpy.spin_once(node, timeout_sec=SLICE_S)
+        answer = future.result() if future.done() else None
     finally:
         rclpy.try_shutdown()
     if answer is None:

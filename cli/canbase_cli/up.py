@@ -9,8 +9,8 @@ from typing import Annotated
 
 import typer
 
-from canbase_cli.options import FAILED, ConfigOption, NamespaceOption, colour, fail, load_config
-from canbase_cli.stack import POLL_S, Stack
+from canbase_cli.options import FAILED, ConfigOption, NamespaceOption, colour, fail, load_config, ros_arguments
+from canbase_cli.stack import POLL_S, Death, Stack
 
 
 def up(
@@ -30,27 +30,39 @@ def up(
     """
     loaded = load_config(config)
     with_sim = loaded.robot.bus.interface == "udp_multicast" if sim is None else sim
-    stack = Stack(loaded.path, namespace=namespace, sim=with_sim, ros_args=rest_of(ctx))
-    ended: list[int] = []
+    ended = _end_signals()
+    stack = Stack(loaded.path, namespace=namespace, sim=with_sim, ros_args=ros_arguments(ctx, ""))
+    with stack:
+        _say(f"{loaded.robot.name} is starting; Ctrl-C stops the robot and ends it")
+        death = _wait(stack, ended)
+        _say(f"{death or 'ending'}; stopping the robot")
+        codes = stack.stop()
+    bad = [str(Death(part, code)) for part, code in codes.items() if code != 0]
+    if death is not None or bad:
+        fail("; ".join(bad) or str(death), FAILED)
 
-    def end(number: int, _frame: FrameType | None) -> None:
-        ended.append(number)
+
+def _end_signals() -> list[int]:
+    """A list that receives the number of each signal that asks for the end."""
+    received: list[int] = []
+
+    def note(number: int, _frame: FrameType | None) -> None:
+        received.append(number)
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, end)
-    stack.start()
-    typer.secho(f"canbase: {loaded.robot.name} is up; Ctrl-C stops the robot and ends it", err=True, color=colour())
-    while not ended and stack.death() is None:
+        signal.signal(number, note)
+    return received
+
+
+def _wait(stack: Stack, ended: list[int]) -> Death | None:
+    """Until a signal, or the death of a part."""
+    while not ended:
+        death = stack.death()
+        if death is not None:
+            return death
         time.sleep(POLL_S)
-    death = stack.death()
-    typer.secho(f"canbase: {death or 'ending'}; stopping the robot", err=True, color=colour())
-    codes = stack.stop()
-    bad = {part: code for part, code in codes.items() if code != 0}
-    if death is not None or bad:
-        fail(f"not ended well: {bad}", FAILED)
+    return None
 
 
-def rest_of(ctx: typer.Context) -> list[str]:
-    """What the user wrote from --ros-args on, with that word."""
-    given = list(ctx.meta.get("--ros-args", ()))
-    return ["--ros-args", *given] if given else []
+def _say(text: str) -> None:
+    typer.secho(f"canbase: {text}", err=True, color=colour())

@@ -7,6 +7,7 @@ process; a process that is killed or hangs is caught by the watchdog and by the 
 from __future__ import annotations
 
 import gc
+import math
 import signal
 import sys
 import time
@@ -26,7 +27,8 @@ from canbase_driver.services import DriverServices
 
 WAKE_S = 0.1
 LOOP_TIMEOUT_S = 0.5
-"""A control thread without a cycle for so long hangs: the process ends, the watchdog has already stopped the drives."""
+"""A control thread without a cycle for so long, while this one ran, hangs: the process ends; the watchdog has already
+stopped the drives."""
 END_MARGIN_S = 3.0
 """Above the ramp's time: quick stop, power off."""
 
@@ -79,10 +81,11 @@ def _spin(
     """Until a signal or a failure; the failure."""
     executor = EventsExecutor()
     executor.add_node(node)
+    watch = HangWatch(LOOP_TIMEOUT_S, WAKE_S)
     try:
         while not received:
             executor.spin_once(timeout_sec=WAKE_S)
-            failure = _failure(loop, threads)
+            failure = _failure(threads) or watch.look(loop.cycle_at, time.monotonic())
             if failure is not None:
                 return failure
     except Exception as error:  # noqa: BLE001 - the base is ramped down, then the process ends by it
@@ -92,13 +95,32 @@ def _spin(
     return None
 
 
-def _failure(loop: ControlLoop, threads: tuple[ControlLoop, Publisher, DriverServices]) -> BaseException | None:
-    """Why the process must end: a thread that failed, ended, or hangs."""
+def _failure(threads: tuple[ControlLoop, Publisher, DriverServices]) -> BaseException | None:
+    """Why the process must end: a thread that failed or ended."""
     for thread in threads:
         if thread.failure is not None:
             return thread.failure
         if not thread.is_alive():
             return RuntimeError(f"thread {thread.name} ended by itself")
-    if time.monotonic() - loop.cycle_at > LOOP_TIMEOUT_S:
-        return TimeoutError(f"the control thread has made no cycle for {LOOP_TIMEOUT_S} s")
     return None
+
+
+class HangWatch:
+    """Tells a thread that hangs from a process that was stopped as a whole, and goes on."""
+
+    def __init__(self, timeout_s: float, look_s: float) -> None:
+        """`look_s`: the longest time between two looks while this thread runs."""
+        self._timeout_s = timeout_s
+        self._look_s = look_s
+        self._cycle_at = self._looked_at = math.inf
+        self._seen_s = 0.0
+
+    def look(self, cycle_at: float, now: float) -> TimeoutError | None:
+        """Call after each wait with the time of the last cycle. The failure, when there is one."""
+        self._seen_s += max(0.0, min(now - self._looked_at, self._look_s))
+        self._looked_at = now
+        if cycle_at != self._cycle_at:
+            self._cycle_at, self._seen_s = cycle_at, 0.0
+        if self._seen_s <= self._timeout_s:
+            return None
+        return TimeoutError(f"the control thread has made no cycle for {now - cycle_at:.1f} s")

@@ -8,6 +8,7 @@ COMMAND = QoSProfile(depth=1)
 """Velocities and the emergency stop: only the newest counts."""
 STATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Latched: who comes late sees the newest state."""
-EVENT = QoSProfile(depth=20)
+EVENT = QoSProfile(depth=20, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""Latched, as the motor driver's on the same topic: who comes late sees why the robot was stopped."""
 SCAN = qos_profile_sensor_data
 """Best effort: it fits every scanner's publisher, reliable or not."""

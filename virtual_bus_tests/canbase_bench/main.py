@@ -30,6 +30,7 @@ def run(robot: Robot, control: str | None = None) -> int:
     Returns the exit code: 0 after SIGINT or SIGTERM, 1 when the bus or the control socket cannot be used.
     """
     logging.basicConfig(level=logging.INFO, format="%(asctime)s sim %(levelname)s %(message)s", stream=sys.stderr)
+    logging.getLogger("canopen").setLevel(logging.WARNING)  # it tells of every SDO
     path = Path(control) if control else control_path(robot)
     with _stop_signals() as stop:
         try:

@@ -22,12 +22,24 @@ MakeRobot = Callable[[Mapping[str, Any]], Path]
 _starts = itertools.count(os.getpid())
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """--stop-times, of test_stack_kill.py."""
+    parser.addoption("--stop-times", type=Path, metavar="FILE", help="add measured stop times to FILE, as Markdown")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def this_machine_alone() -> Iterator[None]:
+    """No test talks to another machine, whatever its domain."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        yield
+
+
 @pytest.fixture(autouse=True)
 def domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     """ROS_DOMAIN_ID of this test, in its environment and in that of every process that it starts."""
     domain, holder = reserve_domain(next(_starts))
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     yield domain
     holder.close()
 

@@ -1,0 +1,28 @@
+"""A part of the stack as the child of another process: `python -m canbase_cli.child PARENT_PID driver …`.
+
+It gets SIGTERM when that parent dies, however it dies: nobody may be left driving.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import sys
+
+PR_SET_PDEATHSIG = 1
+"""prctl(2); kept over execve(2)."""
+
+
+def end_with(parent_pid: int) -> None:
+    """SIGTERM to this process when `parent_pid` dies; at once when it has died already. Linux alone has this."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != parent_pid:
+        sys.exit(128 + signal.SIGTERM)
+
+
+if __name__ == "__main__":
+    end_with(int(sys.argv.pop(1)))
+    from canbase_cli.main import app
+
+    app(prog_name="canbase")

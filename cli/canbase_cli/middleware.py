@@ -1,0 +1,26 @@
+"""How this process talks DDS: over UDP, never over Fast DDS's shared memory. To be called before ROS starts.
+
+There a sender waits up to 0.3 s for a receiver that is slow to answer, such as one that is just starting on a loaded
+computer. rclpy holds Python's interpreter lock meanwhile, so one late process would stop the control loop of another,
+and the watchdog would rightly stop the robot. Over UDP a sender waits for nobody.
+"""
+
+from __future__ import annotations
+
+from collections.abc import MutableMapping
+from pathlib import Path
+from typing import Final
+
+_PROFILES: Final = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")  # Fast DDS 2 and 3
+_RANGE: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+_LOCAL: Final = Path(__file__).with_name("fastdds_local.xml")
+
+
+def prefer_udp(environment: MutableMapping[str, str]) -> None:
+    """Changes the environment of this process. Who has a profile of their own for Fast DDS keeps it."""
+    if any(environment.get(name) for name in _PROFILES):
+        return
+    environment.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
+    if environment.get(_RANGE) == "LOCALHOST":  # here rmw_fastrtps adds shared memory whatever the line above says
+        environment[_RANGE] = "SYSTEM_DEFAULT"
+        environment.update(dict.fromkeys(_PROFILES, str(_LOCAL)))
