@@ -1,0 +1,99 @@
+"""`python -m campaign`: runs scenarios and prints what came of them; `--seed` tells one of them from begin to end."""
+
+from __future__ import annotations
+
+import enum
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
+from rich.table import Table
+
+from campaign.faults import FAULTS
+from campaign.judge import EXCLUDED, PROPERTIES
+from campaign.plan import draw_plan
+from campaign.replay import replay
+from campaign.runner import Tally, run
+from campaign.scenario import Result
+from campaign.without import SAFEGUARDS, remove
+
+SHOWN = 50
+"""Violations that are listed one by one."""
+app = typer.Typer(add_completion=False)
+out = Console()
+Fault = enum.Enum("Fault", {name: name for name in FAULTS}, type=str)  # type: ignore[misc]
+Safeguard = enum.Enum("Safeguard", {name: name for name in SAFEGUARDS}, type=str)  # type: ignore[misc]
+
+
+@app.command()
+def main(
+    scenarios: Annotated[int, typer.Option(min=1, help="how many scenarios")] = 10_000,
+    first: Annotated[int, typer.Option(min=0, help="seed of the first one; the others follow it")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    seed: Annotated[int | None, typer.Option(min=0, help="replay this one alone, with a log of all that happens")] = None,
+    fault: Annotated[list[Fault] | None, typer.Option(help="draw only from these; may be repeated")] = None,
+    frames: Annotated[bool, typer.Option(help="with --seed: every frame on the bus too")] = False,
+    without: Annotated[Safeguard | None, typer.Option(help="take this safeguard out before; it should be missed")] = None,
+) -> None:
+    """Scenarios with 1 to 4 overlapping faults in virtual time. Exit code 1 when a property did not hold."""
+    only = [name.value for name in fault or ()]
+    taken_out = without.value if without is not None else ""
+    if seed is not None:
+        remove(taken_out)
+        result = replay(draw_plan(seed, only), frames, print)
+        raise typer.Exit(1 if result.violations else 0)
+    tally = _run(range(first, first + scenarios), workers, only, taken_out)
+    _tell_faults(tally)
+    _tell_sums(tally)
+    _tell_violations(tally, only)
+    raise typer.Exit(1 if tally.violations else 0)
+
+
+def _run(seeds: range, workers: int, only: list[str], without: str) -> Tally:
+    columns = ("{task.description}", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), "{task.fields[found]}")
+    with Progress(*columns, console=out) as progress:
+        task = progress.add_task("scenarios", total=len(seeds), found="")
+        found = 0
+
+        def on_result(result: Result) -> None:
+            nonlocal found
+            found += len(result.violations)
+            progress.update(task, advance=1, found=f"{found} violations")
+
+        return run(seeds, workers, only, without, on_result)
+
+
+def _tell_faults(tally: Tally) -> None:
+    table = Table("fault", "times", "what happens", title=f"faults in {tally.scenarios} scenarios")
+    for name, kind in FAULTS.items():
+        table.add_row(name, str(tally.faults[name]), kind.sentence)
+    out.print(table)
+
+
+def _tell_sums(tally: Tally) -> None:
+    at_once = ", ".join(f"{count} with {faults}" for faults, count in sorted(tally.at_once.items()))
+    trips = ", ".join(f"{name} {count}" for name, count in tally.trips.most_common())
+    goals = ", ".join(f"{name} {count}" for name, count in tally.goals.most_common())
+    out.print(f"scenarios by number of faults: {at_once}")
+    out.print(f"trips of the watchdog: {trips or 'none'}")
+    out.print(f"ends of goals: {goals or 'none'}")
+    ratio = tally.virtual_s / tally.real_s if tally.real_s else 0.0
+    out.print(f"{tally.virtual_s:.0f} s of virtual time, {tally.moved_m:.0f} m driven, {ratio:.0f} × real time a process")
+
+
+def _tell_violations(tally: Tally, only: list[str]) -> None:
+    table = Table("property", "violations", "what must hold", "not asked for with")
+    for name, sentence in PROPERTIES.items():
+        count = sum(violation.name == name for _, violation in tally.violations)
+        table.add_row(name, str(count), sentence, ", ".join(EXCLUDED[name][0]) if name in EXCLUDED else "")
+    out.print(table)
+    for seed, violation in tally.violations[:SHOWN]:
+        out.print(f"[red]{violation.name}[/red] in seed {seed} at {violation.at_s:.2f} s: {violation.detail}")
+        out.print(f"  {'; '.join(str(fault) for fault in draw_plan(seed, only).faults)}", highlight=False)
+    if tally.violations:
+        out.print("tell one of them: make campaign SEED=…, or python -m campaign --seed …")
+
+
+if __name__ == "__main__":
+    app()

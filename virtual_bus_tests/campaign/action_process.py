@@ -1,0 +1,128 @@
+"""drive_distance_server in virtual time: its `Reception` with the inputs, the timer and the callbacks of node.py."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from canbase_action_server.along_track import Pose
+from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
+from canbase_action_server.outcome import Outcome
+from canbase_action_server.reception import Reception
+from canbase_action_server.request import DriveRequest
+from canbase_config.robot import Robot
+from canbase_driver.snapshot import DriverSnapshot
+from canbase_velocity.decision import Action, Cause, Decision
+from canbase_velocity.mux import MuxDecision
+from canbase_velocity.twist import Twist
+
+from campaign.clock import Clock
+from campaign.process import Process, Topics
+
+ESTOP_CAUSES = (Cause.ESTOP, Cause.ESTOP_STALE)
+
+
+@dataclass(slots=True)
+class Goal:
+    """One accepted goal: when it began, and each end that it was given."""
+
+    number: int
+    distance_m: float
+    speed_mps: float
+    began: float
+    ends: list[Outcome]
+    ended_at: float = 0.0
+    died: bool = False
+    """Its server was killed."""
+    held_up_s: float = 0.0
+    """How long its server hung meanwhile."""
+
+
+class ActionProcess(Process):
+    """`goals`: every goal that was ever accepted."""
+
+    name = "action"
+
+    def __init__(self, robot: Robot, clock: Clock, topics: Topics, on_end: Callable[[Goal], None]) -> None:
+        super().__init__(clock)
+        self._robot, self._topics, self._on_end = robot, topics, on_end
+        self.goals: list[Goal] = []
+        self.refused = 0
+        topics.subscribe("odom", self, self._on_odometry)
+        topics.subscribe("motor_driver/status", self, self._on_driver)
+        topics.subscribe("safety_filter/state", self, self._on_safety)
+        topics.subscribe("velocity_mux/state", self, self._on_mux)
+        self.begin()
+
+    def begin(self) -> None:
+        """A new owner without a goal; it has heard nothing."""
+        self.reception = Reception(self._robot)
+        self._inputs = Inputs()
+        self._turned_at = self.clock.now
+        self.every(1.0 / self._robot.action.control_hz, self._on_timer, phase_s=0.002)
+
+    def die(self) -> None:
+        """The goal dies with its server."""
+        super().die()
+        for goal in self.goals:
+            goal.died = goal.died or not goal.ends
+
+    def send_goal(self, distance_m: float, speed_mps: float) -> None:
+        """A client asks for a goal. It is accepted or refused as in node.py."""
+        self.receive("goals", 10, self._on_goal, distance_m, speed_mps)
+
+    def cancel(self) -> None:
+        """The client of the running goal wants it to end."""
+        self.receive("cancels", 10, self._on_cancel)
+
+    def _on_goal(self, distance_m: float, speed_mps: float) -> None:
+        now = self.clock.now
+        request = DriveRequest(distance_m, speed_mps)
+        if self.reception.refusal(request, self._inputs, now) is not None:
+            self.refused += 1
+            return
+        self.reception.admit(str(len(self.goals)), request, self._inputs, now)
+        self.goals.append(Goal(len(self.goals), distance_m, speed_mps, now, []))
+
+    def _on_cancel(self) -> None:
+        if self.reception.running is not None:
+            self.reception.cancel(self.reception.running)
+
+    def _on_timer(self) -> None:
+        now = self.clock.now
+        if self.goals and not self.goals[-1].ends:
+            self.goals[-1].held_up_s += max(0.0, now - self._turned_at - 1.0 / self._robot.action.control_hz)
+        self._turned_at = now
+        cycle = self.reception.tick(self._inputs, now)
+        if cycle.twist is not None:
+            self._topics.publish("cmd_vel_action", Twist(cycle.twist.linear_mps, cycle.twist.angular_radps))
+        for end in cycle.ends:
+            goal = self.goals[int(end.key)]
+            goal.ends.append(end.outcome)
+            goal.ended_at = now
+            self._on_end(goal)
+
+    def _on_odometry(self, snapshot: DriverSnapshot) -> None:
+        pose = Pose(snapshot.x_m, snapshot.y_m, snapshot.yaw_rad)
+        odometry = Odometry(self.clock.now, pose, snapshot.linear_mps, snapshot.angular_radps)
+        self._inputs = replace(self._inputs, odometry=odometry)
+
+    def _on_driver(self, snapshot: DriverSnapshot) -> None:
+        driver = Driver(
+            received=self.clock.now,
+            state=snapshot.state.name.lower(),
+            cause=snapshot.cause,
+            detail=snapshot.detail,
+            watchdog=snapshot.watchdog.value,
+            watchdog_cause=snapshot.watchdog_cause,
+            standstill=snapshot.standstill,
+        )
+        self._inputs = replace(self._inputs, driver=driver)
+
+    def _on_safety(self, decision: Decision) -> None:
+        stops, estop = decision.action is Action.STOP, decision.cause in ESTOP_CAUSES
+        safety = Safety(self.clock.now, stops, decision.cause.value, decision.detail, estop)
+        self._inputs = replace(self._inputs, safety=safety)
+
+    def _on_mux(self, decision: MuxDecision) -> None:
+        self._inputs = replace(self._inputs, mux=Mux(self.clock.now, decision.active or ""))

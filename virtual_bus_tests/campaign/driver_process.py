@@ -1,0 +1,116 @@
+"""motor_driver in virtual time: the core with the cycle of loop.py and the topics of node.py; and two ways to go mad."""
+
+from __future__ import annotations
+
+from canbase_config.robot import DRIVER_NODE_ID, Robot
+from canbase_driver.core import DriverCore
+from canbase_driver.frame import Frame
+from canbase_driver.kinematics import Twist2D
+from canbase_driver.reset import Outcome
+from canbase_driver.snapshot import DriverSnapshot
+from canbase_velocity.twist import Twist
+
+from campaign.can_bus import CanBus
+from campaign.process import FRAMES_HELD, Process, Topics
+
+SETPOINTS = (0x200, 0x300)
+"""First identifiers of the RPDOs with setpoints: docs/bus.md."""
+CYCLE_JITTER_S = 0.0005
+
+
+class DriverProcess(Process):
+    """`core` is the real driver. `bus_problem`: what its adapter reports. The mad drivers send other frames instead."""
+
+    name = "driver"
+
+    def __init__(self, robot: Robot, bus: CanBus, topics: Topics) -> None:
+        super().__init__(bus.clock)
+        self._robot, self._topics, self._random = robot, topics, bus.random
+        self._member = bus.join(self.name, self._hear)
+        self.bus_problem = ""
+        self.repeats = False
+        """It sends the setpoints of its last cycle again and again, with heartbeat and SYNC."""
+        self.ignores_zero = False
+        """Where a setpoint is zero it sends the last one that was not."""
+        self.heartbeats = True
+        """A mad driver may go on with its heartbeat or be silent there."""
+        self._last_frames: list[Frame] = []
+        self._last_moving: dict[int, bytes] = {}
+        topics.subscribe("cmd_vel", self, self._on_command)
+        self.begin()
+
+    def begin(self) -> None:
+        """A new core: nothing is booted."""
+        self.core = DriverCore(self._robot)
+        self._period_s = 1.0 / self._robot.rates.control_hz
+        self._cycle = 0
+        self.snapshot: DriverSnapshot | None = None
+        self._told: tuple[object, object] | None = None
+        self._status_at = 0.0
+        self.every(self._period_s, self._on_cycle)
+
+    def reset(self, on_outcome: list[Outcome]) -> None:
+        """Service motor_driver/reset; nobody answers while the process does not run."""
+        if self.running:
+            self.core.request_reset(self.clock.now, on_outcome.append)
+
+    def stop(self) -> None:
+        """Service motor_driver/stop."""
+        if self.running:
+            self.core.request_stop()
+
+    def _hear(self, cob_id: int, data: bytes) -> None:
+        self.receive("frames", FRAMES_HELD, self._on_frame, cob_id, data)
+
+    def _on_frame(self, cob_id: int, data: bytes) -> None:
+        if not self.bus_problem:
+            self._send(self.core.on_frame(Frame(cob_id, data), self.clock.now))
+
+    def _on_command(self, twist: Twist) -> None:
+        self.core.on_command(Twist2D(twist.linear_mps, twist.angular_radps), self.clock.now)
+
+    def _on_cycle(self) -> None:
+        now = self.clock.now
+        self.core.on_bus(self.bus_problem, now)
+        frames = self.core.tick(now, self._random.random() * CYCLE_JITTER_S)
+        self._send(self._changed(frames))
+        self._cycle += 1
+        self._publish(now)
+
+    def _send(self, frames: list[Frame]) -> None:
+        if self.bus_problem:
+            return
+        for frame in frames:
+            self._member.send(frame.cob_id, frame.data)
+
+    def _changed(self, frames: list[Frame]) -> list[Frame]:
+        """The cycle's frames as a mad driver sends them; a sane one changes nothing."""
+        if self.repeats:
+            beats = [frame for frame in frames if frame.cob_id == 0x700 + DRIVER_NODE_ID and self.heartbeats]
+            return beats + self._last_frames
+        self._last_frames = [frame for frame in frames if frame.cob_id != 0x700 + DRIVER_NODE_ID]
+        return [self._never_zero(frame) for frame in frames] if self.ignores_zero else self._note(frames)
+
+    def _note(self, frames: list[Frame]) -> list[Frame]:
+        for frame in frames:
+            if frame.cob_id & 0x780 in SETPOINTS and any(frame.data[2:]):
+                self._last_moving[frame.cob_id] = frame.data
+        return frames
+
+    def _never_zero(self, frame: Frame) -> Frame:
+        stands = frame.cob_id & 0x780 in SETPOINTS and not any(frame.data[2:])
+        return Frame(frame.cob_id, self._last_moving.get(frame.cob_id, frame.data)) if stands else frame
+
+    def _publish(self, now: float) -> None:
+        """odom at 50 Hz while it is valid, the status at its rate and on every change."""
+        status = (self.core.state, self.core.cause.name)
+        due = status != self._told or now - self._status_at >= 1.0 / self._robot.rates.status_hz
+        samples = round(self._robot.rates.control_hz / self._robot.rates.odometry_hz)
+        if not due and self._cycle % samples:
+            return
+        snapshot = self.snapshot = self.core.snapshot(now)
+        if snapshot.odometry_valid:
+            self._topics.publish("odom", snapshot)
+        if due:
+            self._told, self._status_at = status, now
+            self._topics.publish("motor_driver/status", snapshot)

@@ -1,0 +1,53 @@
+"""Somebody who does not belong there: a second master on the bus, and a node that publishes straight to cmd_vel."""
+
+from __future__ import annotations
+
+import struct
+
+from canbase_config.derive import mps_per_bit
+from canbase_config.robot import Robot
+from canbase_velocity.twist import Twist
+
+from campaign.can_bus import CanBus
+from campaign.process import Topics
+
+ENABLE = 0x000F
+SETPOINT = struct.Struct("<Hi")
+
+
+class Intruder:
+    """Each flag switches one misdeed on; it goes on every `PERIOD_S` until it is switched off."""
+
+    PERIOD_S = 0.01
+
+    def __init__(self, robot: Robot, bus: CanBus, topics: Topics) -> None:
+        self._clock, self._topics = bus.clock, topics
+        self._member = bus.join("intruder", lambda cob_id, data: None)
+        self._robot = robot
+        self.setpoints_mps = 0.0
+        """It sends enabling setpoints of this speed and SYNC, as if it were the driver."""
+        self.syncs = False
+        self.nmt = b""
+        """It sends this NMT command again and again."""
+        self.twist: Twist | None = None
+        """It publishes this to cmd_vel."""
+        self.bad_at = -1.0
+        """When it last sent something to the bus."""
+        self._act()
+
+    def _act(self) -> None:
+        if self.nmt:
+            self._send(0x000, self.nmt)
+        if self.setpoints_mps:
+            for drive in self._robot.drives:
+                bits = round(self.setpoints_mps / mps_per_bit(drive, self._robot.base.wheel_radius_m))
+                self._send(0x200 + drive.node_id, SETPOINT.pack(ENABLE, bits))
+        if self.setpoints_mps or self.syncs:
+            self._send(0x080, b"")
+        if self.twist is not None:
+            self._topics.publish("cmd_vel", self.twist)
+        self._clock.after(self.PERIOD_S, self._act)
+
+    def _send(self, cob_id: int, data: bytes) -> None:
+        self.bad_at = self._clock.now
+        self._member.send(cob_id, data)

@@ -1,0 +1,255 @@
+"""What must hold in every scenario, whatever goes wrong: looked at every 5 ms, against the ground truth.
+
+Each property has its sentence here; what no software can do is in `EXCLUDED`, as narrow as it can be said.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from canbase_action_server.outcome import ErrorCode
+from canbase_bench.cia402.states import State
+from canbase_config.derive import max_wheel_mps
+from canbase_driver.snapshot import DriverState
+from canbase_velocity.twist import Twist
+from canbase_watchdog.ladder import RUNGS
+from canbase_watchdog.watchdog import Answer
+from canbase_watchdog.watchdog import State as WatchdogState
+
+from campaign.action_process import Goal
+from campaign.envelope import TOLERANCE_MPS, Envelope, braking_s, moving_s, notice_s, react_s
+from campaign.faults import FAULTS
+from campaign.odometry_judge import OdometryJudge
+from campaign.outside import Outside, Surroundings
+from campaign.plan import Plan
+from campaign.wishes import Wishes
+from campaign.world import World
+
+STEP_S = 0.005
+HEARD_S = 0.3
+"""The stop button says ten times a second that it is pressed: the filter has heard it then, if it runs."""
+PROPERTIES = {
+    "envelope": "the base is beyond what its leases order for T_react at most, and then brakes",
+    "sources": "the base moves only while a source orders it, and for the timeouts of mux and filter and T_react after",
+    "latched": "a trip of the watchdog and a latched stop of the driver end by an accepted reset alone",
+    "held": "after a latched stop the base brakes, stands, and does not move again before the reset",
+    "enabling": "no drive gets power without a watchdog that lives and is not tripped",
+    "heartbeat": "a drive that hears neither watchdog nor driver stops by itself",
+    "estop": "the base stands while the emergency stop is pressed",
+    "zero": "after the emergency stop nothing is ordered before the command was zero once",
+    "obstacle": "the base never touches what it could have seen in time",
+    "odometry": "the driver's pose never jumps, and is the true one as long as the encoders tell the truth",
+    "goal": "every goal ends exactly once, in its time; one that succeeded is where it should be",
+    "exception": "nothing raises",
+}
+STRANGE_HANDS = frozenset(("second_master_setpoints", "second_master_nmt", "driver_repeats", "driver_ignores_zero"))
+"""Who sends to the drives past all layers can move them again after a stop, for as long as T_react; nobody else can."""
+EXCLUDED = {
+    "enabling": (
+        tuple(sorted(STRANGE_HANDS)),
+        "who sends controlwords straight to a drive asks no watchdog; it stops the drive afterwards (envelope, held)",
+    ),
+    "zero": (
+        ("velocity_dies", "velocity_hangs", "velocity_hiccup", "estop_stale"),
+        "a filter that was started again, or did not hear the button, knows of no emergency stop",
+    ),
+    "heartbeat": (
+        ("second_master_nmt",),
+        "a drive that was reset by another master has forgotten 1016h; nobody gives it power but that master",
+    ),
+    "obstacle": (
+        ("straight_to_cmd_vel", "second_master_setpoints", "driver_repeats", "driver_ignores_zero", "scan_stale"),
+        "the way until the stop, several times over where the operator resets in between, may be longer than the way "
+        "that was free; and a wall that no scan shows is not seen",
+    ),
+}
+"""Property → faults with which it is not asked for, and why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Violation:
+    """A property that did not hold. `at_s` from the start of the scenario."""
+
+    name: str
+    at_s: float
+    detail: str
+
+
+class Judge:
+    """Watches one scenario. `violations`: the first one of each property."""
+
+    def __init__(self, world: World, around: Surroundings, outside: Outside, plan: Plan) -> None:
+        self._world, self._around, self._outside = world, around, outside
+        self._start = now = world.clock.now
+        self._faults = {fault.name for fault in plan.faults}
+        self.violations: list[Violation] = []
+        self.react_s = self._react_s(plan)
+        self._envelope = Envelope(self.react_s, now)
+        self._wishes = Wishes(world.robot, now)
+        self._wish = Envelope(self.react_s + world.robot.safety.command_timeout_s, now)
+        self._awaits_zero = False
+        self._hold: Envelope | None = None
+        self._stood = False
+        self._latches: dict[str, object] = {}
+        self._resets_done = 0
+        self._watching_at = now
+        self._pressed_at = math.inf
+        lies = any(FAULTS[name].encoder_lies for name in self._faults)
+        self._odometry = OdometryJudge(world, exact=not lies)
+        self.trips: list[str] = []
+        world.on_lease = self._on_lease
+        world.on_goal_end = self._on_goal_end
+        world.topics.watch = self._on_message
+        self._step()
+
+    def finish(self) -> None:
+        """The scenario is over: no goal may be left."""
+        for goal in self._world.action.goals:
+            if not goal.ends and not goal.died:
+                self._violate("goal", f"goal {goal.number} never ended")
+
+    def _react_s(self, plan: Plan) -> float:
+        """Two layers with several faults. A second master is fought rung by rung; what comes late adds its delay."""
+        reaction_s = react_s(self._world.robot, layers=1 if len(plan.faults) == 1 else 2)
+        for fault in plan.faults:
+            if fault.name == "frame_delay":
+                reaction_s += 2.0 * fault.arguments["value"]
+            if fault.name.startswith("second_master"):
+                reaction_s += sum(rung.obey_s for rung in RUNGS.values() if math.isfinite(rung.obey_s))
+        return reaction_s
+
+    def _violate(self, name: str, detail: str) -> None:
+        if name in EXCLUDED and self._faults & set(EXCLUDED[name][0]):
+            return
+        if all(violation.name != name for violation in self.violations):
+            self.violations.append(Violation(name, self._world.clock.now - self._start, detail))
+            self._world.note(f"VIOLATION of {name}: {detail}")
+
+    def _on_lease(self, twist: Twist) -> None:
+        if self._awaits_zero and not twist.is_zero:
+            self._violate("zero", f"{twist} is ordered, and the command was not zero since the emergency stop")
+        tau_s = braking_s(self._world.robot, twist.linear_mps, twist.angular_radps)
+        self._envelope.order(tau_s, self._world.clock.now)
+
+    def _on_message(self, topic: str, message: object) -> None:
+        """What the sources want; and a command of zero after an emergency stop, before anything else is ordered."""
+        if not isinstance(message, Twist):
+            return
+        now = self._world.clock.now
+        self._wishes.take(topic, message, now)
+        if topic == "cmd_vel_mux" and message.is_zero and not self._around.pressed:
+            self._awaits_zero = False
+
+    def _step(self) -> None:
+        now = self._world.clock.now
+        base = self._world.drives.bench.base
+        tau_s = moving_s(self._world.robot, base.v_mps, base.w_radps)
+        coasting = tau_s > 0.0 and self._coasts()
+        self._check_latches(now)
+        self._check_speed(tau_s, coasting, now)
+        self._check_drives(now)
+        self._check_stop_button(tau_s, coasting, now)
+        if min(self._around.free_m) < 0.0:
+            self._violate("obstacle", f"touched: {min(self._around.free_m):.3f} m")
+        problem = self._odometry.step(now)
+        if problem:
+            self._violate("odometry", problem)
+        self._world.clock.after(STEP_S, self._step)
+
+    def _check_speed(self, tau_s: float, coasting: bool, now: float) -> None:
+        allowed_s = self._envelope.bound_s(tau_s, now, coasting)
+        if tau_s > allowed_s:
+            self._violate("envelope", f"{self._speeds()}: {tau_s:.3f} s to stop, the leases allow {allowed_s:.3f} s")
+        self._wish.order(self._wishes.greatest_s(now), now)
+        allowed_s = self._wish.bound_s(tau_s, now, coasting)
+        if tau_s > allowed_s:
+            self._violate("sources", f"{self._speeds()}: {tau_s:.3f} s to stop, the sources want {allowed_s:.3f} s")
+        if self._hold is None:
+            return
+        self._stood = self._stood or tau_s == 0.0
+        again = self._stood and tau_s > 0.0 and not self._faults & STRANGE_HANDS
+        if tau_s > self._hold.bound_s(tau_s, now, coasting) or again:
+            self._violate("held", f"{self._speeds()} while {' and '.join(self._latches)} latched")
+
+    def _check_latches(self, now: float) -> None:
+        driver, watchdog = self._world.driver, self._world.watchdog
+        status = watchdog.core.status
+        done = sum(outcome.done for outcome in self._outside.resets)
+        if watchdog.running and status.state is WatchdogState.WATCHING:
+            self._watching_at = now
+        latched: dict[str, object] = {}
+        if driver.alive and driver.core.state is DriverState.LATCHED:
+            latched["driver"] = driver.core
+        if watchdog.alive and status.state is WatchdogState.TRIPPED:
+            latched["watchdog"] = watchdog.core
+            if "watchdog" not in self._latches:
+                self.trips.append(status.verdict.cause.name.lower())
+        if self._gone("driver", driver.core, latched) and done == self._resets_done:
+            self._violate("latched", "the driver left LATCHED without a reset")
+        if self._gone("watchdog", watchdog.core, latched) and status.reset[1] is not Answer.DONE:
+            self._violate("latched", "the watchdog left TRIPPED without a reset")
+        self._resets_done = done
+        if latched.keys() != self._latches.keys():
+            self._note_latches(latched, now)
+        self._latches = latched
+
+    def _gone(self, name: str, core: object, latched: dict[str, object]) -> bool:
+        """It was latched, is not any more, and is still the same process."""
+        return self._latches.get(name) is core and name not in latched and self._world.processes[name].alive
+
+    def _note_latches(self, latched: dict[str, object], now: float) -> None:
+        self._world.note(f"latched: {', '.join(latched) or 'nothing'}")
+        if not latched:
+            self._hold = None
+        elif self._hold is None:
+            self._hold, self._stood = Envelope(self.react_s, now), False
+
+    def _check_drives(self, now: float) -> None:
+        robot = self._world.robot
+        grace_s = robot.timeouts.watchdog_s + notice_s(robot)
+        for change in self._world.drives.changes():
+            self._world.note(f"drive {change.node_id}: {change.before.name} → {change.after.name}")
+            if change.after is State.OPERATION_ENABLED and now > self._watching_at + grace_s:
+                self._violate("enabling", f"drive {change.node_id}, {now - self._watching_at:.2f} s without watchdog")
+        brakes_s = max_wheel_mps(robot) / robot.limits.emergency_deceleration_mps2
+        for node_id, heard in self._world.drives.heard.items():
+            motor = self._world.drives.bench.nodes[node_id].axes[0].motor
+            alone_s = now - heard
+            moves = motor.powered and abs(motor.speed_mps) > TOLERANCE_MPS
+            if moves and alone_s > robot.timeouts.drive_heartbeat_s + brakes_s + 0.1:
+                self._violate("heartbeat", f"drive {node_id} turns, {alone_s:.2f} s without a heartbeat")
+
+    def _check_stop_button(self, tau_s: float, coasting: bool, now: float) -> None:
+        if not self._around.pressed:
+            self._pressed_at = math.inf
+            return
+        self._pressed_at = min(self._pressed_at, now)
+        if now > self._pressed_at + HEARD_S:
+            self._awaits_zero = True
+        limits = self._world.robot.limits
+        longest_s = braking_s(self._world.robot, limits.linear_mps, limits.angular_radps)
+        if tau_s > 0.0 and not coasting and now > self._pressed_at + 0.1 + self.react_s + longest_s:
+            self._violate("estop", f"{self._speeds()}, {now - self._pressed_at:.2f} s after it was pressed")
+
+    def _on_goal_end(self, goal: Goal) -> None:
+        robot, outcome = self._world.robot, goal.ends[-1]
+        self._world.note(f"goal {goal.number} ends: {outcome.code.name}: {outcome.message}")
+        ramps_s = goal.speed_mps * (1.0 / robot.limits.acceleration_mps2 + 1.0 / robot.limits.deceleration_mps2) + 0.5
+        ideal_s = abs(goal.distance_m) / goal.speed_mps + ramps_s
+        longest_s = robot.action.overall_factor * ideal_s + robot.action.overall_extra_s + robot.timeouts.standstill_s
+        if len(goal.ends) > 1:
+            self._violate("goal", f"goal {goal.number} ended {len(goal.ends)} times")
+        if goal.ended_at - goal.began > longest_s + goal.held_up_s + 1.0:
+            self._violate("goal", f"goal {goal.number} took {goal.ended_at - goal.began:.1f} s")
+        off_m = abs(outcome.traveled_m - goal.distance_m)
+        if outcome.code is ErrorCode.OK and off_m > 3.0 * robot.action.tolerance_m:
+            self._violate("goal", f"goal {goal.number} succeeded {off_m:.3f} m beside its distance")
+
+    def _coasts(self) -> bool:
+        nodes = self._world.drives.bench.nodes.values()
+        return any(not axis.motor.powered for node in nodes for axis in node.axes)
+
+    def _speeds(self) -> str:
+        base = self._world.drives.bench.base
+        return f"{base.v_mps:+.3f} m/s {base.w_radps:+.3f} rad/s"

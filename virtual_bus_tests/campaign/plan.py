@@ -1,0 +1,118 @@
+"""What will happen in one scenario, drawn from its seed: who orders what, which faults come, who resets. Only data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from random import Random
+
+from campaign.faults import FAULTS, PlannedFault
+
+FAULTS_S = (0.2, 2.0)
+"""Faults begin in this part of a scenario."""
+SCENARIO_S = (2.4, 3.4)
+MOST_FAULTS = 4
+KINDS = ("constant", "constant", "constant", "weave", "burst", "nan", "zero")
+"""How a source behaves for a while; a word that stands more often is drawn more often."""
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A source sends for a while, at `rate_hz`; before and after it is silent. Times from the scenario's start [s]."""
+
+    source: str
+    start_s: float
+    duration_s: float
+    kind: str
+    linear_mps: float
+    angular_radps: float
+    rate_hz: float
+
+    def __str__(self) -> str:
+        speed = f"{self.linear_mps:+.2f} m/s {self.angular_radps:+.2f} rad/s"
+        return f"{self.start_s:5.2f} s  {self.source} {self.kind} {speed}, {self.rate_hz:.0f} Hz, {self.duration_s:.2f} s"
+
+
+@dataclass(frozen=True, slots=True)
+class GoalRequest:
+    """A client asks for a goal, and may cancel it."""
+
+    start_s: float
+    distance_m: float
+    speed_mps: float
+    cancel_after_s: float | None
+
+    def __str__(self) -> str:
+        cancel = "" if self.cancel_after_s is None else f", cancelled after {self.cancel_after_s:.2f} s"
+        return f"{self.start_s:5.2f} s  goal {self.distance_m:+.3f} m at {self.speed_mps:.2f} m/s{cancel}"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Everything that is given from outside."""
+
+    seed: int
+    duration_s: float
+    bitrate: int
+    segments: tuple[Segment, ...]
+    goals: tuple[GoalRequest, ...]
+    resets_s: tuple[float, ...]
+    faults: tuple[PlannedFault, ...]
+
+    def lines(self) -> list[str]:
+        """The plan in words."""
+        resets = [f"{at_s:5.2f} s  operator resets" for at_s in self.resets_s]
+        parts = [str(part) for part in (*self.segments, *self.goals, *self.faults)]
+        return [f"seed {self.seed}: {self.duration_s:.2f} s at {self.bitrate} bit/s", *sorted(parts + resets)]
+
+
+def draw_plan(seed: int, only: Sequence[str] = ()) -> Plan:
+    """The same seed gives the same plan. `only`: the faults to draw from; empty: all."""
+    pool = sorted(only or FAULTS)
+    random = Random(seed)
+    duration_s = random.uniform(*SCENARIO_S)
+    by_goals = random.random() < 0.35
+    segments = () if by_goals and random.random() < 0.5 else _segments(random, duration_s, late=by_goals)
+    names = random.sample(pool, min(random.randint(1, MOST_FAULTS), len(pool)))
+    return Plan(
+        seed,
+        duration_s,
+        random.choice((125_000, 250_000, 500_000, 1_000_000)),
+        tuple(segments),
+        _goals(random) if by_goals else (),
+        tuple(random.uniform(0.8, duration_s) for _ in range(random.choice((0, 0, 1, 1, 2)))),
+        tuple(_fault(name, random) for name in names),
+    )
+
+
+def _segments(random: Random, duration_s: float, late: bool) -> tuple[Segment, ...]:
+    """Mostly somebody drives when the faults come; `late`: a goal drives first, and may be taken over."""
+    segments: list[Segment] = []
+    for _ in range(random.randint(1, 3)):
+        first = not segments and not late
+        start_s = random.uniform(0.0, 0.3) if first else random.uniform(0.5, duration_s)
+        kind = "constant" if first else random.choice(KINDS)
+        linear_mps = random.choice((-1.0, 1.0)) * random.uniform(0.1, 1.0)
+        angular_radps = random.choice((0.0, 0.0, random.uniform(-2.5, 2.5)))
+        rate_hz = 200.0 if kind == "burst" else random.choice((10.0, 20.0, 50.0))
+        source = random.choice(("joystick", "navigation"))
+        lasts_s = random.uniform(0.8, duration_s) if first else random.uniform(0.1, 1.5)
+        segments.append(Segment(source, start_s, lasts_s, kind, linear_mps, angular_radps, rate_hz))
+    return tuple(segments)
+
+
+def _goals(random: Random) -> tuple[GoalRequest, ...]:
+    goals = []
+    for number in range(random.randint(1, 2)):
+        start_s = random.uniform(0.0, 0.2) + number * random.uniform(0.3, 1.5)
+        distance_m = math.copysign(random.uniform(0.02, 0.8), random.choice((-1.0, 1.0)))
+        cancel_after_s = random.uniform(0.1, 1.5) if random.random() < 0.25 else None
+        goals.append(GoalRequest(start_s, distance_m, random.uniform(0.1, 0.5), cancel_after_s))
+    return tuple(goals)
+
+
+def _fault(name: str, random: Random) -> PlannedFault:
+    kind = FAULTS[name]
+    start_s = random.uniform(*FAULTS_S)
+    return PlannedFault(name, start_s, random.uniform(*kind.lasts_s), kind.draw(random))

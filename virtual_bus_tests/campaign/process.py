@@ -1,0 +1,131 @@
+"""What every process of the world has in common: it lives, hangs, dies and comes back; and the topics between them."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from random import Random
+from typing import Any
+
+from campaign.clock import Clock
+
+FRAMES_HELD = 2000
+"""Frames or datagrams that the system keeps for a process that hangs."""
+
+
+class Process:
+    """Receives and ticks while it runs. Hung (SIGSTOP), it finds on its return what the system kept for it."""
+
+    name = ""
+
+    def __init__(self, clock: Clock) -> None:
+        self.clock = clock
+        self.alive = True
+        self._hung_by: set[object] = set()
+        self._life = 0
+        self._kept: dict[str, deque[tuple[Callable[..., object], tuple[Any, ...]]]] = {}
+        self._late: list[Callable[[], None]] = []
+
+    @property
+    def running(self) -> bool:
+        """Neither dead nor hung."""
+        return self.alive and not self._hung_by
+
+    def begin(self) -> None:
+        """A new life: make the core anew and start the timers."""
+        raise NotImplementedError
+
+    def receive(self, channel: str, depth: int, do: Callable[..., object], *arguments: Any) -> None:
+        """Something arrives now. A hung process keeps the last `depth` things of each channel."""
+        if not self.alive:
+            return
+        if self._hung_by:
+            self._kept.setdefault(channel, deque(maxlen=depth)).append((do, arguments))
+        else:
+            do(*arguments)
+
+    def every(self, period_s: float, do: Callable[[], None], phase_s: float = 0.0) -> None:
+        """Call `do` on a grid of absolute times as long as this life lasts."""
+        self._enter(self._life, self.clock.now + phase_s, period_s, do)
+
+    def die(self) -> None:
+        """SIGKILL: everything that it knew is gone."""
+        self.alive = False
+        self._life += 1
+        self._hung_by.clear()
+        self._kept.clear()
+        self._late.clear()
+
+    def restart(self) -> None:
+        """Start again, if it is dead."""
+        if not self.alive:
+            self.alive = True
+            self.begin()
+
+    def hang(self, by: object) -> None:
+        """Stand still until `go_on` was called for everything that stopped it."""
+        if self.alive:
+            self._hung_by.add(by)
+
+    def go_on(self, by: object) -> None:
+        """`by` does not stop it any more."""
+        if by not in self._hung_by:
+            return
+        self._hung_by.remove(by)
+        if not self._hung_by:
+            self._catch_up()
+
+    def _catch_up(self) -> None:
+        """What was kept comes first, channel by channel, then the timers that are overdue."""
+        kept, self._kept = self._kept, {}
+        for things in kept.values():
+            for do, arguments in things:
+                do(*arguments)
+        late, self._late = self._late, []
+        for turn in late:
+            turn()
+
+    def _enter(self, life: int, due: float, period_s: float, do: Callable[[], None]) -> None:
+        def turn() -> None:
+            if life != self._life:
+                return
+            if self._hung_by:
+                self._late.append(turn)
+                return
+            do()
+            nonlocal due
+            due = max(due + period_s, self.clock.now)
+            self.clock.at(due, turn)
+
+        self.clock.at(due, turn)
+
+
+class Topics:
+    """Publishers and subscribers: each message takes a little while, another one each time, and may get lost."""
+
+    FASTEST_S = 0.0002
+    JITTER_S = 0.0005
+
+    def __init__(self, clock: Clock, random: Random) -> None:
+        self._clock, self._random = clock, random
+        self._subscribers: dict[str, list[tuple[Process, Callable[[Any], None]]]] = {}
+        self._last: dict[str, float] = {}
+        self.loss: dict[str, float] = {}
+        """Chance by topic that a message does not arrive."""
+        self.watch: Callable[[str, Any], None] | None = None
+        """Told of every message with its topic."""
+
+    def subscribe(self, topic: str, process: Process, do: Callable[[Any], None]) -> None:
+        """`process` calls `do` with each message; while it hangs, the newest is kept (a queue of depth 1)."""
+        self._subscribers.setdefault(topic, []).append((process, do))
+
+    def publish(self, topic: str, message: Any) -> None:
+        """Send a message on its way to every subscriber."""
+        if self.watch is not None:
+            self.watch(topic, message)
+        for process, do in self._subscribers.get(topic, ()):
+            if self._random.random() < self.loss.get(topic, 0.0):
+                continue
+            arrival = self._clock.now + self.FASTEST_S + self._random.random() * self.JITTER_S
+            self._last[topic] = arrival = max(arrival, self._last.get(topic, 0.0))
+            self._clock.at(arrival, process.receive, topic, 1, do, message)

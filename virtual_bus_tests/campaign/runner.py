@@ -1,0 +1,80 @@
+"""Many scenarios in several processes: each worker boots one world and forks it once per scenario."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from functools import partial
+
+from campaign.judge import Violation
+from campaign.plan import draw_plan
+from campaign.scenario import Result, Start
+from campaign.without import remove
+
+BATCH = 25
+"""Scenarios that a worker takes at once."""
+_start: Start | None = None
+
+
+@dataclass(slots=True)
+class Tally:
+    """What all scenarios came to."""
+
+    scenarios: int = 0
+    faults: Counter[str] = field(default_factory=Counter)
+    at_once: Counter[int] = field(default_factory=Counter)
+    trips: Counter[str] = field(default_factory=Counter)
+    goals: Counter[str] = field(default_factory=Counter)
+    violations: list[tuple[int, Violation]] = field(default_factory=list)
+    virtual_s: float = 0.0
+    real_s: float = 0.0
+    moved_m: float = 0.0
+
+    def add(self, result: Result) -> None:
+        """One more result."""
+        self.scenarios += 1
+        self.faults.update(result.faults)
+        self.at_once[len(result.faults)] += 1
+        self.trips.update(result.trips)
+        self.goals.update(result.goals)
+        self.violations += [(result.seed, violation) for violation in result.violations]
+        self.virtual_s += result.virtual_s
+        self.real_s += result.real_s
+        self.moved_m += result.moved_m
+
+
+def run(
+    seeds: Iterable[int],
+    workers: int,
+    only: Sequence[str] = (),
+    without: str = "",
+    on_result: Callable[[Result], None] | None = None,
+) -> Tally:
+    """Run the scenarios of these seeds with faults from `only` (empty: all), `without` a safeguard (campaign.without)."""
+    tally = Tally()
+    listed = list(seeds)
+    batches = [listed[at : at + BATCH] for at in range(0, len(listed), BATCH)]
+    # Not forked from here: who calls may have threads, and a forked scenario must have none.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, context, initializer=_boot, initargs=(without,)) as pool:
+        for results in pool.map(partial(_run, only), batches):
+            for result in results:
+                tally.add(result)
+                if on_result is not None:
+                    on_result(result)
+    return tally
+
+
+def _boot(without: str) -> None:
+    global _start  # noqa: PLW0603 - the worker's one world
+    remove(without)
+    _start = Start()
+
+
+def _run(only: Sequence[str], seeds: list[int]) -> list[Result]:
+    if _start is None:
+        raise RuntimeError("the worker has no world; _boot comes first")
+    return [_start.fork(draw_plan(seed, only)) for seed in seeds]

@@ -1,0 +1,135 @@
+"""One scenario from its seed to its result. The world is booted once; each scenario runs in a forked copy of it."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from campaign.faults import FAULTS, PlannedFault
+from campaign.judge import Judge, Violation
+from campaign.outside import Outside, Surroundings
+from campaign.plan import Plan
+from campaign.world import World
+
+GOALS_END_S = 12.0
+"""How long a scenario goes on at most until its goals have ended."""
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What came out of one scenario."""
+
+    seed: int
+    faults: tuple[str, ...]
+    violations: tuple[Violation, ...] = ()
+    trips: tuple[str, ...] = ()
+    goals: tuple[str, ...] = ()
+    moved_m: float = 0.0
+    virtual_s: float = 0.0
+    real_s: float = field(default=0.0, compare=False)
+
+
+class Start:
+    """A world that is enabled and at rest, from which scenarios begin."""
+
+    def __init__(self) -> None:
+        self.world = World()
+        self.around = Surroundings(self.world)
+        self.world.enable()
+
+    def run(self, plan: Plan, note: Callable[[float, str], None] | None = None) -> Result:
+        """Run one scenario in this very world, which is spent then."""
+        began = time.perf_counter()
+        run = _Run(self.world, self.around, plan, note)
+        return run.result(time.perf_counter() - began)
+
+    def fork(self, plan: Plan) -> Result:
+        """Run one scenario in a copy of this process: the world stays as it is."""
+        reader, writer = os.pipe()
+        pid = os.fork()
+        if pid == 0:
+            os.close(reader)
+            self._tell(plan, writer)
+        os.close(writer)
+        with os.fdopen(reader, "rb") as pipe:
+            told = pipe.read()
+        os.waitpid(pid, 0)
+        if told:
+            result = pickle.loads(told)
+            assert isinstance(result, Result)
+            return result
+        lost = Violation("exception", 0.0, "the scenario's process died")
+        return Result(plan.seed, tuple(fault.name for fault in plan.faults), (lost,))
+
+    def _tell(self, plan: Plan, writer: int) -> None:
+        """The child's whole life; it never returns."""
+        status = 1
+        try:
+            with os.fdopen(writer, "wb") as pipe:
+                pipe.write(pickle.dumps(self.run(plan)))
+            status = 0
+        finally:
+            os._exit(status)
+
+
+class _Run:
+    """One scenario in one world."""
+
+    def __init__(
+        self, world: World, around: Surroundings, plan: Plan, note: Callable[[float, str], None] | None
+    ) -> None:
+        self._world, self._around, self._plan = world, around, plan
+        self._start = world.clock.now
+        world.random.seed(plan.seed)
+        world.bus.bitrate = plan.bitrate
+        if note is not None:
+            world.note = lambda text: note(world.clock.now - self._start, text)
+        self._moved_from_m = world.drives.bench.base.path_m
+        outside = Outside(world, plan, self._start)
+        self._judge = Judge(world, around, outside, plan)
+        for fault in plan.faults:
+            world.clock.at(self._start + fault.start_s, self._begin, fault)
+            world.clock.at(self._start + fault.start_s + fault.duration_s, self._end, fault)
+        self._crash = self._play()
+
+    def _begin(self, fault: PlannedFault) -> None:
+        self._world.note(f"fault begins: {fault}")
+        FAULTS[fault.name].begin(self._world, self._around, fault.arguments)
+
+    def _end(self, fault: PlannedFault) -> None:
+        self._world.note(f"fault ends: {fault.name}")
+        FAULTS[fault.name].end(self._world, self._around, fault.arguments)
+
+    def _play(self) -> tuple[Violation, ...]:
+        clock, end = self._world.clock, self._start + self._plan.duration_s
+        try:
+            clock.run_until(end)
+            while self._goals_run() and clock.now < end + GOALS_END_S:
+                clock.run_until(clock.now + 0.1)
+            self._judge.finish()
+        except Exception:  # noqa: BLE001 - whatever it is: that nothing raises is one of the properties
+            return (Violation("exception", clock.now - self._start, traceback.format_exc(limit=-4)),)
+        return ()
+
+    def _goals_run(self) -> bool:
+        return any(not goal.ends and not goal.died for goal in self._world.action.goals)
+
+    def result(self, real_s: float) -> Result:
+        """The result of the whole."""
+        ends = [end.code.name for goal in self._world.action.goals for end in goal.ends]
+        return Result(
+            self._plan.seed,
+            tuple(fault.name for fault in self._plan.faults),
+            (*self._judge.violations, *self._crash),
+            tuple(self._judge.trips),
+            tuple(ends),
+            self._world.drives.bench.base.path_m - self._moved_from_m,
+            self._world.clock.now - self._start,
+            real_s,
+        )
+
+

@@ -1,0 +1,100 @@
+"""velocity_mux and safety_filter, one process, in virtual time: mux.py and filter_state.py, wired as their nodes are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+
+from canbase_config.robot import Robot
+from canbase_velocity.clearance import Clearances
+from canbase_velocity.decision import Action, Decision
+from canbase_velocity.filter_state import SafetyFilter
+from canbase_velocity.lease import lease_datagram
+from canbase_velocity.mux import Mux, MuxDecision
+from canbase_velocity.safety_filter import FilterConfig
+from canbase_velocity.twist import Twist
+
+from campaign.clock import Clock
+from campaign.process import Process, Topics
+
+STATE_PERIOD_S = 0.1
+MUX_STATE_PERIOD_S = 0.5
+
+
+class VelocityProcess(Process):
+    """Commands in by topic, orders out with a lease each: the lease first, as filter_node.py does it."""
+
+    name = "velocity"
+
+    def __init__(self, robot: Robot, clock: Clock, topics: Topics, send_lease: Callable[[bytes, Twist], None]) -> None:
+        super().__init__(clock)
+        self._robot, self._topics, self._send_lease = robot, topics, send_lease
+        for name, source in robot.mux.sources.items():
+            topics.subscribe(source.topic, self, partial(self._on_source, name))
+        topics.subscribe("cmd_vel_mux", self, self._on_command)
+        topics.subscribe(robot.safety.scan.topic, self, self._on_scan)
+        topics.subscribe(robot.safety.estop.topic, self, self._on_estop)
+        self.begin()
+
+    def begin(self) -> None:
+        """A new mux and a new filter; the sequence of the leases starts again."""
+        now = self.clock.now
+        self.mux = Mux(self._robot.mux.sources)
+        self.filter = SafetyFilter(FilterConfig.of(self._robot))
+        self._sequence = 0
+        self._mux_told: tuple[object, ...] = ()
+        self._told: tuple[object, ...] = ()
+        self._mux_state_at = self._state_at = -math.inf
+        self._active: str | None = None
+        self._mux_due = self._filter_due = now
+        self._period_s = 1.0 / self._robot.rates.command_hz
+        self.every(self._period_s / 4.0, self._on_timer, phase_s=0.003)
+
+    def _on_timer(self) -> None:
+        """Two timers that each message sets anew, at a quarter of their period's resolution."""
+        now = self.clock.now
+        if now >= self._mux_due:
+            self._send(self.mux.decide(now))
+        if now >= self._filter_due:
+            self._issue(self.filter.decide(now))
+
+    def _on_source(self, name: str, twist: Twist) -> None:
+        self.mux.on_command(name, twist, self.clock.now)
+        decision = self.mux.decide(self.clock.now)
+        if decision.active == name or decision.active != self._active:
+            self._send(decision)
+
+    def _send(self, decision: MuxDecision) -> None:
+        now = self.clock.now
+        self._mux_due, self._active = now + self._period_s, decision.active
+        self._topics.publish("cmd_vel_mux", decision.twist)
+        told = (decision.active, decision.standings)
+        if told != self._mux_told or now - self._mux_state_at >= MUX_STATE_PERIOD_S:
+            self._mux_told, self._mux_state_at = told, now
+            self._topics.publish("velocity_mux/state", decision)
+
+    def _on_command(self, twist: Twist) -> None:
+        self.filter.on_command(twist, self.clock.now)
+        self._issue(self.filter.decide(self.clock.now))
+
+    def _on_scan(self, clearances: Clearances) -> None:
+        self.filter.on_scan(clearances, self.clock.now)
+
+    def _on_estop(self, pressed: bool) -> None:
+        self.filter.on_estop(pressed, self.clock.now)
+        if pressed:
+            self._issue(self.filter.decide(self.clock.now))
+
+    def _issue(self, decision: Decision) -> None:
+        now = self.clock.now
+        self._filter_due = now + self._period_s
+        self._sequence += 1
+        stops = decision.action is Action.STOP
+        datagram = lease_datagram(self._sequence, round(now * 1e9), decision.twist, stops=stops, estop=False)
+        self._send_lease(datagram, decision.twist)
+        self._topics.publish("cmd_vel", decision.twist)
+        told = (decision.action, decision.cause)
+        if told != self._told or now - self._state_at >= STATE_PERIOD_S:
+            self._told, self._state_at = told, now
+            self._topics.publish("safety_filter/state", decision)

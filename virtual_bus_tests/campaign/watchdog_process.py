@@ -1,0 +1,56 @@
+"""The watchdog in virtual time: its core with the ticks of its loop; leases come by a queue as from a Unix socket."""
+
+from __future__ import annotations
+
+import math
+
+from canbase_config.watchdog import WatchdogConfig
+from canbase_watchdog.watchdog import Watchdog
+
+from campaign.can_bus import CanBus
+from campaign.process import FRAMES_HELD, Process
+
+TICK_S = 0.005
+"""As in canbase_watchdog.loop."""
+
+
+class WatchdogProcess(Process):
+    """`core` is the real watchdog."""
+
+    name = "watchdog"
+
+    def __init__(self, config: WatchdogConfig, bus: CanBus) -> None:
+        super().__init__(bus.clock)
+        self._config = config
+        self._failed_since = math.inf
+        self._member = bus.join(self.name, self._hear)
+        self.begin()
+
+    def fail_bus(self, fails: bool) -> None:
+        """Its adapter takes and gives no frames from now on; or does again."""
+        self._failed_since = self.clock.now if fails else math.inf
+
+    def begin(self) -> None:
+        """A new core, which knows nothing of a trip before."""
+        self.core = Watchdog(self._config, self.clock.now)
+        self.every(TICK_S, self._on_tick, phase_s=0.001)
+
+    def on_lease(self, datagram: bytes) -> None:
+        """A datagram arrives at the socket."""
+        self.receive("leases", FRAMES_HELD, self._on_lease, datagram)
+
+    def _on_lease(self, datagram: bytes) -> None:
+        self.core.on_lease(datagram, None, self.clock.now)
+
+    def _hear(self, cob_id: int, data: bytes) -> None:
+        self.receive("frames", FRAMES_HELD, self._on_frame, cob_id, data)
+
+    def _on_frame(self, cob_id: int, data: bytes) -> None:
+        if self._failed_since == math.inf:
+            self.core.on_frame(cob_id, data, self.clock.now)
+
+    def _on_tick(self) -> None:
+        self.core.on_bus(self._failed_since, 0)
+        for frame in self.core.tick(self.clock.now):
+            if self._failed_since == math.inf:
+                self._member.send(frame.cob_id, frame.data)

@@ -1,0 +1,101 @@
+"""Safeguards that can be taken out, one at a time: a campaign that then finds nothing would prove nothing.
+
+Rows are dropped from the tables of watchdog and driver; the others are one method each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+from canbase_action_server import causes
+from canbase_action_server.outcome import ErrorCode
+from canbase_bench.cia301.heartbeat import HeartbeatConsumer
+from canbase_driver import command, supervisor, watchdog_link
+from canbase_driver.kinematics import Twist2D
+from canbase_driver.odometry import WheelTravel
+from canbase_driver.snapshot import WatchdogView
+from canbase_velocity import filter_state, mux, safety_filter
+from canbase_watchdog import policy
+from canbase_watchdog.watchdog import State, Watchdog
+
+
+def _drop(module: ModuleType, wanted: Callable[[Any], bool]) -> Callable[[], None]:
+    """Rows that are not `wanted` leave every table of the module."""
+
+    def take_out() -> None:
+        for name, table in list(vars(module).items()):
+            if isinstance(table, tuple) and any(not wanted(row) for row in table):
+                setattr(module, name, tuple(row for row in table if wanted(row)))
+
+    return take_out
+
+
+def _put(owner: Any, name: str, value: Any) -> Callable[[], None]:
+    return lambda: setattr(owner, name, value)
+
+
+def _trip(cause: policy.Cause) -> Callable[[], None]:
+    return _drop(policy, lambda row: getattr(row, "cause", None) is not cause)
+
+
+def _hazard(name: str) -> Callable[[], None]:
+    return _drop(supervisor, lambda row: not (isinstance(row, supervisor.Hazard) and row.name == name))
+
+
+def _all_trips() -> None:
+    policy.CHECKS = ()
+
+
+def _no_latch() -> None:
+    """A trip ends by itself when everything stands."""
+    tick = Watchdog.tick
+
+    def forgetful(self: Watchdog, now: float) -> Any:
+        frames = tick(self, now)
+        if self._state is State.TRIPPED and self._settled:
+            self._state, self._verdict, self._stoppers = State.WATCHING, policy.FINE, []
+        return frames
+
+    Watchdog.tick = forgetful  # type: ignore[method-assign]
+
+
+def _driver_forgets() -> None:
+    """A latched stop of the driver ends by itself."""
+    supervisor.Supervisor._RULES = {  # noqa: SLF001
+        **supervisor.Supervisor._RULES,  # noqa: SLF001
+        supervisor.DriverState.LATCHED: supervisor.Supervisor._without_power,  # noqa: SLF001
+    }
+
+
+SAFEGUARDS: dict[str, Callable[[], None]] = {
+    **{f"watchdog:{check.cause.name.lower()}": _trip(check.cause) for check in policy.CHECKS},
+    "watchdog:all": _all_trips,
+    "watchdog:latch": _no_latch,
+    **{f"driver:{hazard.name.replace(' ', '_')}": _hazard(hazard.name) for hazard in supervisor.HAZARDS},
+    "driver:latch": _driver_forgets,
+    "driver:asks_for_watchdog": _put(
+        watchdog_link.WatchdogLink, "view", lambda self, now: (WatchdogView.OK, "")
+    ),
+    "driver:command_timeout": _put(command.Command, "is_fresh", lambda self, now: self.received_at > 0.0),
+    "driver:zero_before_motion": _put(command.Command, "await_zero", lambda self: None),
+    "driver:command_is_finite": _put(Twist2D, "is_finite", property(lambda self: True)),
+    "driver:odometry_jump_guard": _put(WheelTravel, "_is_near", lambda self, from_raw, raw, cycles: True),
+    "drives:heartbeat_consumer": _put(HeartbeatConsumer, "tick", lambda self, now: None),
+    "mux:timeout": _put(mux._Source, "is_fresh", lambda self, now: self.at_s is not None),  # noqa: SLF001
+    "filter:estop": _put(safety_filter, "_estop", lambda inputs, config: None),
+    "filter:obstacle": _put(safety_filter, "_obstacle", lambda twist, inputs, config: safety_filter.PASSED),
+    "filter:command": _put(safety_filter, "_command", lambda inputs, config: None),
+    "filter:zero_after_estop": _put(filter_state.SafetyFilter, "_remember_estop", lambda self, now: None),
+    "action:timeout_and_progress": _drop(
+        causes, lambda row: getattr(row, "code", None) not in (ErrorCode.TIMEOUT, ErrorCode.NO_PROGRESS)
+    ),
+}  # fmt: skip
+"""Name → how to take it out."""
+
+
+def remove(name: str) -> None:
+    """Take `name` out of the code of this process; nothing for an empty name. Raises KeyError for an unknown one."""
+    if name:
+        SAFEGUARDS[name]()

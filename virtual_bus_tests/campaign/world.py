@@ -1,0 +1,94 @@
+"""All pure cores of canbase in one virtual world: five processes, their topics, the leases, the bus and the drives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from random import Random
+
+from canbase_config.derive import watchdog_config
+from canbase_config.load import load_robot, sample
+from canbase_config.robot import Robot
+from canbase_driver.snapshot import DriverState
+from canbase_velocity.twist import Twist
+
+from campaign.action_process import ActionProcess, Goal
+from campaign.can_bus import CanBus
+from campaign.clock import Clock
+from campaign.driver_process import DriverProcess
+from campaign.drives import Drives
+from campaign.intruder import Intruder
+from campaign.process import Process, Topics
+from campaign.velocity_process import VelocityProcess
+from campaign.watchdog_process import WatchdogProcess
+
+LEASE_DELAY_S = 0.0002
+BOOT_S = 5.0
+
+
+def campaign_robot() -> Robot:
+    """The sample robot with scanner and stop button, and with goals that give up soon enough for a short scenario."""
+    robot = load_robot(sample("bench")).robot
+    scan = robot.safety.scan.model_copy(update={"required": True})
+    estop = robot.safety.estop.model_copy(update={"required": True})
+    safety = robot.safety.model_copy(update={"scan": scan, "estop": estop})
+    action = robot.action.model_copy(
+        update={"progress_timeout_s": 1.0, "overall_factor": 1.5, "overall_extra_s": 0.5, "control_hz": 50.0}
+    )
+    return robot.model_copy(update={"safety": safety, "action": action})
+
+
+class World:
+    """`note` tells a log what happens; `on_lease` hears every order whose lease reaches the watchdog's socket."""
+
+    def __init__(self, robot: Robot | None = None, seed: int = 0) -> None:
+        self.robot = robot or campaign_robot()
+        self.random = Random(seed)
+        self.clock = clock = Clock(100.0)
+        self.note: Callable[[str], None] = lambda text: None
+        self.on_lease: Callable[[Twist], None] = lambda twist: None
+        self.on_goal_end: Callable[[Goal], None] = lambda goal: None
+        self.lease_loss = 0.0
+        """Chance that a lease is lost on its way."""
+        self.lease_garbage = False
+        """Every lease comes with a mangled copy of it."""
+        self.bus = CanBus(clock, self.random, self.robot.bus.bitrate)
+        self.topics = Topics(clock, self.random)
+        self.drives = Drives(self.robot, self.bus)
+        self.driver = DriverProcess(self.robot, self.bus, self.topics)
+        self.watchdog = WatchdogProcess(watchdog_config(self.robot), self.bus)
+        self.velocity = VelocityProcess(self.robot, clock, self.topics, self._lease)
+        self.action = ActionProcess(self.robot, clock, self.topics, lambda goal: self.on_goal_end(goal))
+        self.intruder = Intruder(self.robot, self.bus, self.topics)
+        processes: tuple[Process, ...] = (self.driver, self.watchdog, self.velocity, self.action)
+        self.processes = {process.name: process for process in processes}
+
+    def enable(self) -> None:
+        """From power on until the driver is enabled and has seen a zero. Raises RuntimeError when it does not happen."""
+        end = self.clock.now + BOOT_S
+        while self.driver.core.state is not DriverState.ENABLED:
+            if self.clock.now >= end:
+                raise RuntimeError(f"not enabled after {BOOT_S} s: {self.driver.core.state.name} {self.driver.core.cause}")
+            self.clock.run_until(self.clock.now + 0.01)
+        self.clock.run_until(self.clock.now + 0.7)
+
+    def _lease(self, datagram: bytes, twist: Twist) -> None:
+        if self.random.random() >= self.lease_loss:
+            self.clock.after(LEASE_DELAY_S, self._deliver, datagram, twist)
+        if self.lease_garbage:
+            self.clock.after(LEASE_DELAY_S, self.watchdog.on_lease, self._mangled(datagram))
+
+    def _deliver(self, datagram: bytes, twist: Twist) -> None:
+        if self.watchdog.alive:
+            self.on_lease(twist)
+            self.watchdog.on_lease(datagram)
+
+    def _mangled(self, datagram: bytes) -> bytes:
+        """A byte changed, cut short, or noise of any length."""
+        draw = self.random
+        kind = draw.randrange(3)
+        if kind == 0:
+            at = draw.randrange(len(datagram))
+            return datagram[:at] + bytes([datagram[at] ^ (1 << draw.randrange(8))]) + datagram[at + 1 :]
+        if kind == 1:
+            return datagram[: draw.randrange(len(datagram))]
+        return draw.randbytes(draw.randrange(64))
