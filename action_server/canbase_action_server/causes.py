@@ -21,6 +21,8 @@ from canbase_action_server.inputs import (
 )
 from canbase_action_server.outcome import ErrorCode
 
+CLIENT_SILENT = "no keepalive from the client (action.require_client_lease): it died, hangs, or does not send any"
+
 
 @dataclass(frozen=True, slots=True)
 class Situation:
@@ -113,6 +115,10 @@ def _preempted(s: Situation) -> str | None:
     return "a newer goal takes its place (action.goal_policy is preempt)" if s.inputs.preempted else None
 
 
+def _client_lost(s: Situation) -> str | None:
+    return CLIENT_SILENT if s.inputs.client_lost else None
+
+
 def _shutdown(s: Situation) -> str | None:
     return "the action server is shutting down" if s.inputs.shutdown else None
 
@@ -148,6 +154,7 @@ TABLE: tuple[Row, ...] = (
     Row(ErrorCode.BLOCKED, _blocked, while_stopping=False),
     Row(ErrorCode.CANCELED, _canceled, while_stopping=True),
     Row(ErrorCode.PREEMPTED, _preempted, while_stopping=False),
+    Row(ErrorCode.CLIENT_LOST, _client_lost, while_stopping=False),
     Row(ErrorCode.SHUTDOWN, _shutdown, while_stopping=True),
     Row(ErrorCode.NO_PROGRESS, _no_progress, while_stopping=False),
     Row(ErrorCode.TIMEOUT, _timeout, while_stopping=False),

@@ -76,6 +76,8 @@ class Inputs:
     cancel_requested: bool = False
     preempted: bool = False
     """A newer goal waits for the base."""
+    client_lost: bool = False
+    """The client that must stay alive for this goal went silent."""
     shutdown: bool = False
 
 

@@ -27,6 +27,24 @@ def profile_limits(robot: Robot, max_speed_mps: float) -> ProfileLimits:
     )
 
 
+def lever_m(robot: Robot) -> float:
+    """Radius of the circle on which the wheels go when the base turns in place [m]: metres of way per radian."""
+    return robot.base.track_m / 2.0
+
+
+def turn_limits(robot: Robot, max_speed_radps: float) -> ProfileLimits:
+    """For a turn in place with this max_speed_radps, as the wheels on their circle see it."""
+    lever, limits = lever_m(robot), robot.limits
+    return ProfileLimits(
+        speed_mps=lever * min(max_speed_radps, limits.angular_radps),
+        acceleration_mps2=lever * limits.angular_acceleration_radps2,
+        deceleration_mps2=lever * limits.angular_deceleration_radps2,
+        jerk_mps3=limits.jerk_mps3,
+        crawl_mps=0.5 * lever * robot.action.min_speed_radps,
+        chain_latency_s=chain_latency_s(robot),
+    )
+
+
 def standstill_limits(robot: Robot, deceleration_mps2: float) -> StandstillLimits:
     """When this robot stands after a motion that brakes with `deceleration_mps2`."""
     return StandstillLimits(

@@ -22,6 +22,7 @@ from rclpy.action.server import ServerGoalHandle
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from unique_identifier_msgs.msg import UUID
 
 from canbase_action_server import messages
 from canbase_action_server.binding import Binding
@@ -36,6 +37,8 @@ from canbase_config.robot import Robot
 SENSOR_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 STATUS_QOS = QoSProfile(depth=1)
 LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+KEEPALIVE_QOS = QoSProfile(depth=100)
+"""Deep enough for all goals that may wait."""
 SERVICE_QOS = QoSProfile(depth=100)
 """With the usual depth of 10, of more requests at once the oldest are lost, and their clients wait for ever."""
 
@@ -116,6 +119,9 @@ class DriveDistanceServer(Node):
         self._inputs = replace(self._inputs, mux=messages.mux_in(message, time.monotonic()))
 
     def _serve(self, binding: Binding) -> ActionServer:
+        # Beside the action, also when that is remapped.
+        topic = f"{self.resolve_topic_name(binding.name)}/keepalive"
+        self._listen(UUID, topic, KEEPALIVE_QOS, self._on_keepalive)
         return ActionServer(
             self,
             binding.type,
@@ -128,6 +134,9 @@ class DriveDistanceServer(Node):
             result_service_qos_profile=SERVICE_QOS,
             cancel_service_qos_profile=SERVICE_QOS,
         )
+
+    def _on_keepalive(self, goal_id: UUID) -> None:
+        self._reception.keepalive(bytes(goal_id.uuid).hex(), time.monotonic())
 
     def _on_goal(self, binding: Binding, goal: Any) -> GoalResponse:
         reason = self._reception.refusal(binding.request(goal), self._inputs, time.monotonic())

@@ -8,7 +8,8 @@ Rules.
    ends all others with PREEMPTED: those that wait at once, the running one when the base stands. Then it has the base.
 4. A goal that waits starts only after an end that left the base standing where it was told to. Any other end, such as
    an emergency stop, is theirs too: nothing starts to move by itself when the cause has gone, or from a wrong place.
-5. Each goal that was admitted ends exactly once.
+5. With `require_client_lease` a goal whose client was not heard for `client_lease_s` ends with CLIENT_LOST.
+6. Each goal that was admitted ends exactly once.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 from canbase_action_server.admission import state_reason
-from canbase_action_server.causes import Cause
+from canbase_action_server.causes import CLIENT_SILENT, Cause
 from canbase_action_server.goal import Feedback, Order, Phase
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.motion import STOP, Twist
@@ -53,6 +54,8 @@ class Admitted:
 
     key: str
     request: Request
+    heard: float
+    """When its client gave the last sign of life."""
     canceled: bool = False
     preempted: bool = False
 
@@ -94,7 +97,7 @@ class Reception:
         if self._robot.action.goal_policy == "preempt":
             for goal in self._goals():
                 goal.preempted = True
-        self._waiting.append(Admitted(key, request))
+        self._waiting.append(Admitted(key, request, now))
 
     def cancel(self, key: str) -> bool:
         """A client wants the goal to end. False: no such goal runs or waits."""
@@ -103,13 +106,20 @@ class Reception:
             goal.canceled = True
         return bool(found)
 
+    def keepalive(self, key: str, now: float) -> None:
+        """The client of this goal lives. Nothing happens when no such goal runs or waits."""
+        for goal in self._goals():
+            if goal.key == key:
+                goal.heard = now
+
     def tick(self, inputs: Inputs, now: float) -> Cycle:
         """One control cycle."""
-        ends = self._drop(inputs)
+        ends = self._drop(inputs, now)
         began = self._begin(inputs, now)
         running = self._running
         if running is not None:
-            inputs = replace(inputs, cancel_requested=running.canceled, preempted=running.preempted)
+            lost = self._client_lost(running, now)
+            inputs = replace(inputs, cancel_requested=running.canceled, preempted=running.preempted, client_lost=lost)
         order = self._owner.tick(inputs, now)
         if order is None:
             return Cycle(began=began, ends=ends)
@@ -139,19 +149,25 @@ class Reception:
             return f"busy: {len(self._waiting)} goals wait already (action.queue_length)"
         return None
 
-    def _drop(self, inputs: Inputs) -> tuple[End, ...]:
+    def _client_lost(self, goal: Admitted, now: float) -> bool:
+        action = self._robot.action
+        return action.require_client_lease and now - goal.heard > action.client_lease_s
+
+    def _drop(self, inputs: Inputs, now: float) -> tuple[End, ...]:
         """The ends of those that shall not wait any longer."""
-        causes = [(goal, self._against_waiting(goal, inputs)) for goal in self._waiting]
+        causes = [(goal, self._against_waiting(goal, inputs, now)) for goal in self._waiting]
         self._waiting = deque(goal for goal, cause in causes if cause is None)
         return tuple(End(goal.key, _not_started(cause)) for goal, cause in causes if cause is not None)
 
-    def _against_waiting(self, goal: Admitted, inputs: Inputs) -> Cause | None:
+    def _against_waiting(self, goal: Admitted, inputs: Inputs, now: float) -> Cause | None:
         if self._failed:
             return Cause(ErrorCode.INTERNAL, "defect in the action server, see its log")
         if goal.canceled:
             return Cause(ErrorCode.CANCELED, "canceled by request")
         if goal.preempted:
             return Cause(ErrorCode.PREEMPTED, "a newer goal takes its place")
+        if self._client_lost(goal, now):
+            return Cause(ErrorCode.CLIENT_LOST, CLIENT_SILENT)
         return Cause(ErrorCode.SHUTDOWN, "the action server is shutting down") if inputs.shutdown else None
 
     def _begin(self, inputs: Inputs, now: float) -> str | None:

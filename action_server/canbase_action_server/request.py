@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from canbase_action_server.inputs import Odometry
-from canbase_action_server.limits import profile_limits
+from canbase_action_server.limits import lever_m, profile_limits, turn_limits
 from canbase_action_server.motion import Motion
 from canbase_action_server.straight import StraightMotion
+from canbase_action_server.turn import TurnMotion
 from canbase_config.robot import Robot
 
 
@@ -40,6 +41,25 @@ class DriveRequest:
     def motion(self, robot: Robot, start: Odometry) -> Motion:
         """Straight on."""
         return StraightMotion(start, self.distance_m, profile_limits(robot, self.max_speed_mps))
+
+
+@dataclass(frozen=True, slots=True)
+class RotateRequest:
+    """Goal of rotate_angle; the meaning of the fields is in RotateAngle.action."""
+
+    angle_rad: float
+    max_speed_radps: float
+
+    def range_reason(self, robot: Robot) -> str | None:
+        """Why its numbers are refused; None: they are good."""
+        action = robot.action
+        return _outside("|angle_rad|", abs(self.angle_rad), action.min_angle_rad, action.max_angle_rad) or _outside(
+            "max_speed_radps", self.max_speed_radps, action.min_speed_radps, action.max_speed_radps
+        )
+
+    def motion(self, robot: Robot, start: Odometry) -> Motion:
+        """In place."""
+        return TurnMotion(start, self.angle_rad, lever_m(robot), turn_limits(robot, self.max_speed_radps))
 
 
 def _outside(name: str, value: float, low: float, high: float) -> str | None:

@@ -6,7 +6,8 @@ from typing import Annotated, Final
 
 import typer
 
-from canbase_cli import config, demo, drive, process, trigger, up
+from canbase_cli import config, demo, drive, process, rotate, trigger, up
+from canbase_cli.goal import GoalCommand
 from canbase_cli.options import RosCommand
 
 app = typer.Typer(
@@ -41,7 +42,8 @@ _ROS_USAGE: Final = "[OPTIONS] [--ros-args …]"
 
 app.command("demo")(demo.demo)
 app.command("up", cls=RosCommand, options_metavar=_ROS_USAGE)(up.up)
-app.command("drive", cls=drive.DriveCommand, options_metavar=_ROS_USAGE)(drive.drive)
+app.command("drive", cls=GoalCommand, options_metavar=_ROS_USAGE)(drive.drive)
+app.command("rotate", cls=GoalCommand, options_metavar=_ROS_USAGE)(rotate.rotate)
 app.command("stop", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.stop)
 app.command("reset", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.reset)
 app.add_typer(config.app, name="config")

@@ -14,7 +14,7 @@ from canbase_action_server.goal import GoalRun
 from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
 from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.outcome import Outcome
-from canbase_action_server.request import DriveRequest, Request
+from canbase_action_server.request import DriveRequest, Request, RotateRequest
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 
@@ -34,6 +34,8 @@ class Plant:
 
     acceleration_mps2: float = 0.8
     deceleration_mps2: float = 1.0
+    angular_acceleration_radps2: float = 4.0
+    angular_deceleration_radps2: float = 5.0
     dead_time_s: float = 0.02
     lag_s: float = 0.03
     slip: float = 0.0
@@ -44,6 +46,7 @@ class Plant:
     turn_radps: float = 0.0
     stuck: bool = False
     _ramped_mps: float = 0.0
+    _ramped_radps: float = 0.0
     _pipe: deque[tuple[float, Twist]] = field(default_factory=lambda: deque([(-1.0, STOP)]))
 
     def order(self, twist: Twist, now: float) -> None:
@@ -60,7 +63,10 @@ class Plant:
         self._ramped_mps += max(-most, min(most, wanted.linear_mps - self._ramped_mps))
         share = 0.0 if self.stuck else STEP_S / (self.lag_s + STEP_S)
         self.speed_mps += (self._ramped_mps - self.speed_mps) * share
-        self.turn_radps += (wanted.angular_radps + self.slip * self.speed_mps - self.turn_radps) * share
+        speeding_up = abs(wanted.angular_radps) > abs(self._ramped_radps)
+        most = (self.angular_acceleration_radps2 if speeding_up else self.angular_deceleration_radps2) * STEP_S
+        self._ramped_radps += max(-most, min(most, wanted.angular_radps - self._ramped_radps))
+        self.turn_radps += (self._ramped_radps + self.slip * self.speed_mps - self.turn_radps) * share
         if self.stuck:
             self.speed_mps = self.turn_radps = 0.0
         self.yaw_rad += self.turn_radps * STEP_S
@@ -70,7 +76,8 @@ class Plant:
     def odometry(self, received: float) -> Odometry:
         """What odom says, in whole encoder counts."""
         x, y = (COUNT_M * round(value / COUNT_M) for value in (self.x_m, self.y_m))
-        return Odometry(received, Pose(x, y, self.yaw_rad), self.speed_mps, self.turn_radps)
+        yaw_rad = math.remainder(self.yaw_rad, 2.0 * math.pi)
+        return Odometry(received, Pose(x, y, yaw_rad), self.speed_mps, self.turn_radps)
 
 
 GOOD_SAFETY = Safety(received=0.0, stops=False, cause="none", detail="", estop=False)
@@ -100,6 +107,7 @@ class Story:
     at: dict[float, Callable[[Story], None]] = field(default_factory=dict)
     odometry_alive: bool = True
     fastest_mps: float = 0.0
+    fastest_radps: float = 0.0
     ended_at: float = 0.0
     orders: list[tuple[float, Twist]] = field(default_factory=list)
 
@@ -131,6 +139,7 @@ class Story:
                     return order.end
             self.plant.step(now)
             self.fastest_mps = max(self.fastest_mps, abs(self.plant.speed_mps))
+            self.fastest_radps = max(self.fastest_radps, abs(self.plant.turn_radps))
         raise AssertionError(f"no end after {limit_s} s of virtual time")
 
     def coast(self) -> float:
@@ -144,6 +153,11 @@ class Story:
 def drive(plant: Plant, distance_m: float, speed_mps: float, **others: Any) -> Story:
     """A straight one."""
     return Story(plant, DriveRequest(distance_m, speed_mps), **others)
+
+
+def rotate(plant: Plant, angle_rad: float, speed_radps: float, **others: Any) -> Story:
+    """A turn in place."""
+    return Story(plant, RotateRequest(angle_rad, speed_radps), **others)
 
 
 def goal_run(robot: Robot, distance_m: float, speed_mps: float, start: Odometry) -> GoalRun:

@@ -41,6 +41,7 @@ PROVOKED = {
     ErrorCode.BLOCKED: lambda s: replace(s, obstacle_age_s=0.3),
     ErrorCode.CANCELED: lambda s: with_inputs(s, cancel_requested=True),
     ErrorCode.PREEMPTED: lambda s: with_inputs(s, preempted=True),
+    ErrorCode.CLIENT_LOST: lambda s: with_inputs(s, client_lost=True),
     ErrorCode.SHUTDOWN: lambda s: with_inputs(s, shutdown=True),
     ErrorCode.NO_PROGRESS: lambda s: replace(s, no_progress_s=2.01),
     ErrorCode.TIMEOUT: lambda s: replace(s, running_s=20.01),

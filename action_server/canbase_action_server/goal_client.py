@@ -1,0 +1,212 @@
+"""What the clients of the actions share: discovery, acceptance, feedback, cancel and final status, told apart.
+
+A goal is sent once. When its result is lost it may still have run: nothing here sends it again. While a goal runs and
+its executor spins, the server is told that the client lives (action.require_client_lease in robot.yaml).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+from rclpy.action import ActionClient
+from rclpy.action.client import ClientGoalHandle
+from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.node import Node
+from unique_identifier_msgs.msg import UUID
+
+from canbase_action_server.outcome import ErrorCode, Status
+
+SLICE_S = 0.1
+"""Longest time without a look at the deadline, at `interrupted`, and at whether the server is still there."""
+SERVER_LOST_S = 2.0
+"""A server that cannot be seen for this long is lost."""
+KEEPALIVE_S = 0.1
+"""So often the server is told that the client lives; the shortest lease is three times as long."""
+
+ResultT = TypeVar("ResultT")
+FeedbackT = TypeVar("FeedbackT")
+
+
+class DriveError(Exception):
+    """A goal did not come to a result; the subclass says how far it came."""
+
+
+class NoServerError(DriveError):
+    """No action server was found in time; nothing was sent."""
+
+
+class NoResponseError(DriveError):
+    """The server did not say in time whether it accepts the goal. The goal may run: do not send it again blindly."""
+
+
+class RejectedError(DriveError):
+    """The server refuses the goal; its log says why."""
+
+
+class ServerLostError(DriveError):
+    """The server went away during the goal. The result is unknown: do not send the goal again blindly."""
+
+
+class InterruptedDriveError(DriveError):
+    """`interrupted` became true before the goal was accepted. It was canceled if the server accepted it after all."""
+
+
+def never() -> bool:
+    """Nothing interrupts."""
+    return False
+
+
+class GoalClient(Generic[ResultT, FeedbackT]):
+    """Sends goals from `node`, which nobody else may spin while a method here waits (or give its own `executor`)."""
+
+    def __init__(
+        self,
+        node: Node,
+        kind: type,
+        action: str,
+        executor: Executor | None,
+        read_feedback: Callable[[Any], FeedbackT],
+        read_result: Callable[[Status, ErrorCode, Any], ResultT],
+    ) -> None:
+        self._client = ActionClient(node, kind, action)
+        self._executor = executor or SingleThreadedExecutor(context=node.context)
+        if executor is None:
+            self._executor.add_node(node)
+        self._read_feedback = read_feedback
+        self.read_result = read_result
+        self.action = action
+        self._alive: list[Any] = []
+        # Beside the action, also when that is remapped.
+        self._keepalive = node.create_publisher(UUID, f"{node.resolve_topic_name(action)}/keepalive", 10)
+        self._timer = node.create_timer(KEEPALIVE_S, self._tell_alive)
+        self._node = node
+
+    @property
+    def server_ready(self) -> bool:
+        """An action server is there now."""
+        return bool(self._client.server_is_ready())
+
+    def spin_until(self, done: Callable[[], bool], timeout_s: float | None) -> bool:
+        """Handles what arrives until `done()` or the timeout (None: without end); whether it is done."""
+        deadline = None if timeout_s is None else time.monotonic() + timeout_s
+        while not done():
+            left_s = SLICE_S if deadline is None else deadline - time.monotonic()
+            if left_s <= 0.0:
+                return False
+            self._executor.spin_once(timeout_sec=min(SLICE_S, left_s))
+        return True
+
+    def wait_for_server(self, timeout_s: float = 5.0, interrupted: Callable[[], bool] = never) -> None:
+        """Until a server is found. NoServerError after timeout_s [s], InterruptedDriveError before."""
+        found = self.spin_until(lambda: self.server_ready or interrupted(), timeout_s)
+        if interrupted():
+            raise InterruptedDriveError("interrupted; nothing was sent")
+        if not found:
+            raise NoServerError(
+                f"no action server {self.action} within {timeout_s} s; is drive_distance_server running, "
+                "in the same ROS_DOMAIN_ID and namespace?"
+            )
+
+    def send_goal(
+        self,
+        goal: Any,
+        on_feedback: Callable[[FeedbackT], None] | None = None,
+        discovery_timeout_s: float = 5.0,
+        response_timeout_s: float = 5.0,
+        interrupted: Callable[[], bool] = never,
+    ) -> SentGoal[ResultT]:
+        """Find the server, send the goal once, wait for its acceptance. Raises the subclasses of DriveError."""
+        self.wait_for_server(discovery_timeout_s, interrupted)
+        response = self._client.send_goal_async(goal, feedback_callback=self._feedback_to(on_feedback))
+        if not self.spin_until(response.done, response_timeout_s):
+            response.add_done_callback(_cancel_late)
+            raise NoResponseError(f"{self.action} did not answer within {response_timeout_s} s; the goal may run")
+        handle: ClientGoalHandle = response.result()
+        if not handle.accepted:
+            raise RejectedError(f"{self.action} rejects the goal; the log of drive_distance_server says why")
+        return SentGoal(self, handle, self._watch(handle))
+
+    def close(self) -> None:
+        """Leaves the action."""
+        self._node.destroy_timer(self._timer)
+        self._node.destroy_publisher(self._keepalive)
+        self._client.destroy()
+
+    def _watch(self, handle: ClientGoalHandle) -> Any:
+        """The future result; until it is there the server is told that this client lives."""
+        result = handle.get_result_async()
+        self._alive.append(handle.goal_id)
+        result.add_done_callback(lambda _: self._alive.remove(handle.goal_id))
+        self._tell_alive()
+        return result
+
+    def _tell_alive(self) -> None:
+        for goal_id in self._alive:
+            self._keepalive.publish(goal_id)
+
+    def _feedback_to(self, on_feedback: Callable[[FeedbackT], None] | None) -> Callable[[Any], None] | None:
+        if on_feedback is None:
+            return None
+        told = on_feedback
+        return lambda message: told(self._read_feedback(message.feedback))
+
+
+def _cancel_late(response: Any) -> None:
+    """A goal that is accepted after its client gave it up must not run unwatched."""
+    handle = response.result()
+    if handle is not None and handle.accepted:
+        handle.cancel_goal_async()
+
+
+class SentGoal(Generic[ResultT]):
+    """One accepted goal."""
+
+    def __init__(self, client: GoalClient[ResultT, Any], handle: ClientGoalHandle, result: Any) -> None:
+        self._client = client
+        self._handle = handle
+        self._result = result
+        self._seen = time.monotonic()
+
+    @property
+    def uuid(self) -> str:
+        """In hex, as in the server's log."""
+        return bytes(self._handle.goal_id.uuid).hex()
+
+    @property
+    def result(self) -> ResultT | None:
+        """None while the goal runs. ServerLostError when the server does not know the goal any more."""
+        if not self._result.done():
+            return None
+        wrapped = self._result.result()
+        if wrapped.status not in Status.__members__.values():
+            raise ServerLostError("the action server does not know the goal: it was restarted. The result is unknown")
+        return self._client.read_result(Status(wrapped.status), ErrorCode(wrapped.result.error_code), wrapped.result)
+
+    def wait(self, timeout_s: float | None = None, until: Callable[[], bool] = never) -> ResultT | None:
+        """The result; None when timeout_s [s] is over or `until()` before it came: the goal still runs then.
+
+        ServerLostError when the server goes away.
+        """
+        self._seen = time.monotonic()
+        self._client.spin_until(lambda: self._result.done() or until() or self._server_lost(), timeout_s)
+        if not self._result.done() and self._server_lost():
+            raise ServerLostError("the action server went away; the result is unknown. Look at the base first")
+        return self.result
+
+    def cancel(self, timeout_s: float = 5.0) -> bool:
+        """Ask for a cancel; whether the server accepts it. The goal ends later: `wait` for its status.
+
+        NoResponseError when the server does not answer within timeout_s [s].
+        """
+        response = self._handle.cancel_goal_async()
+        if not self._client.spin_until(response.done, timeout_s):
+            raise NoResponseError(f"no answer to the cancel within {timeout_s} s; the base may still move")
+        return bool(response.result().goals_canceling)
+
+    def _server_lost(self) -> bool:
+        now = time.monotonic()
+        if self._client.server_ready:
+            self._seen = now
+        return now - self._seen > SERVER_LOST_S

@@ -1,0 +1,70 @@
+"""A client of rotate_angle for applications. What it tells apart is in `goal_client.py`.
+
+turn = RotateClient(node).send(math.pi, 0.5)  # raises NoServerError, NoResponseError, RejectedError
+result = turn.wait()                          # read result.status first
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from canbase.action import RotateAngle
+from rclpy.executors import Executor
+from rclpy.node import Node
+
+from canbase_action_server.goal_client import GoalClient, SentGoal, never
+from canbase_action_server.outcome import ErrorCode, Status
+
+
+@dataclass(frozen=True, slots=True)
+class RotateResult:
+    """The end of a goal. Read `status` first."""
+
+    status: Status
+    code: ErrorCode
+    turned_rad: float
+    overshoot_rad: float
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class RotateFeedback:
+    """How far the base has turned [rad]."""
+
+    turned_rad: float
+    remaining_rad: float
+
+
+Turn = SentGoal[RotateResult]
+"""One accepted goal."""
+
+
+class RotateClient(GoalClient[RotateResult, RotateFeedback]):
+    """Sends goals from `node`, which nobody else may spin while a method here waits (or give its own `executor`)."""
+
+    def __init__(self, node: Node, executor: Executor | None = None, action: str = "rotate_angle") -> None:
+        super().__init__(node, RotateAngle, action, executor, _feedback, _result)
+
+    def send(
+        self,
+        angle_rad: float,
+        max_speed_radps: float,
+        *,
+        on_feedback: Callable[[RotateFeedback], None] | None = None,
+        discovery_timeout_s: float = 5.0,
+        response_timeout_s: float = 5.0,
+        interrupted: Callable[[], bool] = never,
+    ) -> Turn:
+        """Find the server, send the goal once, wait for its acceptance. Raises the subclasses of DriveError."""
+        goal = RotateAngle.Goal(angle_rad=float(angle_rad), max_speed_radps=float(max_speed_radps))
+        return self.send_goal(goal, on_feedback, discovery_timeout_s, response_timeout_s, interrupted)
+
+
+def _feedback(message: Any) -> RotateFeedback:
+    return RotateFeedback(message.turned_rad, message.remaining_rad)
+
+
+def _result(status: Status, code: ErrorCode, message: Any) -> RotateResult:
+    return RotateResult(status, code, message.turned_rad, message.overshoot_rad, message.message)

@@ -1,0 +1,149 @@
+"""What `canbase drive` and `canbase rotate` share: send one goal, show it, cancel it with Ctrl-C, tell how it ended."""
+
+from __future__ import annotations
+
+import json
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from types import FrameType
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from canbase_cli.options import FAILED, RosCommand, colour, fail
+
+if TYPE_CHECKING:
+    from canbase_action_server.goal_client import SentGoal
+
+CANCELED: Final = 3
+ABORTED: Final = 4
+REJECTED: Final = 5
+NO_SERVER: Final = 6
+CANCEL_PATIENCE_S: Final = 10.0
+"""After a cancel the final status has this long to come."""
+
+CancelAfterOption = Annotated[
+    float | None,
+    typer.Option("--cancel-after", "--timeout", metavar="SECONDS", min=0.1, help="then cancel it", show_default="none"),
+]
+WaitOption = Annotated[float, typer.Option("--wait", metavar="SECONDS", min=0.1, help="for the server")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as one line of JSON.")]
+
+Show = Callable[[float, float], None]
+"""Called with what is done (signed) and what is left, in the goal's unit."""
+
+
+class GoalCommand(RosCommand):
+    """A command whose argument may be negative: `canbase drive -0.5` is no option."""
+
+    ignore_unknown_options = True
+
+
+class Interrupts:
+    """Ctrl-C as a count instead of an exception: rclpy is never left in the middle of something."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    @contextmanager
+    def caught(self) -> Iterator[None]:
+        """While this lasts, SIGINT and SIGTERM are counted."""
+        before = {number: signal.signal(number, self._count) for number in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def _count(self, _number: int, _frame: FrameType | None) -> None:
+        self.count += 1
+
+
+def run_goal(
+    send: Callable[[Show, Callable[[], bool]], SentGoal[Any]],
+    way: float,
+    unit: str,
+    cancel_after_s: float | None,
+    as_json: bool,
+    interrupts: Interrupts,
+) -> None:
+    """Send the goal, wait for its end, print it, and exit with its code. `send` gets `Show` and `interrupted`."""
+    from canbase_action_server.goal_client import DriveError, InterruptedDriveError, RejectedError
+
+    def interrupted() -> bool:
+        return interrupts.count > 0
+
+    try:
+        with _shown(way, unit, as_json) as show:
+            goal = send(show, interrupted)
+            result = goal.wait(cancel_after_s, until=interrupted) or _cancel(goal, interrupts)
+    except RejectedError as error:
+        fail(str(error), REJECTED)
+    except InterruptedDriveError as error:
+        fail(str(error), CANCELED)
+    except DriveError as error:
+        fail(str(error), NO_SERVER)
+    _print_result(result, as_json)
+    raise typer.Exit({"SUCCEEDED": 0, "CANCELED": CANCELED, "ABORTED": ABORTED}[result.status.name])
+
+
+def _cancel(goal: SentGoal[Any], interrupts: Interrupts) -> Any:
+    seen = interrupts.count
+    typer.echo("canceling; waiting until the base stands", err=True)
+    if goal.cancel():
+        typer.echo("the server accepts the cancel", err=True)
+    else:
+        typer.echo("the server does not accept the cancel: the goal is about to end", err=True)
+    result = goal.wait(CANCEL_PATIENCE_S, until=lambda: interrupts.count > seen)
+    if result is None:
+        fail("gave up waiting for the final status: the base may still move", FAILED)
+    return result
+
+
+@contextmanager
+def _shown(way: float, unit: str, quiet: bool) -> Iterator[Show]:
+    """A progress bar on a terminal, a line per 10 % elsewhere, nothing when quiet."""
+    console = Console(stderr=True)
+    if quiet:
+        yield lambda done, left: None
+    elif console.is_terminal:
+        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
+        with Progress(*columns, TimeElapsedColumn(), console=console) as progress:
+            yield _bar(progress, way, unit)
+    else:
+        yield _lines(way, unit)
+
+
+def _bar(progress: Progress, way: float, unit: str) -> Show:
+    task = progress.add_task(_words(0.0, abs(way), unit), total=abs(way))
+    return lambda done, left: progress.update(task, completed=abs(way) - left, description=_words(done, left, unit))
+
+
+def _lines(way: float, unit: str) -> Show:
+    said = [0]
+
+    def show(done: float, left: float) -> None:
+        tenths = int(10.0 * (1.0 - left / abs(way)))
+        if tenths > said[0]:
+            said[0] = tenths
+            typer.echo(_words(done, left, unit), err=True)
+
+    return show
+
+
+def _words(done: float, left: float, unit: str) -> str:
+    return f"{done:+.3f} {unit}, {left:.3f} {unit} left"
+
+
+def _print_result(result: Any, as_json: bool) -> None:
+    if as_json:
+        values: dict[str, Any] = asdict(result) | {"status": result.status.name, "code": result.code.name}
+        typer.echo(json.dumps(values))
+        return
+    good = result.status.name == "SUCCEEDED"
+    fg = typer.colors.GREEN if good else typer.colors.YELLOW
+    typer.secho(f"{result.status.name} ({result.code.name}): {result.message}", fg=fg, color=colour())
