@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Iterator
@@ -136,8 +137,8 @@ def test_a_bus_that_takes_nothing_for_a_second_ends_the_loop(tmp_path: Path, mon
         with pytest.raises(BusDeadError, match=r"no frame could be sent for 1\.0 s"):
             loop.run(lambda: False)
         assert 1.0 <= time.monotonic() - begin < 2.0
-        assert bus.send_errors >= 10
-        assert 10 <= bus.receive_errors <= 2000
+        assert bus.health.send_errors >= 10
+        assert 10 <= bus.health.receive_errors <= 2000
 
 
 def test_a_bus_that_cannot_be_opened_says_what_to_look_at() -> None:
@@ -150,6 +151,18 @@ def test_only_data_frames_with_11_bits_are_taken_in() -> None:
         for kind in ({"is_extended_id": True}, {"is_remote_frame": True}, {"is_error_frame": True}, {}):
             other.send(can.Message(arbitration_id=0x701, data=b"", **{"is_extended_id": False} | kind))
         assert list(port.receive()) == [(0x701, b"")]
+
+
+def test_error_frames_tell_that_the_bus_fails_and_frames_that_it_works_again() -> None:
+    bus_off = can.Message(arbitration_id=0x040, data=bytes(8), is_error_frame=True, is_extended_id=False)
+    with BusPort({"interface": "virtual", "channel": "off"}) as port, can.Bus("off", interface="virtual") as other:
+        before = time.monotonic()
+        other.send(bus_off)
+        assert list(port.receive()) == []
+        assert before <= port.health.failed_since <= time.monotonic()
+        other.send(can.Message(arbitration_id=0x123, is_extended_id=True))
+        assert list(port.receive()) == []
+        assert (port.health.failed_since, port.health.errors) == (math.inf, 1)
 
 
 def test_the_lease_socket_is_for_its_owner_and_goes_with_the_process(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from canbase_config.derive import max_wheel_mps, mps_per_bit, watchdog_config
+from canbase_config.derive import m_per_count, max_wheel_mps, mps_per_bit, order_hold_s, watchdog_config
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Drive, VelocityUnit
 from canbase_config.units import motor_rev_per_s
@@ -87,12 +87,38 @@ def test_the_watchdog_is_told_what_the_bench_sample_says() -> None:
     assert (config.track_m, config.standstill_mps) == (0.5, 0.005)
     assert (config.acceleration_mps2, config.deceleration_mps2) == (0.8, 1.0)
     assert (config.lease_timeout_s, config.drive_heartbeat_s, config.feedback_timeout_s) == (0.25, 0.3, 0.1)
+    assert (config.linear_mps, config.angular_radps, config.control_hz) == (0.8, 2.0, 100.0)
+    assert (config.angular_acceleration_radps2, config.angular_deceleration_radps2) == (4.0, 5.0)
+    assert [d.m_per_count for d in config.drives] == pytest.approx([7.6699e-06, -7.6699e-06], rel=1e-5)
+    assert (config.max_wheel_mps, config.order_hold_s) == pytest.approx((0.8, 0.37))
+    assert (config.target_tolerance_mps, config.target_tolerance_share, config.drive_lag_s) == (0.03, 0.03, 0.1)
+    assert (config.motion_tolerance_mps, config.motion_tolerance_share, config.feedback_samples) == (0.05, 0.1, 5)
+    assert (config.overspeed_factor, config.travel_tolerance_m) == (1.2, 0.05)
+    assert (config.bus_failed_s, config.loop_late_s) == (0.1, 0.1)
     assert config.lease_socket == "/tmp/canbase-bench/lease.sock"
 
 
-def test_the_fastest_wheel_is_on_the_outside_of_the_tightest_turn() -> None:
-    # 0.8 m/s + 2.0 rad/s × 0.5 m / 2 = 1.3 m/s
-    assert max_wheel_mps(load_robot(sample("bench")).robot) == pytest.approx(1.3, rel=1e-12)
+def test_the_fastest_wheel_is_one_that_goes_straight_or_turns_in_place() -> None:
+    bench = load_robot(sample("bench")).robot
+    assert max_wheel_mps(bench) == 0.8  # in place: 2.0 rad/s × 0.5 m / 2 = 0.5 m/s
+    wide = bench.model_copy(update={"base": bench.base.model_copy(update={"track_m": 1.0})})
+    assert max_wheel_mps(wide) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_travel_of_the_rim_for_one_count() -> None:
+    # 2π × 0.1 m / 20 / 4096 = 7.67 µm; the mirrored one counts backward
+    assert m_per_count(drive(1, 20.0, "rev/s"), 0.1) == pytest.approx(7.669903939428206e-06, rel=1e-12)
+    assert m_per_count(drive(-1, 20.0, "rpm"), 0.1) == pytest.approx(-7.669903939428206e-06, rel=1e-12)
+
+
+def test_how_long_an_order_may_be_followed() -> None:
+    bench = load_robot(sample("bench")).robot
+    # command timeout 0.2 + two cycles 0.02 + latency 0.05 + 1.0 m/s² / 10 m/s³
+    assert order_hold_s(bench) == pytest.approx(0.37)
+    soft = bench.model_copy(update={"limits": bench.limits.model_copy(update={"jerk_mps3": 0.01})})
+    assert order_hold_s(soft) == pytest.approx(0.27 + 3.0)  # the driver gives up its ramp after standstill_s
+    quick = bench.model_copy(update={"limits": bench.limits.model_copy(update={"acceleration_mps2": 2.0})})
+    assert order_hold_s(quick) == pytest.approx(0.47)
 
 
 def test_the_watchdogs_configuration_survives_its_way_over_the_command_line() -> None:

@@ -71,7 +71,7 @@ def test_status_velocity_and_setpoints_mean_the_same_on_both_sides() -> None:
     status, velocity = bytes.fromhex("37 02 fe ff ff ff"), bytes.fromhex("d4 fe ff ff")
     both = pdo.unpack_status(status)
     assert both is not None
-    assert frames.decode_status(status) == both[0]
+    assert frames.decode_status(status) == both
     assert frames.decode_velocity(velocity) == pdo.unpack_velocity(velocity)
 
 

@@ -78,7 +78,7 @@ def test_controlwords_that_ask_for_power(word: int, asks: bool) -> None:
 
 
 def test_feedback_and_setpoints() -> None:
-    assert frames.decode_status(bytes.fromhex("37 02 ff ff ff ff")) == 0x0237
+    assert frames.decode_status(bytes.fromhex("37 02 fe ff ff ff")) == (0x0237, -2)
     assert frames.decode_velocity(bytes.fromhex("0c fe ff ff")) == -500
     assert frames.decode_setpoint(bytes.fromhex("0f 00 0c fe ff ff")) == (0x0F, -500)
 
@@ -115,3 +115,44 @@ def test_sdo_answers(data: str, answer: tuple[int, int] | None) -> None:
 )
 def test_reset_requests(data: str, number: int | None) -> None:
     assert frames.decode_reset_request(bytes.fromhex(data)) == number
+
+
+@pytest.mark.parametrize(
+    ("data", "index"),
+    [
+        ("2b 40 60 00 0f 00 00 00", 0x6040),
+        ("23 ff 68 00 01 00 00 00", 0x68FF),
+        ("21 40 60 00 02 00 00 00", 0x6040),  # segmented
+        ("3f 40 60 00 00 00 00 00", 0x6040),
+        ("40 40 60 00 00 00 00 00", None),
+        ("1f 40 60 00 00 00 00 00", None),
+        ("60 40 60 00 00 00 00 00", None),
+        ("2b 40 60 00 0f 00 00", None),
+    ],
+)
+def test_sdo_requests_that_write(data: str, index: int | None) -> None:
+    assert frames.decode_sdo_download(bytes.fromhex(data)) == index
+
+
+@pytest.mark.parametrize(
+    ("data", "command"),
+    [("01 00", (1, 0)), ("02 05", (2, 5)), ("80 01", (128, 1)), ("81 7f", (129, 127)), ("82 01", (130, 1))],
+)
+def test_nmt_commands(data: str, command: tuple[int, int]) -> None:
+    assert frames.decode_nmt(bytes.fromhex(data)) == command
+
+
+@pytest.mark.parametrize("data", ["03 01", "00 01", "01", "01 01 00"])
+def test_no_nmt_commands(data: str) -> None:
+    assert frames.decode_nmt(bytes.fromhex(data)) is None
+
+
+def test_the_counters() -> None:
+    frame = frames.counters(refused=1, dropped=0x203, bus_errors=0x405, trips=6, gap_s=0.0071)
+    assert (frame.cob_id, frame.data.hex(" ")) == (0x2FE, "01 00 03 02 05 04 06 07")
+
+
+def test_counters_stay_at_their_greatest_number() -> None:
+    greatest = frames.counters(refused=65535, dropped=65535, bus_errors=65535, trips=255, gap_s=0.255)
+    assert greatest.data == bytes([0xFF] * 8)
+    assert frames.counters(65536, 10**9, 65536, 256, 0.2551).data == greatest.data

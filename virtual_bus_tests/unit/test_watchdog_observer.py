@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from random import Random
 
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from canbase_watchdog.frames import DriveState
 from canbase_watchdog.lease import Refusal
 from canbase_watchdog.observer import Observer
+from canbase_watchdog.view import NEVER, Axis, BusView, Node
 from canbase_watchdog.watchdog import State, Watchdog
 from unit.watchdog_story import Story, config
 
@@ -18,11 +20,15 @@ WATCHED = [0x080, 0x77F, 0x27E, 0x701, 0x702, 0x581, 0x582, 0x181, 0x182, 0x281,
 
 
 def observer(*drives: tuple[int, int]) -> Observer:
-    return Observer(config(*drives))
+    return Observer(config(*drives), 0.0)
 
 
-def look(it: Observer) -> View:
-    return it.view(0.0, None, NEVER, 0.0)
+def look(it: Observer) -> BusView:
+    return it.look()
+
+
+def node(it: Observer, node_id: int) -> Node:
+    return next(each for each in it.look().nodes if each.node_id == node_id)
 
 
 def rx(it: Observer, cob_id: int, data: str, now: float = 1.0) -> Axis:
@@ -42,8 +48,8 @@ def test_status_velocity_and_setpoint_of_a_single_axis() -> None:
     assert axis.target_mps == pytest.approx(0.3)
     assert (axis.asks_for_power, axis.command_at) == (True, 3.0)
     assert axis.fed_at == 1.0
-    assert look(it).node(1).heard_at == 2.0
-    assert look(it).node(2).heard_at == NEVER
+    assert node(it, 1).heard_at == 2.0
+    assert node(it, 2).heard_at == NEVER
 
 
 def test_the_second_axis_of_a_node_has_pdos_of_its_own() -> None:
@@ -70,13 +76,57 @@ def test_enabled_since_begins_with_each_time_that_it_is_enabled() -> None:
     assert rx(it, 0x181, "37 02 00 00 00 00", 4.0).enabled_since == 4.0
 
 
+def test_disabled_since_begins_when_it_is_enabled_no_more() -> None:
+    it = observer()
+    assert rx(it, 0x181, "40 02 00 00 00 00", 1.0).disabled_since == NEVER
+    rx(it, 0x181, "37 02 00 00 00 00", 2.0)
+    assert rx(it, 0x181, "17 02 00 00 00 00", 3.0).disabled_since == 3.0
+    assert rx(it, 0x181, "40 02 00 00 00 00", 4.0).disabled_since == 3.0
+
+
+def test_a_sync_makes_the_setpoints_effective_that_came_for_it() -> None:
+    it = observer()
+    assert rx(it, 0x201, "0f 00 2c 01 00 00", 1.0).setpoint_at == NEVER
+    axis = rx(it, 0x080, "", 1.001)
+    assert [axis.setpoint_mps, axis.setpoint_at] == pytest.approx([0.3, 1.001])
+    rx(it, 0x202, "0f 00 64 00 00 00", 1.01)
+    axis = rx(it, 0x080, "", 1.011)
+    assert [axis.setpoint_mps, axis.setpoint_at] == pytest.approx([0.3, 1.001])
+    assert look(it).axes[1].setpoint_at == 1.011
+
+
+def test_setpoints_and_samples_reach_the_feedback_of_their_axis() -> None:
+    it = observer()
+    it.on_frame(0x182, bytes.fromhex("37 02 00 00 00 00"), 0.99)
+    for n in range(3):
+        it.on_frame(0x202, bytes.fromhex("0f 00 64 00 00 00"), 1.0 + n / 100)
+        it.on_frame(0x282, bytes.fromhex("d0 07 00 00"), 1.0 + n / 100)  # 2 m/s
+    left, right = (axis.feedback for axis in look(it).axes)
+    assert (right.high_mps, right.outside, right.overspeed, left.outside) == pytest.approx((0.1, 3, 3, 0))
+    for n in range(10):
+        it.on_frame(0x182, struct.pack("<Hi", 0x0237, 2000 * n), 1.03 + n / 100)
+        it.on_frame(0x282, bytes(4), 1.03 + n / 100)
+    drift = look(it).axes[1].feedback
+    assert drift.implausible >= 5  # the encoder runs at 20 m/s
+    it.on_frame(0x582, bytes.fromhex("43 6c 60 00 d0 07 00 00"), 1.2)  # an SDO answer is no sample of a SYNC
+    assert look(it).axes[1].feedback is drift
+
+
+def test_the_driver_was_heard_when_the_older_of_its_signs_came() -> None:
+    it = observer()
+    it.on_frame(0x080, b"", 1.0)
+    assert it.driver_at == NEVER
+    it.on_frame(0x77F, b"\x05", 2.0)
+    assert it.driver_at == 1.0
+
+
 def test_answers_to_sdo_readings_count_as_feedback() -> None:
     it = observer((5, 0), (5, 1))
     assert rx(it, 0x585, "4b 41 60 00 17 02 00 00", 1.0).state is DriveState.QUICK_STOP_ACTIVE
     assert rx(it, 0x585, "43 6c 60 00 2c 01 00 00", 1.5).velocity_mps == pytest.approx(0.3)
     rx(it, 0x585, "43 6c 68 00 64 00 00 00", 2.0)
     assert look(it).axes[1].velocity_mps == pytest.approx(0.1)
-    assert look(it).node(5).heard_at == 2.0
+    assert node(it, 5).heard_at == 2.0
 
 
 def test_other_sdo_answers_only_show_that_the_node_lives() -> None:
@@ -85,7 +135,7 @@ def test_other_sdo_answers_only_show_that_the_node_lives() -> None:
     for data in ("60 40 60 00 00 00 00 00", "80 41 60 00 00 00 02 06", "43 18 10 01 00 00 00 00", "00"):
         it.on_frame(0x581, bytes.fromhex(data), 1.0)
     assert look(it).axes == before
-    assert (look(it).node(1).heard_at, it.dropped) == (1.0, 0)
+    assert (node(it, 1).heard_at, it.dropped) == (1.0, 0)
 
 
 # SYNC: | | | |              | | |       a gap of 0.1 s begins a new run
@@ -102,7 +152,7 @@ def test_heartbeats() -> None:
     it.on_frame(0x701, b"\x05", 1.0)
     it.on_frame(0x77F, b"\x05", 2.0)
     view = look(it)
-    assert (view.node(1).heartbeat_at, view.node(1).heard_at, view.driver_at) == (1.0, 1.0, 2.0)
+    assert (node(it, 1).heartbeat_at, node(it, 1).heard_at, view.driver_at) == (1.0, 1.0, 2.0)
 
 
 @pytest.mark.parametrize(
@@ -116,6 +166,7 @@ def test_heartbeats() -> None:
         (0x181, "41 02 00 00 00 00"),  # no state has these bits
         (0x281, "00 00 00"),
         (0x201, "0f 00 00 00 00"),
+        (0x000, "80"),
         (0x581, "4b 41 60 00 41 02 00 00"),
     ],
 )
@@ -130,7 +181,7 @@ def test_frames_that_make_no_sense_are_counted_and_change_no_axis(cob_id: int, d
 def test_frames_of_others_are_ignored_without_a_count() -> None:
     it = observer()
     before = look(it)
-    for cob_id in (0x000, 0x081, 0x183, 0x501, 0x601, 0x77E, 0x1FE, 0x7E5):
+    for cob_id in (0x081, 0x183, 0x501, 0x601, 0x77E, 0x1FE, 0x7E5):
         it.on_frame(cob_id, bytes(8), 1.0)
     assert (look(it), it.dropped) == (before, 0)
 

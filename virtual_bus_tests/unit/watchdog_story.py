@@ -23,7 +23,9 @@ def config(*drives: tuple[int, int], uid: int | None = None) -> WatchdogConfig:
     """Drives as (node id, axis), 1 mm/s per bit, 0.1 mm per count, with the default times of robot.yaml."""
     sides = ("left", "right")
     places = drives or ((1, 0), (2, 0))
-    watched = tuple(WatchedDrive(f"wheel_{n}_{a}", n, a, sides[i % 2], 0.001, 0.0001) for i, (n, a) in enumerate(places))
+    watched = tuple(
+        WatchedDrive(f"wheel_{n}_{a}", n, a, sides[i % 2], 0.001, 0.0001) for i, (n, a) in enumerate(places)
+    )
     return WatchdogConfig(
         bus_arguments={"interface": "virtual", "channel": "none"},
         drives=watched,

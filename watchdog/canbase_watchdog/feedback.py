@@ -14,6 +14,9 @@ from canbase_watchdog.envelope import Peak
 
 DRIFT_S = 0.5
 """Differences between encoder and velocity are forgotten with this time constant: noise and filters have no memory."""
+JUMP_FACTOR = 3.0
+"""A step of the encoder beyond so many times the fastest wheel's is a jump: it tells nothing about the motion."""
+JUMP_CYCLES = 2.0
 _WRAP = 2**32
 
 
@@ -28,7 +31,7 @@ class Feedback:
     overspeed: int = 0
     """Samples in a row above the greatest speed of any wheel."""
     implausible: int = 0
-    """Samples in a row at which encoder and velocity had drifted apart."""
+    """Samples in a row at which encoder and velocity had drifted apart, or the encoder jumped."""
     drift_m: float = 0.0
     """Travel by velocity minus travel by encoder."""
 
@@ -41,6 +44,7 @@ class FeedbackWatch:
         self._config = config
         self._m_per_count = drive.m_per_count
         self._fixed_mps = config.motion_tolerance_mps + abs(drive.mps_per_bit)
+        self._jump_mps, self._jump_s = JUMP_FACTOR * config.max_wheel_mps, JUMP_CYCLES / config.control_hz
         self._fastest_mps = config.overspeed_factor * config.max_wheel_mps
         self._forward, self._backward = Peak(config.drive_lag_s), Peak(config.drive_lag_s)
         self._high = self._low = config.max_wheel_mps
@@ -65,7 +69,7 @@ class FeedbackWatch:
         """606Ch of a velocity TPDO. A wheel without power may be pushed: nothing of it is bad."""
         elapsed_s, self._at = now - self._at, now
         self._follow(elapsed_s, now)
-        drift_m = self._drift(velocity_mps, elapsed_s)
+        drift_m, jumped = self._drift(velocity_mps, elapsed_s)
         self._velocity_mps, self._counts_before = velocity_mps, self._counts
         if not powered:
             self.last = Feedback(-self._low, self._high)
@@ -78,7 +82,7 @@ class FeedbackWatch:
             high_mps=self._high,
             outside=0 if inside else last.outside + 1,
             overspeed=last.overspeed + 1 if abs(velocity_mps) > self._fastest_mps else 0,
-            implausible=last.implausible + 1 if abs(drift_m) > config.travel_tolerance_m else 0,
+            implausible=last.implausible + 1 if jumped or abs(drift_m) > config.travel_tolerance_m else 0,
             drift_m=drift_m,
         )
 
@@ -87,11 +91,16 @@ class FeedbackWatch:
         self._high = max(self._high - fallen_mps, self._forward.greatest(now), 0.0)
         self._low = max(self._low - fallen_mps, self._backward.greatest(now), 0.0)
 
-    def _drift(self, velocity_mps: float, elapsed_s: float) -> float:
-        """Begins anew after a gap: what the wheel did in it was not measured."""
+    def _drift(self, velocity_mps: float, elapsed_s: float) -> tuple[float, bool]:
+        """Travel by velocity minus travel by encoder [m], and whether the encoder jumped.
+
+        Begins anew after a gap: what the wheel did in it was not measured.
+        """
         if self._counts is None or self._counts_before is None or elapsed_s >= self._config.feedback_timeout_s:
-            return 0.0
+            return 0.0, False
         steps = (self._counts - self._counts_before + _WRAP // 2) % _WRAP - _WRAP // 2
         by_velocity_m = (velocity_mps + self._velocity_mps) / 2.0 * elapsed_s
+        by_encoder_m = steps * self._m_per_count
+        jumped = abs(by_encoder_m) > self._jump_mps * max(elapsed_s, self._jump_s)
         left = max(1.0 - elapsed_s / DRIFT_S, 0.0)
-        return self.last.drift_m * left + by_velocity_m - steps * self._m_per_count
+        return self.last.drift_m * left + (0.0 if jumped else by_velocity_m - by_encoder_m), jumped

@@ -6,7 +6,6 @@ Written a second time on purpose, apart from the driver's: a wrong byte order th
 from __future__ import annotations
 
 import enum
-import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -162,7 +161,7 @@ def state(number: int, cause: int, rung: int, node_id: int, lease_age_s: float, 
 def counters(refused: int, dropped: int, bus_errors: int, trips: int, gap_s: float) -> Frame:
     """The frame of counters; each stays at its greatest number when it has come so far. `gap_s`: longest pause."""
     words = (min(number, 0xFFFF) for number in (refused, dropped, bus_errors))
-    return Frame(COUNTERS, _COUNTERS.pack(*words, min(trips, 0xFF), min(math.ceil(gap_s * 1000.0), 0xFF)))
+    return Frame(COUNTERS, _COUNTERS.pack(*words, min(trips, 0xFF), min(round(gap_s * 1000.0), 0xFF)))
 
 
 def quick_stop(node_id: int, axis_count: int) -> Frame:

@@ -1,0 +1,232 @@
+"""Samples of one wheel against its setpoints and its encoder, every 10 ms. 1 mm/s per bit, 0.1 mm per count.
+
+setpoint  ████████▁▁▁▁▁▁▁▁
+allowed   ██████████▆▅▄▃▁▁    held for drive_lag_s (0.1 s), then falling with 1 m/s²; tolerance 0.05 m/s + 10 %
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from canbase_watchdog.feedback import Feedback, FeedbackWatch
+from unit.watchdog_story import config
+
+CONFIG = replace(config(), motion_tolerance_mps=0.05 - 0.001)
+"""With one bit the tolerance is 0.05 m/s."""
+
+
+class Wheel:
+    """A wheel on the table. `way_m`: what its encoder shows."""
+
+    def __init__(self, mirrored: bool = False, **changes: Any) -> None:
+        self.sign = -1 if mirrored else 1
+        drive = replace(CONFIG.drives[0], mps_per_bit=self.sign * 0.001, m_per_count=self.sign * 0.0001)
+        self.watch = FeedbackWatch(drive, replace(CONFIG, **changes), -10.0)
+        self.n = 0
+        self.way_m = 0.0
+        self.sample(0.0, 0.0)
+
+    @property
+    def last(self) -> Feedback:
+        return self.watch.last
+
+    def sample(
+        self, velocity: float, target: float, *, rolls: float | None = None, powered: bool = True, after_s: float = 0.01
+    ) -> Feedback:
+        """One cycle: setpoint, then feedback. The encoder rolls like the velocity unless it is told otherwise."""
+        self.n += round(after_s * 1000)
+        now = self.n / 1000
+        self.way_m += (velocity if rolls is None else rolls) * after_s
+        self.watch.on_target(target, now)
+        self.watch.on_position(self.sign * round(self.way_m * 10_000))
+        self.watch.on_velocity(velocity, powered, now)
+        return self.watch.last
+
+    def samples(self, count: int, velocity: float, target: float, rolls: float | None = None) -> Feedback:
+        for _ in range(count):
+            self.sample(velocity, target, rolls=rolls)
+        return self.last
+
+
+# --- outside
+
+
+@pytest.mark.parametrize(
+    ("velocity", "outside"),
+    [(0.4, 0), (0.0, 0), (0.4899, 0), (0.4901, 1), (-0.0899, 0), (-0.0901, 1)],  # 0.05 + 10 % of 0.4
+)
+def test_a_sample_may_leave_the_range_by_its_tolerance(velocity: float, outside: int) -> None:
+    assert Wheel().sample(velocity, 0.4).outside == outside
+
+
+@pytest.mark.parametrize(
+    ("velocity", "outside"), [(-0.4, 0), (0.0, 0), (-0.4899, 0), (-0.4901, 1), (0.0899, 0), (0.0901, 1)]
+)
+def test_backward_it_is_the_same(velocity: float, outside: int) -> None:
+    assert Wheel(mirrored=True).sample(velocity, -0.4).outside == outside
+
+
+def test_bad_samples_are_counted_while_they_follow_each_other() -> None:
+    wheel = Wheel()
+    assert [wheel.sample(0.6, 0.4).outside for _ in range(3)] == [1, 2, 3]
+    assert wheel.sample(0.4, 0.4).outside == 0
+    assert wheel.sample(0.6, 0.4).outside == 1
+
+
+def test_after_a_lower_setpoint_the_range_is_held_and_falls() -> None:
+    wheel = Wheel()
+    wheel.samples(10, 0.4, 0.4)
+    highs = [wheel.sample(0.0, 0.0).high_mps for _ in range(60)]
+    assert highs[:10] == pytest.approx([0.4] * 10)
+    assert highs[10:51] == pytest.approx([0.4 - 0.01 * n for n in range(41)], abs=0.011)
+    assert highs[51:] == [0.0] * 9
+    assert wheel.last.low_mps == 0.0
+
+
+def test_the_lower_end_falls_too() -> None:
+    wheel = Wheel()
+    wheel.samples(10, -0.4, -0.4)
+    lows = [wheel.sample(0.0, 0.0).low_mps for _ in range(60)]
+    assert lows[:10] == pytest.approx([-0.4] * 10)
+    assert lows[30] == pytest.approx(-0.2, abs=0.011)
+    assert (lows[51], wheel.last.high_mps) == (0.0, 0.0)
+
+
+def test_in_a_reversal_the_wheel_may_still_turn_the_old_way() -> None:
+    wheel = Wheel()
+    wheel.samples(10, 0.4, 0.4)
+    last = wheel.sample(0.4, -0.4)
+    assert (last.low_mps, last.high_mps, last.outside) == (-0.4, 0.4, 0)
+    assert wheel.samples(51, 0.0, -0.4).high_mps == 0.0
+
+
+def test_a_wheel_without_power_may_be_pushed_and_nothing_of_it_stays() -> None:
+    wheel = Wheel()
+    wheel.samples(4, 2.0, 0.0, rolls=0.0)
+    assert wheel.last.outside == 4
+    last = wheel.sample(2.0, 0.0, powered=False)
+    assert (last.outside, last.overspeed, last.implausible, last.drift_m) == (0, 0, 0, 0.0)
+    assert wheel.sample(2.0, 0.0).outside == 1
+
+
+def test_before_the_start_the_wheel_may_have_had_any_setpoint() -> None:
+    watch = FeedbackWatch(CONFIG.drives[0], CONFIG, 0.0)
+    watch.on_target(0.0, 0.05)
+    watch.on_velocity(-1.0, True, 0.1)
+    assert (watch.last.low_mps, watch.last.high_mps, watch.last.outside) == (-1.0, 1.0, 0)
+    watch.on_velocity(-1.0, True, 0.3)
+    assert watch.last.low_mps == pytest.approx(-0.8)
+
+
+# --- overspeed: 1.2 × 1.0 m/s
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_faster_than_any_wheel(sign: int) -> None:
+    wheel = Wheel()
+    assert [wheel.sample(sign * v, sign * 9.0).overspeed for v in (1.2, 1.2001, 1.3, 1.2, 1.21)] == [0, 1, 2, 0, 1]
+
+
+# --- encoder and velocity
+
+
+def test_a_wheel_that_rolls_as_it_says_does_not_drift() -> None:
+    wheel = Wheel()
+    for n in range(200):
+        wheel.sample(0.005 * min(n, 100), 0.5)
+    assert abs(wheel.last.drift_m) < 0.0015  # 0.5 m/s² × 10 ms / 2 s of it, and half a count a sample
+    assert wheel.last.implausible == 0
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_a_frozen_encoder_is_noticed_after_a_few_centimetres(mirrored: bool) -> None:
+    wheel = Wheel(mirrored)
+    wheel.samples(500, 0.5, 0.5)
+    drifts = [wheel.sample(0.5, 0.5, rolls=0.0).drift_m for _ in range(12)]
+    assert drifts[0] == pytest.approx(0.005, abs=2e-4)
+    assert drifts[9] == pytest.approx(0.0457, abs=3e-4)  # 0.005 × (1 - 0.98^10) / 0.02
+    assert drifts[11] > 0.05
+    assert [wheel.sample(0.5, 0.5, rolls=0.0).implausible for _ in range(3)] == [2, 3, 4]
+
+
+def test_a_velocity_that_says_nothing_while_the_encoder_runs() -> None:
+    wheel = Wheel()
+    wheel.samples(500, 0.5, 0.5)
+    drift_m = wheel.samples(12, 0.0, 0.5, rolls=0.5).drift_m
+    assert drift_m == pytest.approx(-0.0518, abs=3e-4)  # 0.0025 × 0.98^11 + 0.005 × (1 - 0.98^11) / 0.02
+    assert wheel.last.implausible == 1
+
+
+@pytest.mark.parametrize(("drift_per_sample", "implausible"), [(0.0499, 0), (0.0501, 1), (-0.0499, 0), (-0.0501, 1)])
+def test_the_tolerance_of_the_drift(drift_per_sample: float, implausible: int) -> None:
+    wheel = Wheel()
+    wheel.way_m += drift_per_sample
+    assert wheel.sample(0.0, 0.0).implausible == implausible
+
+
+def test_a_small_error_that_lasts_is_forgotten_as_fast_as_it_comes() -> None:
+    wheel = Wheel()
+    wheel.samples(1000, 0.5, 0.5, rolls=0.45)
+    assert wheel.last.drift_m == pytest.approx(0.05 * 0.5, abs=0.001)  # × DRIFT_S
+
+
+def test_the_counter_goes_round_at_32_bits() -> None:
+    wheel = Wheel()
+    drive = wheel.watch
+    for counts, now in ((2**31 - 50, 1.0), (-(2**31) + 50, 1.01), (2**31 - 50, 1.02)):
+        drive.on_position(counts)
+        drive.on_velocity(0.0, True, now)
+    assert drive.last.drift_m == pytest.approx(0.01 * 0.02, abs=1e-6)  # -0.01 m, a little forgotten, then +0.01 m
+
+
+def test_one_jump_of_the_encoder_is_one_bad_sample_and_no_drift() -> None:
+    wheel = Wheel()
+    wheel.samples(500, 0.5, 0.5)
+    wheel.way_m += 7.0
+    last = wheel.sample(0.5, 0.5)
+    assert (last.implausible, abs(last.drift_m) < 0.001) == (1, True)
+    assert wheel.sample(0.5, 0.5).implausible == 0
+
+
+@pytest.mark.parametrize(("step_m", "jump"), [(0.0599, False), (0.0601, True), (-0.0599, False), (-0.0601, True)])
+def test_what_three_times_the_fastest_wheel_cannot_do_in_two_cycles_is_a_jump(step_m: float, jump: bool) -> None:
+    wheel = Wheel()
+    wheel.way_m += step_m
+    assert (abs(wheel.sample(0.0, 0.0).drift_m) < 0.001) is jump
+
+
+def test_after_a_longer_time_the_step_may_be_longer() -> None:
+    wheel = Wheel()
+    wheel.way_m += 0.26
+    assert wheel.sample(0.0, 0.0, after_s=0.09).drift_m == pytest.approx(-0.26)
+    wheel.way_m += 0.28
+    assert wheel.sample(0.0, 0.0, after_s=0.09).implausible == 2  # a jump after a drift
+
+
+def test_an_encoder_that_jumps_again_and_again_is_bad_each_time() -> None:
+    wheel = Wheel()
+    counts = []
+    for n in range(6):
+        wheel.way_m = 5.0 * (n % 2)
+        counts.append(wheel.sample(0.0, 0.0, rolls=0.0).implausible)
+    assert counts == [0, 1, 2, 3, 4, 5]
+
+
+@pytest.mark.parametrize(("gap_s", "kept"), [(0.099, True), (0.1, False), (5.0, False)])
+def test_what_was_rolled_in_a_gap_is_not_known(gap_s: float, kept: bool) -> None:
+    wheel = Wheel()
+    wheel.samples(8, 0.5, 0.5, rolls=0.0)
+    assert (wheel.sample(0.5, 0.5, after_s=gap_s).drift_m > 0.0) is kept
+
+
+def test_without_a_position_there_is_no_drift() -> None:
+    watch = FeedbackWatch(CONFIG.drives[0], CONFIG, 0.0)
+    for n in range(20):
+        watch.on_target(0.5, n / 100)
+        watch.on_velocity(0.5, True, n / 100)
+    watch.on_position(123_456)
+    watch.on_velocity(0.5, True, 0.2)
+    assert (watch.last.drift_m, watch.last.implausible) == (0.0, 0)
