@@ -6,7 +6,7 @@ import math
 
 from canbase_config.robot import Drive, Robot
 from canbase_config.units import motor_rev_per_s
-from canbase_config.watchdog import WatchdogConfig, WatchedDrive
+from canbase_config.watchdog import RelayLine, WatchdogConfig, WatchedDrive
 
 CYCLES_TO_SETPOINT = 2
 """A command waits for the driver's next cycle, and its age is looked at only there."""
@@ -71,6 +71,7 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
         feedback_samples=watchdog.feedback_samples,
         overspeed_factor=watchdog.overspeed_factor,
         travel_tolerance_m=watchdog.travel_tolerance_m,
+        relay=RelayLine(watchdog.relay.chip, watchdog.relay.line) if watchdog.relay else None,
     )
 
 

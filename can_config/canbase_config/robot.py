@@ -245,6 +245,13 @@ class Lease(Section):
     socket: Annotated[str, Field(min_length=1, max_length=100, description="path; its folder is made if missing")]
 
 
+class Relay(Section):
+    """A GPIO output that is toggled as long as the last rung of the ladder is not reached. Needs the package gpiod."""
+
+    chip: Annotated[str, Field(min_length=1, max_length=100, description="/dev/gpiochip0, …")]
+    line: Annotated[int, Field(ge=0, le=1023, description="offset of the line on the chip")]
+
+
 class Watchdog(Section):
     """How much the watchdog forgives. No tolerance can be switched off, and none is unlimited."""
 
@@ -280,6 +287,7 @@ class Watchdog(Section):
     loop_late_s: Annotated[
         float, Field(ge=0.02, le=0.5, description="the watchdog's own loop stands still for so long [s]")
     ] = 0.1
+    relay: Annotated[Relay, Field(description="keeps a safety relay closed")] | None = None
 
 
 def _no_parallel(policy: object) -> object:

@@ -24,6 +24,14 @@ class WatchedDrive:
 
 
 @dataclass(frozen=True)
+class RelayLine:
+    """The GPIO output that is toggled to keep a safety relay closed: line `offset` of `chip` (/dev/gpiochip0)."""
+
+    chip: str
+    offset: int
+
+
+@dataclass(frozen=True)
 class WatchdogConfig:
     """Everything that the watchdog knows. Times in seconds, speeds in m/s at the rim of the wheel."""
 
@@ -69,6 +77,8 @@ class WatchdogConfig:
 
     lease_uid: int | None = None
     """The only user whose leases count, None: the watchdog's own."""
+    relay: RelayLine | None = None
+    """None: there is no such relay."""
 
     def to_json(self) -> str:
         """One line of JSON that `from_json` reads back."""
@@ -79,4 +89,5 @@ class WatchdogConfig:
         """The configuration from `to_json`. Raises TypeError or ValueError when it is not one."""
         values = json.loads(text)
         drives = tuple(WatchedDrive(**drive) for drive in values.pop("drives"))
-        return WatchdogConfig(drives=drives, **values)
+        relay = values.pop("relay")
+        return WatchdogConfig(drives=drives, relay=RelayLine(**relay) if relay else None, **values)

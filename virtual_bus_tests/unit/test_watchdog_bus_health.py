@@ -48,6 +48,7 @@ def test_from_the_first_failed_send_until_one_that_succeeds() -> None:
         (0x004, NONE, False),
         (0x004, b"", False),
         (0x004, b"\x10", False),  # detail is byte 1
+        (0x004, b"\x00\x10", True),
         (0x002, TX_PASSIVE, False),  # lost arbitration: byte 1 is none of its
         (0x008, NONE, False),  # protocol
         (0x020, NONE, False),  # no acknowledgement: counted, the controller says when it is too much

@@ -86,6 +86,17 @@ def test_after_a_lower_setpoint_the_range_is_held_and_falls() -> None:
     assert wheel.last.low_mps == 0.0
 
 
+def test_it_falls_with_the_configured_deceleration() -> None:
+    wheel = Wheel(deceleration_mps2=2.0)
+    wheel.samples(10, 0.4, 0.4)
+    assert wheel.samples(20, 0.0, 0.0).high_mps == pytest.approx(0.4 - 0.1 * 2.0, abs=0.021)
+
+
+def test_at_the_very_tolerance_it_is_inside() -> None:
+    wheel = Wheel(motion_tolerance_mps=0.124, motion_tolerance_share=0.0)  # with one bit 0.125
+    assert [wheel.sample(velocity, 0.5).outside for velocity in (0.625, -0.125)] == [0, 0]
+
+
 def test_the_lower_end_falls_too() -> None:
     wheel = Wheel()
     wheel.samples(10, -0.4, -0.4)
@@ -130,6 +141,11 @@ def test_faster_than_any_wheel(sign: int) -> None:
     assert [wheel.sample(sign * v, sign * 9.0).overspeed for v in (1.2, 1.2001, 1.3, 1.2, 1.21)] == [0, 1, 2, 0, 1]
 
 
+def test_faster_than_the_configured_limit() -> None:
+    wheel = Wheel(max_wheel_mps=0.5)
+    assert [wheel.sample(velocity, 9.0).overspeed for velocity in (0.6, 0.601)] == [0, 1]
+
+
 # --- encoder and velocity
 
 
@@ -165,6 +181,14 @@ def test_the_tolerance_of_the_drift(drift_per_sample: float, implausible: int) -
     wheel = Wheel()
     wheel.way_m += drift_per_sample
     assert wheel.sample(0.0, 0.0).implausible == implausible
+
+
+def test_before_the_first_sample_the_wheel_is_taken_for_standing() -> None:
+    watch = FeedbackWatch(CONFIG.drives[0], CONFIG, 0.0)
+    watch.on_position(0)
+    watch.on_velocity(0.0, True, 0.0)
+    watch.on_velocity(0.4, True, 0.01)
+    assert watch.last.drift_m == pytest.approx(0.002, abs=1e-9)
 
 
 def test_a_small_error_that_lasts_is_forgotten_as_fast_as_it_comes() -> None:

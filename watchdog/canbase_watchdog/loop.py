@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 from canbase_watchdog.bus_port import BusPort
 from canbase_watchdog.lease_socket import LeaseSocket
+from canbase_watchdog.relay import Relay
 from canbase_watchdog.report import Reporter
 from canbase_watchdog.watchdog import State, Watchdog
 
@@ -27,17 +28,18 @@ class BusDeadError(Exception):
 class Loop:
     """Ticks at absolute times every TICK_S, and once more just when a timeout runs out."""
 
-    def __init__(self, watchdog: Watchdog, bus: BusPort, leases: LeaseSocket) -> None:
-        """Owns none of them: the caller opens and closes."""
+    def __init__(self, watchdog: Watchdog, bus: BusPort, leases: LeaseSocket, relay: Relay | None = None) -> None:
+        """Owns none of them: the caller opens and closes. `relay`: None where there is none."""
         self._watchdog = watchdog
         self._bus = bus
         self._leases = leases
+        self._relay = relay
         self._reporter = Reporter(watchdog)
         self._bus_fd = bus.fileno()
         self._due = self._sent_at = self._collected_at = time.monotonic()
 
     def run(self, asked_to_end: Callable[[], bool]) -> None:
-        """Until `asked_to_end` is true and the wheels stand, at most END_S later. Raises BusDeadError."""
+        """Until `asked_to_end` is true and the wheels stand, at most END_S later. Raises BusDeadError, RelayError."""
         while not asked_to_end():
             self._turn()
         now = time.monotonic()
@@ -75,6 +77,8 @@ class Loop:
         self._watchdog.on_bus(health.failed_since, health.errors)
         for frame in self._watchdog.tick(now):
             self._bus.send(frame)
+        if self._relay is not None and self._watchdog.keeps_relay:
+            self._relay.toggle()
         self._check_bus(now)
         self._reporter.tick(health, now)
         self._collect(now)

@@ -10,6 +10,7 @@ import signal
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import ExitStack
 from types import FrameType
 
 from canbase_config.watchdog import WatchdogConfig
@@ -18,13 +19,14 @@ from canbase_watchdog.bus_port import BusError, BusPort
 from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
 from canbase_watchdog.loop import BusDeadError, Loop
 from canbase_watchdog.notify import notify
+from canbase_watchdog.relay import Relay, RelayError
 from canbase_watchdog.watchdog import Watchdog
 
 _log = logging.getLogger("canbase.watchdog")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run until SIGINT or SIGTERM. Exit code 0: ended as asked; 1: bus or socket failed; 2: bad configuration."""
+    """Run until SIGINT or SIGTERM. Exit code 0: as asked; 1: bus, socket or relay failed; 2: bad configuration."""
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     parser = argparse.ArgumentParser(prog="canbase_watchdog", description="the independent watchdog of a canbase robot")
     parser.add_argument("--config-json", required=True, help="WatchdogConfig.to_json() of the robot")
@@ -36,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     try:
         return _serve(config)
-    except (BusError, LeaseSocketError, BusDeadError) as error:
+    except (BusError, LeaseSocketError, BusDeadError, RelayError) as error:
         _log.error("%s", error)
         return 1
 
@@ -51,10 +53,13 @@ def _serve(config: WatchdogConfig) -> int:
         signal.signal(number, on_signal)
     uid = os.getuid() if config.lease_uid is None else config.lease_uid
     config = dataclasses.replace(config, lease_uid=uid)
-    with BusPort(config.bus_arguments) as bus, LeaseSocket(config.lease_socket, uid) as leases:
+    with ExitStack() as stack:
+        bus = stack.enter_context(BusPort(config.bus_arguments))
+        leases = stack.enter_context(LeaseSocket(config.lease_socket, uid))
+        relay = stack.enter_context(Relay(config.relay)) if config.relay else None
         watchdog = Watchdog(config, time.monotonic())
         try:
-            _guard(watchdog, bus, leases, asked)
+            _guard(Loop(watchdog, bus, leases, relay), asked)
         except BaseException:
             for frame in watchdog.quick_stops():
                 bus.send(frame)
@@ -63,11 +68,10 @@ def _serve(config: WatchdogConfig) -> int:
     return 0
 
 
-def _guard(watchdog: Watchdog, bus: BusPort, leases: LeaseSocket, asked: list[int]) -> None:
+def _guard(loop: Loop, asked: list[int]) -> None:
     complaint = realtime.prepare()
     if complaint is not None:
         _log.warning("%s", complaint)
-    loop = Loop(watchdog, bus, leases)
     notify("READY=1")
     loop.run(lambda: bool(asked))
     notify("STOPPING=1")

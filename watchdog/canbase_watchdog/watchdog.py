@@ -87,6 +87,11 @@ class Watchdog:
         return Status(self._state, self._verdict, self._step, self._settled, self._reset)
 
     @property
+    def keeps_relay(self) -> bool:
+        """False on the last rung: then the own heartbeat is withheld, and a safety relay opens."""
+        return self._step is not Step.HEARTBEAT_WITHHELD
+
+    @property
     def refused_leases(self) -> dict[Refusal, int]:
         """Datagrams that were no lease, by reason, since the start."""
         return self._leases.refused
@@ -177,7 +182,7 @@ class Watchdog:
     def _tell(self, now: float) -> list[Frame]:
         out: list[Frame] = []
         period_s = self._config.drive_heartbeat_s / 3.0
-        if now >= self._heartbeat_due and self._step is not Step.HEARTBEAT_WITHHELD:
+        if now >= self._heartbeat_due and self.keeps_relay:
             self._heartbeat_due = max(self._heartbeat_due, now - period_s) + period_s
             out.append(frames.heartbeat())
         status = self.status
