@@ -79,7 +79,7 @@ def made_consistent(values: Values) -> Values:
     limits["emergency_deceleration_mps2"] = max(limits["emergency_deceleration_mps2"], limits["deceleration_mps2"])
     safety["stop_distance_m"] = min(safety.get("stop_distance_m", 0.15), 4.0)
     safety["slow_distance_m"] = safety["stop_distance_m"] + 0.5
-    for what in ("distance_m", "speed_mps"):
+    for what in ("distance_m", "speed_mps", "angle_rad", "speed_radps"):
         action.pop(f"max_{what}", None)
         action[f"min_{what}"] = min(action.get(f"min_{what}", 0.01), 0.4)
     for index, source in enumerate(values.get("mux", {}).get("sources", {}).values()):
