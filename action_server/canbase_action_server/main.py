@@ -12,6 +12,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from canbase_action_server.drive_messages import drive_binding
 from canbase_action_server.node import DriveDistanceServer
+from canbase_action_server.rotate_messages import rotate_binding
 from canbase_config.robot import Robot
 
 STANDSTILL_S = 2.0
@@ -25,7 +26,7 @@ def run(robot: Robot, ros_args: list[str]) -> int:
     """Serve until SIGINT or SIGTERM; 0 after an orderly end, 1 after a defect. `ros_args` as for rclpy.init."""
     rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)
     executor = SingleThreadedExecutor()
-    node = DriveDistanceServer(robot, [drive_binding()])
+    node = DriveDistanceServer(robot, [drive_binding(), rotate_binding(robot)])
     executor.add_node(node)
     asked_to_end = _catch_signals()
     try:

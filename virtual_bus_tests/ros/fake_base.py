@@ -25,7 +25,7 @@ class FakeBase:
     """The rest of the robot, healthy until a field says otherwise."""
 
     def __init__(self, test_node: TestNode) -> None:
-        self.x_m = 0.0
+        self.x_m = self.y_m = 0.0
         self.yaw_rad = 0.0
         self.speed_mps = 0.0
         self.heal()
@@ -72,12 +72,13 @@ class FakeBase:
         if self.stuck:
             self.speed_mps = 0.0
         self.yaw_rad += self._turn_radps * elapsed_s
-        self.x_m += self.speed_mps * elapsed_s
+        self.x_m += self.speed_mps * elapsed_s * math.cos(self.yaw_rad)
+        self.y_m += self.speed_mps * elapsed_s * math.sin(self.yaw_rad)
         self._publish()
 
     def _publish(self) -> None:
         odometry = Odometry()
-        odometry.pose.pose.position.x = self.x_m
+        odometry.pose.pose.position.x, odometry.pose.pose.position.y = self.x_m, self.y_m
         odometry.pose.pose.orientation.z = math.sin(self.yaw_rad / 2)
         odometry.pose.pose.orientation.w = math.cos(self.yaw_rad / 2)
         odometry.twist.twist.linear.x = self.speed_mps
