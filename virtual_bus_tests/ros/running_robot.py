@@ -19,6 +19,7 @@ from canbase.msg import DriverStatus, SafetyState, StopEvent
 from nav_msgs.msg import Odometry
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from ruamel.yaml import YAML
+from std_srvs.srv import Trigger
 
 from canbase_bench.control import SimControl, control_path
 from canbase_bench.world.bench import Truth
@@ -158,13 +159,21 @@ class RunningRobot:
         return time.monotonic()
 
     def make_ready(self) -> None:
-        """Until the drives have power, with `canbase reset` where a stop is latched."""
+        """Until the drives have power, with a reset where one is asked for."""
         deadline_s = time.monotonic() + READY_S
-        while (state := self.wait_any_state().state) != DriverStatus.ENABLED:
-            assert time.monotonic() < deadline_s, f"not ready, state {state}\n{self.logs()}"
-            if state == DriverStatus.LATCHED:
-                self.run("reset")
+        while (status := self.wait_any_state()).state != DriverStatus.ENABLED:
+            assert time.monotonic() < deadline_s, f"not ready: {status}\n{self.logs()}"
+            if status.clears_on.startswith("reset"):
+                self._reset()
         self.wait_enabled()
+
+    def _reset(self) -> None:
+        """Asks once; whether it was done, the state tells."""
+        client = self.node.node.create_client(Trigger, "motor_driver/reset")
+        self.node.wait_for(client.service_is_ready, READY_S, "motor_driver/reset")
+        answer = client.call_async(Trigger.Request())
+        self.node.wait_for(answer.done, READY_S, "the answer to a reset")
+        self.node.node.destroy_client(client)
 
     def logs(self) -> str:
         """The end of what every process has written."""

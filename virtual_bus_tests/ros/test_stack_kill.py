@@ -54,65 +54,77 @@ def note(request: pytest.FixtureRequest) -> Iterator[Note]:
 
 
 @pytest.fixture
-def robot() -> Iterator[RunningRobot]:
-    """One of its own for each test: a process that was killed leaves traces in DDS for seconds."""
+def fresh() -> Iterator[RunningRobot]:
+    """A robot for one test: a process that was killed leaves traces in DDS for seconds."""
     with own_domain() as domain, robot_on(domain, changes={}) as robot:
         yield robot
 
 
-@pytest.fixture
-def goal(robot: RunningRobot) -> Iterator[Drive]:
-    """On its way at full speed."""
-    client = DriveClient(robot.node.node, robot.node.executor)
-    client.wait_for_server(20.0)
-    robot.node.spin_for(1.0)  # the server rejects a goal before it has heard of all others
-    goal = client.send(4.0, SPEED_MPS)
-    robot.wait_speed(0.97 * SPEED_MPS)
-    robot.node.spin_for(0.2)
-    assert goal.result is None, f"{goal.result}\n{robot.logs()}"
-    yield goal
-    client.close()
+@pytest.fixture(scope="module")
+def lasting() -> Iterator[RunningRobot]:
+    """A robot for all tests after which every process still runs."""
+    with own_domain() as domain, robot_on(domain, changes={}) as robot:
+        yield robot
 
 
 @pytest.mark.parametrize("part", PARTS)
-def test_a_process_is_killed_while_the_robot_drives(robot: RunningRobot, goal: Drive, note: Note, part: str) -> None:
-    moment_s = robot.send(part, signal.SIGKILL)
-    stop = stands_and_stays(robot, moment_s)
-    end = "–"
-    if part != "action-server":
-        end = aborted_with(goal, ENDS[part])
+def test_a_process_is_killed_while_the_robot_drives(fresh: RunningRobot, note: Note, part: str) -> None:
+    goal = driving(fresh)
+    moment_s = fresh.send(part, signal.SIGKILL)
+    stop = stands_and_stays(fresh, moment_s)
+    end = "–" if part == "action-server" else aborted_with(goal, ENDS[part])
     note(part, "SIGKILL", stop, end)
     assert stop.after_s < STANDS_WITHIN_S
 
 
 @pytest.mark.parametrize("part", PARTS)
-def test_a_process_hangs_while_the_robot_drives_and_goes_on_later(
-    robot: RunningRobot, goal: Drive, note: Note, part: str
-) -> None:
-    moment_s = robot.send(part, signal.SIGSTOP)
-    stop = stands_and_stays(robot, moment_s)
-    resumed_s = robot.send(part, signal.SIGCONT)
-    assert robot.moved_since(resumed_s, QUIET_S) < RESTS_M
-    end = aborted_with(goal, ENDS[part])
-    note(part, "SIGSTOP", stop, end)
+def test_a_process_hangs_while_the_robot_drives_and_goes_on_later(lasting: RunningRobot, note: Note, part: str) -> None:
+    goal = driving(lasting)
+    moment_s = lasting.send(part, signal.SIGSTOP)
+    stop = stands_and_stays(lasting, moment_s)
+    resumed_s = lasting.send(part, signal.SIGCONT)
+    assert lasting.moved_since(resumed_s, QUIET_S) < RESTS_M
+    note(part, "SIGSTOP", stop, aborted_with(goal, ENDS[part]))
     assert stop.after_s < STANDS_WITHIN_S
-
-    robot.make_ready()
-    assert robot.run("drive", "0.1", "--speed", "0.2") == 0  # nothing is broken for good
-    assert robot.stack.death() is None
+    assert lasting.stack.death() is None
+    assert driven(lasting, 0.1)  # nothing is broken for good
 
 
-def test_a_driver_that_was_killed_can_be_started_again(robot: RunningRobot, goal: Drive) -> None:
-    robot.send("driver", signal.SIGKILL)
-    robot.wait_standing()
-    assert robot.stack.end("driver") == -signal.SIGKILL
-    robot.stack.start()
+def test_a_driver_that_was_killed_can_be_started_again(fresh: RunningRobot) -> None:
+    driving(fresh)
+    fresh.send("driver", signal.SIGKILL)
+    fresh.wait_standing()
+    assert fresh.stack.end("driver") == -signal.SIGKILL
     started_s = time.monotonic()
-    robot.node.wait_for(lambda: robot.status.since(started_s), 20.0, "the new driver")
-    assert robot.moved_since(started_s, QUIET_S) < RESTS_M
-    assert robot.status.messages[-1].state != DriverStatus.ENABLED  # the watchdog has tripped: that needs a reset
+    fresh.stack.start()
+    fresh.node.wait_for(lambda: fresh.status.since(started_s), 20.0, "the new driver")
+    assert fresh.moved_since(started_s, QUIET_S) < RESTS_M
+    assert fresh.status.messages[-1].state != DriverStatus.ENABLED  # the watchdog has tripped: that needs a reset
+    assert driven(fresh, 0.1)
+
+
+def driving(robot: RunningRobot) -> Drive:
+    """A goal on its way at full speed."""
+    goal = client_of(robot).send(4.0, SPEED_MPS)
+    robot.wait_speed(0.97 * SPEED_MPS)
+    robot.node.spin_for(0.2)
+    assert goal.result is None, f"{goal.result}\n{robot.logs()}"
+    return goal
+
+
+def driven(robot: RunningRobot, distance_m: float) -> bool:
+    """It succeeds in driving that far, after a reset where one is asked for."""
     robot.make_ready()
-    assert robot.run("drive", "0.1", "--speed", "0.2") == 0
+    result = client_of(robot).send(distance_m, SPEED_MPS).wait(20.0)
+    return result is not None and result.status is Status.SUCCEEDED
+
+
+def client_of(robot: RunningRobot) -> DriveClient:
+    """Of its action server, which has heard of all others: before that it rejects."""
+    client = DriveClient(robot.node.node, robot.node.executor)
+    client.wait_for_server(20.0)
+    robot.node.spin_for(1.0)
+    return client
 
 
 def stands_and_stays(robot: RunningRobot, moment_s: float) -> Standstill:

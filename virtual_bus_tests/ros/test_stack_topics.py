@@ -1,0 +1,215 @@
+"""What a whole robot says on its topics, and what those that it listens on make it do. It needs its laser scanner."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+
+import pytest
+from canbase.msg import DriverStatus, MuxState, SafetyState, StopEvent
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import TwistStamped
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import JointState, LaserScan
+from std_msgs.msg import Bool
+
+from canbase_action_server.client import Drive, DriveClient, DriveResult
+from canbase_action_server.outcome import ErrorCode
+from ros.harness import Repeater, merged
+from ros.running_robot import LATCHED, PATIENT, RESTS_M, RunningRobot, own_domain, robot_on
+
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
+
+WATCHES_OUT = merged(PATIENT, {"safety": {"scan": {"required": True, "timeout_s": 1.0}}})
+BEAMS = 180
+BLOCKED_M = 0.35
+"""5 cm before the front of the footprint: inside the stop distance."""
+
+
+def scan(ahead_m: float = math.inf) -> LaserScan:
+    """Beams all around, all free but for the one ahead, from base_link."""
+    ranges = [ahead_m] + [math.inf] * (BEAMS - 1)
+    step_rad = 2.0 * math.pi / BEAMS
+    return LaserScan(angle_min=0.0, angle_increment=step_rad, range_min=0.05, range_max=10.0, ranges=ranges)
+
+
+class World:
+    """A robot, and around it a joystick, a laser scanner and an emergency stop button."""
+
+    def __init__(self, robot: RunningRobot) -> None:
+        self.robot = robot
+        self.node = robot.node
+        self.joystick: Repeater[TwistStamped] = self.node.repeat(TwistStamped, "cmd_vel_joy", 50.0)
+        self.scan: Repeater[LaserScan] = self.node.repeat(LaserScan, "scan", 20.0, qos_profile_sensor_data)
+        self.estop: Repeater[Bool] = self.node.repeat(Bool, "estop_state", 20.0)
+        for repeater in (self.joystick, self.scan, self.estop):
+            self.node.wait_for_subscriber(repeater.publisher)
+        self.mux = self.node.record(MuxState, "velocity_mux/state", LATCHED)
+        self.client = DriveClient(self.node.node, self.node.executor)
+
+    def heal(self) -> None:
+        """All as it should be, and the robot stands ready."""
+        self.joystick.message, self.scan.message, self.estop.message = None, scan(), Bool(data=False)
+        self.robot.wait_standing()
+        self.robot.make_ready()
+        asked_s = time.monotonic()
+        self.node.wait_for(lambda: self.causes_since(asked_s)[-1:] == [SafetyState.CAUSE_NONE], 20.0, "no cause")
+
+    def causes_since(self, since_s: float) -> list[str]:
+        return [state.cause for state in self.robot.safety.since(since_s)]
+
+    def joystick_refused(self) -> int:
+        """Messages of the joystick that the mux has refused since its start."""
+        sources = self.mux.messages[-1].sources
+        return next(int(source.refused) for source in sources if source.name == "joystick")
+
+    def drive(self) -> Drive:
+        """A goal that has the robot at 0.3 m/s."""
+        self.client.wait_for_server(20.0)
+        goal = self.client.send(4.0, 0.3)
+        self.robot.wait_speed(0.28)
+        return goal
+
+    def wait_event(self, since_s: float, by: str, cause: str) -> StopEvent:
+        def found() -> StopEvent | None:
+            events = self.robot.stop_events.since(since_s)
+            return next((event for event in events if (event.stopped_by, event.cause) == (by, cause)), None)
+
+        event = self.node.wait_for(found, 10.0, f"{by}: {cause}")
+        assert event is not None
+        return event
+
+
+@pytest.fixture(scope="module")
+def running() -> Iterator[World]:
+    with own_domain() as domain, robot_on(domain, changes=WATCHES_OUT) as robot:
+        world = World(robot)
+        world.scan.message = scan()
+        world.client.wait_for_server(20.0)
+        world.node.spin_for(1.0)
+        yield world
+
+
+@pytest.fixture
+def world(running: World) -> World:
+    running.heal()
+    return running
+
+
+def ended(goal: Drive) -> DriveResult:
+    result = goal.wait(20.0)
+    assert result is not None
+    return result
+
+
+def test_odom_and_joint_states_agree_with_each_other_and_with_the_truth(world: World) -> None:
+    joints = world.node.record(JointState, "joint_states")
+    world.node.wait_for(lambda: joints.last, 10.0, "joint_states")
+    first, before_m = joints.messages[-1], world.robot.odometry()
+    assert world.robot.run("drive", "0.3", "--speed", "0.3") == 0
+    world.node.spin_for(0.3)
+    last, odom, truth = joints.messages[-1], world.robot.odom.messages[-1], world.robot.truth()
+    assert list(last.name) == ["left_wheel", "right_wheel"]
+    turned_rad = [after - before for after, before in zip(last.position, first.position, strict=True)]
+    assert turned_rad == pytest.approx([3.0, 3.0], abs=0.05)  # 0.3 m on wheels of 0.1 m
+    assert math.dist(before_m, world.robot.odometry()) == pytest.approx(0.3, abs=0.005)
+    assert odom.header.frame_id == "odom"
+    assert odom.child_frame_id == "base_link"
+    pose = odom.pose.pose
+    assert (pose.position.x, pose.position.y) == pytest.approx((truth.x_m, truth.y_m), abs=0.01)
+    assert math.hypot(pose.orientation.z, pose.orientation.w) == pytest.approx(1.0)
+    assert pose.position.z == pose.orientation.x == pose.orientation.y == 0.0
+    assert odom.pose.covariance[0] > 0.0
+    assert odom.twist.covariance[0] > 0.0
+
+
+def test_tf_says_what_odom_says(world: World) -> None:
+    tf2_msgs = pytest.importorskip("tf2_msgs.msg", reason="the ROS wheels have no tf2_msgs")
+    recorder = world.node.record(tf2_msgs.TFMessage, "tf")
+    world.node.wait_for(lambda: recorder.last, 10.0, "tf")
+    transform, odom = recorder.messages[-1].transforms[0], world.robot.odom.messages[-1]
+    assert (transform.header.frame_id, transform.child_frame_id) == ("odom", "base_link")
+    assert transform.transform.translation.x == pytest.approx(odom.pose.pose.position.x, abs=RESTS_M)
+
+
+def test_status_tells_that_all_is_well(world: World) -> None:
+    status = world.robot.wait_state(DriverStatus.ENABLED)
+    assert (status.cause, status.watchdog, status.watchdog_cause) == ("none", DriverStatus.WATCHDOG_OK, "none")
+    assert status.standstill
+    assert status.command_fresh
+    assert [(drive.joint, drive.node_id, drive.state) for drive in status.drives] == [
+        ("left_wheel", 1, "operation enabled"),
+        ("right_wheel", 2, "operation enabled"),
+    ]
+    assert all(drive.stops_by_itself and drive.error_code == 0 for drive in status.drives)
+
+
+def test_diagnostics_have_an_entry_for_each_part_and_none_is_an_error(world: World) -> None:
+    recorder = world.node.record(DiagnosticArray, "/diagnostics")
+    found = world.node.wait_for(lambda: recorder.last, 10.0, "/diagnostics")
+    assert found is not None
+    names = [entry.name for entry in found.status]
+    assert names[:2] == ["bench: motor_driver", "bench: watchdog"]
+    assert names[-2:] == ["bench: drive left_wheel", "bench: drive right_wheel"]
+    assert all(entry.level != DiagnosticStatus.ERROR for entry in found.status)
+
+
+def test_a_joystick_drives_and_its_silence_stops(world: World) -> None:
+    world.joystick.message = TwistStamped()
+    world.joystick.message.twist.linear.x = 0.2
+    world.robot.wait_speed(0.19)
+    world.node.spin_for(0.5)
+    assert world.robot.truth().linear_mps == pytest.approx(0.2, abs=0.02)
+    assert world.robot.odom.messages[-1].twist.twist.linear.x == pytest.approx(0.2, abs=0.02)
+    assert world.mux.messages[-1].active == "joystick"
+    world.joystick.message = None
+    world.robot.wait_standing()
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_a_joystick_that_sends_no_number_moves_nothing(world: World, bad: float) -> None:
+    began_s = time.monotonic()
+    world.joystick.message = TwistStamped()
+    world.joystick.message.twist.linear.x = bad
+    refused = world.joystick_refused()
+    world.node.wait_for(lambda: world.joystick_refused() > refused, 10.0, "its refusal")
+    assert world.robot.moved_since(began_s, 1.0) < RESTS_M
+
+
+def test_an_obstacle_ahead_stops_the_base_and_ends_the_goal(world: World) -> None:
+    goal, began_s = world.drive(), time.monotonic()
+    world.scan.message = scan(BLOCKED_M)
+    assert ended(goal).code is ErrorCode.BLOCKED
+    assert world.robot.moved_since(time.monotonic(), 0.5) < RESTS_M
+    assert not world.wait_event(began_s, "safety_filter", "obstacle").latched
+
+
+def test_a_silent_scanner_stops_the_base_and_ends_the_goal(world: World) -> None:
+    goal = world.drive()
+    world.scan.message = None
+    assert ended(goal).code is ErrorCode.SCAN_LOST
+    assert world.robot.moved_since(time.monotonic(), 0.5) < RESTS_M
+
+
+def test_the_emergency_stop_stops_the_base_and_ends_the_goal(world: World) -> None:
+    goal, began_s = world.drive(), time.monotonic()
+    world.estop.message = Bool(data=True)
+    assert ended(goal).code is ErrorCode.ESTOP
+    assert world.robot.moved_since(time.monotonic(), 0.5) < RESTS_M
+    world.wait_event(began_s, "safety_filter", "estop")
+    assert world.robot.run("drive", "0.3") == 5  # pressed still
+
+    released_s = time.monotonic()
+    world.estop.message = Bool(data=False)
+    assert world.robot.moved_since(released_s, 1.0) < RESTS_M  # the release alone moves nothing
+    assert world.robot.run("drive", "0.1", "--speed", "0.2") == 0
+
+
+def test_a_stop_by_the_driver_is_an_event_that_says_how_it_ends(world: World) -> None:
+    world.drive()
+    began_s = time.monotonic()
+    assert world.robot.run("stop") == 0
+    event = world.wait_event(began_s, "motor_driver", "stop requested")
+    assert event.latched
+    assert event.clears_on == "reset"

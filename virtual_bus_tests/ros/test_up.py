@@ -1,0 +1,104 @@
+"""`canbase up` as a process: every way to end it leaves the robot standing and no part behind.
+
+The simulated drives are a process of their own here, which outlives it and tells what the wheels do afterwards.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from canbase_action_server.client import DriveClient
+from canbase_bench.control import control_path
+from ros.harness import Process
+from ros.running_robot import RESTS_M, RunningRobot, own_domain, robot_on
+
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
+
+PARTS = {"driver", "velocity", "watchdog", "action-server"}
+END_S = 30.0
+
+
+class Driving:
+    """`canbase up`, whose robot drives at 0.3 m/s."""
+
+    def __init__(self, robot: RunningRobot) -> None:
+        self.robot = robot
+        robot.command("sim", "--config", str(robot.config))
+        robot.node.wait_for(control_path(robot.robot).is_socket, 20.0, "the simulator")
+        self.up: Process = robot.command("up", "--config", str(robot.config), "--no-sim")
+        robot.wait_enabled()
+        self.parts = parts_of(self.up.pid)
+        client = DriveClient(robot.node.node, robot.node.executor)
+        client.wait_for_server(20.0)
+        robot.node.spin_for(1.0)  # the server rejects a goal before it has heard of all others
+        client.send(4.0, 0.3)
+        robot.wait_speed(0.28)
+
+    def assert_all_ended_standing(self) -> None:
+        ended_s = time.monotonic()
+        assert self.robot.moved_since(ended_s, 1.0) < RESTS_M
+        assert self.robot.truth().linear_mps == pytest.approx(0.0, abs=1e-6)
+        assert [part for part, pid in self.parts.items() if lives(pid)] == []
+
+
+@pytest.fixture
+def driving() -> Iterator[Driving]:
+    with own_domain() as domain, robot_on(domain, start=False) as robot:
+        yield Driving(robot)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_asked_to_end_it_stops_the_robot_and_ends_well(driving: Driving, number: signal.Signals) -> None:
+    assert set(driving.parts) == PARTS
+    os.kill(driving.up.pid, number)
+    assert driving.robot.exit_code(driving.up, END_S) == 0, driving.up.log()
+    driving.assert_all_ended_standing()
+
+
+@pytest.mark.parametrize("part", ["driver", "action-server"])
+def test_when_a_part_dies_it_says_which_and_ends_the_others(driving: Driving, part: str) -> None:
+    os.kill(driving.parts[part], signal.SIGKILL)
+    assert driving.robot.exit_code(driving.up, END_S) == 1
+    assert f"{part} was ended by SIGKILL" in driving.up.log()
+    driving.assert_all_ended_standing()
+
+
+def test_when_it_is_killed_itself_the_parts_stop_the_robot_and_end(driving: Driving) -> None:
+    driving.up.kill()
+    driving.robot.node.wait_for(lambda: not any(map(lives, driving.parts.values())), END_S, "the end of the parts")
+    driving.assert_all_ended_standing()
+
+
+def test_a_stop_signal_while_the_parts_still_start_ends_it_well() -> None:
+    with own_domain() as domain, robot_on(domain, start=False) as robot:
+        up = robot.command("up", "--config", str(robot.config))
+        robot.node.wait_for(lambda: len(parts_of(up.pid)) == len(PARTS) + 1, 20.0, "the parts")
+        up.interrupt()
+        assert robot.exit_code(up, END_S) in (0, 1)  # a part that has no handler yet dies of its SIGTERM
+        assert "stopping the robot" in up.log()
+
+
+def parts_of(pid: int) -> dict[str, int]:
+    """Process ids of the children of `canbase up`, by part."""
+    children = [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    return {part_of(child): child for child in children}
+
+
+def part_of(pid: int) -> str:
+    """From `python -m canbase_cli.child PARENT part …`, and `python -m canbase_watchdog …`, which that becomes."""
+    words = Path(f"/proc/{pid}/cmdline").read_text().split("\0")
+    return "watchdog" if "canbase_watchdog" in words else words[4]
+
+
+def lives(pid: int) -> bool:
+    """It runs, and is no zombie that waits to be reaped."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
