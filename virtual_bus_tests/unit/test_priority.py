@@ -12,7 +12,7 @@ from canbase_watchdog import realtime
 
 def test_drives_come_before_the_watchdog_and_it_before_all_that_it_watches() -> None:
     assert 50 > PRIORITY["sim"] > realtime.PRIORITY
-    assert realtime.PRIORITY > max(PRIORITY["driver"], PRIORITY["velocity"], PRIORITY["action-server"])
+    assert max(PRIORITY["driver"], PRIORITY["velocity"], PRIORITY["action-server"]) < realtime.PRIORITY
 
 
 def test_a_part_gets_its_priority(monkeypatch: pytest.MonkeyPatch) -> None:
