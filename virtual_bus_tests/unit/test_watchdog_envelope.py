@@ -116,6 +116,12 @@ def test_a_greater_value_takes_the_place_of_all_smaller_ones() -> None:
     assert [peak.greatest(t) for t in (0.5, 1.4, 1.41, 1.5, 1.51)] == [5.0, 5.0, 4.0, 4.0, 3.0]
 
 
+def test_at_its_very_end_a_value_is_still_in_force() -> None:
+    peak = Peak(0.5)
+    peak.set(-3.0, 1.0, until=2.0)
+    assert [peak.greatest(t) for t in (2.0, 2.0625)] == [-3.0, 0.0]
+
+
 # --- one way
 
 
@@ -133,6 +139,17 @@ def test_after_a_stop_the_bound_is_held_and_then_falls_with_the_deceleration() -
     assert line.order(0.0, 0.0, 0.105).linear_high == pytest.approx(0.4, abs=0.006)  # 0.1 s later
     assert line.order(0.0, 0.0, 0.3).linear_high == pytest.approx(0.1, abs=0.006)
     assert numbers(line.order(0.0, 0.0, 0.11)) == NOTHING
+
+
+def test_it_falls_with_the_configured_deceleration() -> None:
+    line = Timeline(deceleration_mps2=2.0)
+    line.order(0.8, 0.0, 1.0)
+    line.order(0.0, 0.0, 0.35)
+    assert line.order(0.0, 0.0, 0.2).linear_high == pytest.approx(0.4, abs=0.011)
+    turn = Timeline(deceleration_mps2=2.0)
+    turn.order(0.8, 0.5, 1.0)  # 0.4 s and 0.1 s
+    turn.order(0.0, 0.0, 0.35)
+    assert turn.order(0.0, 0.0, 0.2).angular_high == pytest.approx(0.25, abs=0.01)
 
 
 def test_backward_and_turning_fall_as_well() -> None:
@@ -272,9 +289,14 @@ def test_a_pause_of_the_watchdog_itself_is_one_long_step() -> None:
 
 
 def test_each_wheel_gets_what_its_place_makes_of_the_bounds() -> None:
-    bounds = Bounds(-0.1, 0.5, -1.0, 2.0)
-    assert bounds.wheel(0.2) == pytest.approx((-0.3, 0.9))  # right: v + w × 0.2 m
-    assert bounds.wheel(-0.2) == pytest.approx((-0.5, 0.7))
+    bounds = Bounds(-0.1, 0.5, -1.5, 2.0)
+    assert bounds.wheel(0.2) == pytest.approx((-0.4, 0.9))  # right: v + w × 0.2 m
+    assert bounds.wheel(-0.2) == pytest.approx((-0.5, 0.8))
+
+
+@pytest.mark.parametrize(("left", "right"), [(0.625, 0.625), (-0.375, -0.375), (-0.125, 0.375), (0.25, -0.25)])
+def test_at_the_very_limit_they_go_together(left: float, right: float) -> None:
+    assert Bounds(-0.25, 0.5, -0.5, 0.5).pair(left, right, track_m=0.5, tolerance_mps=0.125) == ""
 
 
 @pytest.mark.parametrize(

@@ -189,7 +189,7 @@ def test_frames_of_others_are_ignored_without_a_count() -> None:
 frames_on_the_bus = st.tuples(st.sampled_from(WATCHED) | st.integers(0, 0x7FF), st.binary(max_size=8))
 
 
-@settings(max_examples=200)
+@settings(max_examples=200, deadline=None)
 @given(st.lists(frames_on_the_bus, max_size=60))
 def test_noise_never_raises(noise: list[tuple[int, bytes]]) -> None:
     watchdog = Watchdog(config(), 0.0)

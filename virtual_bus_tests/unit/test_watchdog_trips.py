@@ -176,6 +176,14 @@ def test_pauses_of_its_own_loop_that_are_allowed_make_no_trip() -> None:
     assert cause(story) is Cause.NONE
 
 
+def test_the_next_tick_is_due_when_the_first_timeout_runs_out() -> None:
+    story = driving()
+    story.filter = story.driver = False
+    story.run(0.2)
+    assert story.watchdog.next_expiry(story.t) == pytest.approx(1.2 + 0.25, abs=0.021)
+    assert story.watchdog.next_expiry(1.46) == pytest.approx(1.2 + 0.3, abs=0.101)  # the driver's heartbeat
+
+
 # --- counters
 
 
