@@ -52,6 +52,11 @@ class FakeBase:
         self.driver = DriverStatus(state=DriverStatus.ENABLED, watchdog=DriverStatus.WATCHDOG_OK, cause="none")
         self.mux = MuxState()
 
+    @property
+    def heard(self) -> bool:
+        """Somebody listens to each of its topics."""
+        return all(each.get_subscription_count() > 0 for each in (self._odom, self._driver, self._safety, self._mux))
+
     def orders_since(self, start_s: float) -> list[float]:
         """Linear velocities ordered after start_s (time.monotonic)."""
         return [mps for at_s, mps in self.orders if at_s >= start_s]

@@ -33,6 +33,7 @@ class Stage:
         self.client = DriveClient(node.node, node.executor)
         self.client.wait_for_server(20.0)
         self.status = node.record(GoalStatusArray, "drive_distance/_action/status")
+        node.wait_for(lambda: self.base.heard, 20.0, "the server to listen")
         node.spin_for(1.0)
 
     def last_status(self) -> list[int]:

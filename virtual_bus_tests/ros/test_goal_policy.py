@@ -31,7 +31,7 @@ class Crowd:
         self.clients = [ActionClient(node.node, DriveDistance, "drive_distance") for _ in range(4)]
         DriveClient(node.node, node.executor).wait_for_server(20.0)
         node.wait_for(lambda: all(client.server_is_ready() for client in self.clients), 10.0, "all clients")
-        node.wait_for(lambda: node.node.count_subscribers("odom") > 0, 10.0, "the server to listen")
+        node.wait_for(lambda: self.base.heard, 20.0, "the server to listen")
         node.spin_for(0.5)
         self.results: dict[str, list[Any]] = {}
         self.handles: dict[str, Any] = {}

@@ -34,6 +34,7 @@ class Stage:
         self.drives = DriveClient(node.node, node.executor)
         self.turns.wait_for_server(20.0)
         self.drives.wait_for_server(5.0)
+        node.wait_for(lambda: self.base.heard, 20.0, "the server to listen")
         node.spin_for(1.0)
 
 
