@@ -301,3 +301,24 @@ def test_in_a_curve_too(begin: Callable[[World], EachStep]) -> None:
     assert cause in (Cause.TARGET_OUTSIDE, Cause.MOTION_OUTSIDE)
     assert trip_s <= 0.5
     assert stand_s <= fastest_mps / EMERGENCY_MPS2 + 0.06
+
+
+def test_from_standstill_somebody_straight_on_cmd_vel_does_not_get_far() -> None:
+    world = World()
+    world.enable()
+    world.run(1.0)
+    assert watched(world) == (False, Cause.NONE)
+    each_step, start, fastest_mps = somebody_publishes_straight_to_cmd_vel(world), world.truth, 0.0
+    world.command = SPEED
+
+    def note() -> bool:
+        nonlocal fastest_mps
+        each_step()
+        fastest_mps = max(fastest_mps, abs(world.truth.linear_mps))
+        return False
+
+    world.run(2.0, note)
+    assert watched(world) == (True, Cause.TARGET_OUTSIDE)
+    assert world.truth.standing_s > 1.5
+    assert 0.01 < fastest_mps < 0.06
+    assert world.truth.path_m - start.path_m < 0.006
