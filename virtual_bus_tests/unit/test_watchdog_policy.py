@@ -257,7 +257,7 @@ def test_at_the_very_moment_it_trips() -> None:
     assert exactly(well(lease_at=99.75)) is Cause.LEASE_LOST
     assert exactly(of(AT_REST, driver_at=99.5)) is Cause.DRIVER_SILENT
     assert exactly(of(replace(AT_REST, status_at=99.875))) is Cause.DRIVE_SILENT
-    assert exactly(of(AT_REST, nodes=(Node(1, 99.5, 99.99), Node(2)))) is Cause.DRIVE_SILENT
+    assert exactly(of(AT_REST, nodes=(Node(1, 99.5, 99.99), Node(2, 99.95, 99.99)))) is Cause.DRIVE_SILENT
 
 
 def test_at_the_very_moment_syncs_have_stopped() -> None:

@@ -260,6 +260,18 @@ def test_the_order_of_the_table() -> None:
     assert [check.cause for check in CHECKS] == [9, 10, 8, 1, 2, 3, 7, 12, 4, 6, 5]
 
 
+def test_what_is_about_the_whole_robot_names_no_node() -> None:
+    views = (
+        well(lease_at=90.0),
+        of(AT_REST, driver_at=90.0),
+        of(AT_REST, bus_failed_since=90.0),
+        of(AT_REST, tick_gap_s=1.0),
+    )
+    verdicts = [decide(view, CONFIG, NOW) for view in views]
+    assert [(verdict.cause, verdict.node_id) for verdict in verdicts] == [(1, 0), (2, 0), (9, 0), (10, 0)]
+    assert (FINE.cause, FINE.node_id, FINE.detail) == (0, 0, "")
+
+
 def test_a_bus_that_failed_explains_the_silence() -> None:
     everything = well(bus_failed_since=99.0, tick_gap_s=1.0, driver_at=90.0, lease_at=90.0, foreign=Sign(NOW, 1, ""))
     assert cause(everything) is Cause.BUS_FAILED
