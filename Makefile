@@ -23,6 +23,15 @@ demo: $(VENV)/ready ## the whole chain on a simulated bus: drives 1 m, refuses a
 test: $(VENV)/ready ## all tests: pure units, simulated drives on a bus, processes over DDS
 	pytest
 
+.PHONY: campaign
+campaign: $(VENV)/ready ## 10,000 scenarios with overlapping faults in virtual time; SEED=7 tells one of them
+ifdef SEED
+	PYTHONPATH=virtual_bus_tests python -m campaign --seed $(SEED)
+else
+	PYTHONPATH=virtual_bus_tests python -m campaign
+	PYTHONPATH=virtual_bus_tests python -m campaign.fuzz
+endif
+
 .PHONY: lint
 lint: $(VENV)/ready ## ruff, mypy, import rules, and that colcon sees a ROS 2 package
 	ruff check .

@@ -31,10 +31,10 @@ def main(
     scenarios: Annotated[int, typer.Option(min=1, help="how many scenarios")] = 10_000,
     first: Annotated[int, typer.Option(min=0, help="seed of the first one; the others follow it")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
-    seed: Annotated[int | None, typer.Option(min=0, help="replay this one alone, with a log of all that happens")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="tell this one alone, as a log")] = None,
     fault: Annotated[list[Fault] | None, typer.Option(help="draw only from these; may be repeated")] = None,
     frames: Annotated[bool, typer.Option(help="with --seed: every frame on the bus too")] = False,
-    without: Annotated[Safeguard | None, typer.Option(help="take this safeguard out before; it should be missed")] = None,
+    without: Annotated[Safeguard | None, typer.Option(help="take this safeguard out before")] = None,
 ) -> None:
     """Scenarios with 1 to 4 overlapping faults in virtual time. Exit code 1 when a property did not hold."""
     only = [name.value for name in fault or ()]
@@ -79,7 +79,9 @@ def _tell_sums(tally: Tally) -> None:
     out.print(f"trips of the watchdog: {trips or 'none'}")
     out.print(f"ends of goals: {goals or 'none'}")
     ratio = tally.virtual_s / tally.real_s if tally.real_s else 0.0
-    out.print(f"{tally.virtual_s:.0f} s of virtual time, {tally.moved_m:.0f} m driven, {ratio:.0f} × real time a process")
+    out.print(
+        f"{tally.virtual_s:.0f} s of virtual time, {tally.moved_m:.0f} m driven, {ratio:.0f} × real time a process"
+    )
 
 
 def _tell_violations(tally: Tally, only: list[str]) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from campaign.clock import Clock
+from campaign.process import Process, Topics
 from canbase_action_server.along_track import Pose
 from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
 from canbase_action_server.outcome import Outcome
@@ -15,9 +17,6 @@ from canbase_driver.snapshot import DriverSnapshot
 from canbase_velocity.decision import Action, Cause, Decision
 from canbase_velocity.mux import MuxDecision
 from canbase_velocity.twist import Twist
-
-from campaign.clock import Clock
-from campaign.process import Process, Topics
 
 ESTOP_CAUSES = (Cause.ESTOP, Cause.ESTOP_STALE)
 

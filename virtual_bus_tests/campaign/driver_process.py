@@ -1,7 +1,9 @@
-"""motor_driver in virtual time: the core with the cycle of loop.py and the topics of node.py; and two ways to go mad."""
+"""motor_driver in virtual time: the core, the cycle of loop.py and the topics of node.py; and two ways to go mad."""
 
 from __future__ import annotations
 
+from campaign.can_bus import CanBus
+from campaign.process import FRAMES_HELD, Process, Topics
 from canbase_config.robot import DRIVER_NODE_ID, Robot
 from canbase_driver.core import DriverCore
 from canbase_driver.frame import Frame
@@ -9,9 +11,6 @@ from canbase_driver.kinematics import Twist2D
 from canbase_driver.reset import Outcome
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_velocity.twist import Twist
-
-from campaign.can_bus import CanBus
-from campaign.process import FRAMES_HELD, Process, Topics
 
 SETPOINTS = (0x200, 0x300)
 """First identifiers of the RPDOs with setpoints: docs/bus.md."""

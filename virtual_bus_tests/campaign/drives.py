@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 
+from campaign.can_bus import CanBus
 from canbase_bench.node import SimulatedNode, StateChange
 from canbase_bench.world.bench import Bench
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
-
-from campaign.can_bus import CanBus
 
 POLL_S = 0.005
 """How often the drives look at their own timers: heartbeats, and heartbeats that are missing."""
@@ -28,8 +27,9 @@ class Drives:
         self._urgent = {0x000, 0x080}
         for node_id in self.bench.nodes:
             self._urgent |= {0x500 + node_id, 0x600 + node_id}
-        self.heard = {node_id: bus.clock.now for node_id in self.bench.nodes}
+        self.heard = dict.fromkeys(self.bench.nodes, bus.clock.now)
         self.moved_at = bus.clock.now
+        self._answers = False
         self._poll()
 
     def changes(self) -> list[StateChange]:
@@ -42,11 +42,18 @@ class Drives:
             if self.moved_at < self._clock.now:
                 self._say()
             node.on_frame(cob_id, data, self._clock.now)
-            self._say()
+            if not self._answers:
+                self._answers = True
+                self._clock.after(0.0, self._answer)
             return
         node.on_frame(cob_id, data, self._clock.now)
         if cob_id in HEARTBEATS and not node.cut:
             self.heard[node_id] = self._clock.now
+
+    def _answer(self) -> None:
+        """All nodes have heard the frame."""
+        self._answers = False
+        self._say()
 
     def _say(self) -> None:
         self.moved_at = self._clock.now

@@ -21,7 +21,8 @@ ORDER_S = 0.05
 """An order is renewed every 20 ms (rates.command_hz)."""
 TOLERANCE_MPS = 0.06
 TOLERANCE_RADPS = 0.24
-"""What no layer can tell from standing still or from the ordered speed: its own tolerance, slip, overshoot of a loop."""
+"""What no layer can tell from standing or from the ordered speed: tolerances of the layers, overshoot of a loop."""
+ROUNDING_S = 1e-9
 COASTING = 0.2
 """A wheel without power is braked by friction alone: its allowance shrinks this much slower."""
 
@@ -29,7 +30,9 @@ COASTING = 0.2
 def notice_s(robot: Robot) -> float:
     """Longest time until one layer notices that it must stop the base [s]."""
     t = robot.timeouts
-    return max(t.command_s + 1.0 / robot.rates.control_hz, t.lease_s, t.watchdog_s, t.drive_heartbeat_s) + TICK_S + BUS_S
+    return (
+        max(t.command_s + 1.0 / robot.rates.control_hz, t.lease_s, t.watchdog_s, t.drive_heartbeat_s) + TICK_S + BUS_S
+    )
 
 
 def react_s(robot: Robot, layers: int) -> float:
@@ -68,14 +71,17 @@ class Envelope:
         self._order_s, self._ordered_at = tau_s, now
 
     def bound_s(self, tau_s: float, now: float, coasting: bool = False) -> float:
-        """The greatest τ allowed now, when the base has `tau_s`. To be asked again and again; a wheel may be `coasting`."""
+        """The greatest τ allowed now, when the base has `tau_s`. To be asked again and again.
+
+        `coasting`: some wheel has no power.
+        """
         fades_s = (now - self._at) * (COASTING if coasting else 1.0)
         self._at = now
         ordered_s = self._order_s if now <= self._ordered_at + ORDER_S else 0.0
         self._ordered_bound_s = max(ordered_s, self._ordered_bound_s - fades_s)
-        if tau_s <= self._ordered_bound_s:
+        if tau_s <= self._ordered_bound_s + ROUNDING_S:
             self._beyond_since, self._peak_s = math.inf, 0.0
-            return self._ordered_bound_s
+            return self._ordered_bound_s + ROUNDING_S
         self._beyond_since = min(self._beyond_since, now)
         if now <= self._beyond_since + self._react_s:
             self._peak_s = max(self._peak_s, tau_s)

@@ -5,6 +5,7 @@ Faults are plain switches of the processes, the bus and the drives. Several may 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from random import Random
@@ -212,6 +213,17 @@ def _leases(field: str, off: object) -> tuple[Change, Change]:
     return begin, end
 
 
+def _share(random: Random) -> Arguments:
+    return {"share": random.choice((1.0, 1.0, random.uniform(0.1, 1.0)))}
+
+
+def _strange_twist(random: Random) -> Arguments:
+    """Mostly a motion, sometimes nonsense."""
+    nonsense = Twist(math.nan, math.inf)
+    motion = Twist(_speed(random), random.choice((0.0, random.uniform(-2.0, 2.0))))
+    return {"twist": nonsense if random.random() < 0.1 else motion}
+
+
 def _speed(random: Random) -> float:
     return random.choice((-1.0, 1.0)) * random.uniform(0.15, 0.8)
 
@@ -235,7 +247,7 @@ FAULTS: dict[str, Kind] = {
     "straight_to_cmd_vel": Kind(
         "somebody publishes to cmd_vel",
         LONG,
-        lambda r: {"twist": Twist(_speed(r), r.choice((0.0, r.uniform(-2.0, 2.0))))},
+        _strange_twist,
         *_intruder("twist", "twist", None),
     ),
     "second_master_setpoints": Kind(
@@ -269,10 +281,17 @@ FAULTS: dict[str, Kind] = {
         _stays,
     ),
     "frozen_encoder": Kind(
-        "a position stands still", LONG, _node, *_axis_fault("frozen_position", lambda axis: axis.position(), None), True
+        "a position stands still",
+        LONG,
+        _node,
+        *_axis_fault("frozen_position", lambda axis: axis.position(), None),
+        encoder_lies=True,
     ),
     "stuck_velocity": Kind(
-        "an actual velocity stands still", LONG, _node, *_axis_fault("stuck_velocity", lambda axis: axis.velocity(), None)
+        "an actual velocity stands still",
+        LONG,
+        _node,
+        *_axis_fault("stuck_velocity", lambda axis: axis.velocity(), None),
     ),
     "drive_ignores_setpoints": Kind(
         "a drive ignores setpoints", LONG, _node, *_axis_fault("ignores_setpoints", lambda axis: True, False)
@@ -280,10 +299,10 @@ FAULTS: dict[str, Kind] = {
     "odometry_lost": Kind("odom does not arrive", SHORT, _nothing, *_topic_lost("odom")),
     "status_lost": Kind("motor_driver/status does not arrive", SHORT, _nothing, *_topic_lost("motor_driver/status")),
     "cmd_vel_lossy": Kind(
-        "messages of cmd_vel get lost", LONG, lambda r: {"share": r.uniform(0.1, 1.0)}, *_topic_lost("cmd_vel")
+        "messages of cmd_vel get lost", (0.3, 2.5), _share, *_topic_lost("cmd_vel")
     ),
     "mux_lossy": Kind(
-        "messages of cmd_vel_mux get lost", LONG, lambda r: {"share": r.uniform(0.1, 1.0)}, *_topic_lost("cmd_vel_mux")
+        "messages of cmd_vel_mux get lost", (0.5, 4.0), _share, *_topic_lost("cmd_vel_mux")
     ),
     "scan_stale": Kind("no scan arrives", LONG, _nothing, *_topic_lost("scan")),
     "estop_stale": Kind("the stop button is not heard", LONG, _nothing, *_topic_lost("estop_state")),
@@ -295,7 +314,9 @@ FAULTS: dict[str, Kind] = {
         "the driver's adapter fails", SHORT, _nothing, *_driver("bus_problem", on="adapter gone", off="")
     ),
     "watchdog_bus_problem": Kind("the watchdog's adapter fails", SHORT, _nothing, _watchdog_deaf, _watchdog_hears),
-    "lease_lost": Kind("leases get lost", LONG, lambda r: {"value": r.choice((0.3, 0.9, 1.0))}, *_leases("lease_loss", 0.0)),
+    "lease_lost": Kind(
+        "leases get lost", LONG, lambda r: {"value": r.choice((0.3, 0.9, 1.0))}, *_leases("lease_loss", 0.0)
+    ),
     "lease_garbage": Kind(
         "mangled leases come too", LONG, lambda r: {"value": True}, *_leases("lease_garbage", False)
     ),

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import struct
 
+from campaign.can_bus import CanBus
+from campaign.process import Topics
 from canbase_config.derive import mps_per_bit
 from canbase_config.robot import Robot
 from canbase_velocity.twist import Twist
-
-from campaign.can_bus import CanBus
-from campaign.process import Topics
 
 ENABLE = 0x000F
 SETPOINT = struct.Struct("<Hi")

@@ -8,15 +8,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from canbase_action_server.outcome import ErrorCode
-from canbase_bench.cia402.states import State
-from canbase_config.derive import max_wheel_mps
-from canbase_driver.snapshot import DriverState
-from canbase_velocity.twist import Twist
-from canbase_watchdog.ladder import RUNGS
-from canbase_watchdog.watchdog import Answer
-from canbase_watchdog.watchdog import State as WatchdogState
-
 from campaign.action_process import Goal
 from campaign.envelope import TOLERANCE_MPS, Envelope, braking_s, moving_s, notice_s, react_s
 from campaign.faults import FAULTS
@@ -25,6 +16,14 @@ from campaign.outside import Outside, Surroundings
 from campaign.plan import Plan
 from campaign.wishes import Wishes
 from campaign.world import World
+from canbase_action_server.outcome import ErrorCode
+from canbase_bench.cia402.states import State
+from canbase_config.derive import max_wheel_mps
+from canbase_driver.snapshot import DriverState
+from canbase_velocity.twist import Twist
+from canbase_watchdog.ladder import RUNGS
+from canbase_watchdog.watchdog import Answer
+from canbase_watchdog.watchdog import State as WatchdogState
 
 STEP_S = 0.005
 HEARD_S = 0.3
@@ -45,6 +44,8 @@ PROPERTIES = {
 }
 STRANGE_HANDS = frozenset(("second_master_setpoints", "second_master_nmt", "driver_repeats", "driver_ignores_zero"))
 """Who sends to the drives past all layers can move them again after a stop, for as long as T_react; nobody else can."""
+UNHEARD = frozenset(("watchdog_bus_problem",))
+"""A watchdog that cannot send cannot keep a standing base from starting: driver and drives miss it within T_react."""
 EXCLUDED = {
     "enabling": (
         tuple(sorted(STRANGE_HANDS)),
@@ -168,7 +169,7 @@ class Judge:
         if self._hold is None:
             return
         self._stood = self._stood or tau_s == 0.0
-        again = self._stood and tau_s > 0.0 and not self._faults & STRANGE_HANDS
+        again = self._stood and tau_s > 0.0 and not self._faults & (STRANGE_HANDS | UNHEARD)
         if tau_s > self._hold.bound_s(tau_s, now, coasting) or again:
             self._violate("held", f"{self._speeds()} while {' and '.join(self._latches)} latched")
 

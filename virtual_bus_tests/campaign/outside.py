@@ -1,16 +1,15 @@
-"""The world around the base: joystick and navigation, the client of the action, the operator, scanner and stop button."""
+"""The world around the base: joystick, navigation, the client of the action, the operator, scanner, stop button."""
 
 from __future__ import annotations
 
 import math
 
-from canbase_driver.reset import Outcome
-from canbase_velocity.clearance import Clearances
-from canbase_velocity.twist import Twist
-
 from campaign.envelope import react_s
 from campaign.plan import GoalRequest, Plan, Segment
 from campaign.world import World
+from canbase_driver.reset import Outcome
+from canbase_velocity.clearance import Clearances
+from canbase_velocity.twist import Twist
 
 SPEEDING_UP_MPS = 0.2
 """By so much the base may become faster until the wall is noticed."""

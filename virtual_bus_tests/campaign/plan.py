@@ -9,9 +9,9 @@ from random import Random
 
 from campaign.faults import FAULTS, PlannedFault
 
-FAULTS_S = (0.2, 2.0)
+FAULTS_S = (0.1, 1.2)
 """Faults begin in this part of a scenario."""
-SCENARIO_S = (2.4, 3.4)
+SCENARIO_S = (2.1, 2.9)
 MOST_FAULTS = 4
 KINDS = ("constant", "constant", "constant", "weave", "burst", "nan", "zero")
 """How a source behaves for a while; a word that stands more often is drawn more often."""
@@ -31,7 +31,9 @@ class Segment:
 
     def __str__(self) -> str:
         speed = f"{self.linear_mps:+.2f} m/s {self.angular_radps:+.2f} rad/s"
-        return f"{self.start_s:5.2f} s  {self.source} {self.kind} {speed}, {self.rate_hz:.0f} Hz, {self.duration_s:.2f} s"
+        return (
+            f"{self.start_s:5.2f} s  {self.source} {self.kind} {speed}, {self.rate_hz:.0f} Hz, {self.duration_s:.2f} s"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +99,7 @@ def _segments(random: Random, duration_s: float, late: bool) -> tuple[Segment, .
         angular_radps = random.choice((0.0, 0.0, random.uniform(-2.5, 2.5)))
         rate_hz = 200.0 if kind == "burst" else random.choice((10.0, 20.0, 50.0))
         source = random.choice(("joystick", "navigation"))
-        lasts_s = random.uniform(0.8, duration_s) if first else random.uniform(0.1, 1.5)
+        lasts_s = random.uniform(0.4, duration_s) if first else random.uniform(0.1, 1.5)
         segments.append(Segment(source, start_s, lasts_s, kind, linear_mps, angular_radps, rate_hz))
     return tuple(segments)
 

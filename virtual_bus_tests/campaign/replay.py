@@ -19,7 +19,7 @@ class _Teller:
         self._world = world
         self._told: dict[str, str] = {}
         self._speed_at = 0.0
-        self._look()
+        world.clock.after(0.0, self._look)
 
     def _look(self) -> None:
         world = self._world
@@ -47,10 +47,16 @@ def replay(plan: Plan, frames: bool, say: Callable[[str], None]) -> Result:
     for line in plan.lines():
         say(line)
     if frames:
-        world.bus.watch = lambda sender, cob_id, data: world.note(f"    {sender:9} {cob_id:03X} {data.hex(' ').upper()}")
+        world.bus.watch = lambda sender, cob_id, data: world.note(
+            f"    {sender:9} {cob_id:03X} {data.hex(' ').upper()}"
+        )
     _Teller(world)
     result = start.run(plan, lambda at_s, text: say(f"{at_s:8.4f} {text}"))
     say(f"{len(result.violations)} violations")
     for violation in result.violations:
         say(f"{violation.name} at {violation.at_s:.3f} s: {violation.detail}")
     return result
+
+
+def _hex(cob_id: int, data: bytes) -> str:
+    return f"{cob_id:03X} {data.hex(' ').upper()}"

@@ -53,7 +53,7 @@ def run(
     without: str = "",
     on_result: Callable[[Result], None] | None = None,
 ) -> Tally:
-    """Run the scenarios of these seeds with faults from `only` (empty: all), `without` a safeguard (campaign.without)."""
+    """Run the scenarios of these seeds, with faults from `only` (empty: all), `without` one of `SAFEGUARDS`."""
     tally = Tally()
     listed = list(seeds)
     batches = [listed[at : at + BATCH] for at in range(0, len(listed), BATCH)]
@@ -69,7 +69,7 @@ def run(
 
 
 def _boot(without: str) -> None:
-    global _start  # noqa: PLW0603 - the worker's one world
+    global _start
     remove(without)
     _start = Start()
 

@@ -131,5 +131,3 @@ class _Run:
             self._world.clock.now - self._start,
             real_s,
         )
-
-

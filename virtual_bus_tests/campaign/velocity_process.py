@@ -1,4 +1,4 @@
-"""velocity_mux and safety_filter, one process, in virtual time: mux.py and filter_state.py, wired as their nodes are."""
+"""velocity_mux and safety_filter, one process, in virtual time: their cores, wired as their nodes are."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable
 from functools import partial
 
+from campaign.clock import Clock
+from campaign.process import Process, Topics
 from canbase_config.robot import Robot
 from canbase_velocity.clearance import Clearances
 from canbase_velocity.decision import Action, Decision
@@ -14,9 +16,6 @@ from canbase_velocity.lease import lease_datagram
 from canbase_velocity.mux import Mux, MuxDecision
 from canbase_velocity.safety_filter import FilterConfig
 from canbase_velocity.twist import Twist
-
-from campaign.clock import Clock
-from campaign.process import Process, Topics
 
 STATE_PERIOD_S = 0.1
 MUX_STATE_PERIOD_S = 0.5

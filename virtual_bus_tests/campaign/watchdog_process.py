@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 
-from canbase_config.watchdog import WatchdogConfig
-from canbase_watchdog.watchdog import Watchdog
-
 from campaign.can_bus import CanBus
 from campaign.process import FRAMES_HELD, Process
+from canbase_config.watchdog import WatchdogConfig
+from canbase_watchdog.watchdog import Watchdog
 
 TICK_S = 0.005
 """As in canbase_watchdog.loop."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+from campaign.envelope import braking_s
 from canbase_config.robot import Robot
 from canbase_velocity.twist import Twist
-
-from campaign.envelope import braking_s
 
 
 class Wishes:

@@ -15,8 +15,9 @@ from canbase_bench.cia301.heartbeat import HeartbeatConsumer
 from canbase_driver import command, supervisor, watchdog_link
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.odometry import WheelTravel
-from canbase_driver.snapshot import WatchdogView
+from canbase_driver.snapshot import DriverState, WatchdogView
 from canbase_velocity import filter_state, mux, safety_filter
+from canbase_velocity.decision import PASSED
 from canbase_watchdog import policy
 from canbase_watchdog.watchdog import State, Watchdog
 
@@ -45,7 +46,7 @@ def _hazard(name: str) -> Callable[[], None]:
 
 
 def _all_trips() -> None:
-    policy.CHECKS = ()
+    _put(policy, "CHECKS", ())()
 
 
 def _no_latch() -> None:
@@ -63,10 +64,15 @@ def _no_latch() -> None:
 
 def _driver_forgets() -> None:
     """A latched stop of the driver ends by itself."""
-    supervisor.Supervisor._RULES = {  # noqa: SLF001
-        **supervisor.Supervisor._RULES,  # noqa: SLF001
-        supervisor.DriverState.LATCHED: supervisor.Supervisor._without_power,  # noqa: SLF001
+    supervisor.Supervisor._RULES = {
+        **supervisor.Supervisor._RULES,
+        DriverState.LATCHED: supervisor.Supervisor._without_power,
     }
+
+
+def _forget_estop(self: filter_state.SafetyFilter, now: float) -> None:
+    """The command need not be zero after an emergency stop."""
+    self._awaits_zero = False
 
 
 SAFEGUARDS: dict[str, Callable[[], None]] = {
@@ -83,11 +89,11 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "driver:command_is_finite": _put(Twist2D, "is_finite", property(lambda self: True)),
     "driver:odometry_jump_guard": _put(WheelTravel, "_is_near", lambda self, from_raw, raw, cycles: True),
     "drives:heartbeat_consumer": _put(HeartbeatConsumer, "tick", lambda self, now: None),
-    "mux:timeout": _put(mux._Source, "is_fresh", lambda self, now: self.at_s is not None),  # noqa: SLF001
+    "mux:timeout": _put(mux._Source, "is_fresh", lambda self, now: self.at_s is not None),
     "filter:estop": _put(safety_filter, "_estop", lambda inputs, config: None),
-    "filter:obstacle": _put(safety_filter, "_obstacle", lambda twist, inputs, config: safety_filter.PASSED),
+    "filter:obstacle": _put(safety_filter, "_obstacle", lambda twist, inputs, config: PASSED),
     "filter:command": _put(safety_filter, "_command", lambda inputs, config: None),
-    "filter:zero_after_estop": _put(filter_state.SafetyFilter, "_remember_estop", lambda self, now: None),
+    "filter:zero_after_estop": _put(filter_state.SafetyFilter, "_remember_estop", _forget_estop),
     "action:timeout_and_progress": _drop(
         causes, lambda row: getattr(row, "code", None) not in (ErrorCode.TIMEOUT, ErrorCode.NO_PROGRESS)
     ),

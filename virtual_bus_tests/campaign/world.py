@@ -5,12 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from random import Random
 
-from canbase_config.derive import watchdog_config
-from canbase_config.load import load_robot, sample
-from canbase_config.robot import Robot
-from canbase_driver.snapshot import DriverState
-from canbase_velocity.twist import Twist
-
 from campaign.action_process import ActionProcess, Goal
 from campaign.can_bus import CanBus
 from campaign.clock import Clock
@@ -20,6 +14,11 @@ from campaign.intruder import Intruder
 from campaign.process import Process, Topics
 from campaign.velocity_process import VelocityProcess
 from campaign.watchdog_process import WatchdogProcess
+from canbase_config.derive import watchdog_config
+from canbase_config.load import load_robot, sample
+from canbase_config.robot import Robot
+from canbase_driver.snapshot import DriverState
+from canbase_velocity.twist import Twist
 
 LEASE_DELAY_S = 0.0002
 BOOT_S = 5.0
@@ -63,11 +62,13 @@ class World:
         self.processes = {process.name: process for process in processes}
 
     def enable(self) -> None:
-        """From power on until the driver is enabled and has seen a zero. Raises RuntimeError when it does not happen."""
+        """From power on until the driver is enabled and has seen a zero. RuntimeError: it does not happen."""
         end = self.clock.now + BOOT_S
         while self.driver.core.state is not DriverState.ENABLED:
             if self.clock.now >= end:
-                raise RuntimeError(f"not enabled after {BOOT_S} s: {self.driver.core.state.name} {self.driver.core.cause}")
+                raise RuntimeError(
+                    f"not enabled after {BOOT_S} s: {self.driver.core.state.name} {self.driver.core.cause}"
+                )
             self.clock.run_until(self.clock.now + 0.01)
         self.clock.run_until(self.clock.now + 0.7)
 

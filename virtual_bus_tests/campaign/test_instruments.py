@@ -1,0 +1,149 @@
+"""The campaign's own instruments: its bus, its processes, its envelope. What they get wrong, no scenario would find."""
+
+from __future__ import annotations
+
+from random import Random
+
+import pytest
+
+from campaign.can_bus import CanBus
+from campaign.clock import Clock
+from campaign.envelope import Envelope, moving_s, react_s
+from campaign.process import Process, Topics
+from campaign.world import campaign_robot
+
+pytestmark = pytest.mark.campaign
+
+
+class Listener(Process):
+    name = "listener"
+
+    def __init__(self, clock: Clock) -> None:
+        super().__init__(clock)
+        self.heard: list[object] = []
+        self.ticks: list[float] = []
+        self.begin()
+
+    def begin(self) -> None:
+        self.every(0.01, lambda: self.ticks.append(round(self.clock.now, 4)))
+
+
+def bus_of(bitrate: int) -> tuple[Clock, CanBus]:
+    clock = Clock(0.0)
+    return clock, CanBus(clock, Random(0), bitrate)
+
+
+def test_the_lower_identifier_wins_and_each_sender_keeps_its_order() -> None:
+    clock, bus = bus_of(1_000_000)
+    heard: list[int] = []
+    bus.join("ear", lambda cob_id, data: heard.append(cob_id))
+    one, two = bus.join("one", lambda cob_id, data: None), bus.join("two", lambda cob_id, data: None)
+    one.send(0x201, b"")
+    one.send(0x080, b"")
+    two.send(0x181, b"")
+    two.send(0x281, b"")
+    clock.run_until(1.0)
+    # 201 is on the bus already; then 080 < 181 and, of two alone, 181 < 281
+    assert heard == [0x201, 0x080, 0x181, 0x281]
+
+
+def test_eight_bytes_take_a_quarter_of_a_millisecond_at_500_kbit_per_s() -> None:
+    clock, bus = bus_of(500_000)
+    times: list[float] = []
+    bus.join("ear", lambda cob_id, data: times.append(clock.now))
+    bus.join("mouth", lambda cob_id, data: None).send(0x100, bytes(8))
+    clock.run_until(1.0)
+    assert times == pytest.approx([0.00025], rel=0.02)
+
+
+def test_who_is_cut_off_hears_nothing_and_the_others_do() -> None:
+    clock, bus = bus_of(500_000)
+    heard: list[str] = []
+    for name in ("near", "far"):
+        bus.join(name, lambda cob_id, data, name=name: heard.append(name))  # type: ignore[misc]
+    mouth = bus.join("mouth", lambda cob_id, data: None)
+    bus.disturbance.blocked.add(("mouth", "far"))
+    mouth.send(0x100, b"")
+    clock.run_until(1.0)
+    assert heard == ["near"]
+
+
+def test_what_is_delayed_does_not_overtake() -> None:
+    clock, bus = bus_of(500_000)
+    heard: list[int] = []
+    bus.join("ear", lambda cob_id, data: heard.append(cob_id))
+    mouth = bus.join("mouth", lambda cob_id, data: None)
+    bus.disturbance.delay_s = 0.05
+    for cob_id in range(0x100, 0x120):
+        mouth.send(cob_id, b"")
+    clock.run_until(1.0)
+    assert heard == list(range(0x100, 0x120))
+
+
+def test_who_hangs_finds_the_newest_message_and_its_timer_goes_on_from_there() -> None:
+    clock = Clock(0.0)
+    listener, topics = Listener(clock), Topics(clock, Random(0))
+    topics.subscribe("cmd_vel", listener, listener.heard.append)
+    clock.run_until(0.015)
+    listener.hang("test")
+    for number in range(3):
+        topics.publish("cmd_vel", number)
+    clock.run_until(0.095)
+    assert listener.heard == []
+    listener.go_on("test")
+    assert listener.heard == [2]
+    clock.run_until(0.12)
+    assert listener.ticks == [0.0, 0.01, 0.095, 0.105, 0.115]
+
+
+def test_who_died_forgets_and_ticks_again_after_its_restart() -> None:
+    clock = Clock(0.0)
+    listener = Listener(clock)
+    clock.run_until(0.005)
+    listener.hang("test")
+    listener.receive("frames", 10, listener.heard.append, 1)
+    listener.die()
+    clock.run_until(0.1)
+    listener.restart()
+    clock.run_until(0.115)
+    assert listener.heard == []
+    assert listener.ticks == [0.0, 0.1, 0.11]
+
+
+def test_an_order_holds_then_the_base_has_its_time_to_react_and_then_it_must_brake() -> None:
+    """order 0.5 s of braking at t = 0, never again; the base goes on as if nothing were
+
+    t      0 ──── 0.05 ──────────── 0.35 ─────────► the allowance falls
+    order  0.5    gone; beyond since 0.05, T_react = 0.3
+    """
+    envelope = Envelope(react_s=0.3, now=0.0)
+    envelope.order(0.5, 0.0)
+    for step in range(1, 72):
+        now = step * 0.005
+        assert envelope.bound_s(0.5, now) >= 0.5, now
+    assert envelope.bound_s(0.5, 0.40) == pytest.approx(0.46, abs=0.011)
+    assert envelope.bound_s(0.0, 0.41) <= 0.5
+
+
+def test_a_base_that_brakes_with_its_order_is_never_beyond_it() -> None:
+    envelope = Envelope(react_s=0.0, now=0.0)
+    envelope.order(0.4, 0.0)
+    assert envelope.bound_s(0.4, 0.0) == pytest.approx(0.4)
+    for step in range(1, 40):
+        now = step * 0.01
+        envelope.order(0.0, now)
+        braking_s = max(0.0, 0.4 - now)
+        assert envelope.bound_s(braking_s, now) >= braking_s
+
+
+def test_several_layers_have_their_times_one_after_the_other() -> None:
+    robot = campaign_robot()
+    assert 0.4 < react_s(robot, layers=1) < 0.5
+    assert 0.7 < react_s(robot, layers=2) < 0.85
+
+
+def test_what_is_within_the_tolerance_counts_as_standing() -> None:
+    robot = campaign_robot()
+    assert moving_s(robot, 0.05, -0.2) == 0.0
+    assert moving_s(robot, 0.86, 0.0) == pytest.approx(0.8 / robot.limits.deceleration_mps2)
+    assert moving_s(robot, 0.0, -1.24) == pytest.approx(1.0 / robot.limits.angular_deceleration_radps2)
