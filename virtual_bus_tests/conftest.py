@@ -1,10 +1,16 @@
-"""Fixtures of all tests."""
+"""Fixtures and options of all tests."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """--stop-times, of ros/test_stack_kill.py."""
+    parser.addoption("--stop-times", type=Path, metavar="FILE", help="add measured stop times to FILE, as Markdown")
 
 
 @pytest.fixture(scope="session", autouse=True)

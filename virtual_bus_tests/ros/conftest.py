@@ -22,11 +22,6 @@ MakeRobot = Callable[[Mapping[str, Any]], Path]
 _starts = itertools.count(os.getpid())
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """--stop-times, of test_stack_kill.py."""
-    parser.addoption("--stop-times", type=Path, metavar="FILE", help="add measured stop times to FILE, as Markdown")
-
-
 @pytest.fixture(scope="session", autouse=True)
 def this_machine_alone() -> Iterator[None]:
     """No test talks to another machine, whatever its domain."""

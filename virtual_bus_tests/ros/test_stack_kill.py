@@ -47,7 +47,7 @@ def note(request: pytest.FixtureRequest) -> Iterator[Note]:
         print(rows[-1])
 
     yield add
-    path: Path | None = request.config.getoption("--stop-times")
+    path: Path | None = request.config.getoption("--stop-times", default=None)
     if path is not None:
         with path.open("a") as file:
             file.writelines(f"{row}\n" for row in rows)
