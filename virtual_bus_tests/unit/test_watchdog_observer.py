@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 from random import Random
 
 import pytest
@@ -176,6 +177,39 @@ def test_frames_that_make_no_sense_are_counted_and_change_no_axis(cob_id: int, d
     rx(it, cob_id, data)
     assert it.dropped == 1
     assert (look(it).axes, look(it).driver_at, look(it).sync_at) == (before.axes, NEVER, NEVER)
+
+
+@pytest.mark.parametrize(
+    ("cob_id", "data"),
+    [
+        (0x000, "80 01"),
+        (0x080, ""),
+        (0x080, "01"),
+        (0x77F, "05"),
+        (0x701, "7f"),
+        (0x181, "37 02 00 00 00 00"),
+        (0x281, "00 00 00 00"),
+        (0x201, "0f 00 00 00 00 00"),
+        (0x501, "02 00"),
+        (0x501, ""),
+        (0x581, "4b 41 60 00 37 02 00 00"),
+        (0x581, "43 6c 60 00 00 00 00 00"),
+        (0x581, "60 40 60 00 00 00 00 00"),
+        (0x601, "40 41 60 00 00 00 00 00"),
+        (0x601, "00"),
+    ],
+)
+def test_good_frames_are_not_counted_as_dropped(cob_id: int, data: str) -> None:
+    it = observer()
+    rx(it, cob_id, data)
+    assert it.dropped == 0
+
+
+def test_a_run_of_syncs_begins_just_when_the_gap_is_over() -> None:
+    it = Observer(replace(config(), feedback_timeout_s=0.125), 0.0)
+    for now in (1.0, 1.125):
+        it.on_frame(0x080, b"", now)
+    assert look(it).sync_since == 1.125
 
 
 def test_frames_of_others_are_ignored_without_a_count() -> None:

@@ -56,9 +56,9 @@ def test_one_coarse_bit_is_no_reason() -> None:
 
 def test_a_turn_to_the_left_allows_the_right_wheel_forward_and_the_left_one_backward() -> None:
     turn = Bounds(0.0, 0.0, 0.0, 1.0)  # ± 0.2 m/s at the rims, + 0.03 + 0.001 + 0.006
-    right = replace(RIGHT, velocity_mps=0.0)
+    right = replace(RIGHT, velocity_mps=0.0, target_mps=0.2)
     left = replace(AT_REST, target_mps=-0.2)
-    assert cause(of(left, replace(right, target_mps=0.2), bounds=turn)) == 0
+    assert cause(of(left, right, bounds=turn)) == 0
     assert cause(of(replace(left, target_mps=-0.2369), replace(right, target_mps=0.2369), bounds=turn)) == 0
     assert cause(of(replace(left, target_mps=-0.2371), right, bounds=turn)) == 4
     assert cause(of(replace(left, target_mps=0.0371), right, bounds=turn)) == 4
@@ -126,6 +126,10 @@ def test_feedback_counts_after_five_bad_samples_in_a_row(count: str, found: Caus
 
 def test_the_sentences_about_feedback_have_the_values() -> None:
     fast = replace(LEFT, velocity_mps=1.3)
+    slow = replace(CONFIG, max_wheel_mps=0.5)
+    assert decide(of(replace(AT_REST, feedback=Feedback(overspeed=5))), slow, NOW).detail.endswith(
+        "(allowed 0.600 m/s)"
+    )
     right = replace(STANDING, target_mps=0.3)
     assert detail(replace(fast, feedback=Feedback(-0.1, 0.5, outside=5)), right) == (
         "wheel_1_0 turns at 1.300 m/s, its setpoints allow -0.100 to 0.500 m/s"
