@@ -21,6 +21,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from ruamel.yaml import YAML
 from std_srvs.srv import Trigger
 
+from canbase_action_server.client import Drive, DriveClient, RejectedError
+from canbase_action_server.outcome import Status
 from canbase_bench.control import SimControl, control_path
 from canbase_bench.world.bench import Truth
 from canbase_cli.stack import Stack
@@ -61,17 +63,18 @@ class Standstill:
 class RunningRobot:
     """The bench robot with all of its processes. `robot_on` makes and ends it."""
 
-    def __init__(self, folder: Path, domain: int, namespace: str, changes: Mapping[str, Any], sim: bool) -> None:
+    def __init__(self, folder: Path, domain: int, namespace: str, changes: Mapping[str, Any]) -> None:
         self.folder, self.namespace = folder, namespace
         self.env = {"ROS_DOMAIN_ID": str(domain)}
         self.config = robot_file(folder, changes)
         self.robot = load_robot(self.config).robot
-        self.stack = Stack(self.config, namespace=namespace, sim=sim, logs=folder, env=os.environ | self.env)
+        self.stack = Stack(self.config, namespace=namespace, sim=True, logs=folder, env=os.environ | self.env)
         self.node = TestNode(namespace=namespace, domain_id=domain)
         self.status = self.node.record(DriverStatus, "motor_driver/status")
         self.odom = self.node.record(Odometry, "odom")
         self.safety = self.node.record(SafetyState, "safety_filter/state", LATCHED)
         self.stop_events = self.node.record(StopEvent, "stop_events", LATCHED)
+        self.client = DriveClient(self.node.node, self.node.executor)
         self._commands: list[Process] = []
         self._sim: SimControl | None = None
 
@@ -109,6 +112,29 @@ class RunningRobot:
         """Until the drives have power and odometry comes."""
         self.wait_state(DriverStatus.ENABLED)
         self.node.wait_for(lambda: self.odom.last is not None, READY_S, "odom")
+
+    def goal(self, distance_m: float, speed_mps: float) -> Drive:
+        """A goal that was accepted: a server that has not heard of all other nodes yet rejects it."""
+        deadline_s = time.monotonic() + READY_S
+        while True:
+            try:
+                return self.client.send(distance_m, speed_mps, discovery_timeout_s=READY_S)
+            except RejectedError:
+                assert time.monotonic() < deadline_s, f"no goal is accepted\n{self.logs()}"
+                self.node.spin_for(0.2)
+
+    def driven(self, distance_m: float, speed_mps: float = 0.3) -> bool:
+        """It succeeds in driving that far."""
+        result = self.goal(distance_m, speed_mps).wait(READY_S)
+        return result is not None and result.status is Status.SUCCEEDED
+
+    def wait_whole(self) -> None:
+        """Until every node has found every other: it drives 2 cm."""
+        self.wait_enabled()
+        deadline_s = time.monotonic() + READY_S
+        while not self.driven(0.02):
+            assert time.monotonic() < deadline_s, f"it does not drive\n{self.logs()}"
+            self.make_ready()
 
     def wait_speed(self, least_mps: float, timeout_s: float = 20.0) -> None:
         """Until the base really goes that fast, forward or backward."""
@@ -215,13 +241,13 @@ def own_domain() -> Iterator[int]:
 def robot_on(
     domain: int, *, namespace: str = "", changes: Mapping[str, Any] = PATIENT, start: bool = True
 ) -> Iterator[RunningRobot]:
-    """A robot in that ROS domain, its drives enabled. `start` False: nothing runs yet, and no simulator by itself."""
+    """A robot in that ROS domain that has driven. `start` False: nothing runs yet."""
     with tempfile.TemporaryDirectory(prefix="canbase-", dir="/tmp") as folder, ExitStack() as after:
-        robot = RunningRobot(Path(folder), domain, namespace, changes, sim=start)
+        robot = RunningRobot(Path(folder), domain, namespace, changes)
         after.callback(_end, robot)
         if start:
             robot.stack.start()
-            robot.wait_enabled()
+            robot.wait_whole()
         yield robot
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from canbase.msg import DriverStatus
 
-from canbase_action_server.client import Drive, DriveClient
+from canbase_action_server.client import Drive
 from canbase_action_server.outcome import ErrorCode, Status
 from ros.running_robot import RESTS_M, RunningRobot, Standstill, own_domain, robot_on
 
@@ -87,7 +87,8 @@ def test_a_process_hangs_while_the_robot_drives_and_goes_on_later(lasting: Runni
     note(part, "SIGSTOP", stop, aborted_with(goal, ENDS[part]))
     assert stop.after_s < STANDS_WITHIN_S
     assert lasting.stack.death() is None
-    assert driven(lasting, 0.1)  # nothing is broken for good
+    lasting.make_ready()
+    assert lasting.driven(0.1)  # nothing is broken for good
 
 
 def test_a_driver_that_was_killed_can_be_started_again(fresh: RunningRobot) -> None:
@@ -100,31 +101,17 @@ def test_a_driver_that_was_killed_can_be_started_again(fresh: RunningRobot) -> N
     fresh.node.wait_for(lambda: fresh.status.since(started_s), 20.0, "the new driver")
     assert fresh.moved_since(started_s, QUIET_S) < RESTS_M
     assert fresh.status.messages[-1].state != DriverStatus.ENABLED  # the watchdog has tripped: that needs a reset
-    assert driven(fresh, 0.1)
+    fresh.make_ready()
+    assert fresh.driven(0.1)
 
 
 def driving(robot: RunningRobot) -> Drive:
     """A goal on its way at full speed."""
-    goal = client_of(robot).send(4.0, SPEED_MPS)
+    goal = robot.goal(4.0, SPEED_MPS)
     robot.wait_speed(0.97 * SPEED_MPS)
     robot.node.spin_for(0.2)
     assert goal.result is None, f"{goal.result}\n{robot.logs()}"
     return goal
-
-
-def driven(robot: RunningRobot, distance_m: float) -> bool:
-    """It succeeds in driving that far, after a reset where one is asked for."""
-    robot.make_ready()
-    result = client_of(robot).send(distance_m, SPEED_MPS).wait(20.0)
-    return result is not None and result.status is Status.SUCCEEDED
-
-
-def client_of(robot: RunningRobot) -> DriveClient:
-    """Of its action server, which has heard of all others: before that it rejects."""
-    client = DriveClient(robot.node.node, robot.node.executor)
-    client.wait_for_server(20.0)
-    robot.node.spin_for(1.0)
-    return client
 
 
 def stands_and_stays(robot: RunningRobot, moment_s: float) -> Standstill:

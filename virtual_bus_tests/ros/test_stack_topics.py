@@ -14,7 +14,7 @@ from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState, LaserScan
 from std_msgs.msg import Bool
 
-from canbase_action_server.client import Drive, DriveClient, DriveResult
+from canbase_action_server.client import Drive, DriveResult
 from canbase_action_server.outcome import ErrorCode
 from ros.harness import Repeater, merged
 from ros.running_robot import LATCHED, PATIENT, RESTS_M, RunningRobot, own_domain, robot_on
@@ -46,7 +46,6 @@ class World:
         for repeater in (self.joystick, self.scan, self.estop):
             self.node.wait_for_subscriber(repeater.publisher)
         self.mux = self.node.record(MuxState, "velocity_mux/state", LATCHED)
-        self.client = DriveClient(self.node.node, self.node.executor)
 
     def heal(self) -> None:
         """All as it should be, and the robot stands ready."""
@@ -66,8 +65,7 @@ class World:
 
     def drive(self) -> Drive:
         """A goal that has the robot at 0.3 m/s."""
-        self.client.wait_for_server(20.0)
-        goal = self.client.send(4.0, 0.3)
+        goal = self.robot.goal(4.0, 0.3)
         self.robot.wait_speed(0.28)
         return goal
 
@@ -83,11 +81,11 @@ class World:
 
 @pytest.fixture(scope="module")
 def running() -> Iterator[World]:
-    with own_domain() as domain, robot_on(domain, changes=WATCHES_OUT) as robot:
+    with own_domain() as domain, robot_on(domain, changes=WATCHES_OUT, start=False) as robot:
+        robot.stack.start()
         world = World(robot)
         world.scan.message = scan()
-        world.client.wait_for_server(20.0)
-        world.node.spin_for(1.0)
+        robot.wait_whole()
         yield world
 
 

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import pytest
 
-from canbase_action_server.client import DriveClient
 from canbase_bench.control import control_path
 from ros.harness import Process
 from ros.running_robot import RESTS_M, RunningRobot, own_domain, robot_on
@@ -32,12 +31,9 @@ class Driving:
         robot.command("sim", "--config", str(robot.config))
         robot.node.wait_for(control_path(robot.robot).is_socket, 20.0, "the simulator")
         self.up: Process = robot.command("up", "--config", str(robot.config), "--no-sim")
-        robot.wait_enabled()
+        robot.wait_whole()
         self.parts = parts_of(self.up.pid)
-        client = DriveClient(robot.node.node, robot.node.executor)
-        client.wait_for_server(20.0)
-        robot.node.spin_for(1.0)  # the server rejects a goal before it has heard of all others
-        client.send(4.0, 0.3)
+        robot.goal(4.0, 0.3)
         robot.wait_speed(0.28)
 
     def assert_all_ended_standing(self) -> None:
