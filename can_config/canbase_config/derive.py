@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from canbase_config.robot import Drive, Robot
+from canbase_config.drive import Drive
+from canbase_config.robot import Robot
 from canbase_config.units import motor_rev_per_s
 from canbase_config.watchdog import RelayLine, WatchdogConfig, WatchedDrive
 

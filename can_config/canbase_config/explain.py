@@ -12,8 +12,8 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from canbase_config.errors import Loc, Problem, key_path
-from canbase_config.robot import MisfitError
 from canbase_config.schema import Shape, expected, homes, keys_at, sections, shape_at
+from canbase_config.section import MisfitError
 from canbase_config.yaml_file import YamlFile
 
 

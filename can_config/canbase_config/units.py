@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from canbase_config.robot import VelocityUnit
+from canbase_config.drive import VelocityUnit
 
 _MOTOR_REV_PER_S: Final[dict[VelocityUnit, float]] = {
     "rpm": 1.0 / 60.0,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from canbase_config.robot import Drive, Robot
+from canbase_config.drive import Drive
+from canbase_config.robot import Robot
 from canbase_driver.cia402 import DriveState, PowerGoal, decode_statusword, next_controlword
 from canbase_driver.frame import Frame
 from canbase_driver.limits import Limiter

@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID, Drive, Identity, Robot
+from canbase_config.drive import Drive, Identity
+from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
 from canbase_driver.boot_pdo import configure_pdos
 from canbase_driver.boot_steps import BootError, NodeAccess, Pause, SendNmt, Steps, WaitBootUp, boot_error, unsigned
 from canbase_driver.cia301 import NmtCommand

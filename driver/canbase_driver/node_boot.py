@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from canbase_config.robot import Drive, Robot
+from canbase_config.drive import Drive
+from canbase_config.robot import Robot
 from canbase_driver.boot import BootReport, boot
 from canbase_driver.boot_steps import BootError, Pause, SendNmt, Step, WaitBootUp
 from canbase_driver.cia301 import NmtState, nmt, parse_heartbeat

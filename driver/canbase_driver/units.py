@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 
-from canbase_config.robot import Base, Drive
+from canbase_config.drive import Drive
+from canbase_config.robot import Base
 from canbase_config.units import motor_rev_per_s
 
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1

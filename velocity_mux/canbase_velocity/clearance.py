@@ -14,8 +14,8 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from canbase_config.robot import Footprint
-from canbase_config.robot import Scan as ScanConfig
+from canbase_config.safety import Footprint
+from canbase_config.safety import Scan as ScanConfig
 
 Floats: TypeAlias = "npt.NDArray[np.float64]"
 

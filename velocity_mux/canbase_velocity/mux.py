@@ -14,7 +14,7 @@ import enum
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from canbase_config.robot import MuxSource
+from canbase_config.mux import MuxSource
 from canbase_velocity.twist import ZERO, Twist
 
 

@@ -15,7 +15,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from canbase_config.robot import Limits, Robot, Safety
+from canbase_config.robot import Limits, Robot
+from canbase_config.safety import Safety
 from canbase_velocity.clearance import Clearances, swept_radius_m
 from canbase_velocity.decision import PASSED, Action, Cause, Decision, Finding, stop
 from canbase_velocity.twist import ZERO, Twist

@@ -3,7 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from canbase_config.robot import Drive, Identity, Robot
+from canbase_config.drive import Drive, Identity
+from canbase_config.robot import Robot
 from canbase_driver.frame import Frame
 from canbase_driver.node_boot import NodeBoot
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pydantic import ValidationError
 
-from canbase_config.robot import Action
+from canbase_config.action import Action
 
 
 @pytest.mark.parametrize("policy", ["reject", "queue", "preempt"])

@@ -8,7 +8,7 @@ import pytest
 from canbase_action_server.admission import STATE_TIMEOUT_S, action_source, state_reason
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.request import DriveRequest
-from canbase_config.robot import Mux, MuxSource
+from canbase_config.mux import Mux, MuxSource
 from unit.action_plant import GOOD_DRIVER, GOOD_MUX, GOOD_SAFETY, Plant, bench_robot, replaced
 
 ROBOT = bench_robot()  # action.*: 0.01 to 5 m, 0.02 to 0.5 m/s

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from canbase_config.robot import Identity
+from canbase_config.drive import Identity
 from canbase_driver.frame import Frame
 from canbase_driver.node_boot import NodeBoot
 from unit.fake_drive import OFF, Bench, FakeDrive, boot_one_axis, error_of, factory_objects, notes_of, robot, u16, u32

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canbase_config.robot import Footprint
-from canbase_config.robot import Scan as ScanConfig
+from canbase_config.safety import Footprint
+from canbase_config.safety import Scan as ScanConfig
 from canbase_velocity.clearance import FREE, ClearanceReader, Clearances, Scan, swept_radius_m
 
 FOOTPRINT = Footprint(front_m=0.4, rear_m=0.2, left_m=0.3, right_m=0.25)

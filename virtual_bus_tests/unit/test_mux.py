@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canbase_config.robot import DEFAULT_SOURCES, MuxSource
+from canbase_config.mux import DEFAULT_SOURCES, MuxSource
 from canbase_velocity.mux import Mux, MuxDecision, Standing
 from canbase_velocity.twist import ZERO, Twist
 

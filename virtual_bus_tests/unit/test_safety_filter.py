@@ -11,8 +11,9 @@ from canbase.msg import SafetyState
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canbase_config.robot import Estop, Footprint, Limits, Safety
-from canbase_config.robot import Scan as ScanConfig
+from canbase_config.robot import Limits
+from canbase_config.safety import Estop, Footprint, Safety
+from canbase_config.safety import Scan as ScanConfig
 from canbase_velocity.clearance import FREE, Clearances
 from canbase_velocity.decision import Action, Cause
 from canbase_velocity.filter_state import SafetyFilter

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canbase_config.robot import Base, Drive, VelocityUnit
+from canbase_config.drive import Drive, VelocityUnit
+from canbase_config.robot import Base
 from canbase_driver.units import AxisUnits
 
 # A wheel of 0.1 m radius behind a gear of 20: one motor revolution is 2π·0.1/20 = 0.0314159 m at the rim.

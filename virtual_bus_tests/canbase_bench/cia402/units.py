@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import floor, pi
 
-from canbase_config.robot import Drive
+from canbase_config.drive import Drive
 
 STEPS_PER_REVOLUTION = {
     "rpm": 60.0,

@@ -13,7 +13,8 @@ from canbase_bench.cia402.units import Scale
 from canbase_bench.frame import Frame
 from canbase_bench.node import AxisParts, SimulatedNode, StateChange
 from canbase_bench.plant.base import Base, MountedWheel, PlantParameters
-from canbase_config.robot import Drive, Robot
+from canbase_config.drive import Drive
+from canbase_config.robot import Robot
 
 DEFAULT_BODY = PlantParameters()
 """An empty robot of 30 kg on dry floor."""

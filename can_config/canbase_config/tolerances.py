@@ -1,0 +1,54 @@
+"""The keys of robot.yaml below `watchdog`: how much the watchdog forgives. What its process gets is `watchdog.py`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from canbase_config.section import Section
+
+
+class Relay(Section):
+    """A GPIO output that is toggled as long as the last rung of the ladder is not reached. Needs the package gpiod."""
+
+    chip: Annotated[str, Field(min_length=1, max_length=100, description="/dev/gpiochip0, …")]
+    line: Annotated[int, Field(ge=0, le=1023, description="offset of the line on the chip")]
+
+
+class Watchdog(Section):
+    """How much the watchdog forgives. No tolerance can be switched off, and none is unlimited."""
+
+    latency_s: Annotated[
+        float,
+        Field(ge=0.02, le=0.5, description="an order on its way to the driver, on top of timeouts.command_s [s]"),
+    ] = 0.05
+    drive_lag_s: Annotated[
+        float, Field(ge=0.01, le=0.5, description="so long a wheel may keep the speed of an older setpoint [s]")
+    ] = 0.1
+    target_tolerance_mps: Annotated[
+        float, Field(gt=0.0, le=0.2, description="a setpoint beyond what the leases allow, at the rim [m/s]")
+    ] = 0.03
+    target_tolerance_share: Annotated[
+        float, Field(ge=0.0, le=0.2, description="the same as a share of the allowed speed, added to it")
+    ] = 0.03
+    motion_tolerance_mps: Annotated[
+        float, Field(gt=0.0, le=0.5, description="a wheel beyond what its setpoints allow, at the rim [m/s]")
+    ] = 0.05
+    motion_tolerance_share: Annotated[
+        float, Field(ge=0.0, le=0.5, description="the same as a share of the allowed speed, added to it")
+    ] = 0.1
+    feedback_samples: Annotated[
+        int, Field(ge=1, le=20, description="so many velocity samples in a row must be bad before they stop the base")
+    ] = 5
+    overspeed_factor: Annotated[
+        float, Field(ge=1.05, le=2.0, description="a wheel may be so many times as fast as the limits allow")
+    ] = 1.2
+    travel_tolerance_m: Annotated[
+        float, Field(ge=0.005, le=0.5, description="encoder and measured velocity apart, within about 0.5 s [m]")
+    ] = 0.05
+    bus_failed_s: Annotated[float, Field(ge=0.06, le=0.5, description="the bus takes no frames for so long [s]")] = 0.1
+    loop_late_s: Annotated[
+        float, Field(ge=0.02, le=0.5, description="the watchdog's own loop stands still for so long [s]")
+    ] = 0.1
+    relay: Annotated[Relay, Field(description="keeps a safety relay closed")] | None = None
