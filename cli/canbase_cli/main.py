@@ -6,7 +6,7 @@ from typing import Annotated, Final
 
 import typer
 
-from canbase_cli import config, demo, drive, process, rotate, trigger, up
+from canbase_cli import config, demo, doctor, drive, process, rotate, trigger, up
 from canbase_cli.goal import GoalCommand
 from canbase_cli.options import RosCommand
 
@@ -46,6 +46,7 @@ app.command("drive", cls=GoalCommand, options_metavar=_ROS_USAGE)(drive.drive)
 app.command("rotate", cls=GoalCommand, options_metavar=_ROS_USAGE)(rotate.rotate)
 app.command("stop", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.stop)
 app.command("reset", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.reset)
+app.command("doctor", cls=RosCommand, options_metavar=_ROS_USAGE)(doctor.doctor)
 app.add_typer(config.app, name="config")
 app.command("driver", cls=RosCommand, options_metavar=_ROS_USAGE)(process.driver)
 app.command("velocity", cls=RosCommand, options_metavar=_ROS_USAGE)(process.velocity)

@@ -1,0 +1,74 @@
+"""What `canbase doctor` finds out, as plain values: one `Check` a row, and the table and exit code made of them.
+
+Pure. A new row is a function that returns a `Check`, added to `CHECKS` of robot_checks.py or to a `Symptom`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from rich.table import Table
+from rich.text import Text
+
+
+class Verdict(Enum):
+    """What a check says."""
+
+    OK = "ok"
+    WARN = "warn"
+    """It works, or cannot be told now; somebody should look at it."""
+    FAIL = "FAIL"
+
+
+STYLE = {Verdict.OK: "green", Verdict.WARN: "yellow", Verdict.FAIL: "bold red"}
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One row: what was looked at, what was found there, and what to do next (empty when all is well)."""
+
+    name: str
+    verdict: Verdict
+    found: str
+    advice: str = ""
+
+
+def ok(name: str, found: str) -> Check:
+    """All is well."""
+    return Check(name, Verdict.OK, found)
+
+
+def warn(name: str, found: str, advice: str) -> Check:
+    """Not wrong, but somebody should look at it."""
+    return Check(name, Verdict.WARN, found, advice)
+
+
+def fail(name: str, found: str, advice: str) -> Check:
+    """Wrong: this keeps the robot from working."""
+    return Check(name, Verdict.FAIL, found, advice)
+
+
+def first_failure(checks: Sequence[Check]) -> Check | None:
+    """The first row that failed; None when none did."""
+    return next((check for check in checks if check.verdict is Verdict.FAIL), None)
+
+
+def exit_code(checks: Sequence[Check]) -> int:
+    """0 only if nothing failed."""
+    return 0 if first_failure(checks) is None else 1
+
+
+def table(title: str, checks: Sequence[Check]) -> Table:
+    """For a terminal: a line per check, with what to do next below what was found."""
+    result = Table(title=title, title_justify="left", show_lines=False)
+    for column in ("check", "", "found; what to do next"):
+        result.add_column(column, overflow="fold")
+    for check in checks:
+        style = STYLE[check.verdict]
+        text = Text(check.found)
+        if check.advice:
+            text.append(f"\n→ {check.advice}", style=style)
+        result.add_row(Text(check.name), Text(check.verdict.value, style=style), text)
+    return result

@@ -1,0 +1,149 @@
+"""The checks of `canbase doctor` without --symptom: is every part there, and does it say that all is well?
+
+Pure: from `Evidence` to rows. `CHECKS` is the order in which they are shown: from what explains most to the rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from canbase.msg import DriverStatus, SafetyState
+
+from canbase_cli.checks import Check, fail, ok, warn
+from canbase_cli.evidence import Evidence
+
+PARTS_RUN = "is it running (canbase up), in this namespace and ROS_DOMAIN_ID?"
+STATES = {
+    DriverStatus.OFFLINE: "offline",
+    DriverStatus.BOOTING: "booting",
+    DriverStatus.DISARMED: "disarmed",
+    DriverStatus.ENABLING: "enabling",
+    DriverStatus.ENABLED: "enabled",
+    DriverStatus.STOPPING: "stopping",
+    DriverStatus.LATCHED: "latched",
+}
+ON_ITS_WAY = (DriverStatus.BOOTING, DriverStatus.ENABLING, DriverStatus.STOPPING)
+COUNTERS = ("commands_refused", "overruns", "frames_dropped", "send_errors")
+
+
+def configuration(evidence: Evidence) -> list[Check]:
+    """The file was read and is valid, otherwise nothing was observed at all."""
+    robot = evidence.robot
+    return [ok("robot.yaml", f"{evidence.source} is good: {robot.name}, {len(robot.drives)} drives")]
+
+
+def driver(evidence: Evidence) -> list[Check]:
+    """The state of motor_driver, and its counters."""
+    status = evidence.on("motor_driver/status").last
+    if status is None:
+        return [_silent("motor_driver", "motor_driver/status")]
+    state = STATES.get(status.state, f"state {status.state}")
+    if status.state == DriverStatus.ENABLED:
+        stands = "stands" if status.standstill else "moves"
+        found = ok("motor_driver", f"enabled, {stands}; cmd_vel is {_age(status.command_age_s)} old")
+    elif status.state in ON_ITS_WAY:
+        found = warn("motor_driver", f"{state}, {status.cause}: {status.detail}", "look again in a second")
+    else:
+        found = fail("motor_driver", f"{state}, {status.cause}: {status.detail}", _until(status.clears_on))
+    return [found, _counters(evidence.on("motor_driver/status").first, status)]
+
+
+def _counters(before: Any, now: Any) -> Check:
+    told = ", ".join(f"{name} {getattr(now, name)}" for name in COUNTERS)
+    told += f"; cycles at most {now.cycle_lateness_max_s * 1e3:.1f} ms late"
+    grew = [name for name in COUNTERS if getattr(now, name) > getattr(before, name)]
+    if not grew:
+        return ok("its counters", told)
+    return warn("its counters", told, f"{', '.join(grew)} grew while doctor listened; docs/bus.md says what they count")
+
+
+def watchdog(evidence: Evidence) -> list[Check]:
+    """The watchdog as the driver hears it on the bus."""
+    status = evidence.on("motor_driver/status").last
+    if status is None:
+        return [fail("watchdog", "unknown: motor_driver tells about it", PARTS_RUN)]
+    age = _age(status.watchdog_age_s)
+    if status.watchdog == DriverStatus.WATCHDOG_OK:
+        return [ok("watchdog", f"ok, last heard {age} ago")]
+    if status.watchdog == DriverStatus.WATCHDOG_TRIPPED:
+        return [fail("watchdog", f"tripped: {status.watchdog_cause}", "remove the cause (docs/bus.md), canbase reset")]
+    return [fail("watchdog", f"missing, last heard {age} ago", "start canbase watchdog on the same robot.yaml")]
+
+
+def drives(evidence: Evidence) -> list[Check]:
+    """One row per drive that motor_driver tells about."""
+    status = evidence.on("motor_driver/status").last
+    return [] if status is None else [_drive(drive) for drive in status.drives]
+
+
+def _drive(drive: Any) -> Check:
+    name = f"drive {drive.joint} (node {drive.node_id})"
+    ages = f"feedback {_age(drive.feedback_age_s)}, heartbeat {_age(drive.heartbeat_age_s)} old"
+    found = f"{drive.state}, {drive.nmt_state}; {ages}"
+    if drive.error_code:
+        return fail(name, f"{found}; 0x{drive.error_code:04X} {drive.error_text}", "remove the cause, canbase reset")
+    if math.isnan(drive.heartbeat_age_s) and math.isnan(drive.feedback_age_s):
+        return fail(name, "never heard", "power, cable, termination, bit rate, node id; canbase scan shows who answers")
+    if not drive.stops_by_itself:
+        return warn(
+            name, f"{found}; does not watch the watchdog's heartbeat", "it will not stop when the computer dies"
+        )
+    return ok(name, found)
+
+
+def safety_filter(evidence: Evidence) -> list[Check]:
+    """What the filter lets through, and whether its leases arrive."""
+    heard = evidence.on("safety_filter/state")
+    state = heard.last
+    if state is None:
+        return [_silent("safety_filter", "safety_filter/state")]
+    found = f"{state.cause}: {state.detail}" if state.detail else state.cause
+    if state.lease_errors > heard.first.lease_errors:
+        lost = f"{state.lease_errors} leases could not be delivered to {evidence.robot.lease.socket}"
+        return [fail("safety_filter", lost, "is canbase watchdog running, with the same lease.socket?")]
+    if state.action == SafetyState.STOP:
+        return [fail("safety_filter", f"stops, {found}", _until(state.clears_on))]
+    if state.action == SafetyState.PASS:
+        return [ok("safety_filter", f"passes; {state.lease_sequence} leases sent")]
+    return [warn("safety_filter", f"slows down, {found}", _until(state.clears_on))]
+
+
+def velocity_mux(evidence: Evidence) -> list[Check]:
+    """Who drives, and who sends what is no number."""
+    state = evidence.on("velocity_mux/state").last
+    if state is None:
+        return [_silent("velocity_mux", "velocity_mux/state")]
+    found = f"{state.active} drives" if state.active else "nobody drives"
+    bad = [source.name for source in state.sources if source.refused]
+    if bad:
+        return [warn("velocity_mux", f"{found}; refused NaN or infinity of {', '.join(bad)}", "correct that sender")]
+    return [ok("velocity_mux", found)]
+
+
+CHECKS: tuple[Callable[[Evidence], list[Check]], ...] = (
+    configuration,
+    watchdog,
+    driver,
+    drives,
+    safety_filter,
+    velocity_mux,
+)
+
+
+def robot_checks(evidence: Evidence) -> list[Check]:
+    """All rows."""
+    return [check for checks in CHECKS for check in checks(evidence)]
+
+
+def _silent(name: str, topic: str) -> Check:
+    return fail(name, f"nothing came on {topic}", PARTS_RUN)
+
+
+def _until(clears_on: str) -> str:
+    return f"it ends with: {clears_on}" if clears_on else "see its log"
+
+
+def _age(age_s: float) -> str:
+    return "never" if math.isnan(age_s) else f"{age_s:.2f} s"
