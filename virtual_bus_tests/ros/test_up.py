@@ -81,15 +81,18 @@ def test_a_stop_signal_while_the_parts_still_start_ends_it_well() -> None:
 
 
 def parts_of(pid: int) -> dict[str, int]:
-    """Process ids of the children of `canbase up`, by part."""
+    """Process ids of the children of `canbase up`, by part; none before it has come to its own command."""
     children = [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-    return {part_of(child): child for child in children}
+    parts = {part_of(child): child for child in children}
+    return {part: child for part, child in parts.items() if part is not None}
 
 
-def part_of(pid: int) -> str:
+def part_of(pid: int) -> str | None:
     """From `python -m canbase_cli.child PARENT part …`, and `python -m canbase_watchdog …`, which that becomes."""
     words = Path(f"/proc/{pid}/cmdline").read_text().split("\0")
-    return "watchdog" if "canbase_watchdog" in words else words[4]
+    if "canbase_watchdog" in words:
+        return "watchdog"
+    return words[4] if "canbase_cli.child" in words else None
 
 
 def lives(pid: int) -> bool:
