@@ -15,7 +15,7 @@ CYCLES_TO_SETPOINT = 2
 
 def mps_per_bit(drive: Drive, wheel_radius_m: float) -> float:
     """Speed of the wheel's rim [m/s] for one bit of the drive's 60FFh and 606Ch; the sign makes forward positive."""
-    motor_rev_s = motor_rev_per_s(drive.velocity_unit, drive.counts_per_motor_rev)
+    motor_rev_s = motor_rev_per_s(drive.target_unit, drive.counts_per_motor_rev)
     return motor_rev_s * _m_per_motor_rev(drive, wheel_radius_m)
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from canbase_config.section import Name, Section
-
-VelocityUnit = Literal["rpm", "0.1rpm", "0.001rpm", "rev/s", "0.001rev/s", "counts/s", "0.1counts/s"]
-"""What one bit of 60FFh and 606Ch means, always at the motor shaft (before the gear)."""
+from canbase_config.errors import ConfigError
+from canbase_config.profile import Profile, VelocityUnit
+from canbase_config.profile_file import load_profile
+from canbase_config.section import MisfitError, Name, Section
 
 
 class Identity(Section):
@@ -35,5 +36,73 @@ class Drive(Section):
     counts_per_motor_rev: Annotated[
         int, Field(ge=1, le=2**31 - 1, description="increments of 6064h per motor revolution")
     ]
-    velocity_unit: Annotated[VelocityUnit, Field(description="one bit of 60FFh and 606Ch, at the motor shaft")] = "rpm"
+    profile: Annotated[
+        str, Field(min_length=1, description="kind of drive, see docs/drives.md; or a .yaml file beside this one")
+    ] = "generic"
+    mode: (
+        Annotated[
+            int, Field(ge=-128, le=127, description="6060h: 3 profile velocity, 9 cyclic; default: the profile's first")
+        ]
+        | None
+    ) = None
+    velocity_unit: (
+        Annotated[
+            VelocityUnit, Field(description="one bit of 60FFh and 606Ch, at the motor shaft; default: the profile's")
+        ]
+        | None
+    ) = None
     identity: Identity = Identity()
+
+    @property
+    def kind(self) -> Profile:
+        """What the profile says about this kind of drive."""
+        return load_profile(self.profile)
+
+    @property
+    def target_unit(self) -> VelocityUnit:
+        """One bit of 60FFh."""
+        return self._unit(self.kind.units.target_velocity)
+
+    @property
+    def actual_unit(self) -> VelocityUnit:
+        """One bit of 606Ch."""
+        return self._unit(self.kind.units.actual_velocity)
+
+    @property
+    def used_mode(self) -> int:
+        """The value of 6060h."""
+        return self.kind.modes[0] if self.mode is None else self.mode
+
+    def _unit(self, of_profile: VelocityUnit | None) -> VelocityUnit:
+        unit = self.velocity_unit or of_profile
+        if unit is None:
+            message = f"velocity_unit is missing: with {self.kind.title} it depends on the drive's own settings"
+            raise MisfitError(message, ("velocity_unit",), ("profile",))
+        return unit
+
+    @field_validator("profile")
+    @classmethod
+    def _profile_exists(cls, name: str, info: ValidationInfo) -> str:
+        """A file is looked for beside robot.yaml, and kept with its whole path."""
+        if name.endswith((".yaml", ".yml")):
+            folder = (info.context or {}).get("folder", Path())
+            name = str((folder / name).absolute())
+        try:
+            load_profile(name)
+        except ConfigError as error:
+            raise ValueError(f"the profile cannot be used:\n{error}") from error
+        return name
+
+    @model_validator(mode="after")
+    def _fits_the_profile(self) -> Drive:
+        kind = self.kind
+        if self.axis >= kind.layout.axes:
+            raise MisfitError(f"a {kind.title} turns {kind.layout.axes} motor(s); axis 0 is the first", ("axis",))
+        if self.used_mode not in kind.modes:
+            known = ", ".join(map(str, kind.modes))
+            raise MisfitError(f"a {kind.title} takes velocities in mode {known}, not in {self.used_mode}", ("mode",))
+        differ = kind.units.target_velocity != kind.units.actual_velocity
+        if self.velocity_unit is not None and differ:
+            raise MisfitError("60FFh and 606Ch of this profile have different units; leave it out", ("velocity_unit",))
+        self._unit(kind.units.target_velocity)
+        return self

@@ -12,14 +12,17 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from canbase_config.errors import Loc, Problem, key_path
-from canbase_config.schema import Shape, expected, homes, keys_at, sections, shape_at
+from canbase_config.schema import Schema, Shape, expected
 from canbase_config.section import MisfitError
 from canbase_config.yaml_file import YamlFile
 
 
-def explain(error: ValidationError, file: YamlFile) -> tuple[Problem, ...]:
-    """One problem for each error, in the order of the file's lines; those of the whole file first."""
-    problems = [_explain(details, file) for details in error.errors(include_url=False) if not _is_echo(details)]
+def explain(error: ValidationError, file: YamlFile, schema: Schema) -> tuple[Problem, ...]:
+    """One problem for each error, in the order of the file's lines; those of the whole file first.
+
+    `schema` is that of the model which refused the file.
+    """
+    problems = [_explain(details, file, schema) for details in error.errors(include_url=False) if not _is_echo(details)]
     return tuple(sorted(problems, key=lambda problem: problem.line or 0))
 
 
@@ -28,55 +31,55 @@ def _is_echo(details: ErrorDetails) -> bool:
     return details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"]
 
 
-def _explain(details: ErrorDetails, file: YamlFile) -> Problem:
-    return _EXPLAINERS.get(details["type"], _wrong_value)(details, file)
+def _explain(details: ErrorDetails, file: YamlFile, schema: Schema) -> Problem:
+    return _EXPLAINERS.get(details["type"], _wrong_value)(details, file, schema)
 
 
-def _missing(details: ErrorDetails, file: YamlFile) -> Problem:
+def _missing(details: ErrorDetails, file: YamlFile, schema: Schema) -> Problem:
     loc = details["loc"]
-    return Problem(str(file.path), file.line(loc), key_path(loc), "missing", expected(shape_at(loc)))
+    return Problem(str(file.path), file.line(loc), key_path(loc), "missing", expected(schema.shape_at(loc)))
 
 
-def _unknown_key(details: ErrorDetails, file: YamlFile) -> Problem:
+def _unknown_key(details: ErrorDetails, file: YamlFile, schema: Schema) -> Problem:
     *section, key = details["loc"]
-    hint = _key_hint(str(key), tuple(section))
+    hint = _key_hint(str(key), tuple(section), schema)
     return Problem(str(file.path), file.line(details["loc"]), key_path(details["loc"]), "unknown key", hint=hint)
 
 
-def _bad_key(details: ErrorDetails, file: YamlFile) -> Problem:
+def _bad_key(details: ErrorDetails, file: YamlFile, _schema: Schema) -> Problem:
     *section, key = details["loc"]
     what = f"the key {found(key)} is no text"
     line = file.line((*section, str(key)))
     return Problem(str(file.path), line, key_path(tuple(section)), what, hint=f'put it in quotes: "{found(key)}"')
 
 
-def _misfit(details: ErrorDetails, file: YamlFile) -> Problem:
+def _misfit(details: ErrorDetails, file: YamlFile, _schema: Schema) -> Problem:
     error = details["ctx"]["error"]
     places = [(*details["loc"], *at) for at in error.at] if isinstance(error, MisfitError) else []
     loc = next((place for place in places if place in file.lines), details["loc"])
     return Problem(str(file.path), file.line(loc), key_path(loc), str(error))
 
 
-def _wrong_value(details: ErrorDetails, file: YamlFile) -> Problem:
+def _wrong_value(details: ErrorDetails, file: YamlFile, schema: Schema) -> Problem:
     loc, value = details["loc"], details["input"]
     if loc[-1:] == ("[key]",):
-        return _wrong_name(details, file)
-    shape = shape_at(loc)
+        return _wrong_name(details, file, schema)
+    shape = schema.shape_at(loc)
     words = expected(shape) if shape else details["msg"]
     what, hint = f"got {found(value)}", _value_hint(value, shape)
     return Problem(str(file.path), file.line(loc), key_path(loc), what, words, hint)
 
 
-def _wrong_name(details: ErrorDetails, file: YamlFile) -> Problem:
+def _wrong_name(details: ErrorDetails, file: YamlFile, schema: Schema) -> Problem:
     """A key that the user chooses, such as the name of a source, has the wrong form."""
     loc = details["loc"][:-1]
     if not isinstance(loc[-1], str):
-        return _bad_key({**details, "loc": loc}, file)
+        return _bad_key({**details, "loc": loc}, file, schema)
     names = "letters, digits and _, first a letter, at most 64 characters"
     return Problem(str(file.path), file.line(loc), key_path(loc), f"got the name {found(loc[-1])}", names)
 
 
-_EXPLAINERS: Final[Mapping[str, Callable[[ErrorDetails, YamlFile], Problem]]] = {
+_EXPLAINERS: Final[Mapping[str, Callable[[ErrorDetails, YamlFile, Schema], Problem]]] = {
     "missing": _missing,
     "extra_forbidden": _unknown_key,
     "invalid_key": _bad_key,
@@ -117,12 +120,12 @@ def _value_hint(value: Any, shape: Shape) -> str:
     return ""
 
 
-def _key_hint(key: str, section: Loc) -> str:
+def _key_hint(key: str, section: Loc, schema: Schema) -> str:
     """The nearest key of this section, and where a key of this name does belong."""
-    here = keys_at(section)
-    hints = [_did_you_mean(key, here), _belongs(key)]
+    here = schema.keys_at(section)
+    hints = [_did_you_mean(key, here), _belongs(key, schema)]
     if not any(hints):
-        hints.append(_near_elsewhere(key))
+        hints.append(_near_elsewhere(key, schema))
     if not any(hints) and here:
         hints.append("the keys here are " + ", ".join(here))
     return " ".join(hint for hint in hints if hint)
@@ -133,12 +136,12 @@ def _did_you_mean(word: str, choices: Iterable[str]) -> str:
     return f"did you mean {near[0]}?" if near else ""
 
 
-def _belongs(key: str) -> str:
-    places = [path or "the top level (not indented)" for path in homes(key)]
+def _belongs(key: str, schema: Schema) -> str:
+    places = [path or "the top level (not indented)" for path in schema.homes(key)]
     return f"{key} belongs in {' or '.join(places)}" if places else ""
 
 
-def _near_elsewhere(key: str) -> str:
-    everywhere = {name: path for path, names in sections() for name in sorted(names)}
+def _near_elsewhere(key: str, schema: Schema) -> str:
+    everywhere = {name: path for path, names in schema.sections for name in sorted(names)}
     near = difflib.get_close_matches(key.lower(), everywhere, n=1, cutoff=0.75)
-    return f"did you mean {near[0]}, which {_belongs(near[0]).removeprefix(near[0] + ' ')}?" if near else ""
+    return f"did you mean {near[0]}, which {_belongs(near[0], schema).removeprefix(near[0] + ' ')}?" if near else ""

@@ -13,7 +13,10 @@ from pydantic import ValidationError
 from canbase_config.errors import ConfigError, Loc
 from canbase_config.explain import explain
 from canbase_config.robot import Robot
+from canbase_config.schema import Schema
 from canbase_config.yaml_file import read_yaml
+
+ROBOT_SCHEMA = Schema(Robot)
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,9 +33,9 @@ def load_robot(path: str | Path) -> Loaded:
     """The robot that the YAML file at `path` describes. Raises ConfigError, which carries all problems found."""
     file = read_yaml(path)
     try:
-        robot = Robot.model_validate(file.values)
+        robot = Robot.model_validate(file.values, context={"folder": file.path.parent})
     except ValidationError as error:
-        raise ConfigError(explain(error, file)) from error
+        raise ConfigError(explain(error, file, ROBOT_SCHEMA)) from error
     keys = frozenset(leaf_keys(robot.model_dump()))
     given = keys & file.lines.keys()
     return Loaded(robot, file.path, given, keys - given)

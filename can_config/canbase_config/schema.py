@@ -1,4 +1,4 @@
-"""What may stand where in a robot.yaml, in words, read from the JSON schema of the model. For error texts."""
+"""What may stand where in a file, in words, read from the JSON schema of its model. For error texts and docs."""
 
 from __future__ import annotations
 
@@ -6,42 +6,76 @@ import functools
 from collections.abc import Iterator
 from typing import Any
 
+from pydantic import BaseModel
+
 from canbase_config.errors import Loc
-from canbase_config.robot import Robot
 
 Shape = dict[str, Any]
 """One node of the JSON schema, references resolved; empty: anything may stand there, or nothing is known."""
 
 
-@functools.cache
-def _schema() -> Shape:
-    return Robot.model_json_schema()
+class Schema:
+    """The JSON schema of a model, asked by places in a file."""
 
+    def __init__(self, model: type[BaseModel]) -> None:
+        self._model = model
 
-def shape_at(loc: Loc) -> Shape:
-    """What the model says about the value at `loc`."""
-    shape = _schema()
-    for part in loc:
-        shape = _child(shape, part)
-    return shape
+    def shape_at(self, loc: Loc) -> Shape:
+        """What the model says about the value at `loc`."""
+        shape = self._root
+        for part in loc:
+            shape = self._child(shape, part)
+        return shape
 
+    def keys_at(self, loc: Loc) -> tuple[str, ...]:
+        """The keys of the section at `loc`, those first that must be given."""
+        shape = self.shape_at(loc)
+        required = tuple(shape.get("required", ()))
+        return required + tuple(key for key in shape.get("properties", ()) if key not in required)
 
-def keys_at(loc: Loc) -> tuple[str, ...]:
-    """The keys of the section at `loc`, those first that must be given."""
-    shape = shape_at(loc)
-    required = tuple(shape.get("required", ()))
-    return required + tuple(key for key in shape.get("properties", ()) if key not in required)
+    def homes(self, key: str) -> tuple[str, ...]:
+        """The sections that have `key`: `limits`, `drives[…]`, `mux.sources.…`; `` is the top of the file."""
+        return tuple(path for path, keys in self.sections if key in keys)
 
+    @functools.cached_property
+    def sections(self) -> tuple[tuple[str, frozenset[str]], ...]:
+        """Every section of the file: its path and its keys."""
+        return tuple((path, frozenset(shape["properties"])) for path, shape in self.shapes)
 
-def homes(key: str) -> tuple[str, ...]:
-    """The sections that have `key`: `limits`, `drives[…]`, `mux.sources.…`; `` is the top of the file."""
-    return tuple(path for path, keys in sections() if key in keys)
+    @functools.cached_property
+    def shapes(self) -> tuple[tuple[str, Shape], ...]:
+        """Every section of the file: its path and what the model says about it."""
+        return tuple(self._sections(self._root, ""))
 
+    @functools.cached_property
+    def _root(self) -> Shape:
+        return self._model.model_json_schema()
 
-@functools.cache
-def sections() -> tuple[tuple[str, frozenset[str]], ...]:
-    """Every section of the file: its path and its keys."""
-    return tuple(_sections(_schema(), ""))
+    def _child(self, shape: Shape, part: str | int) -> Shape:
+        if isinstance(part, int):
+            return self.resolved(shape.get("items", {}))
+        if part in shape.get("properties", {}):
+            return self.resolved(shape["properties"][part])
+        return self.resolved(_free_keys(shape))
+
+    def resolved(self, shape: Shape) -> Shape:
+        """`shape` with its reference followed, and for an optional value the shape that is not null."""
+        if "$ref" in shape:
+            return {**self._root["$defs"][shape["$ref"].rpartition("/")[2]], **shape}
+        for option in shape.get("anyOf", ()):
+            if option.get("type") != "null":
+                return {**self.resolved(option), **shape}
+        return shape
+
+    def _sections(self, shape: Shape, path: str) -> Iterator[tuple[str, Shape]]:
+        if "properties" in shape:
+            yield path, shape
+        for key, inner in shape.get("properties", {}).items():
+            yield from self._sections(self.resolved(inner), f"{path}.{key}".removeprefix("."))
+        if "items" in shape:
+            yield from self._sections(self.resolved(shape["items"]), f"{path}[…]")
+        if free := _free_keys(shape):
+            yield from self._sections(self.resolved(free), f"{path}.…")
 
 
 def expected(shape: Shape) -> str:
@@ -53,41 +87,12 @@ def expected(shape: Shape) -> str:
     return f"{words} ({meaning})" if meaning else words
 
 
-def _child(shape: Shape, part: str | int) -> Shape:
-    if isinstance(part, int):
-        return _resolved(shape.get("items", {}))
-    if part in shape.get("properties", {}):
-        return _resolved(shape["properties"][part])
-    return _resolved(_free_keys(shape))
-
-
 def _free_keys(shape: Shape) -> Shape:
     """What stands under the keys of a mapping whose keys the user chooses."""
     for free in shape.get("patternProperties", {}).values():
         return dict(free)
     free = shape.get("additionalProperties", {})
     return dict(free) if isinstance(free, dict) else {}
-
-
-def _resolved(shape: Shape) -> Shape:
-    """`shape` with its reference followed, and for an optional value the shape that is not null."""
-    if "$ref" in shape:
-        return {**_schema()["$defs"][shape["$ref"].rpartition("/")[2]], **shape}
-    for option in shape.get("anyOf", ()):
-        if option.get("type") != "null":
-            return {**_resolved(option), **shape}
-    return shape
-
-
-def _sections(shape: Shape, path: str) -> Iterator[tuple[str, frozenset[str]]]:
-    if "properties" in shape:
-        yield path, frozenset(shape["properties"])
-    for key, inner in shape.get("properties", {}).items():
-        yield from _sections(_resolved(inner), f"{path}.{key}".removeprefix("."))
-    if "items" in shape:
-        yield from _sections(_resolved(shape["items"]), f"{path}[…]")
-    if free := _free_keys(shape):
-        yield from _sections(_resolved(free), f"{path}.…")
 
 
 def _kind(shape: Shape) -> str:

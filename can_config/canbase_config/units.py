@@ -1,10 +1,10 @@
-"""What one bit of a drive's velocity objects (60FFh, 606Ch) means. The only place that gives VelocityUnit its value."""
+"""What one bit of a drive's velocities (60FFh, 606Ch) and ramps (6083h–6085h) means: the only place with the values."""
 
 from __future__ import annotations
 
 from typing import Final
 
-from canbase_config.drive import VelocityUnit
+from canbase_config.profile import AccelerationUnit, Units, VelocityUnit
 
 _MOTOR_REV_PER_S: Final[dict[VelocityUnit, float]] = {
     "rpm": 1.0 / 60.0,
@@ -13,7 +13,18 @@ _MOTOR_REV_PER_S: Final[dict[VelocityUnit, float]] = {
     "rev/s": 1.0,
     "0.001rev/s": 0.001,
 }
-_COUNTS_PER_S: Final[dict[VelocityUnit, float]] = {"counts/s": 1.0, "0.1counts/s": 0.1}
+_COUNTS_PER_S: Final[dict[VelocityUnit, float]] = {
+    "counts/s": 1.0,
+    "0.1counts/s": 0.1,
+    "counts/ms/16384": 1000.0 / 16384.0,
+    "counts/ms/65536": 1000.0 / 65536.0,
+}
+_MOTOR_REV_PER_S2: Final[dict[AccelerationUnit, float]] = {"rpm/s": 1.0 / 60.0, "0.1rpm/s": 0.1 / 60.0}
+_COUNTS_PER_S2: Final[dict[AccelerationUnit, float]] = {
+    "10counts/s2": 10.0,
+    "counts/ms2/16384": 1e6 / 16384.0,
+    "counts/ms2/65536": 1e6 / 65536.0,
+}
 
 
 def motor_rev_per_s(unit: VelocityUnit, counts_per_motor_rev: int) -> float:
@@ -30,3 +41,20 @@ def motor_rev_per_s(unit: VelocityUnit, counts_per_motor_rev: int) -> float:
         return _COUNTS_PER_S[unit] / counts_per_motor_rev
     known = ", ".join([*_MOTOR_REV_PER_S, *_COUNTS_PER_S])
     raise ValueError(f"velocity unit {unit!r} is unknown, expected one of {known}")
+
+
+def ramp_raw(units: Units, velocity_unit: VelocityUnit, counts_per_motor_rev: int, motor_rev_per_s2: float) -> float:
+    """Value for 6083h–6085h that gives an acceleration of the motor shaft; positive, not rounded.
+
+    `velocity_unit` is that of 60FFh. Raises ValueError unless the acceleration is positive.
+    """
+    if not motor_rev_per_s2 > 0.0:
+        raise ValueError(f"an acceleration of {motor_rev_per_s2} rev/s² cannot be set; expected a positive number")
+    unit = units.acceleration
+    if unit == "ms":
+        return 1000.0 * (units.full_speed_rpm or 0.0) / 60.0 / motor_rev_per_s2
+    if unit == "velocity/s":
+        return motor_rev_per_s2 / motor_rev_per_s(velocity_unit, counts_per_motor_rev)
+    if unit in _MOTOR_REV_PER_S2:
+        return motor_rev_per_s2 / _MOTOR_REV_PER_S2[unit]
+    return motor_rev_per_s2 * counts_per_motor_rev / _COUNTS_PER_S2[unit]

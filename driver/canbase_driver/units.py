@@ -20,7 +20,7 @@ class AxisUnits:
 
     def __init__(self, drive: Drive, base: Base) -> None:
         rim_m_per_motor_rev = 2.0 * math.pi * base.wheel_radius_m / drive.gear_ratio
-        one_bit_rev_per_s = motor_rev_per_s(drive.velocity_unit, drive.counts_per_motor_rev)
+        one_bit_rev_per_s = motor_rev_per_s(drive.target_unit, drive.counts_per_motor_rev)
         self._direction = drive.direction
         self._mps_per_bit = one_bit_rev_per_s * rim_m_per_motor_rev
         self._m_per_count = rim_m_per_motor_rev / drive.counts_per_motor_rev

@@ -64,7 +64,8 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
     "a choice with a slip": (
         {16: "    velocity_unit: 0.1 rpm"},
         ':16: drives[1].velocity_unit: got "0.1 rpm", expected one of rpm, 0.1rpm, 0.001rpm, rev/s, 0.001rev/s, '
-        "counts/s, 0.1counts/s (one bit of 60FFh and 606Ch, at the motor shaft)\n    did you mean 0.1rpm?",
+        "counts/s, 0.1counts/s, counts/ms/16384, counts/ms/65536 (one bit of 60FFh and 606Ch, at the motor shaft; "
+        "default: the profile's)\n    did you mean 0.1rpm?",
     ),
     "a name with a blank": (
         {6: "  - joint: left wheel"},

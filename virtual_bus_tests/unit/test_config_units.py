@@ -7,8 +7,9 @@ import math
 import pytest
 
 from canbase_config.derive import m_per_count, max_wheel_mps, mps_per_bit, order_hold_s, watchdog_config
-from canbase_config.drive import Drive, VelocityUnit
+from canbase_config.drive import Drive
 from canbase_config.load import load_robot, sample
+from canbase_config.profile import VelocityUnit
 from canbase_config.units import motor_rev_per_s
 from canbase_config.watchdog import WatchdogConfig
 
@@ -23,6 +24,8 @@ UNITS: list[tuple[VelocityUnit, int, float]] = [
     ("counts/s", 1, 1.0),  # one count is one revolution
     ("counts/s", 10_000, 0.0001),
     ("rpm", 1, 0.016666666666666666),  # no counts in it
+    ("counts/ms/65536", 2000, 1000.0 / 65536.0 / 2000.0),  # 16.16 fixed point, 1.0 is one count in 1 ms
+    ("counts/ms/16384", 10_000, 1875.0 / 512.0 / 10_000.0 / 60.0),  # rpm × 512 × resolution / 1875
 ]
 
 

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canbase_config.drive import Drive, VelocityUnit
+from canbase_config.drive import Drive
+from canbase_config.profile import VelocityUnit
 from canbase_config.robot import Base
 from canbase_driver.units import AxisUnits
 

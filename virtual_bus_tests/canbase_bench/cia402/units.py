@@ -32,7 +32,7 @@ class Scale:
         metres_per_motor_rev = 2.0 * pi * wheel_radius_m / drive.gear_ratio
         counts = float(drive.counts_per_motor_rev)
         raw = {"counts/s": counts, "0.1counts/s": counts * 10.0} | STEPS_PER_REVOLUTION
-        return cls(metres_per_motor_rev / raw[drive.velocity_unit], counts / metres_per_motor_rev)
+        return cls(metres_per_motor_rev / raw[drive.target_unit], counts / metres_per_motor_rev)
 
     def counts(self, travel_m: float, offset: int) -> int:
         """6064h after `travel_m` in the motor's positive direction: whole increments, wrapped to 32 bits."""

@@ -1,0 +1,233 @@
+"""The model of a drive profile: what is known about one kind of motor drive. Reading the files is `profile_file.py`.
+
+Everything in here is about CiA 301 and CiA 402-2 objects; what a drive does beyond its profile the boot finds out.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from canbase_config.section import MisfitError, Section
+
+VelocityUnit = Literal[
+    "rpm",
+    "0.1rpm",
+    "0.001rpm",
+    "rev/s",
+    "0.001rev/s",
+    "counts/s",
+    "0.1counts/s",
+    "counts/ms/16384",
+    "counts/ms/65536",
+]
+"""What one bit of 60FFh or 606Ch means, always at the motor shaft (before the gear)."""
+AccelerationUnit = Literal[
+    "velocity/s", "rpm/s", "0.1rpm/s", "10counts/s2", "counts/ms2/16384", "counts/ms2/65536", "ms"
+]
+"""One bit of 6083h–6085h. `velocity/s`: the unit of 60FFh per second; `ms`: time from stand to `full_speed_rpm`."""
+Presence = Literal["yes", "no", "probe"]
+"""Whether the drive has an object; `probe`: unknown, the boot tries."""
+
+Index = Annotated[int, Field(ge=0x1000, le=0xFFFF, description="object index")]
+Sub = Annotated[int, Field(ge=0, le=0xFF, description="sub-index")]
+Bits = Annotated[Literal[8, 16, 32], Field(description="width")]
+
+
+class Layout(Section):
+    """Where the objects of an axis are, and how wide. All velocities and positions are signed on the bus."""
+
+    axes: Annotated[int, Field(ge=1, le=2, description="motors that one node can turn")] = 2
+    second_axis: Annotated[
+        Literal["offset", "sub_index"],
+        Field(description="offset: all its objects at + 800h; sub_index: sub 1 and 2 of the same velocities and ramps"),
+    ] = "offset"
+    controlword: Annotated[
+        Literal["own", "shared"], Field(description="shared: one 6040h switches both motors (sub_index only)")
+    ] = "own"
+    statusword: Annotated[
+        Literal["own", "packed"], Field(description="packed: 6041h has 32 bits, the second axis in the upper half")
+    ] = "own"
+    target_bits: Annotated[Literal[16, 32], Field(description="width of 60FFh")] = 32
+    velocity_bits: Annotated[Literal[16, 32], Field(description="width of 606Ch")] = 32
+
+    @model_validator(mode="after")
+    def _shared_needs_sub_index(self) -> Layout:
+        if self.second_axis == "offset" and (self.controlword, self.statusword) != ("own", "own"):
+            raise MisfitError("axes at + 800h have a controlword and a statusword of their own", ("second_axis",))
+        return self
+
+
+class Units(Section):
+    """What one bit means, at the motor shaft. None: it depends on the drive's own settings, robot.yaml must tell."""
+
+    target_velocity: Annotated[VelocityUnit, Field(description="60FFh")] | None = "rpm"
+    actual_velocity: Annotated[VelocityUnit, Field(description="606Ch")] | None = "rpm"
+    acceleration: Annotated[AccelerationUnit, Field(description="6083h, 6084h, 6085h")] = "velocity/s"
+    full_speed_rpm: Annotated[float, Field(gt=0.0, description="of the unit ms [rpm]")] | None = None
+
+    @model_validator(mode="after")
+    def _times_need_a_speed(self) -> Units:
+        if (self.acceleration == "ms") != (self.full_speed_rpm is not None):
+            raise MisfitError("full_speed_rpm goes with acceleration: ms, and only with it", ("full_speed_rpm",))
+        return self
+
+
+class Pdos(Section):
+    """What the process data objects can do."""
+
+    rpdos: Annotated[int, Field(ge=1, le=512, description="RPDOs that can be mapped")] = 4
+    tpdos: Annotated[int, Field(ge=1, le=512, description="TPDOs that can be mapped")] = 4
+    fixed_cob_id_bits: Annotated[
+        int, Field(ge=0, le=0x7FFF_FFFF, description="bits of 1400h:1 and 1800h:1 that are written as they were read")
+    ] = 0x4000_0000
+    synchronous: Annotated[
+        bool, Field(description="true: transmission type 1; false: RPDOs act at once, TPDOs go by their event timer")
+    ] = True
+
+
+class Sdo(Section):
+    """How the SDO server wants to be asked."""
+
+    timeout_s: (
+        Annotated[float, Field(ge=0.05, le=5.0, description="one answer; default: timeouts.sdo_s [s]")] | None
+    ) = None
+    attempts: Annotated[int, Field(ge=1, le=10, description="requests until it is given up")] = 3
+    gap_s: Annotated[float, Field(ge=0.0, le=0.1, description="at least between two requests [s]")] = 0.0
+
+
+class Start(Section):
+    """How the drive comes up."""
+
+    reset: Annotated[
+        Literal["communication", "node", "none"], Field(description="NMT command that forgets earlier masters")
+    ] = "communication"
+    boot_up_s: Annotated[float, Field(ge=0.1, le=60.0, description="until the boot-up message after it [s]")] = 5.0
+    settle_s: Annotated[
+        float, Field(ge=0.0, le=10.0, description="quiet after a boot-up; a second one may come meanwhile [s]")
+    ] = 0.0
+
+
+class VendorWatchdog(Section):
+    """The maker's own time limit for commands. Without an object only the maker's tool can set it."""
+
+    index: Index | None = None
+    sub: Sub = 0
+    bits: Bits = 16
+    per_s: Annotated[float, Field(gt=0.0, description="value for one second")] = 1000.0
+    text: Annotated[str, Field(min_length=1, description="what it watches and does")]
+
+
+class SelfStop(Section):
+    """What makes the drive stop by itself when its masters die."""
+
+    heartbeat_entries: Annotated[int, Field(ge=0, le=127, description="entries of 1016h; 0: none")] | None = None
+    abort_connection: Annotated[Presence, Field(description="6007h")] = "probe"
+    abort_connection_code: Annotated[int, Field(ge=-32768, le=32767, description="value of 6007h that stops")] = 3
+    error_behaviour: Annotated[Presence, Field(description="1029h:1")] = "probe"
+    rpdo_timer: Annotated[Presence, Field(description="1400h:5, deadline of the setpoints")] = "no"
+    vendor_watchdog: VendorWatchdog | None = None
+
+
+class Options(Section):
+    """Optional objects of CiA 402."""
+
+    quick_stop: Annotated[Presence, Field(description="605Ah")] = "probe"
+    quick_stop_code: Annotated[int, Field(ge=1, le=8, description="value of 605Ah: down the ramp 6085h")] = 2
+    fault_reaction: Annotated[Presence, Field(description="605Eh")] = "probe"
+    fault_reaction_code: Annotated[int, Field(ge=0, le=4, description="value of 605Eh")] = 2
+    mode_display: Annotated[
+        Literal["yes", "no", "when_enabled", "probe"], Field(description="6061h; when_enabled: it is 0 without power")
+    ] = "probe"
+    ramps: Annotated[Presence, Field(description="6083h, 6084h, 6085h")] = "probe"
+    interpolation: Annotated[Presence, Field(description="60C2h, for mode 9")] = "probe"
+    sync_counter: Annotated[Presence, Field(description="1019h")] = "no"
+    store: Annotated[Presence, Field(description="1010h")] = "probe"
+
+
+class SdoWrite(Section):
+    """One write of the boot, read back unless the object is write-only."""
+
+    index: Index
+    sub: Sub = 0
+    value: Annotated[int, Field(ge=-(2**31), le=2**32 - 1, description="value")]
+    bits: Bits
+    optional: Annotated[bool, Field(description="true: a refusal is only a note")] = False
+
+
+class Writes(Section):
+    """What the boot writes besides the standard objects, in order."""
+
+    before_mapping: Annotated[tuple[SdoWrite, ...], Field(strict=False)] = ()
+    after_mapping: Annotated[tuple[SdoWrite, ...], Field(strict=False)] = ()
+
+
+class Measured(Section):
+    """An object that is read now and then: raw × scale is in V, A or °C."""
+
+    index: Index
+    sub: Sub = 0
+    bits: Bits
+    signed: bool = False
+    scale: Annotated[float, Field(gt=0.0, description="V, A or °C for one bit")]
+    second_axis: Annotated[
+        Literal["same", "offset", "next_sub"], Field(description="where it is for the second motor")
+    ] = "same"
+
+
+class Measures(Section):
+    """What the drive measures besides its motion."""
+
+    voltage: Measured | None = None
+    current: Measured | None = None
+    temperature: Measured | None = None
+
+
+class Kind(Section):
+    """What 1018h says of this kind of drive, to guess the profile by."""
+
+    vendor_id: Annotated[int, Field(ge=0, le=0xFFFF_FFFF, description="1018h:1")] | None = None
+    product_code: Annotated[int, Field(ge=0, le=0xFFFF_FFFF, description="1018h:2")] | None = None
+
+
+class Profile(Section):
+    """One kind of motor drive."""
+
+    title: Annotated[str, Field(min_length=1, description="maker and type")]
+    identity: Kind = Kind()
+    layout: Layout = Layout()
+    units: Units = Units()
+    modes: Annotated[
+        tuple[Annotated[int, Field(ge=-128, le=127)], ...],
+        Field(min_length=1, strict=False, description="values of 6060h that take 60FFh, the preferred one first"),
+    ] = (3, 9)
+    pdo: Pdos = Pdos()
+    sdo: Sdo = Sdo()
+    start: Start = Start()
+    self_stop: SelfStop = SelfStop()
+    options: Options = Options()
+    writes: Writes = Writes()
+    heartbeat_fault: Annotated[
+        Literal["fault_reset", "reset_communication"],
+        Field(description="what a fault for a lost heartbeat or bus needs to go"),
+    ] = "fault_reset"
+    measures: Measures = Measures()
+    emcy: Annotated[
+        dict[Annotated[int, Field(ge=0, le=0xFFFF)], Annotated[str, Field(min_length=1)]],
+        Field(description="the maker's emergency codes in words"),
+    ] = Field(default_factory=dict)
+    notes: Annotated[tuple[str, ...], Field(strict=False, description="what to know before the first motion")] = ()
+    unproven: Annotated[
+        tuple[str, ...], Field(strict=False, description="keys above without a source: check them on the bench")
+    ] = ()
+
+    @model_validator(mode="after")
+    def _unproven_keys_exist(self) -> Profile:
+        for position, path in enumerate(self.unproven):
+            section: object = self
+            for key in path.split("."):
+                if key not in type(section).model_fields if isinstance(section, Section) else True:
+                    raise MisfitError(f"{path} is no key of a profile", ("unproven", position))
+                section = getattr(section, key)
+        return self
