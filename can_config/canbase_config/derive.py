@@ -51,6 +51,7 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
         control_hz=robot.rates.control_hz,
         lease_socket=robot.lease.socket,
         lease_timeout_s=timeouts.lease_s,
+        lease_uid=robot.lease.uid,
         drive_heartbeat_s=timeouts.drive_heartbeat_s,
         feedback_timeout_s=timeouts.feedback_s,
         loop_late_s=watchdog.loop_late_s,

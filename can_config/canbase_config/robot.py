@@ -19,6 +19,8 @@ from canbase_config.tolerances import Watchdog
 
 DRIVER_NODE_ID = 127
 """CANopen node id of the motor driver: its heartbeat is COB-ID 77Fh."""
+CYCLES_PER_TIMEOUT = 4
+"""What comes once a control cycle, or is sent from it, may be late or lost once or twice without a stop."""
 WATCHDOG_NODE_ID = 126
 """CANopen node id of the watchdog: its heartbeat is COB-ID 77Eh, its state 1FEh, its reset request 27Eh."""
 
@@ -32,6 +34,13 @@ class Bus(Section):
     extra: Annotated[
         dict[str, Any], Field(default_factory=dict, description="further arguments of can.Bus for this interface")
     ]
+
+    @model_validator(mode="after")
+    def _extra_adds_only(self) -> Bus:
+        for key in ("interface", "channel", "bitrate"):
+            if key in self.extra:
+                raise MisfitError(f"{key} stands in bus itself; extra adds arguments, it replaces none", ("extra", key))
+        return self
 
     def arguments(self) -> dict[str, Any]:
         """Keyword arguments for `can.Bus`. The bit rate of a socketcan interface is set by the system, not here."""
@@ -110,6 +119,12 @@ class Lease(Section):
     """The Unix datagram socket on which the safety filter tells the watchdog what it ordered."""
 
     socket: Annotated[str, Field(min_length=1, max_length=100, description="path; its folder is made if missing")]
+    uid: (
+        Annotated[
+            int, Field(ge=0, le=2**32 - 2, description="number of the only user whose leases count; none: watchdog's")
+        ]
+        | None
+    ) = None
 
 
 class Robot(Section):
@@ -143,4 +158,17 @@ class Robot(Section):
         if {drive.side for drive in self.drives} != {"left", "right"}:
             message = f"all drives are on the {self.drives[0].side}; a base needs at least one on each side"
             raise MisfitError(message, ("drives", 1, "side"))
+        return self
+
+    @model_validator(mode="after")
+    def _timeouts_span_cycles(self) -> Robot:
+        least_s = CYCLES_PER_TIMEOUT / self.rates.control_hz
+        for key in ("feedback_s", "drive_heartbeat_s"):
+            timeout_s = getattr(self.timeouts, key)
+            if timeout_s < least_s - 1e-9:
+                message = (
+                    f"{key} ({timeout_s:g}) is shorter than {CYCLES_PER_TIMEOUT} control cycles: "
+                    f"at least {least_s:g} with rates.control_hz {self.rates.control_hz:g}"
+                )
+                raise MisfitError(message, ("timeouts", key), ("rates", "control_hz"))
         return self

@@ -1,21 +1,30 @@
 """The driver's handle on the CAN bus (python-can): errors become a sentence in `problem`, late frames are never sent.
 
-A bus that fails is closed and opened again every RETRY_S, for as long as it takes: the core disarms meanwhile.
+A bus that fails is closed and opened again every RETRY_S, for as long as it takes; it has failed until a frame went out
+or came in. The core disarms meanwhile.
 """
 
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import Any
 
 import can
 
+from canbase_driver.bus_health import BusReport
 from canbase_driver.frame import Frame
 
 RETRY_S = 1.0
+SEND_TIMEOUT_S = 0.002
+"""A frame that the bus does not take within this time is dropped: setpoints of yesterday must not move a wheel."""
 SEND_FAILURES = 10
 """So many failed sends in a row are a failed bus; fewer are a full transmit buffer."""
-_ERRORS = (can.CanError, OSError)
+RECEIVE_FAILURES = 3
+"""The same for receptions: one may be a datagram that is no CAN frame."""
+BUS_OFF = "the CAN controller is bus-off after too many errors: check cable, termination and bit rate"
+_ERRORS = (can.CanError, OSError, ValueError)
+"""ValueError: what select says of a handle whose adapter is gone."""
 
 
 class BusError(Exception):
@@ -29,10 +38,8 @@ class BusPort:
         """Opens `can.Bus(**arguments)`. Raises BusError."""
         self._arguments = arguments
         self.problem = ""
-        self.send_errors = 0
-        self.dropped = 0
-        """Error, remote and 29-bit frames since start."""
-        self._failures = 0
+        self.report = BusReport()
+        self._send_failures = self._receive_failures = 0
         self._retry_at = 0.0
         self._bus: can.BusABC | None = self._open()
 
@@ -45,14 +52,9 @@ class BusPort:
         try:
             message = self._bus.recv(max(0.0, timeout_s))
         except _ERRORS as error:
-            self._fail(f"receiving failed: {error}")
+            self._on_receive_error(error)
             return None
-        if message is None:
-            return None
-        if message.is_error_frame or message.is_remote_frame or message.is_extended_id:
-            self.dropped += 1
-            return None
-        return Frame(message.arbitration_id, bytes(message.data))
+        return None if message is None else self._take(message)
 
     def send(self, frame: Frame) -> None:
         """Send now or never."""
@@ -60,25 +62,51 @@ class BusPort:
             return
         message = can.Message(arbitration_id=frame.cob_id, data=frame.data, is_extended_id=False)
         try:
-            self._bus.send(message)
+            self._bus.send(message, timeout=SEND_TIMEOUT_S)
         except _ERRORS as error:
-            self.send_errors += 1
-            self._failures += 1
-            if self._failures >= SEND_FAILURES:
-                self._fail(f"sending failed {self._failures} times in a row: {error}")
+            self._on_send_error(error)
         else:
-            self._failures = 0
+            self._send_failures = 0
+            if not self.report.is_bus_off:  # then the kernel takes frames and drops them
+                self.problem = ""
 
     def close(self) -> None:
         """Close the bus for good."""
-        if self._bus is not None:
-            self._bus.shutdown()
-            self._bus = None
+        bus, self._bus = self._bus, None
+        if bus is not None:
+            bus.shutdown()
+
+    def _take(self, message: can.Message) -> Frame | None:
+        if message.is_error_frame:
+            before, self.report = self.report, self.report.with_error_frame(message.arbitration_id, bytes(message.data))
+            if self.report.is_bus_off and not before.is_bus_off:
+                self._fail(BUS_OFF)
+            return None
+        self._receive_failures = 0
+        self.problem = ""
+        if self.report.is_bus_off:
+            self.report = replace(self.report, controller=BusReport().controller)
+        if message.is_remote_frame or message.is_extended_id:
+            self.report = replace(self.report, dropped=self.report.dropped + 1)
+            return None
+        return Frame(message.arbitration_id, bytes(message.data))
+
+    def _on_send_error(self, error: Exception) -> None:
+        self.report = replace(self.report, send_errors=self.report.send_errors + 1)
+        self._send_failures += 1
+        if self._send_failures >= SEND_FAILURES:
+            self._fail(f"sending failed {self._send_failures} times in a row: {error}")
+
+    def _on_receive_error(self, error: Exception) -> None:
+        self.report = replace(self.report, receive_errors=self.report.receive_errors + 1)
+        self._receive_failures += 1
+        if self._receive_failures >= RECEIVE_FAILURES:
+            self._fail(f"receiving failed {self._receive_failures} times in a row: {error}")
 
     def _open(self) -> can.BusABC:
         try:
             return can.Bus(**self._arguments)
-        except (*_ERRORS, ValueError, TypeError, ImportError, NotImplementedError) as error:
+        except (*_ERRORS, TypeError, ImportError, NotImplementedError) as error:
             raise BusError(
                 f"the CAN bus {self._arguments} cannot be opened: {error}. "
                 "Check `bus` in robot.yaml, and that the interface is up (ip -details link show)."
@@ -86,7 +114,7 @@ class BusPort:
 
     def _fail(self, problem: str) -> None:
         self.problem = problem
-        self._failures = 0
+        self.report = replace(self.report, failures=self.report.failures + 1)
         self._retry_at = time.monotonic() + RETRY_S
         bus, self._bus = self._bus, None
         try:
@@ -96,6 +124,7 @@ class BusPort:
             self.problem = f"{problem}; closing failed too: {error}"
 
     def _reopen(self) -> None:
+        """The problem stays until a frame has passed: an interface that is down can be opened too."""
         if time.monotonic() < self._retry_at:
             return
         try:
@@ -104,4 +133,4 @@ class BusPort:
             self.problem = str(error)
             self._retry_at = time.monotonic() + RETRY_S
         else:
-            self.problem = ""
+            self._send_failures = self._receive_failures = 0

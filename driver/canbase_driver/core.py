@@ -15,6 +15,7 @@ from functools import partial
 
 from canbase_config.robot import DRIVER_NODE_ID, Robot
 from canbase_driver.axis import Axis
+from canbase_driver.bus_health import BusReport
 from canbase_driver.cia301 import EMCY, HEARTBEAT, SDO_TO_CLIENT, SYNC, NmtCommand, NmtState, heartbeat, nmt
 from canbase_driver.cia402 import PowerGoal
 from canbase_driver.command import Command
@@ -28,12 +29,14 @@ from canbase_driver.remote_node import RemoteNode
 from canbase_driver.reset import Outcome, Phase, Reset, refusal
 from canbase_driver.snapshot import DriverSnapshot, DriverState, StopRecord
 from canbase_driver.supervisor import NO_POWER, Cause, Drive, Orders, Situation, Supervisor
-from canbase_driver.watchdog_link import STATE_COB_ID, WatchdogLink
+from canbase_driver.watchdog_link import COUNTERS_COB_ID, STATE_COB_ID, WatchdogLink
 
 HEARTBEATS_PER_TIMEOUT = 3
 """The heartbeat goes out this often in the time that the drives allow for it."""
 LONGEST_STEP_S = 1.0
 """A cycle after a longer gap, and the first one, counts as this long."""
+
+HEALTHY = BusReport()
 
 Handler = Callable[[Frame, float], bool]
 
@@ -68,7 +71,8 @@ class DriverCore:
         self._stop_requested = self._shutdown_requested = False
         self._heartbeat_at = self._ticked_at = -math.inf
         self._handlers = self._dispatch_table()
-        self.frames_dropped = self.send_errors = self._bus_dropped = 0
+        self._bus_report = HEALTHY
+        self.frames_dropped = 0
         self.stops: deque[StopRecord] = deque(maxlen=64)
         """Stops since they were last taken out, oldest first."""
 
@@ -105,13 +109,9 @@ class DriverCore:
         """Take a velocity command with its receive time. False, and counted: it was not finite."""
         return self._command.take(twist, received_at)
 
-    def on_bus(self, problem: str, now: float, send_errors: int = 0, dropped: int = 0) -> None:
-        """The bus failed (a sentence), or works (empty); after a failure every node is booted anew.
-
-        `send_errors`: frames that could not be sent in time; `dropped`: received frames that CANopen does not use
-        (error, remote, 29-bit). Both since the start.
-        """
-        self.send_errors, self._bus_dropped = send_errors, dropped
+    def on_bus(self, problem: str, now: float, report: BusReport = HEALTHY) -> None:
+        """The bus failed (a sentence), or works (empty); after a failure every node is booted anew."""
+        self._bus_report = report
         if self._bus_problem and not problem:
             for node in self._drives.nodes:
                 node.lose("was cut off from the bus", now)
@@ -253,7 +253,10 @@ class DriverCore:
 
     def _dispatch_table(self) -> dict[int, tuple[Handler, RemoteNode | None]]:
         """Who takes a frame, and the node that may go on with its boot after it."""
-        table: dict[int, tuple[Handler, RemoteNode | None]] = {STATE_COB_ID: (self._watchdog.on_frame, None)}
+        table: dict[int, tuple[Handler, RemoteNode | None]] = {
+            STATE_COB_ID: (self._watchdog.on_frame, None),
+            COUNTERS_COB_ID: (self._watchdog.on_counters, None),
+        }
         for node in self._drives.nodes:
             table[EMCY + node.node_id] = (node.on_emcy, None)
             table[HEARTBEAT + node.node_id] = (node.on_heartbeat, node)
@@ -268,6 +271,7 @@ class DriverCore:
         watchdog, _detail = self._watchdog.view(now)
         measured = base_twist(*self._drives.speeds_mps(), self._robot.base.track_m)
         odometry, cause = self._feed.odometry, self._supervisor.cause
+        counters, bus = self._watchdog.counters, self._bus_report
         return DriverSnapshot(
             time_s=now,
             state=self.state,
@@ -277,6 +281,13 @@ class DriverCore:
             watchdog=watchdog,
             watchdog_cause=self._watchdog.cause,
             watchdog_age_s=self._watchdog.age_s(now),
+            watchdog_rung=self._watchdog.rung,
+            watchdog_lease_age_s=self._watchdog.lease_age_s,
+            watchdog_trips=counters.trips,
+            watchdog_leases_refused=counters.leases_refused,
+            watchdog_frames_dropped=counters.frames_dropped,
+            watchdog_bus_errors=counters.bus_errors,
+            watchdog_pause_max_s=counters.pause_max_ms / 1000.0,
             standstill=self._drives.stand(now),
             command_age_s=age_s(now, self._command.received_at),
             command_fresh=self._command.is_fresh(now),
@@ -284,8 +295,13 @@ class DriverCore:
             cycles=self._stats.cycles,
             overruns=self._stats.overruns,
             cycle_lateness_max_s=self._stats.worst_s,
-            frames_dropped=self.frames_dropped + self._bus_dropped,
-            send_errors=self.send_errors,
+            frames_dropped=self.frames_dropped + bus.dropped,
+            send_errors=bus.send_errors,
+            bus_problem=self._bus_problem,
+            controller=bus.controller,
+            receive_errors=bus.receive_errors,
+            error_frames=bus.error_frames,
+            bus_failures=bus.failures,
             drives=self._drives.snapshots(now),
             x_m=odometry.pose.x_m,
             y_m=odometry.pose.y_m,

@@ -99,7 +99,7 @@ class ControlLoop(threading.Thread):
             self._take_in_until(cycle_at)
             self._empty_inbox()
             now = self.cycle_at = time.monotonic()
-            self._core.on_bus(self._bus.problem, now, self._bus.send_errors, self._bus.dropped)
+            self._core.on_bus(self._bus.problem, now, self._bus.report)
             self._send(self._core.tick(now, now - cycle_at))
             self._hand_over_if_due(now)
             if now - cycle_at > self._period_s:

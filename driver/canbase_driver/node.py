@@ -19,6 +19,7 @@ from sensor_msgs.msg import JointState
 
 from canbase_config.robot import Robot
 from canbase_driver import messages
+from canbase_driver.diagnostics import diagnostics_message
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.loop import ControlLoop
 from canbase_driver.snapshot import DriverSnapshot, StopRecord
@@ -78,9 +79,7 @@ class MotorDriverNode(Node):
             self._status.publish(messages.status_message(snapshot, stamp))
         if self._diagnosed is None or snapshot.time_s - self._diagnosed.time_s >= DIAGNOSTICS_PERIOD_S:
             before, self._diagnosed = self._diagnosed or snapshot, snapshot
-            self._diagnostics.publish(
-                messages.diagnostics_message(snapshot, stamp, robot=self._robot.name, previous=before)
-            )
+            self._diagnostics.publish(diagnostics_message(snapshot, stamp, robot=self._robot.name, previous=before))
 
     def _log_change(self, snapshot: DriverSnapshot) -> None:
         previous = self._previous

@@ -5,6 +5,7 @@ No ROS, no behaviour. SI units at the wheel and the base; ages are local monoton
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
@@ -84,6 +85,17 @@ class DriverSnapshot:
     """Cause of its trip; "none"."""
     watchdog_age_s: float
     """Since its last state frame [s]; NaN: none yet."""
+    watchdog_rung: int = 0
+    """How far up its ladder it has gone, 0 to 4."""
+    watchdog_lease_age_s: float = math.nan
+    """Age of the last valid lease, as it says [s]; NaN: none."""
+    watchdog_trips: int = 0
+    """Its counters, since its start."""
+    watchdog_leases_refused: int = 0
+    watchdog_frames_dropped: int = 0
+    watchdog_bus_errors: int = 0
+    watchdog_pause_max_s: float = 0.0
+    """Longest pause of its loop in the last half second [s], at most 0.255."""
     standstill: bool
     """All wheels are measured below base.standstill_mps."""
     command_age_s: float
@@ -102,6 +114,16 @@ class DriverSnapshot:
     """Received frames that could not be understood, since start."""
     send_errors: int
     """Frames that could not be sent in time, since start."""
+    bus_problem: str = ""
+    """Why the bus does not work now; empty when it does."""
+    controller: str = "error active"
+    """What error frames say of the CAN controller: error active, error warning, error passive, bus-off."""
+    receive_errors: int = 0
+    """Failed receptions, since start."""
+    error_frames: int = 0
+    """Error frames of the CAN controller, since start."""
+    bus_failures: int = 0
+    """How often the bus failed and was opened anew, since start."""
     drives: tuple[DriveSnapshot, ...]
     """In the order of robot.yaml."""
     x_m: float

@@ -1,4 +1,4 @@
-"""The driver's view of the watchdog: its state frame (1FEh) and the reset request (27Eh), laid out in docs/bus.md.
+"""The driver's view of the watchdog: its frames 1FEh and 2FEh and the reset request (27Eh), laid out in docs/bus.md.
 
 The watchdog has these layouts a second time, on purpose; a test compares both. Pure: time is an argument.
 """
@@ -15,7 +15,10 @@ from canbase_driver.snapshot import WatchdogView
 
 STATE_COB_ID = 0x180 + WATCHDOG_NODE_ID
 RESET_COB_ID = 0x200 + WATCHDOG_NODE_ID
+COUNTERS_COB_ID = 0x280 + WATCHDOG_NODE_ID
 STATE_LAYOUT = struct.Struct("<BBBBHBB")
+COUNTERS_LAYOUT = struct.Struct("<HHHBB")
+LEASE_AGE_UNKNOWN = 0xFFFF
 RESET_KEY = b"RST"
 
 STARTING, WATCHING, TRIPPED = 0, 1, 2
@@ -28,11 +31,12 @@ CAUSES = {
     4: "target outside the envelope",
     5: "motion outside the envelope",
     6: "overspeed",
-    7: "drive in fault while another moves",
+    7: "drive in fault or off while another moves",
     8: "foreign master",
     9: "bus failed",
     10: "own loop late",
     11: "told to end while a wheel turned",
+    12: "feedback implausible",
 }
 ANSWERS = {
     1: "reset done",
@@ -62,6 +66,24 @@ class WatchdogState:
         return CAUSES.get(self.cause, f"cause {self.cause}")
 
 
+@dataclass(frozen=True, slots=True)
+class WatchdogCounters:
+    """One frame of counters, since the watchdog's start. `pause_max_ms`: the longest since the frame before."""
+
+    leases_refused: int = 0
+    frames_dropped: int = 0
+    bus_errors: int = 0
+    trips: int = 0
+    pause_max_ms: int = 0
+
+
+def parse_counters(frame: Frame) -> WatchdogCounters | None:
+    """The watchdog's counters, or None when the frame is not one."""
+    if frame.cob_id != COUNTERS_COB_ID or len(frame.data) != COUNTERS_LAYOUT.size:
+        return None
+    return WatchdogCounters(*COUNTERS_LAYOUT.unpack(frame.data))
+
+
 def parse_state(frame: Frame) -> WatchdogState | None:
     """The watchdog's state, or None when the frame is not one."""
     if frame.cob_id != STATE_COB_ID or len(frame.data) != STATE_LAYOUT.size:
@@ -79,6 +101,8 @@ class WatchdogLink:
         self._state: WatchdogState | None = None
         self._received_s = -math.inf
         self._request = 0
+        self.counters = WatchdogCounters()
+        """As it said last; zeros until then."""
 
     def on_frame(self, frame: Frame, now: float) -> bool:
         """Take a frame 1FEh. False: it was not understood."""
@@ -87,6 +111,26 @@ class WatchdogLink:
             return False
         self._state, self._received_s = state, now
         return True
+
+    def on_counters(self, frame: Frame, _now: float) -> bool:
+        """Take a frame 2FEh. False: it was not understood. It tells; only the state frame keeps the watchdog alive."""
+        counters = parse_counters(frame)
+        if counters is None:
+            return False
+        self.counters = counters
+        return True
+
+    @property
+    def rung(self) -> int:
+        """How far up its ladder it has gone, 0 to 4 (docs/bus.md); 0 while it was never heard."""
+        return self._state.rung if self._state else 0
+
+    @property
+    def lease_age_s(self) -> float:
+        """Age of the last valid lease in its last state frame [s]; NaN: none, or not heard."""
+        if self._state is None or self._state.lease_age_ms == LEASE_AGE_UNKNOWN:
+            return math.nan
+        return self._state.lease_age_ms / 1000.0
 
     def age_s(self, now: float) -> float:
         """Seconds since the last state frame; NaN: none yet."""

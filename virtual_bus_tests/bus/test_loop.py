@@ -18,7 +18,7 @@ from canbase_bench.world.bench import Bench, Truth
 from canbase_config.derive import watchdog_config
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
-from canbase_driver.bus_port import SEND_FAILURES, BusError, BusPort
+from canbase_driver.bus_port import BusPort
 from canbase_driver.core import DriverCore
 from canbase_driver.frame import Frame
 from canbase_driver.kinematics import Twist2D
@@ -41,8 +41,7 @@ def robot() -> Robot:
 def arguments(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """Of a bus that this test has for itself, and can break."""
     monkeypatch.setitem(BACKENDS, "virtual", ("bus.flaky_bus", "FlakyBus"))
-    monkeypatch.setattr(FlakyBus, "broken", False)
-    monkeypatch.setattr(FlakyBus, "deaf", False)
+    FlakyBus.heal()
     return {"interface": "virtual", "channel": f"loop-{request.node.name}"}
 
 
@@ -292,57 +291,3 @@ def test_cycles_that_were_missed_are_not_made_up_for(robot: Robot, arguments: di
     run_for(core, robot, arguments, 1.0)
     after = core.ticked_at[1] + 0.5
     assert len([at for at in core.ticked_at if after < at < after + 0.1]) <= 13
-
-
-def test_a_bus_that_cannot_be_opened_says_what_to_look_at(arguments: dict[str, Any]) -> None:
-    with pytest.raises(BusError, match=r"no_such_bus.*Check `bus` in robot\.yaml"):
-        BusPort(arguments | {"interface": "no_such_bus"})
-
-
-def test_a_full_transmit_buffer_is_counted_and_a_long_one_is_a_failed_bus(arguments: dict[str, Any]) -> None:
-    port = BusPort(arguments)
-    FlakyBus.deaf = True
-    for _ in range(SEND_FAILURES - 1):
-        port.send(Frame(0x080))
-    assert (port.send_errors, port.problem) == (SEND_FAILURES - 1, "")
-    FlakyBus.deaf = False
-    port.send(Frame(0x080))  # one that succeeds: what came before is forgiven
-    FlakyBus.deaf = True
-    for _ in range(SEND_FAILURES):
-        port.send(Frame(0x080))
-    assert port.problem == "sending failed 10 times in a row: transmit buffer full"
-    port.send(Frame(0x080))  # nothing is kept for later
-    port.close()
-    assert port.send_errors == 2 * SEND_FAILURES - 1
-
-
-def test_what_canopen_does_not_use_is_dropped_and_counted(arguments: dict[str, Any]) -> None:
-    port = BusPort(arguments)
-    with VirtualBus(arguments["channel"]) as other:
-        other.send(can.Message(arbitration_id=0x181, data=b"\0", is_extended_id=True))
-        other.send(can.Message(arbitration_id=0x181, is_extended_id=False, is_remote_frame=True))
-        other.send(can.Message(arbitration_id=0x181, is_extended_id=False, is_error_frame=True))
-        other.send(can.Message(arbitration_id=0x181, data=b"\1", is_extended_id=False))
-    received = [port.receive(0.05) for _ in range(5)]
-    port.close()
-    assert received == [None, None, None, Frame(0x181, b"\1"), None]
-    assert port.dropped == 3
-
-
-def test_a_bus_that_stays_away_is_tried_again_and_again(
-    arguments: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("canbase_driver.bus_port.RETRY_S", 0.05)
-    port = BusPort(arguments)
-    FlakyBus.broken = True
-    assert port.receive(0.01) is None
-    assert port.problem == "receiving failed: network is down"
-    start = time.monotonic()
-    while time.monotonic() < start + 0.2:
-        assert port.receive(0.02) is None
-    assert "cannot be opened: network is down" in port.problem
-    FlakyBus.broken = False
-    while port.problem:
-        port.receive(0.02)
-        assert time.monotonic() < start + 5.0
-    port.close()

@@ -94,7 +94,7 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
     ),
     "a key from nowhere": (
         {35: "  socket: /tmp/lease.sock\n  colour: red"},
-        ":36: lease.colour: unknown key\n    the keys here are socket",
+        ":36: lease.colour: unknown key\n    the keys here are socket, uid",
     ),
     "a missing key": (
         {19: ""},
@@ -163,6 +163,20 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
     "a maximum that is not above its minimum": (
         {END: "action: {min_speed_mps: 0.5}"},
         ":36: action.min_speed_mps: max_speed_mps (0.5) must be greater than min_speed_mps (0.5)",
+    ),
+    "an argument of the bus given twice": (
+        {4: "  extra: {channel: can1}"},
+        ":4: bus.extra.channel: channel stands in bus itself; extra adds arguments, it replaces none",
+    ),
+    "feedback that is shorter than a few cycles": (
+        {END: "timeouts: {feedback_s: 0.039}"},
+        ":36: timeouts.feedback_s: feedback_s (0.039) is shorter than 4 control cycles: "
+        "at least 0.04 with rates.control_hz 100",
+    ),
+    "cycles that are longer than a few heartbeats": (
+        {END: "rates: {control_hz: 20.0}\ntimeouts: {feedback_s: 0.2, drive_heartbeat_s: 0.19}"},
+        ":37: timeouts.drive_heartbeat_s: drive_heartbeat_s (0.19) is shorter than 4 control cycles: "
+        "at least 0.2 with rates.control_hz 20",
     ),
     "a key that is a number": (
         {4: "  extra: {1: 2}"},

@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from canbase_driver.bus_health import BusReport
 from canbase_driver.core import DriverCore
 from canbase_driver.frame import Frame
 from canbase_driver.kinematics import Twist2D
@@ -45,7 +46,7 @@ def test_frames_of_others_are_none_of_its_business(core: DriverCore) -> None:
 
 
 def test_counters_of_the_bus_are_passed_on(core: DriverCore) -> None:
-    core.on_bus("", 10.0, send_errors=3, dropped=4)
+    core.on_bus("", 10.0, BusReport(send_errors=3, dropped=4))
     core.on_frame(Frame(0x1FE), 10.0)
     snapshot = core.snapshot(10.0)
     assert (snapshot.send_errors, snapshot.frames_dropped) == (3, 5)

@@ -7,7 +7,7 @@ import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-from canbase_driver import messages
+from canbase_driver.diagnostics import diagnostics_message
 from canbase_driver.snapshot import DriverState, WatchdogView
 from unit.snapshots import SNAPSHOT, with_driver, with_left
 
@@ -22,16 +22,18 @@ def entry(message: DiagnosticArray, name: str) -> DiagnosticStatus:
 
 
 def test_a_healthy_robot_is_ok_in_every_entry() -> None:
-    message = messages.diagnostics_message(SNAPSHOT, STAMP, robot="r1")
+    message = diagnostics_message(SNAPSHOT, STAMP, robot="r1")
     assert message.header.stamp == STAMP
     assert [(status.name, status.level) for status in message.status] == [
         ("r1: motor_driver", OK),
+        ("r1: bus", OK),
         ("r1: watchdog", OK),
         ("r1: drive left_wheel_joint", OK),
         ("r1: drive right_wheel_joint", OK),
     ]
     assert [status.message for status in message.status] == [
         "All drives are enabled.",
+        "The bus works.",
         "The watchdog watches.",
         "Operation enabled, operational.",
         "Operation enabled, operational.",
@@ -40,7 +42,7 @@ def test_a_healthy_robot_is_ok_in_every_entry() -> None:
 
 
 def test_the_values_are_short_and_have_their_units() -> None:
-    message = messages.diagnostics_message(with_left(feedback_age_s=math.nan, error_code=0x8611), STAMP)
+    message = diagnostics_message(with_left(feedback_age_s=math.nan, error_code=0x8611), STAMP)
     drive = {pair.key: pair.value for pair in entry(message, "robot: drive left_wheel_joint").values}
     assert drive == {
         "NMT state": "operational",
@@ -57,7 +59,8 @@ def test_the_values_are_short_and_have_their_units() -> None:
     loop = {pair.key: pair.value for pair in entry(message, "robot: motor_driver").values}
     assert loop["cycles"] == "12345"
     assert loop["greatest lateness [s]"] == "0.0004"
-    assert loop["send errors"] == "4"
+    bus = {pair.key: pair.value for pair in entry(message, "robot: bus").values}
+    assert (bus["send errors"], bus["controller"]) == ("4", "error active")
 
 
 @pytest.mark.parametrize(
@@ -73,7 +76,7 @@ def test_the_values_are_short_and_have_their_units() -> None:
     ],
 )
 def test_the_level_of_the_driver_follows_its_state(state: DriverState, level: bytes) -> None:
-    message = messages.diagnostics_message(with_driver(state=state, cause="x"), STAMP)
+    message = diagnostics_message(with_driver(state=state, cause="x"), STAMP)
     assert entry(message, "robot: motor_driver").level == level
 
 
@@ -87,23 +90,68 @@ def test_the_level_of_the_driver_follows_its_state(state: DriverState, level: by
 )
 def test_a_stopped_driver_says_why_and_what_ends_it(detail: str, clears_on: str, sentence: str) -> None:
     snapshot = with_driver(state=DriverState.LATCHED, cause="drive fault", detail=detail, clears_on=clears_on)
-    assert entry(messages.diagnostics_message(snapshot, STAMP), "robot: motor_driver").message == sentence
+    assert entry(diagnostics_message(snapshot, STAMP), "robot: motor_driver").message == sentence
 
 
-def test_a_counter_is_a_warning_only_while_it_grows() -> None:
-    grown = with_driver(overruns=5, send_errors=5)
-    message = messages.diagnostics_message(grown, STAMP, previous=SNAPSHOT)
-    loop = entry(message, "robot: motor_driver")
-    assert loop.level == WARN
-    assert loop.message == "All drives are enabled. Since the last report: 3 more overruns, 1 more send errors."
-    later = messages.diagnostics_message(grown, STAMP, previous=grown)
-    assert entry(later, "robot: motor_driver").level == OK
+@pytest.mark.parametrize(
+    ("name", "changes", "sentence"),
+    [
+        ("motor_driver", {"overruns": 5}, "All drives are enabled. Since the last report: 3 more overruns."),
+        (
+            "bus",
+            {"send_errors": 5, "error_frames": 7},
+            "The bus works. Since the last report: 1 more send errors, 7 more error frames.",
+        ),
+        (
+            "watchdog",
+            {"watchdog_leases_refused": 2},
+            "The watchdog watches. Since the last report: 2 more leases refused.",
+        ),
+    ],
+)
+def test_a_counter_is_a_warning_only_while_it_grows(name: str, changes: dict[str, Any], sentence: str) -> None:
+    grown = with_driver(**changes)
+    told = entry(diagnostics_message(grown, STAMP, previous=SNAPSHOT), f"robot: {name}")
+    assert (told.level, told.message) == (WARN, sentence)
+    later = diagnostics_message(grown, STAMP, previous=grown)
+    assert entry(later, f"robot: {name}").level == OK
+
+
+def test_a_watchdog_that_was_restarted_counts_from_zero_and_that_is_no_news() -> None:
+    before = with_driver(watchdog_trips=3)
+    assert entry(diagnostics_message(SNAPSHOT, STAMP, previous=before), "robot: watchdog").level == OK
 
 
 def test_a_growing_counter_does_not_make_an_error_a_warning() -> None:
-    snapshot = with_driver(state=DriverState.LATCHED, cause="bus failed", send_errors=5)
-    message = messages.diagnostics_message(snapshot, STAMP, previous=SNAPSHOT)
-    assert entry(message, "robot: motor_driver").level == ERROR
+    snapshot = with_driver(bus_problem="network is down", send_errors=5)
+    message = diagnostics_message(snapshot, STAMP, previous=SNAPSHOT)
+    assert entry(message, "robot: bus").level == ERROR
+
+
+@pytest.mark.parametrize(
+    ("changes", "level", "sentence"),
+    [
+        ({"bus_problem": "network is down."}, ERROR, "The bus has failed: network is down."),
+        ({"controller": "error passive"}, WARN, "The CAN controller is error passive: check the cable."),
+    ],
+)
+def test_what_the_bus_says(changes: dict[str, Any], level: bytes, sentence: str) -> None:
+    bus = entry(diagnostics_message(with_driver(**changes), STAMP), "robot: bus")
+    assert (bus.level, bus.message) == (level, sentence)
+
+
+@pytest.mark.parametrize(("pause_s", "level"), [(0.05, OK), (0.051, WARN)])
+def test_a_watchdog_whose_loop_pauses_is_a_warning(pause_s: float, level: bytes) -> None:
+    message = diagnostics_message(with_driver(watchdog_pause_max_s=pause_s), STAMP)
+    assert entry(message, "robot: watchdog").level == level
+
+
+@pytest.mark.parametrize(
+    ("rung", "text"), [(0, "none"), (2, "NMT pre-operational"), (4, "heartbeat withheld"), (9, "9")]
+)
+def test_how_far_the_watchdog_has_gone_is_told(rung: int, text: str) -> None:
+    watchdog = entry(diagnostics_message(with_driver(watchdog_rung=rung), STAMP), "robot: watchdog")
+    assert {pair.key: pair.value for pair in watchdog.values}["rung of its ladder"] == text
 
 
 @pytest.mark.parametrize(
@@ -124,7 +172,7 @@ def test_a_growing_counter_does_not_make_an_error_a_warning() -> None:
     ],
 )
 def test_a_watchdog_that_does_not_watch_is_an_error(changes: dict[str, Any], sentence: str) -> None:
-    watchdog = entry(messages.diagnostics_message(with_driver(**changes), STAMP), "robot: watchdog")
+    watchdog = entry(diagnostics_message(with_driver(**changes), STAMP), "robot: watchdog")
     assert (watchdog.level, watchdog.message) == (ERROR, sentence)
 
 
@@ -148,7 +196,7 @@ def test_a_watchdog_that_does_not_watch_is_an_error(changes: dict[str, Any], sen
     ],
 )
 def test_what_a_drive_says(changes: dict[str, Any], level: bytes, sentence: str) -> None:
-    message = messages.diagnostics_message(with_left(**changes), STAMP)
+    message = diagnostics_message(with_left(**changes), STAMP)
     drive = entry(message, "robot: drive left_wheel_joint")
     assert (drive.level, drive.message) == (level, sentence)
     assert entry(message, "robot: drive right_wheel_joint").level == OK

@@ -43,7 +43,19 @@ def test_states_and_answers_have_the_same_numbers() -> None:
     assert set(watchdog_link.ACCEPTED) == {Answer.DONE, Answer.NOT_TRIPPED}
 
 
-@pytest.mark.parametrize("cause", [Cause.NONE, Cause.LEASE_LOST, Cause.DRIVER_SILENT, Cause.DRIVE_SILENT])
+def test_the_driver_reads_the_counters_that_the_watchdog_writes() -> None:
+    ours = frames.counters(refused=1, dropped=2, bus_errors=70_000, trips=4, gap_s=0.0061)
+    read = watchdog_link.parse_counters(DriverFrame(ours.cob_id, ours.data))
+    assert read == watchdog_link.WatchdogCounters(1, 2, 65_535, 4, 6)
+
+
+def test_every_cause_of_the_watchdog_has_words_at_the_driver() -> None:
+    assert set(watchdog_link.CAUSES) == set(Cause)
+
+
+@pytest.mark.parametrize(
+    "cause", [Cause.NONE, Cause.LEASE_LOST, Cause.DRIVER_SILENT, Cause.DRIVE_SILENT, Cause.FEEDBACK_IMPLAUSIBLE]
+)
 def test_causes_have_the_same_names(cause: Cause) -> None:
     assert watchdog_link.CAUSES[cause] == cause.name.lower().replace("_", " ")
 

@@ -9,6 +9,7 @@ from canbase.msg import DriverStatus, DriveStatus
 from rclpy.serialization import deserialize_message, serialize_message
 
 from canbase_driver import messages
+from canbase_driver.diagnostics import diagnostics_message
 from canbase_driver.odometry import Odometry
 from canbase_driver.snapshot import DriverState, StopRecord, WatchdogView
 from unit.snapshots import LEFT, RIGHT, SNAPSHOT, with_driver, with_left
@@ -171,6 +172,6 @@ def test_every_message_survives_the_wire() -> None:
         messages.joint_state_message(SNAPSHOT, STAMP),
         messages.status_message(SNAPSHOT, STAMP),
         messages.stop_event_message(STOP, STAMP),
-        messages.diagnostics_message(SNAPSHOT, STAMP),
+        diagnostics_message(SNAPSHOT, STAMP),
     ):
         assert deserialize_message(serialize_message(message), type(message)) == message

@@ -8,7 +8,7 @@ import pytest
 
 from canbase_driver.frame import Frame
 from canbase_driver.snapshot import WatchdogView
-from canbase_driver.watchdog_link import CAUSES, WatchdogLink, WatchdogState, parse_state
+from canbase_driver.watchdog_link import CAUSES, WatchdogCounters, WatchdogLink, WatchdogState, parse_state
 
 WATCHING = "01 00 00 00 14 00 00 00"
 TRIPPED = "02 03 01 02 ff ff 00 00"  # drive silent, quick stop, node 2, no lease
@@ -72,7 +72,7 @@ def test_whether_it_watches(data: str, now: float, view: WatchdogView, sentence:
 
 
 def test_every_cause_of_docs_bus_md_has_a_text() -> None:
-    assert sorted(CAUSES) == list(range(12))
+    assert sorted(CAUSES) == list(range(13))
     assert link("02 0b 00 00 00 00 00 00").cause == "told to end while a wheel turned"
 
 
@@ -106,3 +106,31 @@ def test_the_numbers_go_round_from_255_to_1_and_two_in_a_row_differ() -> None:
     numbers = [heard.request_reset().data[0] for _ in range(300)]
     assert numbers[:256] == [*range(1, 256), 1]
     assert 0 not in numbers
+
+
+def test_the_counters_as_docs_bus_md_has_them() -> None:
+    heard = link(at=10.0)
+    assert heard.counters == WatchdogCounters()
+    assert heard.on_counters(Frame(0x2FE, bytes.fromhex("01 02 03 00 ff ff 04 05")), 10.1)
+    assert heard.counters == WatchdogCounters(0x201, 3, 0xFFFF, 4, 5)
+
+
+@pytest.mark.parametrize("frame", [Frame(0x2FE, bytes(7)), Frame(0x2FE), Frame(0x2FD, bytes(8))])
+def test_what_are_no_counters_is_dropped(frame: Frame) -> None:
+    heard = link()
+    assert not heard.on_counters(frame, 10.0)
+    assert heard.counters == WatchdogCounters()
+
+
+def test_counters_alone_do_not_keep_the_watchdog_alive() -> None:
+    heard = link(at=10.0)
+    heard.on_counters(Frame(0x2FE, bytes(8)), 10.3)
+    assert heard.view(10.3)[0] is WatchdogView.MISSING
+
+
+@pytest.mark.parametrize(("data", "age_s", "rung"), [("01 00 00 00 fe ff 00 00", 65.534, 0), (TRIPPED, math.nan, 1)])
+def test_the_age_of_the_lease_and_the_rung(data: str, age_s: float, rung: int) -> None:
+    heard = link(data)
+    assert heard.lease_age_s == pytest.approx(age_s, nan_ok=True)
+    assert heard.rung == rung
+    assert math.isnan(WatchdogLink(0.2).lease_age_s)

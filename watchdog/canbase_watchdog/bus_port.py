@@ -11,8 +11,12 @@ import can
 from canbase_watchdog.bus_health import BusHealth
 from canbase_watchdog.frames import Frame
 
+SEND_TIMEOUT_S = 0.001
+"""What the bus does not take within this time is dropped: each turn of the loop repeats what still matters."""
 BATCH = 256
 """Frames taken in before the loop looks at the clock again."""
+_ERRORS = (can.CanError, OSError, ValueError)
+"""ValueError: what select says of a handle whose adapter is gone."""
 
 
 class BusError(Exception):
@@ -26,7 +30,7 @@ class BusPort:
         """Opens `can.Bus(**arguments)`. Raises BusError with what to look at."""
         try:
             self._bus = can.Bus(**arguments)
-        except (can.CanError, OSError, ValueError, TypeError, ImportError, NotImplementedError) as error:
+        except (*_ERRORS, TypeError, ImportError, NotImplementedError) as error:
             raise BusError(
                 f"the CAN bus {arguments} cannot be opened: {error}. "
                 "Check `bus` in robot.yaml, and that the interface is up (ip -details link show)."
@@ -68,8 +72,8 @@ class BusPort:
         """Send now or never: a frame that the bus does not take at once is counted and dropped."""
         message = can.Message(arbitration_id=frame.cob_id, data=frame.data, is_extended_id=False)
         try:
-            self._bus.send(message)
-        except (can.CanError, OSError):
+            self._bus.send(message, timeout=SEND_TIMEOUT_S)
+        except _ERRORS:
             self.health.on_send_error(time.monotonic())
         else:
             self.health.on_sent()
@@ -77,7 +81,7 @@ class BusPort:
     def _take(self, timeout_s: float) -> can.Message | None:
         try:
             return self._bus.recv(timeout_s)
-        except (can.CanError, OSError):
+        except _ERRORS:
             self.health.on_receive_error(time.monotonic())
             time.sleep(0.001)
             return None

@@ -24,7 +24,9 @@ class Relay:
         try:
             self._gpiod: Any = importlib.import_module("gpiod")
         except ImportError as error:
-            raise RelayError("watchdog.relay needs the Python package gpiod: pip install 'gpiod>=2.1'") from error
+            raise RelayError(
+                "watchdog.relay needs the Python package gpiod: pip install 'canbase[gpio]' or 'gpiod>=2.1'"
+            ) from error
         self._line, self._active = line, False
         direction = self._gpiod.line.Direction.OUTPUT
         try:

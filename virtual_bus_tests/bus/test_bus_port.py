@@ -1,0 +1,158 @@
+"""The driver's handle on a bus that fails in every way that python-can's adapters do: no exception, no late frame."""
+
+from __future__ import annotations
+
+import errno
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import can
+import pytest
+from can.interfaces import BACKENDS
+from can.interfaces.virtual import VirtualBus
+
+from bus.flaky_bus import FlakyBus
+from canbase_driver import bus_port
+from canbase_driver.bus_port import BUS_OFF, RECEIVE_FAILURES, SEND_FAILURES, SEND_TIMEOUT_S, BusError, BusPort
+from canbase_driver.frame import Frame
+
+pytestmark = pytest.mark.bus
+SYNC = Frame(0x080)
+RETRY_S = 0.05
+WAYS_TO_FAIL = [
+    can.CanOperationError("network is down"),
+    OSError(errno.ENODEV, "no such device"),  # the USB adapter is gone
+    OSError(errno.ENETDOWN, "network is down"),  # ip link set can0 down
+    ValueError("file descriptor cannot be a negative integer (-1)"),  # select on a closed handle
+]
+
+
+@pytest.fixture
+def arguments(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Of a bus that this test has for itself, and can break; it is opened again soon."""
+    monkeypatch.setitem(BACKENDS, "virtual", ("bus.flaky_bus", "FlakyBus"))
+    monkeypatch.setattr(bus_port, "RETRY_S", RETRY_S)
+    FlakyBus.heal()
+    return {"interface": "virtual", "channel": f"port-{request.node.name}"}
+
+
+@pytest.fixture
+def port(arguments: dict[str, Any]) -> Iterator[BusPort]:
+    opened = BusPort(arguments)
+    yield opened
+    FlakyBus.heal()
+    opened.close()
+
+
+@pytest.fixture
+def other(arguments: dict[str, Any]) -> Iterator[VirtualBus]:
+    """Somebody else on the same bus."""
+    with VirtualBus(arguments["channel"]) as bus:
+        yield bus
+
+
+def reopened(port: BusPort) -> None:
+    """Wait for one try to open it again."""
+    time.sleep(RETRY_S)
+    assert port.receive(0.0) is None
+
+
+def error_frame(error_class: int, detail: int = 0) -> can.Message:
+    """As SocketCAN gives it, linux/can/error.h."""
+    data = bytes([0, detail, 0, 0, 0, 0, 0, 0])
+    return can.Message(arbitration_id=error_class, is_error_frame=True, is_extended_id=False, data=data)
+
+
+def test_a_bus_that_cannot_be_opened_says_what_to_look_at(arguments: dict[str, Any]) -> None:
+    with pytest.raises(BusError, match=r"no_such_bus.*Check `bus` in robot\.yaml"):
+        BusPort(arguments | {"interface": "no_such_bus"})
+
+
+def test_a_full_transmit_buffer_is_counted_and_a_long_one_is_a_failed_bus(port: BusPort) -> None:
+    FlakyBus.deaf = True
+    for _ in range(SEND_FAILURES - 1):
+        port.send(SYNC)
+    assert (port.report.send_errors, port.problem) == (SEND_FAILURES - 1, "")
+    FlakyBus.deaf = False
+    port.send(SYNC)  # one that succeeds: what came before is forgiven
+    FlakyBus.deaf = True
+    for _ in range(SEND_FAILURES):
+        port.send(SYNC)
+    assert port.problem == "sending failed 10 times in a row: transmit buffer full"
+    port.send(SYNC)  # nothing is kept for later
+    assert port.report.send_errors == 2 * SEND_FAILURES - 1
+
+
+def test_every_frame_is_sent_with_a_deadline(port: BusPort) -> None:
+    port.send(SYNC)
+    assert FlakyBus.timeouts == {SEND_TIMEOUT_S}
+
+
+@pytest.mark.parametrize("error", WAYS_TO_FAIL, ids=lambda error: type(error).__name__ + str(error)[:12])
+def test_an_adapter_that_goes_away_is_a_problem_until_it_is_back(port: BusPort, error: Exception) -> None:
+    FlakyBus.error, FlakyBus.broken = error, True
+    for _ in range(RECEIVE_FAILURES):
+        assert port.problem == ""
+        assert port.receive(0.0) is None
+    assert port.problem.startswith(f"receiving failed {RECEIVE_FAILURES} times in a row: ")
+    reopened(port)
+    assert "cannot be opened" in port.problem
+    assert (port.report.receive_errors, port.report.failures) == (RECEIVE_FAILURES, 1)
+    FlakyBus.broken = False
+    reopened(port)
+    port.send(SYNC)
+    assert port.problem == ""
+
+
+def test_an_interface_that_is_down_can_be_opened_and_is_a_problem_all_the_same(port: BusPort) -> None:
+    FlakyBus.down = True
+    for _ in range(SEND_FAILURES):
+        port.send(SYNC)
+    problem = port.problem
+    assert problem == "sending failed 10 times in a row: network is down"
+    for _ in range(3):
+        reopened(port)
+        port.send(SYNC)
+        assert port.problem == problem
+    FlakyBus.down = False
+    port.send(SYNC)
+    assert port.problem == ""
+
+
+def test_a_datagram_that_is_no_frame_does_not_fail_the_bus(port: BusPort, other: VirtualBus) -> None:
+    for _ in range(10):
+        FlakyBus.down = True
+        port.receive(0.0)
+        FlakyBus.down = False
+        other.send(can.Message(arbitration_id=0x181, data=b"\1", is_extended_id=False))
+        assert port.receive(0.1) == Frame(0x181, b"\1")
+    assert (port.problem, port.report.receive_errors) == ("", 10)
+
+
+def test_what_canopen_does_not_use_is_dropped_and_counted(port: BusPort, other: VirtualBus) -> None:
+    other.send(can.Message(arbitration_id=0x181, data=b"\0", is_extended_id=True))
+    other.send(can.Message(arbitration_id=0x181, is_extended_id=False, is_remote_frame=True))
+    other.send(error_frame(0x008))
+    other.send(can.Message(arbitration_id=0x181, data=b"\1", is_extended_id=False))
+    assert [port.receive(0.05) for _ in range(5)] == [None, None, None, Frame(0x181, b"\1"), None]
+    assert (port.report.dropped, port.report.error_frames, port.problem) == (2, 1, "")
+
+
+def test_bus_off_is_a_problem_until_something_is_heard_again(port: BusPort, other: VirtualBus) -> None:
+    other.send(error_frame(0x040))
+    assert port.receive(0.1) is None
+    assert port.problem == BUS_OFF
+    reopened(port)
+    port.send(SYNC)  # the kernel takes it, and it goes nowhere
+    assert port.problem == BUS_OFF
+    other.send(can.Message(arbitration_id=0x701, data=b"\5", is_extended_id=False))
+    assert port.receive(0.1) == Frame(0x701, b"\5")
+    assert (port.problem, port.report.controller, port.report.failures) == ("", "error active", 1)
+
+
+def test_closing_twice_is_once(port: BusPort) -> None:
+    port.close()
+    port.close()
+    port.send(SYNC)
+    assert port.report.send_errors == 0
