@@ -32,6 +32,7 @@ SNAPSHOT = DriverSnapshot(
     watchdog=WatchdogView.OK,
     watchdog_cause="none",
     watchdog_age_s=0.03,
+    watchdog_lease_age_s=0.02,
     standstill=False,
     command_age_s=0.015,
     command_fresh=True,
