@@ -14,6 +14,7 @@ from canbase_action_server.drive_messages import drive_binding
 from canbase_action_server.node import DriveDistanceServer
 from canbase_action_server.rotate_messages import rotate_binding
 from canbase_config.robot import Robot
+from canbase_config.service import Service
 
 STANDSTILL_S = 2.0
 """On the way out the base has this long to stand; then the goal ends without it."""
@@ -53,8 +54,11 @@ def _catch_signals() -> list[int]:
 
 
 def _serve(executor: SingleThreadedExecutor, node: DriveDistanceServer, asked_to_end: list[int]) -> None:
+    service = Service()
     while not asked_to_end and node.failure is None:
         _spin(executor, node)
+        service.alive("a goal runs or waits" if node.busy else "waits for goals", time.monotonic())
+    service.stopping()
 
 
 def _spin(executor: SingleThreadedExecutor, node: DriveDistanceServer) -> None:

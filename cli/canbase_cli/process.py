@@ -5,22 +5,38 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from canbase_cli.options import (
+    FAILED,
     ConfigOption,
     NamespaceOption,
     UnusedNamespaceOption,
+    fail,
     load_config,
     ros_arguments,
     ros_needed,
 )
 from canbase_cli.priority import raise_priority
 
+if TYPE_CHECKING:
+    from canbase_config.robot import Robot
 
-def driver(ctx: typer.Context, config: ConfigOption = None, namespace: NamespaceOption = "") -> None:
+
+StopFileOption = Annotated[
+    Path | None,
+    typer.Option("--stop-file", metavar="PATH", help="Write here what `python -m canbase_watchdog.stop` needs."),
+]
+
+
+def driver(
+    ctx: typer.Context,
+    config: ConfigOption = None,
+    namespace: NamespaceOption = "",
+    stop_file: StopFileOption = None,
+) -> None:
     """Run the motor driver: brings the drives up, turns cmd_vel into setpoints, publishes odom.
 
     What stands behind --ros-args goes to rclpy.
@@ -28,6 +44,7 @@ def driver(ctx: typer.Context, config: ConfigOption = None, namespace: Namespace
     robot = load_config(config).robot
     with ros_needed():
         from canbase_driver.main import run
+    leave_stop_file(robot, stop_file)
     raise_priority("driver")
     raise typer.Exit(run(robot, ros_arguments(ctx, namespace)))
 
@@ -71,14 +88,33 @@ def sim(
     raise typer.Exit(run(robot, None if control is None else str(control)))
 
 
-def watchdog(config: ConfigOption = None, namespace: UnusedNamespaceOption = "") -> None:
+def watchdog(
+    config: ConfigOption = None, namespace: UnusedNamespaceOption = "", stop_file: StopFileOption = None
+) -> None:
     """Run the watchdog: stops the drives when lease, driver or a drive goes silent or wrong.
 
     It replaces this process by one that has only Python's standard library and python-can in it.
     """
     from canbase_config.derive import watchdog_config
 
-    told = watchdog_config(load_config(config).robot).to_json()
+    robot = load_config(config).robot
+    leave_stop_file(robot, stop_file)
+    told = watchdog_config(robot).to_json()
     # The ROS wheels' start-up hook would start every Python of their environment a second time.
     environment = os.environ | {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"}
     os.execve(sys.executable, [sys.executable, "-m", "canbase_watchdog", "--config-json", told], environment)
+
+
+def leave_stop_file(robot: Robot, path: Path | None) -> None:
+    """What the stop frames need, for a process that is started when this one has died. Whole or not there at all."""
+    if path is None:
+        return
+    from canbase_config.derive import watchdog_config
+
+    new = path.with_name(f"{path.name}.new{os.getpid()}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        new.write_text(watchdog_config(robot).to_json(), encoding="utf-8")
+        new.replace(path)
+    except OSError as error:
+        fail(f"{path} cannot be written: {error}; without it nobody could stop the drives after a crash", FAILED)

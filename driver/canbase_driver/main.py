@@ -19,6 +19,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from canbase_config.robot import Robot
+from canbase_config.service import Service
 from canbase_driver.bus_port import BusError, BusPort
 from canbase_driver.core import DriverCore
 from canbase_driver.loop import ControlLoop
@@ -81,16 +82,20 @@ def _spin(
     """Until a signal or a failure; the failure."""
     executor = EventsExecutor()
     executor.add_node(node)
-    watch = HangWatch(LOOP_TIMEOUT_S, WAKE_S)
+    watch, service = HangWatch(LOOP_TIMEOUT_S, WAKE_S), Service()
     try:
         while not received:
             executor.spin_once(timeout_sec=WAKE_S)
-            failure = _failure(threads) or watch.look(loop.cycle_at, time.monotonic())
+            now = time.monotonic()
+            failure = _failure(threads) or watch.look(loop.cycle_at, now)
             if failure is not None:
                 return failure
+            if loop.cycle_at < math.inf:
+                service.alive(node.state_text, now)
     except Exception as error:  # noqa: BLE001 - the base is ramped down, then the process ends by it
         return error
     finally:
+        service.stopping()
         executor.shutdown()
     return None
 

@@ -47,6 +47,8 @@ class MotorDriverNode(Node):
         self._previous: DriverSnapshot | None = None
         self._diagnosed: DriverSnapshot | None = None
         self._status_at = 0.0
+        self.state_text = "starting"
+        """State, cause and what ends it, in words: the last line that went to the log."""
         if self._tf is None:
             self.get_logger().warning("tf2_msgs is not installed: no transform is published on tf")
 
@@ -88,7 +90,7 @@ class MotorDriverNode(Node):
         why = f": {snapshot.cause}" if snapshot.cause not in ("none", snapshot.state.name.lower()) else ""
         detail = f" ({snapshot.detail})" if snapshot.detail else ""
         clears = f"; ends on: {snapshot.clears_on}" if snapshot.clears_on else ""
-        text = f"{snapshot.state.name}{why}{detail}{clears}"
+        text = self.state_text = f"{snapshot.state.name}{why}{detail}{clears}"
         if snapshot.cause in ("none", "booting", "enabling", "shutdown"):
             self.get_logger().info(text)
         else:

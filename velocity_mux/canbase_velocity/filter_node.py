@@ -56,6 +56,11 @@ class FilterNode(Node):
         """When the driver's ramp from the last order to move ends, if zeros follow (time.monotonic)."""
         return self._stands_from_s
 
+    @property
+    def state_text(self) -> str:
+        """What it does and why, in words. The detail is left out: its numbers change all the time."""
+        return f"{self._decision.action.name} {self._decision.cause.value}"
+
     def destroy_node(self) -> None:
         """Closes the lease socket with the node."""
         self._leases.close()

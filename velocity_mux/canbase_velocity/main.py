@@ -13,6 +13,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from canbase_config.robot import Robot
+from canbase_config.service import Service
 from canbase_velocity.filter_node import FilterNode
 from canbase_velocity.mux_node import MuxNode
 
@@ -41,10 +42,12 @@ def _run_nodes(robot: Robot, received: list[int]) -> None:
     executor = EventsExecutor()
     executor.add_node(mux)
     executor.add_node(safety)
-    period_s = 1.0 / robot.rates.command_hz
+    period_s, service = 1.0 / robot.rates.command_hz, Service()
     try:
         while not received:
             executor.spin_once(timeout_sec=WAKE_S)
+            service.alive(safety.state_text, time.monotonic())
+        service.stopping()
         patience_s = time.monotonic() + robot.timeouts.standstill_s
         _order_zero(mux, safety, period_s, min(safety.stands_from_s, patience_s))
     except BaseException:

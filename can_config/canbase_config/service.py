@@ -1,0 +1,57 @@
+"""What a process tells systemd, and nothing where there is none: ready, its state in words, that its loop lives.
+
+Standard library only. The protocol is sd_notify(3). The watchdog has its own copy of the datagram: it shares no code.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Mapping
+from typing import Final
+
+ALIVE_PERIOD_S: Final = 0.2
+"""A fifth of the units' WatchdogSec: one datagram may be late without the process being taken for dead."""
+
+
+class Service:
+    """One process as systemd sees it. Nothing here blocks or raises: a full or missing socket must not stop a loop."""
+
+    def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
+        """`environment` names systemd's socket (NOTIFY_SOCKET); without it every call does nothing."""
+        address = environment.get("NOTIFY_SOCKET", "")
+        self._address = "\0" + address[1:] if address.startswith("@") else address
+        self._ready = False
+        self._status = ""
+        self._alive_at = -ALIVE_PERIOD_S
+
+    def alive(self, status: str, now: float) -> None:
+        """To be called by the loop that this process stands for, in each of its turns, at the monotonic time `now` [s].
+
+        The first call says READY; later ones at most every ALIVE_PERIOD_S that it lives, and `status` when it changed.
+        """
+        lines = []
+        if not self._ready:
+            self._ready = True
+            lines.append("READY=1")
+        if status != self._status:
+            self._status = status
+            lines.append(f"STATUS={status}")
+        if now - self._alive_at >= ALIVE_PERIOD_S:
+            self._alive_at = now
+            lines.append("WATCHDOG=1")
+        self._send(lines)
+
+    def stopping(self) -> None:
+        """An orderly end has begun. Its time limit is TimeoutStopSec; the watchdog of systemd no longer counts."""
+        self._send(["STOPPING=1"])
+
+    def _send(self, lines: list[str]) -> None:
+        if not lines or not self._address:
+            return
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+            sender.setblocking(False)
+            try:
+                sender.sendto("\n".join(lines).encode(), self._address)
+            except OSError:
+                return  # systemd is busy or restarts; the next one will do

@@ -1,0 +1,109 @@
+"""The process that sends stop frames after another one has died: `python -m canbase_watchdog.stop`, on a real bus."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import can
+import pytest
+
+from bus.test_watchdog_process import free_port
+from canbase_config.watchdog import WatchdogConfig
+from canbase_watchdog.stop import LIMIT_S, main, plan
+from unit.watchdog_story import config
+
+pytestmark = pytest.mark.bus
+
+QUICK_STOPS = [(0x501, "0200"), (0x502, "0200")]
+PRE_OPERATIONAL = [(0x000, "8001"), (0x000, "8002")]
+
+
+@pytest.fixture
+def bus_arguments() -> dict[str, Any]:
+    return {"interface": "udp_multicast", "channel": "239.74.163.2", "port": free_port(), "hop_limit": 0}
+
+
+@pytest.fixture
+def listener(bus_arguments: dict[str, Any]) -> Iterator[can.BusABC]:
+    with can.Bus(**bus_arguments) as bus:
+        yield bus
+
+
+def stop_file(folder: Path, told: WatchdogConfig) -> Path:
+    path = folder / "stop.json"
+    path.write_text(told.to_json())
+    return path
+
+
+def run(path: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "canbase_watchdog.stop", str(path)],
+        env=os.environ | {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"},
+        capture_output=True,
+        text=True,
+        timeout=LIMIT_S + 10,
+        check=False,
+    )
+
+
+def frames_on(bus: can.BusABC) -> list[tuple[int, str]]:
+    found = []
+    while (message := bus.recv(0.2)) is not None:
+        found.append((message.arbitration_id, bytes(message.data).hex()))
+    return found
+
+
+def test_quick_stops_first_and_pre_operational_after_them(
+    listener: can.BusABC, bus_arguments: dict[str, Any], tmp_path: Path
+) -> None:
+    ended = run(stop_file(tmp_path, replace(config(), bus_arguments=bus_arguments)))
+
+    assert frames_on(listener) == QUICK_STOPS * 3 + PRE_OPERATIONAL
+    assert (ended.returncode, ended.stderr) == (0, "stop frames sent\n")
+
+
+def test_both_axes_of_one_node_are_stopped_by_one_frame() -> None:
+    both = tuple(replace(drive, node_id=5, axis=axis) for axis, drive in enumerate(config().drives))
+
+    rounds = plan(replace(config(), drives=both))
+
+    assert [[(f.cob_id, f.data.hex()) for f in frames] for frames in rounds] == [
+        *([[(0x505, "02000200")]] * 3),
+        [(0x000, "8005")],
+    ]
+
+
+def test_a_bus_that_is_not_there(tmp_path: Path) -> None:
+    nowhere = {"interface": "socketcan", "channel": "nocan7"}
+
+    ended = run(stop_file(tmp_path, replace(config(), bus_arguments=nowhere)))
+
+    assert ended.returncode == 1
+    assert "nocan7" in ended.stderr
+
+
+@pytest.mark.parametrize("text", ["", "{}", '{"drives": 3}', "[]"])
+def test_a_file_that_tells_nothing(tmp_path: Path, text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "stop.json"
+    path.write_text(text)
+
+    assert main([str(path)]) == 2
+    assert str(path) in capsys.readouterr().err
+
+
+def test_a_missing_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(tmp_path / "none")]) == 2
+    assert "none" in capsys.readouterr().err
+
+
+def test_an_adapter_that_blocks_ends_in_bounded_time(tmp_path: Path) -> None:
+    fifo = tmp_path / "blocks"
+    os.mkfifo(fifo)  # opening it waits for a writer that never comes, like a driver that hangs in the kernel
+
+    assert run(fifo).returncode == -14
