@@ -15,6 +15,8 @@ SDO_TO_SERVER = 0x600
 HEARTBEAT = 0x700
 # Broadcast.
 NMT = 0x000
+ALL_NODES = 0
+"""Node id of an NMT command to every node."""
 MAX_NODE_ID = 127
 
 SYNC = Frame(0x080)

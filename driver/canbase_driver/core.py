@@ -16,7 +16,7 @@ from functools import partial
 from canbase_config.robot import DRIVER_NODE_ID, Robot
 from canbase_driver.axis import Axis
 from canbase_driver.bus_health import BusReport
-from canbase_driver.cia301 import EMCY, HEARTBEAT, SDO_TO_CLIENT, SYNC, NmtCommand, NmtState, heartbeat, nmt
+from canbase_driver.cia301 import EMCY, HEARTBEAT, NMT, SDO_TO_CLIENT, SYNC, NmtCommand, NmtState, heartbeat, nmt
 from canbase_driver.cia402 import PowerGoal
 from canbase_driver.command import Command
 from canbase_driver.cycle_stats import CycleStats
@@ -251,11 +251,17 @@ class DriverCore:
         self._feed.update(now)
         return understood
 
+    def _on_nmt(self, frame: Frame, now: float) -> bool:
+        for node in self._drives.nodes:
+            node.on_nmt(frame, now)
+        return True
+
     def _dispatch_table(self) -> dict[int, tuple[Handler, RemoteNode | None]]:
         """Who takes a frame, and the node that may go on with its boot after it."""
         table: dict[int, tuple[Handler, RemoteNode | None]] = {
             STATE_COB_ID: (self._watchdog.on_frame, None),
             COUNTERS_COB_ID: (self._watchdog.on_counters, None),
+            NMT: (self._on_nmt, None),
         }
         for node in self._drives.nodes:
             table[EMCY + node.node_id] = (node.on_emcy, None)

@@ -14,7 +14,7 @@ from enum import Enum
 
 from canbase_config.robot import Robot
 from canbase_driver.axis import Axis
-from canbase_driver.cia301 import NmtCommand, NmtState, nmt, parse_heartbeat
+from canbase_driver.cia301 import ALL_NODES, NmtCommand, NmtState, nmt, parse_heartbeat
 from canbase_driver.emcy import Emcy, parse_emcy
 from canbase_driver.frame import Frame
 from canbase_driver.node_boot import NodeBoot
@@ -22,6 +22,8 @@ from canbase_driver.pdo import NodeLayout
 
 START_TIMEOUT_S = 1.0
 """From NMT start to a heartbeat "operational" and a status of every axis."""
+HOLD_S = 0.2
+"""So long after the last NMT "enter pre-operational" it is left alone; the watchdog repeats it every 0.05 s."""
 RETRY_S = 1.0
 """Between two boots of a node that failed."""
 
@@ -51,6 +53,7 @@ class RemoteNode:
         self.stops_by_itself = False
         self.boot_error = ""
         self.notes: tuple[str, ...] = ()
+        self._held_until = -math.inf
         self._boot: NodeBoot | None = None
         self._since_s = -math.inf
         self._why_gone = "not booted yet"
@@ -89,8 +92,11 @@ class RemoteNode:
         return ""
 
     def begin_boot(self, now: float) -> None:
-        """Boot it (again). Does nothing while a boot runs, and not more often than every RETRY_S after a failed one."""
-        if self.presence is not Presence.GONE or (self.boot_error and now - self._since_s < RETRY_S):
+        """Boot it (again). Does nothing while a boot runs, within RETRY_S after a failed one, and
+        while the watchdog's ladder holds it: a boot would work against that.
+        """
+        too_soon = self.boot_error and now - self._since_s < RETRY_S
+        if self.presence is not Presence.GONE or too_soon or now < self._held_until:
             return
         self._boot = NodeBoot(self.node_id, self._drives, self._robot)
         self._go(Presence.BOOTING, now)
@@ -119,6 +125,11 @@ class RemoteNode:
         elif self._boot is not None:
             self._boot.on_frame(frame, now)
         return True
+
+    def on_nmt(self, frame: Frame, now: float) -> None:
+        """Take an NMT command (000h) that is on the bus: somebody keeps it pre-operational."""
+        if frame.data in (bytes((NmtCommand.ENTER_PRE_OPERATIONAL, node)) for node in (ALL_NODES, self.node_id)):
+            self._held_until = now + HOLD_S
 
     def on_status(self, axis: Axis, frame: Frame, now: float) -> bool:
         """Take 6041h and 6064h of one of its axes. False: not understood."""

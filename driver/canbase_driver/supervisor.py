@@ -123,10 +123,10 @@ _MISSING, _TRIPPED = _watchdog(WatchdogView.MISSING), _watchdog(WatchdogView.TRI
 BLOCKERS: tuple[Blocker, ...] = (
     Blocker("stop requested", _stop_requested, DriverState.LATCHED, "reset"),
     Blocker("bus failed", lambda s: s.bus, DriverState.OFFLINE, "the bus working"),
+    Blocker("watchdog tripped", _TRIPPED, DriverState.LATCHED, "reset"),
     Blocker("booting", lambda s: s.booting or s.absent, DriverState.BOOTING, "drives booted"),
     Blocker("drive fault", lambda s: s.fault, DriverState.LATCHED, "reset, with the drive's cause gone"),
     Blocker("drive silent", lambda s: s.silent, DriverState.DISARMED, "the drive answering"),
-    Blocker("watchdog tripped", _TRIPPED, DriverState.DISARMED, "reset"),
     Blocker("watchdog missing", _MISSING, DriverState.DISARMED, "the watchdog alive"),
     Blocker("resetting", lambda s: "a reset is under way" if s.resetting else "", DriverState.DISARMED, "its end"),
     Blocker("command not zero", lambda s: s.commanded, DriverState.DISARMED, "a zero command"),

@@ -46,7 +46,7 @@ def test_a_watchdog_that_has_tripped_before_the_start_needs_a_reset_and_power_co
     world.run(1.0)
     world.start_driver()
     world.command = Twist2D.ZERO
-    world.run_until(DriverState.DISARMED, within_s=1.5)
+    world.run_until(DriverState.LATCHED, within_s=1.5)
     world.run(0.5)
     assert (world.core.cause.name, world.core.cause.detail) == ("watchdog tripped", "watchdog: driver silent")
     assert ENABLE_OPERATION not in words(world)

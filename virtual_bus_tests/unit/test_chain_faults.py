@@ -110,7 +110,9 @@ def test_a_new_driver_takes_over_after_a_kill_and_needs_a_reset(world: World) ->
     world.run(0.6)
     world.start_driver()
     world.command = Twist2D.ZERO
-    world.run_until(DriverState.DISARMED, within_s=1.5)
+    world.run_until(DriverState.LATCHED, within_s=1.5)
+    world.run(1.5)
+    assert world.core.state is DriverState.LATCHED
     assert world.recovered()
 
 

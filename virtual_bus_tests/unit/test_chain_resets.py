@@ -206,3 +206,49 @@ def test_an_emergency_message_that_its_drive_never_takes_back_goes_with_the_rese
     assert world.snapshot.drives[0].error_code == OVERCURRENT
     assert world.recovered()
     assert world.snapshot.drives[0].error_code == 0
+
+
+def hold_node_1(world: World, seconds: float) -> None:
+    """A watchdog on the second rung of its ladder: node 1 is kept pre-operational."""
+    for _ in range(round(seconds / 0.05)):
+        world.inject(0x77E, "05")
+        world.inject(0x1FE, "02 03 02 01 14 00 00 00")
+        world.inject(0x000, "80 01")
+        world.run(0.05)
+
+
+def test_a_node_that_the_watchdog_keeps_pre_operational_is_not_booted_against_it(world: World) -> None:
+    world.watchdog = None
+    start = world.now
+    hold_node_1(world, 3.0)
+    assert world.core.state is DriverState.LATCHED
+    assert world.sent(0x601, since=start) == []
+    hold_node_1(world, 0.05)
+    released = world.now
+    world.run(1.0)
+    assert released + 0.1 < next(at for at, frame in world.log if frame.cob_id == 0x601 and at > start) < released + 0.3
+    assert world.snapshot.drives[0].nmt_state == "operational"
+
+
+def test_a_watchdog_that_forgets_its_trip_in_a_restart_leaves_the_latch_to_the_driver(world: World) -> None:
+    world.leases = False
+    world.run_until(DriverState.LATCHED, within_s=1.5)
+    world.command, world.leases = Twist2D.ZERO, True
+    world.watchdog = Watchdog(watchdog_config(world.robot), world.now)
+    world.run(2.0)
+    assert world.watchdog.status.state is WatchdogState.WATCHING
+    assert (world.core.state, world.core.cause.name) == (DriverState.LATCHED, "watchdog tripped")
+    assert world.recovered()
+
+
+def test_a_trip_that_a_new_driver_found_is_latched_by_it_though_the_watchdog_restarts_too(world: World) -> None:
+    world.kill_driver()
+    world.run(1.0)
+    world.start_driver()
+    world.command = Twist2D.ZERO
+    world.run(0.2)  # the drives are not even booted
+    world.watchdog = Watchdog(watchdog_config(world.robot), world.now)
+    world.run(2.0)
+    assert world.core.state is DriverState.LATCHED
+    assert [(stop.stopped_by, stop.latched) for stop in world.core.stops] == [("watchdog", True)]
+    assert world.recovered()

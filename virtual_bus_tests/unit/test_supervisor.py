@@ -101,10 +101,11 @@ def at(state: DriverState, wheels: Situation = STANDING) -> Story:
 
 
 NOT_YET = {"bus failed": OFFLINE, "booting": BOOTING, "drive restarted": BOOTING} | dict.fromkeys(
-    ("drive silent", "watchdog tripped", "watchdog missing", "resetting", "command not zero", "not standing"), DISARMED
+    ("drive silent", "watchdog missing", "resetting", "command not zero", "not standing"), DISARMED
 )
 BEFORE_POWER = [(wrong, state, False) for wrong, state in NOT_YET.items()] + [
     ("drive fault", LATCHED, True),
+    ("watchdog tripped", LATCHED, True),
     ("stop requested", LATCHED, True),
 ]
 
