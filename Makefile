@@ -74,6 +74,6 @@ $(VENV)/requirements: pyproject.toml Makefile $(VENV)/made
 	python -m pip install --quiet --requirement $@.txt --group dev
 	@touch $@
 
-$(VENV)/ready: $(VENV)/requirements CMakeLists.txt package.xml $(INTERFACES)
+$(VENV)/ready: $(VENV)/requirements CMakeLists.txt package.xml $(INTERFACES) $(wildcard deploy/systemd/*)
 	python -m pip install --quiet --no-deps --no-build-isolation --config-settings build-dir=$(VENV)/build --editable .
 	@touch $@

@@ -6,7 +6,7 @@ from typing import Annotated, Final
 
 import typer
 
-from canbase_cli import config, demo, doctor, drive, process, rotate, trigger, up
+from canbase_cli import config, demo, doctor, drive, install, process, rotate, trigger, up
 from canbase_cli.goal import GoalCommand
 from canbase_cli.options import RosCommand
 
@@ -48,6 +48,8 @@ app.command("stop", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.stop)
 app.command("reset", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.reset)
 app.command("doctor", cls=RosCommand, options_metavar=_ROS_USAGE)(doctor.doctor)
 app.add_typer(config.app, name="config")
+app.command("install")(install.install)
+app.command("uninstall")(install.uninstall)
 app.command("driver", cls=RosCommand, options_metavar=_ROS_USAGE)(process.driver)
 app.command("velocity", cls=RosCommand, options_metavar=_ROS_USAGE)(process.velocity)
 app.command("action-server", cls=RosCommand, options_metavar=_ROS_USAGE)(process.action_server)

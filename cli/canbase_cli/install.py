@@ -1,0 +1,104 @@
+"""`canbase install` and `canbase uninstall`: a robot's services on this computer. What they are: canbase_deploy."""
+
+from __future__ import annotations
+
+import os
+import sys
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from canbase_cli.options import FAILED, WRONG_INPUT, fail, load_config
+
+
+class Network(str, Enum):
+    """Who may be on the robot's ROS network."""
+
+    LOCALHOST = "localhost"
+    LAN = "lan"
+
+
+PrefixOption = Annotated[
+    Path, typer.Option("--prefix", metavar="DIR", help="Write below DIR, an image's root; run no command.")
+]
+DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Only print what would be done.")]
+
+
+def install(
+    config: Annotated[
+        Path | None,
+        typer.Option("--config", "-c", metavar="FILE", help="The robot.yaml.", show_default="the installed one"),
+    ] = None,
+    name: Annotated[str, typer.Option("--name", help="Name of the robot.", show_default="name in robot.yaml")] = "",
+    prefix: PrefixOption = Path("/"),
+    dry_run: DryRunOption = False,
+    network: Annotated[Network, typer.Option(help="Who may talk ROS with the robot.")] = Network.LOCALHOST,
+    can: Annotated[bool, typer.Option("--can/--no-can", help="Bring the CAN interface up.")] = True,
+    adapter: Annotated[
+        str, typer.Option(metavar="PROPERTY=VALUE", help="udev property of the adapter that gets the channel's name.")
+    ] = "",
+    cpus: Annotated[str, typer.Option(metavar="LIST", help="CPUs for the services, such as 2,3.")] = "",
+    hardware_watchdog: Annotated[
+        int, typer.Option(metavar="SECONDS", min=0, max=600, help="Let a hardware watchdog reset a frozen computer.")
+    ] = 0,
+) -> None:
+    """Install the robot's services: they start at boot, before anybody logs in.
+
+    Units, the user canbase, robot.yaml with mode 0640, the CAN interface. May be given again at any time: what the
+    owner has changed in /etc/canbase is kept, a robot.yaml that is replaced stays beside the new one as .old.
+
+    Exit codes: 0 done, 1 a step failed, 2 wrong command line or robot.yaml, or a robot that services cannot run.
+    """
+    from canbase_deploy.execute import ExecuteError, Executor
+    from canbase_deploy.host import manifests, service_environment, templates
+    from canbase_deploy.plan import InstallError, Request, install_plan, owner_paths
+
+    loaded = load_config(config or prefix / owner_paths(name or "robot")[0].relative_to("/"))
+    try:
+        request = Request(
+            name=name or loaded.robot.name,
+            robot=loaded.robot,
+            yaml=None if config is None else config.read_text(encoding="utf-8"),
+            python=sys.executable,
+            templates=templates(),
+            environment=service_environment(os.environ),
+            network=network.value,
+            bring_up_can=can,
+            adapter=adapter,
+            cpus=cpus,
+            hardware_watchdog_s=hardware_watchdog,
+        )
+        plan = install_plan(request, manifests(prefix))
+    except InstallError as error:
+        fail(str(error), WRONG_INPUT)
+    try:
+        Executor(prefix, typer.echo, dry_run=dry_run).carry_out(plan)
+    except ExecuteError as error:
+        fail(str(error), FAILED)
+    if not dry_run and prefix == Path("/"):
+        typer.echo(f"now: sudo systemctl start canbase@{request.name}.target, or boot; wheels up for the first time")
+
+
+def uninstall(
+    name: Annotated[str, typer.Argument(help="Name of the robot.")] = "robot",
+    prefix: PrefixOption = Path("/"),
+    dry_run: DryRunOption = False,
+    purge: Annotated[bool, typer.Option("--purge", help="Remove its robot.yaml and environment too.")] = False,
+) -> None:
+    """Stop a robot's services and remove them. Its robot.yaml stays, unless --purge.
+
+    Exit codes: 0 done, 1 a step failed, 2 no such robot.
+    """
+    from canbase_deploy.execute import ExecuteError, Executor
+    from canbase_deploy.host import manifests
+    from canbase_deploy.plan import InstallError, owner_paths, uninstall_plan
+
+    owner_files = [str(path) for path in owner_paths(name)] if purge else []
+    try:
+        Executor(prefix, typer.echo, dry_run=dry_run).carry_out(uninstall_plan(name, manifests(prefix), owner_files))
+    except InstallError as error:
+        fail(str(error), WRONG_INPUT)
+    except ExecuteError as error:
+        fail(str(error), FAILED)

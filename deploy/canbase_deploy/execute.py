@@ -1,0 +1,114 @@
+"""Carries out a plan on this machine or below a prefix, and says what it did. All side effects are here."""
+
+from __future__ import annotations
+
+import grp
+import os
+import subprocess
+from collections.abc import Callable, Sequence
+from pathlib import Path, PurePosixPath
+
+from canbase_deploy.actions import Action, Existing, Link, Remove, Run, WriteFile
+
+COMMAND_S = 60.0
+
+
+class ExecuteError(RuntimeError):
+    """A step failed; those before it are done. After the cause is gone the same command may be given again."""
+
+
+class Executor:
+    """Carries out actions one by one."""
+
+    def __init__(self, prefix: Path, say: Callable[[str], None], *, dry_run: bool = False) -> None:
+        """`prefix` other than /: files go below it and no command is run. `dry_run`: only says what it would do."""
+        self._prefix, self._say, self._dry_run = prefix, say, dry_run
+
+    def carry_out(self, actions: Sequence[Action]) -> None:
+        """All of them, in order. Raises ExecuteError."""
+        for action in actions:
+            try:
+                self._one(action)
+            except (OSError, subprocess.SubprocessError) as error:
+                advice = " Run it with sudo." if isinstance(error, PermissionError) else ""
+                raise ExecuteError(f"{_name(action)}: {error}.{advice}") from error
+
+    def _one(self, action: Action) -> None:
+        match action:
+            case WriteFile():
+                self._write(action)
+            case Link():
+                self._link(action)
+            case Remove():
+                self._remove(action)
+            case Run():
+                self._run(action)
+
+    def _write(self, action: WriteFile) -> None:
+        path = self._below(action.path)
+        there = path.read_text(encoding="utf-8") if path.is_file() else None
+        if there == action.text:
+            self._tell("as it was", action.path)
+        elif there is not None and action.existing is Existing.KEEP:
+            self._tell("kept     ", action.path)
+            return
+        elif there is not None and action.existing is Existing.BACK_UP:
+            self._tell("replaced ", action.path, f"the old one is {action.path.name}.old")
+            self._put(path.with_name(f"{path.name}.old"), there, action)
+        else:
+            self._tell("wrote    ", action.path)
+        self._put(path, action.text, action)
+
+    def _put(self, path: Path, text: str, action: WriteFile) -> None:
+        """Whole or not at all, and never readable for more than it is meant to be."""
+        if self._dry_run:
+            return
+        path.parent.mkdir(parents=True, exist_ok=True)
+        new = path.with_name(f".{path.name}.new")
+        new.unlink(missing_ok=True)
+        descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with open(descriptor, "w", encoding="utf-8") as file:
+            file.write(text)
+            if action.group and self._prefix == Path("/"):
+                os.fchown(descriptor, 0, grp.getgrnam(action.group).gr_gid)
+            os.fchmod(descriptor, action.mode)
+        new.replace(path)
+
+    def _link(self, action: Link) -> None:
+        path = self._below(action.path)
+        if path.is_symlink() and os.readlink(path) == action.target:
+            self._tell("as it was", action.path)
+            return
+        self._tell("linked   ", action.path)
+        if not self._dry_run:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.unlink(missing_ok=True)
+            path.symlink_to(action.target)
+
+    def _remove(self, action: Remove) -> None:
+        path = self._below(action.path)
+        if not (path.is_symlink() or path.exists()):
+            return
+        self._tell("removed  ", action.path)
+        if self._dry_run:
+            return
+        path.unlink()
+        if path.parent.suffix in (".d", ".wants") and not any(path.parent.iterdir()):
+            path.parent.rmdir()
+
+    def _run(self, action: Run) -> None:
+        if self._prefix != Path("/"):
+            return
+        self._say(f"ran       {' '.join(action.argv)}")
+        if not self._dry_run:
+            subprocess.run(action.argv, check=not action.may_fail, timeout=COMMAND_S, stdin=subprocess.DEVNULL)
+
+    def _below(self, path: PurePosixPath) -> Path:
+        return self._prefix / path.relative_to("/")
+
+    def _tell(self, what: str, path: PurePosixPath, more: str = "") -> None:
+        self._say(f"{what} {path}" + (f" ({more})" if more else ""))
+
+
+def _name(action: Action) -> str:
+    return " ".join(action.argv) if isinstance(action, Run) else str(action.path)

@@ -1,0 +1,215 @@
+"""Which files, links and commands make a robot's services. Pure: a request in, a list of actions out.
+
+Files that the owner edits (robot.yaml, the environment) are in /etc/canbase; all others are ours and are written anew.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import PurePosixPath
+from typing import Final, Literal
+
+from canbase_config.robot import Robot
+from canbase_deploy.actions import Action, Existing, Link, Remove, Run, WriteFile
+
+USER: Final = "canbase"
+ETC: Final = PurePosixPath("/etc/canbase")
+UNITS: Final = PurePosixPath("/etc/systemd/system")
+RUN: Final = PurePosixPath("/run/canbase")
+PARTS: Final = ("watchdog", "driver", "velocity", "action-server")
+WITH_ROS: Final = PARTS[1:]
+ON_THE_BUS: Final = PARTS[:2]
+
+ACCOUNT: Final = WriteFile(
+    PurePosixPath("/etc/sysusers.d/canbase.conf"), f'u {USER} - "canbase motor driver stack" {RUN}\n'
+)
+MODES: Final = WriteFile(
+    PurePosixPath("/etc/tmpfiles.d/canbase.conf"),
+    f"d {ETC} 0750 root {USER}\nz {ETC}/*.yaml 0640 root {USER}\nz {ETC}/*.env 0640 root {USER}\n",
+)
+"""User and modes as declarations, so that they come true at the first boot of an image too."""
+
+_INTERFACE: Final = re.compile(r"[A-Za-z0-9_.]{1,15}")
+_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_CPUS: Final = re.compile(r"\d+(-\d+)?(,\d+(-\d+)?)*")
+_ADAPTER: Final = re.compile(r"[A-Z_]+=\S+")
+_PYTHON: Final = "@PYTHON@"
+
+
+class InstallError(ValueError):
+    """This robot cannot be installed so; the text says what to change."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What to install. `templates`: name and text of the files in deploy/systemd; `python`: runs `-m canbase_cli`.
+
+    `yaml`: the text of robot.yaml, None: keep the installed one. `adapter`: a udev property, `ID_PATH=…`, that names
+    the adapter which is to get the interface's name. `cpus`: for CPUAffinity. `hardware_watchdog_s`: 0 leaves it alone.
+    """
+
+    name: str
+    robot: Robot
+    yaml: str | None
+    python: str
+    templates: Mapping[str, str]
+    environment: Mapping[str, str] = field(default_factory=dict)
+    network: Literal["localhost", "lan"] = "localhost"
+    bring_up_can: bool = True
+    adapter: str = ""
+    cpus: str = ""
+    hardware_watchdog_s: int = 0
+
+
+def install_plan(request: Request, manifests: Mapping[str, str]) -> list[Action]:
+    """All actions, in order. `manifests`: what is installed now; files of this robot that it no longer has are removed.
+
+    Raises InstallError for a robot that services cannot run.
+    """
+    _check(request)
+    files = _files(request)
+    manifest = "".join(f"{action.path}\n" for action in files if not _is_the_owners(action))
+    stale = [path for path in _own(request.name, manifests) if path not in manifest.splitlines()]
+    return [
+        ACCOUNT,
+        Run(("systemd-sysusers", str(ACCOUNT.path))),
+        *files,
+        *(Remove(PurePosixPath(path)) for path in stale),
+        WriteFile(manifest_path(request.name), manifest),
+        Run(("systemd-tmpfiles", "--create", str(MODES.path))),
+        Run(("udevadm", "control", "--reload")),
+        Run(("systemctl", "daemon-reload")),
+    ]
+
+
+def uninstall_plan(name: str, manifests: Mapping[str, str], owner_files: Iterable[str] = ()) -> list[Action]:
+    """Removes what `manifests[name]` lists and no other robot's manifest does; `owner_files` too, if given.
+
+    Raises InstallError when `name` is not installed.
+    """
+    if name not in manifests:
+        known = ", ".join(sorted(manifests)) or "none"
+        raise InstallError(f"the robot {name!r} is not installed; installed: {known}")
+    return [
+        Run(("systemctl", "stop", f"canbase@{name}.target", *(service(part, name) for part in PARTS)), True),
+        *(Remove(PurePosixPath(line)) for line in [*_own(name, manifests), *owner_files]),
+        Remove(manifest_path(name)),
+        Run(("systemctl", "daemon-reload")),
+    ]
+
+
+def _own(name: str, manifests: Mapping[str, str]) -> list[str]:
+    """Files that belong to this robot and to no other one."""
+    others = {path for other, text in manifests.items() if other != name for path in text.splitlines()}
+    return [path for path in manifests.get(name, "").splitlines() if path not in others]
+
+
+def service(part: str, name: str) -> str:
+    """Name of the unit of one part of one robot."""
+    return f"canbase-{part}@{name}.service"
+
+
+def manifest_path(name: str) -> PurePosixPath:
+    """Where the files of one robot are listed."""
+    return ETC / "installed" / f"{name}.txt"
+
+
+def owner_paths(name: str) -> tuple[PurePosixPath, PurePosixPath]:
+    """The two files of a robot that an upgrade and an ordinary `uninstall` keep."""
+    return ETC / f"{name}.yaml", ETC / f"{name}.env"
+
+
+def _is_the_owners(action: WriteFile | Link) -> bool:
+    return isinstance(action, WriteFile) and action.existing is not Existing.REPLACE
+
+
+def _check(request: Request) -> None:
+    if not _NAME.fullmatch(request.name):
+        raise InstallError(f"--name {request.name!r}: expected letters, digits and _, first a letter")
+    if request.cpus and not _CPUS.fullmatch(request.cpus):
+        raise InstallError(f"--cpus {request.cpus!r}: expected numbers and ranges, such as 2,3 or 4-7")
+    bus, lease = request.robot.bus, PurePosixPath(request.robot.lease.socket)
+    if bus.interface != "socketcan":
+        raise InstallError(
+            f"bus.interface is {bus.interface}: the services need socketcan; `canbase up` runs everything else"
+        )
+    if not _INTERFACE.fullmatch(bus.channel):
+        raise InstallError(f"bus.channel is {bus.channel!r}: expected a CAN interface such as can0")
+    if lease.parent not in (RUN, RUN / request.name):
+        raise InstallError(
+            f"lease.socket is {lease}: expected {RUN / request.name / 'lease.sock'}, a folder of canbase"
+        )
+    if request.adapter and not _ADAPTER.fullmatch(request.adapter):
+        raise InstallError(
+            f"--adapter {request.adapter}: expected a udev property such as ID_PATH=pci-0000:00:14.0-usb"
+        )
+
+
+def _files(request: Request) -> list[WriteFile | Link]:
+    return [
+        *(_unit(name, text, request.python) for name, text in sorted(request.templates.items())),
+        MODES,
+        *_of_the_owner(request),
+        *_can(request),
+        *_tuning(request),
+        Link(UNITS / "multi-user.target.wants" / f"canbase@{request.name}.target", "../canbase@.target"),
+    ]
+
+
+def _unit(name: str, text: str, python: str) -> WriteFile:
+    return WriteFile(UNITS / name, text.replace(_PYTHON, python))
+
+
+def _of_the_owner(request: Request) -> list[WriteFile]:
+    yaml_path, env_path = owner_paths(request.name)
+    reach = "LOCALHOST" if request.network == "localhost" else "SUBNET"
+    values = {"ROS_AUTOMATIC_DISCOVERY_RANGE": reach, **request.environment}
+    env = "# Environment of the services of this robot. Kept by upgrades.\n"
+    env += "".join(f"{key}={value}\n" for key, value in values.items())
+    env += "# CANBASE_OPTIONS=--namespace robot1\n# CANBASE_ROS_ARGS=-r scan:=front/scan\n"
+    files = [WriteFile(env_path, env, 0o640, USER, Existing.KEEP)]
+    if request.yaml is not None:
+        files.append(WriteFile(yaml_path, request.yaml, 0o640, USER, Existing.BACK_UP))
+    return files
+
+
+def _can(request: Request) -> list[WriteFile | Link]:
+    """The interface, and who waits for it. Unplugged, the watchdog goes; plugged in again, it is started anew."""
+    interface, name = request.robot.bus.channel, request.name
+    device = f"sys-subsystem-net-devices-{interface}.device"
+    unit = f"canbase-can@{interface}.service" if request.bring_up_can else device
+    files: list[WriteFile | Link] = [
+        _drop_in("watchdog", name, "10-can", f"[Unit]\nBindsTo={unit}\nAfter={unit}\n"),
+        _drop_in("driver", name, "10-can", f"[Unit]\nWants={unit}\nAfter={unit}\n"),
+        Link(UNITS / f"{device}.wants" / service("watchdog", name), "../canbase-watchdog@.service"),
+    ]
+    if request.bring_up_can:
+        env = f"BITRATE={request.robot.bus.bitrate}\nRESTART_MS=100\nTXQUEUELEN=100\n"
+        files.append(WriteFile(ETC / "can" / f"{interface}.env", env))
+    if request.adapter:
+        link = f"[Match]\nType=can\nProperty={request.adapter}\n\n[Link]\nName={interface}\n"
+        files.append(WriteFile(PurePosixPath(f"/etc/systemd/network/70-canbase-{interface}.link"), link))
+    return files
+
+
+def _tuning(request: Request) -> list[WriteFile]:
+    files: list[WriteFile] = []
+    if request.network == "lan":
+        files += [_drop_in(part, request.name, "20-lan", "[Service]\nIPAddressAllow=any\n") for part in WITH_ROS]
+    if request.cpus:
+        text = f"[Service]\nCPUAffinity={request.cpus}\n"
+        files += [_drop_in(part, request.name, "30-cpus", text) for part in PARTS]
+    relay = request.robot.watchdog.relay
+    if relay is not None:
+        text = f"[Service]\nPrivateDevices=no\nDevicePolicy=closed\nDeviceAllow={relay.chip} rw\n"
+        files.append(_drop_in("watchdog", request.name, "40-relay", text))
+    if request.hardware_watchdog_s:
+        text = f"[Manager]\nRuntimeWatchdogSec={request.hardware_watchdog_s}s\n"
+        files.append(WriteFile(PurePosixPath("/etc/systemd/system.conf.d/canbase.conf"), text))
+    return files
+
+
+def _drop_in(part: str, name: str, file: str, text: str) -> WriteFile:
+    return WriteFile(UNITS / f"{service(part, name)}.d" / f"{file}.conf", text)

@@ -1,0 +1,129 @@
+"""The unit files as systemd itself reads them: `systemd-analyze verify` and `security`. Nothing is started.
+
+Without systemd on the computer these tests are skipped, loudly; the virtual robot runs the units for real.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from canbase_config.load import load_robot, sample
+from canbase_deploy.execute import Executor
+from canbase_deploy.host import read_templates
+from canbase_deploy.plan import PARTS, Request, install_plan
+
+TEMPLATES = Path(__file__).parents[2] / "deploy" / "systemd"
+ANALYZE = shutil.which("systemd-analyze")
+needs_systemd = pytest.mark.skipif(
+    ANALYZE is None, reason="NOT CHECKED: no systemd-analyze here (apt-get install systemd): unit files go unverified"
+)
+EXPOSURE = {"can": 1.8, "watchdog": 1.2, "driver": 1.4, "velocity": 1.3, "action-server": 1.3}
+"""`systemd-analyze security`, from 0 (nothing to be had) to 10: what a unit may have at most."""
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A root with the services of the example robot, as `canbase install --prefix` makes it."""
+    root = tmp_path_factory.mktemp("root")
+    path = sample("example_can0")
+    request = Request("example", load_robot(path).robot, path.read_text(), sys.executable, read_templates(TEMPLATES))
+    Executor(root, lambda line: None).carry_out(install_plan(request, {}))
+    return root
+
+
+def analyze(*words: str, units: Path) -> subprocess.CompletedProcess[str]:
+    assert ANALYZE is not None
+    environment = os.environ | {"SYSTEMD_UNIT_PATH": f"{units}:"}
+    return subprocess.run([ANALYZE, *words], env=environment, capture_output=True, text=True, timeout=60, check=False)
+
+
+@needs_systemd
+@pytest.mark.parametrize(
+    "unit",
+    ["canbase@example.target", "canbase-can@can0.service", *(f"canbase-{part}@example.service" for part in PARTS)],
+)
+def test_systemd_understands_every_line(installed: Path, unit: str) -> None:
+    said = analyze("verify", "--man=no", unit, units=installed / "etc/systemd/system")
+
+    assert [line for line in said.stderr.splitlines() if "canbase" in line] == []
+
+
+@needs_systemd
+def test_a_wrong_line_would_be_noticed(installed: Path, tmp_path: Path) -> None:
+    right = (installed / "etc/systemd/system/canbase-driver@.service").read_text()
+    (tmp_path / "canbase-driver@.service").write_text(right.replace("Restart=always", "Restart=sometimes"))
+
+    said = analyze("verify", "--man=no", "canbase-driver@example.service", units=tmp_path)
+
+    assert "sometimes" in said.stderr
+
+
+@needs_systemd
+@pytest.mark.parametrize(("part", "least"), EXPOSURE.items())
+def test_a_unit_is_as_tight_as_stated(installed: Path, part: str, least: float) -> None:
+    unit = installed / "etc/systemd/system" / f"canbase-{part}@.service"
+
+    said = analyze("security", "--offline=true", str(unit), units=unit.parent)
+
+    exposure = re.search(r"exposure level for .*: ([\d.]+)", said.stdout)
+    assert exposure is not None, said.stderr
+    assert float(exposure[1]) <= least
+
+
+def directives(part: str) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    for line in (TEMPLATES / f"canbase-{part}@.service").read_text().splitlines():
+        key, equals, value = line.partition("=")
+        if equals and not line.startswith("#"):
+            found.setdefault(key, []).append(value)
+    return found
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_a_loop_that_hangs_is_found_and_a_dead_process_comes_back(part: str) -> None:
+    unit = directives(part)
+
+    assert (unit["Type"], unit["WatchdogSec"], unit["Restart"]) == (["notify"], ["1"], ["always"])
+    assert unit["RestartPreventExitStatus"] == ["2"]
+    assert int(unit["StartLimitBurst"][0]) > 0
+
+
+@pytest.mark.parametrize("part", ["watchdog", "driver"])
+def test_who_can_leave_wheels_turning_has_stop_frames_sent_at_its_end(part: str) -> None:
+    unit = directives(part)
+
+    (stop,) = unit["ExecStopPost"]
+    assert stop.startswith("-")  # a stop that fails must not keep the unit from being started again
+    assert stop.endswith("-m canbase_watchdog.stop /run/canbase/%i/stop.json")
+    assert "--stop-file /run/canbase/%i/stop.json" in unit["ExecStart"][0]
+
+
+def test_the_watchdog_is_up_first_and_outlives_the_driver() -> None:
+    driver = directives("driver")
+
+    assert "canbase-watchdog@%i.service" in driver["After"][0]
+    assert "Requires" not in driver  # a driver without watchdog runs and says so; power it gives none
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_no_unit_has_a_capability(part: str) -> None:
+    unit = directives(part)
+
+    assert unit["CapabilityBoundingSet"] == [""]
+    assert unit["AmbientCapabilities"] == [""]
+    assert unit["User"] == ["canbase"]
+
+
+def test_only_the_two_on_the_bus_reach_it() -> None:
+    assert [part for part in PARTS if "AF_CAN" in directives(part)["RestrictAddressFamilies"][0]] == [
+        "watchdog",
+        "driver",
+    ]
+    assert directives("watchdog")["RestrictAddressFamilies"] == ["AF_UNIX AF_CAN"]
