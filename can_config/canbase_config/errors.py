@@ -18,6 +18,15 @@ def key_path(loc: Loc) -> str:
 
 
 @dataclass(frozen=True, slots=True)
+class Place:
+    """Where a value stands: file, line from 1 (None: it is about the whole file), and the key as that file has it."""
+
+    file: str
+    line: int | None
+    key: str
+
+
+@dataclass(frozen=True, slots=True)
 class Problem:
     """One thing that is wrong. `line` counts from 1; None: it is about the whole file."""
 

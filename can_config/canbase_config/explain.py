@@ -6,24 +6,30 @@ import difflib
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from canbase_config.errors import Loc, Problem, key_path
+from canbase_config.errors import Loc, Problem
 from canbase_config.schema import Schema, Shape, expected
 from canbase_config.section import MisfitError
 from canbase_config.yaml_file import YamlFile
 
 
 def explain(error: ValidationError, file: YamlFile, schema: Schema) -> tuple[Problem, ...]:
-    """One problem for each error, in the order of the file's lines; those of the whole file first.
+    """One problem for each error, in the order of the files' lines; those of a whole file first.
 
     `schema` is that of the model which refused the file.
     """
     problems = [_explain(details, file, schema) for details in error.errors(include_url=False) if not _is_echo(details)]
-    return tuple(sorted(problems, key=lambda problem: problem.line or 0))
+    return tuple(sorted(problems, key=lambda problem: (problem.file, problem.line or 0)))
+
+
+def _at(file: YamlFile, loc: Loc, what: str, expected: str = "", hint: str = "") -> Problem:
+    place = file.place(loc)
+    return Problem(place.file, place.line, place.key, what, expected, hint)
 
 
 def _is_echo(details: ErrorDetails) -> bool:
@@ -37,27 +43,27 @@ def _explain(details: ErrorDetails, file: YamlFile, schema: Schema) -> Problem:
 
 def _missing(details: ErrorDetails, file: YamlFile, schema: Schema) -> Problem:
     loc = details["loc"]
-    return Problem(str(file.path), file.line(loc), key_path(loc), "missing", expected(schema.shape_at(loc)))
+    return _at(file, loc, "missing", expected(schema.shape_at(loc)))
 
 
 def _unknown_key(details: ErrorDetails, file: YamlFile, schema: Schema) -> Problem:
     *section, key = details["loc"]
     hint = _key_hint(str(key), tuple(section), schema)
-    return Problem(str(file.path), file.line(details["loc"]), key_path(details["loc"]), "unknown key", hint=hint)
+    return _at(file, details["loc"], "unknown key", hint=hint)
 
 
 def _bad_key(details: ErrorDetails, file: YamlFile, _schema: Schema) -> Problem:
     *section, key = details["loc"]
     what = f"the key {found(key)} is no text"
     line = file.line((*section, str(key)))
-    return Problem(str(file.path), line, key_path(tuple(section)), what, hint=f'put it in quotes: "{found(key)}"')
+    return replace(_at(file, tuple(section), what, hint=f'put it in quotes: "{found(key)}"'), line=line)
 
 
 def _misfit(details: ErrorDetails, file: YamlFile, _schema: Schema) -> Problem:
     error = details["ctx"]["error"]
     places = [(*details["loc"], *at) for at in error.at] if isinstance(error, MisfitError) else []
     loc = next((place for place in places if place in file.lines), details["loc"])
-    return Problem(str(file.path), file.line(loc), key_path(loc), str(error))
+    return _at(file, loc, str(error))
 
 
 def _wrong_value(details: ErrorDetails, file: YamlFile, schema: Schema) -> Problem:
@@ -67,7 +73,7 @@ def _wrong_value(details: ErrorDetails, file: YamlFile, schema: Schema) -> Probl
     shape = schema.shape_at(loc)
     words = expected(shape) if shape else details["msg"]
     what, hint = f"got {found(value)}", _value_hint(value, shape)
-    return Problem(str(file.path), file.line(loc), key_path(loc), what, words, hint)
+    return _at(file, loc, what, words, hint)
 
 
 def _wrong_name(details: ErrorDetails, file: YamlFile, schema: Schema) -> Problem:
@@ -76,7 +82,7 @@ def _wrong_name(details: ErrorDetails, file: YamlFile, schema: Schema) -> Proble
     if not isinstance(loc[-1], str):
         return _bad_key({**details, "loc": loc}, file, schema)
     names = "letters, digits and _, first a letter, at most 64 characters"
-    return Problem(str(file.path), file.line(loc), key_path(loc), f"got the name {found(loc[-1])}", names)
+    return _at(file, loc, f"got the name {found(loc[-1])}", names)
 
 
 _EXPLAINERS: Final[Mapping[str, Callable[[ErrorDetails, YamlFile, Schema], Problem]]] = {

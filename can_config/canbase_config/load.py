@@ -14,6 +14,7 @@ from canbase_config.errors import ConfigError, Loc
 from canbase_config.explain import explain
 from canbase_config.robot import Robot
 from canbase_config.schema import Schema
+from canbase_config.twist_mux import with_twist_mux
 from canbase_config.yaml_file import read_yaml
 
 ROBOT_SCHEMA = Schema(Robot)
@@ -30,8 +31,11 @@ class Loaded:
 
 
 def load_robot(path: str | Path) -> Loaded:
-    """The robot that the YAML file at `path` describes. Raises ConfigError, which carries all problems found."""
-    file = read_yaml(path)
+    """The robot that the YAML file at `path` describes, with the files that `mux.twist_mux` names read in.
+
+    Raises ConfigError, which carries all problems found.
+    """
+    file = with_twist_mux(read_yaml(path))
     try:
         robot = Robot.model_validate(file.values, context={"folder": file.path.parent})
     except ValidationError as error:

@@ -1,12 +1,16 @@
-"""The keys of robot.yaml below `mux`: the sources of velocity commands."""
+"""The keys of robot.yaml below `mux`: the sources of velocity commands, the locks, and who may publish them."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Iterable
+from typing import Annotated, Final, Literal
 
 from pydantic import Field, model_validator
 
-from canbase_config.section import MisfitError, Name, Section, Topic
+from canbase_config.section import MisfitError, Name, NodeName, Section, Topic
+
+OUTPUTS: Final = ("cmd_vel_mux", "cmd_vel")
+"""What the chain itself says: a source there would make the robot follow its own last command for ever."""
 
 
 class MuxSource(Section):
@@ -16,6 +20,19 @@ class MuxSource(Section):
     priority: Annotated[int, Field(ge=0, le=255, description="the higher wins; no two alike")]
     timeout_s: Annotated[float, Field(ge=0.05, le=2.0, description="silent for longer: holds no more [s]")]
     stamped: Annotated[bool, Field(description="true: TwistStamped, false: Twist")] = True
+    nodes: Annotated[
+        tuple[NodeName, ...],
+        Field(min_length=0, max_length=16, strict=False, description="who may publish there; empty: anybody"),
+    ] = ()
+
+
+class MuxLock(Section):
+    """A topic (std_msgs/Bool, true = locked) that holds back every source whose priority is lower than its own."""
+
+    topic: Annotated[Topic, Field(description="relative to the node's namespace")]
+    priority: Annotated[int, Field(ge=0, le=255, description="sources below it are held back, those alike are not")]
+    required: Annotated[bool, Field(description="true: a silent topic counts as locked")] = True
+    timeout_s: Annotated[float, Field(ge=0.05, le=5.0, description="silent for longer: locked, if required [s]")] = 0.5
 
 
 DEFAULT_SOURCES = {
@@ -29,14 +46,45 @@ class Mux(Section):
     """Who may drive."""
 
     sources: Annotated[dict[Name, MuxSource], Field(min_length=1)] = DEFAULT_SOURCES
+    locks: dict[Name, MuxLock] = Field(default_factory=dict)
+    foreign_publishers: Annotated[
+        Literal["report", "lock"],
+        Field(description="publishers on sources' topics and cmd_vel that no key names: said, or held back too"),
+    ] = "report"
+    twist_mux: Annotated[
+        tuple[Annotated[str, Field(min_length=1, max_length=400)], ...],
+        Field(min_length=0, max_length=8, strict=False, description="parameter files of twist_mux, added to the above"),
+    ] = ()
 
     @model_validator(mode="after")
-    def _no_two_alike(self) -> Mux:
+    def _fits_together(self) -> Mux:
         for what in ("priority", "topic"):
-            seen: dict[object, str] = {}
-            for name, source in self.sources.items():
-                other = seen.setdefault(getattr(source, what), name)
-                if other != name:
-                    message = f"sources {other} and {name} have the same {what}; each needs its own"
-                    raise MisfitError(message, ("sources", name, what))
+            self._no_two_alike(what)
+        for name, source in self.sources.items():
+            if source.topic.removeprefix("/") in OUTPUTS:
+                message = f"{source.topic} is what this robot orders itself; a source needs another topic"
+                raise MisfitError(message, ("sources", name, "topic"))
+        for name, lock in self.locks.items():
+            self._check_lock(name, lock)
         return self
+
+    def _no_two_alike(self, what: str) -> None:
+        seen: dict[object, str] = {}
+        for name, source in self.sources.items():
+            other = seen.setdefault(getattr(source, what), name)
+            if other != name:
+                message = f"sources {other} and {name} have the same {what}; each needs its own"
+                raise MisfitError(message, ("sources", name, what))
+
+    def _check_lock(self, name: str, lock: MuxLock) -> None:
+        if lock.topic in _topics(self.sources.values()):
+            message = f"{lock.topic} is the topic of a source too; a lock needs one of its own"
+            raise MisfitError(message, ("locks", name, "topic"))
+        lowest = min(source.priority for source in self.sources.values())
+        if lock.priority <= lowest:
+            message = f"{lock.priority} holds nobody back: the lowest source has {lowest}, and a lock must be above it"
+            raise MisfitError(message, ("locks", name, "priority"))
+
+
+def _topics(sources: Iterable[MuxSource]) -> set[str]:
+    return {source.topic for source in sources}

@@ -22,6 +22,14 @@ Topic = Annotated[
         json_schema_extra={"form": "letters, digits and _, joined by /, each part first a letter"},
     ),
 ]
+NodeName = Annotated[
+    str,
+    Field(
+        pattern=r"^/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*$",
+        max_length=128,
+        json_schema_extra={"form": "a node's name, with its namespace or relative to the robot's"},
+    ),
+]
 
 
 class MisfitError(ValueError):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,7 +14,7 @@ from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
-from canbase_config.errors import ConfigError, Loc, Problem
+from canbase_config.errors import ConfigError, Loc, Place, Problem, key_path
 
 _TAG: Final = "tag:yaml.org,2002:"
 _MERGE_TAG: Final = f"{_TAG}merge"
@@ -35,11 +35,15 @@ _CoreConstructor.yaml_constructors = {
 
 @dataclass(frozen=True, slots=True)
 class YamlFile:
-    """The content of a file. `lines`: for every key and every list entry its line, counted from 1."""
+    """The content of a file. `lines`: for every key and every list entry its line, counted from 1.
+
+    `places`: of what another file has contributed, where it stands there.
+    """
 
     path: Path
     values: Mapping[str, Any]
     lines: Mapping[Loc, int]
+    places: Mapping[Loc, Place] = field(default_factory=dict)
 
     def line(self, loc: Loc) -> int | None:
         """Line of `loc`, or of the innermost section around it that the file has; None: the top of the file."""
@@ -47,6 +51,10 @@ class YamlFile:
             if loc[:length] in self.lines:
                 return self.lines[loc[:length]]
         return None
+
+    def place(self, loc: Loc) -> Place:
+        """Where `loc` stands, or the innermost section around it, in this file or in the one that it came from."""
+        return self.places.get(loc) or Place(str(self.path), self.line(loc), key_path(loc))
 
 
 def read_yaml(path: str | Path) -> YamlFile:

@@ -129,7 +129,9 @@ def test_given_sources_replace_the_default_ones(tmp_path: Path) -> None:
     loaded = load(tmp_path, {END: "mux: {sources: {pad: {topic: pad, priority: 7, timeout_s: 0.1}}}"})
 
     assert list(loaded.robot.mux.sources) == ["pad"]
-    assert {key_path(loc) for loc in loaded.defaults if loc[0] == "mux"} == {"mux.sources.pad.stamped"}
+    assert {key_path(loc) for loc in loaded.defaults if loc[0] == "mux"} == {
+        "mux.sources.pad.stamped", "mux.sources.pad.nodes", "mux.locks", "mux.foreign_publishers", "mux.twist_mux",
+    }  # fmt: skip
 
 
 def test_whole_numbers_do_for_numbers(tmp_path: Path) -> None:

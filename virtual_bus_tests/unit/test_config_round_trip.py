@@ -83,9 +83,16 @@ def made_consistent(values: Values) -> Values:
     for what in ("distance_m", "speed_mps", "angle_rad", "speed_radps"):
         action.pop(f"max_{what}", None)
         action[f"min_{what}"] = min(action.get(f"min_{what}", 0.01), 0.4)
-    for index, source in enumerate(values.get("mux", {}).get("sources", {}).values()):
-        source |= {"priority": index, "topic": f"{source['topic'][:100].rstrip('/')}_{index}"}
+    make_mux_consistent(values.get("mux", {}))
     return values
+
+
+def make_mux_consistent(mux: Values) -> None:
+    mux.pop("twist_mux", None)  # files that would have to exist
+    for index, source in enumerate(mux.get("sources", {}).values()):
+        source |= {"priority": index, "topic": f"{source['topic'][:100].rstrip('/')}_{index}"}
+    for lock in mux.get("locks", {}).values():
+        lock |= {"priority": max(lock["priority"], 41), "topic": f"{lock['topic'][:100].rstrip('/')}_lock"}
 
 
 SCHEMA = Robot.model_json_schema()

@@ -1,0 +1,158 @@
+"""Reads parameter files of twist_mux (ros-teleop/twist_mux) as they are, and lays them into a robot.yaml's `mux`.
+
+Such a file has, below NODE: ros__parameters:, `topics` and `locks`, each entry with topic, timeout and priority, nested
+or in dotted keys (topics.joy.timeout: 0.5). What is outside of our ranges is told with the file's own line and key.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+from canbase_config.errors import ConfigError, Loc, Place, Problem, key_path
+from canbase_config.yaml_file import YamlFile, read_yaml
+
+PARAMETERS: Final = "ros__parameters"
+USE_STAMPED: Final = "use_stamped"
+STAMPED_BY_DEFAULT: Final = True
+"""As twist_mux since 4.4; older ones know Twist alone."""
+FIELDS: Final = {"topic": "topic", "timeout": "timeout_s", "priority": "priority"}
+"""Keys of an entry, theirs and ours."""
+GROUPS: Final = {"topics": "sources", "locks": "locks"}
+EXAMPLE: Final = "twist_mux: {ros__parameters: {topics: {joystick: {topic: joy_vel, timeout: 0.5, priority: 100}}}}"
+
+Entry = dict[str, "Parameter"]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One value of a parameter file and where it stands."""
+
+    value: Any
+    place: Place
+
+
+def with_twist_mux(file: YamlFile) -> YamlFile:
+    """`file` with the sources and locks of the files that its mux.twist_mux names, which are relative to its folder.
+
+    Without `mux.sources` in `file` these are all the sources. Raises ConfigError for a file that is none of twist_mux,
+    and for a name that `file` has too. Types and ranges are left to the model.
+    """
+    mux = file.values.get("mux")
+    if not isinstance(mux, dict):
+        return file
+    names = mux.get("twist_mux")
+    if not isinstance(names, list) or not names or not all(isinstance(name, str) and name for name in names):
+        return file
+    parameters: dict[str, Parameter] = {}
+    for name in names:
+        parameters |= _parameters(file.path.parent / name)
+    return _merged(file, mux, parameters)
+
+
+def _merged(file: YamlFile, mux: Mapping[str, Any], parameters: Mapping[str, Parameter]) -> YamlFile:
+    merged = {**mux, "twist_mux": []}
+    places: dict[Loc, Place] = {}
+    stamped = parameters.get(USE_STAMPED)
+    for group, ours in GROUPS.items():
+        entries = _entries(parameters, group)
+        given = merged.get(ours) or {}
+        if not entries or not isinstance(given, dict):
+            continue  # what is no section, the model tells
+        for name, entry in entries.items():
+            _refuse_second(file, given, ("mux", ours, name), entry)
+            places |= _places(("mux", ours, name), group, entry, stamped)
+        make = _lock if ours == "locks" else partial(_source, stamped=stamped)
+        merged[ours] = {**given, **{name: make(entry) for name, entry in entries.items()}}
+    lines = {**file.lines, **{loc: place.line for loc, place in places.items() if place.line is not None}}
+    return replace(file, values={**file.values, "mux": merged}, lines=lines, places=places)
+
+
+def _parameters(path: Path) -> dict[str, Parameter]:
+    """All parameters of the one node in the file that has topics or locks, by their dotted names."""
+    file = read_yaml(path)
+    found: dict[Loc, dict[str, Parameter]] = {}
+    for node, section, loc in _nodes(file.values, ()):
+        parameters = dict(_flat(section, loc, (), file))
+        if any(name.partition(".")[0] in GROUPS for name in parameters):
+            found[node] = parameters
+    if not found:
+        what = "has no topics and no locks of twist_mux"
+        raise ConfigError([Problem(str(path), None, "", what, hint=f"it should look like {EXAMPLE}")])
+    if len(found) > 1:
+        nodes = " and ".join("/".join(str(part) for part in node) for node in found)
+        raise ConfigError([Problem(str(path), None, "", f"has topics or locks of {nodes}; keep those of one node")])
+    return next(iter(found.values()))
+
+
+def _nodes(values: Any, loc: Loc) -> Iterator[tuple[Loc, Mapping[str, Any], Loc]]:
+    """Name, parameters and place of each node: `twist_mux`, `/**`, or a node below its namespace."""
+    if not isinstance(values, dict):
+        return
+    for key, inner in values.items():
+        if key == PARAMETERS and isinstance(inner, dict):
+            yield loc, inner, (*loc, key)
+        elif key != PARAMETERS:
+            yield from _nodes(inner, (*loc, key))
+
+
+def _flat(values: Any, loc: Loc, name: tuple[str, ...], file: YamlFile) -> Iterator[tuple[str, Parameter]]:
+    if isinstance(values, dict) and values:
+        for key, inner in values.items():
+            yield from _flat(inner, (*loc, key), (*name, str(key)), file)
+    else:
+        dotted = ".".join(name)
+        yield dotted, Parameter(values, Place(str(file.path), file.line(loc), dotted))
+
+
+def _entries(parameters: Mapping[str, Parameter], group: str) -> dict[str, Entry]:
+    """`topics.joy.timeout` → entries["joy"]["timeout"]. Keys that twist_mux does not read are left out, as it does."""
+    entries: dict[str, Entry] = {}
+    for dotted, parameter in parameters.items():
+        first, _, rest = dotted.partition(".")
+        name, _, field = rest.rpartition(".")
+        if first == group and not name:
+            what = f"{first} must hold entries with {', '.join(FIELDS)}"
+            raise ConfigError([Problem(parameter.place.file, parameter.place.line, dotted, what)])
+        if first == group:
+            entries.setdefault(name, {})[field] = parameter
+    return entries
+
+
+def _source(entry: Entry, stamped: Parameter | None) -> dict[str, Any]:
+    return {**_known(entry), "stamped": STAMPED_BY_DEFAULT if stamped is None else stamped.value}
+
+
+def _lock(entry: Entry) -> dict[str, Any]:
+    """timeout 0 is twist_mux's way to say that a lock may be silent."""
+    values = _known(entry)
+    timeout = values.get("timeout_s")
+    if type(timeout) in (int, float) and timeout == 0:
+        del values["timeout_s"]
+        return {**values, "required": False}
+    return {**values, "required": True} if timeout is not None else {"timeout_s": None, **values}
+
+
+def _known(entry: Entry) -> dict[str, Any]:
+    return {FIELDS[field]: parameter.value for field, parameter in entry.items() if field in FIELDS}
+
+
+def _places(loc: Loc, group: str, entry: Entry, stamped: Parameter | None) -> dict[Loc, Place]:
+    """Also of what is missing: there the line of the entry."""
+    first = next(iter(entry.values())).place
+    name = f"{group}.{loc[-1]}"
+    places = {(*loc, ours): replace(first, key=f"{name}.{theirs}") for theirs, ours in FIELDS.items()}
+    places[loc] = replace(first, key=name)
+    if stamped is not None:
+        places |= {(*loc, "stamped"): stamped.place}
+    return places | {(*loc, FIELDS[field]): value.place for field, value in entry.items() if field in FIELDS}
+
+
+def _refuse_second(file: YamlFile, given: Mapping[str, Any], loc: Loc, entry: Entry) -> None:
+    if loc[-1] in given:
+        place = next(iter(entry.values())).place
+        what = f"{key_path(loc)} is given in {file.path.name} too"
+        raise ConfigError([Problem(place.file, place.line, place.key, what, hint="keep one, or rename one")])
