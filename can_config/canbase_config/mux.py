@@ -38,7 +38,7 @@ class MuxLock(Section):
 DEFAULT_SOURCES = {
     "joystick": MuxSource(topic="cmd_vel_joy", priority=100, timeout_s=0.3),
     "navigation": MuxSource(topic="cmd_vel_nav", priority=50, timeout_s=0.5),
-    "action": MuxSource(topic="cmd_vel_action", priority=40, timeout_s=0.3),
+    "action": MuxSource(topic="cmd_vel_action", priority=40, timeout_s=0.3, nodes=("drive_distance_server",)),
 }
 
 

@@ -20,7 +20,7 @@ from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.io import LeaseSender
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.messages import safety_state, scan_of, stop_event, stopped_by_estop, twist_message, twist_of
-from canbase_velocity.qos import COMMAND, EVENT, SCAN, STATE
+from canbase_velocity.qos import ANY_COMMAND, COMMAND, EVENT, SCAN, STATE, listen_twice
 from canbase_velocity.safety_filter import SHUTDOWN, FilterConfig, braking_time_s
 
 STATE_PERIOD_S = 0.1
@@ -42,9 +42,9 @@ class FilterNode(Node):
         self._commands = self.create_publisher(TwistStamped, "cmd_vel", COMMAND)
         self._states = self.create_publisher(SafetyState, "safety_filter/state", STATE)
         self._events = self.create_publisher(StopEvent, "stop_events", EVENT)
-        self.create_subscription(TwistStamped, "cmd_vel_mux", self._on_command, COMMAND)
+        self.create_subscription(TwistStamped, "cmd_vel_mux", self._on_command, ANY_COMMAND)
         self.create_subscription(LaserScan, robot.safety.scan.topic, self._on_scan, SCAN)
-        self.create_subscription(Bool, robot.safety.estop.topic, self._on_estop, COMMAND)
+        listen_twice(self, Bool, robot.safety.estop.topic, self._on_estop)
         self._timer = self.create_timer(1.0 / robot.rates.command_hz, self._tick)
 
     def shut_down(self) -> None:

@@ -1,4 +1,4 @@
-"""ROS messages from and to the plain values of this package. No node, no clock."""
+"""ROS messages from and to this package's plain values; the mux's own are in mux_messages.py. No node, no clock."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ import math
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from canbase.msg import MuxSource, MuxState, SafetyState, StopEvent
+from canbase.msg import SafetyState, StopEvent
 from geometry_msgs.msg import Twist as TwistMessage
 from geometry_msgs.msg import TwistStamped
 from sensor_msgs.msg import LaserScan
 
 from canbase_velocity.clearance import Scan
 from canbase_velocity.decision import Cause, Decision
-from canbase_velocity.mux import MuxDecision, SourceView, Standing
 from canbase_velocity.safety_filter import Inputs
 from canbase_velocity.twist import Twist
 
@@ -41,26 +40,6 @@ def twist_message(twist: Twist, stamp: Time, frame_id: str) -> TwistStamped:
 def scan_of(message: LaserScan) -> Scan:
     """The part of a scan that clearances need."""
     return Scan(message.ranges, message.angle_min, message.angle_increment, message.range_min, message.range_max)
-
-
-def mux_state(decision: MuxDecision, stamp: Time) -> MuxState:
-    """velocity_mux/state."""
-    sources = [_mux_source(source) for source in decision.sources]
-    return MuxState(stamp=stamp, active=decision.active or "", sources=sources)
-
-
-def _mux_source(source: SourceView) -> MuxSource:
-    return MuxSource(
-        name=source.name,
-        topic=source.topic,
-        priority=source.priority,
-        active=source.standing is Standing.ACTIVE,
-        age_s=_or_nan(source.age_s),
-        timeout_s=source.timeout_s,
-        received=source.received,
-        refused=source.refused,
-        reason=source.reason,
-    )
 
 
 def safety_state(decision: Decision, inputs: Inputs, scan_is_fresh: bool, stamp: Time) -> SafetyState:

@@ -1,4 +1,6 @@
-"""The node velocity_mux: ROS around mux.py. Sources in, cmd_vel_mux and velocity_mux/state out; see docs/ros_api.md."""
+"""The node velocity_mux: ROS around mux.py. Sources and locks in, cmd_vel_mux and velocity_mux/state out; it also looks
+into the ROS graph for publishers that should not be there. See docs/ros_api.md.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +9,23 @@ import math
 import time
 
 from canbase.msg import MuxState
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist as TwistMessage
 from geometry_msgs.msg import TwistStamped
 from rclpy.node import Node
+from std_msgs.msg import Bool
 
 from canbase_config.robot import Robot
-from canbase_velocity.messages import mux_state, twist_message, twist_of
+from canbase_velocity.foreign import ForeignWatch
+from canbase_velocity.graph import expected, publishers
+from canbase_velocity.messages import twist_message, twist_of
 from canbase_velocity.mux import Mux, MuxDecision
-from canbase_velocity.qos import COMMAND, STATE
+from canbase_velocity.mux_messages import diagnostics, mux_state
+from canbase_velocity.qos import ANY_COMMAND, COMMAND, STATE, listen_twice, loud
 
 STATE_PERIOD_S = 0.5
+GRAPH_PERIOD_S = 0.5
+DIAGNOSTICS_PERIOD_S = 1.0
 
 
 class MuxNode(Node):
@@ -24,21 +33,35 @@ class MuxNode(Node):
 
     def __init__(self, robot: Robot) -> None:
         super().__init__("velocity_mux")
-        self._mux = Mux(robot.mux.sources)
-        self._frame_id = robot.base.base_frame
+        self._robot = robot
+        self._mux = Mux(robot.mux.sources, robot.mux.locks, foreign_lock=robot.mux.foreign_publishers == "lock")
+        self._watch = ForeignWatch(expected(robot, self))
         self._decision = self._mux.decide(time.monotonic())
         self._state_at_s = -math.inf
-        self._commands = self.create_publisher(TwistStamped, "cmd_vel_mux", COMMAND)
+        self._deaf: list[str] = []
+        self._commands = self.create_publisher(
+            TwistStamped, "cmd_vel_mux", COMMAND, event_callbacks=loud(self, "cmd_vel_mux", self._deaf)
+        )
         self._states = self.create_publisher(MuxState, "velocity_mux/state", STATE)
-        for name, source in robot.mux.sources.items():
-            kind = TwistStamped if source.stamped else TwistMessage
-            callback = self._on_stamped if source.stamped else self._on_plain
-            self.create_subscription(kind, source.topic, functools.partial(callback, name), COMMAND)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._listen()
         self._timer = self.create_timer(1.0 / robot.rates.command_hz, self._tick)
+        self.create_timer(GRAPH_PERIOD_S, self._look)
+        self.create_timer(DIAGNOSTICS_PERIOD_S, self._diagnose)
 
     def shut_down(self) -> None:
         """Sends one zero and says so in the state. Called several times: one may be lost."""
         self._send(self._mux.shutdown(time.monotonic()), time.monotonic())
+
+    def _listen(self) -> None:
+        for name, source in self._robot.mux.sources.items():
+            kind = TwistStamped if source.stamped else TwistMessage
+            callback = self._on_stamped if source.stamped else self._on_plain
+            self.create_subscription(kind, source.topic, functools.partial(callback, name), ANY_COMMAND)
+        for name, lock in self._robot.mux.locks.items():
+            listen_twice(self, Bool, lock.topic, functools.partial(self._on_lock, name))
+            if not lock.required:
+                self.get_logger().warning(f"the silence of lock {name} is not noticed: it is not required (timeout 0)")
 
     def _on_stamped(self, name: str, message: TwistStamped) -> None:
         self._on_plain(name, message.twist)
@@ -52,17 +75,43 @@ class MuxNode(Node):
             self._timer.reset()  # a source faster than the timer is not doubled by it
             self._send(decision, now)
 
+    def _on_lock(self, name: str, message: Bool) -> None:
+        now = time.monotonic()
+        self._mux.on_lock(name, message.data, now)
+        self._send_if_changed(now)
+
+    def _look(self) -> None:
+        """Into the ROS graph. What is found there is logged when it comes."""
+        now = time.monotonic()
+        before = self._decision.foreign
+        graph = {topic.topic: publishers(self, topic.topic) for topic in self._watch.expected}
+        foreign = self._watch.look(graph, now)
+        for found in foreign:
+            if found not in before:
+                self.get_logger().error(found.sentence)
+        self._mux.on_foreign(foreign)
+        self._send_if_changed(now)
+
+    def _send_if_changed(self, now: float) -> None:
+        decision = self._mux.decide(now)
+        if decision.essence != self._decision.essence:
+            self._send(decision, now)
+
     def _tick(self) -> None:
         """Nothing was sent for a period: repeats what holds, or zero."""
         now = time.monotonic()
         self._send(self._mux.decide(now), now)
 
     def _send(self, decision: MuxDecision, now: float) -> None:
-        self._commands.publish(twist_message(decision.twist, self.get_clock().now().to_msg(), self._frame_id))
-        changed = (decision.active, decision.standings) != (self._decision.active, self._decision.standings)
-        if changed or now - self._state_at_s >= STATE_PERIOD_S:
-            self._states.publish(mux_state(decision, self.get_clock().now().to_msg()))
+        stamp = self.get_clock().now().to_msg()
+        self._commands.publish(twist_message(decision.twist, stamp, self._robot.base.base_frame))
+        if decision.essence != self._decision.essence or now - self._state_at_s >= STATE_PERIOD_S:
+            self._states.publish(mux_state(decision, stamp))
             self._state_at_s = now
         if decision.active != self._decision.active:
             self.get_logger().info(f"{decision.active or 'nobody'} drives, before {self._decision.active or 'nobody'}")
         self._decision = decision
+
+    def _diagnose(self) -> None:
+        stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(diagnostics(self._decision, self._robot.name, tuple(self._deaf), stamp))

@@ -1,14 +1,51 @@
-"""Quality of service of the topics of mux and filter."""
+"""Quality of service of the topics of mux and filter, and subscriptions that hear every publisher."""
 
 from __future__ import annotations
 
-from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import (
+    DurabilityPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_policy_name_from_kind,
+    qos_profile_sensor_data,
+)
 
 COMMAND = QoSProfile(depth=1)
 """Velocities and the emergency stop: only the newest counts."""
+ANY_COMMAND = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""For subscriptions: hears reliable publishers and those of best effort. A reliable one would not hear the latter."""
 STATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Latched: who comes late sees the newest state."""
 EVENT = QoSProfile(depth=20, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Latched, as the motor driver's on the same topic: who comes late sees why the robot was stopped."""
 SCAN = qos_profile_sensor_data
 """Best effort: it fits every scanner's publisher, reliable or not."""
+
+
+def listen_twice(node: Node, kind: type[Any], topic: str, callback: Callable[[Any], None]) -> None:
+    """Subscribes to a topic that may speak once and then be silent, such as a button or a lock.
+
+    With best effort, to hear every publisher; and reliably, so that nothing gets lost of one that is reliable. The
+    callback may be called twice for one message.
+    """
+    silent = SubscriptionEventCallbacks(use_default_callbacks=False)  # the other one hears what this one does not
+    node.create_subscription(kind, topic, callback, COMMAND, event_callbacks=silent)
+    node.create_subscription(kind, topic, callback, ANY_COMMAND)
+
+
+def loud(node: Node, topic: str, deaf: list[str]) -> PublisherEventCallbacks:
+    """For a publisher: a subscriber that asks for more than it offers hears nothing. Logs that, adds it to `deaf`."""
+
+    def on_incompatible(event: Any) -> None:
+        policy = qos_policy_name_from_kind(event.last_policy_kind)
+        sentence = f"a subscriber of {topic} hears nothing: it asks for another {policy} than is offered"
+        if sentence not in deaf:
+            deaf.append(sentence)
+        node.get_logger().error(sentence)
+
+    return PublisherEventCallbacks(incompatible_qos=on_incompatible)

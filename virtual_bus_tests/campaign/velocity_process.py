@@ -68,7 +68,7 @@ class VelocityProcess(Process):
         now = self.clock.now
         self._mux_due, self._active = now + self._period_s, decision.active
         self._topics.publish("cmd_vel_mux", decision.twist)
-        told = (decision.active, decision.standings)
+        told = decision.essence
         if told != self._mux_told or now - self._mux_state_at >= MUX_STATE_PERIOD_S:
             self._mux_told, self._mux_state_at = told, now
             self._topics.publish("velocity_mux/state", decision)

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canbase_config.mux import DEFAULT_SOURCES, MuxSource
+from canbase_config.mux import DEFAULT_SOURCES, MuxLock, MuxSource
+from canbase_velocity.foreign import Foreign
 from canbase_velocity.mux import Mux, MuxDecision, Standing
 from canbase_velocity.twist import ZERO, Twist
 
@@ -24,6 +25,10 @@ def mux() -> Mux:
 
 def reasons(decision: MuxDecision) -> dict[str, str]:
     return {source.name: source.reason for source in decision.sources}
+
+
+def standings(decision: MuxDecision) -> list[Standing]:
+    return [source.standing for source in decision.sources]
 
 
 def test_before_any_command_zero_is_ordered_and_each_source_says_why(mux: Mux) -> None:
@@ -114,15 +119,113 @@ def test_at_shutdown_zero_is_ordered_whoever_wants_to_drive(mux: Mux) -> None:
     mux.on_command("joystick", FAST, 0.0)
     decision = mux.shutdown(0.1)
     assert (decision.active, decision.twist) == (None, ZERO)
-    assert set(decision.standings) == {Standing.SHUTDOWN}
+    assert standings(decision) == [Standing.SHUTDOWN] * 3
     assert reasons(decision)["joystick"] == "shutdown"
 
 
-def test_standings_change_with_the_reason_and_not_with_the_age(mux: Mux) -> None:
+def test_the_essence_changes_with_the_reason_and_not_with_the_age(mux: Mux) -> None:
     mux.on_command("navigation", SLOW, 0.0)
     first, later, silent = mux.decide(0.1), mux.decide(0.2), mux.decide(0.6)
-    assert first.standings == later.standings == (Standing.NEVER_RECEIVED, Standing.ACTIVE, Standing.NEVER_RECEIVED)
-    assert silent.standings == (Standing.NEVER_RECEIVED, Standing.SILENT, Standing.NEVER_RECEIVED)
+    assert first.essence == later.essence
+    assert first.essence != silent.essence
+    assert standings(first) == [Standing.NEVER_RECEIVED, Standing.ACTIVE, Standing.NEVER_RECEIVED]
+    assert standings(silent) == [Standing.NEVER_RECEIVED, Standing.SILENT, Standing.NEVER_RECEIVED]
+
+
+PAUSE = MuxLock(topic="pause", priority=60, required=False)
+BUTTON = MuxLock(topic="button", priority=255, timeout_s=0.5)
+
+
+def test_a_lock_holds_back_the_sources_below_it_and_not_those_above() -> None:
+    mux = Mux(DEFAULT_SOURCES, {"pause": PAUSE})
+    mux.on_command("navigation", SLOW, 0.0)
+    assert mux.decide(0.0).active == "navigation"  # a lock that is not required says nothing, and does not hold
+    mux.on_lock("pause", True, 0.1)
+    decision = mux.decide(0.1)
+    assert (decision.active, decision.twist) == (None, ZERO)
+    assert reasons(decision) == {
+        "joystick": "never received", "navigation": "locked: pause holds", "action": "locked: pause holds",
+    }  # fmt: skip
+    mux.on_command("joystick", FAST, 0.2)  # somebody drives it by hand all the same
+    assert mux.decide(0.2).active == "joystick"
+    mux.on_lock("pause", False, 0.3)
+    mux.on_command("navigation", SLOW, 0.3)
+    mux.on_command("joystick", FAST, 0.3)
+    assert reasons(mux.decide(0.3))["navigation"] == "joystick has priority"
+
+
+def test_a_source_with_the_priority_of_the_lock_is_not_held_back() -> None:
+    mux = Mux(DEFAULT_SOURCES, {"alike": MuxLock(topic="x", priority=50)})
+    mux.on_command("navigation", SLOW, 0.0)
+    assert mux.decide(0.0).active == "navigation"
+    mux.on_command("action", FAST, 0.6)
+    assert mux.decide(0.6).active is None
+
+
+def test_a_required_lock_holds_until_it_is_heard_and_again_when_it_falls_silent() -> None:
+    mux = Mux(DEFAULT_SOURCES, {"button": BUTTON})
+    mux.on_command("joystick", FAST, 0.0)
+    assert reasons(mux.decide(0.0))["joystick"] == "locked: button has never said anything on button"
+    mux.on_lock("button", False, 0.1)
+    assert mux.decide(0.1).active == "joystick"
+    mux.on_command("joystick", FAST, 0.6)
+    assert mux.decide(0.6).active == "joystick"  # 0.5 s after its word, exactly its timeout
+    decision = mux.decide(math.nextafter(0.6, 1.0))
+    assert reasons(decision)["joystick"] == "locked: button is silent for 0.50 s (timeout 0.50 s)"
+    mux.on_lock("button", False, 0.7)
+    mux.on_command("joystick", FAST, 0.7)
+    assert mux.decide(0.7).twist == FAST
+
+
+def test_the_last_true_of_a_lock_holds_however_long_it_is_silent() -> None:
+    mux = Mux(DEFAULT_SOURCES, {"pause": PAUSE})
+    mux.on_lock("pause", True, 0.0)
+    mux.on_command("action", FAST, 9999.0)
+    decision = mux.decide(9999.0)
+    assert decision.twist == ZERO
+    (lock,) = decision.locks
+    assert (lock.name, lock.holds, lock.age_s, lock.reason) == ("pause", True, 9999.0, "holds")
+
+
+def test_locks_are_told_by_falling_priority_and_a_change_of_one_changes_the_essence() -> None:
+    mux = Mux(DEFAULT_SOURCES, {"pause": PAUSE, "button": BUTTON})
+    mux.on_lock("button", False, 0.0)
+    before = mux.decide(0.0)
+    assert [(lock.name, lock.holds) for lock in before.locks] == [("button", False), ("pause", False)]
+    mux.on_lock("pause", True, 0.0)
+    assert mux.decide(0.0).essence != before.essence
+
+
+def test_a_lock_that_the_configuration_does_not_name_is_our_own_error(mux: Mux) -> None:
+    with pytest.raises(KeyError, match="pause"):
+        mux.on_lock("pause", True, 0.0)
+
+
+def stranger(source: str | None, *, heard: bool = True) -> Foreign:
+    return Foreign("/t", "/evil", "geometry_msgs/msg/TwistStamped", "only /good should", source, heard)
+
+
+def test_a_foreign_publisher_is_reported_and_holds_nobody_back_unless_the_configuration_says_so(mux: Mux) -> None:
+    mux.on_command("action", SLOW, 0.0)
+    quiet = mux.decide(0.0)
+    mux.on_foreign([stranger("action"), stranger(None)])
+    decision = mux.decide(0.0)
+    assert decision.active == "action"
+    assert decision.foreign == (stranger("action"), stranger(None))
+    assert decision.essence != quiet.essence
+
+
+def test_a_foreign_publisher_locks_its_source_alone_or_all_of_them_when_it_speaks_for_the_chain() -> None:
+    mux = Mux(DEFAULT_SOURCES, foreign_lock=True)
+    mux.on_foreign([stranger("action")])
+    mux.on_command("action", SLOW, 0.0)
+    assert reasons(mux.decide(0.0))["action"] == "locked: /evil publishes on /t: only /good should"
+    mux.on_command("joystick", FAST, 0.0)
+    assert mux.decide(0.0).active == "joystick"
+    mux.on_foreign([stranger(None)])
+    assert (mux.decide(0.0).active, mux.decide(0.0).twist) == (None, ZERO)
+    mux.on_foreign([stranger(None, heard=False)])  # of a type that nobody hears
+    assert mux.decide(0.0).active == "joystick"
 
 
 commands = st.lists(

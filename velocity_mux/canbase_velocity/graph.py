@@ -1,0 +1,52 @@
+"""What the mux expects in the ROS graph and what is there, in the words of foreign.py. Asks a node, decides nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from rclpy.node import Node
+
+from canbase_config.mux import MuxSource
+from canbase_config.robot import Robot
+from canbase_velocity.foreign import Expected, Publisher
+
+STAMPED: Final = "geometry_msgs/msg/TwistStamped"
+PLAIN: Final = "geometry_msgs/msg/Twist"
+OWNERS: Final = {"cmd_vel_mux": "velocity_mux", "cmd_vel": "safety_filter"}
+_NO_NAME: Final = "_NODE_NAME_UNKNOWN_"
+
+
+def expected(robot: Robot, node: Node) -> tuple[Expected, ...]:
+    """Who may publish what: on every source's topic, and on the two of the chain itself."""
+    return (*_of_sources(robot, node), *_of_chain(node))
+
+
+def publishers(node: Node, topic: str) -> list[Publisher]:
+    """Every publisher on the topic of this full name; this process's own too."""
+    return [
+        Publisher("" if info.node_name == _NO_NAME else full_name(info.node_name, info.node_namespace), info.topic_type)
+        for info in node.get_publishers_info_by_topic(topic)
+    ]
+
+
+def full_name(name: str, namespace: str) -> str:
+    """`name` in `namespace`; one with a leading / is full already."""
+    return name if name.startswith("/") else f"{namespace.rstrip('/')}/{name}"
+
+
+def _of_sources(robot: Robot, node: Node) -> Iterator[Expected]:
+    for name, source in robot.mux.sources.items():
+        nodes = tuple(full_name(allowed, node.get_namespace()) for allowed in source.nodes)
+        yield Expected(node.resolve_topic_name(source.topic), kind_of(source), name, nodes)
+
+
+def _of_chain(node: Node) -> Iterator[Expected]:
+    for topic, owner in OWNERS.items():
+        nodes = (full_name(owner, node.get_namespace()),)
+        yield Expected(node.resolve_topic_name(topic), STAMPED, None, nodes, alone=True)
+
+
+def kind_of(source: MuxSource) -> str:
+    """The message type that a source speaks."""
+    return STAMPED if source.stamped else PLAIN

@@ -1,0 +1,56 @@
+"""One lock of the mux: a Bool that holds sources back, and whose silence does too where it is required."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from canbase_config.mux import MuxLock
+
+
+@dataclass(frozen=True, slots=True)
+class LockView:
+    """One lock at one moment. `age_s` is None before its first message; `reason` is empty when it does not hold."""
+
+    name: str
+    topic: str
+    priority: int
+    holds: bool
+    required: bool
+    age_s: float | None
+    timeout_s: float
+    reason: str
+
+
+class Lock:
+    """A configured lock and its last word, which holds until the next one, however old it is."""
+
+    def __init__(self, name: str, config: MuxLock) -> None:
+        self.name = name
+        self.config = config
+        self._locked = False
+        self._at_s: float | None = None
+
+    def hear(self, locked: bool, now: float) -> None:
+        """Takes its word: true = locked."""
+        self._locked, self._at_s = locked, now
+
+    def cause(self, now: float) -> str:
+        """Why it holds at time `now` [s, monotonic]; empty: it does not."""
+        if self._locked:
+            return "holds"
+        if not self.config.required:
+            return ""
+        if self._at_s is None:
+            return f"has never said anything on {self.config.topic}"
+        age_s = now - self._at_s
+        if age_s <= self.config.timeout_s:
+            return ""
+        return f"is silent for {age_s:.2f} s (timeout {self.config.timeout_s:.2f} s)"
+
+    def view(self, now: float) -> LockView:
+        """What is told of it."""
+        config, cause = self.config, self.cause(now)
+        age_s = None if self._at_s is None else now - self._at_s
+        return LockView(
+            self.name, config.topic, config.priority, bool(cause), config.required, age_s, config.timeout_s, cause
+        )

@@ -1,0 +1,86 @@
+"""From a decision of the mux to ROS messages: velocity_mux/state and its entry in /diagnostics. No node, no clock."""
+
+from __future__ import annotations
+
+import math
+
+from builtin_interfaces.msg import Time
+from canbase.msg import ForeignPublisher, MuxLock, MuxSource, MuxState
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from canbase_velocity.foreign import Foreign
+from canbase_velocity.lock import LockView
+from canbase_velocity.mux import MuxDecision, SourceView, Standing
+
+
+def mux_state(decision: MuxDecision, stamp: Time) -> MuxState:
+    """velocity_mux/state."""
+    return MuxState(
+        stamp=stamp,
+        active=decision.active or "",
+        sources=[_source(source) for source in decision.sources],
+        locks=[_lock(lock) for lock in decision.locks],
+        foreign=[_foreign(foreign, decision.foreign_lock) for foreign in decision.foreign],
+    )
+
+
+def diagnostics(decision: MuxDecision, robot: str, deaf: tuple[str, ...], stamp: Time) -> DiagnosticArray:
+    """One entry. `deaf`: sentences about subscribers that ask for what we do not offer and hear nothing."""
+    problems = [*(foreign.sentence for foreign in decision.foreign), *deaf]
+    held = [f"{lock.name} {lock.reason}" for lock in decision.locks if lock.holds]
+    drives = f"{decision.active} drives" if decision.active else "nobody drives"
+    values = {source.name: source.reason or "drives" for source in decision.sources}
+    values |= {f"refused commands of {source.name}": str(source.refused) for source in decision.sources}
+    values |= {f"lock {lock.name}": lock.reason or "free" for lock in decision.locks}
+    values |= {f"foreign publisher {number}": foreign.sentence for number, foreign in enumerate(decision.foreign, 1)}
+    status = DiagnosticStatus(
+        level=DiagnosticStatus.WARN if problems else DiagnosticStatus.OK,
+        name=f"{robot}: velocity_mux",
+        message="; ".join([drives, *held, *problems]),
+        hardware_id=robot,
+        values=[KeyValue(key=key, value=value) for key, value in values.items()],
+    )
+    message = DiagnosticArray(status=[status])
+    message.header.stamp = stamp
+    return message
+
+
+def _source(source: SourceView) -> MuxSource:
+    return MuxSource(
+        name=source.name,
+        topic=source.topic,
+        priority=source.priority,
+        active=source.standing is Standing.ACTIVE,
+        age_s=_or_nan(source.age_s),
+        timeout_s=source.timeout_s,
+        received=source.received,
+        refused=source.refused,
+        reason=source.reason,
+    )
+
+
+def _lock(lock: LockView) -> MuxLock:
+    return MuxLock(
+        name=lock.name,
+        topic=lock.topic,
+        priority=lock.priority,
+        holds=lock.holds,
+        required=lock.required,
+        age_s=_or_nan(lock.age_s),
+        timeout_s=lock.timeout_s,
+        reason=lock.reason,
+    )
+
+
+def _foreign(foreign: Foreign, locks: bool) -> ForeignPublisher:
+    return ForeignPublisher(
+        topic=foreign.topic,
+        node=foreign.node,
+        type=foreign.kind,
+        problem=foreign.problem,
+        locks=locks and foreign.heard,
+    )
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
