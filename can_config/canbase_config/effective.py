@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from typing import Any, Final
 
 from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.nodes import ScalarNode
 from ruamel.yaml.representer import RoundTripRepresenter
 
@@ -45,6 +46,8 @@ def effective(loaded: Loaded) -> str:
 
 def _marked(value: Any, loc: Loc, defaults: frozenset[Loc]) -> Any:
     """`value` in ruamel.yaml's mappings, which carry comments: the mark behind each entry that is among `defaults`."""
+    if isinstance(value, (list, tuple)) and loc in defaults:
+        return _in_one_line(value)
     if isinstance(value, (list, tuple)):
         return [_marked(inner, (*loc, index), defaults) for index, inner in enumerate(value)]
     if not isinstance(value, dict) or not value:
@@ -55,3 +58,10 @@ def _marked(value: Any, loc: Loc, defaults: frozenset[Loc]) -> Any:
         if (*loc, key) in defaults:
             marked.yaml_add_eol_comment(DEFAULT_MARK, key, column=_MARK_COLUMN)
     return marked
+
+
+def _in_one_line(values: Sequence[Any]) -> CommentedSeq:
+    """So that the mark can stand behind it."""
+    line = CommentedSeq(values)
+    line.fa.set_flow_style()
+    return line

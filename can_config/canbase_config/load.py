@@ -55,11 +55,11 @@ def sample(name: str) -> Path:
 
 
 def leaf_keys(value: Any, loc: Loc = ()) -> Iterator[Loc]:
-    """Every place in nested mappings and lists that holds a plain value or something empty."""
+    """Every place in nested mappings and lists that holds a plain value, a list of them, or something empty."""
     if isinstance(value, dict) and value:
         for key, inner in value.items():
             yield from leaf_keys(inner, (*loc, key))
-    elif isinstance(value, (list, tuple)) and value:
+    elif isinstance(value, (list, tuple)) and any(isinstance(inner, (dict, list, tuple)) for inner in value):
         for index, inner in enumerate(value):
             yield from leaf_keys(inner, (*loc, index))
     else:
