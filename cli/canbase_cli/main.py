@@ -6,7 +6,7 @@ from typing import Annotated, Final
 
 import typer
 
-from canbase_cli import config, demo, doctor, drive, install, process, rotate, trigger, up
+from canbase_cli import config, demo, doctor, drive, install, monitor, process, rotate, trigger, up
 from canbase_cli.goal import GoalCommand
 from canbase_cli.options import RosCommand
 
@@ -44,6 +44,7 @@ app.command("demo")(demo.demo)
 app.command("up", cls=RosCommand, options_metavar=_ROS_USAGE)(up.up)
 app.command("drive", cls=GoalCommand, options_metavar=_ROS_USAGE)(drive.drive)
 app.command("rotate", cls=GoalCommand, options_metavar=_ROS_USAGE)(rotate.rotate)
+app.command("monitor", cls=RosCommand, options_metavar=_ROS_USAGE)(monitor.monitor)
 app.command("stop", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.stop)
 app.command("reset", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.reset)
 app.command("doctor", cls=RosCommand, options_metavar=_ROS_USAGE)(doctor.doctor)

@@ -1,0 +1,190 @@
+"""What `canbase monitor` shows, drawn from a snapshot: no ROS, no terminal, no clock. The shell is monitor.py."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from rich.console import Group, RenderableType
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+SILENT_S: Final = 1.5
+"""A node that has said nothing for longer is shown as silent: its slowest state comes every 0.5 s."""
+ACTIONS: Final = ("passes", "limits", "slows", "STOPS")
+"""SafetyState.action in words."""
+DRIVER_STATES: Final = ("OFFLINE", "BOOTING", "DISARMED", "ENABLING", "ENABLED", "STOPPING", "LATCHED")
+"""DriverStatus.state in words."""
+GOOD: Final = "green"
+WARN: Final = "yellow"
+BAD: Final = "bold red"
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """The last message of one topic and how old it is [s], by local receive time. None: nothing was received yet."""
+
+    message: Any = None
+    age_s: float | None = None
+
+    @property
+    def fresh(self) -> bool:
+        """Whether what it says can be taken for what is."""
+        return self.age_s is not None and self.age_s <= SILENT_S
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """What is known of a robot at one moment. mux: MuxState, safety: SafetyState, driver: DriverStatus."""
+
+    robot: str
+    mux: Heard = Heard()
+    safety: Heard = Heard()
+    driver: Heard = Heard()
+    event: Heard = Heard()
+    """The last StopEvent."""
+
+
+def picture(snapshot: Snapshot) -> RenderableType:
+    """The whole screen."""
+    return Group(
+        Panel(
+            headline(snapshot), title=f"canbase: {snapshot.robot}", subtitle="Ctrl-C ends the picture, not the robot"
+        ),
+        _part("Who may drive: velocity_mux", snapshot.mux, _mux),
+        _part("What gets through: safety_filter", snapshot.safety, _safety),
+        _part("The wheels: motor_driver and watchdog", snapshot.driver, _driver),
+        _event(snapshot.event),
+    )
+
+
+def headline(snapshot: Snapshot) -> Text:
+    """The one line that matters."""
+    parts = [_mux_word(snapshot.mux), _safety_word(snapshot.safety), *_driver_words(snapshot.driver)]
+    return Text("  |  ").join(parts)
+
+
+def line(snapshot: Snapshot) -> str:
+    """The headline and everything else that changes in steps, for an output that is no terminal. No ages, no speeds."""
+    words = [headline(snapshot).plain]
+    if snapshot.mux.fresh:
+        words += [
+            f"lock {lock.name} {lock.reason.split(' for ')[0]}" for lock in snapshot.mux.message.locks if lock.holds
+        ]
+        words += [f"foreign publisher {foreign.node} on {foreign.topic}" for foreign in snapshot.mux.message.foreign]
+    if snapshot.driver.fresh:
+        words += [f"{drive.joint} {drive.state}" for drive in snapshot.driver.message.drives]
+    return "  |  ".join(words)
+
+
+def _mux_word(heard: Heard) -> Text:
+    if not heard.fresh:
+        return _silence("velocity_mux", heard)
+    active = heard.message.active
+    return Text(f"{active} drives", GOOD) if active else Text("nobody drives", WARN)
+
+
+def _safety_word(heard: Heard) -> Text:
+    if not heard.fresh:
+        return _silence("safety_filter", heard)
+    action, cause = heard.message.action, heard.message.cause
+    style = (GOOD, WARN, WARN, BAD)[action]
+    return Text(f"filter {ACTIONS[action]}" + ("" if cause == "none" else f": {cause}"), style)
+
+
+def _driver_words(heard: Heard) -> list[Text]:
+    if not heard.fresh:
+        return [_silence("motor_driver", heard)]
+    status = heard.message
+    state = DRIVER_STATES[status.state]
+    style = {"ENABLED": GOOD, "LATCHED": BAD, "OFFLINE": BAD}.get(state, WARN)
+    cause = "" if status.cause in ("", "none") else f": {status.cause}"
+    watchdog = Text(f"watchdog {status.watchdog}", GOOD if status.watchdog == "ok" else BAD)
+    return [Text(f"driver {state}{cause}", style), watchdog]
+
+
+def _part(title: str, heard: Heard, draw: Callable[[Any], RenderableType]) -> Panel:
+    """What a silent node said last is left out: nobody may take it for what is."""
+    body = draw(heard.message) if heard.fresh else _silence("the node", heard)
+    return Panel(body, title=title, title_align="left", border_style="none" if heard.fresh else BAD)
+
+
+def _silence(who: str, heard: Heard) -> Text:
+    since = "not heard yet" if heard.age_s is None else f"SILENT for {heard.age_s:.0f} s"
+    return Text(f"{who} {since}", BAD)
+
+
+def _mux(state: Any) -> RenderableType:
+    table = _table("", "source", "age", "timeout", "refused", "why not")
+    for source in state.sources:
+        style = GOOD if source.active else ""
+        refused = Text(str(source.refused), BAD if source.refused else "")
+        reason = "drives" if source.active else source.reason
+        values = (str(source.priority), source.name, _seconds(source.age_s), _seconds(source.timeout_s))
+        table.add_row(*values, refused, reason, style=style)
+    for lock in state.locks:
+        limit = _seconds(lock.timeout_s) if lock.required else "none"
+        times = (_seconds(lock.age_s), limit)
+        style = BAD if lock.holds else ""
+        table.add_row(str(lock.priority), f"lock {lock.name}", *times, "", lock.reason or "free", style=style)
+    strangers = [Text(f"{found.node} publishes on {found.topic}: {found.problem}", BAD) for found in state.foreign]
+    return Group(table, *strangers)
+
+
+def _safety(state: Any) -> RenderableType:
+    order = f"orders {state.ordered_linear_mps:+.2f} m/s  {state.ordered_angular_radps:+.2f} rad/s"
+    free = f"free ahead {_metres(state.clearance_ahead_m)}, behind {_metres(state.clearance_behind_m)}"
+    ages = f"command {_seconds(state.command_age_s)} old, scan {_seconds(state.scan_age_s)}"
+    first = Text.assemble(_safety_word(Heard(state, 0.0)), f"   {order}   {free}   {ages}")
+    leases = [Text(f"{state.lease_errors} leases were not delivered", WARN)] if state.lease_errors else []
+    return Group(first, *_why(state), *leases)
+
+
+def _driver(status: Any) -> RenderableType:
+    standing = "stands" if status.standstill else "MOVES"
+    first = Text("   ").join([*_driver_words(Heard(status, 0.0)), Text(standing)])
+    table = _table("node", "wheel", "NMT", "drive state", "target", "measured", "heartbeat", "error")
+    for drive in status.drives:
+        good = drive.state == "operation enabled"
+        error = Text(f"{drive.error_code:04X}h {drive.error_text}" if drive.error_code else "", BAD)
+        speeds = (f"{drive.target_radps:+.2f} rad/s", f"{drive.velocity_radps:+.2f} rad/s")
+        state = Text(drive.state, GOOD if good else WARN)
+        table.add_row(
+            str(drive.node_id), drive.joint, drive.nmt_state, state, *speeds, _seconds(drive.heartbeat_age_s), error
+        )
+    trip = [Text(f"watchdog: {status.watchdog_cause}", BAD)] if status.watchdog_cause not in ("", "none") else []
+    return Group(first, *_why(status), *trip, table)
+
+
+def _why(state: Any) -> list[Text]:
+    """Detail and what ends it, where there is something to end."""
+    clears = f"; ends with: {state.clears_on}" if state.clears_on else ""
+    return [Text(f"{state.detail}{clears}", WARN)] if state.detail or clears else []
+
+
+def _event(heard: Heard) -> Text:
+    if heard.age_s is None:
+        return Text("No stop since this picture was opened.", "dim")
+    event = heard.message
+    latched = ", latched" if event.latched else ""
+    return Text(f"Last stop, {heard.age_s:.0f} s ago: {event.stopped_by}: {event.cause}{latched}. {event.detail}")
+
+
+def _table(*titles: str) -> Table:
+    table = Table(box=None, padding=(0, 2, 0, 0), header_style="dim")
+    for title in titles:
+        table.add_column(title, no_wrap=title not in ("why not", "error"))
+    return table
+
+
+def _seconds(value: float) -> str:
+    return "–" if math.isnan(value) else f"{value:.2f} s"
+
+
+def _metres(value: float) -> str:
+    if math.isnan(value):
+        return "unknown"
+    return "all" if math.isinf(value) else f"{value:.2f} m"
