@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -46,7 +47,7 @@ def effective(loaded: Loaded) -> str:
 
 def _marked(value: Any, loc: Loc, defaults: frozenset[Loc]) -> Any:
     """`value` in ruamel.yaml's mappings, which carry comments: the mark behind each entry that is among `defaults`."""
-    if isinstance(value, (list, tuple)) and loc in defaults:
+    if isinstance(value, (list, tuple)) and loc in defaults and all(_is_simple(inner) for inner in value):
         return _in_one_line(value)
     if isinstance(value, (list, tuple)):
         return [_marked(inner, (*loc, index), defaults) for index, inner in enumerate(value)]
@@ -58,6 +59,13 @@ def _marked(value: Any, loc: Loc, defaults: frozenset[Loc]) -> Any:
         if (*loc, key) in defaults:
             marked.yaml_add_eol_comment(DEFAULT_MARK, key, column=_MARK_COLUMN)
     return marked
+
+
+def _is_simple(value: Any) -> bool:
+    """What looks the same in every style of YAML."""
+    return isinstance(value, (bool, int)) or (
+        isinstance(value, str) and re.fullmatch(r"[A-Za-z/][\w/]*", value) is not None
+    )
 
 
 def _in_one_line(values: Sequence[Any]) -> CommentedSeq:
