@@ -5,18 +5,25 @@ from __future__ import annotations
 import math
 
 from canbase_config.drive import Drive
+from canbase_config.profile import Layout
 from canbase_config.robot import Robot
 from canbase_config.units import motor_rev_per_s
-from canbase_config.watchdog import RelayLine, WatchdogConfig, WatchedDrive
+from canbase_config.watchdog import RelayLine, WatchdogConfig, WatchedDrive, WatchedLayout
 
 CYCLES_TO_SETPOINT = 2
 """A command waits for the driver's next cycle, and its age is looked at only there."""
 
 
 def mps_per_bit(drive: Drive, wheel_radius_m: float) -> float:
-    """Speed of the wheel's rim [m/s] for one bit of the drive's 60FFh and 606Ch; the sign makes forward positive."""
+    """Speed of the wheel's rim [m/s] for one bit of the drive's 60FFh; the sign makes forward positive."""
     motor_rev_s = motor_rev_per_s(drive.target_unit, drive.counts_per_motor_rev)
     return motor_rev_s * _m_per_motor_rev(drive, wheel_radius_m)
+
+
+def velocity_scale(drive: Drive) -> float:
+    """How many bits of 60FFh one bit of 606Ch is worth."""
+    counts = drive.counts_per_motor_rev
+    return motor_rev_per_s(drive.actual_unit, counts) / motor_rev_per_s(drive.target_unit, counts)
 
 
 def m_per_count(drive: Drive, wheel_radius_m: float) -> float:
@@ -85,6 +92,18 @@ def _watched(drive: Drive, wheel_radius_m: float) -> WatchedDrive:
         drive.side,
         mps_per_bit(drive, wheel_radius_m),
         m_per_count(drive, wheel_radius_m),
+        velocity_scale(drive),
+        _layout(drive.kind.layout),
+    )
+
+
+def _layout(layout: Layout) -> WatchedLayout:
+    return WatchedLayout(
+        sub_index=layout.second_axis == "sub_index",
+        shared_controlword=layout.controlword == "shared",
+        packed_statusword=layout.statusword == "packed",
+        target_bits=layout.target_bits,
+        velocity_bits=layout.velocity_bits,
     )
 
 

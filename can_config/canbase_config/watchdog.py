@@ -9,10 +9,27 @@ from typing import Any
 
 
 @dataclass(frozen=True)
-class WatchedDrive:
-    """One axis on the bus. `mps_per_bit`: rim speed of its wheel, forward positive, for one bit of 60FFh and 606Ch.
+class WatchedLayout:
+    """Where the objects of a drive are, and how wide. The defaults are those of CiA 402-2, axes at + 800h."""
 
-    `m_per_count`: travel of the rim, forward positive, for one increment of 6064h.
+    sub_index: bool = False
+    """Two motors are sub-index 1 and 2 of the same 60FFh, 606Ch and 6064h, not at + 800h."""
+    shared_controlword: bool = False
+    """One 6040h for both motors of a node."""
+    packed_statusword: bool = False
+    """6041h has 32 bits, the second motor's in the upper half."""
+    target_bits: int = 32
+    """Width of 60FFh."""
+    velocity_bits: int = 32
+    """Width of 606Ch."""
+
+
+@dataclass(frozen=True)
+class WatchedDrive:
+    """One axis on the bus. `mps_per_bit`: rim speed of its wheel, forward positive, for one bit of 60FFh.
+
+    `m_per_count`: travel of the rim, forward positive, for one increment of 6064h. `velocity_scale`: one bit of 606Ch
+    in bits of 60FFh.
     """
 
     joint: str
@@ -21,6 +38,13 @@ class WatchedDrive:
     side: str
     mps_per_bit: float
     m_per_count: float
+    velocity_scale: float = 1.0
+    layout: WatchedLayout = WatchedLayout()
+
+    @property
+    def velocity_mps_per_bit(self) -> float:
+        """Rim speed, forward positive, for one bit of 606Ch."""
+        return self.mps_per_bit * self.velocity_scale
 
 
 @dataclass(frozen=True)
@@ -88,6 +112,10 @@ class WatchdogConfig:
     def from_json(text: str) -> WatchdogConfig:
         """The configuration from `to_json`. Raises TypeError or ValueError when it is not one."""
         values = json.loads(text)
-        drives = tuple(WatchedDrive(**drive) for drive in values.pop("drives"))
+        drives = tuple(_drive(drive) for drive in values.pop("drives"))
         relay = values.pop("relay")
         return WatchdogConfig(drives=drives, relay=RelayLine(**relay) if relay else None, **values)
+
+
+def _drive(values: dict[str, Any]) -> WatchedDrive:
+    return WatchedDrive(layout=WatchedLayout(**values.pop("layout")), **values)

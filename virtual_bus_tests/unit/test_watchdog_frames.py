@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from canbase_config.watchdog import WatchedLayout
 from canbase_watchdog import frames
 from canbase_watchdog.frames import DriveState, Frame
 
@@ -94,18 +95,18 @@ def test_other_lengths_are_none_of_them(length: int) -> None:
 @pytest.mark.parametrize(
     ("data", "answer"),
     [
-        ("4b 41 60 00 37 02 00 00", (0x6041, 0x0237)),
-        ("43 6c 60 00 0c fe ff ff", (0x606C, -500)),
-        ("42 6c 68 00 0c fe ff ff", (0x686C, -500)),  # size not shown: four bytes
-        ("4f 61 60 00 ff 00 00 00", (0x6061, -1)),
-        ("4b 41 60 01 37 02 00 00", None),  # another sub-index
+        ("4b 41 60 00 37 02 00 00", ((0x6041, 0), 0x0237)),
+        ("43 6c 60 00 0c fe ff ff", ((0x606C, 0), -500)),
+        ("42 6c 68 00 0c fe ff ff", ((0x686C, 0), -500)),  # size not shown: four bytes
+        ("4f 61 60 00 ff 00 00 00", ((0x6061, 0), -1)),
+        ("43 6c 60 02 0c fe ff ff", ((0x606C, 2), -500)),
         ("80 41 60 00 00 00 02 06", None),  # abort
         ("60 40 60 00 00 00 00 00", None),  # answer to a write
         ("41 08 10 00 10 00 00 00", None),  # begin of a segmented upload
         ("4b 41 60 00 37 02 00", None),
     ],
 )
-def test_sdo_answers(data: str, answer: tuple[int, int] | None) -> None:
+def test_sdo_answers(data: str, answer: tuple[tuple[int, int], int] | None) -> None:
     assert frames.decode_sdo(bytes.fromhex(data)) == answer
 
 
@@ -156,3 +157,38 @@ def test_counters_stay_at_their_greatest_number() -> None:
     greatest = frames.counters(refused=65535, dropped=65535, bus_errors=65535, trips=255, gap_s=0.255)
     assert greatest.data == bytes([0xFF] * 8)
     assert frames.counters(65536, 10**9, 65536, 256, 0.2551).data == greatest.data
+
+
+HUB_MOTORS = WatchedLayout(sub_index=True, shared_controlword=True, packed_statusword=True)
+"""Two motors on one node: sub-index 1 and 2, one controlword, both statuswords in one object."""
+
+
+def test_both_statuswords_in_one_object() -> None:
+    data = bytes.fromhex("37 02 40 02 fe ff ff ff")
+    assert frames.decode_status(data, HUB_MOTORS, 0) == (0x0237, -2)
+    assert frames.decode_status(data, HUB_MOTORS, 1) == (0x0240, -2)
+    assert frames.decode_status(data[:6], HUB_MOTORS, 0) is None
+    assert frames.own_statusword(-0x10000 + 0x37, HUB_MOTORS, 1) == 0xFFFF  # as an SDO answer reads it
+
+
+def test_the_words_that_stop_hub_motors() -> None:
+    assert frames.quick_stop(5, 2, HUB_MOTORS) == frame(0x505, "02 00")
+    assert frames.write_controlword(5, 1, 0x0000, HUB_MOTORS) == frame(0x605, "2b 40 60 00 00 00 00 00")
+    assert list(frames.read_feedback(5, 1, HUB_MOTORS)) == [
+        frame(0x605, "40 41 60 00 00 00 00 00"),
+        frame(0x605, "40 6c 60 02 00 00 00 00"),
+    ]
+
+
+def test_a_controlword_for_each_motor_by_sub_index() -> None:
+    apart = WatchedLayout(sub_index=True)
+    assert frames.write_controlword(5, 1, 0x0002, apart) == frame(0x605, "2b 40 60 02 02 00 00 00")
+    assert frames.quick_stop(5, 2, apart) == frame(0x505, "02 00 02 00")
+
+
+def test_velocities_of_16_bits() -> None:
+    narrow = WatchedLayout(target_bits=16, velocity_bits=16)
+    assert frames.decode_velocity(bytes.fromhex("0c fe"), narrow) == -500
+    assert frames.decode_velocity(bytes.fromhex("0c fe ff ff"), narrow) is None
+    assert frames.decode_setpoint(bytes.fromhex("0f 00 0c fe"), narrow) == (0x0F, -500)
+    assert frames.decode_setpoint(bytes.fromhex("0f 00 0c fe ff ff"), narrow) is None

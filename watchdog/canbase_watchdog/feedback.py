@@ -43,7 +43,7 @@ class FeedbackWatch:
         """Before the monotonic time `now` [s] the wheel may have had any setpoint within the limits."""
         self._config = config
         self._m_per_count = drive.m_per_count
-        self._fixed_mps = config.motion_tolerance_mps + abs(drive.mps_per_bit)
+        self._fixed_mps = config.motion_tolerance_mps + abs(drive.velocity_mps_per_bit)
         self._jump_mps, self._jump_s = JUMP_FACTOR * config.max_wheel_mps, JUMP_CYCLES / config.control_hz
         self._fastest_mps = config.overspeed_factor * config.max_wheel_mps
         self._forward, self._backward = Peak(config.drive_lag_s), Peak(config.drive_lag_s)

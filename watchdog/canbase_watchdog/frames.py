@@ -10,6 +10,8 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from canbase_config.watchdog import WatchedLayout
+
 NMT = 0x000
 SYNC = 0x080
 STATE = 0x1FE
@@ -45,8 +47,13 @@ DISABLE_VOLTAGE_WORD = 0x0000
 
 LEASE_AGE_UNKNOWN = 0xFFFF
 
-_STATUS = struct.Struct("<Hi")
-_I32 = struct.Struct("<i")
+CIA_402 = WatchedLayout()
+"""Where CiA 402-2 has the objects."""
+
+_STATUS = {False: struct.Struct("<Hi"), True: struct.Struct("<Ii")}
+"""By whether the statusword is packed."""
+_SETPOINT = {16: struct.Struct("<Hh"), 32: struct.Struct("<Hi")}
+_VELOCITY = {16: struct.Struct("<h"), 32: struct.Struct("<i")}
 _U16 = struct.Struct("<H")
 _SDO_HEAD = struct.Struct("<BHB")
 _STATE = struct.Struct("<BBBBHBB")
@@ -92,38 +99,42 @@ def asks_for_power(controlword: int) -> bool:
     return controlword & 0x8F == 0x0F
 
 
-def decode_status(data: bytes) -> tuple[int, int] | None:
-    """Statusword 6041h and position 6064h of a status TPDO; None: not 6 bytes."""
-    if len(data) != _STATUS.size:
+def decode_status(data: bytes, layout: WatchedLayout = CIA_402, axis: int = 0) -> tuple[int, int] | None:
+    """Statusword 6041h of an axis and position 6064h of a status TPDO; None: of another length."""
+    form = _STATUS[layout.packed_statusword]
+    if len(data) != form.size:
         return None
-    statusword, counts = _STATUS.unpack(data)
-    return statusword, counts
+    statusword, counts = form.unpack(data)
+    return own_statusword(statusword, layout, axis), counts
 
 
-def decode_velocity(data: bytes) -> int | None:
-    """Velocity 606Ch of a velocity TPDO in the drive's own unit; None: not 4 bytes."""
-    if len(data) != _I32.size:
+def own_statusword(value: int, layout: WatchedLayout, axis: int) -> int:
+    """The half of a packed 6041h that is this axis's; any other 6041h as it is."""
+    return value >> 16 * axis & 0xFFFF if layout.packed_statusword else value
+
+
+def decode_velocity(data: bytes, layout: WatchedLayout = CIA_402) -> int | None:
+    """Velocity 606Ch of a velocity TPDO in the drive's own unit; None: of another length."""
+    form = _VELOCITY[layout.velocity_bits]
+    return int(form.unpack(data)[0]) if len(data) == form.size else None
+
+
+def decode_setpoint(data: bytes, layout: WatchedLayout = CIA_402) -> tuple[int, int] | None:
+    """Controlword 6040h and target 60FFh of the driver's RPDO, in the drive's own unit; None: of another length."""
+    form = _SETPOINT[layout.target_bits]
+    if len(data) != form.size:
         return None
-    return int(_I32.unpack(data)[0])
-
-
-def decode_setpoint(data: bytes) -> tuple[int, int] | None:
-    """Controlword 6040h and target 60FFh of the driver's RPDO, in the drive's own unit; None: not 6 bytes."""
-    if len(data) != _STATUS.size:
-        return None
-    controlword, target = _STATUS.unpack(data)
+    controlword, target = form.unpack(data)
     return controlword, target
 
 
-def decode_sdo(data: bytes) -> tuple[int, int] | None:
-    """Index and signed value of an expedited upload answer (CiA 301: byte 0 = 0100nn1s) with sub-index 0, else None."""
+def decode_sdo(data: bytes) -> tuple[tuple[int, int], int] | None:
+    """Index and sub-index, signed value of an expedited upload answer (CiA 301: byte 0 = 0100nn1s), else None."""
     if len(data) != 8 or data[0] & 0xF2 != 0x42:
         return None
     _, index, sub_index = _SDO_HEAD.unpack_from(data)
-    if sub_index != 0:
-        return None
     size = 4 - (data[0] >> 2 & 0x03) if data[0] & 0x01 else 4
-    return index, int.from_bytes(data[4 : 4 + size], "little", signed=True)
+    return (index, sub_index), int.from_bytes(data[4 : 4 + size], "little", signed=True)
 
 
 def decode_sdo_download(data: bytes) -> int | None:
@@ -164,9 +175,10 @@ def counters(refused: int, dropped: int, bus_errors: int, trips: int, gap_s: flo
     return Frame(COUNTERS, _COUNTERS.pack(*words, min(trips, 0xFF), min(round(gap_s * 1000.0), 0xFF)))
 
 
-def quick_stop(node_id: int, axis_count: int) -> Frame:
+def quick_stop(node_id: int, axis_count: int, layout: WatchedLayout = CIA_402) -> Frame:
     """Quick stop for every used axis of a node, by the PDO that is the watchdog's own."""
-    return Frame(QUICK_STOP_RPDO + node_id, _U16.pack(QUICK_STOP_WORD) * axis_count)
+    words = 1 if layout.shared_controlword else axis_count
+    return Frame(QUICK_STOP_RPDO + node_id, _U16.pack(QUICK_STOP_WORD) * words)
 
 
 def pre_operational(node_id: int) -> Frame:
@@ -174,13 +186,23 @@ def pre_operational(node_id: int) -> Frame:
     return Frame(NMT, bytes([PRE_OPERATIONAL_COMMAND, node_id]))
 
 
-def write_controlword(node_id: int, axis: int, word: int) -> Frame:
+def place_of(index: int, axis: int, layout: WatchedLayout = CIA_402) -> tuple[int, int]:
+    """Index and sub-index of 6040h, 6041h or 606Ch of an axis."""
+    if not layout.sub_index:
+        return index + axis * AXIS_OFFSET, 0
+    is_common = (index == CONTROLWORD and layout.shared_controlword) or (
+        index == STATUSWORD and layout.packed_statusword
+    )
+    return index, 0 if is_common else axis + 1
+
+
+def write_controlword(node_id: int, axis: int, word: int, layout: WatchedLayout = CIA_402) -> Frame:
     """SDO request: expedited download of two bytes to 6040h of an axis."""
-    head = _SDO_HEAD.pack(0x2B, CONTROLWORD + axis * AXIS_OFFSET, 0)
+    head = _SDO_HEAD.pack(0x2B, *place_of(CONTROLWORD, axis, layout))
     return Frame(SDO_REQUEST + node_id, head + _U16.pack(word) + bytes(2))
 
 
-def read_feedback(node_id: int, axis: int) -> Sequence[Frame]:
+def read_feedback(node_id: int, axis: int, layout: WatchedLayout = CIA_402) -> Sequence[Frame]:
     """SDO requests: uploads of statusword 6041h and velocity 606Ch of an axis."""
-    heads = (_SDO_HEAD.pack(0x40, index + axis * AXIS_OFFSET, 0) for index in (STATUSWORD, VELOCITY))
+    heads = (_SDO_HEAD.pack(0x40, *place_of(index, axis, layout)) for index in (STATUSWORD, VELOCITY))
     return tuple(Frame(SDO_REQUEST + node_id, head + bytes(4)) for head in heads)

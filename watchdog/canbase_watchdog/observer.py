@@ -155,7 +155,7 @@ class Observer:
         return True
 
     def _on_status(self, record: _Record, data: bytes, now: float) -> bool:
-        status = frames.decode_status(data)
+        status = frames.decode_status(data, record.drive.layout, record.drive.axis)
         if status is None or not self._note_state(record, status[0], now):
             return False
         record.feedback.on_position(status[1])
@@ -174,7 +174,7 @@ class Observer:
         return True
 
     def _on_velocity(self, record: _Record, data: bytes, now: float) -> bool:
-        bits = frames.decode_velocity(data)
+        bits = frames.decode_velocity(data, record.drive.layout)
         if bits is None:
             return False
         self._note_velocity(record, bits, now)
@@ -182,11 +182,11 @@ class Observer:
         return True
 
     def _note_velocity(self, record: _Record, bits: int, now: float) -> None:
-        record.velocity_mps, record.velocity_at = bits * record.drive.mps_per_bit, now
+        record.velocity_mps, record.velocity_at = bits * record.drive.velocity_mps_per_bit, now
         self._heard_at[record.drive.node_id] = now
 
     def _on_setpoint(self, record: _Record, cob_id: int, data: bytes, now: float) -> bool:
-        setpoint = frames.decode_setpoint(data)
+        setpoint = frames.decode_setpoint(data, record.drive.layout)
         if setpoint is None:
             return False
         self._foreign.on_setpoint(cob_id, record.drive.node_id, data, now)
@@ -200,14 +200,18 @@ class Observer:
         """Answers to anybody's reading of 6041h and 606Ch are as true as a TPDO; all others are not for us."""
         self._heard_at[node_id] = now
         answer = frames.decode_sdo(data)
+        understood = True
         for key, record in self._records.items():
-            offset = key[1] * frames.AXIS_OFFSET
-            if answer is None or key[0] != node_id:
-                continue
-            if answer[0] == frames.STATUSWORD + offset:
-                return self._note_state(record, answer[1], now)
-            if answer[0] == frames.VELOCITY + offset:
-                self._note_velocity(record, answer[1], now)
+            if answer is not None and key[0] == node_id:
+                understood = self._note_answer(record, *answer, now) and understood
+        return understood
+
+    def _note_answer(self, record: _Record, place: tuple[int, int], value: int, now: float) -> bool:
+        drive = record.drive
+        if place == frames.place_of(frames.STATUSWORD, drive.axis, drive.layout):
+            return self._note_state(record, frames.own_statusword(value, drive.layout, drive.axis), now)
+        if place == frames.place_of(frames.VELOCITY, drive.axis, drive.layout):
+            self._note_velocity(record, value, now)
         return True
 
     def _on_nmt(self, data: bytes, now: float) -> bool:

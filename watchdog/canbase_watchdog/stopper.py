@@ -30,7 +30,8 @@ class Stopper:
         """Begins at the foot of the ladder at the monotonic time `now` [s]."""
         self._node_id = node_id
         self._config = config
-        self._numbers = sorted(drive.axis for drive in config.drives if drive.node_id == node_id)
+        drives = [drive for drive in config.drives if drive.node_id == node_id]
+        self._layout, self._axis_count = drives[0].layout, len(drives)
         self._seen = self._look(view)
         self.climb: Climb = first(self._seen, now)
         self._quick_stop_at = self._nmt_at = self._sdo_at = NEVER
@@ -79,7 +80,7 @@ class Stopper:
         if now < self._quick_stop_at + QUICK_STOP_PERIOD_S:
             return []
         self._quick_stop_at = now
-        return [frames.quick_stop(self._node_id, len(self._numbers))]
+        return [frames.quick_stop(self._node_id, self._axis_count, self._layout)]
 
     def _pre_operational(self, now: float) -> list[Frame]:
         if self.climb.step < Step.PRE_OPERATIONAL or now < self._nmt_at + NMT_PERIOD_S:
@@ -106,7 +107,7 @@ class Stopper:
         for axis in self._axes(view):
             number = axis.drive.axis
             if word is not None:
-                requests.append(frames.write_controlword(self._node_id, number, word))
+                requests.append(frames.write_controlword(self._node_id, number, word, self._layout))
             if word is not None or now >= axis.fed_at + self._config.feedback_timeout_s:
-                requests += frames.read_feedback(self._node_id, number)
+                requests += frames.read_feedback(self._node_id, number, self._layout)
         return requests

@@ -151,7 +151,8 @@ class Watchdog:
     def quick_stops(self) -> list[Frame]:
         """A quick stop for every node, whatever the state: for a way out on which nothing else can be trusted."""
         nodes = [drive.node_id for drive in self._config.drives]
-        return [frames.quick_stop(node_id, nodes.count(node_id)) for node_id in dict.fromkeys(nodes)]
+        layouts = {drive.node_id: drive.layout for drive in self._config.drives}
+        return [frames.quick_stop(node_id, nodes.count(node_id), layout) for node_id, layout in layouts.items()]
 
     def _look(self, now: float) -> View:
         bus, bounds = self._observer.look(), self._envelope.advance(now)
