@@ -53,7 +53,7 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
     limits, timeouts, watchdog = robot.limits, robot.timeouts, robot.watchdog
     return WatchdogConfig(
         bus_arguments=robot.bus.arguments(),
-        drives=tuple(_watched(drive, robot.base.wheel_radius_m) for drive in robot.drives),
+        drives=tuple(watched_drive(drive, robot.base.wheel_radius_m) for drive in robot.drives),
         track_m=robot.base.track_m,
         control_hz=robot.rates.control_hz,
         lease_socket=robot.lease.socket,
@@ -84,7 +84,8 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
     )
 
 
-def _watched(drive: Drive, wheel_radius_m: float) -> WatchedDrive:
+def watched_drive(drive: Drive, wheel_radius_m: float) -> WatchedDrive:
+    """What the watchdog is told about one axis."""
     return WatchedDrive(
         drive.joint,
         drive.node_id,

@@ -14,12 +14,13 @@ from canbase_config.section import MisfitError, Name, Section
 
 
 class Identity(Section):
-    """What object 1018h must say; a key that is not given is not compared."""
+    """What the objects 1018h and 100Ah must say; a key that is not given is not compared."""
 
     vendor_id: Annotated[int, Field(ge=0, le=0xFFFF_FFFF, description="1018h:1")] | None = None
     product_code: Annotated[int, Field(ge=0, le=0xFFFF_FFFF, description="1018h:2")] | None = None
     revision: Annotated[int, Field(ge=0, le=0xFFFF_FFFF, description="1018h:3")] | None = None
     serial: Annotated[int, Field(ge=0, le=0xFFFF_FFFF, description="1018h:4")] | None = None
+    software: Annotated[str, Field(min_length=1, max_length=64, description="firmware, 100Ah")] | None = None
 
 
 class Drive(Section):

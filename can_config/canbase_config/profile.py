@@ -142,7 +142,7 @@ class Options(Section):
     ] = "probe"
     ramps: Annotated[Presence, Field(description="6083h, 6084h, 6085h")] = "probe"
     interpolation: Annotated[Presence, Field(description="60C2h, for mode 9")] = "probe"
-    sync_counter: Annotated[Presence, Field(description="1019h")] = "no"
+    sync_counter: Annotated[Presence, Field(description="1019h")] = "probe"
     store: Annotated[Presence, Field(description="1010h")] = "probe"
 
 
@@ -231,3 +231,9 @@ class Profile(Section):
                     raise MisfitError(f"{path} is no key of a profile", ("unproven", position))
                 section = getattr(section, key)
         return self
+
+    def is_unproven(self, path: str) -> bool:
+        """Whether this key, or one inside it, or the section around it, has no source."""
+        keys = path.split(".")
+        listed = (entry.split(".") for entry in self.unproven)
+        return any(entry[: len(keys)] == keys or keys[: len(entry)] == entry for entry in listed)

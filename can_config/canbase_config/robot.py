@@ -23,6 +23,8 @@ CYCLES_PER_TIMEOUT = 4
 """What comes once a control cycle, or is sent from it, may be late or lost once or twice without a stop."""
 WATCHDOG_NODE_ID = 126
 """CANopen node id of the watchdog: its heartbeat is COB-ID 77Eh, its state 1FEh, its reset request 27Eh."""
+CYCLIC = 9
+"""6060h: cyclic synchronous velocity, without ramps in the drive (CiA 402-2)."""
 
 
 class Bus(Section):
@@ -31,6 +33,12 @@ class Bus(Section):
     interface: Annotated[str, Field(min_length=1, description="python-can interface: socketcan, udp_multicast, …")]
     channel: Annotated[str, Field(min_length=1, description="can0, or the multicast group of a virtual bus")]
     bitrate: Annotated[int, Field(ge=10_000, le=1_000_000, description="[bit/s]")] = 500_000
+    sync_counter: (
+        Annotated[
+            int, Field(ge=2, le=240, description="SYNC carries a byte that counts from 1 to this, 1019h; default: none")
+        ]
+        | None
+    ) = None
     extra: Annotated[
         dict[str, Any], Field(default_factory=dict, description="further arguments of can.Bus for this interface")
     ]
@@ -155,6 +163,7 @@ class Robot(Section):
             if places.setdefault((drive.node_id, drive.axis), i) != i:
                 message = f"two drives are on node {drive.node_id}, axis {drive.axis}; each needs its own"
                 raise MisfitError(message, ("drives", i, "node_id"))
+        self._check_nodes()
         if {drive.side for drive in self.drives} != {"left", "right"}:
             message = f"all drives are on the {self.drives[0].side}; a base needs at least one on each side"
             raise MisfitError(message, ("drives", 1, "side"))
@@ -172,3 +181,21 @@ class Robot(Section):
                 )
                 raise MisfitError(message, ("timeouts", key), ("rates", "control_hz"))
         return self
+
+    def _check_nodes(self) -> None:
+        first: dict[int, Drive] = {}
+        for i, drive in enumerate(self.drives):
+            before = first.setdefault(drive.node_id, drive)
+            if before.profile != drive.profile or before.used_mode != drive.used_mode:
+                message = f"both motors of node {drive.node_id} need the same profile and mode"
+                raise MisfitError(message, ("drives", i, "profile"), ("drives", i, "node_id"))
+            axes, pdo = sum(other.node_id == drive.node_id for other in self.drives), drive.kind.pdo
+            if pdo.rpdos < axes + 1 or pdo.tpdos < 2 * axes:
+                message = f"{axes} motor(s) need {axes + 1} RPDOs and {2 * axes} TPDOs; {drive.kind.title} has fewer"
+                raise MisfitError(message, ("drives", i, "profile"), ("drives", i, "node_id"))
+            if self.bus.sync_counter is not None and drive.kind.options.sync_counter == "no":
+                message = f"{drive.kind.title} knows no counter in SYNC (1019h)"
+                raise MisfitError(message, ("bus", "sync_counter"))
+            if drive.used_mode == CYCLIC and not (1000.0 / self.rates.control_hz).is_integer():
+                message = f"mode 9 needs a cycle of whole milliseconds, {self.rates.control_hz:g} Hz is none"
+                raise MisfitError(message, ("rates", "control_hz"), ("drives", i, "mode"))

@@ -6,7 +6,7 @@ import math
 
 from canbase_config.drive import Drive
 from canbase_config.robot import Robot
-from canbase_driver.cia402 import DriveState, PowerGoal, decode_statusword, next_controlword
+from canbase_driver.cia402 import DriveState, PowerGoal, decode_statusword
 from canbase_driver.frame import Frame
 from canbase_driver.limits import Limiter
 from canbase_driver.odometry import WheelTravel
@@ -34,6 +34,7 @@ class Axis:
         metres_per_count = self.units.position_m(1)
         step_m = STEP_MARGIN * Limiter(robot.limits, robot.base.track_m).wheel_mps / robot.rates.control_hz
         self.travel = WheelTravel(metres_per_count, max(1.0, step_m / abs(metres_per_count)))
+        self._layout = layout.profile.layout
         self._setpoint_cob_id = layout.setpoint_cob_id(drive.axis)
         self._wheel_radius_m = robot.base.wheel_radius_m
         self._control_hz = robot.rates.control_hz
@@ -65,7 +66,7 @@ class Axis:
 
     def on_status(self, data: bytes, now: float) -> bool:
         """Take 6041h and 6064h. False: wrong length, to be dropped and counted."""
-        status = unpack_status(data)
+        status = unpack_status(data, self._layout, self.drive.axis)
         if status is None:
             return False
         self.statusword, counts = status
@@ -78,7 +79,7 @@ class Axis:
 
     def on_velocity(self, data: bytes) -> bool:
         """Take 606Ch, which follows the status of the same SYNC. False: wrong length, to be dropped and counted."""
-        raw = unpack_velocity(data)
+        raw = unpack_velocity(data, self._layout)
         if raw is None:
             return False
         self.velocity_mps = self.units.velocity_mps(raw)
@@ -89,8 +90,8 @@ class Axis:
         """The core has taken the new sample into the odometry."""
         self._status_is_new = self.has_new_sample = False
 
-    def setpoint(self, goal: PowerGoal, rim_mps: float) -> Frame:
-        """The frame with 6040h and 60FFh: one step towards `goal`; the target is zero unless the goal is ON."""
+    def setpoint(self, goal: PowerGoal, rim_mps: float, controlword: int) -> Frame:
+        """The frame with 6040h and 60FFh; the target is zero unless the goal is ON."""
         self.target_mps = rim_mps if goal is PowerGoal.ON else 0.0
-        controlword = next_controlword(self.state, goal)
-        return Frame(self._setpoint_cob_id, pack_setpoint(controlword, self.units.velocity_raw(self.target_mps)))
+        target_raw = self.units.velocity_raw(self.target_mps)
+        return Frame(self._setpoint_cob_id, pack_setpoint(controlword, target_raw, self._layout))

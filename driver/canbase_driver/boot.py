@@ -10,29 +10,43 @@ import math
 from dataclasses import dataclass
 
 from canbase_config.drive import Drive, Identity
-from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
+from canbase_config.places import CONTROLWORD, STATUSWORD, VELOCITY_ACTUAL, place
+from canbase_config.robot import Robot
 from canbase_driver.boot_pdo import configure_pdos
-from canbase_driver.boot_steps import BootError, NodeAccess, Pause, SendNmt, Steps, WaitBootUp, boot_error, unsigned
+from canbase_driver.boot_settings import (
+    configure_motion,
+    configure_self_stop,
+    configure_sync,
+    harmless_on_loss,
+    write_all,
+    write_at,
+)
+from canbase_driver.boot_steps import (
+    BootError,
+    NodeAccess,
+    Pause,
+    Quiet,
+    SendNmt,
+    Steps,
+    WaitBootUp,
+    boot_error,
+    unsigned,
+)
 from canbase_driver.cia301 import NmtCommand
-from canbase_driver.cia402 import Command, DriveState, axis_object, decode_statusword
-from canbase_driver.pdo import CONTROLWORD, STATUSWORD, TARGET_VELOCITY, VELOCITY_ACTUAL, NodeLayout
-from canbase_driver.sdo import Read, SdoError, SdoTimeout, Write
+from canbase_driver.cia402 import Command, DriveState, decode_statusword
+from canbase_driver.pdo import node_layout
+from canbase_driver.sdo import Read, SdoAborted, SdoError, SdoTimeout, Write
 from canbase_driver.units import AxisUnits
 
-DEVICE_TYPE, HEARTBEAT_CONSUMER, HEARTBEAT_PRODUCER, IDENTITY, ERROR_BEHAVIOUR = 0x1000, 0x1016, 0x1017, 0x1018, 0x1029
-ABORT_CONNECTION_OPTION, QUICK_STOP_OPTION, FAULT_REACTION_OPTION, MODE = 0x6007, 0x605A, 0x605E, 0x6060
-PROFILE_ACCELERATION, PROFILE_DECELERATION, QUICK_STOP_DECELERATION = 0x6083, 0x6084, 0x6085
-
+DEVICE_TYPE, SOFTWARE, IDENTITY = 0x1000, 0x100A, 0x1018
+NUMBERS = ("vendor_id", "product_code", "revision", "serial")
+"""1018h:1 to 1018h:4."""
 PROFILE_402 = 0x0192
-PROFILE_VELOCITY = 3
-ENTER_PRE_OPERATIONAL_ON_LOSS = 0
-QUICK_STOP_ON_LOSS = 3
-DOWN_THE_QUICK_STOP_RAMP = 2
 
-BOOT_UP_TIMEOUT_S = 5.0
 POLL_S = 0.02
 STANDING_POLLS = 5
 """A drive that stays in quick stop active stands when it is slow for so many polls on end."""
+_RESETS = {"communication": NmtCommand.RESET_COMMUNICATION, "node": NmtCommand.RESET_NODE}
 _CAN_BE_DISABLED = frozenset(
     (DriveState.READY_TO_SWITCH_ON, DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
 )
@@ -44,9 +58,16 @@ class BootReport:
 
     node_id: int
     identity: Identity
-    stops_by_itself: bool
-    """Whether the drive quick-stops when the watchdog's heartbeat is lost: 1016h:1 and 6007h are set and confirmed."""
+    self_stop: str
+    """What makes the drive stop by itself when nobody commands it, set and confirmed; empty: nothing."""
     notes: tuple[str, ...]
+    changes: tuple[str, ...] = ()
+    """Every object that had another value than wanted: the old one and the new one."""
+
+    @property
+    def stops_by_itself(self) -> bool:
+        """Whether something makes it stop by itself."""
+        return self.self_stop != ""
 
 
 def boot(node_id: int, drives: tuple[Drive, ...], robot: Robot) -> Steps[BootReport]:
@@ -67,7 +88,8 @@ def _explained(steps: Steps[BootReport]) -> Steps[BootReport]:
 class _Boot:
     def __init__(self, node_id: int, drives: tuple[Drive, ...], robot: Robot) -> None:
         self._drives = tuple(sorted(drives, key=lambda drive: drive.axis))
-        self._layout = NodeLayout(node_id, tuple(drive.axis for drive in self._drives))
+        self._layout = node_layout(node_id, self._drives, robot)
+        self._kind = drives[0].kind
         self._robot = robot
         self._node = NodeAccess(node_id)
 
@@ -75,12 +97,16 @@ class _Boot:
         yield from self._wait_for_the_drive()
         identity = yield from self._check_identity()
         yield from self._bring_to_a_stand()
-        yield from self._reset_communication()
+        yield from self._forget_earlier_masters()
+        yield from write_all(self._node, self._kind.writes.before_mapping)
         for drive in self._drives:
-            yield from self._configure_motion(drive)
-        stops_by_itself = yield from self._configure_loss_of_heartbeat()
+            yield from configure_motion(self._node, drive, self._robot)
+        self_stop = yield from configure_self_stop(self._node, self._drives, self._robot)
+        yield from configure_sync(self._node, self._kind, self._robot.bus.sync_counter)
         yield from configure_pdos(self._node, self._layout)
-        return BootReport(self._node.node_id, identity, stops_by_itself, tuple(dict.fromkeys(self._node.notes)))
+        yield from write_all(self._node, self._kind.writes.after_mapping)
+        notes = tuple(dict.fromkeys(self._node.notes))
+        return BootReport(self._node.node_id, identity, self_stop, notes, tuple(self._node.changes))
 
     # -- what is there
 
@@ -98,18 +124,32 @@ class _Boot:
 
     def _check_identity(self) -> Steps[Identity]:
         found: dict[str, int | None] = {}
-        for sub, name in enumerate(Identity.model_fields, start=1):
+        for sub, name in enumerate(NUMBERS, start=1):
             found[name] = yield from self._node.read_if_present(IDENTITY, sub)
             for drive in self._drives:
-                self._compare_identity(sub, name, found[name], getattr(drive.identity, name))
-        return Identity(**found)
+                shown = "missing" if found[name] is None else f"{found[name]:08X}h"
+                expected = getattr(drive.identity, name)
+                self._compare(f"1018h:{sub} ({name})", found[name], shown, expected, f"{expected or 0:08X}h")
+        return Identity(**found, software=(yield from self._check_software()))
 
-    def _compare_identity(self, sub: int, name: str, found: int | None, expected: int | None) -> None:
+    def _check_software(self) -> Steps[str | None]:
+        """Only where robot.yaml asks for it: it takes a segmented transfer, and not every drive has it."""
+        expected = [drive.identity.software for drive in self._drives if drive.identity.software is not None]
+        if not expected:
+            return None
+        try:
+            data: bytes = yield Read(SOFTWARE)
+        except SdoAborted:
+            data = b""
+        found = data.decode("ascii", "replace").strip(" \0")
+        for text in expected:
+            self._compare("100Ah:0 (software)", found, f'"{found}"', text, f'"{text}"')
+        return found or None
+
+    def _compare(self, what: str, found: object, shown: str, expected: object, wanted: str) -> None:
         if expected not in (None, found):
-            found_text = "missing" if found is None else f"{found:08X}h"
-            problem = f"1018h:{sub} ({name}) is {found_text}, expected {expected:08X}h"
-            hint = "Another drive has this node id, or `identity` in robot.yaml is wrong"
-            raise BootError(self._node.node_id, problem, hint)
+            hint = "Another drive or firmware has this node id, or `identity` in robot.yaml is wrong"
+            raise BootError(self._node.node_id, f"{what} is {shown}, expected {wanted}", hint)
 
     # -- nothing may move
 
@@ -130,7 +170,7 @@ class _Boot:
         for _ in range(math.ceil(self._robot.timeouts.standstill_s / POLL_S)):
             if not _has_torque((yield from _state(drive))) or slow == STANDING_POLLS:
                 return
-            raw = int.from_bytes((yield Read(axis_object(VELOCITY_ACTUAL, drive.axis))), "little", signed=True)
+            raw = int.from_bytes((yield _read(drive, VELOCITY_ACTUAL)), "little", signed=True)
             slow = slow + 1 if abs(units.velocity_mps(raw)) < self._robot.base.standstill_mps else 0
             yield Pause(POLL_S, f"{drive.joint} to stand after a quick stop")
         yield from self._give_up(drive)
@@ -143,84 +183,41 @@ class _Boot:
         hint = "Its voltage is now disabled; look for another master, and at 605Ah and 6085h"
         raise BootError(self._node.node_id, problem, hint)
 
-    def _reset_communication(self) -> Steps[None]:
-        """Forgets what earlier masters set. Some drives keep a fault for a lost heartbeat until then."""
-        for drive in self._drives:
-            # With 6007h = 1 a drive takes the reset for the loss of its master, and goes into fault.
-            if (yield from self._node.read_if_present(_on_loss(drive).index)) is not None:
-                yield from self._node.set_if_present(_on_loss(drive))
-        yield SendNmt(NmtCommand.RESET_COMMUNICATION)
-        if not (yield WaitBootUp(BOOT_UP_TIMEOUT_S)):
-            self._node.notes.append(f"no boot-up message within {BOOT_UP_TIMEOUT_S:g} s of NMT reset communication")
+    def _forget_earlier_masters(self) -> Steps[None]:
+        """What they set goes with an NMT reset. Some drives keep a fault for a lost heartbeat until then."""
+        start = self._kind.start
+        command = _RESETS.get(start.reset)
+        if command is not None:
+            yield from self._make_reset_harmless()
+            yield SendNmt(command)
+            if not (yield WaitBootUp(start.boot_up_s)):
+                name = command.name.lower().replace("_", " ")
+                self._node.notes.append(f"no boot-up message within {start.boot_up_s:g} s of NMT {name}")
+            if start.settle_s:
+                yield Quiet(start.settle_s)
         yield SendNmt(NmtCommand.ENTER_PRE_OPERATIONAL)
 
-    # -- how it moves, and when it stops by itself
-
-    def _configure_motion(self, drive: Drive) -> Steps[None]:
-        """A target of an earlier life would move the drive as soon as it is enabled: cleared, after the mode is set."""
-        yield from self._node.set(Write(axis_object(MODE, drive.axis), 0, PROFILE_VELOCITY, 1))
-        yield from self._node.set(Write(axis_object(TARGET_VELOCITY, drive.axis), 0, 0, 4))
-        units = AxisUnits(drive, self._robot.base)
-        for index, mps2 in self._ramps_mps2().items():
-            ramp = Write(axis_object(index, drive.axis), 0, units.acceleration_raw(mps2), 4)
-            yield from self._node.set_if_present(ramp)
-
-    def _ramps_mps2(self) -> dict[int, float]:
-        """The driver shapes the speed; the drive's own ramps bound a step, and must never lag behind in a curve."""
-        limits, arm_m = self._robot.limits, self._robot.base.track_m / 2
-        faster = limits.acceleration_mps2 + limits.angular_acceleration_radps2 * arm_m
-        slower = limits.deceleration_mps2 + limits.angular_deceleration_radps2 * arm_m
-        hardest = limits.emergency_deceleration_mps2
-        return {
-            PROFILE_ACCELERATION: max(faster, hardest),
-            PROFILE_DECELERATION: max(slower, hardest),
-            QUICK_STOP_DECELERATION: hardest,
-        }
-
-    def _configure_loss_of_heartbeat(self) -> Steps[bool]:
-        """Whether the drive will stop by itself."""
-        node, timeout_ms = self._node, round(1000 * self._robot.timeouts.drive_heartbeat_s)
-        yield from node.set_if_present(Write(HEARTBEAT_PRODUCER, 0, round(timeout_ms / 3), 2))
-        stops = yield from self._watch_heartbeats(timeout_ms)
-        yield from node.set_if_present(Write(ERROR_BEHAVIOUR, 1, ENTER_PRE_OPERATIONAL_ON_LOSS, 1))
+    def _make_reset_harmless(self) -> Steps[None]:
         for drive in self._drives:
-            stops = (yield from node.set_if_present(_on_loss(drive))) and stops
-            for index in (QUICK_STOP_OPTION, FAULT_REACTION_OPTION):
-                ramp = Write(axis_object(index, drive.axis), 0, DOWN_THE_QUICK_STOP_RAMP, 2)
-                yield from node.set_if_present(ramp)
-        return stops
-
-    def _watch_heartbeats(self, timeout_ms: int) -> Steps[bool]:
-        """With one entry the watchdog is watched, which is silent when the driver is. Whether it is watched.
-
-        No node may be in two entries, so those of an earlier life go first.
-        """
-        entries = (yield from self._node.read_if_present(HEARTBEAT_CONSUMER)) or 0
-        if entries == 0:
-            self._node.notes.append("1016h: the drive watches no heartbeat, it will not stop by itself")
-            return False
-        for sub in range(2, entries + 1):
-            if (yield from self._node.read_if_present(HEARTBEAT_CONSUMER, sub)):
-                yield from self._node.set_if_present(Write(HEARTBEAT_CONSUMER, sub, 0, 4))
-        watchdog, driver = (node_id << 16 | timeout_ms for node_id in (WATCHDOG_NODE_ID, DRIVER_NODE_ID))
-        is_watched = yield from self._node.set_if_present(Write(HEARTBEAT_CONSUMER, 1, watchdog, 4))
-        if entries > 1:
-            yield from self._node.set_if_present(Write(HEARTBEAT_CONSUMER, 2, driver, 4))
-        return is_watched
+            write = harmless_on_loss(drive)
+            exists = self._kind.self_stop.abort_connection != "no"
+            if exists and (yield from self._node.read_if_present(write.index, write.sub)) is not None:
+                yield from self._node.set_if_present(write)
 
 
 def _state(drive: Drive) -> Steps[DriveState | None]:
-    """Two-axis drives are known that give both statuswords in one object, this axis in the lower half."""
-    return decode_statusword(unsigned((yield Read(axis_object(STATUSWORD, drive.axis)))) & 0xFFFF)
+    at = place(drive.kind.layout, STATUSWORD, drive.axis)
+    return decode_statusword(unsigned((yield _read(drive, STATUSWORD))) >> at.shift & 0xFFFF)
 
 
 def _has_torque(state: DriveState | None) -> bool:
     return state is None or state.has_torque
 
 
-def _on_loss(drive: Drive) -> Write:
-    return Write(axis_object(ABORT_CONNECTION_OPTION, drive.axis), 0, QUICK_STOP_ON_LOSS, 2)
+def _read(drive: Drive, index: int) -> Read:
+    at = place(drive.kind.layout, index, drive.axis)
+    return Read(at.index, at.sub)
 
 
 def _control(drive: Drive, command: Command) -> Write:
-    return Write(axis_object(CONTROLWORD, drive.axis), 0, command.value, 2)
+    return write_at(drive, CONTROLWORD, command.value)

@@ -1,4 +1,4 @@
-"""Writing the PDO layout into a drive by the rules of CiA 301: everything off first, then one PDO after the other."""
+"""Writing the PDO layout into a drive by the rules of CiA 301: a PDO is off while it is changed."""
 
 from __future__ import annotations
 
@@ -8,28 +8,35 @@ from canbase_driver.sdo import Read, Write
 
 PDO_OFF = 1 << 31
 """Bit 31 of 1400h:1 and 1800h:1: the PDO is not valid."""
-PDO_NO_RTR = 1 << 30
-"""Bit 30 of the same; some drives refuse a COB-ID that comes back without it."""
 PREDEFINED = 4
 """RPDO1…4 and TPDO1…4 may have gaps; further ones are looked for until one is missing."""
 MAX_PDO_NUMBER = 64
 
 
 def configure_pdos(node: NodeAccess, layout: NodeLayout) -> Steps[None]:
-    """Switch off every PDO of the drive, then map those of the layout and switch them on. Raises BootError."""
-    cob_ids = yield from _switch_all_off(node)
-    for pdo in layout.pdos():
+    """Make the PDOs of the layout the only ones that are valid. What is right already is left alone.
+
+    Raises BootError when the drive has not these PDOs, or does not keep what is written to them.
+    """
+    wanted = {pdo.communication: pdo for pdo in layout.pdos()}
+    cob_ids = yield from _cob_ids(node)
+    for pdo in wanted.values():
         if pdo.communication not in cob_ids:
             problem = f"it has no {pdo.name} ({pdo.communication:04X}h)"
             raise BootError(node.node_id, problem, "canbase cannot do without, see docs/bus.md")
-        yield from _map(node, pdo)
-        yield from node.set(Write(pdo.communication, 2, pdo.transmission_type, 1))
-        kept = cob_ids[pdo.communication] & PDO_NO_RTR
-        yield from node.set(Write(pdo.communication, 1, kept | pdo.cob_id, 4))
+    for index, cob_id in cob_ids.items():
+        if index not in wanted:
+            yield from _switch_off(node, index, cob_id)
+    for index, pdo in wanted.items():
+        cob_id = cob_ids[index] & layout.profile.pdo.fixed_cob_id_bits | pdo.cob_id
+        if cob_ids[index] != cob_id or not (yield from _is_right(node, pdo)):
+            yield from _switch_off(node, index, cob_ids[index])
+            yield from _configure(node, pdo)
+            yield from node.overwrite(Write(index, 1, cob_id, 4), f"{cob_ids[index]:08X}h")
 
 
-def _switch_all_off(node: NodeAccess) -> Steps[dict[int, int]]:
-    """1400h:1 and 1800h:1 of every PDO that the drive has, as they were, by index."""
+def _cob_ids(node: NodeAccess) -> Steps[dict[int, int]]:
+    """1400h:1 and 1800h:1 of every PDO that the drive has, by index."""
     cob_ids: dict[int, int] = {}
     for kind in ("RPDO", "TPDO"):
         for number in range(1, MAX_PDO_NUMBER + 1):
@@ -39,7 +46,6 @@ def _switch_all_off(node: NodeAccess) -> Steps[dict[int, int]]:
                 break
             if cob_id is not None:
                 cob_ids[index] = cob_id
-                yield from _switch_off(node, index, cob_id)
     return cob_ids
 
 
@@ -48,10 +54,30 @@ def _switch_off(node: NodeAccess, index: int, cob_id: int) -> Steps[None]:
         yield from node.set_if_present(Write(index, 1, cob_id | PDO_OFF, 4))
 
 
+def _times(pdo: Pdo) -> list[Write]:
+    values = ((3, pdo.inhibit_100us), (5, pdo.event_timer_ms))
+    return [Write(pdo.communication, sub, value, 2) for sub, value in values if value is not None]
+
+
+def _is_right(node: NodeAccess, pdo: Pdo) -> Steps[bool]:
+    for write in (Write(pdo.communication, 2, pdo.transmission_type, 1), *_times(pdo)):
+        if (yield from node.read_if_present(write.index, write.sub)) != write.value:
+            return False
+    return (yield from _is_mapped(pdo))
+
+
+def _configure(node: NodeAccess, pdo: Pdo) -> Steps[None]:
+    yield from _map(node, pdo)
+    yield from node.set(Write(pdo.communication, 2, pdo.transmission_type, 1))
+    for time in _times(pdo):
+        yield from node.set_if_present(time)
+
+
 def _map(node: NodeAccess, pdo: Pdo) -> Steps[None]:
     """A mapping that is right stays as it is: some drives have a fixed one."""
     if (yield from _is_mapped(pdo)):
         return
+    node.changes.append(f"{pdo.name}: mapped anew, {len(pdo.mapping)} objects")
     yield Write(pdo.mapping_object, 0, 0, 1)
     for sub, entry in enumerate(pdo.mapping, start=1):
         yield Write(pdo.mapping_object, sub, entry, 4)

@@ -9,6 +9,7 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from canbase_config.profile import Presence
 from canbase_driver.cia301 import NmtCommand
 from canbase_driver.sdo import (
     ACCESS_UNSUPPORTED,
@@ -47,7 +48,14 @@ class Pause:
     until: str
 
 
-Step = Read | Write | SendNmt | WaitBootUp | Pause
+@dataclass(frozen=True, slots=True)
+class Quiet:
+    """Wait until there was no boot-up message for `duration_s`. It brings no answer."""
+
+    duration_s: float
+
+
+Step = Read | Write | SendNmt | WaitBootUp | Pause | Quiet
 T = TypeVar("T")
 Steps = Generator[Step, Any, T]
 """Yields steps; is sent the answer of each (bytes of a Read, b"" of a Write), or thrown SdoAborted or SdoTimeout."""
@@ -72,18 +80,19 @@ def _hint(error: SdoError) -> str:
     if isinstance(error, SdoTimeout):
         return "Check power, cable and bit rate, and that no other program uses the SDO channel of this node"
     if error.index in (0x6060, 0x6860):
-        return "The drive must support profile velocity (mode 3); bit 2 of 6502h tells"
+        return "The drive must support `mode` of robot.yaml, see 6502h: bit 2 is mode 3, bit 8 is mode 9"
     if isinstance(error, SdoAborted) and error.code == DEVICE_STATE:
         return "Switch the drive off and on again, and let no other master control it"
     return "canbase needs this object as docs/bus.md has it; look it up in the manual of the drive"
 
 
 class NodeAccess:
-    """Objects of one node, with what was lacking or refused on the way in `notes`."""
+    """Objects of one node. `notes`: what was lacking or refused; `changes`: what was written, with the old value."""
 
     def __init__(self, node_id: int) -> None:
         self.node_id = node_id
         self.notes: list[str] = []
+        self.changes: list[str] = []
 
     def read_if_present(self, index: int, sub: int = 0) -> Steps[int | None]:
         """An unsigned number; None when the drive lacks the object."""
@@ -95,24 +104,30 @@ class NodeAccess:
             raise
 
     def set(self, step: Write) -> Steps[None]:
-        """Write and read back. An object that is read-only may pass when it already has the value.
+        """Write where it differs, and read back. A read-only object may pass when it has the value.
 
         Raises BootError when another value is read back.
         """
-        refusal = ""
-        try:
-            yield step
-        except SdoAborted as refused:
-            if refused.code not in (READ_ONLY, ACCESS_UNSUPPORTED):
-                raise
-            refusal = f" ({refused.text})"
-        found = yield from self._read_back(step)
-        if found != step.data:
+        before = yield from self._read(step)
+        if before is None or not _same(before, step.data):
+            yield from self.overwrite(step, _hex(before) if before else "?")
+
+    def overwrite(self, step: Write, before: str) -> Steps[None]:
+        """Write what is known to differ from `before`, and read back. Raises BootError when another value is read."""
+        refusal = yield from self._write(step)
+        found = yield from self._read(step)
+        if found is not None and not _same(found, step.data):
             problem = f"{step} is {_hex(found)}, expected {_hex(step.data)}{refusal}"
             raise BootError(self.node_id, problem, "Set it with the maker's tool, or look for what sets it otherwise")
+        self.changes.append(f"{step}: {before} → {_hex(step.data)}")
 
-    def set_if_present(self, step: Write) -> Steps[bool]:
-        """Like `set`, but a drive that lacks, refuses or changes the value only earns a note. Whether it took it."""
+    def set_if_present(self, step: Write, presence: Presence = "probe") -> Steps[bool]:
+        """Like `set`, but a drive that lacks, refuses or changes the value only earns a note. Whether it took it.
+
+        `presence`: what the profile says; an object that it denies is not tried.
+        """
+        if presence == "no":
+            return False
         try:
             yield from self.set(step)
         except SdoAborted as refused:
@@ -123,14 +138,32 @@ class NodeAccess:
             return False
         return True
 
-    def _read_back(self, step: Write) -> Steps[bytes]:
+    def _write(self, step: Write) -> Steps[str]:
+        """Empty, or why a read-only object refused."""
+        try:
+            yield step
+        except SdoAborted as refused:
+            if refused.code not in (READ_ONLY, ACCESS_UNSUPPORTED):
+                raise
+            return f" ({refused.text})"
+        return ""
+
+    def _read(self, step: Write) -> Steps[bytes | None]:
+        """None: the object can only be written."""
         try:
             found: bytes = yield Read(step.index, step.sub)
         except SdoAborted as refused:
             if refused.code != WRITE_ONLY:
                 raise
-            return step.data
+            return None
         return found
+
+
+def _same(found: bytes, wanted: bytes) -> bool:
+    """The same number, of whatever width the drive has it."""
+    width = min(len(found), len(wanted))
+    rest = found[width:] + wanted[width:]
+    return width > 0 and found[:width] == wanted[:width] and rest.strip(b"\0") in (b"", b"\xff" * len(rest))
 
 
 def unsigned(data: bytes) -> int:

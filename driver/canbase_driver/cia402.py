@@ -15,23 +15,14 @@ Rules of the goals
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from enum import Enum
-
-AXIS_OFFSET = 0x800
-"""The objects of axis n are at 6000h + 800h × n (CiA 402-2)."""
 
 FAULT_RESET_CYCLES = 3
 """SYNC cycles for each level of bit 7: synchronous RPDOs act one SYNC late, some drives need three to see an edge."""
 
 REMOTE = 1 << 9
 """Statusword bit 9: 0 means that the drive is in local mode and ignores the controlword."""
-
-
-def axis_object(index: int, axis: int) -> int:
-    """Index of a 6000h…67FFh object on axis 0 or 1. Raises ValueError outside of these."""
-    if not 0x6000 <= index <= 0x67FF or axis not in (0, 1):
-        raise ValueError(f"{index:04X}h on axis {axis}: expected 6000h…67FFh and axis 0 or 1")
-    return index + AXIS_OFFSET * axis
 
 
 class DriveState(Enum):
@@ -131,3 +122,18 @@ COMMANDS: dict[PowerGoal, dict[DriveState | None, Command]] = {
 def next_controlword(state: DriveState | None, goal: PowerGoal) -> int:
     """Controlword 6040h that takes an axis one step from `state` (None: unknown) towards `goal`, or keeps it there."""
     return COMMANDS[goal][state].value
+
+
+def common_controlword(states: Collection[DriveState | None], goal: PowerGoal) -> int:
+    """The one word for motors that share 6040h: of the words for each, that which gives the least power.
+
+    A motor in fault has no voice unless the goal is RESET: it does not act on the others' words, and its own would
+    let them coast.
+    """
+    if goal is PowerGoal.RESET:
+        return max(next_controlword(state, goal) for state in states)
+    voices = [state for state in states if state not in _IN_FAULT] or list(states)
+    return min(next_controlword(state, goal) for state in voices)
+
+
+_IN_FAULT = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)

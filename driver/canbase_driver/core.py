@@ -158,7 +158,8 @@ class DriverCore:
 
     def stop_frames(self) -> list[Frame]:
         """Quick stop for all axes in any state: the way out after a defect. Needs no knowledge, cannot fail."""
-        return [axis.setpoint(PowerGoal.QUICK_STOP, 0.0) for axis in self._drives.axes] + [SYNC]
+        goal = PowerGoal.QUICK_STOP
+        return [frame for node in self._drives.nodes for frame in node.setpoints(goal, 0.0, 0.0)] + [SYNC]
 
     def _judge(self, situation: Situation, now: float) -> Orders:
         before = self._supervisor.state
@@ -184,11 +185,7 @@ class DriverCore:
         resets = self._reset is not None and self._reset.sequence.fault_reset_bit
         goal = PowerGoal.RESET if resets else orders.goal  # to an axis without a fault RESET is OFF
         left_mps, right_mps = wheel_speeds(self._motion.twist, self._robot.base.track_m)
-        frames = [
-            axis.setpoint(goal, left_mps if axis.drive.side == "left" else right_mps)
-            for node in started
-            for axis in node.axes
-        ]
+        frames = [frame for node in started for frame in node.setpoints(goal, left_mps, right_mps)]
         return [*frames, SYNC]
 
     def _go_on_with_reset(self, situation: Situation, now: float) -> list[Frame]:

@@ -1,6 +1,7 @@
 """The PDOs of docs/bus.md as data: which exist, with which identifiers and contents, and their packing.
 
-Writing the layout into a drive is `boot.py`. The layout of the quick stop PDO is the watchdog's; its sender is too.
+The profile of the drive says where its objects are and how wide. Writing the layout into a drive is `boot_pdo.py`.
+The layout of the quick stop PDO is the watchdog's; its sender is too.
 """
 
 from __future__ import annotations
@@ -8,20 +9,25 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
+from canbase_config.drive import Drive
+from canbase_config.places import CONTROLWORD, POSITION_ACTUAL, STATUSWORD, TARGET_VELOCITY, VELOCITY_ACTUAL, place
+from canbase_config.profile import Layout, Profile
+from canbase_config.robot import Robot
 from canbase_driver.cia301 import RPDO, TPDO
-from canbase_driver.cia402 import axis_object
 
 EVERY_SYNC = 1
 """Transmission type: a TPDO goes out after each SYNC, an RPDO takes effect at the next one (CiA 301)."""
 AT_ONCE = 255
 """Transmission type: event driven, an RPDO takes effect when it arrives (CiA 301, profile event)."""
+QUICK_STOP_RPDO = 4
+"""The watchdog's PDO has this number, or the last one of a drive with fewer."""
 
-CONTROLWORD, STATUSWORD = 0x6040, 0x6041
-POSITION_ACTUAL, VELOCITY_ACTUAL, TARGET_VELOCITY = 0x6064, 0x606C, 0x60FF
-
-_SETPOINT = struct.Struct("<Hi")
-_STATUS = struct.Struct("<Hi")
-_VELOCITY = struct.Struct("<i")
+GENERIC_PROFILE = Profile(title="generic")
+GENERIC = GENERIC_PROFILE.layout
+_SETPOINT = {16: struct.Struct("<Hh"), 32: struct.Struct("<Hi")}
+_STATUS = {False: struct.Struct("<Hi"), True: struct.Struct("<Ii")}
+"""By whether the statuswords of two axes are packed into one object."""
+_VELOCITY = {16: struct.Struct("<h"), 32: struct.Struct("<i")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +41,10 @@ class Pdo:
     cob_id: int = 0
     transmission_type: int = EVERY_SYNC
     mapping: tuple[int, ...] = ()
+    inhibit_100us: int | None = None
+    """1800h:3, None: not written."""
+    event_timer_ms: int | None = None
+    """1400h:5 or 1800h:5, None: not written."""
 
     @property
     def name(self) -> str:
@@ -53,12 +63,22 @@ class Pdo:
 
 
 @dataclass(frozen=True, slots=True)
+class Timing:
+    """What the times in PDOs follow from: the period of the control cycle, and how long setpoints may be missing."""
+
+    cycle_s: float = 0.01
+    deadline_s: float = 0.3
+
+
+@dataclass(frozen=True, slots=True)
 class NodeLayout:
     """The PDOs of one node with one or two used axes. Raises ValueError for any other set of axes."""
 
     node_id: int
     axes: tuple[int, ...]
     """Used axes in rising order; the first has RPDO1, TPDO1 and TPDO2, the second RPDO2, TPDO3 and TPDO4."""
+    profile: Profile = GENERIC_PROFILE
+    timing: Timing = Timing()
 
     def __post_init__(self) -> None:
         if self.axes not in ((0,), (1,), (0, 1)):
@@ -78,55 +98,75 @@ class NodeLayout:
 
     def pdos(self) -> tuple[Pdo, ...]:
         """Every PDO in use, as docs/bus.md has them."""
-        setpoints = [
+        return (*self._setpoints(), self._quick_stop(), *self._feedback())
+
+    def _setpoints(self) -> list[Pdo]:
+        has_deadline = self.profile.self_stop.rpdo_timer != "no"
+        deadline_ms = round(1000 * self.timing.deadline_s) if has_deadline else None
+        kind = EVERY_SYNC if self.profile.pdo.synchronous else AT_ONCE
+        return [
             Pdo(
-                "RPDO", 1 + i, self.setpoint_cob_id(axis), EVERY_SYNC, self._entries(axis, CONTROLWORD, TARGET_VELOCITY)
+                "RPDO",
+                1 + i,
+                self.setpoint_cob_id(axis),
+                kind,
+                self._entries(axis, CONTROLWORD, TARGET_VELOCITY),
+                event_timer_ms=deadline_ms,
             )
             for i, axis in enumerate(self.axes)
         ]
-        quick_stop = Pdo("RPDO", 4, RPDO[3] + self.node_id, AT_ONCE, self._quick_stop_entries())
-        return (*setpoints, quick_stop, *self._feedback())
+
+    def _quick_stop(self) -> Pdo:
+        entries = dict.fromkeys(entry for axis in self.axes for entry in self._entries(axis, CONTROLWORD))
+        number = min(QUICK_STOP_RPDO, self.profile.pdo.rpdos)
+        return Pdo("RPDO", number, RPDO[3] + self.node_id, AT_ONCE, tuple(entries))
 
     def _feedback(self) -> list[Pdo]:
         pdos = []
         for i, axis in enumerate(self.axes):
             status, velocity = self._entries(axis, STATUSWORD, POSITION_ACTUAL), self._entries(axis, VELOCITY_ACTUAL)
-            pdos.append(Pdo("TPDO", 2 * i + 1, self.status_cob_id(axis), mapping=status))
-            pdos.append(Pdo("TPDO", 2 * i + 2, self.velocity_cob_id(axis), mapping=velocity))
+            pdos.append(self._tpdo(2 * i + 1, self.status_cob_id(axis), status))
+            pdos.append(self._tpdo(2 * i + 2, self.velocity_cob_id(axis), velocity))
         return pdos
 
-    def _quick_stop_entries(self) -> tuple[int, ...]:
-        return tuple(entry for axis in self.axes for entry in self._entries(axis, CONTROLWORD))
+    def _tpdo(self, number: int, cob_id: int, mapping: tuple[int, ...]) -> Pdo:
+        """Without SYNC it goes by its timer, and never more often than once in a cycle."""
+        if self.profile.pdo.synchronous:
+            return Pdo("TPDO", number, cob_id, mapping=mapping)
+        cycle_ms = max(1, round(1000 * self.timing.cycle_s))
+        return Pdo("TPDO", number, cob_id, AT_ONCE, mapping, inhibit_100us=10 * cycle_ms, event_timer_ms=cycle_ms)
 
-    @staticmethod
-    def _entries(axis: int, *indexes: int) -> tuple[int, ...]:
-        return tuple(mapping_entry(axis_object(index, axis), 0, _BITS[index]) for index in indexes)
-
-
-_BITS = {CONTROLWORD: 16, STATUSWORD: 16, POSITION_ACTUAL: 32, VELOCITY_ACTUAL: 32, TARGET_VELOCITY: 32}
-
-
-def mapping_entry(index: int, sub: int, bits: int) -> int:
-    """An entry of 1600h/1A00h (CiA 301): index, sub-index and length in bits."""
-    return index << 16 | sub << 8 | bits
+    def _entries(self, axis: int, *indexes: int) -> tuple[int, ...]:
+        return tuple(place(self.profile.layout, index, axis).mapping_entry for index in indexes)
 
 
-def pack_setpoint(controlword: int, target_raw: int) -> bytes:
-    """6040h and 60FFh for `setpoint_cob_id`. Raises struct.error when a value does not fit 16 and 32 bits."""
-    return _SETPOINT.pack(controlword, target_raw)
+def node_layout(node_id: int, drives: tuple[Drive, ...], robot: Robot) -> NodeLayout:
+    """The PDOs of a node whose used axes are `drives`, all of one profile. Raises ValueError when there is none."""
+    if not drives:
+        raise ValueError(f"node {node_id} has no axes")
+    timing = Timing(1.0 / robot.rates.control_hz, robot.timeouts.drive_heartbeat_s)
+    return NodeLayout(node_id, tuple(sorted(drive.axis for drive in drives)), drives[0].kind, timing)
 
 
-def unpack_status(data: bytes) -> tuple[int, int] | None:
-    """Statusword 6041h and position 6064h [increments]; None when the length is wrong: to be dropped and counted."""
-    if len(data) != _STATUS.size:
+def pack_setpoint(controlword: int, target_raw: int, layout: Layout = GENERIC) -> bytes:
+    """6040h and 60FFh for `setpoint_cob_id`. Raises struct.error when a value does not fit its object."""
+    return _SETPOINT[layout.target_bits].pack(controlword, target_raw)
+
+
+def unpack_status(data: bytes, layout: Layout = GENERIC, axis: int = 0) -> tuple[int, int] | None:
+    """Statusword 6041h of an axis and position 6064h [increments].
+
+    None when the length is wrong: to be dropped and counted.
+    """
+    is_packed = layout.statusword == "packed"
+    form = _STATUS[is_packed]
+    if len(data) != form.size:
         return None
-    statusword, position = _STATUS.unpack(data)
-    return statusword, position
+    statusword, position = form.unpack(data)
+    return (statusword >> 16 * axis & 0xFFFF if is_packed else statusword), position
 
 
-def unpack_velocity(data: bytes) -> int | None:
+def unpack_velocity(data: bytes, layout: Layout = GENERIC) -> int | None:
     """Velocity 606Ch [raw]; None when the length is wrong: to be dropped and counted."""
-    if len(data) != _VELOCITY.size:
-        return None
-    (velocity,) = _VELOCITY.unpack(data)
-    return int(velocity)
+    form = _VELOCITY[layout.velocity_bits]
+    return int(form.unpack(data)[0]) if len(data) == form.size else None

@@ -15,10 +15,11 @@ from enum import Enum
 from canbase_config.robot import Robot
 from canbase_driver.axis import Axis
 from canbase_driver.cia301 import ALL_NODES, NmtCommand, NmtState, nmt, parse_heartbeat
+from canbase_driver.cia402 import PowerGoal, common_controlword, next_controlword
 from canbase_driver.emcy import Emcy, parse_emcy
 from canbase_driver.frame import Frame
 from canbase_driver.node_boot import NodeBoot
-from canbase_driver.pdo import NodeLayout
+from canbase_driver.pdo import node_layout
 
 START_TIMEOUT_S = 1.0
 """From NMT start to a heartbeat "operational" and a status of every axis."""
@@ -44,7 +45,7 @@ class RemoteNode:
         self.node_id = node_id
         self._robot = robot
         self._drives = tuple(drive for drive in robot.drives if drive.node_id == node_id)
-        self.layout = NodeLayout(node_id, tuple(sorted(drive.axis for drive in self._drives)))
+        self.layout = node_layout(node_id, self._drives, robot)
         self.axes = tuple(Axis(drive, self.layout, robot) for drive in self._drives)
         self.presence = Presence.GONE
         self.nmt_state: NmtState | None = None
@@ -109,6 +110,17 @@ class RemoteNode:
         self._boot = None
         self.stops_by_itself = False
         self._go(Presence.GONE, now)
+
+    def setpoints(self, goal: PowerGoal, left_mps: float, right_mps: float) -> list[Frame]:
+        """The setpoint of each axis, one step towards `goal`; speeds of the rims, forward positive [m/s]."""
+        speeds = {"left": left_mps, "right": right_mps}
+        words = self._controlwords(goal)
+        return [axis.setpoint(goal, speeds[axis.drive.side], word) for axis, word in zip(self.axes, words, strict=True)]
+
+    def _controlwords(self, goal: PowerGoal) -> list[int]:
+        if self.layout.profile.layout.controlword == "own":
+            return [next_controlword(axis.state, goal) for axis in self.axes]
+        return [common_controlword([axis.state for axis in self.axes], goal)] * len(self.axes)
 
     def on_heartbeat(self, frame: Frame, now: float) -> bool:
         """Take a frame 700h + id. False: not a heartbeat."""

@@ -167,6 +167,12 @@ class SdoClient:
         self._answer = None
         return self._begin(step, self._attempts, now)
 
+    def again(self, now: float) -> Frame:
+        """Begin the transfer under way anew: the drive has just started. Raises RuntimeError when there is none."""
+        if self._transfer is None:
+            raise RuntimeError(f"node {self.node_id}: no transfer is under way")
+        return self._begin(self._transfer.step, self._attempts, now)
+
     def answer(self) -> bytes:
         """What the last transfer brought: the object's bytes, or b"" after a write.
 

@@ -9,9 +9,8 @@ import math
 
 from canbase_config.drive import Drive
 from canbase_config.robot import Base
-from canbase_config.units import motor_rev_per_s
+from canbase_config.units import motor_rev_per_s, ramp_raw
 
-INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
 UINT32_MAX = 2**32 - 1
 
 
@@ -20,25 +19,30 @@ class AxisUnits:
 
     def __init__(self, drive: Drive, base: Base) -> None:
         rim_m_per_motor_rev = 2.0 * math.pi * base.wheel_radius_m / drive.gear_ratio
-        one_bit_rev_per_s = motor_rev_per_s(drive.target_unit, drive.counts_per_motor_rev)
+        counts = drive.counts_per_motor_rev
+        target_rev_per_s = motor_rev_per_s(drive.target_unit, counts)
+        self._drive = drive
+        self._rim_m_per_motor_rev = rim_m_per_motor_rev
+        self._target_limit: int = 1 << drive.kind.layout.target_bits - 1
         self._direction = drive.direction
-        self._mps_per_bit = one_bit_rev_per_s * rim_m_per_motor_rev
-        self._m_per_count = rim_m_per_motor_rev / drive.counts_per_motor_rev
+        self._target_mps_per_bit = target_rev_per_s * rim_m_per_motor_rev
+        self._actual_mps_per_bit = motor_rev_per_s(drive.actual_unit, counts) * rim_m_per_motor_rev
+        self._m_per_count = rim_m_per_motor_rev / counts
         self._wheel_radius_m = base.wheel_radius_m
 
     def velocity_raw(self, rim_mps: float) -> int:
-        """Target for 60FFh: nearest value to `rim_mps` [m/s], saturated to 32 bits.
+        """Target for 60FFh: nearest value to `rim_mps` [m/s], saturated to its width.
 
         Raises ValueError when the speed is not finite.
         """
         if not math.isfinite(rim_mps):
             raise ValueError(f"a target velocity of {rim_mps} m/s cannot be sent; expected a finite number")
-        raw = round(self._direction * rim_mps / self._mps_per_bit)
-        return min(max(raw, INT32_MIN), INT32_MAX)
+        raw = round(self._direction * rim_mps / self._target_mps_per_bit)
+        return min(max(raw, -self._target_limit), self._target_limit - 1)
 
     def velocity_mps(self, raw: int) -> float:
-        """Speed of the rim [m/s] for a value of 606Ch or 60FFh."""
-        return self._direction * raw * self._mps_per_bit
+        """Speed of the rim [m/s] for a value of 606Ch."""
+        return self._direction * raw * self._actual_mps_per_bit
 
     def position_m(self, counts: int) -> float:
         """Distance of the rim [m] for a number of increments of 6064h, which may be wider than 32 bits."""
@@ -49,10 +53,12 @@ class AxisUnits:
         return self.position_m(counts) / self._wheel_radius_m
 
     def acceleration_raw(self, mps2: float) -> int:
-        """Value for 6083h, 6084h, 6085h: the velocity unit per second. A magnitude, 1…2³²-1, never 0.
+        """Value for 6083h, 6084h, 6085h in the unit of the profile. A magnitude, 1…2³²-1, never 0.
 
         Raises ValueError unless `mps2` [m/s²] is positive and finite.
         """
         if not (math.isfinite(mps2) and mps2 > 0.0):
             raise ValueError(f"an acceleration of {mps2} m/s² cannot be set; expected a positive number")
-        return min(max(round(mps2 / self._mps_per_bit), 1), UINT32_MAX)
+        drive, rev_per_s2 = self._drive, mps2 / self._rim_m_per_motor_rev
+        raw = ramp_raw(drive.kind.units, drive.target_unit, drive.counts_per_motor_rev, rev_per_s2)
+        return min(max(round(raw), 1), UINT32_MAX)

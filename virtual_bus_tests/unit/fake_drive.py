@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from canbase_config.drive import Drive, Identity
+from canbase_config.drive import Drive
 from canbase_config.robot import Robot
 from canbase_driver.frame import Frame
 from canbase_driver.node_boot import NodeBoot
@@ -152,7 +152,7 @@ def robot(**identity: int) -> Robot:
         {
             "bus": {"interface": "virtual", "channel": "test"},
             "drives": (
-                {"joint": "left", "node_id": 1, "side": "left", "identity": Identity(**identity), **wheel},
+                {"joint": "left", "node_id": 1, "side": "left", "identity": identity, **wheel},
                 {"joint": "right", "node_id": 1, "axis": 1, "side": "right", "direction": -1, **wheel},
             ),
             "base": {"wheel_radius_m": 0.1, "track_m": 0.5},

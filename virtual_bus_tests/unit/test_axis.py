@@ -7,7 +7,7 @@ import math
 import pytest
 
 from canbase_driver.axis import Axis
-from canbase_driver.cia402 import DriveState, PowerGoal
+from canbase_driver.cia402 import DriveState, PowerGoal, next_controlword
 from canbase_driver.pdo import NodeLayout, pack_setpoint
 from unit.chain_world import BITS_PER_MPS, bench_robot
 
@@ -137,7 +137,7 @@ def test_the_setpoint_is_one_step_to_the_goal_and_has_a_target_only_on_the_way_o
 ) -> None:
     wheel = axis(number)
     wheel.on_status(status(word, 0), 10.0)
-    frame = wheel.setpoint(goal, 0.3)
+    frame = wheel.setpoint(goal, 0.3, next_controlword(wheel.state, goal))
     assert frame.cob_id == 0x201 + number
     assert frame.data == pack_setpoint(controlword, sign * round(target * BITS_PER_MPS))
     assert wheel.target_mps == target

@@ -52,7 +52,7 @@ def test_a_drive_without_1016h_does_not_stop_by_itself() -> None:
     for sub in range(3):
         del drive.objects[0x1016, sub]
     boot = boot_one_axis(drive)
-    assert notes_of(boot) == ("1016h: the drive watches no heartbeat, it will not stop by itself",)
+    assert notes_of(boot) == ("1016h: the drive watches no heartbeat, it will not stop by it",)
     assert boot.report is not None
     assert not boot.report.stops_by_itself
 
@@ -105,7 +105,7 @@ def test_a_fixed_mapping_that_is_right_is_left_alone() -> None:
 @pytest.mark.parametrize(
     ("key", "abort", "problem", "hint"),
     [
-        ((0x6060, 0), INVALID, "6060h:0: 0609 0030h value not valid", "must support profile velocity"),
+        ((0x6060, 0), INVALID, "6060h:0: 0609 0030h value not valid", "must support `mode`"),
         ((0x60FF, 0), DEVICE_STATE, "60FFh:0: 0800 0022h", "Switch the drive off and on again"),
         ((0x1600, 2), 0x06040041, "1600h:2: 0604 0041h the object cannot be mapped", "the manual of the drive"),
         ((0x1A00, 0), READ_ONLY, "1A00h:0: 0601 0002h the object is read-only", "the manual of the drive"),

@@ -10,7 +10,7 @@ from canbase_driver.cia402 import (
     STATUSWORD_STATES,
     DriveState,
     PowerGoal,
-    axis_object,
+    common_controlword,
     decode_statusword,
     next_controlword,
 )
@@ -201,11 +201,21 @@ def test_states_are_named_as_in_the_standard() -> None:
     assert SWITCHED_ON.text == "switched on"
 
 
-def test_objects_of_the_second_axis_are_800h_further() -> None:
-    assert (axis_object(0x6040, 0), axis_object(0x6040, 1), axis_object(0x60FF, 1)) == (0x6040, 0x6840, 0x68FF)
-
-
-@pytest.mark.parametrize(("index", "axis"), [(0x6040, 2), (0x6040, -1), (0x6840, 0), (0x1000, 0)])
-def test_objects_outside_of_two_axes_raise(index: int, axis: int) -> None:
-    with pytest.raises(ValueError, match="expected 6000h"):
-        axis_object(index, axis)
+@pytest.mark.parametrize(
+    ("states", "goal", "word"),
+    [
+        ((DISABLED, DISABLED), PowerGoal.ON, 0x06),
+        ((ENABLED, DISABLED), PowerGoal.ON, 0x06),  # the one that is behind
+        ((READY, SWITCHED_ON), PowerGoal.ON, 0x07),
+        ((ENABLED, ENABLED), PowerGoal.ON, 0x0F),
+        ((FAULT, ENABLED), PowerGoal.ON, 0x0F),  # the healthy motor comes down its ramp
+        ((FAULT, FAULT), PowerGoal.ON, 0x00),
+        ((FAULT, ENABLED), PowerGoal.QUICK_STOP, 0x02),
+        ((None, ENABLED), PowerGoal.OFF, 0x00),
+        ((FAULT, DISABLED), PowerGoal.RESET, 0x80),
+        ((DISABLED, DISABLED), PowerGoal.RESET, 0x00),
+    ],
+)
+def test_one_controlword_for_two_motors(states: tuple[DriveState | None, ...], goal: PowerGoal, word: int) -> None:
+    assert common_controlword(states, goal) == word
+    assert common_controlword(states[::-1], goal) == word

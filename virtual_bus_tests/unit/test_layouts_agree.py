@@ -7,15 +7,26 @@ from __future__ import annotations
 
 import pytest
 
+from canbase_config.derive import watched_drive
+from canbase_config.drive import Drive
+from canbase_config.load import load_robot, sample
+from canbase_config.places import place
+from canbase_config.profile_file import load_profile, profile_names
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID
 from canbase_driver import cia301, cia402, pdo, watchdog_link
 from canbase_driver.frame import Frame as DriverFrame
+from canbase_driver.units import AxisUnits
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.twist import Twist
 from canbase_watchdog import frames, lease
 from canbase_watchdog.ladder import Step
 from canbase_watchdog.policy import Cause
 from canbase_watchdog.watchdog import Answer, State
+
+BENCH = load_robot(sample("bench")).robot
+WHEEL = {"joint": "wheel", "node_id": 5, "side": "left", "gear_ratio": 20.0, "counts_per_motor_rev": 4096}
+NEEDED = {name: {"velocity_unit": "0.001rev/s"} for name in ("nanotec", "dryve_d1")}
+"""What profiles do not know."""
 
 
 @pytest.mark.parametrize(
@@ -110,3 +121,29 @@ def test_the_words_that_stop_are_the_same() -> None:
     assert [command for command in cia402.Command if frames.asks_for_power(command.value)] == [
         cia402.Command.ENABLE_OPERATION
     ]
+
+
+@pytest.mark.parametrize("name", profile_names())
+def test_both_sides_read_and_write_every_kind_of_drive_alike(name: str) -> None:
+    """The driver by the profile, the watchdog by what it is told of it."""
+    profile = load_profile(name)
+    layout = profile.layout
+    for axis in range(layout.axes):
+        drive = Drive.model_validate(WHEEL | NEEDED.get(name, {}) | {"profile": name, "axis": axis})
+        watched = watched_drive(drive, 0.1)
+        bits = pdo.pack_setpoint(0x0F, -300, layout)
+        assert frames.decode_setpoint(bits, watched.layout) == (0x0F, -300)
+        status = bytes.fromhex("37 02 21 06 fe ff ff ff")[: 8 if layout.statusword == "packed" else 6]
+        assert frames.decode_status(status, watched.layout, axis) == pdo.unpack_status(status, layout, axis)
+        velocity = (-300).to_bytes(layout.velocity_bits // 8, "little", signed=True)
+        assert frames.decode_velocity(velocity, watched.layout) == pdo.unpack_velocity(velocity, layout) == -300
+        for index in (0x6040, 0x6041, 0x606C):
+            at = place(layout, index, axis)
+            assert frames.place_of(index, axis, watched.layout) == (at.index, at.sub)
+        units = AxisUnits(drive, BENCH.base)
+        assert watched.mps_per_bit * units.velocity_raw(0.5) == pytest.approx(0.5, abs=abs(watched.mps_per_bit))
+        assert watched.velocity_mps_per_bit * 1000 == pytest.approx(units.velocity_mps(1000))
+    both = pdo.NodeLayout(5, tuple(range(layout.axes)), profile)
+    quick_stop = next(pdo for pdo in both.pdos() if pdo.cob_id == 0x505)
+    length = sum(entry & 0xFF for entry in quick_stop.mapping) // 8
+    assert len(frames.quick_stop(5, layout.axes, watched.layout).data) == length
