@@ -75,7 +75,8 @@ def made_consistent(values: Values) -> Values:
     """`values` changed where two of them may contradict each other, as the model's own checks demand."""
     for index, drive in enumerate(values["drives"]):
         drive |= {"joint": f"{drive['joint'][:60]}_{index}", "node_id": index + 1, "side": ("left", "right")[index % 2]}
-        drive |= {"profile": ("generic", "roboteq")[index % 2], "mode": (3, 9, None)[index % 3]}
+        drive |= {"profile": ("generic", "roboteq")[index % 2], "mode": (3, None)[index // 2 % 2]}
+    values["bus"].pop("sync_counter", None)
     limits, safety, action = values["limits"], values["safety"], values.get("action", {})
     limits["emergency_deceleration_mps2"] = max(limits["emergency_deceleration_mps2"], limits["deceleration_mps2"])
     safety["stop_distance_m"] = min(safety.get("stop_distance_m", 0.15), 4.0)
