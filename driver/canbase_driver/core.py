@@ -243,8 +243,11 @@ class DriverCore:
             f"{fastest.drive.joint} turns at {fastest.velocity_mps:.3f} m/s, {elapsed_s:.1f} s after zero was ordered"
         )
 
+    def _on_status(self, node: RemoteNode, axis: Axis, frame: Frame, now: float) -> bool:
+        return self._answers_last_sync(now) and node.on_status(axis, frame, now)
+
     def _on_velocity(self, node: RemoteNode, axis: Axis, frame: Frame, now: float) -> bool:
-        understood = node.on_velocity(axis, frame)
+        understood = self._answers_last_sync(now) and node.on_velocity(axis, frame)
         self._feed.update(now)
         return understood
 
@@ -252,6 +255,10 @@ class DriverCore:
         for node in self._drives.nodes:
             node.on_nmt(frame, now)
         return True
+
+    def _answers_last_sync(self, now: float) -> bool:
+        """False for a TPDO that waited while this process stood still: it tells of then, and would pass for fresh."""
+        return now - self._ticked_at <= self._robot.timeouts.feedback_s
 
     def _dispatch_table(self) -> dict[int, tuple[Handler, RemoteNode | None]]:
         """Who takes a frame, and the node that may go on with its boot after it."""
@@ -265,7 +272,7 @@ class DriverCore:
             table[HEARTBEAT + node.node_id] = (node.on_heartbeat, node)
             table[SDO_TO_CLIENT + node.node_id] = (node.on_sdo, node)
             for axis in node.axes:
-                table[node.layout.status_cob_id(axis.drive.axis)] = (partial(node.on_status, axis), None)
+                table[node.layout.status_cob_id(axis.drive.axis)] = (partial(self._on_status, node, axis), None)
                 table[node.layout.velocity_cob_id(axis.drive.axis)] = (partial(self._on_velocity, node, axis), None)
         return table
 

@@ -6,8 +6,10 @@ import itertools
 
 import pytest
 
+from canbase_bench.frame import Frame as BenchFrame
 from canbase_bench.world.bench import BenchParameters
 from canbase_config.robot import Robot
+from canbase_driver.frame import Frame
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.snapshot import DriverState
 from unit.chain_world import World, robot_of
@@ -49,6 +51,24 @@ def test_the_pose_never_jumps_while_a_drive_is_switched_off_and_on(world: World)
         poses.append(world.snapshot)
     steps = [abs(b.x_m - a.x_m) + abs(b.yaw_rad - a.yaw_rad) for a, b in itertools.pairwise(poses)]
     assert max(steps) < 0.3 * 0.01 * 1.5 + 0.01
+
+
+@pytest.mark.parametrize(("waited_s", "counts"), [(0.099, True), (0.101, False)])
+def test_feedback_that_waited_while_the_driver_stood_still_does_not_pass_for_fresh(
+    world: World, waited_s: float, counts: bool
+) -> None:
+    """t   0  cycle, SYNC, answers ── the process stands still ── waited_s: it goes on and reads the answers"""
+    went_on_at = world.now + waited_s
+    core, dropped = world.core, world.core.frames_dropped
+    core.tick(world.now)
+    world.bench.on_frame(BenchFrame(0x080, b""), world.now)
+    answers = world.bench.tick(world.now)
+    for answer in answers:
+        core.on_frame(Frame(answer.cob_id, answer.data), went_on_at)
+    assert core.snapshot(went_on_at).odometry_valid is counts
+    assert core.frames_dropped == dropped + (0 if counts else len(answers))
+    core.tick(went_on_at)
+    assert (core.cause.name == "drive silent") is not counts
 
 
 @pytest.mark.parametrize(
