@@ -34,3 +34,31 @@ def check(
         typer.secho(line, dim=line.endswith(f"# {DEFAULT_MARK}"), color=colour())
     counts = f"{len(loaded.given)} values from the file, {len(loaded.defaults)} defaults"
     typer.secho(f"{loaded.path} is good: {counts}", err=True, fg=typer.colors.GREEN, color=colour())
+
+
+@app.command("from-eds")
+def from_eds(file: Annotated[Path, typer.Argument(metavar="FILE", help="The EDS or DCF file of a drive.")]) -> None:
+    """Draft a drive profile from an EDS file, on stdout; what to know about it is on stderr.
+
+    Exit code 0: a start for `profile` in robot.yaml. 1: the drive lacks what canbase needs. 2: FILE cannot be read.
+    """
+    from canbase_config.eds_file import EdsError, read_eds
+    from canbase_config.from_eds import draft
+
+    try:
+        eds = read_eds(file)
+    except EdsError as error:
+        typer.secho(f"canbase: {error}", err=True, fg=typer.colors.RED, color=colour())
+        raise typer.Exit(2) from error
+    found = draft(eds)
+    typer.echo(found.text, nl=False)
+    lines = [f"{file}: {len(eds.objects)} objects, read as {eds.encoding}"]
+    lines += [f"  odd: {note}" for note in eds.notes]
+    lines += [f"  an EDS cannot tell: {unknown}" for unknown in found.unknown]
+    typer.secho("\n".join(lines), err=True, color=colour())
+    typer.secho(found.self_stop, err=True, bold=True, color=colour())
+    if found.missing:
+        typer.secho(
+            f"canbase cannot use this drive: it lacks {', '.join(found.missing)}", err=True, fg=typer.colors.RED
+        )
+        raise typer.Exit(1)

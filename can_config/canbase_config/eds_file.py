@@ -1,0 +1,204 @@
+"""Reads EDS and DCF files (CiA 306) as makers really write them: which objects a drive has. It decides nothing.
+
+Whatever can be understood is taken; what is odd becomes a note with its line. An EDS is optional in canbase.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+MAX_BYTES: Final = 8_000_000
+_ENCODINGS: Final = ("utf-8", "cp1252", "latin-1")
+_OBJECT: Final = re.compile(r"([0-9a-f]{4})(?:sub([0-9a-f]{1,2}))?", re.IGNORECASE)
+_NODE_ID: Final = re.compile(r"\$?NODEID", re.IGNORECASE)
+_ACCESS: Final = frozenset(("ro", "wo", "rw", "rwr", "rww", "const"))
+
+
+class EdsError(Exception):
+    """The file cannot be used. The text names file, line where there is one, and reason."""
+
+
+@dataclass(frozen=True, slots=True)
+class EdsObject:
+    """One object or sub-object. `default`: its number as the drive comes up, node id 0; None: none is given."""
+
+    index: int
+    sub: int
+    name: str
+    line: int
+    data_type: int | None
+    access: str
+    default: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Eds:
+    """The content of a file. `objects` by (index, sub-index); `info` is [DeviceInfo], keys in lower case."""
+
+    path: Path
+    encoding: str
+    objects: Mapping[tuple[int, int], EdsObject]
+    info: Mapping[str, str]
+    notes: tuple[str, ...]
+    """What is odd, a sentence each, with its line."""
+
+    def has(self, index: int, sub: int | None = None) -> bool:
+        """Whether the object is described; any sub-index of it when `sub` is None."""
+        return (index, sub) in self.objects if sub is not None else any(key[0] == index for key in self.objects)
+
+    def default(self, index: int, sub: int = 0) -> int | None:
+        """Its default value; None when the object or its default is not there."""
+        found = self.objects.get((index, sub))
+        return found.default if found else None
+
+
+@dataclass(slots=True)
+class _Section:
+    name: str
+    line: int
+    values: dict[str, tuple[str, int]]
+    """By key in lower case: text and line."""
+
+
+def read_eds(path: str | Path) -> Eds:
+    """The EDS or DCF file at `path`. Raises EdsError when nothing in it describes a CANopen device."""
+    path = Path(path)
+    text, encoding = _text(path)
+    notes: list[str] = [] if encoding == "utf-8" else [f"read as {encoding}: it is no UTF-8"]
+    sections = _sections(text, notes)
+    objects = {(found.index, found.sub): found for found in _objects(sections, notes)}
+    if not objects:
+        first = next((line for line in text.splitlines() if line.strip()), "")
+        raise EdsError(f"{path}:1: no section describes an object ([1000], [6040], …); it begins with {first[:40]!r}")
+    info = sections.get("deviceinfo")
+    if info is None:
+        notes.append("it has no section [DeviceInfo]")
+    notes += _lists(sections, objects)
+    values = {key: value for key, (value, _) in info.values.items()} if info else {}
+    return Eds(path, encoding, objects, values, tuple(notes))
+
+
+def number(text: str) -> int | None:
+    """The integer in an EDS value: decimal, 0x…, …h, octal with a leading 0 (CiA 306); `$NODEID` counts as 0."""
+    rest = _NODE_ID.sub("0", text.split(";")[0]).replace(" ", "").replace("\t", "")
+    terms = rest.split("+")
+    numbers = [_term(term) for term in terms if term]
+    return None if not numbers or None in numbers else sum(value for value in numbers if value is not None)
+
+
+def _term(text: str) -> int | None:
+    for pattern, base in ((r"([-+]?)0x([0-9a-f]+)", 16), (r"([-+]?)([0-9a-f]+)h", 16), (r"([-+]?)0([0-7]+)", 8)):
+        match = re.fullmatch(pattern, text, re.IGNORECASE)
+        if match:
+            return int(match[1] + match[2], base)
+    return int(text) if re.fullmatch(r"[-+]?\d+", text) else None
+
+
+def _text(path: Path) -> tuple[str, str]:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise EdsError(f"{path}: cannot be read: {error.strerror or error}") from error
+    if len(data) > MAX_BYTES or b"\0" in data:
+        what = f"is larger than {MAX_BYTES} bytes" if len(data) > MAX_BYTES else "has zero bytes"
+        raise EdsError(f"{path}: {what}: no EDS file, which is text")
+    for encoding in _ENCODINGS:
+        try:
+            return data.decode("utf-8-sig" if encoding == "utf-8" else encoding), encoding
+        except UnicodeDecodeError:
+            continue
+    raise EdsError(f"{path}: in none of the encodings {', '.join(_ENCODINGS)}")
+
+
+def _sections(text: str, notes: list[str]) -> dict[str, _Section]:
+    """By name in lower case. Of a section or key that is there twice the first counts."""
+    sections: dict[str, _Section] = {}
+    current: _Section | None = None
+    for number_of_line, raw in enumerate(text.splitlines(), start=1):
+        line = raw.strip()
+        if not line or line[0] in ";#":
+            continue
+        if line.startswith("["):
+            current = _begin(sections, line, number_of_line, notes)
+        elif "=" in line and current is not None:
+            _take(current, line, number_of_line, notes)
+        else:
+            notes.append(f"line {number_of_line}: neither a section nor a key: {line[:40]!r}")
+    return sections
+
+
+def _begin(sections: dict[str, _Section], line: str, at: int, notes: list[str]) -> _Section:
+    name = line[1:].partition("]")[0].strip()
+    section = _Section(name, at, {})
+    before = sections.setdefault(name.lower(), section)
+    if before is not section:
+        notes.append(f"line {at}: section [{name}] is there already, in line {before.line}; the first counts")
+    if "]" not in line:
+        notes.append(f"line {at}: the bracket of [{name} is not closed")
+    return section
+
+
+def _take(section: _Section, line: str, at: int, notes: list[str]) -> None:
+    key, _, value = line.partition("=")
+    lower = key.strip().lower()
+    if lower in section.values:
+        notes.append(f"line {at}: {key.strip()} is there twice in [{section.name}]; the first counts")
+        return
+    section.values[lower] = (value.strip(), at)
+
+
+def _objects(sections: Mapping[str, _Section], notes: list[str]) -> Iterator[EdsObject]:
+    for name, section in sections.items():
+        match = _OBJECT.fullmatch(name)
+        if match is None or (match[2] is None and name + "sub0" in sections):
+            continue
+        yield _object(section, int(match[1], 16), int(match[2] or "0", 16), notes)
+
+
+def _object(section: _Section, index: int, sub: int, notes: list[str]) -> EdsObject:
+    def value(key: str) -> str:
+        return section.values.get(key, ("", 0))[0]
+
+    access = value("accesstype").lower()
+    if access not in _ACCESS:
+        if access:
+            notes.append(f"line {section.line}: [{section.name}] has the access type {access!r}; rw is assumed")
+        access = "rw"
+    return EdsObject(
+        index, sub, value("parametername"), section.line, number(value("datatype")), access, _default(section, notes)
+    )
+
+
+def _default(section: _Section, notes: list[str]) -> int | None:
+    """A DCF's ParameterValue goes before the DefaultValue."""
+    for key in ("parametervalue", "defaultvalue"):
+        text, at = section.values.get(key, ("", 0))
+        if text:
+            found = number(text)
+            kind = number(section.values.get("datatype", ("", 0))[0])
+            if found is None and kind in range(1, 8):
+                notes.append(f"line {at}: {text[:30]!r} is no number")
+            return found
+    return None
+
+
+def _lists(sections: Mapping[str, _Section], objects: Mapping[tuple[int, int], EdsObject]) -> Iterator[str]:
+    """What the lists of objects and the sections do not agree on; the sections count."""
+    listed: dict[int, int] = {}
+    for name in ("mandatoryobjects", "optionalobjects", "manufacturerobjects"):
+        section = sections.get(name)
+        for key, (text, at) in section.values.items() if section else ():
+            index = number(text) if key.isdigit() else None
+            if index is not None:
+                listed[index] = at
+    described = {index for index, _ in objects}
+    for index, at in listed.items():
+        if index not in described:
+            yield f"line {at}: {index:04X}h is listed, but no section describes it"
+    unlisted = len(described - listed.keys())
+    if unlisted:
+        yield f"{unlisted} objects are described, but not listed"

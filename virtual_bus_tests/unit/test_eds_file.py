@@ -1,0 +1,232 @@
+"""EDS files as makers really write them, and the profiles that are drafted from them."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from canbase_cli.main import app
+from canbase_config.eds_file import EdsError, EdsObject, number, read_eds
+from canbase_config.from_eds import draft
+from canbase_config.load import sample
+from canbase_config.profile_file import load_profile
+
+REAL = Path(os.environ.get("CANBASE_EDS_FOLDER", "eds"))
+"""Files of real drives; they belong to their makers and are not part of canbase."""
+REAL_FILES = sorted(file for file in REAL.glob("*") if file.suffix in (".eds", ".dcf"))
+
+GOOD = """\
+[DeviceInfo]
+VendorName=Maker
+ProductName=Drive "one"
+VendorNumber=0x42
+[MandatoryObjects]
+SupportedObjects=2
+1=0x1000
+2=0x6505
+[1000]
+ParameterName=Device type
+ObjectType=7
+DataType=0x0007
+AccessType=ro
+DefaultValue=0x20192
+[1400sub1]
+ParameterName=COB-ID
+DataType=0x0007
+AccessType=RW
+DefaultValue=$NodeID + 0x40000200
+"""
+
+
+def written(folder: Path, text: str | bytes, name: str = "drive.eds") -> Path:
+    file = folder / name
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return file
+
+
+def test_what_an_eds_says(tmp_path: Path) -> None:
+    eds = read_eds(written(tmp_path, GOOD))
+    assert eds.info["vendorname"] == "Maker"
+    assert eds.default(0x1000) == 0x20192
+    assert eds.objects[0x1400, 1] == EdsObject(0x1400, 1, "COB-ID", 15, 7, "rw", 0x40000200)
+    assert eds.has(0x1400)
+    assert not eds.has(0x1400, 2)
+    assert eds.default(0x6040) is None
+    assert eds.notes == (
+        "line 8: 6505h is listed, but no section describes it",
+        "1 objects are described, but not listed",
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("0x1F4", 500),
+        ("500", 500),
+        ("-3", -3),
+        ("0402", 0o402),
+        ("0", 0),
+        ("20192h", 0x20192),
+        ("$NODEID+0x200", 0x200),
+        ("0x200 + $NodeID", 0x200),
+        ("NODEID+0x200", 0x200),
+        ("$NODEID", 0),
+        ("0x10;comment", 16),
+        ("0xFFFFFFFF", 0xFFFFFFFF),
+        ("", None),
+        ("500k", None),
+        ("1.5", None),
+    ],
+)
+def test_numbers(text: str, value: int | None) -> None:
+    assert number(text) == value
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "note"),
+    [
+        (b"[DeviceInfo]", b"\xef\xbb\xbf[DeviceInfo]", ""),
+        (b"Maker", b"Maker \x93fast\x94", "read as cp1252: it is no UTF-8"),
+        (b"Maker", b"Maker \x81", "read as latin-1: it is no UTF-8"),
+        (b"\n", b"\r\n", ""),
+        (
+            b"AccessType=ro\n",
+            b"AccessType=ro\nACCESSTYPE=rw\n",
+            "line 14: ACCESSTYPE is there twice in [1000]; the first counts",
+        ),
+        (b"[1400sub1]", b"[1400SUB1]", ""),
+        (b"[1400sub1]", b"[1000]\n[1400sub1]", "line 15: section [1000] is there already, in line 9; the first counts"),
+        (b"ObjectType=7\n", b"", ""),
+        (b"ParameterName=Device type\n", b"", ""),
+        (b"ObjectType=7", b"junk", "line 11: neither a section nor a key: 'junk'"),
+        (b"[1000]", b"[1000", "line 9: the bracket of [1000 is not closed"),
+        (b"AccessType=RW", b"AccessType=yes", "line 15: [1400sub1] has the access type 'yes'; rw is assumed"),
+        (b"0x20192\n", b"0x20192\nParameterValue=0x20192\n", ""),
+        (b"$NodeID + 0x40000200", b"sometimes", "line 19: 'sometimes' is no number"),
+    ],
+)
+def test_what_real_files_have_is_read_and_told(tmp_path: Path, before: bytes, after: bytes, note: str) -> None:
+    eds = read_eds(written(tmp_path, GOOD.encode().replace(before, after)))
+    assert eds.default(0x1000) == 0x20192
+    assert eds.has(0x1400, 1)
+    assert [line for line in eds.notes if "listed" not in line] == [note] * bool(note)
+
+
+def test_a_file_without_device_info_is_still_read(tmp_path: Path) -> None:
+    eds = read_eds(written(tmp_path, GOOD[GOOD.index("[1000]") :]))
+    assert "it has no section [DeviceInfo]" in eds.notes
+    assert eds.default(0x1000) == 0x20192
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (b"<?xml version='1.0'?>", ":1: no section describes an object"),
+        (b"", ":1: no section describes an object"),
+        (b"PK\0\0", "has zero bytes: no EDS file"),
+        (b"[1000]\n" * 1_200_000, "is larger than 8000000 bytes"),
+    ],
+)
+def test_what_is_no_eds_says_why(tmp_path: Path, data: bytes, reason: str) -> None:
+    with pytest.raises(EdsError) as error:
+        read_eds(written(tmp_path, data))
+    assert str(error.value).startswith(str(tmp_path / "drive.eds"))
+    assert reason in str(error.value)
+
+
+def test_a_missing_file_says_so(tmp_path: Path) -> None:
+    with pytest.raises(EdsError, match="cannot be read: No such file"):
+        read_eds(tmp_path / "none.eds")
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.sampled_from([*GOOD.splitlines(), "[", "]", "=", "[6040", "DataType=", "\x85"]), max_size=30))
+def test_any_order_of_lines_is_read_or_refused(lines: list[str]) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        refused = refusal(written(Path(folder), "\n".join(lines)))
+    assert refused == "" or "no section describes an object" in refused
+
+
+def refusal(file: Path) -> str:
+    try:
+        read_eds(file)
+    except EdsError as error:
+        return str(error)
+    return ""
+
+
+# -- drafts
+
+
+WHOLE = GOOD + "".join(
+    f"[{index:04X}]\nParameterName=x\nDataType=0x0004\nAccessType=rw\n"
+    for index in (0x1005, 0x6040, 0x6041, 0x6060, 0x6064, 0x606C, 0x60FF, 0x1400, 0x1600, 0x1800, 0x1A00)
+)
+
+
+@pytest.mark.parametrize(
+    ("sections", "sentence"),
+    [
+        ("[1016sub0]\n[1016sub1]\n[6007]\n", "It can stop by itself when the computer dies: it watches heartbeats"),
+        ("[1016sub1]\n", "Do not count on it to stop by itself"),
+        ("[1400sub5]\n", "It may stop by itself when the computer dies: it has a deadline for setpoints"),
+        ("", "It will NOT stop by itself when the computer dies"),
+    ],
+)
+def test_whether_the_drive_stops_by_itself_is_said(tmp_path: Path, sections: str, sentence: str) -> None:
+    found = draft(read_eds(written(tmp_path, WHOLE + sections)))
+    assert found.self_stop.startswith(sentence)
+    assert found.missing == ()
+
+
+def test_a_draft_is_a_profile_that_knows_what_it_does_not_know(tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["config", "from-eds", str(written(tmp_path, WHOLE))])
+    assert result.exit_code == 0
+    assert "It will NOT stop by itself" in result.stderr
+    assert "an EDS cannot tell: what one bit of 60FFh" in result.stderr
+    profile = load_profile(str(written(tmp_path, result.stdout, "drafted.yaml")))
+    assert profile.title == 'Maker Drive "one"'
+    assert profile.identity.vendor_id == 0x42
+    assert (profile.layout.axes, profile.units.target_velocity, profile.modes) == (1, None, (3,))
+    assert profile.self_stop.heartbeat_entries == 0
+    assert (profile.options.quick_stop, profile.self_stop.abort_connection) == ("no", "no")
+    assert {"units.target_velocity", "units.acceleration", "modes", "pdo.synchronous"} <= set(profile.unproven)
+
+
+def test_a_drive_that_lacks_too_much_is_refused_in_words(tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["config", "from-eds", str(written(tmp_path, GOOD))])
+    assert result.exit_code == 1
+    assert "canbase cannot use this drive: it lacks 6040h, 6041h" in result.stderr
+
+
+def test_what_is_no_eds_has_exit_code_2(tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["config", "from-eds", str(written(tmp_path, "nothing"))])
+    assert result.exit_code == 2
+    assert "drive.eds:1: no section describes an object" in result.stderr
+
+
+@pytest.mark.skipif(not REAL_FILES, reason="set CANBASE_EDS_FOLDER to a folder with EDS files of real drives")
+@pytest.mark.parametrize("file", REAL_FILES, ids=lambda file: file.name)
+def test_files_of_real_drives_are_read_and_give_a_profile(file: Path, tmp_path: Path) -> None:
+    eds = read_eds(file)
+    assert eds.has(0x1000)
+    found = draft(eds)
+    profile = load_profile(str(written(tmp_path, found.text, f"{file.stem}.yaml")))
+    assert profile.layout.axes in (1, 2)
+    assert found.self_stop
+    assert found.missing == ()
+
+
+def test_the_eds_of_the_simulated_drive_gives_what_it_has(tmp_path: Path) -> None:
+    file = sample("bench").parents[1] / "eds" / "canbase_cia402.eds"
+    found = draft(read_eds(file))
+    profile = load_profile(str(written(tmp_path, found.text, "sim.yaml")))
+    assert found.missing == ()
+    assert found.self_stop.startswith("It can stop by itself")
+    assert profile.options.quick_stop == "yes"
