@@ -47,7 +47,7 @@ app.command("rotate", cls=GoalCommand, options_metavar=_ROS_USAGE)(rotate.rotate
 app.command("monitor", cls=RosCommand, options_metavar=_ROS_USAGE)(monitor.monitor)
 app.command("stop", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.stop)
 app.command("reset", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.reset)
-app.command("doctor", cls=RosCommand, options_metavar=_ROS_USAGE)(doctor.doctor)
+app.command("doctor", cls=RosCommand, options_metavar=_ROS_USAGE, epilog=doctor.EPILOG)(doctor.doctor)
 app.add_typer(config.app, name="config")
 app.command("install")(install.install)
 app.command("uninstall")(install.uninstall)

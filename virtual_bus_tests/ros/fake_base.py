@@ -9,6 +9,7 @@ import math
 import time
 from pathlib import Path
 
+from builtin_interfaces.msg import Time
 from canbase.msg import DriverStatus, MuxState, SafetyState
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
@@ -46,6 +47,8 @@ class FakeBase:
     def heal(self) -> None:
         """Nothing is wrong from now on."""
         self.stuck = False
+        self.clock_off_s = 0.0
+        """So much later than this computer's clock is the one that stamps odometry."""
         self.silent: set[str] = set()
         """Of: odom, driver, safety, mux."""
         self.safety = SafetyState(cause=SafetyState.CAUSE_NONE)
@@ -82,7 +85,10 @@ class FakeBase:
         self._publish()
 
     def _publish(self) -> None:
-        odometry = Odometry()
+        odometry = Odometry(child_frame_id="base_link")
+        odometry.header.frame_id = "odom"
+        stamp_s = time.time() + self.clock_off_s
+        odometry.header.stamp = Time(sec=int(stamp_s), nanosec=int(stamp_s % 1.0 * 1e9))
         odometry.pose.pose.position.x, odometry.pose.pose.position.y = self.x_m, self.y_m
         odometry.pose.pose.orientation.z = math.sin(self.yaw_rad / 2)
         odometry.pose.pose.orientation.w = math.cos(self.yaw_rad / 2)

@@ -143,6 +143,12 @@ def test_status_tells_that_all_is_well(world: World) -> None:
     assert all(drive.stops_by_itself and drive.error_code == 0 for drive in status.drives)
 
 
+def test_doctor_finds_nothing_wrong_with_a_whole_robot(world: World) -> None:
+    for symptom in ((), ("--symptom", "only-in-simulation"), ("--symptom", "moves-after-cancel")):
+        doctor = world.robot.command("doctor", "--config", str(world.robot.config), *symptom)
+        assert world.robot.exit_code(doctor) == 0, doctor.log()
+
+
 def test_diagnostics_have_an_entry_for_each_part_and_none_is_an_error(world: World) -> None:
     recorder = world.node.record(DiagnosticArray, "/diagnostics")
     found = world.node.wait_for(lambda: recorder.last, 10.0, "/diagnostics")

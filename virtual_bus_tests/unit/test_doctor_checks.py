@@ -39,7 +39,7 @@ def evidence(now: dict[str, Any], before: dict[str, Any] | None = None) -> Evide
     """A robot that said `before` first and `now` last; a topic whose message is None is silent."""
     first = healthy() if before is None else before
     heard = {topic: Heard((first[topic], message), (1.0, 2.0)) for topic, message in now.items() if message is not None}
-    return Evidence(load_robot(sample("bench")).robot, "bench.yaml", 3.0, heard)
+    return Evidence(load_robot(sample("bench")).robot, "bench.yaml", 3.0, heard=heard)
 
 
 def changed(topic: str, **values: Any) -> Evidence:
