@@ -13,7 +13,7 @@ export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
 .PHONY: help
 help: ## show the targets
-	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
 
 .PHONY: demo
 demo: $(VENV)/ready ## the whole chain on a simulated bus: drives 1 m, refuses a goal, cancels a goal
@@ -30,6 +30,14 @@ ifdef SEED
 else
 	PYTHONPATH=virtual_bus_tests python -m campaign
 	PYTHONPATH=virtual_bus_tests python -m campaign.fuzz
+endif
+
+.PHONY: exit-matrix
+exit-matrix: $(VENV)/ready ## every way out of a driving robot, for real, measured: docs/stop_times.md; ONLY=watchdog runs some
+ifdef ONLY
+	PYTHONPATH=virtual_bus_tests python -m exit_matrix --only '$(ONLY)'
+else
+	PYTHONPATH=virtual_bus_tests python -m exit_matrix --write docs/stop_times.md
 endif
 
 .PHONY: lint

@@ -1,10 +1,9 @@
-"""Fixtures and options of all tests."""
+"""Fixtures of all tests."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -12,11 +11,6 @@ from hypothesis import settings
 # The same examples each time: a run judges the change before it. HYPOTHESIS_PROFILE=default looks for new ones.
 settings.register_profile("same", derandomize=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
-
-
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """--stop-times, of ros/test_stack_kill.py."""
-    parser.addoption("--stop-times", type=Path, metavar="FILE", help="add measured stop times to FILE, as Markdown")
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -20,6 +20,10 @@ def _silent(node: SimulatedNode, now: float) -> None:
     node.silent = True
 
 
+def _deaf(node: SimulatedNode, now: float) -> None:
+    node.deaf = True
+
+
 def _cut(node: SimulatedNode, now: float) -> None:
     node.cut = True
 
@@ -45,7 +49,7 @@ def _ignores_setpoints(node: SimulatedNode, now: float, axis: int = 0) -> None:
 
 
 def _heal(node: SimulatedNode, now: float) -> None:
-    node.silent = node.cut = False
+    node.silent = node.deaf = node.cut = False
     for number, axis in enumerate(node.axes):
         axis.faults = AxisFaults()
         node.heal(number)
@@ -53,6 +57,7 @@ def _heal(node: SimulatedNode, now: float) -> None:
 
 KINDS: Mapping[str, tuple[Callable[..., None], frozenset[str]]] = {
     "silent": (_silent, frozenset()),
+    "deaf": (_deaf, frozenset()),
     "cut": (_cut, frozenset()),
     "fault": (_drive_fault, frozenset({"axis", "code", "holds"})),
     "power_cycle": (_power_cycle, frozenset({"off_s"})),
@@ -61,8 +66,8 @@ KINDS: Mapping[str, tuple[Callable[..., None], frozenset[str]]] = {
     "ignores_setpoints": (_ignores_setpoints, frozenset({"axis"})),
     "heal": (_heal, frozenset()),
 }
-"""Each fault and the arguments that it takes. silent: sends nothing. cut: neither sends nor receives. heal: all of them
-are over; a drive fault still needs its reset."""
+"""Each fault and the arguments that it takes. silent: sends nothing. deaf: receives nothing. cut: both.
+heal: all of them are over; a drive fault still needs its reset."""
 
 RANGES: Mapping[str, tuple[type, float, float]] = {
     "axis": (int, 0, 1),

@@ -48,6 +48,8 @@ class Loop:
         self._bus.send(message, timeout=SEND_TIMEOUT_S)
 
     def _tell_changes(self) -> None:
+        for node_id, producer in self._bench.lost_heartbeats():
+            log.info("node %d: heartbeat of node %d lost", node_id, producer)
         for c in self._bench.state_changes():
             log.info("node %d axis %d: %s → %s (%d)", c.node_id, c.axis, c.before.name, c.after.name, c.number)
 

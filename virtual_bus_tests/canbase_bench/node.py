@@ -55,7 +55,7 @@ class StateChange:
 
 
 class SimulatedNode:
-    """One node on the bus. `silent` and `cut` are faults: sends nothing; neither sends nor receives."""
+    """One node on the bus. Faults are `silent`: sends nothing, `deaf`: receives nothing, and `cut`: both."""
 
     def __init__(
         self,
@@ -66,9 +66,11 @@ class SimulatedNode:
         fixed: Mapping[int, int] | None = None,
     ) -> None:
         self.node_id, self.boot_delay_s = node_id, boot_delay_s
-        self.silent = self.cut = False
+        self.silent = self.deaf = self.cut = False
         self.state = NmtState.INITIALISING
         self.changes: deque[StateChange] = deque(maxlen=1000)
+        self.lost_producers: deque[int] = deque(maxlen=100)
+        """Node ids whose heartbeat this node has missed; whoever tells of them empties it."""
         self._out: list[Frame] = []
         d = self.dictionary = Dictionary(node_id, len(axes), fixed)
         d.before_read = self._refresh
@@ -98,7 +100,7 @@ class SimulatedNode:
 
     def on_frame(self, cob_id: int, data: bytes, now: float) -> None:
         """One frame from the bus, at `now`. What the node does not understand is ignored."""
-        if self.cut:
+        if self.cut or self.deaf:
             return
         take = self._routes.get(cob_id)
         if take is not None:
@@ -247,6 +249,7 @@ class SimulatedNode:
 
     def _on_lost(self, producer: int) -> None:
         """A heartbeat is gone: EMCY 8130h, 6007h for the motors, 1029h:1 for the NMT state."""
+        self.lost_producers.append(producer)
         self.emcy.raise_error(emcy.HEARTBEAT_LOST, producer)
         for axis in self.axes:
             axis.causes.add(emcy.HEARTBEAT_LOST)

@@ -63,9 +63,11 @@ class Standstill:
 class RunningRobot:
     """The bench robot with all of its processes. `robot_on` makes and ends it."""
 
-    def __init__(self, folder: Path, domain: int, namespace: str, changes: Mapping[str, Any]) -> None:
+    def __init__(
+        self, folder: Path, domain: int, namespace: str, changes: Mapping[str, Any], env: Mapping[str, str]
+    ) -> None:
         self.folder, self.namespace = folder, namespace
-        self.env = {"ROS_DOMAIN_ID": str(domain)}
+        self.env = {**env, "ROS_DOMAIN_ID": str(domain)}
         self.config = robot_file(folder, changes)
         self.robot = load_robot(self.config).robot
         self.stack = Stack(self.config, namespace=namespace, sim=True, logs=folder, env=os.environ | self.env)
@@ -227,6 +229,7 @@ def robot_file(folder: Path, changes: Mapping[str, Any]) -> Path:
 
 
 _starts = itertools.count(7 * os.getpid())
+NO_MORE: Mapping[str, str] = {}
 
 
 @contextmanager
@@ -239,11 +242,16 @@ def own_domain() -> Iterator[int]:
 
 @contextmanager
 def robot_on(
-    domain: int, *, namespace: str = "", changes: Mapping[str, Any] = PATIENT, start: bool = True
+    domain: int,
+    *,
+    namespace: str = "",
+    changes: Mapping[str, Any] = PATIENT,
+    start: bool = True,
+    env: Mapping[str, str] = NO_MORE,
 ) -> Iterator[RunningRobot]:
-    """A robot in that ROS domain that has driven. `start` False: nothing runs yet."""
+    """A robot in that ROS domain that has driven. `start` False: nothing runs yet. `env`: more for its processes."""
     with tempfile.TemporaryDirectory(prefix="canbase-", dir="/tmp") as folder, ExitStack() as after:
-        robot = RunningRobot(Path(folder), domain, namespace, changes)
+        robot = RunningRobot(Path(folder), domain, namespace, changes, env)
         after.callback(_end, robot)
         if start:
             robot.stack.start()

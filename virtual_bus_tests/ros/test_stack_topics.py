@@ -7,76 +7,21 @@ import time
 from collections.abc import Iterator
 
 import pytest
-from canbase.msg import DriverStatus, MuxState, SafetyState, StopEvent
+from canbase.msg import DriverStatus
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import TwistStamped
-from rclpy.qos import qos_profile_sensor_data
-from sensor_msgs.msg import JointState, LaserScan
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
 from canbase_action_server.client import Drive, DriveResult
 from canbase_action_server.outcome import ErrorCode
-from ros.harness import Repeater, merged
-from ros.running_robot import LATCHED, PATIENT, RESTS_M, RunningRobot, own_domain, robot_on
+from ros.harness import merged
+from ros.running_robot import PATIENT, RESTS_M, own_domain, robot_on
+from ros.surroundings import BLOCKED_M, World, scan
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 
 WATCHES_OUT = merged(PATIENT, {"safety": {"scan": {"required": True, "timeout_s": 1.0}}})
-BEAMS = 180
-BLOCKED_M = 0.35
-"""5 cm before the front of the footprint: inside the stop distance."""
-
-
-def scan(ahead_m: float = math.inf) -> LaserScan:
-    """Beams all around, all free but for the one ahead, from base_link."""
-    ranges = [ahead_m] + [math.inf] * (BEAMS - 1)
-    step_rad = 2.0 * math.pi / BEAMS
-    return LaserScan(angle_min=0.0, angle_increment=step_rad, range_min=0.05, range_max=10.0, ranges=ranges)
-
-
-class World:
-    """A robot, and around it a joystick, a laser scanner and an emergency stop button."""
-
-    def __init__(self, robot: RunningRobot) -> None:
-        self.robot = robot
-        self.node = robot.node
-        self.joystick: Repeater[TwistStamped] = self.node.repeat(TwistStamped, "cmd_vel_joy", 50.0)
-        self.scan: Repeater[LaserScan] = self.node.repeat(LaserScan, "scan", 20.0, qos_profile_sensor_data)
-        self.estop: Repeater[Bool] = self.node.repeat(Bool, "estop_state", 20.0)
-        for repeater in (self.joystick, self.scan, self.estop):
-            self.node.wait_for_subscriber(repeater.publisher)
-        self.mux = self.node.record(MuxState, "velocity_mux/state", LATCHED)
-
-    def heal(self) -> None:
-        """All as it should be, and the robot stands ready."""
-        self.joystick.message, self.scan.message, self.estop.message = None, scan(), Bool(data=False)
-        self.robot.wait_standing()
-        self.robot.make_ready()
-        asked_s = time.monotonic()
-        self.node.wait_for(lambda: self.causes_since(asked_s)[-1:] == [SafetyState.CAUSE_NONE], 20.0, "no cause")
-
-    def causes_since(self, since_s: float) -> list[str]:
-        return [state.cause for state in self.robot.safety.since(since_s)]
-
-    def joystick_refused(self) -> int:
-        """Messages of the joystick that the mux has refused since its start."""
-        sources = self.mux.messages[-1].sources
-        return next(int(source.refused) for source in sources if source.name == "joystick")
-
-    def drive(self) -> Drive:
-        """A goal that has the robot at 0.3 m/s."""
-        goal = self.robot.goal(4.0, 0.3)
-        self.robot.wait_speed(0.28)
-        return goal
-
-    def wait_event(self, since_s: float, by: str, cause: str) -> StopEvent:
-        def found() -> StopEvent | None:
-            events = self.robot.stop_events.since(since_s)
-            return next((event for event in events if (event.stopped_by, event.cause) == (by, cause)), None)
-
-        event = self.node.wait_for(found, 10.0, f"{by}: {cause}")
-        assert event is not None
-        return event
 
 
 @pytest.fixture(scope="module")

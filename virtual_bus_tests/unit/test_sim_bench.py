@@ -120,6 +120,31 @@ def test_a_silent_drive_still_obeys() -> None:
     assert rig.read(0x1000) == 0x20192
 
 
+def test_a_deaf_drive_speaks_and_obeys_nothing() -> None:
+    rig = Rig()
+    rig.write(0x1017, 100)
+    faults.apply(rig.bench.nodes, 1, "deaf", rig.now, {})
+    rig.tx("000 01 01")
+    rig.tx("201 06 00")
+    assert rig.state() is State.SWITCH_ON_DISABLED
+    assert "701 7F" in rig.wait(0.2)
+    faults.apply(rig.bench.nodes, 1, "heal", rig.now, {})
+    rig.tx("000 01 01")
+    rig.tx("201 06 00")
+    assert rig.state() is State.READY_TO_SWITCH_ON
+
+
+def test_the_bench_tells_once_whose_heartbeat_was_missed() -> None:
+    rig = Rig()
+    rig.write(0x1016, 0x7F << 16 | 300, sub=1)
+    rig.tx("77F 05")
+    rig.wait(0.2)
+    assert rig.bench.lost_heartbeats() == []
+    rig.wait(0.2)
+    assert rig.bench.lost_heartbeats() == [(1, 0x7F)]
+    assert rig.bench.lost_heartbeats() == []
+
+
 def test_a_cut_cable_stops_frames_both_ways() -> None:
     rig = Rig()
     faults.apply(rig.bench.nodes, 1, "cut", rig.now, {})

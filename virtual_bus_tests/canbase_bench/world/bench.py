@@ -111,6 +111,13 @@ class Bench:
             node.changes.clear()
         return changes
 
+    def lost_heartbeats(self) -> list[tuple[int, int]]:
+        """Each heartbeat that a node has missed since the last call: who missed it, and whose it was (node ids)."""
+        lost = [(node.node_id, producer) for node in self._all_nodes for producer in node.lost_producers]
+        for node in self._all_nodes:
+            node.lost_producers.clear()
+        return lost
+
     def _advance(self, now: float) -> None:
         """Inner steps lie on a fixed grid from the start, so the result does not depend on when one looks."""
         target = int((now - self._start) / self._h + 1e-6)

@@ -1,0 +1,64 @@
+"""The whole matrix: `python -m exit_matrix [--only TEXT] [--write FILE]`. Exit code 0: every row passed."""
+
+from __future__ import annotations
+
+import argparse
+import io
+import os
+import sys
+import tempfile
+from contextlib import redirect_stdout
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress
+
+from exit_matrix.report import page, table
+from exit_matrix.rows import ROWS, Row
+from exit_matrix.runner import Result, Runner
+
+WIDTH = 140
+"""Of the table where nobody tells how wide the terminal is."""
+
+
+def main() -> int:
+    """Runs the rows and prints them."""
+    parser = argparse.ArgumentParser(prog="exit_matrix", description="every way out stops the robot, measured")
+    parser.add_argument("--only", metavar="TEXT", default="", help="rows with this in their name")
+    parser.add_argument("--write", type=Path, metavar="FILE", help="write the table there, as Markdown")
+    arguments = parser.parse_args()
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    rows = [row for row in ROWS if arguments.only in row.name]
+    console = Console(file=sys.stdout, width=None if sys.stdout.isatty() else WIDTH)
+    said = io.StringIO()
+    with redirect_stdout(said):
+        results = _run(rows, console)
+    console.print(table(results))
+    failed = [result for result in results if result.problem]
+    for result in failed:
+        console.print(f"[red]{result.row.name}[/red]: {result.problem}", soft_wrap=True)
+    console.print(f"{len(results)} rows, {len(failed)} failed")
+    if failed:
+        log = Path(tempfile.gettempdir()) / "canbase_exit_matrix.log"
+        log.write_text(said.getvalue(), encoding="utf-8")
+        console.print(f"what the processes said: {log}", soft_wrap=True)
+    if arguments.write and not failed:
+        arguments.write.write_text(page(results), encoding="utf-8")
+    return 1 if failed or not results else 0
+
+
+def _run(rows: list[Row], console: Console) -> list[Result]:
+    results = []
+    with Runner() as runner, Progress(console=console, redirect_stdout=True) as progress:
+        task = progress.add_task("", total=len(rows))
+        for row in rows:
+            progress.update(task, description=row.name)
+            results.append(runner.run(row))
+            progress.advance(task)
+            if not console.is_terminal:
+                console.print(f"{row.name}: {results[-1].problem or 'ok'}", soft_wrap=True)
+    return results
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,75 @@
+"""A running robot and what is around it: a joystick, a laser scanner, an emergency stop button."""
+
+from __future__ import annotations
+
+import math
+import time
+
+from canbase.msg import MuxState, SafetyState, StopEvent
+from geometry_msgs.msg import TwistStamped
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Bool
+
+from canbase_action_server.client import Drive
+from ros.harness import Repeater
+from ros.running_robot import LATCHED, RunningRobot
+
+BEAMS = 180
+BLOCKED_M = 0.35
+"""5 cm before the front of the footprint: inside the stop distance."""
+
+
+def scan(ahead_m: float = math.inf) -> LaserScan:
+    """Beams all around, all free but for the one ahead, from base_link."""
+    ranges = [ahead_m] + [math.inf] * (BEAMS - 1)
+    step_rad = 2.0 * math.pi / BEAMS
+    return LaserScan(angle_min=0.0, angle_increment=step_rad, range_min=0.05, range_max=10.0, ranges=ranges)
+
+
+class World:
+    """A robot, and around it a joystick, a laser scanner and an emergency stop button."""
+
+    def __init__(self, robot: RunningRobot) -> None:
+        self.robot = robot
+        self.node = robot.node
+        self.joystick: Repeater[TwistStamped] = self.node.repeat(TwistStamped, "cmd_vel_joy", 50.0)
+        self.scan: Repeater[LaserScan] = self.node.repeat(LaserScan, "scan", 20.0, qos_profile_sensor_data)
+        self.estop: Repeater[Bool] = self.node.repeat(Bool, "estop_state", 20.0)
+        for repeater in (self.joystick, self.scan, self.estop):
+            self.node.wait_for_subscriber(repeater.publisher)
+        self.mux = self.node.record(MuxState, "velocity_mux/state", LATCHED)
+
+    def heal(self) -> None:
+        """All as it should be, and the robot stands ready."""
+        self.joystick.message, self.scan.message, self.estop.message = None, scan(), Bool(data=False)
+        self.robot.wait_standing()
+        self.robot.make_ready()
+        asked_s = time.monotonic()
+        self.node.wait_for(lambda: self.causes_since(asked_s)[-1:] == [SafetyState.CAUSE_NONE], 20.0, "no cause")
+
+    def causes_since(self, since_s: float) -> list[str]:
+        """What the safety filter has said since then (time.monotonic)."""
+        return [state.cause for state in self.robot.safety.since(since_s)]
+
+    def joystick_refused(self) -> int:
+        """Messages of the joystick that the mux has refused since its start."""
+        sources = self.mux.messages[-1].sources
+        return next(int(source.refused) for source in sources if source.name == "joystick")
+
+    def drive(self) -> Drive:
+        """A goal that has the robot at 0.3 m/s."""
+        goal = self.robot.goal(4.0, 0.3)
+        self.robot.wait_speed(0.28)
+        return goal
+
+    def wait_event(self, since_s: float, by: str, cause: str) -> StopEvent:
+        """The stop event of that origin and cause that came since then (time.monotonic)."""
+
+        def found() -> StopEvent | None:
+            events = self.robot.stop_events.since(since_s)
+            return next((event for event in events if (event.stopped_by, event.cause) == (by, cause)), None)
+
+        event = self.node.wait_for(found, 10.0, f"{by}: {cause}")
+        assert event is not None
+        return event

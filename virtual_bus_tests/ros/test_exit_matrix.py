@@ -1,0 +1,23 @@
+"""The rows of the exit matrix that every change has to pass; `make exit-matrix` runs all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from exit_matrix.rows import ROWS, Row
+from exit_matrix.runner import Runner
+
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(150)]
+
+
+@pytest.fixture(scope="module")
+def runner() -> Iterator[Runner]:
+    with Runner() as running:
+        yield running
+
+
+@pytest.mark.parametrize("row", [row for row in ROWS if row.common], ids=lambda row: row.name)
+def test_the_robot_stops_in_time_and_stays_at_rest(runner: Runner, row: Row) -> None:
+    assert runner.run(row).problem == ""
