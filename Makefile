@@ -40,6 +40,14 @@ else
 	PYTHONPATH=virtual_bus_tests python -m exit_matrix --write docs/stop_times.md
 endif
 
+.PHONY: bench
+bench: $(VENV)/ready ## every budget of this computer, measured beside a floor: docs/performance.md; NAME=reaction runs one
+ifdef NAME
+	canbase bench $(NAME)
+else
+	canbase bench --write docs/performance.md
+endif
+
 .PHONY: lint
 lint: $(VENV)/ready ## ruff, mypy, import rules, and that colcon sees a ROS 2 package
 	ruff check .

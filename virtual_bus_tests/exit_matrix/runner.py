@@ -57,6 +57,7 @@ class Runner:
     def __init__(self) -> None:
         self._after = ExitStack()
         self._scene: Scene | None = None
+        self._restarted = False
 
     def __enter__(self) -> Runner:
         return self
@@ -81,7 +82,7 @@ class Runner:
         """The robot of the last row, made well; another one when it does not get well."""
         if self._scene is not None:
             try:
-                self._scene.recover()
+                self._scene.recover(restarted=self._restarted)
             except AssertionError:
                 self._forget()
         if self._scene is None:
@@ -126,8 +127,8 @@ class Runner:
         row.undo(scene)
         running = len(scene.robot.stack.pids)
         scene.robot.stack.start()
-        restarted = len(scene.robot.stack.pids) > running
-        _check_rest(scene, "after it was undone", RESTART_S if restarted else QUIET_S)
+        self._restarted = len(scene.robot.stack.pids) > running
+        _check_rest(scene, "after it was undone", RESTART_S if self._restarted else QUIET_S)
 
 
 def judge(row: Row, stop: Standstill, caught: list[Layer], catches: set[Catch], limit_s: float) -> str:

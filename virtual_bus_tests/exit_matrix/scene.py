@@ -106,11 +106,13 @@ class Scene(World):
             self._second.close()
             self._second = None
 
-    def recover(self) -> None:
-        """All is as it should be. AssertionError: it does not get well."""
+    def recover(self, restarted: bool) -> None:
+        """All as it should be. `restarted`: a new process, which the others have to find. AssertionError: in vain."""
         self.close()
         self.straight.message = None
         self.heal()
+        if restarted:
+            self.robot.wait_whole()
 
     def close(self) -> None:
         """Ends what is no part of the robot."""

@@ -1,0 +1,41 @@
+"""What a benchmark hands back, and how a set of durations is told. Used by all benchmarks but accuracy.py."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+MS = 1000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One line of docs/performance.md. `beside`: the floor or the peer that was measured in the same run."""
+
+    what: str
+    measured: str
+    beside: str
+    ratio: float | None
+    budget: str
+    kept: bool
+
+
+def quantile(values: Sequence[float], share: float) -> float:
+    """The value below which that share of them lies. Raises IndexError without any."""
+    ordered = sorted(values)
+    return ordered[min(len(ordered) - 1, int(share * len(ordered)))]
+
+
+def spread(values_s: Sequence[float]) -> str:
+    """p50, p99 and maximum of durations [s], in ms."""
+    p50, p99, most = (quantile(values_s, share) * MS for share in (0.5, 0.99, 1.0))
+    return f"p50 {p50:.2f}, p99 {p99:.2f}, max {most:.2f} ms"
+
+
+def raise_priority(priority: int) -> None:
+    """SCHED_FIFO for this thread, as the processes of the chain have it; without the right to it, nothing."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except OSError as error:
+        print(f"no real-time priority: {error}")

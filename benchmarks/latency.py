@@ -1,0 +1,161 @@
+"""From cmd_vel to the setpoint: how long after its publication an order to move is on the bus.
+
+Driver, watchdog and simulated drives are real processes; this one stands in for the safety filter, orders and leases.
+The driver sends setpoints once in a cycle, so up to one period is waiting. The floor, in turn with it: a rclpy node
+that sends a frame as soon as a message has come.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import socket
+import struct
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import ExitStack, closing
+from pathlib import Path
+
+import can
+from canbase.msg import DriverStatus
+from geometry_msgs.msg import TwistStamped
+
+from canbase_config.load import load_robot
+from canbase_velocity.lease import lease_datagram
+from canbase_velocity.twist import Twist
+from figures import Figure, quantile, raise_priority, spread
+from ros.harness import Process, TestNode
+from ros.running_robot import CANBASE, own_domain, robot_file
+
+ORDERS = 200
+SPEED_MPS = 0.05
+PERIOD_S = 0.02
+MARGIN_S = 0.002
+SETPOINT, FLOOR = 0x201, 0x510
+
+FLOOR_CODE = """
+import json, os, sys
+import can, rclpy
+from geometry_msgs.msg import TwistStamped
+from rclpy.experimental import EventsExecutor
+try:
+    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(35))
+except OSError:
+    pass
+rclpy.init()
+node = rclpy.create_node("floor")
+frame = can.Message(arbitration_id=0x510, is_extended_id=False)
+with can.Bus(**json.loads(sys.argv[1])) as bus:
+    node.create_subscription(TwistStamped, "floor", lambda message: bus.send(frame), 1)
+    executor = EventsExecutor()
+    executor.add_node(node)
+    while True:
+        executor.spin_once(timeout_sec=0.1)
+"""
+
+
+class Filter:
+    """In place of the safety filter: orders with their leases."""
+
+    def __init__(self, node: TestNode, bus: can.BusABC, lease_path: str) -> None:
+        self._node, self._bus, self._path = node, bus, lease_path
+        self._publisher = node.node.create_publisher(TwistStamped, "cmd_vel", 1)
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._sequence = 0
+        node.wait_for_subscriber(self._publisher)
+
+    def close(self) -> None:
+        """Closes its lease socket."""
+        self._socket.close()
+
+    def order(self, speed_mps: float) -> float:
+        """One order; when it was published (time.monotonic)."""
+        self._sequence += 1
+        twist = Twist(speed_mps, 0.0)
+        self._socket.sendto(
+            lease_datagram(self._sequence, time.monotonic_ns(), twist, stops=False, estop=False), self._path
+        )
+        message = TwistStamped()
+        message.twist.linear.x = speed_mps
+        began_s = time.monotonic()
+        self._publisher.publish(message)
+        return began_s
+
+    def repeat(self, speed_mps: float, done: Callable[[], bool]) -> None:
+        """The same order again and again, until `done`; frames that come meanwhile are read and forgotten."""
+        while not done():
+            self.order(speed_mps)
+            end_s = time.monotonic() + PERIOD_S
+            while (left_s := end_s - time.monotonic()) > 0.0:
+                self._bus.recv(left_s)
+
+    def drain(self) -> None:
+        """Forgets what waits."""
+        while self._bus.recv(0.0) is not None:
+            pass
+
+
+def measure(orders: int = ORDERS) -> list[Figure]:
+    """The figure; each order takes about 0.5 s."""
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="canbase-", dir="/tmp")))
+        env = {"ROS_DOMAIN_ID": str(stack.enter_context(own_domain()))}
+        path = robot_file(folder, {})
+        robot = load_robot(path).robot
+        bus = stack.enter_context(can.Bus(**robot.bus.arguments()))
+        for part in ("sim", "watchdog", "driver"):
+            process = Process([*CANBASE, part, "--config", str(path)], folder / f"{part}.log", env)
+            stack.callback(process.close)
+        floor_process = Process(
+            [sys.executable, "-c", FLOOR_CODE, json.dumps(robot.bus.arguments())], folder / "floor.log", env
+        )
+        stack.callback(floor_process.close)
+        node = stack.enter_context(TestNode(domain_id=int(env["ROS_DOMAIN_ID"])))
+        status = node.record(DriverStatus, "motor_driver/status")
+        floor = node.node.create_publisher(TwistStamped, "floor", 1)
+        node.wait_for_subscriber(floor, 20.0)
+        orders_of = stack.enter_context(closing(Filter(node, bus, robot.lease.socket)))
+        node.wait_for(lambda: status.last and status.last.state == DriverStatus.ENABLED, 20.0, "enabled drives")
+        raise_priority(30)
+        ours, theirs = [], []
+        for _ in range(orders):
+            ours.append(_setpoint(orders_of, bus))
+            theirs.append(_frame(floor, bus))
+    period_s = 1.0 / robot.rates.control_hz
+    p99 = quantile(ours, 0.99)
+    what = f"driver: cmd_vel published → setpoint seen on the bus, {orders} orders"
+    beside = f"a node that sends a frame at once: {spread(theirs)}"
+    kept = p99 <= period_s + MARGIN_S
+    return [Figure(what, spread(ours), beside, p99 / quantile(theirs, 0.99), "p99 ≤ one period (10 ms) + 2 ms", kept)]
+
+
+def _setpoint(source: Filter, bus: can.BusABC) -> float:
+    """From standstill, at a moment that has nothing to do with the driver's cycle [s]."""
+    quiet_until_s = time.monotonic() + 0.3 + random.random() * 0.02
+    source.repeat(0.0, lambda: time.monotonic() >= quiet_until_s)
+    source.drain()
+    began_s = source.order(SPEED_MPS)
+    seen_s = _seen(bus, SETPOINT, lambda data: struct.unpack("<Hi", data)[1] != 0)
+    return seen_s - began_s
+
+
+def _frame(publisher: object, bus: can.BusABC) -> float:
+    began_s = time.monotonic()
+    publisher.publish(TwistStamped())  # type: ignore[attr-defined]
+    return _seen(bus, FLOOR, lambda _: True) - began_s
+
+
+def _seen(bus: can.BusABC, cob_id: int, wanted: Callable[[bytes], bool]) -> float:
+    end_s = time.monotonic() + 1.0
+    while time.monotonic() < end_s:
+        message = bus.recv(0.1)
+        if message is not None and message.arbitration_id == cob_id and wanted(bytes(message.data)):
+            return time.monotonic()
+    raise TimeoutError(f"no frame {cob_id:03X}h within 1 s")
+
+
+if __name__ == "__main__":
+    for figure in measure():
+        print(figure)

@@ -1,0 +1,87 @@
+"""All benchmarks, or those that are named, against the budgets: `python benchmarks/run.py [NAME …] [--write FILE]`."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+import cycle
+import intake
+import latency
+import reaction
+import startup
+import virtual_time
+from figures import Figure
+
+BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
+    "reaction": reaction.measure,
+    "intake": intake.measure,
+    "cycle": cycle.measure,
+    "latency": latency.measure,
+    "startup": startup.measure,
+    "virtual_time": virtual_time.measure,
+}
+COLUMNS = ("what", "measured", "beside it, in the same run", "ratio", "budget", "kept")
+
+
+def main() -> int:
+    """Exit code 0: every budget is kept."""
+    parser = argparse.ArgumentParser(prog="benchmarks/run.py", description="measured, beside a floor, against a budget")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"some of {', '.join(BENCHMARKS)}; all without")
+    parser.add_argument("--write", type=Path, metavar="FILE", help="write the page docs/performance.md there")
+    arguments = parser.parse_args()
+    unknown = sorted(set(arguments.names) - set(BENCHMARKS))
+    if unknown:
+        parser.error(f"there is no benchmark {', '.join(unknown)}; expected some of {', '.join(BENCHMARKS)}")
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    figures: list[Figure] = []
+    for name in arguments.names or BENCHMARKS:
+        print(f"{name} …", file=sys.stderr)
+        figures += BENCHMARKS[name]()
+    Console(width=None if sys.stdout.isatty() else 160).print(_table(figures))
+    if arguments.write:
+        arguments.write.write_text(page(figures), encoding="utf-8")
+    return 0 if all(figure.kept for figure in figures) else 1
+
+
+def cells(figure: Figure) -> tuple[str, ...]:
+    """A figure as text."""
+    ratio = "–" if figure.ratio is None else f"{figure.ratio:.2f}"
+    kept = "–" if figure.budget == "–" else "yes" if figure.kept else "**no**"
+    return figure.what, figure.measured, figure.beside, ratio, figure.budget, kept
+
+
+def _table(figures: list[Figure]) -> Table:
+    table = Table(*COLUMNS)
+    for figure in figures:
+        table.add_row(*cells(figure), style=None if figure.kept else "red")
+    return table
+
+
+def page(figures: list[Figure]) -> str:
+    """docs/performance.md; what the numbers mean is in benchmarks/notes.md and comes with them."""
+    lines = [f"| {' | '.join(cells(figure))} |" for figure in figures]
+    notes = (Path(__file__).parent / "notes.md").read_text(encoding="utf-8").strip()
+    rows = "\n".join(lines)
+    return f"""# Performance
+
+Written by `make bench`: budgets, and what was measured, each beside a floor or a peer in the same run, on
+{os.cpu_count()} processors ({platform.machine()}, Python {platform.python_version()}) with the virtual bus.
+
+| {" | ".join(COLUMNS)} |
+|---|---|---|---:|---|---|
+{rows}
+
+{notes}
+"""
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,41 @@
+"""How benchmarks tell what they measured, and that one which misses its budget fails."""
+
+from __future__ import annotations
+
+import pytest
+
+import run
+from figures import Figure, quantile, spread
+
+KEPT = Figure("a loop", "p99 1.00 ms", "C: p99 0.80 ms", 1.25, "≤ 1.5 × C", True)
+MISSED = Figure("a node", "30 %", "bare: 10 %", 3.0, "≤ 2 × bare", False)
+
+
+def test_a_quantile_is_one_of_the_values() -> None:
+    values = [float(number) for number in range(1000, 0, -1)]
+    assert (quantile(values, 0.5), quantile(values, 0.99), quantile(values, 1.0)) == (501.0, 991.0, 1000.0)
+
+
+def test_durations_are_told_in_milliseconds() -> None:
+    assert spread([0.001, 0.002, 0.003]) == "p50 2.00, p99 3.00, max 3.00 ms"
+
+
+def test_the_page_says_which_budget_is_missed() -> None:
+    lines = run.page([KEPT, MISSED]).splitlines()
+    assert "| a loop | p99 1.00 ms | C: p99 0.80 ms | 1.25 | ≤ 1.5 × C | yes |" in lines
+    assert "| a node | 30 % | bare: 10 % | 3.00 | ≤ 2 × bare | **no** |" in lines
+
+
+@pytest.mark.parametrize(("figure", "code"), [(KEPT, 0), (MISSED, 1)])
+def test_a_missed_budget_is_a_failure(monkeypatch: pytest.MonkeyPatch, figure: Figure, code: int) -> None:
+    monkeypatch.setattr(run, "BENCHMARKS", {"it": lambda: [figure]})
+    monkeypatch.setattr("sys.argv", ["run.py"])
+    assert run.main() == code
+
+
+def test_an_unknown_name_is_refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr("sys.argv", ["run.py", "reactoin"])
+    with pytest.raises(SystemExit) as end:
+        run.main()
+    assert end.value.code == 2
+    assert "there is no benchmark reactoin; expected some of reaction," in capsys.readouterr().err
