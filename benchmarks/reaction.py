@@ -119,7 +119,7 @@ class FakeRobot:
         self._cycle += 1
         self._counts += self.speed * COUNTS_PER_BIT_CYCLE
         word, status = (0x0F, ENABLED) if self.speed else (0x06, OFF)
-        if self._cycle % 5 == 0:
+        if self._cycle % 10 == 0:
             self.send(0x77F, b"\x05")
             self.send(0x701, b"\x05")
             self.send(0x702, b"\x05")
