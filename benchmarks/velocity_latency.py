@@ -4,7 +4,8 @@
 
 Five sources at 50 Hz and a scan of 720 points at 20 Hz come from one process; `canbase velocity` runs as it does on a
 robot. The relay is a node in a process of its own with one subscription and one publisher, which hears the same
-commands. A command carries its number in its angular velocity, so each answer is matched to its question.
+commands. All three run with the real-time priority of `canbase velocity`. A command carries its number in its angular
+velocity, so each answer is matched to its question.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from ruamel.yaml import YAML
 from sensor_msgs.msg import LaserScan
 
 from canbase_cli.middleware import prefer_udp
+from canbase_cli.priority import raise_priority
 from canbase_config.load import sample
 
 SOURCES = 5
@@ -95,6 +97,7 @@ class Course(Node):
 def main() -> None:
     """Measures once and prints a table in Markdown."""
     prefer_udp(os.environ)
+    raise_priority("velocity")  # this process and the relay as `canbase velocity` itself
     with tempfile.TemporaryDirectory() as folder:
         config = robot_file(Path(folder))
         velocity = subprocess.Popen([sys.executable, "-m", "canbase_cli", "velocity", "--config", str(config)])
@@ -102,14 +105,10 @@ def main() -> None:
         try:
             report(*measure(velocity.pid, relay.pid))
         finally:
-            for process in (velocity, relay):
-                process.terminate()
-            try:
-                velocity.wait(10.0)
-                relay.wait(2.0)
-            except subprocess.TimeoutExpired:
-                relay.kill()
-                velocity.kill()
+            relay.kill()
+            velocity.terminate()
+            relay.wait(10.0)
+            velocity.wait(10.0)
 
 
 def robot_file(folder: Path) -> Path:
