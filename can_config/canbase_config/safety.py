@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from canbase_config.section import MisfitError, Section, Topic
 
+MAX_SCANS = 8
+
 
 class Scan(Section):
-    """The laser scanner that the safety filter looks at."""
+    """One laser scanner that the safety filter looks at. Its pose is written here, or read from tf_static."""
 
     required: Annotated[bool, Field(description="true: without a fresh scan nothing moves")]
     topic: Topic = "scan"
     timeout_s: Annotated[float, Field(ge=0.05, le=1.0, description="[s]")] = 0.3
+    pose: Annotated[
+        Literal["config", "tf"], Field(description="config: the keys below; tf: tf_static, by the scan's frame_id")
+    ] = "config"
     x_m: Annotated[float, Field(ge=-5.0, le=5.0, description="scanner in base_link [m]")] = 0.0
     y_m: Annotated[float, Field(ge=-5.0, le=5.0, description="scanner in base_link [m]")] = 0.0
     yaw_rad: Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi, description="scanner in base_link [rad]")] = 0.0
+    upside_down: Annotated[bool, Field(description="mounted with its z axis down (roll π)")] = False
+    min_points: Annotated[
+        int, Field(ge=1, le=10, description="fewer neighbouring beams count one scan later, if they are seen again")
+    ] = 2
 
 
 class Estop(Section):
@@ -27,6 +36,9 @@ class Estop(Section):
     required: Annotated[bool, Field(description="true: a silent topic counts as pressed")]
     topic: Topic = "estop_state"
     timeout_s: Annotated[float, Field(ge=0.05, le=2.0, description="[s]")] = 0.5
+    latched: Annotated[
+        bool, Field(description="true: a reset is needed after its release; false: one zero command")
+    ] = True
 
 
 class Footprint(Section):
@@ -38,15 +50,54 @@ class Footprint(Section):
     right_m: Annotated[float, Field(gt=0.0, le=5.0, description="[m]")]
 
 
+class LimitZone(Section):
+    """A rectangle in base_link in which any obstacle limits the speed, whatever the direction of travel."""
+
+    front_m: Annotated[float, Field(gt=0.0, le=10.0, description="[m]")]
+    rear_m: Annotated[float, Field(gt=0.0, le=10.0, description="[m]")]
+    left_m: Annotated[float, Field(gt=0.0, le=10.0, description="[m]")]
+    right_m: Annotated[float, Field(gt=0.0, le=10.0, description="[m]")]
+    linear_mps: Annotated[float, Field(gt=0.0, le=5.0, description="at most, while it is not empty [m/s]")]
+    angular_radps: Annotated[float, Field(gt=0.0, le=20.0, description="at most, while it is not empty [rad/s]")]
+
+
+class Ceiling(Section):
+    """What the filter lets through at most, beside `limits`, which the driver holds by itself."""
+
+    linear_mps: Annotated[float, Field(gt=0.0, le=5.0, description="[m/s]")]
+    angular_radps: Annotated[float, Field(gt=0.0, le=20.0, description="[rad/s]")]
+    acceleration_mps2: Annotated[float, Field(gt=0.0, le=10.0, description="orders grow no faster [m/s²]")]
+    angular_acceleration_radps2: Annotated[float, Field(gt=0.0, le=50.0, description="orders grow no faster [rad/s²]")]
+
+
 class Safety(Section):
     """The last place where a command is decided."""
 
     footprint: Footprint
+    padding_m: Annotated[float, Field(ge=0.0, le=0.5, description="added to the footprint on all sides [m]")] = 0.01
     scan: Scan
+    more_scans: Annotated[
+        tuple[Scan, ...], Field(max_length=MAX_SCANS - 1, strict=False, description="further scanners")
+    ] = ()
     estop: Estop
+    ceiling: Annotated[Ceiling | None, Field(description="none: the speeds of `limits`")] = None
     command_timeout_s: Annotated[float, Field(ge=0.05, le=0.5, description="cmd_vel_mux at the filter [s]")] = 0.2
+    reaction_s: Annotated[float, Field(ge=0.01, le=1.0, description="from an order until the wheels follow it [s]")] = (
+        0.1
+    )
     stop_distance_m: Annotated[float, Field(gt=0.0, le=5.0, description="free way below: stop [m]")] = 0.15
     slow_distance_m: Annotated[float, Field(gt=0.0, le=10.0, description="free way below: slow down [m]")] = 0.6
+    limit_zones: Annotated[
+        tuple[LimitZone, ...], Field(max_length=8, strict=False, description="obstacles in them limit the speed")
+    ] = ()
+    blind_mps: Annotated[
+        float, Field(ge=0.0, le=5.0, description="at most, where no scanner looks; 0: not at all [m/s]")
+    ] = 0.15
+
+    @property
+    def scans(self) -> tuple[Scan, ...]:
+        """All scanners."""
+        return (self.scan, *self.more_scans)
 
     @model_validator(mode="after")
     def _slow_before_stop(self) -> Safety:
@@ -54,4 +105,13 @@ class Safety(Section):
             slow, stop = self.slow_distance_m, self.stop_distance_m
             message = f"slow_distance_m ({slow}) must be greater than stop_distance_m ({stop})"
             raise MisfitError(message, ("slow_distance_m",), ("stop_distance_m",))
+        return self
+
+    @model_validator(mode="after")
+    def _a_topic_each(self) -> Safety:
+        topics = [scan.topic for scan in self.scans]
+        for i, scan in enumerate(self.more_scans):
+            if topics.index(scan.topic) <= i:
+                message = f"two scanners have the topic {scan.topic}; each needs its own"
+                raise MisfitError(message, ("more_scans", i, "topic"))
         return self

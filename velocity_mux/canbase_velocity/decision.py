@@ -26,9 +26,13 @@ class Cause(str, enum.Enum):
     ESTOP = "estop"
     ESTOP_STALE = "estop_stale"
     SCAN_STALE = "scan_stale"
+    SCAN_UNPLACED = "scan_unplaced"
     OBSTACLE = "obstacle"
     OBSTACLE_NEAR = "obstacle_near"
     SPEED = "speed_ceiling"
+    ACCELERATION = "acceleration_ceiling"
+    ZONE = "limit_zone"
+    BLIND = "blind"
     SHUTDOWN = "shutdown"
 
 
@@ -45,13 +49,17 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """The order, what was done to the command, why, and what ends it. `twist` is always finite."""
+    """The order, what was done to the command, why, and what ends it. `twist` is always finite.
+
+    `emergency`: the base has to brake with limits.emergency_deceleration_mps2 now.
+    """
 
     action: Action
     cause: Cause
     detail: str
     clears_on: str
     twist: Twist
+    emergency: bool = False
 
 
 PASSED = Finding(Action.PASS, Cause.NONE, "", "", 1.0)

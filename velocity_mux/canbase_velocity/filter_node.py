@@ -1,39 +1,50 @@
-"""The node safety_filter: ROS and the lease around safety_filter.py. cmd_vel_mux, scan and estop_state in; cmd_vel,
-safety_filter/state, stop_events and leases out; see docs/ros_api.md.
+"""The node safety_filter: ROS and the lease around filter_state.py. cmd_vel_mux, scans and estop_state in; cmd_vel,
+safety_filter/state, stop_events and leases out; the service safety_filter/reset. See docs/ros_api.md.
 """
 
 from __future__ import annotations
 
+import functools
 import math
 import time
+from collections.abc import Callable, Sequence
 
 from canbase.msg import SafetyState, StopEvent
 from geometry_msgs.msg import TwistStamped
 from rclpy.node import Node
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
 
 from canbase_config.robot import Robot
-from canbase_velocity.clearance import ClearanceReader
+from canbase_config.safety import Scan as ScanConfig
+from canbase_velocity import messages
+from canbase_velocity.clearance import ScanReader, field_of
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.io import LeaseSender
 from canbase_velocity.lease import lease_datagram
-from canbase_velocity.messages import safety_state, scan_of, stop_event, stopped_by_estop, twist_message, twist_of
-from canbase_velocity.qos import ANY_COMMAND, COMMAND, EVENT, SCAN, STATE, listen_twice
-from canbase_velocity.safety_filter import SHUTDOWN, FilterConfig, braking_time_s
+from canbase_velocity.obstacle import braking_time_s
+from canbase_velocity.placement import Placement, PlacementError, Transform, placed_by_tf
+from canbase_velocity.qos import ANY_COMMAND, COMMAND, EVENT, SCAN, STATE, STATIC_TF, listen_twice
+from canbase_velocity.safety_filter import SHUTDOWN, FilterConfig
 
 STATE_PERIOD_S = 0.1
+MovingSources = Callable[[], Sequence[str]]
 
 
 class FilterNode(Node):
-    """Issues an order on every command, on the emergency stop, and on a timer; each with its lease."""
+    """Issues an order on every command, on the emergency stop, and on a timer; each with its lease.
 
-    def __init__(self, robot: Robot) -> None:
+    `moving_sources`: names of the sources that order a velocity now, whoever drives; asked before a reset.
+    """
+
+    def __init__(self, robot: Robot, moving_sources: MovingSources = tuple) -> None:
         super().__init__("safety_filter")
         self._robot = robot
+        self._moving_sources = moving_sources
         self._filter = SafetyFilter(FilterConfig.of(robot))
-        self._clearances = ClearanceReader(robot.safety.footprint, robot.safety.scan)
+        self._transforms: dict[str, Transform] = {}
         self._leases = LeaseSender(robot.lease.socket)
         self._lease_sequence = 0
         self._decision = self._filter.decide(time.monotonic())
@@ -43,8 +54,9 @@ class FilterNode(Node):
         self._states = self.create_publisher(SafetyState, "safety_filter/state", STATE)
         self._events = self.create_publisher(StopEvent, "stop_events", EVENT)
         self.create_subscription(TwistStamped, "cmd_vel_mux", self._on_command, ANY_COMMAND)
-        self.create_subscription(LaserScan, robot.safety.scan.topic, self._on_scan, SCAN)
         listen_twice(self, Bool, robot.safety.estop.topic, self._on_estop)
+        self._watch_scans(robot.safety.scans)
+        self.create_service(Trigger, "safety_filter/reset", self._on_reset)
         self._timer = self.create_timer(1.0 / robot.rates.command_hz, self._tick)
 
     def shut_down(self) -> None:
@@ -66,9 +78,18 @@ class FilterNode(Node):
         self._leases.close()
         super().destroy_node()
 
+    def _watch_scans(self, scans: Sequence[ScanConfig]) -> None:
+        for scan in scans:
+            callback = functools.partial(self._on_scan, scan, ScanReader(), Placement.of(scan))
+            self.create_subscription(LaserScan, scan.topic, callback, SCAN)
+        if any(scan.pose == "tf" for scan in scans):
+            if messages.TFMessage is None:
+                raise ModuleNotFoundError("a scanner with `pose: tf` needs tf2_msgs; install ros-jazzy-tf2-msgs")
+            self.create_subscription(messages.TFMessage, "tf_static", self._on_tf_static, STATIC_TF)
+
     def _on_command(self, message: TwistStamped) -> None:
         now = time.monotonic()
-        self._filter.on_command(twist_of(message.twist), now)
+        self._filter.on_command(messages.twist_of(message.twist), now)
         self._timer.reset()  # a mux faster than the timer is not doubled by it
         self._issue(self._filter.decide(now), now)
 
@@ -78,10 +99,27 @@ class FilterNode(Node):
         if message.data:
             self._issue(self._filter.decide(now), now)
 
-    def _on_scan(self, message: LaserScan) -> None:
-        clearances = self._clearances.read(scan_of(message))
-        if clearances is not None:
-            self._filter.on_scan(clearances, time.monotonic())
+    def _on_scan(self, config: ScanConfig, reader: ScanReader, placement: Placement, message: LaserScan) -> None:
+        now = time.monotonic()
+        try:
+            if config.pose == "tf":
+                frame, base_frame = message.header.frame_id.lstrip("/"), self._robot.base.base_frame
+                placement = placed_by_tf(frame, base_frame, self._transforms)
+        except PlacementError as error:
+            self._filter.on_unplaced_scan(config.topic, str(error))
+            return
+        scan = messages.scan_of(message)
+        points = reader.read(scan, placement)
+        if points is not None:
+            self._filter.on_scan(config.topic, points, field_of(scan, placement), now, scan.scan_time_s)
+
+    def _on_tf_static(self, message: messages.TFMessage) -> None:
+        self._transforms.update(messages.transforms_of(message))
+
+    def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success, response.message = self._filter.reset(self._moving_sources(), time.monotonic())
+        self.get_logger().info(f"reset: {response.message}")
+        return response
 
     def _tick(self) -> None:
         """Nothing was issued for a period: decides again, for ages have grown and scans have come."""
@@ -92,11 +130,11 @@ class FilterNode(Node):
         """The lease goes first: the watchdog knows what is allowed before a wheel can move."""
         self._send_lease(decision)
         stamp = self.get_clock().now().to_msg()
-        self._commands.publish(twist_message(decision.twist, stamp, self._robot.base.base_frame))
+        self._commands.publish(messages.twist_message(decision.twist, stamp, self._robot.base.base_frame))
         if not decision.twist.is_zero:
             self._stands_from_s = now + braking_time_s(decision.twist, self._robot.limits)
         if self._filter.begins_stop(decision):
-            self._events.publish(stop_event(decision, stamp))
+            self._events.publish(messages.stop_event(decision, self._robot.safety.estop.latched, stamp))
         self._tell(decision, now)
         self._decision = decision
 
@@ -108,21 +146,23 @@ class FilterNode(Node):
                 time.monotonic_ns(),
                 decision.twist,
                 stops=decision.action is Action.STOP,
-                estop=stopped_by_estop(decision),
+                estop=messages.stopped_by_estop(decision),
             )
         )
         if report is not None:
             self.get_logger().warning(report)
 
     def _tell(self, decision: Decision, now: float) -> None:
-        changed = (decision.action, decision.cause) != (self._decision.action, self._decision.cause)
-        if changed:
+        before = self._decision
+        changed = (decision.action, decision.cause) != (before.action, before.cause)
+        if changed and Action.LIMIT not in (decision.action, before.action):
             self.get_logger().info(f"{decision.action.name} {decision.cause.value} {decision.detail}".rstrip())
+        changed = changed or decision.emergency != before.emergency
         if not changed and now - self._state_at_s < STATE_PERIOD_S:
             return
-        inputs = self._filter.inputs(now)
-        fresh = inputs.scan_age_s is not None and inputs.scan_age_s <= self._robot.safety.scan.timeout_s
-        message = safety_state(decision, inputs, fresh, self.get_clock().now().to_msg())
+        message = messages.safety_state(
+            decision, self._filter.inputs(now), self._filter.clearances(now), self.get_clock().now().to_msg()
+        )
         message.lease_sequence, message.lease_errors = self._lease_sequence, self._leases.errors
         self._states.publish(message)
         self._state_at_s = now

@@ -1,11 +1,56 @@
-"""The safety filter over time: what came in when, and the emergency stop's memory. Deciding is safety_filter.py."""
+"""The safety filter over time: what came in when, and what was ordered. Deciding is safety_filter.py."""
 
 from __future__ import annotations
 
-from canbase_velocity.clearance import FREE, Clearances
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from canbase_config.safety import Scan as ScanConfig
+from canbase_velocity.clearance import FREE, Clearances, Field, Points, clearances
 from canbase_velocity.decision import Action, Decision
-from canbase_velocity.safety_filter import FilterConfig, Inputs, decide, estop_holds
+from canbase_velocity.estop import Estop, EstopEvent, EstopState
+from canbase_velocity.glitch import GlitchFilter
+from canbase_velocity.motion import ExpectedMotion, Pose
+from canbase_velocity.obstacle import Geometry, Sight
+from canbase_velocity.safety_filter import FilterConfig, Inputs, ScanState, decide
+from canbase_velocity.sweep import Floats
 from canbase_velocity.twist import ZERO, Twist
+
+NOTHING_TO_RESET = "nothing to reset: the emergency stop waits for no reset"
+LONGEST_SINCE_S = 0.1
+"""Orders after a longer gap may grow as far as after this one [s]."""
+
+
+class _Scanner:
+    """One scanner: its newest scan, reduced to what can matter."""
+
+    def __init__(self, config: ScanConfig, geometry: Geometry) -> None:
+        self.config = config
+        self._geometry = geometry
+        self._glitches = GlitchFilter(config.min_points)
+        self._reach_m = geometry.reach_m(config.timeout_s)
+        self.at_s: float | None = None
+        self.problem = ""
+        self.field: Field | None = None
+        self.points: Floats = np.empty((0, 2))
+        self.clearances = FREE
+        self.measured_from_s = -math.inf
+
+    def take(self, points: Points, field: Field | None, scan_time_s: float, now: float) -> None:
+        """A scan that says something; its first reading was taken `scan_time_s` before."""
+        limits = self._geometry.limits
+        since_s = self.config.timeout_s if self.at_s is None else min(now - self.at_s, self.config.timeout_s)
+        genuine = self._glitches.genuine(points, limits.linear_mps * since_s, limits.angular_radps * since_s)
+        self.clearances = clearances(genuine, self._geometry.box)
+        self.points = genuine[self._geometry.box.distances_m(genuine) <= self._reach_m]
+        self.field, self.at_s, self.problem = field, now, ""
+        self.measured_from_s = now - min(max(scan_time_s, 0.0), self.config.timeout_s)
+
+    def state(self, now: float) -> ScanState:
+        config = self.config
+        return ScanState(config.topic, config.required, config.timeout_s, _age_s(self.at_s, now), self.problem)
 
 
 class SafetyFilter:
@@ -15,42 +60,88 @@ class SafetyFilter:
         self._config = config
         self._command = ZERO
         self._command_at_s: float | None = None
-        self._clearances = FREE
-        self._scan_at_s: float | None = None
-        self._estop = False
+        self._scanners = {scan.topic: _Scanner(scan, config.geometry) for scan in config.safety.scans}
+        self._estop = Estop(config.safety.estop.latched)
+        self._pressed = False
         self._estop_at_s: float | None = None
-        self._awaits_zero = False
+        longest_s = 2.0 * max(scan.timeout_s for scan in config.safety.scans) + config.safety.reaction_s
+        self._motion = ExpectedMotion(config.limits, longest_s)
+        self._previous, self._previous_at_s = ZERO, -math.inf
         self._stopped = True
+
+    @property
+    def estop(self) -> EstopState:
+        """What the emergency stop wants."""
+        return self._estop.state
 
     def on_command(self, twist: Twist, now: float) -> None:
         """Takes a command of cmd_vel_mux, also one with NaN: that stops."""
         self._command, self._command_at_s = twist, now
 
-    def on_scan(self, clearances: Clearances, now: float) -> None:
-        """Takes the clearances of a scan that says something."""
-        self._clearances, self._scan_at_s = clearances, now
+    def on_scan(self, topic: str, points: Points, field: Field | None, now: float, scan_time_s: float = 0.0) -> None:
+        """Takes a scan that says something. `field` None: it looks everywhere. Raises KeyError for another topic."""
+        self._scanners[topic].take(points, field, scan_time_s, now)
+
+    def on_unplaced_scan(self, topic: str, problem: str) -> None:
+        """A scan came whose scanner cannot be placed. Raises KeyError for another topic."""
+        self._scanners[topic].problem = problem
 
     def on_estop(self, pressed: bool, now: float) -> None:
         """Takes a message of the emergency stop: true = stop."""
-        self._estop, self._estop_at_s = pressed, now
-        self._awaits_zero = self._awaits_zero or pressed
+        self._pressed, self._estop_at_s = pressed, now
+        if pressed:
+            self._estop.happens(EstopEvent.PRESS)
+
+    def reset(self, moving: Sequence[str], now: float) -> tuple[bool, str]:
+        """Whether the emergency stop is free now, and a sentence. `moving`: sources that do not order zero."""
+        self._advance_estop(now)
+        inputs = self.inputs(now)
+        if self._estop.state is EstopState.FREE:
+            return True, NOTHING_TO_RESET
+        if self._estop.state is EstopState.HELD:
+            held = "pressed" if self._pressed else "silent"
+            return False, f"refused: the emergency stop on {self._config.safety.estop.topic} is {held}"
+        if moving or not inputs.command.is_zero:
+            who = ", ".join(moving) or "cmd_vel_mux"
+            return False, f"refused: {who} orders a velocity; let go of the joystick or cancel the goal first"
+        self._estop.happens(EstopEvent.RESET)
+        return True, "emergency stop reset; the next command is followed"
 
     def inputs(self, now: float) -> Inputs:
         """What is known at time `now` [s, monotonic]."""
+        scans = tuple(scanner.state(now) for scanner in self._scanners.values())
+        pose = self._motion.advance(now)
         return Inputs(
             command=self._command,
             command_age_s=_age_s(self._command_at_s, now),
-            clearances=self._clearances,
-            scan_age_s=_age_s(self._scan_at_s, now),
-            estop=self._estop,
+            scans=scans,
+            sight=self._sight(pose, now),
+            motion=self._motion.twist,
+            previous=self._previous,
+            since_s=min(max(now - self._previous_at_s, 0.0), LONGEST_SINCE_S),
+            estop=self._estop.state,
+            pressed=self._pressed,
             estop_age_s=_age_s(self._estop_at_s, now),
-            awaits_zero=self._awaits_zero,
         )
 
+    def clearances(self, now: float) -> Clearances | None:
+        """The free way straight ahead and behind, by all fresh scans; None without any."""
+        fresh = [scanner.clearances for scanner in self._fresh(now)]
+        if not fresh:
+            return None
+        return Clearances(min(each.ahead_m for each in fresh), min(each.behind_m for each in fresh))
+
     def decide(self, now: float) -> Decision:
-        """The order at time `now` [s, monotonic]."""
-        self._remember_estop(now)
-        return decide(self.inputs(now), self._config)
+        """The order at time `now` [s, monotonic]; it counts as given."""
+        self._advance_estop(now)
+        decision = decide(self.inputs(now), self._config)
+        self.ordered(decision.twist, now)
+        return decision
+
+    def ordered(self, twist: Twist, now: float) -> None:
+        """This was ordered, whoever decided it."""
+        self._motion.order(twist, now)
+        self._previous, self._previous_at_s = twist, now
 
     def begins_stop(self, decision: Decision) -> bool:
         """Whether `decision`, the newest, is the beginning of a stop that a command to move ran into."""
@@ -58,14 +149,33 @@ class SafetyFilter:
         self._stopped = decision.action is Action.STOP
         return begins
 
-    def _remember_estop(self, now: float) -> None:
+    def _fresh(self, now: float) -> list[_Scanner]:
+        return [scanner for scanner in self._scanners.values() if scanner.state(now).is_fresh]
+
+    def _sight(self, pose: Pose, now: float) -> Sight:
+        """Each place as it was scanned and as the base must see it by now, where that differs."""
+        fresh = self._fresh(now)
+        parts = [np.empty((0, 2))]
+        for scanner in fresh:
+            there = self._motion.pose_at(scanner.measured_from_s - self._config.safety.reaction_s)
+            parts.append(scanner.points)
+            if not pose.is_at(there) and scanner.points.shape[0] > 0:
+                parts.append(pose.from_here(scanner.points, there))
+        fields = tuple(scanner.field for scanner in fresh if scanner.field is not None)
+        sees_all = any(scanner.field is None for scanner in fresh)
+        return Sight(np.concatenate(parts), () if sees_all else fields)
+
+    def _advance_estop(self, now: float) -> None:
         """A fresh zero command counts only while the emergency stop is free."""
-        inputs = self.inputs(now)
-        age_s = inputs.command_age_s
-        if estop_holds(inputs, self._config):
-            self._awaits_zero = True
-        elif self._command.is_zero and age_s is not None and age_s <= self._config.safety.command_timeout_s:
-            self._awaits_zero = False
+        settings = self._config.safety
+        age_s, command_age_s = _age_s(self._estop_at_s, now), _age_s(self._command_at_s, now)
+        if settings.estop.required and (age_s is None or age_s > settings.estop.timeout_s):
+            self._estop.happens(EstopEvent.SILENCE)
+        elif not self._pressed and age_s is not None:
+            self._estop.happens(EstopEvent.RELEASE)
+        fresh = command_age_s is not None and command_age_s <= settings.command_timeout_s
+        if fresh and self._command.is_zero:
+            self._estop.happens(EstopEvent.ZERO)
 
 
 def _age_s(at_s: float | None, now: float) -> float | None:

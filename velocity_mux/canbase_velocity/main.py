@@ -38,7 +38,8 @@ def run(robot: Robot, ros_args: Sequence[str]) -> int:
 
 
 def _run_nodes(robot: Robot, received: list[int]) -> None:
-    mux, safety = MuxNode(robot), FilterNode(robot)
+    mux = MuxNode(robot)
+    safety = FilterNode(robot, mux.moving_sources)
     executor = EventsExecutor()
     executor.add_node(mux)
     executor.add_node(safety)

@@ -11,10 +11,16 @@ from geometry_msgs.msg import Twist as TwistMessage
 from geometry_msgs.msg import TwistStamped
 from sensor_msgs.msg import LaserScan
 
-from canbase_velocity.clearance import Scan
+from canbase_velocity.clearance import Clearances, Scan
 from canbase_velocity.decision import Cause, Decision
-from canbase_velocity.safety_filter import Inputs
+from canbase_velocity.placement import Transform
+from canbase_velocity.safety_filter import Inputs, ScanState
 from canbase_velocity.twist import Twist
+
+try:
+    from tf2_msgs.msg import TFMessage as TFMessage
+except ModuleNotFoundError:  # a ROS 2 without it: its scanners have their pose in robot.yaml
+    TFMessage = None
 
 NAN = math.nan
 
@@ -38,12 +44,30 @@ def twist_message(twist: Twist, stamp: Time, frame_id: str) -> TwistStamped:
 
 
 def scan_of(message: LaserScan) -> Scan:
-    """The part of a scan that clearances need."""
-    return Scan(message.ranges, message.angle_min, message.angle_increment, message.range_min, message.range_max)
+    """The part of a scan that the filter needs. A scan time that is none counts as 0."""
+    scan_time_s = message.scan_time if math.isfinite(message.scan_time) else 0.0
+    return Scan(
+        message.ranges,
+        message.angle_min,
+        message.angle_increment,
+        message.range_min,
+        message.range_max,
+        scan_time_s,
+    )
 
 
-def safety_state(decision: Decision, inputs: Inputs, scan_is_fresh: bool, stamp: Time) -> SafetyState:
-    """safety_filter/state, without what the node knows of its leases."""
+def transforms_of(message: TFMessage) -> dict[str, Transform]:
+    """The transforms of a message on tf_static, by their child frame. A leading / is of the old tf, and left out."""
+    found = {}
+    for each in message.transforms:
+        at, turn = each.transform.translation, each.transform.rotation
+        parent = each.header.frame_id.lstrip("/")
+        found[each.child_frame_id.lstrip("/")] = Transform(parent, at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w)
+    return found
+
+
+def safety_state(decision: Decision, inputs: Inputs, free: Clearances | None, stamp: Time) -> SafetyState:
+    """safety_filter/state, without what the node knows of its leases. `free` None: no fresh scan."""
     return SafetyState(
         stamp=stamp,
         action=int(decision.action),
@@ -51,19 +75,27 @@ def safety_state(decision: Decision, inputs: Inputs, scan_is_fresh: bool, stamp:
         detail=decision.detail,
         clears_on=decision.clears_on,
         estop=stopped_by_estop(decision),
-        clearance_ahead_m=inputs.clearances.ahead_m if scan_is_fresh else NAN,
-        clearance_behind_m=inputs.clearances.behind_m if scan_is_fresh else NAN,
+        emergency=decision.emergency,
+        clearance_ahead_m=free.ahead_m if free else NAN,
+        clearance_behind_m=free.behind_m if free else NAN,
         command_age_s=_or_nan(inputs.command_age_s),
-        scan_age_s=_or_nan(inputs.scan_age_s),
+        scan_age_s=_or_nan(oldest_scan_s(inputs.scans)),
         ordered_linear_mps=decision.twist.linear_mps,
         ordered_angular_radps=decision.twist.angular_radps,
     )
 
 
-def stop_event(decision: Decision, stamp: Time) -> StopEvent:
-    """One message on stop_events: the filter's stops clear by themselves, none is latched."""
+def oldest_scan_s(scans: tuple[ScanState, ...]) -> float | None:
+    """Age of the oldest scan among those that are required, or among all where none is [s]; None: one is missing."""
+    counting = [scan.age_s for scan in scans if scan.required] or [scan.age_s for scan in scans]
+    known = [age_s for age_s in counting if age_s is not None]
+    return max(known) if len(known) == len(counting) else None
+
+
+def stop_event(decision: Decision, latches: bool, stamp: Time) -> StopEvent:
+    """One message on stop_events. `latches`: the emergency stop needs a reset; all other stops clear by themselves."""
     values: dict[str, Any] = {"cause": decision.cause.value, "detail": decision.detail, "clears_on": decision.clears_on}
-    return StopEvent(stamp=stamp, stopped_by="safety_filter", latched=False, **values)
+    return StopEvent(stamp=stamp, stopped_by="safety_filter", latched=latches and stopped_by_estop(decision), **values)
 
 
 def stopped_by_estop(decision: Decision) -> bool:

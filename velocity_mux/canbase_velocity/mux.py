@@ -141,6 +141,11 @@ class Mux:
         name, twist = (active.name, active.twist) if active else (None, ZERO)
         return MuxDecision(name, twist, views, *self._others(now))
 
+    def moving(self, now: float) -> tuple[str, ...]:
+        """Fresh sources that do not order zero, whoever drives: a reset is refused while there are any."""
+        moving = (source for source in self._sources.values() if source.is_fresh(now) and not source.twist.is_zero)
+        return tuple(source.name for source in moving)
+
     def shutdown(self, now: float) -> MuxDecision:
         """The order while the process ends: zero, whoever wants to drive."""
         views = tuple(source.view(now, Standing.SHUTDOWN, "shutdown") for source in self._sources.values())

@@ -53,6 +53,10 @@ class MuxNode(Node):
         """Sends one zero and says so in the state. Called several times: one may be lost."""
         self._send(self._mux.shutdown(time.monotonic()), time.monotonic())
 
+    def moving_sources(self) -> tuple[str, ...]:
+        """Names of the sources that order a velocity now, whoever drives."""
+        return self._mux.moving(time.monotonic())
+
     def _listen(self) -> None:
         for name, source in self._robot.mux.sources.items():
             kind = TwistStamped if source.stamped else TwistMessage

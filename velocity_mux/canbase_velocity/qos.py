@@ -25,6 +25,8 @@ EVENT = QoSProfile(depth=20, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Latched, as the motor driver's on the same topic: who comes late sees why the robot was stopped."""
 SCAN = qos_profile_sensor_data
 """Best effort: it fits every scanner's publisher, reliable or not."""
+STATIC_TF = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""As tf2's static broadcasters publish, of which there may be many."""
 
 
 def listen_twice(node: Node, kind: type[Any], topic: str, callback: Callable[[Any], None]) -> None:

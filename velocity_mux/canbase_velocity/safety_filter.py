@@ -1,12 +1,15 @@
 """How fast the base may go: the last decision about a command. Time comes in as an argument; ROS is in filter_node.py.
 
 Rules, in the order of their precedence:
-1. Emergency stop pressed: stop. Required and silent counts as pressed. After it, the command has to be zero once.
+1. Emergency stop pressed: stop, with the emergency deceleration. Required and silent counts as pressed. Its memory is
+   estop.py.
 2. Command silent, or with NaN or infinity: stop.
-3. Scan required and silent: stop.
-4. Faster than the limits: slower, on the same curve.
-5. Obstacle in the direction of travel: slower, on the same curve, so that the base can stop before the stop distance;
-   there it stops. Driving away from an obstacle is free.
+3. A required scan silent, or of a scanner whose place is unknown: stop.
+4. Faster than the limits, the ceiling, a limit zone with something in it, or the speed for where no scanner looks:
+   slower, on the same curve.
+5. Growing faster than the ceiling: slower. What falls is never held up.
+6. Obstacle where the footprint will be: slower, on the same curve, so that the base can stop before the stop distance;
+   there it stops. Driving away from an obstacle is free. See obstacle.py.
 Zero is always allowed: nothing here makes a command faster or turns it around.
 """
 
@@ -16,9 +19,12 @@ import math
 from dataclasses import dataclass
 
 from canbase_config.robot import Limits, Robot
-from canbase_config.safety import Safety
-from canbase_velocity.clearance import Clearances, swept_radius_m
+from canbase_config.safety import Ceiling, Safety
+from canbase_velocity import obstacle
 from canbase_velocity.decision import PASSED, Action, Cause, Decision, Finding, stop
+from canbase_velocity.estop import EstopState
+from canbase_velocity.obstacle import Geometry, Sight
+from canbase_velocity.sweep import fastest_mps
 from canbase_velocity.twist import ZERO, Twist
 
 SHUTDOWN = Decision(Action.STOP, Cause.SHUTDOWN, "the safety filter is being shut down", "its next start", ZERO)
@@ -31,82 +37,85 @@ class FilterConfig:
     limits: Limits
     safety: Safety
     standstill_mps: float
+    geometry: Geometry
 
     @staticmethod
     def of(robot: Robot) -> FilterConfig:
         """The filter's part of `robot`."""
-        return FilterConfig(robot.limits, robot.safety, robot.base.standstill_mps)
+        geometry = Geometry.of(robot.limits, robot.safety, robot.rates.command_hz)
+        return FilterConfig(robot.limits, robot.safety, robot.base.standstill_mps, geometry)
+
+
+@dataclass(frozen=True, slots=True)
+class ScanState:
+    """What is known of one scanner. `age_s`: of its last scan that said something [s]; None: none yet."""
+
+    topic: str
+    required: bool
+    timeout_s: float
+    age_s: float | None
+    problem: str = ""
+    """Why its scans cannot be used, such as a frame that tf_static does not know; empty: they can."""
+
+    @property
+    def is_fresh(self) -> bool:
+        """Its last scan counts."""
+        return not self.problem and _is_fresh(self.age_s, self.timeout_s)
 
 
 @dataclass(frozen=True, slots=True)
 class Inputs:
-    """What is known when a decision is made. Ages are of local receive times [s]; None: nothing received yet.
-
-    `clearances` are of the last scan that said something; they count only while that scan is fresh.
-    """
+    """What is known when a decision is made. Ages are of local receive times [s]; None: nothing received yet."""
 
     command: Twist
     command_age_s: float | None
-    clearances: Clearances
-    scan_age_s: float | None
-    estop: bool
+    scans: tuple[ScanState, ...]
+    sight: Sight
+    """What the fresh ones of the scans show."""
+    motion: Twist
+    """How the base is expected to move, by earlier orders."""
+    previous: Twist
+    """The last order."""
+    since_s: float
+    """How long ago that was [s]."""
+    estop: EstopState
+    pressed: bool
+    """The last message of the emergency stop said so."""
     estop_age_s: float | None
-    awaits_zero: bool
-    """An emergency stop was released, and the command has not been zero since."""
 
 
 def decide(inputs: Inputs, config: FilterConfig) -> Decision:
     """The order for these inputs: the most severe finding wins, of two alike the one of the earlier rule."""
-    stopped = _estop(inputs, config) or _command(inputs, config) or _scan(inputs, config)
+    stopped = _estop(inputs, config) or _command(inputs, config) or _scan(inputs)
     if stopped is not None:
-        return Decision(stopped.action, stopped.cause, stopped.detail, stopped.clears_on, ZERO)
-    ceiling = _ceiling(inputs.command, config.limits)
-    limited = _within(inputs.command.scaled(ceiling.factor), config.limits)
-    obstacle = _obstacle(limited, inputs, config)
-    worst = max(ceiling, obstacle, key=lambda finding: finding.action)
-    return Decision(worst.action, worst.cause, worst.detail, worst.clears_on, limited.scaled(obstacle.factor))
-
-
-def estop_holds(inputs: Inputs, config: FilterConfig) -> bool:
-    """Pressed, or required and silent."""
-    return inputs.estop or _estop_is_silent(inputs, config)
-
-
-def approach_speed_mps(gap_m: float, scan_age_s: float, deceleration_mps2: float) -> float:
-    """Speed from which the base still stands within gap_m [m/s], having gone on at that speed since the scan was taken.
-
-    From v·age + v²/(2·a) = gap. With a scan of age 0 it is sqrt(2·a·gap).
-    """
-    if gap_m <= 0.0:
-        return 0.0
-    before_mps = deceleration_mps2 * scan_age_s
-    return math.sqrt(before_mps**2 + 2.0 * deceleration_mps2 * gap_m) - before_mps
-
-
-def braking_time_s(twist: Twist, limits: Limits) -> float:
-    """How long the driver's ordinary ramp from `twist` to standstill takes [s]."""
-    return max(
-        abs(twist.linear_mps) / limits.deceleration_mps2,
-        abs(twist.angular_radps) / limits.angular_deceleration_radps2,
-    )
+        emergency = inputs.estop is EstopState.HELD
+        return Decision(stopped.action, stopped.cause, stopped.detail, stopped.clears_on, ZERO, emergency)
+    if inputs.command.is_zero:
+        late = obstacle.brakes_too_late(inputs.motion, inputs.sight, config.geometry)
+        return Decision(Action.PASS, Cause.NONE, "", "", ZERO, late)
+    slowest = min(_slower(inputs, config), key=lambda finding: finding.factor)
+    limited = _within(inputs.command.scaled(slowest.factor), config.limits)
+    grown, growth = _growth(limited, inputs, config.safety.ceiling)
+    judged, emergency = _obstacle(grown, inputs, config)
+    worst = max(slowest, growth, judged, key=lambda finding: finding.action)
+    twist = ZERO if worst.action is Action.STOP else grown.scaled(judged.factor)
+    return Decision(worst.action, worst.cause, worst.detail, worst.clears_on, twist, emergency)
 
 
 def _estop(inputs: Inputs, config: FilterConfig) -> Finding | None:
     estop = config.safety.estop
-    if inputs.estop:
-        return stop(Cause.ESTOP, "the emergency stop is pressed", "its release, then a zero command")
-    if _estop_is_silent(inputs, config):
-        detail = _silence(estop.topic, inputs.estop_age_s, estop.timeout_s)
-        return stop(Cause.ESTOP_STALE, detail, f"false on {estop.topic}, then a zero command")
-    if inputs.awaits_zero:
+    if inputs.estop is EstopState.AWAITS_RESET:
+        return stop(Cause.ESTOP, "the emergency stop is released and waits for a reset", "reset")
+    if inputs.estop is EstopState.AWAITS_ZERO:
         detail = "the emergency stop is released, the command has not been zero since"
         return stop(Cause.ESTOP, detail, "a zero command")
-    return None
-
-
-def _estop_is_silent(inputs: Inputs, config: FilterConfig) -> bool:
-    estop = config.safety.estop
-    return estop.required and not _is_fresh(inputs.estop_age_s, estop.timeout_s)
+    if inputs.estop is EstopState.FREE:
+        return None
+    then = "a reset" if estop.latched else "a zero command"
+    if not inputs.pressed:
+        detail = _silence(estop.topic, inputs.estop_age_s, estop.timeout_s)
+        return stop(Cause.ESTOP_STALE, detail, f"false on {estop.topic}, then {then}")
+    return stop(Cause.ESTOP, "the emergency stop is pressed", f"its release, then {then}")
 
 
 def _command(inputs: Inputs, config: FilterConfig) -> Finding | None:
@@ -119,24 +128,48 @@ def _command(inputs: Inputs, config: FilterConfig) -> Finding | None:
     return None
 
 
-def _scan(inputs: Inputs, config: FilterConfig) -> Finding | None:
-    scan = config.safety.scan
-    if not scan.required or _is_fresh(inputs.scan_age_s, scan.timeout_s):
+def _scan(inputs: Inputs) -> Finding | None:
+    bad = next((scan for scan in inputs.scans if scan.required and not scan.is_fresh), None)
+    if bad is None:
         return None
-    return stop(Cause.SCAN_STALE, _silence(scan.topic, inputs.scan_age_s, scan.timeout_s), f"scans on {scan.topic}")
+    if bad.problem:
+        return stop(Cause.SCAN_UNPLACED, f"{bad.topic}: {bad.problem}", "a static transform of the scanner")
+    return stop(Cause.SCAN_STALE, _silence(bad.topic, bad.age_s, bad.timeout_s), f"scans on {bad.topic}")
 
 
-def _ceiling(command: Twist, limits: Limits) -> Finding:
-    linear_mps, angular_radps = abs(command.linear_mps), abs(command.angular_radps)
-    if linear_mps <= limits.linear_mps and angular_radps <= limits.angular_radps:
+def _slower(inputs: Inputs, config: FilterConfig) -> list[Finding]:
+    """Rule 4, each with what it leaves of the command."""
+    command, limits, ceiling = inputs.command, config.limits, config.safety.ceiling
+    linear_mps = min(limits.linear_mps, ceiling.linear_mps) if ceiling else limits.linear_mps
+    angular_radps = min(limits.angular_radps, ceiling.angular_radps) if ceiling else limits.angular_radps
+    found = [
+        _limit(command, obstacle.speed_factor(command, linear_mps, angular_radps), Cause.SPEED, "a slower command")
+    ]
+    for zone in config.safety.limit_zones:
+        factor = obstacle.zone_factor(command, zone, inputs.sight)
+        found.append(_limit(command, factor, Cause.ZONE, "nothing in the limit zone"))
+    if inputs.sight.fields and obstacle.is_blind(command, inputs.sight, config.geometry):
+        factor = min(1.0, config.safety.blind_mps / fastest_mps(config.geometry.box, command))
+        found.append(_blind(command, factor, config))
+    return found
+
+
+def _limit(command: Twist, factor: float, cause: Cause, clears_on: str) -> Finding:
+    if factor >= 1.0:
         return PASSED
-    factor = min(
-        limits.linear_mps / max(linear_mps, limits.linear_mps),
-        limits.angular_radps / max(angular_radps, limits.angular_radps),
+    allowed = command.scaled(factor)
+    detail = (
+        f"{command.linear_mps:.2f} m/s, {command.angular_radps:.2f} rad/s asked for, "
+        f"{allowed.linear_mps:.2f} m/s, {allowed.angular_radps:.2f} rad/s allowed"
     )
-    asked = f"{command.linear_mps:.2f} m/s, {command.angular_radps:.2f} rad/s asked for"
-    allowed = f"{limits.linear_mps:.2f} m/s, {limits.angular_radps:.2f} rad/s allowed"
-    return Finding(Action.LIMIT, Cause.SPEED, f"{asked}, {allowed}", "a slower command", factor)
+    return Finding(Action.LIMIT, cause, detail, clears_on, factor)
+
+
+def _blind(command: Twist, factor: float, config: FilterConfig) -> Finding:
+    clears_on = "a command to where a scanner looks"
+    if config.safety.blind_mps < config.standstill_mps:
+        return stop(Cause.BLIND, "no scanner looks where the command leads, safety.blind_mps is 0", clears_on)
+    return _limit(command, factor, Cause.BLIND, clears_on)
 
 
 def _within(twist: Twist, limits: Limits) -> Twist:
@@ -147,49 +180,53 @@ def _within(twist: Twist, limits: Limits) -> Twist:
     )
 
 
-def _obstacle(twist: Twist, inputs: Inputs, config: FilterConfig) -> Finding:
-    """Compares with a fresh scan only: a required one that is stale has stopped the base before."""
-    age_s = inputs.scan_age_s
-    if age_s is None or age_s > config.safety.scan.timeout_s:
-        return PASSED
-    ways = (_straight(twist, inputs.clearances, age_s, config), _turning(twist, inputs.clearances, age_s, config))
-    return min(ways, key=lambda finding: finding.factor)
+def _growth(twist: Twist, inputs: Inputs, ceiling: Ceiling | None) -> tuple[Twist, Finding]:
+    """Rule 5. From rest, and while both speeds grow in proportion, the curve is that of the command."""
+    if ceiling is None:
+        return twist, PASSED
+    kept_mps = _kept(inputs.previous.linear_mps, twist.linear_mps)
+    kept_radps = _kept(inputs.previous.angular_radps, twist.angular_radps)
+    linear_mps, angular_radps = twist.linear_mps - kept_mps, twist.angular_radps - kept_radps
+    share = obstacle.speed_factor(
+        Twist(linear_mps, angular_radps),
+        max(ceiling.acceleration_mps2 * inputs.since_s, math.ulp(0.0)),
+        max(ceiling.angular_acceleration_radps2 * inputs.since_s, math.ulp(0.0)),
+    )
+    if share >= 1.0:
+        return twist, PASSED
+    grown = Twist(kept_mps + linear_mps * share, kept_radps + angular_radps * share)
+    return grown, Finding(Action.LIMIT, Cause.ACCELERATION, "speeding up", "the speed asked for", share)
 
 
-def _straight(twist: Twist, clearances: Clearances, age_s: float, config: FilterConfig) -> Finding:
-    if twist.linear_mps == 0.0:
-        return PASSED
-    where, free_m = ("ahead", clearances.ahead_m) if twist.linear_mps > 0.0 else ("behind", clearances.behind_m)
-    limits, safety = config.limits, config.safety
-    # The gentlest braking that starts at the slow-down distance from the highest speed, never harder than the ordinary.
-    braking_m = safety.slow_distance_m - safety.stop_distance_m
-    deceleration_mps2 = min(limits.deceleration_mps2, limits.linear_mps**2 / (2.0 * braking_m))
-    allowed_mps = approach_speed_mps(free_m - safety.stop_distance_m, age_s, deceleration_mps2)
-    return _slowed(abs(twist.linear_mps), allowed_mps, free_m, where, config)
+def _kept(previous: float, asked: float) -> float:
+    """How much of the last order the new one still asks for: it can be passed at once."""
+    return 0.0 if previous * asked <= 0.0 else math.copysign(min(abs(previous), abs(asked)), asked)
 
 
-def _turning(twist: Twist, clearances: Clearances, age_s: float, config: FilterConfig) -> Finding:
-    """Turning about a centre inside the circle that the footprint sweeps, by the speed of its farthest corner."""
-    radius_m = swept_radius_m(config.safety.footprint)
-    corner_mps = abs(twist.angular_radps) * radius_m
-    if abs(twist.linear_mps) >= corner_mps:
-        return PASSED
-    deceleration_mps2 = config.limits.angular_deceleration_radps2 * radius_m
-    gap_m = clearances.around_m - config.safety.stop_distance_m
-    allowed_mps = approach_speed_mps(gap_m, age_s, deceleration_mps2)
-    return _slowed(corner_mps, allowed_mps, clearances.around_m, "around", config)
-
-
-def _slowed(speed_mps: float, allowed_mps: float, free_m: float, where: str, config: FilterConfig) -> Finding:
+def _obstacle(twist: Twist, inputs: Inputs, config: FilterConfig) -> tuple[Finding, bool]:
     """An allowed speed below standstill is none: otherwise the base would creep towards the stop distance for ever."""
-    stop_m = config.safety.stop_distance_m
-    if allowed_mps < config.standstill_mps:
-        detail = f"{free_m:.2f} m free {where}, stop distance {stop_m:.2f} m"
-        return stop(Cause.OBSTACLE, detail, f"more free way {where}, or a command away from the obstacle")
-    if allowed_mps >= speed_mps:
-        return PASSED
-    detail = f"{free_m:.2f} m free {where}: at most {allowed_mps:.2f} m/s"
-    return Finding(Action.SLOW, Cause.OBSTACLE_NEAR, detail, f"more free way {where}", allowed_mps / speed_mps)
+    if twist.is_zero:
+        return PASSED, False
+    geometry = config.geometry
+    judgement = obstacle.judge(twist, inputs.motion, inputs.sight, geometry)
+    free_m, emergency = judgement.touch.way_m, judgement.hard and not inputs.motion.is_zero
+    where = _where(twist)
+    speed_mps = fastest_mps(geometry.box, twist)
+    if judgement.share >= 1.0:
+        return PASSED, False
+    if judgement.share * speed_mps < config.standstill_mps:
+        detail = f"{free_m:.2f} m free {where}, stop distance {geometry.stop_m:.2f} m"
+        return stop(Cause.OBSTACLE, detail, f"more free way {where}, or a command away from the obstacle"), emergency
+    detail = f"{free_m:.2f} m free {where}: at most {judgement.share * speed_mps:.2f} m/s"
+    slow = Finding(Action.SLOW, Cause.OBSTACLE_NEAR, detail, f"more free way {where}", judgement.share)
+    return slow, False
+
+
+def _where(twist: Twist) -> str:
+    if twist.linear_mps == 0.0:
+        return "around"
+    way = "ahead" if twist.linear_mps > 0.0 else "behind"
+    return way if twist.angular_radps == 0.0 else f"{way} on the arc"
 
 
 def _is_fresh(age_s: float | None, timeout_s: float) -> bool:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from campaign.envelope import react_s
 from campaign.plan import GoalRequest, Plan, Segment
 from campaign.world import World
 from canbase_driver.reset import Outcome
-from canbase_velocity.clearance import Clearances
+from canbase_velocity.clearance import NOWHERE, Points
 from canbase_velocity.twist import Twist
 
 SPEEDING_UP_MPS = 0.2
 """By so much the base may become faster until the wall is noticed."""
 NAN = Twist(math.nan, 0.3)
+BEAMS = 360
 
 
 class Outside:
@@ -34,6 +37,7 @@ class Outside:
     def reset(self) -> None:
         """The operator asks for a reset, whatever the state."""
         self._world.note("operator asks for a reset")
+        self._world.velocity.reset()
         self._world.driver.reset(self.resets)
 
     def _ask(self, goal: GoalRequest) -> None:
@@ -83,7 +87,7 @@ class Surroundings:
         gentlest = limits.linear_mps**2 / (2.0 * (safety.slow_distance_m - safety.stop_distance_m))
         braking_m = base.v_mps**2 / (2.0 * min(gentlest, limits.deceleration_mps2))
         noticing_m = (abs(base.v_mps) + SPEEDING_UP_MPS) * (react_s(robot, layers=2) + self.SCAN_S)
-        self.wall_m = safety.stop_distance_m + braking_m + noticing_m + margin_m
+        self.wall_m = safety.padding_m + safety.stop_distance_m + braking_m + noticing_m + margin_m
         self._wall_from_m = base.travel_m
 
     def take_wall(self) -> None:
@@ -98,6 +102,15 @@ class Surroundings:
         gone_m = self._world.drives.bench.base.travel_m - self._wall_from_m
         return self.wall_m - gone_m, self.wall_m + gone_m
 
+    def _seen(self) -> Points:
+        """Each wall as two neighbouring beams see it; a wall that the base has run into stays at its edge."""
+        if self.wall_m is None:
+            return Points(NOWHERE, np.empty(0, dtype=np.intp), BEAMS)
+        footprint, (ahead_m, behind_m) = self._world.robot.safety.footprint, self.free_m
+        ahead_x_m, behind_x_m = footprint.front_m + max(0.0, ahead_m), -footprint.rear_m - max(0.0, behind_m)
+        places = [(ahead_x_m, -0.02), (ahead_x_m, 0.02), (behind_x_m, 0.02), (behind_x_m, -0.02)]
+        return Points(np.array(places), np.array((0, 1, BEAMS // 2, BEAMS // 2 + 1)), BEAMS)
+
     def press(self, pressed: bool) -> None:
         """The emergency stop is pressed or released; that is told at once."""
         self.pressed = pressed
@@ -109,9 +122,7 @@ class Surroundings:
 
     def _scan(self) -> None:
         if self.scans:
-            ahead_m, behind_m = self.free_m
-            seen = Clearances(max(0.0, ahead_m), max(0.0, behind_m), math.inf)
-            self._world.topics.publish("scan", seen)
+            self._world.topics.publish("scan", self._seen())
         self._world.clock.after(self.SCAN_S, self._scan)
 
     def _speak(self) -> None:

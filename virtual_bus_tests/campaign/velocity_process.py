@@ -9,7 +9,7 @@ from functools import partial
 from campaign.clock import Clock
 from campaign.process import Process, Topics
 from canbase_config.robot import Robot
-from canbase_velocity.clearance import Clearances
+from canbase_velocity.clearance import Points
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.lease import lease_datagram
@@ -77,8 +77,13 @@ class VelocityProcess(Process):
         self.filter.on_command(twist, self.clock.now)
         self._issue(self.filter.decide(self.clock.now))
 
-    def _on_scan(self, clearances: Clearances) -> None:
-        self.filter.on_scan(clearances, self.clock.now)
+    def reset(self) -> None:
+        """The operator resets the emergency stop; a process that is dead or hangs does not hear it."""
+        if self.alive:
+            self.filter.reset(self.mux.moving(self.clock.now), self.clock.now)
+
+    def _on_scan(self, points: Points) -> None:
+        self.filter.on_scan(self._robot.safety.scan.topic, points, None, self.clock.now)
 
     def _on_estop(self, pressed: bool) -> None:
         self.filter.on_estop(pressed, self.clock.now)

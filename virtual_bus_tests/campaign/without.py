@@ -18,6 +18,7 @@ from canbase_driver.odometry import WheelTravel
 from canbase_driver.snapshot import DriverState, WatchdogView
 from canbase_velocity import filter_state, mux, safety_filter
 from canbase_velocity.decision import PASSED
+from canbase_velocity.estop import FREE, HELD
 from canbase_watchdog import policy
 from canbase_watchdog.watchdog import State, Watchdog
 
@@ -71,8 +72,8 @@ def _driver_forgets() -> None:
 
 
 def _forget_estop(self: filter_state.SafetyFilter, now: float) -> None:
-    """The command need not be zero after an emergency stop."""
-    self._awaits_zero = False
+    """Released, the emergency stop is free at once."""
+    self._estop.state = HELD if self._pressed else FREE
 
 
 SAFEGUARDS: dict[str, Callable[[], None]] = {
@@ -91,9 +92,9 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "drives:heartbeat_consumer": _put(HeartbeatConsumer, "tick", lambda self, now: None),
     "mux:timeout": _put(mux._Source, "is_fresh", lambda self, now: self.at_s is not None),
     "filter:estop": _put(safety_filter, "_estop", lambda inputs, config: None),
-    "filter:obstacle": _put(safety_filter, "_obstacle", lambda twist, inputs, config: PASSED),
+    "filter:obstacle": _put(safety_filter, "_obstacle", lambda twist, inputs, config: (PASSED, False)),
     "filter:command": _put(safety_filter, "_command", lambda inputs, config: None),
-    "filter:zero_after_estop": _put(filter_state.SafetyFilter, "_remember_estop", _forget_estop),
+    "filter:zero_after_estop": _put(filter_state.SafetyFilter, "_advance_estop", _forget_estop),
     "action:timeout_and_progress": _drop(
         causes, lambda row: getattr(row, "code", None) not in (ErrorCode.TIMEOUT, ErrorCode.NO_PROGRESS)
     ),

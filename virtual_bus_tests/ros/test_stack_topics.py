@@ -152,6 +152,8 @@ def test_the_emergency_stop_stops_the_base_and_ends_the_goal(world: World) -> No
     released_s = time.monotonic()
     world.estop.message = Bool(data=False)
     assert world.robot.moved_since(released_s, 1.0) < RESTS_M  # the release alone moves nothing
+    assert world.robot.run("drive", "0.1", "--speed", "0.2") == 5  # it is latched
+    assert world.robot.run("reset") == 0
     assert world.robot.run("drive", "0.1", "--speed", "0.2") == 0
 
 

@@ -17,6 +17,7 @@ from geometry_msgs.msg import Twist, TwistStamped
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
 
 from canbase_config.robot import Robot
 from ros.harness import Process, Recorder, TestNode
@@ -199,22 +200,41 @@ def test_a_plain_twist_drives_beside_stamped_sources(start: Callable[[Mapping[st
     chain.wait_for_order(0.25)
 
 
-def test_the_emergency_stop_stops_and_needs_a_zero_command_after_it(chain: Chain) -> None:
+def reset(chain: Chain) -> tuple[bool, str]:
+    """The answer of safety_filter/reset."""
+    client = chain.node.node.create_client(Trigger, "safety_filter/reset")
+    chain.node.wait_for(client.service_is_ready, START_S, "safety_filter/reset")
+    future = client.call_async(Trigger.Request())
+    chain.node.wait_for(future.done, 3.0, "an answer of safety_filter/reset")
+    answer = future.result()
+    assert answer is not None
+    return answer.success, answer.message
+
+
+def test_the_emergency_stop_stops_until_a_reset_that_is_refused_while_anybody_wants_to_drive(chain: Chain) -> None:
     chain.action.message = drive(0.2)
     chain.wait_for_order(0.2)
     chain.estop.message = Bool(data=True)
     state = chain.wait_for_cause(SafetyState.CAUSE_ESTOP)
-    assert state.estop is True
+    assert (state.estop, state.emergency) == (True, True)
     assert chain.ordered == (0.0, 0.0)
     chain.node.wait_for(lambda: chain.events.last is not None, 2.0, "a stop event")
-    assert [(event.stopped_by, event.cause) for event in chain.events.messages] == [("safety_filter", "estop")]
+    events = [(event.stopped_by, event.cause, event.latched) for event in chain.events.messages]
+    assert events == [("safety_filter", "estop", True)]
+    assert reset(chain) == (False, "refused: the emergency stop on estop_state is pressed")
     chain.estop.message = Bool(data=False)
     chain.orders.clear()
     chain.node.spin_for(0.3)
     assert {message.twist.linear.x for message in chain.orders.messages} == {0.0}  # no jump at release
+    chain.joystick.message = drive(0.0)  # it has priority: cmd_vel_mux is zero, and the action wants to drive still
+    chain.node.spin_for(0.2)
+    done, sentence = reset(chain)
+    assert (done, sentence.split(";")[0]) == (False, "refused: action orders a velocity")
     chain.action.message = drive(0.0)
+    chain.node.spin_for(0.2)
+    assert reset(chain)[0] is True
     chain.wait_for_cause(SafetyState.CAUSE_NONE)
-    chain.action.message = drive(0.2)
+    chain.action.message, chain.joystick.message = drive(0.2), None
     chain.wait_for_order(0.2)
 
 
@@ -223,7 +243,7 @@ def test_an_obstacle_ahead_blocks_the_way_ahead_but_not_the_way_back(chain: Chai
     chain.action.message = drive(0.2)
     state = chain.wait_for_cause(SafetyState.CAUSE_OBSTACLE)
     assert state.action == SafetyState.STOP
-    assert state.clearance_ahead_m == pytest.approx(0.1, abs=1e-6)
+    assert state.clearance_ahead_m == pytest.approx(0.09, abs=1e-6)  # 0.01 m of padding
     assert state.clearance_behind_m == math.inf
     assert chain.ordered == (0.0, 0.0)
     chain.action.message = drive(-0.2)
@@ -231,6 +251,7 @@ def test_an_obstacle_ahead_blocks_the_way_ahead_but_not_the_way_back(chain: Chai
     chain.scan.message = scan(ahead_m=0.6)  # 0.30 m free
     chain.action.message = drive(1.0)
     chain.wait_for_cause(SafetyState.CAUSE_OBSTACLE_NEAR)
+    chain.node.spin_for(0.1)
     assert 0.0 < chain.ordered[0] <= math.sqrt(2 * 1.0 * 0.15)
 
 

@@ -10,35 +10,33 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canbase_config.safety import Footprint
 from canbase_config.safety import Scan as ScanConfig
-from canbase_velocity.clearance import FREE, ClearanceReader, Clearances, Scan, swept_radius_m
+from canbase_velocity.clearance import FREE, Clearances, Scan, ScanReader, clearances, field_of
+from canbase_velocity.placement import Placement
+from canbase_velocity.sweep import Box
 
-FOOTPRINT = Footprint(front_m=0.4, rear_m=0.2, left_m=0.3, right_m=0.25)
+BOX = Box(front_m=0.4, rear_m=0.2, left_m=0.3, right_m=0.25)
+HERE = Placement.of(ScanConfig(required=True))
 QUARTER_RAD = math.pi / 2
 INF, NAN = math.inf, math.nan
 
 
-def read(ranges_m: list[float], **changes: float) -> Clearances | None:
+def of(scan: Scan, placement: Placement = HERE, reader: ScanReader | None = None) -> Clearances | None:
+    points = (reader or ScanReader()).read(scan, placement)
+    return None if points is None else clearances(points.at_m, BOX)
+
+
+def read(ranges_m: list[float], **changes: Any) -> Clearances | None:
     """Clearances of beams 90° apart, the first to the rear, the second to the right, then ahead, then left."""
     geometry = {"angle_min_rad": -math.pi, "angle_increment_rad": QUARTER_RAD, "range_min_m": 0.05, "range_max_m": 10.0}
-    pose = {key: changes.pop(key) for key in ("x_m", "y_m", "yaw_rad") if key in changes}
-    reader = ClearanceReader(FOOTPRINT, ScanConfig.model_validate({"required": True, **pose}))
-    return reader.read(Scan(ranges_m, **(geometry | changes)))
+    pose = {key: changes.pop(key) for key in ("x_m", "y_m", "yaw_rad", "upside_down") if key in changes}
+    placement = Placement.of(ScanConfig.model_validate({"required": True, **pose}))
+    return of(Scan(ranges_m, **(geometry | changes)), placement)
 
 
 def points(*places_m: tuple[float, float]) -> Clearances:
-    """Clearances of points in base_link, each seen by a beam of its own."""
-    nearest = Clearances(INF, INF, INF)
-    for x_m, y_m in places_m:
-        seen = read([math.hypot(x_m, y_m)], angle_min_rad=math.atan2(y_m, x_m), range_min_m=0.0)
-        assert seen is not None
-        nearest = Clearances(
-            min(nearest.ahead_m, seen.ahead_m),
-            min(nearest.behind_m, seen.behind_m),
-            min(nearest.around_m, seen.around_m),
-        )
-    return nearest
+    """Clearances of places in base_link."""
+    return clearances(np.array(places_m), BOX)
 
 
 def approx(value: float) -> Any:
@@ -47,7 +45,7 @@ def approx(value: float) -> Any:
 
 def test_ahead_and_behind_are_measured_from_the_edges_of_the_footprint() -> None:
     clearances = read([2.0, INF, 3.0, INF])
-    assert clearances == Clearances(approx(2.6), approx(1.8), INF)
+    assert clearances == Clearances(approx(2.6), approx(1.8))
 
 
 def test_nothing_seen_is_free() -> None:
@@ -65,51 +63,46 @@ def test_only_the_corridor_of_the_footprint_counts(y_m: float, blocks: bool) -> 
 
 @pytest.mark.parametrize("y_m", [0.3, -0.25])
 def test_a_point_exactly_on_the_edge_of_the_corridor_is_in_it(y_m: float) -> None:
-    assert read([1.0], angle_min_rad=0.0, y_m=y_m) == Clearances(approx(0.6), INF, INF)
+    assert read([1.0], angle_min_rad=0.0, y_m=y_m) == Clearances(approx(0.6), INF)
 
 
 def test_a_point_ahead_is_not_behind_and_the_other_way_round() -> None:
-    assert points((1.0, 0.0)) == Clearances(approx(0.6), INF, INF)
-    assert points((-1.0, 0.0)) == Clearances(INF, approx(0.8), INF)
+    assert points((1.0, 0.0)) == Clearances(approx(0.6), INF)
+    assert points((-1.0, 0.0)) == Clearances(INF, approx(0.8))
 
 
 def test_a_point_inside_the_footprint_touches_it_on_its_half() -> None:
-    assert points((0.39, 0.1)) == Clearances(0.0, INF, 0.0)
-    assert points((-0.1, 0.1)) == Clearances(INF, 0.0, 0.0)
-    assert read([1.0], angle_min_rad=0.0, x_m=-1.0) == Clearances(INF, 0.0, 0.0)  # exactly in the middle
-
-
-def test_turning_sees_the_points_inside_the_swept_circle_by_their_distance_from_the_rectangle() -> None:
-    assert swept_radius_m(FOOTPRINT) == approx(0.5)
-    assert points((0.0, 0.45)).around_m == approx(0.15)  # beside it
-    assert points((0.43, 0.0)).around_m == approx(0.03)  # ahead of it
-    assert points((0.0, 0.501)).around_m == INF  # the corners pass it
-    assert points((-0.23, 0.34)).around_m == approx(0.05)  # off the corner: 0.03 and 0.04
+    assert points((0.39, 0.1)) == Clearances(0.0, INF)
+    assert points((-0.1, 0.1)) == Clearances(INF, 0.0)
+    assert points((0.0999, 0.1)) == Clearances(INF, 0.0)
+    assert points((0.1001, 0.1)) == Clearances(0.0, INF)  # the middle of the rectangle, not of the base
 
 
 def test_the_pose_of_the_scanner_is_applied() -> None:
-    # Mounted 0.3 m ahead and 0.1 m to the left, turned left by 90°: its beam ahead looks to the left of the base.
-    clearances = read([INF, 1.0, INF, INF], x_m=0.3, y_m=0.1, yaw_rad=QUARTER_RAD)
-    assert clearances == Clearances(approx(0.9), INF, INF)  # its beam to the right looks ahead of the base
+    """Mounted 0.3 m ahead and 0.1 m to the left, turned left by 90°: its beam ahead looks to the left of the base."""
+    turned = {"x_m": 0.3, "y_m": 0.1, "yaw_rad": QUARTER_RAD}
+    assert read([INF, 1.0, INF, INF], **turned) == Clearances(approx(0.9), INF)  # its beam to the right looks ahead
+    # Upside down as well, what it calls right is left of it: that looks behind the base.
+    assert read([INF, 1.0, INF, INF], **turned, upside_down=True) == Clearances(INF, approx(0.5))
 
 
 @pytest.mark.parametrize("reading_m", [NAN, 0.0, 0.0499, -1.0, 10.001, INF])
 def test_readings_that_are_none_or_see_nothing_do_not_block(reading_m: float) -> None:
     clearances = read([2.0, INF, reading_m, INF])
-    assert clearances == Clearances(INF, approx(1.8), INF)
+    assert clearances == Clearances(INF, approx(1.8))
 
 
 @pytest.mark.parametrize("reading_m", [0.05, 10.0])
 def test_readings_at_the_ends_of_the_range_count(reading_m: float) -> None:
-    clearances = read([INF, INF, reading_m, INF])
+    clearances = read([INF, INF, reading_m, INF], x_m=0.3)
     assert clearances is not None
-    assert clearances.ahead_m == approx(max(0.0, reading_m - 0.4))
+    assert clearances.ahead_m == approx(max(0.0, reading_m - 0.1))
 
 
 def test_too_close_to_be_measured_counts_as_the_shortest_range() -> None:
     """REP 117: -infinity means that something is nearer than range_min."""
     clearances = read([INF, INF, -INF, INF], range_min_m=0.5)
-    assert clearances == Clearances(approx(0.1), INF, approx(0.1))
+    assert clearances == Clearances(approx(0.1), INF)
 
 
 @pytest.mark.parametrize(
@@ -131,16 +124,16 @@ def test_a_scan_that_says_nothing_is_none(ranges_m: list[float], changes: dict[s
 
 
 def test_an_infinite_range_max_leaves_infinite_readings_free() -> None:
-    assert read([INF, INF, 2.0, INF], range_max_m=INF) == Clearances(approx(1.6), INF, INF)
+    assert read([INF, INF, 2.0, INF], range_max_m=INF) == Clearances(approx(1.6), INF)
 
 
 def test_a_scanner_that_changes_its_beams_is_followed() -> None:
-    reader = ClearanceReader(FOOTPRINT, ScanConfig(required=True))
+    reader = ScanReader()
     ahead, behind = Scan([1.0], 0.0, 0.1, 0.0, 10.0), Scan([1.0], math.pi, 0.1, 0.0, 10.0)
-    assert [reader.read(scan) for scan in (ahead, behind, ahead)] == [
-        Clearances(approx(0.6), INF, INF),
-        Clearances(INF, approx(0.8), INF),
-        Clearances(approx(0.6), INF, INF),
+    assert [of(scan, reader=reader) for scan in (ahead, behind, ahead)] == [
+        Clearances(approx(0.6), INF),
+        Clearances(INF, approx(0.8)),
+        Clearances(approx(0.6), INF),
     ]
 
 
@@ -151,10 +144,33 @@ anything = st.floats(width=32)
 def test_clearances_are_never_negative_and_one_more_reading_never_frees_the_way(
     ranges_m: list[float], extra_m: float
 ) -> None:
-    reader = ClearanceReader(FOOTPRINT, ScanConfig(required=True))
     scan = Scan(np.array(ranges_m), -1.0, 0.1, 0.05, 10.0)
     more = Scan(np.array([*ranges_m, extra_m]), -1.0, 0.1, 0.05, 10.0)
-    before, after = reader.read(scan) or FREE, reader.read(more) or FREE
+    before, after = of(scan) or FREE, of(more) or FREE
     assert 0.0 <= after.ahead_m <= before.ahead_m
     assert 0.0 <= after.behind_m <= before.behind_m
-    assert 0.0 <= after.around_m <= before.around_m
+
+
+@pytest.mark.parametrize(
+    ("first_rad", "step_rad", "upside_down", "seen", "unseen"),
+    [
+        (-1.0, 0.1, False, (math.cos(0.99), math.sin(0.99)), (math.cos(1.1), math.sin(1.1))),
+        (1.0, -0.1, False, (math.cos(-0.99), math.sin(-0.99)), (math.cos(-1.1), math.sin(-1.1))),
+        (0.0, 0.05, False, (1.0, 0.5), (1.0, -0.5)),
+        (0.0, 0.05, True, (1.0, -0.5), (1.0, 0.5)),
+        (0.0, 0.1, False, (0.06, 0.0), (0.04, 0.0)),  # range_min
+        (0.0, 0.1, False, (9.99, 0.0), (10.01, 0.0)),  # range_max
+    ],
+)
+def test_a_scanner_sees_what_is_between_its_first_and_last_beam_and_within_its_ranges(
+    first_rad: float, step_rad: float, upside_down: bool, seen: tuple[float, float], unseen: tuple[float, float]
+) -> None:
+    placement = Placement.of(ScanConfig(required=True, upside_down=upside_down))
+    field = field_of(Scan([INF] * 21, first_rad, step_rad, 0.05, 10.0), placement)
+    assert field.sees(np.array([seen, unseen])).tolist() == [True, False]
+
+
+def test_a_full_circle_leaves_no_gap_between_its_last_beam_and_its_first() -> None:
+    field = field_of(Scan([INF] * 360, 0.0, 2.0 * math.pi / 360, 0.0, 10.0), HERE)
+    around = np.array([(math.cos(at), math.sin(at)) for at in np.arange(0.0, 2.0 * math.pi, 0.003)])
+    assert field.sees(around).all()

@@ -33,7 +33,7 @@ def from_schema(shape: Values, definitions: Values) -> st.SearchStrategy[Any]:
     if shape["type"] == "object":
         return objects(shape, definitions)
     if shape["type"] == "array":
-        return st.lists(from_schema(shape["items"], definitions), min_size=shape["minItems"], max_size=4)
+        return st.lists(from_schema(shape["items"], definitions), min_size=shape.get("minItems", 0), max_size=4)
     return scalars(shape)
 
 
@@ -81,6 +81,8 @@ def made_consistent(values: Values) -> Values:
     limits["emergency_deceleration_mps2"] = max(limits["emergency_deceleration_mps2"], limits["deceleration_mps2"])
     safety["stop_distance_m"] = min(safety.get("stop_distance_m", 0.15), 4.0)
     safety["slow_distance_m"] = safety["stop_distance_m"] + 0.5
+    for index, scan in enumerate(safety.get("more_scans", [])):
+        scan["topic"] = f"{scan.get('topic', 'scan')[:100].rstrip('/')}_{index}"
     for what in ("distance_m", "speed_mps", "angle_rad", "speed_radps"):
         action.pop(f"max_{what}", None)
         action[f"min_{what}"] = min(action.get(f"min_{what}", 0.01), 0.4)

@@ -1,0 +1,132 @@
+"""How the base is expected to move, by what was ordered: the driver's ordinary ramps without their jerk limit.
+
+The filter has no odometry on purpose: a lie there must not open the way. What it needs is only how the base leaves the
+motion that it is in, and how far it can have come since a scan; both ways, moved and not moved, are looked at.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from canbase_config.robot import Limits
+from canbase_velocity.sweep import Floats
+from canbase_velocity.twist import ZERO, Twist
+
+LONGEST_STEP_S = 1.0
+STILL_M = 1e-6
+"""A way or, at one metre, a turn below this is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Where the base is, in a frame that stands still."""
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    yaw_rad: float = 0.0
+
+    def moved(self, twist: Twist, dt_s: float) -> Pose:
+        """After `dt_s` of `twist`: an arc."""
+        way_m, turn_rad = twist.linear_mps * dt_s, twist.angular_radps * dt_s
+        chord_m = way_m * float(np.sinc(turn_rad / (2.0 * math.pi)))
+        heading_rad = self.yaw_rad + turn_rad / 2.0
+        x_m, y_m = self.x_m + chord_m * math.cos(heading_rad), self.y_m + chord_m * math.sin(heading_rad)
+        return Pose(x_m, y_m, self.yaw_rad + turn_rad)
+
+    def towards(self, other: Pose, share: float) -> Pose:
+        """On the way to `other`; a share above 1 is 1."""
+        share = min(share, 1.0)
+        return Pose(
+            self.x_m + (other.x_m - self.x_m) * share,
+            self.y_m + (other.y_m - self.y_m) * share,
+            self.yaw_rad + (other.yaw_rad - self.yaw_rad) * share,
+        )
+
+    def is_at(self, other: Pose) -> bool:
+        """The same place, but for less than `STILL_M`."""
+        apart_m = math.hypot(self.x_m - other.x_m, self.y_m - other.y_m)
+        return apart_m < STILL_M and abs(self.yaw_rad - other.yaw_rad) < STILL_M
+
+    def from_here(self, points: Floats, there: Pose) -> Floats:
+        """Points seen from `there`, as they are seen from this pose."""
+        turn_rad = there.yaw_rad - self.yaw_rad
+        x_m, y_m = there.x_m - self.x_m, there.y_m - self.y_m
+        cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        shift_m = np.array((cos * x_m + sin * y_m, cos * y_m - sin * x_m))
+        turn = np.array(((math.cos(turn_rad), math.sin(turn_rad)), (-math.sin(turn_rad), math.cos(turn_rad))))
+        seen: Floats = points @ turn + shift_m
+        return seen
+
+
+def follow(twist: Twist, order: Twist, limits: Limits, dt_s: float) -> Twist:
+    """The velocity `dt_s` after `twist` on the way to `order`: a straight line in both, which keeps the curvature.
+
+    Only braking does not wait for a turn that grows.
+    """
+    linear_s = _ramp_s(twist.linear_mps, order.linear_mps, limits.acceleration_mps2, limits.deceleration_mps2)
+    turn, turn_to = twist.angular_radps, order.angular_radps
+    angular_s = _ramp_s(turn, turn_to, limits.angular_acceleration_radps2, limits.angular_deceleration_radps2)
+    brakes = abs(order.linear_mps) < abs(twist.linear_mps) or order.linear_mps * twist.linear_mps < 0.0
+    whole_s = max(linear_s, angular_s)
+    linear_share = _share(dt_s, linear_s if brakes and abs(turn_to) > abs(turn) else whole_s)
+    return Twist(
+        twist.linear_mps + (order.linear_mps - twist.linear_mps) * linear_share,
+        turn + (turn_to - turn) * _share(dt_s, whole_s),
+    )
+
+
+class ExpectedMotion:
+    """The motion over time: `order` says what holds from now on."""
+
+    def __init__(self, limits: Limits, memory_s: float) -> None:
+        """`memory_s`: so long ago `pose_at` can be asked for."""
+        self._limits = limits
+        self._memory_s = memory_s
+        self._order = self.twist = ZERO
+        """`twist`: the velocity expected now."""
+        self._poses: deque[tuple[float, Pose]] = deque([(-math.inf, Pose())])
+
+    def advance(self, now: float) -> Pose:
+        """Lets the time pass until `now` [s, monotonic]; the pose there."""
+        at_s, pose = self._poses[-1]
+        dt_s = min(max(now - at_s, 0.0), LONGEST_STEP_S)
+        after = follow(self.twist, self._order, self._limits, dt_s)
+        mean = Twist(
+            (self.twist.linear_mps + after.linear_mps) / 2.0, (self.twist.angular_radps + after.angular_radps) / 2.0
+        )
+        pose, self.twist = pose.moved(mean, dt_s), after
+        self._poses.append((now, pose))
+        while len(self._poses) > 2 and self._poses[1][0] < now - self._memory_s:
+            self._poses.popleft()
+        return pose
+
+    def order(self, twist: Twist, now: float) -> None:
+        """From `now` on this is ordered."""
+        self.advance(now)
+        self._order = twist
+
+    def pose_at(self, at_s: float) -> Pose:
+        """The pose at that time, between the two that are remembered around it."""
+        later_s, later = self._poses[-1]
+        for since_s, pose in reversed(self._poses):
+            if since_s <= at_s:
+                span_s = later_s - since_s
+                return pose.towards(later, (at_s - since_s) / span_s if 0.0 < span_s < math.inf else 1.0)
+            later_s, later = since_s, pose
+        return later
+
+
+def _ramp_s(velocity: float, goal: float, acceleration: float, deceleration: float) -> float:
+    """Time from one velocity of an axis to another: down to zero first where it is reversed."""
+    if velocity * goal < 0.0:
+        return abs(velocity) / deceleration + abs(goal) / acceleration
+    rate = acceleration if abs(goal) > abs(velocity) else deceleration
+    return abs(goal - velocity) / rate
+
+
+def _share(dt_s: float, whole_s: float) -> float:
+    return 1.0 if dt_s >= whole_s else dt_s / whole_s
