@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from canbase_action_server.inputs import (
     ENABLED,
     ESTOP_CAUSES,
-    SCAN_LOST_CAUSE,
+    SCAN_LOST_CAUSES,
     WATCHDOG_OK,
     Inputs,
     age_s,
@@ -96,7 +96,7 @@ def _taken_over(s: Situation) -> str | None:
 
 def _scan_lost(s: Situation) -> str | None:
     safety = s.inputs.safety
-    if safety is None or safety.cause != SCAN_LOST_CAUSE:
+    if safety is None or safety.cause not in SCAN_LOST_CAUSES:
         return None
     return f"laser scan lost: {safety.detail}; is the scanner running?"
 

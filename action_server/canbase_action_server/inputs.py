@@ -14,7 +14,7 @@ ENABLED = "enabled"
 """State of motor_driver in which commands move the wheels (DriverStatus.ENABLED)."""
 WATCHDOG_OK = "ok"
 ESTOP_CAUSES = ("estop", "estop_stale")
-SCAN_LOST_CAUSE = "scan_stale"
+SCAN_LOST_CAUSES = ("scan_stale", "scan_unplaced")
 OBSTACLE_CAUSE = "obstacle"
 
 

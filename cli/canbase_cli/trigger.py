@@ -1,17 +1,24 @@
-"""`canbase stop` and `canbase reset`: call a service of the motor driver and tell its answer."""
+"""`canbase stop` and `canbase reset`: call services of the robot and tell their answers."""
 
 from __future__ import annotations
 
 import time
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
 from canbase_cli.options import FAILED, NamespaceOption, colour, fail, ros_arguments, ros_needed
 
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
 NO_DRIVER: Final = 6
 ANSWER_S: Final = 16.0
 """A reset may have to boot the drives first."""
+FILTER_S: Final = 1.0
+"""Beside a motor driver that is found, the safety filter is as well within this time, or there is none."""
+STATUS_S: Final = 1.0
+"""motor_driver/status comes ten times a second."""
 SLICE_S: Final = 0.1
 """Ctrl-C is heard after this at the latest."""
 WaitOption = Annotated[float, typer.Option("--wait", metavar="SECONDS", min=0.1, help="for the motor driver")]
@@ -24,39 +31,98 @@ def stop(ctx: typer.Context, wait_s: WaitOption = 5.0, namespace: NamespaceOptio
 
     Exit codes: 0 done, 1 refused, 2 wrong command line, 6 no motor driver.
     """
-    _call("motor_driver/stop", ros_arguments(ctx, namespace), wait_s)
+    with _Caller(ctx, namespace, wait_s) as caller:
+        _tell(caller.call("motor_driver/stop"))
 
 
 def reset(ctx: typer.Context, wait_s: WaitOption = 5.0, namespace: NamespaceOption = "") -> None:
-    """Let the drives have power again after a latched stop; nothing moves by it.
+    """Let the robot move again after a latched stop, also after an emergency stop; nothing moves by it.
 
     Refused while any source orders a velocity, or while the cause of the stop persists.
 
     Exit codes: 0 done, 1 refused, 2 wrong command line, 6 no motor driver.
     """
-    _call("motor_driver/reset", ros_arguments(ctx, namespace), wait_s)
+    from canbase_velocity.filter_state import NOTHING_TO_RESET
+
+    with _Caller(ctx, namespace, wait_s) as caller:
+        caller.need_driver("motor_driver/reset")
+        if caller.is_offered("safety_filter/reset", FILTER_S):
+            answer = caller.call("safety_filter/reset")
+            if answer != NOTHING_TO_RESET:
+                _tell(answer)
+                if caller.driver_is_enabled():
+                    return
+        _tell(caller.call("motor_driver/reset"))
 
 
-def _call(service: str, ros_args: list[str], wait_s: float) -> None:
-    with ros_needed():
+def _tell(sentence: str) -> None:
+    typer.secho(sentence, fg=typer.colors.GREEN, color=colour())
+
+
+class _Caller:
+    """A node for a few calls. Each failure ends the command with its exit code."""
+
+    def __init__(self, ctx: typer.Context, namespace: str, wait_s: float) -> None:
+        self._ros_args = ros_arguments(ctx, namespace)
+        self._wait_s = wait_s
+        self._node: Node
+
+    def __enter__(self) -> _Caller:
+        with ros_needed():
+            import rclpy
+            from rclpy.signals import SignalHandlerOptions
+
+        # Ctrl-C ends it as any command.
+        rclpy.init(args=self._ros_args, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = rclpy.create_node("canbase_trigger", enable_rosout=False)
+        return self
+
+    def __exit__(self, *_: object) -> None:
         import rclpy
-        from rclpy.signals import SignalHandlerOptions
+
+        rclpy.try_shutdown()
+
+    def is_offered(self, service: str, within_s: float) -> bool:
+        """Somebody offers the service."""
+        return bool(self._client(service).wait_for_service(within_s))
+
+    def need_driver(self, service: str) -> None:
+        """Ends the command when no motor driver offers the service in time."""
+        if not self.is_offered(service, self._wait_s):
+            name = self._client(service).srv_name
+            fail(f"no motor driver offers {name}; is it running (canbase up), in this namespace?", NO_DRIVER)
+
+    def call(self, service: str) -> str:
+        """The sentence of an answer that says it is done."""
         from std_srvs.srv import Trigger
 
-    rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)  # Ctrl-C ends it as any command
-    try:
-        node = rclpy.create_node("canbase_trigger", enable_rosout=False)
-        client = node.create_client(Trigger, service)
-        if not client.wait_for_service(wait_s):
-            fail(f"no motor driver offers {client.srv_name}; is it running (canbase up), in this namespace?", NO_DRIVER)
-        future, deadline = client.call_async(Trigger.Request()), time.monotonic() + ANSWER_S
-        while not future.done() and time.monotonic() < deadline:
-            rclpy.spin_once(node, timeout_sec=SLICE_S)
+        self.need_driver(service)
+        future = self._client(service).call_async(Trigger.Request())
+        self._spin_until(future.done, ANSWER_S)
         answer = future.result() if future.done() else None
-    finally:
-        rclpy.try_shutdown()
-    if answer is None:
-        fail(f"{service} did not answer within {ANSWER_S:.0f} s; look at the driver's log", FAILED)
-    if not answer.success:
-        fail(str(answer.message), FAILED)
-    typer.secho(answer.message, fg=typer.colors.GREEN, color=colour())
+        if answer is None:
+            fail(f"{service} did not answer within {ANSWER_S:.0f} s; look at its log", FAILED)
+        if not answer.success:
+            fail(str(answer.message), FAILED)
+        return str(answer.message)
+
+    def driver_is_enabled(self) -> bool:
+        """The drives have power: they need no reset."""
+        from canbase.msg import DriverStatus
+
+        heard: list[DriverStatus] = []
+        self._node.create_subscription(DriverStatus, "motor_driver/status", heard.append, 1)
+        self._spin_until(lambda: bool(heard), STATUS_S)
+        return bool(heard) and heard[-1].state == DriverStatus.ENABLED
+
+    def _client(self, service: str) -> Any:
+        from std_srvs.srv import Trigger
+
+        return self._node.create_client(Trigger, service)
+
+    def _spin_until(self, done: Any, within_s: float) -> None:
+        import rclpy
+
+        deadline = time.monotonic() + within_s
+        while not done() and time.monotonic() < deadline:
+            rclpy.spin_once(self._node, timeout_sec=SLICE_S)
