@@ -1,16 +1,23 @@
-"""Random and malformed frames against the driver's core and the simulated drives: no exception, no motion, flat memory.
+"""Random and malformed frames and leases against driver core, watchdog and simulated drives.
 
-`python -m campaign.fuzz [frames]` runs each kind with a million frames.
+No exception, no motion, flat memory. `python -m campaign.fuzz [frames]` runs each kind with a million frames.
 """
 
 from __future__ import annotations
 
+import multiprocessing
+import resource
 import sys
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
 from random import Random
 
 from campaign.world import World
 from canbase_driver.frame import Frame
+from canbase_velocity.lease import lease_datagram
+from canbase_velocity.twist import Twist
+from canbase_watchdog.watchdog import State, Watchdog
 
 MILLION = 1_000_000
 CYCLE_S = 0.01
@@ -23,6 +30,12 @@ WARM_UP = 5
 """The memory is compared from this part of the frames on, one in so many: until then tables and caches fill."""
 GROWTH = 3000
 """Blocks of memory that may be more at the end: what is in use at one moment differs by so many."""
+GROWTH_BYTES = 4 * 2**20
+"""The same for the memory of the whole process."""
+LEASES = 5
+"""One lease to so many frames."""
+QUICK_STOP, PRE_OPERATIONAL = b"\x02\x00", 0x80
+STOPS_BY_SDO = (b"\x00\x00", b"\x02\x00")
 
 
 class FuzzError(AssertionError):
@@ -58,6 +71,67 @@ def fuzz_driver(frames: int, seed: int = 0) -> int:
 
     _run(step, frames)
     return sent
+
+
+def fuzz_watchdog(frames: int, seed: int = 0) -> int:
+    """Frames and leases, good, damaged and random ones, into a watchdog: it trips, stays so, and sends nothing but
+    stops. Returns how many of its frames were stops.
+    """
+    world, random = _enabled(), Random(seed)
+    watchdog, now, stops = world.watchdog.core, world.clock.now, 0
+    tripped = False
+
+    def step(number: int) -> None:
+        nonlocal now, stops, tripped
+        cob_id, data = random_frame(random)
+        watchdog.on_frame(cob_id, b"" if data[1:] == b"RST" else data, now)
+        if number % LEASES == 0:
+            watchdog.on_lease(random_lease(random, number + 1, now), None, now)
+        if number % FRAMES_A_CYCLE == 0:
+            now += CYCLE_S / 2.0
+            stops += _count_stops(watchdog, now)
+            if tripped and watchdog.status.state is not State.TRIPPED:
+                raise FuzzError(f"after frame {number}, {cob_id:03X} {data.hex(' ')}, the watchdog forgot its trip")
+            tripped = watchdog.status.state is State.TRIPPED
+
+    _run(step, frames)
+    if not tripped:
+        raise FuzzError("the watchdog never tripped: it was not reached")
+    return stops
+
+
+def random_lease(random: Random, sequence: int, now: float) -> bytes:
+    """A good lease, one with a byte changed, one cut short, or noise."""
+    twist = Twist(random.uniform(-9.0, 9.0), random.choice((0.0, 1e300, -1e300)))
+    stamp_ns = round((now + random.choice((0.0, 0.0, -1.0, 1.0))) * 1e9)
+    datagram = lease_datagram(sequence, stamp_ns, twist, stops=False, estop=False)
+    kind = random.randrange(4)
+    if kind == 0:
+        at = random.randrange(len(datagram))
+        return datagram[:at] + random.randbytes(1) + datagram[at + 1 :]
+    if kind == 1:
+        return datagram[: random.randrange(len(datagram))]
+    return datagram if kind == 2 else random.randbytes(random.choice((0, 43, 44, 44, 45, 2000)))
+
+
+def is_stop(cob_id: int, data: bytes) -> bool:
+    """Quick stop, NMT pre-operational, an SDO that reads or takes power away. FuzzError: the watchdog sends no such."""
+    function = cob_id & 0x780
+    if cob_id == 0x000:
+        allowed = data[0] == PRE_OPERATIONAL
+    elif function == 0x500:
+        allowed = data == QUICK_STOP
+    elif function == SDO_REQUEST:
+        allowed = data[0] == 0x40 or data[4:6] in STOPS_BY_SDO
+    else:
+        allowed = cob_id in (0x1FE, 0x2FE, 0x77E)
+    if not allowed or len(data) > 8:
+        raise FuzzError(f"the watchdog sent {cob_id:03X} {data.hex(' ')}")
+    return cob_id == 0x000 or function in (0x500, SDO_REQUEST)
+
+
+def _count_stops(watchdog: Watchdog, now: float) -> int:
+    return sum(is_stop(frame.cob_id, frame.data) for frame in watchdog.tick(now))
 
 
 def fuzz_drives(frames: int, seed: int = 0) -> float:
@@ -102,12 +176,18 @@ def _fuzz_bench(frames: int, seed: int, everything: bool) -> float:
 def _run(step: Callable[[int], None], frames: int) -> None:
     for number in range(frames // WARM_UP):
         step(number)
-    before = sys.getallocatedblocks()
+    before, before_bytes = sys.getallocatedblocks(), _resident_bytes()
     for number in range(frames // WARM_UP, frames):
         step(number)
     grown = sys.getallocatedblocks() - before
     if grown > GROWTH:
         raise FuzzError(f"memory grew by {grown} blocks in {frames} frames")
+    if _resident_bytes() - before_bytes > GROWTH_BYTES:
+        raise FuzzError(f"memory grew by {_resident_bytes() - before_bytes} bytes in {frames} frames")
+
+
+def _resident_bytes() -> int:
+    return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
 
 
 def _enabled() -> World:
@@ -118,8 +198,24 @@ def _enabled() -> World:
     return world
 
 
+KINDS: dict[str, tuple[Callable[[int], float], str]] = {
+    "driver": (fuzz_driver, "frames sent, no motion ordered"),
+    "watchdog": (fuzz_watchdog, "stops sent, and nothing else; it stayed tripped"),
+    "drives": (fuzz_drives, "m, no order among the frames"),
+    "drives, with orders": (fuzz_drives_with_orders, "m, nothing raised"),
+}
+
+
+def _fuzz(kind: str, frames: int) -> float:
+    return KINDS[kind][0](frames)
+
+
+def main(frames: int) -> None:
+    """Each kind in a process of its own, two at a time."""
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn"), max_tasks_per_child=1) as pool:
+        for kind, result in zip(KINDS, pool.map(_fuzz, KINDS, [frames] * len(KINDS)), strict=True):
+            print(f"{kind}: {frames} frames, {result:.0f} {KINDS[kind][1]}, memory flat")
+
+
 if __name__ == "__main__":
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else MILLION
-    print(f"driver: {count} frames, {fuzz_driver(count)} sent, no motion ordered")
-    print(f"drives: {count} frames, {fuzz_drives(count):.3f} m")
-    print(f"drives, with orders: {count} frames, {fuzz_drives_with_orders(count):.3f} m, nothing raised")
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else MILLION)

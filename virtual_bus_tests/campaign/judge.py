@@ -1,4 +1,4 @@
-"""What must hold in every scenario, whatever goes wrong: looked at every 5 ms, against the ground truth.
+"""What must hold in every scenario, whatever goes wrong: looked at every 10 ms, against the ground truth.
 
 Each property has its sentence here; what no software can do is in `EXCLUDED`, as narrow as it can be said.
 """
@@ -25,7 +25,7 @@ from canbase_watchdog.ladder import RUNGS
 from canbase_watchdog.watchdog import Answer
 from canbase_watchdog.watchdog import State as WatchdogState
 
-STEP_S = 0.005
+STEP_S = 0.01
 HEARD_S = 0.3
 """The stop button says ten times a second that it is pressed: the filter has heard it then, if it runs."""
 PROPERTIES = {
@@ -103,6 +103,11 @@ class Judge:
         world.on_goal_end = self._on_goal_end
         world.topics.watch = self._on_message
         self._step()
+
+    @property
+    def at_rest(self) -> bool:
+        """Something is latched, and the base has come to a stand since."""
+        return bool(self._latches) and self._stood
 
     def finish(self) -> None:
         """The scenario is over: no goal may be left."""

@@ -9,9 +9,9 @@ from random import Random
 
 from campaign.faults import FAULTS, PlannedFault
 
-FAULTS_S = (0.1, 1.2)
+FAULTS_S = (0.1, 0.9)
 """Faults begin in this part of a scenario."""
-SCENARIO_S = (2.1, 2.9)
+SCENARIO_S = (1.7, 2.4)
 MOST_FAULTS = 4
 KINDS = ("constant", "constant", "constant", "weave", "burst", "nan", "zero")
 """How a source behaves for a while; a word that stands more often is drawn more often."""

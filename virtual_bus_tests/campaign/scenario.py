@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import pickle
 import time
@@ -15,6 +16,10 @@ from campaign.outside import Outside, Surroundings
 from campaign.plan import Plan
 from campaign.world import World
 
+LOOK_S = 0.1
+"""How often it is asked whether anything is still to come."""
+QUIET_S = 0.3
+"""A base that is latched and stands is watched for so long after the last fault, reset and goal; then that is all."""
 GOALS_END_S = 12.0
 """How long a scenario goes on at most until its goals have ended."""
 
@@ -40,6 +45,8 @@ class Start:
         self.world = World()
         self.around = Surroundings(self.world)
         self.world.enable()
+        gc.collect()
+        gc.freeze()
 
     def run(self, plan: Plan, note: Callable[[float, str], None] | None = None) -> Result:
         """Run one scenario in this very world, which is spent then."""
@@ -68,6 +75,7 @@ class Start:
     def _tell(self, plan: Plan, writer: int) -> None:
         """The child's whole life; it never returns."""
         status = 1
+        gc.disable()
         try:
             with os.fdopen(writer, "wb") as pipe:
                 pipe.write(pickle.dumps(self.run(plan)))
@@ -94,6 +102,13 @@ class _Run:
         for fault in plan.faults:
             world.clock.at(self._start + fault.start_s, self._begin, fault)
             world.clock.at(self._start + fault.start_s + fault.duration_s, self._end, fault)
+        last_s = max(
+            0.0,
+            *(fault.start_s + fault.duration_s for fault in plan.faults),
+            *plan.resets_s,
+            *(goal.start_s for goal in plan.goals),
+        )
+        self._quiet_at = self._start + last_s + QUIET_S
         self._crash = self._play()
 
     def _begin(self, fault: PlannedFault) -> None:
@@ -107,13 +122,17 @@ class _Run:
     def _play(self) -> tuple[Violation, ...]:
         clock, end = self._world.clock, self._start + self._plan.duration_s
         try:
-            clock.run_until(end)
+            while clock.now < end and not self._is_over():
+                clock.run_until(clock.now + LOOK_S)
             while self._goals_run() and clock.now < end + GOALS_END_S:
-                clock.run_until(clock.now + 0.1)
+                clock.run_until(clock.now + LOOK_S)
             self._judge.finish()
         except Exception:  # noqa: BLE001 - whatever it is: that nothing raises is one of the properties
             return (Violation("exception", clock.now - self._start, traceback.format_exc(limit=-4)),)
         return ()
+
+    def _is_over(self) -> bool:
+        return self._world.clock.now > self._quiet_at and self._judge.at_rest
 
     def _goals_run(self) -> bool:
         return any(not goal.ends and not goal.died for goal in self._world.action.goals)

@@ -13,7 +13,7 @@ from campaign.runner import run
 from campaign.scenario import Start
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(600)]
-SCENARIOS = 300
+SCENARIOS = 120
 WORKERS = 2
 
 

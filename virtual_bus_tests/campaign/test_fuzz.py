@@ -6,14 +6,36 @@ from random import Random
 
 import pytest
 
-from campaign.fuzz import fuzz_driver, fuzz_drives, fuzz_drives_with_orders, orders, random_frame
+from campaign.fuzz import (
+    FuzzError,
+    fuzz_driver,
+    fuzz_drives,
+    fuzz_drives_with_orders,
+    fuzz_watchdog,
+    is_stop,
+    orders,
+    random_frame,
+)
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(300)]
-FRAMES = 40_000
+FRAMES = 20_000
 
 
 def test_whatever_is_on_the_bus_the_driver_orders_no_motion_without_a_command() -> None:
     assert fuzz_driver(FRAMES) > FRAMES / 40
+
+
+def test_whatever_is_on_the_bus_and_at_the_socket_the_watchdog_trips_and_sends_stops_alone() -> None:
+    assert fuzz_watchdog(FRAMES) > 100
+
+
+@pytest.mark.parametrize(
+    ("cob_id", "data"),
+    [(0x501, "06 00"), (0x000, "01 00"), (0x601, "2b 40 60 00 0f 00 00 00"), (0x201, "0f 00 10 00 00 00")],
+)
+def test_a_watchdog_that_sent_anything_else_would_be_told(cob_id: int, data: str) -> None:
+    with pytest.raises(FuzzError):
+        is_stop(cob_id, bytes.fromhex(data))
 
 
 def test_whatever_orders_nothing_turns_no_wheel() -> None:
