@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import multiprocessing
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
 from rich.console import Console
@@ -47,9 +46,8 @@ def look(safeguard: str, scenarios: int = SCENARIOS) -> Bite:
 
 def look_at_all(workers: int) -> Iterator[Bite]:
     """Each safeguard in a process of its own."""
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, max_tasks_per_child=1) as pool:
-        yield from pool.map(look, SAFEGUARDS)
+    with multiprocessing.get_context("spawn").Pool(workers, maxtasksperchild=1) as pool:
+        yield from pool.imap(look, SAFEGUARDS)
 
 
 def main() -> int:
