@@ -15,6 +15,7 @@ class Command:
         self._timeout_s = timeout_s
         self._twist = Twist2D.ZERO
         self._seen_zero = False
+        self._emergency_at = -math.inf
         self.received_at = -math.inf
         self.refused = 0
         """Commands that were not finite."""
@@ -27,6 +28,14 @@ class Command:
         self._twist, self.received_at = twist, received_at
         self._seen_zero = self._seen_zero or twist == Twist2D.ZERO
         return True
+
+    def take_emergency(self, brakes_hard: bool, received_at: float) -> None:
+        """Whether the base has to brake with the emergency deceleration, until it is said otherwise or not any more."""
+        self._emergency_at = received_at if brakes_hard else -math.inf
+
+    def brakes_hard(self, now: float) -> bool:
+        """The emergency deceleration was asked for within the timeout. Whatever the command is, that means a stop."""
+        return now - self._emergency_at <= self._timeout_s
 
     def await_zero(self) -> None:
         """From now on nothing is followed until a zero has come: who holds the stick must let go of it once."""

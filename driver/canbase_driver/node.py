@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 import time
 
-from canbase.msg import DriverStatus, StopEvent
+from canbase.msg import DriverStatus, SafetyState, StopEvent
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
@@ -44,6 +44,7 @@ class MotorDriverNode(Node):
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._stop_events = self.create_publisher(StopEvent, "stop_events", EVENT_QOS)
         self.create_subscription(TwistStamped, "cmd_vel", self._on_command, COMMAND_QOS)
+        self.create_subscription(SafetyState, "safety_filter/state", self._on_safety, COMMAND_QOS)
         self._previous: DriverSnapshot | None = None
         self._diagnosed: DriverSnapshot | None = None
         self._status_at = 0.0
@@ -72,6 +73,9 @@ class MotorDriverNode(Node):
         if not twist.is_finite:
             self.get_logger().error(f"cmd_vel refused: {twist} is not finite", throttle_duration_sec=1.0)
         self._loop.command(twist, received_at)
+
+    def _on_safety(self, message: SafetyState) -> None:
+        self._loop.emergency(message.emergency, time.monotonic())
 
     def _publish_status(self, snapshot: DriverSnapshot, stamp: object) -> None:
         previous = self._previous

@@ -10,6 +10,7 @@ from canbase_driver.frame import Frame
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.reset import Outcome
 from canbase_driver.snapshot import DriverSnapshot
+from canbase_velocity.decision import Decision
 from canbase_velocity.twist import Twist
 
 SETPOINTS = (0x200, 0x300)
@@ -36,6 +37,7 @@ class DriverProcess(Process):
         self._last_frames: list[Frame] = []
         self._last_moving: dict[int, bytes] = {}
         topics.subscribe("cmd_vel", self, self._on_command)
+        topics.subscribe("safety_filter/state", self, self._on_safety)
         self.begin()
 
     def begin(self) -> None:
@@ -67,6 +69,9 @@ class DriverProcess(Process):
 
     def _on_command(self, twist: Twist) -> None:
         self.core.on_command(Twist2D(twist.linear_mps, twist.angular_radps), self.clock.now)
+
+    def _on_safety(self, decision: Decision) -> None:
+        self.core.on_emergency(decision.emergency, self.clock.now)
 
     def _on_cycle(self) -> None:
         now = self.clock.now

@@ -98,7 +98,7 @@ class VelocityProcess(Process):
         datagram = lease_datagram(self._sequence, round(now * 1e9), decision.twist, stops=stops, estop=False)
         self._send_lease(datagram, decision.twist)
         self._topics.publish("cmd_vel", decision.twist)
-        told = (decision.action, decision.cause)
+        told = (decision.action, decision.cause, decision.emergency)
         if told != self._told or now - self._state_at >= STATE_PERIOD_S:
             self._told, self._state_at = told, now
             self._topics.publish("safety_filter/state", decision)
