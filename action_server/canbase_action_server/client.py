@@ -89,5 +89,5 @@ def _feedback(message: Any) -> DriveFeedback:
     return DriveFeedback(message.traveled_m, message.remaining_m)
 
 
-def _result(status: Status, code: ErrorCode, message: Any) -> DriveResult:
-    return DriveResult(status, code, message.traveled_m, message.overshoot_m, message.message)
+def _result(status: Status, message: Any) -> DriveResult:
+    return DriveResult(status, ErrorCode(message.error_code), message.traveled_m, message.overshoot_m, message.message)

@@ -163,7 +163,7 @@ class GoalRun:
         if verdict is Verdict.STILL_MOVES and cause.code.leaves_the_base_standing:
             cause = Cause(ErrorCode.DRIVE_FAULT, "ordered to stand, but the base still moves; use the emergency stop")
         elif cause.code is ErrorCode.OK and motion.overshoot_m > self._robot.action.tolerance_m:
-            cause = Cause(ErrorCode.DRIVE_FAULT, "the drives did not stop at the goal: too fast for load or slope")
+            cause = Cause(ErrorCode.OVERSHOOT, "the base rolled over the goal: too fast for its load or the slope")
         elif verdict is not Verdict.STANDS:
             cause = Cause(cause.code, f"{cause.message}; the base {verdict.value}")
         went = motion.report()

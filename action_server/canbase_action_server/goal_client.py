@@ -16,7 +16,7 @@ from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from unique_identifier_msgs.msg import UUID
 
-from canbase_action_server.outcome import ErrorCode, Status
+from canbase_action_server.outcome import Status
 
 SLICE_S = 0.1
 """Longest time without a look at the deadline, at `interrupted`, and at whether the server is still there."""
@@ -68,7 +68,7 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         action: str,
         executor: Executor | None,
         read_feedback: Callable[[Any], FeedbackT],
-        read_result: Callable[[Status, ErrorCode, Any], ResultT],
+        read_result: Callable[[Status, Any], ResultT],
     ) -> None:
         self._client = ActionClient(node, kind, action)
         self._executor = executor or SingleThreadedExecutor(context=node.context)
@@ -105,7 +105,7 @@ class GoalClient(Generic[ResultT, FeedbackT]):
             raise InterruptedDriveError("interrupted; nothing was sent")
         if not found:
             raise NoServerError(
-                f"no action server {self.action} within {timeout_s} s; is drive_distance_server running, "
+                f"no action server {self.action} within {timeout_s} s; is its server running, "
                 "in the same ROS_DOMAIN_ID and namespace?"
             )
 
@@ -125,7 +125,7 @@ class GoalClient(Generic[ResultT, FeedbackT]):
             raise NoResponseError(f"{self.action} did not answer within {response_timeout_s} s; the goal may run")
         handle: ClientGoalHandle = response.result()
         if not handle.accepted:
-            raise RejectedError(f"{self.action} rejects the goal; the log of drive_distance_server says why")
+            raise RejectedError(f"{self.action} rejects the goal; the log of its server says why")
         return SentGoal(self, handle, self._watch(handle))
 
     def close(self) -> None:
@@ -182,7 +182,7 @@ class SentGoal(Generic[ResultT]):
         wrapped = self._result.result()
         if wrapped.status not in Status.__members__.values():
             raise ServerLostError("the action server does not know the goal: it was restarted. The result is unknown")
-        return self._client.read_result(Status(wrapped.status), ErrorCode(wrapped.result.error_code), wrapped.result)
+        return self._client.read_result(Status(wrapped.status), wrapped.result)
 
     def wait(self, timeout_s: float | None = None, until: Callable[[], bool] = never) -> ResultT | None:
         """The result; None when timeout_s [s] is over or `until()` before it came: the goal still runs then.

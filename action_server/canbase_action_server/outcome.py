@@ -32,6 +32,7 @@ class ErrorCode(IntEnum):
     SHUTDOWN = 12
     CANCELED = 13
     INTERNAL = 14
+    OVERSHOOT = 15
 
     @property
     def status(self) -> Status:

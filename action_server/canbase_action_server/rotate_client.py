@@ -66,5 +66,7 @@ def _feedback(message: Any) -> RotateFeedback:
     return RotateFeedback(message.turned_rad, message.remaining_rad)
 
 
-def _result(status: Status, code: ErrorCode, message: Any) -> RotateResult:
-    return RotateResult(status, code, message.turned_rad, message.overshoot_rad, message.message)
+def _result(status: Status, message: Any) -> RotateResult:
+    return RotateResult(
+        status, ErrorCode(message.error_code), message.turned_rad, message.overshoot_rad, message.message
+    )

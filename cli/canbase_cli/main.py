@@ -6,7 +6,7 @@ from typing import Annotated, Final
 
 import typer
 
-from canbase_cli import bench, config, demo, doctor, drive, install, monitor, process, rotate, trigger, up
+from canbase_cli import bench, config, demo, doctor, drive, fibonacci, install, monitor, process, rotate, trigger, up
 from canbase_cli.goal import GoalCommand
 from canbase_cli.options import RosCommand
 
@@ -50,6 +50,7 @@ app.command("reset", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.reset)
 app.command("doctor", cls=RosCommand, options_metavar=_ROS_USAGE, epilog=doctor.EPILOG)(doctor.doctor)
 app.command("bench")(bench.bench)
 app.add_typer(config.app, name="config")
+app.add_typer(fibonacci.app, name="fibonacci")
 app.command("install")(install.install)
 app.command("uninstall")(install.uninstall)
 app.command("driver", cls=RosCommand, options_metavar=_ROS_USAGE)(process.driver)

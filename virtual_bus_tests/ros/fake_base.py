@@ -47,6 +47,7 @@ class FakeBase:
     def heal(self) -> None:
         """Nothing is wrong from now on."""
         self.stuck = False
+        self.ramp_mps2 = RAMP_MPS2
         self.clock_off_s = 0.0
         """So much later than this computer's clock is the one that stamps odometry."""
         self.silent: set[str] = set()
@@ -75,7 +76,7 @@ class FakeBase:
         held = self.safety.action == SafetyState.STOP or self.driver.state != DriverStatus.ENABLED or not fresh
         wanted_mps = 0.0 if held else self._wanted.twist.linear.x
         self._turn_radps = 0.0 if held else self._wanted.twist.angular.z
-        most = RAMP_MPS2 * elapsed_s
+        most = self.ramp_mps2 * elapsed_s
         self.speed_mps += max(-most, min(most, wanted_mps - self.speed_mps))
         if self.stuck:
             self.speed_mps = 0.0

@@ -189,6 +189,15 @@ def test_what_goes_wrong_on_the_way_aborts_the_goal_with_its_own_code_and_the_ne
         stage.node.spin_for(0.2)
 
 
+def test_a_base_that_rolls_over_its_goal_stands_there_and_is_told_so(stage: Stage) -> None:
+    drive = stage.drive_until_moving(0.5, 0.4)
+    stage.base.ramp_mps2 = 0.2
+    result = stage.end_of(drive)
+    assert (result.status, result.code) == (Status.ABORTED, ErrorCode.OVERSHOOT), result.message
+    assert result.overshoot_m > 0.01
+    assert result.traveled_m == pytest.approx(0.5 + result.overshoot_m, abs=0.001)
+
+
 def test_a_joystick_takes_the_base_over_at_once(stage: Stage) -> None:
     drive = stage.drive_until_moving()
     joystick(stage.base)

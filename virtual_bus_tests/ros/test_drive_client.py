@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from typing import Any
 
 import pytest
@@ -11,7 +12,7 @@ from canbase.action import DriveDistance
 from canbase.msg import DriverStatus
 from rclpy.action import ActionClient
 
-from canbase_action_server.client import DriveClient, NoServerError, ServerLostError
+from canbase_action_server.client import DriveClient, NoResponseError, NoServerError, ServerLostError
 from ros.conftest import MakeRobot, Spawn
 from ros.fake_base import FakeBase, server_code
 from ros.harness import Process, TestNode
@@ -112,6 +113,21 @@ def test_a_server_that_dies_is_told_and_the_goal_is_not_sent_again(stage: Stage)
     stage.server.kill()
     with pytest.raises(ServerLostError):
         drive.wait(30.0)
+    stage.node.spin_for(0.5)
+    assert stage.base.speed_mps == pytest.approx(0.0, abs=0.001)
+
+
+def test_a_server_that_does_not_answer_is_an_error_of_its_own_and_its_late_goal_is_canceled(stage: Stage) -> None:
+    stage.server.stop()  # hangs: it is still in the graph
+    asked_s = time.monotonic()
+    with pytest.raises(NoResponseError, match="may run"):
+        stage.client.send(2.0, 0.3, response_timeout_s=1.0)
+    assert time.monotonic() - asked_s < 2.0
+    stage.server.resume()
+    stage.node.wait_for(
+        lambda: '"step": "ended"' in stage.server.log() or "rejected" in stage.server.log(), 10.0, "its end"
+    )
+    assert "SUCCEEDED" not in stage.server.log()
     stage.node.spin_for(0.5)
     assert stage.base.speed_mps == pytest.approx(0.0, abs=0.001)
 

@@ -89,9 +89,15 @@ def test_status_tells_that_all_is_well(world: World) -> None:
 
 
 def test_doctor_finds_nothing_wrong_with_a_whole_robot(world: World) -> None:
-    for symptom in ((), ("--symptom", "only-in-simulation"), ("--symptom", "moves-after-cancel")):
+    for symptom in ((), ("--symptom", "moves-after-cancel")):
         doctor = world.robot.command("doctor", "--config", str(world.robot.config), *symptom)
         assert world.robot.exit_code(doctor) == 0, doctor.log()
+
+
+def test_doctor_finds_that_the_scanner_of_this_test_stamps_nothing(world: World) -> None:
+    doctor = world.robot.command("doctor", "--config", str(world.robot.config), "--symptom", "only-in-simulation")
+    assert world.robot.exit_code(doctor) == 1
+    assert "The first check that fails: stamps of the sensors" in doctor.log()
 
 
 def test_diagnostics_have_an_entry_for_each_part_and_none_is_an_error(world: World) -> None:

@@ -162,8 +162,8 @@ def test_a_base_that_rolls_over_the_distance_is_not_a_success() -> None:
         story.plant.deceleration_mps2 = 0.3
 
     end = drive(Plant(), 1.0, 0.5, at={1.5: brakes_fade}).run()
-    assert end.code is ErrorCode.DRIVE_FAULT
-    assert "did not stop at the goal" in end.message
+    assert end.code is ErrorCode.OVERSHOOT
+    assert "rolled over the goal" in end.message
     assert end.overshoot_m > 0.005
     assert end.traveled_m == pytest.approx(1.0 + end.overshoot_m, abs=0.001)
 

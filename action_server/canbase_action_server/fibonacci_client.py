@@ -1,0 +1,47 @@
+"""A client of fibonacci on the machinery of `goal_client.py`: as DriveClient is one of drive_distance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from canbase.action import Fibonacci
+from rclpy.executors import Executor
+from rclpy.node import Node
+
+from canbase_action_server.goal_client import GoalClient, SentGoal
+from canbase_action_server.outcome import Status
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """The end of a goal. Read `status` first."""
+
+    status: Status
+    sequence: tuple[int, ...]
+
+
+class FibonacciClient(GoalClient[Numbers, "tuple[int, ...]"]):
+    """Sends goals from `node`, which nobody else may spin while a method here waits (or give its own `executor`)."""
+
+    def __init__(self, node: Node, executor: Executor | None = None) -> None:
+        super().__init__(node, Fibonacci, "fibonacci", executor, _feedback, _result)
+
+    def send(
+        self,
+        order: int,
+        *,
+        on_feedback: Callable[[tuple[int, ...]], None] | None = None,
+        discovery_timeout_s: float = 5.0,
+    ) -> SentGoal[Numbers]:
+        """Find the server, send the goal once, wait for its acceptance. Raises the subclasses of DriveError."""
+        return self.send_goal(Fibonacci.Goal(order=order), on_feedback, discovery_timeout_s)
+
+
+def _feedback(message: Any) -> tuple[int, ...]:
+    return tuple(message.partial_sequence)
+
+
+def _result(status: Status, message: Any) -> Numbers:
+    return Numbers(status, tuple(message.sequence))

@@ -1,0 +1,72 @@
+"""The example without a robot over DDS: a goal in each of the ways that it can end, and `canbase fibonacci`."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from canbase_action_server.fibonacci import next_number, refusal
+from canbase_action_server.fibonacci_client import FibonacciClient
+from canbase_action_server.goal_client import RejectedError
+from canbase_action_server.outcome import Status
+from ros.conftest import Spawn
+from ros.harness import TestNode
+
+pytestmark = pytest.mark.ros
+
+COMMAND = (sys.executable, "-m", "canbase_cli", "fibonacci")
+TO_55 = (0, 1, 1, 2, 3, 5, 8, 13, 21, 34, 55)
+
+
+def test_orders_and_numbers_have_their_limits() -> None:
+    assert [order for order in (-1, 0, 1, 1000, 1001) if refusal(order) is None] == [1, 1000]
+    assert next_number([0, 1]) == 1
+    assert next_number([2**30, 2**30 - 1]) == 2**31 - 1
+    assert next_number([2**30, 2**30]) is None
+
+
+def test_a_learner_sees_a_goal_succeed_fail_be_canceled_and_be_rejected(test_node: TestNode, spawn: Spawn) -> None:
+    server = spawn([*COMMAND, "serve", "--period", "0.05"])
+    client = FibonacciClient(test_node.node, test_node.executor)
+    seen: list[tuple[int, ...]] = []
+    done = client.send(10, on_feedback=seen.append, discovery_timeout_s=20.0)
+    beside = client.send(3)  # goals share nothing: both run
+    assert beside.wait(10.0) is not None
+    assert done.result is None
+    result = done.wait(10.0)
+    assert result is not None
+    assert (result.status, result.sequence) == (Status.SUCCEEDED, TO_55)
+    assert seen[-1] == TO_55[:-1]
+    assert len(seen) >= 8
+
+    long = client.send(1000)
+    test_node.spin_for(0.5)
+    assert long.cancel()
+    canceled = long.wait(5.0)
+    assert canceled is not None
+    assert canceled.status is Status.CANCELED
+    assert 3 < len(canceled.sequence) < 40
+
+    too_far = client.send(1000).wait(20.0)
+    assert too_far is not None
+    assert (too_far.status, too_far.sequence[-1]) == (Status.ABORTED, 1836311903)
+    for order in (0, -1, 1001):
+        with pytest.raises(RejectedError):
+            client.send(order)
+    server.interrupt()
+    assert server.wait(5.0) == 0
+
+
+def test_the_command_shows_each_step_and_ends_with_its_code(test_node: TestNode, spawn: Spawn) -> None:
+    spawn([*COMMAND, "serve", "--period", "0.05", "--namespace", "school"])
+    client = FibonacciClient(test_node.node, test_node.executor)
+    sent = spawn([*COMMAND, "send", "10", "--namespace", "school"])
+    assert sent.wait(20.0) == 0, sent.log()
+    assert "accepted: that is no result yet" in sent.log()
+    assert f"SUCCEEDED: {' '.join(map(str, TO_55))}" in sent.log()
+    canceled = spawn([*COMMAND, "send", "1000", "--cancel-after", "0.5", "--namespace", "school"])
+    assert canceled.wait(20.0) == 3, canceled.log()
+    assert "cancel accepted" in canceled.log()
+    assert spawn([*COMMAND, "send", "0", "--namespace", "school"]).wait(20.0) == 5
+    assert not client.server_ready  # there is none outside the namespace
