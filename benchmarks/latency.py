@@ -133,8 +133,9 @@ def measure(orders: int = ORDERS) -> list[Figure]:
 
 def _setpoint(source: Filter, bus: can.BusABC) -> float:
     """From standstill, at a moment that has nothing to do with the driver's cycle [s]."""
-    quiet_until_s = time.monotonic() + 0.3 + random.random() * 0.02
+    quiet_until_s = time.monotonic() + 0.3
     source.repeat(0.0, lambda: time.monotonic() >= quiet_until_s)
+    time.sleep(random.uniform(0.0, PERIOD_S))
     source.drain()
     began_s = source.order(SPEED_MPS)
     seen_s = _seen(bus, SETPOINT, lambda data: struct.unpack("<Hi", data)[1] != 0)

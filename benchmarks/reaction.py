@@ -185,7 +185,7 @@ def _floor(robot: FakeRobot, floor: socket.socket, path: str) -> float:
 
 def _child(stack: ExitStack, arguments: list[str]) -> None:
     environment = os.environ | {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"}
-    child = subprocess.Popen([sys.executable, *arguments], env=environment)
+    child = subprocess.Popen([sys.executable, *arguments], env=environment, stderr=subprocess.DEVNULL)
     stack.callback(child.wait)
     stack.callback(child.kill)
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import platform
 import sys
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from pathlib import Path
 
 from rich.console import Console
@@ -44,7 +46,8 @@ def main() -> int:
     figures: list[Figure] = []
     for name in arguments.names or BENCHMARKS:
         print(f"{name} …", file=sys.stderr)
-        figures += BENCHMARKS[name]()
+        with redirect_stdout(io.StringIO()):  # what the processes of a robot have said
+            figures += BENCHMARKS[name]()
     Console(width=None if sys.stdout.isatty() else 160).print(_table(figures))
     if arguments.write:
         arguments.write.write_text(page(figures), encoding="utf-8")
