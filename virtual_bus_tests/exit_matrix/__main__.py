@@ -20,6 +20,9 @@ from exit_matrix.runner import Result, Runner
 WIDTH = 140
 """Of the table where nobody tells how wide the terminal is."""
 
+PRIORITY = 25
+"""Below the processes of the chain (`canbase_cli.priority`)."""
+
 
 def main() -> int:
     """Runs the rows and prints them."""
@@ -28,6 +31,7 @@ def main() -> int:
     parser.add_argument("--write", type=Path, metavar="FILE", help="write the table there, as Markdown")
     arguments = parser.parse_args()
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    _raise_priority()
     rows = [row for row in ROWS if arguments.only in row.name]
     console = Console(file=sys.stdout, width=None if sys.stdout.isatty() else WIDTH)
     said = io.StringIO()
@@ -45,6 +49,17 @@ def main() -> int:
     if arguments.write and not failed:
         arguments.write.write_text(page(results), encoding="utf-8")
     return 1 if failed or not results else 0
+
+
+def _raise_priority() -> None:
+    """This process stands in for scanner, joystick and stop button: a loaded computer must not silence them.
+
+    Its children start without it, and those of the chain see to themselves.
+    """
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY))
+    except OSError as error:
+        print(f"no real-time priority ({error}): on a loaded computer rows may fail for the tests' own lateness")
 
 
 def _run(rows: list[Row], console: Console) -> list[Result]:

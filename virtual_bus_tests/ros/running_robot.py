@@ -192,13 +192,13 @@ class RunningRobot:
         while (status := self.wait_any_state()).state != DriverStatus.ENABLED:
             assert time.monotonic() < deadline_s, f"not ready: {status}\n{self.logs()}"
             if status.clears_on.startswith("reset"):
-                self._reset()
+                self.reset()
         self.wait_enabled()
 
-    def _reset(self) -> None:
+    def reset(self, service: str = "motor_driver/reset") -> None:
         """Asks once; whether it was done, the state tells."""
-        client = self.node.node.create_client(Trigger, "motor_driver/reset")
-        self.node.wait_for(client.service_is_ready, READY_S, "motor_driver/reset")
+        client = self.node.node.create_client(Trigger, service)
+        self.node.wait_for(client.service_is_ready, READY_S, service)
         answer = client.call_async(Trigger.Request())
         self.node.wait_for(answer.done, READY_S, "the answer to a reset")
         self.node.node.destroy_client(client)

@@ -19,6 +19,8 @@ BEAMS = 180
 BLOCKED_M = 0.35
 """5 cm before the front of the footprint: inside the stop distance."""
 
+CALM_S = 20.0
+
 
 def scan(ahead_m: float = math.inf) -> LaserScan:
     """Beams all around, all free but for the one ahead, from base_link."""
@@ -45,8 +47,16 @@ class World:
         self.joystick.message, self.scan.message, self.estop.message = None, scan(), Bool(data=False)
         self.robot.wait_standing()
         self.robot.make_ready()
+        deadline_s = time.monotonic() + CALM_S
+        while (cause := self._cause()) != SafetyState.CAUSE_NONE:
+            assert time.monotonic() < deadline_s, f"the safety filter goes on to stop: {cause}"
+            if cause == SafetyState.CAUSE_ESTOP:
+                self.robot.reset("safety_filter/reset")
+
+    def _cause(self) -> str:
+        """What the safety filter says from now on."""
         asked_s = time.monotonic()
-        self.node.wait_for(lambda: self.causes_since(asked_s)[-1:] == [SafetyState.CAUSE_NONE], 20.0, "no cause")
+        return self.node.wait_for(lambda: self.causes_since(asked_s), CALM_S, "safety_filter/state")[-1]
 
     def causes_since(self, since_s: float) -> list[str]:
         """What the safety filter has said since then (time.monotonic)."""
