@@ -56,6 +56,12 @@ lint: $(VENV)/ready ## ruff, mypy, import rules, and that colcon sees a ROS 2 pa
 	lint-imports --no-logo
 	@found=$$(colcon --log-base /dev/null list); echo "$$found"; [[ $$found == *"(ros.ament_cmake)" ]]
 
+.PHONY: vm-test
+vm-test: $(VENV)/ready ## a Linux guest with systemd and CAN: the installed services killed, stopped, unplugged; needs QEMU
+	virtual_bus_tests/vm/build.sh
+	python virtual_bus_tests/vm/host.py $(SCENARIOS)
+	python virtual_bus_tests/vm/table.py
+
 .PHONY: clean
 clean: ## remove what make and the tools created
 	rm -rf $(VENV) build install log dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

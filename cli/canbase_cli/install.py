@@ -34,12 +34,17 @@ def install(
     name: Annotated[str, typer.Option("--name", help="Name of the robot.", show_default="name in robot.yaml")] = "",
     prefix: PrefixOption = Path("/"),
     dry_run: DryRunOption = False,
+    python: Annotated[
+        str,
+        typer.Option(metavar="PATH", help="Python that runs the services, for an image.", show_default="this one"),
+    ] = sys.executable,
     network: Annotated[Network, typer.Option(help="Who may talk ROS with the robot.")] = Network.LOCALHOST,
     can: Annotated[bool, typer.Option("--can/--no-can", help="Bring the CAN interface up.")] = True,
     adapter: Annotated[
         str, typer.Option(metavar="PROPERTY=VALUE", help="udev property of the adapter that gets the channel's name.")
     ] = "",
     cpus: Annotated[str, typer.Option(metavar="LIST", help="CPUs for the services, such as 2,3.")] = "",
+    sros2: Annotated[bool, typer.Option("--sros2", help="Enforce SROS2, with /etc/canbase/keys.")] = False,
     hardware_watchdog: Annotated[
         int, typer.Option(metavar="SECONDS", min=0, max=600, help="Let a hardware watchdog reset a frozen computer.")
     ] = 0,
@@ -61,7 +66,7 @@ def install(
             name=name or loaded.robot.name,
             robot=loaded.robot,
             yaml=None if config is None else config.read_text(encoding="utf-8"),
-            python=sys.executable,
+            python=python,
             templates=templates(),
             environment=service_environment(os.environ),
             network=network.value,
@@ -69,6 +74,7 @@ def install(
             adapter=adapter,
             cpus=cpus,
             hardware_watchdog_s=hardware_watchdog,
+            sros2=sros2,
         )
         plan = install_plan(request, manifests(prefix))
     except InstallError as error:

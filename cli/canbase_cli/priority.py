@@ -10,9 +10,10 @@ from typing import Final
 
 import typer
 
-PRIORITY: Final = {"sim": 45, "driver": 35, "velocity": 35, "action-server": 30}
+PRIORITY: Final = {"sim": 45, "driver": 37, "velocity": 35, "action-server": 30}
 """SCHED_FIFO, 1 to 99. The watchdog has 40: above all that it watches, below the simulated drives, which stand in for
-hardware. Below 50, where the kernel's threads that serve interrupts run: without them no frame would arrive."""
+hardware. No two alike: under FIFO one that is just starting would hold up another of its priority. Below 50, where the
+kernel's threads that serve interrupts run: without them no frame would arrive."""
 
 
 def raise_priority(part: str) -> None:

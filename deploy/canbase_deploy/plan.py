@@ -61,6 +61,7 @@ class Request:
     adapter: str = ""
     cpus: str = ""
     hardware_watchdog_s: int = 0
+    sros2: bool = False
 
 
 def install_plan(request: Request, manifests: Mapping[str, str]) -> list[Action]:
@@ -201,6 +202,8 @@ def _tuning(request: Request) -> list[WriteFile]:
     if request.cpus:
         text = f"[Service]\nCPUAffinity={request.cpus}\n"
         files += [_drop_in(part, request.name, "30-cpus", text) for part in PARTS]
+    if request.sros2:
+        files += [_drop_in(part, request.name, "50-sros2", _enclave(part)) for part in WITH_ROS]
     relay = request.robot.watchdog.relay
     if relay is not None:
         text = f"[Service]\nPrivateDevices=no\nDevicePolicy=closed\nDeviceAllow={relay.chip} rw\n"
@@ -209,6 +212,13 @@ def _tuning(request: Request) -> list[WriteFile]:
         text = f"[Manager]\nRuntimeWatchdogSec={request.hardware_watchdog_s}s\n"
         files.append(WriteFile(PurePosixPath("/etc/systemd/system.conf.d/canbase.conf"), text))
     return files
+
+
+def _enclave(part: str) -> str:
+    """Each part has the enclave that deploy/sros2/policy.xml gives it."""
+    strict = f"ROS_SECURITY_ENABLE=true ROS_SECURITY_STRATEGY=Enforce ROS_SECURITY_KEYSTORE={ETC}/keys"
+    enclave = f"/canbase/{part.replace('-', '_')}"
+    return f'[Service]\nEnvironment={strict}\nEnvironment="CANBASE_ENCLAVE=--enclave {enclave}"\n'
 
 
 def _drop_in(part: str, name: str, file: str, text: str) -> WriteFile:

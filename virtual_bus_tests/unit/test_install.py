@@ -150,6 +150,18 @@ def test_cpus_relay_and_hardware_watchdog_are_drop_ins() -> None:
     assert files["/etc/systemd/system.conf.d/canbase.conf"] == "[Manager]\nRuntimeWatchdogSec=5s\n"
 
 
+def test_each_service_has_the_enclave_that_the_policy_gives_it() -> None:
+    files = texts(install_plan(request(sros2=True), {}))
+    policy = (TEMPLATES.parent / "sros2" / "policy.xml").read_text()
+
+    for part, enclave in {"driver": "driver", "velocity": "velocity", "action-server": "action_server"}.items():
+        drop_in = files[f"{UNITS}/canbase-{part}@example.service.d/50-sros2.conf"]
+        assert f'Environment="CANBASE_ENCLAVE=--enclave /canbase/{enclave}"' in drop_in
+        assert "ROS_SECURITY_STRATEGY=Enforce" in drop_in
+        assert f'path="/canbase/{enclave}"' in policy
+        assert "$CANBASE_ENCLAVE" in files[f"{UNITS}/canbase-{part}@.service"]
+
+
 def _bus(**changes: str) -> Robot:
     return changed(bus=load_robot(EXAMPLE).robot.bus.model_copy(update=changes))
 

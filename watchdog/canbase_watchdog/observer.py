@@ -224,7 +224,9 @@ class Observer:
         return True
 
     def _on_quick_stop(self, node_id: int, data: bytes, now: float) -> bool:
-        self._note_foreign(node_id, f"the watchdog's quick stop PDO with {data.hex(' ')}", now)
+        self._note_foreign(
+            node_id, f"the watchdog's quick stop PDO with {data.hex(' ')} (stop frames at a unit's end do that)", now
+        )
         return True
 
     def _on_sdo_request(self, node_id: int, data: bytes, now: float) -> bool:

@@ -1,0 +1,209 @@
+"""The robot of the guest as scenarios see it: systemd's units, ground truth of the simulated drives, ROS."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from canbase_bench.control import SimControl
+from canbase_bench.world.bench import Truth
+from canbase_cli.middleware import prefer_udp
+
+prefer_udp(os.environ)
+
+import rclpy  # noqa: E402 - reads the environment
+from canbase.msg import DriverStatus  # noqa: E402
+from geometry_msgs.msg import TwistStamped  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
+
+from canbase_action_server.client import Drive, DriveClient, RejectedError  # noqa: E402
+
+SPEED_MPS = 0.3
+STANDS_MPS = 0.005
+RESTS_M = 0.0005
+WAIT_S = 30.0
+PARTS = ("watchdog", "driver", "velocity", "action-server")
+
+T = TypeVar("T")
+
+
+class BrokenPromiseError(AssertionError):
+    """What a scenario promised did not come true."""
+
+
+@dataclass(frozen=True, slots=True)
+class Standstill:
+    """Time [s] and way [m] from some moment until the wheels stood."""
+
+    after_s: float
+    way_m: float
+
+
+def unit(part: str) -> str:
+    """Name of a part's unit."""
+    return f"canbase-{part}@robot.service"
+
+
+def run(*words: str, check: bool = True) -> str:
+    """What a command prints."""
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    if check and done.returncode != 0:
+        raise BrokenPromiseError(f"{' '.join(words)}: exit code {done.returncode}: {done.stderr}{done.stdout}")
+    return done.stdout.strip()
+
+
+def show(name: str, what: str) -> str:
+    """A property of a unit."""
+    return run("systemctl", "show", "--property", what, "--value", name)
+
+
+class Robot:
+    """One connection to everything, for all scenarios of a boot: a new ROS node costs all others much time."""
+
+    def __init__(self) -> None:
+        rclpy.init()
+        self.node = rclpy.create_node("scenarios", enable_rosout=False)
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.node)
+        self.status: DriverStatus | None = None
+        self.status_at = -math.inf
+        self.order_mps: float | None = None
+        self.node.create_subscription(DriverStatus, "motor_driver/status", self._on_status, 10)
+        self._joystick = self.node.create_publisher(TwistStamped, "cmd_vel_joy", 1)
+        self.node.create_timer(0.1, self._on_timer)
+        self._reset = self.node.create_client(Trigger, "motor_driver/reset")
+        self.client = DriveClient(self.node, self.executor)
+        self.sim = SimControl("/run/sim.sock", timeout_s=20.0)
+
+    def _on_status(self, message: DriverStatus) -> None:
+        self.status, self.status_at = message, time.monotonic()
+
+    def _on_timer(self) -> None:
+        if self.order_mps is not None:
+            message = TwistStamped()
+            message.twist.linear.x = self.order_mps
+            self._joystick.publish(message)
+
+    def spin(self, for_s: float) -> None:
+        """Let time pass."""
+        until_s = time.monotonic() + for_s
+        while (left_s := until_s - time.monotonic()) > 0.0:
+            self.executor.spin_once(timeout_sec=min(left_s, 0.1))
+
+    def wait(self, what: str, found: Callable[[], T], timeout_s: float = WAIT_S) -> T:
+        """Until `found()` is true."""
+        until_s = time.monotonic() + timeout_s
+        while not (value := found()):
+            if time.monotonic() > until_s:
+                raise BrokenPromiseError(f"waited {timeout_s:.0f} s in vain for {what}; driver: {self.told()}")
+            self.spin(0.05)
+        return value
+
+    def told(self) -> str:
+        """The driver's state as last heard."""
+        s = self.status
+        return "not heard" if s is None else f"state {s.state} {s.cause} ({s.detail}), ends on {s.clears_on}"
+
+    @property
+    def state(self) -> int | None:
+        """The driver's state, None when it is silent."""
+        fresh = self.status is not None and time.monotonic() - self.status_at < 0.5
+        return int(self.status.state) if fresh and self.status is not None else None
+
+    def truth(self) -> Truth:
+        """What the robot really does."""
+        return self.sim.truth()
+
+    def drive(self) -> None:
+        """Ordered by joystick, until it goes at full speed."""
+        self.order_mps = SPEED_MPS
+        self.wait("speed", lambda: self.truth().linear_mps >= 0.97 * SPEED_MPS, 10.0)
+
+    def goal(self, distance_m: float) -> Drive:
+        """A goal of the action server, accepted."""
+        until_s = time.monotonic() + WAIT_S
+        while True:
+            try:
+                return self.client.send(distance_m, SPEED_MPS, discovery_timeout_s=WAIT_S)
+            except RejectedError:
+                if time.monotonic() > until_s:
+                    raise
+                self.spin(0.3)
+
+    def drive_by_goal(self) -> Drive:
+        """On the way at full speed by the action server."""
+        goal = self.goal(4.0)
+        self.wait("speed", lambda: self.truth().linear_mps >= 0.97 * SPEED_MPS, 10.0)
+        return goal
+
+    def stands(self, moment_s: float, timeout_s: float = 10.0) -> Standstill:
+        """Wait until the wheels have stood for 0.3 s; how they came to stand since `moment_s`."""
+        self.wait("standstill", lambda: self.truth().standing_s >= 0.3, timeout_s)
+        rows = self.sim.trace(moment_s)
+        moving = [row[0] for row in rows if max(abs(row[4]), abs(row[5])) > STANDS_MPS]
+        return Standstill(max(moving, default=moment_s) - moment_s, math.dist(rows[0][1:3], rows[-1][1:3]))
+
+    def stays(self, since_s: float) -> None:
+        """Raises BrokenPromiseError when the base has moved since then."""
+        rows = self.sim.trace(since_s)
+        moved_m = max(math.dist(rows[0][1:3], row[1:3]) for row in rows)
+        if moved_m > RESTS_M:
+            raise BrokenPromiseError(f"moved {moved_m * 1000:.1f} mm after it had come to stand; driver: {self.told()}")
+
+    def stays_disarmed(self, for_s: float = 1.0) -> None:
+        """The driver is heard, and gives no power, for that long, whatever is ordered."""
+        self.wait("the driver", lambda: self.state is not None)
+        until_s = time.monotonic() + for_s
+        while time.monotonic() < until_s:
+            self.spin(0.1)
+            if self.state in (DriverStatus.ENABLED, DriverStatus.ENABLING):
+                raise BrokenPromiseError(f"enabled without a reset; {self.told()}")
+
+    def make_ready(self) -> float:
+        """Drives have power, nothing is ordered; seconds from the reset that was done, 0 without."""
+        self.order_mps = 0.0
+        done_s = 0.0
+        until_s = time.monotonic() + WAIT_S
+        self.wait("the driver", lambda: self.state is not None)
+        while self.state != DriverStatus.ENABLED:
+            if time.monotonic() > until_s:
+                raise BrokenPromiseError(f"not ready: {self.told()}")
+            if self.status is not None and self.status.clears_on.startswith("reset"):
+                asked_s = time.monotonic()
+                if self.reset():
+                    done_s = time.monotonic() - asked_s
+            self.spin(0.2)
+        self.order_mps = None
+        self.spin(0.2)
+        return done_s
+
+    def reset(self) -> bool:
+        """Ask once; whether it was done."""
+        self.wait("motor_driver/reset", self._reset.service_is_ready)
+        answer = self._reset.call_async(Trigger.Request())
+        self.wait("the answer to a reset", answer.done)
+        return bool(answer.result().success)
+
+    def signal(self, part: str, number: signal.Signals) -> float:
+        """A signal to a part's main process; when it was sent [s, monotonic]."""
+        pid = int(show(unit(part), "MainPID"))
+        now = time.monotonic()
+        os.kill(pid, number)
+        return now
+
+    def restarted(self, part: str, before: str) -> float:
+        """Until the unit runs with another process than `before`; when [s, monotonic]."""
+
+        def again() -> bool:
+            now = show(unit(part), "MainPID")
+            return show(unit(part), "ActiveState") == "active" and now not in (before, "0")
+
+        self.wait(f"{part} to be started again", again)
+        return time.monotonic()
