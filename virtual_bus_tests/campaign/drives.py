@@ -5,7 +5,8 @@ from __future__ import annotations
 from functools import partial
 
 from campaign.can_bus import CanBus
-from canbase_bench.node import SimulatedNode, StateChange
+from canbase_bench.axis_parts import StateChange
+from canbase_bench.node import SimulatedNode
 from canbase_bench.world.bench import Bench
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
 

@@ -48,8 +48,16 @@ def _ignores_setpoints(node: SimulatedNode, now: float, axis: int = 0) -> None:
     node.axes[axis].faults.ignores_setpoints = True
 
 
+def _mute_boot(node: SimulatedNode, now: float) -> None:
+    node.mute_boot = True
+
+
+def _short_emcy(node: SimulatedNode, now: float) -> None:
+    node.short_emcy = True
+
+
 def _heal(node: SimulatedNode, now: float) -> None:
-    node.silent = node.deaf = node.cut = False
+    node.silent = node.deaf = node.cut = node.mute_boot = node.short_emcy = False
     for number, axis in enumerate(node.axes):
         axis.faults = AxisFaults()
         node.heal(number)
@@ -64,10 +72,13 @@ KINDS: Mapping[str, tuple[Callable[..., None], frozenset[str]]] = {
     "frozen_encoder": (_frozen_encoder, frozenset({"axis"})),
     "stuck_velocity": (_stuck_velocity, frozenset({"axis", "raw"})),
     "ignores_setpoints": (_ignores_setpoints, frozenset({"axis"})),
+    "mute_boot": (_mute_boot, frozenset()),
+    "short_emcy": (_short_emcy, frozenset()),
     "heal": (_heal, frozenset()),
 }
 """Each fault and the arguments that it takes. silent: sends nothing. deaf: receives nothing. cut: both.
-heal: all of them are over; a drive fault still needs its reset."""
+mute_boot: its boot-up messages are lost. short_emcy: three bytes. heal: all of them are over; a drive fault still
+needs its reset."""
 
 RANGES: Mapping[str, tuple[type, float, float]] = {
     "axis": (int, 0, 1),

@@ -7,55 +7,34 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 
-from canopen import SdoAbortedError
-
-from canbase_bench.cia301 import abort, emcy, heartbeat, nmt, sdo
+from canbase_bench.axis_parts import AxisParts, StateChange
+from canbase_bench.cia301 import emcy, heartbeat, nmt, sdo, store
 from canbase_bench.cia301.dictionary import AXIS_STRIDE, Dictionary, key
 from canbase_bench.cia301.nmt import NmtCommand, NmtState
 from canbase_bench.cia301.rpdo import Rpdo
 from canbase_bench.cia301.tpdo import Tpdo
 from canbase_bench.cia402.axis import Axis
 from canbase_bench.cia402.states import POWERED, State, Transition
-from canbase_bench.cia402.units import Scale
+from canbase_bench.command_watch import CommandWatch
 from canbase_bench.frame import Frame
-from canbase_bench.plant.motor import Motor
+from canbase_bench.personality import GENERIC, Personality
 
 COMMUNICATION_FAULT = 0x7500
 """603Fh when NMT stop or a reset meets an axis with 6007h = 1."""
 RESET_S = 0.01
 """From NMT reset communication to the boot-up message [s]."""
-SIGNATURES = {0x1010: 0x65766173, 0x1011: 0x64616F6C}
-""""save" and "load": what 1010h and 1011h take (CiA 301)."""
 OFFSET_STEP = 1_000_003
 """The encoder shows other counts after each power cycle: it has no battery."""
 
 
-@dataclass(frozen=True, slots=True)
-class AxisParts:
-    """What one axis is built from. `travel_m` gives the way of its motor since the start of the world."""
-
-    motor: Motor
-    scale: Scale
-    travel_m: Callable[[], float]
-    encoder_offset: int
-
-
-@dataclass(frozen=True, slots=True)
-class StateChange:
-    """One transition of one axis."""
-
-    node_id: int
-    axis: int
-    before: State
-    number: int
-    after: State
-
-
 class SimulatedNode:
-    """One node on the bus. Faults are `silent`: sends nothing, `deaf`: receives nothing, and `cut`: both."""
+    """One node on the bus. Faults are plain switches.
+
+    `silent`: sends nothing. `deaf`: receives nothing. `cut`: both. `mute_boot`: its boot-up messages are lost.
+    `short_emcy`: its emergency messages have three bytes.
+    """
 
     def __init__(
         self,
@@ -64,31 +43,34 @@ class SimulatedNode:
         now: float,
         boot_delay_s: float = 0.1,
         fixed: Mapping[int, int] | None = None,
+        personality: Personality = GENERIC,
     ) -> None:
-        self.node_id, self.boot_delay_s = node_id, boot_delay_s
-        self.silent = self.deaf = self.cut = False
+        self.node_id, self.personality = node_id, personality
+        self.boot_delay_s = boot_delay_s if personality.boot_delay_s is None else personality.boot_delay_s
+        self.silent = self.deaf = self.cut = self.mute_boot = self.short_emcy = False
         self.state = NmtState.INITIALISING
         self.changes: deque[StateChange] = deque(maxlen=1000)
         self.lost_producers: deque[int] = deque(maxlen=100)
         """Node ids whose heartbeat this node has missed; whoever tells of them empties it."""
         self._out: list[Frame] = []
-        d = self.dictionary = Dictionary(node_id, len(axes), fixed)
+        self._answers: deque[tuple[float, Frame]] = deque()
+        self._now = now
+        d = self.dictionary = Dictionary(node_id, len(axes), fixed, personality)
         d.before_read = self._refresh
         self.emcy = emcy.EmcyService(d, self._send_emcy)
-        self.sdo = sdo.SdoService(node_id, d, self._send)
+        self.sdo = sdo.SdoService(node_id, d, self._send_answer)
         self._producer = heartbeat.HeartbeatProducer(d)
         self._consumer = heartbeat.HeartbeatConsumer(d, self._on_lost, self._on_alive)
         self.axes = tuple(self._axis(number, parts) for number, parts in enumerate(axes))
         self._rpdos = [Rpdo(n, d, self.emcy, self._operational, self._on_deadline) for n in range(1, 5)]
         self._tpdos = [Tpdo(n, d, self._send, self._operational) for n in range(1, 5)]
-        d.guard(0x1010, lambda subindex, value: _check_signature(0x1010, value))
-        d.guard(0x1011, lambda subindex, value: _check_signature(0x1011, value))
-        d.on_write(0x1010, lambda subindex, value: self._store(keep=True))
-        d.on_write(0x1011, lambda subindex, value: self._store(keep=False))
+        self._command_watch = CommandWatch(d, self._rpdos)
+        store.StoreService(d)
         d.on_write(0x1005, lambda subindex, value: self._route())
         for n in range(4):
             d.on_write(0x1400 + n, partial(self._pdo_written, self._rpdos[n]))
             d.on_write(0x1800 + n, partial(self._pdo_written, self._tpdos[n]))
+        self._boot_at, self._loader_s = now, 0.0
         self._power_up(now, 0.0)
 
     @property
@@ -102,6 +84,7 @@ class SimulatedNode:
         """One frame from the bus, at `now`. What the node does not understand is ignored."""
         if self.cut or self.deaf:
             return
+        self._now = now
         take = self._routes.get(cob_id)
         if take is not None:
             take(data, now)
@@ -110,13 +93,13 @@ class SimulatedNode:
 
     def tick(self, now: float) -> list[Frame]:
         """Whatever is due by `now`, and every frame since the last call, in order."""
-        if self.state is NmtState.INITIALISING:
-            if now >= self._boot_at:
-                self._boot()
-        else:
-            self._consumer.tick(now)
-            if self._producer.due(now):
-                self._send(Frame(heartbeat.COB_ID + self.node_id, bytes([self.state])))
+        self._now = now
+        while self._answers and now >= self._answers[0][0]:
+            self._send(self._answers.popleft()[1])
+        if self.state is not NmtState.INITIALISING:
+            self._tick_watches(now)
+        elif now >= self._boot_at:
+            self._boot()
         if self.state is NmtState.OPERATIONAL:
             self._tick_pdos(now)
         if not self._out:
@@ -180,26 +163,39 @@ class SimulatedNode:
         self._route()
 
     def _boot(self) -> None:
+        if self._loader_s:
+            self._say_boot_up()
+            self._boot_at, self._loader_s = self._boot_at + self._loader_s, 0.0
+            return
         self._enter(NmtState.PRE_OPERATIONAL)
-        self._send(Frame(heartbeat.COB_ID + self.node_id, bytes([NmtState.INITIALISING])))
+        self._say_boot_up()
         for axis in self.axes:
             if axis.state is State.NOT_READY_TO_SWITCH_ON:
                 axis.boot()
+        if self.personality.starts_operational:
+            self._enter(NmtState.OPERATIONAL)
+
+    def _say_boot_up(self) -> None:
+        if not self.mute_boot:
+            self._send(Frame(heartbeat.COB_ID + self.node_id, bytes([NmtState.INITIALISING])))
 
     def _power_up(self, now: float, off_s: float) -> None:
-        self.dictionary.reset(0x6000, 0x9FFF)
+        self.dictionary.reset(0x2000, 0x9FFF)
         for axis in self.axes:
             axis.restart()
-        self._reset_communication(now + off_s + self.boot_delay_s)
+        self._reset_communication(now + off_s + self.boot_delay_s, self.personality.second_boot_up_s or 0.0)
 
-    def _reset_communication(self, boot_at: float) -> None:
+    def _reset_communication(self, boot_at: float, loader_s: float = 0.0) -> None:
         self._enter(NmtState.INITIALISING)
         self._out.clear()
+        self._answers.clear()
         self.dictionary.reset(0x1000, 0x1FFF)
         self.emcy.reset()
         self.sdo.reset()
         self._consumer.configure()
-        self._boot_at = boot_at
+        for axis in self.axes:
+            axis.causes.discard(emcy.HEARTBEAT_LOST)
+        self._boot_at, self._loader_s = boot_at, loader_s
         self._route()
 
     def _route(self) -> None:
@@ -211,7 +207,8 @@ class SimulatedNode:
             self._routes |= {r.cob_id: r.receive for r in self._active_rpdos if r.cob_id is not None}
         if self.state in nmt.HAS_SDO:
             self._routes[self.sdo.rx_cobid] = lambda data, now: self.sdo.receive(data)
-            self._routes[self.dictionary.values[key(0x1005)] & 0x7FF] = self._on_sync
+            if key(0x1005) in self.dictionary.entries:
+                self._routes[self.dictionary.values[key(0x1005)] & 0x7FF] = self._on_sync
         self._routes[nmt.COB_ID] = self._on_nmt
 
     # PDO
@@ -230,6 +227,14 @@ class SimulatedNode:
         for rpdo in self._active_rpdos:
             rpdo.on_sync()
 
+    def _tick_watches(self, now: float) -> None:
+        self._consumer.tick(now)
+        if self._command_watch.ran_out(now):
+            for axis in self.axes:
+                axis.starve()
+        if self._producer.due(now):
+            self._send(Frame(heartbeat.COB_ID + self.node_id, bytes([self.state])))
+
     def _tick_pdos(self, now: float) -> None:
         for rpdo in self._active_rpdos:
             rpdo.tick(now)
@@ -244,6 +249,7 @@ class SimulatedNode:
     def _refresh(self) -> None:
         for axis in self.axes:
             axis.refresh()
+        self.dictionary.pack()
 
     # Loss of the connection
 
@@ -262,7 +268,8 @@ class SimulatedNode:
 
     def _on_alive(self, producer: int) -> None:
         self.emcy.clear_error(emcy.HEARTBEAT_LOST, producer)
-        if not self._consumer.any_lost:
+        needs_reset = self.personality.heartbeat_fault_needs_communication_reset
+        if not (self._consumer.any_lost or needs_reset):
             for axis in self.axes:
                 axis.causes.discard(emcy.HEARTBEAT_LOST)
 
@@ -296,6 +303,7 @@ class SimulatedNode:
             tell_error=lambda code: self._tell_fault(code, number),
             tell_clear=lambda code: self.emcy.clear_error(code, number),
             on_change=on_change,
+            personality=self.personality,
         )
 
     def _tell_fault(self, code: int, axis: int) -> None:
@@ -303,25 +311,19 @@ class SimulatedNode:
         if code >> 8 not in (0x81, 0x82):
             self.emcy.raise_error(code, axis)
 
-    def _store(self, keep: bool) -> None:
-        self.dictionary.values[key(0x1010, 1)] = self.dictionary.values[key(0x1011, 1)] = 1
-        if keep:
-            self.dictionary.save()
-        else:
-            self.dictionary.forget()
-
     def _send(self, frame: Frame) -> None:
         if not (self.silent or self.cut):
             self._out.append(frame)
 
     def _send_emcy(self, frame: Frame) -> None:
         if self.state in nmt.HAS_SDO:
+            self._send(Frame(frame.cob_id, frame.data[:3]) if self.short_emcy else frame)
+
+    def _send_answer(self, frame: Frame) -> None:
+        if self.personality.sdo_delay_s:
+            self._answers.append((self._now + self.personality.sdo_delay_s, frame))
+        else:
             self._send(frame)
-
-
-def _check_signature(index: int, value: int) -> None:
-    if value != SIGNATURES[index]:
-        raise SdoAbortedError(abort.CANNOT_STORE)
 
 
 def axis_key(axis: int, index: int, subindex: int = 0) -> int:

@@ -30,7 +30,7 @@ def test_forward_turns_both_motors_their_own_way() -> None:
 
 
 def test_the_encoder_counts_whole_increments_and_wraps_at_32_bits() -> None:
-    scale = Scale(mps_per_raw=0.001, counts_per_m=1000.0)
+    scale = Scale(target_mps=0.001, actual_mps=0.001, slope_mps2=0.001, counts_per_m=1000.0)
     assert [scale.counts(way, 0) for way in (0.0, 0.0009, 0.001, -0.0001)] == [0, 0, 1, -1]
     top = 2**31 - 1
     assert [scale.counts(way, top) for way in (0.0, 0.001, 0.002)] == [top, -(2**31), -(2**31) + 1]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.resources import files
 
@@ -16,11 +16,16 @@ from canopen import SdoAbortedError, import_od
 from canopen.objectdictionary import ODArray, ODRecord, ODVariable, datatypes
 
 from canbase_bench.cia301 import abort
+from canbase_bench.personality import GENERIC, Extra, Personality
 
 EDS_FILE = "eds/canbase_cia402.eds"
 """Our own EDS, in the package canbase_config."""
 AXIS_STRIDE = 0x800
 """Objects of axis n are at 6000h + n × 800h (CiA 402-1)."""
+FIRST_AXIS = range(0x6000, 0x6000 + AXIS_STRIDE)
+"""Indexes of axis 0."""
+NO_RTR = 1 << 30
+"""Bit 30 of a PDO's COB-ID: no remote requests."""
 
 VOLATILE = frozenset({0x1003, 0x6040, 0x60FF, 0x6840, 0x68FF})
 """Writable objects that 1010h does not keep: error history, controlwords and targets."""
@@ -55,6 +60,13 @@ class Entry:
     low: int | None
     high: int | None
     default: int | bytes
+    places: tuple[int, ...]
+    """Where its value is kept: one address, or those of both axes for what they share."""
+
+    @property
+    def place(self) -> int:
+        """The address that is read."""
+        return self.places[0]
 
     @property
     def size(self) -> int:
@@ -93,7 +105,57 @@ def _entry(variable: ODVariable) -> Entry:
         low=variable.min,
         high=variable.max,
         default=default if code else str(default).encode("ascii"),
+        places=(key(variable.index, variable.subindex),),
     )
+
+
+PER_MOTOR = (0x60FF, 0x606C, 0x6064, 0x6083, 0x6084, 0x6085, 0x6077)
+"""What each motor has of its own where both are behind one controlword, at sub-index 1 and 2."""
+SHARED = (0x6040, 0x6060, 0x6061)
+"""What both have in common there."""
+PACKED = (0x6041, 0x603F)
+"""What holds both there, the first axis in the lower 16 bits."""
+COUNT, PAIR = 0xFD, 0xFE
+"""Sub-indexes under which their number and the pair are kept; the bus sees both at 0."""
+
+
+def visible(node_id: int, axes: int, personality: Personality) -> Mapping[int, Entry]:
+    """The entries that the bus sees, by `key`: those of our EDS, less and more what the personality says."""
+    if personality is GENERIC:
+        return read_eds(node_id, axes)
+    entries = dict(read_eds(node_id, axes))
+    if personality.motors_by_sub_index:
+        entries = _by_sub_index(entries, axes)
+    for k in list(entries):
+        index = k >> 8
+        first = index - AXIS_STRIDE if index - AXIS_STRIDE in FIRST_AXIS else index
+        late = index == 0x1016 and k & 0xFF > personality.heartbeat_entries
+        if first in personality.missing or k in personality.missing_subs or late:
+            del entries[k]
+    for subindex in range(3, personality.heartbeat_entries + 1):
+        k = key(0x1016, subindex)
+        entries[k] = replace(entries[key(0x1016, 1)], default=0, places=(k,))
+    return entries | {k: _extra(k, extra) for k, extra in personality.extras.items()}
+
+
+def _by_sub_index(entries: Mapping[int, Entry], axes: int) -> dict[int, Entry]:
+    """The objects of all motors as a drive shows them that has one controlword."""
+    shown = {k: entry for k, entry in entries.items() if k >> 8 < FIRST_AXIS.stop}
+    second = AXIS_STRIDE * (axes - 1)
+    for index in PER_MOTOR:
+        whole = shown[key(index)]
+        shown[key(index)] = Entry("B", True, False, False, None, None, axes, (key(index, COUNT),))
+        for axis in range(axes):
+            shown[key(index, axis + 1)] = replace(whole, places=(key(index + axis * AXIS_STRIDE),))
+    for index in SHARED:
+        shown[key(index)] = replace(shown[key(index)], places=(key(index), key(index + second))[:axes])
+    for index in PACKED:
+        shown[key(index)] = replace(shown[key(index)], code="I", places=(key(index, PAIR),))
+    return shown
+
+
+def _extra(k: int, extra: Extra) -> Entry:
+    return Entry(extra.code, True, extra.writable, False, None, None, extra.value, (k,))
 
 
 class Dictionary:
@@ -103,16 +165,31 @@ class Dictionary:
     or a `writer` (RPDO). `fixed` overrides defaults of the EDS, for example the identity 1018h.
     """
 
-    def __init__(self, node_id: int, axes: int = 1, fixed: Mapping[int, int] | None = None) -> None:
-        self.entries = read_eds(node_id, axes)
-        self._factory = {k: e.default for k, e in self.entries.items() if isinstance(e.default, int)}
-        self._factory.update(fixed or {})
+    def __init__(
+        self,
+        node_id: int,
+        axes: int = 1,
+        fixed: Mapping[int, int] | None = None,
+        personality: Personality = GENERIC,
+    ) -> None:
+        self.personality = personality
+        self.entries = visible(node_id, axes, personality)
+        self._factory = _factory(node_id, axes, personality) | dict(fixed or {})
         self._saved: dict[int, int] = {}
         self.values: dict[int, int] = dict(self._factory)
         self.before_read: Callable[[], None] = _nothing
         self._indexes = {k >> 8 for k in self.entries}
+        self._pairs = [
+            (key(index, PAIR), key(index), key(index + AXIS_STRIDE * (axes - 1)))
+            for index in (PACKED if personality.motors_by_sub_index else ())
+        ]
         self._guards: dict[int, Check] = {}
         self._reactions: dict[int, Check] = {}
+
+    def pack(self) -> None:
+        """Bring the objects up to date that hold both axes in one value."""
+        for place, low, high in self._pairs:
+            self.values[place] = self.values[low] & 0xFFFF | (self.values[high] & 0xFFFF) << 16
 
     def guard(self, index: int, check: Check) -> None:
         """Ask `check` before each write from the bus to `index`."""
@@ -130,7 +207,8 @@ class Dictionary:
 
     def save(self) -> None:
         """Keep the writable values over resets and power cycles, as 1010h:1 orders."""
-        self._saved = {k: v for k, v in self.values.items() if self.entries[k].writable and k >> 8 not in VOLATILE}
+        kept = {place for entry in self.entries.values() if entry.writable for place in entry.places}
+        self._saved = {k: v for k, v in self.values.items() if k in kept and k >> 8 not in VOLATILE}
 
     def forget(self) -> None:
         """Drop what was saved, as 1011h:1 orders; it counts from the next reset."""
@@ -144,7 +222,7 @@ class Dictionary:
         if isinstance(entry.default, bytes):
             return entry.default
         self.before_read()
-        return struct.pack(f"<{entry.code}", self.values[key(index, subindex)])
+        return struct.pack(f"<{entry.code}", self.values[entry.place])
 
     def set_data(self, index: int, subindex: int, data: bytes, check_writable: bool = False) -> None:
         """Take the bytes of an SDO download. Raises SdoAbortedError and changes nothing when it is refused."""
@@ -158,17 +236,19 @@ class Dictionary:
 
     def writer(self, address: int) -> Callable[[int], None]:
         """A function that takes a value from an RPDO, with the same checks as by SDO. It may raise SdoAbortedError."""
-        reaction = self._reactions.get(address >> 8)
         entry = self.entries[address]
-        if address >> 8 in self._guards or entry.low is not None or entry.high is not None:
+        place = entry.place
+        reaction = self._reactions.get(place >> 8)
+        bounded = entry.low is not None or entry.high is not None
+        if place >> 8 in self._guards or bounded or len(entry.places) > 1:
             return lambda value: self._take(address, value)
         values = self.values
         if reaction is None:
-            return lambda value: values.__setitem__(address, value)
-        subindex = address & 0xFF
+            return lambda value: values.__setitem__(place, value)
+        subindex = place & 0xFF
 
         def store_and_react(value: int) -> None:
-            values[address] = value
+            values[place] = value
             reaction(subindex, value)
 
         return store_and_react
@@ -187,12 +267,26 @@ class Dictionary:
             raise SdoAbortedError(abort.TOO_LOW)
         if entry.high is not None and value > entry.high:
             raise SdoAbortedError(abort.TOO_HIGH)
-        index, subindex = address >> 8, address & 0xFF
-        if index in self._guards:
-            self._guards[index](subindex, value)
-        self.values[address] = value
-        if index in self._reactions:
-            self._reactions[index](subindex, value)
+        for place in entry.places:
+            if place >> 8 in self._guards:
+                self._guards[place >> 8](place & 0xFF, value)
+        for place in entry.places:
+            self.values[place] = value
+            if place >> 8 in self._reactions:
+                self._reactions[place >> 8](place & 0xFF, value)
+
+
+def _factory(node_id: int, axes: int, personality: Personality) -> dict[int, int]:
+    """Values after power on, of what the bus sees and of what the drive keeps for itself."""
+    hidden = {k: e.default for k, e in read_eds(node_id, axes).items() if isinstance(e.default, int)}
+    shown = {e.place: e.default for e in visible(node_id, axes, personality).values() if isinstance(e.default, int)}
+    factory = hidden | shown | dict(personality.defaults) | {key(0x1016): personality.heartbeat_entries}
+    for pdo in range(4) if personality.sets_no_rtr else ():
+        for communication in (0x1400, 0x1800):
+            factory[key(communication + pdo, 1)] |= NO_RTR
+    if axes > 1:
+        factory |= {k + (AXIS_STRIDE << 8): v for k, v in personality.defaults.items() if k >> 8 in FIRST_AXIS}
+    return factory
 
 
 def _nothing() -> None:

@@ -62,10 +62,9 @@ class HeartbeatConsumer:
     `on_lost` and `on_alive` are called with the producer's node id on each change.
     """
 
-    ENTRIES = 2
-
     def __init__(self, dictionary: Dictionary, on_lost: Callable[[int], None], on_alive: Callable[[int], None]) -> None:
         self._values = dictionary.values
+        self._subs = range(1, dictionary.personality.heartbeat_entries + 1)
         self._on_lost, self._on_alive = on_lost, on_alive
         self._producers: dict[int, Producer] = {}
         dictionary.guard(0x1016, self._refuse_twins)
@@ -78,7 +77,7 @@ class HeartbeatConsumer:
 
     def configure(self) -> None:
         """Start anew from 1016h."""
-        for subindex in range(1, self.ENTRIES + 1):
+        for subindex in self._subs:
             self._configure(subindex)
 
     def receive(self, node_id: int, data: bytes, now: float) -> None:
@@ -115,7 +114,7 @@ class HeartbeatConsumer:
 
     def _refuse_twins(self, subindex: int, value: int) -> None:
         node_id, _ = _split(value)
-        others = (_split(self._values[key(0x1016, s)])[0] for s in range(1, self.ENTRIES + 1) if s != subindex)
+        others = (_split(self._values[key(0x1016, s)])[0] for s in self._subs if s != subindex)
         if node_id and node_id in others:
             raise SdoAbortedError(abort.INCOMPATIBLE)
 

@@ -12,12 +12,10 @@ from dataclasses import dataclass
 from canopen import SdoAbortedError
 
 from canbase_bench.cia301 import abort
-from canbase_bench.cia301.dictionary import Dictionary, Entry, key
+from canbase_bench.cia301.dictionary import NO_RTR, Dictionary, Entry, key
 
 NOT_VALID = 1 << 31
 """Bit 31 of the COB-ID: the PDO is off."""
-NO_RTR = 1 << 30
-"""Bit 30 of a TPDO's COB-ID: no remote requests. Kept as written, without effect."""
 COB_ID, TYPE, INHIBIT, EVENT = 1, 2, 3, 5
 """Sub-indexes of the communication parameters."""
 MAX_SYNC_TYPE = 240
@@ -36,7 +34,7 @@ RESERVED_IDS = (
 
 @dataclass(frozen=True, slots=True)
 class Mapped:
-    """One object in a PDO: its address in the dictionary, None for a dummy, and its bytes."""
+    """One object in a PDO: its address as the bus sees it, None for a dummy, and its `struct` letter."""
 
     address: int | None
     code: str
@@ -55,6 +53,7 @@ class PdoRules:
         self._entries, self._values = dictionary.entries, dictionary.values
         self._communication, self._mapping, self._receives = communication, mapping, receives
         self._operational = operational
+        self._needs_no_rtr = dictionary.personality.needs_no_rtr
         dictionary.guard(communication, self._check_communication)
         dictionary.guard(mapping, self._check_mapping)
 
@@ -78,13 +77,18 @@ class PdoRules:
             raise SdoAbortedError(abort.DEVICE_STATE)
         if subindex == COB_ID:
             self._check_cob_id(value)
-        elif (subindex == TYPE and MAX_SYNC_TYPE < value < 254) or (subindex == INHIBIT and self.valid):
+        elif (subindex == TYPE and not self._takes_type(value)) or (subindex == INHIBIT and self.valid):
             raise SdoAbortedError(abort.INVALID_VALUE)
+
+    def _takes_type(self, value: int) -> bool:
+        """Synchronous types need 1005h."""
+        return value in (254, 255) or (value <= MAX_SYNC_TYPE and key(0x1005) in self._entries)
 
     def _check_cob_id(self, value: int) -> None:
         cob_id, switches_on = value & 0x7FF, not value & NOT_VALID
         refused = (
             value & ~(NOT_VALID | NO_RTR | 0x7FF) != 0
+            or (self._needs_no_rtr and not value & NO_RTR)
             or (switches_on and any(cob_id in reserved for reserved in RESERVED_IDS))
             or (switches_on and self.valid and cob_id != self.value(COB_ID) & 0x7FF)
             or (switches_on and self._values[key(self._mapping)] == 0)

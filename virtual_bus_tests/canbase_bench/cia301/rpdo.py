@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
+from math import inf
 
 from canopen import SdoAbortedError
 
@@ -28,6 +29,7 @@ class Rpdo:
     ) -> None:
         self.number = number
         self.refused = 0
+        self.received_at = -inf
         self._dictionary, self._errors, self._on_deadline = dictionary, errors, on_deadline
         self._rules = PdoRules(dictionary, COMMUNICATION + number - 1, MAPPING + number - 1, True, operational)
         self.stop()
@@ -52,6 +54,7 @@ class Rpdo:
 
     def receive(self, data: bytes, now: float) -> None:
         """A frame with this PDO's COB-ID. Too short: dropped, 8210h; too long: the first bytes count, 8220h."""
+        self.received_at = now
         length = self._codec.size
         if len(data) != length and not self._usable(len(data), length):
             return

@@ -21,7 +21,7 @@ class Tpdo:
     def __init__(
         self, number: int, dictionary: Dictionary, send: Callable[[Frame], None], operational: Callable[[], bool]
     ) -> None:
-        self._values, self._send = dictionary.values, send
+        self._values, self._entries, self._send = dictionary.values, dictionary.entries, send
         self._rules = PdoRules(dictionary, COMMUNICATION + number - 1, MAPPING + number - 1, False, operational)
         self.stop()
 
@@ -36,7 +36,7 @@ class Tpdo:
             return
         mapped = self._rules.mapped()
         self._pack = struct.Struct("<" + "".join(m.code for m in mapped)).pack
-        self._addresses = [m.address for m in mapped if m.address is not None]
+        self._places = [self._entries[m.address].place for m in mapped if m.address is not None]
         self._cob_id = self._rules.value(COB_ID) & 0x7FF
         self._type = self._rules.value(TYPE)
         self._inhibit = self._rules.value(INHIBIT) * INHIBIT_UNIT
@@ -54,7 +54,7 @@ class Tpdo:
             return
         self._syncs = 0
         values = self._values
-        data = self._pack(*[values[address] for address in self._addresses])
+        data = self._pack(*[values[place] for place in self._places])
         if self._type == 0 and data == self._last_data:
             return
         self._last_data = data
@@ -66,7 +66,7 @@ class Tpdo:
         if elapsed < self._inhibit:
             return
         values = self._values
-        data = self._pack(*[values[address] for address in self._addresses])
+        data = self._pack(*[values[place] for place in self._places])
         timer_is_over = self._period > 0.0 and elapsed >= self._period
         if data != self._last_data or timer_is_over:
             self._last_data, self._last_time = data, now

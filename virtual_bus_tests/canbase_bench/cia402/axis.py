@@ -21,6 +21,7 @@ from canbase_bench.cia402.states import (
     decode,
 )
 from canbase_bench.cia402.units import Scale
+from canbase_bench.personality import GENERIC, Personality
 from canbase_bench.plant.motor import AT_ONCE, Motor
 
 PROFILE_VELOCITY, CYCLIC_VELOCITY, NO_MODE = 3, 9, 0
@@ -57,6 +58,7 @@ class Axis:
     tell_error: Callable[[int], None]
     tell_clear: Callable[[int], None]
     on_change: Callable[[State, Transition], None]
+    personality: Personality = GENERIC
     state: State = State.NOT_READY_TO_SWITCH_ON
     faults: AxisFaults = field(default_factory=AxisFaults)
     causes: set[int] = field(default_factory=set)
@@ -117,6 +119,11 @@ class Axis:
             self._command(Command.DISABLE_VOLTAGE)
         elif option == 3:
             self._command(Command.QUICK_STOP)
+
+    def starve(self) -> None:
+        """The maker's own watchdog: the motor stops, nothing else changes, and the next target moves it again."""
+        if self.state is _ENABLED:
+            self._stop(1, _stay)
 
     def refresh(self) -> None:
         """Bring statusword, position, velocities and torque in the dictionary up to date."""
@@ -195,6 +202,7 @@ class Axis:
         self._state_bits = self.state.value
         if self.state not in POWERED:
             self.motor.power_off()
+        self._show_mode()
         self.on_change(before, transition)
 
     def _finish_pending(self) -> None:
@@ -226,11 +234,11 @@ class Axis:
             self._stop(self._value(0x5D), _stay)
         elif self.faults.ignores_setpoints:
             return
-        elif self._value(0x60) == CYCLIC_VELOCITY:
-            self.motor.run(self._value(0xFF) * self.scale.mps_per_raw, AT_ONCE, AT_ONCE)
+        elif self._value(0x60) == PROFILE_VELOCITY:
+            slope = self.scale.slope
+            self.motor.run(self._target_mps(), slope(self._value(0x83)), slope(self._value(0x84)))
         else:
-            scale = self.scale.mps_per_raw
-            self.motor.run(self._value(0xFF) * scale, self._value(0x83) * scale, self._value(0x84) * scale)
+            self.motor.run(self._target_mps(), AT_ONCE, AT_ONCE)
 
     def _quick_stop(self) -> None:
         option = self._value(0x5A)
@@ -243,7 +251,7 @@ class Axis:
             then()
             return
         ramps = {1: self._value(0x84), 2: self._value(0x85)}
-        slope = ramps[option] * self.scale.mps_per_raw if option in ramps else AT_ONCE
+        slope = self.scale.slope(ramps[option]) if option in ramps else AT_ONCE
         self.motor.stop(slope, then)
 
     # What the bus sees
@@ -264,16 +272,21 @@ class Axis:
         """Bit 10: the target is reached; in a halt and in QUICK STOP ACTIVE the target is zero."""
         if self.state is State.QUICK_STOP_ACTIVE or self._halted:
             return abs(actual) <= self._value(0x6F)
-        return self.state is _ENABLED and abs(actual - self._value(0xFF)) <= self._value(0x6D)
+        target = self.scale.raw(self._target_mps())
+        return self.state is _ENABLED and abs(actual - target) <= self._value(0x6D)
 
     def _check_mode(self, subindex: int, value: int) -> None:
-        if value not in (NO_MODE, PROFILE_VELOCITY, CYCLIC_VELOCITY):
+        if value not in (NO_MODE, *self.personality.modes):
             raise SdoAbortedError(abort.INVALID_VALUE)
         if self.state in POWERED and value != self._value(0x60):
             raise SdoAbortedError(abort.DEVICE_STATE)
 
     def _show_mode(self) -> None:
-        self._put(0x61, self._value(0x60))
+        hidden = self.state is not _ENABLED and not self.personality.shows_mode_without_power
+        self._put(0x61, NO_MODE if hidden else self._value(0x60))
+
+    def _target_mps(self) -> float:
+        return self._value(0xFF) * self.scale.target_mps
 
     def _put(self, offset: int, value: int) -> None:
         """Set object 60xxh of this axis."""

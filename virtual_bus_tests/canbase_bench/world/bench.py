@@ -8,10 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from canbase_bench.axis_parts import AxisParts, StateChange
 from canbase_bench.cia301.dictionary import AXIS_STRIDE, key
 from canbase_bench.cia402.units import Scale
 from canbase_bench.frame import Frame
-from canbase_bench.node import AxisParts, SimulatedNode, StateChange
+from canbase_bench.node import SimulatedNode
+from canbase_bench.personality import GENERIC, PERSONALITIES, Personality
 from canbase_bench.plant.base import Base, MountedWheel, PlantParameters
 from canbase_config.drive import Drive
 from canbase_config.robot import Robot
@@ -136,20 +138,21 @@ class Bench:
     def _node(self, node_id: int, now: float) -> SimulatedNode:
         mounted = {d.axis: i for i, d in enumerate(self._robot.drives) if d.node_id == node_id}
         parts = [self._axis(mounted.get(axis)) for axis in range(max(mounted) + 1)]
+        personality = _personality(self._robot.drives[next(iter(mounted.values()))])
         fixed = {key(0x1018, 4): node_id}
         for axis, i in mounted.items():
             drive = self._robot.drives[i]
             fixed[key(0x608F + axis * AXIS_STRIDE, 1)] = drive.counts_per_motor_rev
             fixed |= _identity(drive)
-        return SimulatedNode(node_id, parts, now, self._parameters.boot_delay_s, fixed)
+        return SimulatedNode(node_id, parts, now, self._parameters.boot_delay_s, fixed, personality)
 
     def _axis(self, i: int | None) -> AxisParts:
         """The axis of drive `i`; None: an axis of the controller to which nothing is connected."""
         if i is None:
             idle = DEFAULT_BODY.motor(1)
-            return AxisParts(idle, Scale.of(self._robot.drives[0], self._robot.base.wheel_radius_m), _nowhere, 0)
+            return AxisParts(idle, _scale_of(self._robot, self._robot.drives[0]), _nowhere, 0)
         drive = self._robot.drives[i]
-        scale = Scale.of(drive, self._robot.base.wheel_radius_m)
+        scale = _scale_of(self._robot, drive)
         return AxisParts(self._motors[i], scale, self._travel(drive), self._parameters.encoder_offset * (i + 1))
 
     def _travel(self, drive: Drive) -> Callable[[], float]:
@@ -157,6 +160,15 @@ class Bench:
         if drive.side == "left":
             return lambda: direction * base.travel_left_m
         return lambda: direction * base.travel_right_m
+
+
+def _personality(drive: Drive) -> Personality:
+    """The bench plays the drive that robot.yaml names; one of the user's own profiles is played as a generic drive."""
+    return PERSONALITIES.get(drive.profile, GENERIC)
+
+
+def _scale_of(robot: Robot, drive: Drive) -> Scale:
+    return Scale.of(drive, robot.base.wheel_radius_m, _personality(drive))
 
 
 def _identity(drive: Drive) -> dict[int, int]:

@@ -1,0 +1,31 @@
+"""What a simulated node is given for each axis, and what it tells about it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from canbase_bench.cia402.states import State
+from canbase_bench.cia402.units import Scale
+from canbase_bench.plant.motor import Motor
+
+
+@dataclass(frozen=True, slots=True)
+class AxisParts:
+    """What one axis is built from. `travel_m` gives the way of its motor since the start of the world."""
+
+    motor: Motor
+    scale: Scale
+    travel_m: Callable[[], float]
+    encoder_offset: int
+
+
+@dataclass(frozen=True, slots=True)
+class StateChange:
+    """One transition of one axis."""
+
+    node_id: int
+    axis: int
+    before: State
+    number: int
+    after: State

@@ -1,0 +1,187 @@
+"""How kinds of real drives differ on the bus from the simulated drive of our own EDS: what they lack, add and do.
+
+Written from the makers' EDS files and manuals, and on purpose apart from the drive profiles of canbase_config: the
+driver knows a drive by its profile, the bench by this table, and only a boot on the bus brings the two together.
+"assumed" marks what no source tells; it is there because some drive does it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+def _key(index: int, subindex: int = 0) -> int:
+    return index << 8 | subindex
+
+
+@dataclass(frozen=True, slots=True)
+class Extra:
+    """An object that our EDS does not have: `struct` letter, value after power on, and whether the bus may write it."""
+
+    code: str
+    value: int
+    writable: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Personality:
+    """One kind of drive. Indexes are those of the first axis; the second one differs alike."""
+
+    missing: frozenset[int] = frozenset()
+    """Indexes that it does not have; without 1005h it heeds no SYNC, and refuses synchronous PDOs."""
+    missing_subs: frozenset[int] = frozenset()
+    """Single entries (`index << 8 | sub-index`) that it does not have."""
+    extras: Mapping[int, Extra] = field(default_factory=dict)
+    """Objects of the maker, by `index << 8 | sub-index`."""
+    defaults: Mapping[int, int] = field(default_factory=dict)
+    """Values after power on that are not those of our EDS."""
+    heartbeat_entries: int = 2
+    """1016h:0."""
+    sets_no_rtr: bool = False
+    """Bit 30 is set in the COB-IDs of the PDOs after power on."""
+    needs_no_rtr: bool = False
+    """A COB-ID of a PDO without bit 30 is refused."""
+    motors_by_sub_index: bool = False
+    """True: both motors behind one 6040h, 6041h and 6060h, their values at sub-index 1 and 2."""
+    modes: tuple[int, ...] = (3, 9)
+    """Values of 6060h that it takes, besides 0."""
+    target_unit: str | None = None
+    """One bit of 60FFh; None: as robot.yaml says."""
+    actual_unit: str | None = None
+    """One bit of 606Ch; None: as robot.yaml says."""
+    acceleration_unit: str | None = None
+    """One bit of 6083h to 6085h; None: the unit of 60FFh per second. `ms`: time from stand to `full_speed_rpm`."""
+    full_speed_rpm: float = 0.0
+    boot_delay_s: float | None = None
+    """From power on to the boot-up message [s]; None: as the bench says."""
+    second_boot_up_s: float | None = None
+    """Boot loader and firmware say a boot-up each, so long apart [s]; objects answer only after the second."""
+    starts_operational: bool = False
+    """Goes to OPERATIONAL by itself after its boot-up."""
+    sdo_delay_s: float = 0.0
+    """From a request to its answer [s]."""
+    shows_mode_without_power: bool = True
+    """False: 6061h is 0 before OPERATION ENABLED."""
+    heartbeat_fault_needs_communication_reset: bool = False
+    """Fault resets are in vain after 8130h until NMT reset communication or node."""
+    command_timeout_s: float | None = None
+    """The maker's own watchdog: without a command for so long the motors stop; the next one starts them again [s]."""
+    command_timeout_object: int | None = None
+    """The entry that sets it in ms (0: off), where the bus can."""
+
+
+_NO_REACTION: dict[int, int] = {_key(0x6007): 0}
+"""What a drive without 6007h does with its motors when the connection is lost: nothing, which is the worst case."""
+_LACKS_SELF_STOP = frozenset({0x1016, 0x1029, 0x6007})
+_RPDO_TIMERS = frozenset({_key(index, 5) for index in range(0x1400, 0x1404)})
+
+GENERIC = Personality()
+
+PERSONALITIES: Mapping[str, Personality] = {
+    "generic": GENERIC,
+    "epos4": Personality(
+        missing_subs=_RPDO_TIMERS,  # EDS: no 1400h:5
+        sets_no_rtr=True,  # EDS
+        defaults={_key(0x6007): 3, _key(0x605A): 6, _key(0x1029, 1): 0},  # EDS
+        extras={  # EDS: types
+            _key(0x2200, 1): Extra("H", 240),
+            _key(0x30D1, 1): Extra("i", 0),
+            _key(0x3201, 1): Extra("h", 312),
+        },
+        target_unit="rpm",  # EDS 60A9h = 00B44700h
+        actual_unit="rpm",
+        acceleration_unit="rpm/s",  # manual of the motion controller
+        heartbeat_fault_needs_communication_reset=True,  # seen by users: 8130h and 8120h
+    ),
+    "roboteq": Personality(
+        missing=frozenset({0x1005, 0x1029, 0x6007, 0x603F, 0x605A, 0x605E}),  # EDS v80
+        missing_subs=_RPDO_TIMERS,  # EDS
+        sets_no_rtr=True,  # EDS
+        defaults=_NO_REACTION | {_key(base + n, 2): 255 for base in (0x1400, 0x1800) for n in range(4)},  # EDS
+        extras={  # EDS: volts and battery amps, temperatures
+            _key(0x210D, 2): Extra("H", 240),
+            _key(0x2100, 1): Extra("h", 0),
+            _key(0x2100, 2): Extra("h", 0),
+            _key(0x210F, 2): Extra("h", 31),
+        },
+        heartbeat_entries=4,  # EDS
+        needs_no_rtr=True,  # refused with 0609 0030h, as a user of canopen found
+        target_unit="rpm",
+        actual_unit="rpm",
+        acceleration_unit="0.1rpm/s",
+        starts_operational=True,  # manual of the battery system of the same maker
+        command_timeout_s=1.0,  # RWD; then the earlier speed comes back with the next command
+    ),
+    "zlac8015d": Personality(
+        missing=_LACKS_SELF_STOP | {0x1010, 0x1011, 0x605A, 0x605B, 0x605C, 0x605D, 0x605E, 0x60C2, 0x606B, 0x606D},
+        missing_subs=_RPDO_TIMERS,  # the EDS has them; nothing says that the firmware heeds them
+        extras={
+            _key(0x2000): Extra("H", 0, writable=True),  # EDS: communication offline time
+            _key(0x200F): Extra("H", 1, writable=True),  # both targets packed after power on: assumed
+        },
+        defaults=_NO_REACTION,
+        heartbeat_entries=0,
+        motors_by_sub_index=True,
+        modes=(3,),
+        target_unit="rpm",
+        actual_unit="0.1rpm",
+        acceleration_unit="ms",
+        full_speed_rpm=1000.0,
+        command_timeout_object=_key(0x2000),
+    ),
+    "nanotec": Personality(
+        missing_subs=_RPDO_TIMERS,  # assumed
+        defaults={_key(0x6007): 0, _key(0x60C2, 2): -3},  # 6007h assumed
+        heartbeat_entries=1,  # assumed
+        second_boot_up_s=0.3,  # boot loader and firmware; the time is assumed
+    ),
+    "elmo_gold": Personality(
+        missing_subs=_RPDO_TIMERS,  # DCF
+        defaults={_key(0x6007): 1, _key(0x1029, 1): 1, _key(0x605A): 2, _key(0x605E): 2},  # DCF
+        extras={_key(0x22A2): Extra("H", 38)},  # DCF
+        target_unit="counts/s",  # default of the maker's tool
+        actual_unit="counts/s",
+        acceleration_unit="counts/s2",
+    ),
+    "kinco": Personality(
+        missing_subs=_RPDO_TIMERS,  # assumed
+        defaults={_key(0x6007): 0},  # 1 is needed for alarm and stop
+        heartbeat_entries=1,  # assumed
+        modes=(3, -3),
+        target_unit="counts/ms/16384",
+        actual_unit="counts/ms/16384",
+        acceleration_unit="counts/ms2/16384",
+        shows_mode_without_power=False,  # a user's report
+        sdo_delay_s=0.004,  # assumed
+    ),
+    "technosoft": Personality(
+        missing=frozenset({0x1016, 0x1029, 0x60C2, 0x603F}),  # EDS
+        missing_subs=_RPDO_TIMERS,  # EDS
+        defaults={_key(0x6007): 0},  # EDS
+        heartbeat_entries=0,
+        modes=(3,),  # EDS 6502h: no mode 9
+        target_unit="counts/ms/65536",
+        actual_unit="counts/ms/65536",
+        acceleration_unit="counts/ms2/65536",
+        boot_delay_s=0.6,  # assumed: a late boot-up
+    ),
+    "tmcm1636": Personality(
+        missing=frozenset({0x6007, 0x603F}),  # EDS
+        missing_subs=_RPDO_TIMERS,  # EDS
+        sets_no_rtr=True,  # EDS
+        defaults=_NO_REACTION | {_key(0x1029, 1): 0},  # EDS
+        heartbeat_entries=1,  # EDS
+        modes=(3,),
+        target_unit="rpm",
+        actual_unit="rpm",
+        acceleration_unit="rpm/s",
+    ),
+    "dryve_d1": Personality(
+        missing=frozenset({0x1011, 0x1029, 0x6007, 0x605A, 0x605E}),  # EDS
+        sets_no_rtr=True,  # EDS
+        defaults=_NO_REACTION,
+        heartbeat_entries=1,  # EDS
+    ),
+}
+"""By the name that the drive's profile has in robot.yaml."""

@@ -1,0 +1,140 @@
+"""Driver and watchdog with every kind of drive that has a profile: boot, drive, stop, faults, in virtual time."""
+
+from __future__ import annotations
+
+import pytest
+
+from canbase_bench.personality import PERSONALITIES
+from canbase_config.profile_file import load_profile, profile_names
+from canbase_config.robot import Robot
+from canbase_driver.kinematics import Twist2D
+from canbase_driver.snapshot import DriverState
+from unit.chain_world import FORWARD, World, bench_robot
+
+UNIT_OF_OPEN_ONES = "0.1rpm"
+"""Given in robot.yaml where the profile leaves the unit of 60FFh open."""
+KINDS = sorted(PERSONALITIES)
+
+
+def robot_with(kind: str, **changes: object) -> Robot:
+    """The bench robot with that kind of drives; a node of two motors has both."""
+    profile = load_profile(kind)
+    unit = UNIT_OF_OPEN_ONES if profile.units.target_velocity is None else None
+    values = bench_robot().model_dump()
+    for number, drive in enumerate(values["drives"]):
+        drive |= {"profile": kind, "velocity_unit": unit} | changes
+        if profile.layout.second_axis == "sub_index":
+            drive |= {"node_id": 1, "axis": number}
+    return Robot.model_validate(values)
+
+
+def world_of(kind: str, **changes: object) -> World:
+    return World(robot_with(kind, **changes))
+
+
+def test_every_profile_has_a_drive_on_the_bench_that_plays_it() -> None:
+    assert set(KINDS) == set(profile_names())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_it_boots_and_drives_as_fast_as_ordered(kind: str) -> None:
+    world = world_of(kind)
+    world.run_until(DriverState.ENABLED, 5.0)
+    world.run(0.1)
+    world.command = FORWARD
+    world.run(1.5)
+    assert world.truth.linear_mps == pytest.approx(FORWARD.linear_mps, rel=0.02)
+    assert world.snapshot.linear_mps == pytest.approx(world.truth.linear_mps, rel=0.05)
+    assert world.truth.angular_radps == pytest.approx(0.0, abs=0.02)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_its_encoders_tell_the_way(kind: str) -> None:
+    world = world_of(kind)
+    world.drive(Twist2D(0.2, 0.3), 1.0)
+    world.command = Twist2D.ZERO
+    world.run(1.5)
+    pose = world.snapshot
+    assert pose.x_m == pytest.approx(world.truth.x_m, abs=0.01)
+    assert pose.y_m == pytest.approx(world.truth.y_m, abs=0.01)
+    assert pose.yaw_rad == pytest.approx(world.truth.yaw_rad, abs=0.03)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_when_the_driver_dies_the_watchdog_stops_it(kind: str) -> None:
+    world = world_of(kind)
+    world.drive()
+    world.kill_driver()
+    assert world.run(1.0, lambda: world.truth.standing_s > 0.0)
+    before_m = world.truth.path_m
+    world.run(2.0)
+    assert world.truth.path_m - before_m < 0.003
+
+
+SELF_STOPPING = ["elmo_gold", "epos4", "generic", "kinco", "nanotec"]
+
+
+@pytest.mark.parametrize("kind", SELF_STOPPING)
+def test_when_driver_and_watchdog_die_it_stops_by_itself(kind: str) -> None:
+    world = world_of(kind)
+    world.drive()
+    world.kill_driver()
+    world.watchdog = None
+    assert world.run(1.2, lambda: world.truth.standing_s > 0.0)
+
+
+def test_roboteq_stops_by_its_own_watchdog_a_second_after_the_last_command() -> None:
+    world = world_of("roboteq")
+    world.drive()
+    world.kill_driver()
+    world.watchdog = None
+    world.run(0.9)
+    assert world.truth.linear_mps > 0.2
+    assert world.run(1.0, lambda: world.truth.standing_s > 0.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_driver_says_what_does_not_stop_by_itself(kind: str) -> None:
+    world = world_of(kind)
+    world.enable()
+    told = [drive.stops_by_itself for drive in world.snapshot.drives]
+    assert told == [kind in SELF_STOPPING] * 2
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_power_cycle_while_driving_ends_disarmed_and_a_reset_brings_it_back(kind: str) -> None:
+    world = world_of(kind)
+    world.drive()
+    world.node.power_cycle(world.now, 0.5)
+    world.run_until(DriverState.LATCHED, 5.0)
+    world.command = Twist2D.ZERO
+    world.run(6.0)
+    assert world.core.state is DriverState.LATCHED
+    assert not any(world.powered)
+    world.reset()
+    world.run_until(DriverState.ENABLED, 3.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_fault_stops_it_and_needs_a_reset(kind: str) -> None:
+    world = world_of(kind)
+    world.drive()
+    world.node.fail(0, 0x2310)
+    world.run_until(DriverState.LATCHED, 5.0)
+    world.command = Twist2D.ZERO
+    world.run(3.0)
+    assert world.truth.standing_s > 0.5
+    world.reset()
+    world.run_until(DriverState.ENABLED, 3.0)
+
+
+def test_a_lost_watchdog_stops_an_epos4_and_a_reset_brings_it_back_with_the_next_one() -> None:
+    world = world_of("epos4")
+    world.drive()
+    watchdog, world.watchdog = world.watchdog, None
+    world.run(1.0)
+    assert world.truth.standing_s > 0.2
+    world.watchdog = watchdog
+    world.command = Twist2D.ZERO
+    world.run(world.robot.timeouts.standstill_s)  # its node left OPERATIONAL: nothing tells the driver that it stands
+    assert world.recovered()
