@@ -10,6 +10,8 @@ from drive_ways import WAYS
 
 ROBOT = load_robot(sample("bench")).robot
 BUDGET_M = 0.003
+TOO_FAST_MPS = 0.01
+"""The servo's answer to friction: no controller of an outer loop takes it away."""
 
 
 @pytest.mark.parametrize("number", range(12))
@@ -18,6 +20,7 @@ def test_our_goals_end_within_the_budget_and_do_not_move_after_the_result(number
     assert abs(measured.error_m) <= BUDGET_M
     assert measured.overshoot_m <= BUDGET_M
     assert measured.after_m <= 0.0002
+    assert measured.too_fast_mps <= TOO_FAST_MPS
 
 
 def test_a_loop_that_orders_zero_at_the_distance_goes_beyond_it_after_its_result() -> None:
@@ -31,7 +34,7 @@ def test_the_same_goals_are_driven_in_every_run() -> None:
 
 
 def test_the_table_is_in_millimetres() -> None:
-    assert "| one | 2.0 | 2.0 | 2.0 |" in table({"one": [Measured(-0.002, 0.0, 0.0, 1.0)]})
+    assert "| one | 2.0 | 2.0 | 2.0 |" in table({"one": [Measured(-0.002, 0.0, 0.0, 1.0, 0.0)]})
 
 
 @pytest.mark.parametrize(("share", "value"), [(0.5, 2.0), (0.99, 4.0), (1.0, 4.0), (0.25, 1.0)])
