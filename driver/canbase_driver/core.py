@@ -24,6 +24,7 @@ from canbase_driver.drives import Drives, age_s
 from canbase_driver.frame import Frame
 from canbase_driver.kinematics import Twist2D, base_twist, wheel_speeds
 from canbase_driver.limits import Limiter, MotionState
+from canbase_driver.odometry import Pose2D
 from canbase_driver.odometry_feed import OdometryFeed
 from canbase_driver.remote_node import RemoteNode
 from canbase_driver.reset import Outcome, Phase, Reset, refusal
@@ -138,6 +139,18 @@ class DriverCore:
             self._reset = _ResetCall(Reset(now, self._period_s), self._watchdog.request_reset(), on_outcome)
         else:
             on_outcome(Outcome(False, refused))
+
+    def set_pose(self, pose: Pose2D, now: float) -> Outcome:
+        """The odometry goes on from `pose`, with the covariance of a fresh start. Refused in motion."""
+        commanded = self._command.motion(now)
+        if not (math.isfinite(pose.x_m) and math.isfinite(pose.y_m) and math.isfinite(pose.yaw_rad)):
+            return Outcome(False, f"refused: {pose} is not finite")
+        if commanded or not self._drives.stand(now):
+            return Outcome(False, f"refused: {commanded or 'a wheel turns'}; a pose is set at a standstill")
+        self._feed.odometry.reset(pose)
+        return Outcome(
+            True, f"odometry goes on from x {pose.x_m:.3f} m, y {pose.y_m:.3f} m, yaw {pose.yaw_rad:.3f} rad"
+        )
 
     def tick(self, now: float, lateness_s: float = 0.0) -> list[Frame]:
         """One cycle; the frames to send, in this order. `lateness_s`: how late it began."""

@@ -18,6 +18,7 @@ from canbase_driver.bus_port import BusPort
 from canbase_driver.core import DriverCore
 from canbase_driver.frame import Frame
 from canbase_driver.kinematics import Twist2D
+from canbase_driver.odometry import Pose2D
 from canbase_driver.reset import Outcome
 from canbase_driver.snapshot import DriverSnapshot, StopRecord
 
@@ -67,8 +68,15 @@ class ControlLoop(threading.Thread):
 
     def reset(self) -> Outcome:
         """Reset and wait for the outcome; never call it from the control thread."""
+        return self._ask(lambda now, answer: self._core.request_reset(now, answer))
+
+    def set_pose(self, pose: Pose2D) -> Outcome:
+        """Set the pose of the odometry and wait for the outcome; never call it from the control thread."""
+        return self._ask(lambda now, answer: answer(self._core.set_pose(pose, now)))
+
+    def _ask(self, request: Callable[[float, Callable[[Outcome], None]], None]) -> Outcome:
         outcomes: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
-        self._inbox.put(lambda now: self._core.request_reset(now, outcomes.put))
+        self._inbox.put(lambda now: request(now, outcomes.put))
         deadline = time.monotonic() + RESET_TIMEOUT_S
         while time.monotonic() < deadline:
             alive = self.is_alive()

@@ -52,7 +52,7 @@ def run(robot: Robot, ros_args: Sequence[str]) -> int:
     rclpy.init(args=list(ros_args), signal_handler_options=SignalHandlerOptions.NO)
     loop = ControlLoop(DriverCore(robot), bus, robot.rates.control_hz, robot.rates.odometry_hz)
     node = MotorDriverNode(robot, loop)
-    publisher, services = Publisher(node, loop), DriverServices(loop)
+    publisher, services = Publisher(node, loop), DriverServices(loop, robot.base.odom_frame)
     threads = (loop, publisher, services)
     gc.collect()
     gc.freeze()  # what is there now lives for ever: later collections need not look at it

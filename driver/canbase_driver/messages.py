@@ -9,11 +9,11 @@ import math
 
 from builtin_interfaces.msg import Time
 from canbase.msg import DriverStatus, DriveStatus, StopEvent
-from geometry_msgs.msg import Quaternion, TransformStamped
+from geometry_msgs.msg import Pose, Quaternion, TransformStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 
-from canbase_driver.odometry import wrap_angle
+from canbase_driver.odometry import Pose2D, wrap_angle
 from canbase_driver.snapshot import DriverSnapshot, DriveSnapshot, StopRecord
 
 try:
@@ -112,6 +112,14 @@ def stop_event_message(stop: StopRecord, stamp: Time) -> StopEvent:
         latched=stop.latched,
         clears_on=stop.clears_on,
     )
+
+
+def pose_of(message: Pose) -> Pose2D:
+    """The part of a pose that a base on the ground has. No rotation (all 0, or not finite) becomes NaN: refused."""
+    turn = message.orientation
+    is_rotation = math.isfinite(turn.z + turn.w) and math.hypot(turn.x, turn.y, turn.z, turn.w) > 0.5
+    yaw_rad = wrap_angle(2.0 * math.atan2(turn.z, turn.w)) if is_rotation else math.nan
+    return Pose2D(message.position.x, message.position.y, yaw_rad)
 
 
 def _quaternion(yaw_rad: float) -> Quaternion:

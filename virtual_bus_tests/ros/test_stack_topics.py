@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import TwistStamped
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
 
 from canbase_action_server.client import Drive, DriveResult
 from canbase_action_server.outcome import ErrorCode
@@ -74,6 +76,21 @@ def test_tf_says_what_odom_says(world: World) -> None:
     transform, odom = recorder.messages[-1].transforms[0], world.robot.odom.messages[-1]
     assert (transform.header.frame_id, transform.child_frame_id) == ("odom", "base_link")
     assert transform.transform.translation.x == pytest.approx(odom.pose.pose.position.x, abs=RESTS_M)
+
+
+def test_stamps_of_the_odometry_rise_and_its_pose_can_be_reset_at_a_standstill(world: World) -> None:
+    assert world.robot.run("drive", "0.1", "--speed", "0.2") == 0
+    client = world.node.node.create_client(Trigger, "motor_driver/reset_odometry")
+    world.node.wait_for(client.service_is_ready, 10.0, "motor_driver/reset_odometry")
+    future = client.call_async(Trigger.Request())
+    world.node.wait_for(future.done, 10.0, "its answer")
+    answer = future.result()
+    assert answer is not None
+    assert answer.success, answer.message
+    world.node.spin_for(0.3)
+    assert world.robot.odometry() == pytest.approx((0.0, 0.0), abs=1e-6)
+    stamps = [(odom.header.stamp.sec, odom.header.stamp.nanosec) for odom in world.robot.odom.messages]
+    assert all(before < after for before, after in itertools.pairwise(stamps))
 
 
 def test_status_tells_that_all_is_well(world: World) -> None:

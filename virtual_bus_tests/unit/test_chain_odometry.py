@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import pytest
 
@@ -11,8 +12,9 @@ from canbase_bench.world.bench import BenchParameters
 from canbase_config.robot import Robot
 from canbase_driver.frame import Frame
 from canbase_driver.kinematics import Twist2D
+from canbase_driver.odometry import Pose2D
 from canbase_driver.snapshot import DriverState
-from unit.chain_world import World, robot_of
+from unit.chain_world import FORWARD, World, robot_of
 
 OVERCURRENT = 0x2310
 
@@ -116,3 +118,23 @@ def test_an_encoder_that_jumps_for_good_is_no_motion_of_the_base_and_is_reported
     assert after.yaw_rad == pytest.approx(before.yaw_rad, abs=0.01)
     assert after.travel_losses == 1
     assert after.odometry_valid
+
+
+def test_the_pose_is_set_at_a_standstill_only_and_the_way_goes_on_from_there() -> None:
+    world = World()
+    world.drive()
+    moving = world.core.set_pose(Pose2D(), world.now)
+    assert (moving.done, moving.sentence.split(":")[0]) == (False, "refused")
+    world.command = Twist2D.ZERO
+    world.run(1.0)
+    assert world.snapshot.x_m > 0.1
+    assert not world.core.set_pose(Pose2D(math.nan, 0.0, 0.0), world.now).done
+    assert world.core.set_pose(Pose2D(1.0, 2.0, math.pi / 2), world.now).done
+    fresh = world.snapshot
+    assert (fresh.x_m, fresh.y_m, fresh.yaw_rad) == (1.0, 2.0, math.pi / 2)
+    world.command = FORWARD
+    world.run(1.0)
+    snapshot = world.snapshot
+    assert snapshot.x_m == pytest.approx(1.0, abs=0.01)
+    assert snapshot.y_m > 2.15
+    assert snapshot.pose_covariance[0] > fresh.pose_covariance[0]
