@@ -1,4 +1,4 @@
-"""Services motor_driver/reset, /stop and /reset_odometry, and motor_driver/set_pose, on a node and a thread of their own.
+"""Services motor_driver/reset, stop and reset_odometry, and the topic set_pose, on a node and a thread of their own.
 
 A reset takes up to seconds: it answers when it is done, not when it begins. rclpy cannot await inside a service of its
 events executor, and the main thread must not wait, since commands arrive there.

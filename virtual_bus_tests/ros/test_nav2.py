@@ -14,8 +14,7 @@ import pytest
 from canbase.msg import MuxState
 from geometry_msgs.msg import Twist, TwistStamped
 
-from ros.conftest import Process
-from ros.harness import TestNode
+from ros.harness import Process, TestNode
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(60)]
 START_S = 20.0

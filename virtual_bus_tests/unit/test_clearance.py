@@ -130,7 +130,8 @@ def test_an_infinite_range_max_leaves_infinite_readings_free() -> None:
 def test_a_scanner_that_changes_its_beams_is_followed() -> None:
     reader = ScanReader()
     ahead, behind = Scan([1.0], 0.0, 0.1, 0.0, 10.0), Scan([1.0], math.pi, 0.1, 0.0, 10.0)
-    assert [of(scan, reader=reader) for scan in (ahead, behind, ahead)] == [
+    assert [of(scan, reader=reader) for scan in (ahead, ahead, behind, ahead)] == [
+        Clearances(approx(0.6), INF),
         Clearances(approx(0.6), INF),
         Clearances(INF, approx(0.8)),
         Clearances(approx(0.6), INF),

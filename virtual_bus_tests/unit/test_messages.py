@@ -6,6 +6,7 @@ import math
 import pytest
 from builtin_interfaces.msg import Time
 from canbase.msg import DriverStatus, DriveStatus
+from geometry_msgs.msg import Point, Pose, Quaternion
 from rclpy.serialization import deserialize_message, serialize_message
 
 from canbase_driver import messages
@@ -175,3 +176,16 @@ def test_every_message_survives_the_wire() -> None:
         diagnostics_message(SNAPSHOT, STAMP),
     ):
         assert deserialize_message(serialize_message(message), type(message)) == message
+
+
+@pytest.mark.parametrize(("z", "w", "yaw_rad"), [(0.0, 1.0, 0.0), (0.6, 0.8, 1.2870022), (-1.0, 0.0, math.pi)])
+def test_a_pose_is_taken_from_its_quaternion(z: float, w: float, yaw_rad: float) -> None:
+    pose = messages.pose_of(Pose(position=Point(x=1.0, y=-2.0), orientation=Quaternion(z=z, w=w)))
+    assert (pose.x_m, pose.y_m) == (1.0, -2.0)
+    assert math.cos(pose.yaw_rad) == pytest.approx(math.cos(yaw_rad))
+    assert math.sin(pose.yaw_rad) == pytest.approx(math.sin(yaw_rad), abs=1e-6)
+
+
+@pytest.mark.parametrize(("z", "w"), [(0.0, 0.0), (math.nan, 1.0), (0.0, math.inf)])
+def test_a_pose_without_a_rotation_has_no_yaw(z: float, w: float) -> None:
+    assert math.isnan(messages.pose_of(Pose(orientation=Quaternion(z=z, w=w))).yaw_rad)

@@ -19,7 +19,7 @@ from canbase_velocity.clearance import NOWHERE, Field, Points
 from canbase_velocity.decision import Action, Cause, Decision
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import NOTHING_TO_RESET, SafetyFilter
-from canbase_velocity.motion import follow
+from canbase_velocity.motion import ExpectedMotion, follow
 from canbase_velocity.obstacle import NOTHING_IN_SIGHT, Geometry, Sight, allowed_share, braking_time_s
 from canbase_velocity.placement import Placement
 from canbase_velocity.safety_filter import FilterConfig, Inputs, ScanState, decide
@@ -699,3 +699,14 @@ def test_the_expected_motion_follows_the_ramps() -> None:
     back = follow(Twist(0.2, 0.0), Twist(-1.0, 0.0), LIMITS, 0.05)
     assert -1.0 < back.linear_mps < 0.2
     assert follow(Twist(0.2, 0.0), Twist(0.3, 0.0), LIMITS, 5.0) == Twist(0.3, 0.0)
+
+
+def test_the_expected_pose_is_remembered_between_orders_and_no_longer_than_asked_for() -> None:
+    motion = ExpectedMotion(LIMITS, memory_s=0.5)
+    motion.order(Twist(1.0, 0.0), 10.0)
+    at_m = [motion.advance(10.0 + step * 0.1).x_m for step in range(21)]
+    assert at_m[10] == pytest.approx(0.5, abs=1e-6)  # 1 m/s² from rest
+    assert motion.pose_at(11.75).x_m == pytest.approx((at_m[17] + at_m[18]) / 2.0)
+    assert motion.pose_at(11.8).x_m == pytest.approx(at_m[18])
+    assert motion.pose_at(13.0).x_m == at_m[20]
+    assert at_m[14] <= motion.pose_at(10.0).x_m <= at_m[15]
