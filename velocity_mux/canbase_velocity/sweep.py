@@ -103,7 +103,8 @@ def first_touch(points: Floats, box: Box, twist: Twist, stop_m: float) -> Touch:
     speed_mps, turn_radps = abs(twist.linear_mps), abs(twist.angular_radps)
     if speed_mps > turn_radps * STRAIGHT_M:
         ways_m = _straight_ways_m(points, box, math.copysign(1.0, twist.linear_mps))
-        slacks_s = (ways_m - stop_m) / speed_mps
+        with np.errstate(over="ignore"):  # a speed next to nothing takes for ever
+            slacks_s = (ways_m - stop_m) / speed_mps
     else:
         ways_m, speeds_mps = _arc_ways_m(points, box, twist)
         slacks_s = (ways_m - stop_m) / speeds_mps
