@@ -74,3 +74,18 @@ def parse_heartbeat(frame: Frame) -> tuple[int, NmtState | None] | None:
 
 
 _STATES = {state.value: state for state in NmtState}
+
+
+class SyncProducer:
+    """The SYNC of each cycle: empty, or with a byte that counts from 1 to `overflow`, 2…240 (CiA 301, 1019h)."""
+
+    def __init__(self, overflow: int | None) -> None:
+        self._overflow = overflow
+        self._count = 0
+
+    def next(self) -> Frame:
+        """The frame that is due now."""
+        if self._overflow is None:
+            return SYNC
+        self._count = self._count % self._overflow + 1
+        return Frame(SYNC.cob_id, bytes((self._count,)))

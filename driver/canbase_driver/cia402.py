@@ -7,6 +7,7 @@ Rules of the goals
 3. ON goes up one step at a time and stays in OPERATION ENABLED. It never interrupts a quick stop: in QUICK STOP ACTIVE
    it keeps the word; a drive that stays there when it stands (605Ah = 5…8) needs OFF first. In an unknown state it is
    a quick stop too.
+   READY goes one step up from switch on disabled, and is OFF in every state with power.
 4. ON never resets a fault. Only RESET sets bit 7, and only in FAULT; in every other state RESET is OFF.
 5. The drive acts on the 0 → 1 edge of bit 7 (transition 15), not on its level. Before RESET hold OFF, which keeps
    bit 7 at 0, for FAULT_RESET_CYCLES; then hold RESET until the state is no longer FAULT, at least FAULT_RESET_CYCLES.
@@ -21,6 +22,10 @@ from enum import Enum
 FAULT_RESET_CYCLES = 3
 """SYNC cycles for each level of bit 7: synchronous RPDOs act one SYNC late, some drives need three to see an edge."""
 
+WARNING = 1 << 7
+"""Statusword bit 7: something is not as it should be, but no fault."""
+INTERNAL_LIMIT = 1 << 11
+"""Statusword bit 11; some drives set it from the start. Never a fault."""
 REMOTE = 1 << 9
 """Statusword bit 9: 0 means that the drive is in local mode and ignores the controlword."""
 
@@ -49,6 +54,8 @@ class DriveState(Enum):
 
 
 _WITH_TORQUE = frozenset((DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE))
+PREPARED = frozenset((DriveState.READY_TO_SWITCH_ON, DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED))
+"""As far as ready to switch on: main voltage and STO are there."""
 
 STATUSWORD_STATES = (
     (0x4F, 0x00, DriveState.NOT_READY_TO_SWITCH_ON),
@@ -91,6 +98,8 @@ class PowerGoal(Enum):
     """Switch on disabled: no torque."""
     ON = "on"
     """Operation enabled."""
+    READY = "ready"
+    """Ready to switch on: no torque, but nothing that forbids it either."""
     QUICK_STOP = "quick stop"
     """Down the ramp 6085h and then, with 605Ah = 2, to switch on disabled."""
     RESET = "fault reset"
@@ -113,6 +122,8 @@ _STATES: tuple[DriveState | None, ...] = (None, *DriveState)
 COMMANDS: dict[PowerGoal, dict[DriveState | None, Command]] = {
     PowerGoal.OFF: dict.fromkeys(_STATES, Command.DISABLE_VOLTAGE),
     PowerGoal.ON: _UP,
+    PowerGoal.READY: dict.fromkeys(_STATES, Command.DISABLE_VOLTAGE)
+    | dict.fromkeys((DriveState.SWITCH_ON_DISABLED, DriveState.READY_TO_SWITCH_ON), Command.SHUTDOWN),
     PowerGoal.QUICK_STOP: dict.fromkeys(_STATES, Command.QUICK_STOP),
     PowerGoal.RESET: dict.fromkeys(_STATES, Command.DISABLE_VOLTAGE) | {DriveState.FAULT: Command.FAULT_RESET},
 }

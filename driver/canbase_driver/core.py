@@ -16,7 +16,17 @@ from functools import partial
 from canbase_config.robot import DRIVER_NODE_ID, Robot
 from canbase_driver.axis import Axis
 from canbase_driver.bus_health import BusReport
-from canbase_driver.cia301 import EMCY, HEARTBEAT, NMT, SDO_TO_CLIENT, SYNC, NmtCommand, NmtState, heartbeat, nmt
+from canbase_driver.cia301 import (
+    EMCY,
+    HEARTBEAT,
+    NMT,
+    SDO_TO_CLIENT,
+    NmtCommand,
+    NmtState,
+    SyncProducer,
+    heartbeat,
+    nmt,
+)
 from canbase_driver.cia402 import PowerGoal
 from canbase_driver.command import Command
 from canbase_driver.cycle_stats import CycleStats
@@ -58,6 +68,7 @@ class DriverCore:
         self._robot = robot
         self._period_s = 1.0 / robot.rates.control_hz
         self._drives = Drives(robot)
+        self._sync = SyncProducer(robot.bus.sync_counter)
         self._watchdog = WatchdogLink(robot.timeouts.watchdog_s)
         self._supervisor = Supervisor(robot.timeouts.standstill_s)
         self._limiter = Limiter(robot.limits, robot.base.track_m)
@@ -136,6 +147,8 @@ class DriverCore:
         """Begin a reset; `on_outcome` is called once, at once when it is refused."""
         refused = refusal(self._situation(now), self._supervisor.state in NO_POWER)
         if refused is None:
+            for node in self._drives.nodes:
+                node.clear_lost_heartbeat(now)
             self._reset = _ResetCall(Reset(now, self._period_s), self._watchdog.request_reset(), on_outcome)
         else:
             on_outcome(Outcome(False, refused))
@@ -176,7 +189,7 @@ class DriverCore:
     def stop_frames(self) -> list[Frame]:
         """Quick stop for all axes in any state: the way out after a defect. Needs no knowledge, cannot fail."""
         goal = PowerGoal.QUICK_STOP
-        return [frame for node in self._drives.nodes for frame in node.setpoints(goal, 0.0, 0.0)] + [SYNC]
+        return [frame for node in self._drives.nodes for frame in node.setpoints(goal, 0.0, 0.0)] + [self._sync.next()]
 
     def _judge(self, situation: Situation, now: float) -> Orders:
         before = self._supervisor.state
@@ -204,7 +217,7 @@ class DriverCore:
         goal = PowerGoal.RESET if resets else orders.goal  # to an axis without a fault RESET is OFF
         left_mps, right_mps = wheel_speeds(self._motion.twist, self._robot.base.track_m)
         frames = [frame for node in started for frame in node.setpoints(goal, left_mps, right_mps)]
-        return [*frames, SYNC]
+        return [*frames, self._sync.next()]
 
     def _go_on_with_reset(self, situation: Situation, now: float) -> list[Frame]:
         if self._reset is None:
@@ -241,6 +254,7 @@ class DriverCore:
             absent=self._drives.absent(),
             silent=self._drives.silent(now),
             disabled=self._drives.disabled(),
+            unprepared=self._drives.unprepared(),
             watchdog=watchdog,
             watchdog_detail=watchdog_detail,
             commanded=self._command.motion(now),

@@ -142,7 +142,12 @@ def _drive_entry(drive: DriveSnapshot, state: DriverState, robot: str) -> Diagno
         "position [rad]": drive.position_rad,
         "last status TPDO": _heard(drive.feedback_age_s),
         "last heartbeat": _heard(drive.heartbeat_age_s),
-        "stops by itself": drive.stops_by_itself,
+        "stops by itself": drive.self_stop or "no",
+        "warning (bit 7)": drive.warning,
+        "internal limit (bit 11)": drive.internal_limit,
+        **_measured(drive),
+        "lacking or refused": "; ".join(drive.boot_notes) or "nothing",
+        "changed by the boot": "; ".join(drive.boot_changes) or "nothing",
     }
     place = f"node {drive.node_id} axis {drive.axis}"
     return _entry(level, f"{robot}: drive {drive.joint}", sentence, f"{robot} {place}", values)
@@ -155,7 +160,19 @@ def _drive_state(drive: DriveSnapshot, state: DriverState) -> tuple[bytes, str]:
         return DiagnosticStatus.ERROR, f"No feedback yet; its heartbeat was {_heard(drive.heartbeat_age_s)}."
     if state is DriverState.ENABLED and not drive.stops_by_itself:
         return DiagnosticStatus.WARN, f"{drive.state.capitalize()}, but it would not stop by itself without us (1016h)."
+    if drive.warning:
+        return DiagnosticStatus.WARN, f"{drive.state.capitalize()}, but it warns of something (statusword bit 7)."
     return DiagnosticStatus.OK, f"{drive.state.capitalize()}, {drive.nmt_state}."
+
+
+def _measured(drive: DriveSnapshot) -> dict[str, float]:
+    """What the drive measures besides its motion, where it does."""
+    values = {
+        "voltage [V]": drive.voltage_v,
+        "current [A]": drive.current_a,
+        "temperature [°C]": drive.temperature_c,
+    }
+    return {name: value for name, value in values.items() if not math.isnan(value)}
 
 
 def _heard(age_s: float) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 from canbase_config.robot import Robot
 from canbase_driver.axis import Axis
-from canbase_driver.cia402 import DriveState
+from canbase_driver.cia402 import INTERNAL_LIMIT, PREPARED, REMOTE, WARNING, DriveState
 from canbase_driver.emcy import emcy_text
 from canbase_driver.remote_node import RemoteNode
 from canbase_driver.snapshot import DriveSnapshot
@@ -48,6 +48,10 @@ class Drives:
     def disabled(self) -> str:
         """Which axis is not in operation enabled."""
         return _first(_disabled(axis) for axis in self.axes)
+
+    def unprepared(self) -> str:
+        """Which axis has not got as far as ready to switch on, and what that may come from."""
+        return _first(_unprepared(axis) for axis in self.axes)
 
     def are_fresh(self, now: float) -> bool:
         """Every axis has given its status in time."""
@@ -103,6 +107,7 @@ def age_s(now: float, then: float) -> float:
 def _snapshot(node: RemoteNode, axis: Axis, robot: Robot, now: float) -> DriveSnapshot:
     radius_m = robot.base.wheel_radius_m
     code = node.emcy.code if node.emcy else 0
+    measured = node.measured(axis, now)
     return DriveSnapshot(
         joint=axis.drive.joint,
         node_id=node.node_id,
@@ -111,21 +116,38 @@ def _snapshot(node: RemoteNode, axis: Axis, robot: Robot, now: float) -> DriveSn
         state=axis.state.text if axis.state else "unknown",
         statusword=axis.statusword,
         error_code=code,
-        error_text=emcy_text(code) if code else "",
+        error_text=emcy_text(code, node.profile.emcy) if code else "",
         target_radps=axis.target_mps / radius_m,
         velocity_radps=axis.velocity_mps / radius_m,
         position_rad=axis.position_rad,
         feedback_age_s=age_s(now, axis.status_at),
         heartbeat_age_s=age_s(now, node.heartbeat_at),
-        stops_by_itself=node.stops_by_itself,
+        stops_by_itself=node.report is not None and node.report.stops_by_itself,
+        self_stop=node.report.self_stop if node.report else "",
+        warning=bool(axis.statusword & WARNING),
+        internal_limit=bool(axis.statusword & INTERNAL_LIMIT),
+        remote=bool(axis.statusword & REMOTE),
+        voltage_v=measured.voltage_v,
+        current_a=measured.current_a,
+        temperature_c=measured.temperature_c,
+        boot_notes=node.report.notes if node.report else (),
+        boot_changes=node.report.changes if node.report else (),
     )
 
 
 def _fault(node: RemoteNode) -> str:
     for axis in node.axes:
         if axis.state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
-            return f"{axis.drive.joint} (node {node.node_id}): {node.emcy.text if node.emcy else 'no code given'}"
+            return f"{axis.drive.joint} (node {node.node_id}): {node.emcy_text() or 'no code given'}"
     return ""
+
+
+def _unprepared(axis: Axis) -> str:
+    if axis.state in PREPARED:
+        return ""
+    place = f"{axis.drive.joint} (node {axis.drive.node_id})"
+    local = "" if axis.statusword & REMOTE else "; it is in local mode and ignores the controlword (statusword bit 9)"
+    return f"{place} stays in {axis.state.text if axis.state else 'no state known'}: STO, main voltage?{local}"
 
 
 def _disabled(axis: Axis) -> str:

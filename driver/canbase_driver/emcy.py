@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from canbase_driver.cia301 import EMCY, MAX_NODE_ID
 from canbase_driver.frame import Frame
@@ -78,7 +80,12 @@ class Emcy:
     @property
     def text(self) -> str:
         """Code and meaning for people."""
-        return f"{self.code:04X}h {emcy_text(self.code)}"
+        return self.text_with({})
+
+    def text_with(self, makers: Mapping[int, str]) -> str:
+        """The same, with the maker's own words for its codes, and its bytes where there are any."""
+        details = f", bytes {self.vendor.hex(' ').upper()}" if any(self.vendor) else ""
+        return f"{self.code:04X}h {emcy_text(self.code, makers)}{details}"
 
 
 def parse_emcy(frame: Frame) -> Emcy | None:
@@ -93,8 +100,10 @@ def parse_emcy(frame: Frame) -> Emcy | None:
     return Emcy(node_id, code, register=int.from_bytes(frame.data[2:3], "little"), vendor=frame.data[3:])
 
 
-def emcy_text(code: int) -> str:
-    """Meaning of an error code 0…FFFFh in words; the most specific row of the table wins."""
+def emcy_text(code: int, makers: Mapping[int, str] = MappingProxyType({})) -> str:
+    """Meaning of an error code 0…FFFFh in words: the maker's own, or the most specific row of the table."""
+    if code in makers:
+        return makers[code]
     digits = f"{code:04X}"
     patterns = (digits[:known] + "x" * (4 - known) for known in (4, 3, 2, 1))
     return next((TEXTS[pattern] for pattern in patterns if pattern in TEXTS), "unknown error")

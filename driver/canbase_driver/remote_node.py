@@ -12,12 +12,15 @@ from __future__ import annotations
 import math
 from enum import Enum
 
+from canbase_config.profile import Profile
 from canbase_config.robot import Robot
 from canbase_driver.axis import Axis
+from canbase_driver.boot import BootReport
 from canbase_driver.cia301 import ALL_NODES, NmtCommand, NmtState, nmt, parse_heartbeat
-from canbase_driver.cia402 import PowerGoal, common_controlword, next_controlword
+from canbase_driver.cia402 import DriveState, PowerGoal, common_controlword, next_controlword
 from canbase_driver.emcy import Emcy, parse_emcy
 from canbase_driver.frame import Frame
+from canbase_driver.measures import Measures, Values
 from canbase_driver.node_boot import NodeBoot
 from canbase_driver.pdo import node_layout
 
@@ -27,6 +30,8 @@ HOLD_S = 0.2
 """So long after the last NMT "enter pre-operational" it is left alone; the watchdog repeats it every 0.05 s."""
 RETRY_S = 1.0
 """Between two boots of a node that failed."""
+BUS_LOST = (0x8120, 0x8130, 0x8140)
+"""Emergency codes for a lost bus or heartbeat (CiA 301): error passive, heartbeat or life guarding, bus-off."""
 
 
 class Presence(Enum):
@@ -51,9 +56,11 @@ class RemoteNode:
         self.nmt_state: NmtState | None = None
         self.heartbeat_at = -math.inf
         self.emcy: Emcy | None = None
-        self.stops_by_itself = False
+        self.report: BootReport | None = None
+        """Of the last boot, while the node is there."""
         self.boot_error = ""
-        self.notes: tuple[str, ...] = ()
+        self._measures = Measures(node_id, self._drives, robot.timeouts.sdo_s)
+        self._lost_heartbeat = False
         self._held_until = -math.inf
         self._boot: NodeBoot | None = None
         self._since_s = -math.inf
@@ -63,6 +70,11 @@ class RemoteNode:
     def name(self) -> str:
         """ "node 1 (left_wheel_joint)" """
         return f"node {self.node_id} ({', '.join(drive.joint for drive in self._drives)})"
+
+    @property
+    def profile(self) -> Profile:
+        """What is known of its kind."""
+        return self.layout.profile
 
     @property
     def has_pdos(self) -> bool:
@@ -107,9 +119,22 @@ class RemoteNode:
         for axis in self.axes:
             axis.forget()
         self._why_gone = why
-        self._boot = None
-        self.stops_by_itself = False
+        self._boot = self.report = None
         self._go(Presence.GONE, now)
+
+    def clear_lost_heartbeat(self, now: float) -> None:
+        """Some drives keep a fault for a lost heartbeat or bus until an NMT reset, which a boot brings."""
+        faulty = any(axis.state is DriveState.FAULT for axis in self.axes)
+        if self.profile.heartbeat_fault == "reset_communication" and self._lost_heartbeat and faulty:
+            self.lose("is reset: it is in fault for a lost heartbeat", now)
+
+    def measured(self, axis: Axis, now: float) -> Values:
+        """Voltage, current and temperature of one of its axes."""
+        return self._measures.values(axis.drive.axis, now)
+
+    def emcy_text(self) -> str:
+        """Its last emergency message in words; empty: none."""
+        return self.emcy.text_with(self.profile.emcy) if self.emcy else ""
 
     def setpoints(self, goal: PowerGoal, left_mps: float, right_mps: float) -> list[Frame]:
         """The setpoint of each axis, one step towards `goal`; speeds of the rims, forward positive [m/s]."""
@@ -118,7 +143,7 @@ class RemoteNode:
         return [axis.setpoint(goal, speeds[axis.drive.side], word) for axis, word in zip(self.axes, words, strict=True)]
 
     def _controlwords(self, goal: PowerGoal) -> list[int]:
-        if self.layout.profile.layout.controlword == "own":
+        if self.profile.layout.controlword == "own":
             return [next_controlword(axis.state, goal) for axis in self.axes]
         return [common_controlword([axis.state for axis in self.axes], goal)] * len(self.axes)
 
@@ -157,28 +182,31 @@ class RemoteNode:
         if emcy is None:
             return False
         self.emcy = None if emcy.is_reset else emcy
+        self._lost_heartbeat = not emcy.is_reset and (self._lost_heartbeat or emcy.code in BUS_LOST)
         return True
 
     def on_sdo(self, frame: Frame, now: float) -> bool:
-        """Take an SDO answer; without a boot it is somebody else's (a tool's) and fine."""
+        """Take an SDO answer; one that nobody here waits for is somebody else's (a tool's) and fine."""
         if self._boot is not None:
             self._boot.on_frame(frame, now)
+        elif self.presence is Presence.READY:
+            self._measures.on_frame(frame, now)
         return True
 
     def tick(self, now: float) -> list[Frame]:
-        """Let the boot go on. The frames to send."""
+        """Let the boot go on, or ask for the next measured value. The frames to send."""
         if self.presence is Presence.STARTING:
             self._check_started(now)
         if self._boot is None:
-            return []
+            return self._measures.tick(now) if self.presence is Presence.READY else []
         frames = self._boot.tick(now)
         if self._boot.error is not None:
             self.boot_error = str(self._boot.error)
             self.lose(f"could not be booted: {self.boot_error}", now)
         elif self._boot.report is not None:
             self.boot_error = ""
-            self.stops_by_itself = self._boot.report.stops_by_itself
-            self.notes = self._boot.report.notes
+            self.report = self._boot.report
+            self._lost_heartbeat = False
             self._boot = None
             self.nmt_state = None
             self._go(Presence.STARTING, now)

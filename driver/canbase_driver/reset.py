@@ -22,6 +22,9 @@ DRIVES_TIMEOUT_S = 10.0
 EDGE_S = 0.05
 """How long bit 7 of the controlword stays 0, then 1: some drives sample it in a slow loop, after several PDOs."""
 FAULT_TIMEOUT_S = 1.0
+"""From the edge of bit 7 until the fault has gone."""
+FAULT_TRIES = 3
+"""So many edges, then the reset has failed; a cause that stands is not hammered at."""
 
 
 class Phase(Enum):
@@ -86,6 +89,7 @@ class Reset:
         self.phase = Phase.WATCHDOG
         self._edge_s = max(EDGE_S, FAULT_RESET_CYCLES * cycle_s)
         self._since_s = now
+        self._tries_left = FAULT_TRIES
 
     @property
     def fault_reset_bit(self) -> bool:
@@ -128,7 +132,10 @@ class Reset:
         if not situation.fault:
             return Outcome(True, "reset done; the drives get power once the command is zero")
         if now - self._since_s > FAULT_TIMEOUT_S:
-            return Outcome(False, f"{situation.fault}: it does not clear; remove its cause, then reset again")
+            self._tries_left -= 1
+            if not self._tries_left:
+                return Outcome(False, f"{situation.fault}: it does not clear; remove its cause, then reset again")
+            self._go(Phase.EDGE_LOW, now)
         return None
 
     def _go(self, phase: Phase, now: float) -> None:

@@ -64,7 +64,25 @@ class DriveSnapshot:
     heartbeat_age_s: float
     """Since its last heartbeat [s]; NaN: none yet."""
     stops_by_itself: bool
-    """It watches the watchdog's heartbeat: 1016h was written and read back."""
+    """Something makes it stop when nobody commands it; set and read back."""
+    self_stop: str = ""
+    """What does; empty: nothing."""
+    warning: bool = False
+    """Statusword bit 7."""
+    internal_limit: bool = False
+    """Statusword bit 11; some drives set it from the start."""
+    remote: bool = True
+    """Statusword bit 9; false: it ignores the controlword."""
+    voltage_v: float = math.nan
+    """Of its supply [V]; NaN: not measured."""
+    current_a: float = math.nan
+    """Of the motor [A]; NaN: not measured."""
+    temperature_c: float = math.nan
+    """Of the drive [°C]; NaN: not measured."""
+    boot_notes: tuple[str, ...] = ()
+    """What it lacked or refused in its last boot."""
+    boot_changes: tuple[str, ...] = ()
+    """What its last boot had to change."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

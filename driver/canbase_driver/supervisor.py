@@ -2,7 +2,8 @@
 
 Rules
 1. Nothing gets power while one of BLOCKERS holds: drives booted and heard, watchdog alive and not tripped, standstill,
-   no velocity commanded, no reset under way. The first that holds is the state and the cause.
+   no velocity commanded, no reset under way. The first that holds is the state and the cause. Then the drives are taken
+   as far as ready to switch on, however long that lasts (STO open, no main voltage), and only together any further.
 2. While there is power, the first of HAZARDS that holds stops the base: by the ramp, or by quick stop at once. On the
    way to operation enabled nothing follows a command yet, so there it is always the quick stop.
 3. A stop goes down one way only: ramp, quick stop, power off. Each step ends by measured standstill or by its deadline.
@@ -40,6 +41,7 @@ class Situation:
     absent: str = ""  # a node restarted, or is not in NMT operational
     silent: str = ""  # statusword or heartbeat too old
     disabled: str = ""  # an axis is not in operation enabled
+    unprepared: str = ""  # an axis has not got as far as ready to switch on: STO open, no main voltage
     watchdog: WatchdogView = WatchdogView.OK
     watchdog_detail: str = ""
     commanded: str = ""  # a fresh command asks for motion
@@ -118,6 +120,7 @@ def _stop_requested(s: Situation) -> str:
 
 
 SHUTDOWN = "shutdown"
+NOT_READY = "drive not ready"
 _MISSING, _TRIPPED = _watchdog(WatchdogView.MISSING), _watchdog(WatchdogView.TRIPPED)
 
 BLOCKERS: tuple[Blocker, ...] = (
@@ -163,10 +166,14 @@ class Step(Enum):
     OFF = "power off"
 
 
-ORDERS: dict[DriverState | Step, Orders] = {
+PREPARING = "preparing"
+"""DISARMED, with nothing left that forbids power but drives that are not ready to switch on."""
+
+ORDERS: dict[DriverState | Step | str, Orders] = {
     DriverState.OFFLINE: Orders(PowerGoal.OFF, Drive.ZERO),
     DriverState.BOOTING: Orders(PowerGoal.OFF, Drive.ZERO),
     DriverState.DISARMED: Orders(PowerGoal.OFF, Drive.ZERO),
+    PREPARING: Orders(PowerGoal.READY, Drive.ZERO),
     DriverState.ENABLING: Orders(PowerGoal.ON, Drive.ZERO),
     DriverState.ENABLED: Orders(PowerGoal.ON, Drive.FOLLOW),
     DriverState.LATCHED: Orders(PowerGoal.OFF, Drive.ZERO),
@@ -197,6 +204,8 @@ class Supervisor:
         self._RULES[self.state](self, situation, now)
         if (self.state, self._step) != before:
             self._since_s = now
+        if self.state is DriverState.DISARMED and self.cause.name == NOT_READY:
+            return ORDERS[PREPARING]
         return ORDERS[self._step if self.state is DriverState.STOPPING else self.state]
 
     def reset(self) -> None:
@@ -210,6 +219,9 @@ class Supervisor:
         blocker = _first(BLOCKERS, situation)
         if situation.shutdown_requested:
             self._finish()
+        elif blocker is None and situation.unprepared:
+            self.state = DriverState.DISARMED
+            self.cause = Cause(NOT_READY, situation.unprepared, "the drive being ready to switch on")
         elif blocker is None:
             self.state, self.cause = DriverState.ENABLING, Cause("enabling", "", "operation enabled on all drives")
         else:

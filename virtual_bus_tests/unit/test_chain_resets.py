@@ -7,11 +7,12 @@ import itertools
 import pytest
 
 from canbase_config.derive import watchdog_config
+from canbase_config.robot import Robot
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.snapshot import DriverState
 from canbase_watchdog.watchdog import State as WatchdogState
 from canbase_watchdog.watchdog import Watchdog
-from unit.chain_world import FORWARD, World, setpoints
+from unit.chain_world import FORWARD, World, bench_robot, setpoints
 
 OVERCURRENT = 0x2310
 FAULT_RESET = 0x80
@@ -25,7 +26,7 @@ def world() -> World:
     return world
 
 
-def test_a_fault_is_reset_by_one_edge_alone_once_its_cause_is_gone(world: World) -> None:
+def test_a_fault_is_reset_by_three_edges_at_most_once_its_cause_is_gone(world: World) -> None:
     world.node.fail(0, OVERCURRENT, holds=True)
     world.run(1.0)
     world.command = Twist2D.ZERO
@@ -42,7 +43,7 @@ def test_a_fault_is_reset_by_one_edge_alone_once_its_cause_is_gone(world: World)
     assert left.count(FAULT_RESET) >= 3
     assert FAULT_RESET not in right
     edges = [first for first, second in itertools.pairwise(left) if (first, second) == (0, FAULT_RESET)]
-    assert len(edges) == 1
+    assert len(edges) == 3
     world.node.heal(0)
     world.run(1.0)
     assert world.core.state is DriverState.LATCHED  # that the cause has gone is not enough
@@ -254,3 +255,23 @@ def test_a_trip_that_a_new_driver_found_is_latched_by_it_though_the_watchdog_res
     assert world.core.state is DriverState.LATCHED
     assert [(stop.stopped_by, stop.latched) for stop in world.core.stops] == [("watchdog", True)]
     assert world.recovered()
+
+
+LOST_HEARTBEAT = 0x8130
+
+
+@pytest.mark.parametrize(
+    ("profile", "code", "resets"),
+    [("epos4", LOST_HEARTBEAT, 1), ("epos4", OVERCURRENT, 0), ("generic", LOST_HEARTBEAT, 0)],
+)
+def test_a_lost_heartbeat_needs_an_nmt_reset_where_the_profile_says_so(profile: str, code: int, resets: int) -> None:
+    values = bench_robot().model_dump()
+    values["drives"] = [drive | {"profile": profile, "velocity_unit": "rpm"} for drive in values["drives"]]
+    world = World(Robot.model_validate(values))
+    world.enable()
+    world.node.fail(0, code)
+    world.run(1.0)
+    since = world.now
+    assert world.recovered()
+    reset = bytes.fromhex("82 01")
+    assert [frame.data for at, frame in world.log if at > since and frame.cob_id == 0].count(reset) == resets

@@ -42,7 +42,15 @@ def test_a_healthy_robot_is_ok_in_every_entry() -> None:
 
 
 def test_the_values_are_short_and_have_their_units() -> None:
-    message = diagnostics_message(with_left(feedback_age_s=math.nan, error_code=0x8611), STAMP)
+    left = with_left(
+        feedback_age_s=math.nan,
+        error_code=0x8611,
+        self_stop="heartbeat of the watchdog (1016h, 6007h)",
+        internal_limit=True,
+        voltage_v=48.1,
+        boot_changes=("6085h:0: 0000000Ah → 00000B31h",),
+    )
+    message = diagnostics_message(left, STAMP)
     drive = {pair.key: pair.value for pair in entry(message, "robot: drive left_wheel_joint").values}
     assert drive == {
         "NMT state": "operational",
@@ -54,7 +62,12 @@ def test_the_values_are_short_and_have_their_units() -> None:
         "position [rad]": "123.5",
         "last status TPDO": "never heard",
         "last heartbeat": "heard 0.050 s ago",
-        "stops by itself": "True",
+        "stops by itself": "heartbeat of the watchdog (1016h, 6007h)",
+        "warning (bit 7)": "False",
+        "internal limit (bit 11)": "True",
+        "voltage [V]": "48.1",
+        "lacking or refused": "nothing",
+        "changed by the boot": "6085h:0: 0000000Ah → 00000B31h",
     }
     loop = {pair.key: pair.value for pair in entry(message, "robot: motor_driver").values}
     assert loop["cycles"] == "12345"
@@ -200,3 +213,11 @@ def test_what_a_drive_says(changes: dict[str, Any], level: bytes, sentence: str)
     drive = entry(message, "robot: drive left_wheel_joint")
     assert (drive.level, drive.message) == (level, sentence)
     assert entry(message, "robot: drive right_wheel_joint").level == OK
+
+
+def test_a_warning_of_the_drive_is_no_fault_and_an_internal_limit_not_even_a_warning() -> None:
+    warned = entry(diagnostics_message(with_left(warning=True), STAMP), "robot: drive left_wheel_joint")
+    assert warned.level == WARN
+    assert warned.message == "Operation enabled, but it warns of something (statusword bit 7)."
+    limited = entry(diagnostics_message(with_left(internal_limit=True), STAMP), "robot: drive left_wheel_joint")
+    assert limited.level == OK

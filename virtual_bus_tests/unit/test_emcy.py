@@ -13,8 +13,14 @@ def test_a_whole_message() -> None:
     frame = Frame(0x081, bytes.fromhex("30 81 11 01 02 03 04 05"))
     emcy = parse_emcy(frame)
     assert emcy == Emcy(1, 0x8130, 0x11, bytes.fromhex("01 02 03 04 05"))
-    assert emcy.text == "8130h heartbeat or life guarding lost"
+    assert emcy.text == "8130h heartbeat or life guarding lost, bytes 01 02 03 04 05"
     assert not emcy.is_reset
+
+
+def test_the_makers_own_words_go_first() -> None:
+    emcy = Emcy(1, 0xFF00, 0x80, bytes(5))
+    assert emcy.text == "FF00h device specific"
+    assert emcy.text_with({0xFF00: "motor not tuned"}) == "FF00h motor not tuned"
 
 
 def test_an_error_that_has_gone() -> None:

@@ -94,7 +94,8 @@ def test_a_boot_that_ends_well_starts_the_node_and_waits_for_its_first_feedback(
     assert story.sent[-1] == START
     assert story.sent.count(START) == 1
     assert story.node.has_pdos
-    assert story.node.stops_by_itself
+    assert story.node.report is not None
+    assert story.node.report.stops_by_itself
     assert story.node.waiting_for(story.now).startswith("node 1 (left_wheel): waiting for its first feedback since 0.")
     assert (story.node.absent(), story.node.silent(story.now)) == ("", "")
 
@@ -150,7 +151,7 @@ def test_ready_ends_with_any_other_nmt_state(state: int, why: str) -> None:
     assert story.heartbeat(state)
     assert story.node.presence is GONE
     assert story.node.absent() == f"node 1 (left_wheel) {why}"
-    assert not story.node.stops_by_itself
+    assert story.node.report is None
     assert story.axis.status_at == -math.inf
 
 

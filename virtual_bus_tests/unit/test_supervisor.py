@@ -13,6 +13,7 @@ from canbase_driver.supervisor import (
     HAZARDS,
     NO_POWER,
     ORDERS,
+    PREPARING,
     Drive,
     Orders,
     Situation,
@@ -151,7 +152,7 @@ STOPS = [
 def test_the_tables_of_this_test_name_every_hazard_and_every_blocker() -> None:
     assert [name for name, _, _ in STOPS] == [hazard.name for hazard in HAZARDS]
     assert {name for name, _, _ in BEFORE_POWER} - {"drive restarted"} == {blocker.name for blocker in BLOCKERS}
-    assert set(ORDERS) == (set(DriverState) - {STOPPING}) | set(Step)
+    assert set(ORDERS) == (set(DriverState) - {STOPPING}) | set(Step) | {PREPARING}
 
 
 @pytest.mark.parametrize(("wrong", "first", "latched"), STOPS)
@@ -278,3 +279,23 @@ def test_a_reset_in_any_other_state_is_our_own_mistake_and_changes_nothing(state
     with pytest.raises(RuntimeError, match=f"reset in state {state.name}"):
         story.supervisor.reset()
     assert story.told == before
+
+
+STO_OPEN = Situation(disabled="left is switch on disabled", unprepared="left stays in switch on disabled: STO?")
+
+
+def test_drives_that_are_not_ready_are_waited_for_without_power_and_without_a_latch() -> None:
+    story = at(DISARMED, STO_OPEN)
+    for _ in range(1000):
+        assert story.step(STO_OPEN) == Orders(PowerGoal.READY, Drive.ZERO)
+    assert story.told == (DISARMED, "drive not ready", False)
+    assert story.step(replace(STO_OPEN, unprepared="")) == ON
+    assert story.supervisor.state is ENABLING
+
+
+def test_while_they_are_waited_for_every_blocker_takes_the_power_off() -> None:
+    story = at(DISARMED, STO_OPEN)
+    story.step(STO_OPEN)
+    for name in ("watchdog missing", "command not zero"):
+        assert story.step(also(STO_OPEN, WRONG[name])) == OFF
+        assert story.told == (DISARMED, name, False)
