@@ -73,7 +73,7 @@ class Drives:
     def forget_emcys(self) -> None:
         """After a reset: what the drives told before it is no news any more; some never take it back."""
         for node in self.nodes:
-            node.emcy = None
+            node.forget_emcy()
 
     def losses(self) -> int:
         """How often the travel of some wheel went on from a new reference, since the start."""

@@ -128,6 +128,11 @@ class RemoteNode:
         if self.profile.heartbeat_fault == "reset_communication" and self._lost_heartbeat and faulty:
             self.lose("is reset: it is in fault for a lost heartbeat", now)
 
+    def forget_emcy(self) -> None:
+        """What it told before a reset is no news any more."""
+        self.emcy = None
+        self._lost_heartbeat = False
+
     def measured(self, axis: Axis, now: float) -> Values:
         """Voltage, current and temperature of one of its axes."""
         return self._measures.values(axis.drive.axis, now)
@@ -182,7 +187,7 @@ class RemoteNode:
         if emcy is None:
             return False
         self.emcy = None if emcy.is_reset else emcy
-        self._lost_heartbeat = not emcy.is_reset and (self._lost_heartbeat or emcy.code in BUS_LOST)
+        self._lost_heartbeat |= emcy.code in BUS_LOST  # some take the message back, and stay in fault
         return True
 
     def on_sdo(self, frame: Frame, now: float) -> bool:

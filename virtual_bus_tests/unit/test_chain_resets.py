@@ -269,8 +269,11 @@ def test_a_lost_heartbeat_needs_an_nmt_reset_where_the_profile_says_so(profile: 
     values["drives"] = [drive | {"profile": profile, "velocity_unit": "rpm"} for drive in values["drives"]]
     world = World(Robot.model_validate(values))
     world.enable()
+    world.node.emcy.raise_error(code)
     world.node.fail(0, code)
-    world.run(1.0)
+    world.run(0.5)
+    world.node.emcy.clear_error(code)  # the heartbeat is back, and the fault stays
+    world.run(0.5)
     since = world.now
     assert world.recovered()
     reset = bytes.fromhex("82 01")
