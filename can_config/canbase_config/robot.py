@@ -11,6 +11,7 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from canbase_config.action import Action
+from canbase_config.black_box import BlackBox
 from canbase_config.drive import Drive
 from canbase_config.mux import Mux
 from canbase_config.safety import Safety
@@ -150,6 +151,7 @@ class Robot(Section):
     lease: Lease
     watchdog: Watchdog = Watchdog()
     action: Action = Action()
+    black_box: BlackBox = BlackBox()
 
     @model_validator(mode="after")
     def _drives_fit_together(self) -> Robot:

@@ -198,7 +198,8 @@ class DriverCore:
         was_latched = state is DriverState.LATCHED and before is not DriverState.STOPPING
         if state is not before and (state is DriverState.STOPPING or was_latched):
             by = "watchdog" if cause.name == "watchdog tripped" else "motor_driver"
-            self.stops.append(StopRecord(by, cause.name, cause.detail, self._supervisor.latches, cause.clears_on))
+            latches = self._supervisor.latches
+            self.stops.append(StopRecord(by, cause.name, cause.detail, latches, cause.clears_on, now))
         if state is not before and state is DriverState.ENABLED:
             self._command.await_zero()
         return orders

@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Callable
 
+from canbase_driver.black_box import Ring
 from canbase_driver.bus_port import BusPort
 from canbase_driver.core import DriverCore
 from canbase_driver.frame import Frame
@@ -34,10 +35,11 @@ LAST_WORDS = 3
 class ControlLoop(threading.Thread):
     """Runs a core on a bus. `failure` is the exception that ended it, None for an orderly end."""
 
-    def __init__(self, core: DriverCore, bus: BusPort, control_hz: float, odometry_hz: float) -> None:
+    def __init__(self, core: DriverCore, bus: BusPort, control_hz: float, odometry_hz: float, ring: Ring) -> None:
         super().__init__(name="control", daemon=True)
         self._core = core
         self._bus = bus
+        self._ring = ring
         self._period_s = 1.0 / control_hz
         self._samples_per_snapshot = max(1, round(control_hz / odometry_hz))
         self._inbox: queue.SimpleQueue[Callable[[float], object]] = queue.SimpleQueue()
@@ -128,6 +130,7 @@ class ControlLoop(threading.Thread):
             frame = self._bus.receive(max(0.0, wait_s))
             if frame is not None:
                 now = time.monotonic()
+                self._ring.frame(now, frame.cob_id, frame.data, True)
                 self._send(self._core.on_frame(frame, now))
                 self._hand_over_if_due(now)
             elif wait_s <= 0.0:
@@ -143,8 +146,10 @@ class ControlLoop(threading.Thread):
             request(time.monotonic())
 
     def _send(self, frames: list[Frame]) -> None:
+        now = time.monotonic()
         for frame in frames:
             self._bus.send(frame)
+            self._ring.frame(now, frame.cob_id, frame.data, False)
 
     def _hand_over_if_due(self, now: float) -> None:
         """With each sample of the odometry that is to be published, and at once when the state changes."""

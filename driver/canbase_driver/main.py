@@ -16,10 +16,13 @@ from types import FrameType
 
 import rclpy
 from rclpy.experimental import EventsExecutor
+from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
 from canbase_config.robot import Robot
 from canbase_config.service import Service
+from canbase_driver.black_box import Ring
+from canbase_driver.black_box_writer import BlackBoxWriter
 from canbase_driver.bus_port import BusError, BusPort
 from canbase_driver.core import DriverCore
 from canbase_driver.loop import ControlLoop
@@ -32,6 +35,11 @@ LOOP_TIMEOUT_S = 0.5
 stopped the drives."""
 END_MARGIN_S = 3.0
 """Above the ramp's time: quick stop, power off."""
+WRITE_S = 5.0
+"""For the recording of a stop that is just over."""
+
+Worker = ControlLoop | Publisher | DriverServices | BlackBoxWriter
+"""Each of them has a `failure`, and none may end before the process does."""
 
 
 def run(robot: Robot, ros_args: Sequence[str]) -> int:
@@ -50,10 +58,12 @@ def run(robot: Robot, ros_args: Sequence[str]) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, note)
     rclpy.init(args=list(ros_args), signal_handler_options=SignalHandlerOptions.NO)
-    loop = ControlLoop(DriverCore(robot), bus, robot.rates.control_hz, robot.rates.odometry_hz)
-    node = MotorDriverNode(robot, loop)
+    ring = Ring(robot.black_box.seconds)
+    loop = ControlLoop(DriverCore(robot), bus, robot.rates.control_hz, robot.rates.odometry_hz, ring)
+    writer = BlackBoxWriter(robot.black_box, robot.name, get_logger("motor_driver").warning)
+    node = MotorDriverNode(robot, loop, ring, writer)
     publisher, services = Publisher(node, loop), DriverServices(loop, robot.base.odom_frame)
-    threads = (loop, publisher, services)
+    threads = (loop, publisher, services, writer)
     gc.collect()
     gc.freeze()  # what is there now lives for ever: later collections need not look at it
     for thread in threads:
@@ -63,6 +73,7 @@ def run(robot: Robot, ros_args: Sequence[str]) -> int:
         loop.request_shutdown()
         loop.join(robot.timeouts.standstill_s + END_MARGIN_S)
         publisher.join(1.0)
+        writer.finish(WRITE_S)
     finally:
         rclpy.shutdown()
         services.join(1.0)
@@ -76,7 +87,7 @@ def run(robot: Robot, ros_args: Sequence[str]) -> int:
 def _spin(
     node: MotorDriverNode,
     loop: ControlLoop,
-    threads: tuple[ControlLoop, Publisher, DriverServices],
+    threads: Sequence[Worker],
     received: list[int],
 ) -> BaseException | None:
     """Until a signal or a failure; the failure."""
@@ -100,7 +111,7 @@ def _spin(
     return None
 
 
-def _failure(threads: tuple[ControlLoop, Publisher, DriverServices]) -> BaseException | None:
+def _failure(threads: Sequence[Worker]) -> BaseException | None:
     """Why the process must end: a thread that failed or ended."""
     for thread in threads:
         if thread.failure is not None:

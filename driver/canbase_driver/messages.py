@@ -14,7 +14,8 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 
 from canbase_driver.odometry import Pose2D, wrap_angle
-from canbase_driver.snapshot import DriverSnapshot, DriveSnapshot, StopRecord
+from canbase_driver.snapshot import DriverSnapshot, DriveSnapshot
+from canbase_driver.stops import StopReport
 
 try:
     from tf2_msgs.msg import TFMessage as TFMessage
@@ -102,15 +103,21 @@ def status_message(snapshot: DriverSnapshot, stamp: Time) -> DriverStatus:
     )
 
 
-def stop_event_message(stop: StopRecord, stamp: Time) -> StopEvent:
-    """One stop for the topic stop_events."""
+def stop_event_message(stop: StopReport, stamp: Time, black_box: str) -> StopEvent:
+    """One stop for the topic stop_events. `stamp`: of its cause; `black_box`: path of its recording, empty: none."""
+    record = stop.record
     return StopEvent(
         stamp=stamp,
-        stopped_by=stop.stopped_by,
-        cause=stop.cause,
-        detail=stop.detail,
-        latched=stop.latched,
-        clears_on=stop.clears_on,
+        stopped_by=record.stopped_by,
+        cause=record.cause,
+        detail=record.detail,
+        latched=record.latched,
+        clears_on=record.clears_on,
+        standstill=stop.standstill,
+        standstill_s=stop.standstill_s,
+        distance_m=stop.distance_m,
+        turned_rad=stop.turned_rad,
+        black_box=black_box,
     )
 
 

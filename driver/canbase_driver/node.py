@@ -9,31 +9,33 @@ from __future__ import annotations
 import threading
 import time
 
-from canbase.msg import DriverStatus, SafetyState, StopEvent
+from canbase.msg import DriverStatus, SafetyState
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from canbase_config.robot import Robot
 from canbase_driver import messages
+from canbase_driver.black_box import Ring
+from canbase_driver.black_box_writer import BlackBoxWriter
 from canbase_driver.diagnostics import diagnostics_message
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.loop import ControlLoop
 from canbase_driver.snapshot import DriverSnapshot, StopRecord
+from canbase_driver.stop_teller import StopTeller
 
 COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 STATE_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
-EVENT_QOS = QoSProfile(depth=50, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 DIAGNOSTICS_PERIOD_S = 1.0
 
 
 class MotorDriverNode(Node):
     """Talks ROS for a `ControlLoop`."""
 
-    def __init__(self, robot: Robot, loop: ControlLoop) -> None:
+    def __init__(self, robot: Robot, loop: ControlLoop, ring: Ring, writer: BlackBoxWriter) -> None:
         super().__init__("motor_driver")
         self._robot = robot
         self._loop = loop
@@ -42,9 +44,9 @@ class MotorDriverNode(Node):
         self._joints = self.create_publisher(JointState, "joint_states", 10)
         self._status = self.create_publisher(DriverStatus, "motor_driver/status", STATE_QOS)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._stop_events = self.create_publisher(StopEvent, "stop_events", EVENT_QOS)
         self.create_subscription(TwistStamped, "cmd_vel", self._on_command, COMMAND_QOS)
         self.create_subscription(SafetyState, "safety_filter/state", self._on_safety, COMMAND_QOS)
+        self._stops = StopTeller(self, robot, ring, writer)
         self._previous: DriverSnapshot | None = None
         self._diagnosed: DriverSnapshot | None = None
         self._status_at = 0.0
@@ -56,8 +58,7 @@ class MotorDriverNode(Node):
     def publish(self, snapshot: DriverSnapshot, stops: list[StopRecord]) -> None:
         """Publish a snapshot; called by the publisher's thread alone."""
         stamp = self.get_clock().now().to_msg()
-        for stop in stops:
-            self._stop_events.publish(messages.stop_event_message(stop, stamp))
+        self._stops.tell(snapshot, stops)
         if snapshot.odometry_valid:
             self._odom.publish(messages.odometry_message(snapshot, stamp))
             self._joints.publish(messages.joint_state_message(snapshot, stamp))
@@ -67,15 +68,22 @@ class MotorDriverNode(Node):
         self._log_change(snapshot)
         self._previous = snapshot
 
+    def end(self) -> None:
+        """The control thread has ended: tell the stops that are still open."""
+        self._stops.end()
+
     def _on_command(self, message: TwistStamped) -> None:
         received_at = time.monotonic()
         twist = Twist2D(message.twist.linear.x, message.twist.angular.z)
         if not twist.is_finite:
             self.get_logger().error(f"cmd_vel refused: {twist} is not finite", throttle_duration_sec=1.0)
         self._loop.command(twist, received_at)
+        self._stops.on_command(twist, received_at)
 
     def _on_safety(self, message: SafetyState) -> None:
-        self._loop.emergency(message.emergency, time.monotonic())
+        now = time.monotonic()
+        self._loop.emergency(message.emergency, now)
+        self._stops.on_filter(message, now)
 
     def _publish_status(self, snapshot: DriverSnapshot, stamp: object) -> None:
         previous = self._previous
@@ -119,6 +127,7 @@ class Publisher(threading.Thread):
                 if snapshot is not None:
                     self._node.publish(snapshot, stops)
                 elif not alive:
+                    self._node.end()
                     return
         except BaseException as error:  # noqa: BLE001 - main sees it, stops the robot and ends the process
             self.failure = error

@@ -1,5 +1,5 @@
 """The node safety_filter: ROS and the lease around filter_state.py. cmd_vel_mux, scans and estop_state in; cmd_vel,
-safety_filter/state, stop_events and leases out; the service safety_filter/reset. See docs/ros_api.md.
+safety_filter/state and leases out; the service safety_filter/reset. See docs/ros_api.md.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 
-from canbase.msg import SafetyState, StopEvent
+from canbase.msg import SafetyState
 from geometry_msgs.msg import TwistStamped
 from rclpy.node import Node
 from sensor_msgs.msg import LaserScan
@@ -26,7 +26,7 @@ from canbase_velocity.io import LeaseSender
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.obstacle import braking_time_s
 from canbase_velocity.placement import Placement, PlacementError, Transform, placed_by_tf
-from canbase_velocity.qos import ANY_COMMAND, COMMAND, EVENT, SCAN, STATE, STATIC_TF, listen_twice
+from canbase_velocity.qos import ANY_COMMAND, COMMAND, SCAN, STATE, STATIC_TF, listen_twice
 from canbase_velocity.safety_filter import SHUTDOWN, FilterConfig
 
 STATE_PERIOD_S = 0.1
@@ -52,7 +52,6 @@ class FilterNode(Node):
         self._stands_from_s = -math.inf
         self._commands = self.create_publisher(TwistStamped, "cmd_vel", COMMAND)
         self._states = self.create_publisher(SafetyState, "safety_filter/state", STATE)
-        self._events = self.create_publisher(StopEvent, "stop_events", EVENT)
         self.create_subscription(TwistStamped, "cmd_vel_mux", self._on_command, ANY_COMMAND)
         listen_twice(self, Bool, robot.safety.estop.topic, self._on_estop)
         self._watch_scans(robot.safety.scans)
@@ -133,8 +132,6 @@ class FilterNode(Node):
         self._commands.publish(messages.twist_message(decision.twist, stamp, self._robot.base.base_frame))
         if not decision.twist.is_zero:
             self._stands_from_s = now + braking_time_s(decision.twist, self._robot.limits)
-        if self._filter.begins_stop(decision):
-            self._events.publish(messages.stop_event(decision, self._robot.safety.estop.latched, stamp))
         self._tell(decision, now)
         self._decision = decision
 

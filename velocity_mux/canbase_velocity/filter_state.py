@@ -9,7 +9,7 @@ import numpy as np
 
 from canbase_config.safety import Scan as ScanConfig
 from canbase_velocity.clearance import FREE, Clearances, Field, Points, clearances
-from canbase_velocity.decision import Action, Decision
+from canbase_velocity.decision import Decision
 from canbase_velocity.estop import Estop, EstopEvent, EstopState
 from canbase_velocity.glitch import GlitchFilter
 from canbase_velocity.motion import ExpectedMotion, Pose
@@ -67,7 +67,6 @@ class SafetyFilter:
         longest_s = 2.0 * max(scan.timeout_s for scan in config.safety.scans) + config.safety.reaction_s
         self._motion = ExpectedMotion(config.limits, longest_s)
         self._previous, self._previous_at_s = ZERO, -math.inf
-        self._stopped = True
 
     @property
     def estop(self) -> EstopState:
@@ -142,12 +141,6 @@ class SafetyFilter:
         """This was ordered, whoever decided it."""
         self._motion.order(twist, now)
         self._previous, self._previous_at_s = twist, now
-
-    def begins_stop(self, decision: Decision) -> bool:
-        """Whether `decision`, the newest, is the beginning of a stop that a command to move ran into."""
-        begins = decision.action is Action.STOP and not self._stopped and not self._command.is_zero
-        self._stopped = decision.action is Action.STOP
-        return begins
 
     def _fresh(self, now: float) -> list[_Scanner]:
         return [scanner for scanner in self._scanners.values() if scanner.state(now).is_fresh]

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from builtin_interfaces.msg import Time
-from canbase.msg import SafetyState, StopEvent
+from canbase.msg import SafetyState
 from geometry_msgs.msg import Twist as TwistMessage
 from geometry_msgs.msg import TwistStamped
 from sensor_msgs.msg import LaserScan
@@ -90,12 +89,6 @@ def oldest_scan_s(scans: tuple[ScanState, ...]) -> float | None:
     counting = [scan.age_s for scan in scans if scan.required] or [scan.age_s for scan in scans]
     known = [age_s for age_s in counting if age_s is not None]
     return max(known) if len(known) == len(counting) else None
-
-
-def stop_event(decision: Decision, latches: bool, stamp: Time) -> StopEvent:
-    """One message on stop_events. `latches`: the emergency stop needs a reset; all other stops clear by themselves."""
-    values: dict[str, Any] = {"cause": decision.cause.value, "detail": decision.detail, "clears_on": decision.clears_on}
-    return StopEvent(stamp=stamp, stopped_by="safety_filter", latched=latches and stopped_by_estop(decision), **values)
 
 
 def stopped_by_estop(decision: Decision) -> bool:

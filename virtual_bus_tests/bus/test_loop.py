@@ -18,6 +18,7 @@ from canbase_bench.world.bench import Bench, Truth
 from canbase_config.derive import watchdog_config
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
+from canbase_driver.black_box import Ring
 from canbase_driver.bus_port import BusPort
 from canbase_driver.core import DriverCore
 from canbase_driver.frame import Frame
@@ -102,7 +103,8 @@ class Driver:
     def __init__(self, robot: Robot, arguments: dict[str, Any], around: Surroundings) -> None:
         self.core = DriverCore(robot)
         self.bus = BusPort(arguments)
-        self.loop = ControlLoop(self.core, self.bus, robot.rates.control_hz, robot.rates.odometry_hz)
+        self.ring = Ring(10.0)
+        self.loop = ControlLoop(self.core, self.bus, robot.rates.control_hz, robot.rates.odometry_hz, self.ring)
         self.around = around
         self.seen: DriverSnapshot | None = None
         self.stops: list[StopRecord] = []
@@ -267,7 +269,7 @@ class SlowCore(DriverCore):
 
 def run_for(core: DriverCore, robot: Robot, arguments: dict[str, Any], seconds: float, frames: int = 0) -> None:
     """Run the loop; after 0.1 s so many frames arrive at once."""
-    loop = ControlLoop(core, BusPort(arguments), robot.rates.control_hz, robot.rates.odometry_hz)
+    loop = ControlLoop(core, BusPort(arguments), robot.rates.control_hz, robot.rates.odometry_hz, Ring(10.0))
     with VirtualBus(arguments["channel"]) as other:
         loop.start()
         time.sleep(0.1)

@@ -23,10 +23,12 @@ _starts = itertools.count(os.getpid())
 
 
 @pytest.fixture(scope="session", autouse=True)
-def this_machine_alone() -> Iterator[None]:
-    """No test talks to another machine, whatever its domain."""
+def this_machine_alone(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """No test talks to another machine, whatever its domain, and none leaves black boxes behind."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+        patch.delenv("STATE_DIRECTORY", raising=False)
         yield
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from canbase_config.effective import effective
 from canbase_config.load import Loaded, leaf_keys, load_robot
-from canbase_config.robot import Robot
+from canbase_config.robot import CYCLES_PER_TIMEOUT, Robot
 
 Values = dict[str, Any]
 
@@ -86,6 +86,12 @@ def made_consistent(values: Values) -> Values:
     for what in ("distance_m", "speed_mps", "angle_rad", "speed_radps"):
         action.pop(f"max_{what}", None)
         action[f"min_{what}"] = min(action.get(f"min_{what}", 0.01), 0.4)
+    least_s = CYCLES_PER_TIMEOUT / values.get("rates", {}).get("control_hz", 100.0)
+    timeouts = values.setdefault("timeouts", {})
+    for key in ("feedback_s", "drive_heartbeat_s"):
+        timeouts[key] = max(timeouts.get(key, 0.1), least_s)
+    for extra in ("interface", "channel", "bitrate"):
+        values["bus"].get("extra", {}).pop(extra, None)
     make_mux_consistent(values.get("mux", {}))
     return values
 

@@ -13,10 +13,12 @@ from canbase_driver import messages
 from canbase_driver.diagnostics import diagnostics_message
 from canbase_driver.odometry import Odometry
 from canbase_driver.snapshot import DriverState, StopRecord, WatchdogView
+from canbase_driver.stops import StopReport
 from unit.snapshots import LEFT, RIGHT, SNAPSHOT, with_driver, with_left
 
 STAMP = Time(sec=1_700_000_000, nanosec=250_000_000)
-STOP = StopRecord(stopped_by="watchdog", cause="watchdog tripped", detail="overspeed", latched=True, clears_on="reset")
+RECORD = StopRecord("watchdog", "watchdog tripped", "overspeed", latched=True, clears_on="reset", at_s=999.0)
+STOP = StopReport(RECORD, standstill=True, standstill_s=0.31, distance_m=0.05, turned_rad=-0.01)
 
 
 # odom and tf
@@ -167,9 +169,11 @@ def test_counters_go_round_like_their_type_after_497_days(count: int, sent: int)
 
 
 def test_a_stop_is_told_with_its_cause_and_what_ends_it() -> None:
-    message = messages.stop_event_message(STOP, STAMP)
+    message = messages.stop_event_message(STOP, STAMP, "/state/stop.asc")
     assert message.stamp == STAMP
-    assert {name: getattr(message, name) for name in dataclasses.asdict(STOP)} == dataclasses.asdict(STOP)
+    told = dataclasses.asdict(RECORD) | dataclasses.asdict(STOP) | {"black_box": "/state/stop.asc"}
+    names = set(message.get_fields_and_field_types()) - {"stamp"}
+    assert {name: getattr(message, name) for name in names} == {name: told[name] for name in names}
 
 
 # All of them
@@ -181,7 +185,7 @@ def test_every_message_survives_the_wire() -> None:
         messages.transform_message(SNAPSHOT, STAMP),
         messages.joint_state_message(SNAPSHOT, STAMP),
         messages.status_message(SNAPSHOT, STAMP),
-        messages.stop_event_message(STOP, STAMP),
+        messages.stop_event_message(STOP, STAMP, "/state/stop.asc"),
         diagnostics_message(SNAPSHOT, STAMP),
     ):
         assert deserialize_message(serialize_message(message), type(message)) == message

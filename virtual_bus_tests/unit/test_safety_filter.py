@@ -464,25 +464,6 @@ def test_without_an_emergency_stop_nothing_waits_for_a_zero_command() -> None:
     assert safety.decide(0.0).twist == Twist(0.5, 0.0)
 
 
-def test_a_filter_that_starts_stopped_begins_no_stop() -> None:
-    safety = SafetyFilter(config())
-    safety.on_command(Twist(0.5, 0.0), 0.0)
-    assert safety.begins_stop(safety.decide(0.0)) is False
-
-
-def test_a_stop_begins_once_and_only_for_a_command_to_move() -> None:
-    drive = Twist(0.5, 0.0)
-    safety = fed(0.0, ZERO)
-    begins = [safety.begins_stop(safety.decide(0.0))]
-    fed(0.1, drive, the_filter=safety)
-    begins.append(safety.begins_stop(safety.decide(0.1)))
-    see(safety, 0.15, (0.4, 0.0))
-    begins += [safety.begins_stop(safety.decide(0.15)), safety.begins_stop(safety.decide(0.16))]
-    fed(0.2, ZERO, the_filter=safety)
-    begins += [safety.begins_stop(safety.decide(0.2)), safety.begins_stop(safety.decide(0.45))]
-    assert begins == [False, False, True, False, False, False]
-
-
 def latched(now: float, twist: Twist) -> SafetyFilter:
     """A filter whose emergency stop needs a reset; it was heard released, and `twist` is ordered."""
     safety = fed(now, ZERO, the_filter=SafetyFilter(config(latched=True)))

@@ -1,0 +1,93 @@
+"""The last seconds of CAN frames and commands in memory, and as a text of Vector's ASC format. No files, no threads.
+
+python-can, SavvyCAN, CANalyzer and others read ASC; what is no frame (commands, states) stands between them as comment
+lines, which readers pass over and people can read.
+"""
+
+from __future__ import annotations
+
+import io
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import can
+
+MAX_FRAMES = 80_000
+"""A full bus of 1 Mbit/s for ten seconds; about 15 MB in memory, 6 MB in a file."""
+MAX_NOTES = 10_000
+
+FrameEntry = tuple[float, int, bytes, bool]
+"""Local monotonic time [s], COB-ID, data, received. A plain tuple: the garbage collector need not look at it."""
+NoteEntry = tuple[float, str]
+"""Local monotonic time [s] and one line of text."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """What was in the ring. `wall_offset_s` on top of a monotonic time is the time since 1970 [s]."""
+
+    frames: tuple[FrameEntry, ...]
+    notes: tuple[NoteEntry, ...]
+    wall_offset_s: float
+
+
+class Ring:
+    """Keeps the newest entries. Any thread may add: appending to a deque is atomic in CPython, and so is copying it."""
+
+    def __init__(self, seconds: float) -> None:
+        """`seconds`: how far a recording goes back."""
+        self._seconds = seconds
+        self._frames: deque[FrameEntry] = deque(maxlen=MAX_FRAMES)
+        self._notes: deque[NoteEntry] = deque(maxlen=MAX_NOTES)
+
+    def frame(self, now: float, cob_id: int, data: bytes, received: bool) -> None:
+        """A frame was received, or given to the bus."""
+        self._frames.append((now, cob_id, data, received))
+
+    def note(self, now: float, text: str) -> None:
+        """Something else happened."""
+        self._notes.append((now, text))
+
+    def cut(self, now: float, wall_offset_s: float) -> Recording:
+        """What happened in the last seconds before `now`."""
+        since = now - self._seconds
+        frames, notes = self._frames.copy(), self._notes.copy()
+        return Recording(
+            tuple(entry for entry in frames if entry[0] >= since),
+            tuple(entry for entry in notes if entry[0] >= since),
+            wall_offset_s,
+        )
+
+
+def asc_lines(recording: Recording, title: str) -> Iterator[str]:
+    """The recording as an ASC file, piece by piece in the order of time; `title` is its first comment."""
+    text = io.StringIO()
+    writer = can.ASCWriter(text)
+    firsts = [frame[0] for frame in recording.frames[:1]] + [note[0] for note in recording.notes[:1]]
+    start = min(firsts, default=0.0)
+    writer.log_event(f"// {title}", start + recording.wall_offset_s)
+    notes = deque(recording.notes)
+    for at, cob_id, data, received in recording.frames:
+        while notes and notes[0][0] <= at:
+            _write_note(text, *notes.popleft(), start)
+        writer.on_message_received(
+            can.Message(at + recording.wall_offset_s, cob_id, is_extended_id=False, data=data, is_rx=received)
+        )
+        yield _taken(text)
+    for note in notes:
+        _write_note(text, *note, start)
+    text.write("End TriggerBlock\n")
+    yield _taken(text)
+
+
+def _write_note(text: io.StringIO, at: float, line: str, start: float) -> None:
+    text.write(f"// {at - start:.6f} {line}\n")
+
+
+def _taken(text: io.StringIO) -> str:
+    """What was written since the last call."""
+    piece = text.getvalue()
+    text.seek(0)
+    text.truncate()
+    return piece

@@ -1,0 +1,135 @@
+"""Records stops from their cause to standstill, for the topic stop_events: how long each took, and how far it went.
+
+A stop is opened by the driver's core (`StopRecord`), by the safety filter or the velocity mux when they begin to hold a
+base that moves, or by a command that ends while it moves. It is told once the base stands, when it was let go before,
+or after `patience_s`. Pure: fed with snapshots and with what the other nodes say; times are local monotonic seconds.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from canbase_driver.snapshot import DriverSnapshot, DriverState, StopRecord
+
+ORDER_AGE_S = 0.1
+"""A source that ordered motion so short before its end was lost; one that ordered zero had ended by itself."""
+FILTER, MUX, DRIVER = "safety_filter", "velocity_mux", "motor_driver"
+STALE, NO_SOURCE = "command_stale", "no_source"
+
+
+@dataclass(frozen=True, slots=True)
+class StopReport:
+    """A stop that is over. NaN: not measured; `distance_m` is the length of the way, `turned_rad` counter-clockwise."""
+
+    record: StopRecord
+    standstill: bool
+    standstill_s: float
+    distance_m: float
+    turned_rad: float
+
+
+@dataclass(slots=True)
+class _OpenStop:
+    """A stop on its way. `let_go`: what held the base holds it no longer."""
+
+    record: StopRecord
+    stood: bool
+    measured: bool = True
+    distance_m: float = 0.0
+    turned_rad: float = 0.0
+    let_go: bool = field(default=False)
+
+    def add(self, before: DriverSnapshot, now: DriverSnapshot) -> None:
+        """The way between two snapshots."""
+        self.measured = self.measured and now.odometry_valid
+        self.distance_m += math.hypot(now.x_m - before.x_m, now.y_m - before.y_m)
+        self.turned_rad += now.yaw_rad - before.yaw_rad
+
+    def report(self, snapshot: DriverSnapshot) -> StopReport:
+        """As it is now."""
+        stands = snapshot.standstill
+        took_s = 0.0 if self.stood else max(0.0, snapshot.time_s - self.record.at_s)
+        distance_m, turned_rad = (self.distance_m, self.turned_rad) if self.measured else (math.nan, math.nan)
+        return StopReport(self.record, stands, took_s if stands else math.nan, distance_m, turned_rad)
+
+
+class StopRecorder:
+    """All stops that are not told yet."""
+
+    def __init__(self, patience_s: float) -> None:
+        """`patience_s`: after so long without a standstill the stop is told all the same [s]."""
+        self._patience_s = patience_s
+        self._previous: DriverSnapshot | None = None
+        self._open: list[_OpenStop] = []
+        self._moved_at = -math.inf
+        self._filter_stops = self._mux_idle = False
+
+    def on_command(self, moves: bool, now: float) -> None:
+        """A velocity command came; `moves`: it is not zero."""
+        if moves:
+            self._moved_at = now
+
+    def on_filter(self, stop: StopRecord | None, now: float) -> None:
+        """The safety filter said whether it holds the base, and why; None: it does not."""
+        if stop is None:
+            self._let_go(FILTER, "")
+        elif not self._filter_stops and (self._is_moving or self._ordered_motion(now)):
+            self._begin(stop)
+        self._filter_stops = stop is not None
+
+    def on_mux(self, active: str, detail: str, now: float) -> None:
+        """The mux said which source drives, empty: none; `detail`: why the last one does not."""
+        idle = not active
+        if idle and not self._mux_idle and self._is_moving and self._ordered_motion(now):
+            self._begin(StopRecord(MUX, NO_SOURCE, detail, False, "a source that sends", now))
+        if not idle:
+            self._let_go(MUX, "")
+        self._mux_idle = idle
+
+    def on_snapshot(self, snapshot: DriverSnapshot, stops: list[StopRecord]) -> list[StopReport]:
+        """Take what the driver knows now, and the stops that it began since the last call. What is over."""
+        before = self._previous or snapshot
+        for record in stops:
+            self._begin(record)
+        self._look_for_stale(before, snapshot)
+        for stop in self._open:
+            stop.add(before, snapshot)
+        self._previous = snapshot
+        over = [stop for stop in self._open if self._is_over(stop, snapshot)]
+        self._open = [stop for stop in self._open if stop not in over]
+        return [stop.report(snapshot) for stop in over]
+
+    def end(self) -> list[StopReport]:
+        """The driver ends: what is still open."""
+        last, rest, self._open = self._previous, self._open, []
+        return [stop.report(last) for stop in rest] if last is not None else []
+
+    def _look_for_stale(self, before: DriverSnapshot, snapshot: DriverSnapshot) -> None:
+        ended = before.command_fresh and not snapshot.command_fresh
+        at_s = snapshot.time_s - snapshot.command_age_s
+        moved = self._moved_at >= at_s - ORDER_AGE_S
+        if ended and moved and self._is_moving and snapshot.state is DriverState.ENABLED:
+            detail = f"cmd_vel is silent for {snapshot.command_age_s:.2f} s"
+            self._begin(StopRecord(DRIVER, STALE, detail, False, "a fresh command", snapshot.time_s))
+        if snapshot.command_fresh:
+            self._let_go(DRIVER, STALE)
+
+    @property
+    def _is_moving(self) -> bool:
+        return self._previous is not None and not self._previous.standstill
+
+    def _ordered_motion(self, now: float) -> bool:
+        return now - self._moved_at <= ORDER_AGE_S
+
+    def _begin(self, record: StopRecord) -> None:
+        self._open.append(_OpenStop(record, stood=not self._is_moving))
+
+    def _let_go(self, stopped_by: str, cause: str) -> None:
+        for stop in self._open:
+            same = stop.record.stopped_by == stopped_by and cause in ("", stop.record.cause)
+            stop.let_go = stop.let_go or (same and not stop.record.latched)
+
+    def _is_over(self, stop: _OpenStop, snapshot: DriverSnapshot) -> bool:
+        late = snapshot.time_s - stop.record.at_s > self._patience_s
+        return snapshot.standstill or stop.let_go or late

@@ -1,0 +1,80 @@
+"""stop_events and the black box over DDS: what is told of a stop is what really happened, and its file can be read."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import can
+import pytest
+from canbase.msg import StopEvent
+
+from canbase_driver.black_box import MAX_FRAMES
+from ros.running_robot import RunningRobot, own_domain, robot_on
+
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
+
+WRITTEN_S = 20.0
+SETPOINT, WATCHDOG_STATE, STATUS = 0x201, 0x1FE, 0x181
+
+
+@pytest.fixture(scope="module")
+def robot() -> Iterator[RunningRobot]:
+    with own_domain() as domain, robot_on(domain) as running:
+        yield running
+
+
+def event_since(robot: RunningRobot, since_s: float, by: str) -> StopEvent:
+    """The first stop by that node."""
+
+    def found() -> StopEvent | None:
+        return next((each for each in robot.stop_events.since(since_s) if each.stopped_by == by), None)
+
+    event = robot.node.wait_for(found, 15.0, f"a stop by {by}")
+    assert event is not None
+    return event
+
+
+def at_speed(robot: RunningRobot) -> float:
+    """A goal has the robot at 0.3 m/s; the time now."""
+    robot.make_ready()
+    robot.goal(4.0, 0.3)
+    robot.wait_speed(0.28)
+    return time.monotonic()
+
+
+def test_a_latched_stop_has_its_time_its_way_and_a_file_that_python_can_reads(robot: RunningRobot) -> None:
+    began_s = at_speed(robot)
+    assert robot.run("stop") == 0
+    event = event_since(robot, began_s, "motor_driver")
+    robot.wait_standing()
+    age_s = robot.node.node.get_clock().now().nanoseconds * 1e-9 - (event.stamp.sec + event.stamp.nanosec * 1e-9)
+    cause_s = time.monotonic() - age_s
+    truth = robot.standstill_after(cause_s)
+    assert (event.cause, event.latched, event.standstill) == ("stop requested", True, True)
+    assert event.standstill_s == pytest.approx(truth.after_s, abs=0.1)
+    assert event.distance_m == pytest.approx(truth.way_m, abs=0.02)
+    assert abs(event.turned_rad) < 0.05
+
+    file = Path(event.black_box)
+    robot.node.wait_for(file.exists, WRITTEN_S, event.black_box)
+    with can.LogReader(file) as reader:
+        frames = list(reader)
+    assert 300 < len(frames) <= MAX_FRAMES
+    assert {SETPOINT, WATCHDOG_STATE, STATUS} <= {frame.arbitration_id for frame in frames}
+    assert 2.0 < frames[-1].timestamp - frames[0].timestamp <= 10.0
+    comments = [line for line in file.read_text(encoding="utf-8").splitlines() if line.startswith("//")]
+    for what in ("cmd_vel 0.3", "motor_driver STOPPING: stop requested", "safety_filter ", "velocity_mux action"):
+        assert [line for line in comments if what in line], what
+
+
+def test_a_source_that_hangs_is_a_stop_that_is_not_latched(robot: RunningRobot) -> None:
+    began_s = at_speed(robot)
+    robot.send("action-server", signal.SIGSTOP)
+    event = event_since(robot, began_s, "velocity_mux")
+    robot.send("action-server", signal.SIGCONT)
+    assert (event.cause, event.latched, event.standstill, event.black_box) == ("no_source", False, True, "")
+    assert "action: silent for" in event.detail
+    assert 0.05 < event.standstill_s < 2.0
