@@ -103,6 +103,7 @@ class MotorDriverNode(Node):
         detail = f" ({snapshot.detail})" if snapshot.detail else ""
         clears = f"; ends on: {snapshot.clears_on}" if snapshot.clears_on else ""
         text = self.state_text = f"{snapshot.state.name}{why}{detail}{clears}"
+        self._stops.note(text)
         if snapshot.cause in ("none", "booting", "enabling", "shutdown"):
             self.get_logger().info(text)
         else:
