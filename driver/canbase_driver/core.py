@@ -89,6 +89,11 @@ class DriverCore:
         """Stops since they were last taken out, oldest first."""
 
     @property
+    def boot_s(self) -> float:
+        """How long drives may take to boot [s] (timeouts.boot_s)."""
+        return self._robot.timeouts.boot_s
+
+    @property
     def finished(self) -> bool:
         """A shutdown was asked for, and nothing has power any more."""
         return self._supervisor.finished
@@ -149,7 +154,9 @@ class DriverCore:
         if refused is None:
             for node in self._drives.nodes:
                 node.clear_lost_heartbeat(now)
-            self._reset = _ResetCall(Reset(now, self._period_s), self._watchdog.request_reset(), on_outcome)
+            self._reset = _ResetCall(
+                Reset(now, self._period_s, self.boot_s), self._watchdog.request_reset(), on_outcome
+            )
         else:
             on_outcome(Outcome(False, refused))
 
@@ -251,6 +258,7 @@ class DriverCore:
         return Situation(
             bus=self._bus_problem,
             booting=self._drives.booting(now),
+            missing=self._drives.missing(now),
             fault=self._drives.fault(),
             absent=self._drives.absent(),
             silent=self._drives.silent(now),

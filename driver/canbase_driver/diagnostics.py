@@ -60,7 +60,8 @@ def _loop_entry(snapshot: DriverSnapshot, previous: DriverSnapshot, robot: str) 
 def _driver_state(snapshot: DriverSnapshot) -> tuple[bytes, str]:
     if snapshot.state is DriverState.ENABLED:
         return DiagnosticStatus.OK, "All drives are enabled."
-    level = DiagnosticStatus.WARN if snapshot.state in _TRANSIENT else DiagnosticStatus.ERROR
+    passing = snapshot.state in _TRANSIENT and snapshot.cause != "drive missing"
+    level = DiagnosticStatus.WARN if passing else DiagnosticStatus.ERROR
     detail = f": {snapshot.detail.rstrip('.')}" if snapshot.detail else ""
     clears = f" It ends with: {snapshot.clears_on}." if snapshot.clears_on else ""
     return level, f"{snapshot.state.name.capitalize()} ({snapshot.cause}){detail}.{clears}"

@@ -33,6 +33,10 @@ class Drives:
         """What a node that is being booted or started is waiting for."""
         return _first(node.waiting_for(now) for node in self.nodes)
 
+    def missing(self, now: float) -> str:
+        """Which node could not be booted for timeouts.boot_s, and why."""
+        return _first(node.missing(now) for node in self.nodes)
+
     def absent(self) -> str:
         """Why a node must be booted again."""
         return _first(node.absent() for node in self.nodes)

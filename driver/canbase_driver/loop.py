@@ -23,8 +23,8 @@ from canbase_driver.odometry import Pose2D
 from canbase_driver.reset import Outcome
 from canbase_driver.snapshot import DriverSnapshot, StopRecord
 
-RESET_TIMEOUT_S = 15.0
-"""Longer than a reset can take, with drives that boot."""
+RESET_TIMEOUT_S = 5.0
+"""On top of what drives may take to boot: longer than a reset can take."""
 POLL_S = 0.1
 FRAMES_WHEN_LATE = 100
 """So many waiting frames are taken in before a cycle that is already late: more than a bus brings in one cycle."""
@@ -40,6 +40,7 @@ class ControlLoop(threading.Thread):
         self._core = core
         self._bus = bus
         self._ring = ring
+        self._reset_timeout_s = core.boot_s + RESET_TIMEOUT_S
         self._period_s = 1.0 / control_hz
         self._samples_per_snapshot = max(1, round(control_hz / odometry_hz))
         self._inbox: queue.SimpleQueue[Callable[[float], object]] = queue.SimpleQueue()
@@ -79,7 +80,7 @@ class ControlLoop(threading.Thread):
     def _ask(self, request: Callable[[float, Callable[[Outcome], None]], None]) -> Outcome:
         outcomes: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
         self._inbox.put(lambda now: request(now, outcomes.put))
-        deadline = time.monotonic() + RESET_TIMEOUT_S
+        deadline = time.monotonic() + self._reset_timeout_s
         while time.monotonic() < deadline:
             alive = self.is_alive()
             try:
@@ -87,7 +88,7 @@ class ControlLoop(threading.Thread):
             except queue.Empty:
                 if not alive:
                     return Outcome(False, "refused: the control loop has ended")
-        return Outcome(False, f"the control loop did not answer within {RESET_TIMEOUT_S:.0f} s")
+        return Outcome(False, f"the control loop did not answer within {self._reset_timeout_s:.0f} s")
 
     def next_snapshot(self, timeout_s: float) -> tuple[DriverSnapshot | None, list[StopRecord]]:
         """Wait for a new snapshot; (None, []) when none came. Stops since the last call come with it."""

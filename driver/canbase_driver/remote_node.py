@@ -62,6 +62,8 @@ class RemoteNode:
         self._measures = Measures(node_id, self._drives, robot.timeouts.sdo_s)
         self._lost_heartbeat = False
         self._held_until = -math.inf
+        self._ready_at = math.inf
+        """When it was ready last; before that, when it was looked at first. Infinity until then."""
         self._boot: NodeBoot | None = None
         self._since_s = -math.inf
         self._why_gone = "not booted yet"
@@ -88,6 +90,13 @@ class RemoteNode:
         if self.presence is Presence.STARTING:
             return f"{self.name}: waiting for its first feedback since {now - self._since_s:.1f} s"
         return ""
+
+    def missing(self, now: float) -> str:
+        """Why it is not ready though it had timeouts.boot_s for it; empty when it is, or has time left."""
+        if self.presence is Presence.READY or now - self._ready_at <= self._robot.timeouts.boot_s:
+            return ""
+        why = self.boot_error or self._why_gone
+        return f"{self.name} is missing since {now - self._ready_at:.0f} s: {why}; check its power and its cable"
 
     def absent(self) -> str:
         """Why it is gone; empty when it is not."""
@@ -200,6 +209,8 @@ class RemoteNode:
 
     def tick(self, now: float) -> list[Frame]:
         """Let the boot go on, or ask for the next measured value. The frames to send."""
+        if self.presence is Presence.READY or self._ready_at == math.inf:
+            self._ready_at = now
         if self.presence is Presence.STARTING:
             self._check_started(now)
         if self._boot is None:

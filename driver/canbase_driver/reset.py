@@ -18,7 +18,6 @@ from canbase_driver.supervisor import Situation
 from canbase_driver.watchdog_link import ACCEPTED, ANSWERS
 
 WATCHDOG_TIMEOUT_S = 0.5
-DRIVES_TIMEOUT_S = 10.0
 EDGE_S = 0.05
 """How long bit 7 of the controlword stays 0, then 1: some drives sample it in a slow loop, after several PDOs."""
 FAULT_TIMEOUT_S = 1.0
@@ -84,8 +83,12 @@ def refusal(situation: Situation, stopped: bool) -> str | None:
 class Reset:
     """The sequence, stepped once a cycle until it has an outcome."""
 
-    def __init__(self, now: float, cycle_s: float) -> None:
-        """`cycle_s`: period of the setpoints; each level of the fault reset bit lasts FAULT_RESET_CYCLES at least."""
+    def __init__(self, now: float, cycle_s: float, boot_s: float) -> None:
+        """`cycle_s`: period of the setpoints; each level of the fault reset bit lasts FAULT_RESET_CYCLES at least.
+
+        `boot_s`: how long it waits for drives that boot [s] (timeouts.boot_s).
+        """
+        self._boot_s = boot_s
         self.phase = Phase.WATCHDOG
         self._edge_s = max(EDGE_S, FAULT_RESET_CYCLES * cycle_s)
         self._since_s = now
@@ -119,7 +122,7 @@ class Reset:
     def _drives(self, situation: Situation, _answer: int | None, now: float) -> Outcome | None:
         if not situation.unready:
             self._go(Phase.EDGE_LOW if situation.fault else Phase.FAULTS, now)
-        elif now - self._since_s > DRIVES_TIMEOUT_S:
+        elif now - self._since_s > self._boot_s:
             return Outcome(False, f"{situation.unready}; check its power and its cable, then reset again")
         return None
 

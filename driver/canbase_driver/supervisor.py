@@ -37,6 +37,7 @@ class Situation:
 
     bus: str = ""  # the bus failed
     booting: str = ""  # what is still waited for
+    missing: str = ""  # a drive that could not be booted for timeouts.boot_s
     fault: str = ""  # a drive is in fault or fault reaction
     absent: str = ""  # a node restarted, or is not in NMT operational
     silent: str = ""  # statusword or heartbeat too old
@@ -127,6 +128,7 @@ BLOCKERS: tuple[Blocker, ...] = (
     Blocker("stop requested", _stop_requested, DriverState.LATCHED, "reset"),
     Blocker("bus failed", lambda s: s.bus, DriverState.OFFLINE, "the bus working"),
     Blocker("watchdog tripped", _TRIPPED, DriverState.LATCHED, "reset"),
+    Blocker("drive missing", lambda s: s.missing, DriverState.BOOTING, "the drive answering"),
     Blocker("booting", lambda s: s.booting or s.absent, DriverState.BOOTING, "drives booted"),
     Blocker("drive fault", lambda s: s.fault, DriverState.LATCHED, "reset, with the drive's cause gone"),
     Blocker("drive silent", lambda s: s.silent, DriverState.DISARMED, "the drive answering"),

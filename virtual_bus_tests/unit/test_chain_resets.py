@@ -278,3 +278,15 @@ def test_a_lost_heartbeat_needs_an_nmt_reset_where_the_profile_says_so(profile: 
     assert world.recovered()
     reset = bytes.fromhex("82 01")
     assert [frame.data for at, frame in world.log if at > since and frame.cob_id == 0].count(reset) == resets
+
+
+def test_a_drive_that_is_missing_at_the_start_is_an_error_after_boot_s_and_welcome_when_it_comes() -> None:
+    world = World()
+    world.bench.nodes[2].cut = True
+    world.run(9.9)
+    assert (world.core.state, world.core.cause.name) == (DriverState.BOOTING, "booting")
+    world.run(0.2)
+    assert (world.core.state, world.core.cause.name) == (DriverState.BOOTING, "drive missing")
+    assert world.core.cause.detail.startswith("node 2 (right_wheel) is missing since 10 s: ")
+    world.bench.nodes[2].cut = False
+    world.run_until(DriverState.ENABLED, within_s=5.0)

@@ -93,6 +93,11 @@ def test_the_level_of_the_driver_follows_its_state(state: DriverState, level: by
     assert entry(message, "robot: motor_driver").level == level
 
 
+def test_a_drive_that_is_missing_is_an_error() -> None:
+    message = diagnostics_message(with_driver(state=DriverState.BOOTING, cause="drive missing"), STAMP)
+    assert entry(message, "robot: motor_driver").level == ERROR
+
+
 @pytest.mark.parametrize(
     ("detail", "clears_on", "sentence"),
     [

@@ -23,7 +23,7 @@ class Story:
     def __init__(self, cycle_s: float = 0.01) -> None:
         self.cycle_s = cycle_s
         self.now = 10.0
-        self.reset = Reset(self.now, cycle_s)
+        self.reset = Reset(self.now, cycle_s, boot_s=10.0)
         self.phases: list[tuple[float, Phase]] = []
 
     def run(self, situation: Situation, seconds: float, answer: int | None = NOT_TRIPPED) -> Outcome | None:

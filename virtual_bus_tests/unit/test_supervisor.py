@@ -38,6 +38,7 @@ WRONG: dict[str, Situation] = {
     "drive restarted": Situation(absent="node 1 restarted"),
     "booting": Situation(booting="waiting for node 1"),
     "drive silent": Situation(silent="node 1: no status"),
+    "drive missing": Situation(missing="node 1 is missing"),
     "watchdog tripped": Situation(watchdog=WatchdogView.TRIPPED, watchdog_detail="lease lost"),
     "watchdog missing": Situation(watchdog=WatchdogView.MISSING, watchdog_detail="not heard yet"),
     "resetting": Situation(resetting=True),
@@ -101,9 +102,12 @@ def at(state: DriverState, wheels: Situation = STANDING) -> Story:
     return story
 
 
-NOT_YET = {"bus failed": OFFLINE, "booting": BOOTING, "drive restarted": BOOTING} | dict.fromkeys(
-    ("drive silent", "watchdog missing", "resetting", "command not zero", "not standing"), DISARMED
-)
+NOT_YET = {
+    "bus failed": OFFLINE,
+    "booting": BOOTING,
+    "drive missing": BOOTING,
+    "drive restarted": BOOTING,
+} | dict.fromkeys(("drive silent", "watchdog missing", "resetting", "command not zero", "not standing"), DISARMED)
 BEFORE_POWER = [(wrong, state, False) for wrong, state in NOT_YET.items()] + [
     ("drive fault", LATCHED, True),
     ("watchdog tripped", LATCHED, True),
