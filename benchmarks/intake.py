@@ -71,13 +71,15 @@ def bare(robot: Robot, pipe: Connection) -> None:
 
 def driver(robot: Robot, pipe: Connection) -> None:
     """The driver's control thread with its core."""
+    from canbase_driver.black_box import Ring
     from canbase_driver.bus_port import BusPort
     from canbase_driver.core import DriverCore
     from canbase_driver.loop import ControlLoop
 
     raise_priority(35)
     core = DriverCore(robot)
-    loop = ControlLoop(core, BusPort(robot.bus.arguments()), robot.rates.control_hz, robot.rates.odometry_hz)
+    ring = Ring(robot.black_box.seconds)
+    loop = ControlLoop(core, BusPort(robot.bus.arguments()), robot.rates.control_hz, robot.rates.odometry_hz, ring)
     loop.start()
     pipe.send("ready")
     pipe.recv()
