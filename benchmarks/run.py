@@ -32,12 +32,14 @@ BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
 }
 COLUMNS = ("what", "measured", "beside it, in the same run", "ratio", "budget", "kept")
 
+BEGIN, END = "<!-- make bench: begin -->", "<!-- make bench: end -->"
+
 
 def main() -> int:
     """Exit code 0: every budget is kept."""
     parser = argparse.ArgumentParser(prog="benchmarks/run.py", description="measured, beside a floor, against a budget")
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"some of {', '.join(BENCHMARKS)}; all without")
-    parser.add_argument("--write", type=Path, metavar="FILE", help="write the page docs/performance.md there")
+    parser.add_argument("--write", type=Path, metavar="FILE", help="write the table into docs/performance.md")
     arguments = parser.parse_args()
     unknown = sorted(set(arguments.names) - set(BENCHMARKS))
     if unknown:
@@ -50,7 +52,8 @@ def main() -> int:
             figures += BENCHMARKS[name]()
     Console(width=None if sys.stdout.isatty() else 160).print(_table(figures))
     if arguments.write:
-        arguments.write.write_text(page(figures), encoding="utf-8")
+        text = arguments.write.read_text(encoding="utf-8")
+        arguments.write.write_text(rewritten(text, figures), encoding="utf-8")
     return 0 if all(figure.kept for figure in figures) else 1
 
 
@@ -68,22 +71,16 @@ def _table(figures: list[Figure]) -> Table:
     return table
 
 
-def page(figures: list[Figure]) -> str:
-    """docs/performance.md; what the numbers mean is in benchmarks/notes.md and comes with them."""
+def rewritten(text: str, figures: list[Figure]) -> str:
+    """`text` with the table between BEGIN and END. Raises ValueError when these lines are not there."""
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not (begin and end):
+        raise ValueError(f"the file has no lines {BEGIN} and {END}: between them the table is written")
+    processors = f"{os.cpu_count()} processors ({platform.machine()}), Python {platform.python_version()}"
     lines = [f"| {' | '.join(cells(figure))} |" for figure in figures]
-    notes = (Path(__file__).parent / "notes.md").read_text(encoding="utf-8").strip()
-    rows = "\n".join(lines)
-    return f"""# Performance
-
-Written by `make bench`: budgets, and what was measured, each beside a floor or a peer in the same run, on
-{os.cpu_count()} processors ({platform.machine()}, Python {platform.python_version()}) with the virtual bus.
-
-| {" | ".join(COLUMNS)} |
-|---|---|---|---:|---|---|
-{rows}
-
-{notes}
-"""
+    head = f"| {' | '.join(COLUMNS)} |\n|---|---|---|---:|---|---|"
+    return "\n".join((f"{before}{begin}", f"{processors}, the virtual bus:\n", head, *lines, f"{end}{after}"))
 
 
 if __name__ == "__main__":

@@ -21,9 +21,16 @@ def test_durations_are_told_in_milliseconds() -> None:
 
 
 def test_the_page_says_which_budget_is_missed() -> None:
-    lines = run.page([KEPT, MISSED]).splitlines()
+    lines = run.rewritten(f"# Title\n{run.BEGIN}\nold\n{run.END}\nend\n", [KEPT, MISSED]).splitlines()
     assert "| a loop | p99 1.00 ms | C: p99 0.80 ms | 1.25 | ≤ 1.5 × C | yes |" in lines
+    assert "old" not in lines
+    assert (lines[0], lines[-1]) == ("# Title", "end")
     assert "| a node | 30 % | bare: 10 % | 3.00 | ≤ 2 × bare | **no** |" in lines
+
+
+def test_a_page_without_a_place_for_the_table_is_left_alone() -> None:
+    with pytest.raises(ValueError, match="the file has no lines"):
+        run.rewritten("# Title\n", [KEPT])
 
 
 @pytest.mark.parametrize(("figure", "code"), [(KEPT, 0), (MISSED, 1)])
