@@ -6,7 +6,21 @@ from typing import Annotated, Final
 
 import typer
 
-from canbase_cli import bench, config, demo, doctor, drive, fibonacci, install, monitor, process, rotate, trigger, up
+from canbase_cli import (
+    bench,
+    config,
+    demo,
+    doctor,
+    drive,
+    fibonacci,
+    install,
+    monitor,
+    process,
+    rotate,
+    scan,
+    trigger,
+    up,
+)
 from canbase_cli.goal import GoalCommand
 from canbase_cli.options import RosCommand
 
@@ -48,6 +62,7 @@ app.command("monitor", cls=RosCommand, options_metavar=_ROS_USAGE)(monitor.monit
 app.command("stop", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.stop)
 app.command("reset", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.reset)
 app.command("doctor", cls=RosCommand, options_metavar=_ROS_USAGE, epilog=doctor.EPILOG)(doctor.doctor)
+app.command("scan", epilog=scan.EPILOG)(scan.scan)
 app.command("bench")(bench.bench)
 app.add_typer(config.app, name="config")
 app.add_typer(fibonacci.app, name="fibonacci")
