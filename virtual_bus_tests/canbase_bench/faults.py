@@ -48,6 +48,10 @@ def _ignores_setpoints(node: SimulatedNode, now: float, axis: int = 0) -> None:
     node.axes[axis].faults.ignores_setpoints = True
 
 
+def _weak(node: SimulatedNode, now: float, axis: int = 0, share: float = 0.0) -> None:
+    node.axes[axis].weaken(share)
+
+
 def _mute_boot(node: SimulatedNode, now: float) -> None:
     node.mute_boot = True
 
@@ -60,6 +64,7 @@ def _heal(node: SimulatedNode, now: float) -> None:
     node.silent = node.deaf = node.cut = node.mute_boot = node.short_emcy = False
     for number, axis in enumerate(node.axes):
         axis.faults = AxisFaults()
+        axis.weaken(1.0)
         node.heal(number)
 
 
@@ -72,11 +77,13 @@ KINDS: Mapping[str, tuple[Callable[..., None], frozenset[str]]] = {
     "frozen_encoder": (_frozen_encoder, frozenset({"axis"})),
     "stuck_velocity": (_stuck_velocity, frozenset({"axis", "raw"})),
     "ignores_setpoints": (_ignores_setpoints, frozenset({"axis"})),
+    "weak": (_weak, frozenset({"axis", "share"})),
     "mute_boot": (_mute_boot, frozenset()),
     "short_emcy": (_short_emcy, frozenset()),
     "heal": (_heal, frozenset()),
 }
 """Each fault and the arguments that it takes. silent: sends nothing. deaf: receives nothing. cut: both.
+weak: its motor gives a share of its force, none by default, and holds its power.
 mute_boot: its boot-up messages are lost. short_emcy: three bytes. heal: all of them are over; a drive fault still
 needs its reset."""
 
@@ -85,6 +92,7 @@ RANGES: Mapping[str, tuple[type, float, float]] = {
     "code": (int, 1, 0xFFFF),
     "holds": (bool, 0, 1),
     "off_s": (float, 0.0, 3600.0),
+    "share": (float, 0.0, 1.0),
     "raw": (int, -(2**31), 2**31 - 1),
 }
 """Type, least and greatest value of each argument."""

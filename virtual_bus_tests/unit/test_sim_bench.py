@@ -186,6 +186,19 @@ def test_frozen_encoder_stuck_velocity_and_ignored_setpoints() -> None:
     assert rig.read(0x6064) > shown[0]
 
 
+def test_a_weak_drive_holds_its_power_and_moves_nothing_until_it_is_healed() -> None:
+    rig = Rig()
+    for node in (1, 2):
+        faults.apply(rig.bench.nodes, node, "weak", rig.now, {})
+    rig.drive(MPS // 2, MPS // 2, 1.0)
+    assert rig.state() is State.OPERATION_ENABLED
+    assert rig.bench.base.v_mps == 0.0
+    for node in (1, 2):
+        faults.apply(rig.bench.nodes, node, "heal", rig.now, {})
+    rig.wait(1.0)
+    assert rig.bench.base.v_mps == pytest.approx(0.5, abs=0.01)
+
+
 def test_a_drive_fault_with_code_that_holds() -> None:
     rig = Rig()
     faults.apply(rig.bench.nodes, 1, "fault", rig.now, {"code": 0x4210, "holds": True})

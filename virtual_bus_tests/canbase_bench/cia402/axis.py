@@ -43,6 +43,8 @@ class AxisFaults:
     """606Ch shows this."""
     ignores_setpoints: bool = False
     """60FFh is taken, and has no effect on the motor."""
+    force_share: float = 1.0
+    """Of the force that 6072h allows. Set by `Axis.weaken`."""
 
 
 @dataclass(slots=True)
@@ -76,7 +78,7 @@ class Axis:
         d.on_write(at + 0x40, lambda subindex, value: self._on_controlword(value))
         for offset in (0xFF, 0x83, 0x84):
             d.on_write(at + offset, lambda subindex, value: self._steer())
-        d.on_write(at + 0x72, lambda subindex, value: self.motor.limit_force(value / 1000.0))
+        d.on_write(at + 0x72, lambda subindex, value: self._limit_force())
         d.guard(at + 0x60, self._check_mode)
         d.on_write(at + 0x60, lambda subindex, value: self._show_mode())
 
@@ -89,12 +91,20 @@ class Axis:
     def restart(self) -> None:
         """Transition 0, power on or NMT reset node: power stage off, everything forgotten."""
         self.motor.power_off()
-        self.motor.limit_force(self._value(0x72) / 1000.0)
+        self._limit_force()
         self._go(Transition(0, State.NOT_READY_TO_SWITCH_ON))
         self._pending, self._controlword, self._halted = None, 0, False
         self._show_mode()
         self.causes.clear()
         self._told.clear()
+
+    def weaken(self, share: float) -> None:
+        """The motor gives `share` (0..1) of the force that 6072h allows."""
+        self.faults.force_share = share
+        self._limit_force()
+
+    def _limit_force(self) -> None:
+        self.motor.limit_force(self.faults.force_share * self._value(0x72) / 1000.0)
 
     def fail(self, code: int) -> None:
         """A fault: transition 13, reaction by 605Eh, then 14. `code` is 603Fh and the EMCY code."""
