@@ -7,7 +7,7 @@ Rules of the goals
 3. ON goes up one step at a time and stays in OPERATION ENABLED. It never interrupts a quick stop: in QUICK STOP ACTIVE
    it keeps the word; a drive that stays there when it stands (605Ah = 5…8) needs OFF first. In an unknown state it is
    a quick stop too.
-   READY goes one step up from switch on disabled, and is OFF in every state with power.
+   READY goes up to switched on, which needs main voltage and no STO, and is OFF in every state with torque.
 4. ON never resets a fault. Only RESET sets bit 7, and only in FAULT; in every other state RESET is OFF.
 5. The drive acts on the 0 → 1 edge of bit 7 (transition 15), not on its level. Before RESET hold OFF, which keeps
    bit 7 at 0, for FAULT_RESET_CYCLES; then hold RESET until the state is no longer FAULT, at least FAULT_RESET_CYCLES.
@@ -54,8 +54,8 @@ class DriveState(Enum):
 
 
 _WITH_TORQUE = frozenset((DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE))
-PREPARED = frozenset((DriveState.READY_TO_SWITCH_ON, DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED))
-"""As far as ready to switch on: main voltage and STO are there."""
+PREPARED = frozenset((DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED))
+"""As far as switched on: nothing but the enable is missing."""
 
 STATUSWORD_STATES = (
     (0x4F, 0x00, DriveState.NOT_READY_TO_SWITCH_ON),
@@ -99,7 +99,7 @@ class PowerGoal(Enum):
     ON = "on"
     """Operation enabled."""
     READY = "ready"
-    """Ready to switch on: no torque, but nothing that forbids it either."""
+    """Switched on: no torque, but nothing that forbids it either."""
     QUICK_STOP = "quick stop"
     """Down the ramp 6085h and then, with 605Ah = 2, to switch on disabled."""
     RESET = "fault reset"
@@ -123,7 +123,8 @@ COMMANDS: dict[PowerGoal, dict[DriveState | None, Command]] = {
     PowerGoal.OFF: dict.fromkeys(_STATES, Command.DISABLE_VOLTAGE),
     PowerGoal.ON: _UP,
     PowerGoal.READY: dict.fromkeys(_STATES, Command.DISABLE_VOLTAGE)
-    | dict.fromkeys((DriveState.SWITCH_ON_DISABLED, DriveState.READY_TO_SWITCH_ON), Command.SHUTDOWN),
+    | {DriveState.SWITCH_ON_DISABLED: Command.SHUTDOWN}
+    | dict.fromkeys((DriveState.READY_TO_SWITCH_ON, DriveState.SWITCHED_ON), Command.SWITCH_ON),
     PowerGoal.QUICK_STOP: dict.fromkeys(_STATES, Command.QUICK_STOP),
     PowerGoal.RESET: dict.fromkeys(_STATES, Command.DISABLE_VOLTAGE) | {DriveState.FAULT: Command.FAULT_RESET},
 }

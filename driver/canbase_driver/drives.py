@@ -54,7 +54,7 @@ class Drives:
         return _first(_disabled(axis) for axis in self.axes)
 
     def unprepared(self) -> str:
-        """Which axis has not got as far as ready to switch on, and what that may come from."""
+        """Which axis has not got as far as switched on, and what that may come from."""
         return _first(_unprepared(axis) for axis in self.axes)
 
     def are_fresh(self, now: float) -> bool:

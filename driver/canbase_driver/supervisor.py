@@ -3,7 +3,7 @@
 Rules
 1. Nothing gets power while one of BLOCKERS holds: drives booted and heard, watchdog alive and not tripped, standstill,
    no velocity commanded, no reset under way. The first that holds is the state and the cause. Then the drives are taken
-   as far as ready to switch on, however long that lasts (STO open, no main voltage), and only together any further.
+   as far as switched on, however long that lasts (STO open, no main voltage), and only together any further.
 2. While there is power, the first of HAZARDS that holds stops the base: by the ramp, or by quick stop at once. On the
    way to operation enabled nothing follows a command yet, so there it is always the quick stop.
 3. A stop goes down one way only: ramp, quick stop, power off. Each step ends by measured standstill or by its deadline.
@@ -42,7 +42,7 @@ class Situation:
     absent: str = ""  # a node restarted, or is not in NMT operational
     silent: str = ""  # statusword or heartbeat too old
     disabled: str = ""  # an axis is not in operation enabled
-    unprepared: str = ""  # an axis has not got as far as ready to switch on: STO open, no main voltage
+    unprepared: str = ""  # an axis has not got as far as switched on: STO open, no main voltage
     watchdog: WatchdogView = WatchdogView.OK
     watchdog_detail: str = ""
     commanded: str = ""  # a fresh command asks for motion
@@ -169,7 +169,7 @@ class Step(Enum):
 
 
 PREPARING = "preparing"
-"""DISARMED, with nothing left that forbids power but drives that are not ready to switch on."""
+"""DISARMED, with nothing left that forbids power but drives that are not switched on."""
 
 ORDERS: dict[DriverState | Step | str, Orders] = {
     DriverState.OFFLINE: Orders(PowerGoal.OFF, Drive.ZERO),
@@ -223,7 +223,7 @@ class Supervisor:
             self._finish()
         elif blocker is None and situation.unprepared:
             self.state = DriverState.DISARMED
-            self.cause = Cause(NOT_READY, situation.unprepared, "the drive being ready to switch on")
+            self.cause = Cause(NOT_READY, situation.unprepared, "the drive being switched on")
         elif blocker is None:
             self.state, self.cause = DriverState.ENABLING, Cause("enabling", "", "operation enabled on all drives")
         else:

@@ -48,7 +48,7 @@ class Drives:
                 self._clock.after(0.0, self._answer)
             return
         node.on_frame(cob_id, data, self._clock.now)
-        if cob_id in HEARTBEATS and not node.cut:
+        if cob_id in HEARTBEATS and not node.line.cut:
             self.heard[node_id] = self._clock.now
 
     def _answer(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from canbase_bench.cia402.axis import AxisFaults
+from canbase_bench.cia402.axis import AxisFaults, Supply
 from canbase_bench.node import SimulatedNode
 
 DEFAULT_CODE = 0x7305
@@ -17,15 +17,15 @@ class FaultError(ValueError):
 
 
 def _silent(node: SimulatedNode, now: float) -> None:
-    node.silent = True
+    node.line.silent = True
 
 
 def _deaf(node: SimulatedNode, now: float) -> None:
-    node.deaf = True
+    node.line.deaf = True
 
 
 def _cut(node: SimulatedNode, now: float) -> None:
-    node.cut = True
+    node.line.cut = True
 
 
 def _drive_fault(node: SimulatedNode, now: float, axis: int = 0, code: int = DEFAULT_CODE, holds: bool = False) -> None:
@@ -53,15 +53,39 @@ def _weak(node: SimulatedNode, now: float, axis: int = 0, share: float = 0.0) ->
 
 
 def _mute_boot(node: SimulatedNode, now: float) -> None:
-    node.mute_boot = True
+    node.line.mute_boot = True
 
 
 def _short_emcy(node: SimulatedNode, now: float) -> None:
-    node.short_emcy = True
+    node.line.short_emcy = True
+
+
+def _aliases(node: SimulatedNode, now: float) -> None:
+    node.line.aliases = True
+
+
+def _extra_boot_up(node: SimulatedNode, now: float) -> None:
+    node.say_boot_up()
+
+
+def _bus_off(node: SimulatedNode, now: float, off_s: float = 0.2) -> None:
+    node.bus_off(now, off_s)
+
+
+def _reset_node(node: SimulatedNode, now: float) -> None:
+    node.reset_node(now)
+
+
+def _sto(node: SimulatedNode, now: float, axis: int = 0) -> None:
+    node.axes[axis].lose(Supply.NO_TORQUE)
+
+
+def _no_mains(node: SimulatedNode, now: float, axis: int = 0) -> None:
+    node.axes[axis].lose(Supply.NO_MAINS)
 
 
 def _heal(node: SimulatedNode, now: float) -> None:
-    node.silent = node.deaf = node.cut = node.mute_boot = node.short_emcy = False
+    node.line.heal()
     for number, axis in enumerate(node.axes):
         axis.faults = AxisFaults()
         axis.weaken(1.0)
@@ -80,12 +104,20 @@ KINDS: Mapping[str, tuple[Callable[..., None], frozenset[str]]] = {
     "weak": (_weak, frozenset({"axis", "share"})),
     "mute_boot": (_mute_boot, frozenset()),
     "short_emcy": (_short_emcy, frozenset()),
+    "aliases": (_aliases, frozenset()),
+    "extra_boot_up": (_extra_boot_up, frozenset()),
+    "bus_off": (_bus_off, frozenset({"off_s"})),
+    "reset_node": (_reset_node, frozenset()),
+    "sto": (_sto, frozenset({"axis"})),
+    "no_mains": (_no_mains, frozenset({"axis"})),
     "heal": (_heal, frozenset()),
 }
 """Each fault and the arguments that it takes. silent: sends nothing. deaf: receives nothing. cut: both.
 weak: its motor gives a share of its force, none by default, and holds its power.
-mute_boot: its boot-up messages are lost. short_emcy: three bytes. heal: all of them are over; a drive fault still
-needs its reset."""
+mute_boot: its boot-up messages are lost. short_emcy: three bytes. aliases: 29-bit frames that look like its own.
+extra_boot_up: one boot-up message too many. bus_off: its controller leaves the bus for `off_s`. reset_node: as by NMT.
+sto: no torque, it stays in switch on disabled. no_mains: it does not get beyond ready to switch on.
+heal: all of them are over; a drive fault still needs its reset."""
 
 RANGES: Mapping[str, tuple[type, float, float]] = {
     "axis": (int, 0, 1),

@@ -44,7 +44,7 @@ class Loop:
                 self._tell_changes()
 
     def _send(self, frame: Frame) -> None:
-        message = can.Message(arbitration_id=frame.cob_id, data=frame.data, is_extended_id=False, check=True)
+        message = can.Message(arbitration_id=frame.cob_id, data=frame.data, is_extended_id=frame.extended, check=True)
         self._bus.send(message, timeout=SEND_TIMEOUT_S)
 
     def _tell_changes(self) -> None:

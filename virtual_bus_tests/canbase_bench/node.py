@@ -19,6 +19,7 @@ from canbase_bench.cia402.axis import Axis
 from canbase_bench.cia402.states import POWERED, State, Transition
 from canbase_bench.command_watch import CommandWatch
 from canbase_bench.frame import Frame
+from canbase_bench.line import Line
 from canbase_bench.personality import GENERIC, Personality
 
 COMMUNICATION_FAULT = 0x7500
@@ -30,11 +31,7 @@ OFFSET_STEP = 1_000_003
 
 
 class SimulatedNode:
-    """One node on the bus. Faults are plain switches.
-
-    `silent`: sends nothing. `deaf`: receives nothing. `cut`: both. `mute_boot`: its boot-up messages are lost.
-    `short_emcy`: its emergency messages have three bytes.
-    """
+    """One node on the bus. `line` has the switches for what is wrong between it and the others."""
 
     def __init__(
         self,
@@ -47,23 +44,22 @@ class SimulatedNode:
     ) -> None:
         self.node_id, self.personality = node_id, personality
         self.boot_delay_s = boot_delay_s if personality.boot_delay_s is None else personality.boot_delay_s
-        self.silent = self.deaf = self.cut = self.mute_boot = self.short_emcy = False
+        self.line = Line(personality.sdo_delay_s)
         self.state = NmtState.INITIALISING
         self.changes: deque[StateChange] = deque(maxlen=1000)
         self.lost_producers: deque[int] = deque(maxlen=100)
         """Node ids whose heartbeat this node has missed; whoever tells of them empties it."""
-        self._out: list[Frame] = []
-        self._answers: deque[tuple[float, Frame]] = deque()
         self._now = now
+        self._bus_on_at: float | None = None
         d = self.dictionary = Dictionary(node_id, len(axes), fixed, personality)
         d.before_read = self._refresh
         self.emcy = emcy.EmcyService(d, self._send_emcy)
-        self.sdo = sdo.SdoService(node_id, d, self._send_answer)
+        self.sdo = sdo.SdoService(node_id, d, lambda frame: self.line.answer(frame, self._now))
         self._producer = heartbeat.HeartbeatProducer(d)
         self._consumer = heartbeat.HeartbeatConsumer(d, self._on_lost, self._on_alive)
         self.axes = tuple(self._axis(number, parts) for number, parts in enumerate(axes))
         self._rpdos = [Rpdo(n, d, self.emcy, self._operational, self._on_deadline) for n in range(1, 5)]
-        self._tpdos = [Tpdo(n, d, self._send, self._operational) for n in range(1, 5)]
+        self._tpdos = [Tpdo(n, d, self.line.say, self._operational) for n in range(1, 5)]
         self._command_watch = CommandWatch(d, self._rpdos)
         store.StoreService(d)
         d.on_write(0x1005, lambda subindex, value: self._route())
@@ -82,7 +78,7 @@ class SimulatedNode:
 
     def on_frame(self, cob_id: int, data: bytes, now: float) -> None:
         """One frame from the bus, at `now`. What the node does not understand is ignored."""
-        if self.cut or self.deaf:
+        if not self.line.hears:
             return
         self._now = now
         take = self._routes.get(cob_id)
@@ -94,18 +90,16 @@ class SimulatedNode:
     def tick(self, now: float) -> list[Frame]:
         """Whatever is due by `now`, and every frame since the last call, in order."""
         self._now = now
-        while self._answers and now >= self._answers[0][0]:
-            self._send(self._answers.popleft()[1])
+        self.line.say_late_answers(now)
+        if self._bus_on_at is not None and now >= self._bus_on_at:
+            self._recover_from_bus_off()
         if self.state is not NmtState.INITIALISING:
             self._tick_watches(now)
         elif now >= self._boot_at:
             self._boot()
         if self.state is NmtState.OPERATIONAL:
             self._tick_pdos(now)
-        if not self._out:
-            return []
-        sent, self._out = self._out, []
-        return sent
+        return self.line.take_out()
 
     # Faults for tests
 
@@ -114,6 +108,19 @@ class SimulatedNode:
         for axis in self.axes:
             axis.encoder_offset = (axis.encoder_offset + OFFSET_STEP + 2**31) % 2**32 - 2**31
         self._power_up(now, off_s)
+
+    def reset_node(self, now: float) -> None:
+        """As by NMT reset node: everything starts anew, the encoder goes on."""
+        self._power_up(now, 0.0)
+
+    def bus_off(self, now: float, off_s: float = 0.2) -> None:
+        """Too many errors: the CAN controller leaves the bus and comes back after `off_s`; a loss like any other."""
+        self.line.cut, self._bus_on_at = True, now + off_s
+        self._lose_connection(emcy.BUS_OFF_RECOVERED)
+
+    def say_boot_up(self) -> None:
+        """A boot-up message. Called by a test it is one too many: nothing was restarted."""
+        self.line.say_boot_up(Frame(heartbeat.COB_ID + self.node_id, bytes([NmtState.INITIALISING])))
 
     def fail(self, axis: int, code: int, holds: bool = False) -> None:
         """A fault of one axis with EMCY `code`; while it `holds`, fault resets are in vain (see `heal`)."""
@@ -132,7 +139,7 @@ class SimulatedNode:
         if command is None:
             return
         if command is NmtCommand.RESET_NODE:
-            self._power_up(now, 0.0)
+            self.reset_node(now)
         elif command is NmtCommand.RESET_COMMUNICATION:
             self._leave_bus()
             self._reset_communication(now + RESET_S)
@@ -164,20 +171,16 @@ class SimulatedNode:
 
     def _boot(self) -> None:
         if self._loader_s:
-            self._say_boot_up()
+            self.say_boot_up()
             self._boot_at, self._loader_s = self._boot_at + self._loader_s, 0.0
             return
         self._enter(NmtState.PRE_OPERATIONAL)
-        self._say_boot_up()
+        self.say_boot_up()
         for axis in self.axes:
             if axis.state is State.NOT_READY_TO_SWITCH_ON:
                 axis.boot()
         if self.personality.starts_operational:
             self._enter(NmtState.OPERATIONAL)
-
-    def _say_boot_up(self) -> None:
-        if not self.mute_boot:
-            self._send(Frame(heartbeat.COB_ID + self.node_id, bytes([NmtState.INITIALISING])))
 
     def _power_up(self, now: float, off_s: float) -> None:
         self.dictionary.reset(0x2000, 0x9FFF)
@@ -187,8 +190,7 @@ class SimulatedNode:
 
     def _reset_communication(self, boot_at: float, loader_s: float = 0.0) -> None:
         self._enter(NmtState.INITIALISING)
-        self._out.clear()
-        self._answers.clear()
+        self.line.forget()
         self.dictionary.reset(0x1000, 0x1FFF)
         self.emcy.reset()
         self.sdo.reset()
@@ -233,7 +235,7 @@ class SimulatedNode:
             for axis in self.axes:
                 axis.starve()
         if self._producer.due(now):
-            self._send(Frame(heartbeat.COB_ID + self.node_id, bytes([self.state])))
+            self.line.say(Frame(heartbeat.COB_ID + self.node_id, bytes([self.state])))
 
     def _tick_pdos(self, now: float) -> None:
         for rpdo in self._active_rpdos:
@@ -254,12 +256,20 @@ class SimulatedNode:
     # Loss of the connection
 
     def _on_lost(self, producer: int) -> None:
-        """A heartbeat is gone: EMCY 8130h, 6007h for the motors, 1029h:1 for the NMT state."""
+        """A heartbeat is gone: EMCY 8130h."""
         self.lost_producers.append(producer)
         self.emcy.raise_error(emcy.HEARTBEAT_LOST, producer)
         for axis in self.axes:
             axis.causes.add(emcy.HEARTBEAT_LOST)
-        self._abort_connection(emcy.HEARTBEAT_LOST)
+        self._lose_connection(emcy.HEARTBEAT_LOST)
+
+    def _recover_from_bus_off(self) -> None:
+        self.line.cut, self._bus_on_at = False, None
+        self.emcy.raise_error(emcy.BUS_OFF_RECOVERED)
+
+    def _lose_connection(self, code: int) -> None:
+        """6007h for the motors, 1029h:1 for the NMT state."""
+        self._abort_connection(code)
         behaviour = self.dictionary.values[key(0x1029, 1)]
         if behaviour == 2:
             self._enter(NmtState.STOPPED)
@@ -311,19 +321,9 @@ class SimulatedNode:
         if code >> 8 not in (0x81, 0x82):
             self.emcy.raise_error(code, axis)
 
-    def _send(self, frame: Frame) -> None:
-        if not (self.silent or self.cut):
-            self._out.append(frame)
-
     def _send_emcy(self, frame: Frame) -> None:
         if self.state in nmt.HAS_SDO:
-            self._send(Frame(frame.cob_id, frame.data[:3]) if self.short_emcy else frame)
-
-    def _send_answer(self, frame: Frame) -> None:
-        if self.personality.sdo_delay_s:
-            self._answers.append((self._now + self.personality.sdo_delay_s, frame))
-        else:
-            self._send(frame)
+            self.line.say_emcy(frame)
 
 
 def axis_key(axis: int, index: int, subindex: int = 0) -> int:

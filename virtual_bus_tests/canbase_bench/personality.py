@@ -63,6 +63,8 @@ class Personality:
     """From a request to its answer [s]."""
     shows_mode_without_power: bool = True
     """False: 6061h is 0 before OPERATION ENABLED."""
+    locked_with_power: frozenset[int] = frozenset()
+    """Indexes that can only be written while the power stage is off; else 0800 0022h."""
     heartbeat_fault_needs_communication_reset: bool = False
     """Fault resets are in vain after 8130h until NMT reset communication or node."""
     command_timeout_s: float | None = None
@@ -92,6 +94,7 @@ PERSONALITIES: Mapping[str, Personality] = {
         target_unit="rpm",  # EDS 60A9h = 00B44700h
         actual_unit="rpm",
         acceleration_unit="rpm/s",  # manual of the motion controller
+        locked_with_power=frozenset({0x6007, 0x605A, 0x605E}),  # "many objects"; that these are among them is assumed
         heartbeat_fault_needs_communication_reset=True,  # seen by users: 8130h and 8120h
     ),
     "roboteq": Personality(

@@ -256,7 +256,7 @@ def test_a_shutdown_without_a_watchdog_ends_at_once(world: World) -> None:
 
 def test_a_shutdown_with_a_drive_that_is_silent_ends_within_its_deadlines(world: World) -> None:
     world.drive()
-    world.node.silent = True
+    world.node.line.silent = True
     world.core.request_shutdown()
     assert world.run(2.5, lambda: world.core.finished)  # 0.1 s until it is silent, 1.5 s quick stop, 0.5 s power off
     assert world.powered == [False, False]

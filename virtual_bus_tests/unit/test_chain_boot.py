@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from canbase_bench.faults import apply
 from canbase_config.robot import Robot
 from canbase_driver.frame import Frame
+from canbase_driver.kinematics import Twist2D
 from canbase_driver.snapshot import DriverState
 from unit.chain_world import FORWARD, World, bench_robot, robot_of
 
@@ -23,41 +25,56 @@ def test_two_drives_are_enabled_within_a_second_and_eight_within_one_and_a_half_
     assert eight_s <= 1.5 * two_s
 
 
-class RightWithoutSto(World):
-    """As long as `sto_open`, the right drive gets no controlword but 0: it does not leave switch on disabled."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.sto_open = True
-        self._right = self.bench.nodes[2].on_frame
-        vars(self.bench.nodes[2])["on_frame"] = self._gate
-
-    def _gate(self, cob_id: int, data: bytes, now: float) -> None:
-        is_setpoint = cob_id == 0x202 and self.sto_open
-        self._right(cob_id, bytes(2) + data[2:] if is_setpoint else data, now)
+WAITED_FOR = {
+    "sto": "right_wheel (node 2) stays in switch on disabled: STO, main voltage?",
+    "no_mains": "right_wheel (node 2) stays in ready to switch on: STO, main voltage?",
+}
 
 
-def test_a_drive_with_sto_open_is_waited_for_and_enabled_later() -> None:
-    world = RightWithoutSto()
-    world.run(30.0)
+def without(supply: str) -> World:
+    """The right drive starts without it."""
+    world = World()
+    apply(world.bench.nodes, 2, supply, world.now, {})
+    return world
+
+
+@pytest.mark.parametrize(("supply", "sentence"), WAITED_FOR.items())
+def test_a_drive_without_sto_or_main_voltage_is_waited_for_and_enabled_later(supply: str, sentence: str) -> None:
+    world = without(supply)
+    world.run(10.0)
     assert world.core.state is DriverState.DISARMED
-    assert world.core.cause.name == "drive not ready"
-    assert world.core.cause.detail == "right_wheel (node 2) stays in switch on disabled: STO, main voltage?"
+    assert (world.core.cause.name, world.core.cause.detail) == ("drive not ready", sentence)
     assert not any(world.powered)
     assert not world.core.stops
-    world.sto_open = False
+    apply(world.bench.nodes, 2, "heal", world.now, {})
     assert world.run_until(DriverState.ENABLED, within_s=0.3) < 0.3
 
 
-def test_while_it_is_waited_for_a_command_keeps_the_power_off() -> None:
-    world = RightWithoutSto()
+@pytest.mark.parametrize("supply", WAITED_FOR)
+def test_while_it_is_waited_for_a_command_keeps_the_power_off(supply: str) -> None:
+    world = without(supply)
     world.run(1.0)
     world.command = FORWARD
     world.run(0.1)
-    world.sto_open = False
+    apply(world.bench.nodes, 2, "heal", world.now, {})
     world.run(1.0)
     assert world.core.state is DriverState.DISARMED
     assert world.core.cause.name == "command not zero"
+
+
+@pytest.mark.parametrize("supply", WAITED_FOR)
+def test_a_supply_that_is_lost_in_motion_stops_the_base_and_needs_a_reset(supply: str) -> None:
+    world = World()
+    world.drive()
+    apply(world.bench.nodes, 2, supply, world.now, {})
+    world.run_until(DriverState.LATCHED, within_s=2.0)
+    assert world.core.cause.name == "drive disabled"
+    assert world.stands_after() < 2.0
+    apply(world.bench.nodes, 2, "heal", world.now, {})
+    world.command = Twist2D.ZERO
+    world.run(1.0)
+    assert not any(world.powered)
+    assert world.recovered()
 
 
 @pytest.mark.parametrize("overflow", [2, 240])

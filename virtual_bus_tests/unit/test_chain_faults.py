@@ -53,11 +53,11 @@ def power_cycle(world: World) -> None:
 
 
 def silence_a_drive(world: World) -> None:
-    world.node.silent = True
+    world.node.line.silent = True
 
 
 def cut_a_drive(world: World) -> None:
-    world.node.cut = True
+    world.node.line.cut = True
 
 
 def request_stop(world: World) -> None:

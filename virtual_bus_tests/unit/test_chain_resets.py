@@ -95,7 +95,7 @@ def test_a_reset_waits_for_a_drive_that_is_switched_on_later(world: World) -> No
 
 def test_a_reset_of_a_drive_that_stays_dead_ends_after_ten_seconds_and_says_so(world: World) -> None:
     latched(world)
-    world.node.cut = True
+    world.node.line.cut = True
     world.run(0.5)
     start = world.now
     outcome = world.reset()
@@ -106,7 +106,7 @@ def test_a_reset_of_a_drive_that_stays_dead_ends_after_ten_seconds_and_says_so(w
 
 
 def test_while_a_silent_drive_is_the_watchdogs_cause_its_reset_is_refused(world: World) -> None:
-    world.node.cut = True
+    world.node.line.cut = True
     world.command = Twist2D.ZERO
     world.run(2.5)
     outcome = world.reset()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 import pytest
 
 from canbase_bench.frame import Frame
@@ -17,6 +19,14 @@ def test_an_identifier_outside_of_eleven_bits_is_refused(cob_id: int) -> None:
 @pytest.mark.parametrize("length", [0, 8])
 def test_the_limits_themselves_are_frames(cob_id: int, length: int) -> None:
     assert len(Frame(cob_id, bytes(length)).data) == length
+
+
+@pytest.mark.parametrize(("cob_id", "fits"), [(0x800, True), (0x1FFF_FFFF, True), (0x2000_0000, False)])
+def test_an_identifier_of_29_bits_needs_its_mark(cob_id: int, fits: bool) -> None:
+    with pytest.raises(ValueError, match=r"outside 0\.\.7FFh"):
+        Frame(cob_id)
+    with nullcontext() if fits else pytest.raises(ValueError, match=r"outside 0\.\.1FFFFFFFh"):
+        assert Frame(cob_id, extended=True).cob_id == cob_id
 
 
 def test_nine_bytes_are_refused() -> None:

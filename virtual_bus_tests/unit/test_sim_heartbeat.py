@@ -184,7 +184,7 @@ def test_the_fault_of_a_lost_heartbeat_can_be_reset_only_when_it_is_back() -> No
 def test_a_cut_cable_is_noticed_by_the_drive_itself() -> None:
     rig = _watching()
     rig.tx("77F 05")
-    rig.node.cut = True
+    rig.node.line.cut = True
     for _ in range(5):
         rig.tx("77F 05")
         assert rig.wait(0.1) == []  # it cannot tell anybody

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from enum import Enum
 
 from canopen import SdoAbortedError
 
@@ -24,11 +25,22 @@ from canbase_bench.cia402.units import Scale
 from canbase_bench.personality import GENERIC, Personality
 from canbase_bench.plant.motor import AT_ONCE, Motor
 
+
+class Supply(Enum):
+    """What feeds the power stage."""
+
+    FULL = "all there"
+    NO_MAINS = "no main voltage: bit 4 is 0, and READY TO SWITCH ON the most that it reaches"
+    NO_TORQUE = "STO open: it stays in SWITCH ON DISABLED"
+
+
 PROFILE_VELOCITY, CYCLIC_VELOCITY, NO_MODE = 3, 9, 0
 """6060h. Without a mode the drive does not enable."""
 _ENABLED = State.OPERATION_ENABLED
 _ALWAYS = int(Bit.VOLTAGE_ENABLED | Bit.REMOTE)
 _SATURATED, _REACHED, _SPECIFIC = int(Bit.INTERNAL_LIMIT), int(Bit.TARGET_REACHED), int(Bit.MODE_SPECIFIC)
+_NEEDS = {2: (Supply.NO_TORQUE,), 3: (Supply.NO_TORQUE, Supply.NO_MAINS)}
+"""Transitions on the way up, and without which supply they are closed."""
 STAYS_IN_QUICK_STOP = range(5, 9)
 """605Ah: after the stop QUICK STOP ACTIVE stays, and transition 16 is open."""
 
@@ -45,6 +57,8 @@ class AxisFaults:
     """60FFh is taken, and has no effect on the motor."""
     force_share: float = 1.0
     """Of the force that 6072h allows. Set by `Axis.weaken`."""
+    supply: Supply = Supply.FULL
+    """Set by `Axis.lose`."""
 
 
 @dataclass(slots=True)
@@ -81,6 +95,8 @@ class Axis:
         d.on_write(at + 0x72, lambda subindex, value: self._limit_force())
         d.guard(at + 0x60, self._check_mode)
         d.on_write(at + 0x60, lambda subindex, value: self._show_mode())
+        for index in self.personality.locked_with_power:
+            d.guard(index + AXIS_STRIDE * self.number, lambda subindex, value: self._check_power())
 
     # What the node orders
 
@@ -129,6 +145,13 @@ class Axis:
             self._command(Command.DISABLE_VOLTAGE)
         elif option == 3:
             self._command(Command.QUICK_STOP)
+
+    def lose(self, supply: Supply) -> None:
+        """Main voltage or STO is lost: an axis with power coasts, in SWITCH ON DISABLED."""
+        self.faults.supply = supply
+        if self.state in POWERED or self.state is State.SWITCHED_ON:
+            self._pending = None
+            self._command(Command.DISABLE_VOLTAGE)
 
     def starve(self) -> None:
         """The maker's own watchdog: the motor stops, nothing else changes, and the next target moves it again."""
@@ -202,6 +225,8 @@ class Axis:
     def _open(self, transition: Transition, command: Command) -> bool:
         if self._pending is not None:
             return command in (Command.DISABLE_VOLTAGE, Command.QUICK_STOP)
+        if transition.number in _NEEDS and self.faults.supply in _NEEDS[transition.number]:
+            return False
         if transition.number == 4:
             return self._value(0x60) != NO_MODE
         return transition.number != 16 or self._value(0x5A) in STAYS_IN_QUICK_STOP
@@ -268,6 +293,8 @@ class Axis:
 
     def _statusword(self, actual: int) -> int:
         word = self._state_bits | _ALWAYS
+        if self.faults.supply is Supply.NO_MAINS:
+            word &= ~Bit.VOLTAGE_ENABLED
         if self.motor.saturated:
             word |= _SATURATED
         if self.state is _ENABLED and self._value(0x60) == CYCLIC_VELOCITY:
@@ -289,6 +316,10 @@ class Axis:
         if value not in (NO_MODE, *self.personality.modes):
             raise SdoAbortedError(abort.INVALID_VALUE)
         if self.state in POWERED and value != self._value(0x60):
+            raise SdoAbortedError(abort.DEVICE_STATE)
+
+    def _check_power(self) -> None:
+        if self.state in POWERED:
             raise SdoAbortedError(abort.DEVICE_STATE)
 
     def _show_mode(self) -> None:
