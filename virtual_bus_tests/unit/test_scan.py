@@ -148,7 +148,7 @@ def test_the_profile_of_each_kind_of_drive_is_guessed_where_its_identity_is_know
 
 def test_a_drive_of_robot_yaml_that_is_not_there_has_a_row_too() -> None:
     world = SessionWorld()
-    world.bench.nodes[2].cut = True
+    world.bench.nodes[2].line.cut = True
     rows = scan_rows({}, scanned(world).cards, world.robot)
     assert [(row.node_id, row.in_robot) for row in rows] == [(1, "left"), (2, "right")]
     assert rows[1].what == NOT_HERE
