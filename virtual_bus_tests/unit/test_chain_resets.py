@@ -282,11 +282,11 @@ def test_a_lost_heartbeat_needs_an_nmt_reset_where_the_profile_says_so(profile: 
 
 def test_a_drive_that_is_missing_at_the_start_is_an_error_after_boot_s_and_welcome_when_it_comes() -> None:
     world = World()
-    world.bench.nodes[2].cut = True
+    world.bench.nodes[2].line.cut = True
     world.run(9.9)
     assert (world.core.state, world.core.cause.name) == (DriverState.BOOTING, "booting")
     world.run(0.2)
     assert (world.core.state, world.core.cause.name) == (DriverState.BOOTING, "drive missing")
     assert world.core.cause.detail.startswith("node 2 (right_wheel) is missing since 10 s: ")
-    world.bench.nodes[2].cut = False
+    world.bench.nodes[2].line.cut = False
     world.run_until(DriverState.ENABLED, within_s=5.0)
