@@ -18,6 +18,7 @@ from canbase_cli import (
     process,
     rotate,
     scan,
+    sdo,
     trigger,
     up,
 )
@@ -63,6 +64,7 @@ app.command("stop", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.stop)
 app.command("reset", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.reset)
 app.command("doctor", cls=RosCommand, options_metavar=_ROS_USAGE, epilog=doctor.EPILOG)(doctor.doctor)
 app.command("scan", epilog=scan.EPILOG)(scan.scan)
+app.add_typer(sdo.app, name="sdo")
 app.command("bench")(bench.bench)
 app.add_typer(config.app, name="config")
 app.add_typer(fibonacci.app, name="fibonacci")

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated
 
-import typer
 from pydantic import ValidationError
 
 from canbase_cli.commissioning.session import Echo, Session
@@ -17,23 +15,6 @@ from canbase_driver.frame import Frame
 
 TURN_S = 0.002
 """Longest wait for a frame, so the longest delay of anything that a session does by itself."""
-
-InterfaceOption = Annotated[
-    str | None,
-    typer.Option(
-        "--interface",
-        metavar="NAME",
-        help="Kind of adapter, as python-can names it, in place of robot.yaml's.",
-        show_default="socketcan with --channel",
-    ),
-]
-ChannelOption = Annotated[
-    str | None,
-    typer.Option("--channel", metavar="NAME", help="Such as can0, in place of robot.yaml's.", show_default="can0"),
-]
-BitrateOption = Annotated[
-    int | None, typer.Option("--bitrate", metavar="BIT/S", help="Only for adapters that the system does not set up.")
-]
 
 
 def choose_bus(config: Path | None, interface: str | None, channel: str | None, bitrate: int | None) -> Bus:

@@ -1,0 +1,24 @@
+"""The options of the commands that speak on the bus themselves: which bus."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+InterfaceOption = Annotated[
+    str | None,
+    typer.Option(
+        "--interface",
+        metavar="NAME",
+        help="Kind of adapter, as python-can names it, in place of robot.yaml's.",
+        show_default="socketcan with --channel",
+    ),
+]
+ChannelOption = Annotated[
+    str | None,
+    typer.Option("--channel", metavar="NAME", help="Such as can0, in place of robot.yaml's.", show_default="can0"),
+]
+BitrateOption = Annotated[
+    int | None, typer.Option("--bitrate", metavar="BIT/S", help="Only for adapters that the system does not set up.")
+]

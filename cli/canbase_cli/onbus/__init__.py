@@ -1,0 +1,1 @@
+"""The shells of the commissioning commands: bus, clock and terminal around what `commissioning` decides."""

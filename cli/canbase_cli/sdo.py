@@ -1,0 +1,94 @@
+"""`canbase sdo`: reads or writes one object of one node."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from canbase_cli.bus_options import BitrateOption, ChannelOption, InterfaceOption
+from canbase_cli.options import ConfigOption
+
+app = typer.Typer(help="Read or write one object of a node.", no_args_is_help=True)
+
+READ_EPILOG: Final = (
+    "Examples:  \ncanbase sdo read 1 6041 --channel can0  \ncanbase sdo read 2 1018:4 --config robot.yaml  \n"
+    "canbase sdo read 1 0x2000:0 --type u16 --raw"
+)
+WRITE_EPILOG: Final = (
+    "Examples:  \ncanbase sdo write 1 1017 100 --channel can0  \ncanbase sdo write 1 605A 0x2 --config robot.yaml  \n"
+    "canbase sdo write 1 1010:1 0x65766173      (store: the drive keeps its settings)"
+)
+
+NodeArgument = Annotated[int, typer.Argument(metavar="NODE", min=1, max=127, help="Node id.", show_default=False)]
+ObjectArgument = Annotated[
+    str, typer.Argument(metavar="INDEX[:SUB]", help="INDEX is hexadecimal: 6041, 0x1018:4.", show_default=False)
+]
+TypeOption = Annotated[
+    str | None,
+    typer.Option("--type", metavar="TYPE", help="u8 … i64, f32, str, hex.", show_default="what is known of the object"),
+]
+EdsOption = Annotated[Path | None, typer.Option("--eds", metavar="FILE", help="The maker's EDS file: types, names.")]
+TimeoutOption = Annotated[
+    float, typer.Option("--timeout", metavar="SECONDS", min=0.02, max=10.0, help="for one answer")
+]
+
+
+@app.callback()
+def _group() -> None:
+    """Read or write one object of a node."""
+
+
+@app.command("read", epilog=READ_EPILOG)
+def read(
+    node: NodeArgument,
+    at: ObjectArgument,
+    config: ConfigOption = None,
+    interface: InterfaceOption = None,
+    channel: ChannelOption = None,
+    bitrate: BitrateOption = None,
+    kind: TypeOption = None,
+    eds: EdsOption = None,
+    timeout_s: TimeoutOption = 0.5,
+    raw: Annotated[bool, typer.Option("--raw", help="Print the value alone, for scripts.")] = False,
+) -> None:
+    """Read one object: its name, its value in hexadecimal and decimal, and what it says.
+
+    Exit codes: 0 read, 1 refused by the drive or no answer, 2 wrong command line or robot.yaml.
+    """
+    from canbase_cli.onbus.line import choose_bus, robot_if_given
+    from canbase_cli.onbus.sdo import Target, run_read
+
+    target = Target.of(node, at, kind, eds, robot_if_given(config))
+    run_read(choose_bus(config, interface, channel, bitrate), target, timeout_s, raw=raw)
+
+
+@app.command("write", epilog=WRITE_EPILOG, context_settings={"ignore_unknown_options": True})
+def write(
+    node: NodeArgument,
+    at: ObjectArgument,
+    value: Annotated[str, typer.Argument(metavar="VALUE", help="80, 0x50, 50h, -80, or text.", show_default=False)],
+    config: ConfigOption = None,
+    interface: InterfaceOption = None,
+    channel: ChannelOption = None,
+    bitrate: BitrateOption = None,
+    kind: TypeOption = None,
+    eds: EdsOption = None,
+    timeout_s: TimeoutOption = 0.5,
+    force: Annotated[
+        bool, typer.Option("--force", help="Even while a motor has power, or canbase's driver runs.")
+    ] = False,
+) -> None:
+    """Write one object, and read it back.
+
+    Refused while a motor of this node has power, and while canbase's driver runs on this bus: it would not know of the
+    change, and its watchdog takes a write to controlword, mode or target for another master and stops the robot.
+
+    Exit codes: 0 written and read back, 1 refused or no answer, 2 wrong command line, value or robot.yaml.
+    """
+    from canbase_cli.onbus.line import choose_bus, robot_if_given
+    from canbase_cli.onbus.sdo import Target, run_write
+
+    target = Target.of(node, at, kind, eds, robot_if_given(config))
+    run_write(choose_bus(config, interface, channel, bitrate), target, value, timeout_s, force=force)

@@ -1,0 +1,56 @@
+"""`canbase sdo` as a command, on a multicast bus with simulated drives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from bus.tool import canbase, drives, free_port, write_robot
+
+pytestmark = pytest.mark.bus
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    file = write_robot(tmp_path_factory.mktemp("sdo"), free_port())
+    with drives(file):
+        yield str(file)
+
+
+def test_read_and_write_in_words(config: str) -> None:
+    read = canbase("sdo", "read", "1", "6041", "-c", config)
+    assert (read.returncode, read.stderr) == (0, "")
+    assert read.stdout.startswith("node 1, 6041h:0 Axis 0 statusword: 0x")
+    assert read.stdout.endswith("(u16): switch on disabled\n")
+    written = canbase("sdo", "write", "1", "60FF", "-20", "-c", config)
+    assert written.returncode == 0
+    assert written.stdout.endswith("0x00000000 = 0 (i32) → 0xFFFFFFEC = -20 (i32)\n")
+    assert canbase("sdo", "read", "1", "60FF", "-c", config, "--raw").stdout == "-20\n"
+
+
+def test_refusals_name_the_abort_code_in_words_and_what_to_try(config: str) -> None:
+    done = canbase("sdo", "read", "1", "5FFF", "-c", config)
+    assert done.returncode == 1
+    assert "0602 0000h the object does not exist; the drive has no such object" in done.stderr
+    done = canbase("sdo", "read", "9", "1000", "-c", config, "--timeout", "0.05")
+    assert done.returncode == 1
+    assert "canbase scan shows who answers" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "words", [("read", "1", "statusword"), ("read", "1", "6041", "--type", "word"), ("write", "1", "1017", "65536")]
+)
+def test_a_wrong_word_is_2_before_anything_is_sent(config: str, words: tuple[str, ...]) -> None:
+    done = canbase("sdo", *words, "-c", config)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+
+
+def test_write_is_refused_while_the_motor_has_power(config: str) -> None:
+    for at, value in (("6060", "3"), ("6040", "6"), ("6040", "7"), ("6040", "15")):
+        assert canbase("sdo", "write", "2", at, value, "-c", config).returncode == 0
+    done = canbase("sdo", "write", "2", "60FF", "100", "-c", config)
+    assert done.returncode == 1
+    assert "6041h:0 says that a motor has power" in done.stderr
+    assert canbase("sdo", "write", "2", "6040", "0", "-c", config, "--force").returncode == 0
