@@ -70,7 +70,9 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         read_feedback: Callable[[Any], FeedbackT],
         read_result: Callable[[Status, Any], ResultT],
     ) -> None:
-        self._client = ActionClient(node, kind, action)
+        # ROS 2 Jazzy remaps topics and services, and no action (ros2/ros2 issue 1312): the name is resolved here.
+        name = node.resolve_topic_name(action)
+        self._client = ActionClient(node, kind, name)
         self._executor = executor or SingleThreadedExecutor(context=node.context)
         if executor is None:
             self._executor.add_node(node)
@@ -78,8 +80,7 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         self.read_result = read_result
         self.action = action
         self._alive: list[Any] = []
-        # Beside the action, also when that is remapped.
-        self._keepalive = node.create_publisher(UUID, f"{node.resolve_topic_name(action)}/keepalive", 10)
+        self._keepalive = node.create_publisher(UUID, f"{name}/keepalive", 10)
         self._timer = node.create_timer(KEEPALIVE_S, self._tell_alive)
         self._node = node
 

@@ -119,13 +119,13 @@ class DriveDistanceServer(Node):
         self._inputs = replace(self._inputs, mux=messages.mux_in(message, time.monotonic()))
 
     def _serve(self, binding: Binding) -> ActionServer:
-        # Beside the action, also when that is remapped.
-        topic = f"{self.resolve_topic_name(binding.name)}/keepalive"
-        self._listen(UUID, topic, KEEPALIVE_QOS, self._on_keepalive)
+        # ROS 2 Jazzy remaps topics and services, and no action (ros2/ros2 issue 1312): the name is resolved here.
+        name = self.resolve_topic_name(binding.name)
+        self._listen(UUID, f"{name}/keepalive", KEEPALIVE_QOS, self._on_keepalive)
         return ActionServer(
             self,
             binding.type,
-            binding.name,
+            name,
             execute_callback=self._execute,
             goal_callback=partial(self._on_goal, binding),
             handle_accepted_callback=partial(self._on_accepted, binding),

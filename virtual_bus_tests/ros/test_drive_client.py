@@ -145,6 +145,18 @@ def test_a_namespace_is_another_robot(test_node: TestNode, spawn: Spawn, make_ro
     assert not here.server_is_ready()
 
 
+def test_remaps_of_the_action_on_both_sides_meet(test_node: TestNode, spawn: Spawn, make_robot: MakeRobot) -> None:
+    lease = {"timeouts": {"odometry_s": 0.5}, "action": {"require_client_lease": True}}
+    spawn([sys.executable, "-c", server_code(make_robot(lease)), "--ros-args", "-r", "drive_distance:=go"])
+    base = FakeBase(test_node)
+    test_node.wait_for(lambda: base.heard, 20.0, "the server to listen")
+    remap = ("--namespace", "elsewhere", "--ros-args", "-r", "drive_distance:=/go")
+    drive = spawn([*CANBASE, "drive", "0.5", "--speed", "0.3", *remap])
+    test_node.wait_for(lambda: drive.exit_code is not None, 20.0, "its end")
+    assert drive.exit_code == 0, drive.log()  # a lease that is not kept beside the action would have ended it
+    assert base.x_m == pytest.approx(0.5, abs=0.005)
+
+
 def test_the_flow_of_a_client_with_callbacks(stage: Stage) -> None:
     # send_goal_async → done callback → get_result_async → done callback, as in every rclpy tutorial.
     told: dict[str, Any] = {"feedback": []}
