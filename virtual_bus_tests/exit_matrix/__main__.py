@@ -13,12 +13,16 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from exit_matrix.report import page, table
+from exit_matrix.marked import rewritten
+from exit_matrix.report import section, table
 from exit_matrix.rows import ROWS, Row
 from exit_matrix.runner import Result, Runner
 
 WIDTH = 140
 """Of the table where nobody tells how wide the terminal is."""
+
+COMMAND = "make exit-matrix"
+"""Names the part of a page that is ours."""
 
 PRIORITY = 25
 """Below the processes of the chain (`canbase_cli.priority`)."""
@@ -28,7 +32,7 @@ def main() -> int:
     """Runs the rows and prints them."""
     parser = argparse.ArgumentParser(prog="exit_matrix", description="every way out stops the robot, measured")
     parser.add_argument("--only", metavar="TEXT", default="", help="rows with this in their name")
-    parser.add_argument("--write", type=Path, metavar="FILE", help="write the table there, as Markdown")
+    parser.add_argument("--write", type=Path, metavar="FILE", help="write the table there, between its marks")
     arguments = parser.parse_args()
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     _raise_priority()
@@ -47,7 +51,8 @@ def main() -> int:
         log.write_text(said.getvalue(), encoding="utf-8")
         console.print(f"what the processes said: {log}", soft_wrap=True)
     if arguments.write and not failed:
-        arguments.write.write_text(page(results), encoding="utf-8")
+        page = arguments.write.read_text(encoding="utf-8")
+        arguments.write.write_text(rewritten(page, COMMAND, section(results)), encoding="utf-8")
     return 1 if failed or not results else 0
 
 

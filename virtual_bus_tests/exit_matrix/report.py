@@ -1,4 +1,4 @@
-"""Results of the matrix as a table for the terminal and as the page docs/stop_times.md."""
+"""Results of the matrix as a table for the terminal and for docs/stop_times.md."""
 
 from __future__ import annotations
 
@@ -34,26 +34,8 @@ def cells(result: Result) -> tuple[str, ...]:
     return result.row.what, result.row.how, caught, *times
 
 
-def page(results: Sequence[Result]) -> str:
-    """docs/stop_times.md."""
-    lines = [f"| {' | '.join(cells(result))} |" for result in results]
+def section(results: Sequence[Result]) -> str:
+    """The part of docs/stop_times.md that `make exit-matrix` writes."""
     head = f"| {' | '.join(COLUMNS)} |\n|{'---|' * LEFT}{'---:|' * (len(COLUMNS) - LEFT)}"
-    rows = "\n".join(lines)
-    return f"""# Stop times: every way out, measured
-
-Written by `make exit-matrix`. Each row is a whole robot of real processes on a virtual bus, with the timeouts of the
-sample robot. It drives at {SPEED_MPS} m/s; then the failure is made to happen, and the simulator's ground truth tells
-when the last wheel stood and how far the base had gone. A row passes when
-
-- it stands within {ALLOWANCE_S} s + the timeout of the layer that caught it + the time to brake, all from robot.yaml
-  (`virtual_bus_tests/exit_matrix/layers.py`);
-- a layer that was expected to catch it says that it did (`rows.py` has the table);
-- it stays at rest, also when a joystick orders motion (where the stop is latched or its cause stands), and also when
-  what failed is repaired or goes on. Then a reset is given, and the robot has to drive the next row.
-
-{head}
-{rows}
-
-The numbers are of one run on a virtual bus; those of a robot depend on its mass and drives. None of this is a
-certified safety function: see [safety.md](safety.md).
-"""
+    rows = "\n".join(f"| {' | '.join(cells(result))} |" for result in results)
+    return f"Driven at {SPEED_MPS} m/s, {ALLOWANCE_S} s of allowance.\n\n{head}\n{rows}"

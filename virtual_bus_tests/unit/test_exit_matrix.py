@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from exit_matrix import layers
 from exit_matrix.layers import Layer
-from exit_matrix.report import page
+from exit_matrix.marked import rewritten
+from exit_matrix.report import section
 from exit_matrix.rows import ROWS
 from exit_matrix.runner import Result, judge
 from ros.running_robot import Standstill
@@ -66,7 +69,35 @@ def test_a_row_fails_that_somebody_else_has_caught() -> None:
     )
 
 
-def test_the_page_has_a_line_for_each_row() -> None:
+def test_the_table_has_a_line_for_each_row() -> None:
     result = Result(ROW, (("drives", "heartbeat lost"),), Standstill(0.421, 0.1264), 0.75)
     line = "| motor_driver | SIGKILL | drives: heartbeat lost | 0.42 s | 126 mm | 0.75 s |"
-    assert line in page([result]).splitlines()
+    assert line in section([result]).splitlines()
+
+
+PAGE = """text
+<!-- make a: begin -->
+old
+<!-- make a: end -->
+more
+<!-- make b: begin -->
+<!-- make b: end -->
+"""
+
+
+def test_each_command_writes_its_own_part_of_a_page() -> None:
+    assert rewritten(PAGE, "make a", "new\n") == PAGE.replace("old", "new")
+    assert rewritten(PAGE, "make b", "new") == PAGE.replace("begin -->\n<!-- make b", "begin -->\nnew\n<!-- make b")
+
+
+@pytest.mark.parametrize("page", ["", PAGE.replace("make a: end", "make a"), PAGE * 2])
+def test_a_page_without_both_marks_once_is_not_touched(page: str) -> None:
+    with pytest.raises(ValueError, match="make a: begin"):
+        rewritten(page, "make a", "new")
+
+
+def test_the_page_of_stop_times_has_the_marks() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "stop_times.md").read_text(encoding="utf-8")
+
+    for command in ("make exit-matrix", "make vm-test"):
+        assert "new" in rewritten(page, command, "new")
