@@ -90,7 +90,7 @@ def _inputs(odometry: Odometry) -> Inputs:
     """A healthy robot."""
     at = odometry.received
     safety = Safety(at, stops=False, cause="none", detail="", estop=False)
-    driver = Driver(at, "enabled", "none", "", "ok", "none", standstill=False)
+    driver = Driver(at, "enabled", "none", "", "ok", "none", standstill=False, hears_command=True)
     return Inputs(odometry, safety, driver, Mux(at, ""))
 
 

@@ -47,6 +47,8 @@ def _condition(robot: Robot, inputs: Inputs) -> str | None:
         return f"watchdog is {driver.watchdog} (cause {driver.watchdog_cause}); start or reset it"
     if driver and driver.state != ENABLED:
         return f"motor_driver is {driver.state}, not enabled: {driver.detail}"
+    if driver and not driver.hears_command:
+        return "motor_driver hears no cmd_vel; is safety_filter running? After a start try again in a second"
     if mux and mux.active not in ("", action_source(robot)):
         return f"{mux.active} drives now; let go of it first"
     return None

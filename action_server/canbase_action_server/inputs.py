@@ -55,6 +55,8 @@ class Driver:
     watchdog: str
     watchdog_cause: str
     standstill: bool
+    hears_command: bool
+    """cmd_vel reaches it; after a start the ROS network needs a moment for that."""
 
 
 @dataclass(frozen=True, slots=True)

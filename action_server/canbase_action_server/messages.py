@@ -45,6 +45,7 @@ def driver_in(message: DriverStatus, received: float) -> Driver:
         watchdog=message.watchdog,
         watchdog_cause=message.watchdog_cause,
         standstill=message.standstill,
+        hears_command=message.command_fresh,
     )
 
 

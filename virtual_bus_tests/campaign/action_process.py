@@ -115,6 +115,7 @@ class ActionProcess(Process):
             watchdog=snapshot.watchdog.value,
             watchdog_cause=snapshot.watchdog_cause,
             standstill=snapshot.standstill,
+            hears_command=snapshot.command_fresh,
         )
         self._inputs = replace(self._inputs, driver=driver)
 

@@ -54,6 +54,7 @@ class FakeBase:
         """Of: odom, driver, safety, mux."""
         self.safety = SafetyState(cause=SafetyState.CAUSE_NONE)
         self.driver = DriverStatus(state=DriverStatus.ENABLED, watchdog=DriverStatus.WATCHDOG_OK, cause="none")
+        self.driver.command_fresh = True
         self.mux = MuxState()
 
     @property

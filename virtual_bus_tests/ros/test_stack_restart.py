@@ -16,7 +16,7 @@ QUIET_S = 2.0
 
 
 def test_a_driver_that_was_killed_can_be_started_again() -> None:
-    with own_domain() as domain, robot_on(domain, changes={}) as robot:
+    with own_domain() as domain, robot_on(domain) as robot:
         robot.goal(4.0, 0.3)
         robot.wait_speed(0.29)
         robot.send("driver", signal.SIGKILL)

@@ -82,7 +82,14 @@ class Plant:
 
 GOOD_SAFETY = Safety(received=0.0, stops=False, cause="none", detail="", estop=False)
 GOOD_DRIVER = Driver(
-    received=0.0, state="enabled", cause="none", detail="", watchdog="ok", watchdog_cause="none", standstill=True
+    received=0.0,
+    state="enabled",
+    cause="none",
+    detail="",
+    watchdog="ok",
+    watchdog_cause="none",
+    standstill=True,
+    hears_command=True,
 )
 GOOD_MUX = Mux(received=0.0, active="")
 

@@ -59,6 +59,7 @@ def test_a_robot_that_is_ready_has_no_reason_against_it() -> None:
         ({"safety": replace(GOOD_SAFETY, cause="estop_stale")}, "emergency stop"),
         ({"driver": replace(GOOD_DRIVER, state="latched")}, "latched, not enabled"),
         ({"driver": replace(GOOD_DRIVER, watchdog="missing")}, "watchdog is missing"),
+        ({"driver": replace(GOOD_DRIVER, hears_command=False)}, "hears no cmd_vel"),
         ({"mux": replace(GOOD_MUX, active="joystick")}, "joystick drives"),
     ],
 )

@@ -77,7 +77,7 @@ def step(name: str, at_s: float = WALL_S - 2.0, uuid: str | None = "cd", **value
 INPUTS = Inputs(
     odometry=OdometryInput(9.9, Pose(0.0, 0.0, 0.0), 0.0, 0.0),
     safety=Safety(9.9, False, "none", "", False),
-    driver=Driver(9.9, "enabled", "none", "", "ok", "none", True),
+    driver=Driver(9.9, "enabled", "none", "", "ok", "none", standstill=True, hears_command=True),
     mux=Mux(9.9, ""),
 )
 HEALTHY = Evidence(

@@ -214,7 +214,7 @@ def test_turning_is_not_standing() -> None:
 
 
 def test_an_old_word_of_the_driver_is_no_word() -> None:
-    told = Driver(0.1, "enabled", "none", "", "ok", "none", standstill=True)
+    told = Driver(0.1, "enabled", "none", "", "ok", "none", standstill=True, hears_command=True)
     watch = Standstill(STILL, began=0.0, speed_mps=0.1)
     assert watch.judge(Inputs(driver=told), 0.5) is Verdict.WAIT  # received before the order could act
     assert watch.judge(Inputs(driver=replace(told, received=0.4)), 0.5) is Verdict.STANDS
