@@ -6,10 +6,18 @@ import os
 from collections.abc import Iterator
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, Phase, settings
 
-# The same examples each time: a run judges the change before it. HYPOTHESIS_PROFILE=default looks for new ones.
-settings.register_profile("same", derandomize=True)
+# The same examples each time, on a slow machine too: a run judges the change before it, and says what failed as it was
+# drawn. HYPOTHESIS_PROFILE=default looks for new examples and makes a failing one as short as it can.
+settings.register_profile(
+    "same",
+    derandomize=True,
+    deadline=None,
+    max_examples=50,
+    phases=[Phase.explicit, Phase.generate],
+    suppress_health_check=[HealthCheck.too_slow],
+)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
 

@@ -9,17 +9,25 @@ import multiprocessing
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from rich.console import Console
-from rich.progress import track
-from rich.table import Table
-
 from campaign.plan import draw_plan
 from campaign.scenario import Start
 from campaign.without import SAFEGUARDS, remove
 
-SCENARIOS = 400
+SCENARIOS = 150
 """So many scenarios are tried for each."""
-DRAWN_FROM: dict[str, tuple[str, ...]] = {}
+DRAWN_FROM: dict[str, tuple[str, ...]] = {
+    "watchdog:target_outside": ("straight_to_cmd_vel", "driver_repeats", "driver_ignores_zero"),
+    "watchdog:latch": ("velocity_hangs", "lease_lost", "driver_hangs"),
+    "driver:latch": ("watchdog_hangs", "drive_fault"),
+    "driver:asks_for_watchdog": ("watchdog_dies", "driver_dies"),
+    "drives:heartbeat_consumer": ("cable_cut", "cable_cut_to_drives", "cable_cut_one_drive"),
+    "mux:timeout": ("action_dies", "action_hangs"),
+    "filter:command": ("mux_lossy",),
+    "filter:estop": ("estop_pressed", "estop_stale"),
+    "filter:zero_after_estop": ("estop_pressed",),
+    "filter:obstacle": ("obstacle",),
+}
+"""Faults that a safeguard is there for, where they come too seldom among all."""
 COVERED: dict[str, str] = {}
 
 
@@ -52,13 +60,13 @@ def look_at_all(workers: int) -> Iterator[Bite]:
 
 def main() -> int:
     """Exit code 1 when a safeguard is neither found missing nor explained."""
-    table = Table("taken out", "found by", "seed", "scenarios", "otherwise covered by")
     gaps = 0
-    for bite in track(look_at_all(2), total=len(SAFEGUARDS), description="safeguards"):
+    for bite in look_at_all(2):
         gaps += not bite.found and bite.safeguard not in COVERED
-        seed = str(bite.seed) if bite.found else ""
-        table.add_row(bite.safeguard, bite.found, seed, str(bite.tried), COVERED.get(bite.safeguard, ""))
-    Console().print(table)
+        covered = COVERED.get(bite.safeguard, "NOTHING FOUND, NOTHING EXPLAINED")
+        print(
+            f"without {bite.safeguard:32}", f"{bite.found} in seed {bite.seed}" if bite.found else covered, flush=True
+        )
     return 1 if gaps else 0
 
 
