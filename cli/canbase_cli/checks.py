@@ -8,9 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from rich.table import Table
 from rich.text import Text
+
+if TYPE_CHECKING:
+    from canbase_config.load import Loaded
 
 
 class Verdict(Enum):
@@ -48,6 +52,12 @@ def warn(name: str, found: str, advice: str) -> Check:
 def fail(name: str, found: str, advice: str) -> Check:
     """Wrong: this keeps the robot from working."""
     return Check(name, Verdict.FAIL, found, advice)
+
+
+def good_file(loaded: Loaded) -> Check:
+    """The first row: a file that is wrong would have ended the command."""
+    robot = loaded.robot
+    return ok("robot.yaml", f"{loaded.path} is good: {robot.name}, {len(robot.drives)} drives")
 
 
 def first_failure(checks: Sequence[Check]) -> Check | None:

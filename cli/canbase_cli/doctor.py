@@ -1,17 +1,20 @@
-"""`canbase doctor`: looks at a running robot and says what is wrong with it. Orders nothing, changes nothing."""
+"""`canbase doctor`: looks at a robot and says what is wrong with it. Orders nothing, changes nothing."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
 
-from canbase_cli.checks import Check, exit_code, first_failure, table
+from canbase_cli.checks import Check, exit_code, first_failure, good_file, table
 from canbase_cli.options import ConfigOption, NamespaceOption, load_config, ros_arguments, ros_needed
 from canbase_cli.symptoms import SYMPTOMS
+
+if TYPE_CHECKING:
+    from canbase_config.load import Loaded
 
 EPILOG = "  \n".join(["Symptoms:", *(f"{key}: {seen}" for key, seen in SYMPTOMS.items())])
 
@@ -31,6 +34,9 @@ SymptomOption = Annotated[
 SecondsOption = Annotated[
     float, typer.Option("--seconds", metavar="SECONDS", min=0.5, max=60.0, help="to listen for, once found")
 ]
+BusOption = Annotated[
+    bool, typer.Option("--bus/--no-bus", help="Look at the bus and read the drives; or only listen to the processes.")
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the rows as one line of JSON.")]
 
 
@@ -41,26 +47,49 @@ def doctor(
     seconds: SecondsOption = 3.0,
     as_json: JsonOption = False,
     namespace: NamespaceOption = "",
+    bus: BusOption = True,
 ) -> None:
-    """Look at a running robot: what is there, what is wrong, what to do next.
+    """Look at a robot: its bus, its drives, and, where canbase runs, its parts. What is wrong, what to do next.
 
-    It only listens, and asks questions that change nothing: nothing moves by it, at any time. With --symptom it walks
+    It only listens, and asks questions that change nothing: nothing moves by it, at any time. The drives are read by
+    SDO and compared with robot.yaml; beside a running driver only while that one is quiet. With --symptom it walks
     through what can be the reason, up to the first check that fails.
 
     Exit codes: 0 nothing failed, 1 something did, 2 wrong command line or robot.yaml.
     """
-    loaded = load_config(config)
-    with ros_needed():
-        from canbase_cli.observe import observe
-        from canbase_cli.robot_checks import robot_checks
-        from canbase_cli.symptom_walk import walk
-    seen = observe(loaded, ros_arguments(ctx, namespace), seconds)
-    checks = robot_checks(seen) if symptom is None else walk(symptom, seen)
+    loaded, arguments = load_config(config), ros_arguments(ctx, namespace)
+    checks = _walk(symptom, loaded, arguments, seconds) if symptom else _all(loaded, arguments, seconds, with_bus=bus)
     if as_json:
         typer.echo(json.dumps([_row(check) for check in checks]))
     else:
-        _show(f"{_title(symptom)}, {loaded.robot.name} at {seen.namespace}", checks)
+        _show(f"{_title(symptom)}, {loaded.robot.name}{f' at {namespace}' if namespace else ''}", checks)
     raise typer.Exit(exit_code(checks))
+
+
+def _walk(symptom: str, loaded: Loaded, arguments: list[str], seconds: float) -> list[Check]:
+    with ros_needed():
+        from canbase_cli.observe import observe
+        from canbase_cli.symptom_walk import walk
+    return walk(symptom, observe(loaded, arguments, seconds))
+
+
+def _all(loaded: Loaded, arguments: list[str], seconds: float, *, with_bus: bool) -> list[Check]:
+    """Without any part of canbase on the bus, its parts are not looked for: the drives are there alone."""
+    if not with_bus:
+        return _parts(loaded, arguments, seconds)
+    from canbase_cli.bus_checks import bus_checks
+    from canbase_cli.onbus.doctor import look
+
+    seen = look(loaded.robot)
+    rows = _parts(loaded, arguments, seconds) if seen.canbase_runs or seen.problem else [good_file(loaded)]
+    return [rows[0], *bus_checks(seen), *rows[1:]]
+
+
+def _parts(loaded: Loaded, arguments: list[str], seconds: float) -> list[Check]:
+    with ros_needed():
+        from canbase_cli.observe import observe
+        from canbase_cli.robot_checks import robot_checks
+    return robot_checks(observe(loaded, arguments, seconds))
 
 
 def _row(check: Check) -> dict[str, Any]:

@@ -62,7 +62,9 @@ class Clinic:
 
     def doctor(self, *words: str) -> list[dict[str, Any]]:
         """The rows; the exit code is 0 only if none of them failed."""
-        process = self.spawn([*CANBASE, "doctor", "--config", str(self.config), "--json", "--seconds", "1", *words])
+        process = self.spawn(
+            [*CANBASE, "doctor", "--no-bus", "-c", str(self.config), "--json", "--seconds", "1", *words]
+        )
         code = self.end(process)
         rows: list[dict[str, Any]] = json.loads(process.log())
         assert code == max(int(row["verdict"] == "fail") for row in rows), process.log()

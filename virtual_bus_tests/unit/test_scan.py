@@ -84,7 +84,7 @@ def test_drives_alone_are_no_master_nor_is_the_watchdogs_state_a_drive() -> None
 
 def test_the_sdo_channel_is_free_again_a_while_after_the_last_request_of_another() -> None:
     heard = listen("601 40 00 10 00 00 00 00 00")
-    assert [heard.sdo_free(1, t) for t in (10.1, 10.29, 10.31)] == [False, False, True]
+    assert [heard.sdo_free(1, t) for t in (10.1, 10.14, 10.16)] == [False, False, True]
     assert heard.sdo_free(2, 10.1)
 
 
@@ -166,4 +166,4 @@ def test_a_request_waits_until_the_other_master_is_quiet_on_that_channel() -> No
     world.run(roster)
     assert 1 in roster.cards
     asked_at = [at for at, sent in world.said if sent.cob_id == 0x601]
-    assert asked_at[1] >= until + 0.19
+    assert asked_at[1] >= until + 0.04

@@ -28,8 +28,8 @@ from canbase_driver.watchdog_link import RESET_COB_ID, WatchdogCounters, Watchdo
 
 SYNC = 0x080
 OURS = {DRIVER_NODE_ID: "canbase's motor driver", WATCHDOG_NODE_ID: "canbase's watchdog"}
-SDO_QUIET_S = 0.2
-"""An SDO channel on which nobody has asked for so long is free."""
+SDO_QUIET_S = 0.05
+"""An SDO channel on which nobody has asked for so long is free: a boot asks more often, a measurement now and then."""
 OVERHEAD_BITS, STUFFED_BITS = 47, 34
 """Of a data frame with an 11-bit identifier: without its data, and what of it gets stuff bits (ISO 11898-1)."""
 

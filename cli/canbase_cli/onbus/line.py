@@ -38,16 +38,21 @@ def robot_if_given(config: Path | None) -> Robot | None:
     return None if config is None else load_config(config).robot
 
 
+def open_line(bus: Bus) -> BusLine:
+    """The bus, for a `with`. Exits with 1 and advice when it cannot be opened."""
+    try:
+        return BusLine(bus)
+    except BusError as error:
+        fail(str(error), FAILED)
+
+
 class BusLine:
-    """One bus, and the clock. Use with `with`. Exits with 1 and advice when the bus cannot be opened."""
+    """One bus, and the clock. Use with `with`."""
 
     def __init__(self, bus: Bus) -> None:
-        self.bus = bus
+        """Opens it. Raises BusError."""
         self._echo = Echo() if bus.interface == "udp_multicast" else None
-        try:
-            self._port = BusPort(bus.arguments())
-        except BusError as error:
-            fail(str(error), FAILED)
+        self._port = BusPort(bus.arguments())
 
     def __enter__(self) -> BusLine:
         return self

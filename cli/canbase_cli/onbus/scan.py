@@ -15,7 +15,7 @@ from rich.text import Text
 from canbase_cli.commissioning.listening import OURS, ListenSession
 from canbase_cli.commissioning.roster import Roster
 from canbase_cli.commissioning.scan_rows import ScanRow, missing, scan_rows
-from canbase_cli.onbus.line import BusLine
+from canbase_cli.onbus.line import BusLine, open_line
 from canbase_cli.options import FAILED, colour, fail
 from canbase_config.robot import Bus, Robot
 from canbase_driver.cia301 import MAX_NODE_ID
@@ -25,7 +25,7 @@ def run(
     bus: Bus, robot: Robot | None, seconds: float, timeout_s: float, *, passive: bool, yes: bool, as_json: bool
 ) -> None:
     """Listens, asks, prints; exits with 1 when nobody or not everybody is there."""
-    with BusLine(bus) as line:
+    with open_line(bus) as line:
         listening = ListenSession(seconds)
         line.run(listening)
         heard = listening.heard

@@ -24,7 +24,7 @@ from canbase_cli.commissioning.objects import (
     show,
 )
 from canbase_cli.commissioning.sdo_access import Refused, Written, read_object, status_places, write_object
-from canbase_cli.onbus.line import BusLine
+from canbase_cli.onbus.line import BusLine, open_line
 from canbase_cli.options import FAILED, colour, fail
 from canbase_config.eds_file import EdsError, read_eds
 from canbase_config.robot import Bus, Robot
@@ -68,7 +68,7 @@ class Target:
 
 def run_read(bus: Bus, target: Target, timeout_s: float, *, raw: bool) -> None:
     """Reads and prints; exits with 1 when there is nothing to print."""
-    with BusLine(bus) as line:
+    with open_line(bus) as line:
         data = _transfer(line, target.node, read_object(target.at), _listen(line), timeout_s)
     if raw:
         typer.echo(decode(data, target.kind))
@@ -81,7 +81,7 @@ def run_write(bus: Bus, target: Target, value: str, timeout_s: float, *, force: 
     """Writes, reads back, and prints both; exits with 1 when it was not written, 2 for a value that does not fit."""
     if target.kind:
         _or_wrong_value(lambda: encode(value, target.kind))
-    with BusLine(bus) as line:
+    with open_line(bus) as line:
         heard = _listen(line)
         if heard.driver_lives and not force:
             fail("canbase's driver runs on this bus and would not know of the change: end it first, or --force", FAILED)

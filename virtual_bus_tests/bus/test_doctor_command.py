@@ -1,0 +1,37 @@
+"""`canbase doctor` before drives alone, on a multicast bus: it needs neither driver nor ROS 2 there."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from bus.tool import canbase, drives, free_port, write_robot
+
+pytestmark = pytest.mark.bus
+
+
+def test_drives_alone_are_read_and_one_that_goes_is_named(tmp_path: Path) -> None:
+    config = write_robot(tmp_path, free_port())
+    with drives(config) as control:
+        well = canbase("doctor", "--config", str(config), "--json")
+        control.fault(2, "cut")
+        broken = canbase("doctor", "--config", str(config))
+    assert well.returncode == 0, well.stdout + well.stderr
+    rows = {row["name"]: row for row in json.loads(well.stdout)}
+    assert {row["verdict"] for row in rows.values()} == {"ok"}
+    assert rows["node 1 (left_wheel)"]["found"] == "0:CB402:10000:1, profile generic"
+    assert "by heartbeat of the watchdog" in rows["node 2 (right_wheel): stops by itself"]["found"]
+    assert broken.returncode == 1
+    assert "The first check that fails: node 2 (right_wheel)" in broken.stdout
+    assert "\x1b[" not in broken.stdout
+
+
+def test_a_drive_that_does_not_stop_by_itself_is_a_warning(tmp_path: Path) -> None:
+    config = write_robot(tmp_path, free_port(), profile="roboteq", velocity_unit="rpm")
+    with drives(config):
+        done = canbase("doctor", "--config", str(config), "--json")
+    rows = {row["name"]: row for row in json.loads(done.stdout)}
+    assert rows["node 1 (left_wheel): stops by itself"]["verdict"] == "warn"
+    assert "only STO by a safety relay" in rows["node 1 (left_wheel): stops by itself"]["advice"]
