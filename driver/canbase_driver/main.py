@@ -29,7 +29,7 @@ from canbase_driver.loop import ControlLoop
 from canbase_driver.node import MotorDriverNode, Publisher
 from canbase_driver.services import DriverServices
 
-WAKE_S = 0.1
+WAKE_S = 0.05
 LOOP_TIMEOUT_S = 0.5
 """A control thread without a cycle for so long, while this one ran, hangs: the process ends; the watchdog has already
 stopped the drives."""
@@ -98,6 +98,7 @@ def _spin(
         while not received:
             executor.spin_once(timeout_sec=WAKE_S)
             now = time.monotonic()
+            node.look_at_the_clock(now)
             failure = _failure(threads) or watch.look(loop.cycle_at, now)
             if failure is not None:
                 return failure

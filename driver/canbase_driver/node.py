@@ -17,6 +17,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
+from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
 from canbase_driver import messages
 from canbase_driver.black_box import Ring
@@ -39,6 +40,7 @@ class MotorDriverNode(Node):
         super().__init__("motor_driver")
         self._robot = robot
         self._loop = loop
+        self._receive_times = ReceiveTimes()
         self._odom = self.create_publisher(Odometry, "odom", 10)
         self._tf = self.create_publisher(messages.TFMessage, "tf", 100) if messages.TFMessage is not None else None
         self._joints = self.create_publisher(JointState, "joint_states", 10)
@@ -68,12 +70,16 @@ class MotorDriverNode(Node):
         self._log_change(snapshot)
         self._previous = snapshot
 
+    def look_at_the_clock(self, now: float) -> None:
+        """To be called in each turn of the executor's loop: a pause between two of them ages the commands that wait."""
+        self._receive_times.at(now)
+
     def end(self) -> None:
         """The control thread has ended: tell the stops that are still open."""
         self._stops.end()
 
     def _on_command(self, message: TwistStamped) -> None:
-        received_at = time.monotonic()
+        received_at = self._receive_times.at(time.monotonic())
         twist = Twist2D(message.twist.linear.x, message.twist.angular.z)
         if not twist.is_finite:
             self.get_logger().error(f"cmd_vel refused: {twist} is not finite", throttle_duration_sec=1.0)

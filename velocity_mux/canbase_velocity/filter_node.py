@@ -16,6 +16,7 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
+from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
 from canbase_config.safety import Scan as ScanConfig
 from canbase_velocity import messages
@@ -42,6 +43,7 @@ class FilterNode(Node):
     def __init__(self, robot: Robot, moving_sources: MovingSources = tuple) -> None:
         super().__init__("safety_filter")
         self._robot = robot
+        self._receive_times = ReceiveTimes()
         self._moving_sources = moving_sources
         self._filter = SafetyFilter(FilterConfig.of(robot))
         self._transforms: dict[str, Transform] = {}
@@ -88,18 +90,20 @@ class FilterNode(Node):
 
     def _on_command(self, message: TwistStamped) -> None:
         now = time.monotonic()
-        self._filter.on_command(messages.twist_of(message.twist), now)
+        self._filter.on_command(messages.twist_of(message.twist), self._receive_times.at(now))
         self._timer.reset()  # a mux faster than the timer is not doubled by it
         self._issue(self._filter.decide(now), now)
 
     def _on_estop(self, message: Bool) -> None:
         now = time.monotonic()
-        self._filter.on_estop(message.data, now)
+        self._filter.on_estop(message.data, self._receive_times.at(now))
         if message.data:
             self._issue(self._filter.decide(now), now)
 
     def _on_scan(self, config: ScanConfig, reader: ScanReader, placement: Placement, message: LaserScan) -> None:
         now = time.monotonic()
+        if self._receive_times.waited(now):
+            return
         try:
             if config.pose == "tf":
                 frame, base_frame = message.header.frame_id.lstrip("/"), self._robot.base.base_frame
@@ -123,6 +127,7 @@ class FilterNode(Node):
     def _tick(self) -> None:
         """Nothing was issued for a period: decides again, for ages have grown and scans have come."""
         now = time.monotonic()
+        self._receive_times.at(now)
         self._issue(self._filter.decide(now), now)
 
     def _issue(self, decision: Decision, now: float) -> None:

@@ -15,6 +15,7 @@ from geometry_msgs.msg import TwistStamped
 from rclpy.node import Node
 from std_msgs.msg import Bool
 
+from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
 from canbase_velocity.foreign import ForeignWatch
 from canbase_velocity.graph import expected, publishers
@@ -34,6 +35,7 @@ class MuxNode(Node):
     def __init__(self, robot: Robot) -> None:
         super().__init__("velocity_mux")
         self._robot = robot
+        self._receive_times = ReceiveTimes()
         self._mux = Mux(robot.mux.sources, robot.mux.locks, foreign_lock=robot.mux.foreign_publishers == "lock")
         self._watch = ForeignWatch(expected(robot, self))
         self._decision = self._mux.decide(time.monotonic())
@@ -72,7 +74,7 @@ class MuxNode(Node):
 
     def _on_plain(self, name: str, message: TwistMessage) -> None:
         now = time.monotonic()
-        if not self._mux.on_command(name, twist_of(message), now):
+        if not self._mux.on_command(name, twist_of(message), self._receive_times.at(now)):
             self.get_logger().warning(f"{name} refused: NaN or infinity", throttle_duration_sec=5.0)
         decision = self._mux.decide(now)
         if decision.active == name or decision.active != self._decision.active:
@@ -81,7 +83,7 @@ class MuxNode(Node):
 
     def _on_lock(self, name: str, message: Bool) -> None:
         now = time.monotonic()
-        self._mux.on_lock(name, message.data, now)
+        self._mux.on_lock(name, message.data, self._receive_times.at(now))
         self._send_if_changed(now)
 
     def _look(self) -> None:
@@ -104,6 +106,7 @@ class MuxNode(Node):
     def _tick(self) -> None:
         """Nothing was sent for a period: repeats what holds, or zero."""
         now = time.monotonic()
+        self._receive_times.at(now)
         self._send(self._mux.decide(now), now)
 
     def _send(self, decision: MuxDecision, now: float) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import socket
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -15,6 +16,7 @@ from ruamel.yaml import YAML
 from canbase_config.load import load_robot
 from canbase_config.robot import Robot
 from ros.harness import Process, TestNode, merged, python_argv, reserve_domain, robot_values
+from ros.velocity_chain import RUN, Chain
 
 Spawn = Callable[..., Process]
 MakeRobot = Callable[[Mapping[str, Any]], Path]
@@ -99,3 +101,33 @@ def test_node() -> Iterator[TestNode]:
     """A `TestNode` in the test's domain."""
     with TestNode() as node:
         yield node
+
+
+@pytest.fixture
+def watchdog(robot: Robot) -> Iterator[socket.socket]:
+    """The socket at which leases arrive."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(robot.lease.socket)
+        receiver.setblocking(False)
+        yield receiver
+
+
+@pytest.fixture
+def start(
+    spawn: Spawn,
+    make_robot: MakeRobot,
+    test_node: TestNode,
+    watchdog: socket.socket,
+) -> Callable[[Mapping[str, Any]], Chain]:
+    """start({changes of robot.yaml}): the chain, ready to drive."""
+
+    def start_chain(changes: Mapping[str, Any]) -> Chain:
+        process = spawn(RUN.format(path=str(make_robot(changes)), ros_args=[]))
+        return Chain(test_node, process, watchdog)
+
+    return start_chain
+
+
+@pytest.fixture
+def chain(start: Callable[[Mapping[str, Any]], Chain]) -> Chain:
+    return start({})

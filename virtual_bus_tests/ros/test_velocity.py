@@ -4,133 +4,22 @@ from __future__ import annotations
 
 import math
 import socket
-import struct
 import time
-import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
-from canbase.msg import MuxState, SafetyState
+from canbase.msg import SafetyState
 from geometry_msgs.msg import Twist, TwistStamped
-from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
-from canbase_config.robot import Robot
-from ros.harness import Process, Recorder, TestNode
+from ros.harness import Process, TestNode
+from ros.velocity_chain import RUN, START_S, Chain, drive, scan
 
 pytestmark = pytest.mark.ros
-
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-LEASE = struct.Struct("<4sQQddII")
-START_S = 15.0
-RUN = """
-import sys
-from canbase_config.load import load_robot
-from canbase_velocity.main import run
-sys.exit(run(load_robot({path!r}).robot, {ros_args!r}))
-"""
-
-
-def drive(linear_mps: float, angular_radps: float = 0.0) -> TwistStamped:
-    message = TwistStamped()
-    message.twist.linear.x, message.twist.angular.z = linear_mps, angular_radps
-    return message
-
-
-def scan(ahead_m: float = math.inf, behind_m: float = math.inf) -> LaserScan:
-    """720 beams all around, all free but for one ahead and one behind, from base_link."""
-    ranges = [math.inf] * 720
-    ranges[0], ranges[360] = ahead_m, behind_m
-    return LaserScan(angle_min=0.0, angle_increment=math.pi / 360, range_min=0.05, range_max=10.0, ranges=ranges)
-
-
-class Chain:
-    """The process, everything that it says, and the sources that a test can move."""
-
-    def __init__(self, node: TestNode, process: Process, watchdog: socket.socket) -> None:
-        self.node, self.process, self.watchdog = node, process, watchdog
-        self.leases: list[tuple[Any, ...]] = []
-        node.node.create_timer(0.02, self.drain)
-        self.orders: Recorder[TwistStamped] = node.record(TwistStamped, "cmd_vel")
-        self.mux: Recorder[MuxState] = node.record(MuxState, "velocity_mux/state", LATCHED)
-        self.state: Recorder[SafetyState] = node.record(SafetyState, "safety_filter/state", LATCHED)
-        self.joystick = node.repeat(TwistStamped, "cmd_vel_joy", 50.0)
-        self.action = node.repeat(TwistStamped, "cmd_vel_action", 50.0)
-        self.scan = node.repeat(LaserScan, "scan", 20.0, qos_profile_sensor_data)
-        self.estop = node.repeat(Bool, "estop_state", 20.0)
-        for repeater in (self.joystick, self.action, self.scan, self.estop):
-            node.wait_for_subscriber(repeater.publisher, START_S)
-        node.wait_for(lambda: self.mux.last is not None and self.state.last is not None, START_S, "the first states")
-        self.scan.message = scan()
-        self.wait_for_cause(SafetyState.CAUSE_NONE)
-
-    @property
-    def ordered(self) -> tuple[float, float]:
-        """The newest order on cmd_vel [m/s, rad/s]."""
-        last = self.orders.last
-        assert last is not None
-        return last.twist.linear.x, last.twist.angular.z
-
-    def wait_for_order(self, linear_mps: float, timeout_s: float = 3.0) -> float:
-        """Until that is ordered; returns how long it took [s]."""
-        started_s = time.monotonic()
-        what = f"{linear_mps} m/s on cmd_vel"
-        self.node.wait_for(lambda: self.ordered[0] == pytest.approx(linear_mps), timeout_s, what)
-        return time.monotonic() - started_s
-
-    def wait_for_cause(self, cause: str) -> SafetyState:
-        def state() -> SafetyState | None:
-            last = self.state.last
-            return last if last is not None and last.cause == cause else None
-
-        found = self.node.wait_for(state, 3.0, f"cause {cause}, state is {self.state.last}")
-        assert found is not None
-        return found
-
-    def drain(self) -> None:
-        """Takes all leases that wait at the socket: its queue is short, and a full one refuses the newest."""
-        while True:
-            try:
-                data = self.watchdog.recv(100)
-            except BlockingIOError:
-                return
-            lease = LEASE.unpack(data)
-            assert zlib.crc32(data[:40]) == lease[-1]
-            self.leases.append(lease)
-
-
-@pytest.fixture
-def watchdog(robot: Robot) -> Iterator[socket.socket]:
-    """The socket at which leases arrive."""
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as receiver:
-        receiver.bind(robot.lease.socket)
-        receiver.setblocking(False)
-        yield receiver
-
-
-@pytest.fixture
-def start(
-    spawn: Callable[..., Process],
-    make_robot: Callable[[Mapping[str, Any]], Path],
-    test_node: TestNode,
-    watchdog: socket.socket,
-) -> Callable[[Mapping[str, Any]], Chain]:
-    """start({changes of robot.yaml}): the chain, ready to drive."""
-
-    def start_chain(changes: Mapping[str, Any]) -> Chain:
-        process = spawn(RUN.format(path=str(make_robot(changes)), ros_args=[]))
-        return Chain(test_node, process, watchdog)
-
-    return start_chain
-
-
-@pytest.fixture
-def chain(start: Callable[[Mapping[str, Any]], Chain]) -> Chain:
-    return start({})
 
 
 def test_the_higher_priority_drives_and_silence_ends_in_explicit_zeros(chain: Chain) -> None:
@@ -334,19 +223,6 @@ def test_an_exception_in_a_callback_ends_the_process_with_zeros_and_the_tracebac
     assert "RuntimeError: a defect" in chain.process.log()
     chain.node.spin_for(0.2)
     assert [message.twist.linear.x for message in chain.orders.messages[-3:]] == [0.0, 0.0, 0.0]
-
-
-def test_a_process_that_hangs_falls_silent_on_cmd_vel_and_at_the_watchdog(chain: Chain) -> None:
-    chain.action.message = drive(0.2)
-    chain.wait_for_order(0.2)
-    chain.process.stop()
-    chain.node.spin_for(0.2)
-    chain.drain()
-    chain.leases.clear()
-    chain.orders.clear()
-    chain.node.spin_for(0.5)
-    assert chain.orders.messages == []
-    assert chain.leases == []
 
 
 def test_a_namespace_gives_a_second_robot(

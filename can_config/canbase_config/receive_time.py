@@ -1,0 +1,36 @@
+"""When a message counts as received, also after this process stood still (SIGSTOP, a busy loop, a frozen computer).
+
+A message that waited in a queue meanwhile looks new when it is taken out. It may be as old as the pause, so it counts
+from before it: what a source said then orders nothing now.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+GAP_S: Final = 0.1
+"""Two looks that are further apart mean that this process stood still between them."""
+SETTLE_S: Final = 0.1
+"""So long after a pause what is taken out of the queues may be from before its end."""
+
+
+class ReceiveTimes:
+    """The loop asks in each of its turns, at the latest every GAP_S / 2, and at each message."""
+
+    def __init__(self) -> None:
+        self._looked_at = math.inf
+        self._before_pause = self._settled_at = -math.inf
+
+    def at(self, now: float) -> float:
+        """The receive time of what is taken in at `now` (both monotonic, s): `now`, or before the last pause."""
+        if now - self._looked_at > GAP_S:
+            if self._looked_at >= self._settled_at:  # else the queues are not empty yet since the pause before
+                self._before_pause = self._looked_at
+            self._settled_at = now + SETTLE_S
+        self._looked_at = now
+        return now if now >= self._settled_at else self._before_pause
+
+    def waited(self, now: float) -> bool:
+        """What is taken in at `now` may have waited while this process stood still."""
+        return self.at(now) != now
