@@ -5,19 +5,24 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.resources import files
+from typing import Any
 
 import can
 import canopen
 import pytest
 
+from bus.crews import Crew
+from bus.drive_rig import Surroundings
 from canbase_bench.frame import Frame as BenchFrame
 from canbase_bench.world.bench import Bench
+from canbase_config.drive import Drive
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_driver.frame import Frame
 from canbase_driver.node_boot import NodeBoot
 
 pytestmark = pytest.mark.bus
+BOOTED_WITHIN_S = 5.0
 EDS = str(files("canbase_config").joinpath("eds/canbase_cia402.eds"))
 
 
@@ -40,17 +45,22 @@ def message(cob_id: int, data: bytes) -> can.Message:
 
 
 def run(channel: str, boots: list[NodeBoot], limit_s: float) -> float:
+    """As `run_on`, on a virtual bus."""
+    with open_bus(channel) as bus:
+        return run_on(bus, boots, limit_s)
+
+
+def run_on(bus: can.BusABC, boots: list[NodeBoot], limit_s: float) -> float:
     """Runs the boots to their end, at most `limit_s`; how long they took."""
     start = time.monotonic()
-    with open_bus(channel) as bus:
-        while not all(boot.done for boot in boots) and time.monotonic() < start + limit_s:
-            received = bus.recv(0.005)
-            now = time.monotonic()
-            for boot in boots:
-                if received is not None:
-                    boot.on_frame(Frame(received.arbitration_id, bytes(received.data)), now)
-                for frame in boot.tick(now):
-                    bus.send(message(frame.cob_id, frame.data))
+    while not all(boot.done for boot in boots) and time.monotonic() < start + limit_s:
+        received = bus.recv(0.005)
+        now = time.monotonic()
+        for boot in boots:
+            if received is not None:
+                boot.on_frame(Frame(received.arbitration_id, bytes(received.data)), now)
+            for frame in boot.tick(now):
+                bus.send(message(frame.cob_id, frame.data))
     return time.monotonic() - start
 
 
@@ -132,6 +142,22 @@ def test_two_simulated_drives_boot_within_a_second_of_power_on(channel: str, rob
         (2, True, ()),
     ]
     assert duration_s <= 1.0
+
+
+@pytest.mark.real_bus
+def test_drives_of_each_kind_boot_beside_each_other(
+    crew: Crew, arguments: dict[str, Any], around: Surroundings
+) -> None:
+    """Simulated ones from power on; Nanotec's boot loader, Technosoft's late boot-up and Kinco's SDOs take longest."""
+    nodes: dict[int, tuple[Drive, ...]] = {}
+    for drive in crew.robot.drives:
+        nodes[drive.node_id] = (*nodes.get(drive.node_id, ()), drive)
+    boots = [NodeBoot(node_id, drives, crew.robot) for node_id, drives in nodes.items()]
+    with can.Bus(**arguments) as bus:
+        duration_s = run_on(bus, boots, limit_s=8.0)
+    assert [boot.error for boot in boots] == [None] * len(boots)
+    assert [boot.report is not None for boot in boots] == [True] * len(boots), [boot.waiting_for for boot in boots]
+    assert duration_s <= BOOTED_WITHIN_S
 
 
 def test_a_drive_that_is_switched_on_later_is_waited_for(channel: str, robot: Robot) -> None:
