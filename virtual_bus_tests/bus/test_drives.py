@@ -1,7 +1,7 @@
 """The driver in real time with drives of every kind; those marked real_bus can be pointed at real ones.
 
 `pytest virtual_bus_tests/bus/test_drives.py`: simulated drives of all kinds; `--personality epos4`: of one kind.
-`pytest virtual_bus_tests/bus --can-interface socketcan --can-channel can0 --personality epos4 --robot=robot.yaml`: real.
+`pytest virtual_bus_tests/bus --can-interface socketcan --can-channel can0 --personality epos4 --robot=FILE`: real ones.
 """
 
 from __future__ import annotations
