@@ -1,12 +1,13 @@
-"""The line of the safety relay on a chip that is not there: gpiod's own functions and names, without its hardware."""
+"""The line of the safety relay: gpiod as it is, on a chip whose kernel side alone is made up."""
 
 from __future__ import annotations
 
-import enum
 import sys
 from types import SimpleNamespace
 
+import gpiod
 import pytest
+from gpiod.line import Value
 
 from canbase_config.derive import watchdog_config
 from canbase_config.load import load_robot, sample
@@ -19,34 +20,38 @@ from unit.watchdog_story import FakeDrive, Story
 LINE = RelayLine("/dev/gpiochip7", 5)
 
 
-class Direction(enum.Enum):
-    INPUT, OUTPUT = 2, 3
-
-
-class Value(enum.Enum):
-    INACTIVE, ACTIVE = 0, 1
-
-
 class FakeChip:
-    """One chip with 8 lines. `written`: what was set, in order; `gone`: it was unplugged."""
+    """What the kernel has of one chip with 8 lines. `written`: what was set, in order; `gone`: it was unplugged."""
+
+    chip_name, offsets = "gpiochip7", [5]
 
     def __init__(self) -> None:
         self.written: list[tuple[int, Value]] = []
-        self.outputs: list[int] = []
+        self.consumer = ""
         self.released = self.gone = False
 
-    def request_lines(self, path: str, consumer: str, config: dict[int, SimpleNamespace]) -> FakeChip:
+    def open(self, path: str) -> FakeChip:
         if path != "/dev/gpiochip7":
             raise FileNotFoundError(2, "No such file or directory", path)
-        self.outputs = [offset for offset, settings in config.items() if settings.direction is Direction.OUTPUT]
-        if any(offset >= 8 for offset in config):
-            raise ValueError("invalid line config")
         return self
 
-    def set_value(self, line: int, value: Value) -> None:
+    def close(self) -> None:
+        """Only the chip: the request stays."""
+
+    def get_info(self) -> SimpleNamespace:
+        return SimpleNamespace(num_lines=8)
+
+    def get_line_name(self, _offset: int) -> str:
+        return ""
+
+    def request_lines(self, _config: object, consumer: str, _events: None) -> FakeChip:
+        self.consumer = consumer
+        return self
+
+    def set_values(self, values: dict[int, Value]) -> None:
         if self.gone:
             raise OSError(19, "No such device")
-        self.written.append((line, value))
+        self.written += values.items()
 
     def release(self) -> None:
         self.released = True
@@ -55,10 +60,24 @@ class FakeChip:
 @pytest.fixture
 def chip(monkeypatch: pytest.MonkeyPatch) -> FakeChip:
     it = FakeChip()
-    names = SimpleNamespace(Direction=Direction, Value=Value)
-    module = SimpleNamespace(request_lines=it.request_lines, LineSettings=SimpleNamespace, line=names)
-    monkeypatch.setitem(sys.modules, "gpiod", module)
+    monkeypatch.setattr("gpiod.chip._ext.Chip", it.open)
     return it
+
+
+def test_the_line_is_an_output_that_begins_inactive(chip: FakeChip, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[gpiod.LineSettings] = []
+    plain = gpiod.LineSettings
+
+    def settings(**keys: object) -> gpiod.LineSettings:
+        asked.append(plain(**keys))  # type: ignore[arg-type]
+        return asked[-1]
+
+    monkeypatch.setattr("gpiod.LineSettings", settings)
+    with Relay(LINE):
+        assert chip.consumer == "canbase watchdog"
+    assert [(each.direction, each.output_value, each.active_low) for each in asked] == [
+        (gpiod.line.Direction.OUTPUT, Value.INACTIVE, False)
+    ]
 
 
 def test_the_line_is_toggled_and_left_inactive(chip: FakeChip) -> None:
@@ -66,7 +85,6 @@ def test_the_line_is_toggled_and_left_inactive(chip: FakeChip) -> None:
         for _ in range(3):
             relay.toggle()
         assert not chip.released
-    assert chip.outputs == [5]
     assert chip.written == [(5, Value.ACTIVE), (5, Value.INACTIVE), (5, Value.ACTIVE), (5, Value.INACTIVE)]
     assert chip.released
 
@@ -96,9 +114,16 @@ def test_a_line_that_is_gone_is_told_and_released(chip: FakeChip) -> None:
 
 
 @pytest.mark.parametrize("line", [RelayLine("/dev/gpiochip8", 5), RelayLine("/dev/gpiochip7", 8)])
-def test_a_line_that_cannot_be_had_says_where_to_look(chip: FakeChip, line: RelayLine) -> None:
+@pytest.mark.usefixtures("chip")
+def test_a_line_that_cannot_be_had_says_where_to_look(line: RelayLine) -> None:
     with pytest.raises(RelayError, match=r"cannot be had: .* Check watchdog\.relay \(gpioinfo"):
         Relay(line)
+
+
+@pytest.mark.parametrize("path", ["/dev/gpiochip-that-is-not-there", "/dev/null", "/proc/self/environ", ""])
+def test_so_does_the_kernel_of_this_computer_for_what_is_no_chip(path: str) -> None:
+    with pytest.raises(RelayError, match=rf"line 5 of {path} cannot be had: "):
+        Relay(RelayLine(path, 5))
 
 
 def test_without_the_package_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
