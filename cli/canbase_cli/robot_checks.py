@@ -25,6 +25,10 @@ STATES = {
     DriverStatus.LATCHED: "latched",
 }
 ON_ITS_WAY = (DriverStatus.BOOTING, DriverStatus.ENABLING, DriverStatus.STOPPING)
+RUNGS = ("no rung", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld")
+WATCHDOG_COUNTERS = ("leases_refused", "frames_dropped", "bus_errors", "trips")
+PAUSE_S = 0.05
+"""A pause of the watchdog's loop that is worth a look: ten of its turns."""
 COUNTERS = ("commands_refused", "overruns", "frames_dropped", "send_errors")
 
 
@@ -60,16 +64,35 @@ def _counters(before: Any, now: Any) -> Check:
 
 
 def watchdog(evidence: Evidence) -> list[Check]:
-    """The watchdog as the driver hears it on the bus."""
-    status = evidence.on("motor_driver/status").last
+    """The watchdog as the driver hears it on the bus: its state, its ages, its counters."""
+    heard = evidence.on("motor_driver/status")
+    status = heard.last
     if status is None:
         return [fail("watchdog", "unknown: motor_driver tells about it", PARTS_RUN)]
     age = _age(status.watchdog_age_s)
+    if status.watchdog == DriverStatus.WATCHDOG_MISSING:
+        return [fail("watchdog", f"missing, last heard {age} ago", "start canbase watchdog on the same robot.yaml")]
+    told = f"last heard {age} ago; last lease {_age(status.watchdog_lease_age_s)} old"
     if status.watchdog == DriverStatus.WATCHDOG_OK:
-        return [ok("watchdog", f"ok, last heard {age} ago")]
-    if status.watchdog == DriverStatus.WATCHDOG_TRIPPED:
-        return [fail("watchdog", f"tripped: {status.watchdog_cause}", "remove the cause (docs/bus.md), canbase reset")]
-    return [fail("watchdog", f"missing, last heard {age} ago", "start canbase watchdog on the same robot.yaml")]
+        found = ok("watchdog", f"ok, {told}")
+    else:
+        rung = RUNGS[min(status.watchdog_rung, len(RUNGS) - 1)]
+        tripped = f"tripped: {status.watchdog_cause}; went as far as {rung}; {told}"
+        found = fail("watchdog", tripped, "remove the cause (docs/bus.md), canbase reset")
+    return [found, _watchdog_counters(heard.first, status)]
+
+
+def _watchdog_counters(before: Any, now: Any) -> Check:
+    name = "watchdog's counters"
+    counts = {name: getattr(now, f"watchdog_{name}") for name in WATCHDOG_COUNTERS}
+    told = ", ".join(f"{name} {count}" for name, count in counts.items())
+    told += f"; longest pause of its loop {now.watchdog_pause_max_s * 1e3:.0f} ms"
+    grew = [name for name, count in counts.items() if count > getattr(before, f"watchdog_{name}")]
+    if grew:
+        return warn(name, told, f"{', '.join(grew)} grew while doctor listened; docs/bus.md, 2FEh")
+    if now.watchdog_pause_max_s > PAUSE_S:
+        return warn(name, told, "its loop is held up: is the computer overloaded, has it real-time priority?")
+    return ok(name, told)
 
 
 def drives(evidence: Evidence) -> list[Check]:

@@ -28,7 +28,8 @@ def healthy() -> dict[str, Any]:
     return {
         "motor_driver/status": DriverStatus(
             state=DriverStatus.ENABLED, cause="none", watchdog="ok", watchdog_cause="none", standstill=True,
-            command_age_s=0.01, command_fresh=True, drives=drives,
+            command_age_s=0.01, command_fresh=True, drives=drives, watchdog_age_s=0.02, watchdog_lease_age_s=0.01,
+            watchdog_pause_max_s=0.005,
         ),
         "safety_filter/state": SafetyState(cause="none", lease_sequence=100),
         "velocity_mux/state": MuxState(sources=[MuxSource(name="joystick"), MuxSource(name="action")]),
@@ -64,7 +65,7 @@ def not_ok(seen: Evidence) -> list[tuple[str, Verdict]]:
 def test_a_robot_that_is_well_has_nothing_but_good_rows_and_exit_code_0() -> None:
     checks = robot_checks(evidence(healthy()))
     assert {check.verdict for check in checks} == {Verdict.OK}
-    assert [check.advice for check in checks] == [""] * 8
+    assert [check.advice for check in checks] == [""] * 9
     assert exit_code(checks) == 0
 
 
@@ -77,6 +78,11 @@ def test_a_robot_that_is_well_has_nothing_but_good_rows_and_exit_code_0() -> Non
         (changed("motor_driver/status", state=DriverStatus.BOOTING), "motor_driver", "warn", "booting"),
         (changed("motor_driver/status", state=200), "motor_driver", "FAIL", "state 200"),
         (changed("motor_driver/status", watchdog="missing"), "watchdog", "FAIL", "start canbase watchdog"),
+        (changed("motor_driver/status", watchdog="tripped", watchdog_rung=3), "watchdog", "FAIL", "disable voltage"),
+        (changed("motor_driver/status", watchdog="tripped", watchdog_rung=9), "watchdog", "FAIL", "withheld"),
+        (changed("motor_driver/status", watchdog_trips=2), "watchdog's counters", "warn", "trips grew"),
+        (changed("motor_driver/status", watchdog_leases_refused=2), "watchdog's counters", "warn", "leases_refused 2"),
+        (changed("motor_driver/status", watchdog_pause_max_s=0.051), "watchdog's counters", "warn", "51 ms"),
         (changed("motor_driver/status", watchdog="tripped", watchdog_cause="lease"), "watchdog", "FAIL", "lease"),
         (changed("motor_driver/status", overruns=1), "its counters", "warn", "overruns grew"),
         (changed("safety_filter/state", action=SafetyState.STOP, cause="estop"), "safety_filter", "FAIL", "estop"),
