@@ -30,13 +30,14 @@ from canbase_driver.cia301 import (
 from canbase_driver.cia402 import PowerGoal
 from canbase_driver.command import Command
 from canbase_driver.cycle_stats import CycleStats
-from canbase_driver.drives import Drives, age_s
+from canbase_driver.drives import Drives
 from canbase_driver.frame import Frame
-from canbase_driver.kinematics import Twist2D, base_twist, wheel_speeds
+from canbase_driver.kinematics import Twist2D, wheel_speeds
 from canbase_driver.limits import Limiter, MotionState
 from canbase_driver.odometry import Pose2D
 from canbase_driver.odometry_feed import OdometryFeed
 from canbase_driver.remote_node import RemoteNode
+from canbase_driver.report import Told, snapshot_of
 from canbase_driver.reset import Outcome, Phase, Reset, refusal
 from canbase_driver.snapshot import DriverSnapshot, DriverState, StopRecord
 from canbase_driver.supervisor import NO_POWER, Cause, Drive, Orders, Situation, Supervisor
@@ -319,50 +320,15 @@ class DriverCore:
 
     def snapshot(self, now: float) -> DriverSnapshot:
         """What the driver knows now."""
-        watchdog, _detail = self._watchdog.view(now)
-        measured = base_twist(*self._drives.speeds_mps(), self._robot.base.track_m)
-        odometry, cause = self._feed.odometry, self._supervisor.cause
-        counters, bus = self._watchdog.counters, self._bus_report
-        return DriverSnapshot(
-            time_s=now,
-            state=self.state,
-            cause=cause.name,
-            detail=cause.detail,
-            clears_on=cause.clears_on,
-            watchdog=watchdog,
-            watchdog_cause=self._watchdog.cause,
-            watchdog_age_s=self._watchdog.age_s(now),
-            watchdog_rung=self._watchdog.rung,
-            watchdog_lease_age_s=self._watchdog.lease_age_s,
-            watchdog_trips=counters.trips,
-            watchdog_leases_refused=counters.leases_refused,
-            watchdog_frames_dropped=counters.frames_dropped,
-            watchdog_bus_errors=counters.bus_errors,
-            watchdog_pause_max_s=counters.pause_max_ms / 1000.0,
-            standstill=self._drives.stand(now),
-            command_age_s=age_s(now, self._command.received_at),
-            command_fresh=self._command.is_fresh(now),
-            commands_refused=self._command.refused,
-            cycles=self._stats.cycles,
-            overruns=self._stats.overruns,
-            cycle_lateness_max_s=self._stats.worst_s,
-            frames_dropped=self.frames_dropped + bus.dropped,
-            send_errors=bus.send_errors,
-            bus_problem=self._bus_problem,
-            controller=bus.controller,
-            receive_errors=bus.receive_errors,
-            error_frames=bus.error_frames,
-            bus_failures=bus.failures,
-            drives=self._drives.snapshots(now),
-            x_m=odometry.pose.x_m,
-            y_m=odometry.pose.y_m,
-            yaw_rad=odometry.pose.yaw_rad,
-            linear_mps=measured.linear_mps,
-            angular_radps=measured.angular_radps,
-            pose_covariance=odometry.pose_covariance(),
-            twist_covariance=odometry.twist_covariance(),
-            odometry_valid=self._drives.are_fresh(now) and self._drives.have_references(),
-            travel_losses=self._drives.losses(),
-            odom_frame=self._robot.base.odom_frame,
-            base_frame=self._robot.base.base_frame,
+        told = Told(
+            self._supervisor,
+            self._watchdog,
+            self._drives,
+            self._feed.odometry,
+            self._command,
+            self._stats,
+            self._bus_report,
+            self._bus_problem,
+            self.frames_dropped,
         )
+        return snapshot_of(told, self._robot.base, now)
