@@ -45,8 +45,10 @@ DEFAULT_SOURCES = {
 class Mux(Section):
     """Who may drive."""
 
-    sources: Annotated[dict[Name, MuxSource], Field(min_length=1)] = DEFAULT_SOURCES
-    locks: dict[Name, MuxLock] = Field(default_factory=dict)
+    sources: Annotated[dict[Name, MuxSource], Field(min_length=1, description="who may drive, by name")] = (
+        DEFAULT_SOURCES
+    )
+    locks: dict[Name, MuxLock] = Field(default_factory=dict, description="what holds them back, by name")
     foreign_publishers: Annotated[
         Literal["report", "lock"],
         Field(description="publishers on sources' topics and cmd_vel that no key names: said, or held back too"),

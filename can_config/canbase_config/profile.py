@@ -159,8 +159,10 @@ class SdoWrite(Section):
 class Writes(Section):
     """What the boot writes besides the standard objects, in order."""
 
-    before_mapping: Annotated[tuple[SdoWrite, ...], Field(strict=False)] = ()
-    after_mapping: Annotated[tuple[SdoWrite, ...], Field(strict=False)] = ()
+    before_mapping: Annotated[
+        tuple[SdoWrite, ...], Field(strict=False, description="after the reset, before everything else")
+    ] = ()
+    after_mapping: Annotated[tuple[SdoWrite, ...], Field(strict=False, description="at the end of the boot")] = ()
 
 
 class Measured(Section):
@@ -169,7 +171,7 @@ class Measured(Section):
     index: Index
     sub: Sub = 0
     bits: Bits
-    signed: bool = False
+    signed: Annotated[bool, Field(description="true: two's complement")] = False
     scale: Annotated[float, Field(gt=0.0, description="V, A or °C for one bit")]
     second_axis: Annotated[
         Literal["same", "offset", "next_sub"], Field(description="where it is for the second motor")

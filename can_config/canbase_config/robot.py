@@ -141,7 +141,10 @@ class Robot(Section):
 
     name: Annotated[Name, Field(description="used in log lines and diagnostics")] = "robot"
     bus: Bus
-    drives: Annotated[tuple[Drive, ...], Field(min_length=2, max_length=8, strict=False)]
+    drives: Annotated[
+        tuple[Drive, ...],
+        Field(min_length=2, max_length=8, strict=False, description="one for each wheel that is driven"),
+    ]
     base: Base
     limits: Limits
     rates: Rates = Rates()

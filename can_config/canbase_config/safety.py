@@ -16,7 +16,7 @@ class Scan(Section):
     """One laser scanner that the safety filter looks at. Its pose is written here, or read from tf_static."""
 
     required: Annotated[bool, Field(description="true: without a fresh scan nothing moves")]
-    topic: Topic = "scan"
+    topic: Annotated[Topic, Field(description="sensor_msgs/LaserScan")] = "scan"
     timeout_s: Annotated[float, Field(ge=0.05, le=1.0, description="[s]")] = 0.3
     pose: Annotated[
         Literal["config", "tf"], Field(description="config: the keys below; tf: tf_static, by the scan's frame_id")
@@ -34,7 +34,7 @@ class Estop(Section):
     """The software emergency stop topic (std_msgs/Bool, true = stop). Not a safety function: STO is."""
 
     required: Annotated[bool, Field(description="true: a silent topic counts as pressed")]
-    topic: Topic = "estop_state"
+    topic: Annotated[Topic, Field(description="std_msgs/Bool, true: stop")] = "estop_state"
     timeout_s: Annotated[float, Field(ge=0.05, le=2.0, description="[s]")] = 0.5
     latched: Annotated[
         bool, Field(description="true: a reset is needed after its release; false: one zero command")

@@ -80,7 +80,7 @@ class Schema:
 
 def expected(shape: Shape) -> str:
     """Type, range, allowed values and meaning of what should stand there, as the end of a sentence."""
-    words = _kind(shape)
+    words = kind_of(shape)
     meaning = shape.get("description", "") if shape.get("type") != "object" else ""
     if meaning.startswith("["):
         return f"{words} {meaning}"
@@ -95,7 +95,8 @@ def _free_keys(shape: Shape) -> Shape:
     return dict(free) if isinstance(free, dict) else {}
 
 
-def _kind(shape: Shape) -> str:
+def kind_of(shape: Shape) -> str:
+    """Type, range and allowed values of what should stand there."""
     if "enum" in shape:
         return "one of " + ", ".join(str(value) for value in shape["enum"])
     match shape.get("type"):

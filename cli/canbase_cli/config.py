@@ -36,6 +36,14 @@ def check(
     typer.secho(f"{loaded.path} is good: {counts}", err=True, fg=typer.colors.GREEN, color=colour())
 
 
+@app.command()
+def keys() -> None:
+    """Print every key of robot.yaml and of drive profiles, with range, default and meaning: docs/configuration.md."""
+    from canbase_config.reference import configuration_page
+
+    typer.echo(configuration_page(), nl=False)
+
+
 @app.command("from-eds")
 def from_eds(file: Annotated[Path, typer.Argument(metavar="FILE", help="The EDS or DCF file of a drive.")]) -> None:
     """Draft a drive profile from an EDS file, on stdout; what to know about it is on stderr.

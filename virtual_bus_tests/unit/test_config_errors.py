@@ -115,7 +115,7 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
     ),
     "one drive": (
         dict.fromkeys(range(11, 17), ""),
-        ":5: drives: got a list of 1 entry, expected a list of 2 to 8 entries",
+        ":5: drives: got a list of 1 entry, expected a list of 2 to 8 entries (one for each wheel that is driven)",
     ),
     "two drives on one node and axis": (
         {12: "    node_id: 1"},

@@ -1,0 +1,92 @@
+"""docs/configuration.md: every key of robot.yaml and of a drive profile, written from the models that check them."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from canbase_config.profile_file import PROFILE_SCHEMA
+from canbase_config.robot import Robot
+from canbase_config.schema import Schema, Shape, kind_of
+
+_HEAD: Final = """\
+# Configuration
+
+Every key, what may stand there, its default and what it means. Written by `canbase config keys` from the models
+that check the files; a test compares it, so it is never out of date.
+
+- `canbase config check robot.yaml` names each mistake with its line, and prints the whole of it with every default.
+- Lengths are in m, speeds in m/s and rad/s, times in s; the name of a key carries its unit. Forward, left and
+  counter-clockwise are positive (REP 103).
+- **must be given**: there is no default that fits every robot. No timeout can be switched off.
+- `drives[…]` is each entry of a list, `mux.sources.…` each entry under a name that you choose.
+"""
+_PROFILE_HEAD: Final = """\
+# Drive profiles
+
+A `.yaml` file for a kind of drive, named by `drives[…].profile` of robot.yaml. A key that is left out has the value of
+the `generic` profile. How to write one: [drives.md](drives.md).
+"""
+_ROW: Final = "| {} | {} | {} | {} |"
+
+
+def configuration_page() -> str:
+    """The whole of docs/configuration.md."""
+    parts = [_HEAD, *_tables(Schema(Robot), "robot.yaml"), _PROFILE_HEAD, *_tables(PROFILE_SCHEMA, "profile")]
+    return "\n".join(parts)
+
+
+def _tables(schema: Schema, file: str) -> list[str]:
+    tables: list[str] = []
+    first: dict[str, str] = {}
+    for path, shape in schema.shapes:
+        alike = first.setdefault(repr((shape.get("title"), shape["properties"])), path)
+        heading = f"## {f'`{path}`' if path else f'{file}, top level'}\n"
+        tables.append(heading if alike == path else f"{heading}\nAs `{alike}`.\n")
+        if alike == path:
+            tables.append(_table(schema, shape))
+    return tables
+
+
+def _table(schema: Schema, shape: Shape) -> str:
+    required = shape.get("required", ())
+    lines: list[str] = []
+    if shape.get("description"):
+        lines += [" ".join(str(shape["description"]).split()), ""]
+    lines += [_ROW.format("key", "value", "default", "meaning"), "|---|---|---|---|"]
+    for key, inner in shape["properties"].items():
+        at = schema.resolved(inner)
+        default = "**must be given**" if key in required else _default(at, at.get("default"))
+        lines.append(_ROW.format(f"`{key}`", _cell(_value(at)), default, _cell(_meaning(at))))
+    return "\n".join((*lines, ""))
+
+
+def _value(shape: Shape) -> str:
+    """Of a section its keys have a table of their own."""
+    return "section" if shape.get("type") == "object" else kind_of(shape)
+
+
+def _meaning(shape: Shape) -> str:
+    return str(shape.get("description", ""))
+
+
+def _default(shape: Shape, value: Any) -> str:
+    if value is None:
+        return "none" if shape.get("type") != "object" or "default" in shape else "empty"
+    if isinstance(value, (dict, list)):
+        return _collection(shape, value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"`{value}`" if isinstance(value, str) else f"{value:.10g}"
+
+
+def _collection(shape: Shape, value: dict[str, Any] | list[Any]) -> str:
+    if not value:
+        return "empty"
+    if isinstance(value, list):
+        return ", ".join(str(each) for each in value)
+    return "as below" if "properties" in shape else ", ".join(value)
+
+
+def _cell(text: str) -> str:
+    """Without what ends a cell of a table."""
+    return " ".join(text.split()).replace("|", "\\|").replace(">=", "≥").replace("<=", "≤")
