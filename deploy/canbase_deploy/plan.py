@@ -21,6 +21,8 @@ RUN: Final = PurePosixPath("/run/canbase")
 PARTS: Final = ("watchdog", "driver", "velocity", "action-server")
 WITH_ROS: Final = PARTS[1:]
 ON_THE_BUS: Final = PARTS[:2]
+DOMAIN: Final = "0"
+"""ROS_DOMAIN_ID where nobody has chosen one: what ROS 2 takes then, said aloud."""
 
 ACCOUNT: Final = WriteFile(
     PurePosixPath("/etc/sysusers.d/canbase.conf"), f'u {USER} - "canbase motor driver stack" {RUN}\n'
@@ -166,7 +168,7 @@ def _unit(name: str, text: str, python: str) -> WriteFile:
 def _of_the_owner(request: Request) -> list[WriteFile]:
     yaml_path, env_path = owner_paths(request.name)
     reach = "LOCALHOST" if request.network == "localhost" else "SUBNET"
-    values = {"ROS_AUTOMATIC_DISCOVERY_RANGE": reach, **request.environment}
+    values = {"ROS_AUTOMATIC_DISCOVERY_RANGE": reach, "ROS_DOMAIN_ID": DOMAIN, **request.environment}
     env = "# Environment of the services of this robot. Kept by upgrades.\n"
     env += "".join(f"{key}={value}\n" for key, value in values.items())
     env += "# CANBASE_OPTIONS=--namespace robot1\n# CANBASE_ROS_ARGS=-r scan:=front/scan\n"

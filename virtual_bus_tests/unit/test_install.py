@@ -91,12 +91,18 @@ def test_nobody_but_root_and_the_services_reads_what_is_the_owners() -> None:
 def test_by_default_nothing_is_heard_from_outside_this_computer() -> None:
     files = texts(install_plan(request(), {}))
 
-    assert "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST\n" in files["/etc/canbase/example.env"]
+    assert "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST\nROS_DOMAIN_ID=0\n" in files["/etc/canbase/example.env"]
     for part in ("driver", "velocity", "action-server"):
         unit = files[f"{UNITS}/canbase-{part}@.service"]
         assert "\nIPAddressDeny=any\n" in unit
         assert "\nIPAddressAllow=localhost\n" in unit
     assert "IPAddressAllow" not in files[f"{UNITS}/canbase-watchdog@.service"]
+
+
+def test_a_domain_that_was_chosen_goes_along() -> None:
+    files = texts(install_plan(request(environment={"ROS_DOMAIN_ID": "7"}), {}))
+
+    assert [line for line in files["/etc/canbase/example.env"].splitlines() if "DOMAIN" in line] == ["ROS_DOMAIN_ID=7"]
 
 
 def test_a_network_that_is_opened_is_opened_on_purpose() -> None:

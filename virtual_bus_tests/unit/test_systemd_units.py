@@ -112,6 +112,22 @@ def test_the_watchdog_is_up_first_and_outlives_the_driver() -> None:
     assert "Requires" not in driver  # a driver without watchdog runs and says so; power it gives none
 
 
+def test_a_robot_that_is_told_to_stop_waits_for_no_other_end() -> None:
+    assert directives("action-server")["After"] == ["canbase-driver@%i.service"]
+
+
+def test_an_adapter_without_restart_after_bus_off_comes_up_too() -> None:
+    commands = directives("can")["ExecStart"]
+
+    assert [command for command in commands if "restart-ms" in command] == [
+        "-ip link set dev %I type can restart-ms ${RESTART_MS}"
+    ]
+
+
+def test_recordings_of_latched_stops_have_a_folder() -> None:
+    assert directives("driver")["StateDirectory"] == ["canbase"]
+
+
 @pytest.mark.parametrize("part", PARTS)
 def test_no_unit_has_a_capability(part: str) -> None:
     unit = directives(part)

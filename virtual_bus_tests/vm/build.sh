@@ -14,14 +14,13 @@ boot_modules="nfit nd_pmem ext4"
 
 say() { printf 'vm: %s\n' "$*" >&2; }
 
-tools() {
-  local missing=() tool
-  for tool in qemu-system-x86_64:qemu-system-x86 mmdebstrap:mmdebstrap depmod:kmod busybox:busybox-static cpio:cpio mke2fs:e2fsprogs xz:xz-utils; do
-    command -v "${tool%%:*}" >/dev/null || missing+=("${tool#*:}")
-  done
-  ((${#missing[@]} == 0)) && return
-  ((EUID == 0)) || { say "install first: sudo apt-get install ${missing[*]}"; return 1; }
-  timeout 120 apt-get update -qq && timeout 500 apt-get install -y -qq --no-install-recommends "${missing[@]}" >"$out/apt.log"
+# Exit code 3: not on this computer, and why.
+able() {
+  local missing
+  missing=$("$here/missing")
+  [[ -z $missing ]] || { say "install first: sudo apt-get install $missing"; exit 3; }
+  grep -qs '^VERSION_CODENAME=bookworm' /etc/os-release || { say "the guest is a Debian 12, made on one: its kernel, its Python"; exit 3; }
+  python -c 'import sys; exit(sys.version_info[:2] != (3, 11))' || { say ".venv must be of Python 3.11, the guest's"; exit 3; }
 }
 
 # The distribution's kernel, unpacked from its package: no boot loader, no initramfs-tools.
@@ -86,27 +85,41 @@ root() {
   mke2fs -q -t ext4 -b 4096 -O ^metadata_csum -m 0 -d "$tree" "$out/root.ext4" 640M >/dev/null
 }
 
-# A virtual environment as docs/install.md makes it, by the guest's own Python version, moved to where the guest has it.
-environment() {
-  rm -rf "$out/venv" "$out/wheel"
-  .venv/bin/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir "$out/wheel" .
+# A virtual environment as docs/install.md makes it, by the guest's own Python version, moved to where the guest has it:
+# first all that canbase needs, then canbase.
+libraries() {
+  rm -rf "$out/venv"
   /usr/bin/python3 -m venv "$out/venv"
-  "$out/venv/bin/pip" install --quiet "$(ls "$PWD/$out"/wheel/canbase-*.whl)[ros]"
+  python -c "$requirements" >"$out/requirements.txt"
+  "$out/venv/bin/pip" install --quiet --requirement "$out/requirements.txt"
   grep -rlI --exclude='*.pyc' "$PWD/$out/venv" "$out/venv/bin" "$out/venv/pyvenv.cfg" | xargs sed -i "s#$PWD/$out/venv#/opt/canbase#g"
-  "$out/venv/bin/python" -m compileall -q "$out/venv/lib" >/dev/null || true
+}
+
+requirements='
+from pip._vendor import tomli
+project = tomli.load(open("pyproject.toml", "rb"))["project"]
+print(*project["dependencies"], *project["optional-dependencies"]["ros"], sep="\n")'
+
+canbase() {
+  rm -rf "$out/wheel"
+  python -m pip wheel --quiet --no-deps --no-build-isolation --config-settings "build-dir=$out/cmake" --wheel-dir "$out/wheel" .
+  python -m pip --python "$out/venv/bin/python3" install --quiet --no-deps --force-reinstall "$out"/wheel/canbase-*.whl
+  "$out/venv/bin/python3" -m compileall -q "$out/venv/lib" >/dev/null || true
   rm -f "$out/venv.ext4"
   mke2fs -q -t ext4 -b 4096 -N $(($(find "$out/venv" | wc -l) + 2000)) -O ^has_journal,^metadata_csum -m 0 -d "$out/venv" \
     "$out/venv.ext4" $(($(du -sm "$out/venv" | cut -f1) * 115 / 100 / 128 * 128 + 256))M >/dev/null
 }
 
+key() { sha256sum | cut -c1-16; }
 made() { [[ -f $out/$1.key && $(cat "$out/$1.key") == "$2" ]]; }
 
 PATH=$PATH:/usr/sbin:/sbin
 PATH=$PWD/.venv/bin:$PATH
-tools
-system_key=$(cat "$here/build.sh" "$here/guest/init" | sha256sum | cut -c1-16)
+able
+system_key=$(cat "$here/build.sh" "$here/guest/init" | key)
 if ! made system "$system_key"; then
-  ((EUID == 0)) || { say "the guest's root file system is made as root: sudo $0"; exit 1; }
+  ((EUID == 0)) || { say "the guest's root file system is made as root: sudo $0"; exit 3; }
+  timeout 120 apt-get update -qq || { say "no Debian mirror in reach"; exit 3; }
   work=$(mktemp -d)
   chmod 755 "$work"
   trap 'rm -rf "$work"' EXIT
@@ -114,9 +127,15 @@ if ! made system "$system_key"; then
   echo "$system_key" >"$out/system.key"
   say "guest system made: $(du -m "$out/root.ext4" | cut -f1) MB, kernel $version"
 fi
-environment_key=$( (cat "$here/build.sh"; git ls-files -s -- '*.py' '*.action' '*.msg' '*.xml' '*.yaml' '*.eds' pyproject.toml CMakeLists.txt deploy can_config; git diff -- . ':!docs') | sha256sum | cut -c1-16)
-if ! made environment "$environment_key"; then
-  environment
-  echo "$environment_key" >"$out/environment.key"
+libraries_key=$(cat "$here/build.sh" pyproject.toml | key)
+if ! made libraries "$libraries_key"; then
+  libraries
+  echo "$libraries_key" >"$out/libraries.key"
+fi
+sources=(can_config driver velocity_mux watchdog action_server cli deploy interfaces virtual_bus_tests/canbase_bench pyproject.toml CMakeLists.txt package.xml)
+canbase_key=$( (echo "$libraries_key"; find "${sources[@]}" -type f ! -name '*.pyc' -print0 | sort -z | xargs -0 sha256sum) | key)
+if ! made canbase "$canbase_key"; then
+  canbase
+  echo "$canbase_key" >"$out/canbase.key"
   say "/opt/canbase made: $(du -sm "$out/venv" | cut -f1) MB"
 fi

@@ -1,54 +1,65 @@
-"""docs/stop_times_vm.md from the rows that the virtual robot has left: python virtual_bus_tests/vm/table.py."""
+"""What the guests have left: a table, and the part of docs/stop_times.md that `make vm-test` writes."""
 
 from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[2]
-ROWS = ROOT / "build" / "vm" / "job" / "rows.jsonl"
-PAGE = ROOT / "docs" / "stop_times_vm.md"
+from exit_matrix.marked import rewritten
 
-HEAD = """# Stop times in a virtual robot
+COMMAND = "make vm-test"
+"""Names our part of the page."""
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "stop_times.md"
+HEAD = """| what | how | who caught it | stood after | way | limit | again after | then |
+|---|---|---|---:|---:|---:|---:|---|"""
 
-Made by `make vm-test`; do not edit. A Debian 12 guest in QEMU with its own kernel, systemd as the first process and
-two emulated CAN controllers on one bus: the services as `canbase install` makes them on can0, simulated drives on
-can1. Times are taken inside, in instruction-counted time (one processor, a billion instructions a second): they do
-not depend on how busy the computer is that runs the guest. 50 Hz control cycle, all timeouts at their defaults.
-*Stands*: from the event to the last time that a wheel moved, by ground truth. *Again*: until the part ran, or the
-robot was ready, again. How the times on the bench compare: [stop_times.md](stop_times.md).
-
-| what | how | stands after | way | again after | then |
-|---|---|---|---|---|---|
-"""
+Result = dict[str, Any]
+"""A line of guest/main.py: name, failure, took_s, row."""
 
 
-def number(value: float | None, factor: float, unit: str) -> str:
-    """A value with its unit, a dash where there is none."""
-    return "–" if value is None else f"{value * factor:.0f} {unit}"
+def results(job: Path) -> list[Result]:
+    """What one guest has left, in its order; that it died, too."""
+    rows = job / "rows.jsonl"
+    found = [json.loads(line) for line in rows.read_text().splitlines()] if rows.exists() else []
+    if not (job / "code").exists():
+        died = f"the guest died or was too slow; see {job}/console.log and out.txt there"
+        found.append({"name": job.name, "failure": died, "took_s": 0.0, "row": None})
+    return found
 
 
-def line(row: dict[str, Any]) -> str:
-    """One row of the table."""
-    stands, way = number(row["stands_s"], 1000, "ms"), number(row["way_m"], 1000, "mm")
-    again = "–" if row["again_s"] is None else f"{row['again_s']:.1f} s"
-    return f"| {row['scenario']} | {row['what']} | {stands} | {way} | {again} | {row['then']} |"
-
-
-def main() -> int:
-    """Exit code 1, and the page is left as it was, when a scenario failed or there is none."""
-    rows = [json.loads(text) for text in ROWS.read_text().splitlines()] if ROWS.exists() else []
-    bad = [row for row in rows if row["failure"]]
-    for row in bad:
-        print(f"{row['scenario']}: {row['failure']}", file=sys.stderr)
-    if bad or not rows:
+def report(found: Sequence[Result], took_s: float, *, complete: bool) -> int:
+    """Print it; write the page if it is complete and nothing failed. Exit code 0: all came out as promised."""
+    for result in found:
+        print(f"{result['name']}: {result['failure'] or _told(result['row'])} [{result['took_s']:.0f} s in the guest]")
+    bad = [result for result in found if result["failure"]]
+    print(f"{len(found)} scenarios, {len(bad)} failed, {took_s / 60.0:.1f} minutes", file=sys.stderr)
+    if bad or not found:
         return 1
-    PAGE.write_text(HEAD + "".join(f"{line(row)}\n" for row in rows), encoding="utf-8")
-    print(f"{len(rows)} scenarios, all as promised: {PAGE.relative_to(ROOT)}")
+    if complete:
+        table = "\n".join([HEAD, *(_line(result["row"]) for result in found)])
+        PAGE.write_text(rewritten(PAGE.read_text(encoding="utf-8"), COMMAND, table), encoding="utf-8")
     return 0
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+def _told(row: dict[str, Any]) -> str:
+    return ", ".join(cell for cell in _cells(row) if cell != "–")
+
+
+def _line(row: dict[str, Any]) -> str:
+    return f"| {' | '.join(_cells(row))} |"
+
+
+def _cells(row: dict[str, Any]) -> Iterator[str]:
+    yield from (row["what"], row["how"], row["caught"] or "–")
+    yield _number(row["stands_s"], "{:.2f} s", 1.0)
+    yield _number(row["way_m"], "{:.0f} mm", 1000.0)
+    yield _number(row["limit_s"], "{:.2f} s", 1.0)
+    yield _number(row["again_s"], "{:.1f} s", 1.0)
+    yield row["then"]
+
+
+def _number(value: float | None, form: str, factor: float) -> str:
+    return "–" if value is None else form.format(value * factor)

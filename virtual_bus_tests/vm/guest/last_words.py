@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
-import math
 import os
+from dataclasses import asdict
 from pathlib import Path
 
 from canbase_bench.control import SimControl
+from vm.guest.standstill import standstill
 
 FOLDER = Path("/var/lib/canbase-vm")
+"""Outlives a reboot."""
+WORDS = FOLDER / "last_words.json"
 MOMENT = Path("/run/canbase-vm-moment")
-STANDS_MPS = 0.005
 
 
 def main() -> None:
@@ -21,14 +23,9 @@ def main() -> None:
     moment_s = float(MOMENT.read_text())
     with SimControl("/run/sim.sock") as sim:
         rows = sim.trace(moment_s)
-    moving = [row[0] for row in rows if max(abs(row[4]), abs(row[5])) > STANDS_MPS]
-    told = {
-        "after_s": max(moving, default=moment_s) - moment_s,
-        "way_m": math.dist(rows[0][1:3], rows[-1][1:3]),
-        "watched_s": rows[-1][0] - moment_s,
-    }
+    told = asdict(standstill(rows, moment_s)) | {"watched_s": rows[-1][0] - moment_s}
     FOLDER.mkdir(exist_ok=True)
-    (FOLDER / "shutdown.json").write_text(json.dumps(told))
+    WORDS.write_text(json.dumps(told))
     os.sync()
 
 

@@ -1,14 +1,11 @@
-"""The robot of the guest as scenarios see it: systemd's units, ground truth of the simulated drives, ROS."""
+"""The robot of the guest as scenarios see it: ROS, and the ground truth of the simulated drives."""
 
 from __future__ import annotations
 
 import math
 import os
-import signal
-import subprocess
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TypeVar
 
 from canbase_bench.control import SimControl
@@ -24,44 +21,16 @@ from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
 from canbase_action_server.client import Drive, DriveClient, RejectedError  # noqa: E402
+from canbase_config.load import load_robot  # noqa: E402
+from vm.guest.evidence import Evidence  # noqa: E402
+from vm.guest.standstill import Standstill, standstill  # noqa: E402
+from vm.guest.system import ROBOT_YAML, BrokenPromiseError, show, unit  # noqa: E402
 
 SPEED_MPS = 0.3
-STANDS_MPS = 0.005
 RESTS_M = 0.0005
 WAIT_S = 30.0
-PARTS = ("watchdog", "driver", "velocity", "action-server")
 
 T = TypeVar("T")
-
-
-class BrokenPromiseError(AssertionError):
-    """What a scenario promised did not come true."""
-
-
-@dataclass(frozen=True, slots=True)
-class Standstill:
-    """Time [s] and way [m] from some moment until the wheels stood."""
-
-    after_s: float
-    way_m: float
-
-
-def unit(part: str) -> str:
-    """Name of a part's unit."""
-    return f"canbase-{part}@robot.service"
-
-
-def run(*words: str, check: bool = True) -> str:
-    """What a command prints."""
-    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
-    if check and done.returncode != 0:
-        raise BrokenPromiseError(f"{' '.join(words)}: exit code {done.returncode}: {done.stderr}{done.stdout}")
-    return done.stdout.strip()
-
-
-def show(name: str, what: str) -> str:
-    """A property of a unit."""
-    return run("systemctl", "show", "--property", what, "--value", name)
 
 
 class Robot:
@@ -79,6 +48,8 @@ class Robot:
         self._joystick = self.node.create_publisher(TwistStamped, "cmd_vel_joy", 1)
         self.node.create_timer(0.1, self._on_timer)
         self._reset = self.node.create_client(Trigger, "motor_driver/reset")
+        self.evidence = Evidence(self.node)
+        self.config = load_robot(ROBOT_YAML).robot
         self.client = DriveClient(self.node, self.executor)
         self.sim = SimControl("/run/sim.sock", timeout_s=20.0)
 
@@ -140,15 +111,19 @@ class Robot:
     def drive_by_goal(self) -> Drive:
         """On the way at full speed by the action server."""
         goal = self.goal(4.0)
-        self.wait("speed", lambda: self.truth().linear_mps >= 0.97 * SPEED_MPS, 10.0)
+
+        def fast() -> bool:
+            if goal.result is not None:
+                raise BrokenPromiseError(f"the goal ended on the way to full speed: {goal.result}")
+            return self.truth().linear_mps >= 0.97 * SPEED_MPS
+
+        self.wait("speed", fast, 10.0)
         return goal
 
     def stands(self, moment_s: float, timeout_s: float = 10.0) -> Standstill:
         """Wait until the wheels have stood for 0.3 s; how they came to stand since `moment_s`."""
         self.wait("standstill", lambda: self.truth().standing_s >= 0.3, timeout_s)
-        rows = self.sim.trace(moment_s)
-        moving = [row[0] for row in rows if max(abs(row[4]), abs(row[5])) > STANDS_MPS]
-        return Standstill(max(moving, default=moment_s) - moment_s, math.dist(rows[0][1:3], rows[-1][1:3]))
+        return standstill(self.sim.trace(moment_s), moment_s)
 
     def stays(self, since_s: float) -> None:
         """Raises BrokenPromiseError when the base has moved since then."""
@@ -181,7 +156,7 @@ class Robot:
                     done_s = time.monotonic() - asked_s
             self.spin(0.2)
         self.order_mps = None
-        self.spin(0.2)
+        self.spin(0.5)  # until the mux has seen that the joystick is silent
         return done_s
 
     def reset(self) -> bool:
@@ -191,19 +166,14 @@ class Robot:
         self.wait("the answer to a reset", answer.done)
         return bool(answer.result().success)
 
-    def signal(self, part: str, number: signal.Signals) -> float:
-        """A signal to a part's main process; when it was sent [s, monotonic]."""
-        pid = int(show(unit(part), "MainPID"))
-        now = time.monotonic()
-        os.kill(pid, number)
-        return now
-
     def restarted(self, part: str, before: str) -> float:
         """Until the unit runs with another process than `before`; when [s, monotonic]."""
-
-        def again() -> bool:
-            now = show(unit(part), "MainPID")
-            return show(unit(part), "ActiveState") == "active" and now not in (before, "0")
-
-        self.wait(f"{part} to be started again", again)
-        return time.monotonic()
+        until_s = time.monotonic() + WAIT_S
+        while True:
+            state, pid = show(unit(part), "ActiveState", "MainPID")
+            now = time.monotonic()
+            if state == "active" and pid not in (before, "0"):
+                return now
+            if now > until_s:
+                raise BrokenPromiseError(f"{part} was not started again in {WAIT_S:.0f} s: {state}")
+            self.spin(0.4)

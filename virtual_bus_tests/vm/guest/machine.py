@@ -1,0 +1,150 @@
+"""The whole computer: cold boot, a goal, a full disk, a reboot at speed, a frozen machine."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Final, NoReturn
+
+from canbase.msg import DriverStatus
+
+from exit_matrix import layers as by
+from vm.guest.last_words import FOLDER, MOMENT, WORDS
+from vm.guest.robot import Robot
+from vm.guest.scenario import Row, limit_s, timed
+from vm.guest.standstill import Standstill, standstill
+from vm.guest.system import PARTS, TARGET, BrokenPromiseError, run, set_priority, show, unit
+
+GOAL_M: Final = 0.3
+GOAL_ERROR_M: Final = 0.005
+HARDWARE_PRIORITY, OURS, HOG = 98, 97, 90
+"""SCHED_FIFO of the drives, which no computer can freeze, of this process, and of what freezes all others."""
+HOST: Final = Path("/mnt")
+"""A folder of the host: what is in there outlives a reset that does not wait for a disk."""
+LAST_SIGN: Final = HOST / "last_sign.json"
+RESET_S: Final = (2.0, 12.0)
+"""RuntimeWatchdogSec is 5 s: one that comes earlier has another cause, one that comes later is none."""
+
+
+def cold_boot(robot: Robot) -> Row:
+    """Nobody logs in, nobody types: the drives get power."""
+    robot.wait("drives enabled", lambda: robot.state == DriverStatus.ENABLED)
+    return Row("power on", "nobody logs in", again_s=_enabled_s(), then="drives enabled by themselves")
+
+
+def goal(robot: Robot) -> Row:
+    """A goal is driven and ends in a measured standstill."""
+    robot.make_ready()
+    return Row("drive_distance", f"a goal of {GOAL_M} m", again_s=_driven_s(robot), then="OK")
+
+
+def full_disk(robot: Robot) -> Row:
+    """No file can be written: the disk is full, /var/log is read-only. All parts start anew, and do their work."""
+    robot.make_ready()
+    filler, logs = Path("/var/filler"), Path("/var/log")
+    run("mount", "-t", "tmpfs", "-o", "ro", "unwritable", str(logs))
+    _fill(filler)
+    try:
+        run("systemctl", "restart", TARGET, *(unit(part) for part in PARTS))
+        robot.make_ready()
+        driven_s = _driven_s(robot)
+    finally:
+        filler.unlink()
+        run("umount", "-l", str(logs))
+    return Row("disk full, log unwritable", f"all restarted; a goal of {GOAL_M} m", again_s=driven_s, then="OK")
+
+
+def reboot(robot: Robot) -> NoReturn:
+    """`systemctl reboot` at speed. `after_reboot` tells the rest."""
+    robot.make_ready()
+    robot.drive()
+    MOMENT.write_text(str(time.monotonic()))
+    run("systemctl", "--no-block", "reboot")
+    robot.spin(120.0)
+    raise BrokenPromiseError("no reboot in 120 s")
+
+
+def after_reboot(robot: Robot) -> Row:
+    """What the drives saw until they lost power too; the robot is ready again by itself, and stands."""
+    words = json.loads(WORDS.read_text())
+    stop = Standstill(words["after_s"], words["way_m"])
+    again_s = _up_and_still(robot)
+    row = Row("computer", "reboot", again_s=again_s, then="drives enabled by themselves, stands")
+    return timed(row, stop, limit_s(robot, (by.MUX_JOYSTICK, by.FILTER_SHUTDOWN, by.DRIVER_SHUTDOWN)), "systemd")
+
+
+def freeze(robot: Robot) -> NoReturn:
+    """No unit gets the processor any more, nor does systemd; only the drives go on. `after_freeze` tells the rest."""
+    robot.make_ready()
+    robot.drive()
+    os.sync()
+    (drives,) = show("canbase-sim.service", "MainPID")
+    set_priority(int(drives), HARDWARE_PRIORITY)
+    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(OURS))
+    moment_s = time.monotonic()
+    hog = subprocess.Popen(["/bin/sh", "-c", "while :; do :; done"], preexec_fn=_be_a_hog)
+    while time.monotonic() < moment_s + 3.0 * RESET_S[1]:
+        time.sleep(0.2)
+        told = asdict(standstill(robot.sim.trace(moment_s), moment_s))
+        LAST_SIGN.write_text(json.dumps(told | {"alive_s": time.monotonic() - moment_s}))
+    hog.send_signal(signal.SIGKILL)
+    raise BrokenPromiseError("the hardware watchdog did not reset the machine")
+
+
+def after_freeze(robot: Robot) -> Row:
+    """The drives had stopped by themselves; the machine was reset; the robot is ready again by itself, and stands."""
+    sign = json.loads(LAST_SIGN.read_text())
+    if not RESET_S[0] <= sign["alive_s"] <= RESET_S[1]:
+        raise BrokenPromiseError(f"reset after {sign['alive_s']:.1f} s, expected one within {RESET_S} s")
+    again_s = _up_and_still(robot)
+    then = f"reset by the hardware watchdog after {sign['alive_s']:.1f} s; drives enabled by themselves, stands"
+    row = Row("computer", "frozen", again_s=again_s, then=then)
+    return timed(
+        row, Standstill(sign["after_s"], sign["way_m"]), limit_s(robot, (by.DRIVES,)), "drives: heartbeat lost"
+    )
+
+
+def _be_a_hog() -> None:
+    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(HOG))
+
+
+def _up_and_still(robot: Robot) -> float:
+    robot.wait("drives enabled", lambda: robot.state == DriverStatus.ENABLED)
+    enabled_s = _enabled_s()
+    robot.spin(1.0)
+    robot.stays(0.0)
+    return enabled_s
+
+
+def _enabled_s() -> float:
+    """When the drives got power, since the kernel's start."""
+    words = ("journalctl", "-b", "-o", "short-monotonic", "-u", unit("driver"), "-g", "ENABLED")
+    return float(run(*words).splitlines()[0].split("]")[0].strip(" ["))
+
+
+def _driven_s(robot: Robot) -> float:
+    at_m = robot.truth().travel_m
+    begun_s = time.monotonic()
+    result = robot.goal(GOAL_M).wait(30.0)
+    error_m = robot.truth().travel_m - at_m - GOAL_M
+    if result is None or result.code.name != "OK" or abs(error_m) > GOAL_ERROR_M:
+        raise BrokenPromiseError(f"{result}, really {error_m * 1000:+.1f} mm off")
+    return time.monotonic() - begun_s
+
+
+def _fill(filler: Path) -> None:
+    """Every free block, then what is left in small pieces, until nothing more can be written."""
+    FOLDER.mkdir(exist_ok=True)
+    free = os.statvfs("/")
+    run("fallocate", "-l", str(free.f_bavail * free.f_frsize * 99 // 100), str(filler))
+    with filler.open("ab", buffering=0) as file:
+        try:
+            while True:
+                file.write(bytes(1 << 20))
+        except OSError:
+            return

@@ -1,0 +1,113 @@
+"""Goes through the scenarios after boot, on through reboots, and leaves a row for each: python -m vm.guest.main."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+import traceback
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from vm.guest import machine, units, wires
+from vm.guest.last_words import FOLDER
+from vm.guest.robot import Robot
+from vm.guest.scenario import Row, Scenario
+from vm.guest.system import BrokenPromiseError
+
+WANTED = Path("/run/wanted.json")
+ROWS = FOLDER / "rows.jsonl"
+PLAN = FOLDER / "plan.json"
+
+FIRST: dict[str, Scenario] = {
+    "cold boot": machine.cold_boot,
+    "goal": machine.goal,
+    **units.KILLS,
+    "power cut": wires.power_cut,
+    "link down": wires.link_down,
+    "unplugged": wires.unplugged,
+    "masked": units.masked,
+}
+SECOND: dict[str, Scenario] = {
+    **units.ORDERLY,
+    "full disk": machine.full_disk,
+    "error passive": wires.error_passive,
+    "bus-off": wires.bus_off,
+    "reboot": machine.reboot,
+    "freeze": machine.freeze,
+}
+"""For two guests that run side by side. The serial adapter stays until the reboot; that and the freeze come last."""
+AFTER_BOOT: dict[str, Scenario] = {"reboot": machine.after_reboot, "freeze": machine.after_freeze}
+ALL = {**FIRST, **SECOND}
+GROUPS = {"first": FIRST, "second": SECOND}
+
+
+@dataclass(slots=True)
+class Plan:
+    """What is still to be done. It survives a reboot: `open` is the scenario that has asked for it."""
+
+    left: list[str] = field(default_factory=list)
+    open: str = ""
+
+    def save(self) -> None:
+        """To the disk, really."""
+        FOLDER.mkdir(exist_ok=True)
+        PLAN.write_text(json.dumps(asdict(self)))
+        os.sync()
+
+
+def names(words: Sequence[str]) -> list[str]:
+    """The scenarios that these words mean: names, parts of names, or a group; in the order of the table."""
+    if not words:
+        return list(ALL)
+    chosen = [name for word in words for name in GROUPS.get(word, [each for each in ALL if word in each])]
+    if not chosen:
+        raise BrokenPromiseError(f"no scenario is called {' or '.join(words)}; there are: {', '.join(ALL)}")
+    return [name for name in ALL if name in chosen]
+
+
+def plan() -> Plan:
+    """The one that a reboot has interrupted, or a new one."""
+    if PLAN.exists():
+        return Plan(**json.loads(PLAN.read_text()))
+    return Plan(names(json.loads(WANTED.read_text())))
+
+
+def main() -> int:
+    """Exit code 0: every scenario came out as promised."""
+    todo = plan()
+    robot = Robot()
+    while todo.left or todo.open:
+        after_boot = bool(todo.open)
+        name = todo.open or todo.left.pop(0)
+        scenario = AFTER_BOOT[name] if after_boot else ALL[name]
+        todo.open = name if name in AFTER_BOOT and not after_boot else ""
+        if name in AFTER_BOOT:
+            todo.save()
+        _note(name, *_outcome(scenario, robot))
+        todo.open = ""
+        robot.order_mps = None
+    return int(any(json.loads(line)["failure"] for line in ROWS.read_text().splitlines()))
+
+
+def _outcome(scenario: Scenario, robot: Robot) -> tuple[Row | None, str, float]:
+    begun_s = time.monotonic()
+    try:
+        return scenario(robot), "", time.monotonic() - begun_s
+    except Exception as error:  # noqa: BLE001 - the next scenario may tell more
+        traceback.print_exc()
+        return None, f"{type(error).__name__}: {error}", time.monotonic() - begun_s
+
+
+def _note(name: str, row: Row | None, failure: str, took_s: float) -> None:
+    told = {"name": name, "failure": failure, "took_s": round(took_s, 1), "row": asdict(row) if row else None}
+    print(json.dumps(told), flush=True)
+    FOLDER.mkdir(exist_ok=True)
+    with ROWS.open("a") as file:
+        file.write(json.dumps(told) + "\n")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,54 @@
+"""The guest's system as scenarios use it: commands, units, signals. No ROS."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Final
+
+PARTS: Final = ("watchdog", "driver", "velocity", "action-server")
+TARGET: Final = "canbase@robot.target"
+ROBOT_YAML: Final = Path("/etc/canbase/robot.yaml")
+LIMIT_S: Final = 90.0
+"""For a command."""
+
+
+class BrokenPromiseError(AssertionError):
+    """What a scenario promised did not come true."""
+
+
+def unit(part: str) -> str:
+    """Name of a part's unit."""
+    return f"canbase-{part}@robot.service"
+
+
+def run(*words: str, check: bool = True) -> str:
+    """What a command prints. Raises BrokenPromiseError when it fails, unless told not to."""
+    done = subprocess.run(words, capture_output=True, text=True, timeout=LIMIT_S, check=False)
+    if check and done.returncode != 0:
+        raise BrokenPromiseError(f"{' '.join(words)}: exit code {done.returncode}: {done.stderr}{done.stdout}")
+    return done.stdout.strip()
+
+
+def show(name: str, *properties: str) -> list[str]:
+    """Properties of a unit, in that order: one call of systemctl, which costs this processor 20 ms."""
+    lines = run("systemctl", "show", f"--property={','.join(properties)}", name).splitlines()
+    values = dict(line.partition("=")[::2] for line in lines)
+    return [values[each] for each in properties]
+
+
+def send_signal(part: str, number: signal.Signals) -> tuple[float, str]:
+    """A signal to a part's main process: when it was sent [s, monotonic], and the process."""
+    (pid,) = show(unit(part), "MainPID")
+    now = time.monotonic()
+    os.kill(int(pid), number)
+    return now, pid
+
+
+def set_priority(pid: int, priority: int) -> None:
+    """SCHED_FIFO for all threads of a process."""
+    for thread in Path(f"/proc/{pid}/task").iterdir():
+        os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, os.sched_param(priority))

@@ -1,0 +1,146 @@
+"""A unit ends at speed: killed, hung, stopped, restarted, or never there."""
+
+from __future__ import annotations
+
+import time
+from signal import SIGKILL, SIGSTOP, Signals
+
+from exit_matrix import layers as by
+from exit_matrix.layers import Layer
+from vm.guest.robot import SPEED_MPS, Robot
+from vm.guest.scenario import LATCHED, STANDS, Row, Scenario, elapsed, judged
+from vm.guest.system import PARTS, TARGET, BrokenPromiseError, run, send_signal, show, unit
+
+SERVER = "action-server"
+"""The only part whose end does not stop a robot that somebody else drives."""
+DIES: dict[str, tuple[Layer, ...]] = {
+    "driver": (by.WATCHDOG_DRIVER, by.DRIVES),
+    "watchdog": (by.DRIVER_WATCHDOG, by.DRIVES),
+    "velocity": (by.WATCHDOG_LEASE,),
+    SERVER: (by.MUX_ACTION,),
+}
+ENDS: dict[str, tuple[Layer, ...]] = {
+    "driver": (by.DRIVER_SHUTDOWN,),
+    "watchdog": (by.WATCHDOG_ENDED,),
+    "velocity": (by.FILTER_SHUTDOWN,),
+    SERVER: (by.SERVER_SHUTDOWN,),
+    "target": (by.FILTER_SHUTDOWN, by.DRIVER_SHUTDOWN),
+}
+
+
+def killed(part: str, number: Signals) -> Scenario:
+    """A process ends or hangs; systemd starts it again, and it does not move before a reset."""
+
+    def scenario(robot: Robot) -> Row:
+        _at_speed(robot, part)
+        moment_s, before = send_signal(part, number)
+        stop = robot.stands(moment_s)
+        stood_s = time.monotonic()
+        again_s = robot.restarted(part, before) - moment_s
+        if part == SERVER:
+            robot.spin(1.0)
+        else:
+            robot.stays_disarmed()
+        robot.stays(stood_s)
+        then = "goal gone" if part == SERVER else LATCHED
+        row = Row(f"canbase-{part}", number.name, again_s=again_s, then=then)
+        return judged(row, robot, moment_s, stop, DIES[part])
+
+    return scenario
+
+
+def stopped(part: str) -> Scenario:
+    """`systemctl stop`: an orderly end, no failure."""
+
+    def scenario(robot: Robot) -> Row:
+        _at_speed(robot, part)
+        moment_s = time.monotonic()
+        run("systemctl", "--no-block", "stop", _name(part))
+        stop = robot.stands(moment_s)
+        stood_s = time.monotonic()
+        _wait_until_ended(robot, part)
+        robot.spin(0.5)
+        robot.stays(stood_s)
+        row = judged(Row(_title(part), "systemctl stop", then=STANDS), robot, moment_s, stop, ENDS[part])
+        robot.order_mps = None
+        run("systemctl", "start", TARGET)
+        return row
+
+    return scenario
+
+
+def restarted(part: str) -> Scenario:
+    """`systemctl restart`, while the joystick goes on: whatever comes up again must not drive on."""
+
+    def scenario(robot: Robot) -> Row:
+        _at_speed(robot, part)
+        parts = PARTS if part == "target" else (part,)
+        before = {each: show(unit(each), "MainPID")[0] for each in parts}
+        moment_s = time.monotonic()
+        run("systemctl", "--no-block", "restart", _name(part))
+        stop = robot.stands(moment_s)
+        stood_s = time.monotonic()
+        again_s = max(robot.restarted(each, before[each]) for each in parts) - moment_s
+        robot.spin(1.0)
+        robot.stays(stood_s)
+        row = Row(_title(part), "systemctl restart", again_s=again_s, then=STANDS)
+        return judged(row, robot, moment_s, stop, ENDS[part])
+
+    return scenario
+
+
+def masked(robot: Robot) -> Row:
+    """No watchdog: the driver runs, says so, and gives no power."""
+    robot.order_mps = None
+    run("systemctl", "stop", TARGET, *(unit(part) for part in PARTS))
+    run("systemctl", "mask", "--runtime", unit("watchdog"))
+    since_s = time.monotonic()
+    try:
+        run("systemctl", "start", TARGET)
+        robot.wait("the driver", lambda: robot.state is not None and robot.status_at > since_s)
+        robot.order_mps = SPEED_MPS
+        robot.stays_disarmed(3.0)
+        robot.stays(since_s)
+        told = robot.told()
+    finally:
+        robot.order_mps = None
+        run("systemctl", "unmask", "--runtime", unit("watchdog"))
+        run("systemctl", "start", TARGET)
+    if "watchdog" not in told:
+        raise BrokenPromiseError(f"the driver does not say that it is the watchdog: {told}")
+    ready_s = elapsed(since_s)
+    robot.make_ready()
+    return Row("canbase-watchdog", "masked; driver started", again_s=ready_s, then="no power, and says why")
+
+
+def _at_speed(robot: Robot, part: str) -> None:
+    robot.make_ready()
+    if part == SERVER:
+        robot.drive_by_goal()
+    else:
+        robot.drive()
+
+
+def _wait_until_ended(robot: Robot, part: str) -> None:
+    names = [unit(each) for each in PARTS] if part == "target" else [_name(part)]
+    until_s = time.monotonic() + 20.0
+    while states := {name: state for name in names if (state := show(name, "ActiveState")[0]) != "inactive"}:
+        if "failed" in states.values() or time.monotonic() > until_s:
+            raise BrokenPromiseError(f"systemctl stop ended so: {states}")
+        robot.spin(0.4)
+
+
+def _name(part: str) -> str:
+    return TARGET if part == "target" else unit(part)
+
+
+def _title(part: str) -> str:
+    return "canbase.target" if part == "target" else f"canbase-{part}"
+
+
+KILLS: dict[str, Scenario] = {
+    f"{part} {number.name}": killed(part, number) for number in (SIGKILL, SIGSTOP) for part in DIES
+}
+ORDERLY: dict[str, Scenario] = {f"stop {part}": stopped(part) for part in ENDS} | {
+    f"restart {part}": restarted(part) for part in ENDS
+}
