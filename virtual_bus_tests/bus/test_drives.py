@@ -12,7 +12,6 @@ import pytest
 
 from bus.crews import Crew
 from bus.drive_rig import Driver, Surroundings
-from bus.flaky_bus import FlakyBus
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.pdo import node_layout
 from canbase_driver.snapshot import DriverSnapshot, DriverState
@@ -138,18 +137,3 @@ def test_a_defect_in_the_core_sends_quick_stops_ends_the_thread_and_is_kept(
         assert [data[:6] for _, heard, data in around.heard if heard == cob_id][-3:] == [b"\x02\0\0\0\0\0"] * 3
     assert around.truth.standing_s > 0.3
     assert driver.loop.reset().sentence == "refused: the control loop has ended"
-
-
-def test_a_bus_that_fails_is_opened_again_and_the_base_drives_after_a_reset(
-    driver: Driver, around: Surroundings
-) -> None:
-    driver.driving()
-    FlakyBus.broken = True
-    failed = driver.latched(driver.forward)
-    assert failed.cause == "bus failed"
-    assert "network is down" in failed.detail
-    assert around.truth.standing_s > 0.3  # watchdog and drives have done it
-    FlakyBus.broken = False
-    driver.heard_again()
-    driver.reset()
-    driver.driving()
