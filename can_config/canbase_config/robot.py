@@ -51,10 +51,15 @@ class Bus(Section):
                 raise MisfitError(f"{key} stands in bus itself; extra adds arguments, it replaces none", ("extra", key))
         return self
 
+    @property
+    def is_virtual(self) -> bool:
+        """Whether it has no wire, so no bit rate either."""
+        return self.interface in ("udp_multicast", "virtual")
+
     def arguments(self) -> dict[str, Any]:
         """Keyword arguments for `can.Bus`. The bit rate of a socketcan interface is set by the system, not here."""
         given: dict[str, Any] = {"interface": self.interface, "channel": self.channel}
-        if self.interface not in ("socketcan", "udp_multicast", "virtual"):
+        if self.interface != "socketcan" and not self.is_virtual:
             given["bitrate"] = self.bitrate
         return given | self.extra
 

@@ -121,7 +121,7 @@ class DriverCore:
             return []
         take, node = handler
         self.frames_dropped += not take(frame, now)
-        return node.tick(now) if node is not None else []
+        return self._drives.go_on(node, now) if node is not None else []
 
     def on_command(self, twist: Twist2D, received_at: float) -> bool:
         """Take a velocity command with its receive time. False, and counted: it was not finite."""
@@ -179,10 +179,8 @@ class DriverCore:
         self._ticked_at = now
         self._stats.note(now, lateness_s)
         frames = self._heartbeat(now)
-        for node in self._drives.nodes:
-            frames += node.tick(now)
-            if self._supervisor.state in NO_POWER and not self._shutdown_requested:
-                node.begin_boot(now)
+        may_boot = self._supervisor.state in NO_POWER and not self._shutdown_requested
+        frames += self._drives.tick(now, may_boot)
         situation = self._situation(now)
         orders = self._judge(situation, now)
         frames += self._go_on_with_reset(situation, now)

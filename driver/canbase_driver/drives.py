@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import partial
 
 from canbase_config.robot import Robot
 from canbase_driver.axis import Axis
 from canbase_driver.cia402 import INTERNAL_LIMIT, PREPARED, REMOTE, WARNING, DriveState
 from canbase_driver.emcy import emcy_text
+from canbase_driver.frame import Frame
 from canbase_driver.remote_node import RemoteNode
+from canbase_driver.sdo_budget import SdoBudget
 from canbase_driver.snapshot import DriveSnapshot
 
 
@@ -22,12 +25,38 @@ class Drives:
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self.nodes = tuple(RemoteNode(node_id, robot) for node_id in sorted({drive.node_id for drive in robot.drives}))
+        self._budget = SdoBudget(robot.bus, 1.0 / robot.rates.control_hz)
+        self._first = 0
+        for node in self.nodes:
+            node.others_are_configured = partial(self._are_configured_without, node)
         by_joint = {axis.drive.joint: axis for node in self.nodes for axis in node.axes}
         self.axes = tuple(by_joint[drive.joint] for drive in robot.drives)
         self.left = tuple(axis for axis in self.axes if axis.drive.side == "left")
         self.right = tuple(axis for axis in self.axes if axis.drive.side == "right")
         node_of = {node.node_id: node for node in self.nodes}
         self._with_node = tuple((node_of[axis.drive.node_id], axis) for axis in self.axes)
+
+    def _are_configured_without(self, node: RemoteNode) -> bool:
+        return not any(other.is_being_configured for other in self.nodes if other is not node)
+
+    def tick(self, now: float, may_boot: bool) -> list[Frame]:
+        """Once a cycle: every node goes on, another one first each time; those that are gone begin their boot."""
+        self._budget.refill(sum(len(node.axes) for node in self.nodes if node.has_pdos))
+        self._first = (self._first + 1) % len(self.nodes)
+        frames: list[Frame] = []
+        for node in (*self.nodes[self._first :], *self.nodes[: self._first]):
+            frames += self.go_on(node, now)
+            if may_boot:
+                node.begin_boot(now)
+        return frames
+
+    def go_on(self, node: RemoteNode, now: float) -> list[Frame]:
+        """What a node sends next; while it is being configured, only as far as the bus has room for it."""
+        if node.is_being_configured and self._budget.is_spent:
+            return []
+        frames = node.tick(now)
+        self._budget.spend(len(frames))
+        return frames
 
     def booting(self, now: float) -> str:
         """What a node that is being booted or started is waiting for."""

@@ -32,13 +32,18 @@ class NodeBoot:
         """The next transfer, when it has to keep its distance from the one before."""
         self._step: Step | None = None
         self._wake_at = 0.0
-        self._was_reset = False
+        self._was_reset = self._heard = False
         self._outbox: list[Frame] = []
 
     @property
     def done(self) -> bool:
         """Whether it has ended, well or not."""
         return self.report is not None or self.error is not None
+
+    @property
+    def configuring(self) -> bool:
+        """Whether the drive has been heard, and its SDOs fill the bus."""
+        return not self.done and self._heard
 
     @property
     def waiting_for(self) -> str:
@@ -99,6 +104,7 @@ class NodeBoot:
         except SdoError as error:
             self._advance(error, now)
         else:
+            self._heard = True
             self._advance(answer, now)
 
     def _advance(self, answer: bytes | bool | SdoError | None, now: float) -> None:

@@ -4,12 +4,15 @@ GONE ──begin_boot──► BOOTING ──boot report──► STARTING ─�
   ▲                     │ error                  │ too late, or boot-up heard             │
   └─────────────────────┴────────────────────────┴── boot-up or other NMT state heard ────┘
 
+Between boot report and NMT start it waits for the other nodes' boots: PDOs go before SDOs on the bus.
+
 What a node says before it is STARTING comes from an earlier life, with a layout of its own: none of it counts.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from enum import Enum
 
 from canbase_config.profile import Profile
@@ -59,6 +62,8 @@ class RemoteNode:
         self.report: BootReport | None = None
         """Of the last boot, while the node is there."""
         self.boot_error = ""
+        self.others_are_configured: Callable[[], bool] = lambda: True
+        """Whether no other node is in the middle of its boot; set by whoever has them all."""
         self._measures = Measures(node_id, self._drives, robot.timeouts.sdo_s)
         self._lost_heartbeat = False
         self._held_until = -math.inf
@@ -83,8 +88,20 @@ class RemoteNode:
         """It was configured and started: setpoints may be sent to it, and its feedback counts."""
         return self.presence in (Presence.STARTING, Presence.READY)
 
+    @property
+    def is_being_configured(self) -> bool:
+        """It was heard, and its boot fills the bus with SDOs."""
+        return self._boot is not None and self._boot.configuring
+
+    @property
+    def _is_configured(self) -> bool:
+        """Its boot has ended well, and it is not started yet."""
+        return self._boot is not None and self._boot.report is not None
+
     def waiting_for(self, now: float) -> str:
         """What keeps it from being ready; empty when it is, or when it is gone and not being booted."""
+        if self._is_configured:
+            return f"{self.name}: configured, waits for the boots of the others"
         if self.presence is Presence.BOOTING and self._boot is not None:
             return self._boot.waiting_for + (f" (last try: {self.boot_error})" if self.boot_error else "")
         if self.presence is Presence.STARTING:
@@ -168,7 +185,7 @@ class RemoteNode:
             return False
         self.nmt_state = parsed[1]
         self.heartbeat_at = now
-        if self.has_pdos and self.nmt_state is NmtState.INITIALISING:
+        if (self.has_pdos or self._is_configured) and self.nmt_state is NmtState.INITIALISING:
             self.emcy = None
             self.lose("restarted (boot-up message)", now)
         elif self.presence is Presence.READY and self.nmt_state is not NmtState.OPERATIONAL:
@@ -219,15 +236,18 @@ class RemoteNode:
         if self._boot.error is not None:
             self.boot_error = str(self._boot.error)
             self.lose(f"could not be booted: {self.boot_error}", now)
-        elif self._boot.report is not None:
-            self.boot_error = ""
-            self.report = self._boot.report
-            self._lost_heartbeat = False
-            self._boot = None
-            self.nmt_state = None
-            self._go(Presence.STARTING, now)
-            frames.append(nmt(NmtCommand.START, self.node_id))
+        elif self._boot.report is not None and self.others_are_configured():
+            frames.append(self._start(self._boot.report, now))
         return frames
+
+    def _start(self, report: BootReport, now: float) -> Frame:
+        self.boot_error = ""
+        self.report = report
+        self._lost_heartbeat = False
+        self._boot = None
+        self.nmt_state = None
+        self._go(Presence.STARTING, now)
+        return nmt(NmtCommand.START, self.node_id)
 
     def _check_started(self, now: float) -> None:
         heard = all(axis.age_s(now) <= self._robot.timeouts.feedback_s for axis in self.axes)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
+
 import pytest
 
 from canbase_bench.faults import apply
 from canbase_config.robot import Robot
+from canbase_driver.cia301 import NmtCommand
 from canbase_driver.frame import Frame
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.snapshot import DriverState
 from unit.chain_world import FORWARD, World, bench_robot, robot_of
+from unit.timed_bus import TimedBus, on_a_wire
 
 EIGHT = tuple((node_id, 0, "left" if node_id % 2 else "right") for node_id in range(1, 9))
 
@@ -23,6 +27,31 @@ def test_two_drives_are_enabled_within_a_second_and_eight_within_one_and_a_half_
     eight_s = enabled_after(World(robot_of(*EIGHT)))  # type: ignore[arg-type]
     assert two_s <= 1.0
     assert eight_s <= 1.5 * two_s
+
+
+@pytest.mark.parametrize(
+    ("robot", "bitrate", "within_s"),
+    [
+        (bench_robot(), 500_000, 0.5),
+        (bench_robot(), 125_000, 1.7),
+        (robot_of(*EIGHT), 1_000_000, 0.8),  # type: ignore[arg-type]
+        (robot_of(*EIGHT), 500_000, 1.0),  # type: ignore[arg-type]
+    ],
+    ids=["two, 500 kbit/s", "two, 125 kbit/s", "eight, 1 Mbit/s", "eight, 500 kbit/s"],
+)
+def test_boots_beside_each_other_leave_room_for_heartbeats_on_a_bus_with_a_bit_rate(
+    robot: Robot, bitrate: int, within_s: float
+) -> None:
+    """Each node is reset and started once: none was lost meanwhile, and no drive missed a heartbeat."""
+    bus = TimedBus(on_a_wire(robot, bitrate))
+    assert bus.enabled_after(within_s) <= within_s
+    nodes = {drive.node_id for drive in robot.drives}
+    for command in (NmtCommand.RESET_COMMUNICATION, NmtCommand.START):
+        sent = [frame.data[1] for _, frame in bus.heard if frame.cob_id == 0 and frame.data[0] == command]
+        assert sorted(sent) == sorted(nodes)
+    beats = [at for at, frame in bus.heard if frame.cob_id == 0x77F]
+    assert max(b - a for a, b in itertools.pairwise(beats)) < robot.timeouts.drive_heartbeat_s
+    assert [frame for _, frame in bus.heard if 0x081 <= frame.cob_id <= 0x0FF] == []
 
 
 WAITED_FOR = {

@@ -1,0 +1,62 @@
+"""From power on to Operation Enabled on a bus at 500 kbit/s, in virtual time: two drives of each kind, and eight.
+
+Counted are the drives' own delays and the time that each frame takes on the bus; Python's own time is not (`startup.py`
+measures that). `python benchmarks/boot.py` prints the table of docs/drives.md.
+"""
+
+from __future__ import annotations
+
+from canbase_bench.personality import PERSONALITIES
+from figures import Figure
+from unit.chain_world import bench_robot, robot_of
+from unit.test_personalities import robot_with
+from unit.timed_bus import TimedBus, on_a_wire
+
+BUDGET_S, BUDGET_RATIO = 1.0, 1.5
+LONGEST_S = 10.0
+
+
+def few() -> TimedBus:
+    """Two plain drives."""
+    return TimedBus(on_a_wire(bench_robot()))
+
+
+def many() -> TimedBus:
+    """Eight."""
+    return TimedBus(on_a_wire(robot_of(*((node_id, 0, "left" if node_id % 2 else "right") for node_id in range(1, 9)))))
+
+
+def measure() -> list[Figure]:
+    """Two drives, and eight beside each other."""
+    two, eight = few(), many()
+    two_s, eight_s = two.enabled_after(LONGEST_S), eight.enabled_after(LONGEST_S)
+    return [
+        Figure(
+            "boot: power on → 2 drives enabled, virtual time, 500 kbit/s",
+            f"{two_s:.3f} s",
+            f"{len(two.heard)} frames",
+            None,
+            "≤ 1 s",
+            two_s <= BUDGET_S,
+        ),
+        Figure(
+            "boot: power on → 8 drives enabled, virtual time, 500 kbit/s",
+            f"{eight_s:.3f} s",
+            f"2 drives: {two_s:.3f} s; {len(eight.heard)} frames",
+            eight_s / two_s,
+            "≤ 1.5 × 1 s",
+            eight_s <= BUDGET_RATIO * BUDGET_S,
+        ),
+    ]
+
+
+def table() -> list[str]:
+    """A line for each kind: two drives of it."""
+    rows = ["| two drives of | enabled after [s] |", "|---|---|"]
+    for kind in sorted(PERSONALITIES):
+        rows.append(f"| `{kind}` | {TimedBus(on_a_wire(robot_with(kind))).enabled_after(LONGEST_S):.2f} |")
+    return rows
+
+
+if __name__ == "__main__":
+    print(*measure(), *table(), sep="\n")
