@@ -29,8 +29,27 @@ ifdef SEED
 	PYTHONPATH=virtual_bus_tests python -m campaign --seed $(SEED)
 else
 	PYTHONPATH=virtual_bus_tests python -m campaign
-	PYTHONPATH=virtual_bus_tests python -m campaign.fuzz
 endif
+
+.PHONY: teeth
+teeth: $(VENV)/ready ## takes one safeguard out after the other; the campaign has to find it missing
+	PYTHONPATH=virtual_bus_tests python -m campaign.teeth
+
+.PHONY: fuzz
+fuzz: $(VENV)/ready ## a million random and malformed frames and leases against driver, watchdog and drives
+	PYTHONPATH=virtual_bus_tests python -m campaign.fuzz
+
+UNIT := virtual_bus_tests/unit
+DECIDES := $(wildcard $(UNIT)/test_watchdog_*.py) $(patsubst %,$(UNIT)/test_%.py,cia402 axis supervisor reset layouts_agree)
+
+.PHONY: coverage
+coverage: $(VENV)/ready ## branch coverage of watchdog policy and CiA 402 tables: all of it, or it fails
+	coverage run --data-file=$(VENV)/coverage -m pytest -q $(DECIDES)
+	coverage report --data-file=$(VENV)/coverage
+
+.PHONY: mutation
+mutation: $(VENV)/ready ## mutants of watchdog policy and CiA 402 tables, of changed modules; ALL=1 of all of them
+	PYTHONPATH=virtual_bus_tests python -m mutation $(if $(ALL),--all)
 
 .PHONY: exit-matrix
 exit-matrix: $(VENV)/ready ## every way out of a driving robot, for real, measured: docs/stop_times.md; ONLY=watchdog runs some

@@ -108,7 +108,7 @@ def test_a_node_that_runs_before_it_is_booted_does_not_count(world: World) -> No
     assert (left.state, left.statusword, left.velocity_radps) == ("unknown", 0, 0.0)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(mad=st.lists(frames, max_size=60))
 def test_mad_frames_never_raise_and_never_give_a_driver_that_stands_a_target(mad: list[Frame]) -> None:
     world = World()

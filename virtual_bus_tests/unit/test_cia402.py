@@ -7,7 +7,11 @@ import pytest
 from canbase_driver.cia402 import (
     COMMANDS,
     FAULT_RESET_CYCLES,
+    INTERNAL_LIMIT,
+    PREPARED,
+    REMOTE,
     STATUSWORD_STATES,
+    WARNING,
     DriveState,
     PowerGoal,
     common_controlword,
@@ -198,6 +202,19 @@ def test_torque_is_in_three_states_only() -> None:
     assert [state for state in DriveState if state.has_torque] == [ENABLED, QUICK_STOP, REACTION]
 
 
+def test_two_states_lack_nothing_but_the_enable() -> None:
+    assert [state for state in DriveState if state in PREPARED] == [SWITCHED_ON, ENABLED]
+
+
+def test_bits_of_the_statusword_that_are_no_state() -> None:
+    """CiA 402-2, 6041h: bit 7 warning, bit 9 remote, bit 11 internal limit active."""
+    assert (WARNING, REMOTE, INTERNAL_LIMIT) == (0x0080, 0x0200, 0x0800)
+
+
+def test_each_level_of_the_reset_bit_lasts_three_cycles() -> None:
+    assert FAULT_RESET_CYCLES == 3
+
+
 def test_states_are_named_as_in_the_standard() -> None:
     assert SWITCHED_ON.text == "switched on"
 
@@ -210,6 +227,7 @@ def test_states_are_named_as_in_the_standard() -> None:
         ((READY, SWITCHED_ON), PowerGoal.ON, 0x07),
         ((ENABLED, ENABLED), PowerGoal.ON, 0x0F),
         ((FAULT, ENABLED), PowerGoal.ON, 0x0F),  # the healthy motor comes down its ramp
+        ((REACTION, ENABLED), PowerGoal.ON, 0x0F),
         ((FAULT, FAULT), PowerGoal.ON, 0x00),
         ((FAULT, ENABLED), PowerGoal.QUICK_STOP, 0x02),
         ((None, ENABLED), PowerGoal.OFF, 0x00),

@@ -108,7 +108,7 @@ SCHEMA = Robot.model_json_schema()
 ROBOTS = from_schema(SCHEMA, SCHEMA["$defs"]).map(made_consistent).map(Robot.model_validate)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(ROBOTS)
 def test_any_valid_robot_survives_being_written_and_read(robot: Robot) -> None:
     text = effective(Loaded(robot, Path("robot.yaml"), frozenset(), frozenset(leaf_keys(robot.model_dump()))))

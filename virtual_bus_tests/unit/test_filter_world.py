@@ -21,7 +21,7 @@ twists = st.builds(Twist, st.floats(-1.2, 1.2), st.floats(-3.0, 3.0)) | st.sampl
 streams = st.lists(st.tuples(twists, st.floats(0.02, 2.0)), min_size=1, max_size=6)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     places=st.lists(places_m, min_size=1, max_size=25),
     stream=streams,

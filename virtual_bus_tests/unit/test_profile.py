@@ -77,7 +77,7 @@ def test_the_ideal_time_of_a_long_and_of_a_short_way() -> None:
     assert ideal_time_s(0.28125 / 4, LIMITS) == pytest.approx((0.5 + 0.625) / 2 + 1.0)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     distance_m=st.floats(math.log(0.01), math.log(5.0)).map(math.exp),
     sign=st.sampled_from([1.0, -1.0]),

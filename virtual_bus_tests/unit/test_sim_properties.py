@@ -46,7 +46,7 @@ def _do(rig: Rig, what: str, value: str | int) -> None:
             rig.wait(value / 1000.0, step_s=0.01)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=75, deadline=None)
 @given(st.lists(steps, max_size=25))
 def test_torque_comes_only_from_powered_states_and_disable_voltage_always_ends_it(
     story: list[tuple[str, str | int]],

@@ -74,7 +74,7 @@ def test_a_speed_outside_is_refused(speed_radps: float) -> None:
     assert "max_speed_radps" in str(RotateRequest(1.0, speed_radps).range_reason(ROBOT))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     angle_rad=st.floats(math.log(0.02), math.log(20.0)).map(math.exp),
     sign=st.sampled_from([1.0, -1.0]),

@@ -46,6 +46,7 @@ def test_from_the_first_failed_send_until_one_that_succeeds() -> None:
         (0x004, RX_WARNING, False),
         (0x004, TX_WARNING, False),
         (0x004, NONE, False),
+        (0x004, b"\x00\x01", False),  # an overflow of its buffer
         (0x004, b"", False),
         (0x004, b"\x10", False),  # detail is byte 1
         (0x004, b"\x00\x10", True),
@@ -66,6 +67,10 @@ def test_what_an_error_frame_says(error_class: int, data: bytes, failed: bool) -
 @pytest.mark.parametrize("over", [(0x100, NONE), (0x004, ACTIVE)])
 def test_it_is_over_when_the_controller_says_so(over: tuple[int, bytes]) -> None:
     assert told((0x040, NONE), over).failed_since == math.inf
+
+
+def test_an_overflow_does_not_end_it() -> None:
+    assert told((0x040, NONE), (0x004, b"\x00\x01")).failed_since == 1.0
 
 
 def test_it_counts_from_the_first_of_several() -> None:

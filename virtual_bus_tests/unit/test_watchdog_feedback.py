@@ -132,6 +132,24 @@ def test_before_the_start_the_wheel_may_have_had_any_setpoint() -> None:
     assert watch.last.low_mps == pytest.approx(-0.8)
 
 
+def test_before_the_first_sample_nothing_is_allowed_and_nothing_is_wrong() -> None:
+    last = FeedbackWatch(CONFIG.drives[0], CONFIG, 0.0).last
+    assert (last.low_mps, last.high_mps, last.outside, last.overspeed, last.implausible) == (0.0, 0.0, 0, 0, 0)
+
+
+def test_zero_is_always_allowed() -> None:
+    wheel = Wheel()
+    assert wheel.samples(200, 0.4, 0.4).low_mps == 0.0
+    assert wheel.samples(200, -0.4, -0.4).high_mps == 0.0
+
+
+def test_the_range_is_told_of_a_wheel_without_power_too() -> None:
+    wheel = Wheel()
+    wheel.samples(200, -0.4, -0.4)
+    last = wheel.sample(-0.4, -0.4, powered=False)
+    assert (last.low_mps, last.high_mps) == (-0.4, 0.0)
+
+
 # --- overspeed: 1.2 × 1.0 m/s
 
 
@@ -176,7 +194,9 @@ def test_a_velocity_that_says_nothing_while_the_encoder_runs() -> None:
     assert wheel.last.implausible == 1
 
 
-@pytest.mark.parametrize(("drift_per_sample", "implausible"), [(0.0499, 0), (0.0501, 1), (-0.0499, 0), (-0.0501, 1)])
+@pytest.mark.parametrize(
+    ("drift_per_sample", "implausible"), [(0.0499, 0), (0.05, 0), (0.0501, 1), (-0.0499, 0), (-0.0501, 1)]
+)
 def test_the_tolerance_of_the_drift(drift_per_sample: float, implausible: int) -> None:
     wheel = Wheel()
     wheel.way_m += drift_per_sample
@@ -222,6 +242,29 @@ def test_what_three_times_the_fastest_wheel_cannot_do_in_two_cycles_is_a_jump(st
     assert (abs(wheel.sample(0.0, 0.0).drift_m) < 0.001) is jump
 
 
+def test_a_step_as_long_as_it_may_be_is_no_jump() -> None:
+    """3 × 1 m/s × 2/64 s = 1536/2^14 m."""
+    watch = FeedbackWatch(replace(CONFIG.drives[0], m_per_count=2.0**-14), replace(CONFIG, control_hz=64.0), 0.0)
+    for counts, now in ((0, 1.0), (1536, 1.01)):
+        watch.on_position(counts)
+        watch.on_velocity(0.0, True, now)
+    assert watch.last.drift_m == -0.09375
+
+
+@pytest.mark.parametrize(("step_m", "jump"), [(0.0299, False), (0.0301, True)])
+def test_of_a_slower_base_a_shorter_step_is_a_jump(step_m: float, jump: bool) -> None:
+    wheel = Wheel(max_wheel_mps=0.5)
+    wheel.way_m += step_m
+    assert (abs(wheel.sample(0.0, 0.0).drift_m) < 0.001) is jump
+
+
+def test_the_farthest_jump_is_one() -> None:
+    wheel = Wheel()
+    wheel.watch.on_position(-(2**31))
+    wheel.watch.on_velocity(0.0, True, 0.02)
+    assert wheel.last.implausible == 1
+
+
 def test_after_a_longer_time_the_step_may_be_longer() -> None:
     wheel = Wheel()
     wheel.way_m += 0.26
@@ -244,6 +287,13 @@ def test_what_was_rolled_in_a_gap_is_not_known(gap_s: float, kept: bool) -> None
     wheel = Wheel()
     wheel.samples(8, 0.5, 0.5, rolls=0.0)
     assert (wheel.sample(0.5, 0.5, after_s=gap_s).drift_m > 0.0) is kept
+
+
+def test_after_half_a_second_the_drift_before_is_forgotten() -> None:
+    wheel = Wheel(feedback_timeout_s=1.0)
+    wheel.way_m += 0.04
+    assert wheel.sample(0.0, 0.0).drift_m == pytest.approx(-0.04)
+    assert wheel.sample(0.0, 0.0, after_s=0.8).drift_m == 0.0
 
 
 def test_without_a_position_there_is_no_drift() -> None:

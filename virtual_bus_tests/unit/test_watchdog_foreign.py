@@ -152,6 +152,15 @@ def test_syncs_half_as_often_again_as_configured(period_s: float, sign: bool) ->
     assert (bus.sign is not None) is sign
 
 
+def test_75_syncs_at_once_are_a_burst_and_one_more_is_a_second_master() -> None:
+    bus = Bus()
+    for _ in range(75):
+        bus.cycle(A, 1.0)
+    assert bus.sign is None
+    bus.cycle(A, 1.0)
+    assert bus.sign is not None
+
+
 @pytest.mark.parametrize("control_hz", [20.0, 50.0, 200.0])
 def test_the_number_of_syncs_goes_with_the_rate(control_hz: float) -> None:
     one, two = Bus(control_hz=control_hz), Bus(control_hz=control_hz)

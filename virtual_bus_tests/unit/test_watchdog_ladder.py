@@ -22,7 +22,7 @@ def go(climb: Climb, look: Look, now: float) -> Climb:
 def test_the_ladder_has_four_rungs_and_each_but_the_last_has_its_deadlines() -> None:
     assert list(RUNGS) == list(Step)[1:]
     assert [step for step, rung in RUNGS.items() if rung.step is not step] == []
-    assert max(rung.obey_s for rung in list(RUNGS.values())[:-1]) <= 0.2
+    assert [(rung.obey_s, rung.stand_s) for rung in list(RUNGS.values())[:-1]] == [(0.15, 0.3)] * 3
 
 
 def test_it_begins_with_the_quick_stop() -> None:
@@ -38,6 +38,7 @@ def test_it_begins_with_the_quick_stop() -> None:
         (10.051, ENABLED, Step.PRE_OPERATIONAL),
         (10.051, BRAKING, Step.QUICK_STOP),
         (10.051, replace(BRAKING, seen_at=9.9), Step.PRE_OPERATIONAL),  # nothing heard since the trip
+        (10.051, replace(BRAKING, seen_at=9.8), Step.PRE_OPERATIONAL),
         (10.051, replace(BRAKING, seen_at=9.901), Step.QUICK_STOP),
         (10.051, replace(STANDING, seen_at=9.9), Step.PRE_OPERATIONAL),
         (10.049, replace(STANDING, seen_at=9.9), Step.QUICK_STOP),
@@ -50,6 +51,17 @@ def test_it_begins_with_the_quick_stop() -> None:
 )
 def test_deadlines(now: float, look: Look, step: Step) -> None:
     assert go(FOOT, look, now).step is step
+
+
+def test_at_the_very_deadline_it_climbs() -> None:
+    assert go(FOOT, ENABLED, FOOT.since + 0.15).step is Step.PRE_OPERATIONAL
+    assert go(FOOT, BRAKING, FOOT.since + 0.3 + FOOT.speed_mps / 1.0).step is Step.PRE_OPERATIONAL
+
+
+@pytest.mark.parametrize(("now", "step"), [(10.449, Step.QUICK_STOP), (10.451, Step.PRE_OPERATIONAL)])
+def test_a_base_that_brakes_harder_has_less_time(now: float, step: Step) -> None:
+    """0.5 m/s / 2 m/s² + 0.3 s after 9.9."""
+    assert advance(FOOT, BRAKING, 2.0, now).step is step
 
 
 def test_a_new_rung_has_new_deadlines_and_takes_the_speed_of_now() -> None:
@@ -67,8 +79,9 @@ def test_standing_but_enabled_is_not_stopped() -> None:
     assert not go(FOOT, replace(STANDING, enabled=True), 10.0).stopped
 
 
-def test_old_feedback_does_not_end_it() -> None:
-    assert not go(FOOT, replace(STANDING, seen_at=9.9), 10.0).stopped
+@pytest.mark.parametrize("seen_at", [9.8, 9.9])
+def test_old_feedback_does_not_end_it(seen_at: float) -> None:
+    assert not go(FOOT, replace(STANDING, seen_at=seen_at), 10.0).stopped
 
 
 def test_enabled_again_after_it_stood_climbs_at_once() -> None:

@@ -33,8 +33,9 @@ def test_any_other_length_is_refused(length: int) -> None:
     assert parse((BYTES + bytes(256))[:length]) is Refusal.LENGTH
 
 
-def test_another_magic_is_refused() -> None:
-    body = b"CBL2" + BYTES[4:40]
+@pytest.mark.parametrize("magic", [b"CBL2", b"CBL0", b"\0\0\0\0"])
+def test_another_magic_is_refused(magic: bytes) -> None:
+    body = magic + BYTES[4:40]
     assert parse(body + struct.pack("<I", zlib.crc32(body))) is Refusal.MAGIC
 
 
@@ -57,7 +58,14 @@ def test_sequences_begin_at_one() -> None:
 
 @pytest.mark.parametrize(
     ("linear", "angular", "orders"),
-    [(0.0, 0.0, False), (-0.0, 0.0, False), (1e-9, 0.0, True), (0.0, -1e-9, True), (0.3, 0.3, True)],
+    [
+        (0.0, 0.0, False),
+        (-0.0, 0.0, False),
+        (1e-9, 0.0, True),
+        (-1e-9, 0.0, True),
+        (0.0, 1e-9, True),
+        (0.0, -1e-9, True),
+    ],
 )
 def test_any_velocity_but_zero_orders_motion(linear: float, angular: float, orders: bool) -> None:
     assert Lease(1, 1, linear, angular, 0).orders_motion is orders
@@ -81,6 +89,10 @@ def test_any_velocity_but_zero_orders_motion(linear: float, angular: float, orde
 )
 def test_stamps_count_from_the_timeout_to_just_ahead_of_now(stamp_s: float, refusal: Refusal | None) -> None:
     assert judge(Lease(1, round(stamp_s * 1e9), 0.0, 0.0, 0), None, 0.25, 10.0) is refusal
+
+
+def test_a_stamp_at_the_very_tolerance_counts() -> None:
+    assert judge(Lease(1, 5_000_000, 0.0, 0.0, 0), None, 0.25, 0.0) is None
 
 
 # The last lease has sequence 100, stamp 10.000 s. It is 10.100 s.

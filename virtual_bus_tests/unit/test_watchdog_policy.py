@@ -35,6 +35,17 @@ def test_one_row_for_each_cause_that_the_bus_can_show() -> None:
     assert sorted(check.cause for check in CHECKS) == [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12]
 
 
+def test_a_node_is_found_by_its_id_wherever_it_stands() -> None:
+    one, two = Node(1, 99.0), Node(2, 98.0)
+    assert well(nodes=(two, one)).node(1) is one
+    with pytest.raises(StopIteration):
+        WELL.node(3)
+
+
+def test_what_has_not_ticked_yet_is_not_late() -> None:
+    assert WELL.tick_gap_s == 0.0
+
+
 # --- lease lost
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from canbase_watchdog.frames import Frame
 from canbase_watchdog.ladder import Step
+from canbase_watchdog.lease import Refusal
 from canbase_watchdog.policy import Cause
 from canbase_watchdog.watchdog import State
 from unit.watchdog_story import FakeDrive, Story, lease
@@ -206,6 +207,14 @@ def test_quick_stops_for_the_way_out_need_no_state() -> None:
     story = Story(FakeDrive(1), FakeDrive(5, axes=(0, 1)))
     frames = story.watchdog.quick_stops()
     assert frames == [QUICK_STOP, Frame(0x505, bytes.fromhex("02 00 02 00"))]
+
+
+def test_datagrams_that_are_no_lease_are_counted_by_reason() -> None:
+    story = driving()
+    for datagram in (b"", b"noise", bytes(44)):
+        story.watchdog.on_lease(datagram, None, story.t)
+    refused = story.watchdog.refused_leases
+    assert {why: count for why, count in refused.items() if count} == {Refusal.LENGTH: 2, Refusal.MAGIC: 1}
 
 
 def test_its_own_frames_that_come_back_change_nothing() -> None:

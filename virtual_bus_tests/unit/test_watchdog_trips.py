@@ -234,11 +234,12 @@ def noise(random: Random) -> Iterator[tuple[int, bytes]]:
         yield cob_id, data[:8]
 
 
-@pytest.mark.parametrize("seed", range(10))
-def test_a_million_frames_of_noise_neither_raise_nor_fill_the_memory_nor_let_anything_but_stops_out(seed: int) -> None:
+@pytest.mark.parametrize("seed", range(2))
+def test_noise_neither_raises_nor_fills_the_memory_nor_lets_anything_but_stops_out(seed: int) -> None:
+    """20,000 frames; `make fuzz` tries a million."""
     story, random = Story(), Random(seed)
     watchdog, t = story.watchdog, 0.0
-    for n, (cob_id, data) in zip(range(100_000), noise(random), strict=False):
+    for n, (cob_id, data) in zip(range(20_000), noise(random), strict=False):
         t += 0.0002
         watchdog.on_frame(cob_id, data, t)
         if n % 5 == 0:
@@ -251,8 +252,8 @@ def test_a_million_frames_of_noise_neither_raise_nor_fill_the_memory_nor_let_any
             assert all(len(frame.data) <= 8 for frame in frames)
             assert {frame.data for frame in frames if frame.cob_id in (0x501, 0x502)} <= {b"\x02\x00"}
             assert {frame.data[0] for frame in frames if frame.cob_id == 0x000} <= {0x80}
-    assert watchdog.dropped_frames > 10_000
-    assert sum(watchdog.refused_leases.values()) > 1000
+    assert watchdog.dropped_frames > 2_000
+    assert sum(watchdog.refused_leases.values()) > 200
     assert held(watchdog) < 1000
 
 

@@ -1,0 +1,76 @@
+"""What is mutated, and which tests have to notice: the watchdog's policy, and the driver's tables of CiA 402.
+
+`first`: the tests that are about the module, which kill nearly all mutants in no time. `then`: what looks at it
+together with the others, run only for a mutant that is still alive.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+from mutation.mutants import behaviour
+
+ROOT = Path(__file__).resolve().parents[2]
+UNIT = Path("virtual_bus_tests/unit")
+STORIES = ("watchdog_story_trips", "watchdog_story_ladder", "watchdog_story_reset", "watchdog_trips")
+"""Tests of the watchdog as a whole."""
+LONG = "noise or minutes or minute"
+"""Tests that are left out: long, and about exceptions and false trips, which the others notice as well."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """One mutated module. `path`: from the root of the project; `first`, `then`: names of test files."""
+
+    path: str
+    first: tuple[str, ...]
+    then: tuple[str, ...]
+
+    @property
+    def module(self) -> str:
+        """Its dotted name."""
+        return ".".join(Path(self.path).with_suffix("").parts[1:])
+
+    @property
+    def source(self) -> str:
+        """Its text."""
+        return (ROOT / self.path).read_text(encoding="utf-8")
+
+    @property
+    def sha256(self) -> str:
+        """Of what it does: comments, docstrings and layout may change."""
+        return hashlib.sha256(behaviour(self.source).encode()).hexdigest()
+
+
+def files(names: tuple[str, ...]) -> list[str]:
+    """Paths of test files, from the root of the project."""
+    return [str(UNIT / f"test_{name}.py") for name in names]
+
+
+def _watchdog(name: str, *first: str, then: tuple[str, ...] = STORIES) -> Target:
+    return Target(f"watchdog/canbase_watchdog/{name}.py", first or (f"watchdog_{name}",), then)
+
+
+def _driver(name: str, *then: str) -> Target:
+    return Target(f"driver/canbase_driver/{name}.py", (name,), then)
+
+
+TARGETS = (
+    _watchdog("policy", "watchdog_policy", "watchdog_policy_motion"),
+    _watchdog("envelope", then=("watchdog_trips", "watchdog_envelope_limiter")),
+    _watchdog("feedback"),
+    _watchdog("pair"),
+    _watchdog("foreign"),
+    _watchdog("lease"),
+    _watchdog("frames", then=("layouts_agree", *STORIES)),
+    _watchdog("ladder"),
+    _watchdog("stopper", "watchdog_story_ladder", then=STORIES),
+    _watchdog("observer"),
+    _watchdog("view", "watchdog_policy", "watchdog_observer"),
+    _watchdog("bus_health"),
+    _watchdog("watchdog", *STORIES[:3], then=STORIES[3:]),
+    _driver("cia402", "axis", "layouts_agree"),
+    _driver("axis", "core", "chain_odometry"),
+)
