@@ -9,8 +9,10 @@ import can
 import pytest
 
 from vm import table
+from vm.guest.main import ALL, FIRST, SECOND, names
 from vm.guest.slcan_adapter import frame_of, line_of
 from vm.guest.standstill import standstill
+from vm.guest.system import BrokenPromiseError
 from vm.overlay import robot_yaml
 
 ROW = {
@@ -71,48 +73,78 @@ def test_a_frame_of_the_bus_is_written_in_capital_digits() -> None:
     assert line_of(can.Message(arbitration_id=0x18A, is_extended_id=False, data=b"\xab")) == b"t18A1AB\r"
 
 
-def left(job: Path, failure: str = "", *, ended: bool = True) -> list[table.Result]:
+def told(name: str, failure: str = "") -> table.Result:
+    return {"name": name, "failure": failure, "took_s": 10.4, "row": None if failure else ROW}
+
+
+def left(job: Path, *lines: str, ended: bool = True) -> list[table.Result]:
     job.mkdir()
-    told = {"name": "driver SIGKILL", "failure": failure, "took_s": 10.4, "row": None if failure else ROW}
-    (job / "rows.jsonl").write_text(json.dumps(told) + "\n")
+    (job / "out.txt").write_text("".join(f"{line}\n" for line in lines))
     if ended:
         (job / "code").write_text("0")
     return table.results(job)
 
 
+def test_results_are_read_from_the_live_output(tmp_path: Path) -> None:
+    line = json.dumps(told("driver SIGKILL"))
+
+    assert left(tmp_path / "job", "@host device_del", line, line[:20].replace("name", "nome")) == [
+        told("driver SIGKILL")
+    ]
+
+
+def test_all_as_promised_is_success() -> None:
+    assert table.report([told("goal"), told("freeze")], 60.0) == 0
+
+
+@pytest.mark.parametrize(("lines", "ended"), [([told("goal", "stood too late")], True), ([told("goal")], False)])
+def test_a_scenario_that_failed_and_a_guest_that_died_are_failures(
+    tmp_path: Path, lines: list[table.Result], ended: bool
+) -> None:
+    assert table.report(left(tmp_path / "job", *map(json.dumps, lines), ended=ended), 60.0) == 1
+
+
+def test_no_result_is_no_success() -> None:
+    assert table.report([], 60.0) == 1
+
+
 @pytest.fixture
-def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def page(tmp_path: Path) -> Path:
     path = tmp_path / "stop_times.md"
     path.write_text(PAGE)
-    monkeypatch.setattr(table, "PAGE", path)
     return path
 
 
-def test_all_as_promised_is_a_table(tmp_path: Path, page: Path) -> None:
-    assert table.report(left(tmp_path / "job"), 60.0, complete=True) == 0
-
-    line = "| canbase-driver | SIGKILL | drives: heartbeat lost | 0.45 s | 103 mm | 0.75 s | – | no power until reset |"
-    assert line in page.read_text().splitlines()
-
-
-def test_some_scenarios_alone_change_no_page(tmp_path: Path, page: Path) -> None:
-    assert table.report(left(tmp_path / "job"), 60.0, complete=False) == 0
-
-    assert page.read_text() == PAGE
+def passed(page: Path, build: str, *found: table.Result) -> list[str]:
+    """The page's lines after a run of `build`."""
+    rows = table.Passed(page.with_name("passed.json"), build)
+    rows.add(found)
+    rows.write(page, ["goal", "freeze"])
+    return page.read_text().splitlines()
 
 
-@pytest.mark.parametrize(("failure", "ended"), [("stood after 0.8 s", True), ("", False)])
-def test_a_scenario_that_failed_and_a_guest_that_died_change_no_page(
-    tmp_path: Path, page: Path, capsys: pytest.CaptureFixture[str], failure: str, ended: bool
-) -> None:
-    assert table.report(left(tmp_path / "job", failure, ended=ended), 60.0, complete=True) == 1
-
-    assert page.read_text() == PAGE
-    assert (failure or "the guest died") in capsys.readouterr().out
+LINE = "| canbase-driver | SIGKILL | drives: heartbeat lost | 0.45 s | 103 mm | 0.75 s | – | no power until reset |"
 
 
-def test_no_result_is_no_success(page: Path) -> None:
-    assert table.report([], 60.0, complete=True) == 1
+def test_rows_of_several_runs_are_one_table(page: Path) -> None:
+    first = passed(page, "one", told("freeze"))
+    both = passed(page, "one", told("goal"))
+
+    assert "Not passed by this build, or not tried with it: goal." in first
+    assert both.count(LINE) == 2
+    assert not [line for line in both if line.startswith("Not passed")]
+
+
+def test_rows_of_another_build_do_not_count(page: Path) -> None:
+    passed(page, "one", told("freeze"))
+
+    assert passed(page, "two", told("goal")).count(LINE) == 1
+
+
+def test_what_fails_now_has_not_passed(page: Path) -> None:
+    passed(page, "one", told("goal"), told("freeze"))
+
+    assert "Not passed by this build, or not tried with it: freeze." in passed(page, "one", told("freeze", "late"))
 
 
 def test_robot_and_drives_are_on_two_controllers() -> None:
@@ -121,3 +153,27 @@ def test_robot_and_drives_are_on_two_controllers() -> None:
     assert "channel: can0" in robot
     assert "channel: can1" in drives
     assert "required: true" not in robot
+
+
+def test_words_choose_scenarios_in_the_order_of_the_table() -> None:
+    assert names(["freeze", "driver SIG"]) == ["driver SIGKILL", "driver SIGSTOP", "freeze"]
+
+
+def test_no_word_means_all_of_them() -> None:
+    assert names([]) == list(ALL)
+    assert names(["first"]) + names(["second"]) == list(ALL)
+
+
+def test_a_word_that_means_none_is_told_what_there_is() -> None:
+    with pytest.raises(BrokenPromiseError, match="no scenario is called unpluged; there are: cold boot, goal"):
+        names(["unpluged"])
+
+
+@pytest.mark.parametrize("part", ["watchdog", "driver", "velocity", "action-server"])
+def test_every_unit_is_killed_hung_stopped_and_restarted(part: str) -> None:
+    assert {f"{part} SIGKILL", f"{part} SIGSTOP"} <= set(FIRST)
+    assert {f"stop {part}", f"restart {part}"} <= set(SECOND)
+
+
+def test_what_takes_the_guest_down_comes_last() -> None:
+    assert list(ALL)[-2:] == ["reboot", "freeze"]

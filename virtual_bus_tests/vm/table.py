@@ -18,30 +18,53 @@ HEAD = """| what | how | who caught it | stood after | way | limit | again after
 
 Result = dict[str, Any]
 """A line of guest/main.py: name, failure, took_s, row."""
+ROW_BEGINS = '{"name": '
 
 
 def results(job: Path) -> list[Result]:
-    """What one guest has left, in its order; that it died, too."""
-    rows = job / "rows.jsonl"
-    found = [json.loads(line) for line in rows.read_text().splitlines()] if rows.exists() else []
+    """What one guest has left, in its order, from its live output; that it died, too."""
+    out = job / "out.txt"
+    lines = out.read_text(errors="replace").splitlines() if out.exists() else []
+    found = [json.loads(line) for line in lines if line.startswith(ROW_BEGINS)]
     if not (job / "code").exists():
         died = f"the guest died or was too slow; see {job}/console.log and out.txt there"
         found.append({"name": job.name, "failure": died, "took_s": 0.0, "row": None})
     return found
 
 
-def report(found: Sequence[Result], took_s: float, *, complete: bool) -> int:
-    """Print it; write the page if it is complete and nothing failed. Exit code 0: all came out as promised."""
+def report(found: Sequence[Result], took_s: float) -> int:
+    """Print it. Exit code 0: every scenario came out as promised."""
     for result in found:
         print(f"{result['name']}: {result['failure'] or _told(result['row'])} [{result['took_s']:.0f} s in the guest]")
     bad = [result for result in found if result["failure"]]
     print(f"{len(found)} scenarios, {len(bad)} failed, {took_s / 60.0:.1f} minutes", file=sys.stderr)
-    if bad or not found:
-        return 1
-    if complete:
-        table = "\n".join([HEAD, *(_line(result["row"]) for result in found)])
-        PAGE.write_text(rewritten(PAGE.read_text(encoding="utf-8"), COMMAND, table), encoding="utf-8")
-    return 0
+    return int(bool(bad) or not found)
+
+
+class Passed:
+    """The rows that one build of canbase has passed, over several runs: on a slow computer not all fit into one."""
+
+    def __init__(self, path: Path, build: str) -> None:
+        """`build`: rows of another one do not count."""
+        self._path, self._build = path, build
+        kept = json.loads(path.read_text()) if path.exists() else {}
+        self.rows: dict[str, dict[str, Any]] = kept["rows"] if kept.get("build") == build else {}
+
+    def add(self, found: Sequence[Result]) -> None:
+        """And keep them. What has failed now has not passed."""
+        for result in found:
+            self.rows.pop(result["name"], None)
+            if not result["failure"]:
+                self.rows[result["name"]] = result["row"]
+        self._path.write_text(json.dumps({"build": self._build, "rows": self.rows}))
+
+    def write(self, page: Path, names: Sequence[str]) -> None:
+        """Our part of the page: the rows in the order of `names`, and which of them this build has not passed yet."""
+        lines = [HEAD, *(_line(self.rows[name]) for name in names if name in self.rows)]
+        missing = [name for name in names if name not in self.rows]
+        if missing:
+            lines += ["", f"Not passed by this build, or not tried with it: {', '.join(missing)}."]
+        page.write_text(rewritten(page.read_text(encoding="utf-8"), COMMAND, "\n".join(lines)), encoding="utf-8")
 
 
 def _told(row: dict[str, Any]) -> str:
