@@ -8,6 +8,7 @@ import typer
 
 from canbase_cli import (
     bench,
+    commission,
     config,
     demo,
     doctor,
@@ -65,6 +66,7 @@ app.command("reset", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.reset)
 app.command("doctor", cls=RosCommand, options_metavar=_ROS_USAGE, epilog=doctor.EPILOG)(doctor.doctor)
 app.command("scan", epilog=scan.EPILOG)(scan.scan)
 app.add_typer(sdo.app, name="sdo")
+app.command("commission", epilog=commission.EPILOG)(commission.commission)
 app.command("bench")(bench.bench)
 app.add_typer(config.app, name="config")
 app.add_typer(fibonacci.app, name="fibonacci")

@@ -170,10 +170,11 @@ class RemoteNode:
     def setpoints(self, goal: PowerGoal, left_mps: float, right_mps: float) -> list[Frame]:
         """The setpoint of each axis, one step towards `goal`; speeds of the rims, forward positive [m/s]."""
         speeds = {"left": left_mps, "right": right_mps}
-        words = self._controlwords(goal)
+        words = self.controlwords(goal)
         return [axis.setpoint(goal, speeds[axis.drive.side], word) for axis, word in zip(self.axes, words, strict=True)]
 
-    def _controlwords(self, goal: PowerGoal) -> list[int]:
+    def controlwords(self, goal: PowerGoal) -> list[int]:
+        """6040h of each of its axes, one step towards `goal`; motors that share one get the same."""
         if self.profile.layout.controlword == "own":
             return [next_controlword(axis.state, goal) for axis in self.axes]
         return [common_controlword([axis.state for axis in self.axes], goal)] * len(self.axes)

@@ -15,6 +15,8 @@ from canbase_driver.frame import Frame
 
 TURN_S = 0.002
 """Longest wait for a frame, so the longest delay of anything that a session does by itself."""
+MOST_FRAMES = 100
+"""After so many in a row it is the session's turn."""
 
 
 def choose_bus(config: Path | None, interface: str | None, channel: str | None, bitrate: int | None) -> Bus:
@@ -76,11 +78,16 @@ class BusLine:
             self.turn(session)
 
     def turn(self, session: Session) -> None:
-        """Wait for a frame TURN_S at most, hand it over, send what the session wants."""
+        """Wait for a frame TURN_S at most, hand over all that have come, send what the session wants."""
         frame = self._port.receive(TURN_S)
+        for _ in range(MOST_FRAMES):
+            if frame is None:
+                break
+            now = time.monotonic()
+            if not self._is_own(frame, now):
+                session.on_frame(frame, now)
+            frame = self._port.receive(0.0)
         now = time.monotonic()
-        if frame is not None and not self._is_own(frame, now):
-            session.on_frame(frame, now)
         for out in session.tick(now):
             self._send(out, now)
 

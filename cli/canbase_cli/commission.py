@@ -1,0 +1,76 @@
+"""`canbase commission`: guided first motion, and the proof that the drives stop by themselves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from canbase_cli.options import WRONG_INPUT, fail
+
+EPILOG: Final = (
+    "Examples:  \n"
+    "canbase commission --config robot.yaml  \n"
+    "canbase commission --config robot.yaml --steps proof      (again, after a change of firmware)  \n"
+    "canbase commission --config robot.yaml --answers answers.yaml --yes --dry-run"
+)
+STEPS: Final = ("directions", "scale", "proof", "floor")
+
+
+def _steps(text: str) -> str:
+    unknown = [step for step in text.split(",") if step not in STEPS]
+    if unknown:
+        raise typer.BadParameter(f"there is no step {unknown[0]!r}, expected some of {','.join(STEPS)}")
+    return text
+
+
+def commission(
+    config: Annotated[Path, typer.Option("--config", "-c", metavar="FILE", help="The robot.yaml; it is changed.")],
+    steps: Annotated[
+        str, typer.Option("--steps", metavar="STEPS", callback=_steps, help="Some of them, joined by commas.")
+    ] = ",".join(STEPS),
+    speed_mps: Annotated[
+        float, typer.Option("--speed", metavar="M/S", min=0.02, max=0.3, help="of the rims, after the first turn")
+    ] = 0.1,
+    revolutions: Annotated[
+        float, typer.Option("--revolutions", metavar="N", min=0.2, max=50.0, help="of each wheel for its scale")
+    ] = 3.0,
+    distance_m: Annotated[
+        float, typer.Option("--distance", metavar="M", min=0.1, max=20.0, help="of the measured drive")
+    ] = 2.0,
+    turns: Annotated[float, typer.Option("--turns", metavar="N", min=0.1, max=20.0, help="of the measured turn")] = 2.0,
+    report: Annotated[
+        Path | None,
+        typer.Option("--report", metavar="FILE", help="Of the report.", show_default="commissioning.md beside FILE"),
+    ] = None,
+    answers: Annotated[
+        Path | None, typer.Option("--answers", metavar="FILE", help="YAML with answers by key, for tests.")
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Confirm everything that wants a yes. For tests.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Do not change robot.yaml, print the changes.")] = False,
+) -> None:
+    """First motion, guided: WHEELS UP. Direction, scale, the proof of the self-stop, radius and track.
+
+    Slow, one wheel after the other, with questions in between. Then the proof: at a low speed this computer falls
+    silent, and it is measured that each drive stops by itself, and when. Only with that proven, on the floor: wheel
+    radius and track by a measured drive. Values go into robot.yaml, which keeps its comments; a report is written.
+
+    Nothing else of canbase may run on this bus. Enter, Ctrl-C, a signal, a terminal that goes, an error: each stops
+    the wheels and takes the power away. After SIGKILL the drives stop by themselves, if they can: that is the proof.
+
+    Exit codes: 0 done and proven, 1 not proven or not finished, 2 wrong command line, robot.yaml or answers.
+    """
+    from canbase_cli.onbus.commission import Plan, run
+
+    if not config.exists():
+        fail(f"{config} does not exist: begin with a copy of a sample, see canbase config check --help", WRONG_INPUT)
+    plan = Plan(
+        frozenset(steps.split(",")),
+        speed_mps,
+        revolutions,
+        distance_m,
+        turns,
+        report or config.with_name("commissioning.md"),
+    )
+    run(config, plan, answers, yes=yes, dry_run=dry_run)

@@ -1,0 +1,94 @@
+"""What commissioning found, as changes to robot.yaml: comments, order and all other lines stay as they are."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ruamel.yaml import YAML
+
+from canbase_cli.commissioning.floor import FloorFound
+from canbase_cli.commissioning.wheels import WheelFound
+from canbase_config.errors import Loc, key_path
+from canbase_config.robot import Robot
+
+DIGITS = 5
+"""Significant digits of a measured value: a tape gives four."""
+SAME = 1e-4
+"""A share below which a measured value is the one that stood there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Edit:
+    """One value of robot.yaml: what stood there (None: the default) and what is to stand there."""
+
+    loc: Loc
+    before: Any
+    after: Any
+
+    def __str__(self) -> str:
+        return f"{key_path(self.loc)}: {self.before} → {self.after}"
+
+
+def wheel_edits(robot: Robot, found: Sequence[WheelFound]) -> list[Edit]:
+    """Direction, gear, counts and unit of each wheel where they differ."""
+    edits = []
+    for wheel in found:
+        i = next(i for i, drive in enumerate(robot.drives) if drive.joint == wheel.joint)
+        drive = robot.drives[i]
+        edits.append(Edit(("drives", i, "direction"), drive.direction, wheel.direction))
+        if wheel.scale is not None:
+            gear = float(f"{wheel.scale.gear_ratio:.{DIGITS}g}")
+            edits.append(Edit(("drives", i, "gear_ratio"), drive.gear_ratio, gear))
+            counts = wheel.scale.counts_per_motor_rev
+            edits.append(Edit(("drives", i, "counts_per_motor_rev"), drive.counts_per_motor_rev, counts))
+            edits.append(Edit(("drives", i, "velocity_unit"), drive.velocity_unit, wheel.scale.velocity_unit))
+    return [edit for edit in edits if _differs(edit)]
+
+
+def floor_edits(robot: Robot, found: FloorFound) -> list[Edit]:
+    """Radius and track."""
+    radius_m, track_m = (float(f"{value:.{DIGITS}g}") for value in (found.wheel_radius_m, found.track_m))
+    edits = [
+        Edit(("base", "wheel_radius_m"), robot.base.wheel_radius_m, radius_m),
+        Edit(("base", "track_m"), robot.base.track_m, track_m),
+    ]
+    return [edit for edit in edits if _differs(edit)]
+
+
+def with_edits(robot: Robot, edits: Sequence[Edit]) -> Robot:
+    """The robot with these values. Raises pydantic.ValidationError when they do not fit together."""
+    values = robot.model_dump()
+    values["drives"] = [dict(drive) for drive in values["drives"]]
+    for edit in edits:
+        _put(values, edit)
+    return Robot.model_validate(values)
+
+
+def edited(text: str, edits: Sequence[Edit]) -> str:
+    """robot.yaml with these values, everything else as it is, comments too. Raises KeyError for a place it has not."""
+    yaml = YAML()
+    yaml.preserve_quotes = True
+    yaml.width = 4096
+    values = yaml.load(text)
+    yaml.indent(mapping=2, sequence=4 if "\n  - " in text else 2, offset=2 if "\n  - " in text else 0)
+    for edit in edits:
+        _put(values, edit)
+    out = io.StringIO()
+    yaml.dump(values, out)
+    return out.getvalue()
+
+
+def _put(values: Any, edit: Edit) -> None:
+    *places, key = edit.loc
+    for place in places:
+        values = values[place]
+    values[key] = edit.after
+
+
+def _differs(edit: Edit) -> bool:
+    if isinstance(edit.before, float) and isinstance(edit.after, float):
+        return abs(edit.after - edit.before) > SAME * abs(edit.before)
+    return bool(edit.before != edit.after)

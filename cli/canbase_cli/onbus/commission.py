@@ -1,0 +1,145 @@
+"""`canbase commission` on the bus: step by step, the report, robot.yaml. What is measured is in `commissioning`."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import typer
+from pydantic import ValidationError
+
+from canbase_cli.commissioning.edits import Edit, edited, floor_edits, wheel_edits, with_edits
+from canbase_cli.commissioning.floor import FloorFound, measure_floor
+from canbase_cli.commissioning.guide import Ask, CommissionError, Script, Tell
+from canbase_cli.commissioning.judge import JudgeError
+from canbase_cli.commissioning.proof import Outcome, get_ready, prove
+from canbase_cli.commissioning.report import Results, markdown, verdict
+from canbase_cli.commissioning.rig import Rig, RigError
+from canbase_cli.commissioning.wheels import WheelFound, find_direction, measure_scale
+from canbase_cli.onbus.line import BusLine, open_line
+from canbase_cli.onbus.moving import refuse_beside_masters, run_script
+from canbase_cli.onbus.person import Person, Stopped, stopping_signals
+from canbase_cli.options import FAILED, fail, load_config
+from canbase_cli.version import installed_version
+from canbase_config.errors import ConfigError
+from canbase_config.load import load_robot
+from canbase_config.robot import Robot
+
+WHEELS_UP = (
+    "WHEELS UP: all wheels off the floor, nothing near them, the emergency stop (STO) at hand and tried. "
+    "Enter stops everything at any time. Is it so?"
+)
+WHEELS_DOWN = "Now on the floor: put the robot down, 3 m free all around, the emergency stop at hand. Is it so?"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What is to be done. `steps`: directions, scale, proof, floor."""
+
+    steps: frozenset[str]
+    speed_mps: float
+    revolutions: float
+    distance_m: float
+    turns: float
+    report: Path
+
+
+def run(config: Path, plan: Plan, answers: Path | None, *, yes: bool, dry_run: bool) -> None:
+    """All steps; exits with 1 when the self-stop is not proven, or not all was done."""
+    robot = load_config(config).robot
+    person = Person(answers, yes=yes)
+    results = Results()
+    with open_line(robot.bus) as line, stopping_signals():
+        refuse_beside_masters(line)
+        try:
+            _go(line, robot, plan, person, results)
+        except (CommissionError, RigError, JudgeError, ValidationError) as error:
+            results.ended_by = str(error)
+        except Stopped as stopped:
+            results.ended_by = str(stopped)
+    _write_report(robot, plan, results)
+    _change(config, results.edits, dry_run=dry_run)
+    person.tell(Tell(verdict(results), is_loud=not results.proven))
+    if results.ended_by:
+        fail(results.ended_by, FAILED)
+    if "proof" in plan.steps and not results.proven:
+        raise typer.Exit(FAILED)
+
+
+def _go(line: BusLine, robot: Robot, plan: Plan, person: Person, results: Results) -> None:
+    if plan.steps & {"directions", "scale"}:
+        results.wheels = run_script(line, robot, lambda rig: _wheels(rig, plan, results), person)
+        results.edits += wheel_edits(robot, results.wheels)
+        robot = with_edits(robot, results.edits)
+    if "proof" in plan.steps:
+        results.outcomes = run_script(line, robot, lambda rig: _proof(rig, plan, results), person)
+        for outcome in results.outcomes:
+            person.tell(Tell(str(outcome), is_loud=not outcome.stopped))
+    if "floor" not in plan.steps:
+        return
+    if "proof" in plan.steps and not results.proven:
+        person.tell(Tell("the measured drive on the floor is left out: the self-stop is not proven", is_loud=True))
+        return
+    results.floor = run_script(line, robot, lambda rig: _floor(rig, plan), person)
+    results.edits += floor_edits(robot, results.floor)
+
+
+def _wheels(rig: Rig, plan: Plan, results: Results) -> Script[list[WheelFound]]:
+    yield Ask("wheels_up", WHEELS_UP, confirms=True)
+    yield from get_ready(rig)
+    _note_boots(rig, results)
+    found = []
+    for drive in rig.robot.drives:
+        wheel = WheelFound(drive.joint, drive.direction)
+        if "directions" in plan.steps:
+            wheel = yield from find_direction(rig, drive)
+        if "scale" in plan.steps:
+            scale, turned = yield from measure_scale(rig, drive, plan.revolutions, plan.speed_mps)
+            wheel = WheelFound(drive.joint, wheel.direction, scale, turned)
+        found.append(wheel)
+    return found
+
+
+def _proof(rig: Rig, plan: Plan, results: Results) -> Script[tuple[Outcome, ...]]:
+    yield Ask("proof", f"The proof, wheels still up: all wheels turn at {plan.speed_mps:g} m/s. Ready?", confirms=True)
+    yield from get_ready(rig)
+    _note_boots(rig, results)
+    return (yield from prove(rig, plan.speed_mps))
+
+
+def _floor(rig: Rig, plan: Plan) -> Script[FloorFound]:
+    yield Ask("wheels_down", WHEELS_DOWN, confirms=True)
+    yield from get_ready(rig)
+    return (yield from measure_floor(rig, plan.distance_m, plan.turns, plan.speed_mps))
+
+
+def _note_boots(rig: Rig, results: Results) -> None:
+    results.boots = {node_id: node.report for node_id, node in rig.nodes.items() if node.report is not None}
+
+
+def _write_report(robot: Robot, plan: Plan, results: Results) -> None:
+    when = time.strftime("%Y-%m-%d %H:%M %z")
+    try:
+        plan.report.write_text(markdown(robot, results, when, installed_version()), encoding="utf-8")
+    except OSError as error:
+        fail(f"the report cannot be written: {error}", FAILED)
+    typer.echo(f"report: {plan.report}")
+
+
+def _change(config: Path, edits: list[Edit], *, dry_run: bool) -> None:
+    """The new file takes the old one's place only when it is good; the old one stays beside it."""
+    for edit in edits:
+        typer.echo(f"{'would change' if dry_run else 'changed'} {edit}")
+    if not edits or dry_run:
+        return
+    text = config.read_text(encoding="utf-8")
+    new = config.with_name(f".{config.name}.new.yaml")
+    try:
+        new.write_text(edited(text, edits), encoding="utf-8")
+        load_robot(new)
+        config.with_name(f"{config.name}.before").write_text(text, encoding="utf-8")
+        new.replace(config)
+    except (OSError, ConfigError, KeyError) as error:
+        new.unlink(missing_ok=True)
+        fail(f"{config} is left as it was; write the values above into it by hand: {error}", FAILED)
