@@ -11,6 +11,8 @@ from campaign.judge import EXCLUDED, PROPERTIES, STRANGE_HANDS, UNHEARD
 from campaign.plan import MOST_FAULTS, draw_plan
 from campaign.runner import run
 from campaign.scenario import Start
+from campaign.teeth import COVERED, DRAWN_FROM, TOGETHER
+from campaign.without import SAFEGUARDS
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(600)]
 SCENARIOS = 120
@@ -48,11 +50,19 @@ def test_the_same_seed_gives_the_same_scenario() -> None:
         ("filter:estop", ["estop_pressed", "estop_stale"], "estop"),
         ("filter:zero_after_estop", ["estop_pressed"], "zero"),
         ("filter:obstacle", ["obstacle"], "obstacle"),
+        ("driver:watchdog_missing+drives:heartbeat_consumer", ["watchdog_dies", "watchdog_hangs"], "envelope"),
     ],
 )
 def test_without_a_safeguard_the_campaign_finds_it_missing(safeguard: str, faults: list[str], found: str) -> None:
     tally = run(range(50), WORKERS, faults, safeguard)
     assert found in {violation.name for _, violation in tally.violations}
+
+
+def test_what_is_covered_twice_and_what_is_taken_out_together_are_safeguards() -> None:
+    assert set(COVERED) <= set(SAFEGUARDS)
+    assert {name for names in TOGETHER for name in names.split("+")} <= set(SAFEGUARDS)
+    assert set(DRAWN_FROM) <= {*SAFEGUARDS, *TOGETHER}
+    assert {fault for faults in DRAWN_FROM.values() for fault in faults} <= set(FAULTS)
 
 
 def test_only_known_faults_are_excluded_and_only_from_known_properties() -> None:

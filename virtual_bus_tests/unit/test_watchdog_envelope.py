@@ -110,6 +110,13 @@ def test_a_greater_value_takes_the_place_of_all_smaller_ones() -> None:
     assert [peak.greatest(t) for t in (0.5, 1.4, 1.41, 1.5, 1.51)] == [5.0, 5.0, 4.0, 4.0, 3.0]
 
 
+def test_after_the_greatest_the_greatest_of_the_others_counts() -> None:
+    peak = Peak(1.0)
+    for n, value in enumerate((5.0, 2.0, 3.0, 1.0)):
+        peak.set(value, n / 10, until=99.0)
+    assert [peak.greatest(t) for t in (1.09, 1.11, 1.29, 1.31)] == [5.0, 3.0, 3.0, 1.0]
+
+
 def test_at_its_very_end_a_value_is_still_in_force() -> None:
     peak = Peak(0.5)
     peak.set(-3.0, 1.0, until=2.0)

