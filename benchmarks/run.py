@@ -14,6 +14,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+import boot
 import cycle
 import intake
 import latency
@@ -28,6 +29,7 @@ BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "cycle": cycle.measure,
     "latency": latency.measure,
     "startup": startup.measure,
+    "boot": boot.measure,
     "virtual_time": virtual_time.measure,
 }
 COLUMNS = ("what", "measured", "beside it, in the same run", "ratio", "budget", "kept")
