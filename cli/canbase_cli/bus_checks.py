@@ -19,8 +19,9 @@ from canbase_driver.watchdog_link import LEASE_AGE_UNKNOWN, TRIPPED, WATCHING, W
 
 BUSY_LOAD, FULL_LOAD = 0.6, 0.85
 """Above, the frames with high COB-IDs wait for others; heartbeats have the highest of all."""
-SHORT_QUEUE: Final = 100
-"""Frames; with the kernel's 10 a cycle of several axes does not fit."""
+SHORT_QUEUE, GOOD_QUEUE, LONG_QUEUE = 32, 64, 100
+"""Frames. Into the kernel's 10 a cycle of several axes does not fit; what waits in a long one while nobody acknowledges
+goes out late."""
 RUNGS: Final = ("none", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld")
 _SHOWN: Final = 4
 
@@ -94,7 +95,9 @@ def _controller(link: Link) -> Check:
 def _settings_of(link: Link) -> Check:
     missing = [] if link.restart_ms else [f"sudo ip link set {link.name} type can restart-ms 100 (else bus-off stays)"]
     if link.queue_length < SHORT_QUEUE:
-        missing.append(f"sudo ip link set {link.name} txqueuelen 1000")
+        missing.append(f"sudo ip link set {link.name} txqueuelen {GOOD_QUEUE} (frames of one cycle are refused)")
+    if link.queue_length > LONG_QUEUE:
+        missing.append(f"sudo ip link set {link.name} txqueuelen {GOOD_QUEUE} (old setpoints wait in a long one)")
     found = f"restart-ms {link.restart_ms}, txqueuelen {link.queue_length}"
     return warn("interface settings", found, "; ".join(missing)) if missing else ok("interface settings", found)
 

@@ -189,7 +189,7 @@ def _can(request: Request) -> list[WriteFile | Link]:
         Link(UNITS / f"{device}.wants" / service("watchdog", name), "../canbase-watchdog@.service"),
     ]
     if request.bring_up_can:
-        env = f"BITRATE={request.robot.bus.bitrate}\nRESTART_MS=100\nTXQUEUELEN=100\n"
+        env = f"BITRATE={request.robot.bus.bitrate}\nRESTART_MS=100\nTXQUEUELEN=64\n"
         files.append(WriteFile(ETC / "can" / f"{interface}.env", env))
     if request.adapter:
         link = f"[Match]\nType=can\nProperty={request.adapter}\n\n[Link]\nName={interface}\n"

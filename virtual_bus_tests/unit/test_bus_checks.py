@@ -18,7 +18,7 @@ from canbase_config.load import load_robot, sample
 from canbase_driver.cia402 import DriveState
 from canbase_driver.frame import Frame
 
-WELL = Link("can0", "can", True, 500_000, "ERROR-ACTIVE", restart_ms=100, queue_length=1000, counters={"bus_off": 0})
+WELL = Link("can0", "can", True, 500_000, "ERROR-ACTIVE", restart_ms=100, queue_length=64, counters={"bus_off": 0})
 DRIVES = ["701 05", "702 05", "181 37 02 00 00 00 00", "182 37 02 00 00 00 00"]
 DRIVER, WATCHDOG = ["77F 05", "080"], ["77E 05", "1FE 01 00 00 00 0A 00 00 00", "2FE 00 00 00 00 00 00 00 05"]
 
@@ -86,6 +86,8 @@ def test_a_bus_that_cannot_be_opened_is_the_only_row() -> None:
         ({"counters": {"bus_off": 1}}, "CAN controller", Verdict.WARN),
         ({"restart_ms": 0}, "interface settings", Verdict.WARN),
         ({"queue_length": 10}, "interface settings", Verdict.WARN),
+        ({"queue_length": 31}, "interface settings", Verdict.WARN),
+        ({"queue_length": 1000}, "interface settings", Verdict.WARN),
     ],
 )
 def test_each_thing_that_can_be_wrong_with_the_interface(

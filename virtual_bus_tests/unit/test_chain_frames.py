@@ -135,3 +135,28 @@ def test_a_storm_of_mad_frames_while_driving_never_raises_and_never_orders_more_
     assert world.snapshot.frames_dropped > 100
     world.run(3.0)
     assert world.core.state is not DriverState.ENABLED
+
+
+@pytest.mark.parametrize("watched", [True, False])
+def test_setpoints_that_a_kernels_queue_gives_out_late_move_nothing(world: World, watched: bool) -> None:
+    """Nobody acknowledges; up to txqueuelen frames wait in the kernel, and go out when the cable is in again.
+
+    driver   |||||||                 ||||||||||| 200 cycles of driving at once
+    cable    in    out               in
+    drives   ~~~~~~~\\_ off after 0.3 s ____________
+    """
+    world.drive(seconds=3.0)
+    queued = [frame for cycle in world.ticks[-200:] for frame in cycle]
+    assert {word for word, _ in setpoints(queued)} == {0x000F}  # operation enabled, at speed
+    if not watched:
+        world.watchdog = None
+    world.cable = False
+    world.stands_after(2.0)
+    assert world.powered == [False, False]
+    before = world.truth
+    for frame in queued:
+        world.inject(frame.cob_id, frame.data.hex())
+    world.run(1.0)
+    after = world.truth
+    assert world.powered == [False, False]
+    assert (after.x_m, after.y_m) == (before.x_m, before.y_m)

@@ -120,7 +120,7 @@ def test_the_interface_gets_the_bit_rate_of_robot_yaml() -> None:
 
     files = texts(install_plan(request(robot=robot), {}))
 
-    assert files["/etc/canbase/can/can7.env"] == "BITRATE=250000\nRESTART_MS=100\nTXQUEUELEN=100\n"
+    assert files["/etc/canbase/can/can7.env"] == "BITRATE=250000\nRESTART_MS=100\nTXQUEUELEN=64\n"
     bound = files[f"{UNITS}/canbase-watchdog@example.service.d/10-can.conf"]
     assert bound == "[Unit]\nBindsTo=canbase-can@can7.service\nAfter=canbase-can@can7.service\n"
 
