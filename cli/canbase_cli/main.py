@@ -15,6 +15,7 @@ from canbase_cli import (
     drive,
     fibonacci,
     install,
+    jog,
     monitor,
     process,
     rotate,
@@ -67,6 +68,7 @@ app.command("doctor", cls=RosCommand, options_metavar=_ROS_USAGE, epilog=doctor.
 app.command("scan", epilog=scan.EPILOG)(scan.scan)
 app.add_typer(sdo.app, name="sdo")
 app.command("commission", epilog=commission.EPILOG)(commission.commission)
+app.command("jog", epilog=jog.EPILOG)(jog.jog)
 app.command("bench")(bench.bench)
 app.add_typer(config.app, name="config")
 app.add_typer(fibonacci.app, name="fibonacci")
