@@ -39,6 +39,18 @@ def diagnostics_message(
     return message
 
 
+def unguarded(snapshot: DriverSnapshot) -> tuple[str, ...]:
+    """A sentence for each drive that is booted and would not stop by itself when the computer or the cable fails."""
+    if snapshot.state in (DriverState.OFFLINE, DriverState.BOOTING):
+        return ()
+    return tuple(
+        f"{drive.joint} (node {drive.node_id}) WILL NOT STOP BY ITSELF when this computer or the cable fails "
+        f"({'; '.join(drive.boot_notes) or '1016h, 6007h not set'}): only STO stops it then"
+        for drive in snapshot.drives
+        if drive.nmt_state == "operational" and not drive.stops_by_itself
+    )
+
+
 def _loop_entry(snapshot: DriverSnapshot, previous: DriverSnapshot, robot: str) -> DiagnosticStatus:
     level, sentence = _driver_state(snapshot)
     level, sentence = _with_news(level, sentence, _grown(snapshot, previous, _LOOP_COUNTERS))

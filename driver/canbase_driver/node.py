@@ -22,7 +22,7 @@ from canbase_config.robot import Robot
 from canbase_driver import messages
 from canbase_driver.black_box import Ring
 from canbase_driver.black_box_writer import BlackBoxWriter
-from canbase_driver.diagnostics import diagnostics_message
+from canbase_driver.diagnostics import diagnostics_message, unguarded
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.loop import ControlLoop
 from canbase_driver.snapshot import DriverSnapshot, StopRecord
@@ -52,6 +52,7 @@ class MotorDriverNode(Node):
         self._previous: DriverSnapshot | None = None
         self._diagnosed: DriverSnapshot | None = None
         self._status_at = 0.0
+        self._unguarded: tuple[str, ...] = ()
         self.state_text = "starting"
         """State, cause and what ends it, in words: the last line that went to the log."""
         if self._tf is None:
@@ -68,6 +69,7 @@ class MotorDriverNode(Node):
                 self._tf.publish(messages.tf_message(snapshot, stamp))
         self._publish_status(snapshot, stamp)
         self._log_change(snapshot)
+        self._warn_of_unguarded(snapshot)
         self._previous = snapshot
 
     def look_at_the_clock(self, now: float) -> None:
@@ -114,6 +116,14 @@ class MotorDriverNode(Node):
             self.get_logger().info(text)
         else:
             self.get_logger().warning(text)
+
+    def _warn_of_unguarded(self, snapshot: DriverSnapshot) -> None:
+        """Once after each boot, loudly."""
+        before, self._unguarded = self._unguarded, unguarded(snapshot)
+        for sentence in self._unguarded:
+            if sentence not in before:
+                self._stops.note(sentence)
+                self.get_logger().error(sentence)
 
 
 class Publisher(threading.Thread):

@@ -1,5 +1,6 @@
 """What /diagnostics says in words: levels, sentences and values."""
 
+import dataclasses
 import math
 from typing import Any
 
@@ -7,7 +8,7 @@ import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-from canbase_driver.diagnostics import diagnostics_message
+from canbase_driver.diagnostics import diagnostics_message, unguarded
 from canbase_driver.snapshot import DriverState, WatchdogView
 from unit.snapshots import SNAPSHOT, with_driver, with_left
 
@@ -226,3 +227,19 @@ def test_a_warning_of_the_drive_is_no_fault_and_an_internal_limit_not_even_a_war
     assert warned.message == "Operation enabled, but it warns of something (statusword bit 7)."
     limited = entry(diagnostics_message(with_left(internal_limit=True), STAMP), "robot: drive left_wheel_joint")
     assert limited.level == OK
+
+
+def test_a_drive_that_will_not_stop_by_itself_is_told_once_it_is_booted() -> None:
+    assert unguarded(SNAPSHOT) == ()
+    left = with_left(stops_by_itself=False, boot_notes=("1016h: the drive watches no heartbeat",))
+    assert unguarded(left) == (
+        "left_wheel_joint (node 1) WILL NOT STOP BY ITSELF when this computer or the cable fails "
+        "(1016h: the drive watches no heartbeat): only STO stops it then",
+    )
+    assert "1016h, 6007h not set" in unguarded(with_left(stops_by_itself=False))[0]
+
+
+@pytest.mark.parametrize("state", [DriverState.OFFLINE, DriverState.BOOTING])
+def test_before_that_nobody_knows(state: DriverState) -> None:
+    assert unguarded(dataclasses.replace(with_left(stops_by_itself=False), state=state)) == ()
+    assert unguarded(with_left(stops_by_itself=False, nmt_state="pre-operational")) == ()
