@@ -12,6 +12,8 @@ ROOT = HERE.parents[1]
 RATES = "rates: {control_hz: 50.0, odometry_hz: 25.0, command_hz: 25.0}\naction: {control_hz: 20.0}\n"
 """The guest's processor is slow: a billion instructions a second, and no other one."""
 HARDWARE_WATCHDOG_S = 5
+ALIGNED = 4
+"""Where a further archive in a ramdisk has to begin, or the kernel does not see it."""
 
 
 def robot_yaml(channel: str, lease: str) -> str:
@@ -61,5 +63,6 @@ def ramdisk(folder: Path, initrd: Path) -> Path:
     listed = subprocess.run(["find", "overlay"], cwd=folder, check=True, capture_output=True).stdout
     command = ["cpio", "-o", "-H", "newc", "--quiet", "--owner=0:0"]
     archive = subprocess.run(command, cwd=folder, input=listed, check=True, capture_output=True).stdout
-    made.write_bytes(initrd.read_bytes() + archive)
+    first = initrd.read_bytes()
+    made.write_bytes(first + bytes(-len(first) % ALIGNED) + archive)
     return made
