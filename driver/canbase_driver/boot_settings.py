@@ -65,7 +65,7 @@ def configure_sync(node: NodeAccess, kind: Profile, counter: int | None) -> Step
     """1019h as `bus.sync_counter` says; a SYNC of another length than a drive expects is an error to it."""
     if counter is not None:
         yield from node.set(Write(SYNC_COUNTER, 0, counter, 1))
-    elif kind.options.sync_counter == "yes":
+    elif kind.options.sync_counter != "no" and (yield from node.read_if_present(SYNC_COUNTER)):
         yield from node.set_if_present(Write(SYNC_COUNTER, 0, 0, 1))
 
 

@@ -9,8 +9,10 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
+from canopen import SdoAbortedError
+
 from canbase_bench.axis_parts import AxisParts, StateChange
-from canbase_bench.cia301 import emcy, heartbeat, nmt, sdo, store
+from canbase_bench.cia301 import abort, emcy, heartbeat, nmt, sdo, store
 from canbase_bench.cia301.dictionary import AXIS_STRIDE, Dictionary, key
 from canbase_bench.cia301.nmt import NmtCommand, NmtState
 from canbase_bench.cia301.rpdo import Rpdo
@@ -62,6 +64,7 @@ class SimulatedNode:
         self._tpdos = [Tpdo(n, d, self.line.say, self._operational) for n in range(1, 5)]
         self._command_watch = CommandWatch(d, self._rpdos)
         store.StoreService(d)
+        d.guard(0x1019, lambda subindex, value: _check_overflow(value))
         d.on_write(0x1005, lambda subindex, value: self._route())
         for n in range(4):
             d.on_write(0x1400 + n, partial(self._pdo_written, self._rpdos[n]))
@@ -216,8 +219,8 @@ class SimulatedNode:
     # PDO
 
     def _on_sync(self, data: bytes, now: float) -> None:
-        """Feedback is sampled at the SYNC, then the setpoints that came before it take effect."""
-        if data:
+        """Feedback is sampled at the SYNC, then what came before it takes effect. With 1019h it carries a counter."""
+        if len(data) != bool(self.dictionary.values[key(0x1019)]):
             self.emcy.raise_error(emcy.SYNC_LENGTH)
             return
         self.emcy.clear_error(emcy.SYNC_LENGTH)
@@ -324,6 +327,11 @@ class SimulatedNode:
     def _send_emcy(self, frame: Frame) -> None:
         if self.state in nmt.HAS_SDO:
             self.line.say_emcy(frame)
+
+
+def _check_overflow(value: int) -> None:
+    if value == 1:
+        raise SdoAbortedError(abort.INVALID_VALUE)
 
 
 def axis_key(axis: int, index: int, subindex: int = 0) -> int:

@@ -75,6 +75,7 @@ class Personality:
 
 _NO_REACTION: dict[int, int] = {_key(0x6007): 0}
 """What a drive without 6007h does with its motors when the connection is lost: nothing, which is the worst case."""
+_NO_SYNC_COUNTER = frozenset({0x1019})
 _LACKS_SELF_STOP = frozenset({0x1016, 0x1029, 0x6007})
 _RPDO_TIMERS = frozenset({_key(index, 5) for index in range(0x1400, 0x1404)})
 
@@ -83,6 +84,7 @@ GENERIC = Personality()
 PERSONALITIES: Mapping[str, Personality] = {
     "generic": GENERIC,
     "epos4": Personality(
+        missing=_NO_SYNC_COUNTER,  # EDS
         missing_subs=_RPDO_TIMERS,  # EDS: no 1400h:5
         sets_no_rtr=True,  # EDS
         defaults={_key(0x6007): 3, _key(0x605A): 6, _key(0x1029, 1): 0},  # EDS
@@ -98,7 +100,7 @@ PERSONALITIES: Mapping[str, Personality] = {
         heartbeat_fault_needs_communication_reset=True,  # seen by users: 8130h and 8120h
     ),
     "roboteq": Personality(
-        missing=frozenset({0x1005, 0x1029, 0x6007, 0x603F, 0x605A, 0x605E}),  # EDS v80
+        missing=_NO_SYNC_COUNTER | {0x1005, 0x1029, 0x6007, 0x603F, 0x605A, 0x605E},  # EDS v80
         missing_subs=_RPDO_TIMERS,  # EDS
         sets_no_rtr=True,  # EDS
         defaults=_NO_REACTION | {_key(base + n, 2): 255 for base in (0x1400, 0x1800) for n in range(4)},  # EDS
@@ -117,7 +119,9 @@ PERSONALITIES: Mapping[str, Personality] = {
         command_timeout_s=1.0,  # RWD; then the earlier speed comes back with the next command
     ),
     "zlac8015d": Personality(
-        missing=_LACKS_SELF_STOP | {0x1010, 0x1011, 0x605A, 0x605B, 0x605C, 0x605D, 0x605E, 0x60C2, 0x606B, 0x606D},
+        missing=_NO_SYNC_COUNTER
+        | _LACKS_SELF_STOP
+        | {0x1010, 0x1011, 0x605A, 0x605B, 0x605C, 0x605D, 0x605E, 0x60C2, 0x606B, 0x606D},
         missing_subs=_RPDO_TIMERS,  # the EDS has them; nothing says that the firmware heeds them
         extras={
             _key(0x2000): Extra("H", 0, writable=True),  # EDS: communication offline time
@@ -140,6 +144,7 @@ PERSONALITIES: Mapping[str, Personality] = {
         second_boot_up_s=0.3,  # boot loader and firmware; the time is assumed
     ),
     "elmo_gold": Personality(
+        missing=_NO_SYNC_COUNTER,  # DCF
         missing_subs=_RPDO_TIMERS,  # DCF
         defaults={_key(0x6007): 1, _key(0x1029, 1): 1, _key(0x605A): 2, _key(0x605E): 2},  # DCF
         extras={_key(0x22A2): Extra("H", 38)},  # DCF
@@ -159,7 +164,7 @@ PERSONALITIES: Mapping[str, Personality] = {
         sdo_delay_s=0.004,  # assumed
     ),
     "technosoft": Personality(
-        missing=frozenset({0x1016, 0x1029, 0x60C2, 0x603F}),  # EDS
+        missing=_NO_SYNC_COUNTER | {0x1016, 0x1029, 0x60C2, 0x603F},  # EDS
         missing_subs=_RPDO_TIMERS,  # EDS
         defaults={_key(0x6007): 0},  # EDS
         heartbeat_entries=0,
@@ -170,7 +175,7 @@ PERSONALITIES: Mapping[str, Personality] = {
         boot_delay_s=0.6,  # assumed: a late boot-up
     ),
     "tmcm1636": Personality(
-        missing=frozenset({0x6007, 0x603F}),  # EDS
+        missing=_NO_SYNC_COUNTER | {0x6007, 0x603F},  # EDS
         missing_subs=_RPDO_TIMERS,  # EDS
         sets_no_rtr=True,  # EDS
         defaults=_NO_REACTION | {_key(0x1029, 1): 0},  # EDS
@@ -181,7 +186,7 @@ PERSONALITIES: Mapping[str, Personality] = {
         acceleration_unit="rpm/s",
     ),
     "dryve_d1": Personality(
-        missing=frozenset({0x1011, 0x1029, 0x6007, 0x605A, 0x605E}),  # EDS
+        missing=_NO_SYNC_COUNTER | {0x1011, 0x1029, 0x6007, 0x605A, 0x605E},  # EDS
         sets_no_rtr=True,  # EDS
         defaults=_NO_REACTION,
         heartbeat_entries=1,  # EDS

@@ -71,6 +71,35 @@ def test_when_the_driver_dies_the_watchdog_stops_it(kind: str) -> None:
     assert world.truth.path_m - before_m < 0.003
 
 
+CYCLIC_KINDS = [kind for kind in KINDS if 9 in load_profile(kind).modes]
+
+
+@pytest.mark.parametrize("kind", CYCLIC_KINDS)
+def test_in_mode_9_the_ramp_is_the_drivers_own_and_60c2h_its_cycle(kind: str) -> None:
+    world = world_of(kind, mode=9)
+    world.drive(seconds=1.0)
+    assert world.truth.linear_mps == pytest.approx(FORWARD.linear_mps, rel=0.02)
+    values = world.node.dictionary.values
+    assert (values[0x6060_00], values[0x60C2_01], values[0x60C2_02]) == (9, 10, -3)
+    world.command = Twist2D.ZERO
+    assert world.stands_after(1.5) < 0.6
+    assert world.core.state is DriverState.ENABLED
+
+
+COUNTING_KINDS = [kind for kind in KINDS if load_profile(kind).options.sync_counter != "no"]
+
+
+@pytest.mark.parametrize("kind", COUNTING_KINDS)
+def test_with_a_counter_in_sync_it_drives_as_without(kind: str) -> None:
+    values = robot_with(kind).model_dump()
+    values["bus"]["sync_counter"] = 7
+    world = World(Robot.model_validate(values))
+    world.drive(seconds=1.0)
+    assert world.truth.linear_mps == pytest.approx(FORWARD.linear_mps, rel=0.02)
+    assert {len(data) for data in world.sent(0x080)} == {1}
+    assert world.snapshot.drives[0].error_code == 0
+
+
 SELF_STOPPING = ["elmo_gold", "epos4", "generic", "kinco", "nanotec"]
 
 

@@ -140,3 +140,13 @@ def test_a_heartbeat_and_a_setpoint_that_stay_away_are_8130h_and_8250h(rig: Rig)
     assert [data[:5] for data in heard(rig, "081")] == ["50 82"]
     rig.wait(0.1)
     assert [data[:5] for data in heard(rig, "081")] == ["50 82", "30 81"]
+
+
+def test_a_sync_counter_is_expected_where_1019h_says_so(rig: Rig) -> None:
+    assert [rig.write(0x1019, value) for value in (1, 240)] == ["06090030", "ok"]
+    rig.tx("000 01 01")
+    rig.heard.clear()
+    rig.tx("080 01")
+    assert heard(rig, "081") == []
+    rig.tx("080")
+    assert heard(rig, "081") == ["40 82 11 00 00 00 00 00"]
