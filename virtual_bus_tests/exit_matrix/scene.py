@@ -76,6 +76,7 @@ class Scene(World):
         while self.robot.truth().linear_mps < CRUISING_MPS:
             assert time.monotonic() < deadline_s, f"no client drives\n{self.robot.logs()}"
             if self.client is None or self.client.exit_code is not None:
+                self.heal()  # where the computer starved scanner or stop button of this process, that is latched
                 self.client = self.robot.command("drive", str(WAY_M), "--speed", str(SPEED_MPS))
             self.node.spin_for(0.05)
 
