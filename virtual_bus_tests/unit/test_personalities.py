@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from canbase_bench.personality import PERSONALITIES
@@ -155,6 +157,52 @@ def test_a_fault_stops_it_and_needs_a_reset(kind: str) -> None:
     assert world.truth.standing_s > 0.5
     world.reset()
     world.run_until(DriverState.ENABLED, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "code", "text"),
+    [
+        ("epos4", 0x8A88, "8A88h safe torque off (STO) is active"),
+        ("elmo_gold", 0xFF00, "FF00h code of the maker, see its error field"),
+        ("kinco", 0xFF00, "FF00h device specific"),
+        ("roboteq", 0x3210, "3210h over-voltage of the DC link"),
+    ],
+)
+def test_a_fault_is_told_in_the_makers_words_where_the_profile_has_them(kind: str, code: int, text: str) -> None:
+    world = world_of(kind)
+    world.drive(seconds=0.3)
+    world.node.fail(0, code)
+    world.run_until(DriverState.LATCHED, 3.0)
+    assert world.core.cause.detail == f"left_wheel (node 1): {text}"
+
+
+@pytest.mark.parametrize(
+    ("kind", "voltage_v", "current_a", "temperature_c"),
+    [
+        ("epos4", 24.0, 0.0, 31.2),
+        ("roboteq", 24.0, 0.0, 31.0),
+        ("elmo_gold", 24.0, math.nan, 38.0),
+        ("kinco", math.nan, math.nan, math.nan),
+    ],
+)
+def test_what_it_measures_besides_is_read_now_and_then(
+    kind: str, voltage_v: float, current_a: float, temperature_c: float
+) -> None:
+    world = world_of(kind)
+    world.drive(seconds=3.0)
+    drive = world.snapshot.drives[1]
+    measured = (drive.voltage_v, drive.current_a, drive.temperature_c)
+    assert measured == pytest.approx((voltage_v, current_a, temperature_c), nan_ok=True)
+    assert world.core.state is DriverState.ENABLED
+
+
+def test_a_drive_with_an_rpdo_timer_tells_that_the_setpoints_stay_away() -> None:
+    world = world_of("dryve_d1")
+    world.drive(seconds=0.3)
+    killed_at = world.now
+    world.kill_driver()
+    world.run(0.5)
+    assert "50 82" in [data[:2].hex(" ") for data in world.sent(0x081, since=killed_at)]
 
 
 def test_a_lost_watchdog_stops_an_epos4_and_a_reset_brings_it_back_with_the_next_one() -> None:
