@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from canbase_config.errors import ConfigError, Loc
 from canbase_config.explain import explain
 from canbase_config.robot import Robot
+from canbase_config.ros_params import plain
 from canbase_config.schema import Schema
 from canbase_config.twist_mux import with_twist_mux
 from canbase_config.yaml_file import read_yaml
@@ -31,11 +32,11 @@ class Loaded:
 
 
 def load_robot(path: str | Path) -> Loaded:
-    """The robot that the YAML file at `path` describes, with the files that `mux.twist_mux` names read in.
+    """The robot that `path` describes, a robot.yaml or a parameter file of ROS; files of `mux.twist_mux` are read in.
 
     Raises ConfigError, which carries all problems found.
     """
-    file = with_twist_mux(read_yaml(path))
+    file = with_twist_mux(plain(read_yaml(path)))
     try:
         robot = Robot.model_validate(file.values, context={"folder": file.path.parent})
     except ValidationError as error:

@@ -8,6 +8,7 @@ import typer
 
 from canbase_cli import (
     bench,
+    bundle,
     commission,
     config,
     demo,
@@ -74,6 +75,7 @@ app.add_typer(config.app, name="config")
 app.add_typer(fibonacci.app, name="fibonacci")
 app.command("install")(install.install)
 app.command("uninstall")(install.uninstall)
+app.command("support-bundle")(bundle.support_bundle)
 app.command("driver", cls=RosCommand, options_metavar=_ROS_USAGE)(process.driver)
 app.command("velocity", cls=RosCommand, options_metavar=_ROS_USAGE)(process.velocity)
 app.command("action-server", cls=RosCommand, options_metavar=_ROS_USAGE)(process.action_server)

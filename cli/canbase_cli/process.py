@@ -36,6 +36,10 @@ def driver(
     config: ConfigOption = None,
     namespace: NamespaceOption = "",
     stop_file: StopFileOption = None,
+    autostart: Annotated[
+        bool,
+        typer.Option("--autostart/--no-autostart", help="Without it the node waits for its lifecycle transitions."),
+    ] = True,
 ) -> None:
     """Run the motor driver: brings the drives up, turns cmd_vel into setpoints, publishes odom.
 
@@ -46,7 +50,7 @@ def driver(
         from canbase_driver.main import run
     leave_stop_file(robot, stop_file)
     raise_priority("driver")
-    raise typer.Exit(run(robot, ros_arguments(ctx, namespace)))
+    raise typer.Exit(run(robot, ros_arguments(ctx, namespace), autostart))
 
 
 def velocity(ctx: typer.Context, config: ConfigOption = None, namespace: NamespaceOption = "") -> None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 from canbase_config.robot import DRIVER_NODE_ID, Robot
@@ -36,15 +35,19 @@ from canbase_driver.kinematics import Twist2D, wheel_speeds
 from canbase_driver.limits import Limiter, MotionState
 from canbase_driver.odometry import Pose2D
 from canbase_driver.odometry_feed import OdometryFeed
+from canbase_driver.readiness import Aim, Readiness
 from canbase_driver.remote_node import RemoteNode
 from canbase_driver.report import Told, snapshot_of
-from canbase_driver.reset import Outcome, Phase, Reset, refusal
+from canbase_driver.reset import Outcome
+from canbase_driver.reset_run import ResetRun
 from canbase_driver.snapshot import DriverSnapshot, DriverState, StopRecord
 from canbase_driver.supervisor import NO_POWER, Cause, Drive, Orders, Situation, Supervisor
 from canbase_driver.watchdog_link import COUNTERS_COB_ID, STATE_COB_ID, WatchdogLink
 
 HEARTBEATS_PER_TIMEOUT = 3
 """The heartbeat goes out this often in the time that the drives allow for it."""
+RESET_TIMEOUT_S = 5.0
+"""On top of what drives may take to boot: longer than a reset can take."""
 LONGEST_STEP_S = 1.0
 """A cycle after a longer gap, and the first one, counts as this long."""
 
@@ -53,20 +56,13 @@ HEALTHY = BusReport()
 Handler = Callable[[Frame, float], bool]
 
 
-@dataclass(frozen=True, slots=True)
-class _ResetCall:
-    """A reset on its way, its request to the watchdog, and who waits for it."""
-
-    sequence: Reset
-    request: Frame
-    on_outcome: Callable[[Outcome], None]
-
-
 class DriverCore:
     """The whole driver as one object that is told the time [s, monotonic]."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, aim: Aim = Aim.ACTIVE) -> None:
+        """`aim`: how far it goes by itself."""
         self._robot = robot
+        self._readiness = Readiness(robot, aim)
         self._period_s = 1.0 / robot.rates.control_hz
         self._drives = Drives(robot)
         self._sync = SyncProducer(robot.bus.sync_counter)
@@ -79,7 +75,7 @@ class DriverCore:
         self._motion = MotionState.AT_REST
         self._eased_at = math.inf
         """When motion was last ordered, or standstill measured; infinity before the first standstill."""
-        self._reset: _ResetCall | None = None
+        self._reset = ResetRun(self._watchdog, self._period_s, robot.timeouts.boot_s)
         self._bus_problem = ""
         self._stop_requested = self._shutdown_requested = False
         self._heartbeat_at = self._ticked_at = -math.inf
@@ -90,9 +86,9 @@ class DriverCore:
         """Stops since they were last taken out, oldest first."""
 
     @property
-    def boot_s(self) -> float:
-        """How long drives may take to boot [s] (timeouts.boot_s)."""
-        return self._robot.timeouts.boot_s
+    def patience_s(self) -> float:
+        """A request that waits for drives is answered within this [s]."""
+        return max(self._readiness.longest_s, self._robot.timeouts.boot_s + RESET_TIMEOUT_S)
 
     @property
     def finished(self) -> bool:
@@ -142,24 +138,25 @@ class DriverCore:
     def request_stop(self) -> None:
         """Ramp to a stand, take the power away, stay there until a reset. A reset on its way is broken off."""
         self._stop_requested = True
-        self._end_reset(Outcome(False, "broken off: service motor_driver/stop"))
+        self._reset.end(Outcome(False, "broken off: service motor_driver/stop"))
 
     def request_shutdown(self) -> None:
         """Ramp to a stand, take the power away, then be `finished`. A reset on its way is broken off."""
         self._shutdown_requested = True
-        self._end_reset(Outcome(False, "broken off: the driver is ending"))
+        self._reset.end(Outcome(False, "broken off: the driver is ending"))
 
     def request_reset(self, now: float, on_outcome: Callable[[Outcome], None]) -> None:
         """Begin a reset; `on_outcome` is called once, at once when it is refused."""
-        refused = refusal(self._situation(now), self._supervisor.state in NO_POWER)
-        if refused is None:
+        if self._reset.begin(self._situation(now), self._supervisor.state in NO_POWER, now, on_outcome):
             for node in self._drives.nodes:
                 node.clear_lost_heartbeat(now)
-            self._reset = _ResetCall(
-                Reset(now, self._period_s, self.boot_s), self._watchdog.request_reset(), on_outcome
-            )
+
+    def request_aim(self, aim: Aim, now: float, on_outcome: Callable[[Outcome], None]) -> None:
+        """Go so far; `on_outcome` is called once, when it is there or has failed."""
+        if self._shutdown_requested:
+            on_outcome(Outcome(False, "refused: the driver is ending"))
         else:
-            on_outcome(Outcome(False, refused))
+            self._readiness.request(aim, now, on_outcome)
 
     def set_pose(self, pose: Pose2D, now: float) -> Outcome:
         """The odometry goes on from `pose`, with the covariance of a fresh start. Refused in motion."""
@@ -179,15 +176,19 @@ class DriverCore:
         self._ticked_at = now
         self._stats.note(now, lateness_s)
         frames = self._heartbeat(now)
-        may_boot = self._supervisor.state in NO_POWER and not self._shutdown_requested
-        frames += self._drives.tick(now, may_boot)
+        if not self._readiness.released:
+            ends = self._shutdown_requested or self._readiness.unconfigured
+            frames += self._drives.tick(now, may_boot=self._supervisor.state in NO_POWER and not ends)
         situation = self._situation(now)
         orders = self._judge(situation, now)
         frames += self._go_on_with_reset(situation, now)
         frames += self._setpoints(orders, now, dt_s)
         if self._motion.twist != Twist2D.ZERO or situation.standstill:
             self._eased_at = now
-        if self.finished:
+        let_go = self._readiness.step(situation, self.state, self.cause, now)
+        for node in self._drives.nodes if let_go else ():
+            node.release(now)
+        if let_go or (self.finished and not self._readiness.released):
             # Reset communication forgets 1016h: a drive must not report a lost heartbeat after an orderly end.
             frames += [nmt(NmtCommand.RESET_COMMUNICATION, node.node_id) for node in self._drives.nodes]
         return frames
@@ -220,34 +221,26 @@ class DriverCore:
             self._motion = self._limiter.step(self._motion, target, dt_s, emergency=hard)
         if self._bus_problem or not started:
             return []
-        resets = self._reset is not None and self._reset.sequence.fault_reset_bit
-        goal = PowerGoal.RESET if resets else orders.goal  # to an axis without a fault RESET is OFF
+        goal = (
+            PowerGoal.RESET if self._reset.fault_reset_bit else orders.goal
+        )  # to an axis without a fault RESET is OFF
         left_mps, right_mps = wheel_speeds(self._motion.twist, self._robot.base.track_m)
         frames = [frame for node in started for frame in node.setpoints(goal, left_mps, right_mps)]
         return [*frames, self._sync.next()]
 
     def _go_on_with_reset(self, situation: Situation, now: float) -> list[Frame]:
-        if self._reset is None:
-            return []
-        sequence = self._reset.sequence
-        outcome = sequence.step(situation, self._watchdog.answer(), now)
-        if outcome is None:
-            return [self._reset.request] if sequence.phase is Phase.WATCHDOG else []
-        if outcome.done:
+        frames, outcome = self._reset.step(situation, now)
+        if outcome is not None and outcome.done:
             self._stop_requested = False
             self._supervisor.reset()
             self._drives.forget_emcys()
-        self._end_reset(outcome)
-        return []
-
-    def _end_reset(self, outcome: Outcome) -> None:
-        ended, self._reset = self._reset, None
-        if ended is not None:
-            ended.on_outcome(outcome)
+        if outcome is not None:
+            self._reset.end(outcome)
+        return frames
 
     def _heartbeat(self, now: float) -> list[Frame]:
         period_s = self._robot.timeouts.drive_heartbeat_s / HEARTBEATS_PER_TIMEOUT
-        if now - self._heartbeat_at < period_s - self._period_s / 2.0:
+        if self._readiness.released or now - self._heartbeat_at < period_s - self._period_s / 2.0:
             return []
         self._heartbeat_at = now
         return [heartbeat(DRIVER_NODE_ID, NmtState.OPERATIONAL)]
@@ -269,7 +262,9 @@ class DriverCore:
             overdue=self._overdue(now),
             standstill=self._drives.stand(now),
             powered=self._drives.may_have_power(now),
-            resetting=self._reset is not None,
+            unconfigured=self._readiness.unconfigured,
+            inactive=self._readiness.inactive,
+            resetting=self._reset.runs,
             stop_requested=self._stop_requested,
             shutdown_requested=self._shutdown_requested,
         )

@@ -20,11 +20,12 @@ from canbase_driver.core import DriverCore
 from canbase_driver.frame import Frame
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.odometry import Pose2D
+from canbase_driver.readiness import Aim
 from canbase_driver.reset import Outcome
 from canbase_driver.snapshot import DriverSnapshot, StopRecord
 
-RESET_TIMEOUT_S = 5.0
-"""On top of what drives may take to boot: longer than a reset can take."""
+ANSWER_MARGIN_S = 1.0
+"""On top of the time in which the core answers a request."""
 POLL_S = 0.1
 FRAMES_WHEN_LATE = 100
 """So many waiting frames are taken in before a cycle that is already late: more than a bus brings in one cycle."""
@@ -40,7 +41,7 @@ class ControlLoop(threading.Thread):
         self._core = core
         self._bus = bus
         self._ring = ring
-        self._reset_timeout_s = core.boot_s + RESET_TIMEOUT_S
+        self._answer_s = core.patience_s + ANSWER_MARGIN_S
         self._period_s = 1.0 / control_hz
         self._samples_per_snapshot = max(1, round(control_hz / odometry_hz))
         self._inbox: queue.SimpleQueue[Callable[[float], object]] = queue.SimpleQueue()
@@ -77,10 +78,14 @@ class ControlLoop(threading.Thread):
         """Set the pose of the odometry and wait for the outcome; never call it from the control thread."""
         return self._ask(lambda now, answer: answer(self._core.set_pose(pose, now)))
 
+    def aim(self, aim: Aim) -> Outcome:
+        """Go so far and wait for the outcome; never call it from the control thread."""
+        return self._ask(lambda now, answer: self._core.request_aim(aim, now, answer))
+
     def _ask(self, request: Callable[[float, Callable[[Outcome], None]], None]) -> Outcome:
         outcomes: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
         self._inbox.put(lambda now: request(now, outcomes.put))
-        deadline = time.monotonic() + self._reset_timeout_s
+        deadline = time.monotonic() + self._answer_s
         while time.monotonic() < deadline:
             alive = self.is_alive()
             try:
@@ -88,7 +93,7 @@ class ControlLoop(threading.Thread):
             except queue.Empty:
                 if not alive:
                     return Outcome(False, "refused: the control loop has ended")
-        return Outcome(False, f"the control loop did not answer within {self._reset_timeout_s:.0f} s")
+        return Outcome(False, f"the control loop did not answer within {self._answer_s:.0f} s")
 
     def next_snapshot(self, timeout_s: float) -> tuple[DriverSnapshot | None, list[StopRecord]]:
         """Wait for a new snapshot; (None, []) when none came. Stops since the last call come with it."""

@@ -17,6 +17,7 @@ from types import FrameType
 import rclpy
 from rclpy.experimental import EventsExecutor
 from rclpy.logging import get_logger
+from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from canbase_config.robot import Robot
@@ -27,6 +28,7 @@ from canbase_driver.bus_port import BusError, BusPort
 from canbase_driver.core import DriverCore
 from canbase_driver.loop import ControlLoop
 from canbase_driver.node import MotorDriverNode, Publisher
+from canbase_driver.readiness import Aim
 from canbase_driver.services import DriverServices
 
 WAKE_S = 0.05
@@ -42,9 +44,10 @@ Worker = ControlLoop | Publisher | DriverServices | BlackBoxWriter
 """Each of them has a `failure`, and none may end before the process does."""
 
 
-def run(robot: Robot, ros_args: Sequence[str]) -> int:
+def run(robot: Robot, ros_args: Sequence[str], autostart: bool = True) -> int:
     """Runs the driver until SIGINT or SIGTERM. Returns 0 after an orderly end, 1 when the bus cannot be opened or a
-    thread failed. `ros_args`: arguments for rclpy. Call from the main thread (signals)."""
+    thread failed. `ros_args`: arguments for rclpy. `autostart`: without it nothing is sent on the bus before the node
+    is configured. Call from the main thread (signals)."""
     try:
         bus = BusPort(robot.bus.arguments())
     except BusError as error:
@@ -58,18 +61,20 @@ def run(robot: Robot, ros_args: Sequence[str]) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, note)
     rclpy.init(args=list(ros_args), signal_handler_options=SignalHandlerOptions.NO)
+    aim = Aim.ACTIVE if autostart else Aim.RELEASED
     ring = Ring(robot.black_box.seconds)
-    loop = ControlLoop(DriverCore(robot), bus, robot.rates.control_hz, robot.rates.odometry_hz, ring)
+    loop = ControlLoop(DriverCore(robot, aim), bus, robot.rates.control_hz, robot.rates.odometry_hz, ring)
     writer = BlackBoxWriter(robot.black_box, robot.name, get_logger("motor_driver").warning)
-    node = MotorDriverNode(robot, loop, ring, writer)
-    publisher, services = Publisher(node, loop), DriverServices(loop, robot.base.odom_frame)
+    commands = Node("motor_driver_commands")
+    node = MotorDriverNode(robot, loop, ring, writer, commands, autostart)
+    publisher, services = Publisher(node, loop), DriverServices(node, loop, robot.base.odom_frame)
     threads = (loop, publisher, services, writer)
     gc.collect()
     gc.freeze()  # what is there now lives for ever: later collections need not look at it
     for thread in threads:
         thread.start()
     try:
-        failure = _spin(node, loop, threads, received)
+        failure = _spin(node, commands, loop, threads, received)
         loop.request_shutdown()
         loop.join(robot.timeouts.standstill_s + END_MARGIN_S)
         publisher.join(1.0)
@@ -86,13 +91,14 @@ def run(robot: Robot, ros_args: Sequence[str]) -> int:
 
 def _spin(
     node: MotorDriverNode,
+    commands: Node,
     loop: ControlLoop,
     threads: Sequence[Worker],
     received: list[int],
 ) -> BaseException | None:
     """Until a signal or a failure; the failure."""
     executor = EventsExecutor()
-    executor.add_node(node)
+    executor.add_node(commands)
     watch, service = HangWatch(LOOP_TIMEOUT_S, WAKE_S), Service()
     try:
         while not received:

@@ -1,7 +1,7 @@
 """The ROS node motor_driver: cmd_vel in; odom, tf, joint_states, status, diagnostics and stop events out.
 
-Threads: the executor's (main) takes commands; `publisher` waits for snapshots and publishes them; `services` answers
-motor_driver/reset and motor_driver/stop, which wait for the control thread. None of them touches the bus.
+Threads: the executor's (main) takes commands, on a node of its own; `publisher` waits for snapshots and publishes them;
+`services` answers requests and lifecycle transitions, which wait for the control thread. None of them touches the bus.
 """
 
 from __future__ import annotations
@@ -25,19 +25,24 @@ from canbase_driver.black_box_writer import BlackBoxWriter
 from canbase_driver.diagnostics import diagnostics_message, unguarded
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.loop import ControlLoop
+from canbase_driver.managed_node import ManagedNode
 from canbase_driver.snapshot import DriverSnapshot, StopRecord
 from canbase_driver.stop_teller import StopTeller
+from canbase_driver.supervisor import INACTIVE
 
 COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 STATE_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 DIAGNOSTICS_PERIOD_S = 1.0
 
 
-class MotorDriverNode(Node):
+class MotorDriverNode(ManagedNode):
     """Talks ROS for a `ControlLoop`."""
 
-    def __init__(self, robot: Robot, loop: ControlLoop, ring: Ring, writer: BlackBoxWriter) -> None:
-        super().__init__("motor_driver")
+    def __init__(
+        self, robot: Robot, loop: ControlLoop, ring: Ring, writer: BlackBoxWriter, commands: Node, autostart: bool
+    ) -> None:
+        """`commands`: what it hears is heard there, so that no transition of this node can hold it up."""
+        super().__init__("motor_driver", loop.aim, autostart)
         self._robot = robot
         self._loop = loop
         self._receive_times = ReceiveTimes()
@@ -46,9 +51,9 @@ class MotorDriverNode(Node):
         self._joints = self.create_publisher(JointState, "joint_states", 10)
         self._status = self.create_publisher(DriverStatus, "motor_driver/status", STATE_QOS)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self.create_subscription(TwistStamped, "cmd_vel", self._on_command, COMMAND_QOS)
-        self.create_subscription(SafetyState, "safety_filter/state", self._on_safety, COMMAND_QOS)
-        self._stops = StopTeller(self, robot, ring, writer)
+        commands.create_subscription(TwistStamped, "cmd_vel", self._on_command, COMMAND_QOS)
+        commands.create_subscription(SafetyState, "safety_filter/state", self._on_safety, COMMAND_QOS)
+        self._stops = StopTeller(self, commands, robot, ring, writer)
         self._previous: DriverSnapshot | None = None
         self._diagnosed: DriverSnapshot | None = None
         self._status_at = 0.0
@@ -112,7 +117,7 @@ class MotorDriverNode(Node):
         clears = f"; ends on: {snapshot.clears_on}" if snapshot.clears_on else ""
         text = self.state_text = f"{snapshot.state.name}{why}{detail}{clears}"
         self._stops.note(text)
-        if snapshot.cause in ("none", "booting", "enabling", "shutdown"):
+        if snapshot.cause in ("none", "booting", "enabling", "shutdown", "not configured", INACTIVE):
             self.get_logger().info(text)
         else:
             self.get_logger().warning(text)

@@ -148,6 +148,11 @@ class RemoteNode:
         self._boot = self.report = None
         self._go(Presence.GONE, now)
 
+    def release(self, now: float) -> None:
+        """It is not ours any more until it is booted again; what it failed in before is forgotten."""
+        self.lose("is not configured", now)
+        self.boot_error, self._ready_at = "", math.inf
+
     def clear_lost_heartbeat(self, now: float) -> None:
         """Some drives keep a fault for a lost heartbeat or bus until an NMT reset, which a boot brings."""
         faulty = any(axis.state is DriveState.FAULT for axis in self.axes)

@@ -1,7 +1,7 @@
-"""Services motor_driver/reset, stop and reset_odometry, and the topic set_pose, on a node and a thread of their own.
+"""Services motor_driver/reset, stop and reset_odometry, set_pose, and the lifecycle, on a thread of their own.
 
-A reset takes up to seconds: it answers when it is done, not when it begins. rclpy cannot await inside a service of its
-events executor, and the main thread must not wait, since commands arrive there.
+A reset or a transition takes up to seconds: it answers when it is done, not when it begins. rclpy cannot await inside a
+service of its events executor, and the main thread must not wait, since commands arrive there.
 """
 
 from __future__ import annotations
@@ -10,21 +10,21 @@ import threading
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from canbase_driver.loop import ControlLoop
+from canbase_driver.managed_node import ManagedNode
 from canbase_driver.messages import pose_of
 from canbase_driver.odometry import Pose2D
 
 
 class DriverServices(threading.Thread):
-    """Answers until ROS is shut down."""
+    """Spins the node motor_driver until ROS is shut down."""
 
-    def __init__(self, loop: ControlLoop, odom_frame: str) -> None:
+    def __init__(self, node: ManagedNode, loop: ControlLoop, odom_frame: str) -> None:
         super().__init__(name="services", daemon=True)
         self._loop = loop
-        self._node = Node("motor_driver_services")
+        self._node = node
         self._node.create_service(Trigger, "motor_driver/reset", self._on_reset)
         self._node.create_service(Trigger, "motor_driver/stop", self._on_stop)
         self._odom_frame = odom_frame
@@ -37,6 +37,7 @@ class DriverServices(threading.Thread):
         executor = SingleThreadedExecutor()
         executor.add_node(self._node)
         try:
+            self._node.start()
             executor.spin()
         except ExternalShutdownException:
             return

@@ -49,6 +49,8 @@ class Situation:
     overdue: str = ""  # zero was ordered, and the wheels still turn
     standstill: bool = True  # measured, on all wheels
     powered: bool = False  # some axis may produce torque
+    unconfigured: str = ""  # the node's lifecycle: nothing may be sent
+    inactive: str = ""  # the node's lifecycle: nothing may have power
     resetting: bool = False
     stop_requested: bool = False
     shutdown_requested: bool = False
@@ -122,17 +124,20 @@ def _stop_requested(s: Situation) -> str:
 
 SHUTDOWN = "shutdown"
 NOT_READY = "drive not ready"
+INACTIVE = "inactive"
 _MISSING, _TRIPPED = _watchdog(WatchdogView.MISSING), _watchdog(WatchdogView.TRIPPED)
 
 BLOCKERS: tuple[Blocker, ...] = (
     Blocker("stop requested", _stop_requested, DriverState.LATCHED, "reset"),
     Blocker("bus failed", lambda s: s.bus, DriverState.OFFLINE, "the bus working"),
     Blocker("watchdog tripped", _TRIPPED, DriverState.LATCHED, "reset"),
+    Blocker("not configured", lambda s: s.unconfigured, DriverState.OFFLINE, "lifecycle transition configure"),
     Blocker("drive missing", lambda s: s.missing, DriverState.BOOTING, "the drive answering"),
     Blocker("booting", lambda s: s.booting or s.absent, DriverState.BOOTING, "drives booted"),
     Blocker("drive fault", lambda s: s.fault, DriverState.LATCHED, "reset, with the drive's cause gone"),
     Blocker("drive silent", lambda s: s.silent, DriverState.DISARMED, "the drive answering"),
     Blocker("watchdog missing", _MISSING, DriverState.DISARMED, "the watchdog alive"),
+    Blocker(INACTIVE, lambda s: s.inactive, DriverState.DISARMED, "lifecycle transition activate"),
     Blocker("resetting", lambda s: "a reset is under way" if s.resetting else "", DriverState.DISARMED, "its end"),
     Blocker("command not zero", lambda s: s.commanded, DriverState.DISARMED, "a zero command"),
     Blocker("not standing", lambda s: "" if s.standstill else "a wheel turns", DriverState.DISARMED, "standstill"),
@@ -149,6 +154,7 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard("drive disabled", lambda s: s.disabled, True, True, "reset"),
     Hazard("did not stop", lambda s: s.overdue, True, True, "reset"),
     Hazard("stop requested", _stop_requested, False, True, "reset"),
+    Hazard(INACTIVE, lambda s: s.inactive, False, False, "lifecycle transition activate"),
     Hazard(SHUTDOWN, lambda s: "the driver is ending" if s.shutdown_requested else "", False, False, "a new start"),
 )
 """All reasons to stop, the most telling first: when several hold, the first one is the cause that is reported."""

@@ -16,6 +16,7 @@ from canbase_config.robot import Robot
 from canbase_driver.core import DriverCore
 from canbase_driver.frame import Frame
 from canbase_driver.kinematics import Twist2D
+from canbase_driver.readiness import Aim
 from canbase_driver.reset import Outcome
 from canbase_driver.snapshot import DriverSnapshot, DriverState
 from canbase_velocity.lease import lease_datagram
@@ -53,11 +54,13 @@ class World:
     `cable`: False: the driver hears and says nothing, and is told that its bus failed.
     """
 
-    def __init__(self, robot: Robot | None = None, parameters: BenchParameters | None = None) -> None:
+    def __init__(
+        self, robot: Robot | None = None, parameters: BenchParameters | None = None, aim: Aim = Aim.ACTIVE
+    ) -> None:
         self.robot = robot or bench_robot()
         self._start, self._steps = 100.0, 0
         self.bench = Bench(self.robot, self.now, parameters=parameters)
-        self.driver: DriverCore | None = DriverCore(self.robot)
+        self.driver: DriverCore | None = DriverCore(self.robot, aim)
         self.watchdog: Watchdog | None = Watchdog(watchdog_config(self.robot), self.now)
         self.command: Twist2D | None = Twist2D.ZERO
         self.leases = True
@@ -154,6 +157,13 @@ class World:
         outcomes: list[Outcome] = []
         self.core.request_reset(self.now, outcomes.append)
         assert self.run(12.0, lambda: bool(outcomes)), "the reset never ended"
+        return outcomes[0]
+
+    def go(self, aim: Aim) -> Outcome:
+        """Ask the driver to go so far and let it get there, or fail."""
+        outcomes: list[Outcome] = []
+        self.core.request_aim(aim, self.now, outcomes.append)
+        assert self.run(20.0, lambda: bool(outcomes)), "the change never ended"
         return outcomes[0]
 
     def recovered(self) -> bool:

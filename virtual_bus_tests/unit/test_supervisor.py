@@ -47,6 +47,8 @@ WRONG: dict[str, Situation] = {
     "command not zero": Situation(commanded="0.3 m/s"),
     "not standing": Situation(standstill=False),
     "stop requested": Situation(stop_requested=True),
+    "not configured": Situation(unconfigured="lifecycle: unconfigured"),
+    "inactive": Situation(inactive="lifecycle: not active"),
     "shutdown": Situation(shutdown_requested=True),
 }
 
@@ -107,7 +109,10 @@ NOT_YET = {
     "booting": BOOTING,
     "drive missing": BOOTING,
     "drive restarted": BOOTING,
-} | dict.fromkeys(("drive silent", "watchdog missing", "resetting", "command not zero", "not standing"), DISARMED)
+    "not configured": OFFLINE,
+} | dict.fromkeys(
+    ("drive silent", "watchdog missing", "inactive", "resetting", "command not zero", "not standing"), DISARMED
+)
 BEFORE_POWER = [(wrong, state, False) for wrong, state in NOT_YET.items()] + [
     ("drive fault", LATCHED, True),
     ("watchdog tripped", LATCHED, True),
@@ -148,6 +153,7 @@ STOPS = [
     ("drive disabled", QUICK, True),
     ("did not stop", QUICK, True),
     ("stop requested", RAMP, True),
+    ("inactive", RAMP, False),
     ("shutdown", RAMP, False),
 ]
 """Hazard, first step from ENABLED, latched."""

@@ -1,0 +1,92 @@
+"""What goes into a support bundle, and what never does. Pure: texts and names in, texts out. `bundle.py` fills it.
+
+Files are named one by one, never taken by the folder: the keys of SROS2 lie beside robot.yaml.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from canbase_config.robot import Robot
+
+HIDDEN: Final = "(hidden by canbase support-bundle)"
+ENVIRONMENT: Final = re.compile(r"(ROS|RMW|CANBASE|AMENT|COLCON|FASTDDS|FASTRTPS|CYCLONEDDS|PYTHON|_ROS)[A-Z0-9_]*")
+"""Variables whose values are taken; of all others not even the names."""
+FORBIDDEN: Final = re.compile(
+    r"(?i)(\.(pem|key|p12|pfx|p7s|crt|cer)$)|(^|/)(keys|keystore|enclaves|private|\.ssh)(/|$)"
+)
+"""No file of such a name or below such a folder is taken, whoever names it."""
+BOXES: Final = 5
+"""So many recordings of stops, the newest."""
+_SECRET: Final = re.compile(
+    r"(?im)^(?P<name>[^\n=:]*(?:passw|secret|token|api_?key|credential)[^\n=:]*[=:])[ \t]*\S.*$"
+)
+_PRIVATE_KEY: Final = re.compile(
+    r"-----BEGIN [A-Z ]*PRIVATE KEY-----.*?(-----END [A-Z ]*PRIVATE KEY-----|\Z)", re.DOTALL
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A program whose output is one file of the bundle."""
+
+    file: str
+    argv: tuple[str, ...]
+    timeout_s: float = 20.0
+
+
+def commands(python: str, config: Path, since: str) -> tuple[Command, ...]:
+    """All of them; `since` as journalctl takes it."""
+    journal = ("journalctl", "--no-pager", "--since", since)
+    return (
+        Command("system/kernel.txt", ("uname", "-a")),
+        Command("system/release.txt", ("cat", "/etc/os-release")),
+        Command("system/load.txt", ("cat", "/proc/uptime", "/proc/loadavg", "/proc/meminfo")),
+        Command("system/disks.txt", ("df", "-h")),
+        Command("system/usb.txt", ("lsusb",)),
+        Command("can/interfaces.txt", ("ip", "-details", "-statistics", "link", "show", "type", "can")),
+        Command("can/interfaces.json", ("ip", "-details", "-statistics", "-json", "link", "show", "type", "can")),
+        Command("can/sockets.txt", ("sh", "-c", "head -n 50 /proc/net/can/*")),
+        Command("units/list.txt", ("systemctl", "list-units", "--all", "--no-pager", "canbase*")),
+        Command("units/status.txt", ("systemctl", "status", "--all", "--no-pager", "--lines=0", "canbase*")),
+        Command("units/show.txt", ("systemctl", "show", "--no-pager", "canbase*")),
+        Command("journal/canbase.txt", (*journal, "--output=short-precise", "--unit=canbase*"), 60.0),
+        Command("journal/canbase.json", (*journal, "--output=json", "--unit=canbase*"), 60.0),
+        Command("journal/kernel.txt", (*journal, "--output=short-precise", "--dmesg"), 60.0),
+        Command("versions/pip.txt", (python, "-m", "pip", "list", "--format=freeze", "--disable-pip-version-check")),
+        Command("config/check.txt", (python, "-m", "canbase_cli", "config", "check", str(config))),
+        Command("doctor.txt", (python, "-m", "canbase_cli", "doctor", "--config", str(config)), 40.0),
+    )
+
+
+def cleaned(text: str) -> str:
+    """Without what looks like a password, a token or a private key."""
+    text = _PRIVATE_KEY.sub(HIDDEN, text)
+    return _SECRET.sub(lambda found: f"{found['name']} {HIDDEN}", text)
+
+
+def environment_text(environment: Mapping[str, str]) -> str:
+    """The variables that matter to canbase and ROS, one a line."""
+    return "".join(f"{name}={environment[name]}\n" for name in sorted(environment) if ENVIRONMENT.fullmatch(name))
+
+
+def allowed(path: Path) -> bool:
+    """Whether a file of this name may be taken."""
+    return FORBIDDEN.search(path.as_posix()) is None
+
+
+def newest_boxes(robot: Robot, found: Mapping[Path, float]) -> list[Path]:
+    """The last recordings of this robot; `found`: files and their modification times."""
+    mine = [path for path in found if path.suffix == ".asc" and path.name.startswith(f"stop_{robot.name}_")]
+    return sorted(mine, key=lambda path: found[path], reverse=True)[:BOXES]
+
+
+def manifest(taken: Mapping[str, str], missing: Mapping[str, str]) -> str:
+    """The table of contents; what could not be collected comes first, each with its reason."""
+    lines = ["NOT COLLECTED", *(f"  {name}: {why}" for name, why in sorted(missing.items())), ""]
+    lines += ["COLLECTED", *(f"  {name}: {what}" for name, what in sorted(taken.items())), ""]
+    return "\n".join(lines) + "Hidden: values that look like passwords, tokens or keys. Never taken: SROS2 keystores.\n"
