@@ -33,6 +33,8 @@ RESTART_S: Final = 2.0
 """A process that was started again is at work by then."""
 STANDS_WITHIN_S: Final = 6.0
 """Longer than any limit: what takes longer has not stopped."""
+TRIES: Final = 3
+"""To get a robot that drives: a loaded computer may starve the scanner or the client of this process."""
 END_S: Final = 8.0
 """A process that ends by itself may take so long."""
 
@@ -71,13 +73,28 @@ class Runner:
     def run(self, row: Row) -> Result:
         """The row, on a robot that is well. It never raises for what the robot does."""
         try:
-            result = self._measure(row, self._ready_scene())
+            result = self._measure(row, self._driving_scene(row))
         except (AssertionError, DriveError, ControlError) as error:
             self._forget()
             return Result(row, problem=f"{type(error).__name__}: {error}")
         if row.ended == (SERVER, -SIGKILL):
             self._forget()  # for 20 s DDS takes a server that was killed for alive, and its clients with it
         return result
+
+    def _driving_scene(self, row: Row) -> Scene:
+        """A robot that drives at its speed, and to which nothing was done yet. Raises what the last try raised."""
+        for _ in range(TRIES - 1):
+            try:
+                return self._start_driving(row)
+            except (AssertionError, DriveError, ControlError) as error:
+                print(f"{row.name}: once more, it does not drive yet: {error}")
+                self._forget()
+        return self._start_driving(row)
+
+    def _start_driving(self, row: Row) -> Scene:
+        scene = self._ready_scene()
+        scene.start_driving(row.driven_by)
+        return scene
 
     def _ready_scene(self) -> Scene:
         """The robot of the last row, made well; another one when it does not get well."""
@@ -106,7 +123,6 @@ class Runner:
         self._after.close()
 
     def _measure(self, row: Row, scene: Scene) -> Result:
-        scene.start_driving(row.driven_by)
         evidence = Evidence(scene)
         moment_s = row.inject(scene)
         scene.robot.wait_standing(timeout_s=STANDS_WITHIN_S)

@@ -60,7 +60,7 @@ class Scene(World):
         self._second: SecondMaster | None = None
 
     def start_driving(self, by: By) -> None:
-        """Until the base goes at SPEED_MPS."""
+        """Until the base goes at SPEED_MPS. AssertionError: it does not."""
         if by is By.GOAL:
             self.robot.goal(WAY_M, SPEED_MPS)
         elif by is By.JOYSTICK:
@@ -69,6 +69,8 @@ class Scene(World):
             self._start_client()
         self.robot.wait_speed(CRUISING_MPS)
         self.node.spin_for(STEADY_S)
+        speed_mps = self.robot.truth().linear_mps
+        assert speed_mps >= CRUISING_MPS, f"it goes at {speed_mps:.3f} m/s before anything was done to it"
 
     def _start_client(self) -> None:
         """One that drives: on a loaded computer it may take long to start, or be too late for its own goal."""
