@@ -37,6 +37,8 @@ class Loop:
         self._reporter = Reporter(watchdog)
         self._bus_fd = bus.fileno()
         self._due = self._sent_at = self._collected_at = time.monotonic()
+        self._acted_at = self._due
+        """A timeout that ran out since then, while frames were taken in, is acted on at once."""
 
     def run(self, asked_to_end: Callable[[], bool]) -> None:
         """Until `asked_to_end` is true and the wheels stand, at most END_S later. Raises BusDeadError, RelayError."""
@@ -50,10 +52,11 @@ class Loop:
     def _turn(self) -> None:
         """One wait, and what it brought."""
         now = time.monotonic()
-        wake = min(self._due, self._watchdog.next_expiry(now))
+        wake = min(self._due, self._watchdog.next_expiry(self._acted_at))
         self._wait(max(wake - now, 0.0))
         now = self._take_in()
         if now >= wake:
+            self._acted_at = now
             self._act(now)
             self._due = max(self._due, now - TICK_S) + TICK_S if now >= self._due else self._due
 
