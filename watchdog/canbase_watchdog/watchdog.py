@@ -136,7 +136,7 @@ class Watchdog:
         return self._stop(now) + self._tell(now)
 
     def next_expiry(self, now: float) -> float:
-        """When the next timeout after `now` would run out [s]: a tick just then stops without delay."""
+        """When the next timeout would run out [s]: a tick just then stops without delay."""
         return policy.next_expiry(self._leases.valid_at, self._observer.driver_at, self._config, now)
 
     def end(self, now: float) -> None:
