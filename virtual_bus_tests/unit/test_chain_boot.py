@@ -49,6 +49,10 @@ def test_boots_beside_each_other_leave_room_for_heartbeats_on_a_bus_with_a_bit_r
     for command in (NmtCommand.RESET_COMMUNICATION, NmtCommand.START):
         sent = [frame.data[1] for _, frame in bus.heard if frame.cob_id == 0 and frame.data[0] == command]
         assert sorted(sent) == sorted(nodes)
+    starts = [at for at, frame in bus.heard if frame.cob_id == 0 and frame.data[0] == NmtCommand.START]
+    setpoints = [at for at, frame in bus.heard if 0x201 <= frame.cob_id <= 0x208]
+    requests = [at for at, frame in bus.heard if 0x600 < frame.cob_id < 0x680 and at < max(starts)]
+    assert max(requests) <= min(setpoints)  # PDOs, which go before SDOs, begin when all are configured
     beats = [at for at, frame in bus.heard if frame.cob_id == 0x77F]
     assert max(b - a for a, b in itertools.pairwise(beats)) < robot.timeouts.drive_heartbeat_s
     assert [frame for _, frame in bus.heard if 0x081 <= frame.cob_id <= 0x0FF] == []

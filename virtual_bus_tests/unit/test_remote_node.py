@@ -100,6 +100,37 @@ def test_a_boot_that_ends_well_starts_the_node_and_waits_for_its_first_feedback(
     assert (story.node.absent(), story.node.silent(story.now)) == ("", "")
 
 
+def test_when_it_is_configured_it_waits_for_the_boots_of_the_others() -> None:
+    story = Story()
+    story.node.others_are_configured = lambda: False
+    story.booted()
+    assert story.node.presence is BOOTING
+    assert not story.node.is_being_configured
+    assert START not in story.sent
+    assert story.node.waiting_for(story.now) == "node 1 (left_wheel): configured, waits for the boots of the others"
+    story.node.others_are_configured = lambda: True
+    story.wait(0.01)
+    assert story.node.presence is STARTING
+    assert story.sent[-1] == START
+
+
+def test_a_restart_while_it_waits_for_the_others_is_noticed_at_once() -> None:
+    story = Story()
+    story.node.others_are_configured = lambda: False
+    story.booted()
+    story.heartbeat(BOOT_UP)
+    assert story.node.presence is GONE
+    assert story.node.absent() == "node 1 (left_wheel) restarted (boot-up message)"
+
+
+def test_a_drive_that_is_not_there_keeps_nobody_waiting() -> None:
+    story = Story(drive=FakeDrive(powered=False))
+    story.node.begin_boot(story.now)
+    story.wait(2.0)
+    assert story.node.presence is BOOTING
+    assert not story.node.is_being_configured
+
+
 @pytest.mark.parametrize(("beats", "speaks"), [(False, False), (True, False), (False, True)])
 def test_without_heartbeat_or_status_it_is_lost_after_a_second(beats: bool, speaks: bool) -> None:
     story = Story().started()
