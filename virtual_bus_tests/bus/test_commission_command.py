@@ -1,0 +1,107 @@
+"""`canbase commission` as a command before simulated drives: robot.yaml, report, exit code, a signal on the way."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import can
+import pytest
+
+from bus.tool import ENVIRONMENT, argv, canbase, drives, free_port, write_robot
+from canbase_config.load import load_robot
+
+pytestmark = [pytest.mark.bus, pytest.mark.timeout(180)]
+
+
+def write_answers(folder: Path, **answers: str) -> str:
+    file = folder / "answers.yaml"
+    file.write_text("".join(f"{key.replace('__', '.')}: {value}\n" for key, value in answers.items()), encoding="utf-8")
+    return str(file)
+
+
+def test_a_wrong_direction_is_corrected_and_the_self_stop_proven(tmp_path: Path) -> None:
+    port = free_port()
+    with drives(write_robot(tmp_path, port, "truth.yaml")):
+        config = write_robot(tmp_path, port)
+        text = config.read_text(encoding="utf-8").replace("direction: -1 ", "direction: 1 ")
+        config.write_text(text, encoding="utf-8")
+        answers = write_answers(tmp_path, direction__left_wheel="forward", direction__right_wheel="backward")
+        done = canbase(
+            "commission",
+            "-c",
+            str(config),
+            "--answers",
+            answers,
+            "--yes",
+            "--steps",
+            "directions,proof",
+            timeout_s=120.0,
+        )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "PROVEN: every drive stopped by itself" in done.stdout
+    assert "changed drives[1].direction: 1 → -1" in done.stdout
+    assert load_robot(config).robot.drives[1].direction == -1
+    assert "# mounted mirrored" in config.read_text(encoding="utf-8")
+    assert load_robot(tmp_path / "robot.yaml.before").robot.drives[1].direction == 1
+    report = (tmp_path / "commissioning.md").read_text(encoding="utf-8")
+    assert report.count("| this computer fell silent |") == 2
+    assert report.count("| the watchdog's heartbeat went missing, setpoints going on |") == 2
+
+
+def test_a_drive_that_does_not_stop_by_itself_is_not_proven_and_1(tmp_path: Path) -> None:
+    config = write_robot(tmp_path, free_port(), profile="tmcm1636", velocity_unit=None)
+    with drives(config) as control:
+        done = canbase("commission", "-c", str(config), "--yes", "--steps", "proof,floor", timeout_s=120.0)
+        time.sleep(0.5)
+        assert abs(control.truth().v_left_mps) < 0.001
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "left_wheel DID NOT STOP when this computer fell silent" in done.stdout
+    assert "NOT PROVEN: left_wheel, right_wheel did not stop by itself" in done.stdout
+    assert "the measured drive on the floor is left out" in done.stdout
+    assert "**did not stop**" in (tmp_path / "commissioning.md").read_text(encoding="utf-8")
+
+
+def test_sigterm_while_the_wheels_turn_stops_them_and_the_report_says_so(tmp_path: Path) -> None:
+    config = write_robot(tmp_path, free_port())
+    words = argv("commission", "-c", str(config), "--yes", "--steps", "floor", "--distance", "5")
+    with drives(config) as control:
+        process = subprocess.Popen(words, env=ENVIRONMENT, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        end = time.monotonic() + 40.0
+        while control.truth().linear_mps < 0.08:
+            assert time.monotonic() < end, "it does not drive"
+            time.sleep(0.02)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(20.0) == 1
+        assert abs(control.truth().linear_mps) < 0.001
+    assert "stopped by SIGTERM" in (tmp_path / "commissioning.md").read_text(encoding="utf-8")
+
+
+def test_beside_another_master_nothing_is_sent(tmp_path: Path) -> None:
+    port = free_port()
+    config = write_robot(tmp_path, port)
+    with can.Bus("239.74.163.2", "udp_multicast", port=port, hop_limit=0) as other:
+        process = subprocess.Popen(
+            argv("commission", "-c", str(config), "--yes"), env=ENVIRONMENT, stderr=subprocess.PIPE, text=True,
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+        )  # fmt: skip
+        while process.poll() is None:
+            other.send(can.Message(arbitration_id=0x77E, data=b"\x05", is_extended_id=False))
+            time.sleep(0.1)
+        heard = set()
+        while (message := other.recv(0.1)) is not None:
+            heard.add(message.arbitration_id)
+    assert process.returncode == 1
+    assert "canbase's watchdog" in process.communicate()[1]
+    assert heard == {0x77E}
+
+
+def test_without_an_answer_or_a_robot_it_ends_with_advice(tmp_path: Path) -> None:
+    config = write_robot(tmp_path, free_port())
+    assert canbase("commission", "-c", str(tmp_path / "none.yaml")).returncode == 2
+    assert canbase("commission", "-c", str(config), "--steps", "dance").returncode == 2
+    done = canbase("commission", "-c", str(config))
+    assert done.returncode == 1
+    assert "no answer to wheels_up: run it on a terminal, or give it in --answers" in done.stderr
