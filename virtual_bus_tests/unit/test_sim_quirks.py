@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from canbase_bench.cia301.nmt import NmtState
 from canbase_bench.cia402.states import State
-from canbase_bench.faults import apply
+from canbase_bench.faults import KINDS, apply
+from canbase_bench.personality import PERSONALITIES
 from unit.sim_rig import MPS, Rig
 
 DEVICE_STATE = "08000022"
@@ -150,3 +153,9 @@ def test_a_sync_counter_is_expected_where_1019h_says_so(rig: Rig) -> None:
     assert heard(rig, "081") == []
     rig.tx("080")
     assert heard(rig, "081") == ["40 82 11 00 00 00 00 00"]
+
+
+@pytest.mark.parametrize("name", sorted({*KINDS, *PERSONALITIES}))
+def test_every_fault_and_every_kind_is_in_the_documentation(name: str) -> None:
+    page = Path(__file__).parents[2] / "docs" / "drives.md"
+    assert f"`{name}`" in page.read_text(encoding="utf-8")
