@@ -11,13 +11,15 @@ import tarfile
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
 from canbase_cli import support
 from canbase_cli.options import FAILED, fail, load_config
-from canbase_config.robot import Robot
+
+if TYPE_CHECKING:  # `canbase --help` loads no configuration
+    from canbase_config.robot import Robot
 
 LIMIT_BYTES: Final = 20_000_000
 """Of one file: the end of a longer one is taken."""

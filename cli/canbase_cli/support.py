@@ -9,9 +9,10 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from canbase_config.robot import Robot
+if TYPE_CHECKING:  # `canbase --help` loads no configuration
+    from canbase_config.robot import Robot
 
 HIDDEN: Final = "(hidden by canbase support-bundle)"
 ENVIRONMENT: Final = re.compile(r"(ROS|RMW|CANBASE|AMENT|COLCON|FASTDDS|FASTRTPS|CYCLONEDDS|PYTHON|_ROS)[A-Z0-9_]*")
