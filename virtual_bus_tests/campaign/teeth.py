@@ -29,7 +29,6 @@ DRAWN_FROM: dict[str, tuple[str, ...]] = {
     "action:timeout_and_progress": ("cmd_vel_lossy", "drive_ignores_setpoints", "obstacle"),
     "driver:drive_restarted": ("drive_power_cycle", "second_master_nmt"),
     "watchdog:lease_lost+driver:command_timeout": ("velocity_dies", "velocity_hangs"),
-    "watchdog:motion_outside+watchdog:feedback_implausible": ("stuck_velocity", "drive_ignores_setpoints"),
     "driver:watchdog_missing+drives:heartbeat_consumer": ("watchdog_dies", "watchdog_hangs"),
     "drives:heartbeat_consumer": ("cable_cut", "cable_cut_to_drives", "cable_cut_one_drive"),
     "mux:timeout": ("action_dies", "action_hangs"),
@@ -41,7 +40,6 @@ DRAWN_FROM: dict[str, tuple[str, ...]] = {
 """Faults that a safeguard is there for, where they come too seldom among all."""
 TOGETHER = (
     "watchdog:lease_lost+driver:command_timeout",
-    "watchdog:motion_outside+watchdog:feedback_implausible",
     "driver:watchdog_missing+drives:heartbeat_consumer",
 )
 """Layers that cover each other: taken out together."""
@@ -53,7 +51,7 @@ COVERED = {
     "watchdog:driver_silent": "watchdog:target_outside and lease_lost; drives:heartbeat_consumer",
     "watchdog:drive_silent": "driver:drive_silent; one that is cut off stops by drives:heartbeat_consumer",
     "watchdog:drive_down": "driver:drive_fault, drive_restarted and drive_disabled",
-    "watchdog:feedback_implausible": "watchdog:motion_outside, as long as not both lie; together: found",
+    "watchdog:feedback_implausible": "a lie alone moves nothing: test_watchdog_lies.py has drives that lie and disobey",
     "watchdog:overspeed": "watchdog:target_outside and motion_outside: no lease allows as much",
     "driver:bus_failed": "watchdog:driver_silent; drives:heartbeat_consumer",
     "driver:drive_fault": "watchdog:drive_down; driver:drive_disabled",
@@ -67,7 +65,7 @@ COVERED = {
     "driver:shutdown": "the driver is not ended here: test_supervisor.py and the exit matrix do",
     "driver:command_timeout": "watchdog:lease_lost; together: found",
     "driver:zero_before_motion": "a reset is refused while any source orders motion",
-    "driver:odometry_jump_guard": "the drives' encoders do not leap here: test_odometry.py and test_wheel_travel.py",
+    "driver:odometry_jump_guard": "watchdog:feedback_implausible, before an encoder leaps far: test_wheel_travel.py",
     "action:timeout_and_progress": "a goal that gets nowhere is rare here: test_goal.py and test_causes.py",
 }
 """Those that no scenario shows missing: what stops the base without them."""

@@ -64,13 +64,8 @@ TARGETS = (
     _watchdog("pair"),
     _watchdog("foreign"),
     _watchdog("lease"),
-    _watchdog("frames", then=("layouts_agree", *STORIES)),
     _watchdog("ladder"),
-    _watchdog("stopper", "watchdog_story_ladder", then=STORIES),
-    _watchdog("observer"),
     _watchdog("view", "watchdog_policy", "watchdog_observer"),
     _watchdog("bus_health"),
-    _watchdog("watchdog", *STORIES[:3], then=STORIES[3:]),
     _driver("cia402", "axis", "layouts_agree"),
-    _driver("axis", "core", "chain_odometry"),
 )

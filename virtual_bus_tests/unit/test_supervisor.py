@@ -143,6 +143,13 @@ def test_when_nothing_is_wrong_the_drives_are_enabled_at_once(state: DriverState
     assert story.told == (ENABLED, "none", False)
 
 
+def test_while_nothing_is_wrong_it_follows() -> None:
+    story = at(ENABLED, RUNNING)
+    for _ in range(3):
+        assert story.step(RUNNING) == FOLLOW
+    assert story.told == (ENABLED, "none", False)
+
+
 STOPS = [
     ("bus failed", QUICK, True),
     ("drive fault", QUICK, True),

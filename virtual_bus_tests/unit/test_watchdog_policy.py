@@ -35,6 +35,12 @@ def test_one_row_for_each_cause_that_the_bus_can_show() -> None:
     assert sorted(check.cause for check in CHECKS) == [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12]
 
 
+def test_causes_have_the_numbers_of_the_state_frame() -> None:
+    """docs/bus.md, byte 1 of 1FEh. What is not in CHECKS: none, and a watchdog that ended."""
+    others = {cause.name: cause.value for cause in Cause if cause not in {check.cause for check in CHECKS}}
+    assert others == {"NONE": 0, "ENDED": 11}
+
+
 def test_a_node_is_found_by_its_id_wherever_it_stands() -> None:
     one, two = Node(1, 99.0), Node(2, 98.0)
     assert well(nodes=(two, one)).node(1) is one
