@@ -114,6 +114,6 @@ $(VENV)/requirements: pyproject.toml Makefile $(VENV)/made
 	python -m pip install --quiet --requirement $@.txt --group dev
 	@touch $@
 
-$(VENV)/ready: $(VENV)/requirements CMakeLists.txt package.xml $(INTERFACES) $(wildcard deploy/systemd/*)
+$(VENV)/ready: $(VENV)/requirements CMakeLists.txt package.xml $(INTERFACES) $(wildcard deploy/systemd/* deploy/launch/* deploy/bin/*)
 	python -m pip install --quiet --no-deps --no-build-isolation --config-settings build-dir=$(VENV)/build --editable .
 	@touch $@

@@ -1,0 +1,55 @@
+"""A whole robot: watchdog, velocity mux and safety filter, motor driver, action server; on a bench its drives too.
+
+    ros2 launch canbase robot.launch.py config:=robot.yaml
+
+`config` is a robot.yaml or a parameter file of ROS. When one part ends, all end: the base stops. Services that start at
+boot and come back are systemd's work: `canbase install`.
+"""
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, Shutdown
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration, PythonExpression
+from launch_ros.actions import Node
+
+END_S = "15"
+"""From Ctrl-C to SIGTERM, and to SIGKILL: the driver needs the time of its ramp."""
+
+ARGUMENTS = (
+    DeclareLaunchArgument("config", description="robot.yaml, or a parameter file of ROS with its keys"),
+    DeclareLaunchArgument("namespace", default_value="", description="of this robot's nodes"),
+    DeclareLaunchArgument("autostart", default_value="true", description="false: configure and activate motor_driver"),
+    DeclareLaunchArgument("sim", default_value="false", description="true: simulated drives on the robot's bus"),
+)
+
+
+def _part(executable: str, *arguments: object, **options: object) -> Node:
+    return Node(
+        package="canbase",
+        executable=executable,
+        namespace=LaunchConfiguration("namespace"),
+        arguments=["--config", LaunchConfiguration("config"), *arguments],
+        output="screen",
+        emulate_tty=True,
+        sigterm_timeout=END_S,
+        sigkill_timeout=END_S,
+        on_exit=Shutdown(reason=f"{executable} ended"),
+        **options,
+    )
+
+
+def generate_launch_description() -> LaunchDescription:
+    """The parts, those first that stop the others."""
+    autostart = PythonExpression(
+        ["'--autostart' if '", LaunchConfiguration("autostart"), "' == 'true' else '--no-autostart'"]
+    )
+    return LaunchDescription(
+        [
+            *ARGUMENTS,
+            _part("sim", condition=IfCondition(LaunchConfiguration("sim"))),
+            _part("watchdog"),
+            _part("velocity_mux"),
+            _part("motor_driver", autostart),
+            _part("drive_distance_server"),
+        ]
+    )
