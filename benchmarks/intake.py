@@ -7,6 +7,7 @@ sent, and none was lost. The floor is a loop around python-can's recv that does 
 
 from __future__ import annotations
 
+import gc
 import json
 import multiprocessing
 import struct
@@ -80,6 +81,8 @@ def driver(robot: Robot, pipe: Connection) -> None:
     core = DriverCore(robot)
     ring = Ring(robot.black_box.seconds)
     loop = ControlLoop(core, BusPort(robot.bus.arguments()), robot.rates.control_hz, robot.rates.odometry_hz, ring)
+    gc.collect()
+    gc.freeze()  # as the driver's process does
     loop.start()
     pipe.send("ready")
     pipe.recv()
@@ -93,11 +96,13 @@ def watchdog(robot: Robot, pipe: Connection) -> None:
     from canbase_watchdog.bus_port import BusPort
     from canbase_watchdog.lease_socket import LeaseSocket
     from canbase_watchdog.loop import Loop
+    from canbase_watchdog.realtime import calm_the_collector
     from canbase_watchdog.watchdog import Watchdog
 
     raise_priority(40)
     config = watchdog_config(robot)
     guard = Watchdog(config, time.monotonic())
+    calm_the_collector()  # as its own process does
     with BusPort(config.bus_arguments) as bus, LeaseSocket(config.lease_socket, 0) as leases:
         pipe.send("ready")
         Loop(guard, bus, leases).run(pipe.poll)
