@@ -14,7 +14,7 @@ from campaign.scenario import Start
 from campaign.teeth import COVERED, DRAWN_FROM, TOGETHER
 from campaign.without import SAFEGUARDS
 
-pytestmark = [pytest.mark.campaign, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.campaign, pytest.mark.timeout(1800)]
 SCENARIOS = 120
 WORKERS = 2
 
