@@ -14,7 +14,7 @@ import can
 import pytest
 
 from bus.test_watchdog_process import free_port
-from canbase_config.watchdog import WatchdogConfig
+from canbase_config.watchdog import WatchdogConfig, WatchedLayout
 from canbase_watchdog.stop import LIMIT_S, main, plan
 from unit.watchdog_story import config
 
@@ -107,3 +107,12 @@ def test_an_adapter_that_blocks_ends_in_bounded_time(tmp_path: Path) -> None:
     os.mkfifo(fifo)  # opening it waits for a writer that never comes, like a driver that hangs in the kernel
 
     assert run(fifo).returncode == -14
+
+
+def test_two_motors_behind_one_controlword_get_one_word() -> None:
+    """The quick stop PDO of such a node carries 6040h once; a longer frame may be refused."""
+    told = config()
+    shared = WatchedLayout(sub_index=True, shared_controlword=True, packed_statusword=True)
+    drives = tuple(replace(drive, node_id=1, axis=i, layout=shared) for i, drive in enumerate(told.drives))
+    first_round = plan(replace(told, drives=drives))[0]
+    assert [(frame.cob_id, frame.data.hex()) for frame in first_round] == [(0x501, "0200")]

@@ -31,7 +31,8 @@ def plan(config: WatchdogConfig) -> list[list[Frame]]:
     """
     nodes = [drive.node_id for drive in config.drives]
     each = list(dict.fromkeys(nodes))
-    stops = [frames.quick_stop(node_id, nodes.count(node_id)) for node_id in each]
+    layouts = {drive.node_id: drive.layout for drive in config.drives}
+    stops = [frames.quick_stop(node_id, nodes.count(node_id), layouts[node_id]) for node_id in each]
     return [*([stops] * QUICK_STOPS), [frames.pre_operational(node_id) for node_id in each]]
 
 
