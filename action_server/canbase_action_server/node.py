@@ -32,6 +32,7 @@ from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.open_goal import OpenGoal, numbers, uuid_of
 from canbase_action_server.outcome import ErrorCode, Outcome
 from canbase_action_server.reception import Cycle, Reception
+from canbase_config.journal import Journal, Priority
 from canbase_config.robot import Robot
 
 SENSOR_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -52,6 +53,7 @@ class DriveDistanceServer(Node):
         super().__init__("drive_distance_server")
         self._robot = robot
         self._reception = Reception(robot)
+        self._journal = Journal("drive_distance_server")
         self._inputs = Inputs()
         self._open: dict[str, OpenGoal] = {}
         self.failure: Exception | None = None
@@ -199,7 +201,11 @@ class DriveDistanceServer(Node):
         self._orders.publish(message)
 
     def _log(self, step: str, uuid: str | None, **fields: Any) -> None:
-        self.get_logger().info(json.dumps({"uuid": uuid, "step": step, **fields}))
+        text = json.dumps({"uuid": uuid, "step": step, **fields})
+        self.get_logger().info(text)
+        failed = fields.get("status", "SUCCEEDED") != "SUCCEEDED"
+        told = {name: fields[name] for name in ("status", "error_code", "reason") if name in fields}
+        self._journal.tell(text, Priority.NOTICE if failed else Priority.INFO, goal=uuid, step=step, **told)
 
     def _log_phase(self, uuid: str | None, before: Phase) -> None:
         if self._reception.phase is Phase.STOPPING:

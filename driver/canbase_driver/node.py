@@ -17,6 +17,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
+from canbase_config.journal import Journal, Priority
 from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
 from canbase_driver import messages
@@ -45,6 +46,7 @@ class MotorDriverNode(ManagedNode):
         super().__init__("motor_driver", loop.aim, autostart)
         self._robot = robot
         self._loop = loop
+        self._journal = Journal("motor_driver")
         self._receive_times = ReceiveTimes()
         self._odom = self.create_publisher(Odometry, "odom", 10)
         self._tf = self.create_publisher(messages.TFMessage, "tf", 100) if messages.TFMessage is not None else None
@@ -117,7 +119,10 @@ class MotorDriverNode(ManagedNode):
         clears = f"; ends on: {snapshot.clears_on}" if snapshot.clears_on else ""
         text = self.state_text = f"{snapshot.state.name}{why}{detail}{clears}"
         self._stops.note(text)
-        if snapshot.cause in ("none", "booting", "enabling", "shutdown", "not configured", INACTIVE):
+        usual = snapshot.cause in ("none", "booting", "enabling", "shutdown", "not configured", INACTIVE)
+        priority = Priority.INFO if usual else Priority.WARNING
+        self._journal.tell(text, priority, state=snapshot.state.name, cause=snapshot.cause, robot=self._robot.name)
+        if usual:
             self.get_logger().info(text)
         else:
             self.get_logger().warning(text)

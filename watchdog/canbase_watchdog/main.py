@@ -17,6 +17,7 @@ from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog import realtime
 from canbase_watchdog.bus_port import BusError, BusPort
 from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
+from canbase_watchdog.log import formatter
 from canbase_watchdog.loop import BusDeadError, Loop
 from canbase_watchdog.notify import notify
 from canbase_watchdog.relay import Relay, RelayError
@@ -27,7 +28,9 @@ _log = logging.getLogger("canbase.watchdog")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run until SIGINT or SIGTERM. Exit code 0: as asked; 1: bus, socket or relay failed; 2: bad configuration."""
-    logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(formatter(os.environ, os.fstat(2)))
+    logging.basicConfig(level=logging.INFO, handlers=[handler])
     parser = argparse.ArgumentParser(prog="canbase_watchdog", description="the independent watchdog of a canbase robot")
     parser.add_argument("--config-json", required=True, help="WatchdogConfig.to_json() of the robot")
     text = parser.parse_args(arguments).config_json
