@@ -6,10 +6,14 @@ import time
 from collections.abc import Iterator
 from typing import Final
 
+from canbase.msg import DriverStatus
+
 from exit_matrix.said import NAMES, Catch, logged
 from exit_matrix.scene import Scene
 
 SILENT: Final = "silent"
+STOPPED: Final = (DriverStatus.STOPPING, DriverStatus.LATCHED)
+"""The driver tells of a stop on stop_events when it is over, and in its status when it begins."""
 
 
 class Evidence:
@@ -24,9 +28,10 @@ class Evidence:
         """All of them."""
         robot = self._scene.robot
         events = {(event.stopped_by, event.cause) for event in robot.stop_events.since(self._since_s)}
+        begun = {("motor_driver", s.cause) for s in robot.status.since(self._since_s) if s.state in STOPPED}
         stale = {("motor_driver", "command stale") for s in robot.status.since(self._since_s) if not s.command_fresh}
         silent = {("velocity_mux", f"{name} silent") for name in self._silent_sources()}
-        return events | stale | silent | set(logged({part: self._new(part) for part in self._read}))
+        return events | begun | stale | silent | set(logged({part: self._new(part) for part in self._read}))
 
     def _silent_sources(self) -> Iterator[str]:
         for state in self._scene.mux.since(self._since_s):
