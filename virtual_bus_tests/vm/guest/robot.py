@@ -18,6 +18,7 @@ import rclpy  # noqa: E402 - reads the environment
 from canbase.msg import DriverStatus  # noqa: E402
 from geometry_msgs.msg import TwistStamped  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from rclpy.signals import SignalHandlerOptions  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
 from canbase_action_server.client import Drive, DriveClient, RejectedError  # noqa: E402
@@ -37,7 +38,7 @@ class Robot:
     """One connection to everything, for all scenarios of a boot: a new ROS node costs all others much time."""
 
     def __init__(self) -> None:
-        rclpy.init()
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # a reboot ends this process at once
         self.node = rclpy.create_node("scenarios", enable_rosout=False)
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
