@@ -21,11 +21,13 @@ from canbase_bench.cia402.states import State
 from canbase_config.derive import max_wheel_mps
 from canbase_driver.snapshot import DriverState
 from canbase_velocity.twist import Twist
-from canbase_watchdog.ladder import RUNGS
+from canbase_watchdog.ladder import RUNGS, Step
 from canbase_watchdog.watchdog import Answer
 from canbase_watchdog.watchdog import State as WatchdogState
 
 STEP_S = 0.01
+OBEY_S = RUNGS[Step.QUICK_STOP].obey_s
+"""A base that starts just when something is latched goes on until the stop has reached its drives."""
 HEARD_S = 0.3
 """The stop button says ten times a second that it is pressed: the filter has heard it then, if it runs."""
 PROPERTIES = {
@@ -92,6 +94,7 @@ class Judge:
         self._awaits_zero = False
         self._hold: Envelope | None = None
         self._stood = False
+        self._latched_at = now
         self._latches: dict[str, object] = {}
         self._resets_done = 0
         self._watching_at = now
@@ -173,7 +176,7 @@ class Judge:
             self._violate("sources", f"{self._speeds()}: {tau_s:.3f} s to stop, the sources want {allowed_s:.3f} s")
         if self._hold is None:
             return
-        self._stood = self._stood or tau_s == 0.0
+        self._stood = self._stood or (tau_s == 0.0 and now >= self._latched_at + OBEY_S)
         again = self._stood and tau_s > 0.0 and not self._faults & (STRANGE_HANDS | UNHEARD)
         if tau_s > self._hold.bound_s(tau_s, now, coasting) or again:
             self._violate("held", f"{self._speeds()} while {' and '.join(self._latches)} latched")
@@ -209,7 +212,7 @@ class Judge:
         if not latched:
             self._hold = None
         elif self._hold is None:
-            self._hold, self._stood = Envelope(self.react_s, now), False
+            self._hold, self._stood, self._latched_at = Envelope(self.react_s, now), False, now
 
     def _check_drives(self, now: float) -> None:
         robot = self._world.robot
