@@ -21,7 +21,8 @@ demo: $(VENV)/ready ## the whole chain on a simulated bus: drives 1 m, refuses a
 
 .PHONY: test
 test: $(VENV)/ready ## all tests: pure units, simulated drives on a bus, processes over DDS
-	pytest
+	pytest --numprocesses auto virtual_bus_tests/unit virtual_bus_tests/campaign
+	pytest virtual_bus_tests/bus virtual_bus_tests/ros
 
 .PHONY: campaign
 campaign: $(VENV)/ready ## 10,000 robots with overlapping faults in virtual time; SCENARIOS=500 fewer, SEED=7 tells one
