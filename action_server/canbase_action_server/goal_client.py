@@ -70,7 +70,7 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         read_feedback: Callable[[Any], FeedbackT],
         read_result: Callable[[Status, Any], ResultT],
     ) -> None:
-        # ROS 2 Jazzy remaps topics and services, and no action (ros2/ros2 issue 1312): the name is resolved here.
+        # ROS 2 Jazzy remaps topics and services, and no action (ros2/ros2, 1312): the name is resolved here.
         name = node.resolve_topic_name(action)
         self._client = ActionClient(node, kind, name)
         self._executor = executor or SingleThreadedExecutor(context=node.context)

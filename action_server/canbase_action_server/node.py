@@ -121,7 +121,7 @@ class DriveDistanceServer(Node):
         self._inputs = replace(self._inputs, mux=messages.mux_in(message, time.monotonic()))
 
     def _serve(self, binding: Binding) -> ActionServer:
-        # ROS 2 Jazzy remaps topics and services, and no action (ros2/ros2 issue 1312): the name is resolved here.
+        # ROS 2 Jazzy remaps topics and services, and no action (ros2/ros2, 1312): the name is resolved here.
         name = self.resolve_topic_name(binding.name)
         self._listen(UUID, f"{name}/keepalive", KEEPALIVE_QOS, self._on_keepalive)
         return ActionServer(
