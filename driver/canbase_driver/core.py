@@ -40,7 +40,7 @@ from canbase_driver.remote_node import RemoteNode
 from canbase_driver.report import Told, snapshot_of
 from canbase_driver.reset import Outcome
 from canbase_driver.reset_run import ResetRun
-from canbase_driver.snapshot import DriverSnapshot, DriverState, StopRecord
+from canbase_driver.snapshot import DriverSnapshot, DriverState, StopRecord, WatchdogView
 from canbase_driver.supervisor import NO_POWER, Cause, Drive, Orders, Situation, Supervisor
 from canbase_driver.watchdog_link import COUNTERS_COB_ID, STATE_COB_ID, WatchdogLink
 
@@ -183,6 +183,7 @@ class DriverCore:
         orders = self._judge(situation, now)
         frames += self._go_on_with_reset(situation, now)
         frames += self._setpoints(orders, now, dt_s)
+        frames += self._stop_by_sdo(orders, situation, now)
         if self._motion.twist != Twist2D.ZERO or situation.standstill:
             self._eased_at = now
         let_go = self._readiness.step(situation, self.state, self.cause, now)
@@ -227,6 +228,13 @@ class DriverCore:
         left_mps, right_mps = wheel_speeds(self._motion.twist, self._robot.base.track_m)
         frames = [frame for node in started for frame in node.setpoints(goal, left_mps, right_mps)]
         return [*frames, self._sync.next()]
+
+    def _stop_by_sdo(self, orders: Orders, situation: Situation, now: float) -> list[Frame]:
+        """While a watchdog lives its ladder does this, and takes an SDO of ours for another master's."""
+        alone = situation.watchdog is WatchdogView.MISSING and not self._bus_problem
+        if not alone or self._supervisor.state is not DriverState.STOPPING:
+            return []
+        return [frame for node in self._drives.nodes for frame in node.stop_by_sdo(orders.goal, now)]
 
     def _go_on_with_reset(self, situation: Situation, now: float) -> list[Frame]:
         frames, outcome = self._reset.step(situation, now)

@@ -26,6 +26,7 @@ from canbase_driver.frame import Frame
 from canbase_driver.measures import Measures, Values
 from canbase_driver.node_boot import NodeBoot
 from canbase_driver.pdo import node_layout
+from canbase_driver.sdo_stop import SdoStop
 
 START_TIMEOUT_S = 1.0
 """From NMT start to a heartbeat "operational" and a status of every axis."""
@@ -65,6 +66,7 @@ class RemoteNode:
         self.others_are_configured: Callable[[], bool] = lambda: True
         """Whether no other node is in the middle of its boot; set by whoever has them all."""
         self._measures = Measures(node_id, self._drives, robot.timeouts.sdo_s)
+        self._sdo_stop = SdoStop(node_id, self._drives)
         self._lost_heartbeat = False
         self._held_until = -math.inf
         self._ready_at = math.inf
@@ -177,6 +179,10 @@ class RemoteNode:
         speeds = {"left": left_mps, "right": right_mps}
         words = self.controlwords(goal)
         return [axis.setpoint(goal, speeds[axis.drive.side], word) for axis, word in zip(self.axes, words, strict=True)]
+
+    def stop_by_sdo(self, goal: PowerGoal, now: float) -> list[Frame]:
+        """The controlwords by SDO while it takes no PDOs; it may have left NMT operational with its motors turning."""
+        return [] if self.has_pdos else self._sdo_stop.frames(self.controlwords(goal), now)
 
     def controlwords(self, goal: PowerGoal) -> list[int]:
         """6040h of each of its axes, one step towards `goal`; motors that share one get the same."""

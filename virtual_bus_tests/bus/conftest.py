@@ -45,3 +45,4 @@ def driver(crew: Crew, arguments: dict[str, Any], around: Surroundings) -> Itera
     """The control thread, started."""
     with Driver(crew, arguments, around) as running:
         yield running
+        FlakyBus.heal()

@@ -7,6 +7,7 @@ driver knows a drive by its profile, the bench by this table, and only a boot on
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -71,6 +72,20 @@ class Personality:
     """The maker's own watchdog: without a command for so long the motors stop; the next one starts them again [s]."""
     command_timeout_object: int | None = None
     """The entry that sets it in ms (0: off), where the bus can."""
+
+    @property
+    def heeds_heartbeats(self) -> bool:
+        """It watches its masters' heartbeats, and stops when one stays away."""
+        return self.heartbeat_entries > 0 and 0x6007 not in self.missing
+
+    def alone_s(self, configured_s: float) -> float:
+        """From the last word of its masters, who set every time limit to `configured_s`, to its own stop [s].
+
+        Infinity: it goes on turning.
+        """
+        if self.heeds_heartbeats or self.command_timeout_object is not None:
+            return configured_s
+        return math.inf if self.command_timeout_s is None else self.command_timeout_s
 
 
 _NO_REACTION: dict[int, int] = {_key(0x6007): 0}

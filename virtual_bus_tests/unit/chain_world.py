@@ -6,11 +6,13 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Literal
 
+from bus.crews import robot_with
 from canbase_bench.cia402.states import State
 from canbase_bench.frame import Frame as BenchFrame
 from canbase_bench.node import SimulatedNode
+from canbase_bench.personality import PERSONALITIES
 from canbase_bench.world.bench import Bench, BenchParameters, Truth
-from canbase_config.derive import watchdog_config
+from canbase_config.derive import mps_per_bit, watchdog_config
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_driver.core import DriverCore
@@ -34,6 +36,10 @@ BITS_PER_MPS = 60.0 / (2.0 * math.pi * 0.1) * 20.0 * 10.0
 def bench_robot() -> Robot:
     """The sample robot of the bench: nodes 1 (left) and 2 (right, mirrored)."""
     return load_robot(sample("bench")).robot
+
+
+KINDS = sorted(PERSONALITIES)
+"""Every kind of drive that has a profile."""
 
 
 def robot_of(*places: tuple[int, int, Literal["left", "right"]]) -> Robot:
@@ -179,9 +185,10 @@ class World:
         return abs(self.truth.linear_mps - FORWARD.linear_mps) < 0.01
 
     def targets_mps(self) -> list[tuple[float, float]]:
-        """What each cycle ordered of the left and the right wheel of the sample robot, forward positive."""
+        """What each cycle ordered of the left and the right wheel of a robot with two drives, forward positive."""
+        left, right = (mps_per_bit(drive, self.robot.base.wheel_radius_m) for drive in self.robot.drives)
         pairs = [[target for _, target in setpoints(frames)] for frames in self.ticks]
-        return [(pair[0] / BITS_PER_MPS, -pair[1] / BITS_PER_MPS) for pair in pairs if len(pair) == 2]
+        return [(pair[0] * left, pair[1] * right) for pair in pairs if len(pair) == 2]
 
     def sent(self, cob_id: int, since: float = 0.0) -> list[bytes]:
         """The data of all frames with this identifier from then on."""
@@ -230,6 +237,11 @@ class World:
                 self.watchdog.on_frame(frame.cob_id, frame.data, self.now)
             self.bench.on_frame(BenchFrame(frame.cob_id, frame.data), self.now)
             waiting += [Frame(each.cob_id, each.data) for each in self.bench.tick(self.now)]
+
+
+def world_of(kind: str, **changes: object) -> World:
+    """With two drives of that kind; `changes`: keys of both in robot.yaml."""
+    return World(robot_with(kind, **changes))
 
 
 def setpoints(frames: list[Frame]) -> Iterator[tuple[int, int]]:

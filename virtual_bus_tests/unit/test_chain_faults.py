@@ -6,24 +6,30 @@ order to move ──►│ the fault        standstill │◄── measured by 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import pytest
 
+from canbase_bench.personality import PERSONALITIES
 from canbase_config.derive import watchdog_config
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.snapshot import DriverState
 from canbase_watchdog.watchdog import Watchdog
-from unit.chain_world import FORWARD, World, setpoints
+from unit.chain_world import FORWARD, KINDS, World, bench_robot, setpoints, world_of
 
 OVERCURRENT = 0x2310
 QUICK_STOP = 0x02
+ALONE_S = {kind: PERSONALITIES[kind].alone_s(bench_robot().timeouts.drive_heartbeat_s) for kind in KINDS}
+STOPS_ALONE = [kind for kind, alone_s in ALONE_S.items() if math.isfinite(alone_s)]
+BRAKING_S = 0.3
+"""From 0.3 m/s, by the drive's own ramp: 0.15 s by 6085h, 0.3 s by 6084h."""
 
 
 @pytest.fixture
-def world() -> World:
+def world(kind: str) -> World:
     """At 0.3 m/s."""
-    world = World()
+    world = world_of(kind)
     world.drive()
     return world
 
@@ -56,10 +62,6 @@ def silence_a_drive(world: World) -> None:
     world.node.line.silent = True
 
 
-def cut_a_drive(world: World) -> None:
-    world.node.line.cut = True
-
-
 def request_stop(world: World) -> None:
     world.core.request_stop()
 
@@ -68,12 +70,11 @@ Act = Callable[[World], None]
 STOPS: tuple[tuple[Act, float, str], ...] = (
     (lose_leases, 0.45, "watchdog tripped"),
     (lose_filter, 0.45, "watchdog tripped"),
-    (lose_watchdog, 0.45, "watchdog missing"),
+    (lose_watchdog, 0.55, "watchdog missing"),  # the driver's ramp, where the drives do not stop by themselves first
     (cut_the_drivers_cable, 0.5, "bus failed"),
     (drive_fault, 0.2, "drive fault"),
     (power_cycle, 0.85, "drive silent"),  # that wheel coasts, the other one brakes
     (silence_a_drive, 0.35, "drive silent"),
-    (cut_a_drive, 0.5, "drive silent"),
     (request_stop, 0.4, "stop requested"),
 )
 
@@ -99,10 +100,41 @@ def test_a_driver_that_is_killed_is_stopped_by_the_watchdog(world: World) -> Non
     assert world.watchdog.status.verdict.cause.name == "DRIVER_SILENT"
 
 
-def test_driver_and_watchdog_both_killed_the_drives_stop_by_themselves(world: World) -> None:
+@pytest.mark.parametrize("kind", STOPS_ALONE)
+def test_driver_and_watchdog_both_killed_the_drives_stop_by_themselves(world: World, kind: str) -> None:
     world.kill_driver()
     world.watchdog = None
-    assert world.stands_after() < 0.6
+    assert world.stands_after() < ALONE_S[kind] + BRAKING_S
+
+
+@pytest.mark.parametrize("kind", STOPS_ALONE)
+def test_a_drive_that_is_cut_off_stops_by_itself_and_the_base_is_latched(world: World, kind: str) -> None:
+    world.node.line.cut = True
+    assert world.stands_after() < ALONE_S[kind] + BRAKING_S
+    assert (world.core.state, world.core.cause.name) == (DriverState.LATCHED, "drive silent")
+
+
+@pytest.mark.parametrize("kind", sorted(set(KINDS) - set(STOPS_ALONE)))
+def test_a_drive_that_is_cut_off_and_has_nothing_to_stop_it_goes_on_alone(world: World, kind: str) -> None:
+    """What `stops_by_itself` is about: only STO by a safety relay helps here."""
+    world.node.line.cut = True
+    world.run(3.0)
+    assert (world.truth.v_left_mps, world.truth.v_right_mps) == pytest.approx((0.3, 0.0), abs=0.01)
+    assert (world.core.state, world.core.cause.name) == (DriverState.LATCHED, "drive silent")
+    assert not world.snapshot.drives[0].stops_by_itself
+
+
+@pytest.mark.parametrize("kind", ["dryve_d1", "roboteq", "tmcm1636"])
+def test_drives_that_are_deaf_to_pdos_for_a_lost_heartbeat_are_stopped_by_sdo(world: World, kind: str) -> None:
+    """Without 6007h they leave NMT operational, and turn on; no watchdog is there to do anything about it.
+
+    t   0  no watchdog ── 0.2  ramp ── 0.3  drives pre-operational ── their heartbeat ── quick stop by SDO
+    """
+    lost_at = world.now
+    lose_watchdog(world)
+    world.run(2.5)
+    assert bytes.fromhex("2b 40 60 00 02 00 00 00") in world.sent(0x601, since=lost_at)
+    assert world.powered == [False, False]
 
 
 def test_a_new_driver_takes_over_after_a_kill_and_needs_a_reset(world: World) -> None:
@@ -165,7 +197,8 @@ def test_a_wheel_that_does_not_stop_is_stopped_by_whoever_notices_first(world: W
 def test_a_push_against_the_standing_base_is_held_and_no_reason_to_stop(world: World) -> None:
     world.command = Twist2D.ZERO
     world.run(5.0)
-    world.node.axes[0].faults.stuck_velocity = 300  # 16 mm/s for a moment
+    bit_mps = watchdog_config(world.robot).drives[0].velocity_mps_per_bit
+    world.node.axes[0].faults.stuck_velocity = round(0.016 / bit_mps)  # for a moment
     world.run(0.5)
     assert world.core.state is DriverState.ENABLED
     assert not world.snapshot.standstill

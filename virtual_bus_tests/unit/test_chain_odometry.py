@@ -14,15 +14,16 @@ from canbase_driver.frame import Frame
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.odometry import Pose2D
 from canbase_driver.snapshot import DriverState
-from unit.chain_world import FORWARD, World, robot_of
+from unit.chain_world import FORWARD, World, robot_of, world_of
 
 OVERCURRENT = 0x2310
+TPDOS = range(0x181, 0x500)
 
 
 @pytest.fixture
-def world() -> World:
+def world(kind: str) -> World:
     """At 0.3 m/s."""
-    world = World()
+    world = world_of(kind)
     world.drive()
     return world
 
@@ -64,7 +65,8 @@ def test_feedback_that_waited_while_the_driver_stood_still_does_not_pass_for_fre
     core, dropped = world.core, world.core.frames_dropped
     core.tick(world.now)
     world.bench.on_frame(BenchFrame(0x080, b""), world.now)
-    answers = world.bench.tick(world.now)
+    # those without SYNC say theirs in the next 10 ms
+    answers = [each for ms in range(11) for each in world.bench.tick(world.now + ms / 1000) if each.cob_id in TPDOS]
     for answer in answers:
         core.on_frame(Frame(answer.cob_id, answer.data), went_on_at)
     assert core.snapshot(went_on_at).odometry_valid is counts

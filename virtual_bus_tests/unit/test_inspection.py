@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from bus.crews import robot_with
 from canbase_bench.personality import PERSONALITIES
 from canbase_cli.commissioning.inquiry import Inquiry
 from canbase_cli.commissioning.inspection import Inspection, inspect
@@ -17,7 +18,6 @@ from canbase_driver.frame import Frame
 from canbase_driver.node_boot import NodeBoot, sdo_client
 from unit.session_world import SessionWorld
 from unit.sim_rig import robot
-from unit.test_personalities import robot_with
 
 KINDS = sorted(PERSONALITIES)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from bus.crews import robot_with
 from canbase_bench.cia402.states import POWERED
 from canbase_bench.frame import Frame as BenchFrame
 from canbase_bench.personality import PERSONALITIES
@@ -12,7 +13,6 @@ from canbase_cli.commissioning.proof import HEARTBEAT, SILENCE, Outcome, get_rea
 from canbase_cli.commissioning.rig import Rig, RigError
 from canbase_driver.frame import Frame
 from unit.guide_world import GuideWorld
-from unit.test_personalities import robot_with
 
 SPEED_MPS = 0.1
 

@@ -9,8 +9,7 @@ import pytest
 from canbase_bench.faults import apply
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.snapshot import DriverState
-from unit.chain_world import FORWARD, World
-from unit.test_personalities import KINDS, world_of
+from unit.chain_world import FORWARD, World, world_of
 
 LOSSES = ["power_cycle", "reset_node", "bus_off", "extra_boot_up"]
 
@@ -31,7 +30,6 @@ def run_with_poses(world: World, seconds: float) -> list[float]:
 
 
 @pytest.mark.parametrize("loss", LOSSES)
-@pytest.mark.parametrize("kind", KINDS)
 def test_a_drive_that_comes_back_is_booted_again_stays_disarmed_and_waits_for_a_reset(kind: str, loss: str) -> None:
     """t   0  0.3 m/s: the drive is lost ── base stands ── 4.0  booted, no power ── reset ── drives again"""
     world = driving(kind)
@@ -45,7 +43,6 @@ def test_a_drive_that_comes_back_is_booted_again_stays_disarmed_and_waits_for_a_
     assert world.recovered()
 
 
-@pytest.mark.parametrize("kind", KINDS)
 def test_an_adapter_that_is_unplugged_for_a_while(kind: str) -> None:
     """t   0  unplugged: drives and watchdog stop the base ── 3.0  plugged in ── 6.0  booted, no power ── reset"""
     world = driving(kind)
@@ -61,7 +58,6 @@ def test_an_adapter_that_is_unplugged_for_a_while(kind: str) -> None:
     assert world.recovered()
 
 
-@pytest.mark.parametrize("kind", KINDS)
 def test_a_power_cycle_at_a_stand_costs_nothing_of_the_pose(kind: str) -> None:
     """The encoder shows other counts after it; nobody has moved."""
     world = driving(kind)
