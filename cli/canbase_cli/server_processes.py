@@ -38,6 +38,7 @@ def _pids(proc: Path) -> Iterator[int]:
 
 
 def _is_server(words: list[str]) -> bool:
-    return "canbase_action_server.main" in " ".join(words) or (
-        "action-server" in words and any("canbase" in word for word in words)
-    )
+    """By `canbase`, by Python, by `ros2 run` and launch files."""
+    by_ros = any(word.endswith("/lib/canbase/drive_distance_server") for word in words)
+    by_canbase = "action-server" in words and any("canbase" in word for word in words)
+    return by_ros or by_canbase or "canbase_action_server.main" in " ".join(words)

@@ -2,13 +2,19 @@
 
     ros2 launch canbase robot.launch.py config:=robot.yaml
 
-`config` is a robot.yaml or a parameter file of ROS. When one part ends, all end: the base stops. Services that start at
-boot and come back are systemd's work: `canbase install`.
+`config` is a robot.yaml or a parameter file of ROS. When one part ends, or launch itself, all end: the base stops.
+Services that start at boot and come back are systemd's work: `canbase install`.
 """
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, Shutdown
+import os
+import signal
+
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, EmitEvent, RegisterEventHandler, Shutdown
 from launch.conditions import IfCondition
+from launch.event_handlers import OnShutdown
+from launch.events import Shutdown as ShutdownEvent
+from launch.events.process import SignalProcess
 from launch.substitutions import LaunchConfiguration, PythonExpression
 from launch_ros.actions import Node
 
@@ -33,9 +39,17 @@ def _part(executable: str, *arguments: object, **options: object) -> Node:
         emulate_tty=True,
         sigterm_timeout=END_S,
         sigkill_timeout=END_S,
+        additional_env={"CANBASE_PARENT": str(os.getpid())},
         on_exit=Shutdown(reason=f"{executable} ended"),
         **options,
     )
+
+
+def _interrupt_all(event: ShutdownEvent, _context: LaunchContext) -> EmitEvent | None:
+    """launch leaves it to the terminal to interrupt the parts. One that was interrupted alone would wait END_S."""
+    if not event.due_to_sigint:
+        return None
+    return EmitEvent(event=SignalProcess(signal_number=signal.SIGINT, process_matcher=lambda _process: True))
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -46,6 +60,7 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
             *ARGUMENTS,
+            RegisterEventHandler(OnShutdown(on_shutdown=_interrupt_all)),
             _part("sim", condition=IfCondition(LaunchConfiguration("sim"))),
             _part("watchdog"),
             _part("velocity_mux"),

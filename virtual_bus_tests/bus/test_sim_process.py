@@ -160,3 +160,29 @@ def test_a_wrong_robot_file_is_2(tmp_path: Path) -> None:
 def test_without_a_simulator_the_client_says_how_to_start_one(tmp_path: Path) -> None:
     with pytest.raises(ControlError, match="canbase sim"):
         SimControl(tmp_path / "sim.sock")
+
+
+LAUNCH = """
+import os, subprocess, sys, time
+child = subprocess.Popen([sys.executable, *sys.argv[1:]], env=os.environ | {"CANBASE_PARENT": str(os.getpid())})
+print(child.pid, flush=True)
+time.sleep(60)
+"""
+"""Starts one executable as robot.launch.py does."""
+
+
+def test_what_ros2_launch_started_ends_with_it_even_when_that_is_killed(tmp_path: Path) -> None:
+    of = _robot(tmp_path)
+    (tmp_path / "robot.json").write_text(json.dumps(of.model_dump(mode="json")), encoding="utf-8")
+    (tmp_path / "sim").symlink_to(Path(__file__).parents[2] / "deploy" / "bin" / "node")
+    command = [sys.executable, "-c", LAUNCH, str(tmp_path / "sim"), "--config", str(tmp_path / "robot.json")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as launch:
+        assert launch.stdout is not None
+        part = int(launch.stdout.readline())
+        _connect(control_path(of)).close()
+        launch.kill()
+        try:
+            launch.communicate(timeout=5.0)  # until the part, too, has closed its end
+        except subprocess.TimeoutExpired:
+            os.kill(part, signal.SIGKILL)
+            raise

@@ -266,5 +266,7 @@ def test_servers_are_found_among_all_processes_with_what_decides_whom_they_talk_
     process(tmp_path, 12, ["/usr/bin/canbase", "driver"], domain)
     process(tmp_path, 13, ["less", "action-server"], domain)
     (tmp_path / "14").mkdir()  # it ended between two looks
-    assert server_processes(tmp_path) == (ServerProcess(10, {"ROS_DOMAIN_ID": "5"}), ServerProcess(11, {}))
+    process(tmp_path, 15, ["/usr/bin/python3", "/opt/ws/lib/canbase/drive_distance_server", "--config", "a"], {})
+    found = (ServerProcess(10, {"ROS_DOMAIN_ID": "5"}), ServerProcess(11, {}), ServerProcess(15, {}))
+    assert server_processes(tmp_path) == found
     assert talks_by(99, tmp_path) == {}
