@@ -54,7 +54,8 @@ def commission(
 
     Slow, one wheel after the other, with questions in between. Then the proof: at a low speed this computer falls
     silent, and it is measured that each drive stops by itself, and when. Only with that proven, on the floor: wheel
-    radius and track by a measured drive. Values go into robot.yaml, which keeps its comments; a report is written.
+    radius and track by a measured drive. Values go into robot.yaml, which keeps its comments, and with them who each
+    drive is (1018h): from then on the driver refuses another one in its place. A report is written.
 
     Nothing else of canbase may run on this bus. Enter, Ctrl-C, a signal, a terminal that goes, an error: each stops
     the wheels and takes the power away. After SIGKILL the drives stop by themselves, if they can: that is the proof.

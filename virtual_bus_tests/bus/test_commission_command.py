@@ -43,7 +43,10 @@ def test_a_wrong_direction_is_corrected_and_the_self_stop_proven(tmp_path: Path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "PROVEN: every drive stopped by itself" in done.stdout
     assert "changed drives[1].direction: 1 → -1" in done.stdout
-    assert load_robot(config).robot.drives[1].direction == -1
+    commissioned = load_robot(config).robot
+    assert commissioned.drives[1].direction == -1
+    assert [drive.identity.serial for drive in commissioned.drives] == [1, 2]
+    assert {drive.identity.product_code for drive in commissioned.drives} == {0xCB402}
     assert "# mounted mirrored" in config.read_text(encoding="utf-8")
     assert load_robot(tmp_path / "robot.yaml.before").robot.drives[1].direction == 1
     report = (tmp_path / "commissioning.md").read_text(encoding="utf-8")

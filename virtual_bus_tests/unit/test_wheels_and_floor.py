@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from canbase_cli.commissioning.edits import edited, floor_edits, wheel_edits, with_edits
+from bus.crews import robot_with
+from canbase_cli.commissioning.edits import Edit, edited, floor_edits, identity_edits, wheel_edits, with_edits
 from canbase_cli.commissioning.floor import FloorFound, measure_floor
 from canbase_cli.commissioning.guide import CommissionError, Script
 from canbase_cli.commissioning.proof import get_ready
 from canbase_cli.commissioning.report import Results, markdown, verdict
 from canbase_cli.commissioning.rig import Rig, RigError
 from canbase_cli.commissioning.wheels import WheelFound, find_direction, measure_scale
+from canbase_config.drive import Identity
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
+from canbase_driver.boot import BootReport
 from unit.guide_world import GuideWorld
 from unit.sim_rig import robot
 
@@ -152,6 +156,51 @@ def test_robot_yaml_keeps_every_comment_and_line_that_is_not_changed(tmp_path: A
     (tmp_path / "robot.yaml").write_text(new, encoding="utf-8")
     after = load_robot(tmp_path / "robot.yaml").robot
     assert (after.drives[0].direction, after.base.track_m) == (-1, 0.51234)
+
+
+def boot_of(node_id: int, **identity: int | None) -> BootReport:
+    return BootReport(node_id, Identity.model_validate(identity), "", (), ())
+
+
+def test_who_the_drives_are_is_added_beside_comments_that_stay_with_their_section(tmp_path: Path) -> None:
+    text = sample("example_can0").read_text(encoding="utf-8")
+    before = load_robot(sample("example_can0")).robot
+    boots = {1: boot_of(1, vendor_id=0x469, serial=7), 2: boot_of(2, vendor_id=0x469, serial=0xCAFE)}
+    edits = identity_edits(before, boots)
+    assert str(edits[3]) == "drives[1].identity.serial: None → 0xCAFE"
+    new = edited(text, [*edits, Edit(("drives", 1, "side"), "right", "right")])
+    added = [line for line in new.splitlines() if line not in text.splitlines()]
+    assert added == [
+        "    identity: {vendor_id: 0x469, serial: 0x7}",
+        "    identity: {vendor_id: 0x469, serial: 0xCAFE}",
+    ]
+    assert [line for line in new.splitlines() if line not in added] == text.splitlines()
+    assert new.index(added[1]) < new.index("# --- The wheels under the base")
+    file = tmp_path / "robot.yaml"
+    file.write_text(new, encoding="utf-8")
+    after = load_robot(file).robot
+    assert [drive.identity.serial for drive in after.drives] == [7, 0xCAFE]
+    assert identity_edits(after, boots) == []
+    again = identity_edits(after, {1: boot_of(1, vendor_id=0x469, serial=8)})
+    assert [str(edit) for edit in again] == ["drives[0].identity.serial: 0x7 → 0x8"]
+    assert "identity: {vendor_id: 0x469, serial: 0x8}" in edited(new, again)
+
+
+def test_another_drive_than_the_commissioned_one_is_refused_before_anything_moves() -> None:
+    world = Witness(with_left(identity={"serial": 0x22}), robot())
+    with pytest.raises(CommissionError, match=r"1018h:4 \(serial\) is 00000001h, expected 00000022h"):
+        world.guide(get_ready)
+    assert world.bench.base.path_m == 0.0
+
+
+def test_both_motors_of_a_node_are_the_same_drive_and_what_it_does_not_tell_is_not_asked() -> None:
+    edits = identity_edits(robot_with("zlac8015d"), {1: boot_of(1, vendor_id=0x100, product_code=1)})
+    assert [str(edit) for edit in edits] == [
+        "drives[0].identity.vendor_id: None → 0x100",
+        "drives[0].identity.product_code: None → 0x1",
+        "drives[1].identity.vendor_id: None → 0x100",
+        "drives[1].identity.product_code: None → 0x1",
+    ]
 
 
 def test_without_trials_the_report_does_not_pretend() -> None:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.scalarint import HexCapsInt
 
 from canbase_cli.commissioning.floor import FloorFound
 from canbase_cli.commissioning.wheels import WheelFound
 from canbase_config.errors import Loc, key_path
 from canbase_config.robot import Robot
+from canbase_driver.boot import NUMBERS, BootReport
 
 DIGITS = 5
 """Significant digits of a measured value: a tape gives four."""
@@ -29,7 +32,11 @@ class Edit:
     after: Any
 
     def __str__(self) -> str:
-        return f"{key_path(self.loc)}: {self.before} → {self.after}"
+        return f"{key_path(self.loc)}: {self._shown(self.before)} → {self._shown(self.after)}"
+
+    def _shown(self, value: Any) -> str:
+        in_hex = isinstance(self.after, HexCapsInt) and value is not None
+        return f"0x{value:X}" if in_hex else str(value)
 
 
 def wheel_edits(robot: Robot, found: Sequence[WheelFound]) -> list[Edit]:
@@ -55,6 +62,18 @@ def floor_edits(robot: Robot, found: FloorFound) -> list[Edit]:
         Edit(("base", "wheel_radius_m"), robot.base.wheel_radius_m, radius_m),
         Edit(("base", "track_m"), robot.base.track_m, track_m),
     ]
+    return [edit for edit in edits if _differs(edit)]
+
+
+def identity_edits(robot: Robot, boots: Mapping[int, BootReport]) -> list[Edit]:
+    """What 1018h of each drive that was booted says, where robot.yaml does not say so; later boots compare with it."""
+    edits = []
+    for i, drive in enumerate(robot.drives):
+        found = boots[drive.node_id].identity if drive.node_id in boots else drive.identity
+        for name in NUMBERS:
+            before, after = getattr(drive.identity, name), getattr(found, name)
+            if after is not None:
+                edits.append(Edit(("drives", i, "identity", name), before, HexCapsInt(after)))
     return [edit for edit in edits if _differs(edit)]
 
 
@@ -84,8 +103,21 @@ def edited(text: str, edits: Sequence[Edit]) -> str:
 def _put(values: Any, edit: Edit) -> None:
     *places, key = edit.loc
     for place in places:
+        if isinstance(values, CommentedMap) and place not in values:
+            section = CommentedMap()
+            section.fa.set_flow_style()
+            _add(values, place, section)
         values = values[place]
-    values[key] = edit.after
+    if isinstance(values, CommentedMap) and key not in values:
+        _add(values, key, edit.after)
+    else:
+        values[key] = edit.after
+
+
+def _add(values: CommentedMap, key: Any, value: Any) -> None:
+    """At the end; before the last key if comments are behind that one: they may belong to the section that follows."""
+    has_comments = next(reversed(values), None) in values.ca.items
+    values.insert(len(values) - has_comments, key, value)
 
 
 def _differs(edit: Edit) -> bool:

@@ -9,7 +9,7 @@ from pathlib import Path
 import typer
 from pydantic import ValidationError
 
-from canbase_cli.commissioning.edits import Edit, edited, floor_edits, wheel_edits, with_edits
+from canbase_cli.commissioning.edits import Edit, edited, floor_edits, identity_edits, wheel_edits, with_edits
 from canbase_cli.commissioning.floor import FloorFound, measure_floor
 from canbase_cli.commissioning.guide import Ask, CommissionError, Script, Tell
 from canbase_cli.commissioning.judge import JudgeError
@@ -54,6 +54,7 @@ def run(config: Path, plan: Plan, answers: Path | None, *, yes: bool, dry_run: b
         refuse_beside_masters(line)
         try:
             _go(line, robot, plan, person, results)
+            results.edits += identity_edits(robot, results.boots)
         except (CommissionError, RigError, JudgeError, ValidationError) as error:
             results.ended_by = str(error)
         except Stopped as stopped:
@@ -81,7 +82,7 @@ def _go(line: BusLine, robot: Robot, plan: Plan, person: Person, results: Result
     if "proof" in plan.steps and not results.proven:
         person.tell(Tell("the measured drive on the floor is left out: the self-stop is not proven", is_loud=True))
         return
-    results.floor = run_script(line, robot, lambda rig: _floor(rig, plan), person)
+    results.floor = run_script(line, robot, lambda rig: _floor(rig, plan, results), person)
     results.edits += floor_edits(robot, results.floor)
 
 
@@ -108,9 +109,10 @@ def _proof(rig: Rig, plan: Plan, results: Results) -> Script[tuple[Outcome, ...]
     return (yield from prove(rig, plan.speed_mps))
 
 
-def _floor(rig: Rig, plan: Plan) -> Script[FloorFound]:
+def _floor(rig: Rig, plan: Plan, results: Results) -> Script[FloorFound]:
     yield Ask("wheels_down", WHEELS_DOWN, confirms=True)
     yield from get_ready(rig)
+    _note_boots(rig, results)
     return (yield from measure_floor(rig, plan.distance_m, plan.turns, plan.speed_mps))
 
 
