@@ -57,7 +57,7 @@ def install(
     Exit codes: 0 done, 1 a step failed, 2 wrong command line or robot.yaml, or a robot that services cannot run.
     """
     from canbase_deploy.execute import ExecuteError, Executor
-    from canbase_deploy.host import manifests, service_environment, templates
+    from canbase_deploy.host import chosen, manifests, rehearse, sourced, templates
     from canbase_deploy.plan import InstallError, Request, install_plan, owner_paths
 
     loaded = load_config(config or prefix / owner_paths(name or "robot")[0].relative_to("/"))
@@ -68,7 +68,8 @@ def install(
             yaml=None if config is None else config.read_text(encoding="utf-8"),
             python=python,
             templates=templates(),
-            environment=service_environment(os.environ),
+            environment=chosen(os.environ),
+            sourced=sourced(os.environ),
             network=network.value,
             bring_up_can=can,
             adapter=adapter,
@@ -77,6 +78,8 @@ def install(
             sros2=sros2,
         )
         plan = install_plan(request, manifests(prefix))
+        if prefix == Path("/"):
+            rehearse(python, request.sourced)
     except InstallError as error:
         fail(str(error), WRONG_INPUT)
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -23,6 +24,20 @@ SOURCED: Final = (
 CHOSEN: Final = ("ROS_DOMAIN_ID", "RMW_IMPLEMENTATION")
 """What the user may have chosen; it goes along where it is set."""
 
+HIDDEN: Final = ("/home/", "/root/", "/run/user/", "/tmp/", "/var/tmp/")
+"""What the units cannot see, by ProtectHome and PrivateTmp."""
+_USES: Final = """
+import sys
+import canbase.msg, canbase_cli.main, canbase_config.load, can, canopen, rclpy
+for module in (canbase, canbase_cli, canbase_config, can, canopen, rclpy):
+    print(module.__file__)
+print(sys.base_prefix + "/")
+"""
+_ADVICE: Final = (
+    "With ROS 2 from apt the whole command has to know it: sudo bash -c 'source /opt/canbase/install/setup.bash && "
+    "canbase install …'"
+)
+
 
 def templates() -> dict[str, str]:
     """Name and text of the unit files that came with this canbase. Raises InstallError where they are missing."""
@@ -39,11 +54,43 @@ def read_templates(folder: Path) -> dict[str, str]:
     return {path.name: path.read_text(encoding="utf-8") for path in sorted(folder.glob("canbase*"))}
 
 
-def service_environment(environment: Mapping[str, str]) -> dict[str, str]:
+def sourced(environment: Mapping[str, str]) -> dict[str, str]:
     """What of this environment the services need to find ROS 2. The ROS wheels of PyPI find themselves."""
-    wheels = importlib.util.find_spec("ros_wheels_bootstrapper") is not None
-    names = CHOSEN if wheels else (*SOURCED, *CHOSEN)
-    return {name: environment[name] for name in names if environment.get(name)}
+    if importlib.util.find_spec("ros_wheels_bootstrapper") is not None:
+        return {}
+    return {name: environment[name] for name in SOURCED if environment.get(name)}
+
+
+def chosen(environment: Mapping[str, str]) -> dict[str, str]:
+    """What of this environment the user chose."""
+    return {name: environment[name] for name in CHOSEN if environment.get(name)}
+
+
+def rehearse(python: str, environment: Mapping[str, str]) -> None:
+    """Imports what the services import, with their Python and nothing but their environment. Raises InstallError.
+
+    sudo keeps no LD_LIBRARY_PATH, whatever it is told: found out here, and not by a robot that does not start.
+    """
+    try:
+        done = subprocess.run(
+            [python, "-c", _USES],
+            env=dict(environment),
+            cwd="/",
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+    except OSError as error:
+        raise InstallError(f"--python {python}: {error}") from error
+    if done.returncode != 0:
+        why = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+        raise InstallError(f"the services would not start with {python}: {why}. {_ADVICE}")
+    for path in (python, str(Path(python).resolve()), *done.stdout.split("\n")):
+        if path.startswith(HIDDEN):
+            raise InstallError(
+                f"the services do not see {path} (ProtectHome, PrivateTmp in their units): install below /opt"
+            )
 
 
 def manifests(prefix: Path) -> dict[str, str]:

@@ -50,6 +50,7 @@ class Request:
 
     `yaml`: the text of robot.yaml, None: keep the installed one. `adapter`: a udev property, `ID_PATH=…`, that names
     the adapter which is to get the interface's name. `cpus`: for CPUAffinity. `hardware_watchdog_s`: 0 leaves it alone.
+    `environment`: what the owner chose of ROS; `sourced`: what a sourced ROS 2 set, by which the services find it.
     """
 
     name: str
@@ -58,6 +59,7 @@ class Request:
     python: str
     templates: Mapping[str, str]
     environment: Mapping[str, str] = field(default_factory=dict)
+    sourced: Mapping[str, str] = field(default_factory=dict)
     network: Literal["localhost", "lan"] = "localhost"
     bring_up_can: bool = True
     adapter: str = ""
@@ -199,6 +201,8 @@ def _can(request: Request) -> list[WriteFile | Link]:
 
 def _tuning(request: Request) -> list[WriteFile]:
     files: list[WriteFile] = []
+    if request.sourced:
+        files += [_drop_in(part, request.name, "05-ros", _environment(request.sourced)) for part in PARTS]
     if request.network == "lan":
         files += [_drop_in(part, request.name, "20-lan", "[Service]\nIPAddressAllow=any\n") for part in WITH_ROS]
     if request.cpus:
@@ -214,6 +218,14 @@ def _tuning(request: Request) -> list[WriteFile]:
         text = f"[Manager]\nRuntimeWatchdogSec={request.hardware_watchdog_s}s\n"
         files.append(WriteFile(PurePosixPath("/etc/systemd/system.conf.d/canbase.conf"), text))
     return files
+
+
+def _environment(values: Mapping[str, str]) -> str:
+    """In a drop-in, not among the owner's: an upgrade that moves ROS 2 or the workspace has to move it too."""
+    escaped = {
+        name: value.replace("\\", "\\\\").replace('"', '\\"').replace("%", "%%") for name, value in values.items()
+    }
+    return "[Service]\n" + "".join(f'Environment="{name}={value}"\n' for name, value in escaped.items())
 
 
 def _enclave(part: str) -> str:

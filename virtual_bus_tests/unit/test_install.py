@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.util
 import stat
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
@@ -13,10 +16,11 @@ from canbase_cli.main import app
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_config.watchdog import RelayLine
+from canbase_deploy import host
 from canbase_deploy.actions import Action, Existing, Link, Remove, Run, WriteFile
 from canbase_deploy.execute import ExecuteError, Executor
-from canbase_deploy.host import manifests, read_templates
-from canbase_deploy.plan import InstallError, Request, install_plan, uninstall_plan
+from canbase_deploy.host import HIDDEN, chosen, manifests, read_templates, rehearse, sourced
+from canbase_deploy.plan import PARTS, InstallError, Request, install_plan, uninstall_plan
 
 TEMPLATES = Path(__file__).parents[2] / "deploy" / "systemd"
 EXAMPLE = sample("example_can0")
@@ -103,6 +107,23 @@ def test_a_domain_that_was_chosen_goes_along() -> None:
     files = texts(install_plan(request(environment={"ROS_DOMAIN_ID": "7"}), {}))
 
     assert [line for line in files["/etc/canbase/example.env"].splitlines() if "DOMAIN" in line] == ["ROS_DOMAIN_ID=7"]
+
+
+def test_a_sourced_ros_2_reaches_every_process_and_an_upgrade_moves_it(tmp_path: Path) -> None:
+    old = {"AMENT_PREFIX_PATH": "/opt/ws:/opt/ros/jazzy", "PYTHONPATH": '/opt/a 100% "b"'}
+    carried_out(tmp_path, install_plan(request(sourced=old), {}))
+
+    drop_in = "etc/systemd/system/canbase-{}@example.service.d/05-ros.conf"
+    texts = {(tmp_path / drop_in.format(part)).read_text() for part in PARTS}
+    paths = 'Environment="AMENT_PREFIX_PATH=/opt/ws:/opt/ros/jazzy"\nEnvironment="PYTHONPATH=/opt/a 100%% \\"b\\""\n'
+    assert texts == {f"[Service]\n{paths}"}
+    assert "PYTHONPATH" not in (tmp_path / "etc/canbase/example.env").read_text()
+
+    new = {"AMENT_PREFIX_PATH": "/opt/ros/kilted"}
+    carried_out(tmp_path, install_plan(request(sourced=new), manifests(tmp_path)))
+    assert (tmp_path / drop_in.format("driver")).read_text() == (
+        '[Service]\nEnvironment="AMENT_PREFIX_PATH=/opt/ros/kilted"\n'
+    )
 
 
 def test_a_network_that_is_opened_is_opened_on_purpose() -> None:
@@ -195,6 +216,83 @@ def test_what_services_cannot_run_is_refused_with_advice(wrong: Request, told: s
         install_plan(wrong, {})
 
     assert told in str(error.value)
+
+
+# ---- the machine ----------------------------------------------------------------------------------------------------
+
+
+def fake_python(folder: Path, text: str) -> str:
+    """A program in the place of Python that is asked what the services import."""
+    folder.mkdir(parents=True)
+    program = folder / "python3"
+    program.write_text(f"#!/bin/sh\n{text}\n")
+    program.chmod(0o755)
+    return str(program)
+
+
+def test_services_that_would_not_start_are_not_installed(tmp_path: Path) -> None:
+    python = fake_python(
+        tmp_path / "bin", "echo 'Traceback' >&2; echo \"ImportError: librcl.so of $LD_LIBRARY_PATH\" >&2; exit 1"
+    )
+
+    with pytest.raises(InstallError, match=r"librcl.so of /opt/ros/lib.*sudo bash -c 'source") as error:
+        rehearse(python, {"LD_LIBRARY_PATH": "/opt/ros/lib"})
+
+    assert "Traceback" not in str(error.value)
+
+
+def test_the_rehearsal_has_the_services_environment_and_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", "/home/me/ws")
+    python = fake_python(tmp_path / "bin", 'echo "it was: $PYTHONPATH" >&2; exit 1')
+
+    with pytest.raises(InstallError, match=r"it was:\. "):
+        rehearse(python, {})
+
+
+@pytest.mark.parametrize("hidden", HIDDEN)
+def test_what_the_units_cannot_see_is_refused(monkeypatch: pytest.MonkeyPatch, hidden: str) -> None:
+    answer = subprocess.CompletedProcess(
+        [], 0, stdout=f"/opt/canbase/x.py\n{hidden}me/ws/canbase_cli/__init__.py\n", stderr=""
+    )
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: answer)
+
+    with pytest.raises(InstallError, match=f"do not see {hidden}me/ws/canbase_cli"):
+        rehearse("/opt/canbase/bin/python", {})
+
+
+def test_what_they_see_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    answer = subprocess.CompletedProcess([], 0, stdout="/opt/canbase/x.py\n/usr/lib/y.py\n/usr/\n", stderr="")
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: answer)
+
+    rehearse("/opt/canbase/bin/python", {})
+
+
+def test_this_python_has_all_that_the_services_import(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(host, "HIDDEN", ("/nowhere/",))  # a checkout may be below /home
+
+    rehearse(sys.executable, {})
+
+
+def test_a_python_that_is_not_there_is_named() -> None:
+    with pytest.raises(InstallError, match="--python /opt/no/python"):
+        rehearse("/opt/no/python", {})
+
+
+def test_only_what_finds_ros_is_taken_from_a_sourced_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = {
+        "PYTHONPATH": "/opt/ros",
+        "ROS_DISTRO": "jazzy",
+        "ROS_DOMAIN_ID": "5",
+        "HOME": "/root",
+        "LD_LIBRARY_PATH": "",
+    }
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    assert sourced(seen) == {"PYTHONPATH": "/opt/ros", "ROS_DISTRO": "jazzy"}
+    assert chosen(seen) == {"ROS_DOMAIN_ID": "5"}
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: object())
+    assert sourced(seen) == {}
 
 
 # ---- carried out ----------------------------------------------------------------------------------------------------

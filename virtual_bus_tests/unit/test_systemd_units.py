@@ -33,7 +33,8 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A root with the services of the example robot, as `canbase install --prefix` makes it."""
     root = tmp_path_factory.mktemp("root")
     path = sample("example_can0")
-    request = Request("example", load_robot(path).robot, path.read_text(), sys.executable, read_templates(TEMPLATES))
+    templates, ros = read_templates(TEMPLATES), {"PYTHONPATH": '/opt/my ros/100% "x":/opt/ws'}
+    request = Request("example", load_robot(path).robot, path.read_text(), sys.executable, templates, sourced=ros)
     Executor(root, lambda line: None).carry_out(install_plan(request, {}))
     return root
 
