@@ -1,4 +1,4 @@
-"""From power on to Operation Enabled on a bus at 500 kbit/s, in virtual time: two drives of each kind, and eight.
+"""From power on to Operation Enabled on a bus with a bit rate, in virtual time: two drives of each kind, and eight.
 
 Counted are the drives' own delays and the time that each frame takes on the bus; Python's own time is not (`startup.py`
 measures that). `python benchmarks/boot.py` prints the table of docs/drives.md.
@@ -14,25 +14,32 @@ from unit.timed_bus import TimedBus, on_a_wire
 
 BUDGET_S, BUDGET_RATIO = 1.0, 1.5
 LONGEST_S = 10.0
+BITRATES = (500_000, 1_000_000)
 
 
-def few() -> TimedBus:
+def few(bitrate: int) -> TimedBus:
     """Two plain drives."""
-    return TimedBus(on_a_wire(bench_robot()))
+    return TimedBus(on_a_wire(bench_robot(), bitrate))
 
 
-def many() -> TimedBus:
+def many(bitrate: int) -> TimedBus:
     """Eight."""
-    return TimedBus(on_a_wire(robot_of(*((node_id, 0, "left" if node_id % 2 else "right") for node_id in range(1, 9)))))
+    sides = ((node_id, 0, "left" if node_id % 2 else "right") for node_id in range(1, 9))
+    return TimedBus(on_a_wire(robot_of(*sides), bitrate))
 
 
 def measure() -> list[Figure]:
-    """Two drives, and eight beside each other."""
-    two, eight = few(), many()
+    """Two drives, and eight beside each other, at each bit rate."""
+    return [figure for bitrate in BITRATES for figure in _measure(bitrate)]
+
+
+def _measure(bitrate: int) -> list[Figure]:
+    two, eight = few(bitrate), many(bitrate)
     two_s, eight_s = two.enabled_after(LONGEST_S), eight.enabled_after(LONGEST_S)
+    where = f"virtual time, {bitrate // 1000} kbit/s"
     return [
         Figure(
-            "boot: power on → 2 drives enabled, virtual time, 500 kbit/s",
+            f"boot: power on → 2 drives enabled, {where}",
             f"{two_s:.3f} s",
             f"{len(two.heard)} frames",
             None,
@@ -40,7 +47,7 @@ def measure() -> list[Figure]:
             two_s <= BUDGET_S,
         ),
         Figure(
-            "boot: power on → 8 drives enabled, virtual time, 500 kbit/s",
+            f"boot: power on → 8 drives enabled, {where}",
             f"{eight_s:.3f} s",
             f"2 drives: {two_s:.3f} s; {len(eight.heard)} frames",
             eight_s / two_s,

@@ -155,13 +155,16 @@ class _Boot:
 
     def _bring_to_a_stand(self) -> Steps[None]:
         """A drive may still be running from an earlier life of its master."""
+        states: dict[str, DriveState | None] = {}
         for drive in self._drives:
-            if _has_torque((yield from _state(drive))):
+            states[drive.joint] = yield from _state(drive)
+            if _has_torque(states[drive.joint]):
                 yield _control(drive, Command.QUICK_STOP)
         for drive in self._drives:
-            yield from self._wait_for_standstill(drive)
-        for drive in self._drives:
-            if (yield from _state(drive)) in _CAN_BE_DISABLED:
+            if _has_torque(states[drive.joint]):
+                yield from self._wait_for_standstill(drive)
+                states[drive.joint] = yield from _state(drive)
+            if states[drive.joint] in _CAN_BE_DISABLED:
                 yield _control(drive, Command.DISABLE_VOLTAGE)
 
     def _wait_for_standstill(self, drive: Drive) -> Steps[None]:
@@ -200,9 +203,11 @@ class _Boot:
     def _make_reset_harmless(self) -> Steps[None]:
         for drive in self._drives:
             write = harmless_on_loss(drive)
-            exists = self._kind.self_stop.abort_connection != "no"
-            if exists and (yield from self._node.read_if_present(write.index, write.sub)) is not None:
-                yield from self._node.set_if_present(write)
+            if self._kind.self_stop.abort_connection == "no":
+                continue
+            found = yield from self._node.read_if_present(write.index, write.sub)
+            if found is not None:
+                yield from self._node.set_if_present(write, known=found)
 
 
 def _state(drive: Drive) -> Steps[DriveState | None]:

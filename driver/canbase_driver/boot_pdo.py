@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from canbase_driver.boot_steps import BootError, NodeAccess, Steps, unsigned
 from canbase_driver.pdo import NodeLayout, Pdo
-from canbase_driver.sdo import Read, Write
+from canbase_driver.sdo import Read, SdoAborted, Write
 
 PDO_OFF = 1 << 31
 """Bit 31 of 1400h:1 and 1800h:1: the PDO is not valid."""
@@ -30,7 +30,7 @@ def configure_pdos(node: NodeAccess, layout: NodeLayout) -> Steps[None]:
     for index, pdo in wanted.items():
         cob_id = cob_ids[index] & layout.profile.pdo.fixed_cob_id_bits | pdo.cob_id
         if cob_ids[index] != cob_id or not (yield from _is_right(node, pdo)):
-            yield from _switch_off(node, index, cob_ids[index])
+            yield from _suspend(node, index, cob_ids[index])
             yield from _configure(node, pdo)
             yield from node.overwrite(Write(index, 1, cob_id, 4), f"{cob_ids[index]:08X}h")
 
@@ -51,7 +51,17 @@ def _cob_ids(node: NodeAccess) -> Steps[dict[int, int]]:
 
 def _switch_off(node: NodeAccess, index: int, cob_id: int) -> Steps[None]:
     if not cob_id & PDO_OFF:
-        yield from node.set_if_present(Write(index, 1, cob_id | PDO_OFF, 4))
+        yield from node.set_if_present(Write(index, 1, cob_id | PDO_OFF, 4), known=cob_id)
+
+
+def _suspend(node: NodeAccess, index: int, cob_id: int) -> Steps[None]:
+    """Off while it is changed. Not read back: a drive that left it on refuses the mapping."""
+    if not cob_id & PDO_OFF:
+        off = Write(index, 1, cob_id | PDO_OFF, 4)
+        try:
+            yield off
+        except SdoAborted as refused:
+            node.notes.append(f"{off}: {refused.text}")
 
 
 def _times(pdo: Pdo) -> list[Write]:
@@ -75,10 +85,12 @@ def _configure(node: NodeAccess, pdo: Pdo) -> Steps[None]:
 
 def _map(node: NodeAccess, pdo: Pdo) -> Steps[None]:
     """A mapping that is right stays as it is: some drives have a fixed one."""
-    if (yield from _is_mapped(pdo)):
+    count = yield from _count(pdo)
+    if count == len(pdo.mapping) and (yield from _holds(pdo)):
         return
     node.changes.append(f"{pdo.name}: mapped anew, {len(pdo.mapping)} objects")
-    yield Write(pdo.mapping_object, 0, 0, 1)
+    if count:
+        yield Write(pdo.mapping_object, 0, 0, 1)
     for sub, entry in enumerate(pdo.mapping, start=1):
         yield Write(pdo.mapping_object, sub, entry, 4)
     yield Write(pdo.mapping_object, 0, len(pdo.mapping), 1)
@@ -88,8 +100,14 @@ def _map(node: NodeAccess, pdo: Pdo) -> Steps[None]:
 
 
 def _is_mapped(pdo: Pdo) -> Steps[bool]:
-    if unsigned((yield Read(pdo.mapping_object))) != len(pdo.mapping):
-        return False
+    return (yield from _count(pdo)) == len(pdo.mapping) and (yield from _holds(pdo))
+
+
+def _count(pdo: Pdo) -> Steps[int]:
+    return unsigned((yield Read(pdo.mapping_object)))
+
+
+def _holds(pdo: Pdo) -> Steps[bool]:
     for sub, entry in enumerate(pdo.mapping, start=1):
         if unsigned((yield Read(pdo.mapping_object, sub))) != entry:
             return False

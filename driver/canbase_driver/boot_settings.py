@@ -127,14 +127,17 @@ def _watch_heartbeats(node: NodeAccess, kind: Profile, timeout_ms: int) -> Steps
         node.notes.append("1016h: the drive watches no heartbeat, it will not stop by it")
         return False
     watchdog, driver = (node_id << 16 | timeout_ms for node_id in (WATCHDOG_NODE_ID, DRIVER_NODE_ID))
-    wanted = {1: watchdog, 2: driver} if entries > 1 else {1: watchdog}
+    left: int | None = None
     for sub in range(2, entries + 1):
         found = yield from node.read_if_present(HEARTBEAT_CONSUMER, sub)
-        if found and found != wanted.get(sub):
-            yield from node.set_if_present(Write(HEARTBEAT_CONSUMER, sub, 0, 4))
+        is_ours = sub == 2 and found == driver
+        if found and not is_ours:
+            yield from node.set_if_present(Write(HEARTBEAT_CONSUMER, sub, 0, 4), known=found)
+        elif sub == 2:
+            left = found
     is_watched = yield from node.set_if_present(Write(HEARTBEAT_CONSUMER, 1, watchdog, 4))
     if entries > 1:
-        yield from node.set_if_present(Write(HEARTBEAT_CONSUMER, 2, driver, 4))
+        yield from node.set_if_present(Write(HEARTBEAT_CONSUMER, 2, driver, 4), known=left)
     return is_watched
 
 

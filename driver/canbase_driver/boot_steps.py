@@ -103,12 +103,13 @@ class NodeAccess:
                 return None
             raise
 
-    def set(self, step: Write) -> Steps[None]:
+    def set(self, step: Write, known: int | None = None) -> Steps[None]:
         """Write where it differs, and read back. A read-only object may pass when it has the value.
 
-        Raises BootError when another value is read back.
+        `known`: the present value, unsigned, where it was read just now. Raises BootError when another value is read
+        back.
         """
-        before = yield from self._read(step)
+        before = (yield from self._read(step)) if known is None else _as_bytes(known, step.size)
         if before is None or not _same(before, step.data):
             yield from self.overwrite(step, _hex(before) if before else "?")
 
@@ -121,7 +122,7 @@ class NodeAccess:
             raise BootError(self.node_id, problem, "Set it with the maker's tool, or look for what sets it otherwise")
         self.changes.append(f"{step}: {before} → {_hex(step.data)}")
 
-    def set_if_present(self, step: Write, presence: Presence = "probe") -> Steps[bool]:
+    def set_if_present(self, step: Write, presence: Presence = "probe", known: int | None = None) -> Steps[bool]:
         """Like `set`, but a drive that lacks, refuses or changes the value only earns a note. Whether it took it.
 
         `presence`: what the profile says; an object that it denies is not tried.
@@ -129,7 +130,7 @@ class NodeAccess:
         if presence == "no":
             return False
         try:
-            yield from self.set(step)
+            yield from self.set(step, known)
         except SdoAborted as refused:
             self.notes.append(f"{step}: {refused.text}")
             return False
@@ -169,6 +170,11 @@ def _same(found: bytes, wanted: bytes) -> bool:
 def unsigned(data: bytes) -> int:
     """The number in an answer."""
     return int.from_bytes(data, "little")
+
+
+def _as_bytes(number: int, size: int) -> bytes:
+    """In `size` bytes, or in more where a drive has sent more."""
+    return number.to_bytes(max(size, (number.bit_length() + 7) // 8), "little")
 
 
 def _hex(data: bytes) -> str:

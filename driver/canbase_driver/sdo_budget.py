@@ -12,7 +12,7 @@ from canbase_config.robot import Bus
 
 FRAME_BITS = 135
 """A data frame of 8 bytes with stuff bits, at the most, and the gap behind it (ISO 11898-1)."""
-SHARE = 0.8
+SHARE = 0.9
 """Of the bus for PDOs and SDOs together."""
 FRAMES_PER_REQUEST = 2
 """And its answer."""

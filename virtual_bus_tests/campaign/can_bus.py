@@ -19,6 +19,12 @@ STUFFED = 1.1
 QUEUE = 100
 """Frames that wait in one member's adapter; further ones are dropped, as a full transmit buffer does."""
 
+
+def frame_bits(data_bytes: int) -> float:
+    """How long a frame occupies the bus, typically [bit times]."""
+    return (FRAME_BITS + 8 * data_bytes) * STUFFED
+
+
 Receive = Callable[[int, bytes], None]
 
 
@@ -90,8 +96,7 @@ class CanBus:
                 winner, lowest = member, waiting[0][0]
         if winner is not None:
             self._busy = True
-            bits = (FRAME_BITS + 8 * len(winner.waiting[0][1])) * STUFFED
-            self.clock.after(bits / self.bitrate, self._end, winner)
+            self.clock.after(frame_bits(len(winner.waiting[0][1])) / self.bitrate, self._end, winner)
 
     def _end(self, sender: Member) -> None:
         """The last bit is over: everybody has the frame."""

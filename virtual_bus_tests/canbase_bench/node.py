@@ -43,10 +43,11 @@ class SimulatedNode:
         boot_delay_s: float = 0.1,
         fixed: Mapping[int, int] | None = None,
         personality: Personality = GENERIC,
+        sdo_delay_s: float = 0.0,
     ) -> None:
         self.node_id, self.personality = node_id, personality
         self.boot_delay_s = boot_delay_s if personality.boot_delay_s is None else personality.boot_delay_s
-        self.line = Line(personality.sdo_delay_s)
+        self.line = Line(sdo_delay_s if personality.sdo_delay_s is None else personality.sdo_delay_s)
         self.state = NmtState.INITIALISING
         self.changes: deque[StateChange] = deque(maxlen=1000)
         self.lost_producers: deque[int] = deque(maxlen=100)

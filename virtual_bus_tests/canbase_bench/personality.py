@@ -60,8 +60,8 @@ class Personality:
     """Boot loader and firmware say a boot-up each, so long apart [s]; objects answer only after the second."""
     starts_operational: bool = False
     """Goes to OPERATIONAL by itself after its boot-up."""
-    sdo_delay_s: float = 0.0
-    """From a request to its answer [s]."""
+    sdo_delay_s: float | None = None
+    """From a request to its answer [s]; None: as the bench says."""
     shows_mode_without_power: bool = True
     """False: 6061h is 0 before OPERATION ENABLED."""
     locked_with_power: frozenset[int] = frozenset()

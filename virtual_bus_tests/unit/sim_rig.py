@@ -11,11 +11,15 @@ from canbase_bench.cia402.states import State
 from canbase_bench.frame import Frame
 from canbase_bench.node import SimulatedNode
 from canbase_bench.plant.base import PlantParameters
-from canbase_bench.world.bench import Bench
+from canbase_bench.world.bench import Bench, BenchParameters
 from canbase_config.robot import Robot
 
 MPS = 9549
 """About 1 m/s at the rim in 0.1 rpm: wheel radius 0.1 m, gear 10, so 0.1 m/s is 955."""
+
+
+AT_ONCE = BenchParameters(sdo_delay_s=0.0)
+"""An SDO answer comes with the next step, so that a story is not full of waiting."""
 
 
 def robot(*drives: dict[str, Any], **sections: Any) -> Robot:
@@ -52,7 +56,7 @@ class Rig:
     """The bench and its clock. It starts with booted nodes, and what was said until then is in `heard`."""
 
     def __init__(self, of: Robot | None = None, body: PlantParameters | None = None) -> None:
-        self.bench = Bench(of or robot(), 0.0, body or PlantParameters())
+        self.bench = Bench(of or robot(), 0.0, body or PlantParameters(), AT_ONCE)
         self.now = 0.0
         self.heard: list[tuple[float, str]] = []
         self.wait(0.2)

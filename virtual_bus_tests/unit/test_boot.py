@@ -100,10 +100,10 @@ def test_two_axes_on_one_node() -> None:
     assert [drive.number(index, 1) for index in (0x1401, 0x1802, 0x1803)] == [0x4000_0301, 0x4000_0381, 0x4000_0481]
 
 
-def test_the_first_boot_takes_not_more_than_140_transfers() -> None:
+def test_the_first_boot_takes_not_more_than_125_transfers() -> None:
     drive = FakeDrive()
     boot_one_axis(drive)
-    assert drive.transfers <= 140
+    assert drive.transfers <= 125
 
 
 def test_a_second_boot_of_the_same_drive_writes_nothing() -> None:

@@ -34,8 +34,8 @@ def test_two_drives_are_enabled_within_a_second_and_eight_within_one_and_a_half_
     [
         (bench_robot(), 500_000, 0.5),
         (bench_robot(), 125_000, 1.7),
-        (robot_of(*EIGHT), 1_000_000, 0.8),  # type: ignore[arg-type]
-        (robot_of(*EIGHT), 500_000, 1.0),  # type: ignore[arg-type]
+        (robot_of(*EIGHT), 1_000_000, 0.6),  # type: ignore[arg-type]
+        (robot_of(*EIGHT), 500_000, 0.8),  # type: ignore[arg-type]
     ],
     ids=["two, 500 kbit/s", "two, 125 kbit/s", "eight, 1 Mbit/s", "eight, 500 kbit/s"],
 )

@@ -265,6 +265,14 @@ def test_the_trace_samples_on_its_grid_even_when_looked_at_late() -> None:
     assert trace.since(51.0) == []
 
 
+def test_an_sdo_answer_takes_its_time() -> None:
+    bench = Bench(robot(), now=0.0, parameters=BenchParameters(boot_delay_s=0.0, sdo_delay_s=0.003))
+    bench.tick(0.010)
+    bench.on_frame(Frame(0x601, bytes.fromhex("4000100000000000")), 0.010)
+    answers = {at_ms: [f for f in bench.tick(at_ms / 1000) if f.cob_id == 0x581] for at_ms in (10, 11, 12.9, 13.1, 14)}
+    assert [at_ms for at_ms, frames in answers.items() if frames] == [13.1]
+
+
 def test_own_frames_that_come_back_do_no_harm() -> None:
     rig = Rig()
     said = [*rig.tx("601 40 00 10 00 00 00 00 00"), "701 00", "181 50 02", "081 10 23 03 00 00 00 00 00"]

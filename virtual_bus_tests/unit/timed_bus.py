@@ -5,6 +5,7 @@ from __future__ import annotations
 import heapq
 import itertools
 
+from campaign.can_bus import frame_bits
 from canbase_bench.frame import Frame as BenchFrame
 from canbase_bench.world.bench import Bench
 from canbase_config.derive import watchdog_config
@@ -15,8 +16,8 @@ from canbase_driver.kinematics import Twist2D
 from canbase_driver.snapshot import DriverState
 from canbase_watchdog.watchdog import Watchdog
 
-BITS_PER_FRAME = 135
-"""A frame of 8 data bytes with its stuff bits, at the most, and the gap behind it."""
+IDLE_S = 1e-4
+"""The drives' own delays are looked for so often while the bus is idle."""
 COMMAND_PERIOD_S = 0.02
 WATCHDOG_PERIOD_S = 0.005
 
@@ -32,7 +33,6 @@ class TimedBus:
     """Driver, watchdog and drives, all switched on at the same moment."""
 
     def __init__(self, robot: Robot) -> None:
-        self._frame_s = BITS_PER_FRAME / robot.bus.bitrate
         self._robot, self.now = robot, 0.0
         self._bench, self._driver = Bench(robot, 0.0), DriverCore(robot)
         self._watchdog = Watchdog(watchdog_config(robot), 0.0)
@@ -50,8 +50,16 @@ class TimedBus:
         return self.now
 
     def _step(self) -> None:
-        """The time of one frame."""
-        self.now += self._frame_s
+        """The time of one frame, or a little when there is none."""
+        self._queue_up_what_is_due()
+        if not self._queue:
+            self.now += IDLE_S
+            return
+        frame = heapq.heappop(self._queue)[2]
+        self.now += frame_bits(len(frame.data)) / self._robot.bus.bitrate
+        self._deliver(frame)
+
+    def _queue_up_what_is_due(self) -> None:
         if self._is_due("command", COMMAND_PERIOD_S):
             self._driver.on_command(Twist2D.ZERO, self.now)
         if self._is_due("cycle", 1.0 / self._robot.rates.control_hz):
@@ -59,8 +67,6 @@ class TimedBus:
         if self._is_due("watchdog", WATCHDOG_PERIOD_S):
             self._queue_up([Frame(frame.cob_id, frame.data) for frame in self._watchdog.tick(self.now)])
         self._queue_up([Frame(frame.cob_id, frame.data) for frame in self._bench.tick(self.now)])
-        if self._queue:
-            self._deliver(heapq.heappop(self._queue)[2])
 
     def _is_due(self, what: str, period_s: float) -> bool:
         due = self.now >= self._due[what]

@@ -28,6 +28,8 @@ class BenchParameters:
 
     boot_delay_s: float = 0.1
     """From power on to the boot-up message [s]."""
+    sdo_delay_s: float = 0.001
+    """From an SDO request to its answer [s]. Below 1 ms: an STM32 with CANopenNode; 30 ms: Lenze 9400 (its manual)."""
     encoder_offset: int = 123_456
     """6064h at the start; each further axis is at a multiple of it."""
 
@@ -144,7 +146,8 @@ class Bench:
             drive = self._robot.drives[i]
             fixed[key(0x608F + axis * AXIS_STRIDE, 1)] = drive.counts_per_motor_rev
             fixed |= _identity(drive)
-        return SimulatedNode(node_id, parts, now, self._parameters.boot_delay_s, fixed, personality)
+        delays = self._parameters
+        return SimulatedNode(node_id, parts, now, delays.boot_delay_s, fixed, personality, delays.sdo_delay_s)
 
     def _axis(self, i: int | None) -> AxisParts:
         """The axis of drive `i`; None: an axis of the controller to which nothing is connected."""
