@@ -24,8 +24,8 @@ def few(bitrate: int) -> TimedBus:
 
 def many(bitrate: int) -> TimedBus:
     """Eight."""
-    sides = ((node_id, 0, "left" if node_id % 2 else "right") for node_id in range(1, 9))
-    return TimedBus(on_a_wire(robot_of(*sides), bitrate))
+    robot = robot_of(*((node_id, 0, "left" if node_id % 2 else "right") for node_id in range(1, 9)))
+    return TimedBus(on_a_wire(robot, bitrate))
 
 
 def measure() -> list[Figure]:
