@@ -10,25 +10,30 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from canbase_config.errors import ConfigError, Loc
+from canbase_config import bus_load
+from canbase_config.errors import ConfigError, Loc, Problem
 from canbase_config.explain import explain
 from canbase_config.robot import Robot
 from canbase_config.ros_params import plain
 from canbase_config.schema import Schema
 from canbase_config.twist_mux import with_twist_mux
-from canbase_config.yaml_file import read_yaml
+from canbase_config.yaml_file import YamlFile, read_yaml
 
 ROBOT_SCHEMA = Schema(Robot)
 
 
 @dataclass(frozen=True, slots=True)
 class Loaded:
-    """A robot and where it came from. `given` and `defaults` share out all leaf keys of the effective configuration."""
+    """A robot and where it came from. `given` and `defaults` share out all leaf keys of the effective configuration.
+
+    `warnings`: what can be used, and had better be changed.
+    """
 
     robot: Robot
     path: Path
     given: frozenset[Loc]
     defaults: frozenset[Loc]
+    warnings: tuple[Problem, ...] = ()
 
 
 def load_robot(path: str | Path) -> Loaded:
@@ -43,7 +48,15 @@ def load_robot(path: str | Path) -> Loaded:
         raise ConfigError(explain(error, file, ROBOT_SCHEMA)) from error
     keys = frozenset(leaf_keys(robot.model_dump()))
     given = keys & file.lines.keys()
-    return Loaded(robot, file.path, given, keys - given)
+    return Loaded(robot, file.path, given, keys - given, tuple(_warnings(robot, file)))
+
+
+def _warnings(robot: Robot, file: YamlFile) -> Iterator[Problem]:
+    busy = bus_load.busy(robot)
+    if busy:
+        at = next((loc for loc in (("bus", "bitrate"), ("rates", "control_hz")) if loc in file.lines), ("bus",))
+        place = file.place(at)
+        yield Problem(place.file, place.line, place.key, busy)
 
 
 def sample(name: str) -> Path:

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
+from canbase_config import bus_load
 from canbase_config.action import Action
 from canbase_config.black_box import BlackBox
 from canbase_config.drive import Drive
@@ -190,6 +191,13 @@ class Robot(Section):
                     f"at least {least_s:g} with rates.control_hz {self.rates.control_hz:g}"
                 )
                 raise MisfitError(message, ("timeouts", key), ("rates", "control_hz"))
+        return self
+
+    @model_validator(mode="after")
+    def _bus_carries_its_frames(self) -> Robot:
+        why = bus_load.full(self)
+        if why:
+            raise MisfitError(why, ("bus", "bitrate"), ("rates", "control_hz"), ("bus",))
         return self
 
     def _check_nodes(self) -> None:

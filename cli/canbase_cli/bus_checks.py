@@ -11,14 +11,13 @@ from canbase_cli.checks import Check, fail, ok, warn
 from canbase_cli.commissioning.inspection import Inspection, Part
 from canbase_cli.commissioning.link import Link
 from canbase_cli.commissioning.listening import OURS, Listener
+from canbase_config.bus_load import BUSY_LOAD, FULL_LOAD
 from canbase_config.drive import Drive
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
 from canbase_driver.cia402 import DriveState
 from canbase_driver.emcy import emcy_text
 from canbase_driver.watchdog_link import LEASE_AGE_UNKNOWN, TRIPPED, WATCHING, WatchdogCounters
 
-BUSY_LOAD, FULL_LOAD = 0.6, 0.85
-"""Above, the frames with high COB-IDs wait for others; heartbeats have the highest of all."""
 SHORT_QUEUE, GOOD_QUEUE, LONG_QUEUE = 32, 64, 100
 """Frames. Into the kernel's 10 a cycle of several axes does not fit; what waits in a long one while nobody acknowledges
 goes out late."""

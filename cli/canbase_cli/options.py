@@ -74,17 +74,20 @@ def ros_arguments(ctx: typer.Context, namespace: str) -> list[str]:
 
 
 def load_config(path: Path | None) -> Loaded:
-    """The robot in `path`, or the bench sample. Prints what is wrong in the file and exits with code 2."""
+    """The robot in `path`, or the bench sample. Prints warnings; what is wrong in the file too, and exits with 2."""
     from canbase_config.errors import ConfigError
     from canbase_config.load import load_robot, sample
 
     path = sample("bench") if path is None else path
     try:
-        return load_robot(path)
+        loaded = load_robot(path)
     except ConfigError as error:
         typer.echo(str(error), err=True)
         count = len(error.problems)
         fail(f"{path} cannot be used: {count} problem{'s' if count > 1 else ''}", WRONG_INPUT)
+    for warning in loaded.warnings:
+        typer.secho(f"warning: {warning}", err=True, fg=typer.colors.YELLOW, color=colour())
+    return loaded
 
 
 @contextmanager

@@ -77,6 +77,7 @@ def made_consistent(values: Values) -> Values:
         drive |= {"joint": f"{drive['joint'][:60]}_{index}", "node_id": index + 1, "side": ("left", "right")[index % 2]}
         drive |= {"profile": ("generic", "roboteq")[index % 2], "mode": (3, None)[index // 2 % 2]}
     values["bus"].pop("sync_counter", None)
+    values["bus"]["bitrate"] = 1_000_000 - values["bus"].get("bitrate", 0) % 300_000  # for eight drives at 200 Hz
     limits, safety, action = values["limits"], values["safety"], values.get("action", {})
     limits["emergency_deceleration_mps2"] = max(limits["emergency_deceleration_mps2"], limits["deceleration_mps2"])
     safety["stop_distance_m"] = min(safety.get("stop_distance_m", 0.15), 4.0)

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from canbase_cli.commissioning.listening import Listener, ListenSession, wire_bits
+from canbase_cli.commissioning.listening import Listener, ListenSession
 from canbase_cli.commissioning.roster import Roster
 from canbase_cli.commissioning.scan_rows import NOT_HERE, missing, scan_rows
 from canbase_cli.commissioning.session import Echo
@@ -27,10 +27,6 @@ def listen(*frames: str, gap_s: float = 0.1) -> Listener:
     for i, text in enumerate(frames):
         heard.on_frame(frame(text), 10.0 + (i + 1) * gap_s)
     return heard
-
-
-def test_an_empty_frame_has_55_bits_at_most_and_a_full_one_135() -> None:
-    assert [wire_bits(Frame(0x080)), wire_bits(Frame(0x181, bytes(8)))] == [55, 135]
 
 
 def test_the_load_is_the_share_of_the_time_that_the_frames_took() -> None:

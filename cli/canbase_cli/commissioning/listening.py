@@ -10,6 +10,7 @@ import statistics
 from collections import Counter
 from dataclasses import dataclass, field
 
+from canbase_config.bus_load import frame_bits
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID
 from canbase_driver.cia301 import (
     EMCY,
@@ -30,14 +31,6 @@ SYNC = 0x080
 OURS = {DRIVER_NODE_ID: "canbase's motor driver", WATCHDOG_NODE_ID: "canbase's watchdog"}
 SDO_QUIET_S = 0.05
 """An SDO channel on which nobody has asked for so long is free: a boot asks more often, a measurement now and then."""
-OVERHEAD_BITS, STUFFED_BITS = 47, 34
-"""Of a data frame with an 11-bit identifier: without its data, and what of it gets stuff bits (ISO 11898-1)."""
-
-
-def wire_bits(frame: Frame) -> int:
-    """Length of a frame on the wire with as many stuff bits as there can be [bit]."""
-    stuffed = STUFFED_BITS + 8 * len(frame.data)
-    return OVERHEAD_BITS + 8 * len(frame.data) + (stuffed - 1) // 4
 
 
 @dataclass(slots=True)
@@ -97,7 +90,7 @@ class Listener:
     def on_frame(self, frame: Frame, now: float) -> None:
         """Take one frame."""
         self.frames += 1
-        self.bits += wire_bits(frame)
+        self.bits += frame_bits(len(frame.data))
         if not self._on_watchdog(frame, now) and not self._on_master(frame, now):
             self._on_node(frame, now)
 
