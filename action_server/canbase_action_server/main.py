@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
+from collections.abc import Callable
 from types import FrameType
 
 import rclpy
@@ -23,13 +24,15 @@ DELIVERY_S = 0.2
 SLICE_S = 0.1
 
 
-def run(robot: Robot, ros_args: list[str]) -> int:
-    """Serve until SIGINT or SIGTERM; 0 after an orderly end, 1 after a defect. `ros_args` as for rclpy.init."""
+def run(robot: Robot, ros_args: list[str], when_ready: Callable[[], None] = lambda: None) -> int:
+    """Serve until SIGINT or SIGTERM; 0 after an orderly end, 1 after a defect. `ros_args` as for rclpy.init;
+    `when_ready`: called when all is made and nothing runs yet."""
     rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)
     executor = SingleThreadedExecutor()
     node = DriveDistanceServer(robot, [drive_binding(), rotate_binding(robot)])
     executor.add_node(node)
     asked_to_end = _catch_signals()
+    when_ready()
     try:
         _serve(executor, node, asked_to_end)
         _end(executor, node)

@@ -6,20 +6,31 @@ The watchdog sees to itself (`canbase_watchdog.realtime`): it is a process that 
 from __future__ import annotations
 
 import os
+from contextlib import suppress
+from pathlib import Path
 from typing import Final
 
 import typer
 
 PRIORITY: Final = {"sim": 45, "driver": 37, "velocity": 35, "action-server": 30}
 """SCHED_FIFO, 1 to 99. The watchdog has 40: above all that it watches, below the simulated drives, which stand in for
-hardware. No two alike: under FIFO one that is just starting would hold up another of its priority. Below 50, where the
+hardware. No two alike: under FIFO one that is busy would hold up another of its priority. Below 50, where the
 kernel's threads that serve interrupts run: without them no frame would arrive."""
 
 
+THREADS: Final = Path("/proc/self/task")
+
+
 def raise_priority(part: str) -> None:
-    """Of this thread and of those that it starts from now on. Where that is not allowed, one line says so."""
+    """Of all threads that this process has, and of those that they start. Where it is not allowed, one line says so.
+
+    For a process that is ready to run: one that is still starting, above others, would hold them up for a second where
+    processors are few, and the mux would take the silence of a joystick for its release.
+    """
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY[part]))
+        for thread in THREADS.iterdir():
+            with suppress(ProcessLookupError):  # one that has just ended
+                os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, os.sched_param(PRIORITY[part]))
     except (OSError, AttributeError) as error:
         hint = "it may be late on a loaded computer; the service needs LimitRTPRIO"
         typer.echo(f"canbase {part}: no real-time priority ({error}): {hint}", err=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -49,8 +50,7 @@ def driver(
     with ros_needed():
         from canbase_driver.main import run
     leave_stop_file(robot, stop_file)
-    raise_priority("driver")
-    raise typer.Exit(run(robot, ros_arguments(ctx, namespace), autostart))
+    raise typer.Exit(run(robot, ros_arguments(ctx, namespace), autostart, partial(raise_priority, "driver")))
 
 
 def velocity(ctx: typer.Context, config: ConfigOption = None, namespace: NamespaceOption = "") -> None:
@@ -61,8 +61,7 @@ def velocity(ctx: typer.Context, config: ConfigOption = None, namespace: Namespa
     robot = load_config(config).robot
     with ros_needed():
         from canbase_velocity.main import run
-    raise_priority("velocity")
-    raise typer.Exit(run(robot, ros_arguments(ctx, namespace)))
+    raise typer.Exit(run(robot, ros_arguments(ctx, namespace), partial(raise_priority, "velocity")))
 
 
 def action_server(ctx: typer.Context, config: ConfigOption = None, namespace: NamespaceOption = "") -> None:
@@ -73,8 +72,7 @@ def action_server(ctx: typer.Context, config: ConfigOption = None, namespace: Na
     robot = load_config(config).robot
     with ros_needed():
         from canbase_action_server.main import run
-    raise_priority("action-server")
-    raise typer.Exit(run(robot, ros_arguments(ctx, namespace)))
+    raise typer.Exit(run(robot, ros_arguments(ctx, namespace), partial(raise_priority, "action-server")))
 
 
 def sim(

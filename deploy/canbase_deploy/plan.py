@@ -181,16 +181,15 @@ def _of_the_owner(request: Request) -> list[WriteFile]:
 
 
 def _can(request: Request) -> list[WriteFile | Link]:
-    """The interface, and who waits for it. Unplugged, the watchdog goes; plugged in again, it is started anew."""
+    """The interface, and who waits for it. Unplugged, the watchdog ends by itself, and its next start waits for the
+    adapter. It is not bound to the device (BindsTo=): plugged in again while it still stops, nobody would start it."""
     interface, name = request.robot.bus.channel, request.name
     device = f"sys-subsystem-net-devices-{interface}.device"
     unit = f"canbase-can@{interface}.service" if request.bring_up_can else device
-    files: list[WriteFile | Link] = [
-        _drop_in("watchdog", name, "10-can", f"[Unit]\nBindsTo={unit}\nAfter={unit}\n"),
-        _drop_in("driver", name, "10-can", f"[Unit]\nWants={unit}\nAfter={unit}\n"),
-        Link(UNITS / f"{device}.wants" / service("watchdog", name), "../canbase-watchdog@.service"),
-    ]
+    waits = f"[Unit]\nWants={unit}\nAfter={unit}\n"
+    files: list[WriteFile | Link] = [_drop_in(part, name, "10-can", waits) for part in ON_THE_BUS]
     if request.bring_up_can:
+        files.append(Link(UNITS / f"{device}.wants" / unit, "../canbase-can@.service"))
         env = f"BITRATE={request.robot.bus.bitrate}\nRESTART_MS=100\nTXQUEUELEN=64\n"
         files.append(WriteFile(ETC / "can" / f"{interface}.env", env))
     if request.adapter:

@@ -11,7 +11,7 @@ import math
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import FrameType
 
 import rclpy
@@ -44,10 +44,12 @@ Worker = ControlLoop | Publisher | DriverServices | BlackBoxWriter
 """Each of them has a `failure`, and none may end before the process does."""
 
 
-def run(robot: Robot, ros_args: Sequence[str], autostart: bool = True) -> int:
+def run(
+    robot: Robot, ros_args: Sequence[str], autostart: bool = True, when_ready: Callable[[], None] = lambda: None
+) -> int:
     """Runs the driver until SIGINT or SIGTERM. Returns 0 after an orderly end, 1 when the bus cannot be opened or a
     thread failed. `ros_args`: arguments for rclpy. `autostart`: without it nothing is sent on the bus before the node
-    is configured. Call from the main thread (signals)."""
+    is configured. `when_ready`: called when all is made and nothing runs yet. Call from the main thread (signals)."""
     try:
         bus = BusPort(robot.bus.arguments())
     except BusError as error:
@@ -71,6 +73,7 @@ def run(robot: Robot, ros_args: Sequence[str], autostart: bool = True) -> int:
     threads = (loop, publisher, services, writer)
     gc.collect()
     gc.freeze()  # what is there now lives for ever: later collections need not look at it
+    when_ready()
     for thread in threads:
         thread.start()
     try:

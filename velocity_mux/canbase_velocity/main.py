@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
@@ -22,28 +22,30 @@ SHUTDOWN_CYCLES = 5
 WAKE_S = 0.1
 
 
-def run(robot: Robot, ros_args: Sequence[str]) -> int:
+def run(robot: Robot, ros_args: Sequence[str], when_ready: Callable[[], None] = lambda: None) -> int:
     """Runs mux and filter until SIGINT or SIGTERM; then orders zero until the base stands and returns 0.
 
     `ros_args`: arguments for rclpy, such as ["--ros-args", "-r", "__ns:=/robot2"]. An exception in a callback ends the
-    process too: zeros go out, and it is raised here. Call from the main thread (signals).
+    process too: zeros go out, and it is raised here. `when_ready`: called when all is made and nothing runs yet. Call
+    from the main thread (signals).
     """
     with _stop_signals() as received:
         rclpy.init(args=list(ros_args), signal_handler_options=SignalHandlerOptions.NO)
         try:
-            _run_nodes(robot, received)
+            _run_nodes(robot, received, when_ready)
         finally:
             rclpy.shutdown()
     return 0
 
 
-def _run_nodes(robot: Robot, received: list[int]) -> None:
+def _run_nodes(robot: Robot, received: list[int], when_ready: Callable[[], None]) -> None:
     mux = MuxNode(robot)
     safety = FilterNode(robot, mux.moving_sources)
     executor = EventsExecutor()
     executor.add_node(mux)
     executor.add_node(safety)
     period_s, service = 1.0 / robot.rates.command_hz, Service()
+    when_ready()
     try:
         while not received:
             executor.spin_once(timeout_sec=WAKE_S)

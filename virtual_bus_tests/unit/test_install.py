@@ -66,12 +66,12 @@ def test_no_placeholder_is_left_in_a_unit() -> None:
     assert "ExecStart=/opt/canbase/bin/python -m canbase_cli driver" in units[f"{UNITS}/canbase-driver@.service"]
 
 
-def test_a_robot_starts_at_boot_and_its_watchdog_again_with_the_adapter() -> None:
+def test_a_robot_starts_at_boot_and_its_interface_with_the_adapter() -> None:
     links = {str(action.path) for action in install_plan(request(), {}) if isinstance(action, Link)}
 
     assert links == {
         f"{UNITS}/multi-user.target.wants/canbase@example.target",
-        f"{UNITS}/sys-subsystem-net-devices-can0.device.wants/canbase-watchdog@example.service",
+        f"{UNITS}/sys-subsystem-net-devices-can0.device.wants/canbase-can@can0.service",
     }
 
 
@@ -142,8 +142,9 @@ def test_the_interface_gets_the_bit_rate_of_robot_yaml() -> None:
     files = texts(install_plan(request(robot=robot), {}))
 
     assert files["/etc/canbase/can/can7.env"] == "BITRATE=250000\nRESTART_MS=100\nTXQUEUELEN=64\n"
-    bound = files[f"{UNITS}/canbase-watchdog@example.service.d/10-can.conf"]
-    assert bound == "[Unit]\nBindsTo=canbase-can@can7.service\nAfter=canbase-can@can7.service\n"
+    for part in ("watchdog", "driver"):
+        waits = files[f"{UNITS}/canbase-{part}@example.service.d/10-can.conf"]
+        assert waits == "[Unit]\nWants=canbase-can@can7.service\nAfter=canbase-can@can7.service\n"
 
 
 def test_who_brings_the_interface_up_himself_is_left_alone() -> None:
@@ -151,7 +152,7 @@ def test_who_brings_the_interface_up_himself_is_left_alone() -> None:
 
     assert [path for path in files if path.startswith("/etc/canbase/can/")] == []
     assert (
-        "BindsTo=sys-subsystem-net-devices-can0.device"
+        "Wants=sys-subsystem-net-devices-can0.device"
         in files[f"{UNITS}/canbase-watchdog@example.service.d/10-can.conf"]
     )
 

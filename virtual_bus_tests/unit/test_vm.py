@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import json
+import signal
+from collections.abc import Sequence
 from pathlib import Path
 
 import can
 import pytest
 
 from vm import table
-from vm.guest.main import ALL, FIRST, SECOND, names
+from vm.guest.joystick import order_of
+from vm.guest.main import ALL, FIRST, SECOND, bounded, names
 from vm.guest.slcan_adapter import frame_of, line_of
 from vm.guest.standstill import standstill
 from vm.guest.system import BrokenPromiseError
 from vm.overlay import robot_yaml
+from vm.patience import Patience
 
 ROW = {
     "what": "canbase-driver",
@@ -77,12 +81,13 @@ def told(name: str, failure: str = "") -> table.Result:
     return {"name": name, "failure": failure, "took_s": 10.4, "row": None if failure else ROW}
 
 
-def left(job: Path, *lines: str, ended: bool = True) -> list[table.Result]:
+def left(job: Path, *lines: str, wanted: Sequence[str] = (), ended: str = "", alive: bool = True) -> list[table.Result]:
+    """`alive`: the guest has come to its end."""
     job.mkdir()
     (job / "out.txt").write_text("".join(f"{line}\n" for line in lines))
-    if ended:
+    if alive:
         (job / "code").write_text("0")
-    return table.results(job)
+    return table.results(job, wanted, ended)
 
 
 def test_results_are_read_from_the_live_output(tmp_path: Path) -> None:
@@ -97,11 +102,53 @@ def test_all_as_promised_is_success() -> None:
     assert table.report([told("goal"), told("freeze")], 60.0) == 0
 
 
-@pytest.mark.parametrize(("lines", "ended"), [([told("goal", "stood too late")], True), ([told("goal")], False)])
+@pytest.mark.parametrize(("lines", "alive"), [([told("goal", "stood too late")], True), ([told("goal")], False)])
 def test_a_scenario_that_failed_and_a_guest_that_died_are_failures(
-    tmp_path: Path, lines: list[table.Result], ended: bool
+    tmp_path: Path, lines: list[table.Result], alive: bool
 ) -> None:
-    assert table.report(left(tmp_path / "job", *map(json.dumps, lines), ended=ended), 60.0) == 1
+    assert table.report(left(tmp_path / "job", *map(json.dumps, lines), alive=alive), 60.0) == 1
+
+
+def test_a_scenario_that_came_to_no_end_is_a_failure_and_so_is_one_that_was_never_reached(tmp_path: Path) -> None:
+    lines = ["@begin goal", json.dumps(told("goal")), "@begin freeze"]
+
+    found = left(tmp_path / "job", *lines, wanted=["goal", "freeze", "reboot"], ended="silent for 420 s", alive=False)
+
+    assert [(result["name"], result["failure"]) for result in found] == [
+        ("goal", ""),
+        ("freeze", "began and came to no end: silent for 420 s"),
+        ("reboot", "was not reached: silent for 420 s"),
+        ("job", "the guest died: silent for 420 s"),
+    ]
+
+
+def test_the_last_words_of_a_guest_are_the_ends_of_what_it_has_said(tmp_path: Path) -> None:
+    left(tmp_path / "job", *(f"line {i}" for i in range(100)))
+
+    words = table.last_words(tmp_path / "job").splitlines()
+
+    assert words[0].endswith("out.txt")
+    assert (words[1], words[-1], len(words)) == ("line 75", "line 99", 26)
+
+
+def test_a_scenario_that_takes_too_long_is_ended_by_the_guest_itself() -> None:
+    with pytest.raises(BrokenPromiseError, match="goal was not through in 90 s"), bounded("goal"):
+        signal.raise_signal(signal.SIGALRM)
+
+
+def test_a_guest_that_is_silent_too_long_is_waited_for_no_longer() -> None:
+    patience = Patience(1000.0)
+
+    said = [(0, 1420.0), (10, 1420.1), (10, 1840.0), (10, 1840.2)]
+
+    assert [patience.over(length, now_s) for length, now_s in said] == ["", "", "", "silent for 420 s on this computer"]
+
+
+def test_a_guest_that_talks_for_ever_is_not_waited_for_either() -> None:
+    patience = Patience(1000.0)
+
+    assert [patience.over(now, 1000.0 + now) for now in range(0, 1801, 100)] == [""] * 19
+    assert patience.over(1801, 2800.1) == "not through after 1800 s on this computer"
 
 
 def test_no_result_is_no_success() -> None:
@@ -157,6 +204,15 @@ def test_robot_and_drives_are_on_two_controllers() -> None:
 
 def test_words_choose_scenarios_in_the_order_of_the_table() -> None:
     assert names(["freeze", "driver SIG"]) == ["driver SIGKILL", "driver SIGSTOP", "freeze"]
+
+
+@pytest.mark.parametrize(("line", "order_mps"), [("0.3", 0.3), ("-0.1", -0.1), ("0.0", 0.0), ("none", None)])
+def test_the_joystick_is_told_a_velocity_or_to_let_go(line: str, order_mps: float | None) -> None:
+    assert order_of(line) == order_mps
+
+
+def test_a_name_means_itself_alone() -> None:
+    assert names(["goal"]) == ["goal"]
 
 
 def test_no_word_means_all_of_them() -> None:

@@ -82,7 +82,7 @@ root() {
   echo '/dev/pmem1 /opt/canbase ext4 ro 0 0' >"$tree/etc/fstab"
   mkdir -p "$tree/opt/canbase"
   rm -f "$out/root.ext4"
-  mke2fs -q -t ext4 -b 4096 -O ^metadata_csum -m 0 -d "$tree" "$out/root.ext4" 640M >/dev/null
+  mke2fs -q -t ext4 -b 4096 -O ^metadata_csum -d "$tree" "$out/root.ext4" 640M >/dev/null
 }
 
 # A virtual environment as docs/install.md makes it, by the guest's own Python version, moved to where the guest has it:

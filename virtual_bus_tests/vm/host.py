@@ -21,14 +21,13 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
-from vm.guest.main import ALL  # noqa: E402 - needs the path
+from vm.guest.main import ALL, names  # noqa: E402 - needs the path
 from vm.overlay import overlay, ramdisk  # noqa: E402
+from vm.patience import Patience  # noqa: E402
 from vm.qmp import Monitor  # noqa: E402
-from vm.table import PAGE, Passed, report, results  # noqa: E402
+from vm.table import PAGE, Passed, last_words, report, results  # noqa: E402
 
 BUILD = HERE.parents[1] / "build" / "vm"
-LIMIT_S = float(os.environ.get("VM_LIMIT_S", "1800"))
-"""On this computer. A guest that has not ended by then is killed."""
 GROUPS = ("first", "second")
 """Of scenarios, one for each guest: guest/main.py."""
 GUESTS = int(os.environ.get("VM_GUESTS", str(os.cpu_count() or 1)))
@@ -68,17 +67,24 @@ class Guest:
     """One run of QEMU. Its results are in `job`."""
 
     def __init__(self, initrd: Path, monitor: Path, job: Path) -> None:
+        self.job, self.ended = job, ""
         self._monitor_path, self._told = monitor, job / "out.txt"
         self._process = subprocess.Popen(qemu(initrd, monitor, job), stdin=subprocess.DEVNULL)
         self._monitor: Monitor | None = None
+        self._patience = Patience(time.monotonic())
 
     def attend(self) -> bool:
-        """Do what it asks for. False: it has ended."""
+        """Do what it asks for. False: it has ended, or its time is over: then `ended` says why."""
+        if self._process.poll() is not None:
+            return False
         if self._monitor is None and self._monitor_path.exists() and self._told.exists():
             self._monitor = Monitor(self._monitor_path, self._told)
-        if self._monitor is not None and self._process.poll() is None:
+        if self._monitor is not None:
             self._monitor.look()
-        return self._process.poll() is None
+        self.ended = self._patience.over(self._told.stat().st_size if self._told.exists() else 0, time.monotonic())
+        if self.ended:
+            self.end()
+        return not self.ended
 
     def end(self) -> None:
         """Whatever it is doing."""
@@ -86,10 +92,9 @@ class Guest:
         self._process.wait()
 
 
-def boot(jobs: Mapping[Path, Sequence[str]]) -> None:
-    """A guest for each job with its scenarios, side by side, until the last one has ended, or LIMIT_S is over."""
+def boot(jobs: Mapping[Path, Sequence[str]]) -> dict[Path, str]:
+    """A guest for each job with its scenarios, side by side, until the last one has ended. Why one had to be ended."""
     guests: list[Guest] = []
-    until = time.monotonic() + LIMIT_S
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         overlay(folder)
@@ -100,21 +105,24 @@ def boot(jobs: Mapping[Path, Sequence[str]]) -> None:
                 job.mkdir(parents=True)
                 (job / "wanted.json").write_text(json.dumps(wanted))
                 guests.append(Guest(initrd, folder / f"{job.name}.qmp", job))
-            while any([guest.attend() for guest in guests]) and time.monotonic() < until:  # noqa: C419 - each of them
+            while any([guest.attend() for guest in guests]):  # noqa: C419 - each of them
                 time.sleep(0.05)
         finally:
             for guest in guests:
                 guest.end()
+    return {guest.job: guest.ended for guest in guests}
 
 
 def main(wanted: Sequence[str]) -> int:
     """Exit code 0: every scenario came out as promised. The table in docs/stop_times.md is written anew."""
     parts = [list(wanted)] if wanted or len(GROUPS) > GUESTS else [[group] for group in GROUPS]
-    jobs = {BUILD / f"job-{number}": part for number, part in enumerate(parts, 1)}
+    jobs = {BUILD / f"job-{number}": names(part) for number, part in enumerate(parts, 1)}
     begun = time.monotonic()
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # by way of `finally`: guests end too
-    boot(jobs)
-    found = [result for job in jobs for result in results(job)]
+    ended = boot(jobs)
+    found = [result for job in jobs for result in results(job, jobs[job], ended[job])]
+    for job in [job for job in jobs if not (job / "code").exists()]:
+        print(last_words(job), file=sys.stderr)
     passed = Passed(BUILD / "passed.json", (BUILD / "canbase.key").read_text())
     passed.add(found)
     passed.write(PAGE, list(ALL))

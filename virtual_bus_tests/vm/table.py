@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from exit_matrix.marked import rewritten
+from vm.guest.main import BEGINS
 
 COMMAND = "make vm-test"
 """Names our part of the page."""
@@ -19,17 +20,34 @@ HEAD = """| what | how | who caught it | stood after | way | limit | again after
 Result = dict[str, Any]
 """A line of guest/main.py: name, failure, took_s, row."""
 ROW_BEGINS = '{"name": '
+LAST_LINES = 25
 
 
-def results(job: Path) -> list[Result]:
-    """What one guest has left, in its order, from its live output; that it died, too."""
+def results(job: Path, wanted: Sequence[str], ended: str = "") -> list[Result]:
+    """What one guest has left, in its order, from its live output. Each of `wanted` that came to no end is a failure;
+    `ended`: why the host has ended the guest, if it had to."""
     out = job / "out.txt"
     lines = out.read_text(errors="replace").splitlines() if out.exists() else []
     found = [json.loads(line) for line in lines if line.startswith(ROW_BEGINS)]
+    told = {result["name"] for result in found}
+    begun = {line.removeprefix(BEGINS) for line in lines if line.startswith(BEGINS)}
+    why = f": {ended}" if ended else ""
+    for name in [name for name in wanted if name not in told]:
+        found.append(_failed(name, f"began and came to no end{why}" if name in begun else f"was not reached{why}"))
     if not (job / "code").exists():
-        died = f"the guest died or was too slow; see {job}/console.log and out.txt there"
-        found.append({"name": job.name, "failure": died, "took_s": 0.0, "row": None})
+        found.append(_failed(job.name, f"the guest died{why}"))
     return found
+
+
+def last_words(job: Path) -> str:
+    """The end of what a guest has said, on its two serial ports."""
+    files = [job / "console.log", job / "out.txt", job / "journal.txt"]
+    tails = {file: file.read_text(errors="replace").splitlines()[-LAST_LINES:] for file in files if file.exists()}
+    return "\n".join(line for file, tail in tails.items() for line in (f"---- the end of {file}", *tail))
+
+
+def _failed(name: str, failure: str) -> Result:
+    return {"name": name, "failure": failure, "took_s": 0.0, "row": None}
 
 
 def report(found: Sequence[Result], took_s: float) -> int:

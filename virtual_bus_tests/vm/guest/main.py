@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+import faulthandler
 import json
 import os
+import signal
 import sys
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from types import FrameType
 
-from vm.guest import machine, units, wires
+from vm.guest import machine, papers, units, wires
 from vm.guest.last_words import FOLDER
 from vm.guest.robot import Robot
 from vm.guest.scenario import Row, Scenario
 from vm.guest.system import BrokenPromiseError
 
+LIMIT_S = 90.0
+"""For one scenario, in the guest's time."""
+LAST_LIMIT_S = 30.0
+"""After that, for one that does not even notice: then this process ends, with the stacks of its threads."""
+BEGINS = "@begin "
+"""Tells the host which scenario the guest is in."""
 WANTED = Path("/run/wanted.json")
 ROWS = FOLDER / "rows.jsonl"
 PLAN = FOLDER / "plan.json"
@@ -29,6 +39,9 @@ FIRST: dict[str, Scenario] = {
     "link down": wires.link_down,
     "unplugged": wires.unplugged,
     "masked": units.masked,
+    "journal": papers.journal,
+    "support bundle": papers.support_bundle,
+    "installed again": papers.installed_again,
 }
 SECOND: dict[str, Scenario] = {
     **units.ORDERLY,
@@ -62,10 +75,16 @@ def names(words: Sequence[str]) -> list[str]:
     """The scenarios that these words mean: names, parts of names, or a group; in the order of the table."""
     if not words:
         return list(ALL)
-    chosen = [name for word in words for name in GROUPS.get(word, [each for each in ALL if word in each])]
+    chosen = [name for word in words for name in _meant(word)]
     if not chosen:
         raise BrokenPromiseError(f"no scenario is called {' or '.join(words)}; there are: {', '.join(ALL)}")
     return [name for name in ALL if name in chosen]
+
+
+def _meant(word: str) -> list[str]:
+    if word in GROUPS:
+        return list(GROUPS[word])
+    return [word] if word in ALL else [each for each in ALL if word in each]
 
 
 def plan() -> Plan:
@@ -86,16 +105,35 @@ def main() -> int:
         todo.open = name if name in AFTER_BOOT and not after_boot else ""
         if name in AFTER_BOOT:
             todo.save()
-        _note(name, *_outcome(scenario, robot))
+        _note(name, *_outcome(name, scenario, robot))
         todo.open = ""
-        robot.order_mps = None
+        robot.order(None)
     return int(any(json.loads(line)["failure"] for line in ROWS.read_text().splitlines()))
 
 
-def _outcome(scenario: Scenario, robot: Robot) -> tuple[Row | None, str, float]:
+@contextmanager
+def bounded(name: str) -> Iterator[None]:
+    """No scenario is waited for longer than its limits."""
+
+    def too_long(number: int, frame: FrameType | None) -> None:
+        raise BrokenPromiseError(f"{name} was not through in {LIMIT_S:.0f} s")
+
+    signal.signal(signal.SIGALRM, too_long)
+    signal.setitimer(signal.ITIMER_REAL, LIMIT_S)
+    faulthandler.dump_traceback_later(LIMIT_S + LAST_LIMIT_S, exit=True)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        faulthandler.cancel_dump_traceback_later()
+
+
+def _outcome(name: str, scenario: Scenario, robot: Robot) -> tuple[Row | None, str, float]:
+    print(f"{BEGINS}{name}", flush=True)
     begun_s = time.monotonic()
     try:
-        return scenario(robot), "", time.monotonic() - begun_s
+        with bounded(name):
+            return scenario(robot), "", time.monotonic() - begun_s
     except Exception as error:  # noqa: BLE001 - the next scenario may tell more
         traceback.print_exc()
         return None, f"{type(error).__name__}: {error}", time.monotonic() - begun_s

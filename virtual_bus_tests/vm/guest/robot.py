@@ -16,7 +16,6 @@ prefer_udp(os.environ)
 
 import rclpy  # noqa: E402 - reads the environment
 from canbase.msg import DriverStatus  # noqa: E402
-from geometry_msgs.msg import TwistStamped  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.signals import SignalHandlerOptions  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
@@ -25,6 +24,7 @@ from canbase_action_server.client import Drive, DriveClient, RejectedError  # no
 from canbase_config.load import load_robot  # noqa: E402
 from vm.guest.evidence import Evidence  # noqa: E402
 from vm.guest.standstill import Standstill, standstill  # noqa: E402
+from vm.guest.stick import Stick  # noqa: E402
 from vm.guest.system import ROBOT_YAML, BrokenPromiseError, show, unit  # noqa: E402
 
 SPEED_MPS = 0.3
@@ -44,10 +44,8 @@ class Robot:
         self.executor.add_node(self.node)
         self.status: DriverStatus | None = None
         self.status_at = -math.inf
-        self.order_mps: float | None = None
         self.node.create_subscription(DriverStatus, "motor_driver/status", self._on_status, 10)
-        self._joystick = self.node.create_publisher(TwistStamped, "cmd_vel_joy", 1)
-        self.node.create_timer(0.1, self._on_timer)
+        self._stick = Stick()
         self._reset = self.node.create_client(Trigger, "motor_driver/reset")
         self.evidence = Evidence(self.node)
         self.config = load_robot(ROBOT_YAML).robot
@@ -57,11 +55,9 @@ class Robot:
     def _on_status(self, message: DriverStatus) -> None:
         self.status, self.status_at = message, time.monotonic()
 
-    def _on_timer(self) -> None:
-        if self.order_mps is not None:
-            message = TwistStamped()
-            message.twist.linear.x = self.order_mps
-            self._joystick.publish(message)
+    def order(self, speed_mps: float | None) -> None:
+        """By joystick, again and again; None: let go of it."""
+        self._stick.order(speed_mps)
 
     def spin(self, for_s: float) -> None:
         """Let time pass."""
@@ -95,7 +91,7 @@ class Robot:
 
     def drive(self) -> None:
         """Ordered by joystick, until it goes at full speed."""
-        self.order_mps = SPEED_MPS
+        self.order(SPEED_MPS)
         self.wait("speed", lambda: self.truth().linear_mps >= 0.97 * SPEED_MPS, 10.0)
 
     def goal(self, distance_m: float) -> Drive:
@@ -144,7 +140,7 @@ class Robot:
 
     def make_ready(self) -> float:
         """Drives have power, nothing is ordered; seconds from the reset that was done, 0 without."""
-        self.order_mps = 0.0
+        self.order(0.0)
         done_s = 0.0
         until_s = time.monotonic() + WAIT_S
         self.wait("the driver", lambda: self.state is not None)
@@ -156,7 +152,7 @@ class Robot:
                 if self.reset():
                     done_s = time.monotonic() - asked_s
             self.spin(0.2)
-        self.order_mps = None
+        self.order(None)
         self.spin(0.5)  # until the mux has seen that the joystick is silent
         return done_s
 

@@ -19,6 +19,8 @@ import can
 
 N_SLCAN = 17
 """Line discipline, linux/tty.h."""
+SIOCGIFNAME, IFNAMSIZ = 0x8910, 16
+"""linux/sockios.h, linux/if.h: of a terminal the interface that its line discipline has made."""
 STATES = {"passive": b"e1a\rsp128000\r", "off": b"sb256000\r", "active": b"sa000000\r"}
 """drivers/net/can/slcan: an error frame (no acknowledge), the state, its counters of sent and received errors."""
 OPEN = b"O"
@@ -79,11 +81,13 @@ class Adapter:
 
 
 def main() -> None:
-    """The interface slcan0 exists as long as this runs."""
+    """Prints the interface's name. It exists as long as this runs."""
     ours, kernels = pty.openpty()
     for end in (ours, kernels):
         tty.setraw(end)
     fcntl.ioctl(kernels, termios.TIOCSETD, struct.pack("i", N_SLCAN))
+    name = fcntl.ioctl(kernels, SIOCGIFNAME, bytes(IFNAMSIZ))
+    print(name.partition(b"\0")[0].decode(), flush=True)
     with can.Bus(interface="socketcan", channel="can0") as bus:
         Adapter(ours, bus).run()
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from exit_matrix import layers as by
 from vm.guest.robot import Robot
 from vm.guest.scenario import LATCHED, Row, elapsed, judged
-from vm.guest.system import PARTS, ROBOT_YAML, TARGET, run, unit
+from vm.guest.system import PARTS, ROBOT_YAML, TARGET, BrokenPromiseError, run, unit
 
 NODE = 1
 DEVICE = Path("/sys/class/net")
@@ -89,11 +89,15 @@ class SerialAdapter:
         """Driver and watchdog are on it afterwards."""
         if self._process is not None:
             return
-        robot.order_mps = None
+        robot.order(None)
         run("systemctl", "stop", TARGET, *(unit(part) for part in PARTS))
         module = [sys.executable, "-m", "vm.guest.slcan_adapter"]
-        self._process = subprocess.Popen(module, stdin=subprocess.PIPE, text=True)
-        robot.wait(SLCAN, (DEVICE / SLCAN).exists)
+        self._process = subprocess.Popen(module, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        assert self._process.stdout is not None
+        name = self._process.stdout.readline().strip()
+        if not name:
+            raise BrokenPromiseError("the serial adapter did not start")
+        run("ip", "link", "set", name, "name", SLCAN)
         run("ip", "link", "set", SLCAN, "type", "can", "bitrate", "500000")
         run("ip", "link", "set", SLCAN, "txqueuelen", "100", "up")
         ROBOT_YAML.write_text(ROBOT_YAML.read_text().replace("channel: can0", f"channel: {SLCAN}"))
