@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import pty
 import signal
-import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,7 +11,8 @@ from pathlib import Path
 import can
 import pytest
 
-from bus.tool import ENVIRONMENT, argv, canbase, drives, free_port, write_robot
+from bus.terminal import Terminal
+from bus.tool import canbase, drives, free_port, write_robot
 from canbase_bench.control import SimControl
 
 pytestmark = [pytest.mark.bus, pytest.mark.timeout(120)]
@@ -23,50 +21,16 @@ STANDS_S = 1.5
 """1016h is 0.3 s, the ramp 0.25 s; the rest is for a loaded computer."""
 
 
-class Terminal:
-    """jog with a terminal of its own."""
-
-    def __init__(self, config: Path) -> None:
-        self.keyboard, terminal = pty.openpty()
-        words = argv("jog", "left_wheel", "--config", str(config), "--yes", "--speed", "0.1")
-        self.process = subprocess.Popen(
-            words, stdin=terminal, stdout=terminal, stderr=subprocess.STDOUT, env=ENVIRONMENT, start_new_session=True
-        )
-        os.close(terminal)
-
-    def read_until(self, text: str) -> None:
-        seen = b""
-        end = time.monotonic() + 40.0
-        while text.encode() not in seen:
-            assert time.monotonic() < end, seen
-            seen += os.read(self.keyboard, 4096)
-
-    def hold(self, key: str, control: SimControl, mps: float) -> None:
-        """Until the left wheel turns so fast; jog's output is read away."""
-        end = time.monotonic() + 20.0
-        while control.truth().v_left_mps < mps:
-            assert time.monotonic() < end, "the wheel does not turn"
-            os.write(self.keyboard, key.encode())
-            os.read(self.keyboard, 4096)
-            time.sleep(0.03)
-
-    def hang_up(self) -> None:
-        os.close(self.keyboard)
-        self.keyboard = -1
-
-    def close(self) -> None:
-        self.process.kill()
-        self.process.wait(10.0)
-        if self.keyboard >= 0:
-            os.close(self.keyboard)
+def jog(config: Path) -> tuple[str, ...]:
+    return "jog", "left_wheel", "--config", str(config), "--yes", "--speed", "0.1"
 
 
 @contextmanager
 def jogging(config: Path, control: SimControl) -> Iterator[Terminal]:
-    terminal = Terminal(config)
+    terminal = Terminal(*jog(config))
     try:
         terminal.read_until("q ends")
-        terminal.hold("w", control, 0.08)
+        terminal.hold("w", lambda: control.truth().v_left_mps >= 0.08)
         yield terminal
     finally:
         terminal.close()
@@ -90,8 +54,8 @@ def test_released_it_stops_and_q_ends_it(bench: tuple[Path, SimControl]) -> None
     config, control = bench
     with jogging(config, control) as terminal:
         stands(control)
-        os.write(terminal.keyboard, b"q")
-        assert terminal.process.wait(10.0) == 0
+        terminal.press("q")
+        assert terminal.wait() == 0
 
 
 @pytest.mark.parametrize(
@@ -105,7 +69,7 @@ def test_every_signal_stops_the_wheel_and_sigkill_leaves_it_to_the_drive(
     with jogging(config, control) as terminal:
         terminal.process.send_signal(number)
         stands(control)
-        assert terminal.process.wait(10.0) == code
+        assert terminal.wait() == code
 
 
 def test_a_terminal_that_goes_stops_the_wheel(bench: tuple[Path, SimControl]) -> None:
@@ -113,7 +77,7 @@ def test_a_terminal_that_goes_stops_the_wheel(bench: tuple[Path, SimControl]) ->
     with jogging(config, control) as terminal:
         terminal.hang_up()
         stands(control)
-        assert terminal.process.wait(10.0) != 0
+        assert terminal.wait() != 0
 
 
 def test_beside_a_driver_it_is_refused_and_without_a_terminal_too(tmp_path: Path) -> None:
@@ -122,12 +86,12 @@ def test_beside_a_driver_it_is_refused_and_without_a_terminal_too(tmp_path: Path
     assert canbase("jog", "left_wheel", "--config", str(config)).returncode == 2
     assert canbase("jog", "wheel", "--config", str(config)).returncode == 2
     with can.Bus("239.74.163.2", "udp_multicast", port=port, hop_limit=0) as other:
-        terminal = Terminal(config)
+        terminal = Terminal(*jog(config))
         try:
             while terminal.process.poll() is None:
                 other.send(can.Message(arbitration_id=0x77F, data=b"\x05", is_extended_id=False))
                 time.sleep(0.1)
             assert terminal.process.returncode == 1
-            assert b"canbase's motor driver" in os.read(terminal.keyboard, 4096)
+            terminal.read_until("canbase's motor driver")
         finally:
             terminal.close()

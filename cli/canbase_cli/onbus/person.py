@@ -50,6 +50,7 @@ class Person:
     def __init__(self, answers: Path | None, *, yes: bool) -> None:
         """Exits with 2 when the file cannot be read."""
         self._yes = yes
+        self._has_terminal = sys.stdin.isatty()  # asked once: one that has gone says that it is none
         try:
             values = read_yaml(answers).values if answers else {}
         except ConfigError as error:
@@ -66,7 +67,7 @@ class Person:
         if known is not None:
             typer.echo(f"{question.text} {known}")
             return known
-        if not sys.stdin.isatty():
+        if not self._has_terminal:
             raise CommissionError(f"no answer to {question.key}: run it on a terminal, or give it in --answers")
         hint = " [yes/no]" if question.confirms else ""
         typer.secho(f"{question.text}{hint} ", bold=True, nl=False, color=colour())
@@ -81,8 +82,8 @@ class Person:
         typer.secho(f"{error}; please again", fg=typer.colors.YELLOW, color=colour())
 
     def interrupts(self) -> bool:
-        """Whether Enter was pressed while nothing was asked."""
-        if sys.stdin.isatty() and _has_line():
+        """Whether Enter was pressed while nothing was asked. Raises CommissionError when the terminal is gone."""
+        if self._has_terminal and _has_line():
             _line()
             return True
         return False
@@ -93,7 +94,10 @@ def _has_line() -> bool:
 
 
 def _line() -> str:
-    text = sys.stdin.readline()
+    try:
+        text = sys.stdin.readline()
+    except OSError as error:  # EIO, of a terminal that was hung up
+        raise CommissionError("the terminal is gone") from error
     if not text:
         raise CommissionError("the terminal is gone")
     return text.strip()

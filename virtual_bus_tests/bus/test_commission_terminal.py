@@ -1,0 +1,136 @@
+"""`canbase commission` before a person at a terminal: questions and answers, and every way to stop wheels that turn."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from bus.terminal import Terminal
+from bus.tool import drives, free_port, write_robot
+from canbase_bench.control import SimControl
+
+pytestmark = [pytest.mark.bus, pytest.mark.timeout(120)]
+
+STANDS_S = 1.5
+"""1016h is 0.3 s, the ramp 0.25 s; the rest is for a loaded computer."""
+TURNS_MPS = 0.02
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, SimControl]]:
+    config = write_robot(tmp_path_factory.mktemp("terminal"), free_port())
+    with drives(config) as control:
+        yield config, control
+
+
+@contextmanager
+def commissioning(config: Path) -> Iterator[Terminal]:
+    """At its first question."""
+    terminal = Terminal("commission", "--config", str(config), "--steps", "directions")
+    try:
+        terminal.read_until("Is it so? [yes/no]")
+        yield terminal
+    finally:
+        terminal.close()
+
+
+def turning(terminal: Terminal, control: SimControl) -> None:
+    """Confirmed, and the first wheel turns."""
+    terminal.press("yes\n")
+    terminal.hold("", lambda: control.truth().v_left_mps > TURNS_MPS)
+
+
+def stands(control: SimControl) -> None:
+    end = time.monotonic() + STANDS_S
+    while abs(control.truth().v_left_mps) > 0.001:
+        assert time.monotonic() < end, "the wheel still turns"
+        time.sleep(0.01)
+
+
+def report(config: Path) -> str:
+    return (config.parent / "commissioning.md").read_text(encoding="utf-8")
+
+
+def test_enter_stops_the_wheel_and_the_report_says_so(bench: tuple[Path, SimControl]) -> None:
+    config, control = bench
+    before = config.read_text(encoding="utf-8")
+    with commissioning(config) as terminal:
+        turning(terminal, control)
+        terminal.press("\n")
+        stands(control)
+        assert terminal.wait() == 1
+        assert "stopped by Enter" in terminal.shown
+    assert "It did not come to its end: stopped by Enter" in report(config)
+    assert config.read_text(encoding="utf-8") == before
+
+
+def test_any_line_stops_it_too_who_would_look_for_the_right_key(bench: tuple[Path, SimControl]) -> None:
+    config, control = bench
+    with commissioning(config) as terminal:
+        turning(terminal, control)
+        terminal.press("stop!!\n")
+        stands(control)
+        assert terminal.wait() == 1
+
+
+def test_an_answer_without_sense_is_asked_again_and_the_next_wheel_is_stopped_by_enter(
+    bench: tuple[Path, SimControl],
+) -> None:
+    config, control = bench
+    with commissioning(config) as terminal:
+        turning(terminal, control)
+        terminal.read_until("Which way")
+        stands(control)
+        terminal.press("sideways\n")
+        terminal.read_until("expected one of forward, backward, nothing, other; please again")
+        terminal.press("f\n")
+        terminal.hold("", lambda: abs(control.truth().v_right_mps) > TURNS_MPS)
+        terminal.press("\n")
+        assert terminal.wait() == 1
+        assert abs(control.truth().v_right_mps) < 0.001
+        assert "stopped by Enter" in terminal.shown
+
+
+def test_who_does_not_confirm_turns_nothing(bench: tuple[Path, SimControl]) -> None:
+    config, control = bench
+    path_m = control.truth().path_m
+    with commissioning(config) as terminal:
+        terminal.press("\n")
+        assert terminal.wait() == 1
+        assert "not confirmed: nothing more is done" in terminal.shown
+    assert control.truth().path_m == path_m
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
+def test_a_signal_of_the_terminal_stops_the_wheel(bench: tuple[Path, SimControl], number: int) -> None:
+    config, control = bench
+    with commissioning(config) as terminal:
+        turning(terminal, control)
+        terminal.process.send_signal(number)
+        stands(control)
+        assert terminal.wait() == 1
+    assert f"stopped by {signal.Signals(number).name}" in report(config)
+
+
+def test_a_terminal_that_goes_stops_the_wheel_and_leaves_a_report(bench: tuple[Path, SimControl]) -> None:
+    config, control = bench
+    (config.parent / "commissioning.md").unlink(missing_ok=True)
+    with commissioning(config) as terminal:
+        turning(terminal, control)
+        terminal.hang_up()
+        stands(control)
+        assert terminal.wait() != 0
+    assert "the terminal is gone" in report(config)
+
+
+def test_killed_it_leaves_the_wheel_to_the_drive(bench: tuple[Path, SimControl]) -> None:
+    config, control = bench
+    with commissioning(config) as terminal:
+        turning(terminal, control)
+        terminal.process.kill()
+        stands(control)
