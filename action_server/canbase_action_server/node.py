@@ -32,7 +32,8 @@ from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.open_goal import OpenGoal, numbers, uuid_of
 from canbase_action_server.outcome import ErrorCode, Outcome
 from canbase_action_server.reception import Cycle, Reception
-from canbase_config.journal import Journal, Priority
+from canbase_config.journal import Journal, Voice
+from canbase_config.priority import Priority
 from canbase_config.robot import Robot
 
 SENSOR_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -53,7 +54,7 @@ class DriveDistanceServer(Node):
         super().__init__("drive_distance_server")
         self._robot = robot
         self._reception = Reception(robot)
-        self._journal = Journal("drive_distance_server")
+        self._voice = Voice(self.get_logger(), Journal("drive_distance_server"))
         self._inputs = Inputs()
         self._open: dict[str, OpenGoal] = {}
         self.failure: Exception | None = None
@@ -92,7 +93,7 @@ class DriveDistanceServer(Node):
         self.failure = self.failure or error
         self._reception.fail(error, time.monotonic())
         self.shut_down()
-        self.get_logger().fatal("".join(traceback.format_exception(error)))
+        self._voice.tell("".join(traceback.format_exception(error)), Priority.ERROR, robot=self._robot.name)
 
     def _listen(self, kind: type[T], topic: str, qos: QoSProfile, callback: Callable[[T], None]) -> None:
         self.create_subscription(kind, topic, self._guarded(callback), qos)
@@ -202,10 +203,10 @@ class DriveDistanceServer(Node):
 
     def _log(self, step: str, uuid: str | None, **fields: Any) -> None:
         text = json.dumps({"uuid": uuid, "step": step, **fields})
-        self.get_logger().info(text)
         failed = fields.get("status", "SUCCEEDED") != "SUCCEEDED"
         told = {name: fields[name] for name in ("status", "error_code", "reason") if name in fields}
-        self._journal.tell(text, Priority.NOTICE if failed else Priority.INFO, goal=uuid, step=step, **told)
+        priority = Priority.NOTICE if failed else Priority.INFO
+        self._voice.tell(text, priority, robot=self._robot.name, goal=uuid, step=step, **told)
 
     def _log_phase(self, uuid: str | None, before: Phase) -> None:
         if self._reception.phase is Phase.STOPPING:

@@ -8,21 +8,13 @@ from __future__ import annotations
 import os
 import socket
 from collections.abc import Mapping
-from enum import IntEnum
-from typing import Final
+from typing import Final, Protocol
+
+from canbase_config.priority import Priority
 
 SOCKET: Final = "/run/systemd/journal/socket"
 UNDER_SYSTEMD: Final = "JOURNAL_STREAM"
 """systemd sets it for a service whose output goes to the journal."""
-
-
-class Priority(IntEnum):
-    """As syslog has them."""
-
-    ERROR = 3
-    WARNING = 4
-    NOTICE = 5
-    INFO = 6
 
 
 class Journal:
@@ -51,3 +43,33 @@ class Journal:
                 sender.sendto(text.encode(), self._path)
             except OSError:
                 return  # the journal is full or restarts; the plain text is there too
+
+
+class Logger(Protocol):
+    """What of ROS's logger is used here."""
+
+    def error(self, message: str) -> object:
+        """A line of severity ERROR."""
+
+    def warning(self, message: str) -> object:
+        """A line of severity WARN."""
+
+    def info(self, message: str) -> object:
+        """A line of severity INFO."""
+
+
+class Voice:
+    """What one part says: each sentence a line of ROS's log, and an entry of the journal with priority and fields."""
+
+    def __init__(self, logger: Logger, journal: Journal) -> None:
+        self._logger, self._journal = logger, journal
+
+    def tell(self, sentence: str, priority: Priority, **fields: object) -> None:
+        """One sentence. ROS knows no notice: it is an INFO there."""
+        self._journal.tell(sentence, priority, **fields)
+        if priority is Priority.ERROR:  # a call for each severity: rclpy holds a line of source to one
+            self._logger.error(sentence)
+        elif priority is Priority.WARNING:
+            self._logger.warning(sentence)
+        else:
+            self._logger.info(sentence)

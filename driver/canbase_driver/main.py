@@ -20,6 +20,7 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from canbase_config.priority import Priority
 from canbase_config.robot import Robot
 from canbase_config.service import Service
 from canbase_driver.black_box import Ring
@@ -87,7 +88,7 @@ def run(
         services.join(1.0)
     failure = failure or loop.failure
     if failure is not None:
-        node.get_logger().fatal(f"ended by {type(failure).__name__}: {failure}")
+        node.voice.tell(f"ended by {type(failure).__name__}: {failure}", Priority.ERROR, robot=robot.name)
         sys.excepthook(type(failure), failure, failure.__traceback__)
     return 0 if failure is None else 1
 

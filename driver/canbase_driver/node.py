@@ -17,7 +17,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
-from canbase_config.journal import Journal, Priority
+from canbase_config.journal import Journal, Voice
+from canbase_config.priority import Priority
 from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
 from canbase_driver import messages
@@ -46,7 +47,7 @@ class MotorDriverNode(ManagedNode):
         super().__init__("motor_driver", loop.aim, autostart)
         self._robot = robot
         self._loop = loop
-        self._journal = Journal("motor_driver")
+        self.voice = Voice(self.get_logger(), Journal("motor_driver"))
         self._receive_times = ReceiveTimes()
         self._odom = self.create_publisher(Odometry, "odom", 10)
         self._tf = self.create_publisher(messages.TFMessage, "tf", 100) if messages.TFMessage is not None else None
@@ -55,7 +56,7 @@ class MotorDriverNode(ManagedNode):
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         commands.create_subscription(TwistStamped, "cmd_vel", self._on_command, COMMAND_QOS)
         commands.create_subscription(SafetyState, "safety_filter/state", self._on_safety, COMMAND_QOS)
-        self._stops = StopTeller(self, commands, robot, ring, writer)
+        self._stops = StopTeller(self, commands, robot, ring, writer, self.voice)
         self._previous: DriverSnapshot | None = None
         self._diagnosed: DriverSnapshot | None = None
         self._status_at = 0.0
@@ -121,11 +122,7 @@ class MotorDriverNode(ManagedNode):
         self._stops.note(text)
         usual = snapshot.cause in ("none", "booting", "enabling", "shutdown", "not configured", INACTIVE)
         priority = Priority.INFO if usual else Priority.WARNING
-        self._journal.tell(text, priority, state=snapshot.state.name, cause=snapshot.cause, robot=self._robot.name)
-        if usual:
-            self.get_logger().info(text)
-        else:
-            self.get_logger().warning(text)
+        self.voice.tell(text, priority, state=snapshot.state.name, cause=snapshot.cause, robot=self._robot.name)
 
     def _warn_of_unguarded(self, snapshot: DriverSnapshot) -> None:
         """Once after each boot, loudly."""
@@ -133,7 +130,7 @@ class MotorDriverNode(ManagedNode):
         for sentence in self._unguarded:
             if sentence not in before:
                 self._stops.note(sentence)
-                self.get_logger().error(sentence)
+                self.voice.tell(sentence, Priority.ERROR, robot=self._robot.name)
 
 
 class Publisher(threading.Thread):

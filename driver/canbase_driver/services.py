@@ -12,6 +12,8 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from std_srvs.srv import Trigger
 
+from canbase_config.journal import Journal, Voice
+from canbase_config.priority import Priority
 from canbase_driver.loop import ControlLoop
 from canbase_driver.managed_node import ManagedNode
 from canbase_driver.messages import pose_of
@@ -25,6 +27,7 @@ class DriverServices(threading.Thread):
         super().__init__(name="services", daemon=True)
         self._loop = loop
         self._node = node
+        self._voice = Voice(node.get_logger(), Journal("motor_driver"))
         self._node.create_service(Trigger, "motor_driver/reset", self._on_reset)
         self._node.create_service(Trigger, "motor_driver/stop", self._on_stop)
         self._odom_frame = odom_frame
@@ -47,7 +50,7 @@ class DriverServices(threading.Thread):
     def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         outcome = self._loop.reset()
         response.success, response.message = outcome.done, outcome.sentence
-        self._node.get_logger().info(f"reset: {outcome.sentence}")
+        self._voice.tell(f"reset: {outcome.sentence}", Priority.NOTICE)
         return response
 
     def _on_reset_odometry(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -69,5 +72,5 @@ class DriverServices(threading.Thread):
     def _on_stop(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._loop.request_stop()
         response.success, response.message = True, "stopping; nothing moves until motor_driver/reset"
-        self._node.get_logger().warning("stop requested")
+        self._voice.tell("stop requested", Priority.WARNING)
         return response

@@ -15,6 +15,8 @@ from canbase.msg import MuxState, SafetyState, StopEvent
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from canbase_config.journal import Voice
+from canbase_config.priority import Priority
 from canbase_config.robot import Robot
 from canbase_driver.black_box import Ring
 from canbase_driver.black_box_writer import BlackBoxWriter
@@ -31,9 +33,13 @@ STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE, durabil
 class StopTeller:
     """Publishes one StopEvent for each stop, and has its recording written when it is latched."""
 
-    def __init__(self, node: Node, commands: Node, robot: Robot, ring: Ring, writer: BlackBoxWriter) -> None:
+    def __init__(
+        self, node: Node, commands: Node, robot: Robot, ring: Ring, writer: BlackBoxWriter, voice: Voice
+    ) -> None:
         """`node` gets the publisher, `commands` the subscription to the mux."""
         self._node = node
+        self._voice = voice
+        self._robot_name = robot.name
         self._ring = ring
         self._writer = writer
         self._estop_latches = robot.safety.estop.latched
@@ -89,7 +95,17 @@ class StopTeller:
         end = f"after {report.standstill_s:.2f} s and {report.distance_m:.3f} m" if report.standstill else "not seen"
         file = f"; black box: {path}" if path else ""
         by = f"{record.stopped_by}: {record.cause} ({record.detail})"
-        self._node.get_logger().warning(f"stop by {by}; standstill {end}{file}")
+        self._voice.tell(
+            f"stop by {by}; standstill {end}{file}",
+            Priority.WARNING,
+            robot=self._robot_name,
+            stopped_by=record.stopped_by,
+            cause=record.cause,
+            latched=record.latched,
+            standstill_s=f"{report.standstill_s:.3f}" if report.standstill else "",
+            distance_m=f"{report.distance_m:.4f}",
+            black_box=path,
+        )
 
     def _write(self, report: StopReport, now: float) -> str:
         record, offset_s = report.record, time.time() - now

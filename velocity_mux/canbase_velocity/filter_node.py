@@ -16,10 +16,13 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
+from canbase_config.journal import Journal, Voice
+from canbase_config.priority import Priority
 from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
 from canbase_config.safety import Scan as ScanConfig
 from canbase_velocity import messages
+from canbase_velocity.changes import changed_order
 from canbase_velocity.clearance import ScanReader, field_of
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.filter_state import SafetyFilter
@@ -43,6 +46,7 @@ class FilterNode(Node):
     def __init__(self, robot: Robot, moving_sources: MovingSources = tuple) -> None:
         super().__init__("safety_filter")
         self._robot = robot
+        self._voice = Voice(self.get_logger(), Journal("safety_filter"))
         self._receive_times = ReceiveTimes()
         self._moving_sources = moving_sources
         self._filter = SafetyFilter(FilterConfig.of(robot))
@@ -121,7 +125,7 @@ class FilterNode(Node):
 
     def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.success, response.message = self._filter.reset(self._moving_sources(), time.monotonic())
-        self.get_logger().info(f"reset: {response.message}")
+        self._voice.tell(f"reset: {response.message}", Priority.NOTICE, robot=self._robot.name)
         return response
 
     def _tick(self) -> None:
@@ -152,13 +156,14 @@ class FilterNode(Node):
             )
         )
         if report is not None:
-            self.get_logger().warning(report)
+            self._voice.tell(report, Priority.WARNING, robot=self._robot.name)
 
     def _tell(self, decision: Decision, now: float) -> None:
         before = self._decision
         changed = (decision.action, decision.cause) != (before.action, before.cause)
         if changed and Action.LIMIT not in (decision.action, before.action):
-            self.get_logger().info(f"{decision.action.name} {decision.cause.value} {decision.detail}".rstrip())
+            sentence, priority, fields = changed_order(decision)
+            self._voice.tell(sentence, priority, robot=self._robot.name, **fields)
         changed = changed or decision.emergency != before.emergency
         if not changed and now - self._state_at_s < STATE_PERIOD_S:
             return

@@ -15,8 +15,11 @@ from geometry_msgs.msg import TwistStamped
 from rclpy.node import Node
 from std_msgs.msg import Bool
 
+from canbase_config.journal import Journal, Voice
+from canbase_config.priority import Priority
 from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
+from canbase_velocity.changes import changes
 from canbase_velocity.foreign import ForeignWatch
 from canbase_velocity.graph import expected, publishers
 from canbase_velocity.messages import twist_message, twist_of
@@ -35,6 +38,7 @@ class MuxNode(Node):
     def __init__(self, robot: Robot) -> None:
         super().__init__("velocity_mux")
         self._robot = robot
+        self._voice = Voice(self.get_logger(), Journal("velocity_mux"))
         self._receive_times = ReceiveTimes()
         self._mux = Mux(robot.mux.sources, robot.mux.locks, foreign_lock=robot.mux.foreign_publishers == "lock")
         self._watch = ForeignWatch(expected(robot, self))
@@ -94,7 +98,8 @@ class MuxNode(Node):
         foreign = self._watch.look(graph, now)
         for found in foreign:
             if found not in before:
-                self.get_logger().error(found.sentence)
+                told = {"topic": found.topic, "node": found.node}
+                self._voice.tell(found.sentence, Priority.ERROR, robot=self._robot.name, **told)
         self._mux.on_foreign(foreign)
         self._send_if_changed(now)
 
@@ -115,8 +120,8 @@ class MuxNode(Node):
         if decision.essence != self._decision.essence or now - self._state_at_s >= STATE_PERIOD_S:
             self._states.publish(mux_state(decision, stamp))
             self._state_at_s = now
-        if decision.active != self._decision.active:
-            self.get_logger().info(f"{decision.active or 'nobody'} drives, before {self._decision.active or 'nobody'}")
+        for sentence, priority, fields in changes(self._decision, decision):
+            self._voice.tell(sentence, priority, robot=self._robot.name, **fields)
         self._decision = decision
 
     def _diagnose(self) -> None:

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from canbase_config.journal import Journal, Priority
+from canbase_config.journal import Journal, Voice
+from canbase_config.priority import Priority
 from canbase_watchdog.log import formatter
 
 UNDER_SYSTEMD = {"JOURNAL_STREAM": "8:12345"}
@@ -56,6 +57,37 @@ def test_a_journal_that_is_gone_or_full_costs_nothing(path: str, listener: socke
     Journal("x", UNDER_SYSTEMD, path + "gone").tell("text", Priority.INFO)
     for _ in range(2000):
         Journal("x", UNDER_SYSTEMD, path).tell("text " * 100, Priority.INFO)
+
+
+class HeardLogger:
+    """ROS's logger as far as it is used."""
+
+    def __init__(self) -> None:
+        self.lines: list[tuple[str, str]] = []
+
+    def error(self, message: str) -> None:
+        self.lines.append(("ERROR", message))
+
+    def warning(self, message: str) -> None:
+        self.lines.append(("WARN", message))
+
+    def info(self, message: str) -> None:
+        self.lines.append(("INFO", message))
+
+
+@pytest.mark.parametrize(
+    ("priority", "severity"),
+    [(Priority.ERROR, "ERROR"), (Priority.WARNING, "WARN"), (Priority.NOTICE, "INFO"), (Priority.INFO, "INFO")],
+)
+def test_a_voice_is_heard_in_the_log_of_ros_and_in_the_journal(
+    path: str, listener: socket.socket, priority: Priority, severity: str
+) -> None:
+    logger = HeardLogger()
+    Voice(logger, Journal("velocity_mux", UNDER_SYSTEMD, path)).tell("nav drives", priority, active="nav")
+    assert logger.lines == [(severity, "nav drives")]
+    entry = listener.recv(1000).decode().splitlines()
+    assert entry[:2] == ["MESSAGE=nav drives", f"PRIORITY={int(priority)}"]
+    assert entry[3:] == ["CANBASE_PART=velocity_mux", "CANBASE_ACTIVE=nav"]
 
 
 @pytest.mark.parametrize(

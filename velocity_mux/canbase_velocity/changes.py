@@ -1,0 +1,43 @@
+"""What mux and filter tell when they decide differently: a sentence, how grave it is, and its fields (docs/logs.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from canbase_config.priority import Priority
+from canbase_velocity.decision import Action, Cause, Decision
+from canbase_velocity.mux import MuxDecision, Standing
+
+Told = tuple[str, Priority, dict[str, str]]
+
+STOP_PRIORITY: Final = {
+    Cause.OBSTACLE: Priority.NOTICE,
+    Cause.OBSTACLE_NEAR: Priority.NOTICE,
+    Cause.SHUTDOWN: Priority.INFO,
+}
+"""Of a stop. An obstacle is what the filter is for; each other cause is one that somebody should look at."""
+
+
+def changes(before: MuxDecision, now: MuxDecision) -> Iterator[Told]:
+    """Locks that hold or let go, and who drives. A source that lost the wheel to a lock is a notice."""
+    held = {lock.name: lock.holds for lock in before.locks}
+    for lock in now.locks:
+        if lock.holds != held[lock.name]:
+            sentence = f"lock {lock.name} {lock.reason}" if lock.holds else f"lock {lock.name} is free"
+            yield sentence, Priority.NOTICE, {"lock": lock.name, "lock_holds": str(lock.holds).lower()}
+    if now.active != before.active:
+        lost = next((source for source in now.sources if source.name == before.active), None)
+        why = f" ({lost.reason})" if lost is not None and lost.reason else ""
+        locked = lost is not None and lost.standing is Standing.LOCKED
+        sentence = f"{now.active or 'nobody'} drives, before {before.active or 'nobody'}{why}"
+        fields = {"active": now.active or "", "before": before.active or ""}
+        yield sentence, Priority.NOTICE if locked else Priority.INFO, fields
+
+
+def changed_order(now: Decision) -> Told:
+    """What the filter does from now on, and what ends it."""
+    stops = now.action is Action.STOP
+    priority = STOP_PRIORITY.get(now.cause, Priority.WARNING) if stops else Priority.INFO
+    sentence = f"{now.action.name} {now.cause.value} {now.detail}".rstrip()
+    return sentence, priority, {"action": now.action.name, "cause": now.cause.value, "clears_on": now.clears_on}

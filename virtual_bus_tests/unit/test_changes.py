@@ -1,0 +1,67 @@
+"""What mux and filter tell: who drives and why not, locks, and how grave a stop is."""
+
+from __future__ import annotations
+
+import pytest
+
+from canbase_config.mux import MuxLock, MuxSource
+from canbase_config.priority import Priority
+from canbase_velocity.changes import changed_order, changes
+from canbase_velocity.decision import Action, Cause, Decision
+from canbase_velocity.mux import Mux
+from canbase_velocity.twist import ZERO, Twist
+
+SOURCES = {
+    "joy": MuxSource(topic="cmd_vel_joy", priority=100, timeout_s=0.3),
+    "nav": MuxSource(topic="cmd_vel_nav", priority=10, timeout_s=0.5),
+}
+LOCKS = {"gate": MuxLock(topic="gate", priority=50, required=False)}
+FORWARD = Twist(0.5, 0.0)
+
+
+def test_from_first_command_to_silence() -> None:
+    mux = Mux(SOURCES, LOCKS)
+    nobody = mux.decide(0.0)
+    mux.on_command("nav", FORWARD, 1.0)
+    nav = mux.decide(1.0)
+    silent = mux.decide(1.6)
+
+    assert list(changes(nobody, nav)) == [
+        ("nav drives, before nobody", Priority.INFO, {"active": "nav", "before": ""}),
+    ]
+    assert list(changes(nav, mux.decide(1.4))) == []
+    ((sentence, priority, fields),) = changes(nav, silent)
+    assert sentence == "nobody drives, before nav (silent for 0.60 s (timeout 0.50 s))"
+    assert (priority, fields) == (Priority.INFO, {"active": "", "before": "nav"})
+
+
+def test_a_lock_is_a_notice_and_so_is_what_it_takes_away() -> None:
+    mux = Mux(SOURCES, LOCKS)
+    mux.on_command("nav", FORWARD, 1.0)
+    nav = mux.decide(1.0)
+    mux.on_lock("gate", True, 1.1)
+    locked = mux.decide(1.1)
+    mux.on_lock("gate", False, 1.2)
+    free = mux.decide(1.2)
+
+    (lock, lost) = changes(nav, locked)
+    assert lock == ("lock gate holds", Priority.NOTICE, {"lock": "gate", "lock_holds": "true"})
+    assert (lost[0].startswith("nobody drives, before nav ("), lost[1]) == (True, Priority.NOTICE)
+    assert "gate" in lost[0]
+    assert list(changes(locked, free)) == [
+        ("lock gate is free", Priority.NOTICE, {"lock": "gate", "lock_holds": "false"}),
+        ("nav drives, before nobody", Priority.INFO, {"active": "nav", "before": ""}),
+    ]
+
+
+@pytest.mark.parametrize("cause", Cause)
+@pytest.mark.parametrize("action", Action)
+def test_only_a_stop_that_is_not_the_filters_daily_work_is_a_warning(action: Action, cause: Cause) -> None:
+    daily = {Cause.OBSTACLE: Priority.NOTICE, Cause.OBSTACLE_NEAR: Priority.NOTICE, Cause.SHUTDOWN: Priority.INFO}
+    expected = {Action.STOP: daily.get(cause, Priority.WARNING)}.get(action, Priority.INFO)
+
+    sentence, priority, fields = changed_order(Decision(action, cause, "at 0.31 m", "it being gone", ZERO))
+
+    assert sentence == f"{action.name} {cause.value} at 0.31 m"
+    assert priority is expected
+    assert fields == {"action": action.name, "cause": cause.value, "clears_on": "it being gone"}
