@@ -58,7 +58,7 @@ def test_without_the_drivers_heartbeat_it_stops_by_itself_though_setpoints_go_on
     since = world.now
     run_beside_a_blind_watchdog(world, HEARTBEAT_S - SENT_EVERY_S - 0.05)
     assert world.truth.linear_mps == pytest.approx(0.3, abs=0.01)
-    assert world.core.state is DriverState.ENABLED
+    assert not world.core.stops
     run_beside_a_blind_watchdog(world, 2.5)
     stood_after_s = world.now - world.truth.standing_s - since
     assert HEARTBEAT_S - SENT_EVERY_S < stood_after_s < HEARTBEAT_S + BRAKING_S
