@@ -168,26 +168,36 @@ def test_a_node_that_is_not_in_robot_yaml_is_a_warning() -> None:
     assert not_ok(alone(heard=heard(*DRIVES, "709 05"))) == [("other nodes", Verdict.WARN)]
 
 
-IP = [
-    {
-        "ifindex": 3, "ifname": "can0", "flags": ["NOARP", "UP", "LOWER_UP", "ECHO"], "mtu": 16, "txqlen": 10,
-        "link_type": "can",
-        "linkinfo": {
-            "info_kind": "can",
-            "info_data": {
-                "state": "ERROR-WARNING", "berr_counter": {"tx": 8, "rx": 127}, "restart_ms": 100,
-                "bittiming": {"bitrate": 500000, "sample_point": "0.875"}, "clock": 8000000,
-            },
-            "info_xstats": {"restarts": 1, "bus_error": 2, "arbitration_lost": 9, "error_warning": 3,
-                            "error_passive": 4, "bus_off": 5},
-        },
-    }
-]  # fmt: skip
+IP = """[{"ifindex":4,"ifname":"can0","flags":["NOARP","UP","LOWER_UP","ECHO"],"mtu":16,"qdisc":"pfifo_fast",
+"operstate":"UP","linkmode":"DEFAULT","group":"default","txqlen":64,"link_type":"can","promiscuity":0,"allmulti":0,
+"min_mtu":0,"max_mtu":0,"linkinfo":{"info_kind":"can","info_data":{"ctrlmode_supported":["LOOPBACK","LISTEN-ONLY",
+"TRIPLE-SAMPLING","ONE-SHOT","BERR-REPORTING","PRESUME-ACK","CC-LEN8-DLC"],"state":"ERROR-ACTIVE",
+"berr_counter":{"tx":0,"rx":0},"restart_ms":100,"bittiming":{"bitrate":500000,"sample_point":"0.875","tq":125,
+"prop_seg":6,"phase_seg1":7,"phase_seg2":2,"sjw":1,"brp":1},"bittiming_const":{"name":"sja1000",
+"tseg1":{"min":1,"max":16},"tseg2":{"min":1,"max":8},"sjw":{"min":1,"max":4},"brp":{"min":1,"max":64},"brp_inc":1},
+"clock":8000000},"info_xstats":{"restarts":0,"bus_error":0,"arbitration_lost":0,"error_warning":0,"error_passive":0,
+"bus_off":0}},"num_tx_queues":1,"num_rx_queues":1,"gso_max_size":65536,"gso_max_segs":65535,"tso_max_size":65536,
+"tso_max_segs":65535,"gro_max_size":65536,"parentbus":"pci","parentdev":"0000:00:10.0","stats64":{"rx":{"bytes":46571,
+"packets":9591,"errors":0,"dropped":0,"over_errors":0,"multicast":0},"tx":{"bytes":34848,"packets":8014,"errors":0,
+"dropped":0,"carrier_errors":0,"collisions":0}}}]"""
+"""`ip -details -statistics -json link show can0` of iproute2 6.1, an SJA1000 that a driver and a watchdog use."""
+NO_ERRORS = {"restarts": 0, "bus_error": 0, "error_warning": 0, "error_passive": 0, "bus_off": 0}
 
 
 def test_what_ip_tells_about_a_can_interface() -> None:
+    assert parse_link(IP) == Link("can0", "can", True, 500_000, "ERROR-ACTIVE", 0, 0, 100, 64, NO_ERRORS)
+
+
+def test_each_number_is_taken_from_its_own_place() -> None:
+    told = json.loads(IP)
+    info = told[0]["linkinfo"]
+    info["info_data"] |= {"state": "ERROR-WARNING", "berr_counter": {"tx": 8, "rx": 127}}
     counters = {"restarts": 1, "bus_error": 2, "error_warning": 3, "error_passive": 4, "bus_off": 5}
-    assert parse_link(json.dumps(IP)) == Link("can0", "can", True, 500_000, "ERROR-WARNING", 8, 127, 100, 10, counters)
+    info["info_xstats"] |= counters
+
+    found = parse_link(json.dumps(told))
+
+    assert found == Link("can0", "can", True, 500_000, "ERROR-WARNING", 8, 127, 100, 64, counters)
 
 
 @pytest.mark.parametrize("text", ["", "[]", "[{}]", "{}", "Device does not exist"])

@@ -17,6 +17,7 @@ prefer_udp(os.environ)
 import rclpy  # noqa: E402 - reads the environment
 from geometry_msgs.msg import TwistStamped  # noqa: E402
 from rclpy.publisher import Publisher  # noqa: E402
+from rclpy.signals import SignalHandlerOptions  # noqa: E402
 
 from vm.guest.stick import NONE  # noqa: E402
 from vm.guest.system import set_priority  # noqa: E402
@@ -33,7 +34,7 @@ def order_of(line: str) -> float | None:
 
 def main() -> None:
     """Until standard input ends."""
-    rclpy.init()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # a reboot ends this process at once
     node = rclpy.create_node("joystick", enable_rosout=False, start_parameter_services=False)
     publisher = node.create_publisher(TwistStamped, "cmd_vel_joy", 1)
     set_priority(os.getpid(), PRIORITY)  # not before: its start would hold up the robot

@@ -34,13 +34,13 @@ PLAN = FOLDER / "plan.json"
 FIRST: dict[str, Scenario] = {
     "cold boot": machine.cold_boot,
     "goal": machine.goal,
+    "support bundle": papers.support_bundle,
     **units.KILLS,
     "power cut": wires.power_cut,
     "link down": wires.link_down,
     "unplugged": wires.unplugged,
     "masked": units.masked,
     "journal": papers.journal,
-    "support bundle": papers.support_bundle,
     "installed again": papers.installed_again,
 }
 SECOND: dict[str, Scenario] = {

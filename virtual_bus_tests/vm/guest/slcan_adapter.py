@@ -17,6 +17,8 @@ import tty
 
 import can
 
+from vm.guest.system import set_priority
+
 N_SLCAN = 17
 """Line discipline, linux/tty.h."""
 SIOCGIFNAME, IFNAMSIZ = 0x8910, 16
@@ -24,6 +26,8 @@ SIOCGIFNAME, IFNAMSIZ = 0x8910, 16
 STATES = {"passive": b"e1a\rsp128000\r", "off": b"sb256000\r", "active": b"sa000000\r"}
 """drivers/net/can/slcan: an error frame (no acknowledge), the state, its counters of sent and received errors."""
 OPEN = b"O"
+PRIORITY = 55
+"""SCHED_FIFO: hardware, as the simulated drives."""
 
 
 def frame_of(line: bytes) -> can.Message | None:
@@ -88,6 +92,7 @@ def main() -> None:
     fcntl.ioctl(kernels, termios.TIOCSETD, struct.pack("i", N_SLCAN))
     name = fcntl.ioctl(kernels, SIOCGIFNAME, bytes(IFNAMSIZ))
     print(name.partition(b"\0")[0].decode(), flush=True)
+    set_priority(os.getpid(), PRIORITY)
     with can.Bus(interface="socketcan", channel="can0") as bus:
         Adapter(ours, bus).run()
 
