@@ -28,6 +28,8 @@ from canbase_watchdog.watchdog import Watchdog
 STEP_S = 0.002
 """Bus, drives and watchdog look at the clock so often; the watchdog wants it every 5 ms at least."""
 COMMAND_PERIOD_S = 0.02
+BOOTED_S = 1.5
+"""From power on, every kind of drive is enabled within it; the slowest says two boot-up messages."""
 FORWARD = Twist2D(0.3, 0.0)
 BITS_PER_MPS = 60.0 / (2.0 * math.pi * 0.1) * 20.0 * 10.0
 """60FFh of the sample robot: 0.1 rpm at the motor, gear 20, wheel radius 0.1 m."""

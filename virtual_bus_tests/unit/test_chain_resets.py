@@ -13,7 +13,7 @@ from canbase_driver.kinematics import Twist2D
 from canbase_driver.snapshot import DriverState
 from canbase_watchdog.watchdog import State as WatchdogState
 from canbase_watchdog.watchdog import Watchdog
-from unit.chain_world import FORWARD, World, bench_robot, setpoints, world_of
+from unit.chain_world import BOOTED_S, FORWARD, World, bench_robot, setpoints, world_of
 
 OVERCURRENT = 0x2310
 FAULT_RESET = 0x80
@@ -91,7 +91,7 @@ def test_a_reset_waits_for_a_drive_that_is_switched_on_later(world: World) -> No
     start = world.now
     outcome = world.reset()
     assert outcome.done, outcome.sentence
-    assert 3.5 < world.now - start < 4.5
+    assert 3.5 < world.now - start < 3.5 + BOOTED_S
     world.run_until(DriverState.ENABLED, within_s=0.5)
 
 
@@ -232,7 +232,7 @@ def test_a_node_that_the_watchdog_keeps_pre_operational_is_not_booted_against_it
     assert world.sent(0x601, since=start) == []
     hold_node_1(world, 0.05)
     released = world.now
-    world.run(1.0)
+    world.run(BOOTED_S)
     assert released + 0.1 < next(at for at, frame in world.log if frame.cob_id == 0x601 and at > start) < released + 0.3
     assert world.snapshot.drives[0].nmt_state == "operational"
 
