@@ -7,6 +7,7 @@ from typing import Annotated, Final
 
 import typer
 
+from canbase_cli.completion import one_more_of
 from canbase_cli.options import WRONG_INPUT, fail
 
 EPILOG: Final = (
@@ -28,7 +29,14 @@ def _steps(text: str) -> str:
 def commission(
     config: Annotated[Path, typer.Option("--config", "-c", metavar="FILE", help="The robot.yaml; it is changed.")],
     steps: Annotated[
-        str, typer.Option("--steps", metavar="STEPS", callback=_steps, help="Some of them, joined by commas.")
+        str,
+        typer.Option(
+            "--steps",
+            metavar="STEPS",
+            callback=_steps,
+            help="Some of them, joined by commas.",
+            autocompletion=lambda incomplete: one_more_of(STEPS, incomplete),
+        ),
     ] = ",".join(STEPS),
     speed_mps: Annotated[
         float, typer.Option("--speed", metavar="M/S", min=0.02, max=0.3, help="of the rims, after the first turn")

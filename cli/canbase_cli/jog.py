@@ -6,6 +6,7 @@ from typing import Annotated, Final
 
 import typer
 
+from canbase_cli import completion
 from canbase_cli.options import ConfigOption
 
 EPILOG: Final = (
@@ -15,7 +16,10 @@ EPILOG: Final = (
 
 
 def jog(
-    joint: Annotated[str, typer.Argument(metavar="JOINT", help="As in robot.yaml.", show_default=False)],
+    joint: Annotated[
+        str,
+        typer.Argument(metavar="JOINT", help="As in robot.yaml.", show_default=False, autocompletion=completion.joints),
+    ],
     config: ConfigOption = None,
     speed_mps: Annotated[float, typer.Option("--speed", metavar="M/S", min=0.005, max=0.2, help="of the rim")] = 0.05,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="The wheels are up: do not ask.")] = False,

@@ -7,6 +7,7 @@ from typing import Annotated, Final
 
 import typer
 
+from canbase_cli import completion
 from canbase_cli.bus_options import BitrateOption, ChannelOption, InterfaceOption
 from canbase_cli.options import ConfigOption
 
@@ -21,7 +22,12 @@ WRITE_EPILOG: Final = (
     "canbase sdo write 1 1010:1 0x65766173      (store: the drive keeps its settings)"
 )
 
-NodeArgument = Annotated[int, typer.Argument(metavar="NODE", min=1, max=127, help="Node id.", show_default=False)]
+NodeArgument = Annotated[
+    int,
+    typer.Argument(
+        metavar="NODE", min=1, max=127, help="Node id.", show_default=False, autocompletion=completion.node_ids
+    ),
+]
 ObjectArgument = Annotated[
     str, typer.Argument(metavar="INDEX[:SUB]", help="INDEX is hexadecimal: 6041, 0x1018:4.", show_default=False)
 ]

@@ -1,0 +1,46 @@
+"""What the shell proposes on Tab: names out of the robot.yaml that stands on the line before, or the bench sample.
+
+A robot.yaml that cannot be read proposes nothing: the command itself tells what is wrong in it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from canbase_config.robot import Robot
+
+
+def joints(ctx: typer.Context, incomplete: str) -> list[tuple[str, str]]:
+    """Joint names of the drives, each with its node."""
+    robot = _robot(ctx)
+    drives = robot.drives if robot else ()
+    return [(drive.joint, f"node {drive.node_id}") for drive in drives if drive.joint.startswith(incomplete)]
+
+
+def node_ids(ctx: typer.Context, incomplete: str) -> list[tuple[str, str]]:
+    """Node ids of the drives, each with its joints."""
+    robot = _robot(ctx)
+    found: dict[str, list[str]] = {}
+    for drive in robot.drives if robot else ():
+        found.setdefault(str(drive.node_id), []).append(drive.joint)
+    return [(node_id, ", ".join(names)) for node_id, names in found.items() if node_id.startswith(incomplete)]
+
+
+def one_more_of(words: tuple[str, ...], incomplete: str) -> list[str]:
+    """For a list that is joined by commas: what may follow, without what stands in it."""
+    head, comma, begun = incomplete.rpartition(",")
+    given = head.split(",")
+    return [f"{head}{comma}{word}" for word in words if word.startswith(begun) and word not in given]
+
+
+def _robot(ctx: typer.Context) -> Robot | None:
+    from canbase_config.errors import ConfigError
+    from canbase_config.load import load_robot, sample
+
+    try:
+        return load_robot(ctx.params.get("config") or sample("bench")).robot
+    except ConfigError:
+        return None
