@@ -18,8 +18,13 @@ SLOW_ANSWER_S = 0.1
 """A server that takes longer does something else meanwhile; a cancel is promised within half of it."""
 MARGIN_S = 1.0
 """On top of the braking time: the standstill has to be seen, and what is on the way has to arrive."""
-SETTINGS = {"ROS_DOMAIN_ID": "0", "ROS_AUTOMATIC_DISCOVERY_RANGE": "", "ROS_STATIC_PEERS": "", "RMW_IMPLEMENTATION": ""}
-"""What has to be alike for two processes to see each other; their defaults."""
+SETTINGS = {
+    "ROS_DOMAIN_ID": "0",
+    "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+    "ROS_STATIC_PEERS": "",
+    "RMW_IMPLEMENTATION": "",
+}
+"""What has to be alike for two processes to see each other; their defaults in `canbase`."""
 
 
 def server_process(seen: Evidence) -> Check:

@@ -1,4 +1,5 @@
-"""How this process talks DDS: over UDP, never over Fast DDS's shared memory. To be called before ROS starts.
+"""How this process talks DDS: with this computer alone unless somebody asks for more, and over UDP, never over Fast
+DDS's shared memory. To be called before ROS starts.
 
 There a sender waits up to 0.3 s for a receiver that is slow to answer, such as one that is just starting on a loaded
 computer. rclpy holds Python's interpreter lock meanwhile, so one late process would stop the control loop of another,
@@ -13,12 +14,21 @@ from typing import Final
 
 _PROFILES: Final = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")  # Fast DDS 2 and 3
 _RANGE: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+_CHOICES: Final = (_RANGE, "ROS_STATIC_PEERS", *_PROFILES)
+"""Who has set one of them has said who may hear."""
+_FAST_DDS: Final = ("", "rmw_fastrtps_cpp", "rmw_fastrtps_dynamic_cpp")
 _LOCAL: Final = Path(__file__).with_name("fastdds_local.xml")
 
 
+def stay_on_this_computer(environment: MutableMapping[str, str]) -> None:
+    """Changes the environment of this process, unless it says who may hear. DDS has no users: who hears may order."""
+    if not any(environment.get(name) for name in _CHOICES):
+        environment[_RANGE] = "LOCALHOST"
+
+
 def prefer_udp(environment: MutableMapping[str, str]) -> None:
-    """Changes the environment of this process. Who has a profile of their own for Fast DDS keeps it."""
-    if any(environment.get(name) for name in _PROFILES):
+    """Changes the environment of this process. A profile of the user for Fast DDS stays, and so does another DDS."""
+    if environment.get("RMW_IMPLEMENTATION", "") not in _FAST_DDS or any(environment.get(name) for name in _PROFILES):
         return
     environment.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
     if environment.get(_RANGE) == "LOCALHOST":  # here rmw_fastrtps adds shared memory whatever the line above says

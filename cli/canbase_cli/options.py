@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
 import typer
 from typer.core import TyperCommand
 
-from canbase_cli.middleware import prefer_udp
+from canbase_cli.middleware import prefer_udp, stay_on_this_computer
 
 if TYPE_CHECKING:
     from canbase_config.load import Loaded
@@ -93,6 +93,7 @@ def load_config(path: Path | None) -> Loaded:
 @contextmanager
 def ros_needed() -> Iterator[None]:
     """Around the import of a module that needs ROS 2: where that is missing, advice and exit code 1."""
+    stay_on_this_computer(os.environ)
     prefer_udp(os.environ)
     try:
         yield
