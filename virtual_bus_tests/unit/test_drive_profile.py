@@ -39,6 +39,16 @@ def test_every_value_of_a_profile_names_its_source_or_says_that_it_has_none(name
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_every_emergency_code_names_a_source_of_the_files_head(name: str) -> None:
+    file = read_yaml(profile_path(name))
+    lines = file.path.read_text(encoding="utf-8").splitlines()
+    head = "\n".join(line for line in lines if line.startswith("#"))
+    places = [(file.line(("emcy", code)) or 1) - 1 for code in file.values.get("emcy", {})]
+    sources = [lines[place].rpartition("# ")[2] for place in places]
+    assert [source for source in sources if source not in head or not source.startswith("[")] == []
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_what_a_comment_calls_unproven_the_profile_calls_unproven(name: str) -> None:
     file = read_yaml(profile_path(name))
     marked = {line for line in rows(file).values() if "unproven" in line}
