@@ -26,6 +26,8 @@ CHOSEN: Final = ("ROS_DOMAIN_ID", "RMW_IMPLEMENTATION")
 
 HIDDEN: Final = ("/home/", "/root/", "/run/user/", "/tmp/", "/var/tmp/")
 """What the units cannot see, by ProtectHome and PrivateTmp."""
+REHEARSAL_S: Final = 120.0
+"""A small computer imports ROS 2 from a cold memory card in some ten seconds."""
 _USES: Final = """
 import sys
 import canbase.msg, canbase_cli.main, canbase_config.load, can, canopen, rclpy
@@ -78,10 +80,10 @@ def rehearse(python: str, environment: Mapping[str, str]) -> None:
             cwd="/",
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=REHEARSAL_S,
             check=False,
         )
-    except OSError as error:
+    except (OSError, subprocess.TimeoutExpired) as error:
         raise InstallError(f"--python {python}: {error}") from error
     if done.returncode != 0:
         why = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
