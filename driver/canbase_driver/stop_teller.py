@@ -101,7 +101,7 @@ class StopTeller:
             robot=self._robot_name,
             stopped_by=record.stopped_by,
             cause=record.cause,
-            latched=record.latched,
+            latched=str(record.latched).lower(),
             standstill_s=f"{report.standstill_s:.3f}" if report.standstill else "",
             distance_m=f"{report.distance_m:.4f}",
             black_box=path,

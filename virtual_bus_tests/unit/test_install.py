@@ -281,6 +281,14 @@ def test_a_python_that_is_not_there_is_named() -> None:
         rehearse("/opt/no/python", {})
 
 
+def test_one_that_does_not_answer_is_named_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(host, "REHEARSAL_S", 0.05)
+    python = fake_python(tmp_path / "bin", "exec sleep 5")
+
+    with pytest.raises(InstallError, match="timed out"):
+        rehearse(python, {})
+
+
 def test_only_what_finds_ros_is_taken_from_a_sourced_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = {
         "PYTHONPATH": "/opt/ros",
