@@ -36,14 +36,20 @@ Entry = dict[str, Any]
 
 
 def journal(robot: Robot) -> Row:
-    """A goal that is driven, a trip, a goal that is refused: what docs/logs.md says of their entries."""
+    """A goal that is driven, then a trip: what docs/logs.md says of their entries."""
     robot.make_ready()
     robot.goal(0.05).wait(20.0)
     run(*STOP, STOP_FILE)
     robot.wait("the trip", lambda: robot.state not in (None, DriverStatus.ENABLED))
+    robot.wait("the stop's entry", lambda: _entries("CANBASE_STOPPED_BY=watchdog"), 10.0)
     driver, server = _entries("CANBASE_PART=motor_driver"), _entries("CANBASE_PART=drive_distance_server")
     _has(driver, PRIORITY=INFO, CANBASE_STATE="ENABLED", CANBASE_ROBOT="robot", _SYSTEMD_UNIT=unit("driver"))
     _has(driver, PRIORITY=WARNING, CANBASE_CAUSE=".+", CANBASE_STATE="(?!ENABLED).+")
+    _has(
+        driver, PRIORITY=WARNING, CANBASE_STOPPED_BY="watchdog", CANBASE_LATCHED="True", CANBASE_STANDSTILL_S=r"[\d.]+"
+    )
+    _has(_entries("CANBASE_PART=velocity_mux"), PRIORITY=INFO, CANBASE_ACTIVE="action", CANBASE_BEFORE="")
+    _has(_entries("CANBASE_PART=safety_filter"), PRIORITY=INFO, CANBASE_ACTION=".+")
     _has(server, PRIORITY=INFO, CANBASE_STEP="ended", CANBASE_ERROR_CODE="OK", CANBASE_GOAL=r"[0-9a-f-]{32,36}")
     _has(_entries("-u", unit("watchdog")), PRIORITY=WARNING, MESSAGE=".*tripped: .*")
     return Row("journal", "a goal, a trip", then="entries have their priorities and fields")

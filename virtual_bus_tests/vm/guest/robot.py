@@ -30,6 +30,7 @@ from vm.guest.system import ROBOT_YAML, BrokenPromiseError, show, unit  # noqa: 
 SPEED_MPS = 0.3
 RESTS_M = 0.0005
 WAIT_S = 30.0
+TOO_FAR_M = 1000.0
 
 T = TypeVar("T")
 
@@ -77,7 +78,10 @@ class Robot:
     def told(self) -> str:
         """The driver's state as last heard."""
         s = self.status
-        return "not heard" if s is None else f"state {s.state} {s.cause} ({s.detail}), ends on {s.clears_on}"
+        if s is None:
+            return "not heard"
+        fresh = "fresh" if s.command_fresh else "stale"
+        return f"state {s.state} {s.cause} ({s.detail}), ends on {s.clears_on}; its command is {fresh}"
 
     @property
     def state(self) -> int | None:
@@ -95,15 +99,30 @@ class Robot:
         self.wait("speed", lambda: self.truth().linear_mps >= 0.97 * SPEED_MPS, 10.0)
 
     def goal(self, distance_m: float) -> Drive:
-        """A goal of the action server, accepted."""
+        """A goal of the action server, accepted.
+
+        First one that it refuses: Fast DDS holds a server up to 0.1 s with the first answer to a client that it has
+        just met, which on this slow processor is enough to make its odometry old.
+        """
         until_s = time.monotonic() + WAIT_S
-        while True:
-            try:
-                return self.client.send(distance_m, SPEED_MPS, discovery_timeout_s=WAIT_S)
-            except RejectedError:
-                if time.monotonic() > until_s:
-                    raise
-                self.spin(0.3)
+        self._is_refused(TOO_FAR_M)
+        self.spin(0.5)
+        while (goal := self._sent(distance_m)) is None:
+            if time.monotonic() > until_s:
+                raise BrokenPromiseError(f"a goal of {distance_m} m is refused; driver: {self.told()}")
+            self.spin(0.3)
+        return goal
+
+    def _is_refused(self, distance_m: float) -> None:
+        if self._sent(distance_m) is not None:
+            raise BrokenPromiseError(f"a goal of {distance_m} m is not refused")
+
+    def _sent(self, distance_m: float) -> Drive | None:
+        """None: rejected."""
+        try:
+            return self.client.send(distance_m, SPEED_MPS, discovery_timeout_s=WAIT_S)
+        except RejectedError:
+            return None
 
     def drive_by_goal(self) -> Drive:
         """On the way at full speed by the action server."""
@@ -139,12 +158,12 @@ class Robot:
                 raise BrokenPromiseError(f"enabled without a reset; {self.told()}")
 
     def make_ready(self) -> float:
-        """Drives have power, nothing is ordered; seconds from the reset that was done, 0 without."""
+        """Drives have power, the driver hears zeros; then nothing is ordered. Seconds that a reset took, 0 without."""
         self.order(0.0)
         done_s = 0.0
         until_s = time.monotonic() + WAIT_S
         self.wait("the driver", lambda: self.state is not None)
-        while self.state != DriverStatus.ENABLED:
+        while self.state != DriverStatus.ENABLED or self.status is None or not self.status.command_fresh:
             if time.monotonic() > until_s:
                 raise BrokenPromiseError(f"not ready: {self.told()}")
             if self.status is not None and self.status.clears_on.startswith("reset"):
@@ -152,6 +171,7 @@ class Robot:
                 if self.reset():
                     done_s = time.monotonic() - asked_s
             self.spin(0.2)
+        self.spin(0.2)
         self.order(None)
         self.spin(0.5)  # until the mux has seen that the joystick is silent
         return done_s
