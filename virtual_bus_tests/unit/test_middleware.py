@@ -40,6 +40,7 @@ def test_the_profile_is_bound_to_loopback() -> None:
     profile = Path(environment["FASTRTPS_DEFAULT_PROFILES_FILE"]).read_text()
     assert set(re.findall(r"<address>(.*?)</address>", profile)) == {"127.0.0.1"}
     assert profile.count("<interfaceWhiteList>") == 1
+    assert "<leaseAnnouncement><sec>1</sec></leaseAnnouncement>" in profile  # else `ros2 lifecycle get` finds no node
 
 
 @pytest.mark.parametrize("other", ["rmw_cyclonedds_cpp", "rmw_zenoh_cpp"])
