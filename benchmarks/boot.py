@@ -6,10 +6,10 @@ measures that). `python benchmarks/boot.py` prints the table of docs/drives.md.
 
 from __future__ import annotations
 
+from bus.crews import robot_with
 from canbase_bench.personality import PERSONALITIES
 from figures import Figure
 from unit.chain_world import bench_robot, robot_of
-from unit.test_personalities import robot_with
 from unit.timed_bus import TimedBus, on_a_wire
 
 BUDGET_S, BUDGET_RATIO = 1.0, 1.5

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from bus.crews import robot_with as robot_with  # the benchmarks take it from here
+from bus.crews import robot_with
 from canbase_bench.personality import PERSONALITIES
 from canbase_config.derive import watchdog_config
 from canbase_config.profile_file import load_profile, profile_names
