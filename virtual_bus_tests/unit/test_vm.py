@@ -12,7 +12,7 @@ import pytest
 
 from vm import table
 from vm.guest.joystick import order_of
-from vm.guest.main import ALL, FIRST, SECOND, bounded, names
+from vm.guest.main import ALL, FIRST, SECOND, SHORT, bounded, names, shared_out
 from vm.guest.slcan_adapter import frame_of, line_of
 from vm.guest.standstill import standstill
 from vm.guest.system import BrokenPromiseError
@@ -223,6 +223,17 @@ def test_no_word_means_all_of_them() -> None:
 def test_a_word_that_means_none_is_told_what_there_is() -> None:
     with pytest.raises(BrokenPromiseError, match="no scenario is called unpluged; there are: cold boot, goal"):
         names(["unpluged"])
+
+
+def test_two_guests_share_what_is_wanted_and_one_has_all_of_it() -> None:
+    assert shared_out(["goal", "freeze"], 2) == [["goal"], ["freeze"]]
+    assert shared_out(["goal", "unplugged"], 2) == [["goal", "unplugged"]]
+    assert shared_out(["goal", "freeze"], 1) == [["goal", "freeze"]]
+
+
+def test_the_short_group_has_scenarios_of_both_guests() -> None:
+    assert names(["short"]) == list(SHORT)
+    assert len(shared_out(SHORT, 2)) == 2
 
 
 @pytest.mark.parametrize("part", ["watchdog", "driver", "velocity", "action-server"])

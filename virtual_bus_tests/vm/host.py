@@ -21,15 +21,13 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
-from vm.guest.main import ALL, names  # noqa: E402 - needs the path
+from vm.guest.main import ALL, names, shared_out  # noqa: E402 - needs the path
 from vm.overlay import overlay, ramdisk  # noqa: E402
 from vm.patience import Patience  # noqa: E402
 from vm.qmp import Monitor  # noqa: E402
 from vm.table import PAGE, Passed, last_words, report, results  # noqa: E402
 
 BUILD = HERE.parents[1] / "build" / "vm"
-GROUPS = ("first", "second")
-"""Of scenarios, one for each guest: guest/main.py."""
 GUESTS = int(os.environ.get("VM_GUESTS", str(os.cpu_count() or 1)))
 """How many may run side by side."""
 APPEND = (
@@ -115,8 +113,8 @@ def boot(jobs: Mapping[Path, Sequence[str]]) -> dict[Path, str]:
 
 def main(wanted: Sequence[str]) -> int:
     """Exit code 0: every scenario came out as promised. The table in docs/stop_times.md is written anew."""
-    parts = [list(wanted)] if wanted or len(GROUPS) > GUESTS else [[group] for group in GROUPS]
-    jobs = {BUILD / f"job-{number}": names(part) for number, part in enumerate(parts, 1)}
+    parts = shared_out(names(wanted), GUESTS)
+    jobs = {BUILD / f"job-{number}": part for number, part in enumerate(parts, 1)}
     begun = time.monotonic()
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # by way of `finally`: guests end too
     ended = boot(jobs)

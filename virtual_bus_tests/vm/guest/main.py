@@ -54,7 +54,22 @@ SECOND: dict[str, Scenario] = {
 """For two guests that run side by side. The serial adapter stays until the reboot; that and the freeze come last."""
 AFTER_BOOT: dict[str, Scenario] = {"reboot": machine.after_reboot, "freeze": machine.after_freeze}
 ALL = {**FIRST, **SECOND}
-GROUPS = {"first": FIRST, "second": SECOND}
+SHORT = (
+    *("cold boot", "goal", "driver SIGKILL", "watchdog SIGKILL", "velocity SIGKILL", "driver SIGSTOP", "link down"),
+    *(
+        "unplugged",
+        "masked",
+        "journal",
+        "stop target",
+        "restart driver",
+        "full disk",
+        "error passive",
+        "bus-off",
+        "freeze",
+    ),
+)
+"""One of each kind: what continuous integration has the time for."""
+GROUPS: dict[str, Sequence[str]] = {"first": tuple(FIRST), "second": tuple(SECOND), "short": SHORT}
 
 
 @dataclass(slots=True)
@@ -79,6 +94,12 @@ def names(words: Sequence[str]) -> list[str]:
     if not chosen:
         raise BrokenPromiseError(f"no scenario is called {' or '.join(words)}; there are: {', '.join(ALL)}")
     return [name for name in ALL if name in chosen]
+
+
+def shared_out(chosen: Sequence[str], guests: int) -> list[list[str]]:
+    """Among guests that run side by side."""
+    halves = [[name for name in chosen if name in half] for half in (FIRST, SECOND)]
+    return [half for half in halves if half] if guests > 1 else [list(chosen)]
 
 
 def _meant(word: str) -> list[str]:
