@@ -54,7 +54,7 @@ def journal(robot: Robot) -> Row:
 
 
 def support_bundle(robot: Robot) -> Row:
-    """`canbase support-bundle`, and in it the recording of a trip, and `canbase doctor`, who reads the interface as it is."""
+    """`canbase support-bundle`: a recording of a trip is in it, and what `canbase doctor` reads of the interface."""
     robot.make_ready()
     _trip(robot)
     robot.make_ready()
