@@ -105,7 +105,8 @@ def _uninstalled() -> None:
         raise BrokenPromiseError(f"canbase uninstall leaves {left}")
     if gone := sorted(str(path) for path in KEPT if not path.exists()):
         raise BrokenPromiseError(f"canbase uninstall takes the owner's {gone}")
-    if loaded := run("systemctl", "list-units", "--all", "--no-legend", "canbase*@robot*"):
+    listed = run("systemctl", "list-units", "--all", "--plain", "--no-legend", "canbase*@robot*").splitlines()
+    if loaded := [line for line in listed if line.split()[1] != "not-found"]:
         raise BrokenPromiseError(f"canbase uninstall leaves units: {loaded}")
 
 
