@@ -68,7 +68,7 @@ SHORT = (
         "freeze",
     ),
 )
-"""One of each kind: what continuous integration has the time for."""
+"""One of each kind, for a quick look; without reboot and freeze, which need a second boot."""
 GROUPS: dict[str, Sequence[str]] = {"first": tuple(FIRST), "second": tuple(SECOND), "short": SHORT}
 
 
