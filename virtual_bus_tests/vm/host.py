@@ -21,7 +21,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
-from vm.guest.main import ALL, names, shared_out  # noqa: E402 - needs the path
+from vm.guest.main import ALL, PLAN, names, shared_out  # noqa: E402 - needs the path
 from vm.overlay import overlay, ramdisk  # noqa: E402
 from vm.patience import Patience  # noqa: E402
 from vm.qmp import Monitor  # noqa: E402
@@ -30,6 +30,8 @@ from vm.table import PAGE, Passed, last_words, report, results  # noqa: E402
 BUILD = HERE.parents[1] / "build" / "vm"
 GUESTS = int(os.environ.get("VM_GUESTS", str(os.cpu_count() or 1)))
 """How many may run side by side."""
+BOOTS = 3
+"""Of one guest at most: two scenarios end in a reset."""
 APPEND = (
     "console=ttyS0 mitigations=off no_timer_check nokaslr random.trust_cpu=on audit=0 apparmor=0 selinux=0 "
     "systemd.show_status=0 clocksource=hpet"
@@ -42,6 +44,11 @@ def memory(name: str, image: Path) -> list[str]:
     return ["-object", backend, "-device", f"nvdimm,id=nv{name},memdev=m{name}"]
 
 
+def serial(name: str, path: Path) -> list[str]:
+    """A serial port whose output goes behind what is in the file."""
+    return ["-chardev", f"file,id={name},path={path},append=on", "-serial", f"chardev:{name}"]
+
+
 def qemu(initrd: Path, monitor: Path, job: Path) -> list[str]:
     """The command line of the guest."""
     return [
@@ -50,31 +57,45 @@ def qemu(initrd: Path, monitor: Path, job: Path) -> list[str]:
         *("-accel", "tcg,thread=single", "-icount", "shift=0,sleep=off", "-rtc", "base=utc,clock=vm"),
         *("-nodefaults", "-display", "none", "-nic", "none"),
         *("-kernel", str(BUILD / "vmlinux"), "-initrd", str(initrd), "-append", APPEND),
-        *("-serial", f"file:{job}/console.log", "-serial", f"file:{job}/out.txt"),
+        *serial("console", job / "console.log"),
+        *serial("told", job / "out.txt"),
         *("-qmp", f"unix:{monitor},server=on,wait=off"),
         *memory("0", BUILD / "root.ext4"),
         *memory("1", BUILD / "venv.ext4"),
         *("-virtfs", f"local,path={job},mount_tag=job,security_model=none,id=job"),
         *("-object", "can-bus,id=bus", "-device", "kvaser_pci,canbus=bus,id=adapter0,addr=0x10"),
         *("-device", "kvaser_pci,canbus=bus,id=adapter1,addr=0x11"),
-        *("-device", "i6300esb,id=wd", "-action", "watchdog=reset"),
+        *("-device", "i6300esb,id=wd", "-action", "watchdog=reset", "-action", "reboot=shutdown"),
     ]
 
 
 class Guest:
-    """One run of QEMU. Its results are in `job`."""
+    """One computer. Its results are in `job`.
+
+    When it is reset, QEMU ends and begins anew: over a reset the emulated SJA1000 keeps the position where it writes
+    what it receives, and forgets the one to read from; it would hear nonsense from then on.
+    """
 
     def __init__(self, initrd: Path, monitor: Path, job: Path) -> None:
         self.job, self.ended = job, ""
         self._monitor_path, self._told = monitor, job / "out.txt"
-        self._process = subprocess.Popen(qemu(initrd, monitor, job), stdin=subprocess.DEVNULL)
-        self._monitor: Monitor | None = None
+        self._command = qemu(initrd, monitor, job)
+        self._boots_left = BOOTS
         self._patience = Patience(time.monotonic())
+        self._boot()
+
+    def _boot(self) -> None:
+        self._boots_left -= 1
+        self._monitor_path.unlink(missing_ok=True)
+        self._monitor: Monitor | None = None
+        self._process = subprocess.Popen(self._command, stdin=subprocess.DEVNULL)
 
     def attend(self) -> bool:
         """Do what it asks for. False: it has ended, or its time is over: then `ended` says why."""
         if self._process.poll() is not None:
-            return False
+            if self._boots_left == 0 or not (self.job / PLAN.name).exists() or (self.job / "code").exists():
+                return False
+            self._boot()
         if self._monitor is None and self._monitor_path.exists() and self._told.exists():
             self._monitor = Monitor(self._monitor_path, self._told)
         if self._monitor is not None:

@@ -22,19 +22,23 @@ class Monitor:
     """A connection to the guest's control socket."""
 
     def __init__(self, path: Path, told: Path) -> None:
-        """`told`: the file that the guest's output goes to."""
-        self._told, self._done = told, 0
+        """`told`: the file that the guest's output goes to; what it has asked for already is done."""
+        self._told = told
+        self._done = len(self._orders())
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._socket.connect(str(path))
         self._send({"execute": "qmp_capabilities"})
 
     def look(self) -> None:
         """Do what the guest's output asks for since the last look."""
-        *lines, _ = self._told.read_text(errors="replace").split("\n")
-        orders = [line.split()[1] for line in lines if line.startswith("@host ")]
+        orders = self._orders()
         for order in orders[self._done :]:
             self._send(ORDERS[order])
         self._done = len(orders)
+
+    def _orders(self) -> list[str]:
+        *lines, _ = self._told.read_text(errors="replace").split("\n")
+        return [line.split()[1] for line in lines if line.startswith("@host ")]
 
     def _send(self, order: dict[str, Any]) -> None:
         self._socket.sendall(json.dumps(order).encode() + b"\n")

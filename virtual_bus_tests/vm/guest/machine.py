@@ -14,7 +14,7 @@ from typing import Final, NoReturn
 from canbase.msg import DriverStatus
 
 from exit_matrix import layers as by
-from vm.guest.last_words import MOMENT, WORDS
+from vm.guest.last_words import FOLDER, MOMENT, WORDS
 from vm.guest.robot import Robot
 from vm.guest.scenario import Row, limit_s, timed
 from vm.guest.standstill import Standstill, standstill
@@ -27,9 +27,7 @@ MEET_S: Final = 3.0
 FILLER: Final = Path("/var/tmp/filler")
 HARDWARE_PRIORITY, OURS, HOG = 98, 97, 90
 """SCHED_FIFO of the drives, which no computer can freeze, of this process, and of what freezes all others."""
-HOST: Final = Path("/mnt")
-"""A folder of the host: what is in there outlives a reset that does not wait for a disk."""
-LAST_SIGN: Final = HOST / "last_sign.json"
+LAST_SIGN: Final = FOLDER / "last_sign.json"
 RESET_S: Final = (2.0, 12.0)
 """RuntimeWatchdogSec is 5 s: one that comes earlier has another cause, one that comes later is none."""
 
@@ -88,7 +86,6 @@ def freeze(robot: Robot) -> NoReturn:
     """No unit gets the processor any more, nor does systemd; only the drives go on. `after_freeze` tells the rest."""
     robot.make_ready()
     robot.drive()
-    os.sync()
     (drives,) = show("canbase-sim.service", "MainPID")
     set_priority(int(drives), HARDWARE_PRIORITY)
     os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(OURS))
