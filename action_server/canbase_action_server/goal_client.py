@@ -76,6 +76,7 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         self._executor = executor or SingleThreadedExecutor(context=node.context)
         if executor is None:
             self._executor.add_node(node)
+            node.context.on_shutdown(self._executor.shutdown)  # one that outlives its context complains when it goes
         self._read_feedback = read_feedback
         self.read_result = read_result
         self.action = action
