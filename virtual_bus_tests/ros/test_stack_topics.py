@@ -119,15 +119,7 @@ def test_doctor_finds_that_the_scanner_of_this_test_stamps_nothing(world: World)
 
 def test_diagnostics_have_an_entry_for_each_part_and_none_is_an_error(world: World) -> None:
     recorder = world.node.record(DiagnosticArray, "/diagnostics")
-    parts = {
-        "motor_driver",
-        "bus",
-        "watchdog",
-        "drive left_wheel",
-        "drive right_wheel",
-        "velocity_mux",
-        "safety_filter",
-    }
+    parts = {"motor_driver", "bus", "watchdog", "drive left_wheel", "drive right_wheel", "velocity_mux"}
 
     def told() -> dict[str, DiagnosticStatus]:
         return {entry.name: entry for message in recorder.messages for entry in message.status}
