@@ -76,7 +76,7 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         self._executor = executor or SingleThreadedExecutor(context=node.context)
         if executor is None:
             self._executor.add_node(node)
-            node.context.on_shutdown(self._executor.shutdown)  # one that outlives its context complains when it goes
+            node.context.on_shutdown(self._end)
         self._read_feedback = read_feedback
         self.read_result = read_result
         self.action = action
@@ -84,6 +84,10 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         self._keepalive = node.create_publisher(UUID, f"{name}/keepalive", 10)
         self._timer = node.create_timer(KEEPALIVE_S, self._tell_alive)
         self._node = node
+
+    def _end(self) -> None:
+        """An executor that outlives its context complains on the terminal when it goes."""
+        self._executor.shutdown()
 
     @property
     def server_ready(self) -> bool:
