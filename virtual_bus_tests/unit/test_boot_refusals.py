@@ -141,3 +141,25 @@ def test_a_missing_pdo_is_an_error() -> None:
 def test_an_unused_pdo_that_stays_on_is_a_note() -> None:
     boot = boot_one_axis(FakeDrive(refuse={(0x1402, 1): READ_ONLY}))
     assert notes_of(boot) == ("1402h:1 is 40000401h, expected C0000401h (0601 0002h the object is read-only)",)
+
+
+def test_a_pdo_that_cannot_be_switched_off_is_a_note_where_its_fixed_identifier_and_mapping_are_right() -> None:
+    drive = FakeDrive(refuse={(0x1801, 1): READ_ONLY})
+    drive.objects |= {(0x1801, 1): u32(0x4000_0281), (0x1A01, 0): u8(1), (0x1A01, 1): u32(0x606C_0020)}
+    assert notes_of(boot_one_axis(drive)) == ("1801h:1: 0601 0002h the object is read-only",)
+    assert drive.number(0x1801, 2) == 1
+
+
+def test_a_mapping_that_is_empty_is_not_emptied() -> None:
+    drive = FakeDrive()
+    drive.objects[0x1A00, 0] = u8(0)
+    boot_one_axis(drive)
+    mapping = [(sub, value) for index, sub, value in drive.writes if index == 0x1A00]
+    assert mapping == [(1, 0x6041_0010), (2, 0x6064_0020), (0, 2)]
+
+
+def test_an_answer_that_is_wider_than_the_object_is_another_value() -> None:
+    drive = FakeDrive()
+    drive.objects[0x6007, 0] = u32(0x0001_0003)
+    assert notes_of(boot_one_axis(drive)) == ()
+    assert drive.objects[0x6007, 0] == u16(3)
