@@ -48,6 +48,8 @@ HEARTBEATS_PER_TIMEOUT = 3
 """The heartbeat goes out this often in the time that the drives allow for it."""
 RESET_TIMEOUT_S = 5.0
 """On top of what drives may take to boot: longer than a reset can take."""
+PAUSE = 0.5
+"""A cycle that begins so late, in parts of timeouts.feedback_s, begins a new run of SYNCs."""
 LONGEST_STEP_S = 1.0
 """A cycle after a longer gap, and the first one, counts as this long."""
 
@@ -79,6 +81,8 @@ class DriverCore:
         self._bus_problem = ""
         self._stop_requested = self._shutdown_requested = False
         self._heartbeat_at = self._ticked_at = -math.inf
+        self._sync_since = -math.inf
+        """Start of the present run of SYNCs without a pause: a drive is not silent that was not asked."""
         self._handlers = self._dispatch_table()
         self._bus_report = HEALTHY
         self.frames_dropped = 0
@@ -172,6 +176,8 @@ class DriverCore:
 
     def tick(self, now: float, lateness_s: float = 0.0) -> list[Frame]:
         """One cycle; the frames to send, in this order. `lateness_s`: how late it began."""
+        if now - self._ticked_at > PAUSE * self._robot.timeouts.feedback_s:
+            self._sync_since = now
         dt_s = min(now - self._ticked_at, LONGEST_STEP_S)
         self._ticked_at = now
         self._stats.note(now, lateness_s)
@@ -261,7 +267,7 @@ class DriverCore:
             missing=self._drives.missing(now),
             fault=self._drives.fault(),
             absent=self._drives.absent(),
-            silent=self._drives.silent(now),
+            silent=self._drives.silent(now, self._sync_since),
             disabled=self._drives.disabled(),
             unprepared=self._drives.unprepared(),
             watchdog=watchdog,

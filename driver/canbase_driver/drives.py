@@ -70,9 +70,9 @@ class Drives:
         """Why a node must be booted again."""
         return _first(node.absent() for node in self.nodes)
 
-    def silent(self, now: float) -> str:
-        """Which node gives no fresh status or heartbeat."""
-        return _first(node.silent(now) for node in self.nodes)
+    def silent(self, now: float, sync_since: float) -> str:
+        """Which node gives no fresh status or heartbeat. `sync_since`: start of the present run of SYNCs [s]."""
+        return _first(node.silent(now, sync_since) for node in self.nodes)
 
     def fault(self) -> str:
         """Which axis is in fault or in its reaction to one, and the code that the drive gave."""

@@ -121,14 +121,20 @@ class RemoteNode:
         """Why it is gone; empty when it is not."""
         return f"{self.name} {self._why_gone}" if self.presence is Presence.GONE else ""
 
-    def silent(self, now: float) -> str:
-        """A sentence when its feedback or its heartbeat is too old; only a node that is ready can be silent."""
+    def silent(self, now: float, sync_since: float) -> str:
+        """A sentence when its feedback or its heartbeat is too old; only a node that is ready can be silent.
+
+        It answers SYNCs: after a pause of ours it has timeouts.feedback_s from `sync_since` on [s], when the present
+        run of SYNCs began. However often we pause, it is silent when timeouts.drive_heartbeat_s are over as well.
+        """
         if self.presence is not Presence.READY:
             return ""
+        timeouts = self._robot.timeouts
         for axis in self.axes:
-            if axis.age_s(now) > self._robot.timeouts.feedback_s:
+            unasked_s = min(max(0.0, sync_since - axis.status_at), timeouts.drive_heartbeat_s)
+            if axis.age_s(now) - unasked_s > timeouts.feedback_s:
                 return f"{self.name}: no status for {axis.age_s(now):.2f} s"
-        if now - self.heartbeat_at > self._robot.timeouts.drive_heartbeat_s:
+        if now - self.heartbeat_at > timeouts.drive_heartbeat_s:
             return f"{self.name}: no heartbeat for {now - self.heartbeat_at:.2f} s"
         return ""
 

@@ -149,6 +149,15 @@ class World:
         self.driver, self.ticks = DriverCore(self.robot), []
         self.resume_cycles()
 
+    def pause_driver(self, seconds: float) -> None:
+        """Its process gets no time; what the bus brings meanwhile waits until then."""
+        driver, self.driver, taken_in = self.core, None, len(self.log)
+        self.run(seconds)
+        self.driver = driver
+        for _, frame in self.log[taken_in:]:
+            driver.on_frame(frame, self.now)
+        self.resume_cycles()
+
     def resume_cycles(self) -> None:
         """The driver's next cycle is now: those in which it was not there are not made up for."""
         self._next_cycle = self.now

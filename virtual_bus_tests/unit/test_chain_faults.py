@@ -137,6 +137,23 @@ def test_drives_that_are_deaf_to_pdos_for_a_lost_heartbeat_are_stopped_by_sdo(wo
     assert world.powered == [False, False]
 
 
+@pytest.mark.parametrize("pause_s", [0.03, 0.09, 0.15])
+def test_a_pause_of_the_driver_is_not_taken_for_silence_of_its_drives(world: World, pause_s: float) -> None:
+    """They say nothing without SYNC. The drives follow the last setpoint meanwhile, under the watchdog's eyes."""
+    world.pause_driver(pause_s)
+    world.run(0.5)
+    assert (world.core.state, list(world.core.stops)) == (DriverState.ENABLED, [])
+    assert world.truth.linear_mps == pytest.approx(FORWARD.linear_mps, abs=0.01)
+
+
+def test_a_drive_that_fell_silent_in_a_pause_of_the_driver_is_noticed(world: World) -> None:
+    silence_a_drive(world)
+    world.pause_driver(0.15)
+    assert world.stands_after() < 0.35
+    assert world.core.state is DriverState.LATCHED
+    assert world.core.cause.name in ("drive silent", "watchdog tripped")  # whoever looks first
+
+
 def test_a_new_driver_takes_over_after_a_kill_and_needs_a_reset(world: World) -> None:
     world.kill_driver()
     world.run(0.6)

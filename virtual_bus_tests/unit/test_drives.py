@@ -114,8 +114,8 @@ def test_an_emergency_message_alone_is_no_fault_and_goes_with_a_reset(story: Sto
 def test_the_first_node_that_is_silent_is_named(story: Story) -> None:
     for node in story.drives.nodes:
         node.heartbeat_at = 10.0
-    assert story.drives.silent(10.0) == ""
-    assert story.drives.silent(10.2) == "node 1 (left_wheel): no status for 0.20 s"
+    assert story.drives.silent(10.0, 9.0) == ""
+    assert story.drives.silent(10.2, 9.0) == "node 1 (left_wheel): no status for 0.20 s"
 
 
 def test_several_wheels_on_a_side_are_averaged_and_the_fastest_is_found() -> None:

@@ -15,6 +15,8 @@ from canbase_driver.remote_node import Presence, RemoteNode
 from unit.chain_world import bench_robot
 from unit.fake_drive import FakeDrive
 
+NEVER = -math.inf
+
 GONE, BOOTING, STARTING, READY = Presence
 BOOT_UP, OPERATIONAL, PRE_OPERATIONAL, STOPPED = 0x00, 0x05, 0x7F, 0x04
 START = Frame(0x000, b"\x01\x01")
@@ -86,7 +88,7 @@ def test_at_first_it_is_gone_and_sends_nothing() -> None:
     assert story.node.presence is GONE
     assert story.sent == []
     assert story.node.absent() == "node 1 (left_wheel) not booted yet"
-    assert (story.node.waiting_for(10.0), story.node.silent(10.0)) == ("", "")
+    assert (story.node.waiting_for(10.0), story.node.silent(10.0, NEVER)) == ("", "")
 
 
 def test_a_boot_that_ends_well_starts_the_node_and_waits_for_its_first_feedback() -> None:
@@ -97,7 +99,7 @@ def test_a_boot_that_ends_well_starts_the_node_and_waits_for_its_first_feedback(
     assert story.node.report is not None
     assert story.node.report.stops_by_itself
     assert story.node.waiting_for(story.now).startswith("node 1 (left_wheel): waiting for its first feedback since 0.")
-    assert (story.node.absent(), story.node.silent(story.now)) == ("", "")
+    assert (story.node.absent(), story.node.silent(story.now, NEVER)) == ("", "")
 
 
 def test_when_it_is_configured_it_waits_for_the_boots_of_the_others() -> None:
@@ -147,7 +149,7 @@ def test_without_heartbeat_or_status_it_is_lost_after_a_second(beats: bool, spea
 
 def test_with_both_it_is_ready() -> None:
     story = Story().ready()
-    assert (story.node.waiting_for(story.now), story.node.absent(), story.node.silent(story.now)) == ("", "", "")
+    assert (story.node.waiting_for(story.now), story.node.absent(), story.node.silent(story.now, NEVER)) == ("", "", "")
     assert story.node.nmt_state is NmtState.OPERATIONAL
 
 
@@ -156,7 +158,26 @@ def test_a_status_that_is_too_old_is_silence(age_s: float, silent: bool) -> None
     story = Story().ready()
     since = story.axis.status_at
     sentence = f"node 1 (left_wheel): no status for {age_s:.2f} s"
-    assert story.node.silent(since + age_s) == (sentence if silent else "")
+    assert story.node.silent(since + age_s, NEVER) == (sentence if silent else "")
+
+
+@pytest.mark.parametrize(
+    ("run_s", "age_s", "silent"),
+    [
+        (0.0, 0.15, False),
+        (0.09, 0.24, False),
+        (0.11, 0.26, True),
+        (0.0, 0.39, False),  # however often we pause: no longer than 0.3 s + 0.1 s
+        (0.0, 0.41, True),
+    ],
+)
+def test_a_drive_that_was_not_asked_is_not_silent(run_s: float, age_s: float, silent: bool) -> None:
+    """status ──── our pause ──── SYNCs again ── `run_s` ── now: the drive has 0.1 s from there on."""
+    story = Story().ready()
+    now = story.axis.status_at + age_s
+    story.node.heartbeat_at = now
+    sentence = f"node 1 (left_wheel): no status for {age_s:.2f} s"
+    assert story.node.silent(now, now - run_s) == (sentence if silent else "")
 
 
 def test_a_heartbeat_that_is_too_old_is_silence_though_the_status_is_fresh() -> None:
@@ -164,9 +185,9 @@ def test_a_heartbeat_that_is_too_old_is_silence_though_the_status_is_fresh() -> 
     beat_at = story.node.heartbeat_at
     story.now = beat_at + 0.31
     story.status()
-    assert story.node.silent(beat_at + 0.31) == "node 1 (left_wheel): no heartbeat for 0.31 s"
+    assert story.node.silent(beat_at + 0.31, NEVER) == "node 1 (left_wheel): no heartbeat for 0.31 s"
     story.heartbeat(OPERATIONAL)
-    assert story.node.silent(story.now) == ""  # it is ready again by itself; what is latched is the supervisor's
+    assert story.node.silent(story.now, NEVER) == ""  # it is ready again by itself; what is latched is the supervisor's
 
 
 @pytest.mark.parametrize(
