@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,8 @@ ROBOT_SCHEMA = Schema(Robot)
 class Loaded:
     """A robot and where it came from. `given` and `defaults` share out all leaf keys of the effective configuration.
 
-    `warnings`: what can be used, and had better be changed.
+    `warnings`: what can be used, and had better be changed. `files`: the user's own files that belong to it (drive
+    profiles, parameters of twist_mux), by the paths that it names them with.
     """
 
     robot: Robot
@@ -34,6 +35,7 @@ class Loaded:
     given: frozenset[Loc]
     defaults: frozenset[Loc]
     warnings: tuple[Problem, ...] = ()
+    files: Mapping[str, Path] = field(default_factory=dict)
 
 
 def load_robot(path: str | Path) -> Loaded:
@@ -41,14 +43,22 @@ def load_robot(path: str | Path) -> Loaded:
 
     Raises ConfigError, which carries all problems found.
     """
-    file = with_twist_mux(plain(read_yaml(path)))
+    alone = plain(read_yaml(path))
+    file = with_twist_mux(alone)
     try:
         robot = Robot.model_validate(file.values, context={"folder": file.path.parent})
     except ValidationError as error:
         raise ConfigError(explain(error, file, ROBOT_SCHEMA)) from error
     keys = frozenset(leaf_keys(robot.model_dump()))
     given = keys & file.lines.keys()
-    return Loaded(robot, file.path, given, keys - given, tuple(_warnings(robot, file)))
+    return Loaded(robot, file.path, given, keys - given, tuple(_warnings(robot, file)), _named(alone))
+
+
+def _named(file: YamlFile) -> dict[str, Path]:
+    """Of a file that is known to be valid."""
+    profiles = [str(drive.get("profile", "")) for drive in file.values["drives"]]
+    own = [name for name in profiles if name.endswith((".yaml", ".yml"))]
+    return {name: file.path.parent / name for name in [*own, *(file.values.get("mux") or {}).get("twist_mux", ())]}
 
 
 def _warnings(robot: Robot, file: YamlFile) -> Iterator[Problem]:

@@ -9,8 +9,9 @@ import subprocess
 import sys
 import tarfile
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
@@ -85,12 +86,22 @@ class Bundle:
         new.replace(path)
 
 
-def collect(robot: Robot, config: Path, since: str, etc: Path = ETC, state: Path = STATE) -> Bundle:
-    """Everything. Nothing of it touches the bus or orders anything."""
+def collect(
+    robot: Robot,
+    config: Path,
+    since: str,
+    etc: Path = ETC,
+    state: Path = STATE,
+    named: Mapping[str, Path] = MappingProxyType({}),
+) -> Bundle:
+    """Everything. Nothing of it touches the bus or orders anything. `named`: the files that robot.yaml names."""
     bundle = Bundle()
     bundle.text("versions/canbase.txt", "canbase, Python, computer", _versions)
     bundle.text("environment.txt", "variables of ROS and canbase", lambda: support.environment_text(os.environ))
     bundle.file("config/robot.yaml", config)
+    for name, path in named.items():
+        outside = ".." in Path(name).parts or Path(name).is_absolute()
+        bundle.file(f"config/elsewhere/{path.name}" if outside else f"config/{name}", path)
     for path in _listed(bundle, "config/installed", etc, ("*.yaml", "*.env", "installed/*.txt")):
         bundle.file(f"config/installed/{path.relative_to(etc)}", path)
     boxes = {path: path.stat().st_mtime for folder in _box_folders(robot, state) for path in folder.glob("*.asc")}
@@ -103,6 +114,12 @@ def collect(robot: Robot, config: Path, since: str, etc: Path = ETC, state: Path
     for command in support.commands(sys.executable, config, since):
         bundle.output(command)
     return bundle
+
+
+def installed_robot(etc: Path) -> Path | None:
+    """The robot.yaml of the first robot that is installed; other .yaml files may lie beside it. None: there is none."""
+    names = sorted(path.stem for path in (etc / "installed").glob("*.txt")) or ["robot"]
+    return next((path for path in (etc / f"{name}.yaml" for name in names) if path.is_file()), None)
 
 
 def _listed(bundle: Bundle, name: str, folder: Path, patterns: Iterable[str]) -> list[Path]:
@@ -142,11 +159,10 @@ def support_bundle(
 
     It orders nothing, and touches no key: docs/logs.md. As root it sees more. Exit codes: 0 written, 1 not.
     """
-    installed = sorted(ETC.glob("*.yaml"))
-    loaded = load_config(config or (installed[0] if installed else None))
+    loaded = load_config(config or installed_robot(ETC))
     name = f"canbase-support-{loaded.robot.name}-{time.strftime('%Y%m%dT%H%M%S')}.tar.gz"
     path = output or Path(name)
-    bundle = collect(loaded.robot, loaded.path, since)
+    bundle = collect(loaded.robot, loaded.path, since, named=loaded.files)
     try:
         bundle.write(path)
     except OSError as error:

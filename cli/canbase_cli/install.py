@@ -51,14 +51,16 @@ def install(
 ) -> None:
     """Install the robot's services: they start at boot, before anybody logs in.
 
-    Units, the user canbase, robot.yaml with mode 0640, the CAN interface. May be given again at any time: what the
-    owner has changed in /etc/canbase is kept, a robot.yaml that is replaced stays beside the new one as .old.
+    Units, the user canbase, robot.yaml and the files it names with mode 0640, the CAN interface. May be given again
+    at any time: what the owner has changed in /etc/canbase is kept, a file of his that is replaced stays beside the
+    new one as .old.
 
     Exit codes: 0 done, 1 a step failed, 2 wrong command line or robot.yaml, or a robot that services cannot run.
     """
     from canbase_deploy.execute import ExecuteError, Executor
-    from canbase_deploy.host import chosen, manifests, rehearse, sourced, templates
-    from canbase_deploy.plan import InstallError, Request, install_plan, owner_paths
+    from canbase_deploy.host import chosen, manifests, named_texts, rehearse, sourced, templates
+    from canbase_deploy.owner import owner_paths
+    from canbase_deploy.plan import InstallError, Request, install_plan
 
     loaded = load_config(config or prefix / owner_paths(name or "robot")[0].relative_to("/"))
     try:
@@ -76,6 +78,7 @@ def install(
             cpus=cpus,
             hardware_watchdog_s=hardware_watchdog,
             sros2=sros2,
+            files={} if config is None else named_texts(loaded.files),
         )
         plan = install_plan(request, manifests(prefix))
         if prefix == Path("/"):
@@ -94,7 +97,9 @@ def uninstall(
     name: Annotated[str, typer.Argument(help="Name of the robot.")] = "robot",
     prefix: PrefixOption = Path("/"),
     dry_run: DryRunOption = False,
-    purge: Annotated[bool, typer.Option("--purge", help="Remove its robot.yaml and environment too.")] = False,
+    purge: Annotated[
+        bool, typer.Option("--purge", help="Remove its robot.yaml, the files this names, and its environment too.")
+    ] = False,
 ) -> None:
     """Stop a robot's services and remove them. Its robot.yaml stays, unless --purge.
 
@@ -102,11 +107,10 @@ def uninstall(
     """
     from canbase_deploy.execute import ExecuteError, Executor
     from canbase_deploy.host import manifests
-    from canbase_deploy.plan import InstallError, owner_paths, uninstall_plan
+    from canbase_deploy.plan import InstallError, uninstall_plan
 
-    owner_files = [str(path) for path in owner_paths(name)] if purge else []
     try:
-        Executor(prefix, typer.echo, dry_run=dry_run).carry_out(uninstall_plan(name, manifests(prefix), owner_files))
+        Executor(prefix, typer.echo, dry_run=dry_run).carry_out(uninstall_plan(name, manifests(prefix), purge=purge))
     except InstallError as error:
         fail(str(error), WRONG_INPUT)
     except ExecuteError as error:

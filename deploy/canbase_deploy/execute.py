@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path, PurePosixPath
 
 from canbase_deploy.actions import Action, Existing, Link, Remove, Run, WriteFile
+from canbase_deploy.owner import ETC, old
 
 COMMAND_S = 60.0
 
@@ -54,7 +55,7 @@ class Executor:
             return
         elif there is not None and action.existing is Existing.BACK_UP:
             self._tell("replaced ", action.path, f"the old one is {action.path.name}.old")
-            self._put(path.with_name(f"{path.name}.old"), there, action)
+            self._put(self._below(old(action.path)), there, action)
         else:
             self._tell("wrote    ", action.path)
         self._put(path, action.text, action)
@@ -93,7 +94,8 @@ class Executor:
         if self._dry_run:
             return
         path.unlink()
-        if path.parent.suffix in (".d", ".wants") and not any(path.parent.iterdir()):
+        made = path.parent.suffix in (".d", ".wants") or ETC in action.path.parent.parents
+        if made and not any(path.parent.iterdir()):
             path.parent.rmdir()
 
     def _run(self, action: Run) -> None:

@@ -10,7 +10,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
-from canbase_deploy.plan import ETC, InstallError
+from canbase_deploy.owner import ETC
+from canbase_deploy.plan import InstallError
 
 SOURCED: Final = (
     "AMENT_PREFIX_PATH",
@@ -93,6 +94,23 @@ def rehearse(python: str, environment: Mapping[str, str]) -> None:
             raise InstallError(
                 f"the services do not see {path} (ProtectHome, PrivateTmp in their units): install below /opt"
             )
+
+
+def named_texts(files: Mapping[str, Path]) -> dict[str, str]:
+    """Texts of the files that robot.yaml names, by its relative paths; one with an absolute path stays where it is.
+
+    Raises InstallError for one that the services would not see, or that cannot be read.
+    """
+    for name in files:
+        if name.startswith(HIDDEN):
+            raise InstallError(
+                f"robot.yaml names {name}, which the services do not see: expected a path relative to robot.yaml, "
+                "then it is installed too"
+            )
+    try:
+        return {name: path.read_text("utf-8") for name, path in files.items() if not Path(name).is_absolute()}
+    except OSError as error:
+        raise InstallError(f"robot.yaml needs {error.filename}: {error.strerror}") from error
 
 
 def manifests(prefix: Path) -> dict[str, str]:

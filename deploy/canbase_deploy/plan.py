@@ -1,6 +1,6 @@
 """Which files, links and commands make a robot's services. Pure: a request in, a list of actions out.
 
-Files that the owner edits (robot.yaml, the environment) are in /etc/canbase; all others are ours and are written anew.
+Files that the owner edits (`owner.py`) are in /etc/canbase; all others are ours and are written anew.
 """
 
 from __future__ import annotations
@@ -13,9 +13,8 @@ from typing import Final, Literal
 
 from canbase_config.robot import Robot
 from canbase_deploy.actions import Action, Existing, Link, Remove, Run, WriteFile
+from canbase_deploy.owner import ETC, USER, is_the_owners, misplaced, modes, old, owner_paths, place
 
-USER: Final = "canbase"
-ETC: Final = PurePosixPath("/etc/canbase")
 UNITS: Final = PurePosixPath("/etc/systemd/system")
 RUN: Final = PurePosixPath("/run/canbase")
 PARTS: Final = ("watchdog", "driver", "velocity", "action-server")
@@ -48,7 +47,8 @@ class InstallError(ValueError):
 class Request:
     """What to install. `templates`: name and text of the files in deploy/systemd; `python`: runs `-m canbase_cli`.
 
-    `yaml`: the text of robot.yaml, None: keep the installed one. `adapter`: a udev property, `ID_PATH=…`, that names
+    `yaml`: the text of robot.yaml, None: keep the installed one. `files`: texts of the files that it names by relative
+    paths, by these. `adapter`: a udev property, `ID_PATH=…`, that names
     the adapter which is to get the interface's name. `cpus`: for CPUAffinity. `hardware_watchdog_s`: 0 leaves it alone.
     `environment`: what the owner chose of ROS; `sourced`: what a sourced ROS 2 set, by which the services find it.
     """
@@ -66,6 +66,7 @@ class Request:
     cpus: str = ""
     hardware_watchdog_s: int = 0
     sros2: bool = False
+    files: Mapping[str, str] = field(default_factory=dict)
 
 
 def install_plan(request: Request, manifests: Mapping[str, str]) -> list[Action]:
@@ -74,41 +75,47 @@ def install_plan(request: Request, manifests: Mapping[str, str]) -> list[Action]
     Raises InstallError for a robot that services cannot run.
     """
     _check(request)
-    files = _files(request)
-    manifest = "".join(f"{action.path}\n" for action in files if not _is_the_owners(action))
-    stale = [path for path in _own(request.name, manifests) if path not in manifest.splitlines()]
+    _check_places(request, manifests)
+    before = [PurePosixPath(path) for path in manifests.get(request.name, "").splitlines()]
+    named = dict.fromkeys([*map(place, request.files), *filter(is_the_owners, before)])
+    files = [*_files(request), *_modes_of(request.name, named)]
+    listed = dict.fromkeys([*named, *(action.path for action in files if not is_the_owners(action.path))])
+    stale = [path for path in _own(request.name, manifests) if path not in listed]
     return [
         ACCOUNT,
         Run(("systemd-sysusers", str(ACCOUNT.path))),
         *files,
-        *(Remove(PurePosixPath(path)) for path in stale),
-        WriteFile(manifest_path(request.name), manifest),
-        Run(("systemd-tmpfiles", "--create", str(MODES.path))),
+        *map(Remove, stale),
+        WriteFile(manifest_path(request.name), "".join(f"{path}\n" for path in listed)),
+        Run(("systemd-tmpfiles", "--create", str(MODES.path), *(str(f.path) for f in _modes_of(request.name, named)))),
         Run(("udevadm", "control", "--reload")),
         Run(("systemctl", "daemon-reload")),
     ]
 
 
-def uninstall_plan(name: str, manifests: Mapping[str, str], owner_files: Iterable[str] = ()) -> list[Action]:
-    """Removes what `manifests[name]` lists and no other robot's manifest does; `owner_files` too, if given.
+def uninstall_plan(name: str, manifests: Mapping[str, str], *, purge: bool = False) -> list[Action]:
+    """Removes what `manifests[name]` lists and no other robot's manifest does; the owner's files only with `purge`.
 
     Raises InstallError when `name` is not installed.
     """
     if name not in manifests:
         known = ", ".join(sorted(manifests)) or "none"
         raise InstallError(f"the robot {name!r} is not installed; installed: {known}")
+    own = _own(name, manifests)
+    owners = [path for path in [*filter(is_the_owners, own), *owner_paths(name)] if purge]
     return [
         Run(("systemctl", "stop", f"canbase@{name}.target", *(service(part, name) for part in PARTS)), True),
-        *(Remove(PurePosixPath(line)) for line in [*_own(name, manifests), *owner_files]),
+        *(Remove(path) for path in own if not is_the_owners(path)),
+        *(Remove(one) for path in owners for one in (path, old(path))),
         Remove(manifest_path(name)),
         Run(("systemctl", "daemon-reload")),
     ]
 
 
-def _own(name: str, manifests: Mapping[str, str]) -> list[str]:
+def _own(name: str, manifests: Mapping[str, str]) -> list[PurePosixPath]:
     """Files that belong to this robot and to no other one."""
     others = {path for other, text in manifests.items() if other != name for path in text.splitlines()}
-    return [path for path in manifests.get(name, "").splitlines() if path not in others]
+    return [PurePosixPath(path) for path in manifests.get(name, "").splitlines() if path not in others]
 
 
 def service(part: str, name: str) -> str:
@@ -119,15 +126,6 @@ def service(part: str, name: str) -> str:
 def manifest_path(name: str) -> PurePosixPath:
     """Where the files of one robot are listed."""
     return ETC / "installed" / f"{name}.txt"
-
-
-def owner_paths(name: str) -> tuple[PurePosixPath, PurePosixPath]:
-    """The two files of a robot that an upgrade and an ordinary `uninstall` keep."""
-    return ETC / f"{name}.yaml", ETC / f"{name}.env"
-
-
-def _is_the_owners(action: WriteFile | Link) -> bool:
-    return isinstance(action, WriteFile) and action.existing is not Existing.REPLACE
 
 
 def _check(request: Request) -> None:
@@ -150,6 +148,23 @@ def _check(request: Request) -> None:
         raise InstallError(
             f"--adapter {request.adapter}: expected a udev property such as ID_PATH=pci-0000:00:14.0-usb"
         )
+
+
+def _check_places(request: Request, manifests: Mapping[str, str]) -> None:
+    """No robot's robot.yaml takes the place of a file that robot.yaml names, nor the other way."""
+    robots = {owner_paths(name)[0] for name in (request.name, *manifests)}
+    for reference in request.files:
+        if wrong := misplaced(reference):
+            raise InstallError(wrong)
+        if place(reference) in robots:
+            raise InstallError(
+                f"{place(reference)} is a robot: expected another name for its file {reference}; rename it"
+            )
+    for name, text in manifests.items():
+        if str(owner_paths(request.name)[0]) in text.splitlines():
+            raise InstallError(
+                f"{request.name}.yaml is a file of the robot {name}: this one needs another name, --name"
+            )
 
 
 def _files(request: Request) -> list[WriteFile | Link]:
@@ -175,9 +190,17 @@ def _of_the_owner(request: Request) -> list[WriteFile]:
     env += "".join(f"{key}={value}\n" for key, value in values.items())
     env += "# CANBASE_OPTIONS=--namespace robot1\n# CANBASE_ROS_ARGS=-r scan:=front/scan\n"
     files = [WriteFile(env_path, env, 0o640, USER, Existing.KEEP)]
+    for reference, text in request.files.items():
+        files.append(WriteFile(place(reference), text, 0o640, USER, Existing.BACK_UP))
     if request.yaml is not None:
         files.append(WriteFile(yaml_path, request.yaml, 0o640, USER, Existing.BACK_UP))
     return files
+
+
+def _modes_of(name: str, named: Iterable[PurePosixPath]) -> list[WriteFile]:
+    """Of the files that robot.yaml names: they may lie in folders of their own."""
+    text = modes(named)
+    return [WriteFile(PurePosixPath(f"/etc/tmpfiles.d/canbase-{name}.conf"), text)] if text else []
 
 
 def _can(request: Request) -> list[WriteFile | Link]:
