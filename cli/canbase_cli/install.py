@@ -58,7 +58,7 @@ def install(
     Exit codes: 0 done, 1 a step failed, 2 wrong command line or robot.yaml, or a robot that services cannot run.
     """
     from canbase_deploy.execute import ExecuteError, Executor
-    from canbase_deploy.host import chosen, manifests, named_texts, rehearse, sourced, templates
+    from canbase_deploy.host import chosen, manifests, named_texts, neighbours, rehearse, sourced, templates
     from canbase_deploy.owner import owner_paths
     from canbase_deploy.plan import InstallError, Request, install_plan
 
@@ -80,7 +80,8 @@ def install(
             sros2=sros2,
             files={} if config is None else named_texts(loaded.files),
         )
-        plan = install_plan(request, manifests(prefix))
+        installed = manifests(prefix)
+        plan = install_plan(request, installed, neighbours(prefix, request.name, installed))
         if prefix == Path("/"):
             rehearse(python, request.sourced)
     except InstallError as error:

@@ -6,11 +6,14 @@ import importlib.util
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Final
 
-from canbase_deploy.owner import ETC
+from canbase_config.errors import ConfigError
+from canbase_config.load import load_robot
+from canbase_deploy.neighbours import Neighbour
+from canbase_deploy.owner import ETC, owner_paths
 from canbase_deploy.plan import InstallError
 
 SOURCED: Final = (
@@ -111,6 +114,22 @@ def named_texts(files: Mapping[str, Path]) -> dict[str, str]:
         return {name: path.read_text("utf-8") for name, path in files.items() if not Path(name).is_absolute()}
     except OSError as error:
         raise InstallError(f"robot.yaml needs {error.filename}: {error.strerror}") from error
+
+
+def neighbours(prefix: Path, name: str, installed: Iterable[str]) -> list[Neighbour]:
+    """The installed robots but the one of this name. Raises InstallError for one whose robot.yaml cannot be used."""
+    found = []
+    for other in sorted(set(installed) - {name}):
+        path = prefix / owner_paths(other)[0].relative_to("/")
+        try:
+            loaded = load_robot(path)
+        except ConfigError as error:
+            raise InstallError(
+                f"the robot {other} is installed too, and nobody knows on which bus: {path} cannot be used. Mend it "
+                f"(`canbase config check {path}` says what is wrong), or `sudo canbase uninstall {other}`"
+            ) from error
+        found.append(Neighbour(other, loaded.robot, named_texts(loaded.files)))
+    return found
 
 
 def manifests(prefix: Path) -> dict[str, str]:

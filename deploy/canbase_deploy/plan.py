@@ -6,13 +6,14 @@ Files that the owner edits (`owner.py`) are in /etc/canbase; all others are ours
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Final, Literal
 
 from canbase_config.robot import Robot
 from canbase_deploy.actions import Action, Existing, Link, Remove, Run, WriteFile
+from canbase_deploy.neighbours import Neighbour, clash
 from canbase_deploy.owner import ETC, USER, is_the_owners, misplaced, modes, old, owner_paths, place
 
 UNITS: Final = PurePosixPath("/etc/systemd/system")
@@ -69,13 +70,16 @@ class Request:
     files: Mapping[str, str] = field(default_factory=dict)
 
 
-def install_plan(request: Request, manifests: Mapping[str, str]) -> list[Action]:
+def install_plan(request: Request, manifests: Mapping[str, str], neighbours: Sequence[Neighbour] = ()) -> list[Action]:
     """All actions, in order. `manifests`: what is installed now; files of this robot that it no longer has are removed.
 
-    Raises InstallError for a robot that services cannot run.
+    Raises InstallError for a robot that services cannot run, or not beside its `neighbours`.
     """
     _check(request)
     _check_places(request, manifests)
+    for other in neighbours:
+        if wrong := clash(request.name, request.robot, request.files, other):
+            raise InstallError(wrong)
     before = [PurePosixPath(path) for path in manifests.get(request.name, "").splitlines()]
     named = dict.fromkeys([*map(place, request.files), *filter(is_the_owners, before)])
     files = [*_files(request), *_modes_of(request.name, named)]

@@ -1,0 +1,91 @@
+"""`canbase install` beside robots that are installed already: no bus, no lease socket, no file for two of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from canbase_cli.main import app
+from canbase_config.load import sample
+
+EXAMPLE = sample("example_can0").read_text()
+
+
+def install(home: Path, root: Path, *replaced: tuple[str, str], profile: str = "") -> tuple[int, str]:
+    """Exit code and output; the sample with other words in it, and with a profile of its own if one is given."""
+    text, more = EXAMPLE, [("profile: generic", "profile: mine.yaml")] if profile else []
+    for before, after in [*replaced, *more]:
+        assert before in text
+        text = text.replace(before, after)
+    home.mkdir(exist_ok=True)
+    (home / "mine.yaml").write_text(profile)
+    (home / "robot.yaml").write_text(text)
+    done = CliRunner().invoke(app, ["install", "--config", str(home / "robot.yaml"), "--prefix", str(root)])
+    return done.exit_code, done.output
+
+
+def uninstall(root: Path, name: str) -> int:
+    return CliRunner().invoke(app, ["uninstall", name, "--prefix", str(root)]).exit_code
+
+
+def snapshot(root: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in root.rglob("*") if path.is_file()}
+
+
+NAME = ("name: example", "name: second")
+CHANNEL = ("channel: can0", "channel: can1")
+LEASE = ("/run/canbase/lease.sock", "/run/canbase/second/lease.sock")
+
+
+@pytest.mark.parametrize(
+    ("replaced", "told"),
+    [((NAME,), "bus.channel"), ((NAME, LEASE), "bus.channel"), ((NAME, CHANNEL), "/run/canbase/second/lease.sock")],
+)
+def test_a_robot_that_was_renamed_is_refused_until_the_old_one_is_gone(
+    replaced: tuple[tuple[str, str], ...], told: str, tmp_path: Path
+) -> None:
+    root = tmp_path / "root"
+    assert install(tmp_path / "home", root)[0] == 0
+    before = snapshot(root)
+
+    code, said = install(tmp_path / "home", root, *replaced)
+    assert code == 2
+    assert "`sudo canbase uninstall example`" in said
+    assert told in said
+    assert snapshot(root) == before
+
+    assert uninstall(root, "example") == 0
+    assert install(tmp_path / "home", root, *replaced)[0] == 0
+
+
+def test_a_second_robot_with_all_of_its_own_is_installed_and_each_again(tmp_path: Path) -> None:
+    root = tmp_path / "root"
+
+    codes = [install(tmp_path, root, *replaced)[0] for replaced in ((), (NAME, CHANNEL, LEASE)) * 2]
+
+    assert codes == [0, 0, 0, 0]
+
+
+def test_a_neighbour_that_cannot_be_read_may_be_on_any_bus(tmp_path: Path) -> None:
+    root = tmp_path / "root"
+    install(tmp_path, root)
+    (root / "etc/canbase/example.yaml").write_text("name: example\n")
+
+    code, said = install(tmp_path, root, NAME, CHANNEL, LEASE)
+
+    assert code == 2
+    assert "`sudo canbase uninstall example`" in said
+
+
+def test_robots_of_one_kind_share_a_profile_and_none_changes_that_of_another(tmp_path: Path) -> None:
+    root, second = tmp_path / "root", (NAME, CHANNEL, LEASE)
+    assert install(tmp_path, root, profile="title: One\n")[0] == 0
+    assert install(tmp_path / "b", root, *second, profile="title: One\n")[0] == 0
+
+    code, said = install(tmp_path / "b", root, *second, profile="title: Two\n")
+
+    assert code == 2
+    assert "second/mine.yaml" in said
+    assert (root / "etc/canbase/mine.yaml").read_text() == "title: One\n"
