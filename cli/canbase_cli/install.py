@@ -60,7 +60,7 @@ def install(
     from canbase_deploy.execute import ExecuteError, Executor
     from canbase_deploy.host import chosen, manifests, named_texts, neighbours, rehearse, sourced, templates
     from canbase_deploy.owner import owner_paths
-    from canbase_deploy.plan import InstallError, Request, install_plan
+    from canbase_deploy.plan import InstallError, Request, install_plan, next_step
 
     loaded = load_config(config or prefix / owner_paths(name or "robot")[0].relative_to("/"))
     try:
@@ -86,12 +86,13 @@ def install(
             rehearse(python, request.sourced)
     except InstallError as error:
         fail(str(error), WRONG_INPUT)
+    executor = Executor(prefix, typer.echo, dry_run=dry_run)
     try:
-        Executor(prefix, typer.echo, dry_run=dry_run).carry_out(plan)
+        executor.carry_out(plan)
     except ExecuteError as error:
         fail(str(error), FAILED)
     if not dry_run and prefix == Path("/"):
-        typer.echo(f"now: sudo systemctl start canbase@{request.name}.target, or boot; wheels up for the first time")
+        typer.echo(next_step(request, executor.changed, upgrade=request.name in installed))
 
 
 def uninstall(

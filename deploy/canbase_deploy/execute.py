@@ -24,6 +24,8 @@ class Executor:
     def __init__(self, prefix: Path, say: Callable[[str], None], *, dry_run: bool = False) -> None:
         """`prefix` other than /: files go below it and no command is run. `dry_run`: only says what it would do."""
         self._prefix, self._say, self._dry_run = prefix, say, dry_run
+        self.changed: set[PurePosixPath] = set()
+        """Files that were written with other contents than they had, or for the first time."""
 
     def carry_out(self, actions: Sequence[Action]) -> None:
         """All of them, in order. Raises ExecuteError."""
@@ -58,6 +60,8 @@ class Executor:
             self._put(self._below(old(action.path)), there, action)
         else:
             self._tell("wrote    ", action.path)
+        if there != action.text:
+            self.changed.add(action.path)
         self._put(path, action.text, action)
 
     def _put(self, path: Path, text: str, action: WriteFile) -> None:

@@ -6,7 +6,7 @@ Files that the owner edits (`owner.py`) are in /etc/canbase; all others are ours
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Final, Literal
@@ -95,6 +95,20 @@ def install_plan(request: Request, manifests: Mapping[str, str], neighbours: Seq
         Run(("udevadm", "control", "--reload")),
         Run(("systemctl", "daemon-reload")),
     ]
+
+
+def next_step(request: Request, changed: Collection[PurePosixPath], *, upgrade: bool) -> str:
+    """What the user does when the plan has been carried out; `changed`: the files that are not as they were.
+
+    An interface that is up keeps its bit rate however often the robot is restarted: canbase-can@ has to be, alone.
+    """
+    target, interface = f"canbase@{request.name}.target", request.robot.bus.channel
+    if not upgrade:
+        return f"now: sudo systemctl start {target}, or boot; wheels up for the first time"
+    if not request.bring_up_can or not {_can_env(interface), UNITS / "canbase-can@.service"} & set(changed):
+        return f"now, with the robot standing: sudo systemctl restart {target}"
+    steps = (f"stop {target}", f"restart canbase-can@{interface}.service", f"start {target}")
+    return f"now, with the robot standing: {' && '.join(f'sudo systemctl {step}' for step in steps)}"
 
 
 def uninstall_plan(name: str, manifests: Mapping[str, str], *, purge: bool = False) -> list[Action]:
@@ -207,6 +221,10 @@ def _modes_of(name: str, named: Iterable[PurePosixPath]) -> list[WriteFile]:
     return [WriteFile(PurePosixPath(f"/etc/tmpfiles.d/canbase-{name}.conf"), text)] if text else []
 
 
+def _can_env(interface: str) -> PurePosixPath:
+    return ETC / "can" / f"{interface}.env"
+
+
 def _can(request: Request) -> list[WriteFile | Link]:
     """The interface, and who waits for it. Unplugged, the watchdog ends by itself, and its next start waits for the
     adapter. It is not bound to the device (BindsTo=): plugged in again while it still stops, nobody would start it."""
@@ -218,7 +236,7 @@ def _can(request: Request) -> list[WriteFile | Link]:
     if request.bring_up_can:
         files.append(Link(UNITS / f"{device}.wants" / unit, "../canbase-can@.service"))
         env = f"BITRATE={request.robot.bus.bitrate}\nRESTART_MS=100\nTXQUEUELEN=64\n"
-        files.append(WriteFile(ETC / "can" / f"{interface}.env", env))
+        files.append(WriteFile(_can_env(interface), env))
     if request.adapter:
         link = f"[Match]\nType=can\nProperty={request.adapter}\n\n[Link]\nName={interface}\n"
         files.append(WriteFile(PurePosixPath(f"/etc/systemd/network/70-canbase-{interface}.link"), link))

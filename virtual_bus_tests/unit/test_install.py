@@ -16,7 +16,7 @@ from canbase_config.watchdog import RelayLine
 from canbase_deploy.actions import Action, Existing, Link, Remove, Run, WriteFile
 from canbase_deploy.execute import ExecuteError, Executor
 from canbase_deploy.host import manifests, read_templates
-from canbase_deploy.plan import PARTS, InstallError, Request, install_plan, uninstall_plan
+from canbase_deploy.plan import PARTS, InstallError, Request, install_plan, next_step, uninstall_plan
 
 TEMPLATES = Path(__file__).parents[2] / "deploy" / "systemd"
 EXAMPLE = sample("example_can0")
@@ -258,6 +258,45 @@ def test_a_robot_yaml_that_is_replaced_stays_beside_the_new_one(tmp_path: Path) 
 
     assert (tmp_path / "etc/canbase/example.yaml").read_text() == "# new\n"
     assert (tmp_path / "etc/canbase/example.yaml.old").read_text() == EXAMPLE.read_text()
+
+
+TARGET = "canbase@example.target"
+RESTARTED = f"now, with the robot standing: sudo systemctl restart {TARGET}"
+
+
+def upgraded(root: Path, wanted: Request) -> str:
+    """The last words of an installation over the one of `request()`."""
+    carried_out(root, install_plan(request(), {}))
+    executor = Executor(root, lambda _: None)
+    executor.carry_out(install_plan(wanted, manifests(root)))
+    return next_step(wanted, executor.changed, upgrade=True)
+
+
+def test_a_new_bit_rate_comes_into_force_with_the_interface_while_the_robot_is_stopped(tmp_path: Path) -> None:
+    robot = changed(bus=load_robot(EXAMPLE).robot.bus.model_copy(update={"bitrate": 250_000}))
+
+    assert upgraded(tmp_path, request(robot=robot)) == (
+        f"now, with the robot standing: sudo systemctl stop {TARGET} && "
+        f"sudo systemctl restart canbase-can@can0.service && sudo systemctl start {TARGET}"
+    )
+
+
+def test_a_new_unit_of_the_interface_restarts_it_too(tmp_path: Path) -> None:
+    templates = {**request().templates, "canbase-can@.service": "[Service]\n"}
+
+    assert "restart canbase-can@can0.service" in upgraded(tmp_path, request(templates=templates))
+
+
+@pytest.mark.parametrize("wanted", [request(), request(cpus="2"), request(bring_up_can=False)])
+def test_an_interface_that_stays_as_it_is_is_left_alone(wanted: Request, tmp_path: Path) -> None:
+    assert upgraded(tmp_path, wanted) == RESTARTED
+
+
+def test_the_first_time_the_robot_is_started(tmp_path: Path) -> None:
+    executor = Executor(tmp_path, lambda _: None)
+    executor.carry_out(install_plan(request(), {}))
+
+    assert next_step(request(), executor.changed, upgrade=False).startswith(f"now: sudo systemctl start {TARGET},")
 
 
 def test_an_option_that_is_no_longer_given_leaves_no_file_behind(tmp_path: Path) -> None:
