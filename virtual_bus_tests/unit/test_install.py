@@ -1,58 +1,18 @@
-"""`canbase install` and `uninstall`: the plan as data, and the plan carried out below a folder, without root."""
+"""`canbase install` and `uninstall` as data: which files, links and commands they consist of."""
 
 from __future__ import annotations
 
-import stat
-from dataclasses import replace
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from canbase_cli.main import app
-from canbase_config.load import load_robot, sample
+from canbase_config.load import load_robot
 from canbase_config.robot import Robot
 from canbase_config.watchdog import RelayLine
-from canbase_deploy.actions import Action, Existing, Link, Remove, Run, WriteFile
-from canbase_deploy.execute import ExecuteError, Executor
-from canbase_deploy.host import manifests, read_templates
-from canbase_deploy.plan import PARTS, InstallError, Request, install_plan, next_step, uninstall_plan
-
-TEMPLATES = Path(__file__).parents[2] / "deploy" / "systemd"
-EXAMPLE = sample("example_can0")
-UNITS = "/etc/systemd/system"
-
-
-def request(**changes: object) -> Request:
-    wanted = Request(
-        name="example",
-        robot=load_robot(EXAMPLE).robot,
-        yaml=EXAMPLE.read_text(),
-        python="/opt/canbase/bin/python",
-        templates=read_templates(TEMPLATES),
-    )
-    return replace(wanted, **changes)  # type: ignore[arg-type]
-
-
-def changed(**changes: object) -> Robot:
-    return load_robot(EXAMPLE).robot.model_copy(update=changes)
-
-
-def texts(actions: list[Action]) -> dict[str, str]:
-    return {str(action.path): action.text for action in actions if isinstance(action, WriteFile)}
-
-
-def carried_out(root: Path, actions: list[Action]) -> list[str]:
-    said: list[str] = []
-    Executor(root, said.append).carry_out(actions)
-    return said
-
-
-def files_below(root: Path) -> list[str]:
-    return sorted(f"/{path.relative_to(root)}" for path in root.rglob("*") if not path.is_dir())
-
-
-# ---- the plan -------------------------------------------------------------------------------------------------------
+from canbase_deploy.actions import Existing, Link, Run, WriteFile
+from canbase_deploy.host import manifests
+from canbase_deploy.plan import PARTS, InstallError, Request, install_plan
+from unit.install_plans import EXAMPLE, TEMPLATES, UNITS, carried_out, changed, on_bus, request, texts
 
 
 def test_no_placeholder_is_left_in_a_unit() -> None:
@@ -186,10 +146,6 @@ def test_each_service_has_the_enclave_that_the_policy_gives_it() -> None:
         assert "$CANBASE_ENCLAVE" in files[f"{UNITS}/canbase-{part}@.service"]
 
 
-def _bus(**changes: str) -> Robot:
-    return changed(bus=load_robot(EXAMPLE).robot.bus.model_copy(update=changes))
-
-
 def _lease(socket: str) -> Robot:
     return changed(lease=load_robot(EXAMPLE).robot.lease.model_copy(update={"socket": socket}))
 
@@ -197,9 +153,9 @@ def _lease(socket: str) -> Robot:
 @pytest.mark.parametrize(
     ("wrong", "told"),
     [
-        (request(robot=_bus(interface="udp_multicast")), "socketcan"),
-        (request(robot=_bus(channel="can0; reboot")), "can0; reboot"),
-        (request(robot=_bus(channel="a-name")), "a-name"),
+        (request(robot=on_bus(interface="udp_multicast")), "socketcan"),
+        (request(robot=on_bus(channel="can0; reboot")), "can0; reboot"),
+        (request(robot=on_bus(channel="a-name")), "a-name"),
         (request(robot=_lease("/tmp/lease.sock")), "/run/canbase/example/lease.sock"),
         (request(robot=_lease("/run/canbase/../lease.sock")), "lease.socket"),
         (request(adapter="ID_PATH"), "ID_PATH"),
@@ -213,161 +169,3 @@ def test_what_services_cannot_run_is_refused_with_advice(wrong: Request, told: s
         install_plan(wrong, {})
 
     assert told in str(error.value)
-
-
-# ---- carried out ----------------------------------------------------------------------------------------------------
-
-
-def test_the_second_time_nothing_changes(tmp_path: Path) -> None:
-    carried_out(tmp_path, install_plan(request(), {}))
-    before = {path: (tmp_path / path[1:]).read_bytes() for path in files_below(tmp_path) if ".wants" not in path}
-
-    said = carried_out(tmp_path, install_plan(request(), manifests(tmp_path)))
-
-    assert {line[:9] for line in said} == {"as it was"}
-    assert {path: (tmp_path / path[1:]).read_bytes() for path in before} == before
-
-
-def test_modes_below_a_prefix(tmp_path: Path) -> None:
-    carried_out(tmp_path, install_plan(request(), {}))
-
-    def mode(path: str) -> int:
-        return stat.S_IMODE((tmp_path / path).stat().st_mode)
-
-    assert mode("etc/canbase/example.yaml") == 0o640
-    assert mode("etc/canbase/example.env") == 0o640
-    assert mode("etc/systemd/system/canbase@.target") == 0o644
-
-
-def test_an_upgrade_keeps_what_the_owner_wrote(tmp_path: Path) -> None:
-    carried_out(tmp_path, install_plan(request(), {}))
-    env, yaml = tmp_path / "etc/canbase/example.env", tmp_path / "etc/canbase/example.yaml"
-    env.write_text("ROS_DOMAIN_ID=7\n")
-    yaml.write_text("# mine\n")
-
-    said = carried_out(tmp_path, install_plan(request(yaml=None), manifests(tmp_path)))
-
-    assert (env.read_text(), yaml.read_text()) == ("ROS_DOMAIN_ID=7\n", "# mine\n")
-    assert "kept      /etc/canbase/example.env" in said
-
-
-def test_a_robot_yaml_that_is_replaced_stays_beside_the_new_one(tmp_path: Path) -> None:
-    carried_out(tmp_path, install_plan(request(), {}))
-
-    carried_out(tmp_path, install_plan(request(yaml="# new\n"), manifests(tmp_path)))
-
-    assert (tmp_path / "etc/canbase/example.yaml").read_text() == "# new\n"
-    assert (tmp_path / "etc/canbase/example.yaml.old").read_text() == EXAMPLE.read_text()
-
-
-TARGET = "canbase@example.target"
-RESTARTED = f"now, with the robot standing: sudo systemctl restart {TARGET}"
-
-
-def upgraded(root: Path, wanted: Request) -> str:
-    """The last words of an installation over the one of `request()`."""
-    carried_out(root, install_plan(request(), {}))
-    executor = Executor(root, lambda _: None)
-    executor.carry_out(install_plan(wanted, manifests(root)))
-    return next_step(wanted, executor.changed, upgrade=True)
-
-
-def test_a_new_bit_rate_comes_into_force_with_the_interface_while_the_robot_is_stopped(tmp_path: Path) -> None:
-    robot = changed(bus=load_robot(EXAMPLE).robot.bus.model_copy(update={"bitrate": 250_000}))
-
-    assert upgraded(tmp_path, request(robot=robot)) == (
-        f"now, with the robot standing: sudo systemctl stop {TARGET} && "
-        f"sudo systemctl restart canbase-can@can0.service && sudo systemctl start {TARGET}"
-    )
-
-
-def test_a_new_unit_of_the_interface_restarts_it_too(tmp_path: Path) -> None:
-    templates = {**request().templates, "canbase-can@.service": "[Service]\n"}
-
-    assert "restart canbase-can@can0.service" in upgraded(tmp_path, request(templates=templates))
-
-
-@pytest.mark.parametrize("wanted", [request(), request(cpus="2"), request(bring_up_can=False)])
-def test_an_interface_that_stays_as_it_is_is_left_alone(wanted: Request, tmp_path: Path) -> None:
-    assert upgraded(tmp_path, wanted) == RESTARTED
-
-
-def test_the_first_time_the_robot_is_started(tmp_path: Path) -> None:
-    executor = Executor(tmp_path, lambda _: None)
-    executor.carry_out(install_plan(request(), {}))
-
-    assert next_step(request(), executor.changed, upgrade=False).startswith(f"now: sudo systemctl start {TARGET},")
-
-
-def test_an_option_that_is_no_longer_given_leaves_no_file_behind(tmp_path: Path) -> None:
-    carried_out(tmp_path, install_plan(request(cpus="2"), {}))
-
-    carried_out(tmp_path, install_plan(request(), manifests(tmp_path)))
-
-    assert [path for path in files_below(tmp_path) if "cpus" in path] == []
-
-
-def test_uninstalled_only_what_the_owner_may_miss_is_left(tmp_path: Path) -> None:
-    carried_out(tmp_path, install_plan(request(hardware_watchdog_s=5), {}))
-
-    carried_out(tmp_path, uninstall_plan("example", manifests(tmp_path)))
-
-    assert files_below(tmp_path) == [
-        "/etc/canbase/example.env",
-        "/etc/canbase/example.yaml",
-        "/etc/sysusers.d/canbase.conf",
-    ]
-
-
-def test_the_units_stay_as_long_as_another_robot_needs_them(tmp_path: Path) -> None:
-    carried_out(tmp_path, install_plan(request(), {}))
-    carried_out(tmp_path, install_plan(request(name="second", robot=_bus(channel="can1")), manifests(tmp_path)))
-
-    carried_out(tmp_path, uninstall_plan("example", manifests(tmp_path)))
-
-    left = files_below(tmp_path)
-    assert f"{UNITS}/canbase-driver@.service" in left
-    assert [path for path in left if "@example" in path] == []
-    assert list(manifests(tmp_path)) == ["second"]
-
-
-def test_services_are_stopped_before_they_are_removed() -> None:
-    plan = uninstall_plan("example", {"example": "/etc/a\n"})
-
-    assert isinstance(plan[0], Run)
-    assert plan[0].argv[:3] == ("systemctl", "stop", "canbase@example.target")
-    assert plan[1] == Remove(PurePosixPath("/etc/a"))
-
-
-def test_a_robot_that_is_not_installed_is_named_with_those_that_are() -> None:
-    with pytest.raises(InstallError, match="installed: example"):
-        uninstall_plan("exmple", {"example": ""})
-
-
-def test_a_dry_run_changes_nothing(tmp_path: Path) -> None:
-    said: list[str] = []
-
-    Executor(tmp_path, said.append, dry_run=True).carry_out(install_plan(request(), {}))
-
-    assert files_below(tmp_path) == []
-    assert "wrote     /etc/canbase/example.yaml" in said
-
-
-def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
-    (tmp_path / "etc").write_text("a file\n")
-
-    with pytest.raises(ExecuteError, match="canbase"):
-        carried_out(tmp_path, install_plan(request(), {}))
-
-
-def test_the_commands(tmp_path: Path) -> None:
-    runner = CliRunner()
-
-    installed = runner.invoke(app, ["install", "--config", str(EXAMPLE), "--prefix", str(tmp_path)])
-    refused = runner.invoke(app, ["install", "--config", str(sample("bench")), "--prefix", str(tmp_path)])
-    unknown = runner.invoke(app, ["uninstall", "nobody", "--prefix", str(tmp_path)])
-    removed = runner.invoke(app, ["uninstall", "example", "--prefix", str(tmp_path), "--purge"])
-
-    codes = [result.exit_code for result in (installed, refused, unknown, removed)]
-    assert codes == [0, 2, 2, 0]
-    assert files_below(tmp_path) == ["/etc/sysusers.d/canbase.conf"]
