@@ -18,6 +18,7 @@ import typer
 
 from canbase_cli import support
 from canbase_cli.options import FAILED, fail, load_config
+from canbase_cli.redact import cleaned
 
 if TYPE_CHECKING:  # `canbase --help` loads no configuration
     from canbase_config.robot import Robot
@@ -43,7 +44,7 @@ class Bundle:
         except OSError as error:
             self.missing[name] = f"{what}: {error.strerror or error}"
             return
-        self.files[name] = support.cleaned(content).encode()[-LIMIT_BYTES:]
+        self.files[name] = cleaned(content).encode()[-LIMIT_BYTES:]
         self.taken[name] = what
 
     def file(self, name: str, path: Path) -> None:

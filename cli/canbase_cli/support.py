@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Final
 if TYPE_CHECKING:  # `canbase --help` loads no configuration
     from canbase_config.robot import Robot
 
-HIDDEN: Final = "(hidden by canbase support-bundle)"
 ENVIRONMENT: Final = re.compile(r"(ROS|RMW|CANBASE|AMENT|COLCON|FASTDDS|FASTRTPS|CYCLONEDDS|PYTHON|_ROS)[A-Z0-9_]*")
 """Variables whose values are taken; of all others not even the names."""
 FORBIDDEN: Final = re.compile(
@@ -23,12 +22,6 @@ FORBIDDEN: Final = re.compile(
 """No file of such a name or below such a folder is taken, whoever names it."""
 BOXES: Final = 5
 """So many recordings of stops, the newest."""
-_SECRET: Final = re.compile(
-    r"(?im)^(?P<name>[^\n=:]*(?:passw|secret|token|api_?key|credential)[^\n=:]*[=:])[ \t]*\S.*$"
-)
-_PRIVATE_KEY: Final = re.compile(
-    r"-----BEGIN [A-Z ]*PRIVATE KEY-----.*?(-----END [A-Z ]*PRIVATE KEY-----|\Z)", re.DOTALL
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,12 +55,6 @@ def commands(python: str, config: Path, since: str) -> tuple[Command, ...]:
         Command("config/check.txt", (python, "-m", "canbase_cli", "config", "check", str(config))),
         Command("doctor.txt", (python, "-m", "canbase_cli", "doctor", "--config", str(config)), 40.0),
     )
-
-
-def cleaned(text: str) -> str:
-    """Without what looks like a password, a token or a private key."""
-    text = _PRIVATE_KEY.sub(HIDDEN, text)
-    return _SECRET.sub(lambda found: f"{found['name']} {HIDDEN}", text)
 
 
 def environment_text(environment: Mapping[str, str]) -> str:

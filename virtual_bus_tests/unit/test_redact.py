@@ -1,0 +1,94 @@
+"""What a support bundle hides, wherever in a line it stands, and what it must leave as it is."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from canbase_cli.redact import HIDDEN, cleaned
+from canbase_config.load import sample
+
+KEY = "-----BEGIN EC PRIVATE KEY-----\nMHcCAQEE\n-----END EC PRIVATE KEY-----\n"
+JOURNAL = """\
+Nov 22 10:00:01.123456 robot canbase-watchdog[812]: ready: no lease yet, bus can0 at 500000 bit/s, cause=none
+Nov 22 10:00:02.000001 robot motor_driver[813]: [INFO] [1763.25] [motor_driver]: operational: left_wheel (node 1)
+Nov 22 10:00:03.000000 robot systemd[1]: systemd-ask-password-wall.path: Deactivated successfully.
+Nov 22 10:00:04.000000 robot kernel: Key type asymmetric registered; Loaded X.509 cert 'Debian Secure Boot CA: 6ccece7e'
+Nov 22 10:00:05.000000 robot nav[9]: in auth::token::parse, tokens_left == 3, see https://x/token://y
+"""
+SHOW = """\
+Id=canbase-driver@robot.service
+Environment=PYTHONFAULTHANDLER=1 "PYTHONPATH=/opt/my ros:/opt/ws"
+EnvironmentFiles=/etc/canbase/robot.env (ignore_errors=no)
+ExecStart={ path=/opt/canbase/bin/python ; argv[]=/opt/canbase/bin/python -m canbase_cli driver ; status=0/0 }
+KeyringMode=private
+PrivateDevices=yes
+LoadCredential=
+"""
+
+
+@pytest.mark.parametrize(
+    ("line", "clean"),
+    [
+        ("wifi_password: hunter2", f"wifi_password: {HIDDEN}"),
+        ("API_KEY=abc def", f"API_KEY={HIDDEN}"),
+        ("  token = xyz", f"  token = {HIDDEN}"),
+        ("Secret: 1", f"Secret: {HIDDEN}"),
+        ("export WIFI_PASSPHRASE=a,b c", f"export WIFI_PASSPHRASE={HIDDEN}"),
+        ("wifi: {user: x, password: two words, band: 5}", f"wifi: {{user: x, password: {HIDDEN}, band: 5}}"),
+        ("wifi: {password: 'a, b}', user: x}", f"wifi: {{password: '{HIDDEN}', user: x}}"),
+        ("Environment=A=1 TOKEN=abc,d B=2", f"Environment=A=1 TOKEN={HIDDEN} B=2"),
+        ('Environment=A=1 "WIFI_PASSWORD=two words" B=2', f'Environment=A=1 "WIFI_PASSWORD={HIDDEN}" B=2'),
+        ("Nov 22 10:00 nav[1]: private key: abc, next", f"Nov 22 10:00 nav[1]: private key: {HIDDEN} next"),
+        ("Nov 22 10:00 nav[1]: login with api-key=abc ok", f"Nov 22 10:00 nav[1]: login with api-key={HIDDEN} ok"),
+        ("credentials: [abc, def]", f"credentials: {HIDDEN}"),
+        ("GET http://x/y?api_token=abc HTTP/1.1", f"GET http://x/y?api_token={HIDDEN} HTTP/1.1"),
+        ("secret: |\n  one\n  two", f"secret: {HIDDEN}\n  {HIDDEN}"),
+        ("my_tokens:\n  - one\n  - two", f"my_tokens:\n  {HIDDEN}"),
+    ],
+)
+def test_values_that_look_like_secrets_are_hidden_and_their_names_stay(line: str, clean: str) -> None:
+    assert cleaned(f"a: 1\n{line}\nb: 2\n") == f"a: 1\n{clean}\nb: 2\n"
+
+
+@pytest.mark.parametrize("value", ["hunter2", 'a "quoted" one', "back\\slash", "two words, and more"])
+@pytest.mark.parametrize("key", ["password", "user_token", "API key"])
+def test_json_stays_json_also_within_a_message_of_json(key: str, value: str) -> None:
+    inner = json.dumps({"user": "x", key: value, "n": 1})
+    line = json.dumps({"MESSAGE": inner, key: value, "PRIORITY": "6"})
+
+    seen = json.loads(cleaned(line))
+
+    assert (seen[key], seen["PRIORITY"]) == (HIDDEN, "6")
+    assert json.loads(seen["MESSAGE"]) == {"user": "x", key: HIDDEN, "n": 1}
+
+
+def test_a_private_key_is_cut_out_even_without_its_end() -> None:
+    assert cleaned(f"before\n{KEY}after") == f"before\n{HIDDEN}\nafter"
+    assert "MHcC" not in cleaned(KEY[:45])
+    assert "MHcC" not in cleaned(json.dumps({"MESSAGE": KEY}))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(pytest.param(path.read_text(), id=path.name) for path in sorted(sample("bench").parent.glob("*.yaml"))),
+        pytest.param(JOURNAL, id="journal"),
+        pytest.param(json.dumps({"MESSAGE": JOURNAL, "PRIORITY": 6}), id="journal.json"),
+        pytest.param(SHOW, id="systemctl show"),
+        pytest.param("tokenize-rt==6.1.0\ncryptography==43.0\n", id="pip"),
+        pytest.param("password:\nb: 2\n", id="no value"),
+        pytest.param('{"password": "", "token": \'\'}\n', id="empty value"),
+        *(pytest.param(path.read_text(), id=path.name) for path in sorted(Path(__file__).parents[2].glob("docs/*.md"))),
+    ],
+)
+def test_where_there_is_no_secret_nothing_is_changed(text: str) -> None:
+    assert cleaned(text) == text
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize("unit", ["token", "{", '"', " ", "\\", "-----BEGIN PRIVATE KEY"])
+def test_no_text_holds_it_up(unit: str) -> None:
+    assert cleaned(unit * 100_000) == unit * 100_000
