@@ -89,6 +89,6 @@ def test_where_there_is_no_secret_nothing_is_changed(text: str) -> None:
 
 
 @pytest.mark.timeout(20)
-@pytest.mark.parametrize("unit", ["token", "{", '"', " ", "\\", "-----BEGIN PRIVATE KEY"])
+@pytest.mark.parametrize("unit", ["token", "{", '"', " ", "\\", "-----BEGIN PRIVATE KEYS"])
 def test_no_text_holds_it_up(unit: str) -> None:
     assert cleaned(unit * 100_000) == unit * 100_000
