@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from canbase_cli.options import FAILED, WRONG_INPUT, fail, load_config
+from canbase_cli.options import FAILED, WRONG_INPUT, colour, fail, load_config
 
 
 class Network(str, Enum):
@@ -58,9 +58,18 @@ def install(
     Exit codes: 0 done, 1 a step failed, 2 wrong command line or robot.yaml, or a robot that services cannot run.
     """
     from canbase_deploy.execute import ExecuteError, Executor
-    from canbase_deploy.host import chosen, manifests, named_texts, neighbours, rehearse, sourced, templates
+    from canbase_deploy.host import (
+        chosen,
+        environment,
+        manifests,
+        named_texts,
+        neighbours,
+        rehearse,
+        sourced,
+        templates,
+    )
     from canbase_deploy.owner import owner_paths
-    from canbase_deploy.plan import InstallError, Request, install_plan, next_step
+    from canbase_deploy.plan import InstallError, Request, install_plan, network_warning, next_step
 
     loaded = load_config(config or prefix / owner_paths(name or "robot")[0].relative_to("/"))
     try:
@@ -91,6 +100,8 @@ def install(
         executor.carry_out(plan)
     except ExecuteError as error:
         fail(str(error), FAILED)
+    if warning := network_warning(request, environment(prefix, request.name)):
+        typer.secho(warning, err=True, fg=typer.colors.YELLOW, color=colour())
     if not dry_run and prefix == Path("/"):
         typer.echo(next_step(request, executor.changed, upgrade=request.name in installed))
 

@@ -106,8 +106,14 @@ class Executor:
         if self._prefix != Path("/"):
             return
         self._say(f"ran       {' '.join(action.argv)}")
-        if not self._dry_run:
-            subprocess.run(action.argv, check=not action.may_fail, timeout=COMMAND_S, stdin=subprocess.DEVNULL)
+        if self._dry_run:
+            return
+        try:
+            subprocess.run(action.argv, check=True, timeout=COMMAND_S, stdin=subprocess.DEVNULL)
+        except (OSError, subprocess.SubprocessError) as error:
+            if not action.may_fail:
+                raise
+            self._say(f"failed    {error}; the rest is done all the same")
 
     def _below(self, path: PurePosixPath) -> Path:
         return self._prefix / path.relative_to("/")

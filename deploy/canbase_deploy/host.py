@@ -116,6 +116,14 @@ def named_texts(files: Mapping[str, Path]) -> dict[str, str]:
         raise InstallError(f"robot.yaml needs {error.filename}: {error.strerror}") from error
 
 
+def environment(prefix: Path, name: str) -> dict[str, str]:
+    """What the environment file of an installed robot sets; empty where there is none."""
+    path = prefix / owner_paths(name)[1].relative_to("/")
+    lines = path.read_text("utf-8").splitlines() if path.is_file() else []
+    pairs = (line.strip().partition("=") for line in lines if "=" in line and not line.lstrip().startswith(("#", ";")))
+    return {key: value.strip("'\"") for key, _, value in pairs}
+
+
 def neighbours(prefix: Path, name: str, installed: Iterable[str]) -> list[Neighbour]:
     """The installed robots but the one of this name. Raises InstallError for one whose robot.yaml cannot be used."""
     found = []

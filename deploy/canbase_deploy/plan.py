@@ -23,6 +23,7 @@ WITH_ROS: Final = PARTS[1:]
 ON_THE_BUS: Final = PARTS[:2]
 DOMAIN: Final = "0"
 """ROS_DOMAIN_ID where nobody has chosen one: what ROS 2 takes then, said aloud."""
+REACH: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
 ACCOUNT: Final = WriteFile(
     PurePosixPath("/etc/sysusers.d/canbase.conf"), f'u {USER} - "canbase motor driver stack" {RUN}\n'
@@ -111,6 +112,25 @@ def next_step(request: Request, changed: Collection[PurePosixPath], *, upgrade: 
     return f"now, with the robot standing: {' && '.join(f'sudo systemctl {step}' for step in steps)}"
 
 
+def network_warning(request: Request, environment: Mapping[str, str]) -> str:
+    """Where `--network` and the environment file, which an upgrade keeps, say different things; empty: they agree."""
+    path = owner_paths(request.name)[1]
+    lan = UNITS / f"{service('driver', request.name)}.d" / "20-lan.conf"
+    reach = environment.get(REACH, "")
+    is_open = reach in ("SUBNET", "SYSTEM_DEFAULT")
+    if request.network == "localhost" and is_open:
+        return (
+            f"warning: {path} has {REACH}={reach}, but there is no {lan}, which lets others in: "
+            f"set {REACH}=LOCALHOST in {path}, or install with --network lan"
+        )
+    if request.network == "lan" and not is_open and not environment.get("ROS_STATIC_PEERS"):
+        return (
+            f"warning: {lan} lets others in, but {path} has {REACH}={reach}, so they do not find the robot: "
+            f"set {REACH}=SUBNET in {path}, or install without --network lan"
+        )
+    return ""
+
+
 def uninstall_plan(name: str, manifests: Mapping[str, str], *, purge: bool = False) -> list[Action]:
     """Removes what `manifests[name]` lists and no other robot's manifest does; the owner's files only with `purge`.
 
@@ -123,11 +143,18 @@ def uninstall_plan(name: str, manifests: Mapping[str, str], *, purge: bool = Fal
     owners = [path for path in [*filter(is_the_owners, own), *owner_paths(name)] if purge]
     return [
         Run(("systemctl", "stop", f"canbase@{name}.target", *(service(part, name) for part in PARTS)), True),
+        *(Run(("systemctl", "stop", unit), True) for unit in _interfaces(own)),
         *(Remove(path) for path in own if not is_the_owners(path)),
         *(Remove(one) for path in owners for one in (path, old(path))),
         Remove(manifest_path(name)),
+        Run(("udevadm", "control", "--reload")),
         Run(("systemctl", "daemon-reload")),
     ]
+
+
+def _interfaces(paths: Iterable[PurePosixPath]) -> list[str]:
+    """Units of the interfaces whose environments are among these files."""
+    return [f"canbase-can@{path.stem}.service" for path in paths if path == _can_env(path.stem)]
 
 
 def _own(name: str, manifests: Mapping[str, str]) -> list[PurePosixPath]:
@@ -203,7 +230,7 @@ def _unit(name: str, text: str, python: str) -> WriteFile:
 def _of_the_owner(request: Request) -> list[WriteFile]:
     yaml_path, env_path = owner_paths(request.name)
     reach = "LOCALHOST" if request.network == "localhost" else "SUBNET"
-    values = {"ROS_AUTOMATIC_DISCOVERY_RANGE": reach, "ROS_DOMAIN_ID": DOMAIN, **request.environment}
+    values = {REACH: reach, "ROS_DOMAIN_ID": DOMAIN, **request.environment}
     env = "# Environment of the services of this robot. Kept by upgrades.\n"
     env += "".join(f"{key}={value}\n" for key, value in values.items())
     env += "# CANBASE_OPTIONS=--namespace robot1\n# CANBASE_ROS_ARGS=-r scan:=front/scan\n"

@@ -13,7 +13,7 @@ from canbase_config.load import load_robot, sample
 from canbase_deploy.actions import Remove, Run
 from canbase_deploy.execute import ExecuteError, Executor
 from canbase_deploy.host import manifests
-from canbase_deploy.plan import InstallError, Request, install_plan, next_step, uninstall_plan
+from canbase_deploy.plan import InstallError, Request, install_plan, network_warning, next_step, uninstall_plan
 from unit.install_plans import EXAMPLE, UNITS, carried_out, changed, files_below, on_bus, request
 
 
@@ -138,6 +138,40 @@ def test_services_are_stopped_before_they_are_removed() -> None:
     assert plan[1] == Remove(PurePosixPath("/etc/a"))
 
 
+def test_uninstalled_its_interface_goes_down_unless_it_is_another_robots_and_udev_forgets_it() -> None:
+    own = f"/etc/canbase/can/can0.env\n{UNITS}/canbase@.target\n"
+    can = Run(("systemctl", "stop", "canbase-can@can0.service"), may_fail=True)
+    reload = Run(("udevadm", "control", "--reload"))
+
+    alone, beside = uninstall_plan("a", {"a": own}), uninstall_plan("a", {"a": own, "b": own})
+
+    removed = Remove(PurePosixPath("/etc/canbase/can/can0.env"))
+    assert 0 < alone.index(can) < alone.index(removed) < alone.index(reload)
+    assert can not in beside
+
+
+@pytest.mark.parametrize(
+    ("argv", "why"),
+    [(("sleep", "60"), "timed out"), (("false",), "exit status 1"), (("/nowhere/program",), "No such file")],
+)
+def test_a_command_that_may_fail_or_hang_does_not_hold_up_the_rest(
+    argv: tuple[str, ...], why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("canbase_deploy.execute.COMMAND_S", 0.1)
+    there = tmp_path / "there"
+    there.write_text("")
+    rest = Remove(PurePosixPath(there))
+
+    said: list[str] = []
+    Executor(Path("/"), said.append).carry_out([Run(argv, may_fail=True), rest])
+    assert not there.exists()
+    assert said[1].startswith("failed")
+    assert why in said[1]
+
+    with pytest.raises(ExecuteError, match=argv[0]):
+        Executor(Path("/"), said.append).carry_out([Run(argv), rest])
+
+
 def test_a_robot_that_is_not_installed_is_named_with_those_that_are() -> None:
     with pytest.raises(InstallError, match="installed: example"):
         uninstall_plan("exmple", {"example": ""})
@@ -170,3 +204,35 @@ def test_the_commands(tmp_path: Path) -> None:
     codes = [result.exit_code for result in (installed, refused, unknown, removed)]
     assert codes == [0, 2, 2, 0]
     assert files_below(tmp_path) == ["/etc/sysusers.d/canbase.conf"]
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "told"),
+    [
+        (("--network", "lan"), (), "set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST in /etc/canbase/example.env"),
+        ((), ("--network", "lan"), "set ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET in /etc/canbase/example.env"),
+    ],
+)
+def test_a_network_that_does_not_fit_the_environment_that_is_kept_is_told(
+    before: tuple[str, ...], after: tuple[str, ...], told: str, tmp_path: Path
+) -> None:
+    def install(*options: str) -> str:
+        return CliRunner().invoke(app, ["install", "-c", str(EXAMPLE), "--prefix", str(tmp_path), *options]).output
+
+    assert "warning" not in install(*before)
+    assert "warning" not in install(*before)
+
+    warned = install(*after)
+    assert told in warned
+    assert f"{UNITS}/canbase-driver@example.service.d/20-lan.conf" in warned
+
+    env = tmp_path / "etc/canbase/example.env"
+    env.write_text('# ROS_AUTOMATIC_DISCOVERY_RANGE=OFF\nROS_AUTOMATIC_DISCOVERY_RANGE="SUBNET"\nA=1\n')
+    assert "warning" not in install("--network", "lan")
+
+
+def test_peers_that_are_named_need_no_discovery() -> None:
+    lan = request(network="lan")
+
+    assert network_warning(lan, {"ROS_STATIC_PEERS": "10.0.0.7"}) == ""
+    assert "RANGE=OFF" in network_warning(lan, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"})
