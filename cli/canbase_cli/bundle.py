@@ -19,6 +19,7 @@ import typer
 from canbase_cli import support
 from canbase_cli.options import FAILED, fail, load_config
 from canbase_cli.redact import cleaned
+from canbase_cli.service_environment import service_environment
 
 if TYPE_CHECKING:  # `canbase --help` loads no configuration
     from canbase_config.robot import Robot
@@ -27,6 +28,7 @@ LIMIT_BYTES: Final = 20_000_000
 """Of one file: the end of a longer one is taken."""
 STATE: Final = Path("/var/lib/canbase")
 ETC: Final = Path("/etc/canbase")
+UNITS: Final = Path("/etc/systemd/system")
 
 
 class Bundle:
@@ -56,10 +58,15 @@ class Bundle:
 
     def output(self, command: support.Command) -> None:
         """What a program prints; one that cannot tell anything is missing with its last words."""
-        shown = " ".join(command.argv)
+        shown = " ".join(command.argv) + (", in the services' environment" if command.environment is not None else "")
         try:
             ended = subprocess.run(
-                command.argv, capture_output=True, timeout=command.timeout_s, stdin=subprocess.DEVNULL, check=False
+                command.argv,
+                capture_output=True,
+                timeout=command.timeout_s,
+                stdin=subprocess.DEVNULL,
+                env=command.environment,
+                check=False,
             )
         except OSError as error:
             self.missing[command.file] = f"{shown}: {error.strerror}"
@@ -112,7 +119,8 @@ def collect(
         bundle.missing["black_box"] = f"no recording of a stop of {robot.name} in {folders}"
     for path in newest:
         bundle.file(f"black_box/{path.name}", path)
-    for command in support.commands(sys.executable, config, since):
+    services = doctor_environment(config, robot.name, etc)
+    for command in support.commands(sys.executable, config, since, services):
         bundle.output(command)
     return bundle
 
@@ -121,6 +129,20 @@ def installed_robot(etc: Path) -> Path | None:
     """The robot.yaml of the first robot that is installed; other .yaml files may lie beside it. None: there is none."""
     names = sorted(path.stem for path in (etc / "installed").glob("*.txt")) or ["robot"]
     return next((path for path in (etc / f"{name}.yaml" for name in names) if path.is_file()), None)
+
+
+def doctor_environment(config: Path, name: str, etc: Path = ETC, units: Path = UNITS) -> dict[str, str] | None:
+    """What the services of this robot have, None where none are installed or their .env is not readable.
+
+    The .env is beside an installed `config` and has its name, else that of the robot.
+    """
+    installed = config.stem if config.resolve().parent == etc.resolve() else name
+    try:
+        env_file = (etc / f"{installed}.env").read_text()
+        drop_ins = [path.read_text() for path in sorted(units.glob(f"canbase-driver@{installed}.service.d/*.conf"))]
+    except OSError:
+        return None
+    return service_environment(os.environ, drop_ins, env_file)
 
 
 def _listed(bundle: Bundle, name: str, folder: Path, patterns: Iterable[str]) -> list[Path]:

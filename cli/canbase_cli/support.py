@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from canbase_cli.service_environment import arguments
+
 if TYPE_CHECKING:  # `canbase --help` loads no configuration
     from canbase_config.robot import Robot
 
@@ -31,10 +33,13 @@ class Command:
     file: str
     argv: tuple[str, ...]
     timeout_s: float = 20.0
+    environment: Mapping[str, str] | None = None
+    """None: that of whoever asks."""
 
 
-def commands(python: str, config: Path, since: str) -> tuple[Command, ...]:
-    """All of them; `since` as journalctl takes it."""
+def commands(python: str, config: Path, since: str, services: Mapping[str, str] | None = None) -> tuple[Command, ...]:
+    """All of them; `since` as journalctl takes it, `services`: their environment, by which the doctor finds them."""
+    doctor = (python, "-m", "canbase_cli", "doctor", "--config", str(config), *arguments(services or {}))
     journal = ("journalctl", "--no-pager", "--since", since)
     return (
         Command("system/kernel.txt", ("uname", "-a")),
@@ -53,7 +58,7 @@ def commands(python: str, config: Path, since: str) -> tuple[Command, ...]:
         Command("journal/kernel.txt", (*journal, "--output=short-precise", "--dmesg"), 60.0),
         Command("versions/pip.txt", (python, "-m", "pip", "list", "--format=freeze", "--disable-pip-version-check")),
         Command("config/check.txt", (python, "-m", "canbase_cli", "config", "check", str(config))),
-        Command("doctor.txt", (python, "-m", "canbase_cli", "doctor", "--config", str(config)), 40.0),
+        Command("doctor.txt", doctor, 40.0, services),
     )
 
 
