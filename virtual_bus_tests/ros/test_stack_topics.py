@@ -19,6 +19,7 @@ from canbase_action_server.client import Drive, DriveResult
 from canbase_action_server.outcome import ErrorCode
 from ros.harness import merged
 from ros.running_robot import PATIENT, RESTS_M, own_domain, robot_on
+from ros.sros2_policy import allowed, present
 from ros.surroundings import BLOCKED_M, World, scan
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
@@ -189,3 +190,13 @@ def test_a_stop_by_the_driver_is_an_event_that_says_how_it_ends(world: World) ->
     event = world.wait_event(began_s, "motor_driver", "stop requested")
     assert event.latched
     assert event.clears_on == "reset"
+
+
+@pytest.mark.parametrize(
+    "node", ["velocity_mux", "safety_filter", "motor_driver", "motor_driver_commands", "drive_distance_server"]
+)
+def test_the_shipped_sros2_policy_allows_each_node_all_that_it_has(world: World, node: str) -> None:
+    """Under enforcement a node ends at the first endpoint that it may not make."""
+    has, may = present(world.node.node, node), allowed(node)
+    assert has["publish"] | has["subscribe"]
+    assert {way: names - may[way] for way, names in has.items()} == {way: set() for way in has}

@@ -33,9 +33,13 @@ RESET_S: Final = (2.0, 12.0)
 
 
 def cold_boot(robot: Robot) -> Row:
-    """Nobody logs in, nobody types: the drives get power."""
+    """Nobody logs in, nobody types: the drives get power. Nothing listens for other computers."""
     robot.wait("drives enabled", lambda: robot.state == DriverStatus.ENABLED)
-    return Row("power on", "nobody logs in", again_s=_enabled_s(), then="drives enabled by themselves")
+    sockets = [line.split()[4] for line in run("ss", "-Htunl").splitlines()]
+    if not sockets or any(not address.startswith(("127.0.0.", "[::1]")) for address in sockets):
+        raise BrokenPromiseError(f"sockets listen on {sockets}")
+    then = "drives enabled by themselves; sockets on 127.0.0.1 alone"
+    return Row("power on", "nobody logs in", again_s=_enabled_s(), then=then)
 
 
 def goal(robot: Robot) -> Row:

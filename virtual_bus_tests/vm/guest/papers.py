@@ -43,9 +43,8 @@ def journal(robot: Robot) -> Row:
     driver, server = _entries("CANBASE_PART=motor_driver"), _entries("CANBASE_PART=drive_distance_server")
     _has(driver, PRIORITY=INFO, CANBASE_STATE="ENABLED", CANBASE_ROBOT="robot", _SYSTEMD_UNIT=unit("driver"))
     _has(driver, PRIORITY=WARNING, CANBASE_CAUSE=".+", CANBASE_STATE="(?!ENABLED).+")
-    _has(
-        driver, PRIORITY=WARNING, CANBASE_STOPPED_BY="watchdog", CANBASE_LATCHED="True", CANBASE_STANDSTILL_S=r"[\d.]+"
-    )
+    stop = {"CANBASE_STOPPED_BY": "watchdog|motor_driver", "CANBASE_LATCHED": "true", "CANBASE_STANDSTILL_S": r"[\d.]+"}
+    _has(driver, PRIORITY=WARNING, **stop)
     _has(_entries("CANBASE_PART=velocity_mux"), PRIORITY=INFO, CANBASE_ACTIVE="action", CANBASE_BEFORE="")
     _has(_entries("CANBASE_PART=safety_filter"), PRIORITY=INFO, CANBASE_ACTION=".+")
     _has(server, PRIORITY=INFO, CANBASE_STEP="ended", CANBASE_ERROR_CODE="OK", CANBASE_GOAL=r"[0-9a-f-]{32,36}")
@@ -92,10 +91,12 @@ def installed_again(robot: Robot) -> Row:
 
 
 def _trip(robot: Robot) -> None:
-    """By the stop frames of a process that the watchdog does not know; until the driver has told of the stop."""
+    """By the stop frames of a process that the watchdog does not know; until the driver has told of the stop: by the
+    watchdog, or by its drives that have no power, whichever it hears of first."""
+    before = len(_entries("CANBASE_LATCHED=true"))
     run(*STOP, STOP_FILE)
     robot.wait("the trip", lambda: robot.state not in (None, DriverStatus.ENABLED))
-    robot.wait("the stop's entry", lambda: _entries("CANBASE_STOPPED_BY=watchdog"), 10.0)
+    robot.wait("the stop's entry", lambda: len(_entries("CANBASE_LATCHED=true")) > before, 10.0)
 
 
 def _uninstalled() -> None:

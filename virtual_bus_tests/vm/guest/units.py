@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from signal import SIGKILL, SIGSTOP, Signals
 
@@ -15,6 +16,8 @@ SERVER = "action-server"
 """The only part whose end does not stop a robot that somebody else drives."""
 HOLDS_STICK = ("driver", "watchdog")
 """What is restarted while somebody orders motion: the driver waits for a zero first, a dead watchdog latches."""
+LAST_ACTS = ("driver", "watchdog")
+"""Their ExecStopPost sends stop frames."""
 DIES: dict[str, tuple[Layer, ...]] = {
     "driver": (by.WATCHDOG_DRIVER, by.DRIVES),
     "watchdog": (by.DRIVER_WATCHDOG, by.DRIVES),
@@ -39,6 +42,8 @@ def killed(part: str, number: Signals) -> Scenario:
         stop = robot.stands(moment_s)
         stood_s = time.monotonic()
         again_s = robot.restarted(part, before) - moment_s
+        if part in LAST_ACTS:
+            _stop_frames_were_sent(part, moment_s)
         if part == SERVER:
             robot.spin(1.0)
         else:
@@ -116,6 +121,15 @@ def masked(robot: Robot) -> Row:
     ready_s = elapsed(since_s)
     robot.make_ready()
     return Row("canbase-watchdog", "masked; driver started", again_s=ready_s, then="no power, and says why")
+
+
+def _stop_frames_were_sent(part: str, since_s: float) -> None:
+    """By the process that systemd starts when this unit has ended, inside its sandbox."""
+    microseconds = round(since_s * 1e6)
+    told = [json.loads(line) for line in run("journalctl", "-b", "-q", "-o", "json", "-u", unit(part)).splitlines()]
+    since = [str(each.get("MESSAGE")) for each in told if int(each["__MONOTONIC_TIMESTAMP"]) > microseconds]
+    if "stop frames sent" not in since:
+        raise BrokenPromiseError(f"nobody sent stop frames after {part}; its journal since then: {since[-10:]}")
 
 
 def _at_speed(robot: Robot, part: str) -> None:
