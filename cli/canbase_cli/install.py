@@ -92,7 +92,7 @@ def install(
         installed = manifests(prefix)
         plan = install_plan(request, installed, neighbours(prefix, request.name, installed))
         if prefix == Path("/"):
-            rehearse(python, request.sourced)
+            rehearse(python, request.sourced, relay=loaded.robot.watchdog.relay is not None)
     except InstallError as error:
         fail(str(error), WRONG_INPUT)
     executor = Executor(prefix, typer.echo, dry_run=dry_run)

@@ -39,6 +39,7 @@ for module in (canbase, canbase_cli, canbase_config, can, canopen, rclpy):
     print(module.__file__)
 print(sys.base_prefix + "/")
 """
+_USES_RELAY: Final = "from gpiod import LineSettings, request_lines\n"
 _ADVICE: Final = (
     "With ROS 2 from apt the whole command has to know it: sudo bash -c 'source /opt/canbase/install/setup.bash && "
     "canbase install …'"
@@ -72,14 +73,16 @@ def chosen(environment: Mapping[str, str]) -> dict[str, str]:
     return {name: environment[name] for name in CHOSEN if environment.get(name)}
 
 
-def rehearse(python: str, environment: Mapping[str, str]) -> None:
+def rehearse(python: str, environment: Mapping[str, str], *, relay: bool = False) -> None:
     """Imports what the services import, with their Python and nothing but their environment. Raises InstallError.
+
+    `relay`: the watchdog needs gpiod too.
 
     sudo keeps no LD_LIBRARY_PATH, whatever it is told: found out here, and not by a robot that does not start.
     """
     try:
         done = subprocess.run(
-            [python, "-c", _USES],
+            [python, "-c", _USES + (_USES_RELAY if relay else "")],
             env=dict(environment),
             cwd="/",
             capture_output=True,
@@ -91,7 +94,8 @@ def rehearse(python: str, environment: Mapping[str, str]) -> None:
         raise InstallError(f"--python {python}: {error}") from error
     if done.returncode != 0:
         why = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
-        raise InstallError(f"the services would not start with {python}: {why}. {_ADVICE}")
+        advice = f"watchdog.relay needs it: {python} -m pip install 'gpiod>=2.1,<3'" if "gpiod" in why else _ADVICE
+        raise InstallError(f"the services would not start with {python}: {why}. {advice}")
     for path in (python, str(Path(python).resolve()), *done.stdout.split("\n")):
         if path.startswith(HIDDEN):
             raise InstallError(

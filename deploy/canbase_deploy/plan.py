@@ -15,6 +15,7 @@ from canbase_config.robot import Robot
 from canbase_deploy.actions import Action, Existing, Link, Remove, Run, WriteFile
 from canbase_deploy.neighbours import Neighbour, clash
 from canbase_deploy.owner import ETC, USER, is_the_owners, misplaced, modes, old, owner_paths, place
+from canbase_deploy.relay import APPLY, drop_in_text, udev_rule, wrong_chip
 
 UNITS: Final = PurePosixPath("/etc/systemd/system")
 RUN: Final = PurePosixPath("/run/canbase")
@@ -94,6 +95,7 @@ def install_plan(request: Request, manifests: Mapping[str, str], neighbours: Seq
         WriteFile(manifest_path(request.name), "".join(f"{path}\n" for path in listed)),
         Run(("systemd-tmpfiles", "--create", str(MODES.path), *(str(f.path) for f in _modes_of(request.name, named)))),
         Run(("udevadm", "control", "--reload")),
+        *([APPLY] if request.robot.watchdog.relay else []),
         Run(("systemctl", "daemon-reload")),
     ]
 
@@ -193,6 +195,9 @@ def _check(request: Request) -> None:
         raise InstallError(
             f"--adapter {request.adapter}: expected a udev property such as ID_PATH=pci-0000:00:14.0-usb"
         )
+    relay = request.robot.watchdog.relay
+    if relay is not None and (wrong := wrong_chip(relay.chip)):
+        raise InstallError(wrong)
 
 
 def _check_places(request: Request, manifests: Mapping[str, str]) -> None:
@@ -283,8 +288,8 @@ def _tuning(request: Request) -> list[WriteFile]:
         files += [_drop_in(part, request.name, "50-sros2", _enclave(part)) for part in WITH_ROS]
     relay = request.robot.watchdog.relay
     if relay is not None:
-        text = f"[Service]\nPrivateDevices=no\nDevicePolicy=closed\nDeviceAllow={relay.chip} rw\n"
-        files.append(_drop_in("watchdog", request.name, "40-relay", text))
+        files.append(_drop_in("watchdog", request.name, "40-relay", drop_in_text(relay.chip)))
+        files.append(udev_rule(request.name, relay.chip, USER))
     if request.hardware_watchdog_s:
         text = f"[Manager]\nRuntimeWatchdogSec={request.hardware_watchdog_s}s\n"
         files.append(WriteFile(PurePosixPath("/etc/systemd/system.conf.d/canbase.conf"), text))
