@@ -18,6 +18,7 @@ from canbase_config.load import load_robot, sample
 from canbase_deploy.execute import Executor
 from canbase_deploy.host import read_templates
 from canbase_deploy.plan import PARTS, Request, install_plan
+from canbase_watchdog.loop import BUS_DEAD_S
 
 TEMPLATES = Path(__file__).parents[2] / "deploy" / "systemd"
 ANALYZE = shutil.which("systemd-analyze")
@@ -93,7 +94,35 @@ def test_a_loop_that_hangs_is_found_and_a_dead_process_comes_back(part: str) -> 
 
     assert (unit["Type"], unit["WatchdogSec"], unit["Restart"]) == (["notify"], ["1"], ["always"])
     assert unit["RestartPreventExitStatus"] == ["2"]
-    assert int(unit["StartLimitBurst"][0]) > 0
+
+
+def cycle_s(part: str) -> float:
+    """From one start to the next: a part whose starts follow each other faster, for the whole interval, is given up."""
+    unit = directives(part)
+    return float(unit["StartLimitIntervalSec"][0]) / float(unit["StartLimitBurst"][0])
+
+
+def pause_s(part: str) -> float:
+    return float(directives(part)["RestartSec"][0])
+
+
+@pytest.mark.parametrize("part", ["driver", "velocity", "action-server"])
+def test_a_part_that_dies_at_every_start_is_given_up_on_a_slow_computer_too(part: str) -> None:
+    assert cycle_s(part) >= pause_s(part) + 5.0
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_a_part_that_dies_every_ten_seconds_is_never_given_up(part: str) -> None:
+    assert cycle_s(part) < 10.0
+
+
+def test_a_watchdog_that_cannot_begin_is_given_up() -> None:
+    assert cycle_s("watchdog") >= pause_s("watchdog") + 1.0  # Python starts in 0.35 s, and the stop frames after it
+
+
+def test_a_watchdog_whose_bus_is_dead_is_never_given_up() -> None:
+    """Drives without power acknowledge nothing, for hours; their watchdog must be there when they come back."""
+    assert cycle_s("watchdog") <= BUS_DEAD_S + pause_s("watchdog")
 
 
 @pytest.mark.parametrize("part", ["watchdog", "driver"])
