@@ -64,7 +64,7 @@ SHORT = (
     "masked",
     "journal",
     "full disk",
-    "stop target",
+    "stop driver",
     "restart driver",
     "error passive",
     "bus-off",
