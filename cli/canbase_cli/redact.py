@@ -16,17 +16,20 @@ _KEY: Final = (
 )
 """A name with its quotes and its = or :, but not ==, =>, :: and ://."""
 _BEFORE: Final = r"(?:(?P<start>^[ \t]*(?:-[ \t]+|export[ \t]+)?)|(?P<flow>[{,][ \t]*))?"
-_VALUES: Final = (
-    r"(?P<quote>\\{0,7}[\"'])(?:(?!(?<!\\)(?P=quote))[^\n])+(?P<end>(?P=quote))?",
-    r"(?!\\{0,7}[\"'])(?:"
-    r"[\[{][^\]}\n]+[\]}]?",  # a list or mapping
-    r"(?(close)[^\s,}\]]+",  # a number of JSON
-    r"(?(outer)(?:(?!(?P=outer))[^\n])+",  # "key=value" in quotes: up to the quote
-    r"(?(flow)[^,{}\n]+",  # in a flow mapping: up to the next comma or brace
-    r"(?(start)\S[^\n]*",  # a key that begins its line: the rest of it
-    r"(?:(?!\\{0,7}[\"'])\S)+)))))",  # in the midst of a line: a word
-)
-_SECRET: Final = re.compile(f"(?P<before>{_BEFORE}{_KEY})(?:{'|'.join(_VALUES).replace('(?:|', '(?:')})", re.MULTILINE)
+_QUOTED: Final = r"(?P<quote>\\{0,7}[\"'])(?:(?!(?<!\\)(?P=quote))[^\n])+(?P<end>(?P=quote))?"
+_LIST: Final = r"[\[{][^\]}\n]+[\]}]?"
+"""Or a mapping."""
+_NUMBER: Final = r"[^\s,}\]]+"
+"""Of JSON: its key is in quotes."""
+_UP_TO_QUOTE: Final = r"(?:(?!(?P=outer))[^\n])+"
+"""The quotes are around key and value."""
+_FLOW: Final = r"[^,{}\n]+"
+_LINE: Final = r"\S[^\n]*"
+"""The key begins its line."""
+_WORD: Final = r"(?:(?!\\{0,7}[\"'])\S)+"
+_PLAIN: Final = rf"(?(close){_NUMBER}|(?(outer){_UP_TO_QUOTE}|(?(flow){_FLOW}|(?(start){_LINE}|{_WORD}))))"
+_VALUE: Final = rf"(?:{_QUOTED}|(?!\\{{0,7}}[\"'])(?:{_LIST}|{_PLAIN}))"
+_SECRET: Final = re.compile(f"(?P<before>{_BEFORE}{_KEY}){_VALUE}", re.MULTILINE)
 _BLOCK: Final = re.compile(
     rf"^(?P<before>(?P<indent>[ \t]*){_KEY}(?:[|>][^\n]*)?\n)(?:(?P=indent)[ \t]+\S[^\n]*(?:\n|\Z))+", re.MULTILINE
 )
