@@ -68,7 +68,7 @@ SHORT = (
     "bus-off",
     "reboot",
 )
-"""For a look of ten minutes: ways to end, by kind; the freeze needs one more boot, the full disk starts all parts anew."""
+"""For a look of ten minutes: ways to end, by kind. Left out are those that cost most: freeze, full disk, the target."""
 GROUPS: dict[str, Sequence[str]] = {"first": tuple(FIRST), "second": tuple(SECOND), "short": SHORT}
 
 
