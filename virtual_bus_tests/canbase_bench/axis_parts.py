@@ -10,6 +10,10 @@ from canbase_bench.cia402.units import Scale
 from canbase_bench.plant.motor import Motor
 
 
+def _not_mounted(force_n: float) -> None:
+    """No wheel is there to be held."""
+
+
 @dataclass(frozen=True, slots=True)
 class AxisParts:
     """What one axis is built from. `travel_m` gives the way of its motor since the start of the world."""
@@ -18,6 +22,8 @@ class AxisParts:
     scale: Scale
     travel_m: Callable[[], float]
     encoder_offset: int
+    hold: Callable[[float], None] = _not_mounted
+    """Something holds its wheel with so much force [N]."""
 
 
 @dataclass(frozen=True, slots=True)

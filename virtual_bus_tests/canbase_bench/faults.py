@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from canbase_bench.cia402.axis import AxisFaults, Supply
+from canbase_bench.cia402.axis import Supply
 from canbase_bench.node import SimulatedNode
+from canbase_bench.plant.encoder import EncoderFault
 
 DEFAULT_CODE = 0x7305
 """603Fh of a fault without a code: encoder."""
+BLOCKED_N = 1e6
+"""Force that holds a wheel whatever its motor does [N]."""
 
 
 class FaultError(ValueError):
@@ -52,6 +55,36 @@ def _weak(node: SimulatedNode, now: float, axis: int = 0, share: float = 0.0) ->
     node.axes[axis].weaken(share)
 
 
+def _blocked(node: SimulatedNode, now: float, axis: int = 0, force_n: float = BLOCKED_N) -> None:
+    node.axes[axis].hold(force_n)
+
+
+def _limited(node: SimulatedNode, now: float, axis: int = 0, share: float = 0.5) -> None:
+    node.axes[axis].faults.setpoint_share = share
+
+
+def _encoder(**fixed: float | bool) -> Callable[..., None]:
+    """A fault of all that hangs on one encoder; what is not `fixed` is an argument of EncoderFault."""
+
+    def begin(node: SimulatedNode, now: float, axis: int = 0, **given: float) -> None:
+        node.axes[axis].lose_encoder(EncoderFault(**(fixed | given)))  # type: ignore[arg-type]
+
+    return begin
+
+
+def _encoder_zero(node: SimulatedNode, now: float, axis: int = 0) -> None:
+    node.axes[axis].faults.frozen_position = 0
+    node.axes[axis].lose_encoder(EncoderFault())
+
+
+def _rpdo_lost(node: SimulatedNode, now: float, axis: int = 0, every: int = 0) -> None:
+    node.thin_out(axis, every)
+
+
+def _tpdo_lost(node: SimulatedNode, now: float, axis: int = 0) -> None:
+    node.lose_feedback(axis)
+
+
 def _mute_boot(node: SimulatedNode, now: float) -> None:
     node.line.mute_boot = True
 
@@ -87,9 +120,11 @@ def _no_mains(node: SimulatedNode, now: float, axis: int = 0) -> None:
 def _heal(node: SimulatedNode, now: float) -> None:
     node.line.heal()
     for number, axis in enumerate(node.axes):
-        axis.faults = AxisFaults()
-        axis.weaken(1.0)
+        axis.heal()
         node.heal(number)
+    for number in range(len(node.axes)):
+        node.thin_out(number, 1)
+        node.lose_feedback(number, lost=False)
 
 
 KINDS: Mapping[str, tuple[Callable[..., None], frozenset[str]]] = {
@@ -102,6 +137,17 @@ KINDS: Mapping[str, tuple[Callable[..., None], frozenset[str]]] = {
     "stuck_velocity": (_stuck_velocity, frozenset({"axis", "raw"})),
     "ignores_setpoints": (_ignores_setpoints, frozenset({"axis"})),
     "weak": (_weak, frozenset({"axis", "share"})),
+    "blocked": (_blocked, frozenset({"axis", "force_n"})),
+    "limited": (_limited, frozenset({"axis", "share"})),
+    "encoder_lost": (_encoder(), frozenset({"axis"})),
+    "encoder_frozen": (_encoder(holds_speed=True), frozenset({"axis"})),
+    "encoder_zero": (_encoder_zero, frozenset({"axis"})),
+    "encoder_jumping": (_encoder(factor=1.0, jump_m=0.01, every_s=0.02), frozenset({"axis", "jump_m", "every_s"})),
+    "encoder_scaled": (_encoder(factor=0.5), frozenset({"axis", "factor"})),
+    "encoder_reversed": (_encoder(factor=-1.0), frozenset({"axis"})),
+    "encoder_intermittent": (_encoder(off_s=0.1), frozenset({"axis", "off_s"})),
+    "rpdo_lost": (_rpdo_lost, frozenset({"axis", "every"})),
+    "tpdo_lost": (_tpdo_lost, frozenset({"axis"})),
     "mute_boot": (_mute_boot, frozenset()),
     "short_emcy": (_short_emcy, frozenset()),
     "aliases": (_aliases, frozenset()),
@@ -114,6 +160,13 @@ KINDS: Mapping[str, tuple[Callable[..., None], frozenset[str]]] = {
 }
 """Each fault and the arguments that it takes. silent: sends nothing. deaf: receives nothing. cut: both.
 weak: its motor gives a share of its force, none by default, and holds its power.
+blocked: something holds its wheel, with `force_n` beyond its friction, by default more than any motor. limited: its
+motor gets a share of each setpoint, half by default.
+encoder_…: all that hangs on one encoder, 6064h, 606Ch and the drive's own loops. lost: it counts nothing and shows no
+speed. frozen: it counts nothing and shows its last speed. zero: lost, and 6064h is 0. jumping: `jump_m` ahead and back
+in turn, each `every_s`. scaled: it counts `factor` times the motion, 0.5 by default. reversed: it counts backward.
+intermittent: nothing for `off_s`, everything for `off_s`, in turn.
+rpdo_lost: setpoints of one axis do not reach it, or every n-th does. tpdo_lost: the feedback PDOs of one axis are lost.
 mute_boot: its boot-up messages are lost. short_emcy: three bytes. aliases: 29-bit frames that look like its own.
 extra_boot_up: one boot-up message too many. bus_off: its controller leaves the bus for `off_s`. reset_node: as by NMT.
 sto: no torque, it stays in switch on disabled. no_mains: it does not get beyond ready to switch on.
@@ -125,6 +178,11 @@ RANGES: Mapping[str, tuple[type, float, float]] = {
     "holds": (bool, 0, 1),
     "off_s": (float, 0.0, 3600.0),
     "share": (float, 0.0, 1.0),
+    "factor": (float, -10.0, 10.0),
+    "force_n": (float, 0.0, 1e9),
+    "jump_m": (float, 0.0, 10.0),
+    "every_s": (float, 0.002, 10.0),
+    "every": (int, 0, 100),
     "raw": (int, -(2**31), 2**31 - 1),
 }
 """Type, least and greatest value of each argument."""

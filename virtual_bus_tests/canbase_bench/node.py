@@ -23,6 +23,7 @@ from canbase_bench.command_watch import CommandWatch
 from canbase_bench.frame import Frame
 from canbase_bench.line import Line
 from canbase_bench.personality import GENERIC, Personality
+from canbase_bench.plant.encoder import Encoder
 
 COMMUNICATION_FAULT = 0x7500
 """603Fh when NMT stop or a reset meets an axis with 6007h = 1."""
@@ -135,6 +136,15 @@ class SimulatedNode:
     def heal(self, axis: int) -> None:
         """The causes of the faults of one axis are gone; it still needs a fault reset."""
         self.axes[axis].causes.clear()
+
+    def thin_out(self, axis: int, every: int) -> None:
+        """Of the setpoint PDOs of an axis it takes every n-th only, 0: none."""
+        self._rpdos[axis].takes_every = every
+
+    def lose_feedback(self, axis: int, lost: bool = True) -> None:
+        """The feedback PDOs of an axis, status and velocity, do not get onto the bus."""
+        for number in (0, 1):
+            self._tpdos[2 * axis + number].lost = lost
 
     # NMT
 
@@ -312,11 +322,12 @@ class SimulatedNode:
             number,
             parts.motor,
             parts.scale,
-            parts.travel_m,
+            Encoder(parts.travel_m, parts.motor.step_s),
             parts.encoder_offset,
             tell_error=lambda code: self._tell_fault(code, number),
             tell_clear=lambda code: self.emcy.clear_error(code, number),
             on_change=on_change,
+            hold=parts.hold,
             personality=self.personality,
         )
 

@@ -29,6 +29,9 @@ class Rpdo:
     ) -> None:
         self.number = number
         self.refused = 0
+        self.takes_every = 1
+        """A fault of the receiver: it takes every n-th frame only, 0: none."""
+        self._came = 0
         self.received_at = -inf
         self._dictionary, self._errors, self._on_deadline = dictionary, errors, on_deadline
         self._rules = PdoRules(dictionary, COMMUNICATION + number - 1, MAPPING + number - 1, True, operational)
@@ -54,6 +57,9 @@ class Rpdo:
 
     def receive(self, data: bytes, now: float) -> None:
         """A frame with this PDO's COB-ID. Too short: dropped, 8210h; too long: the first bytes count, 8220h."""
+        self._came += 1
+        if not self.takes_every or self._came % self.takes_every:
+            return
         self.received_at = now
         length = self._codec.size
         if len(data) != length and not self._usable(len(data), length):

@@ -23,6 +23,8 @@ class Tpdo:
     ) -> None:
         self._values, self._entries, self._send = dictionary.values, dictionary.entries, send
         self._rules = PdoRules(dictionary, COMMUNICATION + number - 1, MAPPING + number - 1, False, operational)
+        self.lost = False
+        """A fault of the sender: it is due, and does not get onto the bus."""
         self.stop()
 
     def stop(self) -> None:
@@ -58,7 +60,7 @@ class Tpdo:
         if self._type == 0 and data == self._last_data:
             return
         self._last_data = data
-        self._send(Frame(self._cob_id, data))
+        self._say(data)
 
     def tick(self, now: float) -> None:
         """Types 254 and 255: when the data changed, not more often than the inhibit time; and by the event timer."""
@@ -70,4 +72,8 @@ class Tpdo:
         timer_is_over = self._period > 0.0 and elapsed >= self._period
         if data != self._last_data or timer_is_over:
             self._last_data, self._last_time = data, now
+            self._say(data)
+
+    def _say(self, data: bytes) -> None:
+        if not self.lost:
             self._send(Frame(self._cob_id, data))

@@ -23,6 +23,7 @@ from canbase_bench.cia402.states import (
 )
 from canbase_bench.cia402.units import Scale
 from canbase_bench.personality import GENERIC, Personality
+from canbase_bench.plant.encoder import Encoder, EncoderFault
 from canbase_bench.plant.motor import AT_ONCE, Motor
 
 
@@ -55,6 +56,8 @@ class AxisFaults:
     """606Ch shows this."""
     ignores_setpoints: bool = False
     """60FFh is taken, and has no effect on the motor."""
+    setpoint_share: float = 1.0
+    """Of 60FFh, that the motor is given."""
     force_share: float = 1.0
     """Of the force that 6072h allows. Set by `Axis.weaken`."""
     supply: Supply = Supply.FULL
@@ -63,17 +66,21 @@ class AxisFaults:
 
 @dataclass(slots=True)
 class Axis:
-    """Axis `number` of a node. `travel_m` gives the way of its motor, `on_change` hears every transition."""
+    """Axis `number` of a node. `encoder` measures its motor, `on_change` hears every transition.
+
+    `hold`: something holds its wheel with so much force [N].
+    """
 
     dictionary: Dictionary
     number: int
     motor: Motor
     scale: Scale
-    travel_m: Callable[[], float]
+    encoder: Encoder
     encoder_offset: int
     tell_error: Callable[[int], None]
     tell_clear: Callable[[int], None]
     on_change: Callable[[State, Transition], None]
+    hold: Callable[[float], None]
     personality: Personality = GENERIC
     state: State = State.NOT_READY_TO_SWITCH_ON
     faults: AxisFaults = field(default_factory=AxisFaults)
@@ -117,6 +124,19 @@ class Axis:
     def weaken(self, share: float) -> None:
         """The motor gives `share` (0..1) of the force that 6072h allows."""
         self.faults.force_share = share
+        self._limit_force()
+
+    def lose_encoder(self, fault: EncoderFault) -> None:
+        """Position, velocity and the drive's own loops have a faulty sensor, all at once."""
+        self.encoder.suffer(fault, self.motor.speed_mps)
+        self.motor.sensor = self.encoder.sample
+
+    def heal(self) -> None:
+        """Nothing is broken any more."""
+        self.faults = AxisFaults()
+        self.encoder.heal()
+        self.motor.sensor = None
+        self.hold(0.0)
         self._limit_force()
 
     def _limit_force(self) -> None:
@@ -171,7 +191,7 @@ class Axis:
 
     def position(self) -> int:
         """6064h as the encoder has it."""
-        return self.scale.counts(self.travel_m(), self.encoder_offset)
+        return self.scale.counts(self.encoder.travel_m, self.encoder_offset)
 
     def velocity(self) -> int:
         """606Ch as the drive measures it."""
@@ -271,9 +291,9 @@ class Axis:
             return
         elif self._value(0x60) == PROFILE_VELOCITY:
             slope = self.scale.slope
-            self.motor.run(self._target_mps(), slope(self._value(0x83)), slope(self._value(0x84)))
+            self.motor.run(self._goal_mps(), slope(self._value(0x83)), slope(self._value(0x84)))
         else:
-            self.motor.run(self._target_mps(), AT_ONCE, AT_ONCE)
+            self.motor.run(self._goal_mps(), AT_ONCE, AT_ONCE)
 
     def _quick_stop(self) -> None:
         option = self._value(0x5A)
@@ -328,6 +348,9 @@ class Axis:
 
     def _target_mps(self) -> float:
         return self._value(0xFF) * self.scale.target_mps
+
+    def _goal_mps(self) -> float:
+        return self.faults.setpoint_share * self._target_mps()
 
     def _put(self, offset: int, value: int) -> None:
         """Set object 60xxh of this axis."""

@@ -88,6 +88,7 @@ class Base:
         self._left, self._right = ([(w.motor, float(w.direction)) for w in side] for side in (left, right))
         self._viscous_left, self._viscous_right = (parameters.viscous_nspm * len(side) for side in (left, right))
         self._bound_left, self._bound_right = (parameters.coulomb_n * self._h * len(side) for side in (left, right))
+        self._own_bounds = (self._bound_left, self._bound_right)
         self._grip_left, self._grip_right = 1.0 - parameters.slip_left, 1.0 - parameters.slip_right
         self._invert_mass_matrix(parameters)
         self.x_m = self.y_m = self.turned_rad = 0.0
@@ -119,6 +120,14 @@ class Base:
         c = self._cross
         vl, vr = self.v_left_mps, self.v_right_mps
         return (b * vl * vl - 2.0 * c * vl * vr + a * vr * vr) / (a * b - c * c) / 2.0
+
+    def hold(self, side: str, force_n: float) -> None:
+        """Something holds the wheels of a side with so much force beyond their friction: a threshold, a jammed gear."""
+        impulse = force_n * self._h
+        if side == "left":
+            self._bound_left = self._own_bounds[0] + impulse
+        else:
+            self._bound_right = self._own_bounds[1] + impulse
 
     def step(self, now: float) -> None:
         """Advance by one inner step that ends at `now`."""

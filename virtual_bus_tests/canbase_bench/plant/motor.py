@@ -20,12 +20,14 @@ class Motor:
     """
 
     def __init__(self, mass_kg: float, bandwidth_radps: float, peak_force_n: float, dt: float) -> None:
-        self._dt = dt
+        self.step_s = self._dt = dt
         self._kp = mass_kg * bandwidth_radps
         self._ki_dt = mass_kg * bandwidth_radps**2 / 4.0 * dt
         self.peak_force_n = peak_force_n
         self._limit = peak_force_n
         self._on_stopped: Callable[[], None] | None = None
+        self.sensor: Callable[[float], float] | None = None
+        """What makes the measured speed of the true one; None: the true one is measured."""
         self.speed_mps = 0.0
         self.power_off()
 
@@ -60,10 +62,14 @@ class Motor:
     @property
     def at_rest(self) -> bool:
         """True when the next step would do what the last one did, as long as the wheel stands."""
+        if self.sensor is not None:
+            return False
         return not self.powered or (self.demand_mps == 0.0 == self.goal_mps and not self._stopping)
 
     def step(self, speed_mps: float) -> float:
-        """One inner step at the measured speed; returns the force at the rim."""
+        """One inner step at this true speed, of which the loop knows what is measured; returns the force at the rim."""
+        if self.sensor is not None:
+            speed_mps = self.sensor(speed_mps)
         self.speed_mps = speed_mps
         if not self.powered:
             return 0.0

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from canbase_bench.axis_parts import AxisParts, StateChange
 from canbase_bench.cia301.dictionary import AXIS_STRIDE, key
@@ -156,7 +157,8 @@ class Bench:
             return AxisParts(idle, _scale_of(self._robot, self._robot.drives[0]), _nowhere, 0)
         drive = self._robot.drives[i]
         scale = _scale_of(self._robot, drive)
-        return AxisParts(self._motors[i], scale, self._travel(drive), self._parameters.encoder_offset * (i + 1))
+        offset = self._parameters.encoder_offset * (i + 1)
+        return AxisParts(self._motors[i], scale, self._travel(drive), offset, partial(self.base.hold, drive.side))
 
     def _travel(self, drive: Drive) -> Callable[[], float]:
         base, direction = self.base, drive.direction
