@@ -7,11 +7,9 @@ import math
 from canbase_config.drive import Drive
 from canbase_config.profile import Layout
 from canbase_config.robot import Robot
+from canbase_config.stopping import CYCLES_TO_SETPOINT, max_wheel_mps
 from canbase_config.units import motor_rev_per_s
 from canbase_config.watchdog import RelayLine, WatchdogConfig, WatchedDrive, WatchedLayout
-
-CYCLES_TO_SETPOINT = 2
-"""A command waits for the driver's next cycle, and its age is looked at only there."""
 
 
 def mps_per_bit(drive: Drive, wheel_radius_m: float) -> float:
@@ -29,11 +27,6 @@ def velocity_scale(drive: Drive) -> float:
 def m_per_count(drive: Drive, wheel_radius_m: float) -> float:
     """Travel of the wheel's rim [m] for one increment of the drive's 6064h; the sign makes forward positive."""
     return _m_per_motor_rev(drive, wheel_radius_m) / drive.counts_per_motor_rev
-
-
-def max_wheel_mps(robot: Robot) -> float:
-    """The fastest that the driver lets a wheel's rim turn [m/s]: straight on or in place, each at its limit."""
-    return max(robot.limits.linear_mps, robot.limits.angular_radps * robot.base.track_m / 2.0)
 
 
 def order_hold_s(robot: Robot) -> float:

@@ -18,7 +18,7 @@ from campaign.wishes import Wishes
 from campaign.world import World
 from canbase_action_server.outcome import ErrorCode
 from canbase_bench.cia402.states import State
-from canbase_config.derive import max_wheel_mps
+from canbase_config.stopping import max_wheel_mps
 from canbase_driver.snapshot import DriverState
 from canbase_velocity.twist import Twist
 from canbase_watchdog.ladder import RUNGS, Step

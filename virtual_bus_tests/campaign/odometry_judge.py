@@ -9,7 +9,7 @@ import math
 
 from campaign.world import World
 from canbase_action_server.along_track import Pose, displacement
-from canbase_config.derive import max_wheel_mps
+from canbase_config.stopping import max_wheel_mps
 
 BRAKES_MPS = 0.2
 """So much faster the base may have been when the newest sample was taken."""

@@ -1,0 +1,107 @@
+"""How long and how far the base goes on after an order to stop, worked out from robot.yaml. Pure numbers, no state.
+
+Ordinary stop: the driver's ramp. The slower of linear and angular velocity sets its time, both shrink together, and
+jerk_mps3 rounds its begin and its end (an S-curve; an acceleration that was under way ends at once). A turn in place
+has no jerk limit. Emergency stop: the same ramp, shorter by deceleration_mps2 / emergency_deceleration_mps2, without a
+jerk limit. Quick stop: each drive brakes its own wheel with 6085h, emergency_deceleration_mps2 at the rim.
+The driver's ramp itself is canbase_driver/limits.py; a test compares both.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from canbase_config.robot import Limits, Robot
+
+CYCLES_TO_SETPOINT: Final = 2
+"""An order waits for the driver's next cycle, and its end is seen in the one after."""
+BRAKING_SHARE: Final = 0.5
+"""A wheel that loses less speed than this share of its stated deceleration does not brake as it must: half is left to
+double payload, slopes and slow current limits."""
+ROLLING_MPS2: Final = 0.1
+"""What a wheel without power loses at least: rolling resistance 0.01 × 9.81 m/s² of a hard wheel on a hard, level floor
+(soft floors, gears and motors brake more; on a slope nothing is known)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """From the order to stop until the base stands. Magnitudes: no signs."""
+
+    time_s: float
+    distance_m: float = 0.0
+    """Of the middle between the wheels, along its path."""
+    turn_rad: float = 0.0
+
+
+def ramp(limits: Limits, linear_mps: float, angular_radps: float = 0.0, *, emergency: bool = False) -> Stop:
+    """The setpoints on their way to zero, from this velocity (signs do not matter). No lag of driver and drives."""
+    linear, angular = abs(linear_mps), abs(angular_radps)
+    straight_s = max(linear / limits.deceleration_mps2, angular / limits.angular_deceleration_radps2)
+    if emergency:
+        time_s = straight_s * limits.deceleration_mps2 / limits.emergency_deceleration_mps2
+    else:
+        time_s = _rounded_s(straight_s, linear, limits.jerk_mps3)
+    return _symmetrical(time_s, linear, angular)
+
+
+def stop(robot: Robot, linear_mps: float, angular_radps: float = 0.0, *, emergency: bool = False) -> Stop:
+    """From an order to stop at the driver until the wheels stand: `ramp`, after `lag_s` at full speed."""
+    braking = ramp(robot.limits, linear_mps, angular_radps, emergency=emergency)
+    return _after(lag_s(robot), braking, linear_mps, angular_radps)
+
+
+def quick_stop(robot: Robot, wheel_mps: float) -> Stop:
+    """The drives' own ramp, from the controlword on, for a wheel that is so fast. `distance_m`: of its rim."""
+    braking_s = abs(wheel_mps) / robot.limits.emergency_deceleration_mps2
+    return _after(robot.watchdog.drive_lag_s, _symmetrical(braking_s, abs(wheel_mps), 0.0), wheel_mps, 0.0)
+
+
+def lag_s(robot: Robot) -> float:
+    """From an order at the driver until the wheels do it: the driver's cycles and watchdog.drive_lag_s [s]."""
+    return CYCLES_TO_SETPOINT / robot.rates.control_hz + robot.watchdog.drive_lag_s
+
+
+def max_wheel_mps(robot: Robot) -> float:
+    """The fastest that the driver lets a wheel's rim turn [m/s]: straight on or in place, each at its limit."""
+    return max(robot.limits.linear_mps, robot.limits.angular_radps * robot.base.track_m / 2.0)
+
+
+def longest_ramp_s(robot: Robot) -> float:
+    """No ordinary stop takes longer [s]: from all limits at once, with the lag."""
+    return stop(robot, robot.limits.linear_mps, robot.limits.angular_radps).time_s
+
+
+def longest_quick_stop_s(robot: Robot) -> float:
+    """No quick stop takes longer [s]: from the fastest speed that is no overspeed yet."""
+    return quick_stop(robot, robot.watchdog.overspeed_factor * max_wheel_mps(robot)).time_s
+
+
+def coasting_s(wheel_mps: float) -> float:
+    """How long a wheel that was so fast may roll when its power is off, on a level floor [s]."""
+    return abs(wheel_mps) / ROLLING_MPS2
+
+
+def _rounded_s(straight_s: float, linear: float, jerk: float) -> float:
+    """Time of an S-curve whose steepest slope is that of a straight line of `straight_s`, or less where jerk lets it
+    not get so steep. Without a linear part there is no jerk limit."""
+    if linear == 0.0:
+        return straight_s
+    slope_s = max(straight_s, math.sqrt(linear / jerk))
+    return slope_s + linear / slope_s / jerk
+
+
+def _symmetrical(time_s: float, linear: float, angular: float) -> Stop:
+    """Speeds that fall as they would rise, so that their mean is one half."""
+    return Stop(time_s, linear * time_s / 2.0, angular * time_s / 2.0)
+
+
+def _after(delay_s: float, braking: Stop, linear: float, angular: float) -> Stop:
+    """`delay_s` without any braking first."""
+    return Stop(
+        delay_s + braking.time_s,
+        abs(linear) * delay_s + braking.distance_m,
+        abs(angular) * delay_s + braking.turn_rad,
+    )
