@@ -68,6 +68,10 @@ else
 	canbase bench --write docs/performance.md
 endif
 
+.PHONY: hazards
+hazards: $(VENV)/ready ## checks docs/hazards.yaml and writes the tables of docs/safety.md
+	PYTHONPATH=virtual_bus_tests python -m hazards
+
 .PHONY: lint
 lint: $(VENV)/ready ## ruff, mypy, import rules, and that colcon sees a ROS 2 package
 	ruff check .

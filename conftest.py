@@ -6,6 +6,8 @@ import pytest
 
 from bus import real_bus
 
+pytest_plugins = ["pytester"]
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """`pytest --can-interface socketcan --can-channel can0 --personality epos4 --robot=robot.yaml`"""

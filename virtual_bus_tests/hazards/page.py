@@ -1,0 +1,104 @@
+"""The tables of docs/safety.md, made of docs/hazards.yaml. What stands around them is written by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from canbase_config.load import load_robot, sample
+from canbase_config.robot import Robot
+from hazards.catalogue import ROOT, Braking, Catalogue, Hazard, Part, Row
+from hazards.formula import evaluate
+
+PAGE = ROOT / "docs" / "safety.md"
+COMMAND = "make hazards"
+SAMPLE = "bench"
+HEADINGS = {
+    Part.PROCESS: "A process",
+    Part.BUS_AND_DRIVES: "Bus and drives",
+    Part.COMPUTER: "The computer",
+    Part.ROS: "ROS",
+    Part.OPERATOR: "Operators",
+    Part.ACCESS: "Access",
+}
+BRAKES = {
+    Braking.RAMP: "driver's ramp",
+    Braking.QUICK_STOP: "quick stop",
+    Braking.COAST: "coasts",
+    Braking.NONE: "–",
+}
+HEAD = """| failure | must hold | component | acts within | braking, distance | reaction | proof |
+|---|---|---|---|---|---|---|"""
+
+
+def sample_robot() -> Robot:
+    """The robot of the bench, whose numbers the page shows beside each formula."""
+    return load_robot(sample(SAMPLE)).robot
+
+
+def tables(catalogue: Catalogue, robot: Robot) -> str:
+    """All tables, and after them what the rows do not cover."""
+    parts = [_table(part, [row for row in catalogue.rows if row.part is part], robot) for part in Part]
+    return "\n\n".join([*(part for part in parts if part), _gaps(catalogue)])
+
+
+def worst_distance_m(row: Row, robot: Robot) -> float | None:
+    """From the failure at limits.linear_mps until standstill [m]; None where no formula holds."""
+    if row.distance_m:
+        return evaluate(row.distance_m, robot)
+    limits = robot.limits
+    rate = {
+        Braking.RAMP: limits.deceleration_mps2,
+        Braking.QUICK_STOP: limits.emergency_deceleration_mps2,
+    }.get(row.braking)
+    if rate is None or not row.within_s:
+        return None
+    speed_mps = limits.linear_mps
+    return float(speed_mps * evaluate(row.within_s, robot) + speed_mps**2 / (2.0 * rate))
+
+
+def _table(part: Part, rows: list[Row], robot: Robot) -> str:
+    if not rows:
+        return ""
+    return "\n".join([f"## {HEADINGS[part]}", "", HEAD, *(_line(row, robot) for row in rows)])
+
+
+def _line(row: Row, robot: Robot) -> str:
+    cells = (
+        f'<a id="{row.id}"></a>{row.failure} *{row.unsafe_control_action}* ({_words(row.hazard)})',
+        row.constraint,
+        row.layer,
+        _time(row, robot),
+        _distance(row, robot),
+        f"{row.reaction} {_category(row)}",
+        "<br>".join(f"`{name}`" if name.endswith(".py") or "::" in name else name for name in row.tests),
+    )
+    return f"| {' | '.join(cell.replace('|', '∣') for cell in cells)} |"
+
+
+def _time(row: Row, robot: Robot) -> str:
+    if not row.within_s:
+        return "–"
+    return f"`{row.within_s}` = {evaluate(row.within_s, robot):.2f} s"
+
+
+def _distance(row: Row, robot: Robot) -> str:
+    distance_m = worst_distance_m(row, robot)
+    return BRAKES[row.braking] if distance_m is None else f"{BRAKES[row.braking]}, {distance_m:.2f} m"
+
+
+def _category(row: Row) -> str:
+    return "" if row.stop_category == "none" else f"(like stop category {row.stop_category})"
+
+
+def _words(hazard: Hazard) -> str:
+    return hazard.value.replace("_", " ")
+
+
+def _gaps(catalogue: Catalogue) -> str:
+    return "\n".join(["## What these rows do not cover", "", *_gap_lines(catalogue)])
+
+
+def _gap_lines(catalogue: Catalogue) -> Iterator[str]:
+    for row in catalogue.rows:
+        if row.not_covered:
+            yield f"- **{row.failure.rstrip('.')}**: {row.not_covered}"

@@ -1,0 +1,27 @@
+"""Hook of pytest: a test that a row of docs/hazards.yaml names proves nothing when it is skipped, so that fails it."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from functools import cache
+
+import pytest
+
+from hazards import catalogue, proofs
+
+
+@cache
+def _names() -> frozenset[str]:
+    return proofs.pytest_names(catalogue.load())
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """A skipped proof, or one that is expected to fail, is a failure."""
+    report = yield
+    if report.skipped and proofs.is_proof(item.nodeid, _names()):
+        report.outcome = "failed"
+        report.longrepr = f"{item.nodeid} proves a row of docs/hazards.yaml and was skipped: {report.longrepr}"
+    return report
