@@ -26,6 +26,7 @@ def bench(
     script = root / "benchmarks" / "run.py"
     if not script.exists():
         fail("the benchmarks come with the sources: clone the repository, and there `make bench`", FAILED)
-    options = ["--write", str(write)] if write else []
+    options = ["--write", str(write.resolve())] if write else []
     environment = os.environ | {"PYTHONPATH": str(root / "virtual_bus_tests")}
-    raise typer.Exit(subprocess.call([sys.executable, str(script), *(names or []), *options], env=environment))
+    command = [sys.executable, str(script), *(names or []), *options]
+    raise typer.Exit(subprocess.call(command, env=environment, cwd=root))  # its children import from there at most

@@ -10,6 +10,7 @@ import sys
 import tarfile
 import time
 from collections.abc import Callable, Iterable, Mapping
+from importlib.metadata import distributions
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Final
@@ -105,6 +106,7 @@ def collect(
     """Everything. Nothing of it touches the bus or orders anything. `named`: the files that robot.yaml names."""
     bundle = Bundle()
     bundle.text("versions/canbase.txt", "canbase, Python, computer", _versions)
+    bundle.text("versions/packages.txt", "Python packages", _packages)
     bundle.text("environment.txt", "variables of ROS and canbase", lambda: support.environment_text(os.environ))
     bundle.file("config/robot.yaml", config)
     for name, path in named.items():
@@ -120,7 +122,7 @@ def collect(
     for path in newest:
         bundle.file(f"black_box/{path.name}", path)
     services = doctor_environment(config, robot.name, etc)
-    for command in support.commands(sys.executable, config, since, services):
+    for command in support.commands(config, since, services):
         bundle.output(command)
     return bundle
 
@@ -166,6 +168,12 @@ def _versions() -> str:
     collected = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
     python = f"Python {sys.version}\n{sys.executable}"
     return f"canbase {installed_version()}\n{python}\n{platform.platform()}\nROS {ros}\ncollected {collected}\n"
+
+
+def _packages() -> str:
+    """As `pip list --format=freeze` has it, without a process that could be another pip."""
+    found = {(dist.metadata["Name"] or "?", dist.version) for dist in distributions()}
+    return "".join(f"{name}=={version}\n" for name, version in sorted(found))
 
 
 def support_bundle(

@@ -8,7 +8,6 @@ import random
 import signal
 import socket
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -23,6 +22,7 @@ from rich.table import Table
 
 from canbase_cli.goal import CANCELED, REJECTED
 from canbase_cli.options import FAILED, fail, ros_needed
+from canbase_cli.own_modules import module_command
 from canbase_cli.stack import Stack
 
 if TYPE_CHECKING:
@@ -180,7 +180,7 @@ def _run(console: Console, *words: str, interrupt: Callable[[], bool] | None = N
     """A canbase command as a user would type it, on this terminal. It gets Ctrl-C once `interrupt` holds."""
     typed = " ".join(("canbase", *words))
     console.print(f"\n[bold]$ {typed}[/]" + (f"   (Ctrl-C after {CANCEL_AFTER_M} m)" if interrupt else ""))
-    process = subprocess.Popen([sys.executable, "-m", "canbase_cli", *words])
+    process = subprocess.Popen(module_command("canbase_cli", *words))
     deadline = time.monotonic() + RUN_S
     while process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.05)

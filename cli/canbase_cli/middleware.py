@@ -16,6 +16,8 @@ _PROFILES: Final = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_
 _RANGE: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _CHOICES: Final = (_RANGE, "ROS_STATIC_PEERS", *_PROFILES)
 """Who has set one of them has said who may hear."""
+_NO_PROFILES_FROM_HERE: Final = "SKIP_DEFAULT_XML_FILE"
+"""Otherwise Fast DDS reads DEFAULT_FASTRTPS_PROFILES.xml of the current folder, whoever has put it there."""
 _FAST_DDS: Final = ("", "rmw_fastrtps_cpp", "rmw_fastrtps_dynamic_cpp")
 _LOCAL: Final = Path(__file__).with_name("fastdds_local.xml")
 
@@ -24,6 +26,11 @@ def stay_on_this_computer(environment: MutableMapping[str, str]) -> None:
     """Changes the environment of this process, unless it says who may hear. DDS has no users: who hears may order."""
     if not any(environment.get(name) for name in _CHOICES):
         environment[_RANGE] = "LOCALHOST"
+
+
+def take_no_profile_from_here(environment: MutableMapping[str, str]) -> None:
+    """Changes the environment of this process: only a profile that a variable names counts."""
+    environment.setdefault(_NO_PROFILES_FROM_HERE, "1")
 
 
 def prefer_udp(environment: MutableMapping[str, str]) -> None:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
 import typer
 from typer.core import TyperCommand
 
-from canbase_cli.middleware import prefer_udp, stay_on_this_computer
+from canbase_cli.middleware import prefer_udp, stay_on_this_computer, take_no_profile_from_here
 
 if TYPE_CHECKING:
     from canbase_config.load import Loaded
@@ -95,6 +95,7 @@ def ros_needed() -> Iterator[None]:
     """Around the import of a module that needs ROS 2: where that is missing, advice and exit code 1."""
     stay_on_this_computer(os.environ)
     prefer_udp(os.environ)
+    take_no_profile_from_here(os.environ)
     try:
         yield
     except ModuleNotFoundError as error:

@@ -20,6 +20,7 @@ from canbase_cli.options import (
     ros_arguments,
     ros_needed,
 )
+from canbase_cli.own_modules import module_command
 from canbase_cli.priority import raise_priority
 
 if TYPE_CHECKING:
@@ -104,7 +105,7 @@ def watchdog(
     told = watchdog_config(robot).to_json()
     # The ROS wheels' start-up hook would start every Python of their environment a second time.
     environment = os.environ | {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"}
-    os.execve(sys.executable, [sys.executable, "-m", "canbase_watchdog", "--config-json", told], environment)
+    os.execve(sys.executable, module_command("canbase_watchdog", "--config-json", told), environment)
 
 
 def leave_stop_file(robot: Robot, path: Path | None) -> None:

@@ -9,13 +9,14 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Final
+
+from canbase_cli.own_modules import module_command
 
 START_ORDER: Final = ("sim", "watchdog", "velocity", "driver", "action-server")
 END_ORDER: Final = ("action-server", "velocity", "driver", "watchdog", "sim")
@@ -101,7 +102,7 @@ class Stack:
         return "" if self._logs is None else (self._logs / f"{part}.log").read_text(errors="replace")
 
     def _spawn(self, part: str) -> subprocess.Popen[bytes]:
-        argv = [sys.executable, "-m", "canbase_cli.child", str(os.getpid()), part, *self._options]
+        argv = module_command("canbase_cli.child", str(os.getpid()), part, *self._options)
         if part not in WITHOUT_ROS:
             argv += self._ros_args
         with ExitStack() as opened:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from canbase_cli.own_modules import module_command
 from canbase_cli.service_environment import arguments
 
 if TYPE_CHECKING:  # `canbase --help` loads no configuration
@@ -37,9 +38,10 @@ class Command:
     """None: that of whoever asks."""
 
 
-def commands(python: str, config: Path, since: str, services: Mapping[str, str] | None = None) -> tuple[Command, ...]:
+def commands(config: Path, since: str, services: Mapping[str, str] | None = None) -> tuple[Command, ...]:
     """All of them; `since` as journalctl takes it, `services`: their environment, by which the doctor finds them."""
-    doctor = (python, "-m", "canbase_cli", "doctor", "--config", str(config), *arguments(services or {}))
+    check = module_command("canbase_cli", "config", "check", str(config))
+    doctor = module_command("canbase_cli", "doctor", "--config", str(config), *arguments(services or {}))
     journal = ("journalctl", "--no-pager", "--since", since)
     return (
         Command("system/kernel.txt", ("uname", "-a")),
@@ -56,9 +58,8 @@ def commands(python: str, config: Path, since: str, services: Mapping[str, str] 
         Command("journal/canbase.txt", (*journal, "--output=short-precise", "--unit=canbase*"), 60.0),
         Command("journal/canbase.json", (*journal, "--output=json", "--unit=canbase*"), 60.0),
         Command("journal/kernel.txt", (*journal, "--output=short-precise", "--dmesg"), 60.0),
-        Command("versions/pip.txt", (python, "-m", "pip", "list", "--format=freeze", "--disable-pip-version-check")),
-        Command("config/check.txt", (python, "-m", "canbase_cli", "config", "check", str(config))),
-        Command("doctor.txt", doctor, 40.0, services),
+        Command("config/check.txt", tuple(check)),
+        Command("doctor.txt", tuple(doctor), 40.0, services),
     )
 
 

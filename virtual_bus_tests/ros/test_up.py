@@ -80,6 +80,23 @@ def test_a_stop_signal_while_the_parts_still_start_ends_it_well() -> None:
         assert "stopping the robot" in up.log()
 
 
+def test_no_part_imports_from_the_folder_in_which_it_was_started(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each of them imports difflib, by typer; Fast DDS would read this profile, and complain of it."""
+    (tmp_path / "difflib.py").write_text(f"open({str(tmp_path / 'caught')!r}, 'a').write('difflib')\n")
+    (tmp_path / "DEFAULT_FASTRTPS_PROFILES.xml").write_text("<planted/>")
+    monkeypatch.chdir(tmp_path)
+    with own_domain() as domain, robot_on(domain, start=False) as robot:
+        up = robot.command("up", "--config", str(robot.config))
+        robot.wait_whole()
+        up.interrupt()
+        assert robot.exit_code(up, END_S) == 0, up.log()
+        assert "XMLPARSER" not in up.log()
+
+    assert not (tmp_path / "caught").exists()
+
+
 def parts_of(pid: int) -> dict[str, int]:
     """Process ids of the children of `canbase up`, by part; none before it has come to its own command."""
     children = [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
@@ -92,7 +109,7 @@ def part_of(pid: int) -> str | None:
     words = Path(f"/proc/{pid}/cmdline").read_text().split("\0")
     if "canbase_watchdog" in words:
         return "watchdog"
-    return words[4] if "canbase_cli.child" in words else None
+    return words[words.index("canbase_cli.child") + 2] if "canbase_cli.child" in words else None
 
 
 def lives(pid: int) -> bool:

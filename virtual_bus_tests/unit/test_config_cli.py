@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from canbase_cli import version
 from canbase_cli.main import app
 from canbase_cli.options import ros_needed
+from canbase_cli.own_modules import module_command
 from canbase_config.derive import watchdog_config
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
@@ -155,7 +156,7 @@ def test_the_watchdog_replaces_the_process_and_skips_the_start_up_hook(
 
     ((executable, arguments, environment),) = calls
     assert executable == sys.executable
-    assert arguments[:-1] == [sys.executable, "-m", "canbase_watchdog", "--config-json"]
+    assert arguments[:-1] == module_command("canbase_watchdog", "--config-json")
     assert WatchdogConfig.from_json(arguments[-1]) == watchdog_config(load_robot(file).robot)
     assert environment["_ROS_WHEELS_BOOTSTRAP_COMPLETE"] == "1"
     assert environment["PATH"] == os.environ["PATH"]

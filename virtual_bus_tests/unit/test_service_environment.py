@@ -54,7 +54,7 @@ def test_a_file_wins_over_drop_ins_and_a_later_drop_in_over_an_earlier_one() -> 
 )
 def test_the_doctor_looks_where_the_services_are(environment: dict[str, str], words: tuple[str, ...]) -> None:
     assert arguments(environment) == words
-    doctor = commands("python3", Path("r.yaml"), "-1h", environment)[-1]
+    doctor = commands(Path("r.yaml"), "-1h", environment)[-1]
     assert doctor.argv[-len(words) - 1 :] == ("r.yaml", *words)
     assert doctor.environment == environment
 

@@ -114,7 +114,7 @@ def test_the_archive_is_the_owners_alone_and_whole(tmp_path: Path) -> None:
 
 
 def test_units_journal_and_can_statistics_are_asked_for() -> None:
-    asked = {command.file: " ".join(command.argv) for command in commands("python3", Path("r.yaml"), "-1h")}
+    asked = {command.file: " ".join(command.argv) for command in commands(Path("r.yaml"), "-1h")}
     assert "--unit=canbase*" in asked["journal/canbase.json"]
     assert "-statistics" in asked["can/interfaces.txt"]
     assert asked["units/status.txt"].startswith("systemctl status")
