@@ -1,0 +1,175 @@
+"""The file of the watchdog's record, and the thread that writes it: the loop never waits for a disk.
+
+A second copy, on purpose, of what canbase_config.latch_file does for driver and filter: the watchdog shares no code.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import queue
+import stat
+import threading
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from canbase_watchdog import latch
+from canbase_watchdog.latch import Entry, Past
+
+RETRY_S = 1.0
+_MACHINE = (Path("/etc/machine-id"), Path("/sys/firmware/devicetree/base/serial-number"))
+_FLAGS = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+
+
+def path_of(environment: Mapping[str, str], home: Path, robot: str) -> Path:
+    """The last folder that systemd gives (StateDirectory=), else by the robot's name in the user's state folder."""
+    given = environment.get("STATE_DIRECTORY", "").split(":")
+    state = Path(environment.get("XDG_STATE_HOME") or home / ".local" / "state") / "canbase"
+    if given[0]:
+        state = Path(given[-1])
+    return (state if len(given) > 1 else state / robot) / "watchdog.latch"
+
+
+def machine() -> str:
+    """Machine-id, and the serial number of a board that has one."""
+    found = []
+    for path in _MACHINE:
+        with contextlib.suppress(OSError):
+            found.append(path.read_bytes().rstrip(b"\0\n").decode(errors="replace"))
+    return " ".join(found)
+
+
+class Keeper(threading.Thread):
+    """Reads the record at once (`past`), then writes what `want` is given. `failure`: the defect that ended it."""
+
+    def __init__(self, path: Path, robot: str) -> None:
+        super().__init__(name="latch", daemon=True)
+        self._path, self._whose = path, latch.owner(robot, machine())
+        self._descriptor: int | None = None
+        self.past = self._read()
+        self._sequence = self.past.sequence
+        self._wanted: Entry | None = None
+        self._pending: Entry | None = None
+        self._inbox: queue.SimpleQueue[Entry | None] = queue.SimpleQueue()
+        self.written: Entry | None = None
+        self.problem = ""
+        self.failure: BaseException | None = None
+
+    def want(self, entry: Entry) -> None:
+        """This shall be on disk. Never waits."""
+        if entry is not self._wanted:
+            self._wanted = entry
+            self._inbox.put(entry)
+
+    def finish(self, timeout_s: float) -> None:
+        """Write what is wanted, at most for so long, and end."""
+        self._inbox.put(None)
+        self.join(timeout_s)
+
+    def run(self) -> None:
+        """The thread's body."""
+        try:
+            while self._turn():
+                pass
+        except BaseException as error:  # noqa: BLE001 - the loop sees it, stops the drives and ends by it
+            self.failure = error
+
+    def _turn(self) -> bool:
+        taken: list[Entry | None] = []
+        with contextlib.suppress(queue.Empty):
+            taken.append(self._inbox.get(timeout=None if self._pending is None else RETRY_S))
+            while True:
+                taken.append(self._inbox.get_nowait())
+        for entry in taken:
+            self._pending = entry or self._pending
+        if self._pending is not None and self._attempt(self._pending):
+            self._pending = None
+        return None not in taken
+
+    def _attempt(self, entry: Entry) -> bool:
+        try:
+            if self._descriptor is None:
+                self._replace(entry)
+            else:
+                self._overwrite(self._descriptor, entry)
+        except OSError as error:
+            self.problem = f"{self._path} cannot be written: {error.strerror or error}"
+            return False
+        self.written, self.problem = entry, ""
+        return True
+
+    def _overwrite(self, descriptor: int, entry: Entry) -> None:
+        sequence = self._sequence + 1
+        data = latch.page(entry, sequence, self._whose)
+        if os.pwrite(descriptor, data, 0 if sequence % 2 else latch.PAGE) != len(data):
+            raise OSError("written in part")
+        os.fsync(descriptor)
+        self._sequence = sequence
+
+    def _replace(self, entry: Entry) -> None:
+        """A new file, whole on disk before it gets its name."""
+        self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        new = self._path.with_name(f".{self._path.name}.new")
+        new.unlink(missing_ok=True)
+        descriptor = os.open(new, os.O_RDWR | os.O_CREAT | os.O_EXCL | _FLAGS, 0o600)
+        try:
+            data = latch.page(entry, 1, self._whose) + latch.page(entry, 2, self._whose)
+            if os.write(descriptor, data) != len(data):
+                raise OSError("written in part")
+            os.fsync(descriptor)
+            new.replace(self._path)
+            _sync(self._path.parent)
+        except BaseException:
+            os.close(descriptor)
+            raise
+        self._descriptor, self._sequence = descriptor, 2
+
+    def _read(self) -> Past:
+        past = self._read_file()
+        if past.problem:
+            self._close()
+            return replace(past, problem=f"{self._path}: {past.problem}")
+        return past
+
+    def _read_file(self) -> Past:
+        try:
+            self._descriptor = os.open(self._path, os.O_RDWR | _FLAGS)
+        except OSError as error:
+            if error.errno != errno.EROFS:
+                return Past(problem=error.strerror or str(error))
+        try:
+            descriptor = os.open(self._path, os.O_RDONLY | _FLAGS)
+            try:
+                problem = _access(descriptor, self._path.parent)
+                return Past(problem=problem) if problem else latch.decode(os.read(descriptor, 16384), self._whose)
+            finally:
+                os.close(descriptor)
+        except OSError as error:
+            return Past(problem=error.strerror or str(error))
+
+    def _close(self) -> None:
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
+
+
+def _access(descriptor: int, folder: Path) -> str:
+    """Who else could change it; empty: nobody but root."""
+    file, parent, me = os.fstat(descriptor), folder.stat(), os.geteuid()
+    if not stat.S_ISREG(file.st_mode):
+        return "no regular file"
+    if file.st_uid != me or parent.st_uid not in (0, me):
+        return f"it or its folder belongs to another user than {me}"
+    if (file.st_mode | parent.st_mode) & (stat.S_IWGRP | stat.S_IWOTH):
+        return f"others than user {me} may write it or its folder"
+    return ""
+
+
+def _sync(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
