@@ -35,9 +35,23 @@ def changes(before: MuxDecision, now: MuxDecision) -> Iterator[Told]:
         yield sentence, Priority.NOTICE if locked else Priority.INFO, fields
 
 
+def is_told(before: Decision, now: Decision) -> bool:
+    """Whether a log line and a journal entry are due: each change but for speed limits, which come and go all the time.
+
+    A stop that begins or ends, and hard braking that begins, are told in any case, a speed limit before or after it.
+    """
+    if (now.action, now.cause) == (before.action, before.cause):
+        return now.emergency and not before.emergency
+    actions = (before.action, now.action)
+    return Action.STOP in actions or Action.LIMIT not in actions or (now.emergency and not before.emergency)
+
+
 def changed_order(now: Decision) -> Told:
     """What the filter does from now on, and what ends it."""
     stops = now.action is Action.STOP
-    priority = STOP_PRIORITY.get(now.cause, Priority.WARNING) if stops else Priority.INFO
-    sentence = f"{now.action.name} {now.cause.value} {now.detail}".rstrip()
-    return sentence, priority, {"action": now.action.name, "cause": now.cause.value, "clears_on": now.clears_on}
+    otherwise = Priority.NOTICE if now.emergency else Priority.INFO
+    priority = STOP_PRIORITY.get(now.cause, Priority.WARNING) if stops else otherwise
+    hard = "brakes hard" if now.emergency and "brakes hard" not in now.detail else ""
+    sentence = " ".join(word for word in (now.action.name, now.cause.value, now.detail, hard) if word)
+    fields = {"action": now.action.name, "cause": now.cause.value, "clears_on": now.clears_on}
+    return sentence, priority, fields | {"emergency": str(now.emergency).lower()}

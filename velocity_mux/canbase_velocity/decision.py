@@ -61,6 +61,11 @@ class Decision:
     twist: Twist
     emergency: bool = False
 
+    @property
+    def essence(self) -> tuple[Action, Cause, bool]:
+        """What makes two decisions differ for a reader: not their numbers."""
+        return self.action, self.cause, self.emergency
+
 
 PASSED = Finding(Action.PASS, Cause.NONE, "", "", 1.0)
 

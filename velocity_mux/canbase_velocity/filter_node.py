@@ -22,7 +22,7 @@ from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
 from canbase_config.safety import Scan as ScanConfig
 from canbase_velocity import messages
-from canbase_velocity.changes import changed_order
+from canbase_velocity.changes import changed_order, is_told
 from canbase_velocity.clearance import ScanReader, field_of
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.filter_state import SafetyFilter
@@ -31,7 +31,7 @@ from canbase_velocity.lease import lease_datagram
 from canbase_velocity.obstacle import braking_time_s
 from canbase_velocity.placement import Placement, PlacementError, Transform, placed_by_tf
 from canbase_velocity.qos import ANY_COMMAND, COMMAND, SCAN, STATE, STATIC_TF, listen_twice
-from canbase_velocity.safety_filter import SHUTDOWN, FilterConfig
+from canbase_velocity.safety_filter import FilterConfig
 
 STATE_PERIOD_S = 0.1
 MovingSources = Callable[[], Sequence[str]]
@@ -66,7 +66,8 @@ class FilterNode(Node):
 
     def shut_down(self) -> None:
         """Orders zero once, with its lease, and says so in the state. Called several times: one may be lost."""
-        self._issue(SHUTDOWN, time.monotonic())
+        now = time.monotonic()
+        self._issue(self._filter.shut_down(now), now)
 
     @property
     def stands_from_s(self) -> float:
@@ -160,11 +161,10 @@ class FilterNode(Node):
 
     def _tell(self, decision: Decision, now: float) -> None:
         before = self._decision
-        changed = (decision.action, decision.cause) != (before.action, before.cause)
-        if changed and Action.LIMIT not in (decision.action, before.action):
+        if is_told(before, decision):
             sentence, priority, fields = changed_order(decision)
             self._voice.tell(sentence, priority, robot=self._robot.name, **fields)
-        changed = changed or decision.emergency != before.emergency
+        changed = decision.essence != before.essence
         if not changed and now - self._state_at_s < STATE_PERIOD_S:
             return
         message = messages.safety_state(

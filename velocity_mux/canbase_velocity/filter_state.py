@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from canbase_velocity.estop import Estop, EstopEvent, EstopState
 from canbase_velocity.glitch import GlitchFilter
 from canbase_velocity.motion import ExpectedMotion, Pose
 from canbase_velocity.obstacle import Geometry, Sight
-from canbase_velocity.safety_filter import FilterConfig, Inputs, ScanState, decide
+from canbase_velocity.safety_filter import SHUTDOWN, FilterConfig, Inputs, ScanState, brakes_hard, decide
 from canbase_velocity.sweep import Floats
 from canbase_velocity.twist import ZERO, Twist
 
@@ -67,6 +68,7 @@ class SafetyFilter:
         longest_s = 2.0 * max(scan.timeout_s for scan in config.safety.scans) + config.safety.reaction_s
         self._motion = ExpectedMotion(config.limits, longest_s)
         self._previous, self._previous_at_s = ZERO, -math.inf
+        self._braking_hard = False
 
     @property
     def estop(self) -> EstopState:
@@ -121,6 +123,7 @@ class SafetyFilter:
             estop=self._estop.state,
             pressed=self._pressed,
             estop_age_s=_age_s(self._estop_at_s, now),
+            braking_hard=self._braking_hard,
         )
 
     def clearances(self, now: float) -> Clearances | None:
@@ -133,14 +136,18 @@ class SafetyFilter:
     def decide(self, now: float) -> Decision:
         """The order at time `now` [s, monotonic]; it counts as given."""
         self._advance_estop(now)
-        decision = decide(self.inputs(now), self._config)
-        self.ordered(decision.twist, now)
-        return decision
+        return self._ordered(decide(self.inputs(now), self._config), now)
 
-    def ordered(self, twist: Twist, now: float) -> None:
-        """This was ordered, whoever decided it."""
-        self._motion.order(twist, now)
-        self._previous, self._previous_at_s = twist, now
+    def shut_down(self, now: float) -> Decision:
+        """The zero of a filter that ends; where the base brakes hard, it goes on to do so."""
+        emergency = brakes_hard(self.inputs(now), self._config)
+        return self._ordered(replace(SHUTDOWN, emergency=emergency), now)
+
+    def _ordered(self, decision: Decision, now: float) -> Decision:
+        self._motion.order(decision.twist, now)
+        self._previous, self._previous_at_s = decision.twist, now
+        self._braking_hard = decision.emergency
+        return decision
 
     def _fresh(self, now: float) -> list[_Scanner]:
         return [scanner for scanner in self._scanners.values() if scanner.state(now).is_fresh]

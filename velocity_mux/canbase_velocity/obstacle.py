@@ -4,8 +4,9 @@ Rules:
 1. Along the arc of the command the base must be able to stand before the stop distance, by a gentle braking that starts
    at the slow-down distance; it slows down on the same curve. From v·hold + v²/(2·a) = free way, with the time for
    both speeds together.
-2. The base leaves the motion that it is in only by its ramps. If the ordinary ramp no longer stops it within half the
-   stop distance, the order is zero and the emergency deceleration is asked for.
+2. The base leaves the motion that it is in only by its ramps. If the ordinary ramp would no longer stop it before half
+   the stop distance after one more period of the order, the order is zero. If it no longer does now, whatever is
+   ordered, the base has to brake hard.
 3. Each scan is looked at twice: as it was taken, and as the base must see it after what was ordered since then.
 4. Where less than half of what the footprint will sweep is in the field of view of a scanner, the speed is limited.
 """
@@ -84,11 +85,10 @@ class Geometry:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """`share` of the command that is left, 0 to 1, for the touch that decides. `hard`: rule 2 decided."""
+    """`share` of the command that is left, 0 to 1, for the touch that decides."""
 
     share: float
     touch: Touch
-    hard: bool
 
 
 def braking_time_s(twist: Twist, limits: Limits) -> float:
@@ -115,13 +115,13 @@ def judge(order: Twist, motion: Twist, sight: Sight, geometry: Geometry) -> Judg
     """What is left of `order` (not zero), given the `motion` that the base is in."""
     limits, hold_s = geometry.limits, geometry.hold_s
     if sight.points.shape[0] == 0:
-        return Judgement(1.0, NO_TOUCH, hard=False)
+        return Judgement(1.0, NO_TOUCH)
     if brakes_too_late(follow(motion, order, limits, hold_s), sight, geometry):
         touch = first_touch(sight.points, geometry.box, motion if not motion.is_zero else order, geometry.stop_m)
-        return Judgement(0.0, touch, hard=True)
+        return Judgement(0.0, touch)
     touch = first_touch(sight.points, geometry.box, order, geometry.stop_m)
     braking_s = braking_time_s(order, limits) / geometry.gentleness
-    return Judgement(allowed_share(touch.slack_s, braking_s, hold_s), touch, hard=False)
+    return Judgement(allowed_share(touch.slack_s, braking_s, hold_s), touch)
 
 
 def brakes_too_late(motion: Twist, sight: Sight, geometry: Geometry) -> bool:

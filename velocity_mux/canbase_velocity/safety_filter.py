@@ -11,6 +11,9 @@ Rules, in the order of their precedence:
 6. Obstacle where the footprint will be: slower, on the same curve, so that the base can stop before the stop distance;
    there it stops. Driving away from an obstacle is free. See obstacle.py.
 Zero is always allowed: nothing here makes a command faster or turns it around.
+Before all rules, whether the base has to brake hard: with the emergency deceleration, to standstill. That follows from
+its motion and from what is in its way, never from the command: an order that is already lower, or zero, for whatever
+reason, keeps it.
 """
 
 from __future__ import annotations
@@ -24,7 +27,7 @@ from canbase_velocity import obstacle
 from canbase_velocity.decision import PASSED, Action, Cause, Decision, Finding, stop
 from canbase_velocity.estop import EstopState
 from canbase_velocity.obstacle import Geometry, Sight
-from canbase_velocity.sweep import fastest_mps
+from canbase_velocity.sweep import fastest_mps, first_touch
 from canbase_velocity.twist import ZERO, Twist
 
 SHUTDOWN = Decision(Action.STOP, Cause.SHUTDOWN, "the safety filter is being shut down", "its next start", ZERO)
@@ -82,24 +85,34 @@ class Inputs:
     pressed: bool
     """The last message of the emergency stop said so."""
     estop_age_s: float | None
+    braking_hard: bool = False
+    """The last order was to brake hard. It holds until the base is expected to be at standstill."""
 
 
 def decide(inputs: Inputs, config: FilterConfig) -> Decision:
     """The order for these inputs: the most severe finding wins, of two alike the one of the earlier rule."""
+    emergency = brakes_hard(inputs, config)
     stopped = _estop(inputs, config) or _command(inputs, config) or _scan(inputs)
     if stopped is not None:
-        emergency = inputs.estop is EstopState.HELD
         return Decision(stopped.action, stopped.cause, stopped.detail, stopped.clears_on, ZERO, emergency)
     if inputs.command.is_zero:
-        late = obstacle.brakes_too_late(inputs.motion, inputs.sight, config.geometry)
-        return Decision(Action.PASS, Cause.NONE, "", "", ZERO, late)
+        return Decision(Action.PASS, Cause.NONE, "", "", ZERO, emergency)
     slowest = min(_slower(inputs, config), key=lambda finding: finding.factor)
     limited = _within(inputs.command.scaled(slowest.factor), config.limits)
     grown, growth = _growth(limited, inputs, config.safety.ceiling)
-    judged, emergency = _obstacle(grown, inputs, config)
+    judged = _too_late(inputs, config) if emergency else _obstacle(grown, inputs, config)
     worst = max(slowest, growth, judged, key=lambda finding: finding.action)
     twist = ZERO if worst.action is Action.STOP else grown.scaled(judged.factor)
     return Decision(worst.action, worst.cause, worst.detail, worst.clears_on, twist, emergency)
+
+
+def brakes_hard(inputs: Inputs, config: FilterConfig) -> bool:
+    """Whether the ordinary ramp is too late. Decided once for every order: the command has no part in it."""
+    if inputs.estop is EstopState.HELD:
+        return True
+    if inputs.motion.is_zero:
+        return False
+    return inputs.braking_hard or obstacle.brakes_too_late(inputs.motion, inputs.sight, config.geometry)
 
 
 def _estop(inputs: Inputs, config: FilterConfig) -> Finding | None:
@@ -203,23 +216,28 @@ def _kept(previous: float, asked: float) -> float:
     return 0.0 if previous * asked <= 0.0 else math.copysign(min(abs(previous), abs(asked)), asked)
 
 
-def _obstacle(twist: Twist, inputs: Inputs, config: FilterConfig) -> tuple[Finding, bool]:
+def _too_late(inputs: Inputs, config: FilterConfig) -> Finding:
+    """Why the base brakes hard, to standstill."""
+    geometry, where = config.geometry, _where(inputs.motion)
+    touch = first_touch(inputs.sight.points, geometry.box, inputs.motion, geometry.stop_m / 2.0)
+    seen = f": {touch.way_m:.2f} m free {where}" if math.isfinite(touch.way_m) else " to standstill"
+    return stop(Cause.OBSTACLE, f"brakes hard{seen}", "standstill, and more free way")
+
+
+def _obstacle(twist: Twist, inputs: Inputs, config: FilterConfig) -> Finding:
     """An allowed speed below standstill is none: otherwise the base would creep towards the stop distance for ever."""
     if twist.is_zero:
-        return PASSED, False
+        return PASSED
     geometry = config.geometry
     judgement = obstacle.judge(twist, inputs.motion, inputs.sight, geometry)
-    free_m, emergency = judgement.touch.way_m, judgement.hard and not inputs.motion.is_zero
-    where = _where(twist)
-    speed_mps = fastest_mps(geometry.box, twist)
+    free_m, where, speed_mps = judgement.touch.way_m, _where(twist), fastest_mps(geometry.box, twist)
     if judgement.share >= 1.0:
-        return PASSED, False
+        return PASSED
     if judgement.share * speed_mps < config.standstill_mps:
         detail = f"{free_m:.2f} m free {where}, stop distance {geometry.stop_m:.2f} m"
-        return stop(Cause.OBSTACLE, detail, f"more free way {where}, or a command away from the obstacle"), emergency
+        return stop(Cause.OBSTACLE, detail, f"more free way {where}, or a command away from the obstacle")
     detail = f"{free_m:.2f} m free {where}: at most {judgement.share * speed_mps:.2f} m/s"
-    slow = Finding(Action.SLOW, Cause.OBSTACLE_NEAR, detail, f"more free way {where}", judgement.share)
-    return slow, False
+    return Finding(Action.SLOW, Cause.OBSTACLE_NEAR, detail, f"more free way {where}", judgement.share)
 
 
 def _where(twist: Twist) -> str:

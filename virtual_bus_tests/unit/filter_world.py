@@ -47,6 +47,8 @@ class FilterWorld:
         self.command = ZERO
         self.path_m = 0.0
         self.emergencies = 0
+        self.scans = True
+        """The scanner publishes."""
         self._limiter = Limiter(robot.limits, robot.base.track_m)
         self._motion = MotionState.AT_REST
         self._wheels = deque([ZERO] * round(lag_s / STEP_S))
@@ -80,7 +82,7 @@ class FilterWorld:
 
     def _turn(self) -> None:
         now = self.now
-        if self._step % self._scan_steps == 0:
+        if self.scans and self._step % self._scan_steps == 0:
             count = self.obstacles.shape[0]
             points = Points(self.seen, np.arange(count), max(count, 1) + 1)
             self.filter.on_scan(self.robot.safety.scan.topic, points, None, now)

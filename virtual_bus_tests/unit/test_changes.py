@@ -6,7 +6,7 @@ import pytest
 
 from canbase_config.mux import MuxLock, MuxSource
 from canbase_config.priority import Priority
-from canbase_velocity.changes import changed_order, changes
+from canbase_velocity.changes import changed_order, changes, is_told
 from canbase_velocity.decision import Action, Cause, Decision
 from canbase_velocity.mux import Mux
 from canbase_velocity.twist import ZERO, Twist
@@ -64,4 +64,45 @@ def test_only_a_stop_that_is_not_the_filters_daily_work_is_a_warning(action: Act
 
     assert sentence == f"{action.name} {cause.value} at 0.31 m"
     assert priority is expected
-    assert fields == {"action": action.name, "cause": cause.value, "clears_on": "it being gone"}
+    assert fields == {
+        "action": action.name,
+        "cause": cause.value,
+        "clears_on": "it being gone",
+        "emergency": "false",
+    }
+
+
+def decision(action: Action, cause: Cause, *, emergency: bool = False) -> Decision:
+    return Decision(action, cause, "", "", ZERO, emergency)
+
+
+LIMITED = decision(Action.LIMIT, Cause.SPEED)
+FREE = decision(Action.PASS, Cause.NONE)
+PRESSED = decision(Action.STOP, Cause.ESTOP, emergency=True)
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "told"),
+    [
+        (LIMITED, PRESSED, True),  # an emergency stop while the speed was limited
+        (PRESSED, LIMITED, True),
+        (FREE, PRESSED, True),
+        (decision(Action.STOP, Cause.SCAN_STALE), PRESSED, True),
+        (FREE, decision(Action.SLOW, Cause.OBSTACLE_NEAR), True),
+        (FREE, LIMITED, False),  # comes and goes with each command
+        (LIMITED, decision(Action.LIMIT, Cause.ZONE), False),
+        (LIMITED, decision(Action.SLOW, Cause.OBSTACLE_NEAR), False),
+        (FREE, decision(Action.PASS, Cause.NONE, emergency=True), True),  # brakes hard under a zero command
+        (decision(Action.PASS, Cause.NONE, emergency=True), FREE, False),
+        (PRESSED, PRESSED, False),
+    ],
+)
+def test_each_stop_is_told_also_one_that_ends_or_follows_a_speed_limit(
+    before: Decision, now: Decision, told: bool
+) -> None:
+    assert is_told(before, now) is told
+
+
+def test_hard_braking_is_in_the_sentence_and_in_the_fields() -> None:
+    sentence, priority, fields = changed_order(decision(Action.PASS, Cause.NONE, emergency=True))
+    assert (sentence, priority, fields["emergency"]) == ("PASS none brakes hard", Priority.NOTICE, "true")

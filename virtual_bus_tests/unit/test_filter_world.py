@@ -88,3 +88,28 @@ def test_without_the_emergency_deceleration_it_would_have_been_touched() -> None
     world.run(Twist(0.8, 0.0), 3.0)
     step_in(world, 0.3)
     assert world.run(Twist(0.8, 0.0), 2.0) == 0.0
+
+
+def test_who_pulls_the_stick_back_as_somebody_steps_in_keeps_the_hard_braking() -> None:
+    """Zero, a creep and a slower order are all lower than 0.8 m/s; each needs the emergency deceleration."""
+    for creep_mps in (0.0, 0.05, -0.1, 0.3):
+        world = world_with((9.0, 0.0))
+        world.run(Twist(0.8, 0.0), 3.0)
+        step_in(world, 0.3)
+        assert world.run(Twist(creep_mps, 0.0), 2.0) > 0.0, creep_mps
+        assert world.emergencies > 0, creep_mps
+
+
+def test_hard_braking_lasts_until_standstill_though_the_scanner_is_silent_then() -> None:
+    world = world_with((9.0, 0.0))
+    world.run(Twist(0.8, 0.0), 3.0)
+    step_in(world, 0.3)
+    world.run(Twist(0.8, 0.0), 0.2)
+    assert world.decision is not None
+    assert world.decision.emergency
+    world.scans = False
+    assert world.run(Twist(0.8, 0.0), 0.4) > 0.0
+    assert world.decision.emergency or world.decision.cause is Cause.SCAN_STALE
+    before_m = world.path_m
+    world.run(Twist(0.8, 0.0), 1.0)
+    assert world.path_m == pytest.approx(before_m, abs=0.02)

@@ -2,17 +2,34 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 import pytest
 
 from canbase_config.safety import Scan as ScanConfig
-from canbase_velocity.clearance import Points
+from canbase_velocity.clearance import Field, Points
 from canbase_velocity.decision import Action, Cause
+from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
-from canbase_velocity.obstacle import Geometry, braking_time_s
-from canbase_velocity.safety_filter import FilterConfig, decide
+from canbase_velocity.obstacle import Geometry, Sight, braking_time_s
+from canbase_velocity.placement import Placement
+from canbase_velocity.safety_filter import FilterConfig, ScanState, decide
 from canbase_velocity.twist import ZERO, Twist
-from unit.filter_inputs import HOLD_S, INF, LIMITS, STANDSTILL_MPS, config, fed, free, given_that, places, see
+from unit.filter_inputs import (
+    HOLD_S,
+    INF,
+    LIMITS,
+    STANDSTILL_MPS,
+    config,
+    fed,
+    free,
+    given_that,
+    places,
+    scanned,
+    see,
+)
 
 
 def test_an_obstacle_blocks_the_way_to_it_and_no_other() -> None:
@@ -97,6 +114,51 @@ def test_a_base_in_motion_that_can_no_longer_stop_gently_brakes_hard() -> None:
 def test_a_zero_command_that_comes_too_late_brakes_hard_too(free_m: float, emergency: bool) -> None:
     decision = decide(given_that(command=ZERO, motion=Twist(1.0, 0.0), sight=free(ahead_m=free_m)), config())
     assert (decision.action, decision.twist, decision.emergency) == (Action.PASS, ZERO, emergency)
+
+
+BACK_ONLY = Field(Placement(-0.4, 0.0, (-1.0, 0.0), (0.0, -1.0)), -math.pi / 2, math.pi, 0.05, 10.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "settings", "cause"),
+    [
+        ({"scans": (*scanned(0.0), ScanState("scan_rear", True, 0.3, 0.31))}, {}, Cause.SCAN_STALE),
+        ({"command_age_s": 0.21}, {}, Cause.COMMAND_STALE),
+        ({"estop": EstopState.AWAITS_RESET}, {}, Cause.ESTOP),
+        ({"sight": Sight(free(ahead_m=0.29).points, (BACK_ONLY,))}, {"blind_mps": 0.0}, Cause.BLIND),
+        ({"command": Twist(0.02, 0.0)}, {}, Cause.OBSTACLE),  # the stick is pulled back to a creep
+        ({"command": Twist(-0.5, 0.0)}, {}, Cause.OBSTACLE),
+        ({"command": ZERO}, {}, Cause.NONE),
+    ],
+)
+def test_whatever_stops_it_a_base_for_which_the_ordinary_ramp_is_too_late_brakes_hard(
+    changes: dict[str, Any], settings: dict[str, Any], cause: Cause
+) -> None:
+    """At 1 m/s with 0.29 m free, the ordinary ramp of 2 m/s² needs 0.25 m; with 0.31 m it would do."""
+    moving = {"motion": Twist(1.0, 0.0), "sight": free(ahead_m=0.29), **changes}
+    late = decide(given_that(**moving), config(**settings))
+    assert (late.cause, late.twist, late.emergency) == (cause, ZERO, True)
+    fields = moving["sight"].fields
+    in_time = {**moving, "sight": Sight(free(ahead_m=0.31).points, fields)}
+    assert not decide(given_that(**in_time), config(**settings)).emergency
+
+
+def test_hard_braking_that_began_lasts_until_standstill() -> None:
+    """The obstacle is gone from the scans, or the scans are gone: nothing says that the ordinary ramp is enough."""
+    assert decide(given_that(motion=Twist(0.5, 0.0), braking_hard=True), config()).emergency
+    assert not decide(given_that(motion=ZERO, braking_hard=True), config()).emergency
+    safety = fed(0.0, ZERO)
+    safety.decide(0.0)
+    for step in range(1, 101):
+        fed(step * HOLD_S, Twist(1.0, 0.0), the_filter=safety)
+        safety.decide(step * HOLD_S)
+    see(safety, 2.01, (0.6, 0.0))
+    assert safety.decide(2.01).emergency
+    see(safety, 2.03)
+    assert safety.decide(2.03).emergency
+    end = safety.shut_down(2.05)
+    assert (end.cause, end.twist, end.emergency) == (Cause.SHUTDOWN, ZERO, True)
+    assert not safety.shut_down(3.0).emergency
 
 
 def test_the_base_leaves_its_motion_only_by_its_ramps() -> None:

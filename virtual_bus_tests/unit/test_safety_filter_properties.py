@@ -9,9 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from canbase_velocity.clearance import Field
 from canbase_velocity.decision import Action, Cause, Decision
 from canbase_velocity.estop import EstopState
 from canbase_velocity.obstacle import Sight, allowed_share, braking_time_s
+from canbase_velocity.placement import Placement
 from canbase_velocity.safety_filter import FilterConfig, Inputs, decide
 from canbase_velocity.sweep import first_touch
 from canbase_velocity.twist import ZERO, Twist
@@ -119,6 +121,33 @@ def test_one_more_obstacle_never_makes_an_order_faster(inputs: Inputs) -> None:
 @given(inputs=all_inputs, settings=configs)
 def test_zero_is_always_allowed(inputs: Inputs, settings: FilterConfig) -> None:
     assert decide(dataclasses.replace(inputs, command=ZERO), settings).twist == ZERO
+
+
+AHEAD = Field(Placement(0.4, 0.0, (1.0, 0.0), (0.0, 1.0)), -math.pi / 2, math.pi, 0.05, 10.0)
+
+
+@given(
+    inputs=all_inputs | moving_inputs,
+    settings=configs,
+    share=st.floats(0.0, 1.0),
+    looks_ahead_only=st.booleans(),
+    braking_hard=st.booleans(),
+)
+def test_an_order_nearer_to_zero_never_loses_the_hard_braking(
+    inputs: Inputs, settings: FilterConfig, share: float, looks_ahead_only: bool, braking_hard: bool
+) -> None:
+    """Whatever stops or slows it: a stick pulled back, a blind direction, a zone, a scanner that is stale."""
+    fields = (AHEAD,) if looks_ahead_only else ()
+    sight = dataclasses.replace(inputs.sight, fields=fields)
+    fast = dataclasses.replace(inputs, sight=sight, braking_hard=braking_hard)
+    slow = dataclasses.replace(fast, command=fast.command.scaled(share))
+    assert not decide(fast, settings).emergency or decide(slow, settings).emergency
+
+
+@given(inputs=all_inputs | moving_inputs, settings=configs)
+def test_whoever_brakes_hard_is_ordered_zero(inputs: Inputs, settings: FilterConfig) -> None:
+    decision = decide(inputs, settings)
+    assert decision.twist == ZERO or not decision.emergency
 
 
 @given(
