@@ -16,9 +16,9 @@ from canbase_driver import command, supervisor, watchdog_link
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.odometry import WheelTravel
 from canbase_driver.snapshot import DriverState, WatchdogView
-from canbase_velocity import filter_state, mux, safety_filter
-from canbase_velocity.decision import PASSED
+from canbase_velocity import filter_state, mux, obstacle, safety_filter
 from canbase_velocity.estop import FREE, HELD
+from canbase_velocity.sweep import NO_TOUCH
 from canbase_watchdog import policy
 from canbase_watchdog.watchdog import State, Watchdog
 
@@ -76,6 +76,11 @@ def _forget_estop(self: filter_state.SafetyFilter, now: float) -> None:
     self._estop.state = HELD if self._pressed else FREE
 
 
+def _no_estop(self: filter_state.SafetyFilter, now: float) -> None:
+    """Whatever was pressed, nothing of it is left when an order is decided."""
+    self._estop.state = FREE
+
+
 SAFEGUARDS: dict[str, Callable[[], None]] = {
     **{f"watchdog:{check.cause.name.lower()}": _trip(check.cause) for check in policy.CHECKS},
     "watchdog:all": _all_trips,
@@ -91,8 +96,8 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "driver:odometry_jump_guard": _put(WheelTravel, "_is_near", lambda self, from_raw, raw, cycles: True),
     "drives:heartbeat_consumer": _put(HeartbeatConsumer, "tick", lambda self, now: None),
     "mux:timeout": _put(mux._Source, "is_fresh", lambda self, now: self.at_s is not None),
-    "filter:estop": _put(safety_filter, "_estop", lambda inputs, config: None),
-    "filter:obstacle": _put(safety_filter, "_obstacle", lambda twist, inputs, config: (PASSED, False)),
+    "filter:estop": _put(filter_state.SafetyFilter, "_advance_estop", _no_estop),
+    "filter:obstacle": _put(obstacle, "first_touch", lambda points, box, twist, stop_m: NO_TOUCH),
     "filter:command": _put(safety_filter, "_command", lambda inputs, config: None),
     "filter:zero_after_estop": _put(filter_state.SafetyFilter, "_advance_estop", _forget_estop),
     "action:timeout_and_progress": _drop(
