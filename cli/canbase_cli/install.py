@@ -61,9 +61,11 @@ def install(
     from canbase_deploy.host import (
         chosen,
         environment,
+        folders,
         manifests,
         named_texts,
         neighbours,
+        refuse_others,
         rehearse,
         sourced,
         templates,
@@ -92,7 +94,9 @@ def install(
         installed = manifests(prefix)
         plan = install_plan(request, installed, neighbours(prefix, request.name, installed))
         if prefix == Path("/"):
-            rehearse(python, request.sourced, relay=loaded.robot.watchdog.relay is not None)
+            outside = [name for name in loaded.files if Path(name).is_absolute()]
+            refuse_others([python, *folders(request.sourced), *outside])  # before anything of it runs
+            refuse_others(rehearse(python, request.sourced, relay=loaded.robot.watchdog.relay is not None))
     except InstallError as error:
         fail(str(error), WRONG_INPUT)
     executor = Executor(prefix, typer.echo, dry_run=dry_run)

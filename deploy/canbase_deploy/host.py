@@ -14,16 +14,11 @@ from canbase_config.errors import ConfigError
 from canbase_config.load import load_robot
 from canbase_deploy.neighbours import Neighbour
 from canbase_deploy.owner import ETC, owner_paths
+from canbase_deploy.ownership import faults, refusal
 from canbase_deploy.plan import InstallError
 
-SOURCED: Final = (
-    "AMENT_PREFIX_PATH",
-    "PYTHONPATH",
-    "LD_LIBRARY_PATH",
-    "ROS_DISTRO",
-    "ROS_VERSION",
-    "ROS_PYTHON_VERSION",
-)
+PATHS: Final = ("AMENT_PREFIX_PATH", "PYTHONPATH", "LD_LIBRARY_PATH")
+SOURCED: Final = (*PATHS, "ROS_DISTRO", "ROS_VERSION", "ROS_PYTHON_VERSION")
 """What a sourced ROS 2 workspace puts into the environment and a process needs to find it."""
 CHOSEN: Final = ("ROS_DOMAIN_ID", "RMW_IMPLEMENTATION")
 """What the user may have chosen; it goes along where it is set."""
@@ -37,7 +32,10 @@ import sys
 import canbase.msg, canbase_cli.main, canbase_config.load, can, canopen, rclpy
 for module in (canbase, canbase_cli, canbase_config, can, canopen, rclpy):
     print(module.__file__)
-print(sys.base_prefix + "/")
+print(sys.base_prefix + "/")  # the system's own: seen, not looked through
+print(*filter(None, sys.path), sep="\\n")
+if sys.prefix != sys.base_prefix:
+    print(sys.prefix)
 """
 _USES_RELAY: Final = "from gpiod import LineSettings, request_lines\n"
 _ADVICE: Final = (
@@ -65,7 +63,25 @@ def sourced(environment: Mapping[str, str]) -> dict[str, str]:
     """What of this environment the services need to find ROS 2. The ROS wheels of PyPI find themselves."""
     if importlib.util.find_spec("ros_wheels_bootstrapper") is not None:
         return {}
-    return {name: environment[name] for name in SOURCED if environment.get(name)}
+    values = {name: environment.get(name, "") for name in SOURCED}
+    values |= {name: os.pathsep.join(_entries(values[name])) for name in PATHS}
+    return {name: value for name, value in values.items() if value}
+
+
+def folders(environment: Mapping[str, str]) -> list[str]:
+    """Where programs and libraries of the services come from by their environment."""
+    return [entry for name in PATHS for entry in _entries(environment.get(name, ""))]
+
+
+def _entries(value: str) -> list[str]:
+    """An empty or relative one means the current folder, whatever that is."""
+    return [entry for entry in value.split(os.pathsep) if os.path.isabs(entry)]
+
+
+def refuse_others(paths: Iterable[str]) -> None:
+    """Raises InstallError where others than root could change these files and folders, or what is below them."""
+    if refused := refusal(faults(paths)):
+        raise InstallError(refused)
 
 
 def chosen(environment: Mapping[str, str]) -> dict[str, str]:
@@ -73,16 +89,16 @@ def chosen(environment: Mapping[str, str]) -> dict[str, str]:
     return {name: environment[name] for name in CHOSEN if environment.get(name)}
 
 
-def rehearse(python: str, environment: Mapping[str, str], *, relay: bool = False) -> None:
+def rehearse(python: str, environment: Mapping[str, str], *, relay: bool = False) -> list[str]:
     """Imports what the services import, with their Python and nothing but their environment. Raises InstallError.
 
-    `relay`: the watchdog needs gpiod too.
+    `relay`: the watchdog needs gpiod too. Returns the files and folders that they import from.
 
     sudo keeps no LD_LIBRARY_PATH, whatever it is told: found out here, and not by a robot that does not start.
     """
     try:
         done = subprocess.run(
-            [python, "-c", _USES + (_USES_RELAY if relay else "")],
+            [python, "-s", "-c", _USES + (_USES_RELAY if relay else "")],
             env=dict(environment),
             cwd="/",
             capture_output=True,
@@ -96,11 +112,13 @@ def rehearse(python: str, environment: Mapping[str, str], *, relay: bool = False
         why = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
         advice = f"watchdog.relay needs it: {python} -m pip install 'gpiod>=2.1,<3'" if "gpiod" in why else _ADVICE
         raise InstallError(f"the services would not start with {python}: {why}. {advice}")
-    for path in (python, str(Path(python).resolve()), *done.stdout.split("\n")):
+    used = done.stdout.splitlines()
+    for path in (python, str(Path(python).resolve()), *used):
         if path.startswith(HIDDEN):
             raise InstallError(
                 f"the services do not see {path} (ProtectHome, PrivateTmp in their units): install below /opt"
             )
+    return [path for path in used if path and not path.endswith("/")]
 
 
 def named_texts(files: Mapping[str, Path]) -> dict[str, str]:

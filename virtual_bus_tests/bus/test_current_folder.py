@@ -109,7 +109,10 @@ def test_the_services_have_a_safe_path_and_a_folder_that_is_roots() -> None:
     for part in ("watchdog", "driver", "velocity", "action-server"):
         unit = (ROOT / "deploy" / "systemd" / f"canbase-{part}@.service").read_text().splitlines()
         assert "WorkingDirectory=/" in unit
-        assert any(line.startswith("Environment=") and "PYTHONSAFEPATH=1" in line.split() for line in unit)
+        assert any(
+            line.startswith("Environment=") and {"PYTHONSAFEPATH=1", "PYTHONNOUSERSITE=1"} <= set(line.split())
+            for line in unit
+        )
 
 
 def test_without_a_safe_path_the_current_folder_is_taken_out_and_nothing_else() -> None:
