@@ -12,6 +12,8 @@ ETC: Final = PurePosixPath("/etc/canbase")
 OURS: Final = (ETC / "can", ETC / "installed")
 """Folders in which no file is the owner's."""
 RESERVED: Final = (*OURS, ETC / "keys")
+YAML: Final = (".yaml", ".yml")
+"""What robot.yaml may name. All else in /etc/canbase, such as the environment of the services, is no file of it."""
 _REFERENCE: Final = re.compile(r"[A-Za-z0-9_.+/-]+")
 
 
@@ -42,6 +44,8 @@ def misplaced(reference: str) -> str:
         return f"robot.yaml names {reference}: expected a file beside robot.yaml or in a folder below it; move it there"
     if not _REFERENCE.fullmatch(reference):
         return f"robot.yaml names {reference!r}: expected letters, digits and _ . + - in its name; rename it"
+    if path.suffix not in YAML:
+        return f"robot.yaml names {reference}: expected a name that ends with .yaml or .yml; rename it"
     if any(path.is_relative_to(folder) for folder in RESERVED):
         return f"robot.yaml names {reference}: {path.parent} is taken; expected another folder, such as drives"
     return ""

@@ -173,3 +173,18 @@ def test_the_support_bundle_has_them_where_its_robot_yaml_finds_them(
     bundle = collect(loaded.robot, robot, "-1h", root / "etc/canbase", root / "state", loaded.files)
 
     assert bundle.files["config/drives/mine.yaml"] == PROFILE.encode()
+
+
+@pytest.mark.parametrize("name", ["example.env", "other.env", "example.yaml.old", "drives/.yaml"])
+def test_a_file_that_is_no_yaml_is_never_taken_along(robot: Path, root: Path, name: str) -> None:
+    """It could take the place of the services' environment, PYTHONPATH included."""
+    planted = robot.parent / name
+    planted.parent.mkdir(parents=True, exist_ok=True)
+    planted.write_text(TWIST_MUX)
+    robot.write_text(f"{robot.read_text()}\nmux: {{twist_mux: [{name}]}}\n")
+
+    code, said = install(root, "--config", str(robot))
+
+    assert code == 2
+    assert f"robot.yaml names {name}" in said
+    assert not (root / "etc").exists()
