@@ -7,7 +7,7 @@ import math
 from canbase_config.drive import Drive
 from canbase_config.profile import Layout
 from canbase_config.robot import Robot
-from canbase_config.stopping import CYCLES_TO_SETPOINT, max_wheel_mps
+from canbase_config.stopping import BRAKING_SHARE, CYCLES_TO_SETPOINT, coasting_s, max_wheel_mps
 from canbase_config.units import motor_rev_per_s
 from canbase_config.watchdog import RelayLine, WatchdogConfig, WatchedDrive, WatchedLayout
 
@@ -73,6 +73,8 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
         feedback_samples=watchdog.feedback_samples,
         overspeed_factor=watchdog.overspeed_factor,
         travel_tolerance_m=watchdog.travel_tolerance_m,
+        braking_mps2=BRAKING_SHARE * limits.deceleration_mps2,
+        coasting_s=coasting_s(watchdog.overspeed_factor * max_wheel_mps(robot)),
         relay=RelayLine(watchdog.relay.chip, watchdog.relay.line) if watchdog.relay else None,
     )
 

@@ -98,6 +98,10 @@ class WatchdogConfig:
     overspeed_factor: float
     travel_tolerance_m: float
     """How far encoder and measured velocity may drift apart."""
+    braking_mps2: float
+    """A wheel that is stopped under power and loses less does not brake as it must."""
+    coasting_s: float
+    """A wheel without power has rolled out after this on a level floor."""
 
     lease_uid: int | None = None
     """The only user whose leases count, None: the watchdog's own."""

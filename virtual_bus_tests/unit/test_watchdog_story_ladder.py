@@ -14,6 +14,8 @@ from unit.watchdog_story import ENABLED, SOD, FakeDrive, Story
 from unit.watchdog_story_looks import driving, speeds, step, until_still, until_tripped
 
 HEARTBEAT, STATE = 0x77E, 0x1FE
+POWER_OFF, PRE_OP = Frame(0x501, b"\x00\x00"), Frame(0x000, b"\x80\x01")
+SDO_OFF = Frame(0x601, bytes.fromhex("2b 40 60 00 00 00 00 00"))
 
 
 def mad(*drives: FakeDrive) -> Story:
@@ -75,15 +77,54 @@ def test_a_drive_that_ignores_the_quick_stop_has_its_voltage_disabled() -> None:
     assert (status.settled, status.step, speeds(story)) == (True, Step.DISABLE_VOLTAGE, [0])
 
 
-def test_a_drive_that_says_quick_stop_and_does_not_brake_climbs_after_its_braking_time() -> None:
+def test_a_drive_that_says_quick_stop_and_does_not_brake_has_its_power_taken_when_it_should_be_slower() -> None:
+    """trip at 0.3 m/s ── 0.1 s of lag ── 0.5 m/s² from 0.38 m/s on: below 0.3 m/s after 0.26 s ── three samples."""
     drive = FakeDrive(1)
     story = driving(drive)
     drive.brakes = story.filter = story.obedient = False
     until_tripped(story)
-    story.run(0.59)
+    story.run(0.26)
     assert step(story) is Step.QUICK_STOP
-    story.run(0.03)
-    assert step(story) is Step.PRE_OPERATIONAL
+    story.run(0.04)
+    assert step(story) is Step.DISABLE_VOLTAGE
+    assert not story.watchdog.keeps_relay
+
+
+def test_a_wheel_that_gets_faster_has_its_power_taken_within_five_samples_whatever_the_driver_sends() -> None:
+    """Power by PDO first, then pre-operational, which makes the node deaf to PDOs, then by SDO: all in one cycle."""
+    drive = FakeDrive(1)
+    story = driving(drive)
+    drive.runs_away_mps2, story.filter, story.obedient = 4.0, False, False
+    until_tripped(story)
+    trip = story.t
+    story.run(0.07)
+    assert (step(story), drive.words[0]) == (Step.DISABLE_VOLTAGE, SOD)
+    off = [frame for at, frame in story.sent if at > trip and frame in (POWER_OFF, PRE_OP, SDO_OFF)]
+    assert off[:3] == [POWER_OFF, PRE_OP, SDO_OFF]
+    assert not story.watchdog.keeps_relay
+    assert max(speeds(story)) < 600
+    assert story.since(story.t - 0.1, HEARTBEAT) != []  # only the last rung withholds it
+
+
+def test_a_sensor_that_lies_costs_the_power_with_the_trip_and_a_stand_is_assumed_after_rolling_out() -> None:
+    """606Ch and 6064h part ── trip and power off in one cycle ── 2 s without power: it has rolled out."""
+    drive = FakeDrive(1)
+    story = driving(drive)
+    drive.shows = 0
+    until_tripped(story)
+    trip = story.t
+    assert step(story) is Step.DISABLE_VOLTAGE
+    story.run(0.01)
+    assert drive.words[0] == SOD
+    story.run(1.9)
+    assert not story.watchdog.status.settled
+    assert story.reset(1) == Answer.CAUSE_STANDS
+    story.run(0.3)
+    assert story.watchdog.status.settled
+    assert story.watchdog.status.assumed
+    assert story.t - trip < 2.3
+    assert story.reset(2) == Answer.DONE
+    assert not story.watchdog.status.assumed
 
 
 def test_a_drive_that_hears_nothing_at_all_loses_the_heartbeat_until_the_reset() -> None:

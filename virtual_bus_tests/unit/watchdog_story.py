@@ -54,6 +54,8 @@ def config(*drives: tuple[int, int], uid: int | None = None) -> WatchdogConfig:
         feedback_samples=5,
         overspeed_factor=1.2,
         travel_tolerance_m=0.05,
+        braking_mps2=0.5,
+        coasting_s=2.0,
         lease_uid=uid,
     )
 
@@ -76,6 +78,10 @@ class FakeDrive:
     hears_sdo: bool = True
     hears_nmt: bool = True
     brakes: bool = True
+    runs_away_mps2: float = 0.0
+    """Above 0: quick stop makes it faster, as with a sensor of the wrong sign."""
+    shows: int | None = None
+    """606Ch, whatever it does."""
     mute: bool = False
     nmt: int = OPERATIONAL
     words: dict[int, int] = field(default_factory=dict)
@@ -136,7 +142,7 @@ class FakeDrive:
 
     def velocity(self, axis: int) -> int:
         """606Ch: 1 mm/s per bit."""
-        return round(self.speed[axis])
+        return round(self.speed[axis]) if self.shows is None else self.shows
 
     def _answer(self, data: bytes) -> list[Frame]:
         index = int.from_bytes(data[1:3], "little")
@@ -156,6 +162,8 @@ class FakeDrive:
         for axis in self.axes:
             goal = self.target[axis] if self.words[axis] == ENABLED else 0
             change = max(-1000 * dt, min(1000 * dt, goal - self.speed[axis]))
+            if self.runs_away_mps2 and self.words[axis] == QUICK_STOP:
+                change = 1000 * self.runs_away_mps2 * dt
             self.speed[axis] += change if self.brakes else 0.0
             self.travel[axis] += self.speed[axis] * dt
             if self.words[axis] == QUICK_STOP and self.speed[axis] == 0 and self.option < 5:

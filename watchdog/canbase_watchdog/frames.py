@@ -30,7 +30,7 @@ VELOCITY_TPDO = (0x280, 0x480)
 SETPOINT_RPDO = (0x200, 0x300)
 """6040h u16, 60FFh i32 of the node's first and second axis, sent by the driver."""
 QUICK_STOP_RPDO = 0x500
-"""6040h u16 of every used axis, sent by the watchdog."""
+"""6040h u16 of every used axis, sent by the watchdog: quick stop, or disable voltage."""
 
 PRE_OPERATIONAL_COMMAND = 0x80
 OPERATIONAL = 5
@@ -177,8 +177,16 @@ def counters(refused: int, dropped: int, bus_errors: int, trips: int, gap_s: flo
 
 def quick_stop(node_id: int, axis_count: int, layout: WatchedLayout = CIA_402) -> Frame:
     """Quick stop for every used axis of a node, by the PDO that is the watchdog's own."""
-    words = 1 if layout.shared_controlword else axis_count
-    return Frame(QUICK_STOP_RPDO + node_id, _U16.pack(QUICK_STOP_WORD) * words)
+    return _own_pdo(node_id, axis_count, layout, QUICK_STOP_WORD)
+
+
+def disable_voltage(node_id: int, axis_count: int, layout: WatchedLayout = CIA_402) -> Frame:
+    """Power off for every used axis of a node, by the same PDO."""
+    return _own_pdo(node_id, axis_count, layout, DISABLE_VOLTAGE_WORD)
+
+
+def _own_pdo(node_id: int, axis_count: int, layout: WatchedLayout, word: int) -> Frame:
+    return Frame(QUICK_STOP_RPDO + node_id, _U16.pack(word) * (1 if layout.shared_controlword else axis_count))
 
 
 def pre_operational(node_id: int) -> Frame:

@@ -1,6 +1,8 @@
 """How far the watchdog goes to stop a drive: the ladder as a table, and the rule that climbs it. No frames here.
 
 Each node has a ladder of its own: a drive that brakes well is not made to coast because another one is silent.
+Quick stop and pre-operational leave the braking to the drive's velocity loop. Where that loop does not brake, or its
+sensor cannot be trusted, only the power can go: then the rungs between are left out.
 """
 
 from __future__ import annotations
@@ -8,6 +10,8 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, replace
+
+from canbase_config.watchdog import WatchdogConfig
 
 
 class Step(enum.IntEnum):
@@ -22,83 +26,152 @@ class Step(enum.IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Rung:
-    """One way to stop, and how long it may take.
-
-    `obey_s`: until the drive, by fresh feedback, is no longer enabled [s].
-    `stand_s`: until its wheels stand, on top of what braking from their speed takes [s].
-    """
+    """One way to stop. `obey_s`: until the drive, by fresh feedback, has done what this rung orders [s]."""
 
     step: Step
     obey_s: float
-    stand_s: float
 
 
 RUNGS = {
-    Step.QUICK_STOP: Rung(Step.QUICK_STOP, obey_s=0.15, stand_s=0.3),
-    Step.PRE_OPERATIONAL: Rung(Step.PRE_OPERATIONAL, obey_s=0.15, stand_s=0.3),
-    Step.DISABLE_VOLTAGE: Rung(Step.DISABLE_VOLTAGE, obey_s=0.15, stand_s=0.3),
-    Step.HEARTBEAT_WITHHELD: Rung(Step.HEARTBEAT_WITHHELD, obey_s=math.inf, stand_s=math.inf),
+    Step.QUICK_STOP: Rung(Step.QUICK_STOP, obey_s=0.15),
+    Step.PRE_OPERATIONAL: Rung(Step.PRE_OPERATIONAL, obey_s=0.15),
+    Step.DISABLE_VOLTAGE: Rung(Step.DISABLE_VOLTAGE, obey_s=0.1),
+    Step.HEARTBEAT_WITHHELD: Rung(Step.HEARTBEAT_WITHHELD, obey_s=math.inf),
 }
+SAMPLES = 3
+"""So many velocity samples in a row must show that a wheel does not brake: one may be an outlier."""
+
+
+@dataclass(frozen=True, slots=True)
+class Braking:
+    """What a wheel under power that is told to stop may do at most, and one without power. From robot.yaml."""
+
+    lag_s: float
+    """It may keep its speed for so long."""
+    least_mps2: float
+    """Then it loses at least this."""
+    tolerance_mps: float
+    tolerance_share: float
+    coasting_s: float
+    """A wheel without power has rolled out after this, whatever its sensor reports."""
+
+    @classmethod
+    def of(cls, config: WatchdogConfig) -> Braking:
+        """The numbers of this robot."""
+        return cls(
+            config.drive_lag_s,
+            config.braking_mps2,
+            config.motion_tolerance_mps,
+            config.motion_tolerance_share,
+            config.coasting_s,
+        )
+
+    def allowed_mps(self, from_mps: float, elapsed_s: float) -> float:
+        """The speed that is left at most when it began at `from_mps`, `elapsed_s` ago."""
+        begin_mps = from_mps * (1.0 + self.tolerance_share) + self.tolerance_mps
+        return begin_mps - self.least_mps2 * max(0.0, elapsed_s - self.lag_s)
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What the feedback of one node says. `seen_at`: when the oldest of its values came (monotonic, s)."""
+    """What the feedback of one node says. `seen_at`: when the oldest of its values came (monotonic, s).
+
+    `begin_mps`: the speed from which it may begin to brake, which its last setpoint may have raised within the lag.
+    `trusted`: its sensors have not been caught with a lie.
+    """
 
     enabled: bool
     powered: bool
     standing: bool
     speed_mps: float
+    begin_mps: float
     seen_at: float
     present: bool
+    trusted: bool = True
 
 
 @dataclass(frozen=True, slots=True)
 class Climb:
-    """Where on the ladder one node is. `since` [s] and `speed_mps`: when and how fast it came onto this rung."""
+    """Where on the ladder one node is. `since` [s] and `begin_mps`: when and how fast it came onto this rung."""
 
     step: Step
     since: float
-    speed_mps: float
+    begin_mps: float
     stopped: bool = False
+    assumed: bool = False
+    """Stopped without evidence: its power is off for longer than a wheel rolls."""
+    runaway: bool = False
+    """It was seen not to brake: the relay opens."""
+    against: int = 0
+    """Samples in a row that were faster than braking allows."""
+    judged_at: float = -math.inf
+    off_since: float = math.inf
+    """Since when its feedback says that it has no power; infinity: it does not."""
 
 
 def first(look: Look, now: float) -> Climb:
     """The foot of the ladder."""
-    return Climb(Step.QUICK_STOP, now, look.speed_mps)
+    return Climb(Step.QUICK_STOP, now, look.begin_mps)
 
 
-def advance(climb: Climb, look: Look, deceleration_mps2: float, now: float) -> Climb:
+def advance(before: Climb, look: Look, braking: Braking, now: float) -> Climb:
     """The place of a node after this look at it. Rules, the first that fits:
 
     1. stopped, and enabled again: next rung, somebody works against us;
     2. stopped, and moving: not stopped, same rung from the start;
-    3. not enabled and standing, by feedback that came on this rung: stopped;
+    3. not enabled and standing, by feedback that came on this rung: stopped. Where the sensor cannot be trusted, its
+       power must be off as well, for as long as a wheel may roll: then a stand is assumed;
     4. never heard of, and not told to have power: stays, there is nothing to climb for;
-    5. still enabled or unseen when `obey_s` has passed: next rung;
-    6. still powered and moving, or unseen, when braking time + `stand_s` has passed: next rung;
-    7. stays. A wheel that rolls without power is waited for: no rung can brake it.
+    5. a sensor that cannot be trusted: power off at once, for quick stop closes its loop on that sensor;
+    6. powered and faster than braking allows, SAMPLES in a row: power off at once, or the last rung; the relay opens;
+    7. what the rung orders is not done, or not seen, within `obey_s`: next rung;
+    8. stays. A wheel that rolls without power is waited for: no rung can brake it.
     """
+    climb = _judged(before, look, braking, now)
     if climb.stopped:
         if look.enabled:
             return _up(climb, look, now)
-        return climb if look.standing else replace(first(look, now), step=climb.step)
-    if not look.enabled and look.standing and look.seen_at > climb.since:
-        return replace(climb, stopped=True)
-    if look.present and _overdue(climb, look, deceleration_mps2, now):
-        return _up(climb, look, now)
-    return climb
+        return climb if look.standing else replace(first(look, now), step=climb.step, runaway=climb.runaway)
+    if look.standing and look.seen_at > climb.since and _holds(climb, look, braking, now):
+        return replace(climb, stopped=True, assumed=not look.trusted)
+    if not look.present:
+        return climb
+    if not look.trusted and climb.step < Step.DISABLE_VOLTAGE:
+        return _to(Step.DISABLE_VOLTAGE, climb, look, now)
+    if climb.against >= SAMPLES:
+        return replace(_to(max(climb.step + 1, Step.DISABLE_VOLTAGE), climb, look, now), runaway=True)
+    return _up(climb, look, now) if _disobeys(climb, look, now) else climb
 
 
-def _overdue(climb: Climb, look: Look, deceleration_mps2: float, now: float) -> bool:
-    rung = RUNGS[climb.step]
-    unseen = look.seen_at <= climb.since
-    if now >= climb.since + rung.obey_s and (look.enabled or unseen):
+def _judged(climb: Climb, look: Look, braking: Braking, now: float) -> Climb:
+    """Count this look's sample, if it is a new one that came on this rung, and note since when the power is off."""
+    if look.seen_at <= max(climb.since, climb.judged_at):
+        return climb
+    too_fast = look.speed_mps > max(0.0, braking.allowed_mps(climb.begin_mps, look.seen_at - climb.since))
+    against = climb.against + 1 if look.powered and too_fast and not look.standing else 0
+    off_since = math.inf if look.powered else min(climb.off_since, now)
+    return replace(climb, against=against, judged_at=look.seen_at, off_since=off_since)
+
+
+def _holds(climb: Climb, look: Look, braking: Braking, now: float) -> bool:
+    """Nothing drives it, and what says that it stands is evidence, or needs none any more."""
+    return not look.enabled if look.trusted else now >= climb.off_since + braking.coasting_s
+
+
+def _disobeys(climb: Climb, look: Look, now: float) -> bool:
+    obey_s = RUNGS[climb.step].obey_s
+    if now >= max(climb.since, look.seen_at) + obey_s:
         return True
-    stand_at = climb.since + rung.stand_s + climb.speed_mps / deceleration_mps2
-    return now >= stand_at and look.powered and not look.standing
+    asked = look.powered if climb.step >= Step.DISABLE_VOLTAGE else look.enabled
+    return asked and now >= climb.since + obey_s
 
 
 def _up(climb: Climb, look: Look, now: float) -> Climb:
-    step = Step(min(climb.step + 1, Step.HEARTBEAT_WITHHELD))
-    return Climb(step, now, look.speed_mps)
+    return _to(climb.step + 1, climb, look, now)
+
+
+def _to(step: int, climb: Climb, look: Look, now: float) -> Climb:
+    """The last rung is the end: there it stays as it is."""
+    if climb.step is Step.HEARTBEAT_WITHHELD and not climb.stopped:
+        return climb
+    return Climb(Step(min(step, Step.HEARTBEAT_WITHHELD)), now, look.begin_mps, runaway=climb.runaway)

@@ -31,6 +31,8 @@ class Cause(enum.IntEnum):
     FEEDBACK_IMPLAUSIBLE = 12
 
 
+SENSOR_CAUSES = (Cause.FEEDBACK_IMPLAUSIBLE,)
+"""After these, what the drive of the verdict reports about its motion is no evidence any more."""
 SIGN_S = 1.0
 """A sign of another master counts for so long."""
 

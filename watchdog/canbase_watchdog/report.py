@@ -13,6 +13,8 @@ from canbase_watchdog.watchdog import Answer, State, Status, Watchdog
 COUNTERS_PERIOD_S = 10.0
 ALIVE_PERIOD_S = 0.2
 
+ASSUMED = "standstill is assumed, not measured: a sensor is not to be trusted, and the power is off long enough"
+
 _log = logging.getLogger("canbase.watchdog")
 
 
@@ -71,7 +73,7 @@ def _tell_ladder(old: Status, status: Status) -> None:
     if old.step is not status.step:
         _log.warning("ladder: %s", _words(status.step))
     if status.settled and not old.settled:
-        _log.warning("all drives stand")
+        _log.warning(ASSUMED if status.assumed else "all drives stand")
 
 
 def _state_line(status: Status) -> str:

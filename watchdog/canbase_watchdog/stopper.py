@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog import frames
 from canbase_watchdog.frames import Frame
-from canbase_watchdog.ladder import Climb, Look, Step, advance, first
+from canbase_watchdog.ladder import Braking, Climb, Look, Step, advance, first
 from canbase_watchdog.view import NEVER, Axis, View
 
 QUICK_STOP_PERIOD_S = 0.01
@@ -26,10 +26,12 @@ _WORD_BY_STEP = {
 class Stopper:
     """Stops one node and keeps it stopped, from the trip until the reset."""
 
-    def __init__(self, node_id: int, config: WatchdogConfig, view: View, now: float) -> None:
-        """Begins at the foot of the ladder at the monotonic time `now` [s]."""
+    def __init__(self, node_id: int, config: WatchdogConfig, view: View, now: float, trusted: bool = True) -> None:
+        """Begins at the foot of the ladder at the monotonic time `now` [s]; without `trusted`, a sensor lied."""
         self._node_id = node_id
         self._config = config
+        self._braking = Braking.of(config)
+        self._trusted = trusted
         drives = [drive for drive in config.drives if drive.node_id == node_id]
         self._layout, self._axis_count = drives[0].layout, len(drives)
         self._seen = self._look(view)
@@ -46,14 +48,15 @@ class Stopper:
         """Look at the node, climb where the rules say so, and return the frames that are due."""
         self._seen = self._look(view)
         before = self.climb
-        self.climb = advance(before, self._seen, self._config.deceleration_mps2, now)
+        self.climb = advance(before, self._seen, self._braking, now)
         if self.climb.step is not before.step:
             self._quick_stop_at = self._nmt_at = self._sdo_at = NEVER
             self._sdo_turn = 0
         defied = self._defied(view, now)
         out: list[Frame] = []
         if not self.climb.stopped or defied:
-            out += self._quick_stop(now) + self._pre_operational(now)
+            # The PDO first: pre-operational makes the node deaf to it.
+            out += self._stop_word(now) + self._pre_operational(now)
         return out + self._sdo(view, defied, now)
 
     def _axes(self, view: View) -> list[Axis]:
@@ -62,25 +65,38 @@ class Stopper:
     def _look(self, view: View) -> Look:
         axes = self._axes(view)
         node = view.node(self._node_id)
+        lies = any(axis.feedback.implausible >= self._config.feedback_samples for axis in axes)
+        self._trusted = self._trusted and not lies
         return Look(
             enabled=any(axis.enabled for axis in axes),
             powered=any(axis.powered for axis in axes),
             standing=all(abs(axis.velocity_mps) <= self._config.standstill_mps for axis in axes),
-            speed_mps=max(max(abs(axis.velocity_mps), abs(axis.target_mps)) for axis in axes),
+            speed_mps=max(abs(axis.velocity_mps) for axis in axes),
+            begin_mps=max(self._begin_mps(axis) for axis in axes),
             seen_at=min(axis.fed_at for axis in axes),
             present=node.heard_at > NEVER or any(axis.asks_for_power for axis in axes),
+            trusted=self._trusted,
         )
+
+    def _begin_mps(self, axis: Axis) -> float:
+        """How fast it may get before it begins to brake: towards its setpoint, for as long as the drive lags."""
+        speed_mps, config = abs(axis.velocity_mps), self._config
+        gain_mps = config.acceleration_mps2 * config.drive_lag_s
+        return max(speed_mps, min(abs(axis.target_mps), speed_mps + gain_mps))
 
     def _defied(self, view: View, now: float) -> bool:
         """Somebody goes on commanding motion."""
         recent = now - self._config.lease_timeout_s
         return any(axis.command_at > recent and axis.target_mps != 0.0 for axis in self._axes(view))
 
-    def _quick_stop(self, now: float) -> list[Frame]:
+    def _stop_word(self, now: float) -> list[Frame]:
+        """By the PDO that is the watchdog's own: quick stop, from the rung of that name on disable voltage."""
         if now < self._quick_stop_at + QUICK_STOP_PERIOD_S:
             return []
         self._quick_stop_at = now
-        return [frames.quick_stop(self._node_id, self._axis_count, self._layout)]
+        off = self.climb.step >= Step.DISABLE_VOLTAGE
+        order = frames.disable_voltage if off else frames.quick_stop
+        return [order(self._node_id, self._axis_count, self._layout)]
 
     def _pre_operational(self, now: float) -> list[Frame]:
         if self.climb.step < Step.PRE_OPERATIONAL or now < self._nmt_at + NMT_PERIOD_S:

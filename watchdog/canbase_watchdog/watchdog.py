@@ -51,6 +51,8 @@ class Status:
     step: Step
     settled: bool
     reset: tuple[int, Answer]
+    assumed: bool = False
+    """Some drive was not seen to stand: its sensor cannot be trusted, and its power is off for longer than it rolls."""
 
 
 class Watchdog:
@@ -84,11 +86,17 @@ class Watchdog:
     @property
     def status(self) -> Status:
         """State, cause and rung as of now."""
-        return Status(self._state, self._verdict, self._step, self._settled, self._reset)
+        assumed = any(stopper.climb.assumed for stopper in self._stoppers)
+        return Status(self._state, self._verdict, self._step, self._settled, self._reset, assumed)
 
     @property
     def keeps_relay(self) -> bool:
-        """False on the last rung: then the own heartbeat is withheld, and a safety relay opens."""
+        """False on the last rung, and for a wheel that was seen not to brake: then a safety relay opens."""
+        return self._beats and not any(stopper.climb.runaway for stopper in self._stoppers)
+
+    @property
+    def _beats(self) -> bool:
+        """False on the last rung: then the own heartbeat is withheld."""
         return self._step is not Step.HEARTBEAT_WITHHELD
 
     @property
@@ -167,7 +175,8 @@ class Watchdog:
         self.trips += 1
         self._observer.commands_are_ours = True
         nodes = dict.fromkeys(drive.node_id for drive in self._config.drives)
-        self._stoppers = [Stopper(node_id, self._config, self._view, now) for node_id in nodes]
+        lying = verdict.node_id if verdict.cause in policy.SENSOR_CAUSES else 0
+        self._stoppers = [Stopper(node_id, self._config, self._view, now, node_id != lying) for node_id in nodes]
 
     def _stop(self, now: float) -> list[Frame]:
         return [frame for stopper in self._stoppers for frame in stopper.tick(self._view, now)]
@@ -183,7 +192,7 @@ class Watchdog:
     def _tell(self, now: float) -> list[Frame]:
         out: list[Frame] = []
         period_s = self._config.drive_heartbeat_s / 3.0
-        if now >= self._heartbeat_due and self.keeps_relay:
+        if now >= self._heartbeat_due and self._beats:
             self._heartbeat_due = max(self._heartbeat_due, now - period_s) + period_s
             out.append(frames.heartbeat())
         status = self.status
