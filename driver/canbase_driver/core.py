@@ -46,8 +46,6 @@ from canbase_driver.watchdog_link import COUNTERS_COB_ID, STATE_COB_ID, Watchdog
 
 HEARTBEATS_PER_TIMEOUT = 3
 """The heartbeat goes out this often in the time that the drives allow for it."""
-RESET_TIMEOUT_S = 5.0
-"""On top of what drives may take to boot: longer than a reset can take."""
 PAUSE = 0.5
 """A cycle that begins so late, in parts of timeouts.feedback_s, begins a new run of SYNCs."""
 LONGEST_STEP_S = 1.0
@@ -90,9 +88,9 @@ class DriverCore:
         """Stops since they were last taken out, oldest first."""
 
     @property
-    def patience_s(self) -> float:
-        """A request that waits for drives is answered within this [s]."""
-        return max(self._readiness.longest_s, self._robot.timeouts.boot_s + RESET_TIMEOUT_S)
+    def aim(self) -> Aim:
+        """How far it goes."""
+        return self._readiness.aim
 
     @property
     def finished(self) -> bool:

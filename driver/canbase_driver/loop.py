@@ -7,6 +7,7 @@ only put requests into the inbox. However the thread ends, its last act on the b
 from __future__ import annotations
 
 import contextlib
+import itertools
 import math
 import os
 import queue
@@ -24,13 +25,14 @@ from canbase_driver.readiness import Aim
 from canbase_driver.reset import Outcome
 from canbase_driver.snapshot import DriverSnapshot, StopRecord
 
-ANSWER_MARGIN_S = 1.0
-"""On top of the time in which the core answers a request."""
-POLL_S = 0.1
+OLD_S = 0.5
+"""A request that lay in the inbox for longer is refused: this process stood still, and its caller may be gone."""
 FRAMES_WHEN_LATE = 100
 """So many waiting frames are taken in before a cycle that is already late: more than a bus brings in one cycle."""
 LAST_WORDS = 3
 """How often the quick stop is sent on the way out."""
+
+OnOutcome = Callable[[Outcome], None]
 
 
 class ControlLoop(threading.Thread):
@@ -41,10 +43,12 @@ class ControlLoop(threading.Thread):
         self._core = core
         self._bus = bus
         self._ring = ring
-        self._answer_s = core.patience_s + ANSWER_MARGIN_S
         self._period_s = 1.0 / control_hz
         self._samples_per_snapshot = max(1, round(control_hz / odometry_hz))
         self._inbox: queue.SimpleQueue[Callable[[float], object]] = queue.SimpleQueue()
+        self._outcomes: queue.SimpleQueue[tuple[int, Outcome]] = queue.SimpleQueue()
+        self._numbers = itertools.count()
+        self._asked: dict[int, OnOutcome] = {}
         self._condition = threading.Condition()
         self._snapshot: DriverSnapshot | None = None
         self._stops: list[StopRecord] = []
@@ -62,38 +66,71 @@ class ControlLoop(threading.Thread):
         """Hand over whether the safety filter asks for the emergency deceleration, from any thread."""
         self._inbox.put(lambda _now: self._core.on_emergency(brakes_hard, received_at))
 
-    def request_stop(self) -> None:
-        """Hand over a stop request, from any thread."""
-        self._inbox.put(lambda _now: self._core.request_stop())
-
     def request_shutdown(self) -> None:
         """Ramp to a stand, disable, end the thread."""
         self._inbox.put(lambda _now: self._core.request_shutdown())
 
-    def reset(self) -> Outcome:
-        """Reset and wait for the outcome; never call it from the control thread."""
-        return self._ask(lambda now, answer: self._core.request_reset(now, answer))
+    @property
+    def aimed_at(self) -> Aim:
+        """How far the driver goes now."""
+        return self._core.aim
 
-    def set_pose(self, pose: Pose2D) -> Outcome:
-        """Set the pose of the odometry and wait for the outcome; never call it from the control thread."""
-        return self._ask(lambda now, answer: answer(self._core.set_pose(pose, now)))
+    def stop(self, on_outcome: OnOutcome) -> None:
+        """Stop, however late; like each of these four it returns at once, and `deliver` calls `on_outcome`, once.
 
-    def aim(self, aim: Aim) -> Outcome:
-        """Go so far and wait for the outcome; never call it from the control thread."""
-        return self._ask(lambda now, answer: self._core.request_aim(aim, now, answer))
+        No outcome comes while the control thread hangs: nothing obeys then, and the process is about to end.
+        """
 
-    def _ask(self, request: Callable[[float, Callable[[Outcome], None]], None]) -> Outcome:
-        outcomes: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
-        self._inbox.put(lambda now: request(now, outcomes.put))
-        deadline = time.monotonic() + self._answer_s
-        while time.monotonic() < deadline:
-            alive = self.is_alive()
+        def carry_out(_now: float, answer: OnOutcome) -> None:
+            self._core.request_stop()
+            answer(Outcome(True, "stopping; nothing moves until motor_driver/reset"))
+
+        self._ask(carry_out, on_outcome, however_late=True)
+
+    def reset(self, on_outcome: OnOutcome) -> None:
+        """Reset."""
+        self._ask(lambda now, answer: self._core.request_reset(now, answer), on_outcome)
+
+    def set_pose(self, pose: Pose2D, on_outcome: OnOutcome) -> None:
+        """Set the pose of the odometry."""
+        self._ask(lambda now, answer: answer(self._core.set_pose(pose, now)), on_outcome)
+
+    def aim(self, aim: Aim, on_outcome: OnOutcome) -> None:
+        """Go so far. What takes power away is obeyed however late."""
+        takes_power = aim <= self._core.aim
+        self._ask(lambda now, answer: self._core.request_aim(aim, now, answer), on_outcome, takes_power)
+
+    def deliver(self) -> None:
+        """Tell the outcomes that are there. By the thread that asks, and often: nothing here waits."""
+        ended = not self.is_alive()
+        while True:
             try:
-                return outcomes.get(timeout=POLL_S)
+                number, outcome = self._outcomes.get_nowait()
             except queue.Empty:
-                if not alive:
-                    return Outcome(False, "refused: the control loop has ended")
-        return Outcome(False, f"the control loop did not answer within {self._answer_s:.0f} s")
+                break
+            self._asked.pop(number)(outcome)
+        for number in tuple(self._asked) if ended else ():
+            self._asked.pop(number)(Outcome(False, "refused: the control loop has ended"))
+
+    def _ask(
+        self,
+        request: Callable[[float, OnOutcome], None],
+        on_outcome: OnOutcome,
+        however_late: bool = False,
+    ) -> None:
+        number, asked_at = next(self._numbers), time.monotonic()
+        self._asked[number] = on_outcome
+
+        def answer(outcome: Outcome) -> None:
+            self._outcomes.put((number, outcome))
+
+        def carry_out(now: float) -> None:
+            if now - asked_at > OLD_S and not however_late:
+                answer(Outcome(False, f"refused: motor_driver stood still for {now - asked_at:.1f} s; send it again"))
+            else:
+                request(now, answer)
+
+        self._inbox.put(carry_out)
 
     def next_snapshot(self, timeout_s: float) -> tuple[DriverSnapshot | None, list[StopRecord]]:
         """Wait for a new snapshot; (None, []) when none came. Stops since the last call come with it."""

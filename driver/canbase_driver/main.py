@@ -17,7 +17,6 @@ from types import FrameType
 import rclpy
 from rclpy.experimental import EventsExecutor
 from rclpy.logging import get_logger
-from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from canbase_config.priority import Priority
@@ -30,9 +29,9 @@ from canbase_driver.core import DriverCore
 from canbase_driver.loop import ControlLoop
 from canbase_driver.node import MotorDriverNode, Publisher
 from canbase_driver.readiness import Aim
-from canbase_driver.services import DriverServices
 
-WAKE_S = 0.05
+WAKE_S = 0.02
+"""So long an outcome of the control thread may wait for the next message before it is answered."""
 LOOP_TIMEOUT_S = 0.5
 """A control thread without a cycle for so long, while this one ran, hangs: the process ends; the watchdog has already
 stopped the drives."""
@@ -41,7 +40,7 @@ END_MARGIN_S = 3.0
 WRITE_S = 5.0
 """For the recording of a stop that is just over."""
 
-Worker = ControlLoop | Publisher | DriverServices | BlackBoxWriter
+Worker = ControlLoop | Publisher | BlackBoxWriter
 """Each of them has a `failure`, and none may end before the process does."""
 
 
@@ -68,24 +67,23 @@ def run(
     ring = Ring(robot.black_box.seconds)
     loop = ControlLoop(DriverCore(robot, aim), bus, robot.rates.control_hz, robot.rates.odometry_hz, ring)
     writer = BlackBoxWriter(robot.black_box, robot.name, get_logger("motor_driver").warning)
-    commands = Node("motor_driver_commands")
-    node = MotorDriverNode(robot, loop, ring, writer, commands, autostart)
-    publisher, services = Publisher(node, loop), DriverServices(node, loop, robot.base.odom_frame)
-    threads = (loop, publisher, services, writer)
+    node = MotorDriverNode(robot, loop, ring, writer, autostart)
+    publisher = Publisher(node, loop)
+    threads = (loop, publisher, writer)
     gc.collect()
     gc.freeze()  # what is there now lives for ever: later collections need not look at it
     when_ready()
     for thread in threads:
         thread.start()
     try:
-        failure = _spin(node, commands, loop, threads, received)
+        failure = _spin(node, loop, threads, received)
         loop.request_shutdown()
         loop.join(robot.timeouts.standstill_s + END_MARGIN_S)
+        loop.deliver()
         publisher.join(1.0)
         writer.finish(WRITE_S)
     finally:
         rclpy.shutdown()
-        services.join(1.0)
     failure = failure or loop.failure
     if failure is not None:
         node.voice.tell(f"ended by {type(failure).__name__}: {failure}", Priority.ERROR, robot=robot.name)
@@ -94,21 +92,18 @@ def run(
 
 
 def _spin(
-    node: MotorDriverNode,
-    commands: Node,
-    loop: ControlLoop,
-    threads: Sequence[Worker],
-    received: list[int],
+    node: MotorDriverNode, loop: ControlLoop, threads: Sequence[Worker], received: list[int]
 ) -> BaseException | None:
     """Until a signal or a failure; the failure."""
     executor = EventsExecutor()
-    executor.add_node(commands)
+    executor.add_node(node)
     watch, service = HangWatch(LOOP_TIMEOUT_S, WAKE_S), Service()
     try:
         while not received:
             executor.spin_once(timeout_sec=WAKE_S)
             now = time.monotonic()
             node.look_at_the_clock(now)
+            loop.deliver()
             failure = _failure(threads) or watch.look(loop.cycle_at, now)
             if failure is not None:
                 return failure

@@ -1,77 +1,88 @@
 """A managed node (lifecycle_msgs, rclpy.lifecycle) whose transitions are aims of the control thread.
 
 configure boots the drives, activate gives them power, deactivate and shutdown stop the base first, cleanup lets the
-drives go. Whatever the state of the node, the driver's own states decide what moves (`supervisor.py`).
+drives go. The driver owns the lifecycle (`readiness.py`): a transition ends in the state of what it aims at by then. A
+deactivation that could not be confirmed in time is answered with "no", and the node is inactive, as the driver is.
+Nothing here waits: rclpy's own callbacks of a transition would, so they are not used.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+import time
 
+from lifecycle_msgs.msg import Transition
 from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 
+from canbase_config.receive_time import ReceiveTimes
+from canbase_driver.late_answer import Asked, answer_later
+from canbase_driver.loop import ControlLoop
 from canbase_driver.readiness import Aim
+from canbase_driver.request_age import refusal
 from canbase_driver.reset import Outcome
+
+AIMS = {
+    Transition.TRANSITION_CONFIGURE: Aim.CONFIGURED,
+    Transition.TRANSITION_ACTIVATE: Aim.ACTIVE,
+    Transition.TRANSITION_DEACTIVATE: Aim.CONFIGURED,
+    Transition.TRANSITION_CLEANUP: Aim.RELEASED,
+    Transition.TRANSITION_UNCONFIGURED_SHUTDOWN: Aim.RELEASED,
+    Transition.TRANSITION_INACTIVE_SHUTDOWN: Aim.RELEASED,
+    Transition.TRANSITION_ACTIVE_SHUTDOWN: Aim.RELEASED,
+}
+"""What each transition aims at. After a shutdown the process stays until it is ended: nothing would start it again."""
 
 
 class ManagedNode(LifecycleNode):
-    """`go` asks for an aim and waits for the outcome: spin this node in a thread that may wait."""
+    """The lifecycle of the driver as ROS sees it."""
 
-    def __init__(self, name: str, go: Callable[[Aim], Outcome], autostart: bool) -> None:
+    def __init__(self, name: str, loop: ControlLoop, autostart: bool) -> None:
+        """`autostart`: it is active at once, and the driver boots and enables as soon as it can."""
         super().__init__(name)
-        self._go = go
-        self._starts_by_itself = autostart
-        service = self._service_change_state
-        service.callback = self._guarded(service.callback)
-
-    def start(self) -> None:
-        """With autostart the node is active at once, and the driver boots and enables as soon as it can."""
-        if self._starts_by_itself:
+        self._loop = loop
+        self.receive_times = ReceiveTimes()
+        """Whether what is taken in now may have waited while this process stood still."""
+        answer_later(self._service_change_state, self._on_change_state)
+        if autostart:
             self.trigger_configure()
             self.trigger_activate()
-            self._starts_by_itself = False
 
-    def on_configure(self, _state: LifecycleState) -> TransitionCallbackReturn:
-        """Boot the drives; FAILURE when one is not there within timeouts.boot_s."""
-        return self._reach(Aim.CONFIGURED)
+    def _on_change_state(self, asked: Asked) -> None:
+        try:
+            aim = self._begin(asked)
+        except rclpy_implementation.RCLError as error:  # rclpy raises for a transition that the state does not have
+            self._refuse(asked, f"refused: {error}")
+        else:
+            if aim is not None:
+                self._loop.aim(aim, lambda outcome: self._end(asked, aim, outcome))
 
-    def on_activate(self, _state: LifecycleState) -> TransitionCallbackReturn:
-        """Give the drives power; FAILURE when something forbids it."""
-        return self._reach(Aim.ACTIVE)
+    def _begin(self, asked: Asked) -> Aim | None:
+        """What the transition that begins aims at; None: it was refused."""
+        wanted, machine = asked.request.transition, self._state_machine
+        number = machine.get_transition_by_label(wanted.label) if wanted.label else wanted.id
+        aim = AIMS.get(number)
+        if aim is None:
+            self._refuse(asked, "refused: nobody may ask for this transition")
+            return None
+        old = refusal(self.receive_times.waited(time.monotonic()), asked.sent_s, time.time())
+        if old and aim > self._loop.aimed_at:
+            self._refuse(asked, old)
+            return None
+        machine.trigger_transition_by_id(number, True)
+        return aim
 
-    def on_deactivate(self, _state: LifecycleState) -> TransitionCallbackReturn:
-        """Bring the base to a stand, then take the power away."""
-        return self._reach(Aim.CONFIGURED)
-
-    def on_cleanup(self, _state: LifecycleState) -> TransitionCallbackReturn:
-        """Let the drives go."""
-        return self._reach(Aim.RELEASED)
-
-    def on_shutdown(self, _state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop, power off, let the drives go. The process stays until it is ended: nothing would start it again."""
-        return self._reach(Aim.RELEASED)
-
-    def _reach(self, aim: Aim) -> TransitionCallbackReturn:
-        if self._starts_by_itself:
-            return TransitionCallbackReturn.SUCCESS
-        outcome = self._go(aim)
+    def _end(self, asked: Asked, aim: Aim, outcome: Outcome) -> None:
+        taken_back = self._loop.aimed_at is not aim
+        end = TransitionCallbackReturn.FAILURE if taken_back else TransitionCallbackReturn.SUCCESS
+        self._state_machine.trigger_transition_by_label(end.to_label(), True)
         if outcome.done:
             self.get_logger().info(f"lifecycle: {outcome.sentence}")
-            return TransitionCallbackReturn.SUCCESS
-        self.get_logger().error(f"lifecycle: {outcome.sentence}")
-        return TransitionCallbackReturn.FAILURE
+        else:
+            self.get_logger().error(f"lifecycle: {outcome.sentence}")
+        asked.response.success = outcome.done
+        asked.answer()
 
-    def _guarded(self, callback: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
-        """rclpy raises for a transition that the state does not have, and a request must not end the process."""
-
-        def guarded(request: Any, response: Any) -> Any:
-            try:
-                return callback(request, response)
-            except rclpy_implementation.RCLError as error:
-                self.get_logger().warning(f"lifecycle: transition {request.transition.id} refused: {error}")
-                response.success = False
-                return response
-
-        return guarded
+    def _refuse(self, asked: Asked, why: str) -> None:
+        self.get_logger().warning(f"lifecycle: transition {asked.request.transition.id} {why}")
+        asked.response.success = False
+        asked.answer()

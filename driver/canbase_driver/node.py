@@ -1,7 +1,7 @@
 """The ROS node motor_driver: cmd_vel in; odom, tf, joint_states, status, diagnostics and stop events out.
 
-Threads: the executor's (main) takes commands, on a node of its own; `publisher` waits for snapshots and publishes them;
-`services` answers requests and lifecycle transitions, which wait for the control thread. None of them touches the bus.
+Threads: the executor's (main) takes commands, requests and lifecycle transitions, and none of its callbacks waits;
+`publisher` waits for snapshots and publishes them. Neither of them touches the bus.
 """
 
 from __future__ import annotations
@@ -13,13 +13,11 @@ from canbase.msg import DriverStatus, SafetyState
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
-from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from canbase_config.journal import Journal, Voice
 from canbase_config.priority import Priority
-from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
 from canbase_driver import messages
 from canbase_driver.black_box import Ring
@@ -28,6 +26,7 @@ from canbase_driver.diagnostics import diagnostics_message, unguarded
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.loop import ControlLoop
 from canbase_driver.managed_node import ManagedNode
+from canbase_driver.services import DriverServices
 from canbase_driver.snapshot import DriverSnapshot, StopRecord
 from canbase_driver.stop_teller import StopTeller
 from canbase_driver.supervisor import INACTIVE
@@ -40,23 +39,19 @@ DIAGNOSTICS_PERIOD_S = 1.0
 class MotorDriverNode(ManagedNode):
     """Talks ROS for a `ControlLoop`."""
 
-    def __init__(
-        self, robot: Robot, loop: ControlLoop, ring: Ring, writer: BlackBoxWriter, commands: Node, autostart: bool
-    ) -> None:
-        """`commands`: what it hears is heard there, so that no transition of this node can hold it up."""
-        super().__init__("motor_driver", loop.aim, autostart)
+    def __init__(self, robot: Robot, loop: ControlLoop, ring: Ring, writer: BlackBoxWriter, autostart: bool) -> None:
+        super().__init__("motor_driver", loop, autostart)
         self._robot = robot
-        self._loop = loop
         self.voice = Voice(self.get_logger(), Journal("motor_driver"))
-        self._receive_times = ReceiveTimes()
         self._odom = self.create_publisher(Odometry, "odom", 10)
         self._tf = self.create_publisher(messages.TFMessage, "tf", 100) if messages.TFMessage is not None else None
         self._joints = self.create_publisher(JointState, "joint_states", 10)
         self._status = self.create_publisher(DriverStatus, "motor_driver/status", STATE_QOS)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        commands.create_subscription(TwistStamped, "cmd_vel", self._on_command, COMMAND_QOS)
-        commands.create_subscription(SafetyState, "safety_filter/state", self._on_safety, COMMAND_QOS)
-        self._stops = StopTeller(self, commands, robot, ring, writer, self.voice)
+        self.create_subscription(TwistStamped, "cmd_vel", self._on_command, COMMAND_QOS)
+        self.create_subscription(SafetyState, "safety_filter/state", self._on_safety, COMMAND_QOS)
+        self._stops = StopTeller(self, robot, ring, writer, self.voice)
+        self._offers = DriverServices(self, loop, robot.base.odom_frame, self.receive_times)
         self._previous: DriverSnapshot | None = None
         self._diagnosed: DriverSnapshot | None = None
         self._status_at = 0.0
@@ -82,14 +77,14 @@ class MotorDriverNode(ManagedNode):
 
     def look_at_the_clock(self, now: float) -> None:
         """To be called in each turn of the executor's loop: a pause between two of them ages the commands that wait."""
-        self._receive_times.at(now)
+        self.receive_times.at(now)
 
     def end(self) -> None:
         """The control thread has ended: tell the stops that are still open."""
         self._stops.end()
 
     def _on_command(self, message: TwistStamped) -> None:
-        received_at = self._receive_times.at(time.monotonic())
+        received_at = self.receive_times.at(time.monotonic())
         twist = Twist2D(message.twist.linear.x, message.twist.angular.z)
         if not twist.is_finite:
             self.get_logger().error(f"cmd_vel refused: {twist} is not finite", throttle_duration_sec=1.0)

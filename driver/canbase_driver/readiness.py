@@ -3,6 +3,8 @@
 RELEASED ──configure──► CONFIGURED ──activate──► ACTIVE      one change at a time; a change that fails is taken back,
    ▲ └────cleanup───────────┘ └──────deactivate────┘         but none that takes power away: a stop goes on.
 
+What is aimed at is the state of the lifecycle: ROS shows it (`managed_node.py`), and owns none of its own.
+
 Rules. What is aimed at holds at once: less than ACTIVE is a reason to stop (`supervisor.py`), and RELEASED follows only
 when nothing has power. A latched stop outlives every change: `reset` alone ends it. Pure: time is an argument.
 """
@@ -62,11 +64,6 @@ class Readiness:
             Aim.CONFIGURED: max(timeouts.boot_s, stop_s) + MARGIN_S,
             Aim.ACTIVE: ENABLE_TIMEOUT_S + MARGIN_S,
         }
-
-    @property
-    def longest_s(self) -> float:
-        """No change takes longer [s]."""
-        return max(self._patience_s.values())
 
     @property
     def unconfigured(self) -> str:

@@ -11,6 +11,9 @@ from canbase_driver.watchdog_link import WatchdogLink
 
 OnOutcome = Callable[[Outcome], None]
 
+STOOD_STILL_S = 0.5
+"""Two steps that are further apart: the process stood still between them, and whoever asked may be gone."""
+
 
 class ResetRun:
     """At most one at a time; whoever asked is told exactly once how it ended."""
@@ -19,6 +22,7 @@ class ResetRun:
         self._watchdog = watchdog
         self._cycle_s, self._boot_s = cycle_s, boot_s
         self._sequence: Reset | None = None
+        self._stepped_at = 0.0
         self._request = Frame(0, b"")
         self._on_outcome: OnOutcome = lambda _outcome: None
 
@@ -38,7 +42,7 @@ class ResetRun:
         if refused is not None:
             on_outcome(Outcome(False, refused))
             return False
-        self._sequence = Reset(now, self._cycle_s, self._boot_s)
+        self._sequence, self._stepped_at = Reset(now, self._cycle_s, self._boot_s), now
         self._request, self._on_outcome = self._watchdog.request_reset(), on_outcome
         return True
 
@@ -46,6 +50,9 @@ class ResetRun:
         """Once a cycle: what to send, and the outcome, which the caller hands to `end`."""
         if self._sequence is None:
             return [], None
+        pause_s, self._stepped_at = now - self._stepped_at, now
+        if pause_s > STOOD_STILL_S:
+            return [], Outcome(False, f"broken off: motor_driver stood still for {pause_s:.1f} s; reset again")
         outcome = self._sequence.step(situation, self._watchdog.answer(), now)
         asks = outcome is None and self._sequence.phase is Phase.WATCHDOG
         return [self._request] if asks else [], outcome

@@ -1,76 +1,89 @@
-"""Services motor_driver/reset, stop and reset_odometry, set_pose, and the lifecycle, on a thread of their own.
+"""Services motor_driver/stop, reset and reset_odometry, and the topic set_pose.
 
-A reset or a transition takes up to seconds: it answers when it is done, not when it begins. rclpy cannot await inside a
-service of its events executor, and the main thread must not wait, since commands arrive there.
+No callback waits: a request is handed to the control thread, and its answer is sent when the outcome is there. So a
+stop never waits for a reset, a transition or a boot. What gives power or changes the pose is refused when it is old.
 """
 
 from __future__ import annotations
 
-import threading
+import time
+from collections.abc import Callable
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from canbase_config.journal import Journal, Voice
 from canbase_config.priority import Priority
+from canbase_config.receive_time import ReceiveTimes
+from canbase_driver.late_answer import Asked, answer_later
 from canbase_driver.loop import ControlLoop
-from canbase_driver.managed_node import ManagedNode
 from canbase_driver.messages import pose_of
 from canbase_driver.odometry import Pose2D
+from canbase_driver.request_age import refusal
+from canbase_driver.reset import Outcome
 
 
-class DriverServices(threading.Thread):
-    """Spins the node motor_driver until ROS is shut down."""
+def _answered_later(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    """In place of a callback: `answer_later` takes the requests over."""
+    return response
 
-    def __init__(self, node: ManagedNode, loop: ControlLoop, odom_frame: str) -> None:
-        super().__init__(name="services", daemon=True)
+
+class DriverServices:
+    """What `node` offers beside its topics and its lifecycle."""
+
+    def __init__(self, node: Node, loop: ControlLoop, odom_frame: str, receive_times: ReceiveTimes) -> None:
         self._loop = loop
         self._node = node
-        self._voice = Voice(node.get_logger(), Journal("motor_driver"))
-        self._node.create_service(Trigger, "motor_driver/reset", self._on_reset)
-        self._node.create_service(Trigger, "motor_driver/stop", self._on_stop)
         self._odom_frame = odom_frame
-        self._node.create_service(Trigger, "motor_driver/reset_odometry", self._on_reset_odometry)
-        self._node.create_subscription(PoseWithCovarianceStamped, "motor_driver/set_pose", self._on_set_pose, 1)
-        self.failure: BaseException | None = None
+        self._receive_times = receive_times
+        self._voice = Voice(node.get_logger(), Journal("motor_driver"))
+        answer_later(node.create_service(Trigger, "motor_driver/stop", _answered_later), self._on_stop)
+        self._offer("motor_driver/reset", self._on_reset)
+        self._offer("motor_driver/reset_odometry", self._on_reset_odometry)
+        node.create_subscription(PoseWithCovarianceStamped, "motor_driver/set_pose", self._on_set_pose, 1)
 
-    def run(self) -> None:
-        """The thread's body."""
-        executor = SingleThreadedExecutor()
-        executor.add_node(self._node)
-        try:
-            self._node.start()
-            executor.spin()
-        except ExternalShutdownException:
-            return
-        except BaseException as error:  # noqa: BLE001 - main sees it, stops the robot and ends the process
-            self.failure = error
+    def _offer(self, name: str, carry_out: Callable[[Asked], None]) -> None:
+        def on_request(asked: Asked) -> None:
+            old = refusal(self._receive_times.waited(time.monotonic()), asked.sent_s, time.time())
+            if old:
+                self._answer(asked, Outcome(False, old))
+            else:
+                carry_out(asked)
 
-    def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        outcome = self._loop.reset()
-        response.success, response.message = outcome.done, outcome.sentence
-        self._voice.tell(f"reset: {outcome.sentence}", Priority.NOTICE)
-        return response
+        answer_later(self._node.create_service(Trigger, name, _answered_later), on_request)
 
-    def _on_reset_odometry(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success, response.message = self._set_pose(Pose2D())
-        return response
+    def _answer(self, asked: Asked, outcome: Outcome) -> None:
+        asked.response.success, asked.response.message = outcome.done, outcome.sentence
+        asked.answer()
+
+    def _on_stop(self, asked: Asked) -> None:
+        """However old it is, and whatever else is under way. The answer says that the control thread obeys."""
+        self._loop.stop(lambda outcome: self._answer(asked, outcome))
+        self._voice.tell("stop requested", Priority.WARNING)
+
+    def _on_reset(self, asked: Asked) -> None:
+        def end(outcome: Outcome) -> None:
+            self._voice.tell(f"reset: {outcome.sentence}", Priority.NOTICE)
+            self._answer(asked, outcome)
+
+        self._loop.reset(end)
+
+    def _on_reset_odometry(self, asked: Asked) -> None:
+        def end(outcome: Outcome) -> None:
+            self._tell(outcome)
+            self._answer(asked, outcome)
+
+        self._loop.set_pose(Pose2D(), end)
 
     def _on_set_pose(self, message: PoseWithCovarianceStamped) -> None:
-        if message.header.frame_id != self._odom_frame:
+        if self._receive_times.waited(time.monotonic()):
+            self._node.get_logger().warning("set_pose refused: it may be old, motor_driver stood still before it")
+        elif message.header.frame_id != self._odom_frame:
             frame = message.header.frame_id
             self._node.get_logger().warning(f"set_pose refused: frame_id is {frame!r}, not {self._odom_frame!r}")
-            return
-        self._set_pose(pose_of(message.pose.pose))
+        else:
+            self._loop.set_pose(pose_of(message.pose.pose), self._tell)
 
-    def _set_pose(self, pose: Pose2D) -> tuple[bool, str]:
-        outcome = self._loop.set_pose(pose)
+    def _tell(self, outcome: Outcome) -> None:
         self._node.get_logger().info(outcome.sentence)
-        return outcome.done, outcome.sentence
-
-    def _on_stop(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._loop.request_stop()
-        response.success, response.message = True, "stopping; nothing moves until motor_driver/reset"
-        self._voice.tell("stop requested", Priority.WARNING)
-        return response

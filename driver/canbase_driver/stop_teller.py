@@ -33,10 +33,7 @@ STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE, durabil
 class StopTeller:
     """Publishes one StopEvent for each stop, and has its recording written when it is latched."""
 
-    def __init__(
-        self, node: Node, commands: Node, robot: Robot, ring: Ring, writer: BlackBoxWriter, voice: Voice
-    ) -> None:
-        """`node` gets the publisher, `commands` the subscription to the mux."""
+    def __init__(self, node: Node, robot: Robot, ring: Ring, writer: BlackBoxWriter, voice: Voice) -> None:
         self._node = node
         self._voice = voice
         self._robot_name = robot.name
@@ -48,7 +45,7 @@ class StopTeller:
         self._news: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._filter_said = self._mux_said = ""
         self._publisher = node.create_publisher(StopEvent, "stop_events", EVENT_QOS)
-        commands.create_subscription(MuxState, "velocity_mux/state", self._on_mux, STATE_QOS)
+        node.create_subscription(MuxState, "velocity_mux/state", self._on_mux, STATE_QOS)
 
     def on_command(self, twist: Twist2D, received_at: float) -> None:
         """A command came; from the executor's thread."""

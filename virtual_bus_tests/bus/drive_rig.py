@@ -19,6 +19,7 @@ from canbase_driver.bus_port import BusPort
 from canbase_driver.core import DriverCore
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.loop import ControlLoop
+from canbase_driver.reset import Outcome
 from canbase_driver.snapshot import DriverSnapshot, DriverState, StopRecord
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.twist import Twist
@@ -160,5 +161,19 @@ class Driver:
 
     def reset(self) -> None:
         """Reset, which must be done."""
-        outcome = self.loop.reset()
+        outcome = self.try_reset()
         assert outcome.done, outcome.sentence
+
+    def stop(self) -> None:
+        """Service motor_driver/stop; nobody waits for the answer."""
+        self.loop.stop(lambda _outcome: None)
+
+    def try_reset(self, within_s: float = 20.0) -> Outcome:
+        """Reset; how it ended."""
+        outcomes: list[Outcome] = []
+        self.loop.reset(outcomes.append)
+        deadline_s = time.monotonic() + within_s
+        while not outcomes and time.monotonic() < deadline_s:
+            time.sleep(0.01)
+            self.loop.deliver()
+        return outcomes[0]

@@ -59,12 +59,12 @@ def test_every_drive_is_enabled_and_turns_its_wheel_forward_backward_and_against
 @pytest.mark.real_bus
 def test_the_stop_request_and_the_reset_from_another_thread(driver: Driver) -> None:
     driver.enabled()
-    driver.loop.request_stop()
+    driver.stop()
     driver.latched()
     assert [stop.cause for stop in driver.stops] == ["stop requested"]
     driver.reset()
     driver.enabled()
-    driver.loop.request_stop()
+    driver.stop()
     driver.latched()
     driver.loop.request_shutdown()
     driver.loop.join(6.0)
@@ -136,4 +136,4 @@ def test_a_defect_in_the_core_sends_quick_stops_ends_the_thread_and_is_kept(
         cob_id = node_layout(drive.node_id, node, crew.robot).setpoint_cob_id(drive.axis)
         assert [data[:6] for _, heard, data in around.heard if heard == cob_id][-3:] == [b"\x02\0\0\0\0\0"] * 3
     assert around.truth.standing_s > 0.3
-    assert driver.loop.reset().sentence == "refused: the control loop has ended"
+    assert driver.try_reset().sentence == "refused: the control loop has ended"

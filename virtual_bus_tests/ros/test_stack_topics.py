@@ -192,9 +192,7 @@ def test_a_stop_by_the_driver_is_an_event_that_says_how_it_ends(world: World) ->
     assert event.clears_on == "reset"
 
 
-@pytest.mark.parametrize(
-    "node", ["velocity_mux", "safety_filter", "motor_driver", "motor_driver_commands", "drive_distance_server"]
-)
+@pytest.mark.parametrize("node", ["velocity_mux", "safety_filter", "motor_driver", "drive_distance_server"])
 def test_the_shipped_sros2_policy_allows_each_node_all_that_it_has(world: World, node: str) -> None:
     """Under enforcement a node ends at the first endpoint that it may not make."""
     has, may = present(world.node.node, node), allowed(node)

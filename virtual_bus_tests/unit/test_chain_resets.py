@@ -144,6 +144,20 @@ def test_a_watchdog_that_dies_during_a_reset_breaks_it_off(world: World) -> None
     assert [sentence[:33] for sentence in sentences] == ["broken off: watchdog: silent for "]
 
 
+def test_a_reset_that_was_under_way_while_the_driver_stood_still_is_broken_off(world: World) -> None:
+    latched(world)
+    world.node.fail(0, OVERCURRENT)
+    world.run(0.1)
+    sentences: list[str] = []
+    world.core.request_reset(world.now, lambda outcome: sentences.append(outcome.sentence))
+    world.run(0.02)
+    world.pause_driver(9.0)
+    world.run(1.0)
+    assert sentences == ["broken off: motor_driver stood still for 9.0 s; reset again"]
+    assert world.core.state is DriverState.LATCHED
+    assert world.recovered()
+
+
 def test_a_second_reset_is_refused_while_one_is_under_way_and_its_own_caller_may_be_gone(world: World) -> None:
     latched(world)
     world.core.request_reset(world.now, lambda _outcome: None)

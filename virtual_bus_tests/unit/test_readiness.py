@@ -118,6 +118,22 @@ def test_a_configuration_that_fails_is_taken_back_and_says_what_is_missing(relea
     assert released.go(Aim.CONFIGURED).done
 
 
+def test_a_deactivation_that_is_not_confirmed_in_time_is_not_taken_back() -> None:
+    world = World()
+    world.drive()
+    world.node.line.cut = True  # it may have power, as far as anybody knows
+    outcome = world.go(Aim.CONFIGURED)
+    assert not outcome.done
+    assert world.core.aim is Aim.CONFIGURED
+    world.node.line.cut = False
+    world.command = Twist2D.ZERO
+    world.run(3.0)
+    assert world.powered == [False, False]
+    assert world.reset().done
+    assert world.core.cause.name == "inactive"
+    assert world.go(Aim.ACTIVE).done
+
+
 def test_an_activation_that_fails_is_taken_back_and_says_why(released: World) -> None:
     assert released.go(Aim.CONFIGURED).done
     released.command = FORWARD
