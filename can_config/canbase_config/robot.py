@@ -58,8 +58,13 @@ class Bus(Section):
         return self.interface in ("udp_multicast", "virtual")
 
     def arguments(self) -> dict[str, Any]:
-        """Keyword arguments for `can.Bus`. The bit rate of a socketcan interface is set by the system, not here."""
+        """Keyword arguments for `can.Bus`. The bit rate of a socketcan interface is set by the system, not here.
+
+        Frames of a simulated bus do not leave this computer unless `extra` has a hop_limit.
+        """
         given: dict[str, Any] = {"interface": self.interface, "channel": self.channel}
+        if self.interface == "udp_multicast":
+            given["hop_limit"] = 0
         if self.interface != "socketcan" and not self.is_virtual:
             given["bitrate"] = self.bitrate
         return given | self.extra

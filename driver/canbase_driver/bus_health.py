@@ -28,7 +28,7 @@ class BusReport:
     receive_errors: int = 0
     error_frames: int = 0
     dropped: int = 0
-    """Received frames that CANopen does not use: remote and 29-bit."""
+    """Received frames that CANopen does not use: remote, 29-bit, CAN FD; datagrams that are no frame."""
     failures: int = 0
     """How often the bus failed, and was closed to be opened anew."""
 

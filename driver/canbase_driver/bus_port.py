@@ -21,10 +21,18 @@ SEND_TIMEOUT_S = 0.002
 SEND_FAILURES = 10
 """So many failed sends in a row are a failed bus; fewer are a full transmit buffer."""
 RECEIVE_FAILURES = 3
-"""The same for receptions: one may be a datagram that is no CAN frame."""
+"""The same for receptions."""
 BUS_OFF = "the CAN controller is bus-off after too many errors: check cable, termination and bit rate"
 _ERRORS = (can.CanError, OSError, ValueError)
 """ValueError: what select says of a handle whose adapter is gone."""
+
+
+def is_no_frame(error: Exception) -> bool:
+    """A datagram on a simulated bus (udp_multicast) that is no CAN frame: the bus is as good as before.
+
+    python-can gives the reason as the cause of its error; where the bus itself fails, that is an OSError or none.
+    """
+    return isinstance(error, can.CanOperationError) and not isinstance(error.__cause__, OSError | None)
 
 
 class BusError(Exception):
@@ -52,7 +60,10 @@ class BusPort:
         try:
             message = self._bus.recv(max(0.0, timeout_s))
         except _ERRORS as error:
-            self._on_receive_error(error)
+            if is_no_frame(error):
+                self._drop()
+            else:
+                self._on_receive_error(error)
             return None
         return None if message is None else self._take(message)
 
@@ -77,6 +88,9 @@ class BusPort:
             bus.shutdown()
 
     def _take(self, message: can.Message) -> Frame | None:
+        if type(message.arbitration_id) is not int:  # python-can lets a simulated bus have 1.5
+            self._drop()
+            return None
         if message.is_error_frame:
             before, self.report = self.report, self.report.with_error_frame(message.arbitration_id, bytes(message.data))
             if self.report.is_bus_off and not before.is_bus_off:
@@ -86,10 +100,13 @@ class BusPort:
         self.problem = ""
         if self.report.is_bus_off:
             self.report = replace(self.report, controller=BusReport().controller)
-        if message.is_remote_frame or message.is_extended_id:
-            self.report = replace(self.report, dropped=self.report.dropped + 1)
+        if message.is_remote_frame or message.is_extended_id or message.is_fd:
+            self._drop()
             return None
         return Frame(message.arbitration_id, bytes(message.data))
+
+    def _drop(self) -> None:
+        self.report = replace(self.report, dropped=self.report.dropped + 1)
 
     def _on_send_error(self, error: Exception) -> None:
         self.report = replace(self.report, send_errors=self.report.send_errors + 1)

@@ -15,6 +15,7 @@ from canbase_bench.world.trace import Trace
 
 STEP_S = 0.002
 """Longest wait for a frame, so the longest delay of anything that a drive does by itself."""
+DROPS_TOLD_S = 10.0
 SEND_TIMEOUT_S = 0.05
 """A frame that the bus does not take in this time is a bus error."""
 
@@ -26,12 +27,14 @@ class Loop:
 
     def __init__(self, bus: can.BusABC, bench: Bench, trace: Trace, control: ControlServer) -> None:
         self._bus, self._bench, self._trace, self._control = bus, bench, trace, control
-        self._next_step = 0.0
+        self._next_step = self._told_drops_at = 0.0
+        self.datagrams_dropped = 0
+        """Those that were no CAN frame."""
 
     def run(self, stopped: Callable[[], bool]) -> None:
         """Until `stopped()` is true. Raises can.CanError when the bus fails."""
         while not stopped():
-            message = self._bus.recv(STEP_S)
+            message = self._receive()
             now = time.monotonic()
             self._trace.tick(now)
             if message is not None and _is_ours(message):
@@ -42,6 +45,20 @@ class Loop:
                 self._next_step = now + STEP_S
                 self._control.poll(now)
                 self._tell_changes()
+
+    def _receive(self) -> can.Message | None:
+        """The next frame, None when none came in STEP_S. Whoever may send to the port may send what is no frame."""
+        try:
+            return self._bus.recv(STEP_S)
+        except can.CanOperationError as error:
+            # python-can names the reason as the cause; where the bus itself fails, that is an OSError or none.
+            if isinstance(error.__cause__, OSError | None):
+                raise
+        self.datagrams_dropped += 1
+        if time.monotonic() >= self._told_drops_at + DROPS_TOLD_S:
+            self._told_drops_at = time.monotonic()
+            log.warning("dropped what is no CAN frame: %d datagrams since the start", self.datagrams_dropped)
+        return None
 
     def _send(self, frame: Frame) -> None:
         message = can.Message(arbitration_id=frame.cob_id, data=frame.data, is_extended_id=frame.extended, check=True)
@@ -56,4 +73,5 @@ class Loop:
 
 def _is_ours(message: can.Message) -> bool:
     """CANopen uses data frames with eleven-bit identifiers. Where our own come back, no node heeds them."""
-    return not (message.is_extended_id or message.is_remote_frame or message.is_error_frame or message.is_fd)
+    kinds = message.is_extended_id or message.is_remote_frame or message.is_error_frame or message.is_fd
+    return not kinds and type(message.arbitration_id) is int  # python-can lets 1.5 pass

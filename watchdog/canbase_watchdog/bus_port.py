@@ -19,6 +19,10 @@ _ERRORS = (can.CanError, OSError, ValueError)
 """ValueError: what select says of a handle whose adapter is gone."""
 
 
+NO_FRAME = can.Message()
+"""In the place of a datagram on a simulated bus (udp_multicast) that is no CAN frame."""
+
+
 class BusError(Exception):
     """The bus cannot be opened."""
 
@@ -37,6 +41,8 @@ class BusPort:
             ) from error
         self._waiting: can.Message | None = None
         self.health = BusHealth()
+        self.datagrams_dropped = 0
+        """Those that were no CAN frame. The bus is as good as before."""
 
     def __enter__(self) -> BusPort:
         return self
@@ -61,11 +67,14 @@ class BusPort:
             message, self._waiting = self._waiting or self._take(0.0), None
             if message is None:
                 return
+            if message is NO_FRAME or type(message.arbitration_id) is not int:  # python-can lets 1.5 pass there
+                self.datagrams_dropped += 1
+                continue
             if message.is_error_frame:
                 self.health.on_error_frame(message.arbitration_id, bytes(message.data), time.monotonic())
                 continue
             self.health.on_data()
-            if not (message.is_remote_frame or message.is_extended_id):
+            if not (message.is_remote_frame or message.is_extended_id or message.is_fd):
                 yield message.arbitration_id, bytes(message.data)
 
     def send(self, frame: Frame) -> None:
@@ -81,7 +90,10 @@ class BusPort:
     def _take(self, timeout_s: float) -> can.Message | None:
         try:
             return self._bus.recv(timeout_s)
-        except _ERRORS:
+        except _ERRORS as error:
+            # python-can names the reason as the cause; where the bus itself fails, that is an OSError or none.
+            if isinstance(error, can.CanOperationError) and not isinstance(error.__cause__, OSError | None):
+                return NO_FRAME
             self.health.on_receive_error(time.monotonic())
             time.sleep(0.001)
             return None

@@ -83,7 +83,7 @@ class Loop:
         if self._relay is not None and self._watchdog.keeps_relay:
             self._relay.toggle()
         self._check_bus(now)
-        self._reporter.tick(health, now)
+        self._reporter.tick(health, now, self._bus.datagrams_dropped)
         self._collect(now)
 
     def _check_bus(self, now: float) -> None:

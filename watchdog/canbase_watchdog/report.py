@@ -28,7 +28,7 @@ class Reporter:
         self._counters: dict[str, int] = {}
         self._counters_due = self._alive_due = 0.0
 
-    def tick(self, health: BusHealth, now: float) -> None:
+    def tick(self, health: BusHealth, now: float, datagrams_dropped: int = 0) -> None:
         """Say what changed. systemd hears that the loop turns; on a dead bus that ends by itself (loop.py)."""
         if self._watchdog.status != self._status:
             self._tell_status(self._watchdog.status)
@@ -36,7 +36,7 @@ class Reporter:
             self._alive_due = now + ALIVE_PERIOD_S
             notify("WATCHDOG=1")
         if now >= self._counters_due:
-            self._tell_counters(health, now)
+            self._tell_counters(health, now, datagrams_dropped)
 
     def _tell_status(self, status: Status) -> None:
         old, self._status = self._status, status
@@ -50,11 +50,12 @@ class Reporter:
         if answer is not Answer.NONE and (old is None or old.reset != status.reset):
             _log.info("reset request %d: %s", number, _words(answer))
 
-    def _tell_counters(self, health: BusHealth, now: float) -> None:
+    def _tell_counters(self, health: BusHealth, now: float, datagrams_dropped: int) -> None:
         counters = {
             "send errors": health.send_errors,
             "receive errors": health.receive_errors,
             "error frames": health.error_frames,
+            "datagrams that are no frame": datagrams_dropped,
             "frames not understood": self._watchdog.dropped_frames,
         }
         counters |= {f"leases refused, {why.value}": n for why, n in self._watchdog.refused_leases.items()}

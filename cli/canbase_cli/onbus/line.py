@@ -27,8 +27,6 @@ def choose_bus(config: Path | None, interface: str | None, channel: str | None, 
     values: dict[str, object] = {"interface": kind, "channel": channel or "can0"}
     if bitrate is not None:
         values["bitrate"] = bitrate
-    if kind == "udp_multicast":
-        values["extra"] = {"hop_limit": 0}  # no frame leaves this computer
     try:
         return Bus.model_validate(values)
     except ValidationError as error:
