@@ -70,12 +70,13 @@ class BootReport:
         return self.self_stop != ""
 
 
-def boot(node_id: int, drives: tuple[Drive, ...], robot: Robot) -> Steps[BootReport]:
+def boot(node_id: int, drives: tuple[Drive, ...], robot: Robot, settle_s: float = 0.0) -> Steps[BootReport]:
     """All steps for one node, its used axes being `drives`. Raises ValueError when they are not one or two axes.
 
-    The steps end with the report, or raise BootError when the node cannot be made ready.
+    `settle_s`: quiet after a boot-up message [s] where the profile has less (start.settle_s): learnt from a drive that
+    sent a second one. The steps end with the report, or raise BootError when the node cannot be made ready.
     """
-    return _explained(_Boot(node_id, drives, robot).run())
+    return _explained(_Boot(node_id, drives, robot, settle_s).run())
 
 
 def _explained(steps: Steps[BootReport]) -> Steps[BootReport]:
@@ -86,7 +87,8 @@ def _explained(steps: Steps[BootReport]) -> Steps[BootReport]:
 
 
 class _Boot:
-    def __init__(self, node_id: int, drives: tuple[Drive, ...], robot: Robot) -> None:
+    def __init__(self, node_id: int, drives: tuple[Drive, ...], robot: Robot, settle_s: float) -> None:
+        self._settle_s = settle_s
         self._drives = tuple(sorted(drives, key=lambda drive: drive.axis))
         self._layout = node_layout(node_id, self._drives, robot)
         self._kind = drives[0].kind
@@ -196,8 +198,13 @@ class _Boot:
             if not (yield WaitBootUp(start.boot_up_s)):
                 name = command.name.lower().replace("_", " ")
                 self._node.notes.append(f"no boot-up message within {start.boot_up_s:g} s of NMT {name}")
-            if start.settle_s:
-                yield Quiet(start.settle_s)
+            if self._settle_s > start.settle_s:
+                self._node.notes.append(
+                    f"it sends two boot-up messages; the boot waits {self._settle_s:.1f} s for the second one: "
+                    f"set start.settle_s in its drive profile"
+                )
+            if settle_s := max(start.settle_s, self._settle_s):
+                yield Quiet(settle_s)
         yield SendNmt(NmtCommand.ENTER_PRE_OPERATIONAL)
 
     def _make_reset_harmless(self) -> Steps[None]:

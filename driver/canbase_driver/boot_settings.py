@@ -9,8 +9,8 @@ from canbase_config.drive import Drive
 from canbase_config.places import MODE, MODE_DISPLAY, TARGET_VELOCITY, place
 from canbase_config.profile import Profile, SdoWrite
 from canbase_config.robot import CYCLIC, DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
-from canbase_driver.boot_steps import NodeAccess, Steps
-from canbase_driver.sdo import Write
+from canbase_driver.boot_steps import BootError, NodeAccess, Steps
+from canbase_driver.sdo import VALUE_INVALID, VALUE_TOO_HIGH, VALUE_TOO_LOW, SdoAborted, Write
 from canbase_driver.units import AxisUnits
 
 HEARTBEAT_CONSUMER, HEARTBEAT_PRODUCER, SYNC_COUNTER, ERROR_BEHAVIOUR = 0x1016, 0x1017, 0x1019, 0x1029
@@ -24,6 +24,12 @@ MILLISECONDS = -3
 FAULT_SIGNAL = 1
 """6007h: some drives take an NMT reset for the loss of their master then, and go into fault."""
 NO_ACTION = 0
+
+HEARTBEATS_WANTED, HEARTBEATS_NEEDED = 3, 2
+"""In the time after which a drive without a heartbeat counts as silent (timeouts.drive_heartbeat_s)."""
+HEARTBEAT_PERIODS_MS = (10, 20, 25, 40, 50, 64, 80, 100, 125, 128, 150, 160, 200, 250, 256, 320, 400, 500)
+"""Values of 1017h that are tried where a drive refuses the wanted one: those that steps and limits of drives allow."""
+VALUE_REFUSED = (VALUE_INVALID, VALUE_TOO_HIGH, VALUE_TOO_LOW)
 
 
 def configure_motion(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None]:
@@ -45,7 +51,7 @@ def configure_motion(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None
 def configure_self_stop(node: NodeAccess, drives: tuple[Drive, ...], robot: Robot) -> Steps[str]:
     """What makes the drive stop by itself, in words; empty: nothing does that is confirmed."""
     kind, timeout_ms = drives[0].kind, round(1000 * robot.timeouts.drive_heartbeat_s)
-    yield from node.set_if_present(Write(HEARTBEAT_PRODUCER, 0, round(timeout_ms / 3), 2))
+    yield from _produce_heartbeat(node, timeout_ms)
     stops = yield from _watch_heartbeats(node, kind, timeout_ms)
     enters = Write(ERROR_BEHAVIOUR, 1, ENTER_PRE_OPERATIONAL_ON_LOSS, 1)
     yield from node.set_if_present(enters, kind.self_stop.error_behaviour)
@@ -114,6 +120,36 @@ def _ramps_mps2(robot: Robot) -> dict[int, float]:
         PROFILE_DECELERATION: max(slower, hardest),
         QUICK_STOP_DECELERATION: hardest,
     }
+
+
+def _produce_heartbeat(node: NodeAccess, timeout_ms: int) -> Steps[None]:
+    """1017h, or the nearest period that the drive takes. Raises BootError when it takes none that is short enough.
+
+    A drive that lacks the object, or refuses it for another reason, may produce a heartbeat all the same: a note.
+    """
+    wanted, longest = round(timeout_ms / HEARTBEATS_WANTED), timeout_ms // HEARTBEATS_NEEDED
+    others = sorted((ms for ms in HEARTBEAT_PERIODS_MS if ms <= longest), key=lambda ms: abs(ms - wanted))
+    refusal = ""
+    for period_ms in (wanted, *others):
+        try:
+            yield from node.set(Write(HEARTBEAT_PRODUCER, 0, period_ms, 2))
+        except SdoAborted as refused:
+            refusal = f"1017h:0: {refused.text}"
+            if refused.code not in VALUE_REFUSED:
+                node.notes.append(refusal)
+                return
+        except BootError as other:
+            refusal = other.problem
+            if 0 < ((yield from node.read_if_present(HEARTBEAT_PRODUCER)) or 0) <= longest:
+                node.notes.append(f"{refusal}: that is short enough")
+                return
+        else:
+            if period_ms != wanted:
+                node.notes.append(f"1017h:0: heartbeat every {period_ms} ms, {wanted} ms was refused")
+            return
+    problem = f"it takes no heartbeat period of at most {longest} ms ({refusal})"
+    hint = "Raise timeouts.drive_heartbeat_s in robot.yaml to twice the shortest period of the drive, 1017h"
+    raise BootError(node.node_id, problem, hint)
 
 
 def _watch_heartbeats(node: NodeAccess, kind: Profile, timeout_ms: int) -> Steps[bool]:

@@ -14,9 +14,12 @@ from canbase_driver.cia301 import NmtCommand
 from canbase_driver.sdo import (
     ACCESS_UNSUPPORTED,
     DEVICE_STATE,
+    LENGTH_WRONG,
     NO_OBJECT,
     NO_SUB_INDEX,
     READ_ONLY,
+    TOO_LONG,
+    TOO_SHORT,
     WRITE_ONLY,
     Read,
     SdoAborted,
@@ -76,14 +79,53 @@ def boot_error(error: SdoError) -> BootError:
     return BootError(error.node_id, f"{error.index:04X}h:{error.sub}: {error.text}", _hint(error))
 
 
+PROFILE_KEYS: tuple[tuple[range, str], ...] = (
+    (range(0x1016, 0x1017), "self_stop.heartbeat_entries"),
+    (range(0x1017, 0x1018), "timeouts.drive_heartbeat_s of robot.yaml: a third of it is the period"),
+    (range(0x1019, 0x101A), "options.sync_counter"),
+    (range(0x1029, 0x102A), "self_stop.error_behaviour"),
+    (range(0x1600, 0x1800), "layout"),
+    (range(0x1A00, 0x1C00), "layout"),
+    (range(0x6007, 0x6008), "self_stop.abort_connection"),
+    (range(0x605A, 0x605B), "options.quick_stop"),
+    (range(0x605E, 0x605F), "options.fault_reaction"),
+    (range(0x6060, 0x6061), "modes"),
+    (range(0x6061, 0x6062), "options.mode_display"),
+    (range(0x606C, 0x606D), "layout.velocity_bits"),
+    (range(0x6083, 0x6086), "options.ramps"),
+    (range(0x60C2, 0x60C3), "options.interpolation"),
+    (range(0x60FF, 0x6100), "layout.target_bits"),
+)
+"""Object → the key of a drive profile (docs/drives.md) that says whether, where or how wide the drive has it."""
+TRANSMISSION_TYPE = 2
+"""Sub-index of 1400h… and 1800h…."""
+WIDTHS = (LENGTH_WRONG, TOO_LONG, TOO_SHORT)
+
+
+def profile_key(index: int, sub: int = 0) -> str:
+    """The key of a drive profile that an object belongs to; empty: none. The second axis is at + 800h."""
+    if (0x1400 <= index < 0x1600 or 0x1800 <= index < 0x1A00) and sub == TRANSMISSION_TYPE:
+        return "pdo.synchronous"
+    first_axis = index - 0x800 if 0x6800 <= index < 0x7000 else index
+    return next((key for objects, key in PROFILE_KEYS if first_axis in objects), "")
+
+
 def _hint(error: SdoError) -> str:
     if isinstance(error, SdoTimeout):
         return "Check power, cable and bit rate, and that no other program uses the SDO channel of this node"
+    key = profile_key(error.index, error.sub)
+    if key == "pdo.synchronous":
+        return "The drive takes no PDO that waits for SYNC: set `pdo.synchronous: false` in its drive profile"
+    code = error.code if isinstance(error, SdoAborted) else None
+    if code == DEVICE_STATE:
+        return "Switch the drive off and on again, and let no other master control it"
+    if code in WIDTHS:
+        where = f": see `{key}` of its drive profile" if key.startswith("layout") else ""
+        return f"The drive has this object in another width than CiA 402 and its profile say{where}"
     if error.index in (0x6060, 0x6860):
         return "The drive must support `mode` of robot.yaml, see 6502h: bit 2 is mode 3, bit 8 is mode 9"
-    if isinstance(error, SdoAborted) and error.code == DEVICE_STATE:
-        return "Switch the drive off and on again, and let no other master control it"
-    return "canbase needs this object as docs/bus.md has it; look it up in the manual of the drive"
+    needed = "canbase needs this object as docs/bus.md has it; look it up in the manual of the drive"
+    return needed + (f", and see `{key}` of its drive profile" if key else "")
 
 
 class NodeAccess:
@@ -95,13 +137,17 @@ class NodeAccess:
         self.changes: list[str] = []
 
     def read_if_present(self, index: int, sub: int = 0) -> Steps[int | None]:
-        """An unsigned number; None when the drive lacks the object."""
+        """An unsigned number; None when the drive lacks the object, or refuses it with whatever abort code.
+
+        Many drives abort with 0800 0000h (general error) for what they do not have. Any code but "does not exist" is
+        noted.
+        """
         try:
             return unsigned((yield Read(index, sub)))
         except SdoAborted as refused:
-            if refused.code in (NO_OBJECT, NO_SUB_INDEX):
-                return None
-            raise
+            if refused.code not in (NO_OBJECT, NO_SUB_INDEX):
+                self.notes.append(f"{index:04X}h:{sub} cannot be read: {refused.text}{_see(index, sub)}")
+            return None
 
     def set(self, step: Write, known: int | None = None) -> Steps[None]:
         """Write where it differs, and read back. A read-only object may pass when it has the value.
@@ -158,6 +204,11 @@ class NodeAccess:
                 raise
             return None
         return found
+
+
+def _see(index: int, sub: int) -> str:
+    key = profile_key(index, sub)
+    return f" (drive profile: {key})" if key else ""
 
 
 def _same(found: bytes, wanted: bytes) -> bool:

@@ -182,7 +182,8 @@ class DriverCore:
         frames = self._heartbeat(now)
         if not self._readiness.released:
             ends = self._shutdown_requested or self._readiness.unconfigured
-            frames += self._drives.tick(now, may_boot=self._supervisor.state in NO_POWER and not ends)
+            may_boot = self._supervisor.state in NO_POWER and not ends
+            frames += self._drives.tick(now, may_boot, self._sync_since)
         situation = self._situation(now)
         orders = self._judge(situation, now)
         frames += self._go_on_with_reset(situation, now)

@@ -47,7 +47,7 @@ def unguarded(snapshot: DriverSnapshot) -> tuple[str, ...]:
         f"{drive.joint} (node {drive.node_id}) WILL NOT STOP BY ITSELF when this computer or the cable fails "
         f"({'; '.join(drive.boot_notes) or '1016h, 6007h not set'}): only STO stops it then"
         for drive in snapshot.drives
-        if drive.nmt_state == "operational" and not drive.stops_by_itself
+        if drive.configured and drive.nmt_state == "operational" and not drive.stops_by_itself
     )
 
 
@@ -161,6 +161,7 @@ def _drive_entry(drive: DriveSnapshot, state: DriverState, robot: str) -> Diagno
         **_measured(drive),
         "lacking or refused": "; ".join(drive.boot_notes) or "nothing",
         "changed by the boot": "; ".join(drive.boot_changes) or "nothing",
+        "last boot": drive.boot_problem or "well",
     }
     place = f"node {drive.node_id} axis {drive.axis}"
     return _entry(level, f"{robot}: drive {drive.joint}", sentence, f"{robot} {place}", values)
@@ -169,6 +170,8 @@ def _drive_entry(drive: DriveSnapshot, state: DriverState, robot: str) -> Diagno
 def _drive_state(drive: DriveSnapshot, state: DriverState) -> tuple[bytes, str]:
     if drive.error_code or "fault" in drive.state:
         return DiagnosticStatus.ERROR, f"Error {drive.error_code:04X}h: {drive.error_text or drive.state}."
+    if drive.boot_problem:
+        return DiagnosticStatus.ERROR, f"Its last boot failed: {drive.boot_problem.rstrip('.')}."
     if math.isnan(drive.feedback_age_s):
         return DiagnosticStatus.ERROR, f"No feedback yet; its heartbeat was {_heard(drive.heartbeat_age_s)}."
     if state is DriverState.ENABLED and not drive.stops_by_itself:

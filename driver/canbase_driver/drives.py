@@ -39,14 +39,17 @@ class Drives:
     def _are_configured_without(self, node: RemoteNode) -> bool:
         return not any(other.is_being_configured for other in self.nodes if other is not node)
 
-    def tick(self, now: float, may_boot: bool) -> list[Frame]:
-        """Once a cycle: every node goes on, another one first each time; those that are gone begin their boot."""
+    def tick(self, now: float, may_boot: bool, sync_since: float) -> list[Frame]:
+        """Once a cycle: every node goes on, another one first each time; those that are gone begin their boot, those
+        that are silent are looked for. `sync_since`: start of the present run of SYNCs [s].
+        """
         self._budget.refill(sum(len(node.axes) for node in self.nodes if node.has_pdos))
         self._first = (self._first + 1) % len(self.nodes)
         frames: list[Frame] = []
         for node in (*self.nodes[self._first :], *self.nodes[: self._first]):
             frames += self.go_on(node, now)
             if may_boot:
+                node.seek(now, sync_since)
                 node.begin_boot(now)
         return frames
 
@@ -164,6 +167,8 @@ def _snapshot(node: RemoteNode, axis: Axis, robot: Robot, now: float) -> DriveSn
         current_a=measured.current_a,
         temperature_c=measured.temperature_c,
         boot_notes=node.report.notes if node.report else (),
+        boot_problem=node.boot_error,
+        configured=node.report is not None,
         boot_changes=node.report.changes if node.report else (),
     )
 

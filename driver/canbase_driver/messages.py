@@ -154,4 +154,5 @@ def _drive_status(drive: DriveSnapshot) -> DriveStatus:
         feedback_age_s=drive.feedback_age_s,
         heartbeat_age_s=drive.heartbeat_age_s,
         stops_by_itself=drive.stops_by_itself,
+        boot_problem=drive.boot_problem,
     )

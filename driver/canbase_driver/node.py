@@ -56,6 +56,8 @@ class MotorDriverNode(ManagedNode):
         self._diagnosed: DriverSnapshot | None = None
         self._status_at = 0.0
         self._unguarded: tuple[str, ...] = ()
+        self._boot_problems: dict[str, str] = {}
+        """By joint: why its last boot failed, as it went to the log."""
         self.state_text = "starting"
         """State, cause and what ends it, in words: the last line that went to the log."""
         if self._tf is None:
@@ -73,6 +75,7 @@ class MotorDriverNode(ManagedNode):
         self._publish_status(snapshot, stamp)
         self._log_change(snapshot)
         self._warn_of_unguarded(snapshot)
+        self._warn_of_boots(snapshot)
         self._previous = snapshot
 
     def look_at_the_clock(self, now: float) -> None:
@@ -118,6 +121,15 @@ class MotorDriverNode(ManagedNode):
         usual = snapshot.cause in ("none", "booting", "enabling", "shutdown", "not configured", INACTIVE)
         priority = Priority.INFO if usual else Priority.WARNING
         self.voice.tell(text, priority, state=snapshot.state.name, cause=snapshot.cause, robot=self._robot.name)
+
+    def _warn_of_boots(self, snapshot: DriverSnapshot) -> None:
+        """Once for each reason why a drive cannot be booted, whatever else keeps the robot stopped."""
+        for drive in snapshot.drives:
+            if drive.boot_problem and self._boot_problems.get(drive.joint) != drive.boot_problem:
+                sentence = f"boot of {drive.joint} failed: {drive.boot_problem}"
+                self._stops.note(sentence)
+                self.voice.tell(sentence, Priority.WARNING, robot=self._robot.name)
+            self._boot_problems[drive.joint] = drive.boot_problem
 
     def _warn_of_unguarded(self, snapshot: DriverSnapshot) -> None:
         """Once after each boot, loudly."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from canbase_config.drive import Drive
 from canbase_config.profile import Sdo
 from canbase_config.robot import Robot
@@ -10,6 +12,9 @@ from canbase_driver.boot_steps import BootError, Pause, Quiet, SendNmt, Step, Wa
 from canbase_driver.cia301 import NmtState, nmt, parse_heartbeat
 from canbase_driver.frame import Frame
 from canbase_driver.sdo import Read, SdoClient, SdoError, Write
+
+DUPLICATES = 3
+"""So many requests that were sent once and answered twice: one may be an answer that somebody else asked for."""
 
 
 class NodeBoot:
@@ -20,19 +25,24 @@ class NodeBoot:
     `on_frame` makes them follow each other without waiting.
     """
 
-    def __init__(self, node_id: int, drives: tuple[Drive, ...], robot: Robot) -> None:
+    def __init__(self, node_id: int, drives: tuple[Drive, ...], robot: Robot, settle_s: float = 0.0) -> None:
+        """`settle_s`: see `boot`."""
         self.node_id = node_id
+        self.boot_up_at = -math.inf
+        """When the boot-up message came that answered the NMT reset [s]; minus infinity: none did."""
         self.report: BootReport | None = None
         self.error: BootError | None = None
         self._name = f"node {node_id} ({', '.join(drive.joint for drive in drives)})"
-        self._sequence = boot(node_id, drives, robot)
+        self._sequence = boot(node_id, drives, robot, settle_s)
         self._client = sdo_client(node_id, drives[0].kind.sdo, robot.timeouts.sdo_s)
         self._gap_s = drives[0].kind.sdo.gap_s
         self._held: Read | Write | None = None
         """The next transfer, when it has to keep its distance from the one before."""
         self._step: Step | None = None
         self._wake_at = 0.0
-        self._was_reset = self._heard = False
+        self._was_reset = False
+        self.heard = False
+        """Whether it has answered any request."""
         self._outbox: list[Frame] = []
 
     @property
@@ -43,7 +53,7 @@ class NodeBoot:
     @property
     def configuring(self) -> bool:
         """Whether the drive has been heard, and its SDOs fill the bus."""
-        return not self.done and self._heard
+        return not self.done and self.heard
 
     @property
     def waiting_for(self) -> str:
@@ -87,16 +97,21 @@ class NodeBoot:
 
     def _on_boot_up(self, now: float) -> None:
         if isinstance(self._step, WaitBootUp):
+            self.boot_up_at = now
             self._advance(True, now)
         elif isinstance(self._step, Quiet):
             self._wake_at = now + self._step.duration_s
         elif self._was_reset:
             problem = f"it started anew while it was being configured ({_awaited(self._step)} was due)"
-            self._end(error=BootError(self.node_id, problem, "Check its supply voltage; the boot begins again"))
+            hint = "The boot begins again and waits for a second boot-up message (start.settle_s of its drive profile)"
+            self._end(error=BootError(self.node_id, problem, f"{hint}; if this goes on, check its supply voltage"))
         elif self._client.busy:
             self._outbox.append(self._client.again(now))
 
     def _take_answer(self, now: float) -> None:
+        if self._client.duplicates >= DUPLICATES:
+            problem = "each request is answered twice: two devices on the bus have this node id"
+            self._end(error=BootError(self.node_id, problem, "Give each drive a node id of its own (canbase scan)"))
         if self._client.busy or self.done:
             return
         try:
@@ -104,7 +119,7 @@ class NodeBoot:
         except SdoError as error:
             self._advance(error, now)
         else:
-            self._heard = True
+            self.heard = True
             self._advance(answer, now)
 
     def _advance(self, answer: bytes | bool | SdoError | None, now: float) -> None:

@@ -34,6 +34,13 @@ HOLD_S = 0.2
 """So long after the last NMT "enter pre-operational" it is left alone; the watchdog repeats it every 0.05 s."""
 RETRY_S = 1.0
 """Between two boots of a node that failed."""
+UNHEARD_S = 1.0
+"""A node that has answered no request of its boot for so long may have no power or no cable."""
+SEEK_S = 1.0
+"""A node that is silent for so long while nothing has power is looked for by a new boot: its boot-up may be lost."""
+SECOND_BOOT_UP_S, SETTLE_FACTOR, SETTLE_EXTRA_S, SETTLE_MAX_S = 5.0, 1.5, 0.2, 10.0
+"""A boot-up message so soon after the one that answered the NMT reset is a second one of the same start. The next boot
+waits for it: the time that passed between them, times the factor, and the extra; at most start.settle_s' limit."""
 BUS_LOST = (0x8120, 0x8130, 0x8140)
 """Emergency codes for a lost bus or heartbeat (CiA 301): error passive, heartbeat or life guarding, bus-off."""
 
@@ -72,6 +79,8 @@ class RemoteNode:
         self._ready_at = math.inf
         """When it was ready last; before that, when it was looked at first. Infinity until then."""
         self._boot: NodeBoot | None = None
+        self._boot_up_at = -math.inf
+        self._settle_s = 0.0
         self._since_s = -math.inf
         self._why_gone = "not booted yet"
 
@@ -105,7 +114,9 @@ class RemoteNode:
         if self._is_configured:
             return f"{self.name}: configured, waits for the boots of the others"
         if self.presence is Presence.BOOTING and self._boot is not None:
-            return self._boot.waiting_for + (f" (last try: {self.boot_error})" if self.boot_error else "")
+            unheard = not self._boot.heard and now - self._since_s > UNHEARD_S
+            cure = "; check its power and its cable" if unheard else ""
+            return self._boot.waiting_for + cure + (f" (last try: {self.boot_error})" if self.boot_error else "")
         if self.presence is Presence.STARTING:
             return f"{self.name}: waiting for its first feedback since {now - self._since_s:.1f} s"
         return ""
@@ -114,8 +125,8 @@ class RemoteNode:
         """Why it is not ready though it had timeouts.boot_s for it; empty when it is, or has time left."""
         if self.presence is Presence.READY or now - self._ready_at <= self._robot.timeouts.boot_s:
             return ""
-        why = self.boot_error or self._why_gone
-        return f"{self.name} is missing since {now - self._ready_at:.0f} s: {why}; check its power and its cable"
+        why = self.boot_error or f"{self._why_gone}; check its power and its cable"
+        return f"{self.name} is missing since {now - self._ready_at:.0f} s: {why}"
 
     def absent(self) -> str:
         """Why it is gone; empty when it is not."""
@@ -145,8 +156,20 @@ class RemoteNode:
         too_soon = self.boot_error and now - self._since_s < RETRY_S
         if self.presence is not Presence.GONE or too_soon or now < self._held_until:
             return
-        self._boot = NodeBoot(self.node_id, self._drives, self._robot)
+        self._boot = NodeBoot(self.node_id, self._drives, self._robot, self._settle_s)
+        self._boot_up_at = -math.inf
         self._go(Presence.BOOTING, now)
+
+    def seek(self, now: float, sync_since: float) -> None:
+        """Boot a node anew that was ready and is silent for SEEK_S: asked, it may answer. Only without power.
+
+        `sync_since`: start of the present run of SYNCs [s]; before it the node was not asked.
+        """
+        if self.presence is not Presence.READY:
+            return
+        heard_at = min(self.heartbeat_at, *(axis.status_at for axis in self.axes))
+        if now - max(heard_at, self._since_s, sync_since) > SEEK_S:
+            self.lose(f"gave no sign for {now - heard_at:.1f} s and is looked for", now)
 
     def lose(self, why: str, now: float) -> None:
         """It must be booted again before it counts: `why` completes the sentence that begins with its name."""
@@ -205,12 +228,23 @@ class RemoteNode:
         self.heartbeat_at = now
         if (self.has_pdos or self._is_configured) and self.nmt_state is NmtState.INITIALISING:
             self.emcy = None
-            self.lose("restarted (boot-up message)", now)
+            self.lose(f"restarted (boot-up message){self._learn_to_settle(now)}", now)
         elif self.presence is Presence.READY and self.nmt_state is not NmtState.OPERATIONAL:
             self.lose(f"left NMT operational ({self.nmt_state.text})", now)
         elif self._boot is not None:
             self._boot.on_frame(frame, now)
+            if self._boot.error is not None and self.nmt_state is NmtState.INITIALISING:
+                self._boot_up_at = self._boot.boot_up_at
+                self._learn_to_settle(now)
         return True
+
+    def _learn_to_settle(self, now: float) -> str:
+        """A second boot-up message of one start: the next boot waits for it. What to add to a sentence about it."""
+        gap_s = now - self._boot_up_at
+        if gap_s > SECOND_BOOT_UP_S:
+            return ""
+        self._settle_s = max(self._settle_s, min(SETTLE_FACTOR * gap_s + SETTLE_EXTRA_S, SETTLE_MAX_S))
+        return f", {gap_s:.2f} s after that of its boot; the next boot waits for it (drive profile: start.settle_s)"
 
     def on_nmt(self, frame: Frame, now: float) -> None:
         """Take an NMT command (000h) that is on the bus: somebody keeps it pre-operational."""
@@ -259,7 +293,7 @@ class RemoteNode:
         return frames
 
     def _start(self, report: BootReport, now: float) -> Frame:
-        self.boot_error = ""
+        self._boot_up_at = self._boot.boot_up_at if self._boot is not None else -math.inf
         self.report = report
         self._lost_heartbeat = False
         self._boot = None
@@ -270,9 +304,25 @@ class RemoteNode:
     def _check_started(self, now: float) -> None:
         heard = all(axis.age_s(now) <= self._robot.timeouts.feedback_s for axis in self.axes)
         if heard and self.nmt_state is NmtState.OPERATIONAL:
+            self.boot_error = ""
             self._go(Presence.READY, now)
         elif now - self._since_s > START_TIMEOUT_S:
-            self.lose(f"gave no feedback within {START_TIMEOUT_S:.1f} s of NMT start", now)
+            self.boot_error = f"within {START_TIMEOUT_S:.1f} s of NMT start it sent {self._not_started(now)}"
+            self.lose(f"could not be started: {self.boot_error}", now)
+
+    def _not_started(self, now: float) -> str:
+        """What a node that was started has not sent, and what that may come from. It has answered SDOs until then."""
+        lacking = [
+            f"no status of {axis.drive.joint} (its TPDOs: see pdo.synchronous of its drive profile)"
+            for axis in self.axes
+            if axis.age_s(now) > self._robot.timeouts.feedback_s
+        ]
+        if self.nmt_state is None:
+            lacking.append("no heartbeat (1017h; a drive that knows node guarding alone cannot be used)")
+        elif self.nmt_state is not NmtState.OPERATIONAL:
+            lacking.append(f"a heartbeat that says {self.nmt_state.text}, not operational")
+        notes = self.report.notes if self.report else ()
+        return " and ".join(lacking) + (f"; its boot noted: {'; '.join(notes)}" if notes else "")
 
     def _go(self, presence: Presence, now: float) -> None:
         self.presence, self._since_s = presence, now

@@ -124,7 +124,7 @@ class Reset:
         if not situation.unready:
             self._go(Phase.EDGE_LOW if situation.fault else Phase.FAULTS, now)
         elif now - self._since_s > self._boot_s:
-            return Outcome(False, f"{situation.unready}; check its power and its cable, then reset again")
+            return Outcome(False, f"{situation.unready}; reset again once that is cured")
         return None
 
     def _edge(self, _situation: Situation, _answer: int | None, now: float) -> Outcome | None:

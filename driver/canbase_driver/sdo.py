@@ -20,6 +20,8 @@ MAX_UPLOAD_BYTES = 4096
 TOGGLE_BIT_WRONG, TIMED_OUT, COMMAND_UNKNOWN = 0x0503_0000, 0x0504_0000, 0x0504_0001
 OUT_OF_MEMORY, ACCESS_UNSUPPORTED, WRITE_ONLY, READ_ONLY = 0x0504_0005, 0x0601_0000, 0x0601_0001, 0x0601_0002
 NO_OBJECT, NO_SUB_INDEX, LENGTH_WRONG, DEVICE_STATE = 0x0602_0000, 0x0609_0011, 0x0607_0010, 0x0800_0022
+TOO_LONG, TOO_SHORT = 0x0607_0012, 0x0607_0013
+VALUE_INVALID, VALUE_TOO_HIGH, VALUE_TOO_LOW = 0x0609_0030, 0x0609_0031, 0x0609_0032
 
 ABORT_TEXTS = {
     TOGGLE_BIT_WRONG: "toggle bit not alternated",
@@ -39,12 +41,12 @@ ABORT_TEXTS = {
     0x0604_0047: "internal incompatibility in the device",
     0x0606_0000: "access failed because of a hardware error",
     LENGTH_WRONG: "data type or length does not match",
-    0x0607_0012: "data too long",
-    0x0607_0013: "data too short",
+    TOO_LONG: "data too long",
+    TOO_SHORT: "data too short",
     NO_SUB_INDEX: "the sub-index does not exist",
-    0x0609_0030: "value not valid",
-    0x0609_0031: "value too high",
-    0x0609_0032: "value too low",
+    VALUE_INVALID: "value not valid",
+    VALUE_TOO_HIGH: "value too high",
+    VALUE_TOO_LOW: "value too low",
     0x0609_0036: "maximum below minimum",
     0x060A_0023: "resource not available",
     0x0800_0000: "general error",
@@ -142,14 +144,17 @@ class SdoClient:
     """One SDO transfer after the other with one node.
 
     `start` gives the first frame, `on_frame` and `tick` give those that follow; when `busy` ends, `answer()` has it.
-    `dropped` counts the frames of this channel that did not belong to the transfer.
+    `dropped` counts the frames of this channel that did not belong to the transfer, `duplicates` those among them that
+    answer the request before it once more, though that one was sent once.
     """
 
     def __init__(self, node_id: int, timeout_s: float, attempts: int) -> None:
         if not 1 <= node_id <= MAX_NODE_ID or timeout_s <= 0.0 or attempts < 1:
             raise ValueError(f"node {node_id}, {timeout_s} s, {attempts} attempts: expected 1…127, more than 0 of each")
         self.node_id = node_id
-        self.dropped = 0
+        self.dropped = self.duplicates = 0
+        self._answered: bytes | None = None
+        """Address of the transfer that ended last, with the first answer to its only request."""
         self._timeout_s = timeout_s
         self._attempts = attempts
         self._transfer: _Transfer | None = None
@@ -195,6 +200,9 @@ class SdoClient:
         if frame.cob_id != SDO_TO_CLIENT + self.node_id:
             return []
         transfer = self._transfer
+        if len(frame.data) == 8 and frame.data[1:4] == self._answered and not _expects(transfer, frame.data):
+            self.duplicates += 1
+            return self._drop()
         if transfer is None or len(frame.data) != 8:
             return self._drop()
         if frame.data[0] == _ABORT:
@@ -269,13 +277,20 @@ class SdoClient:
         return SdoTimeout(self.node_id, step, f"no answer to {self._attempts} requests, {self._timeout_s:g} s each")
 
     def _finish(self, answer: bytes | SdoError) -> list[Frame]:
-        self._transfer = None
+        transfer, self._transfer = self._transfer, None
+        asked_once = transfer is not None and transfer.attempts_left == self._attempts - 1
+        self._answered = _address(transfer.step) if transfer is not None and asked_once else None
         self._answer = answer
         return []
 
     def _drop(self) -> list[Frame]:
         self.dropped += 1
         return []
+
+
+def _expects(transfer: _Transfer | None, data: bytes) -> bool:
+    """Whether the transfer under way may be what this frame answers."""
+    return transfer is not None and (transfer.initiated or _address(transfer.step) == data[1:4])
 
 
 def _address(step: Read | Write) -> bytes:

@@ -83,6 +83,10 @@ class DriveSnapshot:
     """What it lacked or refused in its last boot."""
     boot_changes: tuple[str, ...] = ()
     """What its last boot had to change."""
+    boot_problem: str = ""
+    """Why its last boot failed; empty: it did not."""
+    configured: bool = True
+    """Its boot has ended well: what it says of itself is set and read back."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,12 +1,18 @@
 """Boots of drives that lack, refuse or change something: what is a note, and what is an error."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import pytest
 
+from canbase_driver.frame import Frame
+from canbase_driver.node_boot import NodeBoot
 from unit.fake_drive import (
     DEVICE_STATE,
     INVALID,
     READ_ONLY,
     WRITE_ONLY,
+    Bench,
     FakeDrive,
     Key,
     boot_one_axis,
@@ -17,12 +23,13 @@ from unit.fake_drive import (
     u16,
     u32,
 )
+from unit.fake_drive import robot as fake_robot
 
 
 @pytest.mark.parametrize(
     ("index", "sub", "note"),
     [
-        (0x1017, 0, "1017h:0: 0602 0000h the object does not exist"),
+        (0x1017, 0, "1017h:0: 0602 0000h the object does not exist"),  # it may send one all the same
         (0x1029, 1, "1029h:1: 0602 0000h the object does not exist"),
         (0x605A, 0, "605Ah:0: 0602 0000h the object does not exist"),
         (0x605E, 0, "605Eh:0: 0602 0000h the object does not exist"),
@@ -97,6 +104,123 @@ def test_a_fixed_mapping_that_is_right_is_left_alone() -> None:
     drive = FakeDrive(refuse=fixed)
     drive.objects |= {(0x1A01, 0): u8(1), (0x1A01, 1): u32(0x606C_0020)}
     assert notes_of(boot_one_axis(drive)) == ()
+
+
+GENERAL_ERROR, LOCAL_CONTROL, TOO_HIGH, TOO_LOW = 0x08000000, 0x08000021, 0x06090031, 0x06090032
+
+
+@pytest.mark.parametrize("abort", [GENERAL_ERROR, LOCAL_CONTROL, 0x06060000, 0x12345678])
+@pytest.mark.parametrize(
+    ("key", "named"),
+    [
+        ((0x1016, 0), "self_stop.heartbeat_entries"),
+        ((0x1018, 3), ""),
+        ((0x1019, 0), "options.sync_counter"),
+        ((0x6007, 0), "self_stop.abort_connection"),
+        ((0x6061, 0), "options.mode_display"),
+    ],
+)
+def test_whatever_the_abort_code_an_optional_object_that_cannot_be_read_is_a_note(
+    key: Key, named: str, abort: int
+) -> None:
+    drive = FakeDrive(refuse_read={key: abort}, refuse={key: abort})
+    drive.objects.setdefault(key, u8(0))
+    assert any(f"{key[0]:04X}h:{key[1]}" in note and named in note for note in notes_of(boot_one_axis(drive)))
+
+
+def test_a_drive_whose_1016h_cannot_be_read_does_not_stop_by_itself() -> None:
+    boot = boot_one_axis(FakeDrive(refuse_read={(0x1016, 0): GENERAL_ERROR}))
+    assert boot.report is not None
+    assert not boot.report.stops_by_itself
+
+
+def heartbeat_of(accepted: Callable[[int], bool], abort: int = INVALID) -> tuple[FakeDrive, NodeBoot]:
+    """A drive that takes only some periods of 1017h, and its boot."""
+
+    @dataclass
+    class Choosy(FakeDrive):
+        def _write(self, key: Key, data: bytes) -> int:
+            wrong = key == (0x1017, 0) and not accepted(int.from_bytes(data, "little"))
+            return abort if wrong else super()._write(key, data)
+
+    drive = Choosy()
+    return drive, boot_one_axis(drive)
+
+
+@pytest.mark.parametrize(
+    ("accepted", "period_ms"),
+    [
+        (lambda ms: ms % 64 == 0, 128),
+        (lambda ms: ms <= 50, 50),
+        (lambda ms: ms >= 125, 125),
+        (lambda ms: ms % 50 == 0, 100),
+    ],
+)
+@pytest.mark.parametrize("abort", [INVALID, TOO_HIGH, TOO_LOW])
+def test_where_the_wanted_heartbeat_period_is_refused_the_nearest_allowed_one_is_set(
+    accepted: Callable[[int], bool], period_ms: int, abort: int
+) -> None:
+    drive, boot = heartbeat_of(accepted, abort)
+    assert drive.number(0x1017) == period_ms
+    said = (f"1017h:0: heartbeat every {period_ms} ms, 100 ms was refused",)
+    assert notes_of(boot) == (said if period_ms != 100 else ())
+
+
+def test_a_drive_that_takes_no_heartbeat_period_that_is_short_enough_cannot_be_used() -> None:
+    _, boot = heartbeat_of(lambda ms: ms >= 1000)
+    text = error_of(boot)
+    assert "it takes no heartbeat period of at most 150 ms (1017h:0: 0609 0030h value not valid)" in text
+    assert "Raise timeouts.drive_heartbeat_s in robot.yaml" in text
+
+
+@pytest.mark.parametrize(("found", "fits"), [(128, True), (150, True), (151, False), (0, False)])
+def test_a_period_that_the_drive_rounds_is_taken_when_it_is_short_enough(found: int, fits: bool) -> None:
+    def rounded(drive: FakeDrive, _: bytes) -> None:
+        drive.objects[0x1017, 0] = u16(found)
+
+    boot = boot_one_axis(FakeDrive(on_write={(0x1017, 0): rounded}))
+    assert (boot.error is None) is fits
+
+
+def test_a_drive_that_takes_no_synchronous_pdo_is_told_the_key_that_cures_it() -> None:
+    text = error_of(boot_one_axis(FakeDrive(refuse={(0x1400, 2): INVALID})))
+    assert "1400h:2: 0609 0030h value not valid" in text
+    assert "set `pdo.synchronous: false` in its drive profile" in text
+
+
+@pytest.mark.parametrize("abort", [0x06070010, 0x06070012, 0x06070013])
+@pytest.mark.parametrize(
+    ("key", "where"), [((0x60FF, 0), "see `layout.target_bits`"), ((0x6060, 0), ""), ((0x1A00, 1), "`layout`")]
+)
+def test_an_object_of_another_width_is_said_to_be_one(key: Key, where: str, abort: int) -> None:
+    text = error_of(boot_one_axis(FakeDrive(refuse={key: abort})))
+    assert "another width than CiA 402" in text
+    assert where in text
+
+
+def test_two_drives_with_one_node_id_are_named() -> None:
+    class Twins(FakeDrive):
+        def on_frame(self, frame: Frame) -> list[Frame]:
+            return super().on_frame(frame) * 2
+
+    text = error_of(boot_one_axis(Twins()))
+    assert text.startswith("node 1: each request is answered twice: two devices on the bus have this node id.")
+
+
+def test_an_answer_that_comes_late_and_then_again_names_no_second_drive() -> None:
+    """The first request of each transfer is lost, so that two were sent, and both are answered in the end."""
+
+    class Slow(FakeDrive):
+        asked = 0
+
+        def on_frame(self, frame: Frame) -> list[Frame]:
+            if frame.cob_id != 0x601 or frame.data[0] == 0x80:
+                return super().on_frame(frame)
+            self.asked += 1
+            return super().on_frame(frame) * 2 if self.asked % 2 == 0 else []
+
+    boot = Bench(Slow(), fake_robot()).run(200.0)
+    assert boot.error is None
 
 
 # -- what no drive may lack

@@ -102,8 +102,8 @@ def test_a_reset_of_a_drive_that_stays_dead_ends_after_ten_seconds_and_says_so(w
     start = world.now
     outcome = world.reset()
     assert not outcome.done
-    assert re.match(r"node 1 \(left_wheel(, right_wheel)?\): no status for 10\.", outcome.sentence)
-    assert outcome.sentence.endswith("check its power and its cable, then reset again")
+    assert re.match(r"waiting for node 1 \(left_wheel(, right_wheel)?\): the answer to 1000h:0", outcome.sentence)
+    assert outcome.sentence.endswith("check its power and its cable; reset again once that is cured")
     assert 10.0 < world.now - start < 11.0
 
 

@@ -69,6 +69,7 @@ def test_the_values_are_short_and_have_their_units() -> None:
         "voltage [V]": "48.1",
         "lacking or refused": "nothing",
         "changed by the boot": "6085h:0: 0000000Ah → 00000B31h",
+        "last boot": "well",
     }
     loop = {pair.key: pair.value for pair in entry(message, "robot: motor_driver").values}
     assert loop["cycles"] == "12345"

@@ -144,7 +144,78 @@ def test_without_heartbeat_or_status_it_is_lost_after_a_second(beats: bool, spea
     assert story.node.presence is STARTING  # a pre-operational heartbeat may still be on its way
     story.wait(0.03)
     assert story.node.presence is GONE
-    assert story.node.absent() == "node 1 (left_wheel) gave no feedback within 1.0 s of NMT start"
+    absent = story.node.absent()
+    assert absent.startswith("node 1 (left_wheel) could not be started: within 1.0 s of NMT start it sent ")
+    assert ("a heartbeat that says pre-operational, not operational" in absent) is not beats
+    assert ("no status of left_wheel (its TPDOs: see pdo.synchronous of its drive profile)" in absent) is not speaks
+    assert "cable" not in story.node.missing(story.now + 60.0)  # it has answered every SDO
+
+
+def test_a_drive_without_a_heartbeat_is_said_to_have_none() -> None:
+    story = Story().started()
+    for _ in range(103):
+        story.wait(0.01)
+        story.status()
+    said = "sent no heartbeat (1017h; a drive that knows node guarding alone cannot be used)"
+    assert story.node.absent().endswith(said)
+    assert said in story.node.boot_error
+
+
+def test_a_node_that_is_silent_without_power_is_asked_again_after_a_second() -> None:
+    story = Story().ready()
+    ready_at = story.now
+    while story.node.presence is READY:
+        story.wait(0.01)
+        story.node.seek(story.now, NEVER)
+    assert story.now - ready_at == pytest.approx(1.0, abs=0.03)
+    assert story.node.absent().endswith("s and is looked for")
+    story.sent.clear()
+    story.booted()
+    assert story.sent[0] == Frame(0x601, bytes.fromhex("40 00 10 00 00 00 00 00"))  # 1000h
+    assert story.node.presence is STARTING
+
+
+def test_a_node_that_was_not_asked_for_a_second_is_not_looked_for() -> None:
+    story = Story().ready()
+    story.wait(3.0)
+    story.node.seek(story.now, story.now - 0.9)  # the driver itself paused: its SYNCs began 0.9 s ago
+    assert story.node.presence is READY
+    story.node.seek(story.now, story.now - 1.1)
+    assert story.node.presence is GONE
+
+
+def test_a_second_boot_up_message_of_one_start_is_waited_for_in_the_next_boot() -> None:
+    story = Story().ready()
+    while story.now - story.node._boot_up_at < 0.8:
+        story.wait(0.01)
+    story.heartbeat(BOOT_UP)
+    assert "the next boot waits for it (drive profile: start.settle_s)" in story.node.absent()
+    began = story.now
+    story.started()
+    assert story.now - began > 1.5 * 0.8
+    assert story.node.report is not None
+    assert any("set start.settle_s in its drive profile" in note for note in story.node.report.notes)
+
+
+def test_a_boot_up_message_long_after_the_boot_is_a_restart_and_changes_nothing_about_the_next_boot() -> None:
+    story = Story().ready()
+    story.wait(6.0)
+    story.heartbeat(BOOT_UP)
+    assert story.node.absent() == "node 1 (left_wheel) restarted (boot-up message)"
+    began = story.now
+    story.started()
+    assert story.now - began < 0.5
+
+
+def test_why_a_boot_failed_is_known_until_the_node_is_ready() -> None:
+    story = Story(drive=FakeDrive(refuse={(0x60FF, 0): 0x08000022}))
+    story.node.begin_boot(story.now)
+    story.wait(0.5)
+    assert "60FFh:0: 0800 0022h" in story.node.boot_error
+    story.drive.refuse.clear()
+    story.wait(1.0)
+    story.ready()
+    assert story.node.boot_error == ""
 
 
 def test_with_both_it_is_ready() -> None:
@@ -202,7 +273,7 @@ def test_ready_ends_with_any_other_nmt_state(state: int, why: str) -> None:
     story = Story().ready()
     assert story.heartbeat(state)
     assert story.node.presence is GONE
-    assert story.node.absent() == f"node 1 (left_wheel) {why}"
+    assert story.node.absent().startswith(f"node 1 (left_wheel) {why}")
     assert story.node.report is None
     assert story.axis.status_at == -math.inf
 
@@ -210,7 +281,7 @@ def test_ready_ends_with_any_other_nmt_state(state: int, why: str) -> None:
 def test_a_restart_while_it_is_starting_is_noticed_at_once() -> None:
     story = Story().started()
     story.heartbeat(BOOT_UP)
-    assert story.node.absent() == "node 1 (left_wheel) restarted (boot-up message)"
+    assert story.node.absent().startswith("node 1 (left_wheel) restarted (boot-up message)")
 
 
 def test_a_restart_forgets_the_emergency_message_of_the_life_before() -> None:

@@ -145,7 +145,7 @@ NOT_THERE = "node 1 is not there"
 def test_it_waits_ten_seconds_for_a_drive_and_goes_on_when_it_is_there(waiting: Situation) -> None:
     late = Story()
     assert late.run(waiting, 9.9) is None
-    assert sentence(late.run(waiting, 0.2)) == "node 1 is not there; check its power and its cable, then reset again"
+    assert sentence(late.run(waiting, 0.2)) == "node 1 is not there; reset again once that is cured"
     in_time = Story()
     assert in_time.run(waiting, 9.9) is None
     outcome = in_time.run(WELL, 0.1)

@@ -252,7 +252,31 @@ def test_an_sdo_that_commands_an_enabled_drive(data: str, index: str) -> None:
     assert after(0x601, data) == Sign(2.0, 1, f"an SDO that writes {index}h, while it is enabled")
 
 
-@pytest.mark.parametrize(("cob_id", "data"), [(0x000, "80 01"), (0x501, "02 00"), (0x601, "2b 40 60 00 02 00 00 00")])
+@pytest.mark.parametrize(
+    ("controlword", "is_sign"),
+    [
+        (0x00, False),
+        (0x02, False),
+        (0x04, False),
+        (0x06, True),
+        (0x07, True),
+        (0x0F, True),
+        (0x0B, False),
+        (0x80, False),
+    ],
+)
+@pytest.mark.parametrize("head", ["2B", "23", "22", "2F"])
+def test_an_sdo_that_takes_power_away_is_a_stop_and_no_sign(controlword: int, is_sign: bool, head: str) -> None:
+    """The boot of a driver that was started anew brings drives that still turn to a stand by it."""
+    sign = after(0x601, f"{head} 40 60 00 {controlword:02X} 00 00 00")
+    assert (sign is not None) is is_sign
+
+
+def test_a_segmented_write_of_the_controlword_is_a_sign() -> None:
+    assert after(0x601, "21 40 60 00 02 00 00 00") is not None
+
+
+@pytest.mark.parametrize(("cob_id", "data"), [(0x000, "80 01"), (0x501, "02 00"), (0x601, "2b 40 60 00 0f 00 00 00")])
 def test_our_own_commands_that_come_back_are_none(cob_id: int, data: str) -> None:
     it = enabled()
     it.commands_are_ours = True

@@ -144,6 +144,12 @@ def decode_sdo_download(data: bytes) -> int | None:
     return int(_SDO_HEAD.unpack_from(data)[1])
 
 
+def takes_power_away(data: bytes) -> bool:
+    """True for an SDO request that writes "disable voltage" or "quick stop" (6040h bits 2, 1 are not both set)."""
+    size = 4 - (data[0] >> 2 & 3) if data[0] & 0x03 == 0x03 else 4
+    return data[0] & 0x02 != 0 and int.from_bytes(data[4 : 4 + min(size, 2)], "little") & 0x06 != 0x06
+
+
 def decode_nmt(data: bytes) -> tuple[int, int] | None:
     """Command and node (0: all) of an NMT frame; None: CiA 301 knows no such command."""
     if len(data) != 2 or data[0] not in NMT_COMMANDS:

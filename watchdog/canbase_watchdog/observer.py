@@ -231,7 +231,8 @@ class Observer:
 
     def _on_sdo_request(self, node_id: int, data: bytes, now: float) -> bool:
         written = frames.decode_sdo_download(data)
-        if written is not None and written % frames.AXIS_OFFSET in _COMMANDS:
+        stops = written is not None and written % frames.AXIS_OFFSET == _CONTROLWORD and frames.takes_power_away(data)
+        if written is not None and written % frames.AXIS_OFFSET in _COMMANDS and not stops:
             self._note_foreign(node_id, f"an SDO that writes {written:04X}h", now)
         return True
 
@@ -241,4 +242,5 @@ class Observer:
             self._foreign.note(node_id, f"{detail}, while it is enabled", now)
 
 
+_CONTROLWORD = frames.CONTROLWORD % frames.AXIS_OFFSET
 _COMMANDS = frozenset(index % frames.AXIS_OFFSET for index in (frames.CONTROLWORD, frames.MODE, frames.TARGET))
