@@ -14,6 +14,7 @@ from canbase_cli.commissioning.listening import OURS, Listener
 from canbase_config.bus_load import BUSY_LOAD, FULL_LOAD
 from canbase_config.drive import Drive
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
+from canbase_driver.cia301 import NmtState
 from canbase_driver.cia402 import DriveState
 from canbase_driver.emcy import emcy_text
 from canbase_driver.watchdog_link import LEASE_AGE_UNKNOWN, TRIPPED, WATCHING, WatchdogCounters
@@ -171,8 +172,8 @@ def _node(seen: BusEvidence, node_id: int, drives: tuple[Drive, ...]) -> list[Ch
     return [
         _identity(name, inspection, drives),
         _life(seen, name, inspection),
-        _configured(seen, f"{name}: configuration", inspection.settings),
-        _configured(seen, f"{name}: PDO mapping", inspection.pdos),
+        _configured(seen, f"{name}: configuration", node_id, inspection.settings),
+        _configured(seen, f"{name}: PDO mapping", node_id, inspection.pdos),
         _self_stop(seen, f"{name}: stops by itself", inspection),
     ]
 
@@ -213,6 +214,11 @@ def _life(seen: BusEvidence, name: str, found: Inspection) -> Check:
     emcy = seen.heard.nodes[found.node_id].emcy if found.node_id in seen.heard.nodes else None
     if emcy is not None:
         return warn(f"{name}: state", f"{told}; EMCY {emcy.text}", "remove the cause")
+    node = seen.heard.nodes.get(found.node_id)
+    if seen.heard.driver_lives and (node is None or node.nmt_state is not NmtState.OPERATIONAL):
+        return fail(
+            f"{name}: state", f"{told}; it is not in NMT operational beside a driver", _advice(seen, found.node_id)
+        )
     return ok(f"{name}: state", told)
 
 
@@ -227,7 +233,15 @@ def _ages(seen: BusEvidence, node_id: int) -> str:
     return f"{node.state_text}, {heartbeat}, {tpdo}"
 
 
-def _configured(seen: BusEvidence, name: str, part: Part) -> Check:
+def _advice(seen: BusEvidence, node_id: int) -> str:
+    """What a difference beside a running driver means: a drive in NMT operational was booted by it, the others not."""
+    node = seen.heard.nodes.get(node_id)
+    if node is not None and node.nmt_state is NmtState.OPERATIONAL:
+        return "something has changed it since its boot: restart canbase driver, and look for another master or tool"
+    return "the driver could not boot this drive: its log and boot_problem in motor_driver/status say why"
+
+
+def _configured(seen: BusEvidence, name: str, node_id: int, part: Part) -> Check:
     """Beside a running driver a difference is wrong; without it the driver writes it at its start."""
     if part.problem:
         return fail(name, part.problem, "docs/drives.md says what a drive must have")
@@ -235,7 +249,7 @@ def _configured(seen: BusEvidence, name: str, part: Part) -> Check:
         return ok(name, "as robot.yaml wants it")
     told = f"{len(part.changes)} differences: {_some(part.changes)}"
     if seen.heard.driver_lives:
-        return fail(name, told, "something has changed it under the driver: restart canbase driver, and look for whom")
+        return fail(name, told, _advice(seen, node_id))
     return ok(name, f"{told}. The driver writes them at its start")
 
 
@@ -247,7 +261,7 @@ def _self_stop(seen: BusEvidence, name: str, found: Inspection) -> Check:
     set_now = not found.self_stop_part.changes
     if not set_now and seen.heard.driver_lives:
         changes = _some(found.self_stop_part.changes)
-        return fail(name, f"not now: {changes}", "something has changed it under the driver: restart canbase driver")
+        return fail(name, f"not now: {changes}", _advice(seen, found.node_id))
     when = "set" if set_now else "when the driver has set it"
     notes = f"; {_some(found.self_stop_part.notes)}" if found.self_stop_part.notes else ""
     return ok(name, f"by {found.self_stop}, {when}{notes}. canbase commission proves it")

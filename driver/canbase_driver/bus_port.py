@@ -6,7 +6,9 @@ or came in. The core disarms meanwhile.
 
 from __future__ import annotations
 
+import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -22,6 +24,10 @@ SEND_FAILURES = 10
 """So many failed sends in a row are a failed bus; fewer are a full transmit buffer."""
 RECEIVE_FAILURES = 3
 """The same for receptions."""
+IGNORED_AT_ONCE = 100
+"""So many frames that are none of ours are passed over in one reception: more than a bus brings in one cycle."""
+OPENS_AT_ONCE_S = 0.002
+"""Most adapters are open by then; a serial one (slcan) takes 2 s, and the control cycle does not wait for it."""
 BUS_OFF = "the CAN controller is bus-off after too many errors: check cable, termination and bit rate"
 _ERRORS = (can.CanError, OSError, ValueError)
 """ValueError: what select says of a handle whose adapter is gone."""
@@ -39,6 +45,36 @@ class BusError(Exception):
     """The bus cannot be opened. The text says what to look at."""
 
 
+class _Opening(threading.Thread):
+    """Opens a bus while the control thread goes on."""
+
+    def __init__(self, open_bus: Callable[[], can.BusABC]) -> None:
+        super().__init__(name="opening", daemon=True)
+        self.bus: can.BusABC | None = None
+        self.error: BusError | None = None
+        self._open_bus = open_bus
+        self._lock, self._abandoned = threading.Lock(), False
+
+    def run(self) -> None:
+        """The thread's body."""
+        try:
+            bus = self._open_bus()
+        except BusError as error:
+            self.error = error
+            return
+        with self._lock:
+            self.bus = bus
+            if self._abandoned:
+                bus.shutdown()
+
+    def abandon(self) -> None:
+        """Nobody waits for it any more: what it opens, or has opened, is closed."""
+        with self._lock:
+            self._abandoned = True
+            if self.bus is not None:
+                self.bus.shutdown()
+
+
 class BusPort:
     """One bus. Only the control thread uses it."""
 
@@ -49,16 +85,31 @@ class BusPort:
         self.report = BusReport()
         self._send_failures = self._receive_failures = 0
         self._retry_at = 0.0
+        self._opening: _Opening | None = None
         self._bus: can.BusABC | None = self._open()
 
     def receive(self, timeout_s: float) -> Frame | None:
-        """The next data frame with an 11-bit identifier; None when none came in `timeout_s`, or it was another kind."""
-        if self._bus is None:
-            time.sleep(max(0.0, min(timeout_s, self._retry_at - time.monotonic())))
-            self._reopen()
-            return None
+        """The next data frame with an 11-bit identifier; None when none came in `timeout_s`, or when receiving failed.
+
+        Frames of other kinds are passed over, IGNORED_AT_ONCE of them at most: what waits behind them is not late.
+        """
+        until = time.monotonic() + timeout_s
+        for _ in range(IGNORED_AT_ONCE):
+            if self._bus is None:
+                time.sleep(max(0.0, min(until, self._retry_at) - time.monotonic()))
+                self._reopen()
+                return None
+            before = self.report
+            frame = self._receive(self._bus, max(0.0, until - time.monotonic()))
+            failed = self.report.receive_errors != before.receive_errors
+            if frame is not None or failed or self.report is before:
+                return frame
+        return None
+
+    def _receive(self, bus: can.BusABC, timeout_s: float) -> Frame | None:
+        """None, and `report` grows, for what is no data frame of CANopen."""
         try:
-            message = self._bus.recv(max(0.0, timeout_s))
+            message = bus.recv(timeout_s)
         except _ERRORS as error:
             if is_no_frame(error):
                 self._drop()
@@ -83,6 +134,8 @@ class BusPort:
 
     def close(self) -> None:
         """Close the bus for good."""
+        if self._opening is not None:
+            self._opening.abandon()
         bus, self._bus = self._bus, None
         if bus is not None:
             bus.shutdown()
@@ -142,12 +195,18 @@ class BusPort:
 
     def _reopen(self) -> None:
         """The problem stays until a frame has passed: an interface that is down can be opened too."""
-        if time.monotonic() < self._retry_at:
+        if self._opening is None:
+            if time.monotonic() < self._retry_at:
+                return
+            self._opening = _Opening(self._open)
+            self._opening.start()
+            self._opening.join(OPENS_AT_ONCE_S)
+        if self._opening.is_alive():
             return
-        try:
-            self._bus = self._open()
-        except BusError as error:
-            self.problem = str(error)
+        opening, self._opening = self._opening, None
+        self._bus = opening.bus
+        if opening.error is not None:
+            self.problem = str(opening.error)
             self._retry_at = time.monotonic() + RETRY_S
         else:
             self._send_failures = self._receive_failures = 0

@@ -203,3 +203,15 @@ def test_each_number_is_taken_from_its_own_place() -> None:
 @pytest.mark.parametrize("text", ["", "[]", "[{}]", "{}", "Device does not exist"])
 def test_no_interface_is_none(text: str) -> None:
     assert parse_link(text) is None
+
+
+def test_a_drive_that_the_driver_could_not_boot_is_a_failure_and_nobody_is_accused() -> None:
+    """It sends no heartbeat, or a pre-operational one: the driver is alive and the robot never starts."""
+    for beats in ([], ["701 7F"]):
+        seen = evidence(
+            heard=heard(*DRIVER, *WATCHDOG, *beats, *DRIVES[1:]),
+            inspections={1: inspection(1, pdos=Part(("1400h:2: FFh → 01h",))), 2: inspection(2)},
+        )
+        failed = {check.name: check for check in bus_checks(seen) if check.verdict is Verdict.FAIL}
+        assert "node 1 (left_wheel): state" in failed
+        assert failed["node 1 (left_wheel): PDO mapping"].advice.startswith("the driver could not boot this drive")
