@@ -64,8 +64,15 @@ class Bench:
         self.executor.add_node(self.node)
         self.clients = {name: ActionClient(self.node, DriveDistance, name) for name in ("drive_distance", "floor")}
         scans = self.node.create_publisher(LaserScan, "scan", qos_profile_sensor_data)
-        scan = LaserScan(angle_increment=0.0349, range_min=0.05, range_max=10.0, ranges=[float("inf")] * 180)
-        self.node.create_timer(0.05, lambda: scans.publish(scan))
+        scan = LaserScan(
+            angle_max=179 * 0.0349, angle_increment=0.0349, range_min=0.05, range_max=10.0, ranges=[float("inf")] * 180
+        )
+
+        def send() -> None:
+            scan.header.stamp = self.node.get_clock().now().to_msg()
+            scans.publish(scan)
+
+        self.node.create_timer(0.05, send)
         self._way_m = 1.0
 
     def until(self, done: Callable[[], Any], timeout_s: float = READY_S) -> None:

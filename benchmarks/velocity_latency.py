@@ -66,11 +66,20 @@ class Course(Node):
         self._number = 0
         self._sources = [self.create_publisher(TwistStamped, f"cmd_vel_{i}", 1) for i in range(SOURCES)]
         self._scans = self.create_publisher(LaserScan, "scan", qos_profile_sensor_data)
-        self._scan = LaserScan(angle_increment=math.tau / POINTS, range_max=10.0, ranges=[5.0] * POINTS)
+        step_rad = math.tau / POINTS
+        self._scan = LaserScan(
+            angle_max=step_rad * (POINTS - 1), angle_increment=step_rad, range_max=10.0, ranges=[5.0] * POINTS
+        )
         for topic in self.took_s:
             self.create_subscription(TwistStamped, topic, self._taker(topic), QoSProfile(depth=50))
         self.create_timer(1.0 / SOURCE_HZ, self._command)
-        self.create_timer(1.0 / SCAN_HZ, lambda: self._scans.publish(self._scan))
+        self.create_timer(1.0 / SCAN_HZ, self._send_scan)
+
+    def _send_scan(self) -> None:
+        """A scan of its own stamp, and with one reading that is never the same: a scanner is noisy."""
+        self._scan.header.stamp = self.get_clock().now().to_msg()
+        self._scan.ranges[0] = 5.0 + 0.001 * (self._number % 10)
+        self._scans.publish(self._scan)
 
     def _command(self) -> None:
         """The highest source last: the others' messages are there before it, as they are on a busy robot."""

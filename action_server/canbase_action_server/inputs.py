@@ -14,7 +14,7 @@ ENABLED = "enabled"
 """State of motor_driver in which commands move the wheels (DriverStatus.ENABLED)."""
 WATCHDOG_OK = "ok"
 ESTOP_CAUSES = ("estop", "estop_stale")
-SCAN_LOST_CAUSES = ("scan_stale", "scan_unplaced")
+SCAN_LOST_CAUSES = ("scan_stale", "scan_unplaced", "scan_invalid", "scan_frozen")
 OBSTACLE_CAUSE = "obstacle"
 
 

@@ -28,6 +28,19 @@ class Scan(Section):
     min_points: Annotated[
         int, Field(ge=1, le=10, description="fewer neighbouring beams count one scan later, if they are seen again")
     ] = 2
+    below_range_min: Annotated[
+        Literal["invalid", "too_near"],
+        Field(description="0 and finite readings below range_min: the beam says nothing; or something is too near"),
+    ] = "invalid"
+    allow_empty: Annotated[
+        bool, Field(description="false: a scan without any reading in range is not used; it always sees something")
+    ] = True
+    frozen_s: Annotated[
+        float, Field(ge=0.2, le=10.0, description="exactly equal readings for so long: the scanner is frozen [s]")
+    ] = 0.5
+    noisy: Annotated[
+        bool, Field(description="false: a simulator without noise; equal readings count only while the base moves")
+    ] = True
 
 
 class Estop(Section):
@@ -91,8 +104,13 @@ class Safety(Section):
         tuple[LimitZone, ...], Field(max_length=8, strict=False, description="obstacles in them limit the speed")
     ] = ()
     blind_mps: Annotated[
-        float, Field(ge=0.0, le=5.0, description="at most, where no scanner looks; 0: not at all [m/s]")
+        float,
+        Field(ge=0.0, le=5.0, description="at most, where no scanner looks or says something; 0: not at all [m/s]"),
     ] = 0.15
+    usable_share: Annotated[
+        float,
+        Field(ge=0.5, le=1.0, description="of the places ahead that scanners face: share with usable readings"),
+    ] = 0.9
 
     @property
     def scans(self) -> tuple[Scan, ...]:

@@ -7,28 +7,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from canbase_config.safety import Scan as ScanConfig
 from canbase_velocity.placement import Placement
-from canbase_velocity.sweep import Bools, Box, Floats
+from canbase_velocity.scan import Scan, ScanError, check
+from canbase_velocity.sweep import FULL_TURN_RAD, Bools, Box, Floats
 
 NOWHERE = np.empty((0, 2))
 """No points."""
 
 
-@dataclass(frozen=True, slots=True)
-class Scan:
-    """What is needed of a sensor_msgs/LaserScan: ranges [m], angles [rad] in the scanner's frame."""
-
-    ranges_m: npt.ArrayLike
-    angle_min_rad: float
-    angle_increment_rad: float
-    range_min_m: float
-    range_max_m: float
-    scan_time_s: float = 0.0
-    """How long the scanner takes for one scan [s]: its first reading is so old when the message is sent."""
+MAX_BEAMS: Final = 1440
+"""A scan with more readings is thinned out: of neighbours that are taken together the nearest counts."""
+GAP_M: Final = 0.03
+"""A place so far beside a beam that says something is covered by it [m]: no leg is hidden between two of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +47,7 @@ class Points:
     beam_count: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Field:
     """Where a scanner looks: its place, its first beam and the angle to its last [rad], its ranges [m]."""
 
@@ -60,41 +56,97 @@ class Field:
     span_rad: float
     range_min_m: float
     range_max_m: float
+    increment_rad: float = 0.0
+    says: npt.NDArray[np.intp] | None = None
+    """The beams that say something, by their number from `first_rad` on, rising. None: all of them do."""
 
     def sees(self, points: Floats) -> Bools:
         """Which of these places the scanner would see, if nothing stood before them."""
-        ranges_m, angles_rad = self.placement.seen_from(points)
-        in_range = (ranges_m >= self.range_min_m) & (ranges_m <= self.range_max_m)
-        seen: Bools = in_range & (np.mod(angles_rad - self.first_rad, 2.0 * math.pi) <= self.span_rad)
+        ranges_m, _, faces = self._looks_at(points)
+        seen: Bools = faces & (ranges_m <= self.range_max_m)
         return seen
+
+    def covers(self, points: Floats) -> tuple[Bools, Bools]:
+        """Which of these places it faces, whatever its reach, and at which of them its newest scan says something."""
+        ranges_m, from_first_rad, faces = self._looks_at(points)
+        told: Bools = faces & (ranges_m <= self.range_max_m)
+        if self.says is not None:
+            gaps = self._gaps(from_first_rad / self.increment_rad - 0.5)
+            told &= (gaps <= 1.0) | (gaps * self.increment_rad * ranges_m <= GAP_M)
+        return faces, told
+
+    def _looks_at(self, points: Floats) -> tuple[Floats, Floats, Bools]:
+        ranges_m, angles_rad = self.placement.seen_from(points)
+        from_first_rad: Floats = np.mod(angles_rad - self.first_rad, FULL_TURN_RAD)
+        faces: Bools = (ranges_m >= self.range_min_m) & (from_first_rad <= self.span_rad)
+        return ranges_m, from_first_rad, faces
+
+    def _gaps(self, at: Floats) -> Floats:
+        """From each of these directions, counted in beams, to the nearest beam that says something."""
+        assert self.says is not None
+        around = FULL_TURN_RAD / self.increment_rad
+        says = np.concatenate(([self.says[-1] - around], self.says, [self.says[0] + around]))
+        above = np.clip(np.searchsorted(says, at), 1, says.size - 1)
+        gaps: Floats = np.minimum(np.abs(at - says[above - 1]), np.abs(says[above] - at))
+        return gaps
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """What one scan shows. `share`: of its beams that say something, above 0, at most 1."""
+
+    points: Points
+    field: Field
+    share: float
 
 
 class ScanReader:
     """Turns the scans of one scanner into points. Keeps the directions of the beams from scan to scan."""
 
-    def __init__(self) -> None:
+    def __init__(self, config: ScanConfig) -> None:
+        self._config = config
         self._geometry: tuple[int, float, float] | None = None
         self._cos: Floats = np.empty(0)
         self._sin: Floats = np.empty(0)
+        self._sign = 0.0
 
-    def read(self, scan: Scan, placement: Placement) -> Points | None:
-        """The points; None when the scan says nothing: empty, geometry not finite, or not one usable reading.
+    def read(self, scan: Scan, placement: Placement) -> View:
+        """What the scan shows. Raises ScanError for a scan that cannot be used, or in which no beam says something.
 
-        Readings (REP 117): +infinity and above range_max: nothing there. -infinity: too close to measure, counts as
-        range_min. NaN, and finite below range_min (dust, the housing): no reading.
+        Readings (REP 117): +infinity and above range_max: nothing there. -infinity: too near to be measured, counts as
+        range_min; so does a finite one below range_min (0, dust, the housing) where safety.scan.below_range_min is
+        too_near. Otherwise that and NaN are no reading: such a beam says nothing.
         """
+        check(scan)
+        self._hold_direction(scan.angle_increment_rad)
         ranges_m = np.asarray(scan.ranges_m, dtype=np.float64)
-        if not _is_sound(scan):
-            return None
-        ranges_m = np.where(np.isneginf(ranges_m), scan.range_min_m, ranges_m)
+        near = ranges_m < scan.range_min_m if self._config.below_range_min == "too_near" else np.isneginf(ranges_m)
+        ranges_m = np.where(near, scan.range_min_m, ranges_m)
         usable = ranges_m >= scan.range_min_m
         if not usable.any():
-            return None
-        beams = np.flatnonzero(usable & (ranges_m <= scan.range_max_m) & np.isfinite(ranges_m))
-        self._aim(ranges_m.size, scan.angle_min_rad, scan.angle_increment_rad)
-        hit_m = ranges_m[beams]
-        at_m = placement.points(hit_m * self._cos[beams], hit_m * self._sin[beams])
-        return Points(at_m, beams, ranges_m.size)
+            raise ScanError(f"none of its {ranges_m.size} readings says something")
+        hit_m = np.where(usable & (ranges_m <= scan.range_max_m), ranges_m, np.inf)
+        if not (self._config.allow_empty or np.isfinite(hit_m).any()):
+            raise ScanError("it sees nothing at all, and allow_empty is false")
+        says = None if usable.all() else np.flatnonzero(usable if scan.angle_increment_rad > 0.0 else usable[::-1])
+        return View(self._points(scan, hit_m, placement), field_of(scan, placement, says), float(usable.mean()))
+
+    def _points(self, scan: Scan, hit_m: Floats, placement: Placement) -> Points:
+        self._aim(hit_m.size, scan.angle_min_rad, scan.angle_increment_rad)
+        together = -(-hit_m.size // MAX_BEAMS)
+        groups = np.pad(hit_m, (0, -hit_m.size % together), constant_values=np.inf).reshape(-1, together)
+        nearest = groups.argmin(axis=1) + np.arange(groups.shape[0]) * together
+        beams = np.flatnonzero(np.isfinite(groups.min(axis=1)))
+        hits = nearest[beams]
+        at_m = placement.points(hit_m[hits] * self._cos[hits], hit_m[hits] * self._sin[hits])
+        return Points(at_m, beams, groups.shape[0])
+
+    def _hold_direction(self, increment_rad: float) -> None:
+        """A scanner that counts the other way round than before is mirrored, or is another one."""
+        sign = math.copysign(1.0, increment_rad)
+        if sign * self._sign < 0.0:
+            raise ScanError("angle_increment has changed its sign; start canbase again if the scanner was changed")
+        self._sign = sign
 
     def _aim(self, count: int, angle_min_rad: float, angle_increment_rad: float) -> None:
         geometry = (count, angle_min_rad, angle_increment_rad)
@@ -104,13 +156,19 @@ class ScanReader:
         self._cos, self._sin, self._geometry = np.cos(angles_rad), np.sin(angles_rad), geometry
 
 
-def field_of(scan: Scan, placement: Placement) -> Field:
-    """The field of view of a scan that `ScanReader.read` understood. Each beam counts for one increment."""
+def field_of(scan: Scan, placement: Placement, says: npt.NDArray[np.intp] | None = None) -> Field:
+    """The field of view of a scan that can be used. Each beam counts for one increment. `says`: as in `Field`."""
     increment_rad = abs(scan.angle_increment_rad)
-    span_rad = increment_rad * (np.size(scan.ranges_m) - 1)
+    span_rad = increment_rad * (scan.count - 1)
     first_rad = scan.angle_min_rad - (span_rad if scan.angle_increment_rad < 0.0 else 0.0)
     return Field(
-        placement, first_rad - increment_rad / 2.0, span_rad + increment_rad, scan.range_min_m, scan.range_max_m
+        placement,
+        first_rad - increment_rad / 2.0,
+        span_rad + increment_rad,
+        scan.range_min_m,
+        scan.range_max_m,
+        increment_rad,
+        says if increment_rad > 0.0 else None,
     )
 
 
@@ -123,12 +181,6 @@ def clearances(points: Floats, box: Box) -> Clearances:
         ahead_m=_least(corridor_x_m[is_ahead] - box.front_m),
         behind_m=_least(-corridor_x_m[~is_ahead] - box.rear_m),
     )
-
-
-def _is_sound(scan: Scan) -> bool:
-    """Geometry from which points can be computed, and limits that can be compared with."""
-    numbers = (scan.angle_min_rad, scan.angle_increment_rad, scan.range_min_m)
-    return all(map(math.isfinite, numbers)) and scan.range_max_m > scan.range_min_m >= 0.0
 
 
 def _least(distances_m: Floats) -> float:

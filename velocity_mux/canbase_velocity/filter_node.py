@@ -23,7 +23,6 @@ from canbase_config.robot import Robot
 from canbase_config.safety import Scan as ScanConfig
 from canbase_velocity import messages
 from canbase_velocity.changes import changed_order, is_told
-from canbase_velocity.clearance import ScanReader, field_of
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.io import LeaseSender
@@ -86,7 +85,7 @@ class FilterNode(Node):
 
     def _watch_scans(self, scans: Sequence[ScanConfig]) -> None:
         for scan in scans:
-            callback = functools.partial(self._on_scan, scan, ScanReader(), Placement.of(scan))
+            callback = functools.partial(self._on_scan, scan, Placement.of(scan))
             self.create_subscription(LaserScan, scan.topic, callback, SCAN)
         if any(scan.pose == "tf" for scan in scans):
             if messages.TFMessage is None:
@@ -105,7 +104,7 @@ class FilterNode(Node):
         if message.data:
             self._issue(self._filter.decide(now), now)
 
-    def _on_scan(self, config: ScanConfig, reader: ScanReader, placement: Placement, message: LaserScan) -> None:
+    def _on_scan(self, config: ScanConfig, placement: Placement, message: LaserScan) -> None:
         now = time.monotonic()
         if self._receive_times.waited(now):
             return
@@ -116,10 +115,7 @@ class FilterNode(Node):
         except PlacementError as error:
             self._filter.on_unplaced_scan(config.topic, str(error))
             return
-        scan = messages.scan_of(message)
-        points = reader.read(scan, placement)
-        if points is not None:
-            self._filter.on_scan(config.topic, points, field_of(scan, placement), now, scan.scan_time_s)
+        self._filter.on_laser_scan(config.topic, messages.scan_of(message), placement, now)
 
     def _on_tf_static(self, message: messages.TFMessage) -> None:
         self._transforms.update(messages.transforms_of(message))

@@ -9,13 +9,16 @@ from dataclasses import replace
 import numpy as np
 
 from canbase_config.safety import Scan as ScanConfig
-from canbase_velocity.clearance import FREE, Clearances, Field, Points, clearances
-from canbase_velocity.decision import Decision
+from canbase_velocity.clearance import FREE, Clearances, Field, Points, ScanReader, clearances
+from canbase_velocity.decision import Cause, Decision
 from canbase_velocity.estop import Estop, EstopEvent, EstopState
+from canbase_velocity.frozen import FrozenWatch
 from canbase_velocity.glitch import GlitchFilter
 from canbase_velocity.motion import ExpectedMotion, Pose
 from canbase_velocity.obstacle import Geometry, Sight
+from canbase_velocity.placement import Placement
 from canbase_velocity.safety_filter import SHUTDOWN, FilterConfig, Inputs, ScanState, brakes_hard, decide
+from canbase_velocity.scan import Scan, ScanError
 from canbase_velocity.sweep import Floats
 from canbase_velocity.twist import ZERO, Twist
 
@@ -30,14 +33,42 @@ class _Scanner:
     def __init__(self, config: ScanConfig, geometry: Geometry) -> None:
         self.config = config
         self._geometry = geometry
+        self._reader = ScanReader(config)
+        self._frozen = FrozenWatch(config.frozen_s, noisy=config.noisy)
         self._glitches = GlitchFilter(config.min_points)
         self._reach_m = geometry.reach_m(config.timeout_s)
         self.at_s: float | None = None
-        self.problem = ""
         self.field: Field | None = None
         self.points: Floats = np.empty((0, 2))
         self.clearances = FREE
         self.measured_from_s = -math.inf
+        self._problem = self._why_dropped = ""
+        self._cause = Cause.SCAN_STALE
+        self._dropped = 0
+        self._share: float | None = None
+
+    def receive(self, scan: Scan, placement: Placement, now: float, *, moves: bool) -> None:
+        """A scan as it came. One that cannot be used is dropped and counted."""
+        if self._frozen.is_repeated(scan):
+            self.drop(Cause.SCAN_FROZEN, "the stamp of its scans does not change")
+            return
+        try:
+            view = self._reader.read(scan, placement)
+        except ScanError as error:
+            self.drop(Cause.SCAN_INVALID, str(error))
+            return
+        frozen = self._frozen.look(scan, now, moves=moves)
+        if frozen:
+            self.drop(Cause.SCAN_FROZEN, frozen, at_once=True)
+            return
+        self._share = view.share
+        self.take(view.points, view.field, now - self._frozen.since + scan.scan_time_s, now)
+
+    def drop(self, cause: Cause, why: str, *, at_once: bool = False) -> None:
+        """A scan that does not count. `at_once`: neither does the one before; otherwise that counts until it is old."""
+        self._dropped += 1
+        self._cause, self._why_dropped = cause, why
+        self._problem = why if at_once else self._problem
 
     def take(self, points: Points, field: Field | None, scan_time_s: float, now: float) -> None:
         """A scan that says something; its first reading was taken `scan_time_s` before."""
@@ -46,12 +77,22 @@ class _Scanner:
         genuine = self._glitches.genuine(points, limits.linear_mps * since_s, limits.angular_radps * since_s)
         self.clearances = clearances(genuine, self._geometry.box)
         self.points = genuine[self._geometry.box.distances_m(genuine) <= self._reach_m]
-        self.field, self.at_s, self.problem = field, now, ""
-        self.measured_from_s = now - min(max(scan_time_s, 0.0), self.config.timeout_s)
+        self.field, self.at_s, self._problem, self._why_dropped = field, now, "", ""
+        self.measured_from_s = now - min(max(scan_time_s, 0.0), self.config.timeout_s + self.config.frozen_s)
 
     def state(self, now: float) -> ScanState:
         config = self.config
-        return ScanState(config.topic, config.required, config.timeout_s, _age_s(self.at_s, now), self.problem)
+        return ScanState(
+            config.topic,
+            config.required,
+            config.timeout_s,
+            _age_s(self.at_s, now),
+            self._problem,
+            self._cause,
+            self._dropped,
+            self._why_dropped,
+            self._share,
+        )
 
 
 class SafetyFilter:
@@ -65,7 +106,7 @@ class SafetyFilter:
         self._estop = Estop(config.safety.estop.latched)
         self._pressed = False
         self._estop_at_s: float | None = None
-        longest_s = 2.0 * max(scan.timeout_s for scan in config.safety.scans) + config.safety.reaction_s
+        longest_s = max(2.0 * scan.timeout_s + scan.frozen_s for scan in config.safety.scans) + config.safety.reaction_s
         self._motion = ExpectedMotion(config.limits, longest_s)
         self._previous, self._previous_at_s = ZERO, -math.inf
         self._braking_hard = False
@@ -80,12 +121,17 @@ class SafetyFilter:
         self._command, self._command_at_s = twist, now
 
     def on_scan(self, topic: str, points: Points, field: Field | None, now: float, scan_time_s: float = 0.0) -> None:
-        """Takes a scan that says something. `field` None: it looks everywhere. Raises KeyError for another topic."""
+        """Takes what a scan shows. `field` None: it looks everywhere. Raises KeyError for another topic."""
         self._scanners[topic].take(points, field, scan_time_s, now)
+
+    def on_laser_scan(self, topic: str, scan: Scan, placement: Placement, now: float) -> None:
+        """Takes a scan as it came; drops and counts one that cannot be used. Raises KeyError for another topic."""
+        self._motion.advance(now)
+        self._scanners[topic].receive(scan, placement, now, moves=not self._motion.twist.is_zero)
 
     def on_unplaced_scan(self, topic: str, problem: str) -> None:
         """A scan came whose scanner cannot be placed. Raises KeyError for another topic."""
-        self._scanners[topic].problem = problem
+        self._scanners[topic].drop(Cause.SCAN_UNPLACED, problem, at_once=True)
 
     def on_estop(self, pressed: bool, now: float) -> None:
         """Takes a message of the emergency stop: true = stop."""

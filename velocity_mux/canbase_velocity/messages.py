@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 
 from builtin_interfaces.msg import Time
-from canbase.msg import SafetyState
+from canbase.msg import SafetyState, ScannerState
 from geometry_msgs.msg import Twist as TwistMessage
 from geometry_msgs.msg import TwistStamped
 from sensor_msgs.msg import LaserScan
 
-from canbase_velocity.clearance import Clearances, Scan
+from canbase_velocity.clearance import Clearances
 from canbase_velocity.decision import Cause, Decision
 from canbase_velocity.placement import Transform
 from canbase_velocity.safety_filter import Inputs, ScanState
+from canbase_velocity.scan import Scan
 from canbase_velocity.twist import Twist
 
 try:
@@ -52,6 +53,8 @@ def scan_of(message: LaserScan) -> Scan:
         message.range_min,
         message.range_max,
         scan_time_s,
+        message.angle_max,
+        message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec,
     )
 
 
@@ -81,6 +84,19 @@ def safety_state(decision: Decision, inputs: Inputs, free: Clearances | None, st
         scan_age_s=_or_nan(oldest_scan_s(inputs.scans)),
         ordered_linear_mps=decision.twist.linear_mps,
         ordered_angular_radps=decision.twist.angular_radps,
+        scanners=[_scanner_state(scan) for scan in inputs.scans],
+    )
+
+
+def _scanner_state(scan: ScanState) -> ScannerState:
+    return ScannerState(
+        topic=scan.topic,
+        required=scan.required,
+        fresh=scan.is_fresh,
+        age_s=_or_nan(scan.age_s),
+        usable_share=_or_nan(scan.usable_share),
+        dropped=scan.dropped,
+        problem=scan.problem or scan.why_dropped,
     )
 
 

@@ -9,6 +9,7 @@ Rules:
    ordered, the base has to brake hard.
 3. Each scan is looked at twice: as it was taken, and as the base must see it after what was ordered since then.
 4. Where less than half of what the footprint will sweep is in the field of view of a scanner, the speed is limited.
+5. So it is where scanners look, and too few of their beams say something, until the base would stand.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ from canbase_velocity.twist import Twist
 SEEN_SHARE = 0.5
 """Rule 4: the share of the swept edge that has to be in a field of view."""
 _EDGE_POINTS = 8
+_LOOKS = 4
+"""Rule 5 looks at so many places of the footprint on its path."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,6 +145,23 @@ def is_blind(order: Twist, sight: Sight, geometry: Geometry) -> bool:
     for field in sight.fields:
         seen |= field.sees(swept)
     return bool(seen.sum() < SEEN_SHARE * swept.shape[0])
+
+
+def told_share(order: Twist, sight: Sight, geometry: Geometry) -> float:
+    """Rule 5: of the places where the footprint will be until it stands, by `order` (not zero) from now on, and that a
+    scanner faces, the share that is covered by usable readings; 1 where no scanner faces any."""
+    limits, box = geometry.limits, geometry.box
+    order = order.scaled(speed_factor(order, limits.linear_mps, limits.angular_radps))
+    stands_s = geometry.hold_s + geometry.reaction_s + braking_time_s(order, limits) / 2.0
+    ahead_s = geometry.stop_m / fastest_mps(box, order) + stands_s
+    edge, start = box.edge(_EDGE_POINTS), Pose()
+    poses = (start.moved(order, ahead_s * step / _LOOKS) for step in range(1, _LOOKS + 1))
+    swept = np.concatenate([start.from_here(edge, pose) for pose in poses])
+    swept = swept[~box.contains(swept)]
+    covered = [field.covers(swept) for field in sight.fields]
+    faced = np.logical_or.reduce([faces for faces, _ in covered])
+    told = np.logical_or.reduce([told for _, told in covered])
+    return float(told.sum() / faced.sum()) if faced.any() else 1.0
 
 
 def zone_factor(order: Twist, zone: LimitZone, sight: Sight) -> float:

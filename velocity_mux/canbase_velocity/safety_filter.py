@@ -4,9 +4,9 @@ Rules, in the order of their precedence:
 1. Emergency stop pressed: stop, with the emergency deceleration. Required and silent counts as pressed. Its memory is
    estop.py.
 2. Command silent, or with NaN or infinity: stop.
-3. A required scan silent, or of a scanner whose place is unknown: stop.
-4. Faster than the limits, the ceiling, a limit zone with something in it, or the speed for where no scanner looks:
-   slower, on the same curve.
+3. A required scan silent, frozen, not usable, or of a scanner whose place is unknown: stop.
+4. Faster than the limits, the ceiling, a limit zone with something in it, or the speed for where no scanner looks or
+   says something: slower, on the same curve.
 5. Growing faster than the ceiling: slower. What falls is never held up.
 6. Obstacle where the footprint will be: slower, on the same curve, so that the base can stop before the stop distance;
    there it stops. Driving away from an obstacle is free. See obstacle.py.
@@ -19,7 +19,8 @@ reason, keeps it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
 
 from canbase_config.robot import Limits, Robot
 from canbase_config.safety import Ceiling, Safety
@@ -31,6 +32,15 @@ from canbase_velocity.sweep import fastest_mps, first_touch
 from canbase_velocity.twist import ZERO, Twist
 
 SHUTDOWN = Decision(Action.STOP, Cause.SHUTDOWN, "the safety filter is being shut down", "its next start", ZERO)
+
+
+CURES: Final = {
+    Cause.SCAN_STALE: "scans that can be used",
+    Cause.SCAN_UNPLACED: "a static transform of the scanner",
+    Cause.SCAN_INVALID: "scans that can be used; see the scanner and its ROS driver",
+    Cause.SCAN_FROZEN: "scans that change; start the scanner or its ROS driver again",
+}
+"""What ends a stop for a scanner whose scans come, and cannot be used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +69,14 @@ class ScanState:
     age_s: float | None
     problem: str = ""
     """Why its scans cannot be used, such as a frame that tf_static does not know; empty: they can."""
+    cause: Cause = Cause.SCAN_STALE
+    """What `problem` is, or what its last dropped scan was."""
+    dropped: int = 0
+    """Scans that could not be used."""
+    why_dropped: str = ""
+    """Why the last one was; empty when one that can be used came since."""
+    usable_share: float | None = None
+    """Of the beams of its last usable scan that say something, 0 to 1; None: none yet."""
 
     @property
     def is_fresh(self) -> bool:
@@ -146,7 +164,10 @@ def _scan(inputs: Inputs) -> Finding | None:
     if bad is None:
         return None
     if bad.problem:
-        return stop(Cause.SCAN_UNPLACED, f"{bad.topic}: {bad.problem}", "a static transform of the scanner")
+        return stop(bad.cause, f"{bad.topic}: {bad.problem}", CURES[bad.cause])
+    if bad.why_dropped:
+        detail = f"{bad.topic}: {bad.why_dropped} ({bad.dropped} scans dropped)"
+        return stop(bad.cause, detail, CURES[bad.cause])
     return stop(Cause.SCAN_STALE, _silence(bad.topic, bad.age_s, bad.timeout_s), f"scans on {bad.topic}")
 
 
@@ -161,9 +182,22 @@ def _slower(inputs: Inputs, config: FilterConfig) -> list[Finding]:
     for zone in config.safety.limit_zones:
         factor = obstacle.zone_factor(command, zone, inputs.sight)
         found.append(_limit(command, factor, Cause.ZONE, "nothing in the limit zone"))
-    if inputs.sight.fields and obstacle.is_blind(command, inputs.sight, config.geometry):
-        factor = min(1.0, config.safety.blind_mps / fastest_mps(config.geometry.box, command))
-        found.append(_blind(command, factor, config))
+    return found + _unseen(inputs, config)
+
+
+def _unseen(inputs: Inputs, config: FilterConfig) -> list[Finding]:
+    """Of rule 4: where no scanner looks, or where one looks and says nothing. Without any scanner nothing is asked."""
+    command, sight, geometry, safety = inputs.command, inputs.sight, config.geometry, config.safety
+    if not sight.fields:
+        return []
+    found = []
+    if obstacle.is_blind(command, sight, geometry):
+        why = "no scanner looks where the command leads"
+        found.append(_blind(command, Cause.BLIND, why, "a command to where a scanner looks", config))
+    share = obstacle.told_share(command, sight, geometry)
+    if share < safety.usable_share:
+        why = f"{share:.0%} of the places ahead have usable readings, at least {safety.usable_share:.0%} are needed"
+        found.append(_blind(command, Cause.SCAN_BLIND, why, "more usable readings, or another direction", config))
     return found
 
 
@@ -178,11 +212,12 @@ def _limit(command: Twist, factor: float, cause: Cause, clears_on: str) -> Findi
     return Finding(Action.LIMIT, cause, detail, clears_on, factor)
 
 
-def _blind(command: Twist, factor: float, config: FilterConfig) -> Finding:
-    clears_on = "a command to where a scanner looks"
-    if config.safety.blind_mps < config.standstill_mps:
-        return stop(Cause.BLIND, "no scanner looks where the command leads, safety.blind_mps is 0", clears_on)
-    return _limit(command, factor, Cause.BLIND, clears_on)
+def _blind(command: Twist, cause: Cause, why: str, clears_on: str, config: FilterConfig) -> Finding:
+    blind_mps = config.safety.blind_mps
+    if blind_mps < config.standstill_mps:
+        return stop(cause, f"{why}, safety.blind_mps is {blind_mps:g}", clears_on)
+    limited = _limit(command, min(1.0, blind_mps / fastest_mps(config.geometry.box, command)), cause, clears_on)
+    return limited if limited is PASSED else replace(limited, detail=f"{why}: {limited.detail}")
 
 
 def _within(twist: Twist, limits: Limits) -> Twist:

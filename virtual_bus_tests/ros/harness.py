@@ -122,13 +122,15 @@ class Repeater(Generic[T]):
 
     def __init__(self, node: Node, kind: type[T], topic: str, rate_hz: float, qos: QoSProfile | int) -> None:
         self.message: T | None = None
+        self.prepare: Callable[[T], T] = lambda message: message
+        """Makes what is sent of `message`, each time."""
         self.sent = 0
         self.publisher = node.create_publisher(kind, topic, qos)
         self._timer = node.create_timer(1.0 / rate_hz, self._tick)
 
     def _tick(self) -> None:
         if self.message is not None:
-            self.publisher.publish(self.message)
+            self.publisher.publish(self.prepare(self.message))
             self.sent += 1
 
 

@@ -7,15 +7,14 @@ import time
 
 from canbase.msg import MuxState, SafetyState, StopEvent
 from geometry_msgs.msg import TwistStamped
-from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 
 from canbase_action_server.client import Drive
 from ros.harness import Repeater
 from ros.running_robot import LATCHED, RunningRobot
+from ros.scanner import BEAMS, all_around, scanner
 
-BEAMS = 180
 BLOCKED_M = 0.35
 """5 cm before the front of the footprint: inside the stop distance."""
 
@@ -24,9 +23,7 @@ CALM_S = 20.0
 
 def scan(ahead_m: float = math.inf) -> LaserScan:
     """Beams all around, all free but for the one ahead, from base_link."""
-    ranges = [ahead_m] + [math.inf] * (BEAMS - 1)
-    step_rad = 2.0 * math.pi / BEAMS
-    return LaserScan(angle_min=0.0, angle_increment=step_rad, range_min=0.05, range_max=10.0, ranges=ranges)
+    return all_around([ahead_m] + [math.inf] * (BEAMS - 1))
 
 
 class World:
@@ -36,7 +33,7 @@ class World:
         self.robot = robot
         self.node = robot.node
         self.joystick: Repeater[TwistStamped] = self.node.repeat(TwistStamped, "cmd_vel_joy", 50.0)
-        self.scan: Repeater[LaserScan] = self.node.repeat(LaserScan, "scan", 20.0, qos_profile_sensor_data)
+        self.scan = scanner(self.node)
         self.estop: Repeater[Bool] = self.node.repeat(Bool, "estop_state", 20.0)
         for repeater in (self.joystick, self.scan, self.estop):
             self.node.wait_for_subscriber(repeater.publisher)

@@ -22,7 +22,8 @@ from exit_matrix.injections import Inject, breaks, estop_pressed, fault, scan_di
 from exit_matrix.rows import DRIVER, SERVER
 from exit_matrix.scene import Scene, sabotaged
 from ros.running_robot import READY_S, RESTS_M, own_domain, robot_on
-from ros.surroundings import BEAMS, BLOCKED_M, scan
+from ros.scanner import BEAMS
+from ros.surroundings import BLOCKED_M, scan
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 

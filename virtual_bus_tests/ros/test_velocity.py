@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 from canbase.msg import SafetyState
 from geometry_msgs.msg import Twist, TwistStamped
-from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from ros.harness import Process, TestNode
+from ros.scanner import BEAMS, all_around
 from ros.velocity_chain import RUN, START_S, Chain, drive, scan
 
 pytestmark = pytest.mark.ros
@@ -147,11 +147,32 @@ def test_a_stale_scan_stops(chain: Chain) -> None:
     assert chain.wait_for_order(0.0) < 0.8
     state = chain.wait_for_cause(SafetyState.CAUSE_SCAN_STALE)
     assert math.isnan(state.clearance_ahead_m)
-    chain.scan.message = LaserScan(ranges=[math.nan] * 720, angle_increment=0.01, range_max=10.0)  # blind
-    chain.node.spin_for(0.3)
+    chain.scan.message = all_around([math.nan] * BEAMS)
+    chain.wait_for_cause(SafetyState.CAUSE_SCAN_INVALID)
     assert chain.ordered == (0.0, 0.0)
     chain.scan.message = scan()
     chain.wait_for_order(0.2)
+
+
+def test_a_scanner_that_says_nothing_ahead_or_sends_the_same_again_and_again_does_not_count_as_free(
+    chain: Chain,
+) -> None:
+    chain.action.message = drive(0.4)
+    chain.wait_for_order(0.4)
+    half_blind = [math.inf] * BEAMS
+    half_blind[: BEAMS // 4] = half_blind[-BEAMS // 4 :] = [math.nan] * (BEAMS // 4)
+    chain.scan.message = all_around(half_blind)
+    state = chain.wait_for_cause(SafetyState.CAUSE_SCAN_BLIND)
+    assert state.scanners[0].usable_share == pytest.approx(0.5)
+    assert 0.0 < chain.ordered[0] <= 0.15
+    chain.scan.message = scan(ahead_m=3.0)
+    chain.wait_for_order(0.4)
+    again = chain.scan.prepare(chain.scan.message)
+    chain.scan.prepare = lambda _: again  # the same message, with its stamp
+    state = chain.wait_for_cause(SafetyState.CAUSE_SCAN_FROZEN)
+    assert "stamp" in state.detail
+    assert state.scanners[0].dropped > 0
+    assert chain.ordered == (0.0, 0.0)
 
 
 def test_every_order_has_its_lease_in_rising_sequence(chain: Chain) -> None:

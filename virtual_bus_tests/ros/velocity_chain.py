@@ -12,11 +12,12 @@ from typing import Any
 import pytest
 from canbase.msg import MuxState, SafetyState
 from geometry_msgs.msg import TwistStamped
-from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 
 from ros.harness import Process, Recorder, TestNode
+from ros.scanner import BEAMS, all_around, scanner
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 LEASE = struct.Struct("<4sQQddII")
@@ -36,10 +37,10 @@ def drive(linear_mps: float, angular_radps: float = 0.0) -> TwistStamped:
 
 
 def scan(ahead_m: float = math.inf, behind_m: float = math.inf) -> LaserScan:
-    """720 beams all around, all free but for one ahead and one behind, from base_link."""
-    ranges = [math.inf] * 720
-    ranges[0], ranges[360] = ahead_m, behind_m
-    return LaserScan(angle_min=0.0, angle_increment=math.pi / 360, range_min=0.05, range_max=10.0, ranges=ranges)
+    """Beams all around, all free but for one ahead and one behind, from base_link."""
+    ranges = [math.inf] * BEAMS
+    ranges[0], ranges[BEAMS // 2] = ahead_m, behind_m
+    return all_around(ranges)
 
 
 class Chain:
@@ -54,7 +55,7 @@ class Chain:
         self.state: Recorder[SafetyState] = node.record(SafetyState, "safety_filter/state", LATCHED)
         self.joystick = node.repeat(TwistStamped, "cmd_vel_joy", 50.0)
         self.action = node.repeat(TwistStamped, "cmd_vel_action", 50.0)
-        self.scan = node.repeat(LaserScan, "scan", 20.0, qos_profile_sensor_data)
+        self.scan = scanner(node)
         self.estop = node.repeat(Bool, "estop_state", 20.0)
         for repeater in (self.joystick, self.action, self.scan, self.estop):
             node.wait_for_subscriber(repeater.publisher, START_S)

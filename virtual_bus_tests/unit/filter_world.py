@@ -18,9 +18,11 @@ from canbase_velocity.clearance import Points
 from canbase_velocity.decision import Decision
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.motion import Pose
+from canbase_velocity.placement import Placement
 from canbase_velocity.safety_filter import FilterConfig
 from canbase_velocity.sweep import Box, Floats
 from canbase_velocity.twist import ZERO, Twist
+from unit.lidar import Fault, Lidar
 
 STEP_S = 0.01
 """The driver's cycle, in which the base moves."""
@@ -49,6 +51,9 @@ class FilterWorld:
         self.emergencies = 0
         self.scans = True
         """The scanner publishes."""
+        self.lidar: Lidar | None = None
+        """Its readings go the whole way into the filter; None: places do, without any noise."""
+        self.fault: Fault = lambda scan: scan
         self._limiter = Limiter(robot.limits, robot.base.track_m)
         self._motion = MotionState.AT_REST
         self._wheels = deque([ZERO] * round(lag_s / STEP_S))
@@ -80,12 +85,20 @@ class FilterWorld:
             least_m = min(least_m, self.gap_m)
         return least_m
 
+    def _scan(self, now: float) -> None:
+        scanner = self.robot.safety.scan
+        if self.lidar is not None:
+            scan = self.fault(self.lidar.scan(self.seen))
+            self.filter.on_laser_scan(scanner.topic, scan, Placement.of(scanner), now)
+            return
+        count = self.obstacles.shape[0]
+        points = Points(self.seen, np.arange(count), max(count, 1) + 1)
+        self.filter.on_scan(scanner.topic, points, None, now)
+
     def _turn(self) -> None:
         now = self.now
         if self.scans and self._step % self._scan_steps == 0:
-            count = self.obstacles.shape[0]
-            points = Points(self.seen, np.arange(count), max(count, 1) + 1)
-            self.filter.on_scan(self.robot.safety.scan.topic, points, None, now)
+            self._scan(now)
         if self._step % self._command_steps == 0:
             self.filter.on_command(self.command, now)
             self.decision = self.filter.decide(now)

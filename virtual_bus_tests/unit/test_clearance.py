@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canbase_config.safety import Scan as ScanConfig
-from canbase_velocity.clearance import FREE, Clearances, Scan, ScanReader, clearances, field_of
+from canbase_velocity.clearance import FREE, Clearances, ScanReader, clearances, field_of
 from canbase_velocity.placement import Placement
+from canbase_velocity.scan import Scan, ScanError
 from canbase_velocity.sweep import Box
 
 BOX = Box(front_m=0.4, rear_m=0.2, left_m=0.3, right_m=0.25)
@@ -21,9 +22,16 @@ QUARTER_RAD = math.pi / 2
 INF, NAN = math.inf, math.nan
 
 
+SCANNER = ScanConfig(required=True)
+
+
 def of(scan: Scan, placement: Placement = HERE, reader: ScanReader | None = None) -> Clearances | None:
-    points = (reader or ScanReader()).read(scan, placement)
-    return None if points is None else clearances(points.at_m, BOX)
+    """None: the scan cannot be used."""
+    try:
+        view = (reader or ScanReader(SCANNER)).read(scan, placement)
+    except ScanError:
+        return None
+    return clearances(view.points.at_m, BOX)
 
 
 def read(ranges_m: list[float], **changes: Any) -> Clearances | None:
@@ -128,7 +136,7 @@ def test_an_infinite_range_max_leaves_infinite_readings_free() -> None:
 
 
 def test_a_scanner_that_changes_its_beams_is_followed() -> None:
-    reader = ScanReader()
+    reader = ScanReader(SCANNER)
     ahead, behind = Scan([1.0], 0.0, 0.1, 0.0, 10.0), Scan([1.0], math.pi, 0.1, 0.0, 10.0)
     assert [of(scan, reader=reader) for scan in (ahead, ahead, behind, ahead)] == [
         Clearances(approx(0.6), INF),

@@ -1,0 +1,209 @@
+"""A base that drives at a wall 2 m ahead while its scanner lies: blind, partly blind, frozen, mirrored, too large.
+
+Footprint 0.3 m to all sides, 0.8 m/s at most, stop distance 0.15 m, blind_mps 0.15 m/s, 10 scans a second. The scanner
+is sound for 0.5 s; then it lies, and the base has 1.3 m to go at the most.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from canbase_velocity.decision import Cause
+from canbase_velocity.scan import MAX_READINGS, Scan
+from canbase_velocity.sweep import fastest_mps
+from canbase_velocity.twist import ZERO, Twist
+from unit.filter_world import FilterWorld, robot_with
+from unit.lidar import Fault, Frozen, Lidar, blind, one_beam_left
+
+WALL = np.array([(2.0, y_m / 20.0) for y_m in range(-20, 21)] + [(-3.0, 0.5)])
+AHEAD = Twist(0.8, 0.0)
+INF, NAN = math.inf, math.nan
+
+
+def world(blind_mps: float = 0.15, **scan: object) -> FilterWorld:
+    made = FilterWorld(robot_with(blind_mps=blind_mps, scan={"required": True, **scan}), WALL)
+    made.lidar = Lidar()
+    return made
+
+
+def lies(made: FilterWorld, fault: Fault, duration_s: float = 6.0) -> tuple[float, set[Cause], float]:
+    """The smallest gap, the causes, and the fastest order in the second half of the time."""
+    made.run(AHEAD, 0.5)
+    made.fault = fault
+    least_m, causes, fastest = made.gap_m, set(), 0.0
+    for step in range(round(duration_s / 0.02)):
+        least_m = min(least_m, made.run(AHEAD, 0.02))
+        assert made.decision is not None
+        causes.add(made.decision.cause)
+        if step > duration_s / 0.04:
+            fastest = max(fastest, fastest_mps(made.box, made.decision.twist))
+    return least_m, causes, fastest
+
+
+def test_a_sound_scanner_lets_the_base_come_to_the_stop_distance_and_no_further() -> None:
+    least_m, causes, _ = lies(world(), lambda scan: scan)
+    assert 0.12 < least_m < 0.2
+    assert causes == {Cause.NONE, Cause.OBSTACLE_NEAR, Cause.OBSTACLE}
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        one_beam_left,
+        blind(NAN, 0.5),
+        blind(0.0, 0.5),
+        blind(0.04, 0.5),
+        blind(-1.0, 0.5),
+        blind(NAN, 0.2),
+        blind(NAN, 0.05, 0.12),  # a part of the corridor, left of the middle
+    ],
+)
+def test_where_the_beams_say_nothing_the_base_creeps_or_does_not_go_at_all(fault: Fault) -> None:
+    """Blind for the wall 1.5 m ahead it goes no faster than blind_mps; with 0 it is not touched."""
+    least_m, causes, fastest = lies(world(), fault)
+    assert Cause.SCAN_BLIND in causes
+    assert fastest <= 0.15 + 1e-9
+    least_m, causes, fastest = lies(world(blind_mps=0.0), fault)
+    assert least_m > 0.5
+    assert fastest == 0.0
+
+
+@pytest.mark.parametrize(
+    ("fault", "cause"),
+    [
+        (blind(NAN), Cause.SCAN_INVALID),
+        (blind(0.0), Cause.SCAN_INVALID),
+        (Frozen(new_stamps=True), Cause.SCAN_FROZEN),
+        (Frozen(new_stamps=False), Cause.SCAN_FROZEN),
+        (lambda scan: dataclasses.replace(scan, angle_increment_rad=-scan.angle_increment_rad), Cause.SCAN_INVALID),
+        (
+            lambda scan: dataclasses.replace(
+                scan,
+                angle_min_rad=scan.angle_max_rad or 0.0,
+                angle_max_rad=scan.angle_min_rad,
+                angle_increment_rad=-scan.angle_increment_rad,
+            ),
+            Cause.SCAN_INVALID,  # counts the other way round all of a sudden: its readings are mirrored
+        ),
+        (lambda scan: dataclasses.replace(scan, angle_min_rad=3.0, angle_max_rad=-3.0), Cause.SCAN_INVALID),
+        (lambda scan: dataclasses.replace(scan, ranges_m=np.full(180, INF)), Cause.SCAN_INVALID),
+        (lambda scan: dataclasses.replace(scan, angle_min_rad=NAN), Cause.SCAN_INVALID),
+        (lambda scan: dataclasses.replace(scan, angle_max_rad=INF), Cause.SCAN_INVALID),
+        (lambda scan: dataclasses.replace(scan, ranges_m=np.full(MAX_READINGS + 1, INF)), Cause.SCAN_INVALID),
+        (lambda scan: dataclasses.replace(scan, ranges_m=[]), Cause.SCAN_INVALID),
+    ],
+)
+def test_a_scan_that_says_nothing_or_cannot_be_right_stops_the_base_before_the_wall(fault: Fault, cause: Cause) -> None:
+    made = world()
+    least_m, causes, fastest = lies(made, fault)
+    assert least_m > 0.14
+    assert fastest == 0.0
+    assert cause in causes
+    (scanner,) = made.filter.inputs(made.now).scans
+    assert scanner.dropped > 0
+    assert scanner.why_dropped
+
+
+def test_a_frozen_scanner_is_noticed_after_frozen_s_and_the_base_drives_on_when_it_wakes() -> None:
+    made = world()
+    made.run(AHEAD, 0.5)
+    made.fault = Frozen(new_stamps=True)
+    made.run(AHEAD, 0.7)
+    assert made.decision is not None
+    assert (made.decision.cause, made.decision.twist) == (Cause.SCAN_FROZEN, ZERO)
+    assert "the same 360 readings for" in made.decision.detail
+    made.fault = lambda scan: scan
+    made.run(AHEAD, 0.2)
+    assert made.decision.cause in (Cause.NONE, Cause.OBSTACLE_NEAR)
+
+
+def cause_of(made: FilterWorld) -> Cause:
+    assert made.decision is not None
+    return made.decision.cause
+
+
+def test_a_simulator_without_noise_starts_from_standstill_and_is_frozen_only_while_the_base_moves() -> None:
+    made = world(noisy=False)
+    made.lidar = Lidar(noise_m=0.0)
+    made.run(ZERO, 3.0)
+    made.run(AHEAD, 0.5)
+    assert cause_of(made) is Cause.NONE
+    made.fault = Frozen(new_stamps=True)
+    assert made.run(AHEAD, 6.0) > 0.14
+    assert cause_of(made) is Cause.SCAN_FROZEN
+    strict = world()
+    strict.lidar = Lidar(noise_m=0.0)
+    strict.run(ZERO, 3.0)
+    assert strict.decision is not None
+    strict.run(AHEAD, 0.5)
+    assert strict.decision.cause is Cause.SCAN_FROZEN
+
+
+def test_in_an_empty_hall_equal_scans_are_no_sign_of_a_frozen_scanner_unless_it_may_not_be_empty() -> None:
+    """Nothing in range for 5 s: free. A scanner that always sees a part of its robot can rule that out."""
+    made = world()
+    made.obstacles = np.empty((0, 2))
+    made.run(AHEAD, 5.0)
+    assert made.decision is not None
+    assert made.decision.cause is Cause.NONE
+    strict = world(allow_empty=False)
+    strict.obstacles = np.empty((0, 2))
+    strict.run(AHEAD, 1.0)
+    assert strict.decision is not None
+    assert strict.decision.cause is Cause.SCAN_INVALID
+    assert "allow_empty" in strict.decision.detail
+
+
+def test_readings_below_range_min_are_obstacles_where_the_scanner_means_them_so() -> None:
+    """Something is put right before the scanner: 0 ahead. By default such beams say nothing."""
+    for meant, cause in (("invalid", Cause.SCAN_BLIND), ("too_near", Cause.OBSTACLE)):
+        made = world(below_range_min=meant, blind_mps=0.15)
+        _, causes, _ = lies(made, blind(0.0, 0.2), 1.0)
+        assert cause in causes, meant
+
+
+def test_single_beams_that_say_nothing_do_not_hold_up_the_base() -> None:
+    """Every tenth reading is NaN: black or shiny things, sunlight."""
+
+    def fault(scan: Scan) -> Scan:
+        ranges_m = np.array(scan.ranges_m)
+        ranges_m[::10] = np.nan
+        return dataclasses.replace(scan, ranges_m=ranges_m)
+
+    least_m, causes, _ = lies(world(), fault)
+    assert causes == {Cause.NONE, Cause.OBSTACLE_NEAR, Cause.OBSTACLE}
+    assert 0.12 < least_m < 0.2
+
+
+def test_a_scanner_whose_reach_is_shorter_than_the_way_to_stop_lets_the_base_creep() -> None:
+    """Ahead 0.8 m are needed at 0.8 m/s; a range_max of 0.5 m shows 0.2 m of them."""
+
+    def fault(scan: Scan) -> Scan:
+        return dataclasses.replace(scan, range_max_m=0.5)
+
+    _, causes, fastest = lies(world(), fault, 2.0)
+    assert Cause.SCAN_BLIND in causes
+    assert fastest <= 0.15 + 1e-9
+
+
+def test_a_huge_scan_is_thinned_out_to_the_nearest_of_neighbours() -> None:
+    made = world()
+
+    def fine(scan: Scan) -> Scan:
+        ranges_m = np.repeat(np.asarray(scan.ranges_m), 250)
+        step_rad = scan.angle_increment_rad / 250
+        return dataclasses.replace(
+            scan,
+            ranges_m=ranges_m,
+            angle_increment_rad=step_rad,
+            angle_max_rad=scan.angle_min_rad + step_rad * (ranges_m.size - 1),
+        )
+
+    made.fault = fine
+    least_m, causes, _ = lies(made, fine)
+    assert causes == {Cause.NONE, Cause.OBSTACLE_NEAR, Cause.OBSTACLE}
+    assert 0.12 < least_m < 0.2
