@@ -10,7 +10,7 @@ from typing import Any
 
 from canbase_action_server.admission import state_reason
 from canbase_action_server.request import DriveRequest, Request, RotateRequest
-from canbase_cli.checks import Check, fail, ok, warn
+from canbase_cli.checks import Check, fail, ok, too_slow, warn
 from canbase_cli.evidence import Evidence, Goal
 
 ACTION = "drive_distance"
@@ -127,9 +127,8 @@ def feedback_rate(seen: Evidence) -> Check:
     rate_hz = max((seen.on(f"{goal.action}/_action/feedback").rate_hz for goal in seen.running), default=0.0)
     if rate_hz >= wanted_hz / 2.0:
         return ok(name, f"at {rate_hz:.1f} Hz")
-    return fail(
-        name, f"at {rate_hz:.1f} Hz instead of {wanted_hz:.0f} Hz", "is the server's computer overloaded? See its log"
-    )
+    found = f"at {rate_hz:.1f} Hz instead of {wanted_hz:.0f} Hz"
+    return too_slow(seen.overload.sentence, name, found, "is the server's computer overloaded? See its log")
 
 
 def client_listens(seen: Evidence) -> Check:
@@ -147,15 +146,13 @@ def client_listens(seen: Evidence) -> Check:
 
 def nothing_blocks(seen: Evidence) -> Check:
     """Does any callback of the server take so long that the others wait?"""
-    return _fast(
-        "no blocking work", seen.answers.question_s, "a callback blocks, or the computer is overloaded: see its log"
-    )
+    return _fast(seen, "no blocking work", seen.answers.question_s, "a callback of the server blocks: see its log")
 
 
 def cancel_is_heard(seen: Evidence) -> Check:
     """Do cancel requests wait longer than other questions?"""
     return _fast(
-        "callback group of the cancel", seen.answers.cancel_s, "the cancel waits for callbacks of its own group"
+        seen, "callback group of the cancel", seen.answers.cancel_s, "the cancel waits for callbacks of its own group"
     )
 
 
@@ -166,9 +163,8 @@ def control_cycle(seen: Evidence) -> Check:
         return warn(name, "no goal runs now: the control cycle was not measured", "call doctor while a goal runs")
     gap_s = orders.longest_gap_s
     if gap_s > SLOW_ANSWER_S:
-        return fail(
-            name, f"orders came up to {gap_s:.2f} s apart", "too little CPU for the server: see the load, nice, chrt"
-        )
+        advice = "too little CPU for the server: see the load, nice, chrt"
+        return too_slow(seen.overload.sentence, name, f"orders came up to {gap_s:.2f} s apart", advice)
     return ok(name, f"orders at most {gap_s * 1e3:.0f} ms apart")
 
 
@@ -181,9 +177,8 @@ def stop_procedure(seen: Evidence) -> Check:
         return warn(name, "no goal was stopped in the last ten seconds", "cancel one, then call doctor at once")
     found = f"the last one took {took_s[-1]:.2f} s"
     if took_s[-1] > allowed_s:
-        return fail(
-            name, f"{found}, expected at most {allowed_s:.2f} s", "load, slope, or limits.deceleration_mps2 too high"
-        )
+        slow = f"{found}, expected at most {allowed_s:.2f} s"
+        return too_slow(seen.overload.sentence, name, slow, "payload, slope, or limits.deceleration_mps2 too high")
     return ok(name, found)
 
 
@@ -268,11 +263,14 @@ def _finite(goal: Any) -> bool:
     return all(math.isfinite(getattr(goal, name)) for name in goal.__slots__)
 
 
-def _fast(name: str, times_s: tuple[float, ...], advice: str) -> Check:
+def _fast(seen: Evidence, name: str, times_s: tuple[float, ...], advice: str) -> Check:
     if not times_s:
         return fail(name, "the server was not asked: it is not seen", "canbase doctor --symptom not-listed")
     found = f"answers within {max(times_s) * 1e3:.0f} ms at most, {len(times_s)} questions"
-    return fail(name, found, advice) if max(times_s) > SLOW_ANSWER_S else ok(name, found)
+    if max(times_s) <= SLOW_ANSWER_S:
+        return ok(name, found)
+    silent = math.inf in times_s  # no answer at all is no matter of a busy computer
+    return too_slow("" if silent else seen.overload.sentence, name, found, advice)
 
 
 def _stop_time_s(seen: Evidence, stopping: dict[str, Any]) -> float:

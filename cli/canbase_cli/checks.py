@@ -23,10 +23,16 @@ class Verdict(Enum):
     OK = "ok"
     WARN = "warn"
     """It works, or cannot be told now; somebody should look at it."""
+    INCONCLUSIVE = "inconclusive"
+    """It took too long, and so did everything else on this computer: no evidence for or against."""
     FAIL = "FAIL"
 
 
-STYLE = {Verdict.OK: "green", Verdict.WARN: "yellow", Verdict.FAIL: "bold red"}
+STYLE = {Verdict.OK: "green", Verdict.WARN: "yellow", Verdict.INCONCLUSIVE: "magenta", Verdict.FAIL: "bold red"}
+
+
+INCONCLUSIVE = 3
+"""Exit code."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +60,16 @@ def fail(name: str, found: str, advice: str) -> Check:
     return Check(name, Verdict.FAIL, found, advice)
 
 
+def too_slow(overload: str, name: str, found: str, advice: str) -> Check:
+    """A time that is too long: wrong, or no evidence where `overload` says that this computer itself is late."""
+    if not overload:
+        return fail(name, found, advice)
+    evidence = f"{found}; this computer is overloaded: {overload}"
+    return Check(
+        name, Verdict.INCONCLUSIVE, evidence, "call doctor again when the computer has time; see top, nice, chrt"
+    )
+
+
 def good_file(loaded: Loaded) -> Check:
     """The first row: a file that is wrong would have ended the command."""
     robot = loaded.robot
@@ -66,8 +82,10 @@ def first_failure(checks: Sequence[Check]) -> Check | None:
 
 
 def exit_code(checks: Sequence[Check]) -> int:
-    """0 only if nothing failed."""
-    return 0 if first_failure(checks) is None else 1
+    """0: nothing failed; 1: something did; INCONCLUSIVE: neither, and something cannot be judged."""
+    if first_failure(checks) is not None:
+        return 1
+    return INCONCLUSIVE if any(check.verdict is Verdict.INCONCLUSIVE for check in checks) else 0
 
 
 def table(title: str, checks: Sequence[Check]) -> Table:

@@ -55,7 +55,8 @@ def doctor(
     SDO and compared with robot.yaml; beside a running driver only while that one is quiet. With --symptom it walks
     through what can be the reason, up to the first check that fails.
 
-    Exit codes: 0 nothing failed, 1 something did, 2 wrong command line or robot.yaml.
+    Exit codes: 0 nothing failed, 1 something did, 2 wrong command line or robot.yaml, 3 nothing failed, and something
+    cannot be judged because this computer is overloaded.
     """
     loaded, arguments = load_config(config), ros_arguments(ctx, namespace)
     checks = _walk(symptom, loaded, arguments, seconds) if symptom else _all(loaded, arguments, seconds, with_bus=bus)

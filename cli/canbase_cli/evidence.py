@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from canbase_action_server.inputs import Inputs
+from canbase_cli.overload import Overload
 from canbase_config.robot import Robot
 
 ACTIONS = ("drive_distance", "rotate_angle")
@@ -122,6 +123,8 @@ class Evidence:
     environment: Mapping[str, str] = field(default_factory=dict)
     """Of doctor itself."""
     answers: Answers = Answers()
+    overload: Overload = field(default_factory=Overload)
+    """Of this computer, while doctor listened."""
 
     def on(self, topic: str) -> Heard:
         """What came on `topic`."""

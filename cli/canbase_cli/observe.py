@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
+from dataclasses import replace
 from typing import Any, Final
 
 import rclpy
@@ -21,6 +22,7 @@ from sensor_msgs.msg import LaserScan
 from canbase_action_server import messages
 from canbase_action_server.inputs import Inputs
 from canbase_cli.evidence import ACTIONS, DOCTOR, Endpoint, Evidence, Goal, Heard
+from canbase_cli.overload import Overload, load_per_core
 from canbase_cli.probes import SERVER, TYPES, Prober
 from canbase_cli.server_processes import server_processes, talks_by
 from canbase_config.load import Loaded
@@ -101,12 +103,14 @@ def observe(loaded: Loaded, ros_args: list[str], seconds: float) -> Evidence:
     try:
         node = rclpy.create_node(DOCTOR, enable_rosout=False)
         listener, prober = Listener(node, loaded.robot), Prober(node)
-        until = time.monotonic() + DISCOVERY_S + seconds
+        until, late_s = time.monotonic() + DISCOVERY_S + seconds, 0.0
         while (left_s := until - time.monotonic()) > 0.0:
+            began_s = time.monotonic()
             rclpy.spin_once(node, timeout_sec=min(SLICE_S, left_s))
+            late_s = max(late_s, time.monotonic() - began_s - SLICE_S)
             until = min(until, max(listener.found_s, prober.first_answer_s) + seconds)
             prober.step(listener.goals())
-        return _evidence(loaded, node, listener, prober)
+        return replace(_evidence(loaded, node, listener, prober), overload=Overload(late_s, load_per_core()))
     finally:
         rclpy.try_shutdown()
 

@@ -19,8 +19,9 @@ from tf2_msgs.msg import TFMessage
 from canbase_action_server.along_track import Pose
 from canbase_action_server.inputs import Driver, Inputs, Mux, Safety
 from canbase_action_server.inputs import Odometry as OdometryInput
-from canbase_cli.checks import Verdict, first_failure
+from canbase_cli.checks import INCONCLUSIVE, Verdict, exit_code, first_failure
 from canbase_cli.evidence import Answers, Endpoint, Evidence, Goal, Heard, ServerProcess
+from canbase_cli.overload import Overload
 from canbase_cli.server_processes import server_processes, talks_by
 from canbase_cli.symptom_walk import CHECKS, walk
 from canbase_cli.symptoms import SYMPTOMS
@@ -270,3 +271,56 @@ def test_servers_are_found_among_all_processes_with_what_decides_whom_they_talk_
     found = (ServerProcess(10, {"ROS_DOMAIN_ID": "5"}), ServerProcess(11, {}), ServerProcess(15, {}))
     assert server_processes(tmp_path) == found
     assert talks_by(99, tmp_path) == {}
+
+
+BUSY = Overload(late_s=0.4, load=5.0)
+LATE = Time(sec=WALL_S - 3)
+SLOW = [
+    ("only-in-simulation", but(odom=heard(odometry(LATE))), "odometry"),
+    ("no-feedback", but(RUNNING, **{FEEDBACK: heard(*[0] * 10, every_s=0.25)}), "feedback is published"),
+    ("slow-cancel", replace(RUNNING, answers=Answers(question_s=(0.3,), cancel_s=(0.01,))), "no blocking work"),
+    (
+        "slow-cancel",
+        replace(RUNNING, answers=Answers(question_s=(0.01,), cancel_s=(0.3,))),
+        "callback group of the cancel",
+    ),
+]
+
+
+@pytest.mark.parametrize(("symptom", "seen", "name"), SLOW)
+def test_what_is_late_on_an_overloaded_computer_is_inconclusive_and_accuses_nobody(
+    symptom: str, seen: Evidence, name: str
+) -> None:
+    quiet = {row.name: row for row in walk(symptom, seen)}
+    assert quiet[name].verdict is Verdict.FAIL
+    rows = walk(symptom, replace(seen, overload=BUSY))
+    row = next(row for row in rows if row.name == name)
+    assert row.verdict is Verdict.INCONCLUSIVE
+    assert "this computer is overloaded: doctor's own turns were up to 0.40 s late" in row.found
+    assert "clocks" not in row.advice
+    assert exit_code([row]) == INCONCLUSIVE
+
+
+@pytest.mark.parametrize(
+    ("symptom", "seen", "name"),
+    [
+        ("only-in-simulation", but(odom=heard(odometry(OLD))), "odometry"),  # 100 s
+        ("only-in-simulation", but(odom=heard(odometry(Time(sec=WALL_S + 30)))), "odometry"),  # from the future
+        (
+            "slow-cancel",
+            replace(RUNNING, answers=Answers(question_s=(math.inf,), cancel_s=(0.01,))),
+            "no blocking work",
+        ),
+    ],
+)
+def test_what_no_load_explains_fails_on_an_overloaded_computer_too(symptom: str, seen: Evidence, name: str) -> None:
+    rows = walk(symptom, replace(seen, overload=BUSY))
+    assert next(row for row in rows if row.name == name).verdict is Verdict.FAIL
+
+
+@pytest.mark.parametrize(
+    ("overload", "is_one"),
+    [(Overload(), False), (Overload(0.1, 1.5), False), (Overload(0.11, 0.2), True), (Overload(0.0, 1.51), True)],
+)
+def test_what_an_overload_is(overload: Overload, is_one: bool) -> None:
+    assert bool(overload.sentence) is is_one
