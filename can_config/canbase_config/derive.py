@@ -76,6 +76,7 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
         braking_mps2=BRAKING_SHARE * limits.deceleration_mps2,
         coasting_s=coasting_s(watchdog.overspeed_factor * max_wheel_mps(robot)),
         relay=RelayLine(watchdog.relay.chip, watchdog.relay.line) if watchdog.relay else None,
+        robot=robot.name,
     )
 
 

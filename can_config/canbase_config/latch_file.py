@@ -170,7 +170,8 @@ class LatchKeeper(threading.Thread):
     def finish(self, timeout_s: float) -> None:
         """Write what is wanted, at most for so long, and end."""
         self._inbox.put(None)
-        self.join(timeout_s)
+        if self.is_alive():
+            self.join(timeout_s)
 
     def run(self) -> None:
         """The thread's body."""

@@ -26,6 +26,8 @@ SIZE: Final = 2 * SLOT
 CAUSE_BYTES: Final = 64
 DETAIL_BYTES: Final = 512
 
+BEFORE: Final = "latched since before the start: "
+
 _HEAD: Final = struct.Struct("<8sHBxHxxQ32s64s512s")
 """Magic, version, mark, code, sequence, owner, cause, detail; then zeros, then the CRC-32 of all before it."""
 _CRC: Final = struct.Struct("<I")
@@ -91,7 +93,7 @@ class Found:
         if self.record.mark is Mark.LIVE:
             return "it ended while there was power: killed, crashed, or the computer lost its supply"
         if self.record.mark is Mark.LATCHED:
-            return f"latched since before the start: {self.record.detail or self.record.cause}"
+            return f"{BEFORE}{(self.record.detail or self.record.cause).removeprefix(BEFORE)}"
         return ""
 
 

@@ -107,6 +107,8 @@ class WatchdogConfig:
     """The only user whose leases count, None: the watchdog's own."""
     relay: RelayLine | None = None
     """None: there is no such relay."""
+    robot: str = "robot"
+    """`name` in robot.yaml: whose record of a trip it keeps."""
 
     def to_json(self) -> str:
         """One line of JSON that `from_json` reads back."""

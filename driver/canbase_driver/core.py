@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Callable
 from functools import partial
 
+from canbase_config.latch_record import Found, Record
 from canbase_config.robot import DRIVER_NODE_ID, Robot
 from canbase_driver.axis import Axis
 from canbase_driver.bus_health import BusReport
@@ -41,6 +42,7 @@ from canbase_driver.report import Told, snapshot_of
 from canbase_driver.reset import Outcome
 from canbase_driver.reset_run import ResetRun
 from canbase_driver.snapshot import DriverSnapshot, DriverState, StopRecord, WatchdogView
+from canbase_driver.stop_record import PowerRecord, cause_before_the_start
 from canbase_driver.supervisor import NO_POWER, Cause, Drive, Orders, Situation, Supervisor
 from canbase_driver.watchdog_link import COUNTERS_COB_ID, STATE_COB_ID, WatchdogLink
 
@@ -59,15 +61,17 @@ Handler = Callable[[Frame, float], bool]
 class DriverCore:
     """The whole driver as one object that is told the time [s, monotonic]."""
 
-    def __init__(self, robot: Robot, aim: Aim = Aim.ACTIVE) -> None:
-        """`aim`: how far it goes by itself."""
+    def __init__(self, robot: Robot, aim: Aim = Aim.ACTIVE, found: Found | None = None) -> None:
+        """`aim`: how far it goes by itself. `found`: the record of its stops at the start; None: nobody keeps one,
+        which is for virtual time alone."""
         self._robot = robot
         self._readiness = Readiness(robot, aim)
         self._period_s = 1.0 / robot.rates.control_hz
         self._drives = Drives(robot)
         self._sync = SyncProducer(robot.bus.sync_counter)
         self._watchdog = WatchdogLink(robot.timeouts.watchdog_s)
-        self._supervisor = Supervisor(robot.timeouts.standstill_s)
+        self._supervisor = Supervisor(robot.timeouts.standstill_s, cause_before_the_start(found))
+        self._record = PowerRecord(found)
         self._limiter = Limiter(robot.limits, robot.base.track_m)
         self._feed = OdometryFeed(self._drives, robot.base.track_m)
         self._command = Command(robot.timeouts.command_s)
@@ -106,6 +110,15 @@ class DriverCore:
     def cause(self) -> Cause:
         """Why it is not enabled."""
         return self._supervisor.cause
+
+    @property
+    def record(self) -> Record:
+        """What shall be on disk now about its stops."""
+        return self._record.wanted
+
+    def on_record(self, written: Record | None, problem: str) -> None:
+        """The newest record on disk (None: none since the start), and what keeps the writer from writing."""
+        self._record.on_written(written, problem)
 
     @property
     def odometry_serial(self) -> int:
@@ -207,6 +220,7 @@ class DriverCore:
     def _judge(self, situation: Situation, now: float) -> Orders:
         before = self._supervisor.state
         orders = self._supervisor.step(situation, now)
+        self._record.note(self._supervisor, situation)
         state, cause = self._supervisor.state, self._supervisor.cause
         was_latched = state is DriverState.LATCHED and before is not DriverState.STOPPING
         if state is not before and (state is DriverState.STOPPING or was_latched):
@@ -269,6 +283,7 @@ class DriverCore:
             silent=self._drives.silent(now, self._sync_since),
             disabled=self._drives.disabled(),
             unprepared=self._drives.unprepared(),
+            unarmed=self._record.unarmed or self._watchdog.unarmed,
             watchdog=watchdog,
             watchdog_detail=watchdog_detail,
             commanded=self._command.motion(now),

@@ -15,6 +15,7 @@ import threading
 import time
 from collections.abc import Callable
 
+from canbase_config.latch_file import LatchKeeper
 from canbase_driver.black_box import Ring
 from canbase_driver.bus_port import BusPort
 from canbase_driver.core import DriverCore
@@ -38,11 +39,21 @@ OnOutcome = Callable[[Outcome], None]
 class ControlLoop(threading.Thread):
     """Runs a core on a bus. `failure` is the exception that ended it, None for an orderly end."""
 
-    def __init__(self, core: DriverCore, bus: BusPort, control_hz: float, odometry_hz: float, ring: Ring) -> None:
+    def __init__(
+        self,
+        core: DriverCore,
+        bus: BusPort,
+        control_hz: float,
+        odometry_hz: float,
+        ring: Ring,
+        keeper: LatchKeeper | None = None,
+    ) -> None:
+        """`keeper`: of the record that the core was made with; None where it was made without."""
         super().__init__(name="control", daemon=True)
         self._core = core
         self._bus = bus
         self._ring = ring
+        self._keeper = keeper
         self._period_s = 1.0 / control_hz
         self._samples_per_snapshot = max(1, round(control_hz / odometry_hz))
         self._inbox: queue.SimpleQueue[Callable[[float], object]] = queue.SimpleQueue()
@@ -160,7 +171,11 @@ class ControlLoop(threading.Thread):
             self._empty_inbox()
             now = self.cycle_at = time.monotonic()
             self._core.on_bus(self._bus.problem, now, self._bus.report)
+            if self._keeper is not None:
+                self._core.on_record(self._keeper.written, self._keeper.problem)
             self._send(self._core.tick(now, now - cycle_at))
+            if self._keeper is not None:
+                self._keeper.want(self._core.record)
             self._hand_over_if_due(now)
             if now - cycle_at > self._period_s:
                 cycle_at = now  # cycles that were missed are not made up for

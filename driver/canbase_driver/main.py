@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import gc
 import math
+import os
 import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from types import FrameType
 
 import rclpy
@@ -19,6 +21,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
+from canbase_config.latch_file import LatchFile, LatchKeeper, latch_folder
 from canbase_config.priority import Priority
 from canbase_config.robot import Robot
 from canbase_config.service import Service
@@ -40,7 +43,7 @@ END_MARGIN_S = 3.0
 WRITE_S = 5.0
 """For the recording of a stop that is just over."""
 
-Worker = ControlLoop | Publisher | BlackBoxWriter
+Worker = ControlLoop | Publisher | BlackBoxWriter | LatchKeeper
 """Each of them has a `failure`, and none may end before the process does."""
 
 
@@ -65,11 +68,13 @@ def run(
     rclpy.init(args=list(ros_args), signal_handler_options=SignalHandlerOptions.NO)
     aim = Aim.ACTIVE if autostart else Aim.RELEASED
     ring = Ring(robot.black_box.seconds)
-    loop = ControlLoop(DriverCore(robot, aim), bus, robot.rates.control_hz, robot.rates.odometry_hz, ring)
+    keeper = LatchKeeper(LatchFile(latch_folder(os.environ, Path.home(), robot.name), "driver", robot.name))
+    core = DriverCore(robot, aim, keeper.found)
+    loop = ControlLoop(core, bus, robot.rates.control_hz, robot.rates.odometry_hz, ring, keeper)
     writer = BlackBoxWriter(robot.black_box, robot.name, get_logger("motor_driver").warning)
     node = MotorDriverNode(robot, loop, ring, writer, autostart)
     publisher = Publisher(node, loop)
-    threads = (loop, publisher, writer)
+    threads = (loop, publisher, writer, keeper)
     gc.collect()
     gc.freeze()  # what is there now lives for ever: later collections need not look at it
     when_ready()
@@ -81,6 +86,7 @@ def run(
         loop.join(robot.timeouts.standstill_s + END_MARGIN_S)
         loop.deliver()
         publisher.join(1.0)
+        keeper.finish(WRITE_S)
         writer.finish(WRITE_S)
     finally:
         rclpy.shutdown()

@@ -3,11 +3,12 @@
 Rules
 1. Nothing gets power while one of BLOCKERS holds: drives booted and heard, watchdog alive and not tripped, standstill,
    no velocity commanded, no reset under way. The first that holds is the state and the cause. Then the drives are taken
-   as far as switched on, however long that lasts (STO open, no main voltage), and only together any further.
+   as far as switched on, however long that lasts (STO open, no main voltage), and only together any further, and not
+   before the records on disk say that there is power: whoever dies with it comes back latched.
 2. While there is power, the first of HAZARDS that holds stops the base: by the ramp, or by quick stop at once. On the
    way to operation enabled nothing follows a command yet, so there it is always the quick stop.
 3. A stop goes down one way only: ramp, quick stop, power off. Each step ends by measured standstill or by its deadline.
-4. A latched cause is forgotten by `reset` alone, and only when nothing has power.
+4. A latched cause is forgotten by `reset` alone, and only when nothing has power; a restart does not end it.
 5. A shutdown ends in every state: at once without power, after the stop with it.
 
 Pure: time is an argument, `Situation` says everything that was measured. It sends nothing; `Orders` says what to do.
@@ -43,6 +44,7 @@ class Situation:
     silent: str = ""  # statusword or heartbeat too old
     disabled: str = ""  # an axis is not in operation enabled
     unprepared: str = ""  # an axis has not got as far as switched on: STO open, no main voltage
+    unarmed: str = ""  # the records on disk do not say yet that there is power
     watchdog: WatchdogView = WatchdogView.OK
     watchdog_detail: str = ""
     commanded: str = ""  # a fresh command asks for motion
@@ -124,6 +126,7 @@ def _stop_requested(s: Situation) -> str:
 
 SHUTDOWN = "shutdown"
 NOT_READY = "drive not ready"
+UNARMED = "stop record"
 INACTIVE = "inactive"
 _MISSING, _TRIPPED = _watchdog(WatchdogView.MISSING), _watchdog(WatchdogView.TRIPPED)
 
@@ -194,13 +197,16 @@ ORDERS: dict[DriverState | Step | str, Orders] = {
 class Supervisor:
     """The state machine. `step` once a cycle; `reset` when the reset sequence has finished."""
 
-    def __init__(self, ramp_timeout_s: float) -> None:
-        """`ramp_timeout_s`: longest time for the driver's ramp before quick stop takes over (timeouts.standstill_s)."""
-        self.state = DriverState.BOOTING
-        self.cause = Cause("booting", "", "drives booted")
+    def __init__(self, ramp_timeout_s: float, latched: Cause | None = None) -> None:
+        """`ramp_timeout_s`: longest time for the driver's ramp before quick stop takes over (timeouts.standstill_s).
+
+        `latched`: a stop of before the start, which ends by a reset alone.
+        """
+        self.state = DriverState.LATCHED if latched else DriverState.BOOTING
+        self.cause = latched or Cause("booting", "", "drives booted")
         self.finished = False
         """A shutdown was asked for, and the way down is at its end."""
-        self.latches = False
+        self.latches = latched is not None
         """The stop that is under way, or the last one, needs a reset."""
         self._step = Step.OFF
         self._since_s = 0.0
@@ -212,7 +218,7 @@ class Supervisor:
         self._RULES[self.state](self, situation, now)
         if (self.state, self._step) != before:
             self._since_s = now
-        if self.state is DriverState.DISARMED and self.cause.name == NOT_READY:
+        if self.state is DriverState.DISARMED and self.cause.name in (NOT_READY, UNARMED):
             return ORDERS[PREPARING]
         return ORDERS[self._step if self.state is DriverState.STOPPING else self.state]
 
@@ -230,6 +236,9 @@ class Supervisor:
         elif blocker is None and situation.unprepared:
             self.state = DriverState.DISARMED
             self.cause = Cause(NOT_READY, situation.unprepared, "the drive being switched on")
+        elif blocker is None and situation.unarmed:
+            self.state = DriverState.DISARMED
+            self.cause = Cause(UNARMED, situation.unarmed, "the record on disk")
         elif blocker is None:
             self.state, self.cause = DriverState.ENABLING, Cause("enabling", "", "operation enabled on all drives")
         else:

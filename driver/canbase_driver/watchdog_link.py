@@ -22,6 +22,8 @@ LEASE_AGE_UNKNOWN = 0xFFFF
 RESET_KEY = b"RST"
 
 STARTING, WATCHING, TRIPPED = 0, 1, 2
+ARMED = 0x80
+"""Bit of byte 2, above the rung: its record on disk says that there is power."""
 
 CAUSES = {
     0: "none",
@@ -37,6 +39,8 @@ CAUSES = {
     10: "own loop late",
     11: "told to end while a wheel turned",
     12: "feedback implausible",
+    20: "ended while a drive had power",
+    21: "record of its last trip unusable",
 }
 ANSWERS = {
     1: "reset done",
@@ -59,6 +63,8 @@ class WatchdogState:
     lease_age_ms: int
     answered: int
     answer: int
+    armed: bool = False
+    """Its record on disk says that there is power: killed now, it comes back tripped."""
 
     @property
     def cause_text(self) -> str:
@@ -88,7 +94,9 @@ def parse_state(frame: Frame) -> WatchdogState | None:
     """The watchdog's state, or None when the frame is not one."""
     if frame.cob_id != STATE_COB_ID or len(frame.data) != STATE_LAYOUT.size:
         return None
-    state = WatchdogState(*STATE_LAYOUT.unpack(frame.data))
+    number, cause, rung, node_id, age_ms, answered, answer = STATE_LAYOUT.unpack(frame.data)
+    armed = bool(rung & ARMED)
+    state = WatchdogState(number, cause, rung & ~ARMED, node_id, age_ms, answered, answer, armed)
     return state if state.state in (STARTING, WATCHING, TRIPPED) else None
 
 
@@ -124,6 +132,13 @@ class WatchdogLink:
     def rung(self) -> int:
         """How far up its ladder it has gone, 0 to 4 (docs/bus.md); 0 while it was never heard."""
         return self._state.rung if self._state else 0
+
+    @property
+    def unarmed(self) -> str:
+        """A sentence until its record of trips is on disk, for which it waits before drives get power; else empty."""
+        if self._state is not None and self._state.armed:
+            return ""
+        return "the watchdog's record of trips is not on disk yet; if it stays so, look at the watchdog's log"
 
     @property
     def lease_age_s(self) -> float:

@@ -14,7 +14,7 @@ from canbase_driver.reset import Outcome
 from canbase_driver.snapshot import DriverState, WatchdogView
 from unit.chain_world import World, bench_robot
 
-WATCHING = Frame(0x1FE, bytes.fromhex("01 00 00 00 14 00 00 00"))
+WATCHING = Frame(0x1FE, bytes.fromhex("01 00 80 00 14 00 00 00"))
 
 
 @pytest.fixture
@@ -75,7 +75,7 @@ def test_a_reset_asks_the_watchdog_in_every_cycle_until_it_answers(core: DriverC
         core.on_frame(WATCHING, 10.0 + 0.01 * cycle)
         asked = [frame for frame in core.tick(10.0 + 0.01 * cycle) if frame.cob_id == 0x27E]
         assert [str(frame) for frame in asked] == ["27Eh [01 52 53 54]"]
-    core.on_frame(Frame(0x1FE, bytes.fromhex("01 00 00 00 14 00 01 04")), 10.04)
+    core.on_frame(Frame(0x1FE, bytes.fromhex("01 00 80 00 14 00 01 04")), 10.04)
     assert [frame for frame in core.tick(10.04) if frame.cob_id == 0x27E] == []
     assert outcomes == []
 

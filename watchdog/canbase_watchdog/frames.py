@@ -81,6 +81,8 @@ class DriveState(enum.Enum):
     FAULT = (0x4F, 0x08)
 
 
+ARMED = 0x80
+"""Byte 2 of the state frame, above the rung."""
 POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
 """States in which the motor has current."""
 
@@ -169,10 +171,15 @@ def heartbeat() -> Frame:
     return Frame(WATCHDOG_HEARTBEAT, bytes([OPERATIONAL]))
 
 
-def state(number: int, cause: int, rung: int, node_id: int, lease_age_s: float, reset: tuple[int, int]) -> Frame:
-    """The state frame. `lease_age_s` above 65.534 s (infinity too) is sent as unknown; `reset`: number, answer."""
+def state(
+    number: int, cause: int, rung: int, node_id: int, lease_age_s: float, reset: tuple[int, int], armed: bool = False
+) -> Frame:
+    """The state frame. `lease_age_s` above 65.534 s (infinity too) is sent as unknown; `reset`: number, answer.
+
+    `armed`: the record on disk says that there is power.
+    """
     age_ms = int(max(lease_age_s, 0.0) * 1000.0) if lease_age_s < 65.535 else LEASE_AGE_UNKNOWN
-    return Frame(STATE, _STATE.pack(number, cause, rung, node_id, age_ms, *reset))
+    return Frame(STATE, _STATE.pack(number, cause, rung | (ARMED if armed else 0), node_id, age_ms, *reset))
 
 
 def counters(refused: int, dropped: int, bus_errors: int, trips: int, gap_s: float) -> Frame:

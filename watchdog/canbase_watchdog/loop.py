@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import gc
+import logging
 import select
 import time
 from collections.abc import Callable
 
 from canbase_watchdog.bus_port import BusPort
+from canbase_watchdog.latch_file import Keeper
 from canbase_watchdog.lease_socket import LeaseSocket
 from canbase_watchdog.relay import Relay
 from canbase_watchdog.report import Reporter
@@ -20,6 +22,8 @@ END_S = 1.0
 """How long it goes on stopping the drives after it was asked to end."""
 COLLECT_S = 10.0
 
+_log = logging.getLogger("canbase.watchdog")
+
 
 class BusDeadError(Exception):
     """No frame could be sent for BUS_DEAD_S."""
@@ -28,12 +32,22 @@ class BusDeadError(Exception):
 class Loop:
     """Ticks at absolute times every TICK_S, and once more just when a timeout runs out."""
 
-    def __init__(self, watchdog: Watchdog, bus: BusPort, leases: LeaseSocket, relay: Relay | None = None) -> None:
-        """Owns none of them: the caller opens and closes. `relay`: None where there is none."""
+    def __init__(
+        self,
+        watchdog: Watchdog,
+        bus: BusPort,
+        leases: LeaseSocket,
+        relay: Relay | None = None,
+        keeper: Keeper | None = None,
+    ) -> None:
+        """Owns none of them: the caller opens and closes. `relay`: None where there is none. `keeper`: of the record
+        that the watchdog was made with; None where it was made without."""
         self._watchdog = watchdog
         self._bus = bus
         self._leases = leases
         self._relay = relay
+        self._keeper = keeper
+        self._record_problem = ""
         self._reporter = Reporter(watchdog)
         self._bus_fd = bus.fileno()
         self._due = self._sent_at = self._collected_at = time.monotonic()
@@ -78,13 +92,27 @@ class Loop:
     def _act(self, now: float) -> None:
         health = self._bus.health
         self._watchdog.on_bus(health.failed_since, health.errors)
+        if self._keeper is not None:
+            self._watchdog.on_record(self._keeper.written, self._keeper.problem)
         for frame in self._watchdog.tick(now):
             self._bus.send(frame)
         if self._relay is not None and self._watchdog.keeps_relay:
             self._relay.toggle()
+        self._keep_record()
         self._check_bus(now)
         self._reporter.tick(health, now, self._bus.datagrams_dropped)
         self._collect(now)
+
+    def _keep_record(self) -> None:
+        """Hands over what shall be on disk; the writer's defect is this loop's."""
+        if self._keeper is None:
+            return
+        if self._keeper.failure is not None:
+            raise self._keeper.failure
+        self._keeper.want(self._watchdog.record)
+        if self._keeper.problem != self._record_problem:
+            self._record_problem = self._keeper.problem
+            _log.warning("%s", self._record_problem or "the record of trips can be written again")
 
     def _check_bus(self, now: float) -> None:
         if self._bus.health.takes_frames:

@@ -11,17 +11,22 @@ import sys
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
+from pathlib import Path
 from types import FrameType
 
 from canbase_config.watchdog import WatchdogConfig
-from canbase_watchdog import realtime
+from canbase_watchdog import latch_file, realtime
 from canbase_watchdog.bus_port import BusError, BusPort
+from canbase_watchdog.latch_file import Keeper
 from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
 from canbase_watchdog.log import formatter
 from canbase_watchdog.loop import BusDeadError, Loop
 from canbase_watchdog.notify import notify
 from canbase_watchdog.relay import Relay, RelayError
 from canbase_watchdog.watchdog import Watchdog
+
+WRITE_S = 1.0
+"""For the record at the end."""
 
 _log = logging.getLogger("canbase.watchdog")
 
@@ -60,21 +65,25 @@ def _serve(config: WatchdogConfig) -> int:
         bus = stack.enter_context(BusPort(config.bus_arguments))
         leases = stack.enter_context(LeaseSocket(config.lease_socket, uid))
         relay = stack.enter_context(Relay(config.relay)) if config.relay else None
-        watchdog = Watchdog(config, time.monotonic())
+        keeper = Keeper(latch_file.path_of(os.environ, Path.home(), config.robot), config.robot)
+        watchdog = Watchdog(config, time.monotonic(), keeper.past)
         try:
-            _guard(Loop(watchdog, bus, leases, relay), asked)
+            _guard(Loop(watchdog, bus, leases, relay, keeper), keeper, asked)
         except BaseException:
             for frame in watchdog.quick_stops():
                 bus.send(frame)
             raise
+        finally:
+            keeper.finish(WRITE_S)
     _log.info("ended by %s", signal.Signals(asked[0]).name)
     return 0
 
 
-def _guard(loop: Loop, asked: list[int]) -> None:
+def _guard(loop: Loop, keeper: Keeper, asked: list[int]) -> None:
     complaint = realtime.prepare()
     if complaint is not None:
         _log.warning("%s", complaint)
+    keeper.start()  # with the priority of this thread: one below it that holds Python's lock would hold this one up
     notify("READY=1")
     loop.run(lambda: bool(asked))
     notify("STOPPING=1")

@@ -10,7 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from canbase_config.watchdog import WatchdogConfig
-from canbase_watchdog.view import Axis, Node, View
+from canbase_watchdog.frames import DriveState
+from canbase_watchdog.latch import Mark, Past
+from canbase_watchdog.view import NEVER, Axis, Node, View
 
 
 class Cause(enum.IntEnum):
@@ -29,6 +31,8 @@ class Cause(enum.IntEnum):
     LOOP_LATE = 10
     ENDED = 11
     FEEDBACK_IMPLAUSIBLE = 12
+    POWER_AT_END = 20
+    RECORD_UNUSABLE = 21
 
 
 SENSOR_CAUSES = (Cause.FEEDBACK_IMPLAUSIBLE,)
@@ -49,6 +53,24 @@ class Verdict:
 FINE = Verdict()
 
 
+def before_the_start(past: Past) -> Verdict:
+    """Why it is tripped from its first moment; FINE where a readable record says that it is not."""
+    if not past.latched:
+        return FINE
+    if past.problem:
+        detail = f"the record of its last trip cannot be used: {past.problem}"
+        return Verdict(Cause.RECORD_UNUSABLE, 0, detail)
+    entry = past.entry
+    if entry.mark is Mark.LIVE:
+        return Verdict(Cause.POWER_AT_END, 0, "it ended while a drive had power, or the computer lost its supply")
+    known = entry.cause in tuple(Cause) and entry.cause != Cause.NONE
+    cause = Cause(entry.cause) if known else Cause.RECORD_UNUSABLE
+    return Verdict(cause, entry.node_id, f"{BEFORE}{entry.detail.removeprefix(BEFORE)}")
+
+
+BEFORE = "since before the start: "
+
+
 def moving(axis: Axis, config: WatchdogConfig) -> bool:
     """True for a wheel that turns under power. One that is pushed by hand, its power off, may turn."""
     return axis.powered and abs(axis.velocity_mps) > config.standstill_mps
@@ -63,6 +85,18 @@ def commanded(axis: Axis, config: WatchdogConfig) -> bool:
 def in_motion(view: View, config: WatchdogConfig) -> Axis | None:
     """The first wheel that turns or is ordered to, None: all rest."""
     return next((axis for axis in view.axes if moving(axis, config) or commanded(axis, config)), None)
+
+
+def near_power(axis: Axis) -> bool:
+    """It has power, is ordered to, or is one step before it: from here on the record on disk must say so."""
+    return axis.powered or axis.state is DriveState.SWITCHED_ON or axis.asks_for_power
+
+
+def is_off(axis: Axis, view: View, config: WatchdogConfig, now: float) -> bool:
+    """Fresh feedback says so, or there is no such drive."""
+    if view.node(axis.drive.node_id).heard_at == NEVER and not axis.asks_for_power:
+        return True
+    return not near_power(axis) and axis.state is not None and now < axis.status_at + config.feedback_timeout_s
 
 
 def velocity_ordered(view: View, config: WatchdogConfig, now: float) -> bool:

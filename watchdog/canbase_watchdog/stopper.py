@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog import frames
@@ -26,8 +27,20 @@ _WORD_BY_STEP = {
 class Stopper:
     """Stops one node and keeps it stopped, from the trip until the reset."""
 
-    def __init__(self, node_id: int, config: WatchdogConfig, view: View, now: float, trusted: bool = True) -> None:
-        """Begins at the foot of the ladder at the monotonic time `now` [s]; without `trusted`, a sensor lied."""
+    def __init__(
+        self,
+        node_id: int,
+        config: WatchdogConfig,
+        view: View,
+        now: float,
+        trusted: bool = True,
+        resting: bool = False,
+    ) -> None:
+        """Begins at the foot of the ladder at the monotonic time `now` [s]; without `trusted`, a sensor lied.
+
+        `resting`: for a trip of before the start. A drive that is off is left alone, so that it can be booted; one that
+        has power or moves is stopped.
+        """
         self._node_id = node_id
         self._config = config
         self._braking = Braking.of(config)
@@ -35,14 +48,14 @@ class Stopper:
         drives = [drive for drive in config.drives if drive.node_id == node_id]
         self._layout, self._axis_count = drives[0].layout, len(drives)
         self._seen = self._look(view)
-        self.climb: Climb = first(self._seen, now)
+        self.climb: Climb = replace(first(self._seen, now), stopped=resting, assumed=resting and not trusted)
         self._quick_stop_at = self._nmt_at = self._sdo_at = NEVER
         self._sdo_turn = 0
 
     @property
     def settled(self) -> bool:
         """True when the node stands and is off or held, as its feedback said, or when there is no such node."""
-        return self.climb.stopped or not self._seen.present
+        return (self.climb.stopped and self._seen.seen_at > self.climb.since) or not self._seen.present
 
     def tick(self, view: View, now: float) -> list[Frame]:
         """Look at the node, climb where the rules say so, and return the frames that are due."""

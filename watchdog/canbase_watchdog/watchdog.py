@@ -11,6 +11,7 @@ from canbase_watchdog import frames, policy
 from canbase_watchdog.envelope import Envelope
 from canbase_watchdog.frames import Frame
 from canbase_watchdog.ladder import Step
+from canbase_watchdog.latch import Entry, Ledger, Mark, Past
 from canbase_watchdog.lease import LeaseBook, Refusal
 from canbase_watchdog.observer import Observer
 from canbase_watchdog.pair import PairWatch
@@ -53,17 +54,22 @@ class Status:
     reset: tuple[int, Answer]
     assumed: bool = False
     """Some drive was not seen to stand: its sensor cannot be trusted, and its power is off for longer than it rolls."""
+    armed: bool = False
+    """The record on disk says that there is power."""
 
 
 class Watchdog:
     """Trips when policy.py says so and then stops every drive until a reset. All times are monotonic seconds.
 
     States: STARTING until it has listened for as long as a heartbeat may take (it trips already), then WATCHING;
-    TRIPPED from the first cause on, latched: only an accepted reset request leads back to WATCHING.
+    TRIPPED from the first cause on, latched: only an accepted reset request leads back to WATCHING, over restarts too.
     """
 
-    def __init__(self, config: WatchdogConfig, now: float) -> None:
-        """`config.lease_uid` None: leases of any user count, so the caller puts in its own."""
+    def __init__(self, config: WatchdogConfig, now: float, past: Past | None = None) -> None:
+        """`config.lease_uid` None: leases of any user count, so the caller puts in its own.
+
+        `past`: the record of its last life; None: nobody keeps one, which is for virtual time alone.
+        """
         self._config = config
         self._observer = Observer(config, now)
         self._envelope = Envelope(config, now)
@@ -80,14 +86,29 @@ class Watchdog:
         self._heartbeat_due = self._state_due = self._counters_due = now
         self._told: Status | None = None
         self._longest_gap_s = 0.0
+        self._ledger = Ledger(past)
         self.trips = 0
         """Since the start."""
+        before = policy.before_the_start(past) if past is not None else policy.FINE
+        if before.cause is not Cause.NONE:
+            self._latch(before, now, resting=True)
+        self._note_record(now)
 
     @property
     def status(self) -> Status:
         """State, cause and rung as of now."""
         assumed = any(stopper.climb.assumed for stopper in self._stoppers)
-        return Status(self._state, self._verdict, self._step, self._settled, self._reset, assumed)
+        armed = self._ledger.wanted.mark is Mark.LIVE and self._ledger.is_on_disk
+        return Status(self._state, self._verdict, self._step, self._settled, self._reset, assumed, armed)
+
+    @property
+    def record(self) -> Entry:
+        """What shall be on disk now."""
+        return self._ledger.wanted
+
+    def on_record(self, written: Entry | None, problem: str) -> None:
+        """The newest record on disk (None: none since the start), and what keeps the writer from writing."""
+        self._ledger.on_written(written, problem)
 
     @property
     def keeps_relay(self) -> bool:
@@ -133,15 +154,20 @@ class Watchdog:
         self._view = self._look(now)
         self._longest_gap_s = max(self._longest_gap_s, self._view.tick_gap_s)
         self._ticked_at = now
+        stop = self._judge(now)
+        self._note_record(now)
+        return stop + self._tell(now)
+
+    def _judge(self, now: float) -> list[Frame]:
         if self._state is State.TRIPPED:
-            return self._stop(now) + self._tell(now)
+            return self._stop(now)
         if self._state is State.STARTING and now >= self._started_at + self._config.drive_heartbeat_s:
             self._state = State.WATCHING
         verdict = policy.decide(self._view, self._config, now)
         if verdict.cause is Cause.NONE:
-            return self._tell(now)
+            return []
         self._trip(verdict, now)
-        return self._stop(now) + self._tell(now)
+        return self._stop(now)
 
     def next_expiry(self, now: float) -> float:
         """When the next timeout would run out [s]: a tick just then stops without delay."""
@@ -155,6 +181,7 @@ class Watchdog:
             return
         detail = f"asked to end while {axis.drive.joint} turns at {axis.velocity_mps:.3f} m/s"
         self._trip(Verdict(Cause.ENDED, 0, detail), now)
+        self._note_record(now)
 
     def quick_stops(self) -> list[Frame]:
         """A quick stop for every node, whatever the state: for a way out on which nothing else can be trusted."""
@@ -170,13 +197,28 @@ class Watchdog:
         return View(bus, bounds, self._started_at, leases.last, leases.valid_at, skew, gap_s, failed)
 
     def _trip(self, verdict: Verdict, now: float) -> None:
+        self.trips += 1
+        self._latch(verdict, now)
+
+    def _latch(self, verdict: Verdict, now: float, resting: bool = False) -> None:
         self._state = State.TRIPPED
         self._verdict = verdict
-        self.trips += 1
         self._observer.commands_are_ours = True
         nodes = dict.fromkeys(drive.node_id for drive in self._config.drives)
         lying = verdict.node_id if verdict.cause in policy.SENSOR_CAUSES else 0
-        self._stoppers = [Stopper(node_id, self._config, self._view, now, node_id != lying) for node_id in nodes]
+        self._stoppers = [
+            Stopper(node_id, self._config, self._view, now, node_id != lying, resting) for node_id in nodes
+        ]
+
+    def _note_record(self, now: float) -> None:
+        """LIVE before there is power, and until all of it was seen to be off."""
+        verdict, axes = self._verdict, self._view.axes
+        if self._state is State.TRIPPED:
+            self._ledger.want(Mark.LATCHED, verdict.cause, verdict.node_id, verdict.detail)
+        elif all(policy.is_off(axis, self._view, self._config, now) for axis in axes):
+            self._ledger.want(Mark.CLEAR)
+        elif self._ledger.wanted.mark is not Mark.CLEAR or any(policy.near_power(axis) for axis in axes):
+            self._ledger.want(Mark.LIVE)
 
     def _stop(self, now: float) -> list[Frame]:
         return [frame for stopper in self._stoppers for frame in stopper.tick(self._view, now)]
@@ -208,7 +250,9 @@ class Watchdog:
     def _state_frame(self, status: Status, now: float) -> Frame:
         age_s = now - self._leases.valid_at
         verdict = status.verdict
-        return frames.state(status.state, verdict.cause, status.step, verdict.node_id, age_s, status.reset)
+        return frames.state(
+            status.state, verdict.cause, status.step, verdict.node_id, age_s, status.reset, status.armed
+        )
 
     def _counters_frame(self) -> Frame:
         refused, gap_s = sum(self._leases.refused.values()), self._longest_gap_s
