@@ -26,7 +26,7 @@ from canbase_config.load import load_robot
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.twist import Twist
 from figures import Figure, quantile, raise_priority, spread
-from ros.harness import Process, TestNode
+from ros.harness import Process, TestNode, clear_records
 from ros.running_robot import CANBASE, own_domain, robot_file
 
 ORDERS = 200
@@ -101,7 +101,7 @@ def measure(orders: int = ORDERS) -> list[Figure]:
     """The figure; each order takes about 0.5 s."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="canbase-", dir="/tmp")))
-        env = {"ROS_DOMAIN_ID": str(stack.enter_context(own_domain()))}
+        env = {"ROS_DOMAIN_ID": str(stack.enter_context(own_domain())), **clear_records(folder, "bench")}
         path = robot_file(folder, {})
         robot = load_robot(path).robot
         bus = stack.enter_context(can.Bus(**robot.bus.arguments()))

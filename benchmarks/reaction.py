@@ -26,7 +26,7 @@ from canbase_config.load import load_robot, sample
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.twist import Twist
 from figures import Figure, quantile, raise_priority, spread
-from ros.harness import free_udp_port
+from ros.harness import clear_records, free_udp_port
 
 TRIPS = 1000
 LEASE_S = 0.05
@@ -146,6 +146,7 @@ def measure(trips: int = TRIPS) -> list[Figure]:
         config = watchdog_config(robot)
         path = str(folder / "lease")
         config = replace(config, bus_arguments=arguments, lease_socket=path, lease_timeout_s=LEASE_S)
+        os.environ.update(clear_records(folder, config.robot))
         _child(stack, ["-m", "canbase_watchdog", "--config-json", config.to_json()])
         floor_path = str(folder / "floor")
         _child(stack, ["-c", FLOOR_CODE, json.dumps(arguments), floor_path, str(LEASE_S)])

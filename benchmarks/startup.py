@@ -18,7 +18,7 @@ import can
 
 from canbase_config.load import load_robot
 from figures import Figure, quantile
-from ros.harness import Process
+from ros.harness import Process, clear_records
 from ros.running_robot import CANBASE, own_domain, robot_file
 
 RUNS = 5
@@ -77,7 +77,7 @@ def _start(count: int) -> tuple[float, float]:
     """Until the driver's first frame, and from there until all drives are enabled [s]."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="canbase-", dir="/tmp")))
-        env = {"ROS_DOMAIN_ID": str(stack.enter_context(own_domain()))}
+        env = {"ROS_DOMAIN_ID": str(stack.enter_context(own_domain())), **clear_records(folder, "bench")}
         path = robot_file(folder, {"drives": drives(count)})
         bus = stack.enter_context(can.Bus(**load_robot(path).robot.bus.arguments()))
         for part in ("sim", "watchdog"):

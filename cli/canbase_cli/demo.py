@@ -91,6 +91,7 @@ def demo(
         with ros_needed():
             import rclpy  # noqa: F401 - fails here, with advice, rather than in five processes
         config = _robot_file(Path(folder))
+        env["XDG_STATE_HOME"] = str(Path(folder) / "state")  # no stop of another run, and none is left behind
         report = Report()
         with Stack(config, sim=True, logs=Path(folder), env=env) as stack:
             _show(console, stack, config, report, speed_mps)

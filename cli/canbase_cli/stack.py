@@ -10,7 +10,7 @@ import os
 import signal
 import subprocess
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -54,6 +54,7 @@ class Stack:
     ) -> None:
         """`sim`: simulated drives too. `ros_args`: for the parts with ROS. `logs`: a folder for the parts' output, one
         file each; None: they write to this terminal. `env`: their environment; None: that of this process."""
+        self._config = config
         self._options = ["--config", str(config), *(["--namespace", namespace] if namespace else [])]
         self._ros_args = list(ros_args)
         self._parts = [part for part in START_ORDER if sim or part != "sim"]
@@ -76,10 +77,24 @@ class Stack:
         return {part: process.pid for part, process in self._running.items()}
 
     def start(self) -> None:
-        """Starts the parts that do not run; they find each other by themselves, in whatever order they get ready."""
+        """Starts the parts that do not run; they find each other by themselves, in whatever order they get ready.
+
+        A robot that has never run here begins with clear records of stops.
+        """
+        self._clear_first_records()
         for part in self._parts:
             if part not in self._running:
                 self._running[part] = self._spawn(part)
+
+    def _clear_first_records(self) -> None:
+        from canbase_config.latch_file import create_first, latch_folder
+        from canbase_config.load import load_robot
+
+        name = load_robot(self._config).robot.name
+        folder = latch_folder(os.environ if self._env is None else self._env, Path.home(), name)
+        # Where they cannot be made the parts start latched, and say why.
+        with suppress(OSError):
+            create_first(folder, name)
 
     def death(self) -> Death | None:
         """The first part found that has ended, None while all run."""

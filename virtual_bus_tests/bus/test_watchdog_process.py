@@ -16,6 +16,7 @@ import pytest
 
 from bus.watchdog_live import LiveRobot
 from canbase_watchdog.frames import Frame
+from ros.harness import clear_records
 from unit.watchdog_story import config
 
 pytestmark = pytest.mark.bus
@@ -39,9 +40,12 @@ class Watched:
         self.systemd.bind(str(folder / "notify"))
         self.systemd.setblocking(False)
         self.robot = LiveRobot(bus, self.config.lease_socket)
+        self.state = clear_records(folder, self.config.robot)
         self.process = subprocess.Popen(
             [sys.executable, "-m", "canbase_watchdog", "--config-json", self.config.to_json()],
-            env=os.environ | {"NOTIFY_SOCKET": str(folder / "notify"), "_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"},
+            env=os.environ
+            | {"NOTIFY_SOCKET": str(folder / "notify"), "_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"}
+            | self.state,
             stderr=subprocess.PIPE,
             text=True,
         )

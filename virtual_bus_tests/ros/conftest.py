@@ -15,7 +15,7 @@ from ruamel.yaml import YAML
 
 from canbase_config.load import load_robot
 from canbase_config.robot import Robot
-from ros.harness import Process, TestNode, merged, python_argv, reserve_domain, robot_values
+from ros.harness import Process, TestNode, clear_records, merged, python_argv, reserve_domain, robot_values
 from ros.velocity_chain import RUN, Chain
 
 Spawn = Callable[..., Process]
@@ -26,12 +26,19 @@ _starts = itertools.count(os.getpid())
 
 @pytest.fixture(scope="session", autouse=True)
 def this_machine_alone(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """No test talks to another machine, whatever its domain, and none leaves black boxes behind."""
+    """No test talks to another machine, whatever its domain, and none leaves anything behind."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
         patch.delenv("STATE_DIRECTORY", raising=False)
         yield
+
+
+@pytest.fixture(autouse=True)
+def no_stop_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each test begins with clear records of stops, as a robot does that has just been installed."""
+    for name, value in clear_records(tmp_path, "robot", "bench").items():
+        monkeypatch.setenv(name, value)
 
 
 @pytest.fixture(autouse=True)

@@ -23,6 +23,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
+from canbase_config.latch_file import create_first, latch_folder
+
 T = TypeVar("T")
 
 
@@ -83,6 +85,14 @@ class Process:
         if self._popen.poll() is None:
             self._popen.kill()
         self._popen.wait(10.0)
+
+
+def clear_records(folder: Path, *robots: str) -> dict[str, str]:
+    """Environment with a state folder of its own, in which these robots have clear records of stops."""
+    environment = {"XDG_STATE_HOME": str(folder / "state")}
+    for robot in robots:
+        create_first(latch_folder(environment, folder, robot), robot)
+    return environment
 
 
 def python_argv(code: str) -> list[str]:

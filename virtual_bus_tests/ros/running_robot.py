@@ -67,7 +67,7 @@ class RunningRobot:
         self, folder: Path, domain: int, namespace: str, changes: Mapping[str, Any], env: Mapping[str, str]
     ) -> None:
         self.folder, self.namespace = folder, namespace
-        self.env = {**env, "ROS_DOMAIN_ID": str(domain)}
+        self.env = {"XDG_STATE_HOME": str(folder / "state"), **env, "ROS_DOMAIN_ID": str(domain)}
         self.config = robot_file(folder, changes)
         self.robot = load_robot(self.config).robot
         self.stack = Stack(self.config, namespace=namespace, sim=True, logs=folder, env=os.environ | self.env)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Literal
 
 from bus.crews import robot_with
+from campaign.disk import StopDisk, WatchdogDisk
 from canbase_bench.cia402.states import State
 from canbase_bench.frame import Frame as BenchFrame
 from canbase_bench.node import SimulatedNode
@@ -63,13 +64,21 @@ class World:
     """
 
     def __init__(
-        self, robot: Robot | None = None, parameters: BenchParameters | None = None, aim: Aim = Aim.ACTIVE
+        self,
+        robot: Robot | None = None,
+        parameters: BenchParameters | None = None,
+        aim: Aim = Aim.ACTIVE,
+        keeps: bool = False,
     ) -> None:
+        """`keeps`: driver and watchdog keep records of their stops, on `disk` and `watchdog_disk`."""
         self.robot = robot or bench_robot()
         self._start, self._steps = 100.0, 0
         self.bench = Bench(self.robot, self.now, parameters=parameters)
-        self.driver: DriverCore | None = DriverCore(self.robot, aim)
-        self.watchdog: Watchdog | None = Watchdog(watchdog_config(self.robot), self.now)
+        self._keeps = keeps
+        self.disk, self.watchdog_disk = StopDisk("driver"), WatchdogDisk()
+        self.driver: DriverCore | None = DriverCore(self.robot, aim, self.disk.found() if keeps else None)
+        self.watchdog: Watchdog | None = None
+        self.start_watchdog()
         self.command: Twist2D | None = Twist2D.ZERO
         self.leases = True
         self.cable = True
@@ -146,8 +155,20 @@ class World:
 
     def start_driver(self) -> None:
         """A new driver process, which knows nothing of the one before."""
-        self.driver, self.ticks = DriverCore(self.robot), []
+        self.driver, self.ticks = DriverCore(self.robot, found=self.disk.found() if self._keeps else None), []
         self.resume_cycles()
+
+    def start_watchdog(self) -> None:
+        """A new watchdog process."""
+        past = self.watchdog_disk.past() if self._keeps else None
+        self.watchdog = Watchdog(watchdog_config(self.robot), self.now, past)
+
+    def reboot(self, seconds: float = 0.5) -> None:
+        """The computer loses its supply for so long; the drives keep theirs."""
+        self.driver = self.watchdog = None
+        self.run(seconds)
+        self.start_watchdog()
+        self.start_driver()
 
     def pause_driver(self, seconds: float) -> None:
         """Its process gets no time; what the bus brings meanwhile waits until then."""
@@ -218,11 +239,15 @@ class World:
             self._cycle(self.driver)
         if self.watchdog is not None:
             self._send([Frame(frame.cob_id, frame.data) for frame in self.watchdog.tick(self.now)])
+            if self._keeps:
+                self.watchdog.on_record(*self.watchdog_disk.write(self.watchdog.record))
         self._send([Frame(frame.cob_id, frame.data) for frame in self.bench.tick(self.now)])
 
     def _cycle(self, driver: DriverCore) -> None:
         driver.on_bus("" if self.cable else "the cable is cut", self.now)
         frames = driver.tick(self.now)
+        if self._keeps:
+            driver.on_record(*self.disk.write(driver.record))
         self.ticks.append(frames)
         self._send(frames if self.cable else [])
 

@@ -14,6 +14,8 @@ from canbase_driver.supervisor import (
     NO_POWER,
     ORDERS,
     PREPARING,
+    UNARMED,
+    Cause,
     Drive,
     Orders,
     Situation,
@@ -316,3 +318,28 @@ def test_while_they_are_waited_for_every_blocker_takes_the_power_off() -> None:
     for name in ("watchdog missing", "command not zero"):
         assert story.step(also(STO_OPEN, WRONG[name])) == OFF
         assert story.told == (DISARMED, name, False)
+
+
+# drives prepared ── the records say so on disk ── power
+def test_no_power_before_the_record_is_on_disk() -> None:
+    story = Story()
+    waits = Situation(unarmed="not on disk yet")
+    orders = story.step(waits, 500)
+    assert (story.supervisor.state, story.supervisor.cause.name) == (DISARMED, UNARMED)
+    assert orders == ORDERS[PREPARING]
+    story.step(replace(waits, unprepared="no main voltage"))
+    assert story.supervisor.cause.name == "drive not ready"
+    story.step(READY)
+    assert story.supervisor.state is ENABLING
+
+
+def test_a_stop_of_before_the_start_is_latched_until_a_reset() -> None:
+    before = Cause("drive fault", "latched since before the start: left_wheel", "reset")
+    supervisor = Supervisor(3.0, before)
+    for step in range(100):
+        orders = supervisor.step(READY, 10.0 + step)
+    assert orders == ORDERS[LATCHED]
+    assert (supervisor.state, supervisor.cause, supervisor.latches) == (LATCHED, before, True)
+    supervisor.reset()
+    supervisor.step(READY, 200.0)
+    assert supervisor.state is ENABLING

@@ -1,0 +1,75 @@
+"""The disk in virtual time: the records of stops, as the bytes that a real file has. It outlives processes."""
+
+from __future__ import annotations
+
+from canbase_config import latch_record
+from canbase_config.latch_record import SLOT, Found, Record
+from canbase_watchdog import latch
+from canbase_watchdog.latch import Entry, Past
+
+FULL = "the record of stops cannot be written: no space left on device"
+
+
+class _File:
+    """One file, clear at first. `writable` False: it cannot be written from now on."""
+
+    def __init__(self, clear: bytes) -> None:
+        self.data: bytearray | None = bytearray(clear)
+        self.writable = True
+        self._sequence = 2
+
+    def put(self, page: bytes, sequence: int) -> None:
+        """In place of the older page."""
+        at = latch_record.place_of(sequence)
+        assert self.data is not None
+        self.data[at : at + SLOT] = page
+        self._sequence = sequence
+
+    @property
+    def next(self) -> int:
+        """The next sequence."""
+        return self._sequence + 1
+
+
+class StopDisk:
+    """The record of a part that keeps canbase_config's: driver or filter."""
+
+    def __init__(self, part: str, robot: str = "robot") -> None:
+        self._owner = latch_record.owner_of(part, robot, "virtual")
+        self.file = _File(latch_record.whole(Record(), self._owner))
+        self._last: Record | None = None
+
+    def found(self) -> Found:
+        """What a process finds that starts now."""
+        return latch_record.read(bytes(self.file.data or b""), self._owner)
+
+    def write(self, record: Record) -> tuple[Record | None, str]:
+        """On disk at once; what the part is told of it."""
+        if not self.file.writable:
+            return None, FULL
+        if record is not self._last:
+            self._last = record
+            self.file.put(latch_record.slot(record, self.file.next, self._owner), self.file.next)
+        return record, ""
+
+
+class WatchdogDisk:
+    """The watchdog's record."""
+
+    def __init__(self, robot: str = "robot") -> None:
+        self._owner = latch.owner(robot, "virtual")
+        self.file = _File(latch.page(Entry(), 1, self._owner) + latch.page(Entry(), 2, self._owner))
+        self._last: Entry | None = None
+
+    def past(self) -> Past:
+        """What a watchdog finds that starts now."""
+        return latch.decode(bytes(self.file.data or b""), self._owner)
+
+    def write(self, entry: Entry) -> tuple[Entry | None, str]:
+        """On disk at once; what the watchdog is told of it."""
+        if not self.file.writable:
+            return None, FULL
+        if entry is not self._last:
+            self._last = entry
+            self.file.put(latch.page(entry, self.file.next, self._owner), self.file.next)
+        return entry, ""
