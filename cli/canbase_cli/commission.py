@@ -50,7 +50,12 @@ def commission(
     turns: Annotated[float, typer.Option("--turns", metavar="N", min=0.1, max=20.0, help="of the measured turn")] = 2.0,
     report: Annotated[
         Path | None,
-        typer.Option("--report", metavar="FILE", help="Of the report.", show_default="commissioning.md beside FILE"),
+        typer.Option(
+            "--report",
+            metavar="FILE",
+            help="Of the report.",
+            show_default="commissioning-<robot>-<date>.md beside FILE",
+        ),
     ] = None,
     answers: Annotated[
         Path | None, typer.Option("--answers", metavar="FILE", help="YAML with answers by key, for tests.")
@@ -72,6 +77,8 @@ def commission(
     """
     from canbase_cli.onbus.commission import Plan, run
 
+    if report is not None and report.exists():
+        fail(f"{report} exists; a report is never overwritten: give --report another name", WRONG_INPUT)
     if not config.exists():
         fail(f"{config} does not exist: begin with a copy of a sample, see canbase config check --help", WRONG_INPUT)
     plan = Plan(
@@ -80,6 +87,6 @@ def commission(
         revolutions,
         distance_m,
         turns,
-        report or config.with_name("commissioning.md"),
+        report,
     )
     run(config, plan, answers, yes=yes, dry_run=dry_run)

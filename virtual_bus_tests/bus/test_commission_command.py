@@ -22,13 +22,54 @@ def write_answers(folder: Path, **answers: str) -> str:
     return str(file)
 
 
+def only_report(folder: Path) -> str:
+    (found,) = folder.glob("commissioning-*.md")
+    return found.read_text(encoding="utf-8")
+
+
+def test_a_wrong_count_is_measured_again_and_changes_nothing(tmp_path: Path) -> None:
+    """Somebody types 3 revolutions where the wheel made 0.3; by that scale it makes 0.03 the second time."""
+    port = free_port()
+    config = write_robot(tmp_path, port)
+    before = config.read_text(encoding="utf-8")
+    counts = {f"revolutions__{joint}": "0.3" for joint in ("left_wheel", "right_wheel")}
+    answers = write_answers(
+        tmp_path, **(counts | {"revolutions__left_wheel": "3", "revolutions__left_wheel__again": "0.05"})
+    )
+    options = ("--answers", answers, "--yes", "--steps", "scale,proof", "--revolutions", "0.3")
+    with drives(config) as control:
+        done = canbase("commission", "-c", str(config), *options, timeout_s=120.0)
+        assert abs(control.truth().v_left_mps) < 0.001
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "robot.yaml is wrong: drives[0].gear_ratio" in done.stdout
+    assert "the second measurement contradicts the first" in done.stderr
+    assert "trial 1" not in done.stdout  # no proof with a scale in doubt
+    assert config.read_text(encoding="utf-8") == before
+    assert "the second measurement contradicts the first" in only_report(tmp_path)
+
+
+def test_a_report_is_never_overwritten(tmp_path: Path) -> None:
+    config = write_robot(tmp_path, free_port())
+    old = tmp_path / "proven.md"
+    old.write_text("PROVEN", encoding="utf-8")
+    done = canbase("commission", "-c", str(config), "--report", str(old), "--dry-run", "--yes")
+    assert done.returncode == 2
+    assert "a report is never overwritten" in done.stderr
+    assert old.read_text(encoding="utf-8") == "PROVEN"
+
+
 def test_a_wrong_direction_is_corrected_and_the_self_stop_proven(tmp_path: Path) -> None:
     port = free_port()
     with drives(write_robot(tmp_path, port, "truth.yaml")):
         config = write_robot(tmp_path, port)
         text = config.read_text(encoding="utf-8").replace("direction: -1 ", "direction: 1 ")
         config.write_text(text, encoding="utf-8")
-        answers = write_answers(tmp_path, direction__left_wheel="forward", direction__right_wheel="backward")
+        answers = write_answers(
+            tmp_path,
+            direction__left_wheel="forward",
+            direction__right_wheel="backward",
+            direction__right_wheel__again="forward",
+        )
         done = canbase(
             "commission",
             "-c",
@@ -49,7 +90,7 @@ def test_a_wrong_direction_is_corrected_and_the_self_stop_proven(tmp_path: Path)
     assert {drive.identity.product_code for drive in commissioned.drives} == {0xCB402}
     assert "# mounted mirrored" in config.read_text(encoding="utf-8")
     assert load_robot(tmp_path / "robot.yaml.before").robot.drives[1].direction == 1
-    report = (tmp_path / "commissioning.md").read_text(encoding="utf-8")
+    report = only_report(tmp_path)
     assert report.count("| this computer fell silent |") == 2
     assert report.count("| the watchdog's heartbeat went missing, setpoints going on |") == 2
 
@@ -64,7 +105,7 @@ def test_a_drive_that_does_not_stop_by_itself_is_not_proven_and_1(tmp_path: Path
     assert "left_wheel DID NOT STOP when this computer fell silent" in done.stdout
     assert "NOT PROVEN: left_wheel, right_wheel did not stop by itself" in done.stdout
     assert "the measured drive on the floor is left out" in done.stdout
-    assert "**did not stop**" in (tmp_path / "commissioning.md").read_text(encoding="utf-8")
+    assert "**did not stop**" in only_report(tmp_path)
 
 
 def test_sigterm_while_the_wheels_turn_stops_them_and_the_report_says_so(tmp_path: Path) -> None:
@@ -79,7 +120,7 @@ def test_sigterm_while_the_wheels_turn_stops_them_and_the_report_says_so(tmp_pat
         process.send_signal(signal.SIGTERM)
         assert process.wait(20.0) == 1
         assert abs(control.truth().linear_mps) < 0.001
-    assert "stopped by SIGTERM" in (tmp_path / "commissioning.md").read_text(encoding="utf-8")
+    assert "stopped by SIGTERM" in only_report(tmp_path)
 
 
 def test_beside_another_master_nothing_is_sent(tmp_path: Path) -> None:

@@ -53,7 +53,8 @@ def stands(control: SimControl) -> None:
 
 
 def report(config: Path) -> str:
-    return (config.parent / "commissioning.md").read_text(encoding="utf-8")
+    """The newest one: each run has a file of its own."""
+    return max(config.parent.glob("commissioning-*.md"), key=lambda path: path.stat().st_mtime_ns).read_text("utf-8")
 
 
 def test_enter_stops_the_wheel_and_the_report_says_so(bench: tuple[Path, SimControl]) -> None:
@@ -96,6 +97,18 @@ def test_an_answer_without_sense_is_asked_again_and_the_next_wheel_is_stopped_by
         assert "stopped by Enter" in terminal.shown
 
 
+def test_what_is_neither_yes_nor_no_is_asked_again(bench: tuple[Path, SimControl]) -> None:
+    config, control = bench
+    path_m = control.truth().path_m
+    with commissioning(config) as terminal:
+        terminal.press("0,5 m\n")
+        terminal.read_until("'0,5 m' is neither yes nor no; please again")
+        terminal.press("no\n")
+        assert terminal.wait() == 1
+        assert "not confirmed: nothing more is done" in terminal.shown
+    assert control.truth().path_m == path_m
+
+
 def test_who_does_not_confirm_turns_nothing(bench: tuple[Path, SimControl]) -> None:
     config, control = bench
     path_m = control.truth().path_m
@@ -119,7 +132,8 @@ def test_a_signal_of_the_terminal_stops_the_wheel(bench: tuple[Path, SimControl]
 
 def test_a_terminal_that_goes_stops_the_wheel_and_leaves_a_report(bench: tuple[Path, SimControl]) -> None:
     config, control = bench
-    (config.parent / "commissioning.md").unlink(missing_ok=True)
+    for old in config.parent.glob("commissioning-*.md"):
+        old.unlink()
     with commissioning(config) as terminal:
         turning(terminal, control)
         terminal.hang_up()

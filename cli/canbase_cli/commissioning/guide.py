@@ -83,6 +83,15 @@ def one_of(*words: str) -> Callable[[str], str]:
     return check
 
 
+def _confirm(text: str) -> None:
+    """Raises CommissionError for a no or a bare Enter, ValueError for what is neither yes nor no."""
+    word = text.strip().lower()
+    if word in ("", "n", "no"):
+        raise CommissionError("not confirmed: nothing more is done")
+    if word not in ("y", "yes"):
+        raise ValueError(f"{text.strip()!r} is neither yes nor no")
+
+
 class Guide(Generic[T]):
     """Runs one script on one rig. A session; when it waits for a person, `question` says for what.
 
@@ -122,8 +131,8 @@ class Guide(Generic[T]):
         """
         if self.question is None:
             raise RuntimeError("nothing was asked")
-        if self.question.confirms and text.strip().lower() not in ("y", "yes"):
-            raise CommissionError("not confirmed: nothing more is done")
+        if self.question.confirms:
+            _confirm(text)
         value = self.question.check(text)
         self._go_on(value, self.rig.now)
 

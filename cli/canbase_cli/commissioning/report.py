@@ -23,6 +23,7 @@ class Results:
     edits: list[Edit] = field(default_factory=list)
     ended_by: str = ""
     """Why it did not come to its end; empty: it did."""
+    dry_run: bool = False
 
     @property
     def proven(self) -> bool:
@@ -48,7 +49,8 @@ def verdict(results: Results) -> str:
 
 def markdown(robot: Robot, results: Results, when: str, version: str) -> str:
     """The whole report. `when`: date and time for people."""
-    lines = [f"# Commissioning of {robot.name}", "", f"{when}, canbase {version}.", "", f"**{verdict(results)}**", ""]
+    title = f"# Commissioning of {robot.name}{' (dry run: robot.yaml was not changed)' if results.dry_run else ''}"
+    lines = [title, "", f"{when}, canbase {version}.", "", f"**{verdict(results)}**", ""]
     if results.ended_by:
         lines += [f"It did not come to its end: {results.ended_by}", ""]
     lines += _drives(robot, results) + _wheels(results) + _trials(results) + _floor(results) + _edits(results)

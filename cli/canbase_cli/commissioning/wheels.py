@@ -30,8 +30,15 @@ class WheelFound:
     turned: Turned | None = None
 
 
-def find_direction(rig: Rig, drive: Drive) -> Script[WheelFound]:
-    """Turns one wheel forward, as robot.yaml has it, and asks. Raises CommissionError when something else happens."""
+AGAIN = ".again"
+"""Ends the key of a question that is asked a second time, after a correction."""
+
+
+def find_direction(rig: Rig, drive: Drive, again: str = "") -> Script[WheelFound]:
+    """Turns one wheel forward, as robot.yaml has it, and asks. Raises CommissionError when something else happens.
+
+    `again`: AGAIN after a correction.
+    """
     joint = drive.joint
     yield Tell(f"{joint} turns now, at {FIRST_MPS:g} m/s, for {FIRST_S:g} s: it should turn forward. Watch it")
     yield from spin(rig, {joint: FIRST_MPS})
@@ -45,7 +52,7 @@ def find_direction(rig: Rig, drive: Drive) -> Script[WheelFound]:
             "motor or two tracks of the encoder, or set its polarity with the maker's tool; do not drive it like this"
         )
     text = f"Which way did {joint} turn: forward, backward, nothing, other (another wheel turned)?"
-    seen = yield Ask(f"direction.{joint}", text, one_of("forward", "backward", "nothing", "other"))
+    seen = yield Ask(f"direction.{joint}{again}", text, one_of("forward", "backward", "nothing", "other"))
     if seen == "other":
         raise CommissionError(
             f"another wheel than {joint} turned: exchange node_id (or axis) of the drives in robot.yaml"
@@ -58,11 +65,16 @@ def find_direction(rig: Rig, drive: Drive) -> Script[WheelFound]:
     return WheelFound(joint, drive.direction * (1 if seen == "forward" else -1))
 
 
-def measure_scale(rig: Rig, drive: Drive, revolutions: float, speed_mps: float) -> Script[tuple[Scale, Turned]]:
-    """Turns one wheel by `revolutions` as robot.yaml counts them, and asks. Raises CommissionError, JudgeError."""
+def measure_scale(
+    rig: Rig, drive: Drive, revolutions: float, speed_mps: float, again: str = ""
+) -> Script[tuple[Scale, Turned]]:
+    """Turns one wheel by `revolutions` as robot.yaml counts them, and asks. Raises CommissionError, JudgeError.
+
+    `again`: AGAIN after a correction.
+    """
     joint, rim_m = drive.joint, 2.0 * math.pi * rig.robot.base.wheel_radius_m
     confirm = f"Mark the top of {joint} (tape): it will make {revolutions:g} revolutions. Count them. Ready?"
-    yield Ask(f"mark.{joint}", confirm, confirms=True)
+    yield Ask(f"mark.{joint}{again}", confirm, confirms=True)
     axis = rig.axes[joint]
     start_m, integral = axis.travel.travel_m, _Integral(rig, joint)
     goal_m = revolutions * rim_m - braking_way_m(rig, speed_mps)
@@ -74,8 +86,8 @@ def measure_scale(rig: Rig, drive: Drive, revolutions: float, speed_mps: float) 
     yield Until(lambda now: not integral.add(now), 0.3)
     rig.speeds_mps = {}
     by_position = (axis.travel.travel_m - start_m) / rim_m
-    text = f"How many revolutions did {joint} make, to a twentieth (robot.yaml says {by_position:.2f})?"
-    seen = yield Ask(f"revolutions.{joint}", text, number(0.05, MOST_REVOLUTIONS))
+    text = f"How many revolutions did {joint} make, to a twentieth?"
+    seen = yield Ask(f"revolutions.{joint}{again}", text, number(0.05, MOST_REVOLUTIONS))
     turned = Turned(by_position, integral.way_m / rim_m, float(seen))
     return scale(drive, turned), turned
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,12 +17,13 @@ from canbase_cli.commissioning.judge import JudgeError
 from canbase_cli.commissioning.proof import Outcome, get_ready, prove
 from canbase_cli.commissioning.report import Results, markdown, verdict
 from canbase_cli.commissioning.rig import Rig, RigError
-from canbase_cli.commissioning.wheels import WheelFound, find_direction, measure_scale
+from canbase_cli.commissioning.wheels import AGAIN, WheelFound, find_direction, measure_scale
 from canbase_cli.onbus.line import BusLine, open_line
 from canbase_cli.onbus.moving import refuse_beside_masters, run_script
 from canbase_cli.onbus.person import Person, Stopped, stopping_signals
 from canbase_cli.options import FAILED, fail, load_config
 from canbase_cli.version import installed_version
+from canbase_config.derive import mps_per_bit
 from canbase_config.errors import ConfigError
 from canbase_config.load import load_robot
 from canbase_config.robot import Robot
@@ -42,14 +44,15 @@ class Plan:
     revolutions: float
     distance_m: float
     turns: float
-    report: Path
+    report: Path | None
+    """None: beside robot.yaml, with the robot's name and the date."""
 
 
 def run(config: Path, plan: Plan, answers: Path | None, *, yes: bool, dry_run: bool) -> None:
     """All steps; exits with 1 when the self-stop is not proven, or not all was done."""
     robot = load_config(config).robot
     person = Person(answers, yes=yes)
-    results = Results()
+    results = Results(dry_run=dry_run)
     with open_line(robot.bus) as line, stopping_signals():
         refuse_beside_masters(line)
         try:
@@ -59,7 +62,7 @@ def run(config: Path, plan: Plan, answers: Path | None, *, yes: bool, dry_run: b
             results.ended_by = str(error)
         except Stopped as stopped:
             results.ended_by = str(stopped)
-    _write_report(robot, plan, results)
+    _write_report(robot, plan.report, config, results)
     _change(config, results.edits, dry_run=dry_run)
     person.tell(Tell(verdict(results), is_loud=not results.proven))
     if results.ended_by:
@@ -70,9 +73,7 @@ def run(config: Path, plan: Plan, answers: Path | None, *, yes: bool, dry_run: b
 
 def _go(line: BusLine, robot: Robot, plan: Plan, person: Person, results: Results) -> None:
     if plan.steps & {"directions", "scale"}:
-        results.wheels = run_script(line, robot, lambda rig: _wheels(rig, plan, results), person)
-        results.edits += wheel_edits(robot, results.wheels)
-        robot = with_edits(robot, results.edits)
+        robot = _measure_wheels(line, robot, plan, person, results)
     if "proof" in plan.steps:
         results.outcomes = run_script(line, robot, lambda rig: _proof(rig, plan, results), person)
         for outcome in results.outcomes:
@@ -86,17 +87,57 @@ def _go(line: BusLine, robot: Robot, plan: Plan, person: Person, results: Result
     results.edits += floor_edits(robot, results.floor)
 
 
-def _wheels(rig: Rig, plan: Plan, results: Results) -> Script[list[WheelFound]]:
-    yield Ask("wheels_up", WHEELS_UP, confirms=True)
+def _measure_wheels(line: BusLine, robot: Robot, plan: Plan, person: Person, results: Results) -> Robot:
+    """The robot with what was found. A correction is measured again before anything else relies on it.
+
+    Raises CommissionError when the second measurement contradicts the first: then nothing is changed.
+    """
+    results.wheels = run_script(line, robot, lambda rig: _wheels(rig, plan, results), person)
+    edits = wheel_edits(robot, results.wheels)
+    if not edits:
+        return robot
+    corrected = with_edits(robot, edits)
+    wrong = {robot.drives[int(edit.loc[1])].joint for edit in edits}
+    for edit in edits:
+        person.tell(Tell(f"robot.yaml is wrong: {edit}. It is measured again with the corrected value", is_loud=True))
+    found = run_script(
+        line, corrected, lambda rig: _wheels(rig, plan, results, wrong, _gentler(robot, rig.robot)), person
+    )
+    other = wheel_edits(corrected, found)
+    if other:
+        told = "; ".join(str(edit) for edit in other)
+        raise CommissionError(
+            f"the second measurement contradicts the first ({told}): measure again from the beginning"
+        )
+    results.edits += edits
+    return corrected
+
+
+def _gentler(before: Robot, after: Robot) -> dict[str, float]:
+    """By joint, the share of the speed at which the motor turns no faster with the corrected scale than before it."""
+    radius_m = before.base.wheel_radius_m
+    pairs = zip(before.drives, after.drives, strict=True)
+    return {new.joint: min(1.0, abs(mps_per_bit(new, radius_m) / mps_per_bit(old, radius_m))) for old, new in pairs}
+
+
+def _wheels(
+    rig: Rig, plan: Plan, results: Results, again: Collection[str] = (), shares: Mapping[str, float] | None = None
+) -> Script[list[WheelFound]]:
+    """All wheels, or those of `again`, at these shares of the speed."""
+    suffix = AGAIN if again else ""
+    yield Ask(f"wheels_up{suffix}", WHEELS_UP, confirms=True)
     yield from get_ready(rig)
     _note_boots(rig, results)
     found = []
     for drive in rig.robot.drives:
+        if again and drive.joint not in again:
+            continue
         wheel = WheelFound(drive.joint, drive.direction)
         if "directions" in plan.steps:
-            wheel = yield from find_direction(rig, drive)
+            wheel = yield from find_direction(rig, drive, suffix)
         if "scale" in plan.steps:
-            scale, turned = yield from measure_scale(rig, drive, plan.revolutions, plan.speed_mps)
+            speed_mps = plan.speed_mps * (shares or {}).get(drive.joint, 1.0)
+            scale, turned = yield from measure_scale(rig, drive, plan.revolutions, speed_mps, suffix)
             wheel = WheelFound(drive.joint, wheel.direction, scale, turned)
         found.append(wheel)
     return found
@@ -120,13 +161,18 @@ def _note_boots(rig: Rig, results: Results) -> None:
     results.boots = {node_id: node.report for node_id, node in rig.nodes.items() if node.report is not None}
 
 
-def _write_report(robot: Robot, plan: Plan, results: Results) -> None:
+def _write_report(robot: Robot, wanted: Path | None, config: Path, results: Results) -> None:
+    """To a file of its own: a report of another day, or of another robot, is never overwritten."""
     when = time.strftime("%Y-%m-%d %H:%M %z")
+    path = wanted or config.with_name(f"commissioning-{robot.name}-{time.strftime('%Y%m%d-%H%M%S')}.md")
+    text = markdown(robot, results, when, installed_version())
     try:
-        plan.report.write_text(markdown(robot, results, when, installed_version()), encoding="utf-8")
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
     except OSError as error:
-        fail(f"the report cannot be written: {error}", FAILED)
-    typer.echo(f"report: {plan.report}")
+        typer.echo(text)
+        fail(f"the report above cannot be written: {error}", FAILED)
+    typer.echo(f"report: {path}")
 
 
 def _change(config: Path, edits: list[Edit], *, dry_run: bool) -> None:
