@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tarfile
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from importlib.metadata import distributions
 from pathlib import Path
 from types import MappingProxyType
@@ -18,18 +18,24 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from canbase_cli import support
-from canbase_cli.options import FAILED, fail, load_config
+from canbase_cli.bounded_run import run
+from canbase_cli.careful_read import RefusedError, modified, names, read_end
+from canbase_cli.options import FAILED, colour, fail
 from canbase_cli.redact import cleaned
 from canbase_cli.service_environment import service_environment
 
 if TYPE_CHECKING:  # `canbase --help` loads no configuration
     from canbase_config.robot import Robot
 
-LIMIT_BYTES: Final = 20_000_000
+LIMIT_BYTES: Final = 10_000_000
 """Of one file: the end of a longer one is taken."""
+TOTAL_BYTES: Final = 80_000_000
+"""Of all: what comes later is missing."""
+MOST_FILES: Final = 200
 STATE: Final = Path("/var/lib/canbase")
 ETC: Final = Path("/etc/canbase")
 UNITS: Final = Path("/etc/systemd/system")
+_KEY: Final = "it may be a key; such files are never taken"
 
 
 class Bundle:
@@ -42,6 +48,9 @@ class Bundle:
 
     def text(self, name: str, what: str, read: Callable[[], str]) -> None:
         """One file, cleaned; an OSError of `read` is the reason why it is missing."""
+        if len(self.files) >= MOST_FILES or sum(map(len, self.files.values())) >= TOTAL_BYTES:
+            self.missing[name] = f"{what}: the bundle is full ({MOST_FILES} files, {TOTAL_BYTES // 1_000_000} MB)"
+            return
         try:
             content = read()
         except OSError as error:
@@ -51,35 +60,24 @@ class Bundle:
         self.taken[name] = what
 
     def file(self, name: str, path: Path) -> None:
-        """A file of this computer, if its name is allowed."""
-        if support.allowed(path.resolve()):
-            self.text(name, str(path), lambda: path.read_text(errors="replace"))
-        else:
-            self.missing[name] = f"{path}: it may be a key; such files are never taken"
+        """A regular file of this computer, if its name is allowed, where it really is too. No link is followed."""
+        self.text(name, str(path), lambda: _regular(path))
 
     def output(self, command: support.Command) -> None:
         """What a program prints; one that cannot tell anything is missing with its last words."""
         shown = " ".join(command.argv) + (", in the services' environment" if command.environment is not None else "")
         try:
-            ended = subprocess.run(
-                command.argv,
-                capture_output=True,
-                timeout=command.timeout_s,
-                stdin=subprocess.DEVNULL,
-                env=command.environment,
-                check=False,
-            )
+            code, said, complaint = run(command.argv, command.environment, command.timeout_s, LIMIT_BYTES)
         except OSError as error:
             self.missing[command.file] = f"{shown}: {error.strerror}"
         except subprocess.TimeoutExpired:
             self.missing[command.file] = f"{shown}: not done within {command.timeout_s:.0f} s"
         else:
-            said, complaint = (stream.decode(errors="replace") for stream in (ended.stdout, ended.stderr))
             if said.strip():
-                self.text(command.file, f"{shown} (exit code {ended.returncode})", lambda: said + complaint)
+                self.text(command.file, f"{shown} (exit code {code})", lambda: said + complaint)
             else:
                 last = complaint.strip().splitlines()[-1:] or ["it says nothing"]
-                self.missing[command.file] = f"{shown}: exit code {ended.returncode}, {last[0]}"
+                self.missing[command.file] = f"{shown}: exit code {code}, {cleaned(last[0])}"
 
     def write(self, path: Path) -> None:
         """As path, a .tar.gz that its owner alone may read, and that appears whole or not at all."""
@@ -95,16 +93,31 @@ class Bundle:
         new.replace(path)
 
 
+def _regular(path: Path) -> str:
+    if not support.allowed(path):
+        raise RefusedError(_KEY)
+    place, content = read_end(path, LIMIT_BYTES)
+    if not support.allowed(Path(place)):
+        raise RefusedError(_KEY)
+    return content.decode(errors="replace")
+
+
 def collect(
-    robot: Robot,
+    robot: Robot | None,
     config: Path,
     since: str,
     etc: Path = ETC,
     state: Path = STATE,
     named: Mapping[str, Path] = MappingProxyType({}),
+    problems: str = "",
 ) -> Bundle:
-    """Everything. Nothing of it touches the bus or orders anything. `named`: the files that robot.yaml names."""
+    """Everything. Nothing of it touches the bus or orders anything. `named`: the files that robot.yaml names.
+
+    `robot`: None where robot.yaml is of no use, for the reasons in `problems`; then the recordings of all robots count.
+    """
     bundle = Bundle()
+    if problems:
+        bundle.text("config/problems.txt", f"what is wrong with {config}", lambda: problems)
     bundle.text("versions/canbase.txt", "canbase, Python, computer", _versions)
     bundle.text("versions/packages.txt", "Python packages", _packages)
     bundle.text("environment.txt", "variables of ROS and canbase", lambda: support.environment_text(os.environ))
@@ -112,16 +125,12 @@ def collect(
     for name, path in named.items():
         outside = ".." in Path(name).parts or Path(name).is_absolute()
         bundle.file(f"config/elsewhere/{path.name}" if outside else f"config/{name}", path)
-    for path in _listed(bundle, "config/installed", etc, ("*.yaml", "*.env", "installed/*.txt")):
-        bundle.file(f"config/installed/{path.relative_to(etc)}", path)
-    boxes = {path: path.stat().st_mtime for folder in _box_folders(robot, state) for path in folder.glob("*.asc")}
-    newest = support.newest_boxes(robot, boxes)
-    if not newest:
-        folders = ", ".join(str(folder) for folder in _box_folders(robot, state))
-        bundle.missing["black_box"] = f"no recording of a stop of {robot.name} in {folders}"
-    for path in newest:
-        bundle.file(f"black_box/{path.name}", path)
-    services = doctor_environment(config, robot.name, etc)
+    for path in _listed(bundle, "config/installed", etc, (".yaml", ".env")):
+        bundle.file(f"config/installed/{path.name}", path)
+    for path in _listed(bundle, "config/installed/installed", etc / "installed", (".txt",)):
+        bundle.file(f"config/installed/installed/{path.name}", path)
+    _black_boxes(bundle, robot, state)
+    services = doctor_environment(config, robot.name if robot else config.stem, etc)
     for command in support.commands(config, since, services):
         bundle.output(command)
     return bundle
@@ -129,8 +138,8 @@ def collect(
 
 def installed_robot(etc: Path) -> Path | None:
     """The robot.yaml of the first robot that is installed; other .yaml files may lie beside it. None: there is none."""
-    names = sorted(path.stem for path in (etc / "installed").glob("*.txt")) or ["robot"]
-    return next((path for path in (etc / f"{name}.yaml" for name in names) if path.is_file()), None)
+    stems = sorted(path.stem for path in (etc / "installed").glob("*.txt")) or ["robot"]
+    return next((path for path in (etc / f"{stem}.yaml" for stem in stems) if os.path.isfile(path)), None)
 
 
 def doctor_environment(config: Path, name: str, etc: Path = ETC, units: Path = UNITS) -> dict[str, str] | None:
@@ -140,25 +149,47 @@ def doctor_environment(config: Path, name: str, etc: Path = ETC, units: Path = U
     """
     installed = config.stem if config.resolve().parent == etc.resolve() else name
     try:
-        env_file = (etc / f"{installed}.env").read_text()
-        drop_ins = [path.read_text() for path in sorted(units.glob(f"canbase-driver@{installed}.service.d/*.conf"))]
+        env_file = _regular(etc / f"{installed}.env")
+        drop_ins = [_regular(path) for path in sorted(units.glob(f"canbase-driver@{installed}.service.d/*.conf"))]
     except OSError:
         return None
     return service_environment(os.environ, drop_ins, env_file)
 
 
-def _listed(bundle: Bundle, name: str, folder: Path, patterns: Iterable[str]) -> list[Path]:
-    if not os.access(folder, os.R_OK | os.X_OK):
-        bundle.missing[name] = f"{folder}: {'not readable: try sudo' if folder.exists() else 'nothing is installed'}"
-        return []
-    return sorted(path for pattern in patterns for path in folder.glob(pattern))
+def _listed(bundle: Bundle, name: str, folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
+    try:
+        return [folder / file for file in names(folder) if file.endswith(suffixes)]
+    except FileNotFoundError:
+        bundle.missing[name] = f"{folder}: nothing is installed"
+    except OSError as error:
+        bundle.missing[name] = f"{folder}: not readable: {error.strerror}; try sudo"
+    return []
 
 
-def _box_folders(robot: Robot, state: Path) -> list[Path]:
+def _black_boxes(bundle: Bundle, robot: Robot | None, state: Path) -> None:
+    """The newest recordings. Services write to these folders: what is no ordinary file in them is not taken."""
+    folders = list(dict.fromkeys(_box_folders(robot, state)))
+    found: dict[Path, float] = {}
+    for folder in folders:
+        try:
+            found |= {
+                path: modified(path) for path in (folder / file for file in names(folder)) if path.suffix == ".asc"
+            }
+        except OSError:
+            continue  # said below where no folder has any
+    newest = support.newest_boxes(robot.name if robot else "", found)
+    if not newest:
+        whose = f"of {robot.name}" if robot else "of any robot"
+        bundle.missing["black_box"] = f"no recording of a stop {whose} in {', '.join(map(str, folders))}"
+    for path in newest:
+        bundle.file(f"black_box/{path.name}", path)
+
+
+def _box_folders(robot: Robot | None, state: Path) -> list[Path]:
     from canbase_driver.black_box_writer import state_folder
 
-    own = [Path(robot.black_box.folder)] if robot.black_box.folder else []
-    return [*own, state_folder(os.environ, Path.home()), state, state / robot.name]
+    own = [Path(robot.black_box.folder)] if robot and robot.black_box.folder else []
+    return [*own, state_folder(os.environ, Path.home()), state, *([state / robot.name] if robot else [])]
 
 
 def _versions() -> str:
@@ -188,12 +219,22 @@ def support_bundle(
 ) -> None:
     """Collect what helps to find a fault: configuration, versions, units, journal, CAN statistics, black box.
 
-    It orders nothing, and touches no key: docs/logs.md. As root it sees more. Exit codes: 0 written, 1 not.
+    It orders nothing, and touches no key: docs/logs.md. As root it sees more. A robot.yaml with mistakes is collected
+    with a list of them. Exit codes: 0 written, 1 not.
     """
-    loaded = load_config(config or installed_robot(ETC))
-    name = f"canbase-support-{loaded.robot.name}-{time.strftime('%Y%m%dT%H%M%S')}.tar.gz"
-    path = output or Path(name)
-    bundle = collect(loaded.robot, loaded.path, since, named=loaded.files)
+    from canbase_config.errors import ConfigError
+    from canbase_config.load import load_robot, sample
+
+    file = config or installed_robot(ETC) or sample("bench")
+    try:
+        loaded = load_robot(file)
+    except ConfigError as error:  # the bundle is needed then above all
+        problems = str(error)
+        typer.secho(f"{file} cannot be used; collected all the same:\n{problems}", err=True, color=colour())
+        bundle, robot = collect(None, file, since, problems=problems), file.stem
+    else:
+        bundle, robot = collect(loaded.robot, loaded.path, since, named=loaded.files), loaded.robot.name
+    path = output or Path(f"canbase-support-{robot}-{time.strftime('%Y%m%dT%H%M%S')}.tar.gz")
     try:
         bundle.write(path)
     except OSError as error:

@@ -9,13 +9,10 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from canbase_cli.own_modules import module_command
 from canbase_cli.service_environment import arguments
-
-if TYPE_CHECKING:  # `canbase --help` loads no configuration
-    from canbase_config.robot import Robot
 
 ENVIRONMENT: Final = re.compile(r"(ROS|RMW|CANBASE|AMENT|COLCON|FASTDDS|FASTRTPS|CYCLONEDDS|PYTHON|_ROS)[A-Z0-9_]*")
 """Variables whose values are taken; of all others not even the names."""
@@ -73,9 +70,10 @@ def allowed(path: Path) -> bool:
     return FORBIDDEN.search(path.as_posix()) is None
 
 
-def newest_boxes(robot: Robot, found: Mapping[Path, float]) -> list[Path]:
-    """The last recordings of this robot; `found`: files and their modification times."""
-    mine = [path for path in found if path.suffix == ".asc" and path.name.startswith(f"stop_{robot.name}_")]
+def newest_boxes(robot: str, found: Mapping[Path, float]) -> list[Path]:
+    """The last recordings of the robot of this name, of all robots if empty; `found`: files and modification times."""
+    begin = f"stop_{robot}_" if robot else "stop_"
+    mine = [path for path in found if path.suffix == ".asc" and path.name.startswith(begin)]
     return sorted(mine, key=lambda path: found[path], reverse=True)[:BOXES]
 
 

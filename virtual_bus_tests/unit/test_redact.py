@@ -16,6 +16,8 @@ Nov 22 10:00:01.123456 robot canbase-watchdog[812]: ready: no lease yet, bus can
 Nov 22 10:00:02.000001 robot motor_driver[813]: [INFO] [1763.25] [motor_driver]: operational: left_wheel (node 1)
 Nov 22 10:00:03.000000 robot systemd[1]: systemd-ask-password-wall.path: Deactivated successfully.
 Nov 22 10:00:04.000000 robot kernel: Key type asymmetric registered; Loaded X.509 cert 'Debian Secure Boot CA: 6ccece7e'
+Nov 22 10:00:04.500000 robot sshd[7]: 12 tests passed: 3, bypass=on, compass: 12, PASSED=1, Failed password for root
+Nov 22 10:00:04.600000 robot nav[9]: see https://host:8080/path, mail me@host, basic setup --tokenize 3, user --help
 Nov 22 10:00:05.000000 robot nav[9]: in auth::token::parse, tokens_left == 3, see https://x/token://y
 """
 SHOW = """\
@@ -47,6 +49,30 @@ LoadCredential=
         ("GET http://x/y?api_token=abc HTTP/1.1", f"GET http://x/y?api_token={HIDDEN} HTTP/1.1"),
         ("secret: |\n  one\n  two", f"secret: {HIDDEN}\n  {HIDDEN}"),
         ("my_tokens:\n  - one\n  - two", f"my_tokens:\n  {HIDDEN}"),
+        ("DB_PASS=hunter2", f"DB_PASS={HIDDEN}"),
+        ("MQTT_PWD: hunter2", f"MQTT_PWD: {HIDDEN}"),
+        ('  psk="correct horse"', f'  psk="{HIDDEN}"'),
+        ("802-11-wireless-security.psk:  hunter2", f"802-11-wireless-security.psk:  {HIDDEN}"),
+        ("    wpa-psk correct horse", f"    wpa-psk {HIDDEN}"),
+        ("machine host login me password hunter2", f"machine host login me password {HIDDEN}"),
+        ("origin https://user:pw@host/x.git (fetch)", f"origin https://{HIDDEN}@host/x.git (fetch)"),
+        ("amqp://me:p@ss@host:5672", f"amqp://{HIDDEN}@host:5672"),
+        ("clone https://ghp_abc@github.com/x", f"clone https://{HIDDEN}@github.com/x"),
+        ("Authorization: Bearer abc.def-ghi", f"Authorization: {HIDDEN}"),
+        ("curl -H 'Authorization: Basic dXNlcg==' https://x", f"curl -H 'Authorization: {HIDDEN}' https://x"),
+        ('{"authorization": "Digest a=b, c=d", "n": 1}', f'{{"authorization": "{HIDDEN}", "n": 1}}'),
+        ("Nov 22 x[1]: sent bearer abcdefghij to host", f"Nov 22 x[1]: sent bearer {HIDDEN} to host"),
+        ("Cookie: session=abc; other=def", f"Cookie: {HIDDEN}"),
+        ("argv: mysql --password hunter2 --host db", f"argv: mysql --password {HIDDEN} --host db"),
+        ("argv: x --db-pass 'two words' -v", f"argv: x --db-pass {HIDDEN} -v"),
+        ('["x", "--token", "hunter2", "-v"]', f'["x", "--token", {HIDDEN}, "-v"]'),
+        ("curl --user me:hunter2 https://x", f"curl --user me:{HIDDEN} https://x"),
+        ("sshpass -p hunter2 ssh host", f"sshpass -p {HIDDEN} ssh host"),
+        ("got AKIAIOSFODNN7EXAMPLE today", f"got {HIDDEN} today"),
+        ('password: "one\n  two\n three"', f'password: "{HIDDEN}"'),
+        ("export DB_PASS='one\ntwo'", f"export DB_PASS='{HIDDEN}'"),
+        ("password: one\n  two\n  three", f"password: {HIDDEN}"),
+        ("DB_PASSWORD=one\\\ntwo", f"DB_PASSWORD={HIDDEN}"),
     ],
 )
 def test_values_that_look_like_secrets_are_hidden_and_their_names_stay(line: str, clean: str) -> None:
@@ -63,6 +89,17 @@ def test_json_stays_json_also_within_a_message_of_json(key: str, value: str) -> 
 
     assert (seen[key], seen["PRIORITY"]) == (HIDDEN, "6")
     assert json.loads(seen["MESSAGE"]) == {"user": "x", key: HIDDEN, "n": 1}
+
+
+def test_a_private_key_whose_begin_was_cut_off_is_hidden_too() -> None:
+    assert cleaned(f"{KEY[40:]}after\n{KEY}") == f"{HIDDEN}\nafter\n{HIDDEN}\n"
+    assert cleaned("no key at all\n") == "no key at all\n"
+
+
+def test_a_quote_that_is_never_closed_hides_its_line_alone() -> None:
+    text = 'password: "one\n' + "next: 1\n" * 30
+
+    assert cleaned(text) == f'password: "{HIDDEN}\n' + "next: 1\n" * 30
 
 
 def test_a_private_key_is_cut_out_even_without_its_end() -> None:
@@ -92,3 +129,13 @@ def test_where_there_is_no_secret_nothing_is_changed(text: str) -> None:
 @pytest.mark.parametrize("unit", ["token", "{", '"', " ", "\\", "-----BEGIN PRIVATE KEYS"])
 def test_no_text_holds_it_up(unit: str) -> None:
     assert cleaned(unit * 100_000) == unit * 100_000
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize(
+    "unit",
+    ["a://", "a://b@", "--password ", "bearer ", "psk=\n", "psk='\n", "a: \n", "cookie:", "-----END PRIVATE KEYS"],
+)
+def test_the_work_grows_no_faster_than_the_text(unit: str) -> None:
+    """A pattern that tries again and again would take hours of this."""
+    assert len(cleaned(unit * 30_000)) <= (len(unit) + 2 * len(HIDDEN)) * 30_000

@@ -48,7 +48,7 @@ def test_the_environment_has_what_matters_to_ros_and_nothing_else() -> None:
 def test_the_newest_recordings_of_this_robot_are_taken() -> None:
     mine = {Path(f"/s/stop_bench_{n}.asc"): float(n) for n in range(BOXES + 3)}
     others = {Path("/s/stop_other_9.asc"): 99.0, Path("/s/stop_bench_99.txt"): 99.0}
-    assert newest_boxes(ROBOT, mine | others) == [Path(f"/s/stop_bench_{n}.asc") for n in range(BOXES + 2, 2, -1)]
+    assert newest_boxes(ROBOT.name, mine | others) == [Path(f"/s/stop_bench_{n}.asc") for n in range(BOXES + 2, 2, -1)]
 
 
 def test_the_manifest_begins_with_what_is_missing() -> None:
@@ -79,7 +79,7 @@ def test_an_installed_robot_is_collected_without_its_keys(tmp_path: Path) -> Non
     everything = b"".join(bundle.files.values())
     assert b"hunter2" not in everything
     assert b"PRIVATE KEY" not in everything
-    assert "may be a key" in bundle.missing["config/installed/stolen.yaml"]
+    assert "links are not followed" in bundle.missing["config/installed/stolen.yaml"]
 
 
 @pytest.mark.usefixtures("quiet")
