@@ -21,13 +21,13 @@ from canbase_config.priority import Priority
 from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
 from canbase_config.safety import Scan as ScanConfig
+from canbase_config.stopping import ramp
 from canbase_velocity import messages
 from canbase_velocity.changes import changed_order, is_told
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.io import LeaseSender
 from canbase_velocity.lease import lease_datagram
-from canbase_velocity.obstacle import braking_time_s
 from canbase_velocity.placement import Placement, PlacementError, Transform, placed_by_tf
 from canbase_velocity.qos import ANY_COMMAND, COMMAND, SCAN, STATE, STATIC_TF, listen_twice
 from canbase_velocity.safety_filter import FilterConfig
@@ -137,7 +137,8 @@ class FilterNode(Node):
         stamp = self.get_clock().now().to_msg()
         self._commands.publish(messages.twist_message(decision.twist, stamp, self._robot.base.base_frame))
         if not decision.twist.is_zero:
-            self._stands_from_s = now + braking_time_s(decision.twist, self._robot.limits)
+            order = decision.twist
+            self._stands_from_s = now + ramp(self._robot.limits, order.linear_mps, order.angular_radps).time_s
         self._tell(decision, now)
         self._decision = decision
 

@@ -127,7 +127,7 @@ class SafetyFilter:
     def on_laser_scan(self, topic: str, scan: Scan, placement: Placement, now: float) -> None:
         """Takes a scan as it came; drops and counts one that cannot be used. Raises KeyError for another topic."""
         self._motion.advance(now)
-        self._scanners[topic].receive(scan, placement, now, moves=not self._motion.twist.is_zero)
+        self._scanners[topic].receive(scan, placement, now, moves=not self._motion.moving.twist.is_zero)
 
     def on_unplaced_scan(self, topic: str, problem: str) -> None:
         """A scan came whose scanner cannot be placed. Raises KeyError for another topic."""
@@ -163,7 +163,7 @@ class SafetyFilter:
             command_age_s=_age_s(self._command_at_s, now),
             scans=scans,
             sight=self._sight(pose, now),
-            motion=self._motion.twist,
+            moving=self._motion.moving,
             previous=self._previous,
             since_s=min(max(now - self._previous_at_s, 0.0), LONGEST_SINCE_S),
             estop=self._estop.state,

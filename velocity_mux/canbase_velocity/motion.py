@@ -1,4 +1,4 @@
-"""How the base is expected to move, by what was ordered: the driver's ordinary ramps without their jerk limit.
+"""How the base is expected to move, by what was ordered: the driver's ordinary ramps (ramp.py).
 
 The filter has no odometry on purpose: a lie there must not open the way. What it needs is only how the base leaves the
 motion that it is in, and how far it can have come since a scan; both ways, moved and not moved, are looked at.
@@ -13,10 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from canbase_config.robot import Limits
+from canbase_velocity.ramp import AT_REST, follow
 from canbase_velocity.sweep import Floats
 from canbase_velocity.twist import ZERO, Twist
 
-LONGEST_STEP_S = 1.0
+LONGEST_TIME_S = 1.0
+"""A longer gap between two looks counts as this one [s]."""
+STEP_S = 0.05
+"""The velocity changes in steps no longer than this."""
 STILL_M = 1e-6
 """A way or, at one metre, a turn below this is none."""
 
@@ -62,23 +66,6 @@ class Pose:
         return seen
 
 
-def follow(twist: Twist, order: Twist, limits: Limits, dt_s: float) -> Twist:
-    """The velocity `dt_s` after `twist` on the way to `order`: a straight line in both, which keeps the curvature.
-
-    Only braking does not wait for a turn that grows.
-    """
-    linear_s = _ramp_s(twist.linear_mps, order.linear_mps, limits.acceleration_mps2, limits.deceleration_mps2)
-    turn, turn_to = twist.angular_radps, order.angular_radps
-    angular_s = _ramp_s(turn, turn_to, limits.angular_acceleration_radps2, limits.angular_deceleration_radps2)
-    brakes = abs(order.linear_mps) < abs(twist.linear_mps) or order.linear_mps * twist.linear_mps < 0.0
-    whole_s = max(linear_s, angular_s)
-    linear_share = _share(dt_s, linear_s if brakes and abs(turn_to) > abs(turn) else whole_s)
-    return Twist(
-        twist.linear_mps + (order.linear_mps - twist.linear_mps) * linear_share,
-        turn + (turn_to - turn) * _share(dt_s, whole_s),
-    )
-
-
 class ExpectedMotion:
     """The motion over time: `order` says what holds from now on."""
 
@@ -86,23 +73,29 @@ class ExpectedMotion:
         """`memory_s`: so long ago `pose_at` can be asked for."""
         self._limits = limits
         self._memory_s = memory_s
-        self._order = self.twist = ZERO
-        """`twist`: the velocity expected now."""
+        self._order = ZERO
+        self.moving = AT_REST
+        """The velocity expected now, and how it changes."""
         self._poses: deque[tuple[float, Pose]] = deque([(-math.inf, Pose())])
 
     def advance(self, now: float) -> Pose:
         """Lets the time pass until `now` [s, monotonic]; the pose there."""
         at_s, pose = self._poses[-1]
-        dt_s = min(max(now - at_s, 0.0), LONGEST_STEP_S)
-        after = follow(self.twist, self._order, self._limits, dt_s)
-        mean = Twist(
-            (self.twist.linear_mps + after.linear_mps) / 2.0, (self.twist.angular_radps + after.angular_radps) / 2.0
-        )
-        pose, self.twist = pose.moved(mean, dt_s), after
+        left_s = min(max(now - at_s, 0.0), LONGEST_TIME_S)
+        while left_s > 0.0:
+            dt_s = min(left_s, STEP_S)
+            left_s -= dt_s
+            pose = self._step(pose, dt_s)
         self._poses.append((now, pose))
         while len(self._poses) > 2 and self._poses[1][0] < now - self._memory_s:
             self._poses.popleft()
         return pose
+
+    def _step(self, pose: Pose, dt_s: float) -> Pose:
+        before, self.moving = self.moving.twist, follow(self.moving, self._order, self._limits, dt_s)
+        after = self.moving.twist
+        mean = Twist((before.linear_mps + after.linear_mps) / 2.0, (before.angular_radps + after.angular_radps) / 2.0)
+        return pose.moved(mean, dt_s)
 
     def order(self, twist: Twist, now: float) -> None:
         """From `now` on this is ordered."""
@@ -118,15 +111,3 @@ class ExpectedMotion:
                 return pose.towards(later, (at_s - since_s) / span_s if 0.0 < span_s < math.inf else 1.0)
             later_s, later = since_s, pose
         return later
-
-
-def _ramp_s(velocity: float, goal: float, acceleration: float, deceleration: float) -> float:
-    """Time from one velocity of an axis to another: down to zero first where it is reversed."""
-    if velocity * goal < 0.0:
-        return abs(velocity) / deceleration + abs(goal) / acceleration
-    rate = acceleration if abs(goal) > abs(velocity) else deceleration
-    return abs(goal - velocity) / rate
-
-
-def _share(dt_s: float, whole_s: float) -> float:
-    return 1.0 if dt_s >= whole_s else dt_s / whole_s

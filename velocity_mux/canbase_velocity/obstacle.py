@@ -2,8 +2,8 @@
 
 Rules:
 1. Along the arc of the command the base must be able to stand before the stop distance, by a gentle braking that starts
-   at the slow-down distance; it slows down on the same curve. From v·hold + v²/(2·a) = free way, with the time for
-   both speeds together.
+   at the slow-down distance; it slows down on the same curve. From v·hold + v·T/2 = free way, with the time T of the
+   gentle ramp, jerk limit included, for both speeds together.
 2. The base leaves the motion that it is in only by its ramps. If the ordinary ramp would no longer stop it before half
    the stop distance after one more period of the order, the order is zero. If it no longer does now, whatever is
    ordered, the base has to brake hard.
@@ -21,14 +21,17 @@ import numpy as np
 
 from canbase_config.robot import Limits
 from canbase_config.safety import LimitZone, Safety
+from canbase_config.stopping import ramp
 from canbase_velocity.clearance import Field
-from canbase_velocity.motion import Pose, follow
+from canbase_velocity.motion import Pose
+from canbase_velocity.ramp import Moving, follow, stop_way_s
 from canbase_velocity.sweep import NO_TOUCH, Box, Floats, Touch, fastest_mps, first_touch
 from canbase_velocity.twist import Twist
 
 SEEN_SHARE = 0.5
 """Rule 4: the share of the swept edge that has to be in a field of view."""
 _EDGE_POINTS = 8
+_HALVINGS = 30
 _LOOKS = 4
 """Rule 5 looks at so many places of the footprint on its path."""
 
@@ -54,8 +57,8 @@ class Geometry:
     limits: Limits
     box: Box
     stop_m: float
-    gentleness: float
-    """Share of the ordinary deceleration that slowing down uses, 0 to 1."""
+    gentle: Limits
+    """With the decelerations that slowing down uses: the ordinary ones, or a share of them."""
     hold_s: float
     reaction_s: float
     zones: tuple[LimitZone, ...]
@@ -64,12 +67,16 @@ class Geometry:
     def of(limits: Limits, safety: Safety, command_hz: float) -> Geometry:
         """Of these sections of robot.yaml."""
         braking_m = safety.slow_distance_m - safety.stop_distance_m
-        gentle_mps2 = limits.linear_mps**2 / (2.0 * braking_m)
+        share = min(1.0, limits.linear_mps**2 / (2.0 * braking_m) / limits.deceleration_mps2)
+        gentle = {
+            "deceleration_mps2": share * limits.deceleration_mps2,
+            "angular_deceleration_radps2": share * limits.angular_deceleration_radps2,
+        }
         return Geometry(
             limits,
             Box.of(safety.footprint, safety.padding_m),
             safety.stop_distance_m,
-            min(1.0, gentle_mps2 / limits.deceleration_mps2),
+            limits.model_copy(update=gentle),
             1.0 / command_hz,
             safety.reaction_s,
             safety.limit_zones,
@@ -79,9 +86,8 @@ class Geometry:
         """No obstacle farther from the footprint can matter to anything that is allowed."""
         limits = self.limits
         fastest_m_s = limits.linear_mps + limits.angular_radps * self.box.radius_m
-        whole = Twist(limits.linear_mps, limits.angular_radps)
         waits_s = scan_timeout_s + self.reaction_s + 2.0 * self.hold_s
-        way_m = fastest_m_s * (waits_s + braking_time_s(whole, limits) / (2.0 * self.gentleness))
+        way_m = fastest_m_s * (waits_s + ramp(self.gentle, limits.linear_mps, limits.angular_radps).time_s / 2.0)
         zones_m = (max(zone.front_m, zone.rear_m, zone.left_m, zone.right_m) for zone in self.zones)
         return self.stop_m + max(way_m, math.sqrt(2.0) * max(zones_m, default=0.0))
 
@@ -94,49 +100,50 @@ class Judgement:
     touch: Touch
 
 
-def braking_time_s(twist: Twist, limits: Limits) -> float:
-    """How long the driver's ordinary ramp from `twist` to standstill takes [s]."""
-    return max(
-        abs(twist.linear_mps) / limits.deceleration_mps2,
-        abs(twist.angular_radps) / limits.angular_deceleration_radps2,
-    )
+def allowed_share(slack_s: float, twist: Twist, gentle: Limits, hold_s: float) -> float:
+    """Share k of `twist` from which the base still stands in time, by the ramp of `gentle`; at most 1.
 
-
-def allowed_share(slack_s: float, braking_s: float, hold_s: float) -> float:
-    """Share k of a velocity from which the base still stands in time: k·hold + k²·braking/2 = slack; at most 1.
-
-    `slack_s`: until the last point to stand at, driven with the whole velocity. `braking_s`: from there to standstill.
+    `slack_s`: until the last point to stand at, driven with the whole velocity: k·hold + k·T(k)/2 = slack, where T is
+    the time of the ramp from k times the velocity. Found by halving, from below.
     """
     if slack_s <= 0.0:
         return 0.0
-    if slack_s >= hold_s + braking_s / 2.0:
+    if _needs_s(1.0, twist, gentle, hold_s) <= slack_s:
         return 1.0
-    return min(1.0, (math.sqrt(hold_s**2 + 2.0 * braking_s * slack_s) - hold_s) / braking_s)
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if _needs_s(middle, twist, gentle, hold_s) <= slack_s else (low, middle)
+    return low
 
 
-def judge(order: Twist, motion: Twist, sight: Sight, geometry: Geometry) -> Judgement:
-    """What is left of `order` (not zero), given the `motion` that the base is in."""
-    limits, hold_s = geometry.limits, geometry.hold_s
+def _needs_s(share: float, twist: Twist, gentle: Limits, hold_s: float) -> float:
+    return share * (hold_s + stop_way_s(Moving(twist.scaled(share)), gentle))
+
+
+def judge(order: Twist, moving: Moving, sight: Sight, geometry: Geometry) -> Judgement:
+    """What is left of `order` (not zero), given the motion that the base is in."""
+    hold_s = geometry.hold_s
     if sight.points.shape[0] == 0:
         return Judgement(1.0, NO_TOUCH)
-    if brakes_too_late(follow(motion, order, limits, hold_s), sight, geometry):
-        touch = first_touch(sight.points, geometry.box, motion if not motion.is_zero else order, geometry.stop_m)
-        return Judgement(0.0, touch)
+    if brakes_too_late(follow(moving, order, geometry.limits, hold_s), sight, geometry):
+        ahead = order if moving.twist.is_zero else moving.twist
+        return Judgement(0.0, first_touch(sight.points, geometry.box, ahead, geometry.stop_m))
     touch = first_touch(sight.points, geometry.box, order, geometry.stop_m)
-    braking_s = braking_time_s(order, limits) / geometry.gentleness
-    return Judgement(allowed_share(touch.slack_s, braking_s, hold_s), touch)
+    return Judgement(allowed_share(touch.slack_s, order, geometry.gentle, hold_s), touch)
 
 
-def brakes_too_late(motion: Twist, sight: Sight, geometry: Geometry) -> bool:
-    """Rule 2: from `motion` the ordinary ramp leads nearer to an obstacle than half the stop distance."""
-    if motion.is_zero or sight.points.shape[0] == 0:
+def brakes_too_late(moving: Moving, sight: Sight, geometry: Geometry) -> bool:
+    """Rule 2: from this motion the ordinary ramp leads nearer to an obstacle than half the stop distance."""
+    if moving.twist.is_zero or sight.points.shape[0] == 0:
         return False
-    touch = first_touch(sight.points, geometry.box, motion, geometry.stop_m / 2.0)
-    return touch.slack_s < braking_time_s(motion, geometry.limits) / 2.0
+    touch = first_touch(sight.points, geometry.box, moving.twist, geometry.stop_m / 2.0)
+    return touch.slack_s < stop_way_s(moving, geometry.limits)
 
 
 def is_blind(order: Twist, sight: Sight, geometry: Geometry) -> bool:
     """Rule 4: what lies before the edge of the footprint, a stop distance along the arc of `order` (not zero)."""
+    order = order.normalized()
     ahead_s = geometry.stop_m / fastest_mps(geometry.box, order)
     edge = geometry.box.edge(_EDGE_POINTS)
     swept = Pose().from_here(edge, Pose().moved(order, ahead_s))
@@ -152,8 +159,10 @@ def told_share(order: Twist, sight: Sight, geometry: Geometry) -> float:
     scanner faces, the share that is covered by usable readings; 1 where no scanner faces any."""
     limits, box = geometry.limits, geometry.box
     order = order.scaled(speed_factor(order, limits.linear_mps, limits.angular_radps))
-    stands_s = geometry.hold_s + geometry.reaction_s + braking_time_s(order, limits) / 2.0
-    ahead_s = geometry.stop_m / fastest_mps(box, order) + stands_s
+    stands_s = geometry.hold_s + geometry.reaction_s + stop_way_s(Moving(order), limits)
+    way_m = geometry.stop_m + fastest_mps(box, order) * stands_s
+    order = order.normalized()
+    ahead_s = way_m / fastest_mps(box, order)
     edge, start = box.edge(_EDGE_POINTS), Pose()
     poses = (start.moved(order, ahead_s * step / _LOOKS) for step in range(1, _LOOKS + 1))
     swept = np.concatenate([start.from_here(edge, pose) for pose in poses])

@@ -28,6 +28,7 @@ from canbase_velocity import obstacle
 from canbase_velocity.decision import PASSED, Action, Cause, Decision, Finding, stop
 from canbase_velocity.estop import EstopState
 from canbase_velocity.obstacle import Geometry, Sight
+from canbase_velocity.ramp import Moving
 from canbase_velocity.sweep import fastest_mps, first_touch
 from canbase_velocity.twist import ZERO, Twist
 
@@ -93,7 +94,7 @@ class Inputs:
     scans: tuple[ScanState, ...]
     sight: Sight
     """What the fresh ones of the scans show."""
-    motion: Twist
+    moving: Moving
     """How the base is expected to move, by earlier orders."""
     previous: Twist
     """The last order."""
@@ -128,9 +129,9 @@ def brakes_hard(inputs: Inputs, config: FilterConfig) -> bool:
     """Whether the ordinary ramp is too late. Decided once for every order: the command has no part in it."""
     if inputs.estop is EstopState.HELD:
         return True
-    if inputs.motion.is_zero:
+    if inputs.moving.twist.is_zero:
         return False
-    return inputs.braking_hard or obstacle.brakes_too_late(inputs.motion, inputs.sight, config.geometry)
+    return inputs.braking_hard or obstacle.brakes_too_late(inputs.moving, inputs.sight, config.geometry)
 
 
 def _estop(inputs: Inputs, config: FilterConfig) -> Finding | None:
@@ -253,8 +254,8 @@ def _kept(previous: float, asked: float) -> float:
 
 def _too_late(inputs: Inputs, config: FilterConfig) -> Finding:
     """Why the base brakes hard, to standstill."""
-    geometry, where = config.geometry, _where(inputs.motion)
-    touch = first_touch(inputs.sight.points, geometry.box, inputs.motion, geometry.stop_m / 2.0)
+    geometry, where = config.geometry, _where(inputs.moving.twist)
+    touch = first_touch(inputs.sight.points, geometry.box, inputs.moving.twist, geometry.stop_m / 2.0)
     seen = f": {touch.way_m:.2f} m free {where}" if math.isfinite(touch.way_m) else " to standstill"
     return stop(Cause.OBSTACLE, f"brakes hard{seen}", "standstill, and more free way")
 
@@ -264,7 +265,7 @@ def _obstacle(twist: Twist, inputs: Inputs, config: FilterConfig) -> Finding:
     if twist.is_zero:
         return PASSED
     geometry = config.geometry
-    judgement = obstacle.judge(twist, inputs.motion, inputs.sight, geometry)
+    judgement = obstacle.judge(twist, inputs.moving, inputs.sight, geometry)
     free_m, where, speed_mps = judgement.touch.way_m, _where(twist), fastest_mps(geometry.box, twist)
     if judgement.share >= 1.0:
         return PASSED

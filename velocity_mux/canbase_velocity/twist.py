@@ -27,5 +27,10 @@ class Twist:
         """The same curve, driven `factor` (0 to 1) times as fast."""
         return Twist(self.linear_mps * factor, self.angular_radps * factor)
 
+    def normalized(self) -> Twist:
+        """The same curve with 1 m/s or 1 rad/s, whichever is the greater; for twists that are not zero."""
+        greatest = max(abs(self.linear_mps), abs(self.angular_radps))
+        return Twist(self.linear_mps / greatest, self.angular_radps / greatest)
+
 
 ZERO = Twist(0.0, 0.0)

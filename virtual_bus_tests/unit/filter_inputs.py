@@ -16,6 +16,7 @@ from canbase_velocity.decision import Cause
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.obstacle import NOTHING_IN_SIGHT, Geometry, Sight
+from canbase_velocity.ramp import AT_REST, Moving
 from canbase_velocity.safety_filter import FilterConfig, Inputs, ScanState
 from canbase_velocity.sweep import Box
 from canbase_velocity.twist import ZERO, Twist
@@ -30,7 +31,8 @@ LIMITS = Limits(
     emergency_deceleration_mps2=4.0,
     angular_acceleration_radps2=4.0,
     angular_deceleration_radps2=4.0,
-)
+).model_copy(update={"jerk_mps3": 1e9})
+"""Ramps without a jerk limit, to be counted by hand: it is over within nanoseconds."""
 HOLD_S = 0.02
 BOX = Box(front_m=0.4, rear_m=0.4, left_m=0.3, right_m=0.3)
 
@@ -69,7 +71,7 @@ GOOD = Inputs(
     command_age_s=0.0,
     scans=scanned(0.0),
     sight=NOTHING_IN_SIGHT,
-    motion=ZERO,
+    moving=AT_REST,
     previous=ZERO,
     since_s=HOLD_S,
     estop=EstopState.FREE,
@@ -80,7 +82,9 @@ HELD = {"estop": EstopState.HELD}
 
 
 def given_that(**changes: Any) -> Inputs:
-    """All is well and 0.5 m/s ordered, but for the changes."""
+    """All is well and 0.5 m/s ordered, but for the changes. `motion`: a velocity that does not change."""
+    if "motion" in changes:
+        changes["moving"] = Moving(changes.pop("motion"))
     return dataclasses.replace(GOOD, **changes)
 
 

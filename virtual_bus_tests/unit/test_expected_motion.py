@@ -4,22 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from canbase_velocity.motion import ExpectedMotion, follow
-from canbase_velocity.twist import ZERO, Twist
+from canbase_velocity.motion import ExpectedMotion
+from canbase_velocity.twist import Twist
 from unit.filter_inputs import LIMITS
-
-
-def test_the_expected_motion_follows_the_ramps() -> None:
-    assert follow(ZERO, Twist(1.0, 0.0), LIMITS, 0.1).linear_mps == pytest.approx(0.1)
-    assert follow(Twist(1.0, 0.0), ZERO, LIMITS, 0.1).linear_mps == pytest.approx(0.8)
-    braking = follow(Twist(1.0, 0.5), ZERO, LIMITS, 0.1)
-    assert braking.angular_radps / braking.linear_mps == pytest.approx(0.5)
-    turning = follow(Twist(1.0, 0.0), Twist(0.0, 2.0), LIMITS, 0.1)
-    assert turning.linear_mps == pytest.approx(0.8)  # braking does not wait for the turn
-    assert 0.0 < turning.angular_radps <= 0.4
-    back = follow(Twist(0.2, 0.0), Twist(-1.0, 0.0), LIMITS, 0.05)
-    assert -1.0 < back.linear_mps < 0.2
-    assert follow(Twist(0.2, 0.0), Twist(0.3, 0.0), LIMITS, 5.0) == Twist(0.3, 0.0)
 
 
 def test_the_expected_pose_is_remembered_between_orders_and_no_longer_than_asked_for() -> None:

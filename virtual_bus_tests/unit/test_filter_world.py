@@ -7,6 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from canbase_config.robot import Robot
 from canbase_velocity.decision import Action, Cause
 from canbase_velocity.twist import ZERO, Twist
 from unit.filter_world import FilterWorld, robot_with
@@ -113,3 +114,37 @@ def test_hard_braking_lasts_until_standstill_though_the_scanner_is_silent_then()
     before_m = world.path_m
     world.run(Twist(0.8, 0.0), 1.0)
     assert world.path_m == pytest.approx(before_m, abs=0.02)
+
+
+def soft(jerk_mps3: float, **changes: float) -> Robot:
+    limits = ROBOT.limits.model_copy(update={"jerk_mps3": jerk_mps3, **changes})
+    return ROBOT.model_copy(update={"limits": limits})
+
+
+@pytest.mark.parametrize(
+    ("robot", "emergencies"),
+    [(soft(10.0), 0), (soft(1.0), 0), (soft(0.2), 0), (soft(0.2, deceleration_mps2=0.4), 0), (soft(1000.0), 0)],
+)
+def test_with_any_jerk_limit_of_the_driver_the_wall_is_not_touched(robot: Robot, emergencies: int) -> None:
+    """0.8 m/s at a wall 4 m ahead: with 0.2 m/s³ alone the stop takes 4 s and 1.6 m."""
+    world = FilterWorld(robot, np.array([(5.0, 0.0), (5.0, 0.05)]))
+    least_m = world.run(Twist(0.8, 0.0), 25.0)
+    assert 0.1 < least_m < 0.2
+    assert world.emergencies == emergencies
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    places=st.lists(places_m, min_size=1, max_size=25),
+    stream=streams,
+    jerk_mps3=st.sampled_from([0.2, 1.0, 10.0]),
+    deceleration_mps2=st.sampled_from([0.4, 1.0]),
+)
+def test_whatever_is_ordered_and_however_soft_the_ramps_are_no_obstacle_is_touched(
+    places: list[tuple[float, float]], stream: list[tuple[Twist, float]], jerk_mps3: float, deceleration_mps2: float
+) -> None:
+    world = FilterWorld(soft(jerk_mps3, deceleration_mps2=deceleration_mps2), np.array(places))
+    assume(world.gap_m > 0.02)
+    for command, duration_s in stream:
+        assert world.run(command, duration_s) > 0.0
+    assert world.run(ZERO, 5.0) > 0.0

@@ -113,5 +113,5 @@ def test_ceiling_and_obstacle_together_tell_the_more_severe_and_order_the_slower
     decision = decide(given_that(command=Twist(4.0, 0.0), sight=free(ahead_m=0.35)), config())
     assert (decision.action, decision.cause) == (Action.SLOW, Cause.OBSTACLE_NEAR)
     assert decision.twist.linear_mps == pytest.approx(0.6874, abs=1e-4)
-    far = decide(given_that(command=Twist(4.0, 0.0), sight=free(ahead_m=0.62)), config())
+    far = decide(given_that(command=Twist(4.0, 0.0), sight=free(ahead_m=0.621)), config())
     assert (far.action, far.twist.linear_mps) == (Action.LIMIT, 1.0)

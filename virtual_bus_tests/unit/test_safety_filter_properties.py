@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from canbase_velocity.clearance import Field
 from canbase_velocity.decision import Action, Cause, Decision
 from canbase_velocity.estop import EstopState
-from canbase_velocity.obstacle import Sight, allowed_share, braking_time_s
+from canbase_velocity.obstacle import Sight, allowed_share
 from canbase_velocity.placement import Placement
+from canbase_velocity.ramp import Moving, stop_way_s
 from canbase_velocity.safety_filter import FilterConfig, Inputs, decide
 from canbase_velocity.sweep import first_touch
 from canbase_velocity.twist import ZERO, Twist
@@ -25,13 +26,14 @@ ages_s = st.none() | st.floats(0.0, 1.0) | st.sampled_from([0.2, 0.3, 0.5])
 spots_m = st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)) | st.sampled_from([(0.4, 0.3), (0.5, 0.0), (0.0, 0.0)])
 sights = st.lists(spots_m, max_size=8).map(lambda at: places(*at))
 motions = st.builds(Twist, st.floats(-1.0, 1.0), st.floats(-2.0, 2.0)) | st.just(ZERO)
+movings = st.builds(Moving, motions, st.floats(-2.0, 2.0))
 all_inputs = st.builds(
     Inputs,
     command=st.builds(Twist, numbers, numbers),
     command_age_s=ages_s,
     scans=ages_s.map(scanned),
     sight=sights,
-    motion=motions,
+    moving=movings,
     previous=motions,
     since_s=st.floats(0.0, 0.1),
     estop=st.sampled_from(EstopState),
@@ -44,7 +46,7 @@ moving_inputs = st.builds(
     command_age_s=st.floats(0.0, 0.2),
     scans=st.floats(0.0, 0.3).map(scanned),
     sight=sights,
-    motion=motions,
+    moving=movings,
     previous=motions,
     since_s=st.floats(0.0, 0.1),
     estop=st.just(EstopState.FREE),
@@ -102,7 +104,7 @@ def test_it_stops_whenever_a_required_input_is_stale_or_the_emergency_stop_is_no
 def stands_in_time(decision: Decision, inputs: Inputs) -> bool:
     """Along the arc of the order, by the ordinary ramp, before the stop distance."""
     touch = first_touch(inputs.sight.points, BOX, decision.twist, 0.1)
-    return braking_time_s(decision.twist, LIMITS) / 2.0 <= touch.slack_s * (1 + 1e-9)
+    return stop_way_s(Moving(decision.twist), LIMITS) <= touch.slack_s * (1 + 1e-9)
 
 
 @given(inputs=moving_inputs)
@@ -152,12 +154,14 @@ def test_whoever_brakes_hard_is_ordered_zero(inputs: Inputs, settings: FilterCon
 
 @given(
     slack_s=st.floats(-1.0, 10.0) | st.sampled_from([0.0, 5e-324]),
-    braking_s=st.floats(1e-6, 3.0),
+    twist=st.builds(Twist, st.floats(0.001, 1.0), st.floats(-2.0, 2.0)),
+    jerk_mps3=st.sampled_from([0.1, 1.0, 10.0, 1e9]),
     hold_s=st.floats(0.001, 0.3),
 )
-def test_the_allowed_share_uses_the_time_up(slack_s: float, braking_s: float, hold_s: float) -> None:
-    share = allowed_share(slack_s, braking_s, hold_s)
+def test_the_allowed_share_uses_the_time_up(slack_s: float, twist: Twist, jerk_mps3: float, hold_s: float) -> None:
+    gentle = LIMITS.model_copy(update={"jerk_mps3": jerk_mps3})
+    share = allowed_share(slack_s, twist, gentle, hold_s)
     assert 0.0 <= share <= 1.0
-    used_s = share * hold_s + share**2 * braking_s / 2.0
-    assert share == 1.0 or used_s == pytest.approx(max(slack_s, 0.0), abs=1e-9)
-    assert share < 1.0 or used_s <= slack_s * (1 + 1e-9) + 1e-9
+    used_s = share * (hold_s + stop_way_s(Moving(twist.scaled(share)), gentle))
+    assert share == 1.0 or used_s == pytest.approx(max(slack_s, 0.0), abs=1e-6)
+    assert share == 0.0 or used_s <= slack_s
