@@ -21,6 +21,7 @@ import time
 from pathlib import Path
 
 import rclpy
+from canbase.msg import DriverStatus
 from geometry_msgs.msg import TwistStamped
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
@@ -37,11 +38,14 @@ SOURCE_HZ = 50.0
 SCAN_HZ = 20.0
 POINTS = 720
 WARM_UP_S = 5.0
+FIRST_ZEROS = 200
+"""Commands of zero before the first that moves: the mux has started by then."""
 MEASURED_S = float(os.environ.get("MEASURED_S", "30"))
 STEP_RADPS = 1e-6
 """The number of a command, counted in these, stands in its angular velocity."""
 RELAY = """
 import rclpy
+from canbase.msg import DriverStatus
 from geometry_msgs.msg import TwistStamped
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
@@ -65,6 +69,7 @@ class Course(Node):
         self.took_s: dict[str, dict[int, float]] = {"cmd_vel": {}, "relayed": {}}
         self._number = 0
         self._sources = [self.create_publisher(TwistStamped, f"cmd_vel_{i}", 1) for i in range(SOURCES)]
+        self._driver = self.create_publisher(DriverStatus, "motor_driver/status", 1)
         self._scans = self.create_publisher(LaserScan, "scan", qos_profile_sensor_data)
         step_rad = math.tau / POINTS
         self._scan = LaserScan(
@@ -73,6 +78,7 @@ class Course(Node):
         for topic in self.took_s:
             self.create_subscription(TwistStamped, topic, self._taker(topic), QoSProfile(depth=50))
         self.create_timer(1.0 / SOURCE_HZ, self._command)
+        self.create_timer(0.1, lambda: self._driver.publish(DriverStatus(state=DriverStatus.ENABLED)))
         self.create_timer(1.0 / SCAN_HZ, self._send_scan)
 
     def _send_scan(self) -> None:
@@ -87,8 +93,9 @@ class Course(Node):
             publisher.publish(TwistStamped())
         self._number += 1
         message = TwistStamped()
-        message.twist.linear.x = 0.1
-        message.twist.angular.z = self._number * STEP_RADPS
+        if self._number > FIRST_ZEROS:  # the mux follows a source that has commanded zero
+            message.twist.linear.x = 0.1
+            message.twist.angular.z = self._number * STEP_RADPS
         self.sent_s[self._number] = time.monotonic()
         self._sources[0].publish(message)
 

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from canbase_config.section import MisfitError, Name, NodeName, Section, Topic
 
 OUTPUTS: Final = ("cmd_vel_mux", "cmd_vel")
 """What the chain itself says: a source there would make the robot follow its own last command for ever."""
+
+
+NEUTRAL_AFTER_S: Final = 2.0
+"""Of a program that begins with a velocity: far longer than a radio gap [s]."""
+PROGRAMS: Final = ("navigation", "action")
+"""Sources with one of these names may start without a zero command, unless their key neutral_after_s says otherwise."""
 
 
 class MuxSource(Section):
@@ -24,6 +30,13 @@ class MuxSource(Section):
         tuple[NodeName, ...],
         Field(min_length=0, max_length=16, strict=False, description="who may publish there; empty: anybody"),
     ] = ()
+    neutral_after_s: Annotated[
+        float | None,
+        Field(ge=1.0, le=60.0, description="silent for so long: may start without a zero; null: never [s]"),
+    ] = None
+    same_clock: Annotated[
+        bool, Field(description="its stamps are of this computer's clock: their age is the delay")
+    ] = False
 
 
 class MuxLock(Section):
@@ -37,8 +50,14 @@ class MuxLock(Section):
 
 DEFAULT_SOURCES = {
     "joystick": MuxSource(topic="cmd_vel_joy", priority=100, timeout_s=0.3),
-    "navigation": MuxSource(topic="cmd_vel_nav", priority=50, timeout_s=0.5),
-    "action": MuxSource(topic="cmd_vel_action", priority=40, timeout_s=0.3, nodes=("drive_distance_server",)),
+    "navigation": MuxSource(topic="cmd_vel_nav", priority=50, timeout_s=0.5, neutral_after_s=NEUTRAL_AFTER_S),
+    "action": MuxSource(
+        topic="cmd_vel_action",
+        priority=40,
+        timeout_s=0.3,
+        nodes=("drive_distance_server",),
+        neutral_after_s=NEUTRAL_AFTER_S,
+    ),
 }
 
 
@@ -57,6 +76,19 @@ class Mux(Section):
         tuple[Annotated[str, Field(min_length=1, max_length=400)], ...],
         Field(min_length=0, max_length=8, strict=False, description="parameter files of twist_mux, added to the above"),
     ] = ()
+
+    @field_validator("sources", mode="before")
+    @classmethod
+    def _programs(cls, sources: Any) -> Any:
+        """What is no section is reported by the model."""
+        if not isinstance(sources, dict):
+            return sources
+        return {
+            name: {"neutral_after_s": NEUTRAL_AFTER_S, **source}
+            if name in PROGRAMS and isinstance(source, dict)
+            else source
+            for name, source in sources.items()
+        }
 
     @model_validator(mode="after")
     def _fits_together(self) -> Mux:

@@ -83,8 +83,13 @@ def line(snapshot: Snapshot) -> str:
 def _mux_word(heard: Heard) -> Text:
     if not heard.fresh:
         return _silence("velocity_mux", heard)
-    active = heard.message.active
-    return Text(f"{active} drives", GOOD) if active else Text("nobody drives", WARN)
+    state = heard.message
+    holder = next((source for source in state.sources if source.active), None)
+    if holder is None:
+        return Text("nobody drives", WARN)
+    if holder.reason:
+        return Text(f"{holder.name} is not followed: {holder.reason.split(' (')[0]}", BAD)
+    return Text(f"{holder.name} drives", GOOD)
 
 
 def _safety_word(heard: Heard) -> Text:
@@ -118,20 +123,24 @@ def _silence(who: str, heard: Heard) -> Text:
 
 
 def _mux(state: Any) -> RenderableType:
-    table = _table("", "source", "age", "timeout", "refused", "why not")
+    table = _table("", "source", "age", "late by", "timeout", "refused", "why not")
     for source in state.sources:
-        style = GOOD if source.active else ""
+        followed = source.active and not source.reason
+        style = GOOD if followed else BAD if source.active else ""
         refused = Text(str(source.refused), BAD if source.refused else "")
-        reason = "drives" if source.active else source.reason
-        values = (str(source.priority), source.name, _seconds(source.age_s), _seconds(source.timeout_s))
+        unarmed = "" if source.armed or "waiting" in source.reason else "; needs a zero first"
+        reason = "drives" if followed else source.reason + unarmed
+        times = (_seconds(source.age_s), _seconds(source.delay_s), _seconds(source.timeout_s))
+        values = (str(source.priority), source.name, *times)
         table.add_row(*values, refused, reason, style=style)
     for lock in state.locks:
         limit = _seconds(lock.timeout_s) if lock.required else "none"
-        times = (_seconds(lock.age_s), limit)
+        times = (_seconds(lock.age_s), "", limit)
         style = BAD if lock.holds else ""
         table.add_row(str(lock.priority), f"lock {lock.name}", *times, "", lock.reason or "free", style=style)
     strangers = [Text(f"{found.node} publishes on {found.topic}: {found.problem}", BAD) for found in state.foreign]
-    return Group(table, *strangers)
+    ready = [] if state.ready else [Text(f"The base cannot move: {state.not_ready}", WARN)]
+    return Group(table, *ready, *strangers)
 
 
 def _safety(state: Any) -> RenderableType:

@@ -19,14 +19,23 @@ STOP_PRIORITY: Final = {
 """Of a stop. An obstacle is what the filter is for; each other cause is one that somebody should look at."""
 
 
+NOT_FOLLOWED: Final = (Standing.UNARMED, Standing.DELAYED)
+"""Of a source that has the base all the same."""
+
+
 def changes(before: MuxDecision, now: MuxDecision) -> Iterator[Told]:
-    """Locks that hold or let go, and who drives. A source that lost the wheel to a lock is a notice."""
+    """Locks that hold or let go, and who drives. A source that lost the base to a lock is a notice, as is one that is
+    not followed.
+    """
     held = {lock.name: lock.holds for lock in before.locks}
     for lock in now.locks:
         if lock.holds != held[lock.name]:
             sentence = f"lock {lock.name} {lock.reason}" if lock.holds else f"lock {lock.name} is free"
             yield sentence, Priority.NOTICE, {"lock": lock.name, "lock_holds": str(lock.holds).lower()}
-    if now.active != before.active:
+    ignored = now.holder is not None and bool(now.holder.reason)
+    if ignored and _standing(now) is not _standing(before):
+        yield now.sentence, Priority.NOTICE, {"active": now.active or "", "before": before.active or ""}
+    elif now.active != before.active or (_standing(before) in NOT_FOLLOWED and not ignored):
         lost = next((source for source in now.sources if source.name == before.active), None)
         why = f" ({lost.reason})" if lost is not None and lost.reason else ""
         locked = lost is not None and lost.standing is Standing.LOCKED
@@ -44,6 +53,10 @@ def is_told(before: Decision, now: Decision) -> bool:
         return now.emergency and not before.emergency
     actions = (before.action, now.action)
     return Action.STOP in actions or Action.LIMIT not in actions or (now.emergency and not before.emergency)
+
+
+def _standing(decision: MuxDecision) -> Standing | None:
+    return None if decision.holder is None else decision.holder.standing
 
 
 def changed_order(now: Decision) -> Told:

@@ -1,5 +1,5 @@
-"""The node safety_filter: ROS and the lease around filter_state.py. cmd_vel_mux, scans and estop_state in; cmd_vel,
-safety_filter/state and leases out; the service safety_filter/reset. See docs/ros_api.md.
+"""The node safety_filter: ROS and the lease around filter_state.py. Orders of the mux, scans and estop_state in;
+cmd_vel, safety_filter/state and leases out; the service safety_filter/reset. See docs/ros_api.md.
 """
 
 from __future__ import annotations
@@ -25,12 +25,15 @@ from canbase_config.stopping import ramp
 from canbase_velocity import messages
 from canbase_velocity.changes import changed_order, is_told
 from canbase_velocity.decision import Action, Decision
+from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.io import LeaseSender
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.placement import Placement, PlacementError, Transform, placed_by_tf
-from canbase_velocity.qos import ANY_COMMAND, COMMAND, SCAN, STATE, STATIC_TF, listen_twice
+from canbase_velocity.qos import COMMAND, SCAN, STATE, STATIC_TF, listen_twice
 from canbase_velocity.safety_filter import FilterConfig
+from canbase_velocity.steady import refuse_sim_time, steady_timer
+from canbase_velocity.twist import Twist
 
 STATE_PERIOD_S = 0.1
 MovingSources = Callable[[], Sequence[str]]
@@ -44,6 +47,7 @@ class FilterNode(Node):
 
     def __init__(self, robot: Robot, moving_sources: MovingSources = tuple) -> None:
         super().__init__("safety_filter")
+        refuse_sim_time(self)
         self._robot = robot
         self._voice = Voice(self.get_logger(), Journal("safety_filter"))
         self._receive_times = ReceiveTimes()
@@ -57,11 +61,10 @@ class FilterNode(Node):
         self._stands_from_s = -math.inf
         self._commands = self.create_publisher(TwistStamped, "cmd_vel", COMMAND)
         self._states = self.create_publisher(SafetyState, "safety_filter/state", STATE)
-        self.create_subscription(TwistStamped, "cmd_vel_mux", self._on_command, ANY_COMMAND)
         listen_twice(self, Bool, robot.safety.estop.topic, self._on_estop)
         self._watch_scans(robot.safety.scans)
         self.create_service(Trigger, "safety_filter/reset", self._on_reset)
-        self._timer = self.create_timer(1.0 / robot.rates.command_hz, self._tick)
+        self._timer = steady_timer(self, 1.0 / robot.rates.command_hz, self._tick)
 
     def shut_down(self) -> None:
         """Orders zero once, with its lease, and says so in the state. Called several times: one may be lost."""
@@ -72,6 +75,11 @@ class FilterNode(Node):
     def stands_from_s(self) -> float:
         """When the driver's ramp from the last order to move ends, if zeros follow (time.monotonic)."""
         return self._stands_from_s
+
+    @property
+    def estop_free(self) -> bool:
+        """No emergency stop holds or waits for its reset, or for a zero."""
+        return self._filter.estop is EstopState.FREE
 
     @property
     def state_text(self) -> str:
@@ -92,9 +100,9 @@ class FilterNode(Node):
                 raise ModuleNotFoundError("a scanner with `pose: tf` needs tf2_msgs; install ros-jazzy-tf2-msgs")
             self.create_subscription(messages.TFMessage, "tf_static", self._on_tf_static, STATIC_TF)
 
-    def _on_command(self, message: TwistStamped) -> None:
-        now = time.monotonic()
-        self._filter.on_command(messages.twist_of(message.twist), self._receive_times.at(now))
+    def obey(self, twist: Twist, now: float) -> None:
+        """Takes the order of the mux at `now` [s, time.monotonic], and issues it as far as it may."""
+        self._filter.on_command(twist, self._receive_times.at(now))
         self._timer.reset()  # a mux faster than the timer is not doubled by it
         self._issue(self._filter.decide(now), now)
 

@@ -143,11 +143,11 @@ class SafetyFilter:
         """Whether the emergency stop is free now, and a sentence. `moving`: sources that do not order zero."""
         self._advance_estop(now)
         inputs = self.inputs(now)
-        if self._estop.state is EstopState.FREE:
-            return True, NOTHING_TO_RESET
         if self._estop.state is EstopState.HELD:
             held = "pressed" if self._pressed else "silent"
             return False, f"refused: the emergency stop on {self._config.safety.estop.topic} is {held}"
+        if self._estop.state is EstopState.FREE and not moving:
+            return True, NOTHING_TO_RESET
         if moving or not inputs.command.is_zero:
             who = ", ".join(moving) or "cmd_vel_mux"
             return False, f"refused: {who} orders a velocity; let go of the joystick or cancel the goal first"

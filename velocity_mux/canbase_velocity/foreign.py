@@ -5,6 +5,7 @@ ROS does not say which publisher sent a message, so they are found in the ROS gr
 Rules:
 1. On a source's topic those are foreign that its `nodes` do not name; without `nodes` anybody may publish there.
 2. cmd_vel_mux and cmd_vel belong to one node each; every other publisher, and a second one of that name, is foreign.
+   Nobody obeys cmd_vel_mux: it shows what the mux orders. A foreign publisher there is a notice and disturbs nobody.
 3. A publisher of another message type is not heard at all. That is said, and it disturbs nobody.
 4. A publisher whose node is not known (yet) counts after PATIENCE_S: discovery tells names a little later than topics.
 """
@@ -14,6 +15,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+
+from canbase_config.priority import Priority
 
 PATIENCE_S = 2.0
 UNKNOWN = "an unknown node"
@@ -30,6 +33,8 @@ class Expected:
     """Full names of the nodes that may publish there; empty: anybody."""
     alone: bool = False
     """One publisher at most."""
+    shown: bool = False
+    """Published for people to look at: nobody obeys it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +54,15 @@ class Foreign:
     kind: str
     problem: str
     source: str | None
-    heard: bool
+    obeyed: bool
+    """Its messages are obeyed: of the right type, on a topic that counts."""
+    shown: bool = False
+    """It is on a topic that nobody obeys."""
+
+    @property
+    def priority(self) -> Priority:
+        """How grave it is."""
+        return Priority.NOTICE if self.shown else Priority.ERROR
 
     @property
     def sentence(self) -> str:
@@ -58,7 +71,7 @@ class Foreign:
 
     def disturbs(self, source: str) -> bool:
         """Whether the commands of `source` cannot be trusted for it: on its own topic, or on what all of them share."""
-        return self.heard and self.source in (None, source)
+        return self.obeyed and self.source in (None, source)
 
 
 class ForeignWatch:
@@ -83,8 +96,10 @@ class ForeignWatch:
         for publisher in sorted(set(publishers), key=lambda p: (p.node, p.kind)):
             problem = _problem(publisher, expected, counts[publisher.node])
             if problem and (publisher.node or not patient):
-                node, heard = publisher.node or UNKNOWN, publisher.kind == expected.kind
-                found.append(Foreign(expected.topic, node, publisher.kind, problem, expected.source, heard))
+                node, obeyed = publisher.node or UNKNOWN, publisher.kind == expected.kind and not expected.shown
+                found.append(
+                    Foreign(expected.topic, node, publisher.kind, problem, expected.source, obeyed, expected.shown)
+                )
         return found
 
 
@@ -95,5 +110,6 @@ def _problem(publisher: Publisher, expected: Expected, count: int) -> str:
     if not expected.nodes:
         return ""
     if publisher.node not in expected.nodes:
-        return f"only {' and '.join(expected.nodes)} should"
+        nobody = "; nobody obeys it" if expected.shown else ""
+        return f"only {' and '.join(expected.nodes)} should{nobody}"
     return f"{count} times; is it running twice?" if expected.alone and count > 1 else ""

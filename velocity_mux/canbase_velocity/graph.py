@@ -14,6 +14,8 @@ from canbase_velocity.foreign import Expected, Publisher
 STAMPED: Final = "geometry_msgs/msg/TwistStamped"
 PLAIN: Final = "geometry_msgs/msg/Twist"
 OWNERS: Final = {"cmd_vel_mux": "velocity_mux", "cmd_vel": "safety_filter"}
+SHOWN: Final = "cmd_vel_mux"
+"""Published for people to look at: the order itself stays in the process."""
 _NO_NAME: Final = "_NODE_NAME_UNKNOWN_"
 
 
@@ -44,7 +46,8 @@ def _of_sources(robot: Robot, node: Node) -> Iterator[Expected]:
 def _of_chain(node: Node) -> Iterator[Expected]:
     for topic, owner in OWNERS.items():
         nodes = (full_name(owner, node.get_namespace()),)
-        yield Expected(node.resolve_topic_name(topic), STAMPED, None, nodes, alone=True)
+        shown = topic == SHOWN
+        yield Expected(node.resolve_topic_name(topic), STAMPED, None, nodes, alone=True, shown=shown)
 
 
 def kind_of(source: MuxSource) -> str:

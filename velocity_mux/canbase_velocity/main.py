@@ -41,6 +41,7 @@ def run(robot: Robot, ros_args: Sequence[str], when_ready: Callable[[], None] = 
 def _run_nodes(robot: Robot, received: list[int], when_ready: Callable[[], None]) -> None:
     mux = MuxNode(robot)
     safety = FilterNode(robot, mux.moving_sources)
+    mux.lead(safety)
     executor = EventsExecutor()
     executor.add_node(mux)
     executor.add_node(safety)

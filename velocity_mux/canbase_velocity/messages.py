@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 
 from builtin_interfaces.msg import Time
-from canbase.msg import SafetyState, ScannerState
+from canbase.msg import DriverStatus, SafetyState, ScannerState
 from geometry_msgs.msg import Twist as TwistMessage
 from geometry_msgs.msg import TwistStamped
 from sensor_msgs.msg import LaserScan
 
 from canbase_velocity.clearance import Clearances
 from canbase_velocity.decision import Cause, Decision
+from canbase_velocity.delay import Sent
 from canbase_velocity.placement import Transform
 from canbase_velocity.safety_filter import Inputs, ScanState
 from canbase_velocity.scan import Scan
@@ -23,6 +24,10 @@ except ModuleNotFoundError:  # a ROS 2 without it: its scanners have their pose 
     TFMessage = None
 
 NAN = math.nan
+DRIVER_STATES = {
+    getattr(DriverStatus, name): name
+    for name in ("OFFLINE", "BOOTING", "DISARMED", "ENABLING", "ENABLED", "STOPPING", "LATCHED")
+}
 
 
 def twist_of(message: TwistMessage) -> Twist:
@@ -41,6 +46,19 @@ def twist_message(twist: Twist, stamp: Time, frame_id: str) -> TwistStamped:
     message.twist.linear.x = twist.linear_mps
     message.twist.angular.z = twist.angular_radps
     return message
+
+
+def sent_at(stamp: Time, wall_s: float, now: float) -> Sent | None:
+    """The times of a command that was taken in at `wall_s` by this computer's clock and at `now`, monotonic [s]. None:
+    its stamp is zero, which says nothing.
+    """
+    stamp_s = stamp.sec + stamp.nanosec * 1e-9
+    return Sent(stamp_s, wall_s, now) if stamp_s > 0.0 else None
+
+
+def driver_state(message: DriverStatus) -> str:
+    """The state of a motor_driver/status by its name; one that is not known is none in which the base can move."""
+    return DRIVER_STATES.get(message.state, f"in state {message.state}")
 
 
 def scan_of(message: LaserScan) -> Scan:

@@ -1,24 +1,32 @@
 """Who may drive: sources of commands with priority and timeout, and locks. Time comes in as an argument.
 
 Rules:
-1. A source is fresh while its last valid command is not older than its timeout, by local receive time.
+1. A source is fresh while its last valid command is not older than its timeout: by local receive time, plus what it
+   was late by (delay.py).
 2. A lock holds while its last word is true, and, where it is required, while it is silent. It holds back every source
    whose priority is lower than its own. A foreign publisher may hold back too (foreign.py).
-3. The fresh source of the highest priority that is not held back drives; its last command holds.
+3. The fresh source of the highest priority that is not held back has the base; its last command holds.
 4. None is left: the order is zero, said explicitly. A source that was taken over does not come back with an old
    command: it drives again only while it is fresh by itself.
 5. A command with NaN or infinity is refused and counted, and does not make its source fresh.
+6. A source that is not armed (neutral.py), or whose commands arrive later than its timeout, is not followed. While it
+   publishes it has the base all the same: the order is zero, and no lower source moves the base under the hand of
+   somebody who wants to drive it himself.
 """
 
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from canbase_config.mux import MuxLock, MuxSource
+from canbase_velocity.base_ready import STATUS_TIMEOUT_S, BaseReady
+from canbase_velocity.delay import Delay, Sent
 from canbase_velocity.foreign import Foreign
 from canbase_velocity.lock import Lock, LockView
+from canbase_velocity.neutral import BLIND_S, Arming
 from canbase_velocity.twist import ZERO, Twist
 
 
@@ -26,6 +34,8 @@ class Standing(enum.Enum):
     """Why a source drives or does not."""
 
     ACTIVE = "active"
+    UNARMED = "waiting for zero"
+    DELAYED = "delayed"
     NEVER_RECEIVED = "never received"
     SILENT = "silent"
     LOCKED = "locked"
@@ -35,7 +45,10 @@ class Standing(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class SourceView:
-    """One source at one moment. `age_s` is None before its first valid command; `reason` is empty when it drives."""
+    """One source at one moment. `age_s` is None before its first valid command, `delay_s` while nothing is known of it.
+
+    `reason`: why it is not followed; empty when it is. `locked`: something holds it back, also while it is silent.
+    """
 
     name: str
     topic: str
@@ -46,11 +59,17 @@ class SourceView:
     received: int
     refused: int
     reason: str
+    armed: bool = False
+    locked: bool = False
+    delay_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class MuxDecision:
-    """The order to send now, whose it is (None: nobody's, zero), and every source and lock by falling priority."""
+    """The order to send now, who has the base (None: nobody), and every source and lock by falling priority.
+
+    Whoever has the base may not be followed (rule 6): then the order is zero, and its view says why.
+    """
 
     active: str | None
     twist: Twist
@@ -59,12 +78,30 @@ class MuxDecision:
     foreign: tuple[Foreign, ...] = ()
     foreign_lock: bool = False
     """Whether foreign publishers hold sources back."""
+    not_ready: str = ""
+    """Why the base cannot move; empty: it can."""
+
+    @property
+    def holder(self) -> SourceView | None:
+        """The source that has the base."""
+        return next((source for source in self.sources if source.name == self.active), None)
+
+    @property
+    def sentence(self) -> str:
+        """Who drives, for people."""
+        if self.holder is None:
+            return "nobody drives"
+        return f"{self.active} is not followed: {self.holder.reason}" if self.holder.reason else f"{self.active} drives"
 
     @property
     def essence(self) -> tuple[object, ...]:
         """What has to differ for the decision to count as changed: ages change all the time."""
-        standings = tuple(source.standing for source in self.sources)
-        return self.active, standings, tuple(lock.holds for lock in self.locks), self.foreign
+        sources = tuple((source.standing, source.armed, source.locked) for source in self.sources)
+        return self.active, sources, tuple(lock.holds for lock in self.locks), self.foreign, self.not_ready
+
+
+LATE_S = 1.0
+"""A source whose commands arrive late for longer needs a zero before it is followed again."""
 
 
 class _Source:
@@ -77,19 +114,50 @@ class _Source:
         self.at_s: float | None = None
         self.received = 0
         self.refused = 0
+        self.arming = Arming(config.neutral_after_s)
+        self.delay_s: float | None = None
+        self._delay = Delay(config.same_clock)
+        self._late_from = math.inf
+
+    def take(self, twist: Twist, received: float, sent: Sent | None, now: float) -> None:
+        """A finite command."""
+        self.received += 1
+        self.twist, self.at_s = twist, received
+        self.delay_s = None if sent is None else self._delay.take(sent)
+        if sent is not None and self._delay.set_back:
+            self.arming.disarm("the clock of its sender was set back")
+        self._late_from = min(self._late_from, now) if self.is_late else math.inf
+        if now - self._late_from > LATE_S:
+            self.arming.disarm("its commands arrived late")
+        self.arming.command(twist, now, on_time=not self.is_late and received == now)
+
+    @property
+    def is_late(self) -> bool:
+        """Its last command was on the way for longer than it may hold, or is stamped that far in the future."""
+        return self.delay_s is not None and abs(self.delay_s) > self.config.timeout_s
 
     def age_s(self, now: float) -> float | None:
         return None if self.at_s is None else now - self.at_s
 
     def is_fresh(self, now: float) -> bool:
+        """Also of commands that were late: somebody publishes there."""
         age_s = self.age_s(now)
-        return age_s is not None and age_s <= self.config.timeout_s
+        late_s = 0.0 if self.is_late else max(0.0, self.delay_s or 0.0)
+        return age_s is not None and age_s + late_s <= self.config.timeout_s
 
-    def view(self, now: float, standing: Standing, reason: str) -> SourceView:
+    def standing(self) -> tuple[Standing, str]:
+        """Of the one that has the base."""
+        if self.is_late:
+            what = "delayed by" if (self.delay_s or 0.0) > 0.0 else "stamped in the future by"
+            limit = f"(limit {self.config.timeout_s:.2f} s)"
+            return Standing.DELAYED, f"{what} {abs(self.delay_s or 0.0):.2f} s {limit}"
+        return (Standing.ACTIVE, "") if self.arming.armed else (Standing.UNARMED, self.arming.reason)
+
+    def view(self, now: float, standing: Standing, reason: str, locked: bool = False) -> SourceView:
         config = self.config
         return SourceView(
             self.name, config.topic, config.priority, standing, self.age_s(now), config.timeout_s,
-            self.received, self.refused, reason,
+            self.received, self.refused, reason, self.arming.armed, locked, self.delay_s,
         )  # fmt: skip
 
 
@@ -102,9 +170,11 @@ class Mux:
         locks: Mapping[str, MuxLock] | None = None,
         *,
         foreign_lock: bool = False,
+        status_timeout_s: float = STATUS_TIMEOUT_S,
     ) -> None:
         """Sources and locks by name, no two sources of one priority (canbase_config refuses that). Raises ValueError
-        without any source. `foreign_lock`: foreign publishers hold back what they disturb.
+        without any source. `foreign_lock`: foreign publishers hold back what they disturb. `status_timeout_s`: so long
+        a motor_driver/status counts [s].
         """
         if not sources:
             raise ValueError("the mux needs at least one source, see mux.sources in robot.yaml")
@@ -114,16 +184,35 @@ class Mux:
         self._locks = {lock.name: lock for lock in sorted(lock_list, key=lambda lock: -lock.config.priority)}
         self._foreign: tuple[Foreign, ...] = ()
         self._foreign_lock = foreign_lock
+        self._base = BaseReady(status_timeout_s)
+        self._looked_at = -math.inf
 
-    def on_command(self, name: str, twist: Twist, now: float) -> bool:
-        """Takes the command of source `name`; False: refused, for NaN or infinity. Raises KeyError for another name."""
+    def on_command(
+        self, name: str, twist: Twist, received: float, now: float | None = None, sent: Sent | None = None
+    ) -> bool:
+        """Takes the command of source `name`; False: refused, for NaN or infinity. Raises KeyError for another name.
+
+        `received`: when it counts as received, before `now` where this process stood still in between
+        (receive_time.py); `now` None: the same. `sent`: its times; None: it has no stamp.
+        """
+        now = received if now is None else now
         source = self._sources[name]
+        self._look(now)
         if not twist.is_finite:
             source.refused += 1
             return False
-        source.received += 1
-        source.twist, source.at_s = twist, now
+        source.take(twist, received, sent, now)
+        self._look(now)
         return True
+
+    def on_driver(self, state: str, cycles: int, received: float) -> None:
+        """Takes a motor_driver/status: the name of its state ("ENABLED", …) and its counter of cycles."""
+        if self._base.on_driver(state, cycles, received):
+            self._arm("motor_driver was restarted", received)
+
+    def on_estop(self, free: bool) -> None:
+        """Takes what the safety filter knows of the emergency stop. False: it holds, or waits for a reset or a zero."""
+        self._base.on_estop(free)
 
     def on_lock(self, name: str, locked: bool, now: float) -> None:
         """Takes the word of lock `name`. Raises KeyError for another name."""
@@ -135,11 +224,14 @@ class Mux:
 
     def decide(self, now: float) -> MuxDecision:
         """The order at time `now` [s, monotonic]."""
+        self._look(now)
         held = {name: self._held_back(source, now) for name, source in self._sources.items()}
         active = next((s for s in self._sources.values() if s.is_fresh(now) and not held[s.name]), None)
         views = tuple(self._view(source, active, held[source.name], now) for source in self._sources.values())
-        name, twist = (active.name, active.twist) if active else (None, ZERO)
-        return MuxDecision(name, twist, views, *self._others(now))
+        if active is None:
+            return MuxDecision(None, ZERO, views, *self._others(now))
+        followed = active.standing()[0] is Standing.ACTIVE
+        return MuxDecision(active.name, active.twist if followed else ZERO, views, *self._others(now))
 
     def moving(self, now: float) -> tuple[str, ...]:
         """Fresh sources that do not order zero, whoever drives: a reset is refused while there are any."""
@@ -151,8 +243,21 @@ class Mux:
         views = tuple(source.view(now, Standing.SHUTDOWN, "shutdown") for source in self._sources.values())
         return MuxDecision(None, ZERO, views, *self._others(now))
 
-    def _others(self, now: float) -> tuple[tuple[LockView, ...], tuple[Foreign, ...], bool]:
-        return tuple(lock.view(now) for lock in self._locks.values()), self._foreign, self._foreign_lock
+    def _look(self, now: float) -> None:
+        """Time has passed: whom that arms or disarms."""
+        if now - self._looked_at > BLIND_S:
+            for source in self._sources.values():
+                source.arming.missed(now)
+        self._looked_at = now
+        self._arm(self._base.problem(now), now)
+
+    def _arm(self, not_ready: str, now: float) -> None:
+        for source in self._sources.values():
+            source.arming.look(not_ready, now)
+
+    def _others(self, now: float) -> tuple[tuple[LockView, ...], tuple[Foreign, ...], bool, str]:
+        locks = tuple(lock.view(now) for lock in self._locks.values())
+        return locks, self._foreign, self._foreign_lock, self._base.problem(now)
 
     def _held_back(self, source: _Source, now: float) -> str:
         """By what; empty: by nothing."""
@@ -167,9 +272,9 @@ class Mux:
     def _view(self, source: _Source, active: _Source | None, held: str, now: float) -> SourceView:
         age_s = source.age_s(now)
         if source is active:
-            return source.view(now, Standing.ACTIVE, "")
+            return source.view(now, *source.standing())
         if held:
-            return source.view(now, Standing.LOCKED, held)
+            return source.view(now, Standing.LOCKED, held, locked=True)
         if age_s is None:
             return source.view(now, Standing.NEVER_RECEIVED, "never received")
         if active is None or not source.is_fresh(now):

@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from canbase_velocity.foreign import Foreign
 from canbase_velocity.lock import LockView
-from canbase_velocity.mux import MuxDecision, SourceView, Standing
+from canbase_velocity.mux import MuxDecision, SourceView
 
 
 def mux_state(decision: MuxDecision, stamp: Time) -> MuxState:
@@ -18,7 +18,9 @@ def mux_state(decision: MuxDecision, stamp: Time) -> MuxState:
     return MuxState(
         stamp=stamp,
         active=decision.active or "",
-        sources=[_source(source) for source in decision.sources],
+        ready=not decision.not_ready,
+        not_ready=decision.not_ready,
+        sources=[_source(source, decision.active) for source in decision.sources],
         locks=[_lock(lock) for lock in decision.locks],
         foreign=[_foreign(foreign, decision.foreign_lock) for foreign in decision.foreign],
     )
@@ -28,15 +30,16 @@ def diagnostics(decision: MuxDecision, robot: str, deaf: tuple[str, ...], stamp:
     """One entry. `deaf`: sentences about subscribers that ask for what we do not offer and hear nothing."""
     problems = [*(foreign.sentence for foreign in decision.foreign), *deaf]
     held = [f"{lock.name} {lock.reason}" for lock in decision.locks if lock.holds]
-    drives = f"{decision.active} drives" if decision.active else "nobody drives"
+    ignored = decision.holder is not None and bool(decision.holder.reason)
     values = {source.name: source.reason or "drives" for source in decision.sources}
+    values |= {"the base": decision.not_ready or "can move"}
     values |= {f"refused commands of {source.name}": str(source.refused) for source in decision.sources}
     values |= {f"lock {lock.name}": lock.reason or "free" for lock in decision.locks}
     values |= {f"foreign publisher {number}": foreign.sentence for number, foreign in enumerate(decision.foreign, 1)}
     status = DiagnosticStatus(
-        level=DiagnosticStatus.WARN if problems else DiagnosticStatus.OK,
+        level=DiagnosticStatus.WARN if problems or ignored else DiagnosticStatus.OK,
         name=f"{robot}: velocity_mux",
-        message="; ".join([drives, *held, *problems]),
+        message="; ".join([decision.sentence, *held, *problems]),
         hardware_id=robot,
         values=[KeyValue(key=key, value=value) for key, value in values.items()],
     )
@@ -45,14 +48,17 @@ def diagnostics(decision: MuxDecision, robot: str, deaf: tuple[str, ...], stamp:
     return message
 
 
-def _source(source: SourceView) -> MuxSource:
+def _source(source: SourceView, active: str | None) -> MuxSource:
     return MuxSource(
         name=source.name,
         topic=source.topic,
         priority=source.priority,
-        active=source.standing is Standing.ACTIVE,
+        active=source.name == active,
+        armed=source.armed,
+        locked=source.locked,
         age_s=_or_nan(source.age_s),
         timeout_s=source.timeout_s,
+        delay_s=_or_nan(source.delay_s),
         received=source.received,
         refused=source.refused,
         reason=source.reason,
@@ -78,7 +84,7 @@ def _foreign(foreign: Foreign, locks: bool) -> ForeignPublisher:
         node=foreign.node,
         type=foreign.kind,
         problem=foreign.problem,
-        locks=locks and foreign.heard,
+        locks=locks and foreign.obeyed,
     )
 
 

@@ -1,5 +1,6 @@
-"""The node velocity_mux: ROS around mux.py. Sources and locks in, cmd_vel_mux and velocity_mux/state out; it also looks
-into the ROS graph for publishers that should not be there. See docs/ros_api.md.
+"""The node velocity_mux: ROS around mux.py. Sources, locks and motor_driver/status in, velocity_mux/state out. Orders
+reach the safety filter within the process; cmd_vel_mux shows them. It also looks into the ROS graph for publishers that
+should not be there. See docs/ros_api.md.
 """
 
 from __future__ import annotations
@@ -7,8 +8,9 @@ from __future__ import annotations
 import functools
 import math
 import time
+from typing import Protocol
 
-from canbase.msg import MuxState
+from canbase.msg import DriverStatus, MuxState
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist as TwistMessage
 from geometry_msgs.msg import TwistStamped
@@ -16,31 +18,52 @@ from rclpy.node import Node
 from std_msgs.msg import Bool
 
 from canbase_config.journal import Journal, Voice
-from canbase_config.priority import Priority
 from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
+from canbase_velocity.base_ready import status_timeout_s
 from canbase_velocity.changes import changes
+from canbase_velocity.delay import Sent
 from canbase_velocity.foreign import ForeignWatch
 from canbase_velocity.graph import expected, publishers
-from canbase_velocity.messages import twist_message, twist_of
+from canbase_velocity.messages import driver_state, sent_at, twist_message, twist_of
 from canbase_velocity.mux import Mux, MuxDecision
 from canbase_velocity.mux_messages import diagnostics, mux_state
-from canbase_velocity.qos import ANY_COMMAND, COMMAND, STATE, listen_twice, loud
+from canbase_velocity.qos import ANY_COMMAND, COMMAND, DRIVER_STATUS, STATE, listen_twice, loud
+from canbase_velocity.steady import refuse_sim_time, steady_timer
+from canbase_velocity.twist import Twist
 
 STATE_PERIOD_S = 0.5
 GRAPH_PERIOD_S = 0.5
 DIAGNOSTICS_PERIOD_S = 1.0
 
 
+class Follower(Protocol):
+    """The safety filter, as the mux sees it."""
+
+    @property
+    def estop_free(self) -> bool:
+        """No emergency stop holds or waits for its reset."""
+
+    def obey(self, twist: Twist, now: float) -> None:
+        """Takes the order of the mux at `now` [s, monotonic]."""
+
+
 class MuxNode(Node):
-    """Publishes at once what the driving source says, and repeats it on a timer while that source is fresh."""
+    """Orders at once what the source that has the base says, and repeats it on a timer while that source is fresh."""
 
     def __init__(self, robot: Robot) -> None:
         super().__init__("velocity_mux")
+        refuse_sim_time(self)
         self._robot = robot
+        self._follower: Follower | None = None
         self._voice = Voice(self.get_logger(), Journal("velocity_mux"))
         self._receive_times = ReceiveTimes()
-        self._mux = Mux(robot.mux.sources, robot.mux.locks, foreign_lock=robot.mux.foreign_publishers == "lock")
+        self._mux = Mux(
+            robot.mux.sources,
+            robot.mux.locks,
+            foreign_lock=robot.mux.foreign_publishers == "lock",
+            status_timeout_s=status_timeout_s(robot.rates.status_hz),
+        )
         self._watch = ForeignWatch(expected(robot, self))
         self._decision = self._mux.decide(time.monotonic())
         self._state_at_s = -math.inf
@@ -51,12 +74,17 @@ class MuxNode(Node):
         self._states = self.create_publisher(MuxState, "velocity_mux/state", STATE)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._listen()
-        self._timer = self.create_timer(1.0 / robot.rates.command_hz, self._tick)
-        self.create_timer(GRAPH_PERIOD_S, self._look)
-        self.create_timer(DIAGNOSTICS_PERIOD_S, self._diagnose)
+        self._timer = steady_timer(self, 1.0 / robot.rates.command_hz, self._tick)
+        steady_timer(self, GRAPH_PERIOD_S, self._look)
+        steady_timer(self, DIAGNOSTICS_PERIOD_S, self._diagnose)
+
+    def lead(self, follower: Follower) -> None:
+        """From now on orders go to the safety filter too, and its emergency stop counts."""
+        self._follower = follower
 
     def shut_down(self) -> None:
-        """Sends one zero and says so in the state. Called several times: one may be lost."""
+        """Publishes one zero and the state. Called several times: one may be lost. The filter orders its own zeros."""
+        self._follower = None
         self._send(self._mux.shutdown(time.monotonic()), time.monotonic())
 
     def moving_sources(self) -> tuple[str, ...]:
@@ -64,6 +92,7 @@ class MuxNode(Node):
         return self._mux.moving(time.monotonic())
 
     def _listen(self) -> None:
+        self.create_subscription(DriverStatus, "motor_driver/status", self._on_driver, DRIVER_STATUS)
         for name, source in self._robot.mux.sources.items():
             kind = TwistStamped if source.stamped else TwistMessage
             callback = self._on_stamped if source.stamped else self._on_plain
@@ -74,16 +103,24 @@ class MuxNode(Node):
                 self.get_logger().warning(f"the silence of lock {name} is not noticed: it is not required (timeout 0)")
 
     def _on_stamped(self, name: str, message: TwistStamped) -> None:
-        self._on_plain(name, message.twist)
+        now = time.monotonic()
+        self._on_twist(name, message.twist, now, sent_at(message.header.stamp, time.time(), now))
 
     def _on_plain(self, name: str, message: TwistMessage) -> None:
-        now = time.monotonic()
-        if not self._mux.on_command(name, twist_of(message), self._receive_times.at(now)):
+        self._on_twist(name, message, time.monotonic(), None)
+
+    def _on_twist(self, name: str, message: TwistMessage, now: float, sent: Sent | None) -> None:
+        if not self._mux.on_command(name, twist_of(message), self._receive_times.at(now), now, sent):
             self.get_logger().warning(f"{name} refused: NaN or infinity", throttle_duration_sec=5.0)
-        decision = self._mux.decide(now)
+        decision = self._decide(now)
         if decision.active == name or decision.active != self._decision.active:
             self._timer.reset()  # a source faster than the timer is not doubled by it
             self._send(decision, now)
+
+    def _on_driver(self, message: DriverStatus) -> None:
+        now = time.monotonic()
+        self._mux.on_driver(driver_state(message), message.cycles, self._receive_times.at(now))
+        self._send_if_changed(now)
 
     def _on_lock(self, name: str, message: Bool) -> None:
         now = time.monotonic()
@@ -99,12 +136,12 @@ class MuxNode(Node):
         for found in foreign:
             if found not in before:
                 told = {"topic": found.topic, "node": found.node}
-                self._voice.tell(found.sentence, Priority.ERROR, robot=self._robot.name, **told)
+                self._voice.tell(found.sentence, found.priority, robot=self._robot.name, **told)
         self._mux.on_foreign(foreign)
         self._send_if_changed(now)
 
     def _send_if_changed(self, now: float) -> None:
-        decision = self._mux.decide(now)
+        decision = self._decide(now)
         if decision.essence != self._decision.essence:
             self._send(decision, now)
 
@@ -112,9 +149,17 @@ class MuxNode(Node):
         """Nothing was sent for a period: repeats what holds, or zero."""
         now = time.monotonic()
         self._receive_times.at(now)
-        self._send(self._mux.decide(now), now)
+        self._send(self._decide(now), now)
+
+    def _decide(self, now: float) -> MuxDecision:
+        if self._follower is not None:
+            self._mux.on_estop(self._follower.estop_free)
+        return self._mux.decide(now)
 
     def _send(self, decision: MuxDecision, now: float) -> None:
+        """The filter first: what is published afterwards is for people."""
+        if self._follower is not None:
+            self._follower.obey(decision.twist, now)
         stamp = self.get_clock().now().to_msg()
         self._commands.publish(twist_message(decision.twist, stamp, self._robot.base.base_frame))
         if decision.essence != self._decision.essence or now - self._state_at_s >= STATE_PERIOD_S:

@@ -21,6 +21,8 @@ ANY_COMMAND = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """For subscriptions: hears reliable publishers and those of best effort. A reliable one would not hear the latter."""
 STATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Latched: who comes late sees the newest state."""
+DRIVER_STATUS = QoSProfile(depth=10)
+"""Every change of state counts, also those that come close together."""
 SCAN = qos_profile_sensor_data
 """Best effort: it fits every scanner's publisher, reliable or not."""
 STATIC_TF = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -302,7 +302,7 @@ FAULTS: dict[str, Kind] = {
         "messages of cmd_vel get lost", (0.3, 2.5), _share, *_topic_lost("cmd_vel")
     ),
     "mux_lossy": Kind(
-        "messages of cmd_vel_mux get lost", (0.5, 4.0), _share, *_topic_lost("cmd_vel_mux")
+        "orders of the mux do not reach the filter in its own process", (0.5, 4.0), _share, *_topic_lost("cmd_vel_mux")
     ),
     "scan_stale": Kind("no scan arrives", LONG, _nothing, *_topic_lost("scan")),
     "estop_stale": Kind("the stop button is not heard", LONG, _nothing, *_topic_lost("estop_state")),

@@ -117,6 +117,10 @@ class Topics:
         self.watch: Callable[[str, Any], None] | None = None
         """Told of every message with its topic."""
 
+    def loses(self, topic: str) -> bool:
+        """Whether this message on `topic` gets lost."""
+        return self._random.random() < self.loss.get(topic, 0.0)
+
     def subscribe(self, topic: str, process: Process, do: Callable[[Any], None]) -> None:
         """`process` calls `do` with each message; while it hangs, the newest is kept (a queue of depth 1)."""
         self._subscribers.setdefault(topic, []).append((process, do))
@@ -126,7 +130,7 @@ class Topics:
         if self.watch is not None:
             self.watch(topic, message)
         for process, do in self._subscribers.get(topic, ()):
-            if self._random.random() < self.loss.get(topic, 0.0):
+            if self.loses(topic):
                 continue
             arrival = self._clock.now + self.FASTEST_S + self._random.random() * self.JITTER_S
             self._last[topic] = arrival = max(arrival, self._last.get(topic, 0.0))

@@ -34,13 +34,14 @@ DRAWN_FROM: dict[str, tuple[str, ...]] = {
     "mux:timeout": ("action_dies", "action_hangs"),
     "filter:command": ("mux_lossy",),
     "filter:estop": ("estop_pressed", "estop_stale"),
-    "filter:zero_after_estop": ("estop_pressed",),
+    "filter:zero_after_estop+mux:neutral_start": ("estop_pressed",),
     "filter:obstacle": ("obstacle",),
 }
 """Faults that a safeguard is there for, where they come too seldom among all."""
 TOGETHER = (
     "watchdog:lease_lost+driver:command_timeout",
     "driver:watchdog_missing+drives:heartbeat_consumer",
+    "filter:zero_after_estop+mux:neutral_start",
 )
 """Layers that cover each other: taken out together."""
 _TELL_ALONE = "cannot stop anything then; driver:watchdog_missing and drives:heartbeat_consumer do"
@@ -64,7 +65,9 @@ COVERED = {
     "driver:stop_requested": "nobody asks for it here: test_supervisor.py and the exit matrix do",
     "driver:shutdown": "the driver is not ended here: test_supervisor.py and the exit matrix do",
     "driver:command_timeout": "watchdog:lease_lost; together: found",
-    "driver:zero_before_motion": "a reset is refused while any source orders motion",
+    "driver:zero_before_motion": "mux:neutral_start",
+    "filter:zero_after_estop": "mux:neutral_start; together: found",
+    "mux:neutral_start": "filter:zero_after_estop, driver:zero_before_motion; test_neutral_start.py has a held stick",
     "driver:odometry_jump_guard": "watchdog:feedback_implausible, before an encoder leaps far: test_wheel_travel.py",
     "action:timeout_and_progress": "a goal that gets nowhere is rare here: test_goal.py and test_causes.py",
 }

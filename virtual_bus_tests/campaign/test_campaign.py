@@ -48,7 +48,7 @@ def test_the_same_seed_gives_the_same_scenario() -> None:
         ("mux:timeout", ["action_dies", "action_hangs"], "sources"),
         ("filter:command", ["mux_lossy"], "sources"),
         ("filter:estop", ["estop_pressed", "estop_stale"], "estop"),
-        ("filter:zero_after_estop", ["estop_pressed"], "zero"),
+        ("filter:zero_after_estop+mux:neutral_start", ["estop_pressed"], "zero"),
         ("filter:obstacle", ["obstacle"], "obstacle"),
         ("driver:watchdog_missing+drives:heartbeat_consumer", ["watchdog_dies", "watchdog_hangs"], "envelope"),
     ],

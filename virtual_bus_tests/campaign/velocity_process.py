@@ -9,8 +9,11 @@ from functools import partial
 from campaign.clock import Clock
 from campaign.process import Process, Topics
 from canbase_config.robot import Robot
+from canbase_driver.snapshot import DriverSnapshot
+from canbase_velocity.base_ready import status_timeout_s
 from canbase_velocity.clearance import Points
 from canbase_velocity.decision import Action, Decision
+from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.mux import Mux, MuxDecision
@@ -31,7 +34,7 @@ class VelocityProcess(Process):
         self._robot, self._topics, self._send_lease = robot, topics, send_lease
         for name, source in robot.mux.sources.items():
             topics.subscribe(source.topic, self, partial(self._on_source, name))
-        topics.subscribe("cmd_vel_mux", self, self._on_command)
+        topics.subscribe("motor_driver/status", self, self._on_driver)
         topics.subscribe(robot.safety.scan.topic, self, self._on_scan)
         topics.subscribe(robot.safety.estop.topic, self, self._on_estop)
         self.begin()
@@ -39,7 +42,7 @@ class VelocityProcess(Process):
     def begin(self) -> None:
         """A new mux and a new filter; the sequence of the leases starts again."""
         now = self.clock.now
-        self.mux = Mux(self._robot.mux.sources)
+        self.mux = Mux(self._robot.mux.sources, status_timeout_s=status_timeout_s(self._robot.rates.status_hz))
         self.filter = SafetyFilter(FilterConfig.of(self._robot))
         self._sequence = 0
         self._mux_told: tuple[object, ...] = ()
@@ -54,28 +57,35 @@ class VelocityProcess(Process):
         """Two timers that each message sets anew, at a quarter of their period's resolution."""
         now = self.clock.now
         if now >= self._mux_due:
-            self._send(self.mux.decide(now))
+            self._send(self._decide())
         if now >= self._filter_due:
             self._issue(self.filter.decide(now))
 
     def _on_source(self, name: str, twist: Twist) -> None:
         self.mux.on_command(name, twist, self.clock.now)
-        decision = self.mux.decide(self.clock.now)
+        decision = self._decide()
         if decision.active == name or decision.active != self._active:
             self._send(decision)
 
+    def _on_driver(self, snapshot: DriverSnapshot) -> None:
+        self.mux.on_driver(snapshot.state.name, snapshot.cycles, self.clock.now)
+
+    def _decide(self) -> MuxDecision:
+        self.mux.on_estop(self.filter.estop is EstopState.FREE)
+        return self.mux.decide(self.clock.now)
+
     def _send(self, decision: MuxDecision) -> None:
+        """As mux_node.py: the filter first; the topic is for people."""
         now = self.clock.now
         self._mux_due, self._active = now + self._period_s, decision.active
         self._topics.publish("cmd_vel_mux", decision.twist)
+        if not self._topics.loses("cmd_vel_mux"):
+            self.filter.on_command(decision.twist, now)
+            self._issue(self.filter.decide(now))
         told = decision.essence
         if told != self._mux_told or now - self._mux_state_at >= MUX_STATE_PERIOD_S:
             self._mux_told, self._mux_state_at = told, now
             self._topics.publish("velocity_mux/state", decision)
-
-    def _on_command(self, twist: Twist) -> None:
-        self.filter.on_command(twist, self.clock.now)
-        self._issue(self.filter.decide(self.clock.now))
 
     def reset(self) -> None:
         """The operator resets the emergency stop; a process that is dead or hangs does not hear it."""

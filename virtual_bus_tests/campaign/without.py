@@ -16,7 +16,7 @@ from canbase_driver import command, supervisor, watchdog_link
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.odometry import WheelTravel
 from canbase_driver.snapshot import DriverState, WatchdogView
-from canbase_velocity import filter_state, mux, obstacle, safety_filter
+from canbase_velocity import filter_state, mux, neutral, obstacle, safety_filter
 from canbase_velocity.estop import FREE, HELD
 from canbase_velocity.sweep import NO_TOUCH
 from canbase_watchdog import policy
@@ -95,6 +95,7 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "driver:command_is_finite": _put(Twist2D, "is_finite", property(lambda self: True)),
     "driver:odometry_jump_guard": _put(WheelTravel, "_is_near", lambda self, from_raw, raw, cycles: True),
     "drives:heartbeat_consumer": _put(HeartbeatConsumer, "tick", lambda self, now: None),
+    "mux:neutral_start": _put(neutral.Arming, "armed", property(lambda self: True)),
     "mux:timeout": _put(mux._Source, "is_fresh", lambda self, now: self.at_s is not None),
     "filter:estop": _put(filter_state.SafetyFilter, "_advance_estop", _no_estop),
     "filter:obstacle": _put(obstacle, "first_touch", lambda points, box, twist, stop_m: NO_TOUCH),

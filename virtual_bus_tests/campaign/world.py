@@ -70,7 +70,13 @@ class World:
                     f"not enabled after {BOOT_S} s: {self.driver.core.state.name} {self.driver.core.cause}"
                 )
             self.clock.run_until(self.clock.now + 0.01)
+        self.release()
         self.clock.run_until(self.clock.now + 0.7)
+
+    def release(self) -> None:
+        """Every source commands zero once: from now on it is followed (neutral start)."""
+        for source in self.robot.mux.sources.values():
+            self.topics.publish(source.topic, Twist(0.0, 0.0))
 
     def _lease(self, datagram: bytes, twist: Twist) -> None:
         if self.random.random() >= self.lease_loss:

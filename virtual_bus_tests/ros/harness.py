@@ -17,6 +17,7 @@ from types import TracebackType
 from typing import Any, Generic, TypeVar
 
 import rclpy
+from geometry_msgs.msg import TwistStamped
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -100,6 +101,10 @@ def python_argv(code: str) -> list[str]:
     return [sys.executable, "-c", code]
 
 
+RELEASE_S = 0.2
+"""So long a source commands zero: some of it arrives on a loaded computer too."""
+
+
 class Recorder(Generic[T]):
     """What arrived on one topic: messages and their local receive times, oldest first."""
 
@@ -131,6 +136,7 @@ class Repeater(Generic[T]):
     """Publishes `message` at a fixed rate while the node spins. `message` may be changed; None is silence."""
 
     def __init__(self, node: Node, kind: type[T], topic: str, rate_hz: float, qos: QoSProfile | int) -> None:
+        self.kind = kind
         self.message: T | None = None
         self.prepare: Callable[[T], T] = lambda message: message
         """Makes what is sent of `message`, each time."""
@@ -167,6 +173,21 @@ class TestNode:
     def repeat(self, kind: type[T], topic: str, rate_hz: float, qos: QoSProfile | int = 1) -> Repeater[T]:
         """A publisher that says nothing until its `message` is set."""
         return Repeater(self.node, kind, topic, rate_hz, qos)
+
+    def source(self, topic: str = "cmd_vel_joy", kind: type[Any] = TwistStamped, qos: QoSProfile | int = 1) -> Any:
+        """A source of the mux at 50 Hz that may drive: it was found, and has commanded zero for a moment."""
+        repeater = self.repeat(kind, topic, 50.0, qos)
+        self.wait_for_subscriber(repeater.publisher, 15.0)
+        self.release(repeater)
+        return repeater
+
+    def release(self, *sources: Repeater[Any]) -> None:
+        """These sources command zero for a moment, and are silent then."""
+        for source in sources:
+            source.message = source.kind()
+        self.spin_for(RELEASE_S)
+        for source in sources:
+            source.message = None
 
     def wait_for(self, predicate: Callable[[], T], timeout_s: float, what: str = "the condition") -> T:
         """Spins until predicate() is true and returns its value. Fails with `what` when timeout_s is over."""

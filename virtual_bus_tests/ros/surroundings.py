@@ -41,7 +41,8 @@ class World:
 
     def heal(self) -> None:
         """All as it should be, and the robot stands ready."""
-        self.joystick.message, self.scan.message, self.estop.message = None, scan(), Bool(data=False)
+        self.scan.message, self.estop.message = scan(), Bool(data=False)
+        self.node.release(self.joystick)
         self.robot.wait_standing()
         self.robot.make_ready()
         deadline_s = time.monotonic() + CALM_S

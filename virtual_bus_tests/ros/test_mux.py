@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from canbase.msg import MuxState
+from canbase.msg import DriverStatus, MuxState
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Twist, TwistStamped
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -44,8 +44,11 @@ class Velocity:
         self.node, self.process = node, process
         self.orders: Recorder[TwistStamped] = node.record(TwistStamped, "cmd_vel")
         self.states: Recorder[MuxState] = node.record(MuxState, "velocity_mux/state", LATCHED)
+        self.driver = node.repeat(DriverStatus, "motor_driver/status", 20.0)
+        self.driver.message = DriverStatus(state=DriverStatus.ENABLED)
         self.diagnostics: Recorder[DiagnosticArray] = node.record(DiagnosticArray, "/diagnostics")
         node.wait_for(lambda: self.orders.last is not None and self.states.last is not None, START_S, "cmd_vel")
+        node.wait_for(lambda: self.state.ready, START_S, "the driver's state at the mux")
 
     @property
     def state(self) -> MuxState:
@@ -54,7 +57,9 @@ class Velocity:
         return last
 
     def source(self, kind: type[Any], topic: str, qos: QoSProfile | int = 1) -> Any:
-        """A publisher at 50 Hz that the mux has found."""
+        """A publisher at 50 Hz that the mux has found; one of velocities has commanded zero."""
+        if kind is not Bool:
+            return self.node.source(topic, kind, qos)
         repeater = self.node.repeat(kind, topic, 50.0, qos)
         self.node.wait_for_subscriber(repeater.publisher, START_S)
         return repeater

@@ -46,8 +46,7 @@ def test_a_goal_moves_the_robot_of_its_namespace_alone(robots: Pair, name: str, 
 @BOTH_WAYS
 def test_a_joystick_moves_the_robot_of_its_namespace_alone(robots: Pair, name: str, other: str) -> None:
     driven, idle = robots[name], robots[other]
-    joystick = driven.node.repeat(TwistStamped, "cmd_vel_joy", 50.0)
-    driven.node.wait_for_subscriber(joystick.publisher)
+    joystick = driven.node.source()
     began_s = time.monotonic()
     joystick.message = TwistStamped()
     joystick.message.twist.angular.z = 0.5

@@ -25,8 +25,7 @@ def robot() -> Iterator[RunningRobot]:
 
 def test_the_joystick_ends_the_goal_at_once_and_its_release_leaves_the_base_standing(robot: RunningRobot) -> None:
     states = robot.node.record(MuxState, "velocity_mux/state", LATCHED)
-    joystick = robot.node.repeat(TwistStamped, "cmd_vel_joy", 50.0)
-    robot.node.wait_for_subscriber(joystick.publisher)
+    joystick = robot.node.source()
     goal = robot.goal(3.0, 0.4)
     robot.wait_speed(0.35)
 

@@ -35,5 +35,9 @@ def test_a_command_that_waited_meanwhile_moves_nothing_after(chain: Chain) -> No
     chain.node.spin_for(1.0)
     assert len(chain.orders.messages) > 20
     assert {message.twist.linear.x for message in chain.orders.messages} == {0.0}
+    chain.joystick.message = drive(0.2)  # the stick was held while the process stood still
+    chain.node.spin_for(0.5)
+    assert chain.ordered == (0.0, 0.0)
+    chain.node.release(chain.joystick)
     chain.joystick.message = drive(0.2)
     chain.wait_for_order(0.2)

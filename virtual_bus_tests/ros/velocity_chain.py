@@ -10,7 +10,7 @@ import zlib
 from typing import Any
 
 import pytest
-from canbase.msg import MuxState, SafetyState
+from canbase.msg import DriverStatus, MuxState, SafetyState
 from geometry_msgs.msg import TwistStamped
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import LaserScan
@@ -22,6 +22,8 @@ from ros.scanner import BEAMS, all_around, scanner
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 LEASE = struct.Struct("<4sQQddII")
 START_S = 15.0
+SILENT_S = 0.4
+"""After it no source of the sample robot is fresh that says nothing."""
 RUN = """
 import sys
 from canbase_config.load import load_robot
@@ -46,7 +48,8 @@ def scan(ahead_m: float = math.inf, behind_m: float = math.inf) -> LaserScan:
 class Chain:
     """The process, everything that it says, and the sources that a test can move."""
 
-    def __init__(self, node: TestNode, process: Process, watchdog: socket.socket) -> None:
+    def __init__(self, node: TestNode, process: Process, watchdog: socket.socket, released: bool = True) -> None:
+        """`released`: joystick and action have commanded zero, and are silent now."""
         self.node, self.process, self.watchdog = node, process, watchdog
         self.leases: list[tuple[Any, ...]] = []
         node.node.create_timer(0.02, self.drain)
@@ -57,11 +60,16 @@ class Chain:
         self.action = node.repeat(TwistStamped, "cmd_vel_action", 50.0)
         self.scan = scanner(node)
         self.estop = node.repeat(Bool, "estop_state", 20.0)
-        for repeater in (self.joystick, self.action, self.scan, self.estop):
+        self.driver = node.repeat(DriverStatus, "motor_driver/status", 20.0)
+        for repeater in (self.joystick, self.action, self.scan, self.estop, self.driver):
             node.wait_for_subscriber(repeater.publisher, START_S)
         node.wait_for(lambda: self.mux.last is not None and self.state.last is not None, START_S, "the first states")
         self.scan.message = scan()
+        self.driver.message = DriverStatus(state=DriverStatus.ENABLED)
         self.wait_for_cause(SafetyState.CAUSE_NONE)
+        if released:
+            node.release(self.joystick, self.action)
+            node.spin_for(SILENT_S)
 
     @property
     def ordered(self) -> tuple[float, float]:

@@ -8,8 +8,8 @@ from canbase_config.mux import MuxLock, MuxSource
 from canbase_config.priority import Priority
 from canbase_velocity.changes import changed_order, changes, is_told
 from canbase_velocity.decision import Action, Cause, Decision
-from canbase_velocity.mux import Mux
 from canbase_velocity.twist import ZERO, Twist
+from unit.mux_world import rested
 
 SOURCES = {
     "joy": MuxSource(topic="cmd_vel_joy", priority=100, timeout_s=0.3),
@@ -20,7 +20,7 @@ FORWARD = Twist(0.5, 0.0)
 
 
 def test_from_first_command_to_silence() -> None:
-    mux = Mux(SOURCES, LOCKS)
+    mux = rested(SOURCES, LOCKS)
     nobody = mux.decide(0.0)
     mux.on_command("nav", FORWARD, 1.0)
     nav = mux.decide(1.0)
@@ -36,7 +36,7 @@ def test_from_first_command_to_silence() -> None:
 
 
 def test_a_lock_is_a_notice_and_so_is_what_it_takes_away() -> None:
-    mux = Mux(SOURCES, LOCKS)
+    mux = rested(SOURCES, LOCKS)
     mux.on_command("nav", FORWARD, 1.0)
     nav = mux.decide(1.0)
     mux.on_lock("gate", True, 1.1)
@@ -52,6 +52,22 @@ def test_a_lock_is_a_notice_and_so_is_what_it_takes_away() -> None:
         ("lock gate is free", Priority.NOTICE, {"lock": "gate", "lock_holds": "false"}),
         ("nav drives, before nobody", Priority.INFO, {"active": "nav", "before": ""}),
     ]
+
+
+def test_a_source_that_is_not_followed_is_a_notice_with_what_it_waits_for() -> None:
+    mux = rested(SOURCES, LOCKS)
+    nobody = mux.decide(0.9)
+    mux.on_estop(False)
+    mux.on_command("joy", FORWARD, 1.0)
+    held = mux.decide(1.0)
+    mux.on_estop(True)
+    mux.on_command("joy", ZERO, 1.2)
+    released = mux.decide(1.2)
+
+    ((sentence, priority, fields),) = changes(nobody, held)
+    assert sentence.startswith("joy is not followed: waiting for zero")
+    assert (priority, fields) == (Priority.NOTICE, {"active": "joy", "before": ""})
+    assert [sentence for sentence, _, _ in changes(held, released)] == ["joy drives, before joy"]
 
 
 @pytest.mark.parametrize("cause", Cause)

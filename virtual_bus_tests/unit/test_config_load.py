@@ -9,7 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from canbase_config.effective import effective
-from canbase_config.errors import key_path
+from canbase_config.errors import ConfigError, key_path
 from canbase_config.load import Loaded, leaf_keys, load_robot, sample
 from canbase_config.robot import Robot
 from unit.robot_files import GOOD, LAST_LINE, write
@@ -130,8 +130,31 @@ def test_given_sources_replace_the_default_ones(tmp_path: Path) -> None:
 
     assert list(loaded.robot.mux.sources) == ["pad"]
     assert {key_path(loc) for loc in loaded.defaults if loc[0] == "mux"} == {
-        "mux.sources.pad.stamped", "mux.sources.pad.nodes", "mux.locks", "mux.foreign_publishers", "mux.twist_mux",
+        "mux.sources.pad.stamped", "mux.sources.pad.nodes", "mux.sources.pad.neutral_after_s",
+        "mux.sources.pad.same_clock", "mux.locks", "mux.foreign_publishers", "mux.twist_mux",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(("source", "after_s"), [
+    ("joystick: {topic: a, priority: 7, timeout_s: 0.1}", None),
+    ("navigation: {topic: a, priority: 7, timeout_s: 0.1}", 2.0),
+    ("action: {topic: a, priority: 7, timeout_s: 0.1}", 2.0),
+    ("navigation: {topic: a, priority: 7, timeout_s: 0.1, neutral_after_s: null}", None),
+    ("navigation: {topic: a, priority: 7, timeout_s: 0.1, neutral_after_s: 5.0}", 5.0),
+    ("joystick: {topic: a, priority: 7, timeout_s: 0.1, neutral_after_s: 1.0}", 1.0),
+])  # fmt: skip
+def test_programs_may_start_without_a_zero_after_a_silence_unless_their_key_says_otherwise(
+    tmp_path: Path, source: str, after_s: float | None
+) -> None:
+    sources = load(tmp_path, {END: f"mux: {{sources: {{{source}}}}}"}).robot.mux.sources
+    assert [each.neutral_after_s for each in sources.values()] == [after_s]
+
+
+@pytest.mark.parametrize("after_s", ["0", "0.45", "61", ".inf"])
+def test_no_radio_gap_arms_a_source(tmp_path: Path, after_s: str) -> None:
+    text = f"mux: {{sources: {{pad: {{topic: a, priority: 7, timeout_s: 0.1, neutral_after_s: {after_s}}}}}}}"
+    with pytest.raises(ConfigError, match="neutral_after_s"):
+        load(tmp_path, {END: text})
 
 
 def test_whole_numbers_do_for_numbers(tmp_path: Path) -> None:

@@ -54,8 +54,8 @@ def test_another_message_type_is_told_and_disturbs_nobody() -> None:
 
 
 def test_who_it_disturbs() -> None:
-    on_action = Foreign("/t", "/evil", STAMPED, "x", "action", heard=True)
-    on_output = Foreign("/t", "/evil", STAMPED, "x", None, heard=True)
+    on_action = Foreign("/t", "/evil", STAMPED, "x", "action", obeyed=True)
+    on_output = Foreign("/t", "/evil", STAMPED, "x", None, obeyed=True)
     assert [on_action.disturbs(name) for name in ("action", "joystick")] == [True, False]
     assert [on_output.disturbs(name) for name in ("action", "joystick")] == [True, True]
 

@@ -22,9 +22,12 @@ from canbase_cli.picture import SILENT_S, Heard, Snapshot, line, picture
 
 MUX = MuxState(
     active="joystick",
+    ready=True,
     sources=[
-        MuxSource(name="joystick", priority=100, active=True, age_s=0.02, timeout_s=0.3, refused=3),
-        MuxSource(name="action", priority=40, age_s=math.nan, timeout_s=0.3, reason="never received"),
+        MuxSource(
+            name="joystick", priority=100, active=True, armed=True, age_s=0.02, delay_s=0.01, timeout_s=0.3, refused=3
+        ),
+        MuxSource(name="action", priority=40, age_s=math.nan, delay_s=math.nan, timeout_s=0.3, reason="never received"),
     ],
     locks=[MuxLock(name="pause", priority=99, required=True, age_s=0.61, timeout_s=0.5)],
 )
@@ -67,8 +70,8 @@ def test_everything_that_an_operator_needs_is_there() -> None:
     for words in (
         "canbase: /r1",
         "joystick drives | filter slows: obstacle_near | driver ENABLED | watchdog ok",
-        "100 joystick 0.02 s 0.30 s 3 drives",
-        "40 action – 0.30 s 0 never received",
+        "100 joystick 0.02 s 0.01 s 0.30 s 3 drives",
+        "40 action – – 0.30 s 0 never received; needs a zero first",
         "99 lock pause 0.61 s 0.50 s free",
         "orders +0.30 m/s +0.00 rad/s free ahead 0.40 m, behind all",
         "0.40 m free ahead: at most 0.30 m/s; ends with: more free way ahead",
@@ -77,6 +80,16 @@ def test_everything_that_an_operator_needs_is_there() -> None:
         "MOVES",
     ):
         assert words in text
+
+
+def test_a_held_stick_that_is_not_followed_is_told_in_the_headline_and_with_its_reason() -> None:
+    reason = "waiting for zero (motor_driver is LATCHED)"
+    joystick = MuxSource(name="joystick", active=True, delay_s=math.nan, reason=reason)
+    mux = MuxState(active="joystick", not_ready="motor_driver is LATCHED", sources=[joystick])
+    snapshot = replace(ALL, mux=Heard(mux, 0.1))
+    assert line(snapshot).startswith("joystick is not followed: waiting for zero  |")
+    assert reason in drawn(snapshot)
+    assert "The base cannot move: motor_driver is LATCHED" in drawn(snapshot)
 
 
 def test_a_silent_node_is_told_as_silent_and_nothing_that_it_said_is_shown() -> None:

@@ -12,6 +12,7 @@ from canbase_config.mux import DEFAULT_SOURCES, MuxLock, MuxSource
 from canbase_velocity.foreign import Foreign
 from canbase_velocity.mux import Mux, MuxDecision, Standing
 from canbase_velocity.twist import ZERO, Twist
+from unit.mux_world import rested
 
 SLOW = Twist(0.1, 0.0)
 FAST = Twist(0.5, 0.2)
@@ -20,7 +21,7 @@ TIMEOUTS_S = {name: source.timeout_s for name, source in DEFAULT_SOURCES.items()
 
 @pytest.fixture
 def mux() -> Mux:
-    return Mux(DEFAULT_SOURCES)
+    return rested()
 
 
 def reasons(decision: MuxDecision) -> dict[str, str]:
@@ -45,11 +46,11 @@ def test_sources_are_listed_by_falling_priority_whatever_their_order_in_the_file
         "high": MuxSource(topic="b", priority=255, timeout_s=0.3),
         "middle": MuxSource(topic="c", priority=7, timeout_s=0.3),
     }
-    assert [source.name for source in Mux(sources).decide(0.0).sources] == ["high", "middle", "low"]
+    assert [source.name for source in rested(sources).decide(0.0).sources] == ["high", "middle", "low"]
 
 
 def test_priority_0_drives_when_it_is_alone() -> None:
-    mux = Mux({"low": MuxSource(topic="a", priority=0, timeout_s=0.3)})
+    mux = rested({"low": MuxSource(topic="a", priority=0, timeout_s=0.3)})
     mux.on_command("low", SLOW, 1.0)
     assert mux.decide(1.0).twist == SLOW
 
@@ -137,7 +138,7 @@ BUTTON = MuxLock(topic="button", priority=255, timeout_s=0.5)
 
 
 def test_a_lock_holds_back_the_sources_below_it_and_not_those_above() -> None:
-    mux = Mux(DEFAULT_SOURCES, {"pause": PAUSE})
+    mux = rested(DEFAULT_SOURCES, {"pause": PAUSE})
     mux.on_command("navigation", SLOW, 0.0)
     assert mux.decide(0.0).active == "navigation"  # a lock that is not required says nothing, and does not hold
     mux.on_lock("pause", True, 0.1)
@@ -155,7 +156,7 @@ def test_a_lock_holds_back_the_sources_below_it_and_not_those_above() -> None:
 
 
 def test_a_source_with_the_priority_of_the_lock_is_not_held_back() -> None:
-    mux = Mux(DEFAULT_SOURCES, {"alike": MuxLock(topic="x", priority=50)})
+    mux = rested(DEFAULT_SOURCES, {"alike": MuxLock(topic="x", priority=50)})
     mux.on_command("navigation", SLOW, 0.0)
     assert mux.decide(0.0).active == "navigation"
     mux.on_command("action", FAST, 0.6)
@@ -163,7 +164,7 @@ def test_a_source_with_the_priority_of_the_lock_is_not_held_back() -> None:
 
 
 def test_a_required_lock_holds_until_it_is_heard_and_again_when_it_falls_silent() -> None:
-    mux = Mux(DEFAULT_SOURCES, {"button": BUTTON})
+    mux = rested(DEFAULT_SOURCES, {"button": BUTTON})
     mux.on_command("joystick", FAST, 0.0)
     assert reasons(mux.decide(0.0))["joystick"] == "locked: button has never said anything on button"
     mux.on_lock("button", False, 0.1)
@@ -178,7 +179,7 @@ def test_a_required_lock_holds_until_it_is_heard_and_again_when_it_falls_silent(
 
 
 def test_the_last_true_of_a_lock_holds_however_long_it_is_silent() -> None:
-    mux = Mux(DEFAULT_SOURCES, {"pause": PAUSE})
+    mux = rested(DEFAULT_SOURCES, {"pause": PAUSE})
     mux.on_lock("pause", True, 0.0)
     mux.on_command("action", FAST, 9999.0)
     decision = mux.decide(9999.0)
@@ -188,7 +189,7 @@ def test_the_last_true_of_a_lock_holds_however_long_it_is_silent() -> None:
 
 
 def test_locks_are_told_by_falling_priority_and_a_change_of_one_changes_the_essence() -> None:
-    mux = Mux(DEFAULT_SOURCES, {"pause": PAUSE, "button": BUTTON})
+    mux = rested(DEFAULT_SOURCES, {"pause": PAUSE, "button": BUTTON})
     mux.on_lock("button", False, 0.0)
     before = mux.decide(0.0)
     assert [(lock.name, lock.holds) for lock in before.locks] == [("button", False), ("pause", False)]
@@ -201,8 +202,8 @@ def test_a_lock_that_the_configuration_does_not_name_is_our_own_error(mux: Mux) 
         mux.on_lock("pause", True, 0.0)
 
 
-def stranger(source: str | None, *, heard: bool = True) -> Foreign:
-    return Foreign("/t", "/evil", "geometry_msgs/msg/TwistStamped", "only /good should", source, heard)
+def stranger(source: str | None, *, obeyed: bool = True) -> Foreign:
+    return Foreign("/t", "/evil", "geometry_msgs/msg/TwistStamped", "only /good should", source, obeyed)
 
 
 def test_a_foreign_publisher_is_reported_and_holds_nobody_back_unless_the_configuration_says_so(mux: Mux) -> None:
@@ -216,7 +217,7 @@ def test_a_foreign_publisher_is_reported_and_holds_nobody_back_unless_the_config
 
 
 def test_a_foreign_publisher_locks_its_source_alone_or_all_of_them_when_it_speaks_for_the_chain() -> None:
-    mux = Mux(DEFAULT_SOURCES, foreign_lock=True)
+    mux = rested(DEFAULT_SOURCES, foreign_lock=True)
     mux.on_foreign([stranger("action")])
     mux.on_command("action", SLOW, 0.0)
     assert reasons(mux.decide(0.0))["action"] == "locked: /evil publishes on /t: only /good should"
@@ -224,7 +225,7 @@ def test_a_foreign_publisher_locks_its_source_alone_or_all_of_them_when_it_speak
     assert mux.decide(0.0).active == "joystick"
     mux.on_foreign([stranger(None)])
     assert (mux.decide(0.0).active, mux.decide(0.0).twist) == (None, ZERO)
-    mux.on_foreign([stranger(None, heard=False)])  # of a type that nobody hears
+    mux.on_foreign([stranger(None, obeyed=False)])  # of a type that nobody hears
     assert mux.decide(0.0).active == "joystick"
 
 
@@ -242,7 +243,7 @@ commands = st.lists(
 def test_the_order_is_the_newest_valid_command_of_the_highest_fresh_source_or_zero(
     commands: list[tuple[str, Twist, float]], pause_s: float
 ) -> None:
-    mux, now, newest = Mux(DEFAULT_SOURCES), 0.0, dict[str, tuple[Twist, float]]()
+    mux, now, newest = rested(), 0.0, dict[str, tuple[Twist, float]]()
     for name, twist, before_s in commands:
         now += before_s
         mux.on_command(name, twist, now)

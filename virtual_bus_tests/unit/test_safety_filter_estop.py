@@ -85,6 +85,12 @@ def latched(now: float, twist: Twist) -> SafetyFilter:
     return fed(now, twist, the_filter=safety)
 
 
+def test_without_an_emergency_stop_a_reset_is_refused_too_while_a_source_orders_a_velocity() -> None:
+    """The driver hears the zeros behind the filter alone, and a stick may be held that is not followed."""
+    done, sentence = latched(0.0, ZERO).reset(("joystick",), 0.0)
+    assert (done, sentence.split(";")[0]) == (False, "refused: joystick orders a velocity")
+
+
 def test_a_latched_emergency_stop_needs_a_reset_after_its_release() -> None:
     safety = latched(0.0, Twist(0.5, 0.0))
     assert safety.reset((), 0.0) == (True, NOTHING_TO_RESET)

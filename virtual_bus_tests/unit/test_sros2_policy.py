@@ -44,6 +44,12 @@ def test_each_default_source_is_written_by_its_own_enclave_and_read_by_the_mux(p
         assert readers[source.topic] == {"/canbase/velocity"}
 
 
+def test_the_mux_reads_whether_the_base_can_move_and_nobody_obeys_what_it_shows(policy: ElementTree.Element) -> None:
+    readers = allowed(policy, "subscribe")
+    assert "/canbase/velocity" in readers["motor_driver/status"]
+    assert readers["cmd_vel_mux"] == set()
+
+
 def test_no_rule_is_a_wildcard_and_nothing_is_allowed_for_all(policy: ElementTree.Element) -> None:
     assert [expression.text for expression in policy.iter() if "*" in (expression.text or "")] == []
 

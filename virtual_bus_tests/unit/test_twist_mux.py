@@ -9,7 +9,7 @@ import pytest
 from canbase_config.effective import effective
 from canbase_config.errors import ConfigError
 from canbase_config.load import load_robot
-from canbase_config.mux import Mux, MuxLock, MuxSource
+from canbase_config.mux import NEUTRAL_AFTER_S, Mux, MuxLock, MuxSource
 from unit.robot_files import LAST_LINE, write
 
 END = LAST_LINE + 1
@@ -80,7 +80,9 @@ def refusal(folder: Path, *files: str, also: str = "") -> str:
 def test_the_two_files_of_twist_mux_become_sources_and_locks(tmp_path: Path) -> None:
     mux = mux_of(tmp_path, TOPICS, LOCKS)
     assert mux.sources == {
-        "navigation": MuxSource(topic="nav_vel", priority=10, timeout_s=0.5, stamped=False),
+        "navigation": MuxSource(
+            topic="nav_vel", priority=10, timeout_s=0.5, stamped=False, neutral_after_s=NEUTRAL_AFTER_S
+        ),
         "joystick": MuxSource(topic="joy_vel", priority=100, timeout_s=0.5, stamped=False),
     }
     assert mux.locks == {

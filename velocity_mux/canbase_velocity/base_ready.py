@@ -1,0 +1,48 @@
+"""Whether the base can move now, as far as the mux knows: the drives are enabled, and no emergency stop holds.
+
+Unknown is not ready: before the first motor_driver/status, and when it is older than its timeout. A driver that counts
+its cycles from the start again was restarted: that is not ready either, also when it is enabled already.
+"""
+
+from __future__ import annotations
+
+STATUS_TIMEOUT_S = 0.5
+STATUS_PERIODS = 2.5
+"""A status counts for STATUS_TIMEOUT_S, or for so many of its periods where rates.status_hz is low."""
+ESTOP_HOLDS = "the emergency stop holds or waits for its reset"
+
+
+def status_timeout_s(status_hz: float) -> float:
+    """So long one motor_driver/status counts [s]. `status_hz`: rates.status_hz."""
+    return max(STATUS_TIMEOUT_S, STATUS_PERIODS / status_hz)
+
+
+class BaseReady:
+    """What is known of driver and emergency stop. Starts with nothing: not ready."""
+
+    def __init__(self, timeout_s: float = STATUS_TIMEOUT_S) -> None:
+        self._timeout_s = timeout_s
+        self._state = ""
+        self._at_s: float | None = None
+        self._cycles = 0
+        self._estop_free = False
+
+    def on_driver(self, state: str, cycles: int, received: float) -> bool:
+        """Takes a motor_driver/status: its state ("ENABLED", …) and cycle counter. True: the driver was restarted."""
+        restarted = self._at_s is not None and cycles < self._cycles
+        self._state, self._cycles, self._at_s = state, cycles, received
+        return restarted
+
+    def on_estop(self, free: bool) -> None:
+        """Takes what the safety filter knows of the emergency stop. False: it holds, or waits for a reset or a zero."""
+        self._estop_free = free
+
+    def problem(self, now: float) -> str:
+        """Why the base cannot move at `now` [s, monotonic]; empty: it can."""
+        if self._at_s is None:
+            return "nothing received on motor_driver/status yet"
+        if now - self._at_s > self._timeout_s:
+            return "motor_driver/status is silent"
+        if self._state != "ENABLED":
+            return f"motor_driver is {self._state}"
+        return "" if self._estop_free else ESTOP_HOLDS

@@ -1,0 +1,64 @@
+"""Neutral start: who ordered motion while the base could not move is not followed before he has commanded zero.
+
+Rules, for each source:
+1. At the start of the mux nobody is armed. Only an armed source is followed.
+2. A zero command arms. One that arrives too late does not: nobody knows what the source wants now.
+3. With `absent_s` (key neutral_after_s), so long without any message arms too: a program that begins with a velocity.
+   What this process did not watch, because it stood still itself, is no absence.
+4. Whose last command orders motion while the base is not ready is armed no more, however old that command is. A radio
+   gap across a reset changes nothing.
+"""
+
+from __future__ import annotations
+
+import math
+
+from canbase_velocity.twist import Twist
+
+BLIND_S = 0.2
+"""The mux decides at 20 Hz at least. After a longer pause it has missed messages, and every absence begins anew."""
+STARTED = "velocity_mux started"
+
+
+class Arming:
+    """Whether one source may be followed. `waits_since`: what disarmed it, for people; empty while it is armed."""
+
+    def __init__(self, absent_s: float | None) -> None:
+        """`absent_s`: silence that arms [s]; None: a zero command alone does."""
+        self._absent_s = absent_s
+        self._absent_from = math.inf
+        self._moves = False
+        self.waits_since = STARTED
+
+    @property
+    def armed(self) -> bool:
+        """It may be followed."""
+        return not self.waits_since
+
+    def command(self, twist: Twist, now: float, *, on_time: bool) -> None:
+        """A command arrived at `now` [s, monotonic]."""
+        self._absent_from = now
+        self._moves = not twist.is_zero
+        if twist.is_zero and on_time:
+            self.waits_since = ""
+
+    def disarm(self, why: str) -> None:
+        """It needs a zero again. The first reason is kept."""
+        self.waits_since = self.waits_since or why
+
+    def look(self, not_ready: str, now: float) -> None:
+        """Time has passed. `not_ready`: why the base cannot move; empty: it can."""
+        if not_ready and self._moves:
+            self.disarm(not_ready)
+        if self._absent_s is not None and now - self._absent_from >= self._absent_s:
+            self.waits_since, self._moves = "", False
+
+    def missed(self, now: float) -> None:
+        """Until `now` nobody watched: absence counts from here."""
+        self._absent_from = now
+
+    @property
+    def reason(self) -> str:
+        """For people, while it is not armed."""
+        silence = f" or {self._absent_s:.1f} s of silence" if self._absent_s is not None else ""
+        return f"waiting for zero{silence} ({self.waits_since})"
