@@ -9,18 +9,21 @@ STATE_TIMEOUT_S = 1.5
 """A state that is older says nothing: three periods of the slowest one (velocity_mux/state, 2 Hz)."""
 
 
+NO_SOURCE = "mux.sources has no stamped source with topic cmd_vel_action: the mux would never hear a goal; add it"
+
+
 def action_source(robot: Robot) -> str:
-    """Name under mux.sources of the source on topic cmd_vel_action; ValueError when there is none."""
-    for name, source in robot.mux.sources.items():
-        if source.topic == "cmd_vel_action":
-            return name
-    raise ValueError("mux.sources has no source with topic cmd_vel_action: the action server could never drive; add it")
+    """Name under mux.sources of the source on topic cmd_vel_action; empty when there is none."""
+    sources = robot.mux.sources.items()
+    return next((name for name, source in sources if source.topic == "cmd_vel_action" and source.stamped), "")
 
 
 def state_reason(robot: Robot, inputs: Inputs, now: float) -> str | None:
     """Why the robot cannot start a goal now; None: it can."""
     if inputs.shutdown:
         return "the action server is shutting down"
+    if not action_source(robot):
+        return NO_SOURCE
     return _silence(robot, inputs, now) or _condition(robot, inputs)
 
 
@@ -51,4 +54,6 @@ def _condition(robot: Robot, inputs: Inputs) -> str | None:
         return "motor_driver hears no cmd_vel; is safety_filter running? After a start try again in a second"
     if mux and mux.active not in ("", action_source(robot)):
         return f"{mux.active} drives now; let go of it first"
+    if mux and mux.held_back:
+        return f"velocity_mux holds {action_source(robot)} back: {mux.held_back}; free it first"
     return None

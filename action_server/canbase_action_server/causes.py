@@ -35,6 +35,9 @@ class Situation:
     gap_s: float
     """Since the control cycle before this one."""
     odometry_jumped: bool
+    pose_was_reset: bool
+    off_course: str
+    """How far the base is beside its line or turned away from it, if that is too far; else empty."""
     obstacle_age_s: float
     """For how long the filter has been stopping this motion for an obstacle; 0: it does not."""
     obstacle_patience_s: float
@@ -76,6 +79,8 @@ def _drive_fault(s: Situation) -> str | None:
 def _odometry_lost(s: Situation) -> str | None:
     odometry = s.inputs.odometry
     age = age_s(odometry.received if odometry else None, s.now)
+    if s.pose_was_reset:
+        return "the pose of the odometry was set anew during the goal, or missed some travel: send a new goal"
     if s.odometry_jumped:
         return "odometry jumped farther than the base can move: it was reset, or another node publishes odom"
     if s.gap_s > s.odometry_timeout_s:  # what arrives now may look fresh: the base was driven without it
@@ -94,6 +99,10 @@ def _taken_over(s: Situation) -> str | None:
     return f"{mux.active} drives now, it has priority; the base follows it"
 
 
+def _off_course(s: Situation) -> str | None:
+    return s.off_course or None
+
+
 def _scan_lost(s: Situation) -> str | None:
     safety = s.inputs.safety
     if safety is None or safety.cause not in SCAN_LOST_CAUSES:
@@ -102,6 +111,8 @@ def _scan_lost(s: Situation) -> str | None:
 
 
 def _blocked(s: Situation) -> str | None:
+    if s.inputs.mux is not None and s.inputs.mux.held_back:
+        return f"velocity_mux holds {s.own_source} back: {s.inputs.mux.held_back}; free it and send a new goal"
     if s.obstacle_age_s < s.obstacle_patience_s or s.inputs.safety is None:
         return None
     return f"obstacle in the way: {s.inputs.safety.detail}; clear the way and send a new goal for the rest"
@@ -150,6 +161,7 @@ TABLE: tuple[Row, ...] = (
     Row(ErrorCode.DRIVE_FAULT, _drive_fault, while_stopping=True),
     Row(ErrorCode.ODOMETRY_LOST, _odometry_lost, while_stopping=True),
     Row(ErrorCode.TAKEN_OVER, _taken_over, while_stopping=True),
+    Row(ErrorCode.DRIVE_FAULT, _off_course, while_stopping=True),
     Row(ErrorCode.SCAN_LOST, _scan_lost, while_stopping=False),
     Row(ErrorCode.BLOCKED, _blocked, while_stopping=False),
     Row(ErrorCode.CANCELED, _canceled, while_stopping=True),
@@ -159,7 +171,8 @@ TABLE: tuple[Row, ...] = (
     Row(ErrorCode.NO_PROGRESS, _no_progress, while_stopping=False),
     Row(ErrorCode.TIMEOUT, _timeout, while_stopping=False),
 )
-PRECEDENCE = {row.code: place for place, row in enumerate(TABLE)} | {ErrorCode.OK: len(TABLE)}
+PRECEDENCE = {row.code: place for place, row in reversed(tuple(enumerate(TABLE)))} | {ErrorCode.OK: len(TABLE)}
+"""Of a code with two rows, the upper one."""
 
 
 def cause_while_driving(situation: Situation) -> Cause | None:

@@ -72,6 +72,9 @@ class GoalRun:
         self._standstill: Standstill | None = None
         self._last_odometry = start
         self._jumped = False
+        self._pose_resets: int | None = None
+        """As the driver had counted them when the goal began."""
+        self._pose_was_reset = False
         self._obstacle_since: float | None = None
         self._best_remaining_m = self._motion.remaining_m
         self._progress_time = now
@@ -98,8 +101,12 @@ class GoalRun:
 
     def _observe(self, inputs: Inputs, now: float) -> None:
         odometry, safety = inputs.odometry, inputs.safety
+        if inputs.driver is not None:
+            at_start = self._pose_resets = inputs.driver.pose_resets if self._pose_resets is None else self._pose_resets
+            self._pose_was_reset = self._pose_was_reset or inputs.driver.pose_resets != at_start
         if odometry and odometry.received > self._last_odometry.received:
-            self._jumped = self._jumped or not self._motion.observe(odometry)
+            known = not (self._pose_was_reset or self._jumped)  # else the pose is not about this motion any more
+            self._jumped = self._jumped or (known and not self._motion.observe(odometry))
             self._last_odometry = odometry
         if self._best_remaining_m - self._motion.remaining_m >= PROGRESS_M:
             self._best_remaining_m, self._progress_time = self._motion.remaining_m, now
@@ -108,6 +115,7 @@ class GoalRun:
         self._obstacle_since = since if blocked else None
 
     def _situation(self, inputs: Inputs, now: float) -> Situation:
+        action = self._robot.action
         return Situation(
             inputs=inputs,
             now=now,
@@ -115,10 +123,12 @@ class GoalRun:
             odometry_timeout_s=self._robot.timeouts.odometry_s,
             gap_s=self._gap_s,
             odometry_jumped=self._jumped,
+            pose_was_reset=self._pose_was_reset,
+            off_course=self._motion.strayed(action.lateral_tolerance_m, action.heading_tolerance_rad),
             obstacle_age_s=0.0 if self._obstacle_since is None else now - self._obstacle_since,
             obstacle_patience_s=OBSTACLE_PATIENCE_S,
             no_progress_s=now - self._progress_time,
-            progress_timeout_s=self._robot.action.progress_timeout_s,
+            progress_timeout_s=action.progress_timeout_s,
             running_s=now - self._started,
             overall_timeout_s=self._overall_s,
         )

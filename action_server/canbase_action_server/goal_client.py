@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
+from uuid import uuid4
 
 from rclpy.action import ActionClient
 from rclpy.action.client import ClientGoalHandle
@@ -38,7 +39,7 @@ class NoServerError(DriveError):
 
 
 class NoResponseError(DriveError):
-    """The server did not say in time whether it accepts the goal. The goal may run: do not send it again blindly."""
+    """The server did not say in time whether it accepts the goal. It is canceled, if it is accepted after all."""
 
 
 class RejectedError(DriveError):
@@ -125,10 +126,14 @@ class GoalClient(Generic[ResultT, FeedbackT]):
     ) -> SentGoal[ResultT]:
         """Find the server, send the goal once, wait for its acceptance. Raises the subclasses of DriveError."""
         self.wait_for_server(discovery_timeout_s, interrupted)
-        response = self._client.send_goal_async(goal, feedback_callback=self._feedback_to(on_feedback))
-        if not self.spin_until(response.done, response_timeout_s):
-            response.add_done_callback(_cancel_late)
-            raise NoResponseError(f"{self.action} did not answer within {response_timeout_s} s; the goal may run")
+        uuid = UUID(uuid=list(uuid4().bytes))
+        response = self._client.send_goal_async(goal, self._feedback_to(on_feedback), uuid)
+        self.spin_until(lambda: response.done() or interrupted(), response_timeout_s)
+        if not response.done():
+            self._give_up(uuid, response)
+            if interrupted():
+                raise InterruptedDriveError("interrupted before the goal was accepted; its cancel was sent")
+            raise NoResponseError(f"{self.action} did not answer within {response_timeout_s} s; its cancel was sent")
         handle: ClientGoalHandle = response.result()
         if not handle.accepted:
             raise RejectedError(f"{self.action} rejects the goal; the log of its server says why")
@@ -139,6 +144,11 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         self._node.destroy_timer(self._timer)
         self._node.destroy_publisher(self._keepalive)
         self._client.destroy()
+
+    def _give_up(self, uuid: UUID, response: Any) -> None:
+        """Nobody will watch this goal: its cancel waits at the server behind it, also when this process is gone."""
+        ClientGoalHandle(self._client, uuid, None).cancel_goal_async()
+        response.add_done_callback(_cancel_late)
 
     def _watch(self, handle: ClientGoalHandle) -> Any:
         """The future result; until it is there the server is told that this client lives."""

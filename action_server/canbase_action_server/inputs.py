@@ -57,6 +57,8 @@ class Driver:
     standstill: bool
     hears_command: bool
     """cmd_vel reaches it; after a start the ROS network needs a moment for that."""
+    pose_resets: int = 0
+    """How often the pose of the odometry was set anew since the driver's start: distances across one mean nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +67,8 @@ class Mux:
 
     received: float
     active: str
+    held_back: str = ""
+    """Why cmd_vel_action is locked now, whoever publishes there; empty: it is not."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,6 +46,7 @@ def driver_in(message: DriverStatus, received: float) -> Driver:
         watchdog_cause=message.watchdog_cause,
         standstill=message.standstill,
         hears_command=message.command_fresh,
+        pose_resets=message.pose_resets,
     )
 
 

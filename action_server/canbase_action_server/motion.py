@@ -93,6 +93,10 @@ class Motion(ABC):
         """What was done, in words and in the goal's own unit."""
 
     @abstractmethod
+    def strayed(self, lateral_m: float, heading_rad: float) -> str:
+        """How far the base is off its course, if that is more than these tolerances; empty: it is not."""
+
+    @abstractmethod
     def _step_m(self, odometry: Odometry) -> float:
         """How far the pose is from the last one."""
 

@@ -34,6 +34,7 @@ from canbase_action_server.outcome import ErrorCode, Outcome
 from canbase_action_server.reception import Cycle, Reception
 from canbase_config.journal import Journal, Voice
 from canbase_config.priority import Priority
+from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
 
 SENSOR_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -43,6 +44,8 @@ KEEPALIVE_QOS = QoSProfile(depth=100)
 """Deep enough for all goals that may wait."""
 SERVICE_QOS = QoSProfile(depth=100)
 """With the usual depth of 10, of more requests at once the oldest are lost, and their clients wait for ever."""
+
+OLD = "the action server stood still before it took the goal in: its client may be gone; send it again"
 
 T = TypeVar("T")
 
@@ -56,6 +59,7 @@ class DriveDistanceServer(Node):
         self._reception = Reception(robot)
         self._voice = Voice(self.get_logger(), Journal("drive_distance_server"))
         self._inputs = Inputs()
+        self._request_times = ReceiveTimes.of_requests()
         self._open: dict[str, OpenGoal] = {}
         self.failure: Exception | None = None
         """The first exception that a callback raised; the process must end with an error."""
@@ -139,10 +143,13 @@ class DriveDistanceServer(Node):
         )
 
     def _on_keepalive(self, goal_id: UUID) -> None:
-        self._reception.keepalive(bytes(goal_id.uuid).hex(), time.monotonic())
+        if not self._request_times.waited(time.monotonic()):
+            self._reception.keepalive(bytes(goal_id.uuid).hex(), time.monotonic())
 
     def _on_goal(self, binding: Binding, goal: Any) -> GoalResponse:
-        reason = self._reception.refusal(binding.request(goal), self._inputs, time.monotonic())
+        now = time.monotonic()
+        old = OLD if self._request_times.waited(now) else None
+        reason = old or self._reception.refusal(binding.request(goal), self._inputs, now)
         if reason is None:
             return GoalResponse.ACCEPT
         # rclpy does not tell the UUID of a goal that is not accepted yet.
@@ -175,6 +182,7 @@ class DriveDistanceServer(Node):
         return result
 
     def _on_timer(self) -> None:
+        self._request_times.at(time.monotonic())
         for uuid, goal in self._open.items():
             if goal.handle.is_cancel_requested:
                 self._reception.cancel(uuid)

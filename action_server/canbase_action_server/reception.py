@@ -8,7 +8,8 @@ Rules.
    ends all others with PREEMPTED: those that wait at once, the running one when the base stands. Then it has the base.
 4. A goal that waits starts only after an end that left the base standing where it was told to. Any other end, such as
    an emergency stop, is theirs too: nothing starts to move by itself when the cause has gone, or from a wrong place.
-5. With `require_client_lease` a goal whose client was not heard for `client_lease_s` ends with CLIENT_LOST.
+5. With `require_client_lease` a goal begins when its client has been heard since its acceptance, and ends with
+   CLIENT_LOST when it was not heard for `client_lease_s`.
 6. Each goal that was admitted ends exactly once.
 """
 
@@ -55,7 +56,9 @@ class Admitted:
     key: str
     request: Request
     heard: float
-    """When its client gave the last sign of life."""
+    """When its client gave the last sign of life; until the first one, when it was admitted."""
+    alive: bool = False
+    """Its client has given one since then: it knows that the goal was accepted."""
     canceled: bool = False
     preempted: bool = False
 
@@ -110,7 +113,7 @@ class Reception:
         """The client of this goal lives. Nothing happens when no such goal runs or waits."""
         for goal in self._goals():
             if goal.key == key:
-                goal.heard = now
+                goal.heard, goal.alive = now, True
 
     def tick(self, inputs: Inputs, now: float) -> Cycle:
         """One control cycle."""
@@ -174,6 +177,8 @@ class Reception:
         if self._owner.busy or not self._waiting:
             return None
         goal = self._waiting[0]
+        if self._robot.action.require_client_lease and not goal.alive:
+            return None
         self._owner.take(goal.request, inputs, now)
         self._running = self._waiting.popleft()
         return goal.key

@@ -41,6 +41,18 @@ class StraightMotion(Motion):
         """How far, and how far beside the line."""
         return f"drove {self.traveled_m:+.4f} m of {self._way_m:+.4f} m, {self.lateral_m:+.4f} m beside the line"
 
+    def strayed(self, lateral_m: float, heading_rad: float) -> str:
+        """Beside the line, or turned away from it. Odometry sees what the wheels do: slip is not in it."""
+        at = self._now_at
+        if abs(at.lateral_m) <= lateral_m and abs(at.heading_rad) <= heading_rad:
+            return ""
+        slow = "left" if at.heading_rad * self._sign > 0.0 else "right"
+        return (
+            f"{at.lateral_m:+.3f} m beside the line and turned away by {at.heading_rad:+.3f} rad (tolerances: "
+            f"action.lateral_tolerance_m {lateral_m}, action.heading_tolerance_rad {heading_rad}); "
+            f"does the {slow} wheel turn as ordered?"
+        )
+
     def _step_m(self, odometry: Odometry) -> float:
         return math.hypot(odometry.pose.x_m - self._last.pose.x_m, odometry.pose.y_m - self._last.pose.y_m)
 

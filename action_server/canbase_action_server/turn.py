@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from canbase_action_server.along_track import displacement
 from canbase_action_server.inputs import Odometry
 from canbase_action_server.motion import Motion, Twist
 from canbase_action_server.profile import ProfileLimits
@@ -29,9 +30,24 @@ class TurnMotion(Motion):
 
     def report(self) -> str:
         """How far, and how far from where it began."""
+        return (
+            f"turned {self._turned_rad:+.4f} rad of {self._angle_rad:+.4f} rad, {self._shift_m:.4f} m beside the place"
+        )
+
+    def strayed(self, lateral_m: float, heading_rad: float) -> str:
+        """Away from its place. About a wheel that stands the base swings to the side of that wheel."""
+        if self._shift_m <= lateral_m:
+            return ""
+        slow = "left" if displacement(self._start, self._last.pose).lateral_m > 0.0 else "right"
+        return (
+            f"{self._shift_m:.3f} m away from where the turn began (tolerance action.lateral_tolerance_m {lateral_m}); "
+            f"does the {slow} wheel turn as ordered?"
+        )
+
+    @property
+    def _shift_m(self) -> float:
         start, last = self._start, self._last.pose
-        shift_m = math.hypot(last.x_m - start.x_m, last.y_m - start.y_m)
-        return f"turned {self._turned_rad:+.4f} rad of {self._angle_rad:+.4f} rad, {shift_m:.4f} m beside the place"
+        return math.hypot(last.x_m - start.x_m, last.y_m - start.y_m)
 
     def _step_m(self, odometry: Odometry) -> float:
         last = self._last.pose

@@ -45,6 +45,13 @@ class Action(Section):
         float,
         Field(gt=0.0, le=0.1, description="a goal that ends nearer has succeeded; of a turn, at the wheels' rims [m]"),
     ] = 0.005
+    lateral_tolerance_m: Annotated[
+        float,
+        Field(gt=0.0, le=1.0, description="farther beside its line, or a turn from its place: DRIVE_FAULT [m]"),
+    ] = 0.05
+    heading_tolerance_rad: Annotated[
+        float, Field(gt=0.0, le=1.5, description="turned farther away from its line: DRIVE_FAULT [rad]")
+    ] = 0.2
     control_hz: Annotated[float, Field(ge=10.0, le=100.0, description="cmd_vel_action [Hz]")] = 50.0
     feedback_hz: Annotated[float, Field(ge=1.0, le=50.0, description="[Hz]")] = 10.0
     progress_timeout_s: Annotated[

@@ -13,23 +13,32 @@ GAP_S: Final = 0.1
 """Two looks that are further apart mean that this process stood still between them."""
 SETTLE_S: Final = 0.1
 """So long after a pause what is taken out of the queues may be from before its end."""
+REQUEST_GAP_S: Final = 0.5
+REQUEST_SETTLE_S: Final = 0.5
+"""The same for requests, whose callers wait for seconds: a busy computer must not have them refused."""
 
 
 class ReceiveTimes:
-    """The loop asks in each of its turns, at the latest every GAP_S / 2, and at each message."""
+    """The loop asks in each of its turns, at the latest every `gap_s` / 2, and at each message."""
 
-    def __init__(self) -> None:
+    def __init__(self, gap_s: float = GAP_S, settle_s: float = SETTLE_S) -> None:
+        self._gap_s, self._settle_s = gap_s, settle_s
         self._looked_at = math.inf
         self._before_pause = self._settled_at = -math.inf
 
     def at(self, now: float) -> float:
         """The receive time of what is taken in at `now` (both monotonic, s): `now`, or before the last pause."""
-        if now - self._looked_at > GAP_S:
+        if now - self._looked_at > self._gap_s:
             if self._looked_at >= self._settled_at:  # else the queues are not empty yet since the pause before
                 self._before_pause = self._looked_at
-            self._settled_at = now + SETTLE_S
+            self._settled_at = now + self._settle_s
         self._looked_at = now
         return now if now >= self._settled_at else self._before_pause
+
+    @classmethod
+    def of_requests(cls) -> ReceiveTimes:
+        """For requests."""
+        return cls(REQUEST_GAP_S, REQUEST_SETTLE_S)
 
     def waited(self, now: float) -> bool:
         """What is taken in at `now` may have waited while this process stood still."""

@@ -180,7 +180,7 @@ class DriverCore:
             return Outcome(False, f"refused: {pose} is not finite")
         if commanded or not self._drives.stand(now):
             return Outcome(False, f"refused: {commanded or 'a wheel turns'}; a pose is set at a standstill")
-        self._feed.odometry.reset(pose)
+        self._feed.set_pose(pose)
         return Outcome(
             True, f"odometry goes on from x {pose.x_m:.3f} m, y {pose.y_m:.3f} m, yaw {pose.yaw_rad:.3f} rad"
         )
@@ -345,7 +345,7 @@ class DriverCore:
             self._supervisor,
             self._watchdog,
             self._drives,
-            self._feed.odometry,
+            self._feed,
             self._command,
             self._stats,
             self._bus_report,

@@ -40,8 +40,8 @@ class ManagedNode(LifecycleNode):
         """`autostart`: it is active at once, and the driver boots and enables as soon as it can."""
         super().__init__(name)
         self._loop = loop
-        self.receive_times = ReceiveTimes()
-        """Whether what is taken in now may have waited while this process stood still."""
+        self.request_times = ReceiveTimes.of_requests()
+        """Whether a request that is taken in now may have waited while this process stood still."""
         answer_later(self._service_change_state, self._on_change_state)
         if autostart:
             self.trigger_configure()
@@ -64,7 +64,7 @@ class ManagedNode(LifecycleNode):
         if aim is None:
             self._refuse(asked, "refused: nobody may ask for this transition")
             return None
-        old = refusal(self.receive_times.waited(time.monotonic()), asked.sent_s, time.time())
+        old = refusal(self.request_times.waited(time.monotonic()), asked.sent_s, time.time())
         if old and aim > self._loop.aimed_at:
             self._refuse(asked, old)
             return None

@@ -85,6 +85,7 @@ def status_message(snapshot: DriverSnapshot, stamp: Time) -> DriverStatus:
         watchdog_frames_dropped=snapshot.watchdog_frames_dropped,
         watchdog_bus_errors=snapshot.watchdog_bus_errors,
         watchdog_pause_max_s=snapshot.watchdog_pause_max_s,
+        pose_resets=_u32(snapshot.pose_resets),
         standstill=snapshot.standstill,
         command_age_s=snapshot.command_age_s,
         command_fresh=snapshot.command_fresh,

@@ -18,6 +18,7 @@ from sensor_msgs.msg import JointState
 
 from canbase_config.journal import Journal, Voice
 from canbase_config.priority import Priority
+from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
 from canbase_driver import messages
 from canbase_driver.black_box import Ring
@@ -42,6 +43,7 @@ class MotorDriverNode(ManagedNode):
     def __init__(self, robot: Robot, loop: ControlLoop, ring: Ring, writer: BlackBoxWriter, autostart: bool) -> None:
         super().__init__("motor_driver", loop, autostart)
         self._robot = robot
+        self._receive_times = ReceiveTimes()
         self.voice = Voice(self.get_logger(), Journal("motor_driver"))
         self._odom = self.create_publisher(Odometry, "odom", 10)
         self._tf = self.create_publisher(messages.TFMessage, "tf", 100) if messages.TFMessage is not None else None
@@ -51,7 +53,7 @@ class MotorDriverNode(ManagedNode):
         self.create_subscription(TwistStamped, "cmd_vel", self._on_command, COMMAND_QOS)
         self.create_subscription(SafetyState, "safety_filter/state", self._on_safety, COMMAND_QOS)
         self._stops = StopTeller(self, robot, ring, writer, self.voice)
-        self._offers = DriverServices(self, loop, robot.base.odom_frame, self.receive_times)
+        self._offers = DriverServices(self, loop, robot.base.odom_frame, self.request_times)
         self._previous: DriverSnapshot | None = None
         self._diagnosed: DriverSnapshot | None = None
         self._status_at = 0.0
@@ -80,14 +82,15 @@ class MotorDriverNode(ManagedNode):
 
     def look_at_the_clock(self, now: float) -> None:
         """To be called in each turn of the executor's loop: a pause between two of them ages the commands that wait."""
-        self.receive_times.at(now)
+        self._receive_times.at(now)
+        self.request_times.at(now)
 
     def end(self) -> None:
         """The control thread has ended: tell the stops that are still open."""
         self._stops.end()
 
     def _on_command(self, message: TwistStamped) -> None:
-        received_at = self.receive_times.at(time.monotonic())
+        received_at = self._receive_times.at(time.monotonic())
         twist = Twist2D(message.twist.linear.x, message.twist.angular.z)
         if not twist.is_finite:
             self.get_logger().error(f"cmd_vel refused: {twist} is not finite", throttle_duration_sec=1.0)
@@ -101,7 +104,7 @@ class MotorDriverNode(ManagedNode):
 
     def _publish_status(self, snapshot: DriverSnapshot, stamp: object) -> None:
         previous = self._previous
-        changed = previous is None or (previous.state, previous.cause) != (snapshot.state, snapshot.cause)
+        changed = previous is None or _essence(previous) != _essence(snapshot)
         if changed or snapshot.time_s - self._status_at >= 1.0 / self._robot.rates.status_hz:
             self._status_at = snapshot.time_s
             self._status.publish(messages.status_message(snapshot, stamp))
@@ -138,6 +141,11 @@ class MotorDriverNode(ManagedNode):
             if sentence not in before:
                 self._stops.note(sentence)
                 self.voice.tell(sentence, Priority.ERROR, robot=self._robot.name)
+
+
+def _essence(snapshot: DriverSnapshot) -> tuple[object, ...]:
+    """What is published at once when it changes. After odom: who knows of a new pose has seen it."""
+    return snapshot.state, snapshot.cause, snapshot.pose_resets
 
 
 class Publisher(threading.Thread):

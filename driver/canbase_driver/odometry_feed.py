@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from canbase_driver.drives import Drives
-from canbase_driver.odometry import Odometry
+from canbase_driver.odometry import Odometry, Pose2D
 
 LONGEST_S = 1.0
 """The mean velocity after a longer gap is taken over this time."""
@@ -21,9 +21,19 @@ class OdometryFeed:
     def __init__(self, drives: Drives, track_m: float) -> None:
         self._drives = drives
         self._taken_at = -math.inf
-        self._losses = 0
+        self._losses = self._sets = 0
         self.odometry = Odometry(track_m)
         self.serial = 0
+
+    @property
+    def pose_resets(self) -> int:
+        """How often the pose was set anew, or missed some travel."""
+        return self._sets + self._losses
+
+    def set_pose(self, pose: Pose2D) -> None:
+        """The pose goes on from there."""
+        self._sets += 1
+        self.odometry.reset(pose)
 
     def update(self, now: float) -> None:
         """Take the sample in if every wheel has given one since the last; call it after each feedback."""

@@ -10,7 +10,7 @@ from canbase_driver.command import Command
 from canbase_driver.cycle_stats import CycleStats
 from canbase_driver.drives import Drives, age_s
 from canbase_driver.kinematics import base_twist
-from canbase_driver.odometry import Odometry
+from canbase_driver.odometry_feed import OdometryFeed
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervisor import Supervisor
 from canbase_driver.watchdog_link import WatchdogLink
@@ -23,7 +23,7 @@ class Told:
     supervisor: Supervisor
     watchdog: WatchdogLink
     drives: Drives
-    odometry: Odometry
+    feed: OdometryFeed
     command: Command
     stats: CycleStats
     bus: BusReport
@@ -33,7 +33,7 @@ class Told:
 
 def snapshot_of(told: Told, base: Base, now: float) -> DriverSnapshot:
     """The snapshot at the monotonic time `now` [s]."""
-    supervisor, watchdog, drives, odometry = told.supervisor, told.watchdog, told.drives, told.odometry
+    supervisor, watchdog, drives, odometry = told.supervisor, told.watchdog, told.drives, told.feed.odometry
     view, _detail = watchdog.view(now)
     measured = base_twist(*drives.speeds_mps(), base.track_m)
     counters, cause = watchdog.counters, supervisor.cause
@@ -77,6 +77,7 @@ def snapshot_of(told: Told, base: Base, now: float) -> DriverSnapshot:
         twist_covariance=odometry.twist_covariance(),
         odometry_valid=drives.are_fresh(now) and drives.have_references(),
         travel_losses=drives.losses(),
+        pose_resets=told.feed.pose_resets,
         odom_frame=base.odom_frame,
         base_frame=base.base_frame,
     )

@@ -32,11 +32,11 @@ def _answered_later(_request: Trigger.Request, response: Trigger.Response) -> Tr
 class DriverServices:
     """What `node` offers beside its topics and its lifecycle."""
 
-    def __init__(self, node: Node, loop: ControlLoop, odom_frame: str, receive_times: ReceiveTimes) -> None:
+    def __init__(self, node: Node, loop: ControlLoop, odom_frame: str, request_times: ReceiveTimes) -> None:
         self._loop = loop
         self._node = node
         self._odom_frame = odom_frame
-        self._receive_times = receive_times
+        self._request_times = request_times
         self._voice = Voice(node.get_logger(), Journal("motor_driver"))
         answer_later(node.create_service(Trigger, "motor_driver/stop", _answered_later), self._on_stop)
         self._offer("motor_driver/reset", self._on_reset)
@@ -45,7 +45,7 @@ class DriverServices:
 
     def _offer(self, name: str, carry_out: Callable[[Asked], None]) -> None:
         def on_request(asked: Asked) -> None:
-            old = refusal(self._receive_times.waited(time.monotonic()), asked.sent_s, time.time())
+            old = refusal(self._request_times.waited(time.monotonic()), asked.sent_s, time.time())
             if old:
                 self._answer(asked, Outcome(False, old))
             else:
@@ -77,7 +77,7 @@ class DriverServices:
         self._loop.set_pose(Pose2D(), end)
 
     def _on_set_pose(self, message: PoseWithCovarianceStamped) -> None:
-        if self._receive_times.waited(time.monotonic()):
+        if self._request_times.waited(time.monotonic()):
             self._node.get_logger().warning("set_pose refused: it may be old, motor_driver stood still before it")
         elif message.header.frame_id != self._odom_frame:
             frame = message.header.frame_id

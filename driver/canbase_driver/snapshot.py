@@ -168,6 +168,8 @@ class DriverSnapshot:
     """
     travel_losses: int = 0
     """How often the pose missed some travel since start: a drive restarted, or an encoder jumped for good."""
+    pose_resets: int = 0
+    """How often the pose was set anew, or missed some travel, since start: distances across one mean nothing."""
     odom_frame: str = "odom"
     """REP 105."""
     base_frame: str = "base_link"

@@ -116,6 +116,7 @@ class ActionProcess(Process):
             watchdog_cause=snapshot.watchdog_cause,
             standstill=snapshot.standstill,
             hears_command=snapshot.command_fresh,
+            pose_resets=snapshot.pose_resets,
         )
         self._inputs = replace(self._inputs, driver=driver)
 

@@ -75,6 +75,34 @@ def stage(test_node: TestNode, spawn: Spawn, make_robot: MakeRobot) -> Stage:
     return Stage(test_node, spawn(server_code(path)))
 
 
+def test_a_pose_that_is_set_anew_by_less_than_a_jump_ends_the_goal(stage: Stage) -> None:
+    drive = stage.drive_until_moving()
+    stage.base.x_m -= 0.09
+    stage.base.driver.pose_resets += 1
+    result = stage.end_of(drive)
+    assert result.code is ErrorCode.ODOMETRY_LOST
+    assert "set anew" in result.message
+
+
+def test_a_base_that_turns_away_ends_the_goal_and_the_message_has_offset_angle_and_wheel(stage: Stage) -> None:
+    drive = stage.drive_until_moving()
+    stage.base.yaw_rad += 0.25
+    result = stage.end_of(drive)
+    assert result.code is ErrorCode.DRIVE_FAULT
+    assert "turned away by +0.2" in result.message
+    assert "left wheel" in result.message
+
+
+def test_where_the_mux_does_not_hear_the_server_goals_are_rejected_and_it_lives_on(
+    test_node: TestNode, spawn: Spawn, make_robot: MakeRobot
+) -> None:
+    robot = make_robot({"mux": {"sources": {"joystick": {"topic": "cmd_vel_joy", "priority": 1, "timeout_s": 0.3}}}})
+    stage = Stage(test_node, spawn(server_code(robot)))
+    for _ in range(2):
+        assert "cmd_vel_action" in stage.rejection(1.0, 0.2)
+    assert stage.server.exit_code is None
+
+
 def test_goals_end_at_their_distance_and_stand(stage: Stage) -> None:
     for distance_m in (0.5, -0.3, 0.01):
         ends_at_its_distance(stage, distance_m)

@@ -120,7 +120,7 @@ def test_a_server_that_dies_is_told_and_the_goal_is_not_sent_again(stage: Stage)
 def test_a_server_that_does_not_answer_is_an_error_of_its_own_and_its_late_goal_is_canceled(stage: Stage) -> None:
     stage.server.stop()  # hangs: it is still in the graph
     asked_s = time.monotonic()
-    with pytest.raises(NoResponseError, match="may run"):
+    with pytest.raises(NoResponseError, match="cancel was sent"):
         stage.client.send(2.0, 0.3, response_timeout_s=1.0)
     assert time.monotonic() - asked_s < 2.0
     stage.server.resume()
@@ -130,6 +130,75 @@ def test_a_server_that_does_not_answer_is_an_error_of_its_own_and_its_late_goal_
     assert "SUCCEEDED" not in stage.server.log()
     stage.node.spin_for(0.5)
     assert stage.base.speed_mps == pytest.approx(0.0, abs=0.001)
+
+
+DEAF_CLIENT = """
+import time, rclpy
+from canbase.action import DriveDistance
+from rclpy.action import ActionClient
+rclpy.init()
+node = rclpy.create_node("deaf")
+client = ActionClient(node, DriveDistance, "drive_distance")
+client.wait_for_server()
+print("found", flush=True)
+time.sleep(1.0)
+client.send_goal_async(DriveDistance.Goal(distance_m=1.0, max_speed_mps=0.3))
+print("sent", flush=True)
+time.sleep(60.0)
+"""
+
+
+def test_a_goal_that_waited_in_a_server_that_stood_still_never_starts(stage: Stage) -> None:
+    client = stage.spawn(DEAF_CLIENT)
+    stage.node.wait_for(lambda: "found" in client.log(), 20.0, "the client to find the server")
+    stage.server.stop()
+    stage.node.wait_for(lambda: "sent" in client.log(), 10.0, "the goal to be sent")
+    stage.node.spin_for(3.0)
+    resumed_s = time.monotonic()
+    stage.server.resume()
+    stage.node.wait_for(lambda: '"step": "rejected"' in stage.server.log(), 10.0, "its rejection")
+    assert "stood still" in stage.server.log()
+    stage.node.spin_for(1.0)
+    assert set(stage.base.orders_since(resumed_s)) <= {0.0}
+    again = stage.canbase_drive("0.1", "--speed", "0.3")  # the server is well
+    assert stage.exit_code(again) == 0, again.log()
+
+
+SLOW_SERVER = """
+import time, rclpy
+from canbase.action import DriveDistance
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+
+def on_goal(goal):
+    print("asked", flush=True)
+    time.sleep(2.0)
+    return GoalResponse.ACCEPT
+
+def on_cancel(handle):
+    print("cancel requested", flush=True)
+    return CancelResponse.ACCEPT
+
+rclpy.init()
+node = rclpy.create_node("slow")
+server = ActionServer(
+    node, DriveDistance, "drive_distance", lambda handle: DriveDistance.Result(),
+    goal_callback=on_goal, cancel_callback=on_cancel,
+    handle_accepted_callback=lambda handle: print("accepted", flush=True),
+)
+rclpy.spin(node)
+"""
+
+
+def test_a_client_that_ends_before_the_acceptance_leaves_its_cancel_behind(test_node: TestNode, spawn: Spawn) -> None:
+    server = spawn(SLOW_SERVER)
+    drive = spawn([*CANBASE, "drive", "1.0"])
+    test_node.wait_for(lambda: "asked" in server.log(), 20.0, "the goal to arrive")
+    drive.interrupt()
+    test_node.wait_for(lambda: drive.exit_code is not None, 1.5, f"its end:\n{drive.log()}")
+    assert drive.wait(1.0) == 3
+    assert "accepted" not in server.log()
+    test_node.wait_for(lambda: "cancel requested" in server.log(), 5.0, "the cancel, after the acceptance")
+    assert server.log().index("accepted") < server.log().index("cancel requested")
 
 
 def test_no_server_is_an_error_of_its_own(test_node: TestNode) -> None:

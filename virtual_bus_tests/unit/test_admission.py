@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from canbase_action_server.admission import STATE_TIMEOUT_S, action_source, state_reason
+from canbase_action_server.admission import NO_SOURCE, STATE_TIMEOUT_S, action_source, state_reason
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.request import DriveRequest
 from canbase_config.mux import Mux, MuxSource
@@ -61,6 +61,7 @@ def test_a_robot_that_is_ready_has_no_reason_against_it() -> None:
         ({"driver": replace(GOOD_DRIVER, watchdog="missing")}, "watchdog is missing"),
         ({"driver": replace(GOOD_DRIVER, hears_command=False)}, "hears no cmd_vel"),
         ({"mux": replace(GOOD_MUX, active="joystick")}, "joystick drives"),
+        ({"mux": replace(GOOD_MUX, held_back="locked: pause holds")}, "holds action back: locked: pause holds"),
     ],
 )
 def test_each_thing_that_is_missing_is_named(changes: dict[str, object], reason: str) -> None:
@@ -75,8 +76,14 @@ def test_old_messages_are_no_messages() -> None:
     assert "motor_driver/status is silent" in str(state_reason(ROBOT, fresh, STATE_TIMEOUT_S + 0.1))
 
 
-def test_the_action_server_must_be_a_source_of_the_mux() -> None:
+@pytest.mark.parametrize(
+    "source",
+    [
+        MuxSource(topic="cmd_vel_joy", priority=1, timeout_s=0.3),
+        MuxSource(topic="cmd_vel_action", priority=1, timeout_s=0.3, stamped=False),  # it would hear no TwistStamped
+    ],
+)
+def test_where_the_mux_does_not_hear_the_action_server_every_goal_is_refused(source: MuxSource) -> None:
     assert action_source(ROBOT) == "action"
-    alone = Mux(sources={"joystick": MuxSource(topic="cmd_vel_joy", priority=1, timeout_s=0.3)})
-    with pytest.raises(ValueError, match="cmd_vel_action"):
-        action_source(ROBOT.model_copy(update={"mux": alone}))
+    robot = ROBOT.model_copy(update={"mux": Mux(sources={"only": source})})
+    assert state_reason(robot, READY, 0.0) == NO_SOURCE

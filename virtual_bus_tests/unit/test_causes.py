@@ -1,5 +1,6 @@
 """The table of causes: each row alone, the order among them, and which of them count during a stop."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -17,6 +18,8 @@ GOOD = Situation(
     odometry_timeout_s=0.2,
     gap_s=0.02,
     odometry_jumped=False,
+    pose_was_reset=False,
+    off_course="",
     obstacle_age_s=0.0,
     obstacle_patience_s=0.3,
     no_progress_s=0.0,
@@ -30,11 +33,11 @@ def with_inputs(situation: Situation, **changes: object) -> Situation:
     return replace(situation, inputs=replaced(situation.inputs, **changes))
 
 
-# One way to provoke each row, in the order of the table.
-PROVOKED = {
+Provoke = Callable[[Situation], Situation]
+PROVOKED: dict[ErrorCode, Provoke] = {
     ErrorCode.ESTOP: lambda s: with_inputs(s, safety=replace(GOOD_SAFETY, estop=True)),
-    ErrorCode.WATCHDOG: lambda s: with_inputs(s, driver=replace(s.inputs.driver, watchdog="tripped")),
-    ErrorCode.DRIVE_FAULT: lambda s: with_inputs(s, driver=replace(s.inputs.driver, state="latched")),
+    ErrorCode.WATCHDOG: lambda s: with_inputs(s, driver=replace(s.inputs.driver or GOOD_DRIVER, watchdog="tripped")),
+    ErrorCode.DRIVE_FAULT: lambda s: with_inputs(s, driver=replace(s.inputs.driver or GOOD_DRIVER, state="latched")),
     ErrorCode.ODOMETRY_LOST: lambda s: replace(s, now=10.21),
     ErrorCode.TAKEN_OVER: lambda s: with_inputs(s, mux=replace(GOOD_MUX, active="joystick")),
     ErrorCode.SCAN_LOST: lambda s: with_inputs(s, safety=replace(GOOD_SAFETY, cause="scan_stale")),
@@ -48,6 +51,12 @@ PROVOKED = {
 }
 
 
+OFF_COURSE = "0.061 m beside the line and turned away by 0.210 rad"
+ROWS: list[tuple[ErrorCode, Provoke]] = list(PROVOKED.items())
+ROWS.insert(5, (ErrorCode.DRIVE_FAULT, lambda s: replace(s, off_course=OFF_COURSE)))
+"""One way to provoke each row, in the order of the table."""
+
+
 def test_nothing_wrong_is_no_cause() -> None:
     assert cause_while_driving(GOOD) is None
     almost = replace(GOOD, now=10.2, gap_s=0.2, obstacle_age_s=0.299, no_progress_s=2.0, running_s=20.0)
@@ -55,24 +64,46 @@ def test_nothing_wrong_is_no_cause() -> None:
     assert cause_while_driving(with_inputs(GOOD, mux=replace(GOOD_MUX, active="action"))) is None
 
 
-@pytest.mark.parametrize("code", PROVOKED)
-def test_each_row_alone(code: ErrorCode) -> None:
-    cause = cause_while_driving(PROVOKED[code](GOOD))
+@pytest.mark.parametrize(("code", "provoke"), ROWS)
+def test_each_row_alone(code: ErrorCode, provoke: Provoke) -> None:
+    cause = cause_while_driving(provoke(GOOD))
     assert cause is not None
     assert cause.code is code
     assert len(cause.message) > 15
 
 
 def test_the_table_is_in_this_order() -> None:
-    assert [row.code for row in TABLE] == list(PROVOKED)
+    assert [row.code for row in TABLE] == [code for code, _ in ROWS]
 
 
 @pytest.mark.parametrize("place", range(len(TABLE) - 1))
 def test_of_two_that_hold_the_upper_one_wins(place: int) -> None:
-    upper, lower = TABLE[place].code, TABLE[place + 1].code
-    cause = cause_while_driving(PROVOKED[upper](PROVOKED[lower](GOOD)))
+    (upper, provoke), (_, provoke_lower) = ROWS[place], ROWS[place + 1]
+    cause = cause_while_driving(provoke(provoke_lower(GOOD)))
     assert cause is not None
     assert cause.code is upper
+
+
+def test_a_pose_that_was_set_anew_is_a_loss_of_odometry_and_not_a_way_off_the_course() -> None:
+    cause = cause_while_driving(replace(GOOD, pose_was_reset=True, off_course=OFF_COURSE))
+    assert cause is not None
+    assert cause.code is ErrorCode.ODOMETRY_LOST
+    assert "set anew" in cause.message
+
+
+def test_a_lock_of_the_mux_ends_a_goal_at_once_and_names_the_lock() -> None:
+    cause = cause_while_driving(with_inputs(GOOD, mux=replace(GOOD_MUX, held_back="locked: pause holds")))
+    assert cause is not None
+    assert cause.code is ErrorCode.BLOCKED
+    assert cause.message == ("velocity_mux holds action back: locked: pause holds; free it and send a new goal")
+
+
+def test_a_base_off_its_course_is_still_stopped_by_a_trip() -> None:
+    tripped = replace(PROVOKED[ErrorCode.WATCHDOG](GOOD), off_course=OFF_COURSE)
+    cause = cause_while_stopping(tripped, ErrorCode.DRIVE_FAULT)
+    assert cause is not None
+    assert cause.code is ErrorCode.WATCHDOG
+    assert cause_while_stopping(replace(GOOD, off_course=OFF_COURSE), ErrorCode.DRIVE_FAULT) is None
 
 
 def test_a_jump_of_the_odometry_is_a_loss_of_it() -> None:
@@ -92,9 +123,9 @@ STOPPING = {ErrorCode.ESTOP, ErrorCode.WATCHDOG, ErrorCode.DRIVE_FAULT, ErrorCod
             ErrorCode.CANCELED, ErrorCode.SHUTDOWN}  # fmt: skip
 
 
-@pytest.mark.parametrize("code", PROVOKED)
-def test_during_the_stop_of_a_goal_that_arrived_only_some_rows_count(code: ErrorCode) -> None:
-    cause = cause_while_stopping(PROVOKED[code](GOOD), ErrorCode.OK)
+@pytest.mark.parametrize(("code", "provoke"), ROWS)
+def test_during_the_stop_of_a_goal_that_arrived_only_some_rows_count(code: ErrorCode, provoke: Provoke) -> None:
+    cause = cause_while_stopping(provoke(GOOD), ErrorCode.OK)
     assert (cause is not None) == (code in STOPPING)
 
 

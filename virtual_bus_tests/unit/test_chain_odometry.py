@@ -129,9 +129,13 @@ def test_the_pose_is_set_at_a_standstill_only_and_the_way_goes_on_from_there() -
     world.run(1.0)
     assert world.snapshot.x_m > 0.1
     assert not world.core.set_pose(Pose2D(math.nan, 0.0, 0.0), world.now).done
+    assert world.snapshot.pose_resets == 0
     assert world.core.set_pose(Pose2D(1.0, 2.0, math.pi / 2), world.now).done
     fresh = world.snapshot
     assert (fresh.x_m, fresh.y_m, fresh.yaw_rad) == (1.0, 2.0, math.pi / 2)
+    assert fresh.pose_resets == 1
+    assert world.core.set_pose(Pose2D(1.0, 2.0, math.pi / 2), world.now).done
+    assert world.snapshot.pose_resets == 2  # also where nothing jumps
     world.command = FORWARD
     world.run(1.0)
     snapshot = world.snapshot

@@ -15,6 +15,7 @@ def leased_world() -> ReceptionWorld:
 def test_a_goal_runs_to_its_end_while_its_client_lives() -> None:
     world = leased_world()
     key = world.ask_way(1.0)
+    world.run(0.1)
     for _ in range(20):
         world.reception.keepalive(key, world.now)
         world.run(0.98)
@@ -25,6 +26,7 @@ def test_the_base_stops_within_the_lease_of_the_last_sign_of_life() -> None:
     # heard at 0.5 ... lost at 1.52 ... brakes for 0.4 s
     world = leased_world()
     key = world.ask_way(5.0, 0.4)
+    world.reception.keepalive(key, world.now)
     world.run(0.5)
     world.reception.keepalive(key, world.now)
     world.run(0.98)
@@ -40,12 +42,24 @@ def test_the_base_stops_within_the_lease_of_the_last_sign_of_life() -> None:
 def test_the_life_of_another_client_does_not_count() -> None:
     world = leased_world()
     first, second = world.ask_way(3.0), world.ask_way(0.1)
+    world.reception.keepalive(first, world.now)
     world.run(0.6)
     world.reception.keepalive(first, world.now)
     world.reception.keepalive("unknown", world.now)
     world.run(0.6)
     assert world.code(second) is ErrorCode.CLIENT_LOST
     assert world.goals[first].ends == []
+
+
+def test_a_goal_whose_client_never_learned_of_its_acceptance_never_starts() -> None:
+    world = leased_world()
+    key = world.ask_way(1.0)
+    world.run(0.98)
+    assert world.goals[key].ends == []
+    world.run(0.1)
+    assert world.code(key) is ErrorCode.CLIENT_LOST
+    assert world.goals[key].began is None
+    assert world.x_m == 0.0
 
 
 def test_without_the_lease_a_goal_needs_no_client() -> None:

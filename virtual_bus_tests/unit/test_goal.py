@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import pytest
 
+from canbase_action_server.along_track import Pose
 from canbase_action_server.goal import Phase
-from canbase_action_server.inputs import Driver, Inputs, Safety
+from canbase_action_server.inputs import Driver, Inputs, Odometry, Safety
 from canbase_action_server.motion import Twist
 from canbase_action_server.outcome import ErrorCode, Status
+from canbase_action_server.request import DriveRequest
 from canbase_action_server.standstill import Standstill, StandstillLimits, Verdict
 from unit.action_plant import GOOD_SAFETY, Plant, Story, bench_robot, drive, goal_run, replaced
 
@@ -155,6 +157,76 @@ def test_odometry_that_jumps_is_not_driven_on() -> None:
     end = drive(Plant(), 3.0, 0.3, at={2.0: jump}).run()
     assert end.code is ErrorCode.ODOMETRY_LOST
     assert "jumped" in end.message
+
+
+@pytest.mark.parametrize("jump_m", [0.0, 0.001, 0.05, 0.0999, -0.0999])
+def test_a_pose_that_is_set_anew_during_a_goal_ends_it_whatever_its_size(jump_m: float) -> None:
+    def set_pose(story: Story) -> None:
+        story.plant.x_m += jump_m
+        driver(story, pose_resets=4)
+
+    story = drive(Plant(yaw_rad=0.0), 0.4, 0.2, at={0.0: lambda s: driver(s, pose_resets=3), 1.0: set_pose})
+    end = story.run()
+    assert end.code is ErrorCode.ODOMETRY_LOST
+    assert "set anew" in end.message
+    assert zero_from(story, 1.02)
+    assert story.ended_at < 1.7
+
+
+def test_poses_that_were_set_before_the_goal_do_not_matter() -> None:
+    story = drive(Plant(), 0.4, 0.2, at={0.0: lambda s: driver(s, pose_resets=2**32 - 1)})
+    assert story.run().code is ErrorCode.OK
+
+
+def test_a_pose_that_is_set_anew_while_the_base_comes_to_stand_is_no_success() -> None:
+    story = drive(Plant(yaw_rad=0.0), 0.1, 0.2, at={})
+    arrived = drive(Plant(yaw_rad=0.0), 0.1, 0.2)
+    assert arrived.run().code is ErrorCode.OK
+
+    def set_pose(story: Story) -> None:
+        story.plant.x_m -= 0.05
+        driver(story, pose_resets=1)
+
+    story.at = {arrived.ended_at - 0.05: set_pose}
+    assert story.run().code is ErrorCode.ODOMETRY_LOST
+
+
+@pytest.mark.parametrize(("distance_m", "slip"), [(2.0, 1.2), (2.0, -1.2), (-2.0, 1.2), (-2.0, -1.2)])
+def test_a_base_that_is_carried_off_its_line_ends_at_once_and_names_offset_angle_and_wheel(
+    distance_m: float, slip: float
+) -> None:
+    # One wheel turns slower than ordered: more curvature [rad/m] than the steering may order against it (0.5).
+    story = drive(Plant(yaw_rad=0.0, slip=slip), distance_m, 0.3)
+    end = story.run()
+    turned_rad = story.plant.yaw_rad
+    assert end.code is ErrorCode.DRIVE_FAULT
+    assert "beside the line and turned away by" in end.message
+    assert ("left wheel" if turned_rad * distance_m > 0.0 else "right wheel") in end.message
+    assert abs(turned_rad) < 0.35
+    assert story.coast() < 0.0002
+
+
+def test_a_base_that_ends_beside_its_line_is_no_success() -> None:
+    # The last centimetre: pushed aside while it comes to stand, after the way was gone.
+    def push(story: Story) -> None:
+        story.plant.y_m += 0.051
+
+    arrived = drive(Plant(yaw_rad=0.0), 0.3, 0.2)
+    assert arrived.run().code is ErrorCode.OK
+    story = drive(Plant(yaw_rad=0.0), 0.3, 0.2, at={arrived.ended_at - 0.08: push})
+    end = story.run()
+    assert end.code is ErrorCode.DRIVE_FAULT
+    assert "+0.051 m beside the line" in end.message
+
+
+@pytest.mark.parametrize(("lateral_m", "heading_rad", "ends"), [
+    (0.0499, 0.0, False), (0.0501, 0.0, True), (-0.0499, 0.0, False), (-0.0501, 0.0, True),
+    (0.0, 0.199, False), (0.0, 0.201, True), (0.0, -0.199, False), (0.0, -0.201, True),
+])  # fmt: skip
+def test_the_tolerances_of_the_course_are_those_of_robot_yaml(lateral_m: float, heading_rad: float, ends: bool) -> None:
+    motion = DriveRequest(1.0, 0.2).motion(bench_robot(), Odometry(0.0, Pose(0.0, 0.0, 0.0), 0.0, 0.0))
+    assert motion.observe(Odometry(0.02, Pose(0.05, lateral_m, heading_rad), 0.2, 0.0))
+    assert bool(motion.strayed(0.05, 0.2)) is ends
 
 
 def test_a_base_that_rolls_over_the_distance_is_not_a_success() -> None:

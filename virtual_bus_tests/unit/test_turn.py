@@ -16,7 +16,7 @@ from canbase_action_server.limits import lever_m, turn_limits
 from canbase_action_server.outcome import ErrorCode
 from canbase_action_server.request import RotateRequest
 from canbase_action_server.turn import TurnMotion
-from unit.action_plant import Plant, bench_robot, rotate
+from unit.action_plant import Plant, Story, bench_robot, rotate
 from unit.reception_world import ReceptionWorld, robot_with
 
 ROBOT = bench_robot()  # action.*: 0.02 to 63 rad, 0.1 to 1.5 rad/s; the wheels are 0.25 m from the middle
@@ -113,3 +113,28 @@ def test_a_drive_and_a_turn_share_the_one_base() -> None:
 
 def test_the_lever_is_half_the_track() -> None:
     assert lever_m(ROBOT) == LEVER_M
+
+
+@pytest.mark.parametrize(("angle_rad", "slow"), [(2.0, "left"), (-2.0, "left"), (2.0, "right"), (-2.0, "right")])
+def test_a_base_that_swings_about_one_wheel_drifts_away_and_the_wheel_is_named(angle_rad: float, slow: str) -> None:
+    motion = TurnMotion(Odometry(0.0, Pose(1.0, 2.0, 0.7), 0.0, 0.0), angle_rad, 0.2, turn_limits(ROBOT, 1.5))
+    side_m = 0.2 if slow == "left" else -0.2  # the wheel that stands, in the frame of the base
+    for share in (0.03, 0.06, 0.09, 0.12, 0.15):
+        turned = share * angle_rad
+        along_m, lateral_m = side_m * math.sin(turned), side_m * (1.0 - math.cos(turned))
+        x_m = 1.0 + along_m * math.cos(0.7) - lateral_m * math.sin(0.7)
+        y_m = 2.0 + along_m * math.sin(0.7) + lateral_m * math.cos(0.7)
+        assert motion.observe(Odometry(10.0 * share, Pose(x_m, y_m, 0.7 + turned), 0.0, 0.0))
+        assert bool(motion.strayed(0.05, 0.2)) is (0.4 * abs(math.sin(turned / 2.0)) > 0.05)
+    assert f"does the {slow} wheel turn as ordered?" in motion.strayed(0.05, 0.2)
+
+
+def test_a_turn_that_drifts_away_ends_at_once_with_drive_fault() -> None:
+    def push(story: Story) -> None:
+        story.plant.x_m += 0.06
+
+    story = rotate(Plant(), 3.0, 1.0, at={1.0: push})
+    end = story.run()
+    assert end.code is ErrorCode.DRIVE_FAULT
+    assert "0.060 m away from where the turn began" in end.message
+    assert story.ended_at < 2.0
