@@ -17,6 +17,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from canbase_config.journal import Journal, Voice
+from canbase_config.latch_file import LatchKeeper
 from canbase_config.priority import Priority
 from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
@@ -45,14 +46,16 @@ class FilterNode(Node):
     `moving_sources`: names of the sources that order a velocity now, whoever drives; asked before a reset.
     """
 
-    def __init__(self, robot: Robot, moving_sources: MovingSources = tuple) -> None:
+    def __init__(self, robot: Robot, moving_sources: MovingSources = tuple, keeper: LatchKeeper | None = None) -> None:
+        """`keeper`: of the record of the emergency stop; None: for a test of the node alone."""
         super().__init__("safety_filter")
         refuse_sim_time(self)
         self._robot = robot
         self._voice = Voice(self.get_logger(), Journal("safety_filter"))
         self._receive_times = ReceiveTimes()
         self._moving_sources = moving_sources
-        self._filter = SafetyFilter(FilterConfig.of(robot))
+        self._keeper = keeper
+        self._filter = SafetyFilter(FilterConfig.of(robot), keeper.found if keeper else None)
         self._transforms: dict[str, Transform] = {}
         self._leases = LeaseSender(robot.lease.socket)
         self._lease_sequence = 0
@@ -70,6 +73,10 @@ class FilterNode(Node):
         """Orders zero once, with its lease, and says so in the state. Called several times: one may be lost."""
         now = time.monotonic()
         self._issue(self._filter.shut_down(now), now)
+
+    def end(self) -> None:
+        """An orderly end has begun: a free emergency stop leaves nothing behind for the next start."""
+        self._filter.end()
 
     @property
     def stands_from_s(self) -> float:
@@ -149,6 +156,16 @@ class FilterNode(Node):
             self._stands_from_s = now + ramp(self._robot.limits, order.linear_mps, order.angular_radps).time_s
         self._tell(decision, now)
         self._decision = decision
+        self._keep_record()
+
+    def _keep_record(self) -> None:
+        """After the order is out; the writer's defect is this process's."""
+        if self._keeper is None:
+            return
+        if self._keeper.failure is not None:
+            raise self._keeper.failure
+        self._filter.on_record(self._keeper.written, self._keeper.problem)
+        self._keeper.want(self._filter.record)
 
     def _send_lease(self, decision: Decision) -> None:
         self._lease_sequence += 1

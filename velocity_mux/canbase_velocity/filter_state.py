@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from canbase_config.latch_record import Found, Record
 from canbase_config.safety import Scan as ScanConfig
 from canbase_velocity.clearance import FREE, Clearances, Field, Points, ScanReader, clearances
 from canbase_velocity.decision import Cause, Decision
@@ -98,13 +99,14 @@ class _Scanner:
 class SafetyFilter:
     """Keeps the newest of each input. Starts with nothing received: that is a stop for everything required."""
 
-    def __init__(self, config: FilterConfig) -> None:
+    def __init__(self, config: FilterConfig, found: Found | None = None) -> None:
+        """`found`: the record of the emergency stop at the start; None: nobody keeps one, for virtual time alone."""
         self._config = config
         self._command = ZERO
         self._command_at_s: float | None = None
         self._scanners = {scan.topic: _Scanner(scan, config.geometry) for scan in config.safety.scans}
-        self._estop = Estop(config.safety.estop.latched)
-        self._pressed = False
+        self._estop = Estop(config.safety.estop.latched, found)
+        self._pressed = self._estop.state is EstopState.HELD
         self._estop_at_s: float | None = None
         longest_s = max(2.0 * scan.timeout_s + scan.frozen_s for scan in config.safety.scans) + config.safety.reaction_s
         self._motion = ExpectedMotion(config.limits, longest_s)
@@ -115,6 +117,19 @@ class SafetyFilter:
     def estop(self) -> EstopState:
         """What the emergency stop wants."""
         return self._estop.state
+
+    @property
+    def record(self) -> Record:
+        """What shall be on disk now of the emergency stop."""
+        return self._estop.record
+
+    def on_record(self, written: Record | None, problem: str) -> None:
+        """The newest record on disk (None: none since the start), and what keeps the writer from writing."""
+        self._estop.on_written(written, problem)
+
+    def end(self) -> None:
+        """An orderly end has begun."""
+        self._estop.end()
 
     def on_command(self, twist: Twist, now: float) -> None:
         """Takes a command of cmd_vel_mux, also one with NaN: that stops."""
@@ -145,6 +160,8 @@ class SafetyFilter:
         inputs = self.inputs(now)
         if self._estop.state is EstopState.HELD:
             held = "pressed" if self._pressed else "silent"
+            if self._pressed and self._estop_at_s is None:
+                held = f"not seen released yet ({self._estop.before_the_start}): press and release it"
             return False, f"refused: the emergency stop on {self._config.safety.estop.topic} is {held}"
         if self._estop.state is EstopState.FREE and not moving:
             return True, NOTHING_TO_RESET
@@ -169,6 +186,8 @@ class SafetyFilter:
             estop=self._estop.state,
             pressed=self._pressed,
             estop_age_s=_age_s(self._estop_at_s, now),
+            estop_before=self._estop.before_the_start,
+            estop_unarmed=self._estop.unarmed,
             braking_hard=self._braking_hard,
         )
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from types import FrameType
 
 import rclpy
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
+from canbase_config.latch_file import LatchFile, LatchKeeper, latch_folder
 from canbase_config.robot import Robot
 from canbase_config.service import Service
 from canbase_velocity.filter_node import FilterNode
@@ -20,6 +23,8 @@ from canbase_velocity.mux_node import MuxNode
 SHUTDOWN_CYCLES = 5
 """So many zeros go out at least at the end, one per command period."""
 WAKE_S = 0.1
+WRITE_S = 1.0
+"""For the record of the emergency stop at the end."""
 
 
 def run(robot: Robot, ros_args: Sequence[str], when_ready: Callable[[], None] = lambda: None) -> int:
@@ -40,18 +45,21 @@ def run(robot: Robot, ros_args: Sequence[str], when_ready: Callable[[], None] = 
 
 def _run_nodes(robot: Robot, received: list[int], when_ready: Callable[[], None]) -> None:
     mux = MuxNode(robot)
-    safety = FilterNode(robot, mux.moving_sources)
+    keeper = LatchKeeper(LatchFile(latch_folder(os.environ, Path.home(), robot.name), "velocity", robot.name))
+    safety = FilterNode(robot, mux.moving_sources, keeper)
     mux.lead(safety)
     executor = EventsExecutor()
     executor.add_node(mux)
     executor.add_node(safety)
     period_s, service = 1.0 / robot.rates.command_hz, Service()
     when_ready()
+    keeper.start()
     try:
         while not received:
             executor.spin_once(timeout_sec=WAKE_S)
             service.alive(safety.state_text, time.monotonic())
         service.stopping()
+        safety.end()
         patience_s = time.monotonic() + robot.timeouts.standstill_s
         _order_zero(mux, safety, period_s, min(safety.stands_from_s, patience_s))
     except BaseException:
@@ -59,6 +67,7 @@ def _run_nodes(robot: Robot, received: list[int], when_ready: Callable[[], None]
         _order_zero(mux, safety, period_s, 0.0)
         raise
     finally:
+        keeper.finish(WRITE_S)
         executor.shutdown()
         safety.destroy_node()
         mux.destroy_node()

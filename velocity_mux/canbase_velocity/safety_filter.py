@@ -104,6 +104,10 @@ class Inputs:
     pressed: bool
     """The last message of the emergency stop said so."""
     estop_age_s: float | None
+    estop_before: str = ""
+    """Why the emergency stop holds since the start; empty: it does not."""
+    estop_unarmed: str = ""
+    """A press would not outlive this process: why; empty: it would."""
     braking_hard: bool = False
     """The last order was to brake hard. It holds until the base is expected to be at standstill."""
 
@@ -137,16 +141,20 @@ def brakes_hard(inputs: Inputs, config: FilterConfig) -> bool:
 def _estop(inputs: Inputs, config: FilterConfig) -> Finding | None:
     estop = config.safety.estop
     if inputs.estop is EstopState.AWAITS_RESET:
-        return stop(Cause.ESTOP, "the emergency stop is released and waits for a reset", "reset")
+        before = f" ({inputs.estop_before})" if inputs.estop_before else ""
+        return stop(Cause.ESTOP, f"the emergency stop is released and waits for a reset{before}", "reset")
     if inputs.estop is EstopState.AWAITS_ZERO:
         detail = "the emergency stop is released, the command has not been zero since"
         return stop(Cause.ESTOP, detail, "a zero command")
     if inputs.estop is EstopState.FREE:
-        return None
+        return stop(Cause.ESTOP, inputs.estop_unarmed, "the record on disk") if inputs.estop_unarmed else None
     then = "a reset" if estop.latched else "a zero command"
     if not inputs.pressed:
         detail = _silence(estop.topic, inputs.estop_age_s, estop.timeout_s)
         return stop(Cause.ESTOP_STALE, detail, f"false on {estop.topic}, then {then}")
+    if inputs.estop_before and inputs.estop_age_s is None:
+        detail = f"the emergency stop was not seen released yet: {inputs.estop_before}"
+        return stop(Cause.ESTOP, detail, f"false on {estop.topic}, then {then}")
     return stop(Cause.ESTOP, "the emergency stop is pressed", f"its release, then {then}")
 
 

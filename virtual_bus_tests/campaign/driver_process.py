@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from campaign.can_bus import CanBus
+from campaign.disk import StopDisk
 from campaign.process import FRAMES_HELD, Process, Topics
 from canbase_config.robot import DRIVER_NODE_ID, Robot
 from canbase_driver.core import DriverCore
@@ -27,6 +28,8 @@ class DriverProcess(Process):
         super().__init__(bus.clock)
         self._robot, self._topics, self._random = robot, topics, bus.random
         self._member = bus.join(self.name, self._hear)
+        self.disk = StopDisk("driver")
+        """Its record of stops, which outlives it."""
         self.bus_problem = ""
         self.repeats = False
         """It sends the setpoints of its last cycle again and again, with heartbeat and SYNC."""
@@ -41,8 +44,8 @@ class DriverProcess(Process):
         self.begin()
 
     def begin(self) -> None:
-        """A new core: nothing is booted."""
-        self.core = DriverCore(self._robot)
+        """A new core: nothing is booted, and what its record says is latched."""
+        self.core = DriverCore(self._robot, found=self.disk.found())
         self._period_s = 1.0 / self._robot.rates.control_hz
         self._cycle = 0
         self.snapshot: DriverSnapshot | None = None
@@ -77,6 +80,7 @@ class DriverProcess(Process):
         now = self.clock.now
         self.core.on_bus(self.bus_problem, now)
         frames = self.core.tick(now, self._random.random() * CYCLE_JITTER_S)
+        self.core.on_record(*self.disk.write(self.core.record))
         self._send(self._changed(frames))
         self._cycle += 1
         self._publish(now)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import partial
 
 from campaign.clock import Clock
+from campaign.disk import StopDisk
 from campaign.process import Process, Topics
 from canbase_config.robot import Robot
 from canbase_driver.snapshot import DriverSnapshot
@@ -37,13 +38,15 @@ class VelocityProcess(Process):
         topics.subscribe("motor_driver/status", self, self._on_driver)
         topics.subscribe(robot.safety.scan.topic, self, self._on_scan)
         topics.subscribe(robot.safety.estop.topic, self, self._on_estop)
+        self.disk = StopDisk("velocity")
+        """Its record of the emergency stop, which outlives it."""
         self.begin()
 
     def begin(self) -> None:
         """A new mux and a new filter; the sequence of the leases starts again."""
         now = self.clock.now
         self.mux = Mux(self._robot.mux.sources, status_timeout_s=status_timeout_s(self._robot.rates.status_hz))
-        self.filter = SafetyFilter(FilterConfig.of(self._robot))
+        self.filter = SafetyFilter(FilterConfig.of(self._robot), self.disk.found())
         self._sequence = 0
         self._mux_told: tuple[object, ...] = ()
         self._told: tuple[object, ...] = ()
@@ -112,3 +115,4 @@ class VelocityProcess(Process):
         if told != self._told or now - self._state_at >= STATE_PERIOD_S:
             self._told, self._state_at = told, now
             self._topics.publish("safety_filter/state", decision)
+        self.filter.on_record(*self.disk.write(self.filter.record))

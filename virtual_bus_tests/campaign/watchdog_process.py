@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from campaign.can_bus import CanBus
+from campaign.disk import WatchdogDisk
 from campaign.process import FRAMES_HELD, Process
 from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog.watchdog import Watchdog
@@ -22,6 +23,8 @@ class WatchdogProcess(Process):
         super().__init__(bus.clock)
         self._config = config
         self._failed_since = math.inf
+        self.disk = WatchdogDisk()
+        """Its record of a trip, which outlives it."""
         self._member = bus.join(self.name, self._hear)
         self.begin()
 
@@ -30,8 +33,8 @@ class WatchdogProcess(Process):
         self._failed_since = self.clock.now if fails else math.inf
 
     def begin(self) -> None:
-        """A new core, which knows nothing of a trip before."""
-        self.core = Watchdog(self._config, self.clock.now)
+        """A new core, which knows of a trip before by its record."""
+        self.core = Watchdog(self._config, self.clock.now, self.disk.past())
         self.every(TICK_S, self._on_tick, phase_s=0.001)
 
     def on_lease(self, datagram: bytes) -> None:
@@ -53,3 +56,4 @@ class WatchdogProcess(Process):
         for frame in self.core.tick(self.clock.now):
             if self._failed_since == math.inf:
                 self._member.send(frame.cob_id, frame.data)
+        self.core.on_record(*self.disk.write(self.core.record))
