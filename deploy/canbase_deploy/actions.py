@@ -52,4 +52,16 @@ class Run:
     may_fail: bool = False
 
 
-Action = WriteFile | Link | Remove | Run
+@dataclass(frozen=True, slots=True)
+class FirstRecords:
+    """Clear records of stops for a robot that has never had any; left out with a prefix, for they are this computer's.
+
+    `folder`: of this robot alone; where it is there already nothing is done. `user`: whom the services run as.
+    """
+
+    folder: PurePosixPath
+    robot: str
+    user: str
+
+
+Action = WriteFile | Link | Remove | Run | FirstRecords

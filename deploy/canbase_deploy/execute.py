@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import grp
 import os
+import pwd
 import subprocess
 from collections.abc import Callable, Sequence
 from pathlib import Path, PurePosixPath
 
-from canbase_deploy.actions import Action, Existing, Link, Remove, Run, WriteFile
+from canbase_config.latch_file import create_first
+from canbase_deploy.actions import Action, Existing, FirstRecords, Link, Remove, Run, WriteFile
 from canbase_deploy.owner import ETC, old
 
 COMMAND_S = 60.0
@@ -46,6 +48,8 @@ class Executor:
                 self._remove(action)
             case Run():
                 self._run(action)
+            case FirstRecords():
+                self._first_records(action)
 
     def _write(self, action: WriteFile) -> None:
         path = self._below(action.path)
@@ -115,6 +119,16 @@ class Executor:
                 raise
             self._say(f"failed    {error}; the rest is done all the same")
 
+    def _first_records(self, action: FirstRecords) -> None:
+        if self._prefix != Path("/"):
+            return
+        if Path(action.folder).exists():
+            self._tell("kept     ", action.folder)
+            return
+        self._tell("made     ", action.folder, "no stop is latched")
+        if not self._dry_run:
+            first_records(Path(action.folder), action.robot, action.user)
+
     def _below(self, path: PurePosixPath) -> Path:
         return self._prefix / path.relative_to("/")
 
@@ -122,5 +136,20 @@ class Executor:
         self._say(f"{what} {path}" + (f" ({more})" if more else ""))
 
 
+def first_records(folder: Path, robot: str, user: str) -> None:
+    """Clear records of stops in a new folder of this user. Raises OSError; KeyError without such a user."""
+    account = pwd.getpwnam(user)
+    new_parent = not folder.parent.exists()
+
+    def chown(path: Path) -> None:
+        os.chown(path, account.pw_uid, account.pw_gid)
+
+    create_first(folder, robot, chown)
+    if new_parent:
+        chown(folder.parent)
+
+
 def _name(action: Action) -> str:
-    return " ".join(action.argv) if isinstance(action, Run) else str(action.path)
+    if isinstance(action, Run):
+        return " ".join(action.argv)
+    return str(action.folder if isinstance(action, FirstRecords) else action.path)

@@ -12,13 +12,14 @@ from pathlib import PurePosixPath
 from typing import Final, Literal
 
 from canbase_config.robot import Robot
-from canbase_deploy.actions import Action, Existing, Link, Remove, Run, WriteFile
+from canbase_deploy.actions import Action, Existing, FirstRecords, Link, Remove, Run, WriteFile
 from canbase_deploy.neighbours import Neighbour, clash
 from canbase_deploy.owner import ETC, USER, is_the_owners, misplaced, modes, old, owner_paths, place
 from canbase_deploy.relay import APPLY, drop_in_text, udev_rule, wrong_chip
 
 UNITS: Final = PurePosixPath("/etc/systemd/system")
 RUN: Final = PurePosixPath("/run/canbase")
+STATE: Final = PurePosixPath("/var/lib/canbase")
 PARTS: Final = ("watchdog", "driver", "velocity", "action-server")
 WITH_ROS: Final = PARTS[1:]
 ON_THE_BUS: Final = PARTS[:2]
@@ -90,6 +91,7 @@ def install_plan(request: Request, manifests: Mapping[str, str], neighbours: Seq
     return [
         ACCOUNT,
         Run(("systemd-sysusers", str(ACCOUNT.path))),
+        FirstRecords(STATE / request.name, request.robot.name, USER),
         *files,
         *map(Remove, stale),
         WriteFile(manifest_path(request.name), "".join(f"{path}\n" for path in listed)),

@@ -154,8 +154,9 @@ def test_an_adapter_without_restart_after_bus_off_comes_up_too() -> None:
     ]
 
 
-def test_recordings_of_latched_stops_have_a_folder() -> None:
-    assert directives("driver")["StateDirectory"] == ["canbase"]
+@pytest.mark.parametrize("part", ["driver", "watchdog", "velocity"])
+def test_recordings_and_records_of_latched_stops_have_a_folder(part: str) -> None:
+    assert directives(part)["StateDirectory"] == ["canbase canbase/%i"]
 
 
 @pytest.mark.parametrize("part", PARTS)
