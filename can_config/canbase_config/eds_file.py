@@ -12,6 +12,10 @@ from pathlib import Path
 from typing import Final
 
 MAX_BYTES: Final = 8_000_000
+MAX_NUMBER: Final = 200
+"""Characters of a number with its $NODEID, spaces and comment: more than any data type has."""
+MAX_NOTES: Final = 1_000
+"""What is odd after that is not noted."""
 _ENCODINGS: Final = ("utf-8", "cp1252", "latin-1")
 _OBJECT: Final = re.compile(r"([0-9a-f]{4})(?:sub([0-9a-f]{1,2}))?", re.IGNORECASE)
 _NODE_ID: Final = re.compile(r"\$?NODEID", re.IGNORECASE)
@@ -79,11 +83,13 @@ def read_eds(path: str | Path) -> Eds:
         notes.append("it has no section [DeviceInfo]")
     notes += _lists(sections, objects)
     values = {key: value for key, (value, _) in info.values.items()} if info else {}
-    return Eds(path, encoding, objects, values, tuple(notes))
+    return Eds(path, encoding, objects, values, tuple(notes[:MAX_NOTES]))
 
 
 def number(text: str) -> int | None:
     """The integer in an EDS value: decimal, 0x…, …h, octal with a leading 0 (CiA 306); `$NODEID` counts as 0."""
+    if len(text) > MAX_NUMBER:
+        return None
     rest = _NODE_ID.sub("0", text.split(";")[0]).replace(" ", "").replace("\t", "")
     terms = rest.split("+")
     numbers = [_term(term) for term in terms if term]
@@ -100,7 +106,8 @@ def _term(text: str) -> int | None:
 
 def _text(path: Path) -> tuple[str, str]:
     try:
-        data = path.read_bytes()
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
     except OSError as error:
         raise EdsError(f"{path}: cannot be read: {error.strerror or error}") from error
     if len(data) > MAX_BYTES or b"\0" in data:

@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+MOST_TOLD = 20
+"""Problems that are printed; of the others the number."""
+MOST_CHARACTERS = 200
+"""Of a key, printed."""
 Loc = tuple[str | int, ...]
 """Where a value is: keys and list positions from the top of the file, as pydantic counts them."""
 
@@ -40,13 +44,21 @@ class Problem:
     def __str__(self) -> str:
         place = self.file if self.line is None else f"{self.file}:{self.line}"
         wrong = f"{self.what}, expected {self.expected}" if self.expected else self.what
-        text = ": ".join(part for part in (place, self.key, wrong) if part)
-        return f"{text}\n    {self.hint}" if self.hint else text
+        text = ": ".join(part for part in (place, printable(self.key, MOST_CHARACTERS), wrong) if part)
+        return f"{printable(text)}\n    {printable(self.hint)}" if self.hint else printable(text)
+
+
+def printable(text: str, most: int = 1_000) -> str:
+    """`text` for a terminal: of a long one the begin, and no character that the terminal would obey."""
+    shown = "".join(one if one.isprintable() else repr(one)[1:-1] for one in text[:most])
+    return shown if len(text) <= most else f"{shown}…"
 
 
 class ConfigError(Exception):
     """The file is of no use: it cannot be read, is no YAML, or does not describe a robot. Its text is for the user."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:
-        super().__init__("\n".join(str(problem) for problem in problems))
+        told = [str(problem) for problem in problems[:MOST_TOLD]]
+        more = [f"and {len(problems) - MOST_TOLD} more"] if len(problems) > MOST_TOLD else []
+        super().__init__("\n".join([*told, *more]))
         self.problems = tuple(problems)

@@ -12,7 +12,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from canbase_config.errors import Loc, Problem
+from canbase_config.errors import MOST_TOLD, Loc, Problem
 from canbase_config.schema import Schema, Shape, expected
 from canbase_config.section import MisfitError
 from canbase_config.yaml_file import YamlFile
@@ -23,8 +23,13 @@ def explain(error: ValidationError, file: YamlFile, schema: Schema) -> tuple[Pro
 
     `schema` is that of the model which refused the file.
     """
-    problems = [_explain(details, file, schema) for details in error.errors(include_url=False) if not _is_echo(details)]
-    return tuple(sorted(problems, key=lambda problem: (problem.file, problem.line or 0)))
+    found = [details for details in error.errors(include_url=False) if not _is_echo(details)]
+    found.sort(key=lambda details: (file.place(details["loc"]).file, file.place(details["loc"]).line or 0))
+    told = [_explain(details, file, schema) for details in found[:MOST_TOLD]]
+    counted = [
+        _at(file, details["loc"], details["msg"]) for details in found[MOST_TOLD:]
+    ]  # no hints: nobody reads them
+    return tuple(sorted([*told, *counted], key=lambda problem: (problem.file, problem.line or 0)))
 
 
 def _at(file: YamlFile, loc: Loc, what: str, expected: str = "", hint: str = "") -> Problem:

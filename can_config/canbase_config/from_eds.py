@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from canbase_config.eds_file import Eds, number
+from canbase_config.errors import printable
 
 NEEDED: Final = (0x6040, 0x6041, 0x6060, 0x6064, 0x606C, 0x60FF, 0x1400, 0x1600, 0x1800, 0x1A00)
 """What canbase cannot do without."""
@@ -183,5 +184,5 @@ def _presence(eds: Eds, index: int) -> tuple[str, str]:
 
 
 def _quoted(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    escaped = printable(text).replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'

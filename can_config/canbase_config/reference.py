@@ -21,6 +21,8 @@ that check the files; a test compares it, so it is never out of date.
 - What the frames of every cycle take of the bus is worked out from `bus.bitrate`, `rates.control_hz`, the drives' PDOs,
   SYNC and heartbeats: above 90 % the file is refused (eight drives at 250 kbit/s and 100 Hz), above 60 % there is a
   warning. Both say what to change. For boots and tools the rest has to do.
+- A file has at most 256,000 bytes, 5,000 keys and values with every alias written out, 32 levels, 4,000 characters in a
+  text and 40 in a number. Of its mistakes the first twenty are printed.
 - `drives[…]` is each entry of a list, `mux.sources.…` each entry under a name that you choose.
 """
 _PROFILE_HEAD: Final = """\

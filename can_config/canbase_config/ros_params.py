@@ -13,6 +13,7 @@ from typing import Any, Final
 from canbase_config.errors import ConfigError, Loc, Place, Problem
 from canbase_config.twist_mux import PARAMETERS
 from canbase_config.yaml_file import YamlFile
+from canbase_config.yaml_limits import MAX_DEPTH
 
 NODES: Final = ("/**", "canbase", "/canbase")
 """Whose parameters count; a later one has the last word."""
@@ -39,6 +40,9 @@ def plain(file: YamlFile) -> YamlFile:
     for node in mine:
         for theirs, value, line in _leaves(file, (node, PARAMETERS), ros[node][PARAMETERS]):
             keys = tuple(part for key in theirs for part in str(key).split("."))
+            if len(keys) > MAX_DEPTH:
+                what = f"nested too deeply: more than {MAX_DEPTH} levels"
+                raise ConfigError([Problem(str(file.path), line, ".".join(keys), what)])
             if keys[0] != OF_EVERY_NODE:
                 loc = _put(values, keys, value)
                 places[loc] = Place(str(file.path), line, ".".join(keys))

@@ -15,10 +15,10 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
 from canbase_config.errors import ConfigError, Loc, Place, Problem, key_path
+from canbase_config.yaml_limits import MAX_BYTES, MAX_DEPTH, BoundedComposer, ExcessError, line_of_brackets
 
 _TAG: Final = "tag:yaml.org,2002:"
 _MERGE_TAG: Final = f"{_TAG}merge"
-_TOO_DEEP: Final = "nested too deeply, or an alias (*name) contains itself"
 
 
 class _CoreConstructor(SafeConstructor):
@@ -61,14 +61,17 @@ def read_yaml(path: str | Path) -> YamlFile:
     """The mapping in the file at `path`. Raises ConfigError, with one problem, for anything else than that."""
     path = Path(path)
     text = _text(path)
+    if line := line_of_brackets(text):
+        raise ConfigError([Problem(str(path), line, "", f"nested too deeply: more than {MAX_DEPTH} levels")])
     yaml = YAML(typ="safe", pure=True)
     yaml.Constructor = _CoreConstructor
+    yaml.Composer = BoundedComposer
     try:
         root = yaml.compose(text)
         values = yaml.load(text)
         lines = dict(_lines(root))
-    except RecursionError:
-        raise ConfigError([Problem(str(path), None, "", _TOO_DEEP)]) from None
+    except ExcessError as error:
+        raise ConfigError([Problem(str(path), error.problem_mark.line + 1, "", str(error.problem))]) from None
     except ReaderError as error:
         raise ConfigError([_unprintable(path, text, error)]) from error
     except MarkedYAMLError as error:
@@ -83,7 +86,11 @@ def read_yaml(path: str | Path) -> YamlFile:
 def _text(path: Path) -> str:
     """The file as text. Raises ConfigError if it cannot be had."""
     try:
-        return path.read_bytes().decode("utf-8")
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+        if len(content) > MAX_BYTES:
+            raise ConfigError([Problem(str(path), None, "", f"larger than {MAX_BYTES} bytes")])
+        return content.decode("utf-8")
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
         what = f"byte {error.object[error.start]:02X}h is no UTF-8"

@@ -51,6 +51,7 @@ def from_eds(file: Annotated[Path, typer.Argument(metavar="FILE", help="The EDS 
     Exit code 0: a start for `profile` in robot.yaml. 1: the drive lacks what canbase needs. 2: FILE cannot be read.
     """
     from canbase_config.eds_file import EdsError, read_eds
+    from canbase_config.errors import MOST_TOLD, printable
     from canbase_config.from_eds import draft
 
     try:
@@ -61,7 +62,8 @@ def from_eds(file: Annotated[Path, typer.Argument(metavar="FILE", help="The EDS 
     found = draft(eds)
     typer.echo(found.text, nl=False)
     lines = [f"{file}: {len(eds.objects)} objects, read as {eds.encoding}"]
-    lines += [f"  odd: {note}" for note in eds.notes]
+    lines += [f"  odd: {printable(note)}" for note in eds.notes[:MOST_TOLD]]
+    lines += [f"  and {len(eds.notes) - MOST_TOLD} more"] if len(eds.notes) > MOST_TOLD else []
     lines += [f"  an EDS cannot tell: {unknown}" for unknown in found.unknown]
     typer.secho("\n".join(lines), err=True, color=colour())
     typer.secho(found.self_stop, err=True, bold=True, color=colour())
