@@ -9,6 +9,7 @@ from nav_msgs.msg import Odometry as OdometryMessage
 from canbase_action_server.along_track import Pose, yaw_of_quaternion
 from canbase_action_server.inputs import Driver, Mux, Odometry, Safety
 from canbase_action_server.motion import Twist
+from canbase_config.foreign_text import SENTENCE_LENGTH, printable
 
 DRIVER_STATES = {
     DriverStatus.OFFLINE: "offline",
@@ -32,7 +33,8 @@ def odometry_in(message: OdometryMessage, received: float) -> Odometry | None:
 def safety_in(message: SafetyState, received: float) -> Safety:
     """From safety_filter/state."""
     stops = message.action == SafetyState.STOP
-    return Safety(received, stops, message.cause, message.detail, message.estop)
+    detail = printable(message.detail, SENTENCE_LENGTH)
+    return Safety(received, stops, printable(message.cause), detail, message.estop)
 
 
 def driver_in(message: DriverStatus, received: float) -> Driver:
@@ -40,10 +42,10 @@ def driver_in(message: DriverStatus, received: float) -> Driver:
     return Driver(
         received=received,
         state=DRIVER_STATES.get(message.state, "offline"),
-        cause=message.cause,
-        detail=message.detail,
-        watchdog=message.watchdog,
-        watchdog_cause=message.watchdog_cause,
+        cause=printable(message.cause),
+        detail=printable(message.detail, SENTENCE_LENGTH),
+        watchdog=printable(message.watchdog),
+        watchdog_cause=printable(message.watchdog_cause, SENTENCE_LENGTH),
         standstill=message.standstill,
         hears_command=message.command_fresh,
         pose_resets=message.pose_resets,
@@ -52,7 +54,7 @@ def driver_in(message: DriverStatus, received: float) -> Driver:
 
 def mux_in(message: MuxState, received: float) -> Mux:
     """From velocity_mux/state."""
-    return Mux(received, message.active)
+    return Mux(received, printable(message.active))
 
 
 def twist_out(twist: Twist, frame: str) -> TwistStamped:

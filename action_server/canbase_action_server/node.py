@@ -97,7 +97,8 @@ class DriveDistanceServer(Node):
         self.failure = self.failure or error
         self._reception.fail(error, time.monotonic())
         self.shut_down()
-        self._voice.tell("".join(traceback.format_exception(error)), Priority.ERROR, robot=self._robot.name)
+        for line in "".join(traceback.format_exception(error)).splitlines():
+            self._voice.tell(line, Priority.ERROR, robot=self._robot.name)
 
     def _listen(self, kind: type[T], topic: str, qos: QoSProfile, callback: Callable[[T], None]) -> None:
         self.create_subscription(kind, topic, self._guarded(callback), qos)

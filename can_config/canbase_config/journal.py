@@ -10,6 +10,7 @@ import socket
 from collections.abc import Mapping
 from typing import Final, Protocol
 
+from canbase_config.foreign_text import LINE_LENGTH, printable
 from canbase_config.priority import Priority
 
 SOCKET: Final = "/run/systemd/journal/socket"
@@ -36,7 +37,7 @@ class Journal:
             "CANBASE_PART": self._part,
         }
         entry = {**own, **{f"CANBASE_{name.upper()}": value for name, value in fields.items()}}
-        text = "".join(f"{name}={' '.join(str(value).splitlines())}\n" for name, value in entry.items())
+        text = "".join(f"{name}={printable(value, LINE_LENGTH)}\n" for name, value in entry.items())
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
             sender.setblocking(False)
             try:
@@ -65,7 +66,8 @@ class Voice:
         self._logger, self._journal = logger, journal
 
     def tell(self, sentence: str, priority: Priority, **fields: object) -> None:
-        """One sentence. ROS knows no notice: it is an INFO there."""
+        """One sentence, which is one line whatever is in it. ROS knows no notice: it is an INFO there."""
+        sentence = printable(sentence, LINE_LENGTH)
         self._journal.tell(sentence, priority, **fields)
         if priority is Priority.ERROR:  # a call for each severity: rclpy holds a line of source to one
             self._logger.error(sentence)

@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from canbase_cli.options import FAILED, RosCommand, colour, fail
+from canbase_config.foreign_text import SENTENCE_LENGTH, printable
 
 if TYPE_CHECKING:
     from canbase_action_server.goal_client import SentGoal
@@ -146,4 +147,8 @@ def _print_result(result: Any, as_json: bool) -> None:
         return
     good = result.status.name == "SUCCEEDED"
     fg = typer.colors.GREEN if good else typer.colors.YELLOW
-    typer.secho(f"{result.status.name} ({result.code.name}): {result.message}", fg=fg, color=colour())
+    typer.secho(
+        f"{result.status.name} ({result.code.name}): {printable(result.message, SENTENCE_LENGTH)}",
+        fg=fg,
+        color=colour(),
+    )

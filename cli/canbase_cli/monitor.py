@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import typer
 
 from canbase_cli.options import NamespaceOption, ros_arguments, ros_needed
+from canbase_config.foreign_text import clean
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -95,7 +96,7 @@ def _listen(node: Node) -> dict[str, tuple[Any, float]]:
     kept: dict[str, tuple[Any, float]] = {}
 
     def keeper(name: str) -> Callable[[Any], None]:
-        return lambda message: kept.update({name: (message, time.monotonic())})
+        return lambda message: kept.update({name: (clean(message), time.monotonic())})
 
     for name, (kind, topic, qos) in topics.items():
         node.create_subscription(kind, topic, keeper(name), qos)

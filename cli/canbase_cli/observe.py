@@ -25,6 +25,7 @@ from canbase_cli.evidence import ACTIONS, DOCTOR, Endpoint, Evidence, Goal, Hear
 from canbase_cli.overload import Overload, load_per_core
 from canbase_cli.probes import SERVER, TYPES, Prober
 from canbase_cli.server_processes import server_processes, talks_by
+from canbase_config.foreign_text import clean
 from canbase_config.load import Loaded
 from canbase_config.robot import Robot
 
@@ -94,7 +95,7 @@ class Listener:
         )
 
     def _keeper(self, kept: list[tuple[float, Any]]) -> Any:
-        return lambda message: kept.append((time.monotonic(), message))
+        return lambda message: kept.append((time.monotonic(), clean(message)))
 
 
 def observe(loaded: Loaded, ros_args: list[str], seconds: float) -> Evidence:

@@ -149,7 +149,15 @@ def _safety(state: Any) -> RenderableType:
     ages = f"command {_seconds(state.command_age_s)} old, scan {_seconds(state.scan_age_s)}"
     first = Text.assemble(_safety_word(Heard(state, 0.0)), f"   {order}   {free}   {ages}")
     leases = [Text(f"{state.lease_errors} leases were not delivered", WARN)] if state.lease_errors else []
-    return Group(first, *_why(state), *leases)
+    return Group(first, *_why(state), *map(_scanner, state.scanners), *leases)
+
+
+def _scanner(scanner: Any) -> Text:
+    share = "" if math.isnan(scanner.usable_share) else f", {scanner.usable_share:.0%} of its beams usable"
+    dropped = f", {scanner.dropped} scans dropped" if scanner.dropped else ""
+    problem = f": {scanner.problem}" if scanner.problem else ""
+    style = (WARN if scanner.dropped else GOOD) if scanner.fresh else (BAD if scanner.required else WARN)
+    return Text(f"scanner {scanner.topic} {_seconds(scanner.age_s)} old{share}{dropped}{problem}", style)
 
 
 def _driver(status: Any) -> RenderableType:

@@ -27,6 +27,8 @@ STATES = {
 ON_ITS_WAY = (DriverStatus.BOOTING, DriverStatus.ENABLING, DriverStatus.STOPPING)
 RUNGS = ("no rung", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld")
 WATCHDOG_COUNTERS = ("leases_refused", "frames_dropped", "bus_errors", "trips")
+MOSTLY_USABLE = 0.5
+"""Share of beams: a scanner of which more says nothing is covered, dirty or defective."""
 PAUSE_S = 0.05
 """A pause of the watchdog's loop that is worth a look: ten of its turns."""
 COUNTERS = ("commands_refused", "overruns", "frames_dropped", "send_errors")
@@ -133,6 +135,32 @@ def safety_filter(evidence: Evidence) -> list[Check]:
     return [warn("safety_filter", f"slows down, {found}", _until(state.clears_on))]
 
 
+def scanners(evidence: Evidence) -> list[Check]:
+    """Each scanner as the safety filter sees it."""
+    heard = evidence.on("safety_filter/state")
+    if heard.last is None:
+        return []
+    before = {scanner.topic: scanner.dropped for scanner in heard.first.scanners}
+    return [_scanner(scanner, scanner.dropped - before.get(scanner.topic, 0)) for scanner in heard.last.scanners]
+
+
+def _scanner(scanner: Any, dropped: int) -> Check:
+    """`dropped`: scans within the observation."""
+    name, found = f"scanner {scanner.topic}", f"last usable scan {_age(scanner.age_s)} old"
+    if not math.isnan(scanner.usable_share):
+        found += f", {scanner.usable_share:.0%} of its beams say something"
+    if dropped or scanner.problem:
+        found += f"; {dropped} scans dropped: {scanner.problem or 'some could not be used'}"
+    cure = "look at the scanner and its ROS driver; docs/safety_filter.md, Scanners, has what a scan must be"
+    if scanner.required and not scanner.fresh:
+        return fail(name, found, cure)
+    if dropped or scanner.problem:
+        return warn(name, found, cure)
+    if scanner.usable_share < MOSTLY_USABLE:
+        return warn(name, found, "the base only creeps to where the others look: clean it, free its view")
+    return ok(name, found if scanner.fresh else f"{found}; it is not required")
+
+
 def velocity_mux(evidence: Evidence) -> list[Check]:
     """Who drives, and who sends what is no number."""
     state = evidence.on("velocity_mux/state").last
@@ -151,6 +179,7 @@ CHECKS: tuple[Callable[[Evidence], list[Check]], ...] = (
     driver,
     drives,
     safety_filter,
+    scanners,
     velocity_mux,
 )
 

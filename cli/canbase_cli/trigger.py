@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from canbase_cli.options import FAILED, NamespaceOption, colour, fail, ros_arguments, ros_needed
+from canbase_config.foreign_text import SENTENCE_LENGTH, printable
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -103,8 +104,8 @@ class _Caller:
         if answer is None:
             fail(f"{service} did not answer within {ANSWER_S:.0f} s; look at its log", FAILED)
         if not answer.success:
-            fail(str(answer.message), FAILED)
-        return str(answer.message)
+            fail(printable(answer.message, SENTENCE_LENGTH), FAILED)
+        return printable(answer.message, SENTENCE_LENGTH)
 
     def driver_is_enabled(self) -> bool:
         """The drives have power: they need no reset."""

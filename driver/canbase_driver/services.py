@@ -13,6 +13,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
+from canbase_config.foreign_text import printable
 from canbase_config.journal import Journal, Voice
 from canbase_config.priority import Priority
 from canbase_config.receive_time import ReceiveTimes
@@ -80,7 +81,7 @@ class DriverServices:
         if self._request_times.waited(time.monotonic()):
             self._node.get_logger().warning("set_pose refused: it may be old, motor_driver stood still before it")
         elif message.header.frame_id != self._odom_frame:
-            frame = message.header.frame_id
+            frame = printable(message.header.frame_id)
             self._node.get_logger().warning(f"set_pose refused: frame_id is {frame!r}, not {self._odom_frame!r}")
         else:
             self._loop.set_pose(pose_of(message.pose.pose), self._tell)

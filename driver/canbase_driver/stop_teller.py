@@ -15,6 +15,7 @@ from canbase.msg import MuxState, SafetyState, StopEvent
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from canbase_config.foreign_text import SENTENCE_LENGTH, printable
 from canbase_config.journal import Voice
 from canbase_config.priority import Priority
 from canbase_config.robot import Robot
@@ -56,11 +57,13 @@ class StopTeller:
     def on_filter(self, message: SafetyState, now: float) -> None:
         """The safety filter said what it does; from the executor's thread."""
         stops = message.action == SafetyState.STOP
-        said = f"safety_filter {message.cause} {message.detail}".rstrip()
+        cause, detail = printable(message.cause), printable(message.detail, SENTENCE_LENGTH)
+        said = f"safety_filter {cause} {detail}".rstrip()
         ordered = f"{message.ordered_linear_mps:.4f} m/s {message.ordered_angular_radps:.4f} rad/s"
         self._ring.note(now, f"{said}; orders {ordered}, lease {message.lease_sequence}")
         latched = self._estop_latches and message.cause in (SafetyState.CAUSE_ESTOP, SafetyState.CAUSE_ESTOP_STALE)
-        record = StopRecord(FILTER, message.cause, message.detail, latched, message.clears_on, now)
+        clears_on = printable(message.clears_on, SENTENCE_LENGTH)
+        record = StopRecord(FILTER, cause, detail, latched, clears_on, now)
         self._news.put(lambda: self._recorder.on_filter(record if stops else None, now))
 
     def note(self, text: str) -> None:
@@ -111,7 +114,8 @@ class StopTeller:
         return self._writer.submit(recording, record.cause, record.at_s + offset_s, title)
 
     def _on_mux(self, message: MuxState) -> None:
-        now, active = time.monotonic(), message.active
-        detail = "; ".join(f"{source.name}: {source.reason}" for source in message.sources if source.reason)
+        now, active = time.monotonic(), printable(message.active)
+        reasons = (f"{source.name}: {source.reason}" for source in message.sources if source.reason)
+        detail = printable("; ".join(reasons), SENTENCE_LENGTH)
         self._ring.note(now, f"velocity_mux {active or 'no source'}; {detail}")
         self._news.put(lambda: self._recorder.on_mux(active, detail, now))

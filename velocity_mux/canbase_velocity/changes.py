@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from canbase_config.priority import Priority
 from canbase_velocity.decision import Action, Cause, Decision
 from canbase_velocity.mux import MuxDecision, Standing
+from canbase_velocity.safety_filter import ScanState
 
 Told = tuple[str, Priority, dict[str, str]]
 
+AGAIN_S: Final = 10.0
+"""Scans that are dropped all the time are told again after so long [s]."""
 STOP_PRIORITY: Final = {
     Cause.OBSTACLE: Priority.NOTICE,
     Cause.OBSTACLE_NEAR: Priority.NOTICE,
@@ -42,6 +46,23 @@ def changes(before: MuxDecision, now: MuxDecision) -> Iterator[Told]:
         sentence = f"{now.active or 'nobody'} drives, before {before.active or 'nobody'}{why}"
         fields = {"active": now.active or "", "before": before.active or ""}
         yield sentence, Priority.NOTICE if locked else Priority.INFO, fields
+
+
+class DropTeller:
+    """Tells that scans are dropped and why: at the first one, for another reason, and AGAIN_S later if it goes on."""
+
+    def __init__(self) -> None:
+        self._told: dict[str, tuple[Cause, float]] = {}
+
+    def news(self, scans: Sequence[ScanState], now: float) -> Iterator[Told]:
+        """What is to be told at the time `now` [s, monotonic]."""
+        for scan in scans:
+            why = scan.problem or scan.why_dropped
+            cause, told_at = self._told.get(scan.topic, (Cause.NONE, -math.inf))
+            if why and (scan.cause is not cause or now - told_at >= AGAIN_S):
+                self._told[scan.topic] = scan.cause, now
+                sentence = f"scans of {scan.topic} are dropped, {scan.dropped} so far: {why}"
+                yield sentence, Priority.WARNING, {"topic": scan.topic, "cause": scan.cause.value}
 
 
 def is_told(before: Decision, now: Decision) -> bool:

@@ -24,7 +24,7 @@ from canbase_config.robot import Robot
 from canbase_config.safety import Scan as ScanConfig
 from canbase_config.stopping import ramp
 from canbase_velocity import messages
-from canbase_velocity.changes import changed_order, is_told
+from canbase_velocity.changes import DropTeller, changed_order, is_told
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
@@ -56,6 +56,7 @@ class FilterNode(Node):
         self._moving_sources = moving_sources
         self._keeper = keeper
         self._filter = SafetyFilter(FilterConfig.of(robot), keeper.found if keeper else None)
+        self._drops = DropTeller()
         self._transforms: dict[str, Transform] = {}
         self._leases = LeaseSender(robot.lease.socket)
         self._lease_sequence = 0
@@ -186,12 +187,13 @@ class FilterNode(Node):
         if is_told(before, decision):
             sentence, priority, fields = changed_order(decision)
             self._voice.tell(sentence, priority, robot=self._robot.name, **fields)
+        inputs = self._filter.inputs(now)
+        for sentence, priority, fields in self._drops.news(inputs.scans, now):
+            self._voice.tell(sentence, priority, robot=self._robot.name, **fields)
         changed = decision.essence != before.essence
         if not changed and now - self._state_at_s < STATE_PERIOD_S:
             return
-        message = messages.safety_state(
-            decision, self._filter.inputs(now), self._filter.clearances(now), self.get_clock().now().to_msg()
-        )
+        message = messages.safety_state(decision, inputs, self._filter.clearances(now), self.get_clock().now().to_msg())
         message.lease_sequence, message.lease_errors = self._lease_sequence, self._leases.errors
         self._states.publish(message)
         self._state_at_s = now

@@ -7,6 +7,7 @@ from typing import Final
 
 from rclpy.node import Node
 
+from canbase_config.foreign_text import printable
 from canbase_config.mux import MuxSource
 from canbase_config.robot import Robot
 from canbase_velocity.foreign import Expected, Publisher
@@ -27,7 +28,10 @@ def expected(robot: Robot, node: Node) -> tuple[Expected, ...]:
 def publishers(node: Node, topic: str) -> list[Publisher]:
     """Every publisher on the topic of this full name; this process's own too."""
     return [
-        Publisher("" if info.node_name == _NO_NAME else full_name(info.node_name, info.node_namespace), info.topic_type)
+        Publisher(
+            "" if info.node_name == _NO_NAME else printable(full_name(info.node_name, info.node_namespace)),
+            printable(info.topic_type),
+        )
         for info in node.get_publishers_info_by_topic(topic)
     ]
 

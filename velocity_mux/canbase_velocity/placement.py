@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from canbase_config.foreign_text import printable
 from canbase_config.safety import Scan as ScanConfig
 from canbase_velocity.sweep import Floats
 
@@ -70,7 +71,7 @@ class Transform:
         numbers = (self.x_m, self.y_m, self.z_m, self.qx, self.qy, self.qz, self.qw)
         norm = math.hypot(self.qx, self.qy, self.qz, self.qw)
         if not all(map(math.isfinite, numbers)) or norm < 0.5:
-            raise PlacementError(f"tf_static has a transform below {self.parent} that is none: {self}")
+            raise PlacementError(f"tf_static has a transform below {printable(self.parent)} that is none: {numbers}")
         x, y, z, w = self.qx / norm, self.qy / norm, self.qz / norm, self.qw / norm
         return np.array((
             (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), self.x_m),
@@ -90,14 +91,16 @@ def placed_by_tf(frame: str, base_frame: str, transforms: Mapping[str, Transform
         if at == base_frame:
             return _on_the_floor(frame, whole)
         if at not in transforms:
-            raise PlacementError(f"tf_static does not say where {at or 'the empty frame'} is in {base_frame}")
+            raise PlacementError(
+                f"tf_static does not say where {printable(at) or 'the empty frame'} is in {base_frame}"
+            )
         whole, at = transforms[at].matrix() @ whole, transforms[at].parent
-    raise PlacementError(f"tf_static goes round in circles between {frame} and {base_frame}")
+    raise PlacementError(f"tf_static goes round in circles between {printable(frame)} and {base_frame}")
 
 
 def _on_the_floor(frame: str, matrix: npt.NDArray[np.float64]) -> Placement:
     if abs(matrix[2, 2]) < math.cos(MAX_TILT_RAD):
         tilt_deg = math.degrees(math.acos(min(1.0, abs(matrix[2, 2]))))
-        raise PlacementError(f"{frame} is tilted by {tilt_deg:.0f}°; the scanner has to be level")
+        raise PlacementError(f"{printable(frame)} is tilted by {tilt_deg:.0f}°; the scanner has to be level")
     x_axis, y_axis = (float(matrix[0, 0]), float(matrix[1, 0])), (float(matrix[0, 1]), float(matrix[1, 1]))
     return Placement(float(matrix[0, 3]), float(matrix[1, 3]), x_axis, y_axis)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from canbase_config.mux import MuxLock, MuxSource
 from canbase_config.priority import Priority
-from canbase_velocity.changes import changed_order, changes, is_told
+from canbase_velocity.changes import DropTeller, changed_order, changes, is_told
 from canbase_velocity.decision import Action, Cause, Decision
+from canbase_velocity.safety_filter import ScanState
 from canbase_velocity.twist import ZERO, Twist
 from unit.mux_world import rested
 
@@ -122,3 +125,20 @@ def test_each_stop_is_told_also_one_that_ends_or_follows_a_speed_limit(
 def test_hard_braking_is_in_the_sentence_and_in_the_fields() -> None:
     sentence, priority, fields = changed_order(decision(Action.PASS, Cause.NONE, emergency=True))
     assert (sentence, priority, fields["emergency"]) == ("PASS none brakes hard", Priority.NOTICE, "true")
+
+
+def test_scans_that_are_dropped_are_told_once_for_each_reason_and_again_after_ten_seconds() -> None:
+    sound = ScanState("scan", True, 0.3, 0.1)
+    invalid = replace(sound, cause=Cause.SCAN_INVALID, dropped=3, why_dropped="it has no readings")
+    frozen = replace(sound, cause=Cause.SCAN_FROZEN, dropped=9, problem="the same 360 readings for 0.5 s, 6 scans")
+    drops = DropTeller()
+    assert list(drops.news([sound], 0.0)) == []
+    ((sentence, priority, fields),) = drops.news([invalid], 0.1)
+    assert sentence == "scans of scan are dropped, 3 so far: it has no readings"
+    assert (priority, fields) == (Priority.WARNING, {"topic": "scan", "cause": "scan_invalid"})
+    assert list(drops.news([invalid], 0.2)) == []
+    assert list(drops.news([sound], 0.3)) == []  # one that comes and goes does not fill the log
+    assert list(drops.news([invalid], 0.4)) == []
+    assert [told[2]["cause"] for told in drops.news([frozen], 0.5)] == ["scan_frozen"]
+    assert list(drops.news([frozen], 10.4)) == []
+    assert len(list(drops.news([frozen], 10.5))) == 1

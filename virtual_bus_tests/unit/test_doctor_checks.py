@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from canbase.msg import DriverStatus, DriveStatus, MuxSource, MuxState, SafetyState
+from canbase.msg import DriverStatus, DriveStatus, MuxSource, MuxState, SafetyState, ScannerState
 from rich.console import Console
 
 from canbase_cli.checks import Verdict, exit_code, first_failure, table
@@ -138,3 +138,27 @@ def test_the_table_shows_what_was_found_and_what_to_do() -> None:
     Console(file=told, width=120).print(table("bench at /", robot_checks(seen)))
     for text in ("bench at /", "motor_driver", "FAIL", "stop asked for", "→ it ends with: reset"):
         assert text in told.getvalue()
+
+
+SOUND = {"topic": "scan", "required": True, "fresh": True, "age_s": 0.05, "usable_share": 0.98}
+
+
+@pytest.mark.parametrize(
+    ("changes", "dropped_before", "verdict", "told"),
+    [
+        ({}, 0, Verdict.OK, "last usable scan 0.05 s old, 98% of its beams say something"),
+        ({"dropped": 7}, 7, Verdict.OK, "98%"),
+        ({"dropped": 7}, 2, Verdict.WARN, "5 scans dropped"),
+        ({"usable_share": 0.3}, 0, Verdict.WARN, "30% of its beams"),
+        ({"fresh": False, "dropped": 7, "problem": "angle_increment is 0"}, 2, Verdict.FAIL, "angle_increment is 0"),
+        ({"fresh": False, "age_s": math.nan, "usable_share": math.nan}, 0, Verdict.FAIL, "never"),
+        ({"fresh": False, "required": False, "age_s": math.nan, "usable_share": math.nan}, 0, Verdict.OK, "required"),
+    ],
+)
+def test_each_scanner_has_its_row(changes: dict[str, Any], dropped_before: int, verdict: Verdict, told: str) -> None:
+    now, before = healthy(), healthy()
+    now["safety_filter/state"].scanners = [ScannerState(**{**SOUND, **changes})]
+    before["safety_filter/state"].scanners = [ScannerState(**{**SOUND, "dropped": dropped_before})]
+    (row,) = [check for check in robot_checks(evidence(now, before)) if check.name == "scanner scan"]
+    assert row.verdict is verdict
+    assert told in row.found

@@ -44,7 +44,7 @@ def test_an_entry_has_message_priority_part_and_fields(path: str, listener: sock
 
 def test_a_line_break_cannot_make_a_field_of_its_own(path: str, listener: socket.socket) -> None:
     Journal("x", UNDER_SYSTEMD, path).tell("one\nPRIORITY=0", Priority.INFO)
-    assert listener.recv(1000).decode().splitlines()[:2] == ["MESSAGE=one PRIORITY=0", "PRIORITY=6"]
+    assert listener.recv(1000).decode().splitlines()[:2] == ["MESSAGE=one\\nPRIORITY=0", "PRIORITY=6"]
 
 
 def test_outside_of_systemd_nothing_is_sent(path: str, listener: socket.socket) -> None:

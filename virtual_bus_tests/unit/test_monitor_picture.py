@@ -14,6 +14,7 @@ from canbase.msg import (
     MuxSource,
     MuxState,
     SafetyState,
+    ScannerState,
     StopEvent,
 )
 from rich.console import Console
@@ -41,6 +42,12 @@ SAFETY = SafetyState(
     command_age_s=0.01,
     scan_age_s=math.nan,
     ordered_linear_mps=0.3,
+    scanners=[
+        ScannerState(topic="scan", required=True, fresh=True, age_s=0.05, usable_share=0.97),
+        ScannerState(
+            topic="scan_rear", required=True, age_s=0.9, usable_share=0.5, dropped=8, problem="it has no readings"
+        ),
+    ],
 )
 DRIVER = DriverStatus(
     state=DriverStatus.ENABLED,
@@ -74,6 +81,8 @@ def test_everything_that_an_operator_needs_is_there() -> None:
         "40 action – – 0.30 s 0 never received; needs a zero first",
         "99 lock pause 0.61 s 0.50 s free",
         "orders +0.30 m/s +0.00 rad/s free ahead 0.40 m, behind all",
+        "scanner scan 0.05 s old, 97% of its beams usable",
+        "scanner scan_rear 0.90 s old, 50% of its beams usable, 8 scans dropped: it has no readings",
         "0.40 m free ahead: at most 0.30 m/s; ends with: more free way ahead",
         "1 left_wheel operational operation enabled +3.00 rad/s +2.98 rad/s 0.05 s",
         "2 right_wheel operational fault +0.00 rad/s +0.00 rad/s – 8130h heartbeat lost",
