@@ -187,12 +187,12 @@ class FilterNode(Node):
         if is_told(before, decision):
             sentence, priority, fields = changed_order(decision)
             self._voice.tell(sentence, priority, robot=self._robot.name, **fields)
-        inputs = self._filter.inputs(now)
-        for sentence, priority, fields in self._drops.news(inputs.scans, now):
-            self._voice.tell(sentence, priority, robot=self._robot.name, **fields)
         changed = decision.essence != before.essence
         if not changed and now - self._state_at_s < STATE_PERIOD_S:
             return
+        inputs = self._filter.inputs(now)
+        for sentence, priority, fields in self._drops.news(inputs.scans, now):
+            self._voice.tell(sentence, priority, robot=self._robot.name, **fields)
         message = messages.safety_state(decision, inputs, self._filter.clearances(now), self.get_clock().now().to_msg())
         message.lease_sequence, message.lease_errors = self._lease_sequence, self._leases.errors
         self._states.publish(message)
