@@ -20,6 +20,7 @@ import intake
 import latency
 import reaction
 import startup
+import stop_service
 import virtual_time
 from figures import Figure
 
@@ -28,6 +29,7 @@ BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "intake": intake.measure,
     "cycle": cycle.measure,
     "latency": latency.measure,
+    "stop": stop_service.measure,
     "startup": startup.measure,
     "boot": boot.measure,
     "virtual_time": virtual_time.measure,
