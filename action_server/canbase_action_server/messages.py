@@ -52,9 +52,10 @@ def driver_in(message: DriverStatus, received: float) -> Driver:
     )
 
 
-def mux_in(message: MuxState, received: float) -> Mux:
-    """From velocity_mux/state."""
-    return Mux(received, printable(message.active))
+def mux_in(message: MuxState, received: float, own_source: str) -> Mux:
+    """From velocity_mux/state. `own_source`: name of the source that the goals' orders go to."""
+    locked = (source.reason for source in message.sources if source.name == own_source and source.locked)
+    return Mux(received, printable(message.active), printable(next(locked, "")))
 
 
 def twist_out(twist: Twist, frame: str) -> TwistStamped:

@@ -25,6 +25,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from unique_identifier_msgs.msg import UUID
 
 from canbase_action_server import messages
+from canbase_action_server.admission import action_source
 from canbase_action_server.binding import Binding
 from canbase_action_server.goal import Phase
 from canbase_action_server.inputs import Inputs
@@ -56,6 +57,7 @@ class DriveDistanceServer(Node):
     def __init__(self, robot: Robot, bindings: Sequence[Binding]) -> None:
         super().__init__("drive_distance_server")
         self._robot = robot
+        self._own_source = action_source(robot)
         self._reception = Reception(robot)
         self._voice = Voice(self.get_logger(), Journal("drive_distance_server"))
         self._inputs = Inputs()
@@ -124,7 +126,8 @@ class DriveDistanceServer(Node):
         self._inputs = replace(self._inputs, driver=messages.driver_in(message, time.monotonic()))
 
     def _on_mux(self, message: MuxState) -> None:
-        self._inputs = replace(self._inputs, mux=messages.mux_in(message, time.monotonic()))
+        mux = messages.mux_in(message, time.monotonic(), self._own_source)
+        self._inputs = replace(self._inputs, mux=mux)
 
     def _serve(self, binding: Binding) -> ActionServer:
         # ROS 2 Jazzy remaps topics and services, and no action (ros2/ros2, 1312): the name is resolved here.

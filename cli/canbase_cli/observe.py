@@ -6,6 +6,7 @@ import json
 import math
 import time
 from dataclasses import replace
+from functools import partial
 from typing import Any, Final
 
 import rclpy
@@ -20,6 +21,7 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import LaserScan
 
 from canbase_action_server import messages
+from canbase_action_server.admission import action_source
 from canbase_action_server.inputs import Inputs
 from canbase_cli.evidence import ACTIONS, DOCTOR, Endpoint, Evidence, Goal, Heard
 from canbase_cli.overload import Overload, load_per_core
@@ -126,7 +128,7 @@ def _evidence(loaded: Loaded, node: Node, listener: Listener, prober: Prober) ->
         namespace=node.get_namespace(),
         wall_s=time.time(),
         heard=heard,
-        inputs=_inputs(heard),
+        inputs=_inputs(heard, action_source(loaded.robot)),
         steps=_steps(heard["/rosout"], node.get_namespace()),
         servers=_servers(node),
         publishers={name: _endpoints(node.get_publishers_info_by_topic(name)) for name in names},
@@ -138,7 +140,7 @@ def _evidence(loaded: Loaded, node: Node, listener: Listener, prober: Prober) ->
     )
 
 
-def _inputs(heard: dict[str, Heard]) -> Inputs:
+def _inputs(heard: dict[str, Heard], own_source: str) -> Inputs:
     def last(topic: str, read: Any) -> Any:
         return read(heard[topic].last, heard[topic].times_s[-1]) if heard[topic].messages else None
 
@@ -146,7 +148,7 @@ def _inputs(heard: dict[str, Heard]) -> Inputs:
         odometry=last("odom", messages.odometry_in),
         safety=last("safety_filter/state", messages.safety_in),
         driver=last("motor_driver/status", messages.driver_in),
-        mux=last("velocity_mux/state", messages.mux_in),
+        mux=last("velocity_mux/state", partial(messages.mux_in, own_source=own_source)),
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from campaign.clock import Clock
 from campaign.process import Process, Topics
+from canbase_action_server.admission import action_source
 from canbase_action_server.along_track import Pose
 from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
 from canbase_action_server.outcome import Outcome
@@ -126,4 +127,6 @@ class ActionProcess(Process):
         self._inputs = replace(self._inputs, safety=safety)
 
     def _on_mux(self, decision: MuxDecision) -> None:
-        self._inputs = replace(self._inputs, mux=Mux(self.clock.now, decision.active or ""))
+        own = action_source(self._robot)
+        locked = (source.reason for source in decision.sources if source.name == own and source.locked)
+        self._inputs = replace(self._inputs, mux=Mux(self.clock.now, decision.active or "", next(locked, "")))

@@ -79,4 +79,4 @@ def test_the_frame_of_a_scan_and_the_details_of_other_nodes_come_in_escaped_and_
     assert safety.cause.isprintable()
     assert safety.detail.isprintable()
     assert len(safety.detail) == 500
-    assert mux_in(MuxState(active=FORGED), 0.0).active.isprintable()
+    assert mux_in(MuxState(active=FORGED), 0.0, "action").active.isprintable()
