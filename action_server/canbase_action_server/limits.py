@@ -5,6 +5,7 @@ from __future__ import annotations
 from canbase_action_server.profile import ProfileLimits
 from canbase_action_server.standstill import StandstillLimits
 from canbase_config.robot import Robot
+from canbase_config.stopping import standstill_s
 
 DRIVES_LAG_S = 0.03
 """Typical time constant of a velocity-controlled drive."""
@@ -52,5 +53,5 @@ def standstill_limits(robot: Robot, deceleration_mps2: float) -> StandstillLimit
         angular_radps=2.0 * robot.base.standstill_mps / robot.base.track_m,
         odometry_timeout_s=robot.timeouts.odometry_s,
         deceleration_mps2=deceleration_mps2,
-        give_up_s=robot.timeouts.standstill_s,
+        give_up_s=standstill_s(robot),
     )

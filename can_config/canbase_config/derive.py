@@ -7,7 +7,7 @@ import math
 from canbase_config.drive import Drive
 from canbase_config.profile import Layout
 from canbase_config.robot import Robot
-from canbase_config.stopping import BRAKING_SHARE, CYCLES_TO_SETPOINT, coasting_s, max_wheel_mps
+from canbase_config.stopping import BRAKING_SHARE, CYCLES_TO_SETPOINT, coasting_s, jerk_adds_s, max_wheel_mps
 from canbase_config.units import motor_rev_per_s
 from canbase_config.watchdog import RelayLine, WatchdogConfig, WatchedDrive, WatchedLayout
 
@@ -32,13 +32,10 @@ def m_per_count(drive: Drive, wheel_radius_m: float) -> float:
 def order_hold_s(robot: Robot) -> float:
     """How long the driver may follow an order that another one has replaced [s].
 
-    Its command timeout, two cycles, the latency on the way to it, and what the jerk limit adds to a change of speed,
-    which never is more than it takes the driver to give up its ramp.
+    Its command timeout, two cycles, the latency on the way to it, and what the jerk limit adds to a change of speed.
     """
-    limits = robot.limits
-    jerk_s = max(limits.acceleration_mps2, limits.deceleration_mps2) / limits.jerk_mps3
     waiting_s = robot.timeouts.command_s + CYCLES_TO_SETPOINT / robot.rates.control_hz + robot.watchdog.latency_s
-    return waiting_s + min(jerk_s, robot.timeouts.standstill_s)
+    return waiting_s + jerk_adds_s(robot.limits)
 
 
 def watchdog_config(robot: Robot) -> WatchdogConfig:

@@ -16,6 +16,7 @@ from canbase_config.explain import explain
 from canbase_config.robot import Robot
 from canbase_config.ros_params import plain
 from canbase_config.schema import Schema
+from canbase_config.stop_checks import uncertain_stops
 from canbase_config.twist_mux import with_twist_mux
 from canbase_config.yaml_file import YamlFile, read_yaml
 
@@ -67,6 +68,9 @@ def _warnings(robot: Robot, file: YamlFile) -> Iterator[Problem]:
         at = next((loc for loc in (("bus", "bitrate"), ("rates", "control_hz")) if loc in file.lines), ("bus",))
         place = file.place(at)
         yield Problem(place.file, place.line, place.key, busy)
+    for loc, sentence in uncertain_stops(robot):
+        place = file.place(loc if loc in file.lines else loc[:-1])
+        yield Problem(place.file, place.line, place.key, sentence)
 
 
 def sample(name: str) -> Path:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from canbase_config import bus_load
+from canbase_config import bus_load, stopping
 from canbase_config.action import Action
 from canbase_config.black_box import BlackBox
 from canbase_config.drive import Drive
@@ -25,6 +25,8 @@ CYCLES_PER_TIMEOUT = 4
 """What comes once a control cycle, or is sent from it, may be late or lost once or twice without a stop."""
 WATCHDOG_NODE_ID = 126
 """CANopen node id of the watchdog: its heartbeat is COB-ID 77Eh, its state 1FEh, its reset request 27Eh."""
+LONGEST_STOP_S = 20.0
+"""A base that needs longer for an ordinary stop cannot be supervised [s]."""
 CYCLIC = 9
 """6060h: cyclic synchronous velocity, without ramps in the drive (CiA 402-2)."""
 
@@ -125,9 +127,17 @@ class Timeouts(Section):
     ] = 0.3
     feedback_s: Annotated[float, Field(ge=0.02, le=0.5, description="status TPDO of an enabled drive [s]")] = 0.1
     watchdog_s: Annotated[float, Field(ge=0.05, le=0.5, description="watchdog's state frame at the driver [s]")] = 0.2
-    standstill_s: Annotated[
-        float, Field(ge=0.1, le=10.0, description="from the order to stop until the driver gives up the ramp [s]")
-    ] = 3.0
+    standstill_s: (
+        Annotated[
+            float,
+            Field(
+                ge=0.1,
+                le=LONGEST_STOP_S,
+                description="from the order to stop until the driver gives up the ramp; default: from limits [s]",
+            ),
+        ]
+        | None
+    ) = None
     sdo_s: Annotated[float, Field(ge=0.05, le=5.0, description="one SDO answer [s]")] = 0.3
     boot_s: Annotated[
         float, Field(ge=1.0, le=600.0, description="until a missing drive is reported as an error [s]")
@@ -196,6 +206,22 @@ class Robot(Section):
                     f"at least {least_s:g} with rates.control_hz {self.rates.control_hz:g}"
                 )
                 raise MisfitError(message, ("timeouts", key), ("rates", "control_hz"))
+        return self
+
+    @model_validator(mode="after")
+    def _stops_in_time(self) -> Robot:
+        ramp_s, given_s, limits = stopping.longest_ramp_s(self), self.timeouts.standstill_s, self.limits
+        figures = (
+            f"an ordinary stop takes up to {ramp_s:.2f} s (limits: linear_mps {limits.linear_mps:g}, deceleration_mps2 "
+            f"{limits.deceleration_mps2:g}, angular_radps {limits.angular_radps:g}, angular_deceleration_radps2 "
+            f"{limits.angular_deceleration_radps2:g}, jerk_mps3 {limits.jerk_mps3:g}; lag {stopping.lag_s(self):.2f} s)"
+        )
+        if given_s is not None and given_s < ramp_s:
+            message = f"standstill_s ({given_s:g}) is shorter than the ramp: {figures}; leave standstill_s out"
+            raise MisfitError(message, ("timeouts", "standstill_s"))
+        if given_s is None and stopping.standstill_s(self) > LONGEST_STOP_S:
+            message = f"{figures}: more than can be supervised; raise jerk_mps3 or deceleration_mps2"
+            raise MisfitError(message, ("limits", "jerk_mps3"), ("limits", "deceleration_mps2"))
         return self
 
     @model_validator(mode="after")

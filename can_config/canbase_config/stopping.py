@@ -21,6 +21,8 @@ CYCLES_TO_SETPOINT: Final = 2
 BRAKING_SHARE: Final = 0.5
 """A wheel that loses less speed than this share of its stated deceleration does not brake as it must: half is left to
 double payload, slopes and slow current limits."""
+SETTLE_S: Final = 0.5
+"""Until a wheel that has braked is seen to stand."""
 ROLLING_MPS2: Final = 0.1
 """What a wheel without power loses at least: rolling resistance 0.01 × 9.81 m/s² of a hard wheel on a hard, level floor
 (soft floors, gears and motors brake more; on a slope nothing is known)."""
@@ -77,6 +79,29 @@ def longest_ramp_s(robot: Robot) -> float:
 def longest_quick_stop_s(robot: Robot) -> float:
     """No quick stop takes longer [s]: from the fastest speed that is no overspeed yet."""
     return quick_stop(robot, robot.watchdog.overspeed_factor * max_wheel_mps(robot)).time_s
+
+
+def standstill_s(robot: Robot) -> float:
+    """The driver gives up its ramp after this [s]: timeouts.standstill_s, or twice the longest ramp and SETTLE_S."""
+    given_s = robot.timeouts.standstill_s
+    if given_s is not None:
+        return given_s
+    longest = ramp(robot.limits, robot.limits.linear_mps, robot.limits.angular_radps)
+    return lag_s(robot) + longest.time_s / BRAKING_SHARE + SETTLE_S
+
+
+def given_up_s(robot: Robot) -> float:
+    """After this the driver has taken the power, whatever the wheels do: ramp, then quick stop [s]."""
+    wheel = robot.watchdog
+    fastest_mps = wheel.overspeed_factor * max_wheel_mps(robot)
+    begin_mps = fastest_mps * (1.0 + wheel.motion_tolerance_share) + wheel.motion_tolerance_mps
+    return standstill_s(robot) + lag_s(robot) + begin_mps / (BRAKING_SHARE * robot.limits.deceleration_mps2)
+
+
+def jerk_adds_s(limits: Limits) -> float:
+    """How much longer the jerk limit makes a change of speed, up to the whole of linear_mps [s]."""
+    straight = (limits.linear_mps / rate for rate in (limits.acceleration_mps2, limits.deceleration_mps2))
+    return max(_rounded_s(time_s, limits.linear_mps, limits.jerk_mps3) - time_s for time_s in straight)
 
 
 def coasting_s(wheel_mps: float) -> float:

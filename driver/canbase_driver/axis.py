@@ -11,6 +11,7 @@ from canbase_driver.frame import Frame
 from canbase_driver.limits import Limiter
 from canbase_driver.odometry import WheelTravel
 from canbase_driver.pdo import NodeLayout, pack_setpoint, unpack_status, unpack_velocity
+from canbase_driver.stillness import Stillness, StillnessLimits
 from canbase_driver.units import AxisUnits
 
 STEP_MARGIN = 3.0
@@ -29,11 +30,13 @@ class Axis:
         self.state: DriveState | None = None
         self.velocity_mps = 0.0
         self.target_mps = 0.0
-        self.status_at = -math.inf
+        self.status_at = self.velocity_at = -math.inf
         self.has_new_sample = False
         metres_per_count = self.units.position_m(1)
         step_m = STEP_MARGIN * Limiter(robot.limits, robot.base.track_m).wheel_mps / robot.rates.control_hz
         self.travel = WheelTravel(metres_per_count, max(1.0, step_m / abs(metres_per_count)))
+        self.stillness = Stillness(StillnessLimits.of(robot), metres_per_count)
+        self._feedback_s = robot.timeouts.feedback_s
         self._layout = layout.profile.layout
         self._setpoint_cob_id = layout.setpoint_cob_id(drive.axis)
         self._wheel_radius_m = robot.base.wheel_radius_m
@@ -51,16 +54,26 @@ class Axis:
         """How often the travel went on from a new reference: what the wheel rolled meanwhile is unknown."""
         return self._restarts + self.travel.losses
 
+    @property
+    def fed_at(self) -> float:
+        """When the older one of its values came: 6041h with 6064h, and 606Ch, come in frames of their own."""
+        return min(self.status_at, self.velocity_at)
+
     def age_s(self, now: float) -> float:
-        """Seconds since the last status; infinity: none since the last `forget`."""
-        return now - self.status_at
+        """Age of the oldest of its values [s]; infinity: not all came since the last `forget`."""
+        return now - self.fed_at
+
+    def stands(self, now: float) -> bool:
+        """Fresh values are evidence that the wheel stands."""
+        return self.age_s(now) <= self._feedback_s and self.stillness.stands(now)
 
     def forget(self) -> None:
         """What was heard no longer counts: the drive restarted, or its bus did."""
         self._restarts += self.status_at > -math.inf
-        self.status_at = -math.inf
+        self.status_at = self.velocity_at = -math.inf
         self.state = None
         self.velocity_mps = 0.0
+        self.stillness.forget()
         self.travel.reset_reference()
         self._status_is_new = self.has_new_sample = False
 
@@ -71,18 +84,24 @@ class Axis:
             return False
         self.statusword, counts = status
         self.state = decode_statusword(self.statusword)
-        gap_s = min(self.age_s(now), GAP_MAX_S)
+        gap_s = min(now - self.status_at, GAP_MAX_S)
         self.travel.update(counts, max(1, round(gap_s * self._control_hz)))
         self.status_at = now
         self._status_is_new = True
+        self.stillness.on_power(self.state is None or self.state.has_torque, now)
         return True
 
-    def on_velocity(self, data: bytes) -> bool:
+    def on_velocity(self, data: bytes, now: float) -> bool:
         """Take 606Ch, which follows the status of the same SYNC. False: wrong length, to be dropped and counted."""
         raw = unpack_velocity(data, self._layout)
         if raw is None:
             return False
         self.velocity_mps = self.units.velocity_mps(raw)
+        if now - self.velocity_at > self._feedback_s:
+            self.stillness.forget()
+        self.velocity_at = now
+        ordered_mps = self.target_mps if self.state is DriveState.OPERATION_ENABLED else 0.0
+        self.stillness.on_sample(self.travel.travel_m, self.velocity_mps, ordered_mps, now)
         self.has_new_sample = self._status_is_new
         return True
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from canbase_config.drive import Drive, Identity
 from canbase_config.places import CONTROLWORD, STATUSWORD, VELOCITY_ACTUAL, place
 from canbase_config.robot import Robot
+from canbase_config.stopping import standstill_s
 from canbase_driver.boot_pdo import configure_pdos
 from canbase_driver.boot_settings import (
     configure_motion,
@@ -172,7 +173,7 @@ class _Boot:
     def _wait_for_standstill(self, drive: Drive) -> Steps[None]:
         units = AxisUnits(drive, self._robot.base)
         slow = 0
-        for _ in range(math.ceil(self._robot.timeouts.standstill_s / POLL_S)):
+        for _ in range(math.ceil(standstill_s(self._robot) / POLL_S)):
             if not _has_torque((yield from _state(drive))) or slow == STANDING_POLLS:
                 return
             raw = int.from_bytes((yield _read(drive, VELOCITY_ACTUAL)), "little", signed=True)
@@ -184,7 +185,7 @@ class _Boot:
         """Setpoints of whoever keeps it moving count no more, then the power goes."""
         yield SendNmt(NmtCommand.ENTER_PRE_OPERATIONAL)
         yield _control(drive, Command.DISABLE_VOLTAGE)
-        problem = f"{drive.joint} did not stand {self._robot.timeouts.standstill_s:g} s after a quick stop"
+        problem = f"{drive.joint} did not stand {standstill_s(self._robot):.1f} s after a quick stop"
         hint = "Its voltage is now disabled; look for another master, and at 605Ah and 6085h"
         raise BootError(self._node.node_id, problem, hint)
 

@@ -12,9 +12,11 @@ from collections import deque
 from collections.abc import Callable
 from functools import partial
 
+from canbase_config import stopping
 from canbase_config.latch_record import Found, Record
 from canbase_config.robot import DRIVER_NODE_ID, Robot
 from canbase_driver.axis import Axis
+from canbase_driver.braking import Braking
 from canbase_driver.bus_health import BusReport
 from canbase_driver.cia301 import (
     EMCY,
@@ -70,7 +72,8 @@ class DriverCore:
         self._drives = Drives(robot)
         self._sync = SyncProducer(robot.bus.sync_counter)
         self._watchdog = WatchdogLink(robot.timeouts.watchdog_s)
-        self._supervisor = Supervisor(robot.timeouts.standstill_s, cause_before_the_start(found))
+        self._standstill_s = stopping.standstill_s(robot)
+        self._supervisor = Supervisor(Braking(robot), self._standstill_s, cause_before_the_start(found))
         self._record = PowerRecord(found)
         self._limiter = Limiter(robot.limits, robot.base.track_m)
         self._feed = OdometryFeed(self._drives, robot.base.track_m)
@@ -179,7 +182,7 @@ class DriverCore:
         if not (math.isfinite(pose.x_m) and math.isfinite(pose.y_m) and math.isfinite(pose.yaw_rad)):
             return Outcome(False, f"refused: {pose} is not finite")
         if commanded or not self._drives.stand(now):
-            return Outcome(False, f"refused: {commanded or 'a wheel turns'}; a pose is set at a standstill")
+            return Outcome(False, f"refused: {commanded or self._drives.turning(now)}; a pose is set at a standstill")
         self._feed.set_pose(pose)
         return Outcome(
             True, f"odometry goes on from x {pose.x_m:.3f} m, y {pose.y_m:.3f} m, yaw {pose.yaw_rad:.3f} rad"
@@ -204,12 +207,14 @@ class DriverCore:
         frames += self._stop_by_sdo(orders, situation, now)
         if self._motion.twist != Twist2D.ZERO or situation.standstill:
             self._eased_at = now
+        # Reset communication forgets 1016h: a drive must not report a lost heartbeat after an orderly end. One that may
+        # have power keeps it, and stops by the missing heartbeat.
+        off = [node.node_id for node in self._drives.nodes if node.is_off(now)]
         let_go = self._readiness.step(situation, self.state, self.cause, now)
         for node in self._drives.nodes if let_go else ():
             node.release(now)
         if let_go or (self.finished and not self._readiness.released):
-            # Reset communication forgets 1016h: a drive must not report a lost heartbeat after an orderly end.
-            frames += [nmt(NmtCommand.RESET_COMMUNICATION, node.node_id) for node in self._drives.nodes]
+            frames += [nmt(NmtCommand.RESET_COMMUNICATION, node_id) for node_id in off]
         return frames
 
     def stop_frames(self) -> list[Frame]:
@@ -218,12 +223,13 @@ class DriverCore:
         return [frame for node in self._drives.nodes for frame in node.setpoints(goal, 0.0, 0.0)] + [self._sync.next()]
 
     def _judge(self, situation: Situation, now: float) -> Orders:
-        before = self._supervisor.state
+        before, latched_before = self._supervisor.state, self._supervisor.latches
         orders = self._supervisor.step(situation, now)
         self._record.note(self._supervisor, situation)
         state, cause = self._supervisor.state, self._supervisor.cause
-        was_latched = state is DriverState.LATCHED and before is not DriverState.STOPPING
-        if state is not before and (state is DriverState.STOPPING or was_latched):
+        began = state is not before and state in (DriverState.STOPPING, DriverState.LATCHED)
+        continued = before is DriverState.STOPPING and state in (DriverState.STOPPING, DriverState.LATCHED)
+        if (began and not continued) or (continued and self._supervisor.latches and not latched_before):
             by = "watchdog" if cause.name == "watchdog tripped" else "motor_driver"
             latches = self._supervisor.latches
             self.stops.append(StopRecord(by, cause.name, cause.detail, latches, cause.clears_on, now))
@@ -232,7 +238,7 @@ class DriverCore:
         return orders
 
     def _setpoints(self, orders: Orders, now: float, dt_s: float) -> list[Frame]:
-        started = [node for node in self._drives.nodes if node.has_pdos]
+        started = [node for node in self._drives.nodes if node.takes_pdos]
         if orders.drive is Drive.ZERO:
             self._motion = MotionState.AT_REST
         else:
@@ -274,6 +280,11 @@ class DriverCore:
 
     def _situation(self, now: float) -> Situation:
         watchdog, watchdog_detail = self._watchdog.view(now)
+        liar = self._watchdog.lying_node(now)
+        if liar:
+            self._drives.doubt(liar, f"reports what cannot be ({watchdog_detail})")
+        measured_mps = abs(self._drives.fastest().velocity_mps)
+        ordered_mps = max(abs(speed) for speed in wheel_speeds(self._motion.twist, self._robot.base.track_m))
         return Situation(
             bus=self._bus_problem,
             booting=self._drives.booting(now),
@@ -286,9 +297,15 @@ class DriverCore:
             unarmed=self._record.unarmed or self._watchdog.unarmed,
             watchdog=watchdog,
             watchdog_detail=watchdog_detail,
+            watchdog_about_drive=self._watchdog.about_drive,
             commanded=self._command.motion(now),
             overdue=self._overdue(now),
             standstill=self._drives.stand(now),
+            turning=self._drives.turning(now),
+            speed_mps=measured_mps,
+            begin_mps=max(measured_mps, ordered_mps),
+            turn_radps=self._motion.twist.angular_radps,
+            doubted=self._drives.doubted(),
             powered=self._drives.may_have_power(now),
             unconfigured=self._readiness.unconfigured,
             inactive=self._readiness.inactive,
@@ -299,7 +316,7 @@ class DriverCore:
 
     def _overdue(self, now: float) -> str:
         elapsed_s = now - self._eased_at
-        if elapsed_s <= self._robot.timeouts.standstill_s:
+        if elapsed_s <= self._standstill_s:
             return ""
         fastest = self._drives.fastest()
         return (
@@ -310,7 +327,7 @@ class DriverCore:
         return self._answers_last_sync(now) and node.on_status(axis, frame, now)
 
     def _on_velocity(self, node: RemoteNode, axis: Axis, frame: Frame, now: float) -> bool:
-        understood = self._answers_last_sync(now) and node.on_velocity(axis, frame)
+        understood = self._answers_last_sync(now) and node.on_velocity(axis, frame, now)
         self._feed.update(now)
         return understood
 

@@ -90,17 +90,35 @@ class Drives:
         return _first(_unprepared(axis) for axis in self.axes)
 
     def are_fresh(self, now: float) -> bool:
-        """Every axis has given its status in time."""
+        """Every axis has given all its values in time."""
         return all(self._is_fresh(axis, now) for axis in self.axes)
 
     def stand(self, now: float) -> bool:
-        """Measured, and fresh: no rim is faster than base.standstill_mps."""
-        limit_mps = self._robot.base.standstill_mps
-        return self.are_fresh(now) and all(abs(axis.velocity_mps) <= limit_mps for axis in self.axes)
+        """Measured, fresh, and evidence: no wheel turns."""
+        return all(axis.stands(now) for axis in self.axes)
+
+    def turning(self, now: float) -> str:
+        """Which wheel does not stand, and why that is said; empty: all stand."""
+        return _first(self._turning(axis, now) for axis in self.axes)
+
+    def doubt(self, node_id: int, why: str) -> None:
+        """What this node measures is no evidence: somebody has caught it with a lie."""
+        for axis in self.axes:
+            if axis.drive.node_id == node_id:
+                axis.stillness.distrust(why)
+
+    def doubted(self) -> str:
+        """Which wheel's sensors are no evidence, and why; empty: none."""
+        return _first(_of(axis, axis.stillness.doubt) for axis in self.axes)
+
+    def assumed(self, now: float) -> str:
+        """Which wheel's standstill is assumed and not measured, and why; empty: none."""
+        return _first(_of(axis, axis.stillness.assumed(now)) for axis in self.axes)
 
     def may_have_power(self, now: float) -> bool:
         """Some axis has torque, or does not tell."""
-        return any(not self._is_fresh(axis, now) or axis.state is None or axis.state.has_torque for axis in self.axes)
+        fresh_s = self._robot.timeouts.feedback_s
+        return any(now - axis.status_at > fresh_s or axis.state is None or axis.state.has_torque for axis in self.axes)
 
     def have_references(self) -> bool:
         """The travel of every wheel is known since its first sample."""
@@ -131,6 +149,16 @@ class Drives:
         """One per axis, in the order of robot.yaml."""
         return tuple(_snapshot(node, axis, self._robot, now) for node, axis in self._with_node)
 
+    def _turning(self, axis: Axis, now: float) -> str:
+        if axis.stands(now):
+            return ""
+        joint, base = axis.drive.joint, self._robot.base
+        if not self._is_fresh(axis, now):
+            return f"{joint} has given no velocity for {axis.age_s(now):.2f} s"
+        if axis.stillness.doubt:
+            return f"{joint} {axis.stillness.doubt}: its sensors are no evidence of standstill"
+        return f"{joint} turns at {axis.velocity_mps:.3f} m/s (base.standstill_mps {base.standstill_mps:g})"
+
     def _is_fresh(self, axis: Axis, now: float) -> bool:
         return axis.age_s(now) <= self._robot.timeouts.feedback_s
 
@@ -156,7 +184,7 @@ def _snapshot(node: RemoteNode, axis: Axis, robot: Robot, now: float) -> DriveSn
         target_radps=axis.target_mps / radius_m,
         velocity_radps=axis.velocity_mps / radius_m,
         position_rad=axis.position_rad,
-        feedback_age_s=age_s(now, axis.status_at),
+        feedback_age_s=age_s(now, axis.fed_at),
         heartbeat_age_s=age_s(now, node.heartbeat_at),
         stops_by_itself=node.report is not None and node.report.stops_by_itself,
         self_stop=node.report.self_stop if node.report else "",
@@ -178,6 +206,10 @@ def _fault(node: RemoteNode) -> str:
         if axis.state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
             return f"{axis.drive.joint} (node {node.node_id}): {node.emcy_text() or 'no code given'}"
     return ""
+
+
+def _of(axis: Axis, what: str) -> str:
+    return f"{axis.drive.joint} {what}" if what else ""
 
 
 def _unprepared(axis: Axis) -> str:

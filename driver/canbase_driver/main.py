@@ -25,6 +25,7 @@ from canbase_config.latch_file import LatchFile, LatchKeeper, latch_folder
 from canbase_config.priority import Priority
 from canbase_config.robot import Robot
 from canbase_config.service import Service
+from canbase_config.stopping import given_up_s
 from canbase_driver.black_box import Ring
 from canbase_driver.black_box_writer import BlackBoxWriter
 from canbase_driver.bus_port import BusError, BusPort
@@ -38,8 +39,8 @@ WAKE_S = 0.02
 LOOP_TIMEOUT_S = 0.5
 """A control thread without a cycle for so long, while this one ran, hangs: the process ends; the watchdog has already
 stopped the drives."""
-END_MARGIN_S = 3.0
-"""Above the ramp's time: quick stop, power off."""
+END_MARGIN_S = 1.5
+"""Above the time of ramp and quick stop: power off."""
 WRITE_S = 5.0
 """For the recording of a stop that is just over."""
 
@@ -83,7 +84,7 @@ def run(
     try:
         failure = _spin(node, loop, threads, received)
         loop.request_shutdown()
-        loop.join(robot.timeouts.standstill_s + END_MARGIN_S)
+        loop.join(given_up_s(robot) + END_MARGIN_S)
         loop.deliver()
         publisher.join(1.0)
         keeper.finish(WRITE_S)

@@ -30,11 +30,13 @@ from canbase_driver.managed_node import ManagedNode
 from canbase_driver.services import DriverServices
 from canbase_driver.snapshot import DriverSnapshot, StopRecord
 from canbase_driver.stop_teller import StopTeller
-from canbase_driver.supervisor import INACTIVE, UNARMED
+from canbase_driver.supervisor import INACTIVE, PREPARING_CAUSE, UNARMED
 
 COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 STATE_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 DIAGNOSTICS_PERIOD_S = 1.0
+_USUAL = ("none", "booting", PREPARING_CAUSE, "enabling", "shutdown", "not configured", INACTIVE, UNARMED)
+"""Causes that are no warning."""
 
 
 class MotorDriverNode(ManagedNode):
@@ -121,7 +123,7 @@ class MotorDriverNode(ManagedNode):
         clears = f"; ends on: {snapshot.clears_on}" if snapshot.clears_on else ""
         text = self.state_text = f"{snapshot.state.name}{why}{detail}{clears}"
         self._stops.note(text)
-        usual = snapshot.cause in ("none", "booting", "enabling", "shutdown", "not configured", INACTIVE, UNARMED)
+        usual = snapshot.cause in _USUAL
         priority = Priority.INFO if usual else Priority.WARNING
         self.voice.tell(text, priority, state=snapshot.state.name, cause=snapshot.cause, robot=self._robot.name)
 

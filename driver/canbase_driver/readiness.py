@@ -16,13 +16,13 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from canbase_config.robot import Robot
+from canbase_config.stopping import given_up_s
 from canbase_driver.reset import Outcome
 from canbase_driver.snapshot import DriverState
 from canbase_driver.supervisor import (
     ENABLE_TIMEOUT_S,
     NO_POWER,
     POWER_OFF_TIMEOUT_S,
-    QUICK_STOP_TIMEOUT_S,
     Cause,
     Situation,
 )
@@ -58,7 +58,7 @@ class Readiness:
         self.released = aim is Aim.RELEASED
         """Nothing is sent: never configured, or let go again."""
         self._change: _Change | None = None
-        stop_s = timeouts.standstill_s + QUICK_STOP_TIMEOUT_S + POWER_OFF_TIMEOUT_S
+        stop_s = given_up_s(robot) + POWER_OFF_TIMEOUT_S
         self._patience_s = {
             Aim.RELEASED: stop_s + MARGIN_S,
             Aim.CONFIGURED: max(timeouts.boot_s, stop_s) + MARGIN_S,

@@ -74,7 +74,7 @@ class RemoteNode:
         """Whether no other node is in the middle of its boot; set by whoever has them all."""
         self._measures = Measures(node_id, self._drives, robot.timeouts.sdo_s)
         self._sdo_stop = SdoStop(node_id, self._drives)
-        self._lost_heartbeat = False
+        self._lost_heartbeat = self._owed_stop = False
         self._held_until = -math.inf
         self._ready_at = math.inf
         """When it was ready last; before that, when it was looked at first. Infinity until then."""
@@ -98,6 +98,18 @@ class RemoteNode:
     def has_pdos(self) -> bool:
         """It was configured and started: setpoints may be sent to it, and its feedback counts."""
         return self.presence in (Presence.STARTING, Presence.READY)
+
+    @property
+    def takes_pdos(self) -> bool:
+        """`has_pdos`; or it had power when it was lost, and nothing has shown since that its motors have none: NMT
+        tells nothing about that, and it may obey its PDOs still. Until its boot begins, which stops it by SDO."""
+        return self.has_pdos or self._owed_stop
+
+    def is_off(self, now: float) -> bool:
+        """Every axis says, in a fresh statusword, that it has no torque."""
+        fresh_s = self._robot.timeouts.feedback_s
+        axes = self.axes
+        return all(now - axis.status_at <= fresh_s and axis.state and not axis.state.has_torque for axis in axes)
 
     @property
     def is_being_configured(self) -> bool:
@@ -142,9 +154,10 @@ class RemoteNode:
             return ""
         timeouts = self._robot.timeouts
         for axis in self.axes:
-            unasked_s = min(max(0.0, sync_since - axis.status_at), timeouts.drive_heartbeat_s)
+            unasked_s = min(max(0.0, sync_since - axis.fed_at), timeouts.drive_heartbeat_s)
             if axis.age_s(now) - unasked_s > timeouts.feedback_s:
-                return f"{self.name}: no status for {axis.age_s(now):.2f} s"
+                value = "status" if axis.status_at <= axis.velocity_at else "velocity"
+                return f"{self.name}: no {value} for {axis.age_s(now):.2f} s"
         if now - self.heartbeat_at > timeouts.drive_heartbeat_s:
             return f"{self.name}: no heartbeat for {now - self.heartbeat_at:.2f} s"
         return ""
@@ -158,6 +171,7 @@ class RemoteNode:
             return
         self._boot = NodeBoot(self.node_id, self._drives, self._robot, self._settle_s)
         self._boot_up_at = -math.inf
+        self._owed_stop = False
         self._go(Presence.BOOTING, now)
 
     def seek(self, now: float, sync_since: float) -> None:
@@ -173,6 +187,8 @@ class RemoteNode:
 
     def lose(self, why: str, now: float) -> None:
         """It must be booted again before it counts: `why` completes the sentence that begins with its name."""
+        had_power = self.has_pdos and any(axis.state is None or axis.state.has_torque for axis in self.axes)
+        self._owed_stop = had_power or self._owed_stop
         for axis in self.axes:
             axis.forget()
         self._why_gone = why
@@ -253,11 +269,11 @@ class RemoteNode:
 
     def on_status(self, axis: Axis, frame: Frame, now: float) -> bool:
         """Take 6041h and 6064h of one of its axes. False: not understood."""
-        return not self.has_pdos or axis.on_status(frame.data, now)
+        return not self.takes_pdos or axis.on_status(frame.data, now)
 
-    def on_velocity(self, axis: Axis, frame: Frame) -> bool:
+    def on_velocity(self, axis: Axis, frame: Frame, now: float) -> bool:
         """Take 606Ch of one of its axes. False: not understood."""
-        return not self.has_pdos or axis.on_velocity(frame.data)
+        return not self.takes_pdos or axis.on_velocity(frame.data, now)
 
     def on_emcy(self, frame: Frame, _now: float) -> bool:
         """Take a frame 080h + id. False: not an emergency message. It tells; only the statusword stops anything."""

@@ -54,6 +54,7 @@ def snapshot_of(told: Told, base: Base, now: float) -> DriverSnapshot:
         watchdog_bus_errors=counters.bus_errors,
         watchdog_pause_max_s=counters.pause_max_ms / 1000.0,
         standstill=drives.stand(now),
+        standstill_assumed=drives.assumed(now),
         command_age_s=age_s(now, told.command.received_at),
         command_fresh=told.command.is_fresh(now),
         commands_refused=told.command.refused,

@@ -60,7 +60,7 @@ class DriveSnapshot:
     position_rad: float
     """Wheel angle since the first feedback, unwrapped [rad]; 0 until then."""
     feedback_age_s: float
-    """Since the last status TPDO [s]; NaN: none yet."""
+    """Age of the oldest of its values, 6041h, 6064h, 606Ch [s]; NaN: not all came yet."""
     heartbeat_age_s: float
     """Since its last heartbeat [s]; NaN: none yet."""
     stops_by_itself: bool
@@ -119,7 +119,9 @@ class DriverSnapshot:
     watchdog_pause_max_s: float = 0.0
     """Longest pause of its loop in the last half second [s], at most 0.255."""
     standstill: bool
-    """All wheels are measured below base.standstill_mps."""
+    """All wheels stand, by encoder and velocity; or a stand is assumed."""
+    standstill_assumed: str = ""
+    """Why it is assumed and not measured; empty: it is measured, or they do not stand."""
     command_age_s: float
     """Age of cmd_vel by local receive time [s]; NaN: none yet."""
     command_fresh: bool

@@ -6,6 +6,7 @@ waits in a queue until the second one takes it.
 
 from __future__ import annotations
 
+import math
 import queue
 import time
 from collections.abc import Callable
@@ -19,13 +20,14 @@ from canbase_config.foreign_text import SENTENCE_LENGTH, printable
 from canbase_config.journal import Voice
 from canbase_config.priority import Priority
 from canbase_config.robot import Robot
+from canbase_config.stopping import given_up_s
 from canbase_driver.black_box import Ring
 from canbase_driver.black_box_writer import BlackBoxWriter
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.messages import stop_event_message
 from canbase_driver.snapshot import DriverSnapshot, StopRecord
-from canbase_driver.stops import FILTER, StopRecorder, StopReport
-from canbase_driver.supervisor import POWER_OFF_TIMEOUT_S, QUICK_STOP_TIMEOUT_S
+from canbase_driver.stops import FILTER, StopRecorder, StopReport, standstill_text
+from canbase_driver.supervisor import POWER_OFF_TIMEOUT_S
 
 EVENT_QOS = QoSProfile(depth=50, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -41,7 +43,7 @@ class StopTeller:
         self._ring = ring
         self._writer = writer
         self._estop_latches = robot.safety.estop.latched
-        patience_s = robot.timeouts.standstill_s + QUICK_STOP_TIMEOUT_S + POWER_OFF_TIMEOUT_S
+        patience_s = given_up_s(robot) + POWER_OFF_TIMEOUT_S
         self._recorder = StopRecorder(patience_s)
         self._news: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._filter_said = self._mux_said = ""
@@ -92,7 +94,7 @@ class StopTeller:
         path = self._write(report, now) if record.latched else ""
         stamp = Time(sec=stamp_ns // 1_000_000_000, nanosec=stamp_ns % 1_000_000_000)
         self._publisher.publish(stop_event_message(report, stamp, path))
-        end = f"after {report.standstill_s:.2f} s and {report.distance_m:.3f} m" if report.standstill else "not seen"
+        end = standstill_text(report)
         file = f"; black box: {path}" if path else ""
         by = f"{record.stopped_by}: {record.cause} ({record.detail})"
         self._voice.tell(
@@ -103,7 +105,7 @@ class StopTeller:
             cause=record.cause,
             latched=str(record.latched).lower(),
             standstill_s=f"{report.standstill_s:.3f}" if report.standstill else "",
-            distance_m=f"{report.distance_m:.4f}",
+            distance_m="" if math.isnan(report.distance_m) else f"{report.distance_m:.4f}",
             black_box=path,
         )
 

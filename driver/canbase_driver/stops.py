@@ -29,6 +29,15 @@ class StopReport:
     turned_rad: float
 
 
+def standstill_text(report: StopReport) -> str:
+    """When and after how many metres the base stood, for a log line that begins with "standstill"."""
+    if not report.standstill:
+        return "not seen"
+    if math.isnan(report.distance_m):
+        return f"after {report.standstill_s:.2f} s, distance not measured"
+    return f"after {report.standstill_s:.2f} s and {report.distance_m:.3f} m"
+
+
 @dataclass(slots=True)
 class _OpenStop:
     """A stop on its way. `let_go`: what held the base holds it no longer."""

@@ -7,9 +7,11 @@ Rules
    before the records on disk say that there is power: whoever dies with it comes back latched.
 2. While there is power, the first of HAZARDS that holds stops the base: by the ramp, or by quick stop at once. On the
    way to operation enabled nothing follows a command yet, so there it is always the quick stop.
-3. A stop goes down one way only: ramp, quick stop, power off. Each step ends by measured standstill or by its deadline.
-4. A latched cause is forgotten by `reset` alone, and only when nothing has power; a restart does not end it.
-5. A shutdown ends in every state: at once without power, after the stop with it.
+3. A stop goes down one way only: ramp, quick stop, power off. Each step ends by measured standstill, or as soon as the
+   base does not lose speed as it must (`braking.py`); a wheel whose sensor is no evidence has its power taken at once.
+4. The first cause is the one that is shown; only a stop that needs no reset is taken over by a cause that does.
+5. A latched cause is forgotten by `reset` alone, and only when nothing has power; a restart does not end it.
+6. A shutdown ends in every state: at once without power, after the stop with it.
 
 Pure: time is an argument, `Situation` says everything that was measured. It sends nothing; `Orders` says what to do.
 """
@@ -21,13 +23,14 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar, TypeVar
 
+from canbase_driver.braking import Braking
 from canbase_driver.cia402 import PowerGoal
 from canbase_driver.snapshot import DriverState, WatchdogView
 
 ENABLE_TIMEOUT_S = 2.0
 """From the first controlword to operation enabled on all drives; real ones need up to 1 s (brake, bus charge)."""
-QUICK_STOP_TIMEOUT_S = 1.5
-"""Time for the drives' own quick-stop ramp before their power is taken away."""
+PREPARE_TIMEOUT_S = 1.0
+"""From nothing that forbids power to switched on on all drives: after it STO or the main voltage is missing."""
 POWER_OFF_TIMEOUT_S = 0.5
 """Time for the drives to report that power is off; then the stop ends all the same, and the watchdog stays alert."""
 
@@ -47,9 +50,15 @@ class Situation:
     unarmed: str = ""  # the records on disk do not say yet that there is power
     watchdog: WatchdogView = WatchdogView.OK
     watchdog_detail: str = ""
+    watchdog_about_drive: bool = False  # it tripped because a drive was silent or down
     commanded: str = ""  # a fresh command asks for motion
     overdue: str = ""  # zero was ordered, and the wheels still turn
     standstill: bool = True  # measured, on all wheels
+    turning: str = ""  # which wheel does not stand
+    speed_mps: float = 0.0  # of the fastest wheel, measured
+    begin_mps: float = 0.0  # the same, or what it was ordered last where that is more
+    turn_radps: float = 0.0  # of the base, ordered last
+    doubted: str = ""  # a wheel's sensors are no evidence of anything
     powered: bool = False  # some axis may produce torque
     unconfigured: str = ""  # the node's lifecycle: nothing may be sent
     inactive: str = ""  # the node's lifecycle: nothing may have power
@@ -125,8 +134,10 @@ def _stop_requested(s: Situation) -> str:
 
 
 SHUTDOWN = "shutdown"
+DID_NOT_STOP = "did not stop"
 NOT_READY = "drive not ready"
 UNARMED = "stop record"
+PREPARING_CAUSE = "preparing"
 INACTIVE = "inactive"
 _MISSING, _TRIPPED = _watchdog(WatchdogView.MISSING), _watchdog(WatchdogView.TRIPPED)
 
@@ -143,27 +154,35 @@ BLOCKERS: tuple[Blocker, ...] = (
     Blocker(INACTIVE, lambda s: s.inactive, DriverState.DISARMED, "lifecycle transition activate"),
     Blocker("resetting", lambda s: "a reset is under way" if s.resetting else "", DriverState.DISARMED, "its end"),
     Blocker("command not zero", lambda s: s.commanded, DriverState.DISARMED, "a zero command"),
-    Blocker("not standing", lambda s: "" if s.standstill else "a wheel turns", DriverState.DISARMED, "standstill"),
+    Blocker("not standing", lambda s: "" if s.standstill else s.turning, DriverState.DISARMED, "standstill"),
 )
 """What keeps the power off while nothing is latched, the most telling first. Nothing moved: most go by themselves."""
 
 HAZARDS: tuple[Hazard, ...] = (
     Hazard("bus failed", lambda s: s.bus, True, True, "reset, with the bus working"),
+    Hazard("watchdog tripped", lambda s: "" if s.watchdog_about_drive else _TRIPPED(s), True, True, "reset"),
     Hazard("drive fault", lambda s: s.fault, True, True, "reset, with the drive's cause gone"),
     Hazard("drive restarted", lambda s: s.absent, True, True, "reset"),
     Hazard("drive silent", lambda s: s.silent, True, True, "reset, with the drive answering"),
     Hazard("watchdog tripped", _TRIPPED, True, True, "reset"),
     Hazard("watchdog missing", _MISSING, False, True, "reset, with the watchdog alive"),
     Hazard("drive disabled", lambda s: s.disabled, True, True, "reset"),
-    Hazard("did not stop", lambda s: s.overdue, True, True, "reset"),
+    Hazard(DID_NOT_STOP, lambda s: s.overdue, True, True, "reset"),
     Hazard("stop requested", _stop_requested, False, True, "reset"),
     Hazard(INACTIVE, lambda s: s.inactive, False, False, "lifecycle transition activate"),
     Hazard(SHUTDOWN, lambda s: "the driver is ending" if s.shutdown_requested else "", False, False, "a new start"),
 )
-"""All reasons to stop, the most telling first: when several hold, the first one is the cause that is reported."""
+"""All reasons to stop, the most telling first: when several hold, the first one is the cause that is reported.
+
+A tripped watchdog stops the drives itself. Where both are seen in the same cycle (this process was stopped for a
+while), drives that left NMT operational, are in fault or silent are what came of it, unless it tripped about a drive.
+"""
 
 _HAZARDS_WHILE_ENABLING = tuple(hazard for hazard in HAZARDS if hazard.name != "drive disabled")
 _QUICK_HAZARDS = tuple(hazard for hazard in HAZARDS if hazard.quick)
+_LATCHED_HAZARDS = tuple(hazard for hazard in HAZARDS if hazard.latched)
+_LATCHED_HAZARDS_ON_THE_WAY_DOWN = tuple(hazard for hazard in _HAZARDS_WHILE_ENABLING if hazard.latched)
+"""Drives that are disabled by a quick stop or by us are no hazard there."""
 
 
 NO_POWER = (DriverState.OFFLINE, DriverState.BOOTING, DriverState.DISARMED, DriverState.LATCHED)
@@ -197,8 +216,8 @@ ORDERS: dict[DriverState | Step | str, Orders] = {
 class Supervisor:
     """The state machine. `step` once a cycle; `reset` when the reset sequence has finished."""
 
-    def __init__(self, ramp_timeout_s: float, latched: Cause | None = None) -> None:
-        """`ramp_timeout_s`: longest time for the driver's ramp before quick stop takes over (timeouts.standstill_s).
+    def __init__(self, braking: Braking, ramp_timeout_s: float, latched: Cause | None = None) -> None:
+        """`ramp_timeout_s`: the ramp takes no longer whatever the speed is (timeouts.standstill_s).
 
         `latched`: a stop of before the start, which ends by a reset alone.
         """
@@ -209,8 +228,9 @@ class Supervisor:
         self.latches = latched is not None
         """The stop that is under way, or the last one, needs a reset."""
         self._step = Step.OFF
-        self._since_s = 0.0
+        self._since_s = self._prepares_since_s = 0.0
         self._ramp_timeout_s = ramp_timeout_s
+        self._braking = braking
 
     def step(self, situation: Situation, now: float) -> Orders:
         """Judge the situation, move on, and say what to do in this cycle."""
@@ -218,7 +238,10 @@ class Supervisor:
         self._RULES[self.state](self, situation, now)
         if (self.state, self._step) != before:
             self._since_s = now
-        if self.state is DriverState.DISARMED and self.cause.name in (NOT_READY, UNARMED):
+            if self.state is DriverState.STOPPING:
+                quick = self._step is not Step.RAMP
+                self._braking.begin(situation.begin_mps, situation.turn_radps, now, quick)
+        if self.state is DriverState.DISARMED and self.cause.name in (NOT_READY, PREPARING_CAUSE, UNARMED):
             return ORDERS[PREPARING]
         return ORDERS[self._step if self.state is DriverState.STOPPING else self.state]
 
@@ -229,13 +252,14 @@ class Supervisor:
         self.latches = False
         self.state = DriverState.DISARMED
 
-    def _without_power(self, situation: Situation, _now: float) -> None:
+    def _without_power(self, situation: Situation, now: float) -> None:
         blocker = _first(BLOCKERS, situation)
+        if blocker is not None or not situation.unprepared:
+            self._prepares_since_s = now
         if situation.shutdown_requested:
             self._finish()
         elif blocker is None and situation.unprepared:
-            self.state = DriverState.DISARMED
-            self.cause = Cause(NOT_READY, situation.unprepared, "the drive being switched on")
+            self._prepare(situation, now)
         elif blocker is None and situation.unarmed:
             self.state = DriverState.DISARMED
             self.cause = Cause(UNARMED, situation.unarmed, "the record on disk")
@@ -244,6 +268,12 @@ class Supervisor:
         else:
             self.state, self.cause = blocker.state, _cause(blocker, situation)
             self.latches = blocker.state is DriverState.LATCHED
+
+    def _prepare(self, situation: Situation, now: float) -> None:
+        """The way to switched on takes some cycles; what takes longer needs a hand."""
+        late = now - self._prepares_since_s > PREPARE_TIMEOUT_S
+        self.state = DriverState.DISARMED
+        self.cause = Cause(NOT_READY if late else PREPARING_CAUSE, situation.unprepared, "the drive being switched on")
 
     def _enabling(self, situation: Situation, now: float) -> None:
         hazard = _first(_HAZARDS_WHILE_ENABLING, situation)
@@ -265,23 +295,35 @@ class Supervisor:
         self.cause, self.latches = cause, latched
 
     def _stopping(self, situation: Situation, now: float) -> None:
-        self._STEPS[self._step](self, situation, now - self._since_s)
+        if not self.latches:
+            ramps = self._step is Step.RAMP
+            worse = _first(_LATCHED_HAZARDS if ramps else _LATCHED_HAZARDS_ON_THE_WAY_DOWN, situation)
+            if worse is not None:
+                self.cause, self.latches = _cause(worse, situation), True
+        self._STEPS[self._step](self, situation, now)
 
-    def _ramp(self, situation: Situation, elapsed_s: float) -> None:
-        worse = _first(_QUICK_HAZARDS, situation)
-        if worse is not None:
-            self._step, self.latches = Step.QUICK, True
+    def _ramp(self, situation: Situation, now: float) -> None:
+        if _first(_QUICK_HAZARDS, situation) is not None:
+            self._step = Step.QUICK
         elif situation.standstill:
             self._step = Step.OFF
-        elif elapsed_s > self._ramp_timeout_s:
+        elif situation.doubted:
+            self._step = Step.OFF
+            self._latch("feedback implausible", situation.doubted)
+        elif self._braking.fails(situation.speed_mps, now) or now - self._since_s > self._ramp_timeout_s:
             self._step = Step.QUICK
+            self._latch(DID_NOT_STOP, f"{situation.turning} on its ramp, {now - self._since_s:.2f} s after it began")
 
-    def _quick(self, situation: Situation, elapsed_s: float) -> None:
-        if situation.standstill or elapsed_s > QUICK_STOP_TIMEOUT_S:
+    def _quick(self, situation: Situation, now: float) -> None:
+        if situation.standstill or situation.doubted or self._braking.fails(situation.speed_mps, now):
             self._step = Step.OFF
 
-    def _off(self, situation: Situation, elapsed_s: float) -> None:
-        if situation.powered and elapsed_s <= POWER_OFF_TIMEOUT_S:
+    def _latch(self, name: str, detail: str) -> None:
+        if not self.latches:
+            self.cause, self.latches = Cause(name, detail, "reset"), True
+
+    def _off(self, situation: Situation, now: float) -> None:
+        if situation.powered and now - self._since_s <= POWER_OFF_TIMEOUT_S:
             return
         self.state = DriverState.LATCHED if self.latches else DriverState.DISARMED
         if situation.shutdown_requested:

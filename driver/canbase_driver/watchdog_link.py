@@ -42,6 +42,10 @@ CAUSES = {
     20: "ended while a drive had power",
     21: "record of its last trip unusable",
 }
+SENSOR_CAUSES = (12, 13)
+"""After these, what the node in the state frame reports about its motion is no evidence. 13: motion missing."""
+DRIVE_CAUSES = (3, 7)
+"""What the driver sees at its drives itself, and can tell more about."""
 ANSWERS = {
     1: "reset done",
     2: "the cause stands",
@@ -169,6 +173,17 @@ class WatchdogLink:
         if self._state.state == STARTING:
             return WatchdogView.MISSING, "still starting"
         return WatchdogView.OK, ""
+
+    @property
+    def about_drive(self) -> bool:
+        """The last trip was about a drive that is silent or down."""
+        return self._state is not None and self._state.cause in DRIVE_CAUSES
+
+    def lying_node(self, now: float) -> int:
+        """The node whose sensors the watchdog has caught with a lie; 0: none."""
+        if self._state is None or self.view(now)[0] is not WatchdogView.TRIPPED:
+            return 0
+        return self._state.node_id if self._state.cause in SENSOR_CAUSES else 0
 
     def request_reset(self) -> Frame:
         """A reset request with a new number. Send the same frame again until `answer` is not None."""

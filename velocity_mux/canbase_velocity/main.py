@@ -17,6 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 from canbase_config.latch_file import LatchFile, LatchKeeper, latch_folder
 from canbase_config.robot import Robot
 from canbase_config.service import Service
+from canbase_config.stopping import standstill_s
 from canbase_velocity.filter_node import FilterNode
 from canbase_velocity.mux_node import MuxNode
 
@@ -60,7 +61,7 @@ def _run_nodes(robot: Robot, received: list[int], when_ready: Callable[[], None]
             service.alive(safety.state_text, time.monotonic())
         service.stopping()
         safety.end()
-        patience_s = time.monotonic() + robot.timeouts.standstill_s
+        patience_s = time.monotonic() + standstill_s(robot)
         _order_zero(mux, safety, period_s, min(safety.stands_from_s, patience_s))
     except BaseException:
         # What failed may fail again: no waiting for standstill, the driver and the watchdog see to it.

@@ -18,7 +18,7 @@ from campaign.wishes import Wishes
 from campaign.world import World
 from canbase_action_server.outcome import ErrorCode
 from canbase_bench.cia402.states import State
-from canbase_config.stopping import max_wheel_mps
+from canbase_config.stopping import max_wheel_mps, standstill_s
 from canbase_driver.snapshot import DriverState
 from canbase_velocity.twist import Twist
 from canbase_watchdog.ladder import RUNGS, Step
@@ -246,7 +246,7 @@ class Judge:
         self._world.note(f"goal {goal.number} ends: {outcome.code.name}: {outcome.message}")
         ramps_s = goal.speed_mps * (1.0 / robot.limits.acceleration_mps2 + 1.0 / robot.limits.deceleration_mps2) + 0.5
         ideal_s = abs(goal.distance_m) / goal.speed_mps + ramps_s
-        longest_s = robot.action.overall_factor * ideal_s + robot.action.overall_extra_s + robot.timeouts.standstill_s
+        longest_s = robot.action.overall_factor * ideal_s + robot.action.overall_extra_s + standstill_s(robot)
         if len(goal.ends) > 1:
             self._violate("goal", f"goal {goal.number} ended {len(goal.ends)} times")
         if goal.ended_at - goal.began > longest_s + goal.held_up_s + 1.0:

@@ -41,7 +41,7 @@ def test_feedback_in_si_forward_positive(number: int, sign: int) -> None:
     wheel = axis(number)
     assert wheel.on_status(status(ENABLED, 1000), 10.0)
     assert wheel.on_status(status(ENABLED, 1000 + sign * round(0.003 * COUNTS_PER_M)), 10.01)
-    assert wheel.on_velocity(velocity(sign * round(0.3 * BITS_PER_MPS)))
+    assert wheel.on_velocity(velocity(sign * round(0.3 * BITS_PER_MPS)), 10.01)
     assert wheel.state is DriveState.OPERATION_ENABLED
     assert wheel.velocity_mps == pytest.approx(0.3, abs=1e-4)
     assert wheel.travel.travel_m == pytest.approx(0.003, abs=1e-5)
@@ -53,6 +53,7 @@ def test_feedback_in_si_forward_positive(number: int, sign: int) -> None:
 def test_a_status_of_wrong_length_is_refused_and_changes_nothing(length: int) -> None:
     left = axis()
     left.on_status(status(ENABLED, 5), 10.0)
+    left.on_velocity(velocity(0), 10.0)
     assert not left.on_status(bytes(length), 10.1)
     assert left.statusword == ENABLED
     assert left.age_s(10.1) == pytest.approx(0.1)
@@ -62,19 +63,19 @@ def test_a_status_of_wrong_length_is_refused_and_changes_nothing(length: int) ->
 def test_a_velocity_of_wrong_length_is_refused_and_is_no_sample(length: int) -> None:
     left = axis()
     left.on_status(status(ENABLED, 5), 10.0)
-    assert not left.on_velocity(bytes(length))
+    assert not left.on_velocity(bytes(length), 10.0)
     assert not left.has_new_sample
 
 
 def test_a_sample_is_new_when_both_frames_of_a_sync_have_come_and_until_it_is_taken() -> None:
     left = axis()
-    left.on_velocity(velocity(0))
+    left.on_velocity(velocity(0), 10.0)
     assert not left.has_new_sample
     left.on_status(status(READY, 0), 10.0)
-    left.on_velocity(velocity(0))
+    left.on_velocity(velocity(0), 10.0)
     assert left.has_new_sample
     left.sample_taken()
-    left.on_velocity(velocity(0))
+    left.on_velocity(velocity(0), 10.0)
     assert not left.has_new_sample
 
 
@@ -105,7 +106,7 @@ def test_after_a_restart_what_was_heard_no_longer_counts_and_the_travel_goes_on(
     left = axis()
     left.on_status(status(ENABLED, 0), 10.0)
     left.on_status(status(ENABLED, 1000), 10.01)
-    left.on_velocity(velocity(500))
+    left.on_velocity(velocity(500), 10.01)
     way_m = left.travel.travel_m
     left.forget()
     assert (left.state, left.velocity_mps, left.age_s(10.02), left.has_new_sample) == (None, 0.0, math.inf, False)
@@ -141,3 +142,15 @@ def test_the_setpoint_is_one_step_to_the_goal_and_has_a_target_only_on_the_way_o
     assert frame.cob_id == 0x201 + number
     assert frame.data == pack_setpoint(controlword, sign * round(target * BITS_PER_MPS))
     assert wheel.target_mps == target
+
+
+def test_each_value_has_its_own_age_and_the_oldest_is_that_of_the_axis() -> None:
+    left = axis()
+    left.on_status(status(ENABLED, 0), 10.0)
+    assert left.age_s(10.0) == math.inf  # no velocity yet
+    left.on_velocity(velocity(100), 10.0)
+    left.on_status(status(ENABLED, 5), 10.2)
+    assert left.age_s(10.2) == pytest.approx(0.2)
+    left.on_velocity(velocity(100), 10.2)
+    left.on_velocity(velocity(100), 10.5)
+    assert left.age_s(10.5) == pytest.approx(0.3)

@@ -13,6 +13,7 @@ import pytest
 
 from canbase_bench.personality import PERSONALITIES
 from canbase_config.derive import watchdog_config
+from canbase_config.stopping import standstill_s
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.snapshot import DriverState
 from canbase_watchdog.watchdog import Watchdog
@@ -193,10 +194,12 @@ def run_beside_a_blind_watchdog(world: World, seconds: float) -> None:
 def test_a_wheel_that_does_not_stop_is_quick_stopped_and_latched_by_the_driver_alone(world: World) -> None:
     world.node.axes[0].faults.ignores_setpoints = True
     world.command = Twist2D.ZERO
-    run_beside_a_blind_watchdog(world, 3.2)
+    patience_s = standstill_s(world.robot)  # 2 × (0.8 s + 0.1 s of jerk) + 0.12 s of lag + 0.5 s
+    assert patience_s == pytest.approx(2.42)
+    run_beside_a_blind_watchdog(world, patience_s - 0.1)
     assert not world.core.stops
     assert world.truth.v_left_mps > 0.1
-    run_beside_a_blind_watchdog(world, 0.3)
+    run_beside_a_blind_watchdog(world, 0.7)  # since its ramp was at zero
     assert world.core.cause.name == "did not stop"
     assert world.core.cause.detail.startswith("left_wheel turns at 0.3")
     run_beside_a_blind_watchdog(world, 2.0)
@@ -211,14 +214,14 @@ def test_a_wheel_that_does_not_stop_is_stopped_by_whoever_notices_first(world: W
     assert world.core.state is DriverState.LATCHED
 
 
-def test_a_push_against_the_standing_base_is_held_and_no_reason_to_stop(world: World) -> None:
+def test_a_velocity_of_16_mm_per_s_beside_an_encoder_that_is_still_is_noise_and_a_stand(world: World) -> None:
     world.command = Twist2D.ZERO
     world.run(5.0)
     bit_mps = watchdog_config(world.robot).drives[0].velocity_mps_per_bit
     world.node.axes[0].faults.stuck_velocity = round(0.016 / bit_mps)  # for a moment
     world.run(0.5)
     assert world.core.state is DriverState.ENABLED
-    assert not world.snapshot.standstill
+    assert world.snapshot.standstill
     world.node.axes[0].faults.stuck_velocity = None
     world.run(3.5)
     assert world.core.state is DriverState.ENABLED

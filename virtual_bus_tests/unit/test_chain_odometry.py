@@ -30,10 +30,10 @@ def world(kind: str) -> World:
 
 def test_a_drive_that_was_switched_off_and_on_is_booted_again_and_waits_for_a_reset(world: World) -> None:
     world.node.power_cycle(world.now, off_s=0.5)
-    world.run(1.5)
+    world.run(0.7)
     before = world.snapshot
     assert not before.odometry_valid
-    world.run(1.5)
+    world.run(3.3)
     after = world.snapshot
     assert after.state is DriverState.LATCHED
     assert after.odometry_valid

@@ -79,6 +79,8 @@ def made_consistent(values: Values) -> Values:
     values["bus"].pop("sync_counter", None)
     values["bus"]["bitrate"] = 1_000_000 - values["bus"].get("bitrate", 0) % 300_000  # for eight drives at 200 Hz
     limits, safety, action = values["limits"], values["safety"], values.get("action", {})
+    for key, least in (("deceleration_mps2", 1.0), ("angular_deceleration_radps2", 5.0), ("jerk_mps3", 1.0)):
+        limits[key] = max(limits.get(key, 10.0), least)  # it stops in time
     limits["emergency_deceleration_mps2"] = max(limits["emergency_deceleration_mps2"], limits["deceleration_mps2"])
     safety["stop_distance_m"] = min(safety.get("stop_distance_m", 0.15), 4.0)
     safety["slow_distance_m"] = safety["stop_distance_m"] + 0.5
@@ -89,6 +91,7 @@ def made_consistent(values: Values) -> Values:
         action[f"min_{what}"] = min(action.get(f"min_{what}", 0.01), 0.4)
     least_s = CYCLES_PER_TIMEOUT / values.get("rates", {}).get("control_hz", 100.0)
     timeouts = values.setdefault("timeouts", {})
+    timeouts.pop("standstill_s", None)
     for key in ("feedback_s", "drive_heartbeat_s"):
         timeouts[key] = max(timeouts.get(key, 0.1), least_s)
     for extra in ("interface", "channel", "bitrate"):

@@ -34,7 +34,7 @@ class Story:
             round(axis.drive.direction * value) for value in (travel_m * COUNTS_PER_M, speed_mps * BITS_PER_MPS)
         )
         axis.on_status(word.to_bytes(2, "little") + counts.to_bytes(4, "little", signed=True), self.now)
-        axis.on_velocity(raw.to_bytes(4, "little", signed=True))
+        axis.on_velocity(raw.to_bytes(4, "little", signed=True), self.now)
         self.feed.update(self.now)
 
     def all_say(self, *travels_m: float) -> None:

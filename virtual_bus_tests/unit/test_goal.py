@@ -13,6 +13,7 @@ from canbase_action_server.motion import Twist
 from canbase_action_server.outcome import ErrorCode, Status
 from canbase_action_server.request import DriveRequest
 from canbase_action_server.standstill import Standstill, StandstillLimits, Verdict
+from canbase_config.stopping import standstill_s
 from unit.action_plant import GOOD_SAFETY, Plant, Story, bench_robot, drive, goal_run, replaced
 
 OBSTACLE = replace(GOOD_SAFETY, stops=True, cause="obstacle", detail="0.12 m ahead")
@@ -116,7 +117,7 @@ def test_a_base_that_does_not_stop_is_not_called_canceled() -> None:
     end = story.run()
     assert end.code is ErrorCode.DRIVE_FAULT
     assert "still moves" in end.message
-    assert story.ended_at == pytest.approx(2.0 + 3.0, abs=0.05)  # timeouts.standstill_s
+    assert story.ended_at == pytest.approx(2.0 + standstill_s(bench_robot()), abs=0.05)
 
 
 def test_a_base_that_is_stuck_makes_no_progress() -> None:

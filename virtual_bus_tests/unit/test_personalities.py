@@ -11,6 +11,7 @@ from canbase_bench.personality import PERSONALITIES
 from canbase_config.derive import watchdog_config
 from canbase_config.profile_file import load_profile, profile_names
 from canbase_config.robot import Robot
+from canbase_config.stopping import standstill_s
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.snapshot import DriverState
 from canbase_watchdog.stop import plan
@@ -193,5 +194,5 @@ def test_a_lost_watchdog_stops_an_epos4_and_a_reset_brings_it_back_with_the_next
     assert world.truth.standing_s > 0.2
     world.watchdog = watchdog
     world.command = Twist2D.ZERO
-    world.run(world.robot.timeouts.standstill_s)  # its node left OPERATIONAL: nothing tells the driver that it stands
+    world.run(standstill_s(world.robot))  # its node left OPERATIONAL: nothing tells the driver that it stands
     assert world.recovered()

@@ -130,6 +130,7 @@ def test_a_deactivation_that_is_not_confirmed_in_time_is_not_taken_back() -> Non
     world.run(3.0)
     assert world.powered == [False, False]
     assert world.reset().done
+    world.run(0.02)
     assert world.core.cause.name == "inactive"
     assert world.go(Aim.ACTIVE).done
 

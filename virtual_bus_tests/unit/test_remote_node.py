@@ -52,7 +52,9 @@ class Story:
         return self.node.on_heartbeat(Frame(0x701, bytes([state])), self.now)
 
     def status(self) -> bool:
-        return self.node.on_status(self.axis, Frame(0x181, bytes.fromhex("37 06 10 00 00 00")), self.now)
+        """Status and velocity, as they answer one SYNC."""
+        status = self.node.on_status(self.axis, Frame(0x181, bytes.fromhex("37 06 10 00 00 00")), self.now)
+        return self.node.on_velocity(self.axis, Frame(0x281, bytes(4)), self.now) and status
 
     def booted(self) -> Story:
         self.node.begin_boot(self.now)
@@ -315,15 +317,15 @@ def test_feedback_counts_only_from_the_nmt_start_on_and_its_length_matters_only_
     story = Story()
     velocity = Frame(0x281, bytes.fromhex("10 00 00 00"))
     assert story.status()
-    assert story.node.on_velocity(story.axis, velocity)
+    assert story.node.on_velocity(story.axis, velocity, story.now)
     assert story.node.on_status(story.axis, Frame(0x181), 10.0)
     assert (story.axis.state, story.axis.velocity_mps) == (None, 0.0)
     story.started()
     assert story.status()
-    assert story.node.on_velocity(story.axis, velocity)
+    assert story.node.on_velocity(story.axis, velocity, story.now)
     assert story.axis.velocity_mps > 0.0
     assert not story.node.on_status(story.axis, Frame(0x181), story.now)
-    assert not story.node.on_velocity(story.axis, Frame(0x281))
+    assert not story.node.on_velocity(story.axis, Frame(0x281), story.now)
 
 
 def test_a_second_begin_does_nothing_while_it_boots_or_is_there() -> None:

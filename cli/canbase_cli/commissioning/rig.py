@@ -180,7 +180,7 @@ class Rig:
                 node.on_status(axis, frame, now)
                 self._unanswered[axis.drive.joint] = 0
             elif frame.cob_id == node.layout.velocity_cob_id(axis.drive.axis):
-                node.on_velocity(axis, frame)
+                node.on_velocity(axis, frame, now)
 
     def tick(self, now: float) -> list[Frame]:
         """What is due. Raises RigError when a wheel runs away, or another master speaks."""

@@ -1,0 +1,53 @@
+"""Which of the stops that robot.yaml describes are not certain: sentences with numbers, the key, and the way out.
+
+What cannot be used at all is refused by `robot.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Final
+
+from canbase_config.errors import Loc
+from canbase_config.stopping import longest_quick_stop_s, max_wheel_mps, quick_stop
+
+if TYPE_CHECKING:
+    from canbase_config.drive import Drive
+    from canbase_config.robot import Robot
+
+DISABLE_VOLTAGE: Final = 2
+"""6007h: a drive that loses its masters lets its motor coast (CiA 402-2)."""
+
+
+def uncertain_stops(robot: Robot) -> Iterator[tuple[Loc, str]]:
+    """The place of each in robot.yaml, and a sentence."""
+    for index, drive in enumerate(robot.drives):
+        sentence = _own_ramp(robot, drive) or _cut_short(robot, drive)
+        if sentence:
+            yield ("drives", index, "profile"), sentence
+
+
+def _own_ramp(robot: Robot, drive: Drive) -> str:
+    kind = drive.kind
+    if kind.options.ramps == "no":
+        why = "it has no 6085h"
+    elif kind.is_unproven("options.ramps") or kind.is_unproven("units.acceleration"):
+        why = "the unit of its 6085h has no source"
+    else:
+        return ""
+    stop = quick_stop(robot, max_wheel_mps(robot))
+    return (
+        f"the quick stop of a {kind.title} may not be the stated one, {stop.time_s:.2f} s and {stop.distance_m:.2f} m "
+        f"from {max_wheel_mps(robot):g} m/s: {why}; measure it before the first drive (docs/commissioning.md)"
+    )
+
+
+def _cut_short(robot: Robot, drive: Drive) -> str:
+    own, longest_s = drive.kind.self_stop, longest_quick_stop_s(robot)
+    if own.abort_connection_code != DISABLE_VOLTAGE or longest_s <= robot.timeouts.drive_heartbeat_s:
+        return ""
+    return (
+        f"a quick stop takes up to {longest_s:.2f} s; when driver and watchdog end meanwhile, a {drive.kind.title} "
+        f"coasts after timeouts.drive_heartbeat_s ({robot.timeouts.drive_heartbeat_s:g}), as its profile's "
+        "self_stop.abort_connection_code is 2; 3 would let it brake to the end"
+    )

@@ -1,0 +1,106 @@
+"""Whether one wheel stands, judged from encoder and velocity together, and whether they are evidence for it.
+
+Standstill: the velocity is below base.standstill_mps and the encoder does not contradict it; or the encoder has not
+moved for STILL_S, and what is left of the velocity is noise. A sensor that did not show motion that was ordered is no
+evidence: then a stand is only assumed, when the power has been off for as long as a wheel rolls. Pure.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from canbase_config.robot import Robot
+from canbase_config.stopping import coasting_s, max_wheel_mps
+
+STILL_S = 0.2
+"""An encoder that did not move for so long stands, even if the velocity is noisy."""
+STEP_FACTOR = 3.0
+"""One step of the encoder may look so many times as fast as it is: samples come early and late."""
+COUNTS = 2.0
+"""An encoder at an edge counts to and fro."""
+
+
+@dataclass(frozen=True, slots=True)
+class StillnessLimits:
+    """Numbers of robot.yaml."""
+
+    standstill_mps: float
+    noise_mps: float
+    unshown_m: float
+    """So much ordered travel without any sign of motion takes the trust."""
+    coasting_s: float
+
+    @classmethod
+    def of(cls, robot: Robot) -> StillnessLimits:
+        """Of this robot."""
+        watchdog = robot.watchdog
+        rolls_s = coasting_s(watchdog.overspeed_factor * max_wheel_mps(robot))
+        return cls(robot.base.standstill_mps, watchdog.motion_tolerance_mps, watchdog.travel_tolerance_m, rolls_s)
+
+
+class Stillness:
+    """Follows the samples of one wheel. Speeds and travel at the rim, forward positive [m/s, m]."""
+
+    def __init__(self, limits: StillnessLimits, m_per_count: float) -> None:
+        self._limits = limits
+        self._grain_m = COUNTS * abs(m_per_count)
+        self._at = self._still_since = -math.inf
+        self._travel_m = self._anchor_m = self._unshown_m = 0.0
+        self._off_since = math.inf
+        self._quiet = False
+        self.doubt = ""
+        """Why the sensors are no evidence; empty: they are."""
+
+    def forget(self) -> None:
+        """What was measured no longer counts: a gap, or a restart. Doubts and the time without power stay."""
+        self._at = self._still_since = -math.inf
+        self._quiet = False
+
+    def on_power(self, has_torque: bool, now: float) -> None:
+        """What the statusword tells. Power after a stand that was assumed: the sensors get a new trial."""
+        if has_torque and self.doubt and self.rolled_out(now):
+            self.doubt, self._unshown_m = "", 0.0
+        self._off_since = math.inf if has_torque else min(self._off_since, now)
+
+    def on_sample(self, travel_m: float, velocity_mps: float, ordered_mps: float, now: float) -> None:
+        """Encoder and velocity of one SYNC; `ordered_mps`: what an enabled drive was ordered before it, else 0."""
+        limits, elapsed_s = self._limits, now - self._at
+        first = self._at == -math.inf
+        step_m = 0.0 if first else abs(travel_m - self._travel_m)
+        slow_m = 0.0 if first else STEP_FACTOR * limits.standstill_mps * elapsed_s
+        moved = first or abs(travel_m - self._anchor_m) > max(limits.standstill_mps * STILL_S, self._grain_m)
+        if moved:
+            self._anchor_m, self._still_since = travel_m, now
+        speed_mps = abs(velocity_mps)
+        slow = speed_mps <= limits.standstill_mps and step_m <= max(slow_m, self._grain_m)
+        self._quiet = slow or (speed_mps <= limits.noise_mps and now - self._still_since >= STILL_S)
+        self._travel_m, self._at = travel_m, now
+        if not first:
+            self._compare(moved and speed_mps > limits.standstill_mps, abs(ordered_mps) * elapsed_s)
+
+    def distrust(self, why: str) -> None:
+        """Somebody else has caught the sensors with a lie."""
+        self.doubt = why
+
+    def stands(self, now: float) -> bool:
+        """The last sample says so, and is evidence; or nothing has driven it for longer than it rolls."""
+        return self._quiet and (not self.doubt or self.rolled_out(now))
+
+    def rolled_out(self, now: float) -> bool:
+        """Its power has been off, by its own statusword, for longer than a wheel rolls on a level floor."""
+        return now - self._off_since >= self._limits.coasting_s
+
+    def assumed(self, now: float) -> str:
+        """Why its standstill is assumed and not measured; empty: it is measured, or it does not stand."""
+        if not self.doubt or not self.stands(now):
+            return ""
+        return f"{self.doubt}; its power has been off for {now - self._off_since:.0f} s, so a stand is assumed"
+
+    def _compare(self, shown: bool, ordered_m: float) -> None:
+        if shown:
+            self._unshown_m, self.doubt = 0.0, ""
+            return
+        self._unshown_m += ordered_m
+        if self._unshown_m > self._limits.unshown_m:
+            self.doubt = f"showed no motion for {self._unshown_m:.3f} m that were ordered"
