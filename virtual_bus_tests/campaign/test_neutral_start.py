@@ -1,0 +1,233 @@
+"""A stick that is held while parts come and go, with all real cores in virtual time: what stays still until it is
+released. Each story says first that the stick works, and at the end that it works again. Times in s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from campaign.outside import Surroundings
+from campaign.world import World
+from canbase_driver.reset import Outcome
+from canbase_driver.snapshot import DriverState
+from canbase_velocity.neutral import Arming
+from canbase_velocity.twist import ZERO, Twist
+
+FORWARD = Twist(0.3, 0.0)
+STICK_HZ = 20.0
+RESTS_M = 0.002
+READY_S = 8.0
+
+
+class Hand:
+    """Somebody at the joystick. `holds`: what the stick orders; None: the radio is silent."""
+
+    def __init__(self, topic: str = "cmd_vel_joy") -> None:
+        self.world = World()
+        self.around = Surroundings(self.world)
+        self.holds: Twist | None = None
+        self._topic = topic
+        self._send()
+
+    def _send(self) -> None:
+        if self.holds is not None:
+            self.world.topics.publish(self._topic, self.holds)
+        self.world.clock.after(1.0 / STICK_HZ, self._send)
+
+    def run(self, seconds: float) -> float:
+        """Let time pass; how far the base went meanwhile [m]."""
+        base = self.world.drives.bench.base
+        before_m = base.path_m
+        self.world.clock.run_until(self.world.clock.now + seconds)
+        return base.path_m - before_m
+
+    def wait_enabled(self) -> None:
+        """Until the drives have power; a reset where one is needed."""
+        outcomes: list[Outcome] = []
+        for _ in range(round(READY_S / 0.1)):
+            self.run(0.1)
+            if self.world.driver.core.state is DriverState.ENABLED:
+                return
+            if self.world.driver.core.state is DriverState.LATCHED:
+                self.world.velocity.reset()
+                self.world.driver.reset(outcomes)
+        raise AssertionError(f"{self.world.driver.core.state}: {self.world.driver.core.cause} {outcomes}")
+
+    def stays(self, seconds: float = 3.0) -> bool:
+        """The base does not move."""
+        return self.run(seconds) < RESTS_M
+
+    def drives(self) -> bool:
+        """The base follows the stick, after it was released."""
+        self.holds = ZERO
+        self.run(0.3)
+        self.holds = FORWARD
+        return self.run(1.5) > 0.2
+
+
+@pytest.fixture
+def hand() -> Hand:
+    """The robot is enabled, and follows the stick, which is held."""
+    hand = Hand()
+    hand.world.enable()
+    assert hand.drives()
+    return hand
+
+
+def driver_restarts(hand: Hand) -> None:
+    hand.world.driver.die()
+    hand.run(2.0)
+    hand.world.driver.restart()
+
+
+def velocity_restarts(hand: Hand) -> None:
+    hand.world.velocity.die()
+    hand.run(2.0)
+    hand.world.velocity.restart()
+
+
+def watchdog_restarts(hand: Hand) -> None:
+    hand.world.watchdog.die()
+    hand.run(2.0)
+    hand.world.watchdog.restart()
+
+
+def all_restart(hand: Hand) -> None:
+    for process in hand.world.processes.values():
+        process.die()
+    hand.run(2.0)
+    for process in hand.world.processes.values():
+        process.restart()
+
+
+def stop_service(hand: Hand) -> None:
+    hand.world.driver.stop()
+    hand.run(2.0)
+
+
+def estop_pressed_and_released(hand: Hand) -> None:
+    hand.around.press(True)
+    hand.run(2.0)
+    hand.around.press(False)
+    hand.run(0.3)
+
+
+def reset_while_no_scan_comes(hand: Hand) -> None:
+    """The filter orders zero, so the driver accepts a reset; then the scans return."""
+    hand.around.scans = False
+    hand.run(1.0)
+    hand.world.driver.stop()
+    hand.run(2.0)
+    hand.wait_enabled()
+    hand.run(1.0)
+    hand.around.scans = True
+
+
+def reset_before_an_obstacle(hand: Hand) -> None:
+    """The same with a wall ahead, which is taken away."""
+    hand.around.put_wall(0.05)
+    hand.run(3.0)
+    hand.world.driver.stop()
+    hand.run(2.0)
+    hand.wait_enabled()
+    hand.run(1.0)
+    hand.around.take_wall()
+
+
+EVENTS = (
+    driver_restarts,
+    velocity_restarts,
+    watchdog_restarts,
+    all_restart,
+    stop_service,
+    estop_pressed_and_released,
+    reset_while_no_scan_comes,
+    reset_before_an_obstacle,
+)
+
+
+@pytest.mark.parametrize("event", EVENTS)
+def test_a_stick_held_over_it_moves_nothing_until_it_is_released(hand: Hand, event: Callable[[Hand], None]) -> None:
+    event(hand)
+    hand.world.velocity.reset()
+    assert hand.world.drives.bench.base.v_mps == pytest.approx(0.0, abs=1e-3)
+    before_m = hand.world.drives.bench.base.path_m
+    hand.wait_enabled()
+    assert hand.stays()
+    assert hand.world.drives.bench.base.path_m - before_m < RESTS_M
+    hand.holds = ZERO
+    hand.run(0.2)
+    hand.world.velocity.reset()  # an emergency stop waits for it, and refused it while the stick was held
+    assert hand.drives()
+
+
+def test_a_stick_that_is_held_at_power_on_moves_nothing_until_it_is_released() -> None:
+    hand = Hand()
+    hand.holds = FORWARD
+    hand.wait_enabled()
+    assert hand.stays(10.0)
+    assert hand.drives()
+
+
+def test_a_slow_scanner_at_power_on_does_not_release_a_held_stick() -> None:
+    hand = Hand()
+    hand.holds, hand.around.scans = FORWARD, False
+    hand.wait_enabled()
+    hand.run(2.0)
+    hand.around.scans = True
+    assert hand.stays(5.0)
+    assert hand.drives()
+
+
+@pytest.mark.parametrize("gap_s", [0.45, 1.0, 3.0])
+def test_a_radio_gap_after_a_reset_is_no_release(hand: Hand, gap_s: float) -> None:
+    stop_service(hand)
+    hand.wait_enabled()
+    hand.holds = None  # the mux orders zero, for which the driver waits
+    hand.run(gap_s)
+    hand.holds = FORWARD  # the stick was never released
+    assert hand.stays()
+    assert hand.drives()
+
+
+@pytest.mark.parametrize("gap_s", [0.45, 1.0, 3.0])
+def test_a_radio_gap_across_a_reset_is_no_release(hand: Hand, gap_s: float) -> None:
+    hand.holds = None
+    hand.run(gap_s / 2)
+    stop_service(hand)
+    hand.wait_enabled()
+    hand.run(gap_s / 2)
+    hand.holds = FORWARD
+    assert hand.stays()
+    assert hand.drives()
+
+
+def test_navigation_that_was_idle_starts_with_a_velocity_and_not_while_it_goes_on_over_a_reset() -> None:
+    hand = Hand("cmd_vel_nav")
+    hand.wait_enabled()
+    hand.run(2.1)
+    hand.holds = FORWARD
+    assert hand.run(1.5) > 0.2
+    stop_service(hand)
+    hand.wait_enabled()
+    assert hand.stays(5.0)
+    hand.holds = None
+    hand.run(2.1)
+    hand.holds = FORWARD
+    assert hand.run(1.5) > 0.2
+
+
+@pytest.mark.parametrize("event", [driver_restarts, velocity_restarts, stop_service, reset_while_no_scan_comes])
+def test_without_neutral_start_the_base_drives_off(
+    hand: Hand, event: Callable[[Hand], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The stories above can fail: this is what happened before there was a neutral start."""
+    monkeypatch.setattr(Arming, "armed", property(lambda self: True))
+    event(hand)
+    if event is not reset_while_no_scan_comes:
+        hand.holds = None  # a radio gap, in which the driver sees its zero
+        hand.wait_enabled()
+        hand.holds = FORWARD
+    assert not hand.stays()
