@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 from canbase.msg import DriverStatus, MuxState, SafetyState
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry as OdometryMessage
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.clock import Clock, ClockType
@@ -37,6 +38,7 @@ from canbase_config.journal import Journal, Voice
 from canbase_config.priority import Priority
 from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
+from canbase_config.sim_time import refuse_sim_time
 
 SENSOR_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 STATUS_QOS = QoSProfile(depth=1)
@@ -56,6 +58,7 @@ class DriveDistanceServer(Node):
 
     def __init__(self, robot: Robot, bindings: Sequence[Binding]) -> None:
         super().__init__("drive_distance_server")
+        refuse_sim_time(self, SetParametersResult)
         self._robot = robot
         self._own_source = action_source(robot)
         self._reception = Reception(robot)

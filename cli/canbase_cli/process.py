@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -22,9 +24,12 @@ from canbase_cli.options import (
 )
 from canbase_cli.own_modules import module_command
 from canbase_cli.priority import raise_priority
+from canbase_config.sim_time import SimTimeError
 
 if TYPE_CHECKING:
     from canbase_config.robot import Robot
+
+WRONG_COMMAND_LINE: Final = 2
 
 
 StopFileOption = Annotated[
@@ -51,7 +56,8 @@ def driver(
     with ros_needed():
         from canbase_driver.main import run
     leave_stop_file(robot, stop_file)
-    raise typer.Exit(run(robot, ros_arguments(ctx, namespace), autostart, partial(raise_priority, "driver")))
+    with _real_time():
+        raise typer.Exit(run(robot, ros_arguments(ctx, namespace), autostart, partial(raise_priority, "driver")))
 
 
 def velocity(ctx: typer.Context, config: ConfigOption = None, namespace: NamespaceOption = "") -> None:
@@ -62,7 +68,8 @@ def velocity(ctx: typer.Context, config: ConfigOption = None, namespace: Namespa
     robot = load_config(config).robot
     with ros_needed():
         from canbase_velocity.main import run
-    raise typer.Exit(run(robot, ros_arguments(ctx, namespace), partial(raise_priority, "velocity")))
+    with _real_time():
+        raise typer.Exit(run(robot, ros_arguments(ctx, namespace), partial(raise_priority, "velocity")))
 
 
 def action_server(ctx: typer.Context, config: ConfigOption = None, namespace: NamespaceOption = "") -> None:
@@ -73,7 +80,17 @@ def action_server(ctx: typer.Context, config: ConfigOption = None, namespace: Na
     robot = load_config(config).robot
     with ros_needed():
         from canbase_action_server.main import run
-    raise typer.Exit(run(robot, ros_arguments(ctx, namespace), partial(raise_priority, "action-server")))
+    with _real_time():
+        raise typer.Exit(run(robot, ros_arguments(ctx, namespace), partial(raise_priority, "action-server")))
+
+
+@contextmanager
+def _real_time() -> Iterator[None]:
+    """A wrong command line: use_sim_time."""
+    try:
+        yield
+    except SimTimeError as error:
+        fail(str(error), WRONG_COMMAND_LINE)
 
 
 def sim(

@@ -14,6 +14,14 @@ from canbase.msg import DriverStatus, SafetyState
 from canbase_cli.checks import Check, fail, ok, warn
 from canbase_cli.evidence import Evidence
 
+UNFOLLOWED = {
+    True: "release the joystick, or let that program order zero (docs/velocity.md, Neutral start)",
+    False: "look at the network between that sender and the robot, and at the clock of the sender",
+}
+"""What to do about a source that is not followed, by whether it waits for a zero."""
+SILENT_S = 1.5
+"""A state that was received longer ago says nothing: the slowest one comes every 0.5 s."""
+HANGS = "its process hangs, or its timers stand still: look at its log, and restart it"
 PARTS_RUN = "is it running (canbase up), in this namespace and ROS_DOMAIN_ID?"
 STATES = {
     DriverStatus.OFFLINE: "offline",
@@ -43,8 +51,8 @@ def configuration(evidence: Evidence) -> list[Check]:
 def driver(evidence: Evidence) -> list[Check]:
     """The state of motor_driver, and its counters."""
     status = evidence.on("motor_driver/status").last
-    if status is None:
-        return [_silent("motor_driver", "motor_driver/status")]
+    if silent := _silent(evidence, "motor_driver", "motor_driver/status"):
+        return [silent]
     state = STATES.get(status.state, f"state {status.state}")
     if status.state == DriverStatus.ENABLED:
         stands = "stands" if status.standstill else "moves"
@@ -122,8 +130,8 @@ def safety_filter(evidence: Evidence) -> list[Check]:
     """What the filter lets through, and whether its leases arrive."""
     heard = evidence.on("safety_filter/state")
     state = heard.last
-    if state is None:
-        return [_silent("safety_filter", "safety_filter/state")]
+    if silent := _silent(evidence, "safety_filter", "safety_filter/state"):
+        return [silent]
     found = f"{state.cause}: {state.detail}" if state.detail else state.cause
     if state.lease_errors > heard.first.lease_errors:
         lost = f"{state.lease_errors} leases could not be delivered to {evidence.robot.lease.socket}"
@@ -164,8 +172,12 @@ def _scanner(scanner: Any, dropped: int) -> Check:
 def velocity_mux(evidence: Evidence) -> list[Check]:
     """Who drives, and who sends what is no number."""
     state = evidence.on("velocity_mux/state").last
-    if state is None:
-        return [_silent("velocity_mux", "velocity_mux/state")]
+    if silent := _silent(evidence, "velocity_mux", "velocity_mux/state"):
+        return [silent]
+    ignored = [source for source in state.sources if source.active and source.reason]
+    if ignored:
+        told = f"{ignored[0].name} is not followed: {ignored[0].reason}"
+        return [fail("velocity_mux", told, UNFOLLOWED[ignored[0].reason.startswith("waiting")])]
     found = f"{state.active} drives" if state.active else "nobody drives"
     bad = [source.name for source in state.sources if source.refused]
     if bad:
@@ -189,8 +201,15 @@ def robot_checks(evidence: Evidence) -> list[Check]:
     return [check for checks in CHECKS for check in checks(evidence)]
 
 
-def _silent(name: str, topic: str) -> Check:
-    return fail(name, f"nothing came on {topic}", PARTS_RUN)
+def _silent(evidence: Evidence, name: str, topic: str) -> Check | None:
+    """Nothing came, or nothing any more: a latched topic gives the last words of a node that hangs to everybody."""
+    heard = evidence.on(topic)
+    if heard.last is None:
+        return fail(name, f"nothing came on {topic}", PARTS_RUN)
+    age_s = evidence.now - heard.times_s[-1]
+    if age_s <= SILENT_S:
+        return None
+    return fail(name, f"nothing on {topic} for {age_s:.1f} s; what it said before is not looked at", HANGS)
 
 
 def _until(clears_on: str) -> str:

@@ -11,10 +11,12 @@ from __future__ import annotations
 import time
 
 from lifecycle_msgs.msg import Transition
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 
 from canbase_config.receive_time import ReceiveTimes
+from canbase_config.sim_time import refuse_sim_time
 from canbase_driver.late_answer import Asked, answer_later
 from canbase_driver.loop import ControlLoop
 from canbase_driver.readiness import Aim
@@ -39,6 +41,7 @@ class ManagedNode(LifecycleNode):
     def __init__(self, name: str, loop: ControlLoop, autostart: bool) -> None:
         """`autostart`: it is active at once, and the driver boots and enables as soon as it can."""
         super().__init__(name)
+        refuse_sim_time(self, SetParametersResult)
         self._loop = loop
         self.request_times = ReceiveTimes.of_requests()
         """Whether a request that is taken in now may have waited while this process stood still."""

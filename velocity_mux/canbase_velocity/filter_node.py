@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 
 from canbase.msg import SafetyState
 from geometry_msgs.msg import TwistStamped
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
@@ -22,6 +23,7 @@ from canbase_config.priority import Priority
 from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
 from canbase_config.safety import Scan as ScanConfig
+from canbase_config.sim_time import refuse_sim_time
 from canbase_config.stopping import ramp
 from canbase_velocity import messages
 from canbase_velocity.changes import DropTeller, changed_order, is_told
@@ -33,7 +35,7 @@ from canbase_velocity.lease import lease_datagram
 from canbase_velocity.placement import Placement, PlacementError, Transform, placed_by_tf
 from canbase_velocity.qos import COMMAND, SCAN, STATE, STATIC_TF, listen_twice
 from canbase_velocity.safety_filter import FilterConfig
-from canbase_velocity.steady import refuse_sim_time, steady_timer
+from canbase_velocity.steady import steady_timer
 from canbase_velocity.twist import Twist
 
 STATE_PERIOD_S = 0.1
@@ -49,7 +51,7 @@ class FilterNode(Node):
     def __init__(self, robot: Robot, moving_sources: MovingSources = tuple, keeper: LatchKeeper | None = None) -> None:
         """`keeper`: of the record of the emergency stop; None: for a test of the node alone."""
         super().__init__("safety_filter")
-        refuse_sim_time(self)
+        refuse_sim_time(self, SetParametersResult)
         self._robot = robot
         self._voice = Voice(self.get_logger(), Journal("safety_filter"))
         self._receive_times = ReceiveTimes()

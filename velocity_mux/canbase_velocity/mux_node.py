@@ -14,12 +14,14 @@ from canbase.msg import DriverStatus, MuxState
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist as TwistMessage
 from geometry_msgs.msg import TwistStamped
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from std_msgs.msg import Bool
 
 from canbase_config.journal import Journal, Voice
 from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
+from canbase_config.sim_time import refuse_sim_time
 from canbase_velocity.base_ready import status_timeout_s
 from canbase_velocity.changes import changes
 from canbase_velocity.delay import Sent
@@ -29,7 +31,7 @@ from canbase_velocity.messages import driver_state, sent_at, twist_message, twis
 from canbase_velocity.mux import Mux, MuxDecision
 from canbase_velocity.mux_messages import diagnostics, mux_state
 from canbase_velocity.qos import ANY_COMMAND, COMMAND, DRIVER_STATUS, STATE, listen_twice, loud
-from canbase_velocity.steady import refuse_sim_time, steady_timer
+from canbase_velocity.steady import steady_timer
 from canbase_velocity.twist import Twist
 
 STATE_PERIOD_S = 0.5
@@ -53,7 +55,7 @@ class MuxNode(Node):
 
     def __init__(self, robot: Robot) -> None:
         super().__init__("velocity_mux")
-        refuse_sim_time(self)
+        refuse_sim_time(self, SetParametersResult)
         self._robot = robot
         self._follower: Follower | None = None
         self._voice = Voice(self.get_logger(), Journal("velocity_mux"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,8 @@ import pytest
 from canbase.msg import DriverStatus, MuxState
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Twist, TwistStamped
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 
@@ -213,6 +216,52 @@ def test_a_foreign_publisher_locks_its_source_when_the_configuration_says_so(
         velocity.wait_for_order(0.0, 5.0)
         assert velocity.ordered_for(0.3) == {0.0}
     velocity.wait_for_order(0.1, 5.0)
+
+
+@pytest.mark.parametrize("policy", ["report", "lock"])
+def test_a_stranger_on_cmd_vel_mux_moves_nothing_holds_nobody_back_and_is_told(
+    start: Callable[[Mapping[str, Any]], Velocity], policy: str
+) -> None:
+    velocity = start({"foreign_publishers": policy})
+    stranger = velocity.node.repeat(TwistStamped, "cmd_vel_mux", 100.0)
+    stranger.message = drive(0.28)
+    velocity.node.wait_for(lambda: velocity.state.foreign, 5.0, "a foreign publisher")
+    assert velocity.ordered_for(1.0) == {0.0}
+    (foreign,) = velocity.state.foreign
+    assert (foreign.topic, foreign.locks) == ("/cmd_vel_mux", False)
+    assert foreign.problem == "only /velocity_mux should; nobody obeys it"
+    joystick = velocity.source(TwistStamped, "cmd_vel_joy")
+    joystick.message = drive(0.1)
+    velocity.wait_for_order(0.1)
+    assert velocity.ordered_for(0.5) == {0.1}
+
+
+@pytest.mark.parametrize("node", ["velocity_mux", "safety_filter"])
+def test_simulation_time_is_refused_while_it_runs_and_its_timers_go_on(
+    start: Callable[[Mapping[str, Any]], Velocity], node: str
+) -> None:
+    velocity = start({})
+    client = velocity.node.node.create_client(SetParameters, f"{node}/set_parameters")
+    velocity.node.wait_for(client.service_is_ready, START_S, "the parameters")
+    value = ParameterValue(type=ParameterType.PARAMETER_BOOL, bool_value=True)
+    request = SetParameters.Request(parameters=[Parameter(name="use_sim_time", value=value)])
+    answer = client.call_async(request)
+    velocity.node.wait_for(answer.done, 5.0, "an answer")
+    (result,) = answer.result().results
+    assert not result.successful
+    assert result.reason.startswith("use_sim_time is refused: this node moves a robot")
+    velocity.ordered_for(1.0)  # it asserts that it is not silent
+
+
+def test_a_start_with_simulation_time_is_refused_with_a_sentence(
+    spawn: Callable[..., Process], make_robot: Callable[[Mapping[str, Any]], Path], test_node: TestNode
+) -> None:
+    words = ["velocity", "--config", str(make_robot(FREE)), "--ros-args", "-p", "use_sim_time:=true"]
+    process = spawn([sys.executable, "-m", "canbase_cli", *words])
+    test_node.wait_for(lambda: process.exit_code is not None, 30.0, "its end")
+    assert process.exit_code == 2
+    assert "use_sim_time is refused" in process.log()
+    assert "Traceback" not in process.log()
 
 
 def test_a_publisher_of_the_other_message_type_is_told(start: Callable[[Mapping[str, Any]], Velocity]) -> None:

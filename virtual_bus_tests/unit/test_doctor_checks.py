@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -49,6 +50,29 @@ def changed(topic: str, **values: Any) -> Evidence:
     for name, value in values.items():
         setattr(now[topic], name, value)
     return evidence(now)
+
+
+@pytest.mark.parametrize(("age_s", "found"), [(1.5, False), (1.6, True), (18.0, True)])
+@pytest.mark.parametrize("topic", ["motor_driver/status", "safety_filter/state", "velocity_mux/state"])
+def test_a_sample_that_is_old_is_not_taken_for_what_is(topic: str, age_s: float, found: bool) -> None:
+    """A latched topic gives the last words of a node that hangs to whoever asks."""
+    seen = evidence(healthy())
+    heard = {**seen.heard, topic: Heard(seen.on(topic).messages, (0.0, seen.now - age_s))}
+    checks = robot_checks(replace(seen, heard=heard))
+    assert any(f"nothing on {topic} for {age_s:.1f} s" in check.found for check in checks) is found
+    assert (exit_code(checks) != 0) is found
+
+
+@pytest.mark.parametrize(("reason", "advice"), [
+    ("waiting for zero (motor_driver is LATCHED)", "release the joystick"),
+    ("delayed by 1.20 s (limit 0.30 s)", "look at the network"),
+])  # fmt: skip
+def test_a_source_that_is_not_followed_is_named_with_what_to_do(reason: str, advice: str) -> None:
+    source = MuxSource(name="joystick", active=True, reason=reason)
+    failed = first_failure(robot_checks(changed("velocity_mux/state", active="joystick", sources=[source])))
+    assert failed is not None
+    assert failed.found == f"joystick is not followed: {reason}"
+    assert failed.advice.startswith(advice)
 
 
 def drive_changed(**values: Any) -> Evidence:

@@ -1,0 +1,138 @@
+"""Neutral start with real processes: a stick that is held while parts of the robot come and go."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import pytest
+from canbase.msg import DriverStatus, SafetyState
+from geometry_msgs.msg import TwistStamped
+from std_msgs.msg import Bool
+
+from ros.running_robot import RESTS_M, RunningRobot, own_domain, robot_on
+from ros.test_velocity import reset
+from ros.velocity_chain import Chain, drive
+
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(240)]
+ENABLED = DriverStatus(state=DriverStatus.ENABLED)
+LATCHED = DriverStatus(state=DriverStatus.LATCHED)
+
+
+def followed(chain: Chain, seconds: float = 1.0) -> bool:
+    """Whether anything but zero is ordered from now on."""
+    chain.orders.clear()
+    chain.node.spin_for(seconds)
+    assert len(chain.orders.messages) > 10 * seconds
+    return any(order.twist.linear.x != 0.0 for order in chain.orders.messages)
+
+
+def waits(chain: Chain) -> str:
+    """What the mux says about the joystick."""
+    chain.node.spin_for(0.6)
+    assert chain.mux.last is not None
+    assert chain.mux.last.active == "joystick"
+    return str(chain.mux.last.sources[0].reason)
+
+
+def release(chain: Chain) -> None:
+    """The stick goes through zero, and is held again: now it is followed."""
+    chain.joystick.message = drive(0.0)
+    chain.node.spin_for(0.2)
+    chain.joystick.message = drive(0.2)
+    chain.wait_for_order(0.2)
+
+
+def test_a_stick_held_while_the_driver_latches_or_restarts_is_not_followed_before_a_zero(chain: Chain) -> None:
+    release(chain)
+    chain.driver.message = LATCHED
+    chain.node.spin_for(0.3)
+    chain.driver.message = ENABLED  # the operator has reset it
+    assert not followed(chain)
+    assert waits(chain) == "waiting for zero (motor_driver is LATCHED)"
+    release(chain)
+    chain.driver.message = None  # the driver dies
+    chain.node.spin_for(1.0)
+    chain.driver.message = ENABLED
+    assert not followed(chain)
+    chain.joystick.message = None  # a radio gap of 0.45 s
+    chain.node.spin_for(0.45)
+    chain.joystick.message = drive(0.2)
+    assert not followed(chain)
+    assert waits(chain).startswith("waiting for zero (motor_driver/status is silent")
+    release(chain)
+
+
+def test_a_stick_held_over_the_emergency_stop_is_not_followed_before_a_zero(chain: Chain) -> None:
+    release(chain)
+    chain.estop.message = Bool(data=True)
+    chain.wait_for_cause(SafetyState.CAUSE_ESTOP)
+    chain.estop.message = Bool(data=False)
+    chain.node.spin_for(0.3)
+    done, sentence = reset(chain)
+    assert (done, sentence.split(";")[0]) == (False, "refused: joystick orders a velocity")
+    chain.joystick.message = None  # a radio gap, in which the operator resets
+    chain.node.spin_for(0.45)
+    assert reset(chain)[0] is True
+    chain.joystick.message = drive(0.2)
+    assert not followed(chain)
+    release(chain)
+
+
+def test_a_reset_while_no_scan_comes_does_not_release_a_held_stick(chain: Chain) -> None:
+    release(chain)
+    scan, chain.scan.message = chain.scan.message, None
+    chain.wait_for_cause(SafetyState.CAUSE_SCAN_STALE)
+    chain.driver.message = LATCHED
+    chain.node.spin_for(0.3)
+    chain.driver.message = ENABLED  # reset: behind the filter everything was zero
+    chain.node.spin_for(0.3)
+    chain.scan.message = scan  # and the scans return
+    chain.wait_for_cause(SafetyState.CAUSE_NONE)
+    assert not followed(chain)
+    release(chain)
+
+
+def test_without_the_drivers_state_nothing_moves(start: Callable[[Mapping[str, Any]], Chain]) -> None:
+    chain = start({})
+    chain.driver.message = None
+    chain.node.spin_for(0.8)
+    chain.joystick.message = drive(0.2)
+    assert not followed(chain)
+    assert chain.mux.last is not None
+    assert (chain.mux.last.ready, chain.mux.last.not_ready) == (False, "motor_driver/status is silent")
+
+
+@pytest.fixture(scope="module")
+def running() -> Iterator[RunningRobot]:
+    with own_domain() as domain, robot_on(domain) as robot:
+        yield robot
+
+
+@pytest.mark.parametrize("parts", [("driver",), ("velocity",), ("velocity", "driver")], ids=" and ".join)
+def test_a_stick_held_while_parts_are_killed_and_started_again_moves_nothing(
+    running: RunningRobot, parts: tuple[str, ...]
+) -> None:
+    robot = running
+    robot.make_ready()
+    joystick = robot.node.source()
+    held = TwistStamped()
+    held.twist.linear.x = 0.2
+    joystick.message = held
+    robot.wait_speed(0.19)
+    for part in parts:
+        robot.send(part, signal.SIGKILL)
+    robot.wait_standing()
+    robot.stack.start()
+    robot.make_ready()
+    ready_s = time.monotonic()
+    assert robot.moved_since(ready_s, 2.0) < RESTS_M
+    robot.node.release(joystick)
+    joystick.message = held
+    robot.wait_speed(0.19)
+    robot.node.release(joystick)
+    robot.wait_standing()
+    robot.node.node.destroy_timer(joystick._timer)
+    robot.node.node.destroy_publisher(joystick.publisher)
