@@ -151,7 +151,7 @@ class GoalRun:
         self._cause = cause_while_stopping(self._situation(inputs, now), self._cause.code) or self._cause
         verdict = self._standstill.judge(inputs, now) if self._standstill else Verdict.WAIT
         if self._cause.code is ErrorCode.TAKEN_OVER:
-            verdict = Verdict.STANDS  # the base is another's now, and may well be moving
+            verdict = Verdict.HANDED_OVER
         if verdict is Verdict.WAIT:
             return Order(STOP)
         if self._stands_short(verdict):
@@ -178,7 +178,7 @@ class GoalRun:
             cause = Cause(cause.code, f"{cause.message}; the base {verdict.value}")
         went = motion.report()
         text = f"{cause.message}; {went}" if cause.message else f"{went}, and stands"
-        return Outcome(cause.code, motion.traveled_m, max(0.0, motion.overshoot_m), text)
+        return Outcome(cause.code, motion.traveled_m, max(0.0, motion.overshoot_m), text, verdict is Verdict.STANDS)
 
     def _feedback(self, now: float) -> Feedback | None:
         if now < self._next_feedback:

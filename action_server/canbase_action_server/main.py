@@ -16,9 +16,8 @@ from canbase_action_server.node import DriveDistanceServer
 from canbase_action_server.rotate_messages import rotate_binding
 from canbase_config.robot import Robot
 from canbase_config.service import Service
+from canbase_config.stopping import standstill_s
 
-STANDSTILL_S = 2.0
-"""On the way out the base has this long to stand; then the goal ends without it."""
 DELIVERY_S = 0.2
 """After the last result, for the middleware to hand it over."""
 SLICE_S = 0.1
@@ -35,7 +34,7 @@ def run(robot: Robot, ros_args: list[str], when_ready: Callable[[], None] = lamb
     when_ready()
     try:
         _serve(executor, node, asked_to_end)
-        _end(executor, node)
+        _end(executor, node, standstill_s(robot))
     finally:
         node.order_stop()
         executor.shutdown()
@@ -71,9 +70,10 @@ def _spin(executor: SingleThreadedExecutor, node: DriveDistanceServer) -> None:
         node.fail(error)
 
 
-def _end(executor: SingleThreadedExecutor, node: DriveDistanceServer) -> None:
+def _end(executor: SingleThreadedExecutor, node: DriveDistanceServer, stop_s: float) -> None:
+    """`stop_s`: the base has this long to stand; then the goal ends without it."""
     node.shut_down()
-    give_up = time.monotonic() + STANDSTILL_S
+    give_up = time.monotonic() + stop_s
     while node.busy and time.monotonic() < give_up:
         _spin(executor, node)
     node.give_up("the process ends; whether the base stands was not confirmed in time")

@@ -196,7 +196,7 @@ class DriveDistanceServer(Node):
         running, before = self._reception.running, self._reception.phase
         cycle = self._reception.tick(self._inputs, time.monotonic())
         if self._reception.phase is not before:
-            self._log_phase(running, before)
+            self._log_phase(running, before, cycle)
         self._carry_out(cycle)
 
     def _carry_out(self, cycle: Cycle) -> None:
@@ -223,10 +223,10 @@ class DriveDistanceServer(Node):
         priority = Priority.NOTICE if failed else Priority.INFO
         self._voice.tell(text, priority, robot=self._robot.name, goal=uuid, step=step, **told)
 
-    def _log_phase(self, uuid: str | None, before: Phase) -> None:
+    def _log_phase(self, uuid: str | None, before: Phase, cycle: Cycle) -> None:
         if self._reception.phase is Phase.STOPPING:
             self._log("stopping", self._reception.running)
-        elif before is Phase.STOPPING and self._reception.phase is Phase.ENDED:
+        elif before is Phase.STOPPING and any(end.key == uuid and end.outcome.stands for end in cycle.ends):
             self._log("standstill", uuid)
 
     def _log_end(self, uuid: str, goal: OpenGoal, outcome: Outcome, result: Any) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 
@@ -54,6 +54,8 @@ class Outcome:
     """Along the way, signed; of a turn, the way of the wheels on their circle."""
     overshoot_m: float
     message: str
+    stands: bool = field(default=False, compare=False)
+    """The base was seen standing at the end; for the log."""
 
     @property
     def status(self) -> Status:

@@ -26,6 +26,7 @@ class Verdict(Enum):
 
     WAIT = "not known to stand yet"
     STANDS = "seen standing"
+    HANDED_OVER = "belongs to another source now, and may be moving"
     NOT_MEASURED = "had the time to stop, but nothing told whether it did"
     STILL_MOVES = "still moves after the time in which it must stop"
 

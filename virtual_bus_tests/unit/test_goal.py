@@ -291,3 +291,18 @@ def test_an_old_word_of_the_driver_is_no_word() -> None:
     watch = Standstill(STILL, began=0.0, speed_mps=0.1)
     assert watch.judge(Inputs(driver=told), 0.5) is Verdict.WAIT  # received before the order could act
     assert watch.judge(Inputs(driver=replace(told, received=0.4)), 0.5) is Verdict.STANDS
+
+
+def test_a_base_that_another_source_took_over_is_not_said_to_stand() -> None:
+    """The joystick takes over at 0.3 m/s and drives on: the goal ends at once, and nothing was seen standing."""
+
+    def take_over(story: Story) -> None:
+        assert story.inputs.mux is not None
+        story.inputs = replaced(story.inputs, mux=replace(story.inputs.mux, active="joystick"))
+
+    story = drive(Plant(), 3.0, 0.3, at={2.0: take_over})
+    end = story.run()
+    assert end.code is ErrorCode.TAKEN_OVER
+    assert not end.stands
+    assert "belongs to another source now, and may be moving" in end.message
+    assert drive(Plant(), 0.5, 0.3).run().stands
