@@ -65,6 +65,8 @@ class DriveDistanceServer(Node):
         self._voice = Voice(self.get_logger(), Journal("drive_distance_server"))
         self._inputs = Inputs()
         self._request_times = ReceiveTimes.of_requests()
+        self._keepalive_times = ReceiveTimes(robot.action.client_lease_s)
+        """One that waited for longer than the lease does not say that the client lives now."""
         self._open: dict[str, OpenGoal] = {}
         self.failure: Exception | None = None
         """The first exception that a callback raised; the process must end with an error."""
@@ -150,8 +152,9 @@ class DriveDistanceServer(Node):
         )
 
     def _on_keepalive(self, goal_id: UUID) -> None:
-        if not self._request_times.waited(time.monotonic()):
-            self._reception.keepalive(bytes(goal_id.uuid).hex(), time.monotonic())
+        now = time.monotonic()
+        if not self._keepalive_times.waited(now):
+            self._reception.keepalive(bytes(goal_id.uuid).hex(), now)
 
     def _on_goal(self, binding: Binding, goal: Any) -> GoalResponse:
         now = time.monotonic()
@@ -189,7 +192,8 @@ class DriveDistanceServer(Node):
         return result
 
     def _on_timer(self) -> None:
-        self._request_times.at(time.monotonic())
+        for times in (self._request_times, self._keepalive_times):
+            times.at(time.monotonic())
         for uuid, goal in self._open.items():
             if goal.handle.is_cancel_requested:
                 self._reception.cancel(uuid)
