@@ -5,12 +5,15 @@ from __future__ import annotations
 import signal
 import time
 from types import FrameType
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from canbase_cli.options import FAILED, ConfigOption, NamespaceOption, colour, fail, load_config, ros_arguments
 from canbase_cli.stack import POLL_S, Death, Stack
+
+if TYPE_CHECKING:
+    from canbase_config.robot import Robot
 
 
 def up(
@@ -30,6 +33,7 @@ def up(
     """
     loaded = load_config(config)
     with_sim = loaded.robot.bus.interface == "udp_multicast" if sim is None else sim
+    _refuse_twice(loaded.robot)
     ended = _end_signals()
     stack = Stack(loaded.path, namespace=namespace, sim=with_sim, ros_args=ros_arguments(ctx, ""))
     with stack:
@@ -40,6 +44,18 @@ def up(
     bad = [str(Death(part, code)) for part, code in codes.items() if code != 0]
     if death is not None or bad:
         fail("; ".join(bad) or str(death), FAILED)
+
+
+def _refuse_twice(robot: Robot) -> None:
+    """Before any part starts: one that runs already is left alone."""
+    from canbase_config.sole import TakenError, bus_name, check
+
+    bus = bus_name(robot.bus.arguments())
+    try:
+        for task, name in (("driver", bus), ("watchdog", bus), ("velocity process", robot.lease.socket)):
+            check(task, name)
+    except TakenError as error:
+        fail(f"{robot.name} is not started: {error}", FAILED)
 
 
 def _end_signals() -> list[int]:

@@ -23,12 +23,14 @@ from rclpy.signals import SignalHandlerOptions
 
 from canbase_config.latch_file import LatchFile, LatchKeeper, latch_folder
 from canbase_config.priority import Priority
-from canbase_config.robot import Robot
+from canbase_config.robot import DRIVER_NODE_ID, Robot
 from canbase_config.service import Service
+from canbase_config.sole import TakenError, bus_name, take
 from canbase_config.stopping import given_up_s
 from canbase_driver.black_box import Ring
 from canbase_driver.black_box_writer import BlackBoxWriter
 from canbase_driver.bus_port import BusError, BusPort
+from canbase_driver.cia301 import HEARTBEAT, SYNC
 from canbase_driver.core import DriverCore
 from canbase_driver.loop import ControlLoop
 from canbase_driver.node import MotorDriverNode, Publisher
@@ -55,8 +57,10 @@ def run(
     thread failed. `ros_args`: arguments for rclpy. `autostart`: without it nothing is sent on the bus before the node
     is configured. `when_ready`: called when all is made and nothing runs yet. Call from the main thread (signals)."""
     try:
+        held = take("driver", bus_name(robot.bus.arguments()))
         bus = BusPort(robot.bus.arguments())
-    except BusError as error:
+        _listen_for_another(bus, robot.timeouts.drive_heartbeat_s)
+    except (BusError, TakenError) as error:
         print(f"canbase driver: {error}", file=sys.stderr)
         return 1
     received: list[int] = []
@@ -91,11 +95,25 @@ def run(
         writer.finish(WRITE_S)
     finally:
         rclpy.shutdown()
+        held.close()
     failure = failure or loop.failure
     if failure is not None:
         node.voice.tell(f"ended by {type(failure).__name__}: {failure}", Priority.ERROR, robot=robot.name)
         sys.excepthook(type(failure), failure, failure.__traceback__)
     return 0 if failure is None else 1
+
+
+def _listen_for_another(bus: BusPort, listen_s: float) -> None:
+    """A driver on another computer: heard before the first frame of this one. Raises TakenError."""
+    end = time.monotonic() + listen_s
+    while (left_s := end - time.monotonic()) > 0.0:
+        frame = bus.receive(left_s)
+        if frame is not None and frame.cob_id in (SYNC.cob_id, HEARTBEAT + DRIVER_NODE_ID):
+            bus.close()
+            raise TakenError(
+                f"another driver is on the bus: SYNC or the heartbeat of node {DRIVER_NODE_ID} came ({frame}). "
+                "Only one may run; end it first, on the computer that it runs on"
+            )
 
 
 def _spin(

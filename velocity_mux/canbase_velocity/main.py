@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -17,6 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 from canbase_config.latch_file import LatchFile, LatchKeeper, latch_folder
 from canbase_config.robot import Robot
 from canbase_config.service import Service
+from canbase_config.sole import TakenError, take
 from canbase_config.stopping import standstill_s
 from canbase_velocity.filter_node import FilterNode
 from canbase_velocity.mux_node import MuxNode
@@ -35,7 +37,12 @@ def run(robot: Robot, ros_args: Sequence[str], when_ready: Callable[[], None] = 
     process too: zeros go out, and it is raised here. `when_ready`: called when all is made and nothing runs yet. Call
     from the main thread (signals).
     """
-    with _stop_signals() as received:
+    try:
+        held = take("velocity process", robot.lease.socket)
+    except TakenError as error:
+        print(f"canbase velocity: {error}", file=sys.stderr)
+        return 1
+    with held, _stop_signals() as received:
         rclpy.init(args=list(ros_args), signal_handler_options=SignalHandlerOptions.NO)
         try:
             _run_nodes(robot, received, when_ready)

@@ -139,7 +139,7 @@ def test_systemd_is_told_ready_alive_and_the_state(watched: Watched) -> None:
     assert "STOPPING=1" in watched.notified()
 
 
-def test_a_second_watchdog_on_the_same_socket_leaves_the_first_alone(watched: Watched) -> None:
+def test_a_second_watchdog_on_the_same_bus_leaves_the_first_alone(watched: Watched) -> None:
     second = subprocess.run(
         [sys.executable, "-m", "canbase_watchdog", "--config-json", watched.config.to_json()],
         capture_output=True,
@@ -147,9 +147,22 @@ def test_a_second_watchdog_on_the_same_socket_leaves_the_first_alone(watched: Wa
         timeout=10.0,
         check=False,
     )
-    assert (second.returncode, "another watchdog listens" in second.stderr) == (1, True)
+    assert (second.returncode, f"process {watched.process.pid} of user" in second.stderr) == (1, True)
     begin = time.monotonic()
     watched.robot.first(0x1FE, begin)
+
+
+# another computer's watchdog on the bus ── 0.16 s of listening ── ended, without a frame
+def test_a_watchdog_that_hears_another_one_never_sends(watched: Watched) -> None:
+    """On another computer the name of the first one is not taken: here it is left out."""
+    code = (
+        "import sys; from canbase_watchdog import main, sole; sole.take = lambda bus: open('/dev/null'); "
+        "sys.exit(main.main(sys.argv[1:]))"
+    )
+    other = replace(watched.config, lease_socket=f"{watched.config.lease_socket}2")
+    command = [sys.executable, "-c", code, "--config-json", other.to_json()]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
+    assert (done.returncode, "another watchdog is on the bus" in done.stderr) == (1, True), done.stderr
 
 
 # --- starting badly

@@ -157,3 +157,24 @@ def test_noise_is_no_lease(datagram: bytes) -> None:
     it = book()
     assert it.take(datagram, None, 10.0) is not None
     assert it.last is None
+
+
+# one filter sends ── a second one too: refused ── the first ends ── 0.25 s ── the second counts
+def test_leases_of_one_process_count() -> None:
+    leases = book()
+    assert leases.take(lease(1, 1.0), 1000, 1.0, pid=7) is None
+    assert leases.take(lease(1, 1.1, 0.5), 1000, 1.1, pid=8) is Refusal.SECOND
+    assert leases.take(lease(2, 1.2), 1000, 1.2, pid=7) is None
+    assert leases.take(lease(2, 1.449, 0.5), 1000, 1.449, pid=8) is Refusal.SECOND
+    assert leases.last is not None
+    assert leases.last.linear_mps == 0.0
+    assert leases.refused[Refusal.SECOND] == 2
+    assert leases.take(lease(3, 1.45, 0.5), 1000, 1.45, pid=8) is None
+    assert leases.take(lease(3, 1.5), 1000, 1.5, pid=7) is Refusal.SECOND
+
+
+def test_a_refused_lease_of_the_first_does_not_keep_the_second_away() -> None:
+    leases = book()
+    assert leases.take(lease(1, 1.0), 1000, 1.0, pid=7) is None
+    assert leases.take(b"garbage", 1000, 1.2, pid=7) is Refusal.LENGTH
+    assert leases.take(lease(2, 1.25), 1000, 1.25, pid=8) is None

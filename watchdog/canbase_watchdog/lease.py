@@ -24,6 +24,7 @@ class Refusal(enum.Enum):
     """Why a datagram is no lease."""
 
     SENDER = "sender: not the configured user"
+    SECOND = "second: another process, while the first one still sends"
     LENGTH = "length: not 44 bytes"
     MAGIC = "magic: does not begin with CBL1"
     CHECKSUM = "checksum: CRC-32 differs"
@@ -91,26 +92,35 @@ class LeaseBook:
         """`uid`: the only user whose datagrams count; None: any."""
         self._timeout_s = timeout_s
         self._uid = uid
+        self._pid: int | None = None
+        self._heard_at = -math.inf
         self.last: Lease | None = None
         self.valid_at = -math.inf
         """Monotonic time [s] that the last lease's age counts from: its stamp or its arrival, whichever is earlier."""
         self.refused: dict[Refusal, int] = dict.fromkeys(Refusal, 0)
 
-    def take(self, datagram: bytes, uid: int | None, now: float) -> Refusal | None:
-        """Judge a datagram from the user `uid` (None: the system did not tell). Returns why it does not count."""
-        refusal = self._judge(datagram, uid, now)
+    def take(self, datagram: bytes, uid: int | None, now: float, pid: int | None = None) -> Refusal | None:
+        """Judge a datagram from the user `uid` (None: the system did not tell). Returns why it does not count.
+
+        `pid`: the process that sent it. Leases of one process count; of another one when the first has sent nothing for
+        the timeout, as after a restart.
+        """
+        refusal = self._judge(datagram, uid, now, pid)
         if refusal is not None:
             self.refused[refusal] += 1
         return refusal
 
-    def _judge(self, datagram: bytes, uid: int | None, now: float) -> Refusal | None:
+    def _judge(self, datagram: bytes, uid: int | None, now: float, pid: int | None) -> Refusal | None:
         if self._uid is not None and uid != self._uid:
             return Refusal.SENDER
+        if pid != self._pid and now < self._heard_at + self._timeout_s:
+            return Refusal.SECOND
         lease = parse(datagram)
         if isinstance(lease, Refusal):
             return lease
         refusal = judge(lease, self.last, self._timeout_s, now)
         if refusal is None:
+            self._pid, self._heard_at = pid, now
             self.last = lease
             self.valid_at = min(now, lease.stamp_ns * 1e-9)
         return refusal

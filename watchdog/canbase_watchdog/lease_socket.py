@@ -49,21 +49,22 @@ class LeaseSocket:
         """What to wait on with select."""
         return self._socket.fileno()
 
-    def receive(self) -> Iterator[tuple[bytes, int | None]]:
-        """What has arrived, at most BATCH: datagram and its sender's user id (None: the system did not tell)."""
+    def receive(self) -> Iterator[tuple[bytes, int | None, int | None]]:
+        """What has arrived, at most BATCH: datagram, its sender's user and process (None: the system did not tell)."""
         for _ in range(BATCH):
             try:
                 datagram, ancillary, _, _ = self._socket.recvmsg(256, _ROOM)
             except BlockingIOError:
                 return
-            yield datagram, _sender(ancillary)
+            yield datagram, *_sender(ancillary)
 
 
-def _sender(ancillary: list[tuple[int, int, bytes]]) -> int | None:
+def _sender(ancillary: list[tuple[int, int, bytes]]) -> tuple[int | None, int | None]:
     for level, kind, data in ancillary:
         if (level, kind) == (socket.SOL_SOCKET, socket.SCM_CREDENTIALS) and len(data) == _CREDENTIALS.size:
-            return int(_CREDENTIALS.unpack(data)[1])
-    return None
+            pid, uid, _ = _CREDENTIALS.unpack(data)
+            return int(uid), int(pid)
+    return None, None
 
 
 def _remove_stale(path: Path) -> None:

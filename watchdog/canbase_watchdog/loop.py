@@ -83,8 +83,8 @@ class Loop:
     def _take_in(self) -> float:
         """Everything that has arrived, leases first. Returns the time [s] of it."""
         now = time.monotonic()
-        for datagram, uid in self._leases.receive():
-            self._watchdog.on_lease(datagram, uid, now)
+        for datagram, uid, pid in self._leases.receive():
+            self._watchdog.on_lease(datagram, uid, now, pid)
         for cob_id, data in self._bus.receive():
             self._watchdog.on_frame(cob_id, data, now)
         return now

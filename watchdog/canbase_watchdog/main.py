@@ -15,7 +15,7 @@ from pathlib import Path
 from types import FrameType
 
 from canbase_config.watchdog import WatchdogConfig
-from canbase_watchdog import latch_file, realtime
+from canbase_watchdog import frames, latch_file, realtime, sole
 from canbase_watchdog.bus_port import BusError, BusPort
 from canbase_watchdog.latch_file import Keeper
 from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
@@ -25,6 +25,8 @@ from canbase_watchdog.notify import notify
 from canbase_watchdog.relay import Relay, RelayError
 from canbase_watchdog.watchdog import Watchdog
 
+LISTEN_S = 0.16
+"""Three periods of a watchdog's state frame."""
 WRITE_S = 1.0
 """For the record at the end."""
 
@@ -46,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     try:
         return _serve(config)
-    except (BusError, LeaseSocketError, BusDeadError, RelayError) as error:
+    except (BusError, LeaseSocketError, BusDeadError, RelayError, sole.TakenError) as error:
         _log.error("%s", error)
         return 1
 
@@ -62,7 +64,9 @@ def _serve(config: WatchdogConfig) -> int:
     uid = os.getuid() if config.lease_uid is None else config.lease_uid
     config = dataclasses.replace(config, lease_uid=uid)
     with ExitStack() as stack:
+        stack.enter_context(sole.take(config.bus_arguments))
         bus = stack.enter_context(BusPort(config.bus_arguments))
+        _listen_for_another(bus)
         leases = stack.enter_context(LeaseSocket(config.lease_socket, uid))
         relay = stack.enter_context(Relay(config.relay)) if config.relay else None
         keeper = Keeper(latch_file.path_of(os.environ, Path.home(), config.robot), config.robot)
@@ -77,6 +81,18 @@ def _serve(config: WatchdogConfig) -> int:
             keeper.finish(WRITE_S)
     _log.info("ended by %s", signal.Signals(asked[0]).name)
     return 0
+
+
+def _listen_for_another(bus: BusPort) -> None:
+    """A watchdog on another computer: heard before the first frame of this one. Raises sole.TakenError."""
+    end = time.monotonic() + LISTEN_S
+    while (left_s := end - time.monotonic()) > 0.0:
+        bus.wait(left_s)
+        if any(cob_id in (frames.STATE, frames.WATCHDOG_HEARTBEAT) for cob_id, _ in bus.receive()):
+            raise sole.TakenError(
+                f"another watchdog is on the bus: its heartbeat or state frame came within {LISTEN_S} s. "
+                "Only one may run; end it first, on the computer that it runs on"
+            )
 
 
 def _guard(loop: Loop, keeper: Keeper, asked: list[int]) -> None:

@@ -137,9 +137,10 @@ class Watchdog:
         else:
             self._observer.on_frame(cob_id, data, now)
 
-    def on_lease(self, datagram: bytes, uid: int | None, now: float) -> Refusal | None:
-        """Take in a datagram from the lease socket, sent by the user `uid`. Returns why it does not count."""
-        refusal = self._leases.take(datagram, uid, now)
+    def on_lease(self, datagram: bytes, uid: int | None, now: float, pid: int | None = None) -> Refusal | None:
+        """Take in a datagram from the lease socket, sent by the user `uid` and the process `pid`. Returns why it does
+        not count."""
+        refusal = self._leases.take(datagram, uid, now, pid)
         lease = self._leases.last
         if refusal is None and lease is not None:
             self._envelope.order(lease.linear_mps, lease.angular_radps, now)

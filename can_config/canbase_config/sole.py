@@ -1,0 +1,70 @@
+"""One process for each task: one driver on a bus, one filter for a watchdog. Held by name, released by the kernel.
+
+The name is an abstract Unix socket: it exists once in a network namespace, as a CAN interface does, for all users of
+the computer, and whatever ends its process frees it. Whoever comes second is told who holds it (SO_PEERCRED, unix(7)).
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import socket
+import struct
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+_CREDENTIALS: Final = struct.Struct("iII")
+_LONGEST: Final = 60
+ADVICE: Final = "Only one may run; end it first (`canbase doctor` shows what runs)"
+
+
+class TakenError(Exception):
+    """Another process does this already; the text names it."""
+
+
+def bus_name(arguments: Mapping[str, Any]) -> str:
+    """What tells a bus from others on this computer. `arguments`: of `can.Bus`."""
+    return ":".join(str(arguments.get(key, "")) for key in ("interface", "channel", "port"))
+
+
+def take(task: str, name: str) -> socket.socket:
+    """Hold this task until the socket is closed or the process ends. Raises TakenError with the holder."""
+    holder = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        holder.bind(_address(task, name))
+        holder.listen(8)
+    except OSError as error:
+        holder.close()
+        if error.errno != errno.EADDRINUSE:
+            raise
+        raise TakenError(f"another {task} has {name}: {_who(task, name)}. {ADVICE}") from error
+    return holder
+
+
+def check(task: str, name: str) -> None:
+    """Raises TakenError when somebody holds it now."""
+    take(task, name).close()
+
+
+def _address(task: str, name: str) -> str:
+    short = name if len(name) <= _LONGEST else hashlib.sha256(name.encode()).hexdigest()[:_LONGEST]
+    return f"\0canbase.{task}.{short}"
+
+
+def _who(task: str, name: str) -> str:
+    """Process, user and command of the holder, as far as this user may see them."""
+    try:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as caller:
+            caller.setblocking(False)
+            caller.connect(_address(task, name))
+            pid, uid, _ = _CREDENTIALS.unpack(
+                caller.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+            )
+    except OSError as error:
+        return f"who it is cannot be seen ({error.strerror or error})"
+    try:
+        command = Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
+    except OSError:
+        command = ""
+    return f"process {pid} of user {uid}" + (f", {command[:200]}" if command else "")
