@@ -11,6 +11,9 @@ from canbase_config.stopping import BRAKING_SHARE, CYCLES_TO_SETPOINT, coasting_
 from canbase_config.units import motor_rev_per_s
 from canbase_config.watchdog import RelayLine, WatchdogConfig, WatchedDrive, WatchedLayout
 
+SLOWEST_RAMP_SHARE = 0.25
+"""Of the limits' acceleration, where watchdog.slowest_ramp_mps2 is not given."""
+
 
 def mps_per_bit(drive: Drive, wheel_radius_m: float) -> float:
     """Speed of the wheel's rim [m/s] for one bit of the drive's 60FFh; the sign makes forward positive."""
@@ -36,6 +39,16 @@ def order_hold_s(robot: Robot) -> float:
     """
     waiting_s = robot.timeouts.command_s + CYCLES_TO_SETPOINT / robot.rates.control_hz + robot.watchdog.latency_s
     return waiting_s + jerk_adds_s(robot.limits)
+
+
+def slowest_ramp_mps2(robot: Robot) -> float:
+    """How fast a wheel gets to its setpoint at least, where robot.yaml does not give it [m/s²].
+
+    A share of what the driver's setpoints do: soft drives, slopes and payload take the rest.
+    """
+    limits = robot.limits
+    turning_mps2 = limits.angular_acceleration_radps2 * robot.base.track_m / 2.0
+    return SLOWEST_RAMP_SHARE * min(limits.acceleration_mps2, turning_mps2)
 
 
 def watchdog_config(robot: Robot) -> WatchdogConfig:
@@ -72,6 +85,15 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
         travel_tolerance_m=watchdog.travel_tolerance_m,
         braking_mps2=BRAKING_SHARE * limits.deceleration_mps2,
         coasting_s=coasting_s(watchdog.overspeed_factor * max_wheel_mps(robot)),
+        motion_missing_s=watchdog.motion_missing_s,
+        motion_missing_m=watchdog.motion_missing_m,
+        jolt_mps2=watchdog.jolt_mps2,
+        slow_wheel_share=watchdog.slow_wheel_share,
+        slow_wheel_s=watchdog.slow_wheel_s,
+        slowest_ramp_mps2=watchdog.slowest_ramp_mps2 or slowest_ramp_mps2(robot),
+        twist_tolerance_mps=watchdog.twist_tolerance_mps,
+        twist_tolerance_share=watchdog.twist_tolerance_share,
+        twist_s=watchdog.twist_s,
         relay=RelayLine(watchdog.relay.chip, watchdog.relay.line) if watchdog.relay else None,
         robot=robot.name,
     )
@@ -87,6 +109,7 @@ def watched_drive(drive: Drive, wheel_radius_m: float) -> WatchedDrive:
         mps_per_bit(drive, wheel_radius_m),
         m_per_count(drive, wheel_radius_m),
         velocity_scale(drive),
+        drive.kind.pdo.synchronous,
         _layout(drive.kind.layout),
     )
 

@@ -45,8 +45,45 @@ class Watchdog(Section):
         float, Field(ge=1.05, le=2.0, description="a wheel may be so many times as fast as the limits allow")
     ] = 1.2
     travel_tolerance_m: Annotated[
-        float, Field(ge=0.005, le=0.5, description="encoder and measured velocity apart, within about 0.5 s [m]")
+        float,
+        Field(ge=0.005, le=0.5, description="encoder and measured velocity apart, within about 0.25 m of travel [m]"),
     ] = 0.05
+    motion_missing_s: Annotated[
+        float,
+        Field(
+            ge=0.1,
+            le=2.0,
+            description="an ordered wheel shows nothing for so long, after its lag [s]; with a brake: longer",
+        ),
+    ] = 0.25
+    motion_missing_m: Annotated[
+        float, Field(ge=0.001, le=0.1, description="... and for so much of the ordered travel [m]")
+    ] = 0.003
+    jolt_mps2: Annotated[
+        float, Field(ge=5.0, le=200.0, description="no wheel changes its speed faster; a sensor that fails does [m/s²]")
+    ] = 20.0
+    slow_wheel_share: Annotated[
+        float, Field(ge=0.0, le=0.6, description="a wheel slower than its setpoint, beside motion_tolerance_mps")
+    ] = 0.3
+    slow_wheel_s: Annotated[float, Field(ge=0.1, le=3.0, description="a wheel is too slow for so long [s]")] = 0.5
+    slowest_ramp_mps2: (
+        Annotated[
+            float,
+            Field(
+                gt=0.0,
+                le=10.0,
+                description="a wheel gets to its setpoint so fast; default: a quarter of the limits [m/s²]",
+            ),
+        ]
+        | None
+    ) = None
+    twist_tolerance_mps: Annotated[
+        float, Field(gt=0.0, le=0.2, description="the base turns or drives as nobody ordered, at the rim [m/s]")
+    ] = 0.01
+    twist_tolerance_share: Annotated[
+        float, Field(ge=0.0, le=0.3, description="the same as a share of the ordered speed, added to it")
+    ] = 0.08
+    twist_s: Annotated[float, Field(ge=0.1, le=3.0, description="it does so for so long [s]")] = 0.5
     bus_failed_s: Annotated[float, Field(ge=0.06, le=0.5, description="the bus takes no frames for so long [s]")] = 0.1
     loop_late_s: Annotated[
         float, Field(ge=0.02, le=0.5, description="the watchdog's own loop stands still for so long [s]")

@@ -39,6 +39,8 @@ class WatchedDrive:
     mps_per_bit: float
     m_per_count: float
     velocity_scale: float = 1.0
+    answers_sync: bool = True
+    """Its feedback PDOs are sent once for each SYNC, and not by its own clock."""
     layout: WatchedLayout = WatchedLayout()
 
     @property
@@ -102,6 +104,22 @@ class WatchdogConfig:
     """A wheel that is stopped under power and loses less does not brake as it must."""
     coasting_s: float
     """A wheel without power has rolled out after this on a level floor."""
+    motion_missing_s: float
+    """An enabled wheel that is ordered to move may show nothing of it for so long ..."""
+    motion_missing_m: float
+    """... or for so much of the ordered travel, whichever is longer."""
+    jolt_mps2: float
+    """No wheel changes its speed faster."""
+    slow_wheel_share: float
+    """A wheel may be slower than its setpoint by this share, on top of motion_tolerance_mps ..."""
+    slow_wheel_s: float
+    """... and by more for so long."""
+    slowest_ramp_mps2: float
+    """A wheel gets to its setpoint at least so fast."""
+    twist_tolerance_mps: float
+    twist_tolerance_share: float
+    twist_s: float
+    """The measured twist may be outside of the ordered one for so long."""
 
     lease_uid: int | None = None
     """The only user whose leases count, None: the watchdog's own."""

@@ -39,6 +39,10 @@ CAUSES = {
     10: "own loop late",
     11: "told to end while a wheel turned",
     12: "feedback implausible",
+    13: "motion missing",
+    14: "base moves otherwise than ordered",
+    15: "setpoint missing",
+    16: "two drives with one node id",
     20: "ended while a drive had power",
     21: "record of its last trip unusable",
 }

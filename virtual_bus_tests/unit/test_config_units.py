@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from canbase_config.derive import m_per_count, mps_per_bit, order_hold_s, watchdog_config
+from bus.crews import robot_with
+from canbase_config.derive import m_per_count, mps_per_bit, order_hold_s, slowest_ramp_mps2, watchdog_config
 from canbase_config.drive import Drive
 from canbase_config.load import load_robot, sample
 from canbase_config.profile import VelocityUnit
@@ -99,6 +100,10 @@ def test_the_watchdog_is_told_what_the_bench_sample_says() -> None:
     assert (config.motion_tolerance_mps, config.motion_tolerance_share, config.feedback_samples) == (0.05, 0.1, 5)
     assert (config.overspeed_factor, config.travel_tolerance_m) == (1.2, 0.05)
     assert (config.bus_failed_s, config.loop_late_s) == (0.1, 0.1)
+    assert (config.motion_missing_s, config.motion_missing_m, config.jolt_mps2) == (0.25, 0.003, 20.0)
+    assert (config.slow_wheel_share, config.slow_wheel_s, config.slowest_ramp_mps2) == pytest.approx((0.3, 0.5, 0.2))
+    assert (config.twist_tolerance_mps, config.twist_tolerance_share, config.twist_s) == (0.01, 0.08, 0.5)
+    assert [drive.answers_sync for drive in config.drives] == [True, True]
     assert config.lease_socket == "/tmp/canbase-bench/lease.sock"
 
 
@@ -131,3 +136,16 @@ def test_the_watchdogs_configuration_survives_its_way_over_the_command_line() ->
 
     assert WatchdogConfig.from_json(config.to_json()) == config
     assert math.copysign(1.0, config.drives[1].mps_per_bit) == -1.0
+
+
+def test_the_slowest_ramp_is_a_quarter_of_the_limits_or_what_robot_yaml_says() -> None:
+    bench = load_robot(sample("bench")).robot
+    assert slowest_ramp_mps2(bench) == pytest.approx(0.25 * 0.8)
+    soft = bench.limits.model_copy(update={"angular_acceleration_radps2": 1.0})
+    assert slowest_ramp_mps2(bench.model_copy(update={"limits": soft})) == pytest.approx(0.25 * 1.0 * 0.25)
+    given = bench.watchdog.model_copy(update={"slowest_ramp_mps2": 0.7})
+    assert watchdog_config(bench.model_copy(update={"watchdog": given})).slowest_ramp_mps2 == 0.7
+
+
+def test_a_drive_with_a_clock_of_its_own_does_not_answer_each_sync() -> None:
+    assert [drive.answers_sync for drive in watchdog_config(robot_with("roboteq")).drives] == [False, False]

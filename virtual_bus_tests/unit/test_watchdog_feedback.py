@@ -6,7 +6,9 @@ allowed   ██████████▆▅▄▃▁▁    held for drive_lag
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from random import Random
 from typing import Any
 
 import pytest
@@ -42,7 +44,7 @@ class Wheel:
         self.way_m += (velocity if rolls is None else rolls) * after_s
         self.watch.on_target(target, now)
         self.watch.on_position(self.sign * round(self.way_m * 10_000))
-        self.watch.on_velocity(velocity, powered, now)
+        self.watch.on_velocity(velocity, powered, powered, now)
         return self.watch.last
 
     def samples(self, count: int, velocity: float, target: float, rolls: float | None = None) -> Feedback:
@@ -126,9 +128,9 @@ def test_a_wheel_without_power_may_be_pushed_and_nothing_of_it_stays() -> None:
 def test_before_the_start_the_wheel_may_have_had_any_setpoint() -> None:
     watch = FeedbackWatch(CONFIG.drives[0], CONFIG, 0.0)
     watch.on_target(0.0, 0.05)
-    watch.on_velocity(-1.0, True, 0.1)
+    watch.on_velocity(-1.0, True, True, 0.1)
     assert (watch.last.low_mps, watch.last.high_mps, watch.last.outside) == (-1.0, 1.0, 0)
-    watch.on_velocity(-1.0, True, 0.3)
+    watch.on_velocity(-1.0, True, True, 0.3)
     assert watch.last.low_mps == pytest.approx(-0.8)
 
 
@@ -206,15 +208,38 @@ def test_the_tolerance_of_the_drift(drift_per_sample: float, implausible: int) -
 def test_before_the_first_sample_the_wheel_is_taken_for_standing() -> None:
     watch = FeedbackWatch(CONFIG.drives[0], CONFIG, 0.0)
     watch.on_position(0)
-    watch.on_velocity(0.0, True, 0.0)
-    watch.on_velocity(0.4, True, 0.01)
+    watch.on_velocity(0.0, True, True, 0.0)
+    watch.on_velocity(0.4, True, True, 0.01)
     assert watch.last.drift_m == pytest.approx(0.002, abs=1e-9)
 
 
-def test_a_small_error_that_lasts_is_forgotten_as_fast_as_it_comes() -> None:
+@pytest.mark.parametrize("velocity", [0.02, 0.1, 0.5])
+def test_a_small_error_that_lasts_is_forgotten_over_the_way_on_which_it_comes(velocity: float) -> None:
     wheel = Wheel()
-    wheel.samples(1000, 0.5, 0.5, rolls=0.45)
-    assert wheel.last.drift_m == pytest.approx(0.05 * 0.5, abs=0.001)  # × DRIFT_S
+    wheel.samples(8000, velocity, velocity, rolls=0.9 * velocity)
+    forgotten = velocity / 0.25 + 1.0 / 10.0  # DRIFT_M, DRIFT_S
+    assert wheel.last.drift_m == pytest.approx(0.1 * velocity / forgotten, rel=0.03)
+    assert wheel.last.implausible == 0
+
+
+@pytest.mark.parametrize("velocity", [0.01, 0.03, 0.1, 0.5])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_an_encoder_that_stands_still_is_found_after_a_way_at_any_speed(velocity: float, mirrored: bool) -> None:
+    wheel = Wheel(mirrored)
+    wheel.samples(2000, velocity, velocity)
+    n = 0
+    while wheel.last.implausible < CONFIG.feedback_samples and n < 10_000:
+        wheel.sample(velocity, velocity, rolls=0.0)
+        n += 1
+    forgotten = 1.0 / 0.25 + 1.0 / (10.0 * velocity)
+    way_m = -math.log(1.0 - 0.05 * forgotten) / forgotten
+    assert n / 100 * velocity == pytest.approx(way_m + 5 * velocity / 100, rel=0.05, abs=0.002)
+
+
+def test_noise_of_a_standing_wheel_does_not_drift() -> None:
+    random, wheel = Random(1), Wheel()
+    worst = max(abs(wheel.sample(random.uniform(-0.02, 0.02), 0.0, rolls=0.0).drift_m) for _ in range(60_000))
+    assert worst < 0.02
 
 
 def test_the_counter_goes_round_at_32_bits() -> None:
@@ -222,8 +247,9 @@ def test_the_counter_goes_round_at_32_bits() -> None:
     drive = wheel.watch
     for counts, now in ((2**31 - 50, 1.0), (-(2**31) + 50, 1.01), (2**31 - 50, 1.02)):
         drive.on_position(counts)
-        drive.on_velocity(0.0, True, now)
-    assert drive.last.drift_m == pytest.approx(0.01 * 0.02, abs=1e-6)  # -0.01 m, a little forgotten, then +0.01 m
+        drive.on_velocity(0.0, True, True, now)
+    forgotten = 0.01 / 0.25 + 0.01 / 10.0
+    assert drive.last.drift_m == pytest.approx(0.01 * forgotten, abs=1e-6)  # -0.01 m, a little forgotten, then +0.01 m
 
 
 def test_one_jump_of_the_encoder_is_one_bad_sample_and_no_drift() -> None:
@@ -247,7 +273,7 @@ def test_a_step_as_long_as_it_may_be_is_no_jump() -> None:
     watch = FeedbackWatch(replace(CONFIG.drives[0], m_per_count=2.0**-14), replace(CONFIG, control_hz=64.0), 0.0)
     for counts, now in ((0, 1.0), (1536, 1.01)):
         watch.on_position(counts)
-        watch.on_velocity(0.0, True, now)
+        watch.on_velocity(0.0, True, True, now)
     assert watch.last.drift_m == -0.09375
 
 
@@ -261,7 +287,7 @@ def test_of_a_slower_base_a_shorter_step_is_a_jump(step_m: float, jump: bool) ->
 def test_the_farthest_jump_is_one() -> None:
     wheel = Wheel()
     wheel.watch.on_position(-(2**31))
-    wheel.watch.on_velocity(0.0, True, 0.02)
+    wheel.watch.on_velocity(0.0, True, True, 0.02)
     assert wheel.last.implausible == 1
 
 
@@ -289,18 +315,26 @@ def test_what_was_rolled_in_a_gap_is_not_known(gap_s: float, kept: bool) -> None
     assert (wheel.sample(0.5, 0.5, after_s=gap_s).drift_m > 0.0) is kept
 
 
-def test_after_half_a_second_the_drift_before_is_forgotten() -> None:
-    wheel = Wheel(feedback_timeout_s=1.0)
+@pytest.mark.parametrize(("after_s", "left"), [(1.0, 0.9), (9.0, 0.1), (10.0, 0.0), (11.0, 0.0)])
+def test_a_drift_before_is_forgotten_with_time_too(after_s: float, left: float) -> None:
+    wheel = Wheel(feedback_timeout_s=20.0)
     wheel.way_m += 0.04
     assert wheel.sample(0.0, 0.0).drift_m == pytest.approx(-0.04)
-    assert wheel.sample(0.0, 0.0, after_s=0.8).drift_m == 0.0
+    assert wheel.sample(0.0, 0.0, after_s=after_s).drift_m == pytest.approx(-0.04 * left)
+
+
+def test_a_longer_way_forgets_all_that_was_before_it() -> None:
+    wheel = Wheel(feedback_timeout_s=20.0)
+    wheel.way_m += 0.04
+    wheel.sample(0.0, 0.0)
+    assert wheel.sample(1.0, 1.0, after_s=0.5, rolls=0.5).drift_m == pytest.approx(0.0, abs=1e-9)
 
 
 def test_without_a_position_there_is_no_drift() -> None:
     watch = FeedbackWatch(CONFIG.drives[0], CONFIG, 0.0)
     for n in range(20):
         watch.on_target(0.5, n / 100)
-        watch.on_velocity(0.5, True, n / 100)
+        watch.on_velocity(0.5, True, True, n / 100)
     watch.on_position(123_456)
-    watch.on_velocity(0.5, True, 0.2)
+    watch.on_velocity(0.5, True, True, 0.2)
     assert (watch.last.drift_m, watch.last.implausible) == (0.0, 0)

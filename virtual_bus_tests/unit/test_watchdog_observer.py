@@ -96,6 +96,68 @@ def test_a_sync_makes_the_setpoints_effective_that_came_for_it() -> None:
     assert look(it).axes[1].setpoint_at == 1.011
 
 
+def cycle(it: Observer, n: int, *, setpoint: bool = True, answers: int = 1, state: str = "37 02") -> Axis:
+    """One cycle of both nodes; node 1 with or without its setpoint, and so many answers of it."""
+    now = 2.0 + n / 100
+    if setpoint:
+        it.on_frame(0x201, bytes.fromhex("0f 00 2c 01 00 00"), now)
+    it.on_frame(0x202, bytes.fromhex("0f 00 2c 01 00 00"), now)
+    it.on_frame(0x080, b"", now)
+    for node_id, count in ((1, answers), (2, 1)):
+        for _ in range(count):
+            it.on_frame(0x180 + node_id, bytes.fromhex(f"{state} 00 00 00 00"), now)
+            it.on_frame(0x280 + node_id, bytes.fromhex("00 00 00 00"), now)
+    return look(it).axes[0]
+
+
+def test_an_enabled_axis_wants_a_setpoint_for_each_sync() -> None:
+    it = observer()
+    cycle(it, 0)
+    assert [cycle(it, n, setpoint=False).missed_setpoints for n in (1, 2, 3)] == [1.0, 2.0, 3.0]
+    assert look(it).axes[1].missed_setpoints == 0.0
+    assert cycle(it, 4).missed_setpoints == 2.5
+    assert cycle(it, 5, setpoint=False, state="40 02").missed_setpoints == 3.5
+    assert cycle(it, 6, setpoint=False).missed_setpoints == 0.0  # it was not enabled at this SYNC
+
+
+def test_an_enabled_axis_answers_a_sync_once() -> None:
+    it = observer()
+    cycle(it, 0, answers=2)
+    assert [cycle(it, n, answers=2).double_answers for n in (1, 2, 3)] == [1.0, 2.0, 3.0]
+    assert look(it).axes[1].double_answers == 0.0
+    assert cycle(it, 4, answers=0).double_answers == 4.0
+    assert cycle(it, 5, answers=1).double_answers == 3.5
+    assert cycle(it, 6, answers=2, state="40 02").double_answers == 3.0
+    assert cycle(it, 7, answers=2).double_answers == 0.0
+
+
+def test_a_drive_with_a_clock_of_its_own_may_answer_twice() -> None:
+    own = replace(config(), drives=tuple(replace(drive, answers_sync=False) for drive in config().drives))
+    it = Observer(own, 0.0)
+    assert [cycle(it, n, answers=2).double_answers for n in range(9)] == [0.0] * 9
+
+
+def test_the_evidence_of_an_axis_begins_with_the_setpoint_that_a_sync_made_effective() -> None:
+    it = observer()
+    cycle(it, 0)
+    assert cycle(it, 1).evidence.setpoint_mps == pytest.approx(0.3)
+    it.on_frame(0x201, bytes.fromhex("0f 00 64 00 00 00"), 2.02)
+    it.on_frame(0x281, bytes(4), 2.02)
+    assert look(it).axes[0].evidence.setpoint_mps == pytest.approx(0.3)
+    assert cycle(it, 2, state="17 02").evidence.setpoint_mps == 0.0  # powered, and not enabled
+    before = cycle(it, 3).evidence.unseen_s
+    assert cycle(it, 4).evidence.unseen_s == pytest.approx(before + 0.01)
+
+
+def test_a_reset_trusts_all_sensors_again() -> None:
+    it = observer()
+    for n in range(60):
+        cycle(it, n)
+    assert [axis.trusted for axis in look(it).axes] == [False, False]
+    it.trust()
+    assert [axis.trusted for axis in look(it).axes] == [True, True]
+
+
 def test_setpoints_and_samples_reach_the_feedback_of_their_axis() -> None:
     it = observer()
     it.on_frame(0x182, bytes.fromhex("37 02 00 00 00 00"), 0.99)

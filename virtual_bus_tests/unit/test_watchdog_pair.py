@@ -91,6 +91,26 @@ def test_one_axis_without_a_new_setpoint_is_enough_to_say_nothing() -> None:
         assert pair.look(stale, ARC) == ""
 
 
+def test_a_sync_without_a_setpoint_shows_nothing_and_forgets_nothing() -> None:
+    """An axis that gets its setpoint for every second SYNC only."""
+    pair = PairWatch(CONFIG)
+    found = []
+    for n in range(6):
+        view = bus(-0.2, 0.6, n / 100)
+        left, right = view.axes
+        stale = replace(view, axes=(left, replace(right, setpoint_at=-1.0)))
+        found.append(pair.look(view if n % 2 == 0 else stale, ARC) != "")
+    assert found == [False, False, True, False, True, False]
+
+
+def test_drives_that_were_not_enabled_begin_anew() -> None:
+    pair = PairWatch(CONFIG)
+    assert pair.look(bus(-0.2, 0.6, 1.0), ARC) == ""
+    assert pair.look(bus(-0.2, 0.6, 1.01, state=DriveState.SWITCHED_ON), ARC) == ""
+    assert pair.look(bus(-0.2, 0.6, 1.02), ARC) == ""
+    assert pair.look(bus(-0.2, 0.6, 1.03), ARC) != ""
+
+
 def test_every_wheel_of_one_side_goes_together_with_every_one_of_the_other() -> None:
     four = config((1, 0), (2, 0), (3, 0), (4, 0))  # left, right, left, right
     pair = PairWatch(four)

@@ -10,6 +10,7 @@ import pytest
 
 from canbase_config.watchdog import WatchedDrive
 from canbase_watchdog.envelope import Bounds
+from canbase_watchdog.evidence import Evidence
 from canbase_watchdog.feedback import Feedback
 from canbase_watchdog.foreign import Sign
 from canbase_watchdog.frames import DriveState
@@ -146,6 +147,82 @@ def test_the_sentences_about_feedback_have_the_values() -> None:
     assert [verdict.node_id for verdict in verdicts] == [2, 2, 2]
 
 
+# --- sensors that show what no wheel can do, and wheels that do not show their orders
+
+EVIDENCE = [
+    (Evidence(halted=5, setpoint_mps=0.3), Cause.FEEDBACK_IMPLAUSIBLE),
+    (Evidence(jolts=5), Cause.FEEDBACK_IMPLAUSIBLE),
+    (Evidence(unseen=True, unseen_s=0.3, unseen_m=0.09, setpoint_mps=0.3), Cause.MOTION_MISSING),
+    (Evidence(behind_s=0.5, ordered_mps=0.3), Cause.MOTION_MISSING),
+]
+
+
+@pytest.mark.parametrize(("evidence", "found"), EVIDENCE)
+def test_evidence_against_a_wheel_trips(evidence: Evidence, found: Cause) -> None:
+    verdict = decide(of(AT_REST, replace(STANDING, evidence=evidence)), CONFIG, NOW)
+    assert (verdict.cause, verdict.node_id) == (found, 2)
+    assert verdict.detail.startswith("wheel_2_0 ")
+    assert cause(of(replace(AT_REST, evidence=evidence))) is found
+    unpowered = replace(OFF, drive=RIGHT.drive)
+    assert cause(of(replace(OFF, evidence=evidence), unpowered)) == 0
+    stopping = of(replace(AT_REST, state=DriveState.QUICK_STOP_ACTIVE, evidence=evidence), unpowered)
+    assert cause(stopping) is (found if found is Cause.FEEDBACK_IMPLAUSIBLE else Cause.NONE)
+    assert not stands(verdict, of(replace(OFF, evidence=evidence)), CONFIG, NOW)
+
+
+@pytest.mark.parametrize(
+    "evidence",
+    [Evidence(halted=4), Evidence(jolts=4), Evidence(unseen_s=9.0, unseen_m=9.0), Evidence(behind_s=0.499)],
+)
+def test_a_little_less_does_not(evidence: Evidence) -> None:
+    assert cause(of(replace(AT_REST, evidence=evidence))) == 0
+
+
+def test_the_sentences_about_evidence_have_the_values() -> None:
+    slow = replace(AT_REST, velocity_mps=0.1, target_mps=0.3)
+    said = [detail(replace(slow, evidence=evidence), replace(RIGHT, target_mps=0.3)) for evidence, _ in EVIDENCE]
+    assert said == [
+        "wheel_1_0 reports standstill at once, and no motion since, with 0.300 m/s ordered: "
+        "no wheel stops so fast (watchdog.jolt_mps2 20 m/s²)",
+        "wheel_1_0 reports 0.100 m/s, and 5 changes of speed that no wheel can do (watchdog.jolt_mps2 20 m/s²)",
+        "wheel_1_0 is ordered 0.300 m/s, and its encoder has not moved for 0.300 s and 0.090 m of that "
+        "(allowed 0.250 s and 0.010 m); it reports 0.100 m/s: see encoder, motor, wheel",
+        "wheel_1_0 turns at 0.100 m/s, its setpoints ask for 0.300 m/s for 0.500 s "
+        "(allowed 0.500 s; slow ramps: watchdog.slowest_ramp_mps2)",
+    ]
+
+
+def test_a_base_that_moves_otherwise_trips_without_a_node() -> None:
+    verdict = decide(of(AT_REST, twist="1.000 rad/s together"), CONFIG, NOW)
+    assert verdict == Verdict(Cause.TWIST_OUTSIDE, 0, "the base moves otherwise than ordered: 1.000 rad/s together")
+
+
+# --- frames of one axis: 0.1 s at 100 Hz are 10 SYNCs
+
+
+@pytest.mark.parametrize(
+    ("count", "found"),
+    [("missed_setpoints", Cause.SETPOINT_MISSING), ("double_answers", Cause.ANSWERED_TWICE)],
+)
+@pytest.mark.parametrize(("syncs", "trips"), [(0.0, False), (9.5, False), (10.0, True), (10.5, True)])
+def test_ten_bad_syncs_are_enough(count: str, found: Cause, syncs: float, trips: bool) -> None:
+    bad = {count: syncs}
+    verdict = decide(of(AT_REST, replace(STANDING, **bad)), CONFIG, NOW)
+    assert ((verdict.cause, verdict.node_id) == (found, 2)) is trips
+    assert (cause(of(replace(AT_REST, **bad))) is found) is trips
+    assert cause(of(replace(OFF, **bad), replace(OFF, drive=RIGHT.drive, **bad))) == 0
+    assert not stands(verdict, of(replace(OFF, **bad)), CONFIG, NOW)
+
+
+def test_the_sentences_about_frames_have_the_values() -> None:
+    assert detail(replace(AT_REST, missed_setpoints=10.0, setpoint_at=99.9)) == (
+        "wheel_1_0 is enabled, and SYNCs come without setpoints for it: the last one is 0.100 s old (allowed 0.100 s)"
+    )
+    assert detail(replace(AT_REST, double_answers=10.0)) == (
+        "two drives answer as node 1, that of wheel_1_0: give each its own id"
+    )
+
+
 # --- a drive that is down while another one moves: the driver has 0.1 s
 
 
@@ -249,7 +326,14 @@ def test_each_cause_says_what_a_reset_needs() -> None:
 
 @pytest.mark.parametrize(
     "tripped_by",
-    [Cause.TARGET_OUTSIDE, Cause.MOTION_OUTSIDE, Cause.OVERSPEED, Cause.DRIVE_DOWN, Cause.FEEDBACK_IMPLAUSIBLE],
+    [
+        Cause.TARGET_OUTSIDE,
+        Cause.MOTION_OUTSIDE,
+        Cause.OVERSPEED,
+        Cause.DRIVE_DOWN,
+        Cause.FEEDBACK_IMPLAUSIBLE,
+        Cause.TWIST_OUTSIDE,
+    ],
 )
 def test_of_motion_nothing_is_left_when_the_wheels_stand(tripped_by: Cause) -> None:
     """A drive in fault must not keep the reset away: the driver resets the fault only after it."""
@@ -261,7 +345,7 @@ def test_of_motion_nothing_is_left_when_the_wheels_stand(tripped_by: Cause) -> N
 
 
 def test_the_order_of_the_table() -> None:
-    assert [check.cause for check in CHECKS] == [9, 10, 8, 1, 2, 3, 7, 12, 4, 6, 5]
+    assert [check.cause for check in CHECKS] == [9, 10, 8, 1, 2, 3, 16, 15, 7, 12, 13, 4, 6, 5, 14]
 
 
 def test_what_is_about_the_whole_robot_names_no_node() -> None:

@@ -5,11 +5,14 @@ As a program it drives on several seeds and prints what tripped: `python -m unit
 
 from __future__ import annotations
 
+import struct
 import sys
 from collections import deque
 from collections.abc import Callable, Iterator
 from random import Random
 
+from canbase_bench.cia301.dictionary import key
+from canbase_bench.cia402.states import State as DriveState
 from canbase_bench.frame import Frame as BenchFrame
 from canbase_bench.plant.base import PlantParameters
 from canbase_bench.world.bench import Bench
@@ -26,9 +29,15 @@ from canbase_watchdog.policy import Verdict
 from canbase_watchdog.watchdog import State, Watchdog
 
 STEP_S = 0.001
+GRAVITY_MPS2 = 9.81
 WATCHDOG_STEPS, FILTER_STEPS, DRIVER_STEPS = 5, 20, 10
 RUN_S = 300.0
-"""One seed: one robot, one load, stiff or soft drives."""
+"""One seed: one robot, one load, one floor, stiff or soft drives, their ramps and noise."""
+STEEPEST = 0.1
+"""Slope, 10 %: with double payload the weakest motors of the bench need half of their force for it."""
+LONGEST_HOLD_S = 0.2
+HOLD_N = (20.0, 250.0)
+"""What holds a wheel for a moment: up to nearly three times what its motor can push."""
 
 Source = Iterator[tuple[float, Twist]]
 """Velocity commands, each with the time until the next one [s]."""
@@ -42,9 +51,16 @@ class Soak:
         self.robot = load_robot(sample("bench")).robot
         load, bandwidth = self.random.choice((0.5, 1.0, 1.0, 1.5, 2.0)), self.random.choice((50.0, 200.0))
         self.step, self._start = 0, 1000.0
-        self.bench = Bench(self.robot, self.now, PlantParameters(payload_factor=load, bandwidth_radps=bandwidth))
+        carpet_n = self.random.choice((6.0, 6.0, 12.0, 25.0))
+        body = PlantParameters(payload_factor=load, bandwidth_radps=bandwidth, coulomb_n=carpet_n)
+        self.bench = Bench(self.robot, self.now, body)
+        self._weight_n = GRAVITY_MPS2 * body.mass_kg * load
+        self._noise_mps = self.random.choice((0.0, 0.005, 0.02))
+        self._ramp_share = self.random.choice((1.0, 1.0, 0.5, 0.3))
+        self._floor_until, self._held_until, self._freed_until = 0.0, 0.0, 0.0
         self.driver = DriverCore(self.robot)
-        self.watchdog = Watchdog(watchdog_config(self.robot), self.now)
+        self.watchdog_config = watchdog_config(self.robot)
+        self.watchdog = Watchdog(self.watchdog_config, self.now)
         self.filter = SafetyFilter(FilterConfig.of(self.robot))
         self.path_m = 0.0
         self._sequence = 0
@@ -78,6 +94,7 @@ class Soak:
             self._command(now)
         elif self.step % FILTER_STEPS == 0:
             self._issue(now)
+        self._change_floor(now)
         while self._to_driver and self._to_driver[0][0] <= now:
             self.driver.on_command(self._to_driver.popleft()[1], now)
         if self.step >= self._driver_step:
@@ -95,12 +112,45 @@ class Soak:
             due += self.random.randint(5, most)
         return max(due, self.step + 1)
 
+    def _change_floor(self, now: float) -> None:
+        """Slopes for some seconds; now and then something holds a wheel for a moment, like a threshold."""
+        random, base = self.random, self.bench.base
+        if now >= self._floor_until:
+            self._floor_until = now + random.uniform(2.0, 20.0)
+            base.push_n = self._weight_n * random.choice((0.0, 0.0, random.uniform(-STEEPEST, STEEPEST)))
+            self._slow_ramps()
+        if self._held_until and now >= self._held_until:
+            self._held_until, self._freed_until = 0.0, now + random.uniform(1.0, 8.0)
+            base.hold("left", 0.0)
+            base.hold("right", 0.0)
+        elif not self._held_until and now >= self._freed_until:
+            self._held_until = now + random.uniform(0.02, LONGEST_HOLD_S)
+            force_n = random.uniform(*HOLD_N)
+            for side in random.choice((("left",), ("right",), ("left", "right"))):
+                base.hold(side, force_n)
+
+    def _slow_ramps(self) -> None:
+        """The drives' own ramps are slower than the driver's setpoints; down they must be as the limits say."""
+        for node in self.bench.nodes.values():
+            axis = node.axes[0]
+            slope = self._ramp_share * self.robot.limits.acceleration_mps2
+            if self._ramp_share < 1.0 and axis.state is DriveState.OPERATION_ENABLED:
+                node.dictionary.values[key(0x6083)] = round(slope / axis.scale.slope_mps2)
+
     def _watch(self, now: float) -> None:
         """What has come meanwhile is taken in at once, and all of it counts as received now."""
         while self._to_watchdog:
-            frame = self._to_watchdog.popleft()
+            frame = self._noisy(self._to_watchdog.popleft())
             self.watchdog.on_frame(frame.cob_id, frame.data, now)
         self._send([Frame(frame.cob_id, frame.data) for frame in self.watchdog.tick(now)])
+
+    def _noisy(self, frame: Frame) -> Frame:
+        """606Ch of a drive that measures badly."""
+        if not self._noise_mps or frame.cob_id & 0x780 != 0x280 or len(frame.data) != 4:
+            return frame
+        bits_per_mps = 1.0 / abs(self.watchdog_config.drives[0].velocity_mps_per_bit)
+        noise = round(self.random.uniform(-1.0, 1.0) * self._noise_mps * bits_per_mps)
+        return Frame(frame.cob_id, struct.pack("<i", struct.unpack("<i", frame.data)[0] + noise))
 
     def _command(self, now: float) -> None:
         if now >= self._source_until:

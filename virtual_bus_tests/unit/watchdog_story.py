@@ -56,6 +56,15 @@ def config(*drives: tuple[int, int], uid: int | None = None) -> WatchdogConfig:
         travel_tolerance_m=0.05,
         braking_mps2=0.5,
         coasting_s=2.0,
+        motion_missing_s=0.25,
+        motion_missing_m=0.01,
+        jolt_mps2=20.0,
+        slow_wheel_share=0.3,
+        slow_wheel_s=0.5,
+        slowest_ramp_mps2=0.25,
+        twist_tolerance_mps=0.01,
+        twist_tolerance_share=0.08,
+        twist_s=0.5,
         lease_uid=uid,
     )
 

@@ -1,7 +1,9 @@
 """Whether what one drive reports fits its setpoints and itself: three counts of bad samples in a row. No judgement.
 
 The wheel follows its setpoints: it may have the speed of any setpoint of the last `drive_lag_s` and less, and after
-that it falls with the configured deceleration. Encoder and velocity tell the same way, but for a small drift.
+that it falls with the configured deceleration; what it must have at least is evidence.py. Encoder and velocity tell the
+same way, but for a small drift: a difference is forgotten over the way on which it did not grow, and very slowly with
+time, so that it is found at any speed (docs/decisions/0020).
 """
 
 from __future__ import annotations
@@ -11,9 +13,11 @@ from dataclasses import dataclass
 
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 from canbase_watchdog.envelope import Peak
+from canbase_watchdog.evidence import EvidenceWatch
 
-DRIFT_S = 0.5
-"""Differences between encoder and velocity are forgotten with this time constant: noise and filters have no memory."""
+DRIFT_M, DRIFT_S = 0.25, 10.0
+"""Differences between encoder and velocity are forgotten over this way, and within this time: noise, filters and a
+scale that is a little wrong have no memory. An error of more than travel_tolerance_m / DRIFT_M is found on the way."""
 JUMP_FACTOR = 3.0
 """A step of the encoder beyond so many times the fastest wheel's is a jump: it tells nothing about the motion."""
 JUMP_CYCLES = 2.0
@@ -55,6 +59,7 @@ class FeedbackWatch:
         self._counts: int | None = None
         self._counts_before: int | None = None
         self.last = Feedback()
+        self.evidence = EvidenceWatch(drive, config, now)
 
     def on_target(self, target_mps: float, now: float) -> None:
         """A setpoint, which stays until the next one."""
@@ -65,12 +70,19 @@ class FeedbackWatch:
         """6064h of a status TPDO; the velocity of the same SYNC follows."""
         self._counts = counts
 
-    def on_velocity(self, velocity_mps: float, powered: bool, now: float) -> None:
+    def on_velocity(self, velocity_mps: float, powered: bool, enabled: bool, now: float) -> None:
         """606Ch of a velocity TPDO. A wheel without power may be pushed: nothing of it is bad."""
         elapsed_s, self._at = now - self._at, now
         self._follow(elapsed_s, now)
-        drift_m, jumped = self._drift(velocity_mps, elapsed_s)
+        step_m, jumped = self._step(elapsed_s)
+        drift_m = self._drift(velocity_mps, step_m, jumped, elapsed_s)
+        self._judge(velocity_mps, powered, drift_m, jumped)
+        self.evidence.on_sample(velocity_mps, None if jumped else step_m, enabled, elapsed_s, now)
+        if self.last.implausible >= self._config.feedback_samples:
+            self.evidence.doubt()
         self._velocity_mps, self._counts_before = velocity_mps, self._counts
+
+    def _judge(self, velocity_mps: float, powered: bool, drift_m: float, jumped: bool) -> None:
         if not powered:
             self.last = Feedback(-self._low, self._high)
             return
@@ -91,16 +103,22 @@ class FeedbackWatch:
         self._high = max(self._high - fallen_mps, self._forward.greatest(now), 0.0)
         self._low = max(self._low - fallen_mps, self._backward.greatest(now), 0.0)
 
-    def _drift(self, velocity_mps: float, elapsed_s: float) -> tuple[float, bool]:
-        """Travel by velocity minus travel by encoder [m], and whether the encoder jumped.
+    def _step(self, elapsed_s: float) -> tuple[float | None, bool]:
+        """Travel by the encoder since the last sample [m], and whether it jumped.
 
-        Begins anew after a gap: what the wheel did in it was not measured.
+        None after a gap: what the wheel did in it was not measured.
         """
         if self._counts is None or self._counts_before is None or elapsed_s >= self._config.feedback_timeout_s:
-            return 0.0, False
-        steps = (self._counts - self._counts_before + _WRAP // 2) % _WRAP - _WRAP // 2
+            return None, False
+        counts = (self._counts - self._counts_before + _WRAP // 2) % _WRAP - _WRAP // 2
+        step_m = counts * self._m_per_count
+        return step_m, abs(step_m) > self._jump_mps * max(elapsed_s, self._jump_s)
+
+    def _drift(self, velocity_mps: float, step_m: float | None, jumped: bool, elapsed_s: float) -> float:
+        """Travel by velocity minus travel by encoder [m]. A jump is no travel; without a step it begins anew."""
+        if step_m is None:
+            return 0.0
         by_velocity_m = (velocity_mps + self._velocity_mps) / 2.0 * elapsed_s
-        by_encoder_m = steps * self._m_per_count
-        jumped = abs(by_encoder_m) > self._jump_mps * max(elapsed_s, self._jump_s)
-        left = max(1.0 - elapsed_s / DRIFT_S, 0.0)
-        return self.last.drift_m * left + (0.0 if jumped else by_velocity_m - by_encoder_m), jumped
+        way_m = max(abs(by_velocity_m), 0.0 if jumped else abs(step_m))
+        left = max(1.0 - way_m / DRIFT_M - elapsed_s / DRIFT_S, 0.0)
+        return self.last.drift_m * left + (0.0 if jumped else by_velocity_m - step_m)

@@ -13,6 +13,7 @@ from canbase_watchdog import frames
 from canbase_watchdog.feedback import FeedbackWatch
 from canbase_watchdog.foreign import Foreign
 from canbase_watchdog.frames import DriveState
+from canbase_watchdog.tally import Tally
 from canbase_watchdog.view import NEVER, Axis, BusView, Node
 
 ENABLED = DriveState.OPERATION_ENABLED
@@ -24,13 +25,16 @@ class _Record:
     """The last values of one axis, as they come."""
 
     __slots__ = (
+        "answers",
         "asks_for_power",
         "command_at",
         "disabled_since",
+        "doubles",
         "drive",
         "enabled_since",
         "feedback",
         "fresh",
+        "misses",
         "setpoint_at",
         "setpoint_mps",
         "state",
@@ -49,6 +53,7 @@ class _Record:
         self.target_mps, self.command_at = 0.0, NEVER
         self.setpoint_mps, self.setpoint_at = 0.0, NEVER
         self.asks_for_power = self.fresh = False
+        self.misses, self.doubles, self.answers = Tally(), Tally(), 0
 
     def axis(self) -> Axis:
         return Axis(
@@ -65,7 +70,23 @@ class _Record:
             self.setpoint_mps,
             self.setpoint_at,
             self.feedback.last,
+            self.feedback.evidence.last,
+            self.misses.value,
+            self.doubles.value,
         )
+
+    def on_sync(self, now: float) -> None:
+        """What came before it counts from now on; each SYNC wants one setpoint, and one answer from one drive."""
+        if self.state is ENABLED:
+            self.misses.count(not self.fresh)
+            self.doubles.count(self.drive.answers_sync and self.answers > 1)
+        else:
+            self.misses.clear()
+            self.doubles.clear()
+        self.answers = 0
+        if self.fresh:
+            self.setpoint_mps, self.setpoint_at, self.fresh = self.target_mps, now, False
+            self.feedback.evidence.on_setpoint(self.setpoint_mps, now)
 
 
 class Observer:
@@ -105,6 +126,11 @@ class Observer:
             self._foreign.last,
         )
 
+    def trust(self) -> None:
+        """A reset was accepted: what spoke against the sensors is over."""
+        for record in self._records.values():
+            record.feedback.evidence.trust()
+
     @property
     def driver_at(self) -> float:
         """When the older one of the driver's heartbeat and SYNC came."""
@@ -134,8 +160,7 @@ class Observer:
             return False
         self._foreign.on_sync(now)
         for record in self._records.values():
-            if record.fresh:
-                record.setpoint_mps, record.setpoint_at, record.fresh = record.target_mps, now, False
+            record.on_sync(now)
         if now >= self._sync_at + self._gap_s:
             self._sync_since = now
         self._sync_at = now
@@ -178,7 +203,9 @@ class Observer:
         if bits is None:
             return False
         self._note_velocity(record, bits, now)
-        record.feedback.on_velocity(record.velocity_mps, record.state in frames.POWERED, now)
+        record.answers += 1
+        enabled = record.state is ENABLED
+        record.feedback.on_velocity(record.velocity_mps, record.state in frames.POWERED, enabled, now)
         return True
 
     def _note_velocity(self, record: _Record, bits: int, now: float) -> None:

@@ -1,7 +1,8 @@
 """Whether the setpoints of the left and the right side go together: what each wheel may do alone, both may not.
 
 Looked at per SYNC, for only the SYNC makes setpoints effective: between the two frames of one cycle new and old mix.
-It takes two SYNCs in a row, as one lost frame leaves an old setpoint beside a new one.
+It takes two SYNCs that show it, as one lost frame leaves an old setpoint beside a new one. A SYNC for which a setpoint
+is missing shows nothing, neither that they fit nor that they do not: the count stays.
 """
 
 from __future__ import annotations
@@ -24,18 +25,21 @@ class PairWatch:
         self._bad = 0
 
     def look(self, bus: BusView, bounds: Bounds) -> str:
-        """Why they have not gone together for SYNCS in a row, empty when they have."""
+        """Why they did not go together in the last SYNCS that showed it, empty when they did."""
         if bus.sync_at == self._sync_at:
             return ""
         self._sync_at = bus.sync_at
+        if not all(axis.enabled for axis in bus.axes):
+            self._bad = 0
+            return ""
+        if not all(axis.setpoint_at == bus.sync_at for axis in bus.axes):
+            return ""
         misfit = self._misfit(bus, bounds)
         self._bad = self._bad + 1 if misfit else 0
         return misfit if self._bad >= SYNCS else ""
 
     def _misfit(self, bus: BusView, bounds: Bounds) -> str:
-        """Setpoints that did not come for this SYNC, or do not count in their drive, say nothing."""
-        if not all(axis.enabled and axis.setpoint_at == bus.sync_at for axis in bus.axes):
-            return ""
+        """Each wheel of the left side with each one of the right."""
         lefts, rights = _speeds(bus.axes, "left"), _speeds(bus.axes, "right")
         config, low_high = self._config, bounds.wheel(self._config.track_m / 2.0)
         share = config.target_tolerance_share * max(abs(speed) for speed in low_high)

@@ -31,12 +31,16 @@ class Cause(enum.IntEnum):
     LOOP_LATE = 10
     ENDED = 11
     FEEDBACK_IMPLAUSIBLE = 12
+    MOTION_MISSING = 13
+    TWIST_OUTSIDE = 14
+    SETPOINT_MISSING = 15
+    ANSWERED_TWICE = 16
     POWER_AT_END = 20
     RECORD_UNUSABLE = 21
 
 
-SENSOR_CAUSES = (Cause.FEEDBACK_IMPLAUSIBLE,)
-"""After these, what the drive of the verdict reports about its motion is no evidence any more."""
+SENSOR_CAUSES = (Cause.FEEDBACK_IMPLAUSIBLE, Cause.MOTION_MISSING)
+"""After a trip of before the start with one of these, what the drive reports about its motion is no evidence."""
 SIGN_S = 1.0
 """A sign of another master counts for so long."""
 
@@ -211,12 +215,85 @@ def _overspeed(view: View, config: WatchdogConfig, now: float) -> Verdict:
 
 def _feedback_implausible(view: View, config: WatchdogConfig, now: float) -> Verdict:
     for axis in view.axes:
-        if axis.powered and axis.feedback.implausible >= config.feedback_samples:
+        detail = _implausible(axis, config) if axis.powered else ""
+        if detail:
+            return Verdict(Cause.FEEDBACK_IMPLAUSIBLE, axis.drive.node_id, f"{axis.drive.joint} {detail}")
+    return FINE
+
+
+def _implausible(axis: Axis, config: WatchdogConfig) -> str:
+    """What is wrong with the sensor of a wheel, in words; empty: nothing."""
+    evidence, samples = axis.evidence, config.feedback_samples
+    if evidence.halted >= samples:
+        return (
+            f"reports standstill at once, and no motion since, with {evidence.setpoint_mps:.3f} m/s ordered: "
+            f"no wheel stops so fast (watchdog.jolt_mps2 {config.jolt_mps2:g} m/s²)"
+        )
+    if evidence.jolts >= samples:
+        return (
+            f"reports {axis.velocity_mps:.3f} m/s, and {evidence.jolts} changes of speed that no wheel can do "
+            f"(watchdog.jolt_mps2 {config.jolt_mps2:g} m/s²)"
+        )
+    if axis.feedback.implausible >= samples:
+        return (
+            f"reports {axis.velocity_mps:.3f} m/s, and its encoder tells otherwise: "
+            f"{axis.feedback.drift_m:.3f} m apart (allowed {config.travel_tolerance_m:.3f} m)"
+        )
+    return ""
+
+
+def _motion_missing(view: View, config: WatchdogConfig, now: float) -> Verdict:
+    for axis in view.axes:
+        detail = _missing(axis, config) if axis.enabled else ""
+        if detail:
+            return Verdict(Cause.MOTION_MISSING, axis.drive.node_id, f"{axis.drive.joint} {detail}")
+    return FINE
+
+
+def _missing(axis: Axis, config: WatchdogConfig) -> str:
+    """What of the ordered motion a wheel does not show, in words; empty: nothing."""
+    evidence = axis.evidence
+    if evidence.unseen:
+        return (
+            f"is ordered {evidence.setpoint_mps:.3f} m/s, and its encoder has not moved for {evidence.unseen_s:.3f} s "
+            f"and {evidence.unseen_m:.3f} m of that (allowed {config.motion_missing_s:.3f} s and "
+            f"{config.motion_missing_m:.3f} m); it reports {axis.velocity_mps:.3f} m/s: see encoder, motor, wheel"
+        )
+    if evidence.behind_s >= config.slow_wheel_s:
+        return (
+            f"turns at {axis.velocity_mps:.3f} m/s, its setpoints ask for {evidence.ordered_mps:.3f} m/s for "
+            f"{evidence.behind_s:.3f} s (allowed {config.slow_wheel_s:.3f} s; slow ramps: watchdog.slowest_ramp_mps2)"
+        )
+    return ""
+
+
+def _twist_outside(view: View, config: WatchdogConfig, now: float) -> Verdict:
+    if not view.twist:
+        return FINE
+    return Verdict(Cause.TWIST_OUTSIDE, 0, f"the base moves otherwise than ordered: {view.twist}")
+
+
+def _cycles(config: WatchdogConfig) -> float:
+    """So many SYNCs are as long as feedback may be missing."""
+    return config.feedback_timeout_s * config.control_hz
+
+
+def _setpoint_missing(view: View, config: WatchdogConfig, now: float) -> Verdict:
+    for axis in view.axes:
+        if axis.enabled and axis.missed_setpoints >= _cycles(config):
             detail = (
-                f"{axis.drive.joint} reports {axis.velocity_mps:.3f} m/s, and its encoder tells otherwise: "
-                f"{axis.feedback.drift_m:.3f} m apart (allowed {config.travel_tolerance_m:.3f} m)"
+                f"{axis.drive.joint} is enabled, and SYNCs come without setpoints for it: "
+                f"the last one is {now - axis.setpoint_at:.3f} s old (allowed {config.feedback_timeout_s:.3f} s)"
             )
-            return Verdict(Cause.FEEDBACK_IMPLAUSIBLE, axis.drive.node_id, detail)
+            return Verdict(Cause.SETPOINT_MISSING, axis.drive.node_id, detail)
+    return FINE
+
+
+def _answered_twice(view: View, config: WatchdogConfig, now: float) -> Verdict:
+    for axis in view.axes:
+        if axis.enabled and axis.double_answers >= _cycles(config):
+            detail = f"two drives answer as node {axis.drive.node_id}, that of {axis.drive.joint}: give each its own id"
+            return Verdict(Cause.ANSWERED_TWICE, axis.drive.node_id, detail)
     return FINE
 
 
@@ -300,11 +377,15 @@ CHECKS = (
         lambda view, node_id, config, now: now >= view.node(node_id).heard_at + config.drive_heartbeat_s,
         "the drive is heard again",
     ),
+    Check(Cause.ANSWERED_TWICE, _answered_twice, _over, "nothing else; give each drive a node id of its own first"),
+    Check(Cause.SETPOINT_MISSING, _setpoint_missing, _over, "nothing else"),
     Check(Cause.DRIVE_DOWN, _drive_down, _over, "nothing else; the driver resets the drive's fault after it"),
     Check(Cause.FEEDBACK_IMPLAUSIBLE, _feedback_implausible, _over, "nothing else; look at the encoder first"),
+    Check(Cause.MOTION_MISSING, _motion_missing, _over, "nothing else; look at encoder, motor and wheel first"),
     Check(Cause.TARGET_OUTSIDE, _target_outside, _over, "nothing else"),
     Check(Cause.OVERSPEED, _overspeed, _over, "nothing else"),
     Check(Cause.MOTION_OUTSIDE, _motion_outside, _over, "nothing else"),
+    Check(Cause.TWIST_OUTSIDE, _twist_outside, _over, "nothing else"),
 )
 """The first row that trips is the cause: where one failure shows in several rows, the one that explains it most comes
 first. A cause without a row does not stand: nothing of it is left to see."""

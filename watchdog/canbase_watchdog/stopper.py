@@ -78,8 +78,6 @@ class Stopper:
     def _look(self, view: View) -> Look:
         axes = self._axes(view)
         node = view.node(self._node_id)
-        lies = any(axis.feedback.implausible >= self._config.feedback_samples for axis in axes)
-        self._trusted = self._trusted and not lies
         return Look(
             enabled=any(axis.enabled for axis in axes),
             powered=any(axis.powered for axis in axes),
@@ -88,7 +86,7 @@ class Stopper:
             begin_mps=max(self._begin_mps(axis) for axis in axes),
             seen_at=min(axis.fed_at for axis in axes),
             present=node.heard_at > NEVER or any(axis.asks_for_power for axis in axes),
-            trusted=self._trusted,
+            trusted=self._trusted and all(axis.trusted for axis in axes),
         )
 
     def _begin_mps(self, axis: Axis) -> float:

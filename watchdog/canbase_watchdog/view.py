@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from canbase_config.watchdog import WatchedDrive
 from canbase_watchdog.envelope import Bounds
+from canbase_watchdog.evidence import Evidence
 from canbase_watchdog.feedback import Feedback
 from canbase_watchdog.foreign import Sign
 from canbase_watchdog.frames import POWERED, DriveState
@@ -36,6 +37,11 @@ class Axis:
     setpoint_mps: float = 0.0
     setpoint_at: float = NEVER
     feedback: Feedback = Feedback()  # noqa: RUF009 - immutable
+    evidence: Evidence = Evidence()  # noqa: RUF009 - immutable
+    missed_setpoints: float = 0.0
+    """SYNCs without a setpoint while it was enabled, less half of those with one."""
+    double_answers: float = 0.0
+    """SYNCs that were answered twice while it was enabled, less half of the others."""
 
     @property
     def enabled(self) -> bool:
@@ -46,6 +52,11 @@ class Axis:
     def powered(self) -> bool:
         """True when its last statusword said a state in which the motor has current."""
         return self.state in POWERED
+
+    @property
+    def trusted(self) -> bool:
+        """False when its sensor was found to show no motion, or a wrong one: no standstill is proven by it."""
+        return self.evidence.trusted
 
     @property
     def fed_at(self) -> float:
@@ -85,6 +96,8 @@ class View:
     lease_at: float = NEVER
     skew: str = ""
     """Why the setpoints of both sides do not go together, for two SYNCs in a row; empty when they do."""
+    twist: str = ""
+    """Why the base has not moved as ordered for `twist_s`; empty when it has."""
     tick_gap_s: float = 0.0
     bus_failed_since: float = math.inf
 

@@ -17,6 +17,7 @@ from canbase_watchdog.observer import Observer
 from canbase_watchdog.pair import PairWatch
 from canbase_watchdog.policy import Cause, Verdict
 from canbase_watchdog.stopper import Stopper
+from canbase_watchdog.twist import TwistWatch
 from canbase_watchdog.view import View
 
 STATE_PERIOD_S = 0.05
@@ -74,6 +75,7 @@ class Watchdog:
         self._observer = Observer(config, now)
         self._envelope = Envelope(config, now)
         self._pair = PairWatch(config)
+        self._twist = TwistWatch(config, now)
         self._leases = LeaseBook(config.lease_timeout_s, config.lease_uid)
         self._started_at = self._ticked_at = now
         self._bus_failed_since, self._bus_errors = math.inf, 0
@@ -195,7 +197,8 @@ class Watchdog:
         skew = self._pair.look(bus, bounds)
         gap_s = now - self._ticked_at
         leases, failed = self._leases, self._bus_failed_since
-        return View(bus, bounds, self._started_at, leases.last, leases.valid_at, skew, gap_s, failed)
+        twist = self._twist.look(bus, now)
+        return View(bus, bounds, self._started_at, leases.last, leases.valid_at, skew, twist, gap_s, failed)
 
     def _trip(self, verdict: Verdict, now: float) -> None:
         self.trips += 1
@@ -206,7 +209,7 @@ class Watchdog:
         self._verdict = verdict
         self._observer.commands_are_ours = True
         nodes = dict.fromkeys(drive.node_id for drive in self._config.drives)
-        lying = verdict.node_id if verdict.cause in policy.SENSOR_CAUSES else 0
+        lying = verdict.node_id if resting and verdict.cause in policy.SENSOR_CAUSES else 0
         self._stoppers = [
             Stopper(node_id, self._config, self._view, now, node_id != lying, resting) for node_id in nodes
         ]
@@ -280,4 +283,5 @@ class Watchdog:
         self._verdict = policy.FINE
         self._stoppers = []
         self._observer.commands_are_ours = False
+        self._observer.trust()
         return Answer.DONE

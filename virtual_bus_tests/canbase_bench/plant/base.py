@@ -93,6 +93,8 @@ class Base:
         self._invert_mass_matrix(parameters)
         self.x_m = self.y_m = self.turned_rad = 0.0
         self.v_left_mps = self.v_right_mps = 0.0
+        self.push_n = 0.0
+        """Force on the body along its x axis: a slope [N]."""
         self.travel_left_m = self.travel_right_m = 0.0
         self.travel_m = self.path_m = 0.0
         self.time_of_motion = now
@@ -132,7 +134,8 @@ class Base:
     def step(self, now: float) -> None:
         """Advance by one inner step that ends at `now`."""
         vl, vr, h = self.v_left_mps, self.v_right_mps, self._h
-        push_left, push_right = -self._viscous_left * vl, -self._viscous_right * vr
+        push = self.push_n / 2.0
+        push_left, push_right = push - self._viscous_left * vl, push - self._viscous_right * vr
         for motor, direction in self._left:
             push_left += direction * motor.step(direction * vl)
         for motor, direction in self._right:
@@ -179,7 +182,7 @@ class Base:
         self.turned_rad += turn
         self.travel_m += way
         self.path_m += abs(way)
-        self.resting = vl == 0.0 == vr and left == 0.0 == right
+        self.resting = vl == 0.0 == vr and left == 0.0 == right and not self.push_n
         self.v_left_mps, self.v_right_mps = vl, vr
         if abs(vl) > self._standstill or abs(vr) > self._standstill:
             self.time_of_motion = now

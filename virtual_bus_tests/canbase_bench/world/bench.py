@@ -128,7 +128,7 @@ class Bench:
         target = int((now - self._start) / self._h + 1e-6)
         base, h, start = self.base, self._h, self._start
         while self._steps < target:
-            if base.resting and all(motor.at_rest for motor in self._motors):
+            if base.resting and not base.push_n and all(motor.at_rest for motor in self._motors):
                 self._steps = target
                 return
             self._steps += 1

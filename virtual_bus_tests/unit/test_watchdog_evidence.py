@@ -1,0 +1,381 @@
+"""What a wheel must show of its orders: samples every 1/64 s, 1 mm/s per bit. Times and speeds are binary fractions.
+
+setpoint   ▁▁████████████████
+encoder    ▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁
+unseen       ▁▁▁▁▂▃▄▅▆▇█       0.25 s after the lag of 1/8 s, and 1/16 m of ordered travel
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from canbase_watchdog.evidence import Evidence, EvidenceWatch
+from unit.watchdog_story import config
+
+HZ = 64.0
+CONFIG = replace(
+    config(),
+    control_hz=HZ,
+    drive_lag_s=0.125,
+    standstill_mps=2.0**-7,
+    motion_tolerance_mps=0.0625,
+    motion_missing_s=0.25,
+    motion_missing_m=2.0**-4,
+    jolt_mps2=16.0,
+    slow_wheel_share=0.25,
+    slow_wheel_s=0.5,
+    slowest_ramp_mps2=0.5,
+)
+
+
+class Wheel:
+    """An enabled wheel on the table."""
+
+    def __init__(self, m_per_count: float = 2.0**-13, mps_per_bit: float = 0.0, **changes: Any) -> None:
+        drive = replace(CONFIG.drives[0], mps_per_bit=mps_per_bit, m_per_count=m_per_count)
+        self.watch = EvidenceWatch(drive, replace(CONFIG, **changes), 0.0)
+        self.n = 0
+
+    @property
+    def last(self) -> Evidence:
+        return self.watch.last
+
+    def sample(
+        self,
+        setpoint: float,
+        velocity: float,
+        *,
+        rolls: float | None = None,
+        enabled: bool = True,
+        known: bool = True,
+        cycles: float = 1.0,
+    ) -> Evidence:
+        """One cycle. The encoder rolls like the velocity unless it is told otherwise."""
+        self.n += 1
+        now, elapsed_s = self.n / HZ, cycles / HZ
+        self.watch.on_setpoint(setpoint, now)
+        step_m = (velocity if rolls is None else rolls) * elapsed_s
+        self.watch.on_sample(velocity, step_m if known else None, enabled, elapsed_s, now)
+        return self.last
+
+    def samples(self, count: int, setpoint: float, velocity: float, **how: Any) -> Evidence:
+        for _ in range(count):
+            self.sample(setpoint, velocity, **how)
+        return self.last
+
+
+# --- 1: ordered to move, and nothing moves
+
+
+def test_at_the_start_nothing_speaks_against_a_wheel() -> None:
+    assert Wheel().last == Evidence(0.0, 0.0, 0.0, 0.0, False, 0, 0, 0.0, True)
+
+
+def rolling(setpoint: float = 0.25, **changes: Any) -> Wheel:
+    """It has followed its order for longer than the lag."""
+    wheel = Wheel(**changes)
+    wheel.samples(16, setpoint, setpoint / 2, rolls=setpoint)
+    return wheel
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_wheel_that_shows_nothing_of_its_order_any_more_is_unseen_after_the_time(sign: int) -> None:
+    wheel = rolling(sign * 0.25)
+    last = wheel.samples(15, sign * 0.25, 0.0)
+    assert (last.unseen, last.trusted, last.unseen_s, last.setpoint_mps) == (False, True, 15 / HZ, sign * 0.25)
+    last = wheel.sample(sign * 0.25, 0.0)
+    assert (last.unseen, last.trusted, last.unseen_s, last.unseen_m) == (True, False, 0.25, 0.0625)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_from_a_stand_it_has_the_lag_besides(sign: int) -> None:
+    wheel = Wheel()
+    assert wheel.samples(9, sign * 0.25, 0.0).unseen_s == 0.0
+    assert not wheel.samples(15, sign * 0.25, 0.0).unseen
+    assert wheel.sample(sign * 0.25, 0.0).unseen
+
+
+def test_a_slow_order_needs_its_way_too() -> None:
+    wheel = rolling(2.0**-6)
+    assert not wheel.samples(255, 2.0**-6, 0.0).unseen
+    assert wheel.sample(2.0**-6, 0.0).unseen  # 1/64 m/s for 4 s
+
+
+def test_of_a_coarse_encoder_four_increments_are_waited_for() -> None:
+    wheel = rolling(m_per_count=-(2.0**-5))
+    assert not wheel.samples(31, 0.25, 0.0).unseen
+    assert wheel.sample(0.25, 0.0).unseen  # 1/8 m
+
+
+@pytest.mark.parametrize(("setpoint", "counts"), [(2.0**-7, False), (-(2.0**-7), False), (2.0**-7 + 2.0**-12, True)])
+def test_what_is_no_faster_than_standstill_need_not_be_seen(setpoint: float, counts: bool) -> None:
+    last = Wheel().samples(20, setpoint, 0.0)
+    assert (last.unseen_s > 0.0) is counts
+    assert (last.unseen_m > 0.0) is counts
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_an_encoder_that_moves_lives_whatever_the_direction(sign: int) -> None:
+    wheel = rolling()
+    wheel.samples(15, 0.25, 0.0)
+    last = wheel.sample(0.25, 0.0, rolls=sign * 0.25)
+    assert (last.unseen_s, last.unseen_m) == (0.0, 0.0)
+    last = wheel.sample(0.25, 0.0, rolls=0.0)
+    assert (last.unseen_s, last.unseen_m) == (1 / HZ, 0.25 / HZ)
+
+
+@pytest.mark.parametrize(
+    ("m_per_count", "life_m"), [(2.0**-10, 2.0**-9), (2.0**-13, 2.0**-12), (-(2.0**-10), 2.0**-9), (2.0**-20, 0.0002)]
+)
+def test_a_fifth_of_a_millimetre_or_two_increments_are_a_sign_of_life(m_per_count: float, life_m: float) -> None:
+    for step_m, lives in ((life_m, True), (life_m * 0.999, False)):
+        wheel = rolling(m_per_count=m_per_count)
+        wheel.sample(0.25, 0.0)
+        assert (wheel.sample(0.25, 0.0, rolls=step_m * HZ).unseen_s == 0.0) is lives
+
+
+def test_small_steps_one_way_add_up_to_a_sign_of_life_and_noise_does_not() -> None:
+    creeps, trembles = rolling(), rolling()
+    for n in range(12):
+        creeps.sample(0.25, 0.0, rolls=2.0**-13 * HZ)
+        trembles.sample(0.25, 0.0, rolls=(-1) ** n * 2.0**-13 * HZ)
+    assert creeps.last.unseen_s < 5 / HZ
+    assert trembles.last.unseen_s == 12 / HZ
+
+
+def test_the_travel_of_short_orders_adds_up_and_then_the_time_does_without_an_order() -> None:
+    wheel = Wheel()
+    for n in range(1, 4):
+        wheel.samples(4, 0.25, 0.0)
+        last = wheel.samples(30, 0.0, 0.0)
+        assert (last.unseen_s, last.unseen_m) == (0.0, n / HZ)
+    last = wheel.samples(4, 0.25, 0.0)
+    assert (last.unseen_s, last.unseen_m) == (1 / HZ, 0.0625)
+    assert not wheel.samples(14, 0.0, 0.0).unseen
+    assert wheel.sample(0.0, 0.0).unseen
+
+
+def test_drives_that_are_not_enabled_begin_anew() -> None:
+    wheel = rolling()
+    wheel.samples(15, 0.25, 0.0)
+    assert wheel.sample(0.25, 0.0, enabled=False) == Evidence()
+    assert not wheel.samples(15, 0.25, 0.0).unseen
+
+
+def test_a_step_that_is_not_known_neither_counts_nor_forgets() -> None:
+    wheel = rolling()
+    wheel.samples(5, 0.25, 0.0)
+    last = wheel.samples(50, 0.25, 0.0, known=False)
+    assert (last.unseen_s, last.unseen_m) == (5 / HZ, 5 / 256)
+
+
+def test_a_reset_trusts_the_sensor_again() -> None:
+    wheel = rolling()
+    wheel.sample(0.25, 0.0, rolls=2.0**-13 * HZ)
+    wheel.samples(16, 0.25, 0.0)
+    assert not wheel.samples(3, 0.25, 0.25).trusted
+    assert not wheel.samples(3, 0.25, 0.25, enabled=False).trusted
+    wheel.sample(0.25, 0.0, rolls=2.0**-13 * HZ)
+    wheel.watch.trust()
+    assert wheel.last == Evidence()
+    wheel.samples(15, 0.25, 0.0)
+    assert wheel.sample(0.25, 0.0, rolls=2.0**-13 * HZ).unseen
+
+
+def test_a_sensor_that_contradicts_itself_is_doubted_until_a_reset() -> None:
+    wheel = Wheel()
+    wheel.samples(4, 0.25, 0.25)
+    wheel.watch.doubt()
+    assert not wheel.samples(50, 0.25, 0.25).trusted
+    wheel.watch.trust()
+    assert wheel.samples(50, 0.25, 0.25).trusted
+
+
+# --- 2: halted at once. 16 m/s² in 1/64 s are 0.25 m/s, and 0.0625 m/s tolerance
+
+
+def fast(speed: float = 0.5, **changes: Any) -> Wheel:
+    wheel = Wheel(**changes)
+    for n in range(1, 33):
+        wheel.sample(speed, speed * n / 32)
+    return wheel
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_velocity_that_drops_to_nothing_at_once_is_counted_while_nothing_moves(sign: int) -> None:
+    wheel = fast(sign * 0.5)
+    counts = [wheel.sample(sign * 0.5, 0.0) for _ in range(6)]
+    assert [each.halted for each in counts] == [1, 2, 3, 4, 5, 6]
+    assert [each.trusted for each in counts] == [True] * 4 + [False] * 2
+    assert counts[-1].jolts == 1
+
+
+@pytest.mark.parametrize(("speed", "halts"), [(0.3125, False), (0.3126, True), (-0.3125, False), (-0.3126, True)])
+def test_what_a_wheel_can_lose_in_a_cycle_is_no_halt(speed: float, halts: bool) -> None:
+    wheel = Wheel()
+    wheel.samples(3, speed, speed / 2)
+    wheel.sample(speed, speed)
+    assert (wheel.sample(speed, 0.0).halted == 1) is halts
+
+
+def test_one_bit_of_the_velocity_is_no_jolt() -> None:
+    wheel = Wheel(mps_per_bit=-0.125)
+    assert wheel.sample(0.5, 0.4375).jolts == 0
+    assert Wheel(mps_per_bit=-0.125).sample(0.5, 0.4376).jolts == 1
+
+
+def test_after_a_longer_time_more_can_be_lost_and_after_a_shorter_one_no_less() -> None:
+    assert fast().sample(0.5, 0.0, cycles=2.0).halted == 0
+    assert fast().sample(0.5, 0.25, cycles=0.0).jolts == 0
+
+
+FASTER = 2.0**-7 + 2.0**-12
+
+
+@pytest.mark.parametrize(("velocity", "halted"), [(0.0, 1), (2.0**-7, 1), (-(2.0**-7), 1), (FASTER, 0), (-FASTER, 0)])
+def test_slower_than_standstill_is_halted_and_faster_is_not(velocity: float, halted: int) -> None:
+    assert fast().sample(0.5, velocity, rolls=0.0).halted == halted
+
+
+def test_a_wheel_that_moves_on_was_not_halted() -> None:
+    wheel = fast()
+    wheel.samples(3, 0.5, 0.0)
+    assert wheel.sample(0.5, 0.25).halted == 0
+    assert wheel.samples(9, 0.5, 0.0).halted == 0
+    wheel = fast()
+    wheel.samples(3, 0.5, 0.0)
+    assert wheel.sample(0.5, 0.0, rolls=0.25).halted == 0
+    assert wheel.sample(0.5, 0.0).halted == 0
+
+
+def test_what_it_rolled_until_the_jolt_is_no_sign_of_life() -> None:
+    wheel = fast()
+    wheel.sample(0.5, 0.0, rolls=0.25)
+    assert wheel.sample(0.5, 0.0, rolls=0.01).halted == 2
+
+
+def test_no_wheel_stands_at_once_when_it_is_ordered_to_either() -> None:
+    wheel = fast()
+    assert wheel.sample(0.0, 0.0).halted == 1
+    assert wheel.samples(20, 0.0, 0.0).halted == 21
+
+
+@pytest.mark.parametrize(("share", "halted"), [(0.5, 0), (0.51, 1), (-0.51, 1), (-0.5, 0), (0.0, 0)])
+def test_a_velocity_that_was_an_error_itself_is_no_wheel_that_halts(share: float, halted: int) -> None:
+    wheel = Wheel()
+    wheel.sample(0.0, 0.5, rolls=share * 0.5)
+    assert wheel.sample(0.0, 0.0).halted == halted
+    wheel = Wheel()
+    wheel.sample(0.0, 0.5, known=False)
+    assert wheel.sample(0.0, 0.0).halted == 0
+
+
+def test_without_power_to_turn_nothing_is_halted() -> None:
+    wheel = fast()
+    assert wheel.sample(0.5, 0.0, enabled=False).halted == 0
+    assert wheel.samples(9, 0.5, 0.0).halted == 0
+
+
+# --- 3: jolts
+
+
+def test_changes_that_no_wheel_can_do_are_counted_while_none_is_a_second_after_the_one_before() -> None:
+    wheel = Wheel()
+    for n in range(8):
+        last = wheel.sample(0.5, 0.5 * (n % 2), rolls=0.5)
+    assert (last.jolts, last.trusted) == (7, False)
+    assert wheel.samples(62, 0.5, 0.5, rolls=0.5).jolts == 7
+    assert wheel.sample(0.5, 0.5).jolts == 7
+    assert wheel.sample(0.5, 0.5).jolts == 0
+
+
+def test_of_few_jolts_a_sensor_may_still_be_trusted() -> None:
+    wheel = Wheel()
+    for n in range(5):
+        last = wheel.sample(0.5, 0.5 * (n % 2), rolls=0.5)
+    assert (last.jolts, last.trusted) == (4, True)
+    last = wheel.sample(0.5, 0.5, rolls=0.5)
+    assert (last.jolts, last.trusted) == (5, False)
+
+
+def test_a_jolt_after_a_long_time_is_the_first_again() -> None:
+    wheel = fast()
+    assert wheel.sample(0.5, 0.0).jolts == 1
+    for n in range(70):
+        wheel.sample(0.5, min(0.5, n / 64))
+    assert wheel.sample(0.5, 0.0).jolts == 1
+
+
+# --- 4: slower than the least that the setpoints ask for
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_what_is_asked_for_rises_with_the_slowest_ramp_after_the_lag(sign: int) -> None:
+    wheel = Wheel()
+    asked = [sign * wheel.sample(sign * 0.25, sign * 0.25).ordered_mps for _ in range(50)]
+    # The order came in the first of them; from 9 on nothing else was in force in the last 8 cycles.
+    assert asked[:9] == [0.0] * 9
+    assert asked[9:12] == [0.5 / 64, 1.0 / 64, 1.5 / 64]
+    assert asked[-1] == 0.25
+
+
+def test_it_falls_with_the_setpoints_at_once() -> None:
+    wheel = Wheel()
+    wheel.samples(100, 0.5, 0.5)
+    assert wheel.sample(0.25, 0.5).ordered_mps == 0.25
+    assert wheel.sample(0.0, 0.5).ordered_mps == 0.0
+    assert wheel.sample(0.5, 0.5).ordered_mps == 0.0
+
+
+def test_of_a_reversal_nothing_is_asked_for_while_the_wheel_turns_the_old_way() -> None:
+    for sign in (1, -1):
+        wheel = Wheel()
+        wheel.samples(100, sign * 0.5, sign * 0.5)
+        wheel.samples(20, -sign * 0.5, sign * 0.5)
+        assert wheel.sample(-sign * 0.5, sign * 0.0626).ordered_mps == 0.0
+        assert wheel.sample(-sign * 0.5, sign * 0.0625).ordered_mps == -sign * 0.5 / 64
+        assert wheel.sample(-sign * 0.5, -sign * 0.25).ordered_mps == -sign * 1.0 / 64
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("velocity", "behind"), [(0.3125, False), (0.3124, True), (-0.01, True), (0.6, False)])
+def test_behind_is_what_is_slower_than_share_and_tolerance(sign: int, velocity: float, behind: bool) -> None:
+    wheel = Wheel()
+    wheel.samples(100, sign * 0.5, sign * 0.5)  # 0.5 × 0.75 - 0.0625 = 0.3125
+    assert (wheel.sample(sign * 0.5, sign * velocity).behind_s > 0.0) is behind
+
+
+def test_one_bit_more_is_not_behind() -> None:
+    wheel = Wheel(mps_per_bit=-0.125)
+    wheel.samples(100, 0.5, 0.5)
+    assert wheel.sample(0.5, 0.1875).behind_s == 0.0
+    assert wheel.sample(0.5, 0.1874).behind_s > 0.0
+
+
+def test_the_time_behind_adds_up_and_goes_down_as_fast() -> None:
+    wheel = Wheel()
+    wheel.samples(100, 0.5, 0.5)
+    assert wheel.samples(8, 0.5, 0.25).behind_s == 8 / HZ
+    assert wheel.samples(5, 0.5, 0.5).behind_s == 3 / HZ
+    assert wheel.samples(5, 0.5, 0.5).behind_s == 0.0
+    assert wheel.samples(2, 0.5, 0.25).behind_s == 2 / HZ
+
+
+def test_a_wheel_that_stands_while_nothing_is_ordered_is_not_behind() -> None:
+    wheel = Wheel()
+    wheel.samples(100, 0.5, 0.5)
+    wheel.sample(0.0, 0.5)
+    assert wheel.samples(20, 0.0, 0.0).behind_s == 0.0
+    assert wheel.samples(20, 0.0, -0.5).behind_s == 0.0
+
+
+def test_nothing_is_asked_of_a_drive_that_is_not_enabled() -> None:
+    wheel = Wheel()
+    wheel.samples(100, 0.5, 0.5)
+    wheel.samples(4, 0.5, 0.25)
+    last = wheel.sample(0.5, 0.25, enabled=False)
+    assert (last.ordered_mps, last.behind_s, last.setpoint_mps) == (0.0, 0.0, 0.0)
+    assert wheel.sample(0.5, 0.25).ordered_mps == 0.5 / 64

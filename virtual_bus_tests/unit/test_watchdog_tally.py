@@ -1,0 +1,33 @@
+"""Bad cycles add up, good ones take back half of one."""
+
+from __future__ import annotations
+
+import pytest
+
+from canbase_watchdog.tally import Tally
+
+
+def count(pattern: str) -> float:
+    tally = Tally()
+    for each in pattern:
+        tally.count(each == "x")
+    return tally.value
+
+
+@pytest.mark.parametrize(
+    ("pattern", "value"),
+    [("", 0.0), ("x", 1.0), ("xx", 2.0), (".", 0.0), ("x.", 0.5), ("x..", 0.0), ("x...x", 1.0), ("x." * 40, 20.0)],
+)
+def test_a_bad_cycle_is_one_and_a_good_one_half_of_it_back(pattern: str, value: float) -> None:
+    assert count(pattern) == value
+
+
+def test_one_bad_cycle_in_three_does_not_add_up() -> None:
+    assert count("x.." * 1000) == 0.0
+
+
+def test_cleared_it_begins_anew() -> None:
+    tally = Tally()
+    tally.count(True)
+    tally.clear()
+    assert tally.value == 0.0

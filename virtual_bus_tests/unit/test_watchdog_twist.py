@@ -1,0 +1,218 @@
+"""The base against the orders of its wheels, every 1/64 s: lag 1/8 s, slowest ramp 0.5 m/s², track 0.5 m.
+
+ordered    both wheels 0.25 m/s: straight on
+measured   left 0.125, right 0.25: a curve, 0.25 rad/s       trips after 0.25 s, and the smoothing
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from canbase_watchdog.frames import DriveState
+from canbase_watchdog.twist import Reach, TwistWatch
+from canbase_watchdog.view import Axis, BusView
+from unit.watchdog_story import config
+
+HZ = 64.0
+CONFIG = replace(
+    config(),
+    control_hz=HZ,
+    track_m=0.5,
+    drive_lag_s=0.125,
+    slowest_ramp_mps2=0.5,
+    twist_tolerance_mps=0.01,
+    twist_tolerance_share=0.0,
+    twist_s=0.25,
+)
+BIT = replace(CONFIG.drives[0], mps_per_bit=0.0), replace(CONFIG.drives[1], mps_per_bit=0.0)
+
+
+class Base:
+    """Two wheels on the table, enabled; `start` closes what may have been ordered before."""
+
+    def __init__(self, start: bool = True, **changes: Any) -> None:
+        self.config = replace(CONFIG, drives=BIT, **changes)
+        self.watch = TwistWatch(self.config, 0.0)
+        self.n = 0
+        if start:
+            self.cycle((0.0, 0.0), state=DriveState.SWITCHED_ON)
+
+    def cycle(
+        self,
+        ordered: tuple[float, float],
+        measured: tuple[float, float] | None = None,
+        state: DriveState = DriveState.OPERATION_ENABLED,
+        cycles: int = 1,
+    ) -> str:
+        """One SYNC with setpoints and velocities of left and right; the base does as ordered unless told otherwise."""
+        self.n += cycles
+        axes = [
+            Axis(drive, state=state, setpoint_mps=setpoint, velocity_mps=velocity)
+            for drive, setpoint, velocity in zip(self.config.drives, ordered, measured or ordered, strict=False)
+        ]
+        return self.watch.look(BusView(tuple(axes), (), sync_at=self.n / HZ), self.n / HZ)
+
+    def trips_after(self, ordered: tuple[float, float], measured: tuple[float, float], most: int = 200) -> int | None:
+        """So many SYNCs; None: it does not."""
+        return next((n for n in range(1, most) if self.cycle(ordered, measured)), None)
+
+
+def straight(speed: float = 0.25, **changes: Any) -> Base:
+    base = Base(**changes)
+    for _ in range(64):
+        base.cycle((speed, speed))
+    return base
+
+
+@pytest.mark.parametrize(
+    ("measured", "trips"),
+    [
+        ((0.25, 0.25), False),
+        ((0.0, 0.0), False),  # slow together: no curve, and each wheel has its own bound
+        ((0.125, 0.25), True),
+        ((0.25, 0.125), True),
+        ((0.25, 0.25 - 0.0199), False),  # 2 × 0.01 m/s between the wheels
+        ((0.25, 0.25 - 0.0201), True),
+        ((0.25 - 0.0201, 0.25), True),
+        ((0.2599, 0.2599), False),
+        ((0.2601, 0.2601), True),
+        ((-0.0099, -0.0099), False),
+        ((-0.0101, -0.0101), True),
+    ],
+)
+def test_straight_on(measured: tuple[float, float], trips: bool) -> None:
+    assert (straight().trips_after((0.25, 0.25), measured) is not None) is trips
+    mirrored = (-measured[0], -measured[1])
+    assert (straight(-0.25).trips_after((-0.25, -0.25), mirrored) is not None) is trips
+
+
+def test_a_curve_that_nobody_ordered_trips_after_its_time() -> None:
+    assert straight().trips_after((0.25, 0.25), (0.125, 0.25)) == 16
+    assert straight(twist_s=0.5).trips_after((0.25, 0.25), (0.125, 0.25)) == 32
+
+
+def test_of_a_turn_in_place_both_wheels_have_their_share() -> None:
+    base = Base()
+    for _ in range(64):
+        base.cycle((-0.25, 0.25))
+    assert base.trips_after((-0.25, 0.25), (-0.125, 0.25)) is not None  # 0.0625 m/s ahead
+    assert straight(0.0).trips_after((0.0, 0.0), (-0.05, 0.05)) is not None
+
+
+def test_the_share_is_that_of_the_fastest_wheel() -> None:
+    assert straight(twist_tolerance_share=0.25).trips_after((0.25, 0.25), (0.25, 0.106)) is None  # 2 × (0.01 + 0.0625)
+    assert straight(twist_tolerance_share=0.25).trips_after((0.25, 0.25), (0.25, 0.104)) is not None
+    base = straight(-0.25, twist_tolerance_share=0.25)
+    assert base.trips_after((-0.25, -0.25), (-0.25, -0.106)) is None
+
+
+def test_one_bit_of_the_velocity_is_no_curve() -> None:
+    coarse = tuple(replace(drive, mps_per_bit=-0.0625) for drive in BIT)
+    base = straight()
+    base.watch = TwistWatch(replace(base.config, drives=coarse), base.n / HZ)
+    base.cycle((0.0, 0.0), state=DriveState.SWITCHED_ON)
+    assert base.trips_after((0.25, 0.25), (0.25, 0.106)) is None
+    assert base.trips_after((0.25, 0.25), (0.25, 0.104)) is not None
+
+
+def test_the_wheel_that_is_farthest_from_its_setpoint_is_named() -> None:
+    base = straight()
+    why = ""
+    while not why:
+        why = base.cycle((0.25, 0.25), (0.125, 0.24))
+    assert why.startswith("0.2")
+    assert "rad/s together, allowed" in why
+    assert why.endswith("; wheel_1_0 is ordered 0.250 m/s and turns at 0.125 m/s")
+
+
+def test_a_moment_is_forgotten_as_fast_as_it_came() -> None:
+    base = straight()
+    for _ in range(20):
+        assert base.trips_after((0.25, 0.25), (0.0, 0.25), 6) is None
+        assert base.trips_after((0.25, 0.25), (0.25, 0.25), 30) is None
+
+
+def test_a_wheel_that_is_slow_more_than_half_of_the_time_adds_up() -> None:
+    base = straight()
+    bad = [base.cycle((0.25, 0.25), (0.0 if n % 8 < 5 else 0.25, 0.25)) for n in range(200)]
+    assert any(bad)
+
+
+def test_noise_of_both_wheels_is_no_curve() -> None:
+    base = straight()
+    noise = [(0.03, -0.03), (-0.03, 0.03)]
+    assert not any(base.cycle((0.25, 0.25), (0.25 + noise[n % 2][0], 0.25 + noise[n % 2][1])) for n in range(500))
+
+
+def test_a_twist_that_was_ordered_may_go_on_for_the_lag_and_falls_with_the_slowest_ramp() -> None:
+    base = Base(twist_s=0.01)
+    for _ in range(64):
+        base.cycle((0.0, 0.5))  # 1 rad/s, 0.25 m/s
+    speed, n = 0.5, 0
+    while speed > 0.0:
+        n += 1
+        speed = 0.5 - max(0.0, 0.5 * (n / HZ - 0.125))
+        assert base.cycle((0.0, 0.0), (0.0, speed)) == ""
+    assert base.trips_after((0.0, 0.0), (0.0, 0.1)) is not None
+
+
+def test_looking_twice_at_one_sync_is_looking_once() -> None:
+    base = straight()
+    assert base.trips_after((0.25, 0.25), (0.125, 0.25), 16) is None
+    axes = tuple(Axis(d, state=DriveState.OPERATION_ENABLED, velocity_mps=9.0) for d in BIT)
+    same = BusView(axes, (), sync_at=base.n / HZ)
+    assert [base.watch.look(same, base.n / HZ + n) for n in range(9)] == [""] * 9
+    assert base.cycle((0.25, 0.25), (0.125, 0.25)) != ""
+
+
+def test_while_a_drive_is_not_enabled_nothing_is_judged_and_all_begins_anew() -> None:
+    base = straight()
+    assert base.trips_after((0.25, 0.25), (0.125, 0.25), 15) is None
+    assert base.cycle((0.25, 0.25), (9.0, -9.0), state=DriveState.QUICK_STOP_ACTIVE) == ""
+    assert base.trips_after((0.25, 0.25), (0.125, 0.25), 15) is None
+
+
+def test_before_the_start_anything_within_the_limits_may_have_been_ordered() -> None:
+    assert Base(start=False).trips_after((0.0, 0.0), (0.0, 1.0), 17) is None
+    assert Base(start=False).trips_after((0.0, 0.0), (-1.0, 0.9), 17) is None
+    assert Base(start=False).trips_after((0.0, 0.0), (2.0, 2.0), 30) is not None
+    assert Base(start=False).trips_after((0.0, 0.0), (-1.1, 1.1), 30) is not None
+
+
+def test_each_wheel_of_a_side_is_looked_at() -> None:
+    base = straight()
+    drives = (*BIT, replace(BIT[0], joint="rear_left"))
+    base.config = replace(base.config, drives=drives)
+    axes = [
+        Axis(drive, state=DriveState.OPERATION_ENABLED, setpoint_mps=0.25, velocity_mps=speed)
+        for drive, speed in zip(drives, (0.25, 0.25, 0.125), strict=True)
+    ]
+    watch = TwistWatch(base.config, 0.0)
+    off = tuple(replace(axis, state=DriveState.SWITCHED_ON) for axis in axes)
+    watch.look(BusView(off, (), sync_at=0.0), 0.0)
+    said = [watch.look(BusView(tuple(axes), (), sync_at=n / HZ), n / HZ) for n in range(1, 40)]
+    assert any("rear_left" in why for why in said)
+
+
+def test_a_base_of_one_side_has_no_twist() -> None:
+    watch = TwistWatch(replace(CONFIG, drives=BIT[:1]), 0.0)
+    axis = Axis(BIT[0], state=DriveState.OPERATION_ENABLED, velocity_mps=9.0)
+    assert [watch.look(BusView((axis,), (), sync_at=n / HZ), n / HZ) for n in range(1, 40)] == [""] * 39
+
+
+def test_reach_is_what_was_ordered_within_the_lag_and_falls() -> None:
+    reach = Reach(0.25, 1.0, 0.0)
+    reach.order(0.5, 1.0)
+    reach.advance(1.0, 1.0)
+    assert (reach.low, reach.high) == (0.0, 0.5)
+    reach.order(-0.25, 1.0)
+    reach.advance(0.25, 1.25)
+    assert (reach.low, reach.high) == (0.25, 0.5)
+    reach.advance(0.125, 1.375)
+    assert (reach.low, reach.high) == (0.25, 0.375)
+    reach.order(0.0, 1.375)
+    reach.advance(1.0, 2.375)
+    assert (reach.low, reach.high) == (0.0, 0.0)

@@ -1,0 +1,172 @@
+"""Whether a wheel shows the motion that it is ordered: the lower bounds of motion. It measures; policy.py decides.
+
+Rules, each for an enabled drive and the setpoint that a SYNC made effective (docs/decisions/0020)
+1. Unseen: ordered to move, and the encoder has not moved. The ordered travel adds up until it moves; a setpoint of
+   zero adds nothing and forgets nothing, so short orders add up too. The time adds up while an order is older than
+   `drive_lag_s`, and always once enough travel was ordered: a wheel runs away after its order too.
+2. Halted: the velocity of a wheel that rolled drops at once to standstill, as no wheel can, whatever is ordered, and
+   the encoder does not move from then on.
+3. Jolts: velocities that change as no wheel can, again and again.
+4. Behind: slower than the least that the setpoints of the last `drive_lag_s` ask for, reached by `slowest_ramp_mps2`.
+   It adds up while the wheel is too slow, and goes down as fast while it is not.
+A sensor that did 1 to 3, or contradicts itself, is not trusted until a reset.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from canbase_config.watchdog import WatchdogConfig, WatchedDrive
+from canbase_watchdog.envelope import Peak
+
+LIFE_M, LIFE_COUNTS = 0.0002, 2
+"""An encoder that moves by less may be noise; whichever is more."""
+UNSEEN_COUNTS = 4
+"""Of a coarse encoder nothing is missed before so many increments were ordered."""
+ROLLING_SHARE = 0.5
+"""An encoder that moved by more than this share of what the velocity says: the wheel really rolled."""
+JOLT_MEMORY_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What speaks against a wheel. `ordered_mps`: the least that its setpoints ask for, `setpoint_mps` the last one."""
+
+    ordered_mps: float = 0.0
+    setpoint_mps: float = 0.0
+    unseen_s: float = 0.0
+    unseen_m: float = 0.0
+    unseen: bool = False
+    """Both are beyond what is allowed: rule 1."""
+    halted: int = 0
+    """Samples in a row without any motion after a drop that no wheel can do: rule 2."""
+    jolts: int = 0
+    """Changes of the velocity that no wheel can do, none more than JOLT_MEMORY_S after the one before: rule 3."""
+    behind_s: float = 0.0
+    """Rule 4."""
+    trusted: bool = True
+
+
+class EvidenceWatch:
+    """Follows one axis. Speeds at the rim, forward positive [m/s]."""
+
+    def __init__(self, drive: WatchedDrive, config: WatchdogConfig, now: float) -> None:
+        """Before the monotonic time `now` [s] nothing was ordered."""
+        self._config = config
+        count_m = abs(drive.m_per_count)
+        self._life_m = max(LIFE_M, LIFE_COUNTS * count_m)
+        self._unseen_m = max(config.motion_missing_m, UNSEEN_COUNTS * count_m)
+        self._slack_mps = config.motion_tolerance_mps + abs(drive.velocity_mps_per_bit)
+        self._period_s = 1.0 / config.control_hz
+        self._backward, self._forward = Peak(config.drive_lag_s), Peak(config.drive_lag_s)
+        self._setpoint_mps = self._ordered_mps = 0.0
+        self._least_mps = self._velocity_mps = self._moved_m = 0.0
+        self._rolled = False
+        self._jolted_at = -math.inf
+        self.last = Evidence()
+
+    def on_setpoint(self, setpoint_mps: float, now: float) -> None:
+        """A SYNC made it effective."""
+        self._setpoint_mps = setpoint_mps
+        self._forward.set(setpoint_mps, now, math.inf)
+        self._backward.set(-setpoint_mps, now, math.inf)
+
+    def trust(self) -> None:
+        """A reset was accepted: everything begins anew."""
+        self._moved_m = 0.0
+        self.last = Evidence()
+
+    def doubt(self) -> None:
+        """The sensor contradicts itself."""
+        self.last = replace(self.last, trusted=False)
+
+    def on_sample(self, velocity_mps: float, step_m: float | None, enabled: bool, elapsed_s: float, now: float) -> None:
+        """606Ch, and the travel of the encoder since the last sample; None: it is not known, or a jump."""
+        jolted, rolled = self._is_jolt(velocity_mps, elapsed_s), self._rolled
+        lives = self._lives(step_m, jolted)
+        self._velocity_mps = velocity_mps
+        self._rolled = step_m is not None and abs(step_m) > ROLLING_SHARE * abs(velocity_mps) * elapsed_s
+        self._ask(elapsed_s, now, enabled)
+        if not enabled:
+            self.last = Evidence(trusted=self.last.trusted)
+            return
+        unseen_s, unseen_m = self._unseen(lives, step_m is not None, elapsed_s)
+        unseen = unseen_s >= self._config.motion_missing_s and unseen_m >= self._unseen_m
+        halted, jolts = self._halted(jolted and rolled, lives), self._jolts(jolted, now)
+        samples = self._config.feedback_samples
+        self.last = Evidence(
+            ordered_mps=self._ordered_mps,
+            setpoint_mps=self._setpoint_mps,
+            unseen_s=unseen_s,
+            unseen_m=unseen_m,
+            unseen=unseen,
+            halted=halted,
+            jolts=jolts,
+            behind_s=self._behind_s(velocity_mps, elapsed_s),
+            trusted=self.last.trusted and not unseen and halted < samples and jolts < samples,
+        )
+
+    def _is_visible(self, ordered_mps: float) -> bool:
+        """Slower than `standstill_mps` nothing has to be seen: many drives cannot turn so slowly."""
+        return abs(ordered_mps) > self._config.standstill_mps
+
+    def _is_jolt(self, velocity_mps: float, elapsed_s: float) -> bool:
+        """Samples that were received at once are one cycle apart all the same."""
+        possible_mps = self._config.jolt_mps2 * max(elapsed_s, self._period_s) + self._slack_mps
+        return abs(velocity_mps - self._velocity_mps) > possible_mps
+
+    def _lives(self, step_m: float | None, jolted: bool) -> bool:
+        """The encoder has moved since it last did. What it did until a jolt was before it."""
+        self._moved_m += step_m or 0.0
+        moved = abs(self._moved_m) >= self._life_m
+        if moved or jolted:
+            self._moved_m = 0.0
+        return moved
+
+    def _unseen(self, lives: bool, known: bool, elapsed_s: float) -> tuple[float, float]:
+        unseen_s, unseen_m = self.last.unseen_s, self.last.unseen_m
+        if lives:
+            return 0.0, 0.0
+        if not known:
+            return unseen_s, unseen_m
+        if self._is_visible(self._setpoint_mps):
+            unseen_m += abs(self._setpoint_mps) * elapsed_s
+        if self._is_visible(self._least_mps) or unseen_m >= self._unseen_m:
+            unseen_s += elapsed_s
+        return unseen_s, unseen_m
+
+    def _halted(self, halts: bool, lives: bool) -> int:
+        if self._is_visible(self._velocity_mps):
+            return 0
+        if halts:
+            return 1
+        return self.last.halted + 1 if self.last.halted and not lives else 0
+
+    def _jolts(self, jolted: bool, now: float) -> int:
+        before = self.last.jolts if now < self._jolted_at + JOLT_MEMORY_S else 0
+        if jolted:
+            self._jolted_at = now
+        return before + jolted
+
+    def _ask(self, elapsed_s: float, now: float, enabled: bool) -> None:
+        """The least that the setpoints of the lag ask for, and how far the slowest ramp has got to it from a stand.
+
+        A wheel that still turns the other way has not begun: how fast that ends is the upper bound's, feedback.py.
+        """
+        backward_mps, forward_mps = -self._backward.greatest(now), self._forward.greatest(now)
+        self._least_mps = max(backward_mps, 0.0) + min(forward_mps, 0.0)
+        other_way = self._velocity_mps * self._least_mps < 0.0 and abs(self._velocity_mps) > self._slack_mps
+        gain_mps = self._config.slowest_ramp_mps2 * elapsed_s
+        if not enabled or other_way or self._least_mps == 0.0:
+            self._ordered_mps = 0.0
+        elif self._least_mps > 0.0:
+            self._ordered_mps = min(self._least_mps, max(self._ordered_mps, 0.0) + gain_mps)
+        else:
+            self._ordered_mps = max(self._least_mps, min(self._ordered_mps, 0.0) - gain_mps)
+
+    def _behind_s(self, velocity_mps: float, elapsed_s: float) -> float:
+        ordered_mps = self._ordered_mps
+        least_mps = abs(ordered_mps) * (1.0 - self._config.slow_wheel_share) - self._slack_mps
+        behind = ordered_mps != 0.0 and math.copysign(1.0, ordered_mps) * velocity_mps < least_mps
+        return max(0.0, self.last.behind_s + (elapsed_s if behind else -elapsed_s))

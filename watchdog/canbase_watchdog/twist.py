@@ -1,0 +1,109 @@
+"""Whether the base as a whole moves as its setpoints order: what each wheel may do alone, both may not.
+
+A base that is ordered straight on, with one slow wheel, turns. So the measured twist must be between standstill and
+what the setpoints of the last `drive_lag_s` ordered. After that the range falls to a new order as slowly as wheels on
+the slowest ramp get there, one of them after the other. Speeds are smoothed, as the noise of two wheels adds up. The
+time outside adds up, and goes down as fast while the base is inside (docs/decisions/0020).
+"""
+
+from __future__ import annotations
+
+import math
+
+from canbase_config.watchdog import WatchdogConfig
+from canbase_watchdog.envelope import Bounds, Peak
+from canbase_watchdog.view import NEVER, Axis, BusView
+
+SMOOTHED_S = 0.05
+"""Time constant of the measured speeds."""
+
+
+class Reach:
+    """How far a velocity may be from zero, both ways: as ordered within the lag, then falling."""
+
+    def __init__(self, lag_s: float, slope: float, most: float) -> None:
+        """`slope`: how fast it falls, per second. Up to `most` may have been ordered before."""
+        self._up, self._down, self._slope = Peak(lag_s), Peak(lag_s), slope
+        self.high = self.low = most
+
+    def order(self, value: float, now: float) -> None:
+        """Ordered from now on."""
+        self._up.set(value, now, math.inf)
+        self._down.set(-value, now, math.inf)
+
+    def advance(self, elapsed_s: float, now: float) -> None:
+        """Bring `high` and `low`, which counts the other way, up to the time `now`."""
+        fallen = elapsed_s * self._slope
+        self.high = max(self.high - fallen, self._up.greatest(now), 0.0)
+        self.low = max(self.low - fallen, self._down.greatest(now), 0.0)
+
+
+class TwistWatch:
+    """Follows the setpoints and speeds of all wheels, from SYNC to SYNC."""
+
+    def __init__(self, config: WatchdogConfig, now: float) -> None:
+        """Before the monotonic time `now` [s] anything within the limits may have been ordered."""
+        self._config = config
+        self._coarsest_mps = max(abs(drive.velocity_mps_per_bit) for drive in config.drives)
+        self._sync_at = NEVER
+        self._at = now
+        self._begin(config.linear_mps, config.angular_radps)
+
+    def _begin(self, linear_mps: float, angular_radps: float) -> None:
+        config = self._config
+        self._linear = Reach(config.drive_lag_s, config.slowest_ramp_mps2 / 2.0, linear_mps)
+        self._angular = Reach(config.drive_lag_s, config.slowest_ramp_mps2 / config.track_m, angular_radps)
+        self._speeds: list[float] = []
+        self._outside_s = 0.0
+
+    def look(self, bus: BusView, now: float) -> str:
+        """Why the base has not moved as ordered for `twist_s`, empty when it has."""
+        if bus.sync_at == self._sync_at:
+            return ""
+        self._sync_at = bus.sync_at
+        elapsed_s, self._at = now - self._at, now
+        if not all(axis.enabled for axis in bus.axes):
+            self._begin(0.0, 0.0)
+            return ""
+        bounds = self._bounds(bus, elapsed_s, now)
+        self._smooth([axis.velocity_mps for axis in bus.axes], elapsed_s)
+        why = self._why(bus, bounds)
+        self._outside_s = max(0.0, self._outside_s + (elapsed_s if why else -elapsed_s))
+        return why if self._outside_s >= self._config.twist_s else ""
+
+    def _bounds(self, bus: BusView, elapsed_s: float, now: float) -> Bounds:
+        left, right = _mean(bus.axes, "left"), _mean(bus.axes, "right")
+        linear, angular = self._linear, self._angular
+        linear.order((left + right) / 2.0, now)
+        angular.order((right - left) / self._config.track_m, now)
+        linear.advance(elapsed_s, now)
+        angular.advance(elapsed_s, now)
+        return Bounds(-linear.low, linear.high, -angular.low, angular.high)
+
+    def _smooth(self, speeds: list[float], elapsed_s: float) -> None:
+        share = min(elapsed_s / SMOOTHED_S, 1.0)
+        before = self._speeds or speeds
+        self._speeds = [old + share * (new - old) for old, new in zip(before, speeds, strict=True)]
+
+    def _why(self, bus: BusView, bounds: Bounds) -> str:
+        config = self._config
+        fastest_mps = max(abs(speed) for speed in bounds.wheel(config.track_m / 2.0))
+        tolerance_mps = config.twist_tolerance_mps + self._coarsest_mps + config.twist_tolerance_share * fastest_mps
+        lefts, rights = self._side(bus, "left"), self._side(bus, "right")
+        pairs = (bounds.pair(left, right, config.track_m, tolerance_mps) for left in lefts for right in rights)
+        why = next((each for each in pairs if each), "")
+        return why and f"{why}; {self._worst(bus)}"
+
+    def _side(self, bus: BusView, side: str) -> list[float]:
+        pairs = zip(bus.axes, self._speeds, strict=True)
+        return [speed for axis, speed in pairs if axis.drive.side == side]
+
+    def _worst(self, bus: BusView) -> str:
+        """The wheel that is farthest from its setpoint, in words."""
+        axis = max(bus.axes, key=lambda each: abs(each.velocity_mps - each.setpoint_mps))
+        return f"{axis.drive.joint} is ordered {axis.setpoint_mps:.3f} m/s and turns at {axis.velocity_mps:.3f} m/s"
+
+
+def _mean(axes: tuple[Axis, ...], side: str) -> float:
+    speeds = [axis.setpoint_mps for axis in axes if axis.drive.side == side]
+    return sum(speeds) / max(len(speeds), 1)
