@@ -58,7 +58,7 @@ class Watchdog(Section):
     ] = 0.25
     motion_missing_m: Annotated[
         float, Field(ge=0.001, le=0.1, description="... and for so much of the ordered travel [m]")
-    ] = 0.003
+    ] = 0.005
     jolt_mps2: Annotated[
         float, Field(ge=5.0, le=200.0, description="no wheel changes its speed faster; a sensor that fails does [m/s²]")
     ] = 20.0

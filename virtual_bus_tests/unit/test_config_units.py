@@ -100,7 +100,7 @@ def test_the_watchdog_is_told_what_the_bench_sample_says() -> None:
     assert (config.motion_tolerance_mps, config.motion_tolerance_share, config.feedback_samples) == (0.05, 0.1, 5)
     assert (config.overspeed_factor, config.travel_tolerance_m) == (1.2, 0.05)
     assert (config.bus_failed_s, config.loop_late_s) == (0.1, 0.1)
-    assert (config.motion_missing_s, config.motion_missing_m, config.jolt_mps2) == (0.25, 0.003, 20.0)
+    assert (config.motion_missing_s, config.motion_missing_m, config.jolt_mps2) == (0.25, 0.005, 20.0)
     assert (config.slow_wheel_share, config.slow_wheel_s, config.slowest_ramp_mps2) == pytest.approx((0.3, 0.5, 0.2))
     assert (config.twist_tolerance_mps, config.twist_tolerance_share, config.twist_s) == (0.01, 0.08, 0.5)
     assert [drive.answers_sync for drive in config.drives] == [True, True]

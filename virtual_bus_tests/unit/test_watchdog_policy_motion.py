@@ -206,7 +206,7 @@ def test_a_base_that_moves_otherwise_trips_without_a_node() -> None:
 )
 @pytest.mark.parametrize(("syncs", "trips"), [(0.0, False), (9.5, False), (10.0, True), (10.5, True)])
 def test_ten_bad_syncs_are_enough(count: str, found: Cause, syncs: float, trips: bool) -> None:
-    bad = {count: syncs}
+    bad: dict[str, Any] = {count: syncs}
     verdict = decide(of(AT_REST, replace(STANDING, **bad)), CONFIG, NOW)
     assert ((verdict.cause, verdict.node_id) == (found, 2)) is trips
     assert (cause(of(replace(AT_REST, **bad))) is found) is trips
