@@ -38,7 +38,7 @@ def test_one_row_for_each_cause_that_the_bus_can_show() -> None:
 def test_causes_have_the_numbers_of_the_state_frame() -> None:
     """docs/bus.md, byte 1 of 1FEh. What is not in CHECKS: none, and a watchdog that ended."""
     others = {cause.name: cause.value for cause in Cause if cause not in {check.cause for check in CHECKS}}
-    assert others == {"NONE": 0, "ENDED": 11}
+    assert others == {"NONE": 0, "ENDED": 11, "POWER_AT_END": 20, "RECORD_UNUSABLE": 21}
 
 
 def test_a_node_is_found_by_its_id_wherever_it_stands() -> None:

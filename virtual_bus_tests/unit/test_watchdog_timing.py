@@ -27,7 +27,7 @@ class Machine:
     """A computer with a clock that runs only while something is done, a bus that is never quiet, and a watchdog."""
 
     status = Status(State.WATCHING, FINE, Step.NONE, True, (0, Answer.NONE))
-    dropped_frames, keeps_relay = 0, True
+    dropped_frames, datagrams_dropped, keeps_relay = 0, 0, True
 
     def __init__(self, expires_at: float) -> None:
         self.now = START_S
