@@ -9,14 +9,19 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import rclpy
 from canbase.msg import DriverStatus, MuxState
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Twist, TwistStamped
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
+from rclpy.clock_type import ClockType
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 
+from canbase_config.robot import Robot
+from canbase_velocity.filter_node import FilterNode
+from canbase_velocity.mux_node import MuxNode
 from ros.harness import Process, Recorder, TestNode
 
 pytestmark = pytest.mark.ros
@@ -251,6 +256,19 @@ def test_simulation_time_is_refused_while_it_runs_and_its_timers_go_on(
     assert not result.successful
     assert result.reason.startswith("use_sim_time is refused: this node moves a robot")
     velocity.ordered_for(1.0)  # it asserts that it is not silent
+
+
+@pytest.mark.usefixtures("domain_id")
+def test_every_timer_of_mux_and_filter_runs_on_the_steady_clock(robot: Robot) -> None:
+    """A clock that is set back, or simulated and paused, holds up neither zeros nor leases."""
+    rclpy.init(args=[])
+    try:
+        mux = MuxNode(robot)
+        timers = [*mux.timers, *FilterNode(robot, mux.moving_sources).timers]
+        assert len(timers) >= 4
+        assert {timer.clock.clock_type for timer in timers} == {ClockType.STEADY_TIME}
+    finally:
+        rclpy.shutdown()
 
 
 def test_a_start_with_simulation_time_is_refused_with_a_sentence(

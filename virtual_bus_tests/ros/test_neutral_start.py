@@ -125,6 +125,9 @@ def test_a_stick_held_while_parts_are_killed_and_started_again_moves_nothing(
     for part in parts:
         robot.send(part, signal.SIGKILL)
     robot.wait_standing()
+    for part in parts:
+        assert robot.stack.end(part) == -signal.SIGKILL
+    robot.node.spin_for(1.0)  # what they said last is read
     robot.stack.start()
     robot.make_ready()
     ready_s = time.monotonic()
