@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import pytest
-from canbase.msg import DriverStatus, SafetyState
-from geometry_msgs.msg import TwistStamped
+from canbase.msg import DriverStatus, MuxState, SafetyState
 from std_msgs.msg import Bool
 
+from ros.running_robot import LATCHED as STATE
 from ros.running_robot import RESTS_M, RunningRobot, own_domain, robot_on
 from ros.test_velocity import reset
 from ros.velocity_chain import Chain, drive
@@ -105,6 +105,11 @@ def test_without_the_drivers_state_nothing_moves(start: Callable[[Mapping[str, A
     assert (chain.mux.last.ready, chain.mux.last.not_ready) == (False, "motor_driver/status is silent")
 
 
+def stamp_s(message: DriverStatus | MuxState) -> float:
+    """When it was made, by the computer's clock: a loaded test reads what waited first."""
+    return float(message.stamp.sec + message.stamp.nanosec * 1e-9)
+
+
 @pytest.fixture(scope="module")
 def running() -> Iterator[RunningRobot]:
     with own_domain() as domain, robot_on(domain) as robot:
@@ -117,25 +122,26 @@ def test_a_stick_held_while_parts_are_killed_and_started_again_moves_nothing(
 ) -> None:
     robot = running
     robot.make_ready()
+    mux = robot.node.record(MuxState, "velocity_mux/state", STATE)
     joystick = robot.node.source()
-    held = TwistStamped()
-    held.twist.linear.x = 0.2
-    joystick.message = held
-    robot.wait_speed(0.19)
-    for part in parts:
-        robot.send(part, signal.SIGKILL)
-    robot.wait_standing()
-    for part in parts:
-        assert robot.stack.end(part) == -signal.SIGKILL
-    robot.node.spin_for(1.0)  # what they said last is read
-    robot.stack.start()
-    robot.make_ready()
-    ready_s = time.monotonic()
-    assert robot.moved_since(ready_s, 2.0) < RESTS_M
-    robot.node.release(joystick)
-    joystick.message = held
-    robot.wait_speed(0.19)
-    robot.node.release(joystick)
-    robot.wait_standing()
-    robot.node.node.destroy_timer(joystick._timer)
-    robot.node.node.destroy_publisher(joystick.publisher)
+    try:
+        joystick.message = drive(0.2)
+        robot.wait_speed(0.19)
+        for part in parts:
+            robot.send(part, signal.SIGKILL)
+        robot.wait_standing()
+        for part in parts:
+            assert robot.stack.end(part) == -signal.SIGKILL
+        started_s = time.time()
+        robot.stack.start()
+        robot.node.wait_for(lambda: robot.status.last and stamp_s(robot.status.last) > started_s, 40.0, "the driver")
+        robot.make_ready()
+        robot.node.wait_for(lambda: mux.last and stamp_s(mux.last) > started_s and mux.last.ready, 40.0, "the mux")
+        assert robot.moved_since(time.monotonic(), 2.0) < RESTS_M
+        assert mux.messages[-1].sources[0].reason.startswith("waiting for zero (")
+        robot.node.release(joystick)
+        joystick.message = drive(0.2)
+        robot.wait_speed(0.19)
+    finally:
+        joystick.message = None
+        robot.wait_standing()
