@@ -21,7 +21,7 @@ demo: $(VENV)/ready ## the whole chain on a simulated bus: drives 1 m, refuses a
 
 .PHONY: test
 test: $(VENV)/ready ## all tests: pure units, simulated drives on a bus, processes over DDS
-	pytest --numprocesses auto virtual_bus_tests/unit virtual_bus_tests/campaign
+	pytest --numprocesses auto virtual_bus_tests/unit virtual_bus_tests/campaign virtual_bus_tests/small_worlds
 	pytest virtual_bus_tests/bus virtual_bus_tests/ros
 
 .PHONY: campaign
@@ -35,6 +35,14 @@ endif
 .PHONY: teeth
 teeth: $(VENV)/ready ## takes one safeguard out after the other; the campaign has to find it missing
 	PYTHONPATH=virtual_bus_tests python -m campaign.teeth
+
+.PHONY: stops
+stops: $(VENV)/ready ## times and distances of each stop and each lie, 20 seeded runs each: docs/stop_times.md
+	PYTHONPATH=virtual_bus_tests python -m campaign.stops --write docs/stop_times.md
+
+.PHONY: small-worlds
+small-worlds: $(VENV)/ready ## every failure with every action of an operator in small worlds; FAULTS=2 deeper, EVERY=1 denser
+	PYTHONPATH=virtual_bus_tests python -m small_worlds $(if $(FAULTS),--faults $(FAULTS)) $(if $(OPERATOR),--operator $(OPERATOR)) $(if $(EVERY),--every $(EVERY))
 
 .PHONY: fuzz
 fuzz: $(VENV)/ready ## a million random and malformed frames and leases against driver, watchdog and drives

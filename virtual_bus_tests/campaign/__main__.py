@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+from collections import Counter
 from typing import Annotated
 
 import typer
@@ -11,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemaining
 from rich.table import Table
 
 from campaign.faults import FAULTS
-from campaign.judge import EXCLUDED, PROPERTIES
+from campaign.judge import EXCLUDED, OPEN, PROPERTIES
 from campaign.plan import draw_plan
 from campaign.replay import replay
 from campaign.runner import Tally, run
@@ -93,6 +94,10 @@ def _tell_violations(tally: Tally, only: list[str]) -> None:
     for seed, violation in tally.violations[:SHOWN]:
         out.print(f"[red]{violation.name}[/red] in seed {seed} at {violation.at_s:.2f} s: {violation.detail}")
         out.print(f"  {'; '.join(str(fault) for fault in draw_plan(seed, only).faults)}", highlight=False)
+    if tally.open:
+        rows = Counter(f"{violation.name} ({OPEN[violation.name][1]})" for _, violation in tally.open)
+        out.print("known to be open: " + "; ".join(f"{count} × {row}" for row, count in rows.most_common()))
+        out.print(f"  seeds {', '.join(str(seed) for seed in sorted({seed for seed, _ in tally.open})[:SHOWN])}")
     if tally.violations:
         out.print("tell one of them: make campaign SEED=…, or python -m campaign --seed …")
 

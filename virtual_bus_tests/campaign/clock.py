@@ -4,7 +4,29 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How finely a world cuts its time [s]: the timers that are no key of robot.yaml, and what varies between runs."""
+
+    watchdog_tick_s: float = 0.005
+    """As in canbase_watchdog.loop."""
+    drives_poll_s: float = 0.005
+    """How often the drives look at their own timers: heartbeats, and heartbeats that are missing."""
+    command_parts: float = 4.0
+    """The timers of mux and filter are looked at so many times in a period of rates.command_hz."""
+    topic_jitter_s: float = 0.0005
+    cycle_jitter_s: float = 0.0005
+    sdo_delay_s: float = 0.001
+    plant_step_s: float = 0.002
+    bandwidth_radps: float = 200.0
+    """Velocity loop of the drives; times `plant_step_s` at most 0.5."""
+
+
+FINE = Pace()
 
 
 class Clock:

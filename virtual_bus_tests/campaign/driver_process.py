@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from campaign.can_bus import CanBus
+from campaign.clock import FINE, Pace
 from campaign.disk import StopDisk
 from campaign.process import FRAMES_HELD, Process, Topics
 from canbase_config.robot import DRIVER_NODE_ID, Robot
@@ -16,7 +17,6 @@ from canbase_velocity.twist import Twist
 
 SETPOINTS = (0x200, 0x300)
 """First identifiers of the RPDOs with setpoints: docs/bus.md."""
-CYCLE_JITTER_S = 0.0005
 
 
 class DriverProcess(Process):
@@ -24,8 +24,9 @@ class DriverProcess(Process):
 
     name = "driver"
 
-    def __init__(self, robot: Robot, bus: CanBus, topics: Topics) -> None:
+    def __init__(self, robot: Robot, bus: CanBus, topics: Topics, pace: Pace = FINE) -> None:
         super().__init__(bus.clock)
+        self._jitter_s = pace.cycle_jitter_s
         self._robot, self._topics, self._random = robot, topics, bus.random
         self._member = bus.join(self.name, self._hear)
         self.disk = StopDisk("driver")
@@ -79,7 +80,7 @@ class DriverProcess(Process):
     def _on_cycle(self) -> None:
         now = self.clock.now
         self.core.on_bus(self.bus_problem, now)
-        frames = self.core.tick(now, self._random.random() * CYCLE_JITTER_S)
+        frames = self.core.tick(now, self._random.random() * self._jitter_s)
         self.core.on_record(*self.disk.write(self.core.record))
         self._send(self._changed(frames))
         self._cycle += 1

@@ -5,22 +5,23 @@ from __future__ import annotations
 from functools import partial
 
 from campaign.can_bus import CanBus
+from campaign.clock import FINE, Pace
 from canbase_bench.axis_parts import StateChange
 from canbase_bench.node import SimulatedNode
-from canbase_bench.world.bench import Bench
+from canbase_bench.plant.base import PlantParameters
+from canbase_bench.world.bench import Bench, BenchParameters
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
 
-POLL_S = 0.005
-"""How often the drives look at their own timers: heartbeats, and heartbeats that are missing."""
 HEARTBEATS = {0x700 + DRIVER_NODE_ID: "driver", 0x700 + WATCHDOG_NODE_ID: "watchdog"}
 
 
 class Drives:
     """`bench` is the simulated world. `heard`: when each node last heard the heartbeat of driver and watchdog."""
 
-    def __init__(self, robot: Robot, bus: CanBus) -> None:
-        self._bus, self._clock = bus, bus.clock
-        self.bench = Bench(robot, bus.clock.now)
+    def __init__(self, robot: Robot, bus: CanBus, pace: Pace = FINE) -> None:
+        self._bus, self._clock, self._poll_s = bus, bus.clock, pace.drives_poll_s
+        body = PlantParameters(step_s=pace.plant_step_s, bandwidth_radps=pace.bandwidth_radps)
+        self.bench = Bench(robot, bus.clock.now, body, BenchParameters(sdo_delay_s=pace.sdo_delay_s))
         self._members = {
             node_id: bus.join(f"drive{node_id}", partial(self._hear, node_id, node))
             for node_id, node in self.bench.nodes.items()
@@ -63,6 +64,6 @@ class Drives:
 
     def _poll(self) -> None:
         """While SYNCs come they move the world often enough."""
-        if self.moved_at < self._clock.now - POLL_S:
+        if self.moved_at < self._clock.now - self._poll_s:
             self._say()
-        self._clock.after(POLL_S, self._poll)
+        self._clock.after(self._poll_s, self._poll)

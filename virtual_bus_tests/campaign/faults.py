@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from random import Random
 from typing import TYPE_CHECKING, Any
 
+from campaign import bench_faults as bench
+from campaign import people
 from canbase_velocity.twist import Twist
 
 if TYPE_CHECKING:
@@ -203,6 +205,45 @@ def _watchdog_hears(world: World, around: Surroundings, given: Arguments) -> Non
     world.watchdog.fail_bus(False)
 
 
+SOURCES = ("cmd_vel_joy", "cmd_vel_nav")
+
+
+def _network(field: str) -> tuple[Change, Change]:
+    def begin(world: World, around: Surroundings, given: Arguments) -> None:
+        for topic in SOURCES:
+            getattr(world.topics, field)[topic] = given["value"]
+
+    def end(world: World, around: Surroundings, given: Arguments) -> None:
+        for topic in SOURCES:
+            getattr(world.topics, field).pop(topic, None)
+
+    return begin, end
+
+
+def _twice(world: World, around: Surroundings, given: Arguments) -> None:
+    world.topics.twice |= set(SOURCES)
+
+
+def _once(world: World, around: Surroundings, given: Arguments) -> None:
+    world.topics.twice.clear()
+
+
+def _all_die(world: World, around: Surroundings, given: Arguments) -> None:
+    for name in PROCESSES:
+        world.processes[name].die()
+
+
+def _all_restart(world: World, around: Surroundings, given: Arguments) -> None:
+    for name in PROCESSES:
+        world.processes[name].restart()
+
+
+def _supply_lost(world: World, around: Surroundings, given: Arguments) -> None:
+    _all_die(world, around, given)
+    for node in world.drives.bench.nodes.values():
+        node.power_cycle(world.clock.now, given["off_s"])
+
+
 def _leases(field: str, off: object) -> tuple[Change, Change]:
     def begin(world: World, around: Surroundings, given: Arguments) -> None:
         setattr(world, field, given["value"])
@@ -320,5 +361,105 @@ FAULTS: dict[str, Kind] = {
     "lease_garbage": Kind(
         "mangled leases come too", LONG, lambda r: {"value": True}, *_leases("lease_garbage", False)
     ),
+    "encoder_lost": Kind(
+        "all that hangs on one encoder shows nothing",
+        LONG,
+        _node,
+        *bench.suffer("encoder_lost", bench.heal_encoder),
+        encoder_lies=True,
+    ),
+    "encoder_frozen": Kind(
+        "an encoder counts nothing and shows its last speed",
+        LONG,
+        _node,
+        *bench.suffer("encoder_frozen", bench.heal_encoder),
+        encoder_lies=True,
+    ),
+    "encoder_reversed": Kind(
+        "an encoder counts backward", LONG, _node, *bench.suffer("encoder_reversed", bench.heal_encoder),
+        encoder_lies=True,
+    ),
+    "encoder_scaled": Kind(
+        "an encoder counts a share of the motion",
+        LONG,
+        lambda r: {**_node(r), "factor": r.choice((0.3, 0.5, 2.0))},
+        *bench.suffer("encoder_scaled", bench.heal_encoder),
+        encoder_lies=True,
+    ),
+    "encoder_jumping": Kind(
+        "an encoder jumps to and fro", LONG, _node, *bench.suffer("encoder_jumping", bench.heal_encoder),
+        encoder_lies=True,
+    ),
+    "encoder_intermittent": Kind(
+        "an encoder comes and goes",
+        LONG,
+        lambda r: {**_node(r), "off_s": r.uniform(0.03, 0.2)},
+        *bench.suffer("encoder_intermittent", bench.heal_encoder),
+        encoder_lies=True,
+    ),
+    "wheel_blocked": Kind("something holds a wheel", LONG, _node, *bench.suffer("blocked", bench.let_loose)),
+    "wheel_limited": Kind(
+        "a drive follows a share of its setpoint",
+        LONG,
+        lambda r: {**_node(r), "share": r.uniform(0.0, 0.7)},
+        *bench.suffer("limited", bench.unlimit),
+    ),
+    "motor_weak": Kind(
+        "a motor has a share of its force",
+        LONG,
+        lambda r: {**_node(r), "share": r.choice((0.0, r.uniform(0.0, 0.5)))},
+        *bench.suffer("weak", bench.strengthen),
+    ),
+    "setpoints_lost": Kind(
+        "setpoints do not reach one drive, or one of several does",
+        LONG,
+        lambda r: {**_node(r), "every": r.choice((0, 0, 2, 5))},
+        *bench.suffer("rpdo_lost", bench.hear_setpoints),
+    ),
+    "feedback_lost": Kind(
+        "one drive's feedback is lost", LONG, _node, *bench.suffer("tpdo_lost", bench.give_feedback)
+    ),
+    "drive_sto": Kind("STO opens at one drive", SHORT, _node, *bench.suffer("sto", bench.give_torque)),
+    "drive_resets": Kind("one drive starts again", SHORT, _node, *bench.suffer("reset_node", bench.stay)),
+    "drive_bus_off": Kind(
+        "one drive's CAN controller leaves the bus", SHORT, _node, *bench.suffer("bus_off", bench.stay)
+    ),
+    "twin_node": Kind(
+        "a second drive has the node id of another one, and stands", SHORT, _node,
+        *_intruder("twin", "node", 0),
+    ),
+    "all_processes_restart": Kind(
+        "all processes are killed, and started again", LONG, _nothing, _all_die, _all_restart
+    ),
+    "supply_lost": Kind(
+        "computer and drives lose their supply, and start again",
+        LONG,
+        lambda r: {"off_s": r.uniform(0.05, 0.8)},
+        _supply_lost,
+        _all_restart,
+    ),
+    "stick_held": Kind(
+        "a stick is held through everything", (0.8, 4.0), people.steady,
+        *people.goes_on(people.hold_stick, people.release_stick),
+    ),
+    "two_hands": Kind(
+        "joystick and navigation order opposite motions", LONG, people.steady, *people.goes_on(people.two_hands)
+    ),
+    "button_tapped": Kind(
+        "the emergency stop is pressed and released again and again", (0.05, 0.6), _nothing,
+        *people.goes_on(people.tap_button, people.release_button),
+    ),
+    "resets_too_early": Kind(
+        "an operator resets again and again", LONG, _nothing, *people.goes_on(people.reset_again, every_s=0.2)
+    ),
+    "radio_gap": Kind("the joystick's radio is lost for a moment", SHORT, _nothing, *_topic_lost("cmd_vel_joy")),
+    "orders_delayed": Kind(
+        "the network delays what sources order", LONG, lambda r: {"value": r.uniform(0.2, 2.0)}, *_network("delay_s")
+    ),
+    "orders_shuffled": Kind(
+        "the network reorders what sources order", LONG, lambda r: {"value": r.uniform(0.02, 0.25)},
+        *_network("shuffles_s"),
+    ),
+    "orders_twice": Kind("the network duplicates what sources order", LONG, _nothing, _twice, _once),
 }  # fmt: skip
 """Every fault that a scenario may draw."""

@@ -12,6 +12,8 @@ from canbase_velocity.twist import Twist
 
 ENABLE = 0x000F
 SETPOINT = struct.Struct("<Hi")
+TWIN_STATUS = struct.pack("<Hi", 0x0637, 0)
+"""Operation enabled; position 0."""
 
 
 class Intruder:
@@ -30,6 +32,8 @@ class Intruder:
         """It sends this NMT command again and again."""
         self.twist: Twist | None = None
         """It publishes this to cmd_vel."""
+        self.twin = 0
+        """It answers as a second drive of this node id: switched on, at a stand."""
         self.bad_at = -1.0
         """When it last sent something to the bus."""
         self._act()
@@ -43,6 +47,9 @@ class Intruder:
                 self._send(0x200 + drive.node_id, SETPOINT.pack(ENABLE, bits))
         if self.setpoints_mps or self.syncs:
             self._send(0x080, b"")
+        if self.twin:
+            self._send(0x180 + self.twin, TWIN_STATUS)
+            self._send(0x280 + self.twin, bytes(4))
         if self.twist is not None:
             self._topics.publish("cmd_vel", self.twist)
         self._clock.after(self.PERIOD_S, self._act)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from campaign.action_process import Goal
 from campaign.envelope import TOLERANCE_MPS, Envelope, braking_s, moving_s, notice_s, react_s
 from campaign.faults import FAULTS
+from campaign.motion_judge import MotionJudge
 from campaign.odometry_judge import OdometryJudge
 from campaign.outside import Outside, Surroundings
 from campaign.plan import Plan
@@ -42,6 +43,9 @@ PROPERTIES = {
     "obstacle": "the base never touches what it could have seen in time",
     "odometry": "the driver's pose never jumps, and is the true one as long as the encoders tell the truth",
     "goal": "every goal ends exactly once, in its time; one that succeeded is where it should be",
+    "runaway": "no wheel is faster than it was ordered to be for longer than the stated time",
+    "path": "the base turns as it was ordered to, or not at all, but for the stated time",
+    "standstill": "what the driver reports as standstill is one",
     "exception": "nothing raises",
 }
 STRANGE_HANDS = frozenset(("second_master_setpoints", "second_master_nmt", "driver_repeats", "driver_ignores_zero"))
@@ -68,6 +72,22 @@ EXCLUDED = {
     ),
 }
 """Property → faults with which it is not asked for, and why."""
+SCALED = (
+    ("encoder_scaled",),
+    "position, velocity and the drive's own loop hang on this one encoder: a wheel whose encoder counts half of it "
+    "is to every part a wheel of half the size; only another sensor could tell them apart",
+)
+EXCLUDED |= dict.fromkeys(("envelope", "sources", "held", "estop", "runaway", "path", "standstill"), SCALED)
+SENSORLESS = (
+    ("encoder_lost", "encoder_frozen", "encoder_reversed", "encoder_jumping", "encoder_intermittent"),
+    "a drive that closes its velocity loop on a dead or lying sensor is not stopped in time, above all when its cable "
+    "or another stop comes in between",
+)
+OPEN: dict[str, tuple[tuple[str, ...], str]] = dict.fromkeys(
+    ("envelope", "sources", "held", "estop", "heartbeat", "obstacle", "runaway", "path", "standstill", "goal"),
+    SENSORLESS,
+)
+"""Property → faults with which it does not hold yet, and what is missing. A row goes when its mend has landed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +121,10 @@ class Judge:
         self._pressed_at = math.inf
         lies = any(FAULTS[name].encoder_lies for name in self._faults)
         self._odometry = OdometryJudge(world, exact=not lies)
+        self._motion = MotionJudge(world)
         self.trips: list[str] = []
+        self.open: list[Violation] = []
+        """What did not hold and is known not to: `OPEN`."""
         world.on_lease = self._on_lease
         world.on_goal_end = self._on_goal_end
         world.topics.watch = self._on_message
@@ -131,15 +154,18 @@ class Judge:
     def _violate(self, name: str, detail: str) -> None:
         if name in EXCLUDED and self._faults & set(EXCLUDED[name][0]):
             return
-        if all(violation.name != name for violation in self.violations):
-            self.violations.append(Violation(name, self._world.clock.now - self._start, detail))
-            self._world.note(f"VIOLATION of {name}: {detail}")
+        is_open = name in OPEN and bool(self._faults & set(OPEN[name][0]))
+        found = self.open if is_open else self.violations
+        if all(violation.name != name for violation in found):
+            found.append(Violation(name, self._world.clock.now - self._start, detail))
+            self._world.note(f"VIOLATION of {name}{' (known to be open)' if is_open else ''}: {detail}")
 
     def _on_lease(self, twist: Twist) -> None:
         if self._awaits_zero and not twist.is_zero:
             self._violate("zero", f"{twist} is ordered, and the command was not zero since the emergency stop")
         tau_s = braking_s(self._world.robot, twist.linear_mps, twist.angular_radps)
         self._envelope.order(tau_s, self._world.clock.now)
+        self._motion.order(twist)
 
     def _on_message(self, topic: str, message: object) -> None:
         """What the sources want; and a command of zero after an emergency stop, before anything else is ordered."""
@@ -164,6 +190,9 @@ class Judge:
         problem = self._odometry.step(now)
         if problem:
             self._violate("odometry", problem)
+        name, detail = self._motion.step(now)
+        if name:
+            self._violate(name, detail)
         self._world.clock.after(STEP_S, self._step)
 
     def _check_speed(self, tau_s: float, coasting: bool, now: float) -> None:

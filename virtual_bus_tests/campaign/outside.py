@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -22,10 +23,11 @@ BEAMS = 360
 class Outside:
     """Does what a plan says. `resets`: the outcome of each reset that was asked for."""
 
-    def __init__(self, world: World, plan: Plan, start: float) -> None:
+    def __init__(self, world: World, around: Surroundings, plan: Plan, start: float) -> None:
         self._world, self._start = world, start
         self._topics = {name: source.topic for name, source in world.robot.mux.sources.items()}
         self.resets: list[Outcome] = []
+        around.reset = self.reset
         clock = world.clock
         for segment in plan.segments:
             clock.at(start + segment.start_s, self._send, segment)
@@ -77,6 +79,8 @@ class Surroundings:
         """The scanner sends, the stop button sends."""
         self.wall_m: float | None = None
         self._wall_from_m = 0.0
+        self.reset: Callable[[], None] = lambda: None
+        """The operator asks for a reset; set by who plays the operator."""
         self._scan()
         self._speak()
 

@@ -106,14 +106,21 @@ class Topics:
     """Publishers and subscribers: each message takes a little while, another one each time, and may get lost."""
 
     FASTEST_S = 0.0002
-    JITTER_S = 0.0005
+    AGAIN_S = 0.03
+    """The second copy of a message comes so much later."""
 
-    def __init__(self, clock: Clock, random: Random) -> None:
-        self._clock, self._random = clock, random
+    def __init__(self, clock: Clock, random: Random, jitter_s: float = 0.0005) -> None:
+        self._clock, self._random, self._jitter_s = clock, random, jitter_s
         self._subscribers: dict[str, list[tuple[Process, Callable[[Any], None]]]] = {}
         self._last: dict[str, float] = {}
         self.loss: dict[str, float] = {}
         """Chance by topic that a message does not arrive."""
+        self.delay_s: dict[str, float] = {}
+        """By topic: so much later a message arrives."""
+        self.shuffles_s: dict[str, float] = {}
+        """By topic: each message arrives up to so much later, and may overtake others."""
+        self.twice: set[str] = set()
+        """Topics whose messages arrive a second time."""
         self.watch: Callable[[str, Any], None] | None = None
         """Told of every message with its topic."""
 
@@ -132,6 +139,15 @@ class Topics:
         for process, do in self._subscribers.get(topic, ()):
             if self.loses(topic):
                 continue
-            arrival = self._clock.now + self.FASTEST_S + self._random.random() * self.JITTER_S
-            self._last[topic] = arrival = max(arrival, self._last.get(topic, 0.0))
+            arrival = self._arrival(topic)
             self._clock.at(arrival, process.receive, topic, 1, do, message)
+            if topic in self.twice:
+                self._clock.at(arrival + self.AGAIN_S, process.receive, topic, 1, do, message)
+
+    def _arrival(self, topic: str) -> float:
+        arrival = self._clock.now + self.FASTEST_S + self._random.random() * self._jitter_s
+        if topic in self.shuffles_s:
+            return arrival + self._random.random() * self.shuffles_s[topic]
+        arrival += self.delay_s.get(topic, 0.0)
+        self._last[topic] = arrival = max(arrival, self._last.get(topic, 0.0))
+        return arrival

@@ -29,6 +29,7 @@ class Tally:
     trips: Counter[str] = field(default_factory=Counter)
     goals: Counter[str] = field(default_factory=Counter)
     violations: list[tuple[int, Violation]] = field(default_factory=list)
+    open: list[tuple[int, Violation]] = field(default_factory=list)
     virtual_s: float = 0.0
     real_s: float = 0.0
     moved_m: float = 0.0
@@ -41,6 +42,7 @@ class Tally:
         self.trips.update(result.trips)
         self.goals.update(result.goals)
         self.violations += [(result.seed, violation) for violation in result.violations]
+        self.open += [(result.seed, violation) for violation in result.open]
         self.virtual_s += result.virtual_s
         self.real_s += result.real_s
         self.moved_m += result.moved_m

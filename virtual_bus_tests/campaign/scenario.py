@@ -31,6 +31,7 @@ class Result:
     seed: int
     faults: tuple[str, ...]
     violations: tuple[Violation, ...] = ()
+    open: tuple[Violation, ...] = ()
     trips: tuple[str, ...] = ()
     goals: tuple[str, ...] = ()
     moved_m: float = 0.0
@@ -97,7 +98,7 @@ class _Run:
         if note is not None:
             world.note = lambda text: note(world.clock.now - self._start, text)
         self._moved_from_m = world.drives.bench.base.path_m
-        outside = Outside(world, plan, self._start)
+        outside = Outside(world, around, plan, self._start)
         self._judge = Judge(world, around, outside, plan)
         for fault in plan.faults:
             world.clock.at(self._start + fault.start_s, self._begin, fault)
@@ -144,6 +145,7 @@ class _Run:
             self._plan.seed,
             tuple(fault.name for fault in self._plan.faults),
             (*self._judge.violations, *self._crash),
+            tuple(self._judge.open),
             tuple(self._judge.trips),
             tuple(ends),
             self._world.drives.bench.base.path_m - self._moved_from_m,

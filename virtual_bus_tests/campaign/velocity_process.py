@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from functools import partial
 
-from campaign.clock import Clock
+from campaign.clock import FINE, Clock, Pace
 from campaign.disk import StopDisk
 from campaign.process import Process, Topics
 from canbase_config.robot import Robot
@@ -30,8 +30,16 @@ class VelocityProcess(Process):
 
     name = "velocity"
 
-    def __init__(self, robot: Robot, clock: Clock, topics: Topics, send_lease: Callable[[bytes, Twist], None]) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        clock: Clock,
+        topics: Topics,
+        send_lease: Callable[[bytes, Twist], None],
+        pace: Pace = FINE,
+    ) -> None:
         super().__init__(clock)
+        self._parts = pace.command_parts
         self._robot, self._topics, self._send_lease = robot, topics, send_lease
         for name, source in robot.mux.sources.items():
             topics.subscribe(source.topic, self, partial(self._on_source, name))
@@ -54,7 +62,7 @@ class VelocityProcess(Process):
         self._active: str | None = None
         self._mux_due = self._filter_due = now
         self._period_s = 1.0 / self._robot.rates.command_hz
-        self.every(self._period_s / 4.0, self._on_timer, phase_s=0.003)
+        self.every(self._period_s / self._parts, self._on_timer, phase_s=0.003)
 
     def _on_timer(self) -> None:
         """Two timers that each message sets anew, at a quarter of their period's resolution."""

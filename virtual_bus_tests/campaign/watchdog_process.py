@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 
 from campaign.can_bus import CanBus
+from campaign.clock import FINE, Pace
 from campaign.disk import WatchdogDisk
 from campaign.process import FRAMES_HELD, Process
 from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog.watchdog import Watchdog
-
-TICK_S = 0.005
-"""As in canbase_watchdog.loop."""
 
 
 class WatchdogProcess(Process):
@@ -19,9 +17,9 @@ class WatchdogProcess(Process):
 
     name = "watchdog"
 
-    def __init__(self, config: WatchdogConfig, bus: CanBus) -> None:
+    def __init__(self, config: WatchdogConfig, bus: CanBus, pace: Pace = FINE) -> None:
         super().__init__(bus.clock)
-        self._config = config
+        self._config, self._tick_s = config, pace.watchdog_tick_s
         self._failed_since = math.inf
         self.disk = WatchdogDisk()
         """Its record of a trip, which outlives it."""
@@ -35,7 +33,7 @@ class WatchdogProcess(Process):
     def begin(self) -> None:
         """A new core, which knows of a trip before by its record."""
         self.core = Watchdog(self._config, self.clock.now, self.disk.past())
-        self.every(TICK_S, self._on_tick, phase_s=0.001)
+        self.every(self._tick_s, self._on_tick, phase_s=0.001)
 
     def on_lease(self, datagram: bytes) -> None:
         """A datagram arrives at the socket."""

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
+from campaign.disk import StopDisk
 from canbase_action_server import causes
 from canbase_action_server.outcome import ErrorCode
 from canbase_bench.cia301.heartbeat import HeartbeatConsumer
@@ -81,6 +82,12 @@ def _no_estop(self: filter_state.SafetyFilter, now: float) -> None:
     self._estop.state = FREE
 
 
+def _no_records() -> None:
+    """Whatever stands on the disk, a driver and a filter that start find that nothing was latched."""
+    found = StopDisk.found
+    StopDisk.found = lambda self: found(StopDisk("driver"))  # type: ignore[method-assign]
+
+
 SAFEGUARDS: dict[str, Callable[[], None]] = {
     **{f"watchdog:{check.cause.name.lower()}": _trip(check.cause) for check in policy.CHECKS},
     "watchdog:all": _all_trips,
@@ -94,6 +101,7 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "driver:zero_before_motion": _put(command.Command, "await_zero", lambda self: None),
     "driver:command_is_finite": _put(Twist2D, "is_finite", property(lambda self: True)),
     "driver:odometry_jump_guard": _put(WheelTravel, "_is_near", lambda self, from_raw, raw, cycles: True),
+    "driver:stop_record": _no_records,
     "drives:heartbeat_consumer": _put(HeartbeatConsumer, "tick", lambda self, now: None),
     "mux:neutral_start": _put(neutral.Arming, "armed", property(lambda self: True)),
     "mux:timeout": _put(mux._Source, "is_fresh", lambda self, now: self.at_s is not None),

@@ -7,7 +7,7 @@ from random import Random
 
 from campaign.action_process import ActionProcess, Goal
 from campaign.can_bus import CanBus
-from campaign.clock import Clock
+from campaign.clock import FINE, Clock, Pace
 from campaign.driver_process import DriverProcess
 from campaign.drives import Drives
 from campaign.intruder import Intruder
@@ -39,7 +39,7 @@ def campaign_robot() -> Robot:
 class World:
     """`note` tells a log what happens; `on_lease` hears every order whose lease reaches the watchdog's socket."""
 
-    def __init__(self, robot: Robot | None = None, seed: int = 0) -> None:
+    def __init__(self, robot: Robot | None = None, seed: int = 0, pace: Pace = FINE) -> None:
         self.robot = robot or campaign_robot()
         self.random = Random(seed)
         self.clock = clock = Clock(100.0)
@@ -51,11 +51,11 @@ class World:
         self.lease_garbage = False
         """Every lease comes with a mangled copy of it."""
         self.bus = CanBus(clock, self.random, self.robot.bus.bitrate)
-        self.topics = Topics(clock, self.random)
-        self.drives = Drives(self.robot, self.bus)
-        self.driver = DriverProcess(self.robot, self.bus, self.topics)
-        self.watchdog = WatchdogProcess(watchdog_config(self.robot), self.bus)
-        self.velocity = VelocityProcess(self.robot, clock, self.topics, self._lease)
+        self.topics = Topics(clock, self.random, pace.topic_jitter_s)
+        self.drives = Drives(self.robot, self.bus, pace)
+        self.driver = DriverProcess(self.robot, self.bus, self.topics, pace)
+        self.watchdog = WatchdogProcess(watchdog_config(self.robot), self.bus, pace)
+        self.velocity = VelocityProcess(self.robot, clock, self.topics, self._lease, pace)
         self.action = ActionProcess(self.robot, clock, self.topics, lambda goal: self.on_goal_end(goal))
         self.intruder = Intruder(self.robot, self.bus, self.topics)
         processes: tuple[Process, ...] = (self.driver, self.watchdog, self.velocity, self.action)

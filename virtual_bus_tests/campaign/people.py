@@ -1,0 +1,76 @@
+"""People as faults: a stick held through everything, two hands, a stop button tapped, resets that are too early."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from random import Random
+from typing import TYPE_CHECKING
+
+from canbase_velocity.twist import ZERO, Twist
+
+if TYPE_CHECKING:
+    from campaign.faults import Arguments, Change
+    from campaign.outside import Surroundings
+    from campaign.world import World
+
+AGAIN_S = 0.05
+Do = Callable[["World", "Surroundings", "Arguments", int], None]
+
+
+def goes_on(do: Do, after: Do | None = None, every_s: float = AGAIN_S) -> tuple[Change, Change]:
+    """Somebody does something again and again (with its number) until the end, then `after`."""
+    running: set[int] = set()
+
+    def begin(world: World, around: Surroundings, given: Arguments) -> None:
+        running.add(id(given))
+
+        def again(number: int) -> None:
+            if id(given) in running:
+                do(world, around, given, number)
+                world.clock.after(every_s, again, number + 1)
+
+        again(0)
+
+    def end(world: World, around: Surroundings, given: Arguments) -> None:
+        running.discard(id(given))
+        if after is not None:
+            after(world, around, given, 0)
+
+    return begin, end
+
+
+def hold_stick(world: World, around: Surroundings, given: Arguments, number: int) -> None:
+    """The joystick orders the same motion, whatever happens."""
+    world.topics.publish("cmd_vel_joy", given["twist"])
+
+
+def release_stick(world: World, around: Surroundings, given: Arguments, number: int) -> None:
+    """It says zero, as a joystick at rest does."""
+    world.topics.publish("cmd_vel_joy", ZERO)
+
+
+def two_hands(world: World, around: Surroundings, given: Arguments, number: int) -> None:
+    """Joystick and navigation order opposite motions."""
+    twist: Twist = given["twist"]
+    world.topics.publish("cmd_vel_joy" if number % 2 else "cmd_vel_nav", twist.scaled(1.0 if number % 2 else -1.0))
+
+
+def tap_button(world: World, around: Surroundings, given: Arguments, number: int) -> None:
+    """Pressed and released in turn."""
+    around.press(number % 2 == 0)
+
+
+def release_button(world: World, around: Surroundings, given: Arguments, number: int) -> None:
+    """Nobody presses it."""
+    around.press(False)
+
+
+def reset_again(world: World, around: Surroundings, given: Arguments, number: int) -> None:
+    """A reset, whether it is time for it or not."""
+    around.reset()
+
+
+def steady(random: Random) -> Arguments:
+    """A motion to hold."""
+    speed_mps = random.choice((-1.0, 1.0)) * random.uniform(0.15, 0.8)
+    return {"twist": Twist(speed_mps, random.choice((0.0, random.uniform(-2.0, 2.0))))}

@@ -1,0 +1,146 @@
+"""What of a world decides about its future, as one number: two worlds with the same number go on alike.
+
+Times count as ages, and an age beyond `OLD_S` is old; counters and paths that no decision looks at are left out.
+Two worlds that differ in the fourth digit of a speed count as the same: that is the one rounding here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
+from enum import Enum
+from functools import partial
+from random import Random
+from types import BuiltinFunctionType, FunctionType, GeneratorType, MethodType
+from typing import Any
+
+from campaign.clock import Clock
+from campaign.process import Process, Topics
+from campaign.world import World
+from canbase_bench.cia301.dictionary import Dictionary
+
+OLD_S = 1.05
+"""Longer than any timeout of the small robot that ends in what the properties look at: what is older has run out."""
+EPOCH_S = 50.0
+"""A number nearer than this to the present is a time: the clock begins at 100 s, nothing else is as large."""
+DIGITS = 3
+UNSEEN = frozenset((
+    # counters, and what is only said to people
+    "_stats", "_told", "_mux_told", "_cycle", "_sequence", "sequence", "received", "refused", "frames_dropped",
+    "dropped", "serial", "stops", "trips", "counters", "lease_age_ms", "stamp_ns", "seen", "detail", "snapshot",
+    "_status_at", "_mux_state_at", "_state_at", "_counters_due", "_longest_gap_s", "_request", "answered", "_reset_at",
+    "_sdo_turn", "changes", "lost_producers", "_measures", "report",
+    # where the base is: no decision of these parts looks at it; that of the scanner sees nothing
+    "_feed", "travel", "travel_m", "_counts", "_counts_before", "_poses", "encoder_offset",
+    # what never changes
+    "_robot", "robot", "_config", "config", "drive", "layout", "scale", "personality", "_geometry", "dictionary",
+    "_timeouts", "clock", "_member", "_topics", "_late", "_kept", "_life", "_random", "_routes", "_handlers", "_values",
+    # of the records on the disk what was written last counts
+    "file", "_owner", "_cycles", "reset",
+))  # fmt: skip
+"""Names of fields that no decision looks at."""
+VALUES_UNSEEN = frozenset((0x6064, 0x6864, 0x606C, 0x6041, 0x606B, 0x6077))
+"""Objects of a drive that say again what its motor is: position, velocity, statusword, demand, torque."""
+_FIXED = (
+    FunctionType,
+    BuiltinFunctionType,
+    MethodType,
+    partial,
+    type,
+    GeneratorType,
+    Clock,
+    Random,
+    Topics,
+    Dictionary,
+)
+
+
+class Canon:
+    """Walks through objects; `form` gives nested tuples of plain values."""
+
+    def __init__(self, now: float) -> None:
+        self._now = now
+        self._known: dict[int, object] = {}
+
+    def form(self, thing: Any) -> object:
+        """`thing` as plain values; an object that is within itself ends there."""
+        kind = type(thing)
+        if kind is float:
+            return self._number(thing)
+        if thing is None or kind in (int, str, bytes, bool):
+            return thing
+        if isinstance(thing, Enum):
+            return thing.name
+        if kind in (tuple, list, deque):
+            return tuple([self.form(each) for each in thing])
+        if kind is dict:
+            return tuple([(str(key), self.form(value)) for key, value in thing.items()])
+        if kind in (set, frozenset):
+            return tuple(sorted(str(each) for each in thing))
+        return self._object(thing)
+
+    def _number(self, number: float) -> object:
+        if not math.isfinite(number):
+            return str(number)
+        age_s = self._now - number
+        if abs(age_s) < EPOCH_S:
+            return ("age", round(age_s, DIGITS) if age_s < OLD_S else "old")
+        return round(number, DIGITS) + 0.0
+
+    def _object(self, thing: Any) -> object:
+        if isinstance(thing, _FIXED) or type(thing).__module__.startswith("canbase_config"):
+            return ""
+        if id(thing) not in self._known:
+            self._known[id(thing)] = "itself"
+            told = [self.form(value) for name, value in fields(thing) if name not in UNSEEN]
+            self._known[id(thing)] = (type(thing).__name__, *told)
+        return self._known[id(thing)]
+
+
+def fields(thing: Any) -> Iterable[tuple[str, Any]]:
+    """Name and value of each field, slots and all."""
+    names = [name for kind in type(thing).__mro__ for name in _slots(kind)]
+    yield from ((name, getattr(thing, name)) for name in names if hasattr(thing, name))
+    yield from getattr(thing, "__dict__", {}).items()
+
+
+def _slots(kind: type) -> tuple[str, ...]:
+    slots = vars(kind).get("__slots__", ())
+    return (slots,) if isinstance(slots, str) else tuple(slots)
+
+
+def form(world: World, more: Mapping[str, object]) -> tuple[object, ...]:
+    """All that decides: the cores, who lives, the drives, the wheels, the cables, what is on its way, and `more`."""
+    canon = Canon(world.clock.now)
+    processes = (world.driver, world.watchdog, world.velocity)
+    bench = world.drives.bench
+    return (
+        *[_process(canon, process) for process in processes],
+        *[canon.form((node.state, node.line, node.axes, node._consumer, node._bus_on_at, node._boot_at))
+          for node in bench.nodes.values()],
+        *[_values(canon, node.dictionary.values) for node in bench.nodes.values()],
+        round(bench.base.v_left_mps, DIGITS) + 0.0, round(bench.base.v_right_mps, DIGITS) + 0.0,
+        canon.form(world.bus.disturbance), canon.form(world.topics.loss), world.lease_loss,
+        _waiting(world),
+        *[(name, canon.form(value)) for name, value in more.items()],
+    )  # fmt: skip
+
+
+def _process(canon: Canon, process: Process) -> object:
+    kept = tuple((channel, len(things)) for channel, things in process._kept.items())
+    return (process.alive, kept, canon.form(process) if process.alive else "")
+
+
+def _values(canon: Canon, values: Mapping[int, int]) -> object:
+    return tuple([value for address, value in values.items() if address >> 8 not in VALUES_UNSEEN])
+
+
+def _waiting(world: World) -> object:
+    """What is on its way, and when: each timer and message by the name of what it calls."""
+    now = world.clock.now
+    return tuple(sorted((round(when - now, DIGITS), _name(do)) for when, _, do, _ in world.clock._events))
+
+
+def _name(do: Callable[..., object]) -> str:
+    return getattr(do, "__qualname__", "") or type(do).__name__

@@ -1,0 +1,123 @@
+"""A small world: the campaign's, with its time cut as coarse as its timeouts allow, and nothing left to chance."""
+
+from __future__ import annotations
+
+import math
+
+from campaign.clock import Pace
+from campaign.outside import Surroundings
+from campaign.process import Process
+from campaign.world import World, campaign_robot
+from canbase_config.robot import Robot
+from canbase_driver.reset import Outcome
+from canbase_velocity.twist import ZERO, Twist
+from small_worlds.events import EVER_S, Event
+
+STEP_S = 0.05
+"""Of all timers."""
+POINT_S = 0.2
+"""Something may happen at each multiple of this."""
+AFTER_S = 0.01
+"""What the timers sent has arrived by then."""
+COARSE = Pace(
+    watchdog_tick_s=STEP_S,
+    drives_poll_s=STEP_S,
+    command_parts=1.0,
+    topic_jitter_s=0.0,
+    cycle_jitter_s=0.0,
+    sdo_delay_s=0.0,
+    plant_step_s=STEP_S / 5.0,
+    bandwidth_radps=40.0,
+)
+STICK_S = 0.1
+"""Between two messages of the joystick."""
+SPEED_MPS = 0.4
+SETTLES_S = 1.2
+STARTS = ("driving", "standing", "stopped", "stopped, stick held")
+"""Where a search begins: stick held since the start, nobody there, latched by a stop, and that with the stick held."""
+
+
+def small_robot() -> Robot:
+    """The campaign's robot with the slowest loops that its timeouts allow."""
+    robot = campaign_robot()
+    rates = robot.rates.model_copy(
+        update={"control_hz": 1.0 / STEP_S, "command_hz": 1.0 / STEP_S, "odometry_hz": 1.0, "status_hz": 25.0}
+    )
+    timeouts = robot.timeouts.model_copy(update={"feedback_s": 0.2})
+    return robot.model_copy(update={"rates": rates, "timeouts": timeouts})
+
+
+class SmallWorld:
+    """One world with its operator. `resets`: outcome of each reset at the driver; `freed`: those of the filter."""
+
+    def __init__(self, start: str) -> None:
+        """Raises KeyError for a start that is not in STARTS."""
+        self.world: World = World(small_robot(), 0, COARSE)
+        self.world.bus.bitrate = math.inf  # type: ignore[assignment]
+        self.around: Surroundings = Surroundings(self.world)
+        self.parts: tuple[Process, ...] = (self.world.driver, self.world.watchdog, self.world.velocity)
+        self.resets: list[Outcome] = []
+        self.freed = 0
+        self.asked_s: list[float] = []
+        self.held = self._talks = False
+        self.has_radio = True
+        self.ends: list[tuple[float, str]] = []
+        """What holds now, and until when."""
+        self.world.processes["action"].die()
+        self.world.enable()
+        {"driving": self._drive, "standing": lambda: None, "stopped": self._stop,
+         "stopped, stick held": self._stop_and_hold}[start]()  # fmt: skip
+        self.pass_to_point(SETTLES_S)
+
+    def pass_to_point(self, least_s: float = POINT_S) -> None:
+        """At least so much time passes, up to a moment at which something may happen: just after all timers."""
+        clock = self.world.clock
+        clock.run_until(math.ceil((clock.now - AFTER_S + least_s) / POINT_S - 1e-6) * POINT_S + AFTER_S)
+
+    def happens(self, event: Event) -> None:
+        """It begins now, and ends by itself when its time is over."""
+        event.begin(self)
+        if event.lasts_s < EVER_S:
+            clock = self.world.clock
+            end = clock.now - AFTER_S + event.lasts_s
+            self.ends.append((end, event.name))
+            clock.at(end, self._over, event)
+        elif event.once:
+            self.ends.append((math.inf, event.name))
+
+    def turn_stick(self) -> None:
+        """Push it if it is released, release it if it is held: then it says zero, as a joystick at rest does."""
+        self.held = not self.held
+        if not self._talks:
+            self._talks = True
+            self._send()
+
+    def reset(self) -> None:
+        """Both resets, as `canbase reset` asks for them."""
+        self.asked_s.append(self.world.clock.now)
+        velocity = self.world.velocity
+        before = velocity.filter.estop if velocity.running else None
+        velocity.reset()
+        if before is not None and velocity.filter.estop is not before:
+            self.freed += 1
+        self.world.driver.reset(self.resets)
+
+    def _over(self, event: Event) -> None:
+        self.ends = [end for end in self.ends if end[1] != event.name]
+        event.end(self)
+
+    def _send(self) -> None:
+        if self.has_radio:
+            self.world.topics.publish("cmd_vel_joy", Twist(SPEED_MPS, 0.0) if self.held else ZERO)
+        self.world.clock.after(STICK_S, self._send)
+
+    def _drive(self) -> None:
+        self.turn_stick()
+
+    def _stop(self) -> None:
+        self.world.driver.stop()
+
+    def _stop_and_hold(self) -> None:
+        self._stop()
+        self.pass_to_point(SETTLES_S)
+        self.turn_stick()
