@@ -6,6 +6,7 @@ The watchdog sees to itself (`canbase_watchdog.realtime`): it is a process that 
 from __future__ import annotations
 
 import os
+import resource
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
@@ -18,6 +19,9 @@ hardware. No two alike: under FIFO one that is busy would hold up another of its
 kernel's threads that serve interrupts run: without them no frame would arrive."""
 
 
+LONGEST_US: Final = 1_000_000
+"""A thread with real-time priority that runs for so long without ever waiting ends its process (RLIMIT_RTTIME,
+SIGXCPU): it would keep everything else of the computer from running. The threads here wait every 20 ms."""
 THREADS: Final = Path("/proc/self/task")
 
 
@@ -28,9 +32,10 @@ def raise_priority(part: str) -> None:
     processors are few, and the mux would take the silence of a joystick for its release.
     """
     try:
+        resource.setrlimit(resource.RLIMIT_RTTIME, (LONGEST_US, 2 * LONGEST_US))
         for thread in THREADS.iterdir():
             with suppress(ProcessLookupError):  # one that has just ended
                 os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, os.sched_param(PRIORITY[part]))
-    except (OSError, AttributeError) as error:
+    except (OSError, AttributeError, ValueError) as error:
         hint = "it may be late on a loaded computer; the service needs LimitRTPRIO"
         typer.echo(f"canbase {part}: no real-time priority ({error}): {hint}", err=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import os
 import threading
 import time
 from collections.abc import Iterator
@@ -175,7 +176,32 @@ def test_the_lease_socket_is_for_its_owner_and_goes_with_the_process(tmp_path: P
 def test_the_lease_socket_of_another_user_can_be_written_by_it(tmp_path: Path) -> None:
     path = tmp_path / "run" / "lease"
     with LeaseSocket(str(path), 12345):
-        assert (path.stat().st_mode & 0o777, path.parent.stat().st_mode & 0o777) == (0o666, 0o755)
+        found = path.stat()
+        if os.geteuid() == 0:  # it is that user's: nobody else can fill its queue
+            assert (found.st_mode & 0o777, found.st_uid) == (0o600, 12345)
+        else:
+            assert found.st_mode & 0o777 == 0o666
+        assert path.parent.stat().st_mode & 0o777 == 0o755
+
+
+def test_a_folder_that_others_may_change_is_refused(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    folder.chmod(0o777)
+    with pytest.raises(LeaseSocketError, match="chmod go-w"):
+        LeaseSocket(str(folder / "lease"), 0)
+    folder.chmod(0o1777)  # as /tmp: others cannot remove or rename what is there
+    with LeaseSocket(str(folder / "lease"), 0):
+        pass
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder away")
+def test_a_folder_of_another_user_is_refused(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir(0o755)
+    os.chown(folder, 12345, -1)
+    with pytest.raises(LeaseSocketError, match="belongs to user 12345"):
+        LeaseSocket(str(folder / "lease"), 0)
 
 
 def test_a_socket_that_a_killed_watchdog_left_is_taken_over(tmp_path: Path) -> None:

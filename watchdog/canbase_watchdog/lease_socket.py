@@ -29,12 +29,15 @@ class LeaseSocket:
         foreign = uid != os.getuid()
         try:
             self._path.parent.mkdir(mode=0o755 if foreign else 0o700, parents=True, exist_ok=True)
+            _check_folder(self._path.parent)
             _remove_stale(self._path)
             self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
             self._socket.setblocking(False)
             self._socket.bind(path)
-            self._path.chmod(0o666 if foreign else 0o600)
+            if foreign and os.geteuid() == 0:
+                os.chown(path, uid, -1)  # nobody else can fill its queue
+            self._path.chmod(0o600 if not foreign or os.geteuid() == 0 else 0o666)
         except OSError as error:
             raise LeaseSocketError(f"the lease socket {path} cannot be bound: {error}. Check lease.socket.") from error
 
@@ -65,6 +68,21 @@ def _sender(ancillary: list[tuple[int, int, bytes]]) -> tuple[int | None, int | 
             pid, uid, _ = _CREDENTIALS.unpack(data)
             return int(uid), int(pid)
     return None, None
+
+
+def _check_folder(folder: Path) -> None:
+    """Whoever may change the folder of the socket can put another socket in its place. Raises LeaseSocketError."""
+    found = folder.stat()
+    if found.st_uid not in (0, os.geteuid()):
+        raise LeaseSocketError(
+            f"the folder {folder} of the lease socket belongs to user {found.st_uid}, this is user {os.geteuid()}: "
+            "that user could take its place. Choose another lease.socket, in a folder of this user"
+        )
+    if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not found.st_mode & stat.S_ISVTX:
+        raise LeaseSocketError(
+            f"others may write to the folder {folder} of the lease socket, and so take its place. "
+            f"Take that from them (chmod go-w {folder}), or choose another lease.socket"
+        )
 
 
 def _remove_stale(path: Path) -> None:

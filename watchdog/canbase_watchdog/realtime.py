@@ -8,9 +8,13 @@ from __future__ import annotations
 import ctypes
 import gc
 import os
+import resource
 
 PRIORITY = 40
 """Below the threads that serve interrupts (50 by default): without them no frame would arrive."""
+
+LONGEST_US = 1_000_000
+"""A thread that runs for so long without a wait ends its process (RLIMIT_RTTIME): it would starve the computer."""
 
 _MCL_CURRENT = 1
 _MCL_FUTURE = 2
@@ -29,8 +33,9 @@ def lock_memory() -> str | None:
 def raise_priority() -> str | None:
     """SCHED_FIFO for this process. Returns why not, or None."""
     try:
+        resource.setrlimit(resource.RLIMIT_RTTIME, (LONGEST_US, 2 * LONGEST_US))
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
-    except (OSError, AttributeError) as error:
+    except (OSError, AttributeError, ValueError) as error:
         return f"no real-time priority ({error})"
     return None
 
