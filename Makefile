@@ -127,6 +127,16 @@ $(VENV)/requirements: pyproject.toml Makefile $(VENV)/made
 	python -m pip install --quiet --requirement $@.txt --group dev
 	@touch $@
 
+# Pins and hashes of all that a robot installs, for every supported Python; no host of a registry stands in them.
+LOCK := uv pip compile --no-config --quiet --upgrade --universal --python-version 3.10 --generate-hashes --no-annotate \
+  --custom-compile-command 'make lock'
+
+.PHONY: lock
+lock: $(VENV)/requirements ## renews deploy/requirements: what a robot installs, with hashes
+	python -m pip install --quiet 'uv>=0.9'
+	$(LOCK) --extra gpio --no-emit-package numpy pyproject.toml --output-file deploy/requirements/ros_apt.txt
+	$(LOCK) --extra gpio --extra ros pyproject.toml $(VENV)/requirements.txt --output-file deploy/requirements/ros_pypi.txt
+
 $(VENV)/ready: $(VENV)/requirements CMakeLists.txt package.xml $(INTERFACES) $(wildcard deploy/systemd/* deploy/launch/* deploy/bin/*)
 	python -m pip install --quiet --no-deps --no-build-isolation --config-settings build-dir=$(VENV)/build --editable .
 	@touch $@

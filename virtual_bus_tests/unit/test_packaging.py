@@ -83,17 +83,6 @@ def test_the_ros_wheels_stay_an_extra() -> None:
     assert [name for name in project["optional-dependencies"]["ros"] if not name.startswith("ros-jazzy-")] == []
 
 
-def test_who_builds_with_colcon_is_told_all_libraries_that_pip_would_fetch() -> None:
-    told = re.search(r"^pip install '.*$", read("docs/install.md"), re.MULTILINE)
-    from_ros = {"numpy"}
-
-    assert told is not None
-    fetched = {name for name in pyproject()["project"]["dependencies"] if re.split(r"[<>=]", name)[0] not in from_ros}
-    words = [word.strip("'") for word in told[0].split()[2:]]
-    assert {re.sub(r"[<>=].*", "", word) for word in words} == {re.sub(r"[<>=].*", "", name) for name in fetched}
-    assert {word for word in words if word not in fetched} <= {"msgpack"}
-
-
 def imported_modules(source: str) -> set[str]:
     """Modules that a source imports, at any depth of its blocks."""
     found: set[str] = set()
