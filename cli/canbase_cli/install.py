@@ -65,6 +65,7 @@ def install(
         manifests,
         named_texts,
         neighbours,
+        refuse_keystore,
         refuse_others,
         rehearse,
         sourced,
@@ -94,6 +95,8 @@ def install(
         installed = manifests(prefix)
         plan = install_plan(request, installed, neighbours(prefix, request.name, installed))
         if prefix == Path("/"):
+            if sros2:
+                refuse_keystore()
             outside = [name for name in loaded.files if Path(name).is_absolute()]
             refuse_others([python, *folders(request.sourced), *outside])  # before anything of it runs
             refuse_others(rehearse(python, request.sourced, relay=loaded.robot.watchdog.relay is not None))

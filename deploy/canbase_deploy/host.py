@@ -12,6 +12,7 @@ from typing import Final
 
 from canbase_config.errors import ConfigError
 from canbase_config.load import load_robot
+from canbase_deploy.keystore import KEYS, found_in, refusals
 from canbase_deploy.neighbours import Neighbour
 from canbase_deploy.owner import ETC, owner_paths
 from canbase_deploy.ownership import faults, refusal
@@ -76,6 +77,12 @@ def folders(environment: Mapping[str, str]) -> list[str]:
 def _entries(value: str) -> list[str]:
     """An empty or relative one means the current folder, whatever that is."""
     return [entry for entry in value.split(os.pathsep) if os.path.isabs(entry)]
+
+
+def refuse_keystore() -> None:
+    """Raises InstallError where /etc/canbase/keys is not what `--sros2` needs."""
+    if wrong := refusals(found_in(Path(KEYS))):
+        raise InstallError("\n".join(["--sros2:", *wrong]))
 
 
 def refuse_others(paths: Iterable[str]) -> None:

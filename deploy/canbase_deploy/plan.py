@@ -13,6 +13,7 @@ from typing import Final, Literal
 
 from canbase_config.robot import Robot
 from canbase_deploy.actions import Action, Existing, FirstRecords, Link, Remove, Run, WriteFile
+from canbase_deploy.keystore import KEYS, SERVICES, view
 from canbase_deploy.neighbours import Neighbour, clash
 from canbase_deploy.owner import ETC, USER, is_the_owners, misplaced, modes, old, owner_paths, place
 from canbase_deploy.relay import APPLY, drop_in_text, udev_rule, wrong_chip
@@ -288,6 +289,7 @@ def _tuning(request: Request) -> list[WriteFile]:
         files += [_drop_in(part, request.name, "30-cpus", text) for part in PARTS]
     if request.sros2:
         files += [_drop_in(part, request.name, "50-sros2", _enclave(part)) for part in WITH_ROS]
+        files.append(_drop_in("watchdog", request.name, "50-sros2", f"[Service]\n{view('watchdog')}"))
     relay = request.robot.watchdog.relay
     if relay is not None:
         files.append(_drop_in("watchdog", request.name, "40-relay", drop_in_text(relay.chip)))
@@ -308,9 +310,9 @@ def _environment(values: Mapping[str, str]) -> str:
 
 def _enclave(part: str) -> str:
     """Each part has the enclave that deploy/sros2/policy.xml gives it."""
-    strict = f"ROS_SECURITY_ENABLE=true ROS_SECURITY_STRATEGY=Enforce ROS_SECURITY_KEYSTORE={ETC}/keys"
-    enclave = f"/canbase/{part.replace('-', '_')}"
-    return f'[Service]\nEnvironment={strict}\nEnvironment="CANBASE_ENCLAVE=--enclave {enclave}"\n'
+    strict = f"ROS_SECURITY_ENABLE=true ROS_SECURITY_STRATEGY=Enforce ROS_SECURITY_KEYSTORE={KEYS}"
+    enclave = f"/canbase/{SERVICES[part]}"
+    return f'[Service]\nEnvironment={strict}\nEnvironment="CANBASE_ENCLAVE=--enclave {enclave}"\n{view(part)}'
 
 
 def _drop_in(part: str, name: str, file: str, text: str) -> WriteFile:

@@ -35,7 +35,9 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("root")
     path = sample("example_can0")
     templates, ros = read_templates(TEMPLATES), {"PYTHONPATH": '/opt/my ros/100% "x":/opt/ws'}
-    request = Request("example", load_robot(path).robot, path.read_text(), sys.executable, templates, sourced=ros)
+    request = Request(
+        "example", load_robot(path).robot, path.read_text(), sys.executable, templates, sourced=ros, sros2=True
+    )
     Executor(root, lambda line: None).carry_out(install_plan(request, {}))
     return root
 
