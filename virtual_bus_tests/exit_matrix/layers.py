@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from canbase_bench.world.bench import DEFAULT_BODY
 from canbase_config.derive import order_hold_s
 from canbase_config.robot import Robot
-from canbase_watchdog.feedback import DRIFT_S
+from canbase_watchdog.feedback import DRIFT_M, DRIFT_S
 from canbase_watchdog.foreign import DISORDER_COUNT
 
 ALLOWANCE_S = 0.25
@@ -88,8 +88,9 @@ def kept_motion(robot: Robot, speed_mps: float) -> float:
 
 def drift(robot: Robot, speed_mps: float) -> float:
     """Until encoder and velocity, one of which says that the wheel stands, are too far apart."""
-    share = robot.watchdog.travel_tolerance_m / (speed_mps * DRIFT_S)
-    return -DRIFT_S * math.log(1.0 - share) + robot.watchdog.feedback_samples / robot.rates.control_hz
+    forgotten = 1.0 / DRIFT_M + 1.0 / (DRIFT_S * speed_mps)
+    way_m = -math.log(1.0 - robot.watchdog.travel_tolerance_m * forgotten) / forgotten
+    return way_m / speed_mps + robot.watchdog.feedback_samples / robot.rates.control_hz
 
 
 def disorder(robot: Robot, speed_mps: float) -> float:
