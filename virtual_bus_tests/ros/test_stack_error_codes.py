@@ -15,6 +15,7 @@ from typing import Any, Final
 import pytest
 from canbase.action import DriveDistance
 from rclpy.action import ActionClient
+from unique_identifier_msgs.msg import UUID
 
 from canbase_action_server.client import Drive
 from canbase_action_server.outcome import ErrorCode, Status
@@ -189,10 +190,14 @@ def test_preempted_by_a_newer_goal_that_begins_after_the_stop(stage: Stage) -> N
     assert stage.end_of(newer) == (Status.SUCCEEDED, ErrorCode.OK)
 
 
-def test_client_lost_of_a_client_that_sends_no_keepalives(stage: Stage) -> None:
+def test_client_lost_of_a_client_whose_keepalives_end(stage: Stage) -> None:
     bare = ActionClient(stage.robot.node.node, DriveDistance, "drive_distance")
+    keepalive = stage.robot.node.node.create_publisher(UUID, "drive_distance/keepalive", 1)
+    stage.robot.node.wait_for_subscriber(keepalive)
     stage.robot.node.wait_for(bare.server_is_ready, READY_S, "the server")
     answer = bare.send_goal_async(DriveDistance.Goal(distance_m=1.0, max_speed_mps=0.3))
+    stage.robot.node.wait_for(answer.done, READY_S, "the acceptance")
+    keepalive.publish(answer.result().goal_id)  # the first and the last one
     stage.robot.wait_speed(0.27)
     ended = answer.result().get_result_async()
     stage.robot.node.wait_for(ended.done, END_S, "the result")
