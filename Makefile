@@ -27,26 +27,26 @@ test: $(VENV)/ready ## all tests: pure units, simulated drives on a bus, process
 .PHONY: campaign
 campaign: $(VENV)/ready ## 10,000 robots with overlapping faults in virtual time; SCENARIOS=500 fewer, SEED=7 tells one
 ifdef SEED
-	PYTHONPATH=virtual_bus_tests python -m campaign --seed $(SEED)
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign --seed $(SEED)
 else
-	PYTHONPATH=virtual_bus_tests python -m campaign $(if $(SCENARIOS),--scenarios $(SCENARIOS))
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign $(if $(SCENARIOS),--scenarios $(SCENARIOS))
 endif
 
 .PHONY: teeth
 teeth: $(VENV)/ready ## takes one safeguard out after the other; the campaign has to find it missing
-	PYTHONPATH=virtual_bus_tests python -m campaign.teeth
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.teeth
 
 .PHONY: stops
 stops: $(VENV)/ready ## times and distances of each stop and each lie, 20 seeded runs each: docs/stop_times.md
-	PYTHONPATH=virtual_bus_tests python -m campaign.stops --write docs/stop_times.md
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.stops --write docs/stop_times.md
 
 .PHONY: small-worlds
 small-worlds: $(VENV)/ready ## every failure with every action of an operator in small worlds; FAULTS=2 deeper, EVERY=1 denser
-	PYTHONPATH=virtual_bus_tests python -m small_worlds $(if $(FAULTS),--faults $(FAULTS)) $(if $(OPERATOR),--operator $(OPERATOR)) $(if $(EVERY),--every $(EVERY))
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m small_worlds $(if $(FAULTS),--faults $(FAULTS)) $(if $(OPERATOR),--operator $(OPERATOR)) $(if $(EVERY),--every $(EVERY))
 
 .PHONY: fuzz
 fuzz: $(VENV)/ready ## a million random and malformed frames and leases against driver, watchdog and drives
-	PYTHONPATH=virtual_bus_tests python -m campaign.fuzz
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.fuzz
 
 UNIT := virtual_bus_tests/unit
 DECIDES := $(filter-out %_soak.py,$(wildcard $(UNIT)/test_watchdog_*.py)) $(patsubst %,$(UNIT)/test_%.py,cia402 axis supervisor reset layouts_agree latch_record)
@@ -58,14 +58,14 @@ coverage: $(VENV)/ready ## branch coverage of watchdog policy and CiA 402 tables
 
 .PHONY: mutation
 mutation: $(VENV)/ready ## mutants of watchdog policy and CiA 402 tables, of changed modules; ALL=1 of all of them
-	PYTHONPATH=virtual_bus_tests python -m mutation $(if $(ALL),--all)
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m mutation $(if $(ALL),--all)
 
 .PHONY: exit-matrix
 exit-matrix: $(VENV)/ready ## every way out of a driving robot, for real, measured: docs/stop_times.md; ONLY=watchdog runs some
 ifdef ONLY
-	PYTHONPATH=virtual_bus_tests python -m exit_matrix --only '$(ONLY)'
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m exit_matrix --only '$(ONLY)'
 else
-	PYTHONPATH=virtual_bus_tests python -m exit_matrix --write docs/stop_times.md
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m exit_matrix --write docs/stop_times.md
 endif
 
 .PHONY: bench
@@ -78,7 +78,7 @@ endif
 
 .PHONY: hazards
 hazards: $(VENV)/ready ## checks docs/hazards.yaml and writes the tables of docs/safety.md
-	PYTHONPATH=virtual_bus_tests python -m hazards
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m hazards
 
 .PHONY: lint
 lint: $(VENV)/ready ## ruff, mypy, import rules, and that colcon sees a ROS 2 package
