@@ -81,6 +81,7 @@ def test_a_torn_write_counts_as_latched(new: Record, written: int) -> None:
 def test_a_record_of_another_robot_computer_or_part(owner: bytes, defect: Defect) -> None:
     found = read(file_after(), owner)
     assert (found.defect, found.latched) == (defect, defect is not Defect.NONE)
+    assert latch.decode(file_after(), owner).latched == found.latched
 
 
 def test_a_version_from_the_future(monkeypatch: pytest.MonkeyPatch) -> None:
