@@ -92,7 +92,7 @@ def test_motion_that_was_ordered_and_not_shown_takes_the_evidence() -> None:
     wheel.turns(0.5, 0.3, 0.3, ordered_mps=0.3)
     assert wheel.turns(0.15, 0.0, 0.0, ordered_mps=0.3)
     assert not wheel.turns(0.05, 0.0, 0.0, ordered_mps=0.3)
-    assert wheel.stillness.doubt == "showed no motion for 0.051 m that were ordered"
+    assert wheel.stillness.doubt == "showed no motion for 0.060 m that were ordered"
     assert not wheel.turns(1.0, 0.0, 0.0)
 
 
