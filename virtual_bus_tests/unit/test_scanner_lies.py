@@ -12,8 +12,10 @@ import math
 import numpy as np
 import pytest
 
+from canbase_velocity.clearance import ScanReader
 from canbase_velocity.decision import Cause
-from canbase_velocity.scan import MAX_READINGS, Scan
+from canbase_velocity.placement import Placement
+from canbase_velocity.scan import MAX_READINGS, Scan, ScanError, check
 from canbase_velocity.sweep import fastest_mps
 from canbase_velocity.twist import ZERO, Twist
 from unit.filter_world import FilterWorld, robot_with
@@ -207,3 +209,34 @@ def test_a_huge_scan_is_thinned_out_to_the_nearest_of_neighbours() -> None:
     least_m, causes, _ = lies(made, fine)
     assert causes == {Cause.NONE, Cause.OBSTACLE_NEAR, Cause.OBSTACLE}
     assert 0.12 < least_m < 0.2
+
+
+def test_a_scanner_that_keeps_its_stamp_is_frozen_though_its_readings_change() -> None:
+    least_m, causes, fastest = lies(world(), lambda scan: dataclasses.replace(scan, stamp_ns=7))
+    assert Cause.SCAN_FROZEN in causes
+    assert least_m > 0.14
+    assert fastest == 0.0
+
+
+def test_until_frozen_s_is_over_equal_readings_are_taken_for_as_old_as_they_are() -> None:
+    """With 10 s of patience: the base counts its own way since the readings were new, and does not touch the wall."""
+    least_m, causes, _ = lies(world(frozen_s=10.0), Frozen(new_stamps=True))
+    assert Cause.SCAN_FROZEN not in causes
+    assert least_m > 0.1
+
+
+def test_a_scan_of_more_than_the_most_readings_is_dropped_though_its_angles_fit() -> None:
+    step_rad = 2.0 * math.pi / (MAX_READINGS + 1)
+    check(Scan(np.full(MAX_READINGS, INF), 0.0, step_rad, 0.05, 10.0))
+    with pytest.raises(ScanError, match="readings, at most"):
+        check(Scan(np.full(MAX_READINGS + 1, INF), 0.0, step_rad, 0.05, 10.0))
+
+
+def test_of_neighbours_that_are_taken_together_the_nearest_counts_where_it_is() -> None:
+    """2880 readings, two together: one of 1 m beside one of 3 m, ahead of the scanner."""
+    ranges_m = np.full(2880, INF)
+    ranges_m[1440], ranges_m[1441] = 3.0, 1.0
+    step_rad = 2.0 * math.pi / 2880
+    scanner = robot_with().safety.scan
+    view = ScanReader(scanner).read(Scan(ranges_m, -math.pi, step_rad, 0.05, 10.0), Placement.of(scanner))
+    assert view.points.at_m == pytest.approx(np.array([[math.cos(step_rad), math.sin(step_rad)]]))
