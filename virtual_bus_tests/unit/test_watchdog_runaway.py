@@ -118,3 +118,12 @@ def test_what_brakes_as_the_ramp_says_is_never_near_the_limit() -> None:
         assert all(
             max(0.0, mps - half * (t - rules.lag_s)) <= max(0.0, rules.allowed_mps(mps, t)) + 1e-9 for t in steps
         )
+
+
+@pytest.mark.parametrize("kind", ["encoder_lost", "encoder_zero"])
+def test_a_lost_encoder_ends_in_power_off_within_035_s_and_below_1_5_mps(kind: str) -> None:
+    """0.3 m/s ── encoder lost ── 0.05 s ── trip and power off in one cycle; fastest 0.56 m/s."""
+    story = told(kind, 0.3)
+    assert story.off_s <= 2 * STEP_S
+    assert story.trip_s + story.off_s <= 0.35
+    assert story.peak_mps <= 1.5
