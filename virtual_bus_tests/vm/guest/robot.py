@@ -48,6 +48,7 @@ class Robot:
         self.node.create_subscription(DriverStatus, "motor_driver/status", self._on_status, 10)
         self._stick = Stick()
         self._reset = self.node.create_client(Trigger, "motor_driver/reset")
+        self._filter_reset = self.node.create_client(Trigger, "safety_filter/reset")
         self.evidence = Evidence(self.node)
         self.config = load_robot(ROBOT_YAML).robot
         self.client = DriveClient(self.node, self.executor)
@@ -177,7 +178,10 @@ class Robot:
         return done_s
 
     def reset(self) -> bool:
-        """Ask once; whether it was done."""
+        """Ask once, the safety filter too, as `canbase reset` does; whether the driver's was done."""
+        self.wait("safety_filter/reset", self._filter_reset.service_is_ready)
+        free = self._filter_reset.call_async(Trigger.Request())
+        self.wait("the answer to a reset", free.done)
         self.wait("motor_driver/reset", self._reset.service_is_ready)
         answer = self._reset.call_async(Trigger.Request())
         self.wait("the answer to a reset", answer.done)
