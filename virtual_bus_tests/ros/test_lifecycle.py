@@ -113,14 +113,14 @@ def test_deactivate_at_speed_stops_the_wheels_before_it_answers_and_nothing_move
     assert active.robot.odom.since(answered_s)
 
 
-def test_activate_is_refused_while_a_velocity_is_ordered_and_gives_no_power_later_by_itself(inactive: Managed) -> None:
+def test_a_stick_that_is_held_during_activate_moves_nothing_until_it_is_released(inactive: Managed) -> None:
+    """The mux does not follow it, so the driver hears zero."""
     inactive.joystick.message = forward(SPEED_MPS)
     inactive.robot.node.spin_for(0.3)
-    assert not inactive.change(ACTIVATE)
-    assert inactive.state == State.PRIMARY_STATE_INACTIVE
-    inactive.joystick.message = None
+    assert inactive.change(ACTIVATE)
+    assert inactive.robot.wait_any_state().state == DriverStatus.ENABLED
     assert inactive.moved(1.5) < RESTS_M
-    assert inactive.robot.wait_any_state().state == DriverStatus.DISARMED
+    assert inactive.drives()
 
 
 def test_activate_enables_the_drives_and_they_follow(inactive: Managed) -> None:
