@@ -192,13 +192,14 @@ def test_preempted_by_a_newer_goal_that_begins_after_the_stop(stage: Stage) -> N
 
 def test_client_lost_of_a_client_whose_keepalives_end(stage: Stage) -> None:
     bare = ActionClient(stage.robot.node.node, DriveDistance, "drive_distance")
-    keepalive = stage.robot.node.node.create_publisher(UUID, "drive_distance/keepalive", 1)
-    stage.robot.node.wait_for_subscriber(keepalive)
+    keepalive = stage.robot.node.repeat(UUID, "drive_distance/keepalive", 10.0)
+    stage.robot.node.wait_for_subscriber(keepalive.publisher)
     stage.robot.node.wait_for(bare.server_is_ready, READY_S, "the server")
     answer = bare.send_goal_async(DriveDistance.Goal(distance_m=1.0, max_speed_mps=0.3))
     stage.robot.node.wait_for(answer.done, READY_S, "the acceptance")
-    keepalive.publish(answer.result().goal_id)  # the first and the last one
+    keepalive.message = answer.result().goal_id
     stage.robot.wait_speed(0.27)
+    keepalive.message = None
     ended = answer.result().get_result_async()
     stage.robot.node.wait_for(ended.done, END_S, "the result")
     stage.stood_at(time.monotonic())
