@@ -66,6 +66,7 @@ COVERED = {
     "driver:stop_requested": "nobody asks for it here: test_supervisor.py and the exit matrix do",
     "driver:shutdown": "the driver is not ended here: test_supervisor.py and the exit matrix do",
     "driver:command_timeout": "watchdog:lease_lost; together: found",
+    "driver:asks_for_watchdog": "driver:stop_record, and the watchdog's record, which has to be armed before power",
     "driver:zero_before_motion": "mux:neutral_start",
     "filter:zero_after_estop": "mux:neutral_start; together: found",
     "mux:neutral_start": "filter:zero_after_estop, driver:zero_before_motion; test_neutral_start.py has a held stick",

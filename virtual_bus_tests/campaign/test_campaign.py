@@ -44,7 +44,6 @@ def test_the_same_seed_gives_the_same_scenario() -> None:
         ("watchdog:latch", ["velocity_hangs", "lease_lost", "driver_hangs"], "latched"),
         ("driver:latch", ["watchdog_hangs", "drive_fault"], "latched"),
         ("driver:stop_record", ["driver_dies", "drive_fault", "all_processes_restart"], "latched"),
-        ("driver:asks_for_watchdog", ["watchdog_dies", "driver_dies"], "enabling"),
         ("drives:heartbeat_consumer", ["cable_cut", "cable_cut_to_drives", "cable_cut_one_drive"], "heartbeat"),
         ("mux:timeout", ["action_dies", "action_hangs"], "sources"),
         ("filter:command", ["mux_lossy"], "sources"),
