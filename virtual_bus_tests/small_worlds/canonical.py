@@ -32,7 +32,7 @@ UNSEEN = frozenset((
     "_status_at", "_mux_state_at", "_state_at", "_counters_due", "_longest_gap_s", "_request", "answered", "_reset_at",
     "_sdo_turn", "changes", "lost_producers", "_measures", "report",
     # where the base is: no decision of these parts looks at it; that of the scanner sees nothing
-    "_feed", "travel", "travel_m", "_counts", "_counts_before", "_poses", "encoder_offset",
+    "_feed", "travel", "travel_m", "_travel_m", "_anchor_m", "_counts", "_counts_before", "_poses", "encoder_offset",
     # what never changes
     "_robot", "robot", "_config", "config", "drive", "layout", "scale", "personality", "_geometry", "dictionary",
     "_timeouts", "clock", "_member", "_topics", "_late", "_kept", "_life", "_random", "_routes", "_handlers", "_values",

@@ -32,7 +32,7 @@ COARSE = Pace(
 STICK_S = 0.1
 """Between two messages of the joystick."""
 SPEED_MPS = 0.4
-SETTLES_S = 1.2
+SETTLES_S = 2.4
 STARTS = ("driving", "standing", "stopped", "stopped, stick held")
 """Where a search begins: stick held since the start, nobody there, latched by a stop, and that with the stick held."""
 
