@@ -6,9 +6,7 @@ from collections.abc import Sequence
 
 from small_worlds.explore import Story
 
-OPEN: dict[str, tuple[frozenset[str], str]] = {
-    "fresh": (frozenset(("encoder dead",)), "a wheel whose encoder shows nothing runs away"),
-}
+OPEN: dict[str, tuple[frozenset[str], str]] = {}
 """Property → with which of these events it does not hold yet, and why."""
 
 
