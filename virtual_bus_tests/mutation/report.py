@@ -1,6 +1,7 @@
 """What the last run found: `report.json`, with the hash of each source that it holds for; and why survivors may live.
 
 `explained.yaml`: `because` for groups of survivors, each named by its module and its lines before and after.
+`unmeasured.yaml`: modules whose mutants were not tried since they changed; the report says nothing about them.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from ruamel.yaml import YAML
 from mutation.targets import TARGETS
 
 HERE = Path(__file__).parent
-REPORT, EXPLAINED = HERE / "report.json", HERE / "explained.yaml"
+REPORT, EXPLAINED, UNMEASURED = HERE / "report.json", HERE / "explained.yaml", HERE / "unmeasured.yaml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,12 +59,17 @@ def save(report: Report) -> None:
 
 
 def outdated(report: Report) -> list[str]:
-    """Paths of mutated sources that are not the ones that the report is about."""
+    """Modules whose sources are not the ones that the report is about."""
     return [
-        target.path
+        target.module
         for target in TARGETS
         if target.module not in report or report[target.module].sha256 != target.sha256
     ]
+
+
+def unmeasured() -> list[str]:
+    """Modules that `unmeasured.yaml` admits to be untried since they changed."""
+    return [str(module) for module in YAML(typ="safe").load(UNMEASURED) or []]
 
 
 def explanations() -> dict[tuple[str, str, str], str]:
