@@ -199,7 +199,8 @@ class DriverCore:
         if not self._readiness.released:
             ends = self._shutdown_requested or self._readiness.unconfigured
             may_boot = self._supervisor.state in NO_POWER and not ends
-            frames += self._drives.tick(now, may_boot, self._sync_since)
+            asked_since = now if self._bus_problem else self._sync_since
+            frames += self._drives.tick(now, may_boot, asked_since)
         situation = self._situation(now)
         orders = self._judge(situation, now)
         frames += self._go_on_with_reset(situation, now)

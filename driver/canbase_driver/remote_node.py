@@ -38,9 +38,10 @@ UNHEARD_S = 1.0
 """A node that has answered no request of its boot for so long may have no power or no cable."""
 SEEK_S = 1.0
 """A node that is silent for so long while nothing has power is looked for by a new boot: its boot-up may be lost."""
-SECOND_BOOT_UP_S, SETTLE_FACTOR, SETTLE_EXTRA_S, SETTLE_MAX_S = 5.0, 1.5, 0.2, 10.0
-"""A boot-up message so soon after the one that answered the NMT reset is a second one of the same start. The next boot
-waits for it: the time that passed between them, times the factor, and the extra; at most start.settle_s' limit."""
+SECOND_BOOT_UP_S, ALIKE, SETTLE_FACTOR, SETTLE_EXTRA_S = 3.0, 0.3, 1.3, 0.2
+"""A boot-up message so soon after the one that answered the NMT reset may be a second one of the same start. When it
+comes again after the next boot, as late but for this share, the boots after that wait for it: that time, times the
+factor, and the extra. Once alone it is a drive that lost its supply."""
 BUS_LOST = (0x8120, 0x8130, 0x8140)
 """Emergency codes for a lost bus or heartbeat (CiA 301): error passive, heartbeat or life guarding, bus-off."""
 
@@ -80,6 +81,8 @@ class RemoteNode:
         """When it was ready last; before that, when it was looked at first. Infinity until then."""
         self._boot: NodeBoot | None = None
         self._boot_up_at = -math.inf
+        self._second_s = math.inf
+        """From the boot-up message of the last boot to a second one [s]; infinity: there was none."""
         self._settle_s = 0.0
         self._since_s = -math.inf
         self._why_gone = "not booted yet"
@@ -257,10 +260,14 @@ class RemoteNode:
     def _learn_to_settle(self, now: float) -> str:
         """A second boot-up message of one start: the next boot waits for it. What to add to a sentence about it."""
         gap_s = now - self._boot_up_at
-        if gap_s > SECOND_BOOT_UP_S:
+        before_s, self._second_s = self._second_s, gap_s if gap_s <= SECOND_BOOT_UP_S else math.inf
+        if self._second_s == math.inf:
             return ""
-        self._settle_s = max(self._settle_s, min(SETTLE_FACTOR * gap_s + SETTLE_EXTRA_S, SETTLE_MAX_S))
-        return f", {gap_s:.2f} s after that of its boot; the next boot waits for it (drive profile: start.settle_s)"
+        told = f", {gap_s:.2f} s after that of its boot"
+        if abs(gap_s - before_s) > ALIKE * gap_s:
+            return f"{told}; if it does so after each boot, set start.settle_s in its drive profile"
+        self._settle_s = max(self._settle_s, SETTLE_FACTOR * gap_s + SETTLE_EXTRA_S)
+        return f"{told}, again; the next boot waits for it (drive profile: start.settle_s)"
 
     def on_nmt(self, frame: Frame, now: float) -> None:
         """Take an NMT command (000h) that is on the bus: somebody keeps it pre-operational."""

@@ -57,7 +57,7 @@ REFUSALS: tuple[Callable[[Situation], str], ...] = (
     lambda s: "the driver is ending" if s.shutdown_requested else "",
     lambda s: "a reset is under way" if s.resetting else "",
     lambda s: f"{s.unconfigured}; configure it first" if s.unconfigured else "",
-    lambda s: "a wheel turns" if not s.standstill and not s.unready else "",
+    lambda s: s.turning or "a wheel turns" if not s.standstill and not s.unready else "",
     *_BUS_OR_COMMAND,
     lambda s: f"watchdog: {s.watchdog_detail}" if s.watchdog is WatchdogView.MISSING else "",
 )

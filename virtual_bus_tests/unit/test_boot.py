@@ -270,10 +270,10 @@ def test_a_drive_that_does_not_stop_loses_its_voltage_and_is_an_error() -> None:
     drive.objects[0x606C, 0] = u32(2**32 - 955)  # backward
     bench = Bench(drive, robot())
     boot = bench.run()
-    assert "left did not stand 3 s after a quick stop. Its voltage is now disabled" in error_of(boot)
+    assert "left did not stand 4.7 s after a quick stop. Its voltage is now disabled" in error_of(boot)
     assert drive.nmt == [0x80]
     assert drive.writes == [(0x6040, 0, 0x02), (0x6040, 0, 0x00)]
-    assert bench.now == pytest.approx(103.0, abs=0.02)
+    assert bench.now == pytest.approx(104.7, abs=0.03)
 
 
 def test_both_axes_get_their_quick_stop_before_either_is_waited_for() -> None:

@@ -188,13 +188,14 @@ def test_a_node_that_was_not_asked_for_a_second_is_not_looked_for() -> None:
 
 def test_a_second_boot_up_message_of_one_start_is_waited_for_in_the_next_boot() -> None:
     story = Story().ready()
-    while story.now - story.node._boot_up_at < 0.8:
-        story.wait(0.01)
-    story.heartbeat(BOOT_UP)
-    assert "the next boot waits for it (drive profile: start.settle_s)" in story.node.absent()
-    began = story.now
-    story.started()
-    assert story.now - began > 1.5 * 0.8
+    for said in ("if it does so after each boot, set start.settle_s", "again; the next boot waits for it"):
+        while story.now - story.node._boot_up_at < 0.8:
+            story.wait(0.01)
+        story.heartbeat(BOOT_UP)
+        assert said in story.node.absent()
+        began = story.now
+        story.started()
+    assert story.now - began > 1.3 * 0.8
     assert story.node.report is not None
     assert any("set start.settle_s in its drive profile" in note for note in story.node.report.notes)
 
@@ -207,6 +208,17 @@ def test_a_boot_up_message_long_after_the_boot_is_a_restart_and_changes_nothing_
     began = story.now
     story.started()
     assert story.now - began < 0.5
+
+
+def test_a_drive_that_loses_its_supply_soon_after_its_boot_is_booted_at_once() -> None:
+    """Twice, but not as late after its boot each time: that is no second boot-up message of one start."""
+    story = Story().ready()
+    for lives_s in (2.0, 1.0):
+        story.wait(lives_s)
+        story.heartbeat(BOOT_UP)
+        began = story.now
+        story.ready()
+        assert story.now - began < 0.5
 
 
 def test_why_a_boot_failed_is_known_until_the_node_is_ready() -> None:

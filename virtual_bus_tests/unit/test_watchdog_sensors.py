@@ -237,7 +237,7 @@ def test_after_a_lost_encoder_the_reset_waits_until_the_wheel_has_rolled_out() -
     world.run(2.0)
     assert abs(world.truth.v_left_mps) > 0.0 or not watchdog(world).status.settled
     assert not world.reset().done
-    world.run(world_coasting_s(world))
+    world.run(2.0 * world_coasting_s(world))  # the watchdog's own, then the driver's, from its new boot on
     assert world.truth.standing_s > 0.5
     suffer(world, "heal")
     assert world.reset().done
@@ -254,7 +254,7 @@ def test_a_reset_trusts_a_sensor_until_it_fails_again() -> None:
     suffer(world, "encoder_lost")
     course(world, 1.0)
     world.command = Twist2D.ZERO
-    world.run(2.0 + world_coasting_s(world))
+    world.run(2.0 + 2.0 * world_coasting_s(world))
     assert world.reset().done
     world.run(1.0)
     world.command = Twist2D(0.3, 0.0)
