@@ -23,6 +23,8 @@ NOWHERE = np.empty((0, 2))
 
 MAX_BEAMS: Final = 1440
 """A scan with more readings is thinned out: of neighbours that are taken together the nearest counts."""
+TOO_NEAR_M: Final = 0.001
+"""What is too near to be measured is taken to be so far beside the footprint [m]: the base can drive away."""
 GAP_M: Final = 0.03
 """A place so far beside a beam that says something is covered by it [m]: no leg is hidden between two of them."""
 
@@ -103,8 +105,10 @@ class View:
 class ScanReader:
     """Turns the scans of one scanner into points. Keeps the directions of the beams from scan to scan."""
 
-    def __init__(self, config: ScanConfig) -> None:
+    def __init__(self, config: ScanConfig, box: Box | None = None) -> None:
+        """`box`: the footprint; None: what is too near to be measured counts as range_min, wherever that is."""
         self._config = config
+        self._box = box
         self._geometry: tuple[int, float, float] | None = None
         self._cos: Floats = np.empty(0)
         self._sin: Floats = np.empty(0)
@@ -114,25 +118,27 @@ class ScanReader:
         """What the scan shows. Raises ScanError for a scan that cannot be used, or in which no beam says something.
 
         Readings (REP 117): +infinity and above range_max: nothing there. -infinity: too near to be measured, counts as
-        range_min; so does a finite one below range_min (0, dust, the housing) where safety.scan.below_range_min is
-        too_near. Otherwise that and NaN are no reading: such a beam says nothing.
+        the place of its beam next to the footprint, at most range_min away; so does a finite one below range_min (0,
+        dust, the housing) where safety.scan.below_range_min is too_near. Otherwise that and NaN are no reading: such a
+        beam says nothing.
         """
         check(scan)
         self._hold_direction(scan.angle_increment_rad)
+        self._aim(scan.count, scan.angle_min_rad, scan.angle_increment_rad)
         ranges_m = np.asarray(scan.ranges_m, dtype=np.float64)
         near = ranges_m < scan.range_min_m if self._config.below_range_min == "too_near" else np.isneginf(ranges_m)
-        ranges_m = np.where(near, scan.range_min_m, ranges_m)
-        usable = ranges_m >= scan.range_min_m
+        usable = near | (ranges_m >= scan.range_min_m)
         if not usable.any():
             raise ScanError(f"none of its {ranges_m.size} readings says something")
         hit_m = np.where(usable & (ranges_m <= scan.range_max_m), ranges_m, np.inf)
+        if near.any():
+            hit_m = np.where(near, np.minimum(self._beside_m(placement), scan.range_min_m), hit_m)
         if not (self._config.allow_empty or np.isfinite(hit_m).any()):
             raise ScanError("it sees nothing at all, and allow_empty is false")
         says = None if usable.all() else np.flatnonzero(usable if scan.angle_increment_rad > 0.0 else usable[::-1])
         return View(self._points(scan, hit_m, placement), field_of(scan, placement, says), float(usable.mean()))
 
     def _points(self, scan: Scan, hit_m: Floats, placement: Placement) -> Points:
-        self._aim(hit_m.size, scan.angle_min_rad, scan.angle_increment_rad)
         together = -(-hit_m.size // MAX_BEAMS)
         groups = np.pad(hit_m, (0, -hit_m.size % together), constant_values=np.inf).reshape(-1, together)
         nearest = groups.argmin(axis=1) + np.arange(groups.shape[0]) * together
@@ -140,6 +146,18 @@ class ScanReader:
         hits = nearest[beams]
         at_m = placement.points(hit_m[hits] * self._cos[hits], hit_m[hits] * self._sin[hits])
         return Points(at_m, beams, groups.shape[0])
+
+    def _beside_m(self, placement: Placement) -> Floats:
+        """How far along each beam its first place beside the footprint is [m]; 0 for a scanner outside of it."""
+        if self._box is None:
+            return np.full(self._cos.size, np.inf)
+        ways = placement.points(self._cos, self._sin) - (placement.x_m, placement.y_m)
+        high = np.array((self._box.front_m, self._box.left_m)) - (placement.x_m, placement.y_m)
+        low = np.array((-self._box.rear_m, -self._box.right_m)) - (placement.x_m, placement.y_m)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            leaves_m = np.where(ways > 0.0, high / ways, np.where(ways < 0.0, low / ways, np.inf)).min(axis=1)
+        beside_m: Floats = np.maximum(leaves_m + TOO_NEAR_M, 0.0)
+        return beside_m
 
     def _hold_direction(self, increment_rad: float) -> None:
         """A scanner that counts the other way round than before is mirrored, or is another one."""

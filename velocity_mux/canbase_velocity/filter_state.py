@@ -34,7 +34,7 @@ class _Scanner:
     def __init__(self, config: ScanConfig, geometry: Geometry) -> None:
         self.config = config
         self._geometry = geometry
-        self._reader = ScanReader(config)
+        self._reader = ScanReader(config, geometry.box)
         self._frozen = FrozenWatch(config.frozen_s, noisy=config.noisy)
         self._glitches = GlitchFilter(config.min_points)
         self._reach_m = geometry.reach_m(config.timeout_s)

@@ -2,35 +2,43 @@
 
 Rules:
 1. A scan with the stamp of the one before is that one: it does not count again.
-2. Real scanners are noisy: when every reading is exactly equal for `frozen_s` and FROZEN_SCANS scans, it is frozen.
-3. Where nothing is in range there is nothing to compare: such scans are never frozen (safety.scan.allow_empty).
+2. Real scanners are noisy: when every reading is exactly equal for `frozen_s` and FROZEN_SCANS scans, it is frozen. So
+   it is when up to PERIODS scans come by turns, as from a driver that hands out its old buffers.
+3. Where nothing is in range there is nothing to compare: such scans are never frozen (safety.scan.allow_empty). Less
+   than MANY readings are equal to an older scan's by chance: they are compared with the scan before alone.
 4. A simulator without noise (`noisy` false): equal scans count only while the base moves.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import Final
 
 import numpy as np
 
 from canbase_velocity.scan import Scan
-from canbase_velocity.sweep import Floats
 
 FROZEN_SCANS: Final = 4
 """A driver may send each scan twice; three repetitions are no accident."""
+PERIODS: Final = 8
+"""So many scans are remembered."""
+MANY: Final = 8
+"""So many readings in range tell one scan from another."""
 
 
 class FrozenWatch:
-    """Remembers the readings of the scan before, for one scanner."""
+    """Remembers the readings of the scans before, for one scanner."""
 
     def __init__(self, frozen_s: float, *, noisy: bool) -> None:
         self._frozen_s, self._noisy = frozen_s, noisy
         self._stamp_ns: int | None = None
-        self._ranges: Floats = np.empty(0)
+        self._before: deque[tuple[bytes, float]] = deque(maxlen=PERIODS)
+        """The readings, newest first, and when they were received first."""
         self._looked_at = math.nan
-        self._same = 0
-        self._same_s = 0.0
+        self._repeats = [0] * PERIODS
+        """How often in a row a scan was equal to the one so many places, plus one, before it."""
+        self._same_s = [0.0] * PERIODS
         self.since = math.nan
         """When these readings were received first (monotonic) [s]."""
 
@@ -41,15 +49,24 @@ class FrozenWatch:
 
     def look(self, scan: Scan, now: float, *, moves: bool) -> str:
         """Why the scanner counts as frozen, empty: it does not. `moves`: the base may have moved since the last one."""
-        ranges = np.array(scan.ranges_m, dtype=np.float64)  # a copy: the message may be used again
-        before, self._ranges = self._ranges, ranges
-        in_range = (ranges >= scan.range_min_m) & (ranges <= scan.range_max_m) & np.isfinite(ranges)
-        if not in_range.any() or not np.array_equal(ranges, before, equal_nan=True):
-            self._same, self._same_s, self.since = 1, 0.0, now
-        else:
-            self._same += 1
-            self._same_s += now - self._looked_at if moves or self._noisy else 0.0
-        self._looked_at = now
-        if self._same < FROZEN_SCANS or self._same_s < self._frozen_s:
-            return ""
-        return f"the same {ranges.size} readings for {self._same_s:.1f} s, {self._same} scans"
+        ranges = np.asarray(scan.ranges_m, dtype=np.float64)
+        in_range = int(np.count_nonzero((ranges >= scan.range_min_m) & (ranges <= scan.range_max_m)))
+        step_s = now - self._looked_at if moves or self._noisy else 0.0
+        readings, self._looked_at, self.since = ranges.tobytes(), now, now
+        compared = len(self._before) if in_range >= MANY else min(len(self._before), 1 if in_range else 0)
+        for place in range(PERIODS):
+            if place < compared and self._before[place][0] == readings:
+                self._repeats[place] += 1
+                self._same_s[place] += step_s
+                self.since = self._before[place][1]
+            else:
+                self._repeats[place], self._same_s[place] = 0, 0.0
+        self._before.appendleft((readings, self.since))
+        return self._sentence(ranges.size)
+
+    def _sentence(self, count: int) -> str:
+        for place, (repeats, same_s) in enumerate(zip(self._repeats, self._same_s, strict=True)):
+            if repeats + 1 >= FROZEN_SCANS and same_s >= self._frozen_s:
+                turns = f", {place + 1} scans by turns" if place else ""
+                return f"the same {count} readings for {same_s:.1f} s, {repeats + 1} scans{turns}"
+        return ""

@@ -253,7 +253,7 @@ class Mux:
 
     def _arm(self, not_ready: str, now: float) -> None:
         for source in self._sources.values():
-            source.arming.look(not_ready, now)
+            source.arming.look(not_ready, now, silent=not source.is_fresh(now))
 
     def _others(self, now: float) -> tuple[tuple[LockView, ...], tuple[Foreign, ...], bool, str]:
         locks = tuple(lock.view(now) for lock in self._locks.values())

@@ -7,6 +7,8 @@ Rules, for each source:
    What this process did not watch, because it stood still itself, is no absence.
 4. Whose last command orders motion while the base is not ready is armed no more, however old that command is. A radio
    gap across a reset changes nothing.
+5. Who is silent while the base is not ready is armed no more either, unless absence may arm him (rule 3): his last zero
+   is old, and nobody knows whether he has pushed the stick since.
 """
 
 from __future__ import annotations
@@ -46,9 +48,9 @@ class Arming:
         """It needs a zero again. The first reason is kept."""
         self.waits_since = self.waits_since or why
 
-    def look(self, not_ready: str, now: float) -> None:
-        """Time has passed. `not_ready`: why the base cannot move; empty: it can."""
-        if not_ready and self._moves:
+    def look(self, not_ready: str, now: float, *, silent: bool) -> None:
+        """Time has passed. `not_ready`: why the base cannot move; empty: it can. `silent`: it is not fresh."""
+        if not_ready and (self._moves or (silent and self._absent_s is None)):
             self.disarm(not_ready)
         if self._absent_s is not None and now - self._absent_from >= self._absent_s:
             self.waits_since, self._moves = "", False

@@ -88,3 +88,30 @@ class Frozen:
     def __call__(self, scan: Scan) -> Scan:
         self._first = self._first or scan
         return dataclasses.replace(self._first, stamp_ns=scan.stamp_ns) if self._new_stamps else self._first
+
+
+class ByTurns:
+    """The first `count` scans again and again, by turns, as from a driver that hands out its old buffers."""
+
+    def __init__(self, count: int, *, new_stamps: bool) -> None:
+        self._count, self._new_stamps = count, new_stamps
+        self._first: list[Scan] = []
+        self._sent = 0
+
+    def __call__(self, scan: Scan) -> Scan:
+        if len(self._first) < self._count:
+            self._first.append(scan)
+        old = self._first[self._sent % self._count]
+        self._sent += 1
+        return dataclasses.replace(old, stamp_ns=scan.stamp_ns) if self._new_stamps else old
+
+
+def far_from(range_min_m: float, reading_m: float = -math.inf) -> Fault:
+    """A scanner that measures nothing nearer than `range_min_m` reads `reading_m` there."""
+
+    def fault(scan: Scan) -> Scan:
+        ranges_m = np.array(scan.ranges_m, dtype=np.float64)
+        ranges_m[ranges_m < range_min_m] = reading_m
+        return dataclasses.replace(scan, ranges_m=ranges_m, range_min_m=range_min_m)
+
+    return fault

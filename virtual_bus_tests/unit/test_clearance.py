@@ -183,3 +183,26 @@ def test_a_full_circle_leaves_no_gap_between_its_last_beam_and_its_first() -> No
     field = field_of(Scan([INF] * 360, 0.0, 2.0 * math.pi / 360, 0.0, 10.0), HERE)
     around = np.array([(math.cos(at), math.sin(at)) for at in np.arange(0.0, 2.0 * math.pi, 0.003)])
     assert field.sees(around).all()
+
+
+@pytest.mark.parametrize(
+    ("angle_rad", "at_m"),
+    [(0.0, (0.501, 0.0)), (math.pi / 2.0, (0.2, 0.301)), (math.pi, (-0.401, 0.0)), (-math.pi / 2.0, (0.2, -0.201))],
+)
+def test_what_is_too_near_stands_beside_the_footprint(angle_rad: float, at_m: tuple[float, float]) -> None:
+    """A scanner 0.2 m ahead of base_link in a footprint of 0.5, 0.4, 0.3 and 0.2 m; it measures from 2 m on."""
+    scanner = ScanConfig(required=True, x_m=0.2)
+    reader = ScanReader(scanner, Box(0.5, 0.4, 0.3, 0.2))
+    points = reader.read(Scan([-INF], angle_rad, 0.01, 2.0, 10.0), Placement.of(scanner)).points
+    assert points.at_m[0] == pytest.approx(at_m)
+
+
+def test_a_scanner_outside_of_the_footprint_has_it_where_it_is_itself_and_none_is_farther_than_range_min() -> None:
+    scanner = ScanConfig(required=True, x_m=0.8)
+    reader = ScanReader(scanner, Box(0.5, 0.4, 0.3, 0.2))
+    points = reader.read(Scan([-INF], 0.0, 0.01, 2.0, 10.0), Placement.of(scanner)).points
+    assert points.at_m[0] == pytest.approx((0.8, 0.0))
+    scanner = ScanConfig(required=True)
+    reader = ScanReader(scanner, Box(0.5, 0.4, 0.3, 0.2))
+    points = reader.read(Scan([-INF], 0.0, 0.01, 0.1, 10.0), Placement.of(scanner)).points
+    assert points.at_m[0] == pytest.approx((0.1, 0.0))

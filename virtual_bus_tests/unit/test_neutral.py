@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from canbase_config.mux import DEFAULT_SOURCES
 from canbase_velocity.base_ready import STATUS_TIMEOUT_S, BaseReady, status_timeout_s
+from canbase_velocity.delay import Sent
 from canbase_velocity.mux import Mux, MuxDecision, Standing
 from canbase_velocity.neutral import BLIND_S, Arming
 from canbase_velocity.twist import ZERO, Twist
@@ -230,7 +231,7 @@ def test_the_status_timeout_covers_a_slow_status() -> None:
 def test_absence_arms_at_exactly_its_key(absent_s: float | None, silence_s: float, armed: bool) -> None:
     arming = Arming(absent_s)
     arming.missed(10.0)
-    arming.look("not ready", 10.0 + silence_s)
+    arming.look("not ready", 10.0 + silence_s, silent=True)
     assert arming.armed is armed
 
 
@@ -268,3 +269,67 @@ def test_no_motion_reaches_the_base_without_a_zero_since_the_last_motion_while_i
 
 def test_the_mux_decides_often_enough_to_watch_absence() -> None:
     assert BLIND_S > 1.0 / 20.0  # least rates.command_hz
+
+
+@pytest.mark.parametrize("event", [driver_latches, driver_is_silent, estop_holds])
+@pytest.mark.parametrize("gap_s", [0.02, 0.5, 5.0])
+def test_a_stick_that_is_pushed_in_a_radio_gap_across_a_stop_is_not_followed_by_its_old_zero(
+    story: Story, event: Callable[[Story], None], gap_s: float
+) -> None:
+    """The last that was heard of it is a zero, from before the stop. The gap ends `gap_s` after the stop does."""
+    story.release()
+    assert story.followed("joystick")
+    story.release()
+    story.sends = {}
+    story.run(0.4)
+    event(story)
+    story.run(1.0)
+    story.driver, story.estop_free = "ENABLED", True
+    story.run(gap_s)
+    assert not story.followed("joystick", 20.0)
+    assert story.decide().sources[0].reason.startswith("waiting for zero (")
+    story.release()
+    assert story.followed("joystick")
+
+
+def test_what_waited_in_the_radio_comes_at_once_after_a_stop_and_is_not_followed(story: Story) -> None:
+    """Stamped: zero until 0.0; the stick is pushed in the gap; stop and reset; then 70 messages in one moment."""
+
+    def say(twist: Twist, sent_s: float) -> None:
+        sent = Sent(1000.0 + sent_s, story.now, story.now)
+        story.mux.on_command("joystick", twist, story.now, sent=sent)
+
+    for _ in range(50):
+        story.run(STEP_S)
+        say(ZERO, story.now)
+    pushed_s = story.now
+    story.run(0.2)
+    driver_latches(story)
+    story.run(1.0)
+    story.driver = "ENABLED"
+    story.run(0.2)
+    for number in range(70):
+        say(FORWARD, pushed_s + STEP_S * number)
+    story.ordered.clear()
+    for _ in range(50):
+        story.run(STEP_S)
+        say(FORWARD, story.now)
+    assert set(story.ordered) == {ZERO}
+
+
+def test_a_stick_at_rest_that_goes_on_to_say_so_and_a_program_that_was_just_at_zero_are_followed_at_once(
+    story: Story,
+) -> None:
+    story.release()
+    story.release("navigation")
+    story.sends = {"joystick": ZERO}
+    driver_latches(story)
+    story.run(1.0)
+    story.driver = "ENABLED"
+    story.run(0.2)
+    story.sends = {}
+    story.run(0.4)
+    assert story.followed("joystick", 0.1)
+    story.sends = {}
+    story.run(0.4)
+    assert story.followed("navigation", 0.1)

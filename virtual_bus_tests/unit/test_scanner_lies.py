@@ -14,12 +14,13 @@ import pytest
 
 from canbase_velocity.clearance import ScanReader
 from canbase_velocity.decision import Cause
+from canbase_velocity.frozen import FrozenWatch
 from canbase_velocity.placement import Placement
 from canbase_velocity.scan import MAX_READINGS, Scan, ScanError, check
 from canbase_velocity.sweep import fastest_mps
 from canbase_velocity.twist import ZERO, Twist
 from unit.filter_world import FilterWorld, robot_with
-from unit.lidar import Fault, Frozen, Lidar, blind, one_beam_left
+from unit.lidar import ByTurns, Fault, Frozen, Lidar, blind, far_from, one_beam_left
 
 WALL = np.array([(2.0, y_m / 20.0) for y_m in range(-20, 21)] + [(-3.0, 0.5)])
 AHEAD = Twist(0.8, 0.0)
@@ -81,6 +82,9 @@ def test_where_the_beams_say_nothing_the_base_creeps_or_does_not_go_at_all(fault
         (blind(0.0), Cause.SCAN_INVALID),
         (Frozen(new_stamps=True), Cause.SCAN_FROZEN),
         (Frozen(new_stamps=False), Cause.SCAN_FROZEN),
+        (ByTurns(2, new_stamps=True), Cause.SCAN_FROZEN),
+        (ByTurns(2, new_stamps=False), Cause.SCAN_FROZEN),
+        (ByTurns(5, new_stamps=True), Cause.SCAN_FROZEN),
         (lambda scan: dataclasses.replace(scan, angle_increment_rad=-scan.angle_increment_rad), Cause.SCAN_INVALID),
         (
             lambda scan: dataclasses.replace(
@@ -240,3 +244,33 @@ def test_of_neighbours_that_are_taken_together_the_nearest_counts_where_it_is() 
     scanner = robot_with().safety.scan
     view = ScanReader(scanner).read(Scan(ranges_m, -math.pi, step_rad, 0.05, 10.0), Placement.of(scanner))
     assert view.points.at_m == pytest.approx(np.array([[math.cos(step_rad), math.sin(step_rad)]]))
+
+
+@pytest.mark.parametrize("range_min_m", [0.3, 0.48, 0.6, 0.8])
+@pytest.mark.parametrize("reading_m", [-INF, 0.0])
+def test_what_is_too_near_to_be_measured_is_not_touched(range_min_m: float, reading_m: float) -> None:
+    """Footprint 0.3 m: the wall may come nearer than range_min, and then says nothing but that it is too near."""
+    least_m, _, fastest = lies(world(below_range_min="too_near"), far_from(range_min_m, reading_m), 14.0)
+    assert least_m > 0.15
+    assert fastest == 0.0
+
+
+def test_from_what_is_too_near_the_base_drives_away() -> None:
+    made = world()
+    lies(made, far_from(0.6), 14.0)
+    stood_m = made.path_m
+    made.run(Twist(-0.3, 0.0), 3.0)
+    assert made.path_m > stood_m + 0.3
+
+
+def test_one_reading_in_range_may_come_again_by_chance_and_many_may_not() -> None:
+    """Three readings by turns, as of a single far pole in millimetres; then the same of a wall."""
+    for beams, frozen in ((1, False), (7, False), (8, True), (360, True)):
+        watch, told = FrozenWatch(0.5, noisy=True), ""
+        for number in range(40):
+            ranges_m = np.full(360, np.inf)
+            ranges_m[:beams] = 4.0 + 0.001 * (number % 3)
+            scan = Scan(ranges_m, -math.pi, math.tau / 360, 0.05, 10.0)
+            told = told or watch.look(scan, 0.05 * number, moves=False)
+        assert bool(told) is frozen
+        assert not frozen or told.endswith("3 scans by turns")
