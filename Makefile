@@ -49,7 +49,7 @@ fuzz: $(VENV)/ready ## a million random and malformed frames and leases against 
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.fuzz
 
 UNIT := virtual_bus_tests/unit
-DECIDES := $(filter-out %_soak.py,$(wildcard $(UNIT)/test_watchdog_*.py)) $(patsubst %,$(UNIT)/test_%.py,cia402 axis supervisor reset layouts_agree latch_record)
+DECIDES := $(filter-out %_soak.py,$(wildcard $(UNIT)/test_watchdog_*.py)) $(patsubst %,$(UNIT)/test_%.py,cia402 axis supervisor reset layouts_agree latch_record stillness braking)
 
 .PHONY: coverage
 coverage: $(VENV)/ready ## branch coverage of watchdog policy and CiA 402 tables: all of it, or it fails
