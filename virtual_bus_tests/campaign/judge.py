@@ -80,8 +80,9 @@ SCALED = (
 EXCLUDED |= dict.fromkeys(("envelope", "sources", "held", "estop", "runaway", "path", "standstill"), SCALED)
 SENSORLESS = (
     ("encoder_lost", "encoder_frozen", "encoder_reversed", "encoder_jumping", "encoder_intermittent"),
-    "a drive that closes its velocity loop on a dead or lying sensor is not stopped in time, above all when its cable "
-    "or another stop comes in between",
+    "two kinds are left, 11 of 600 scenarios: an encoder that is lost below about 0.1 m/s while zero is ordered shows "
+    "the same as a wheel that stands; and a drive whose encoder is dead or reversed turns on while nobody can reach it "
+    "(all processes restart, the cable is cut), since its own quick stop closes its loop on that sensor",
 )
 OPEN: dict[str, tuple[tuple[str, ...], str]] = dict.fromkeys(
     ("envelope", "sources", "held", "estop", "heartbeat", "obstacle", "runaway", "path", "standstill", "goal"),
