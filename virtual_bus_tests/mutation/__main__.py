@@ -70,7 +70,9 @@ def _tell(known: Report, took_s: float) -> None:
     table.add_row("all", str(sum(entry.mutants for entry in known.values())), str(alive))
     out.print(table)
     for name, survivor in report.unexplained(known):
-        out.print(f"alive: {name}:{survivor.line}  {survivor.before}\n    →  {survivor.after}", highlight=False)
+        out.print(
+            f"alive: {name}:{survivor.line}  {survivor.before}\n    →  {survivor.after}", highlight=False, markup=False
+        )
 
 
 if __name__ == "__main__":

@@ -74,6 +74,12 @@ def test_at_the_start_nothing_speaks_against_a_wheel() -> None:
     assert Wheel().last == Evidence(0.0, 0.0, 0.0, 0.0, False, 0, 0, 0.0, True)
 
 
+def test_before_the_first_setpoint_nothing_is_ordered() -> None:
+    watch = Wheel().watch
+    watch.on_sample(0.0, 0.0, True, 1 / HZ, 1 / HZ)
+    assert watch.last == Evidence()
+
+
 def rolling(setpoint: float = 0.25, **changes: Any) -> Wheel:
     """It has followed its order for longer than the lag."""
     wheel = Wheel(**changes)
@@ -273,6 +279,11 @@ def test_a_velocity_that_was_an_error_itself_is_no_wheel_that_halts(share: float
     assert wheel.sample(0.0, 0.0).halted == 0
 
 
+def test_before_the_first_sample_it_did_not_roll() -> None:
+    last = Wheel(standstill_mps=1.0).sample(0.0, 0.5, rolls=0.0)
+    assert (last.jolts, last.halted) == (1, 0)
+
+
 def test_without_power_to_turn_nothing_is_halted() -> None:
     wheel = fast()
     assert wheel.sample(0.5, 0.0, enabled=False).halted == 0
@@ -320,6 +331,20 @@ def test_what_is_asked_for_rises_with_the_slowest_ramp_after_the_lag(sign: int) 
     assert asked[:9] == [0.0] * 9
     assert asked[9:12] == [0.5 / 64, 1.0 / 64, 1.5 / 64]
     assert asked[-1] == 0.25
+
+
+@pytest.mark.parametrize("setpoint", [1.0, -1.0])
+def test_of_a_fast_wheel_all_of_its_setpoint_is_asked_for(setpoint: float) -> None:
+    assert Wheel().samples(200, setpoint, setpoint).ordered_mps == setpoint
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_after_a_reversal_in_a_gap_of_the_samples_the_ramp_begins_at_a_stand(sign: int) -> None:
+    wheel = Wheel()
+    wheel.samples(100, sign * 0.5, sign * 0.5)
+    wheel.watch.on_setpoint(-sign * 0.5, (wheel.n + 1) / HZ)
+    wheel.n += 16
+    assert wheel.sample(-sign * 0.5, -sign * 0.1, cycles=17).ordered_mps == -sign * 0.5 * 17 / HZ
 
 
 def test_it_falls_with_the_setpoints_at_once() -> None:

@@ -118,6 +118,11 @@ def test_the_limit_itself_is_allowed() -> None:
     assert fed(FOOT, BRAKING, *[(9.95 + i / 1000, limit_mps) for i in range(4)]).against == 0
 
 
+def test_a_wheel_that_has_no_speed_brakes_though_its_standstill_is_not_proven() -> None:
+    climb = fed(FOOT, BRAKING, *[(11.3 + i / 100, 0.0) for i in range(4)])
+    assert (climb.step, climb.runaway, climb.against) == (Step.QUICK_STOP, False, 0)
+
+
 def test_a_rolling_wheel_without_power_and_one_that_stands_count_nothing_against_them() -> None:
     fast = [(9.91 + i / 100, 3.0) for i in range(5)]
     assert fed(FOOT, ROLLING, *fast).against == 0
@@ -162,7 +167,7 @@ def test_its_standstill_is_no_evidence() -> None:
 
 
 # power off, by feedback, at 10.000 ── 2 s ── a stand is assumed
-@pytest.mark.parametrize(("now", "stopped"), [(11.999, False), (12.001, True)])
+@pytest.mark.parametrize(("now", "stopped"), [(11.999, False), (12.0, True), (12.001, True)])
 def test_without_power_a_stand_is_assumed_when_it_must_have_rolled_out(now: float, stopped: bool) -> None:
     off = go(OFF, replace(STANDING, trusted=False), 10.0)
     assert not off.stopped

@@ -94,6 +94,11 @@ def test_a_curve_that_nobody_ordered_trips_after_its_time() -> None:
     assert straight(twist_s=0.5).trips_after((0.25, 0.25), (0.125, 0.25)) == 32
 
 
+def test_from_a_stand_each_cycle_counts() -> None:
+    assert Base().trips_after((0.0, 0.0), (0.0, 0.25)) == 16
+    assert Base().trips_after((0.0, 0.0), (0.25, 0.25)) == 16
+
+
 def test_of_a_turn_in_place_both_wheels_have_their_share() -> None:
     base = Base()
     for _ in range(64):
@@ -107,6 +112,16 @@ def test_the_share_is_that_of_the_fastest_wheel() -> None:
     assert straight(twist_tolerance_share=0.25).trips_after((0.25, 0.25), (0.25, 0.104)) is not None
     base = straight(-0.25, twist_tolerance_share=0.25)
     assert base.trips_after((-0.25, -0.25), (-0.25, -0.106)) is None
+
+
+@pytest.mark.parametrize(("ahead_mps", "trips"), [(0.144, False), (0.146, True)])
+def test_in_a_turn_in_place_the_wheels_are_the_fastest_though_the_base_goes_nowhere(
+    ahead_mps: float, trips: bool
+) -> None:
+    base = Base(twist_tolerance_share=0.25)  # 0.01 + 25 % of 0.25 m/s
+    for _ in range(64):
+        base.cycle((-0.25, 0.25))
+    assert (base.trips_after((-0.25, 0.25), (ahead_mps - 0.25, 0.25)) is not None) is trips
 
 
 def test_one_bit_of_the_velocity_is_no_curve() -> None:
@@ -159,6 +174,25 @@ def test_a_twist_that_was_ordered_may_go_on_for_the_lag_and_falls_with_the_slowe
     assert base.trips_after((0.0, 0.0), (0.0, 0.1)) is not None
 
 
+# order | for 8 cycles | falls: 0.25 m/s² and 1 rad/s², 0.1 m/s below it is forgiven: 0.4 s are 25.6 cycles
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("wheels", [(0.5, 0.5), (-0.25, 0.25)])
+def test_a_base_that_goes_on_after_its_order_is_outside_when_the_slowest_ramp_has_ended_so_much(
+    wheels: tuple[float, float], sign: int
+) -> None:
+    going = sign * wheels[0], sign * wheels[1]
+    base = Base(twist_s=0.01, twist_tolerance_mps=0.1)
+    for _ in range(64):
+        base.cycle(going)
+    assert base.trips_after((0.0, 0.0), going) == 1 + 8 + 26
+
+
+def test_after_a_gap_the_smoothed_speed_is_the_measured_one_and_not_beyond_it() -> None:
+    base = straight(twist_s=0.01)
+    assert base.cycle((0.25, 0.25), (0.25, 0.25 - 0.0199), cycles=6) == ""
+    assert base.cycle((0.25, 0.25), (0.25, 0.25 - 0.0201), cycles=6) != ""
+
+
 def test_looking_twice_at_one_sync_is_looking_once() -> None:
     base = straight()
     assert base.trips_after((0.25, 0.25), (0.125, 0.25), 16) is None
@@ -182,19 +216,29 @@ def test_before_the_start_anything_within_the_limits_may_have_been_ordered() -> 
     assert Base(start=False).trips_after((0.0, 0.0), (-1.1, 1.1), 30) is not None
 
 
-def test_each_wheel_of_a_side_is_looked_at() -> None:
-    base = straight()
-    drives = (*BIT, replace(BIT[0], joint="rear_left"))
-    base.config = replace(base.config, drives=drives)
+def said(speeds: tuple[float, ...]) -> list[str]:
+    """40 cycles of left, right, left, …, all ordered 0.25 m/s; the speeds are measured."""
+    drives = tuple(replace(BIT[n % 2], joint=f"wheel_{n}") for n in range(len(speeds)))
+    watch = TwistWatch(replace(CONFIG, drives=drives), 0.0)
     axes = [
         Axis(drive, state=DriveState.OPERATION_ENABLED, setpoint_mps=0.25, velocity_mps=speed)
-        for drive, speed in zip(drives, (0.25, 0.25, 0.125), strict=True)
+        for drive, speed in zip(drives, speeds, strict=True)
     ]
-    watch = TwistWatch(base.config, 0.0)
     off = tuple(replace(axis, state=DriveState.SWITCHED_ON) for axis in axes)
     watch.look(BusView(off, (), sync_at=0.0), 0.0)
-    said = [watch.look(BusView(tuple(axes), (), sync_at=n / HZ), n / HZ) for n in range(1, 40)]
-    assert any("rear_left" in why for why in said)
+    return [watch.look(BusView(tuple(axes), (), sync_at=n / HZ), n / HZ) for n in range(1, 40)]
+
+
+@pytest.mark.parametrize("speeds", [(0.25, 0.25, 0.125), (0.25, 0.25, 0.25, 0.125)])
+def test_each_wheel_of_a_side_is_looked_at(speeds: tuple[float, ...]) -> None:
+    assert any(
+        why.endswith(f"wheel_{len(speeds) - 1} is ordered 0.250 m/s and turns at 0.125 m/s") for why in said(speeds)
+    )
+
+
+def test_the_setpoint_of_a_side_is_the_mean_of_its_wheels() -> None:
+    assert said((0.25, 0.25, 0.25)) == said((0.259, 0.259, 0.259, 0.259)) == [""] * 39
+    assert any(said((0.261, 0.261, 0.261, 0.261)))
 
 
 def test_a_base_of_one_side_has_no_twist() -> None:

@@ -87,7 +87,7 @@ class Look:
     begin_mps: float
     seen_at: float
     present: bool
-    trusted: bool = True
+    trusted: bool
 
 
 @dataclass(frozen=True, slots=True)
