@@ -50,6 +50,7 @@ class Wheel:
         *,
         rolls: float | None = None,
         enabled: bool = True,
+        powered: bool = True,
         known: bool = True,
         cycles: float = 1.0,
     ) -> Evidence:
@@ -58,7 +59,7 @@ class Wheel:
         now, elapsed_s = self.n / HZ, cycles / HZ
         self.watch.on_setpoint(setpoint, now)
         step_m = (velocity if rolls is None else rolls) * elapsed_s
-        self.watch.on_sample(velocity, step_m if known else None, enabled, elapsed_s, now)
+        self.watch.on_sample(velocity, step_m if known else None, powered, enabled and powered, elapsed_s, now)
         return self.last
 
     def samples(self, count: int, setpoint: float, velocity: float, **how: Any) -> Evidence:
@@ -76,7 +77,7 @@ def test_at_the_start_nothing_speaks_against_a_wheel() -> None:
 
 def test_before_the_first_setpoint_nothing_is_ordered() -> None:
     watch = Wheel().watch
-    watch.on_sample(0.0, 0.0, True, 1 / HZ, 1 / HZ)
+    watch.on_sample(0.0, 0.0, True, True, 1 / HZ, 1 / HZ)
     assert watch.last == Evidence()
 
 
@@ -117,10 +118,19 @@ def test_of_a_coarse_encoder_four_increments_are_waited_for() -> None:
 
 
 @pytest.mark.parametrize(("setpoint", "counts"), [(2.0**-7, False), (-(2.0**-7), False), (2.0**-7 + 2.0**-12, True)])
-def test_what_is_no_faster_than_standstill_need_not_be_seen(setpoint: float, counts: bool) -> None:
+def test_what_is_no_faster_than_standstill_need_not_be_seen_in_time(setpoint: float, counts: bool) -> None:
     last = Wheel().samples(20, setpoint, 0.0)
     assert (last.unseen_s > 0.0) is counts
-    assert (last.unseen_m > 0.0) is counts
+    assert last.unseen_m == pytest.approx(20 * abs(setpoint) / HZ)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_an_order_may_be_as_slow_as_it_likes_and_has_to_be_seen_on_its_way(sign: int) -> None:
+    wheel = Wheel()
+    last = wheel.samples(512, sign * 2.0**-7, 0.0)  # 1/128 m/s for 8 s are 1/16 m
+    assert (last.unseen_s, last.unseen_m, last.unseen) == (1 / HZ, 0.0625, False)
+    assert not wheel.samples(14, sign * 2.0**-7, 0.0).unseen
+    assert wheel.sample(sign * 2.0**-7, 0.0).unseen
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -164,11 +174,25 @@ def test_the_travel_of_short_orders_adds_up_and_then_the_time_does_without_an_or
     assert wheel.sample(0.0, 0.0).unseen
 
 
-def test_drives_that_are_not_enabled_begin_anew() -> None:
+@pytest.mark.parametrize("off", [{"powered": False}, {"enabled": False}])
+def test_of_drives_that_are_not_enabled_most_of_the_way_is_remembered(off: dict[str, bool]) -> None:
     wheel = rolling()
     wheel.samples(15, 0.25, 0.0)
-    assert wheel.sample(0.25, 0.0, enabled=False) == Evidence()
-    assert not wheel.samples(15, 0.25, 0.0).unseen
+    last = wheel.samples(3, 0.25, 0.0, **off)
+    assert (last.unseen_s, last.unseen_m, last.unseen, last.trusted) == (0.0, 14 / 256, False, True)
+    assert wheel.samples(99, 0.0, 0.0).unseen_s == 0.0
+    assert wheel.samples(16, 0.25, 0.0).unseen_m == 30 / 256
+    assert wheel.sample(0.25, 0.0).unseen
+    wheel = rolling()
+    wheel.samples(4, 0.25, 0.0)
+    assert wheel.sample(0.25, 0.0, **off).unseen_m == 1 / 64
+
+
+@pytest.mark.parametrize("off", [{"powered": False}, {"enabled": False}])
+def test_a_wheel_that_is_pushed_without_power_shows_that_its_encoder_lives(off: dict[str, bool]) -> None:
+    wheel = rolling()
+    wheel.samples(15, 0.25, 0.0)
+    assert wheel.sample(0.25, 0.0, rolls=0.25, **off).unseen_m == 0.0
 
 
 def test_a_step_that_is_not_known_neither_counts_nor_forgets() -> None:
@@ -286,8 +310,19 @@ def test_before_the_first_sample_it_did_not_roll() -> None:
 
 def test_without_power_to_turn_nothing_is_halted() -> None:
     wheel = fast()
-    assert wheel.sample(0.5, 0.0, enabled=False).halted == 0
+    assert wheel.sample(0.5, 0.0, powered=False).halted == 0
     assert wheel.samples(9, 0.5, 0.0).halted == 0
+
+
+def test_a_wheel_in_its_quick_stop_is_halted_and_jolted_as_well() -> None:
+    wheel = fast()
+    counts = [wheel.sample(0.5, 0.0, enabled=False) for _ in range(5)]
+    assert [each.halted for each in counts] == [1, 2, 3, 4, 5]
+    assert [each.trusted for each in counts] == [True] * 4 + [False]
+    wheel = Wheel()
+    for n in range(6):
+        last = wheel.sample(0.5, 0.5 * (n % 2), rolls=0.5, enabled=False)
+    assert (last.jolts, last.trusted) == (5, False)
 
 
 # --- 3: jolts
@@ -402,5 +437,5 @@ def test_nothing_is_asked_of_a_drive_that_is_not_enabled() -> None:
     wheel.samples(100, 0.5, 0.5)
     wheel.samples(4, 0.5, 0.25)
     last = wheel.sample(0.5, 0.25, enabled=False)
-    assert (last.ordered_mps, last.behind_s, last.setpoint_mps) == (0.0, 0.0, 0.0)
+    assert (last.ordered_mps, last.behind_s, last.setpoint_mps) == (0.0, 0.0, 0.5)
     assert wheel.sample(0.5, 0.25).ordered_mps == 0.5 / 64

@@ -222,6 +222,16 @@ def test_moving_again_begins_the_same_rung_anew() -> None:
     assert go(replace(stood, runaway=True), ROLLING, 10.0).runaway
 
 
+@pytest.mark.parametrize(("step", "then"), [(Step.QUICK_STOP, Step.QUICK_STOP), (Step.DISABLE_VOLTAGE,) * 2])
+def test_a_stand_that_a_liar_showed_was_none(step: Step, then: Step) -> None:
+    stood = replace(FOOT, step=step, stopped=True, judged_at=STANDING.seen_at)
+    again = go(stood, replace(STANDING, trusted=False), 99.0)
+    assert (again.step, again.stopped, again.since) == (then, False, 99.0)
+    assert go(again, replace(STANDING, trusted=False, seen_at=99.001), 99.001).step is Step.DISABLE_VOLTAGE
+    assumed = replace(stood, assumed=True)
+    assert go(assumed, replace(STANDING, trusted=False), 99.0).stopped
+
+
 def test_it_stays_stopped_while_it_stands() -> None:
     stood = replace(FOOT, stopped=True, judged_at=STANDING.seen_at)
     assert go(stood, STANDING, 99.0) == stood

@@ -144,7 +144,9 @@ def test_the_evidence_of_an_axis_begins_with_the_setpoint_that_a_sync_made_effec
     it.on_frame(0x201, bytes.fromhex("0f 00 64 00 00 00"), 2.02)
     it.on_frame(0x281, bytes(4), 2.02)
     assert look(it).axes[0].evidence.setpoint_mps == pytest.approx(0.3)
-    assert cycle(it, 2, state="17 02").evidence.setpoint_mps == 0.0  # powered, and not enabled
+    asked_m = look(it).axes[0].evidence.unseen_m
+    assert cycle(it, 2, state="17 02").evidence.unseen_m == asked_m  # powered, and not enabled
+    assert cycle(it, 2, state="40 02").evidence.setpoint_mps == 0.0  # no power
     before = cycle(it, 3).evidence.unseen_m
     assert cycle(it, 4).evidence.unseen_m == pytest.approx(before + 0.3 * 0.01)
 

@@ -19,6 +19,7 @@ from canbase_bench.frame import Frame as BenchFrame
 from canbase_driver.core import DriverCore
 from canbase_driver.frame import Frame
 from canbase_driver.kinematics import Twist2D
+from canbase_driver.readiness import Aim
 from canbase_watchdog.policy import Cause
 from canbase_watchdog.watchdog import State, Watchdog
 from unit.chain_world import STEP_S, World
@@ -142,6 +143,47 @@ def test_short_orders_with_a_lost_encoder_add_up() -> None:
         world.run(0.06)
         world.command = Twist2D.ZERO
         world.run(0.3)
+
+
+def test_short_orders_add_up_over_the_times_without_power() -> None:
+    world = at_rest()
+    suffer(world, "encoder_lost")
+    cycles = 0
+    while not tripped(world):
+        cycles += 1
+        assert cycles < 8
+        world.command = Twist2D(0.1, 0.0)
+        world.run(0.06)
+        world.command = Twist2D.ZERO
+        if not world.run(0.3, lambda: tripped(world)):
+            assert world.go(Aim.CONFIGURED).done
+            assert world.go(Aim.ACTIVE).done
+            world.enable()
+    assert watchdog(world).status.verdict.cause is MISSING
+
+
+@pytest.mark.parametrize("speed", [0.002, 0.005])
+def test_an_order_that_is_slower_than_standstill_is_no_cover_for_a_lost_encoder(speed: float) -> None:
+    """A setpoint of this kind comes from a driver that does not leave it out."""
+    world = at_rest()
+    suffer(world, "encoder_lost")
+    world.command = Twist2D(speed, 0.0)
+    start = world.now
+    assert course(world, 0.006 / speed + 0.4).cause is MISSING
+    assert world.now - start <= 0.006 / speed + 0.4
+
+
+@pytest.mark.parametrize("speed", [0.5, 0.8])
+def test_an_encoder_that_is_lost_in_the_quick_stop_proves_no_standstill(speed: float) -> None:
+    world = driving(speed)
+    world.leases = False
+    assert world.run(1.0, lambda: tripped(world))
+    world.run(0.05)
+    suffer(world, "encoder_lost")
+    while abs(world.truth.v_left_mps) > 0.01:
+        world.run(STEP_S)
+        assert not watchdog(world).status.settled, world.truth
+    assert not world.powered[0]
 
 
 @pytest.mark.parametrize(("speed", "way_m"), [(0.03, 0.01), (0.1, 0.03), (0.8, 0.1)])

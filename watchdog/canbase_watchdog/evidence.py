@@ -1,9 +1,11 @@
 """Whether a wheel shows the motion that it is ordered: the lower bounds of motion. It measures; policy.py decides.
 
-Rules, each for an enabled drive and the setpoint that a SYNC made effective (docs/decisions/0020)
-1. Unseen: ordered to move, and the encoder has not moved. The ordered travel adds up until it moves; a setpoint of
-   zero adds nothing and forgets nothing, so short orders add up too. The time adds up while an order is older than
-   `drive_lag_s`, and always once enough travel was ordered: a wheel runs away after its order too.
+Rules, 1 and 4 for an enabled drive and the setpoint that a SYNC made effective, 2 and 3 for one with power: a wheel
+that is being stopped can lose its sensor as well (docs/decisions/0020)
+1. Unseen: ordered to move, and the encoder has not moved. The ordered travel adds up until it moves, however slow the
+   order is; a setpoint of zero adds nothing and forgets nothing, so short orders add up too, and most of it
+   outlives the power. The time adds up while an order is older than `drive_lag_s`, and always once enough
+   travel was ordered: a wheel runs away after its order too.
 2. Halted: the velocity of a wheel that rolled drops at once to standstill, as no wheel can, whatever is ordered, and
    the encoder does not move from then on.
 3. Jolts: velocities that change as no wheel can, again and again.
@@ -24,6 +26,9 @@ LIFE_M, LIFE_COUNTS = 0.0002, 2
 """An encoder that moves by less may be noise; whichever is more."""
 UNSEEN_COUNTS = 4
 """Of a coarse encoder nothing is missed before so many increments were ordered."""
+KEPT_SHARE = 0.875
+"""So much of the ordered travel that is allowed without a sign of life is remembered while there is no power. Not all:
+a wheel that gets power again needs an order before it can show anything."""
 ROLLING_SHARE = 0.5
 """An encoder that moved by more than this share of what the velocity says: the wheel really rolled."""
 JOLT_MEMORY_S = 1.0
@@ -81,17 +86,21 @@ class EvidenceWatch:
         """The sensor contradicts itself."""
         self.last = replace(self.last, trusted=False)
 
-    def on_sample(self, velocity_mps: float, step_m: float | None, enabled: bool, elapsed_s: float, now: float) -> None:
+    def on_sample(
+        self, velocity_mps: float, step_m: float | None, powered: bool, enabled: bool, elapsed_s: float, now: float
+    ) -> None:
         """606Ch, and the travel of the encoder since the last sample; None: it is not known, or a jump."""
         jolted, rolled = self._is_jolt(velocity_mps, elapsed_s), self._rolled
         lives = self._lives(step_m, jolted)
         self._velocity_mps = velocity_mps
         self._rolled = step_m is not None and abs(step_m) > ROLLING_SHARE * abs(velocity_mps) * elapsed_s
         self._ask(elapsed_s, now, enabled)
-        if not enabled:
-            self.last = Evidence(trusted=self.last.trusted)
+        if not powered:
+            self.last = Evidence(unseen_m=self._kept_m(lives), trusted=self.last.trusted)
             return
-        unseen_s, unseen_m = self._unseen(lives, step_m is not None, elapsed_s)
+        unseen_s, unseen_m = 0.0, self._kept_m(lives)
+        if enabled:
+            unseen_s, unseen_m = self._unseen(lives, step_m is not None, elapsed_s)
         unseen = unseen_s >= self._config.motion_missing_s and unseen_m >= self._unseen_m
         halted, jolts = self._halted(jolted and rolled, lives), self._jolts(jolted, now)
         samples = self._config.feedback_samples
@@ -103,12 +112,12 @@ class EvidenceWatch:
             unseen=unseen,
             halted=halted,
             jolts=jolts,
-            behind_s=self._behind_s(velocity_mps, elapsed_s),
+            behind_s=self._behind_s(velocity_mps, elapsed_s) if enabled else 0.0,
             trusted=self.last.trusted and not unseen and halted < samples and jolts < samples,
         )
 
     def _is_visible(self, ordered_mps: float) -> bool:
-        """Slower than `standstill_mps` nothing has to be seen: many drives cannot turn so slowly."""
+        """Slower than `standstill_mps` nothing has to be seen in time: many drives cannot turn so slowly."""
         return abs(ordered_mps) > self._config.standstill_mps
 
     def _is_jolt(self, velocity_mps: float, elapsed_s: float) -> bool:
@@ -130,11 +139,13 @@ class EvidenceWatch:
             return 0.0, 0.0
         if not known:
             return unseen_s, unseen_m
-        if self._is_visible(self._setpoint_mps):
-            unseen_m += abs(self._setpoint_mps) * elapsed_s
+        unseen_m += abs(self._setpoint_mps) * elapsed_s
         if self._is_visible(self._least_mps) or unseen_m >= self._unseen_m:
             unseen_s += elapsed_s
         return unseen_s, unseen_m
+
+    def _kept_m(self, lives: bool) -> float:
+        return 0.0 if lives else min(self.last.unseen_m, KEPT_SHARE * self._unseen_m)
 
     def _halted(self, halts: bool, lives: bool) -> int:
         if self._is_visible(self._velocity_mps):

@@ -77,7 +77,7 @@ class FeedbackWatch:
         step_m, jumped = self._step(elapsed_s)
         drift_m = self._drift(velocity_mps, step_m, jumped, elapsed_s)
         self._judge(velocity_mps, powered, drift_m, jumped)
-        self.evidence.on_sample(velocity_mps, None if jumped else step_m, enabled, elapsed_s, now)
+        self.evidence.on_sample(velocity_mps, None if jumped else step_m, powered, enabled, elapsed_s, now)
         if self.last.implausible >= self._config.feedback_samples:
             self.evidence.doubt()
         self._velocity_mps, self._counts_before = velocity_mps, self._counts

@@ -118,7 +118,7 @@ def advance(before: Climb, look: Look, braking: Braking, now: float) -> Climb:
     """The place of a node after this look at it. Rules, the first that fits:
 
     1. stopped, and enabled again: next rung, somebody works against us;
-    2. stopped, and moving: not stopped, same rung from the start;
+    2. stopped, and moving, or its sensor is caught with a lie after that: not stopped, same rung from the start;
     3. not enabled and standing, by feedback that came on this rung: stopped. Where the sensor cannot be trusted, its
        power must be off as well, for as long as a wheel may roll: then a stand is assumed;
     4. never heard of, and not told to have power: stays, there is nothing to climb for;
@@ -131,7 +131,8 @@ def advance(before: Climb, look: Look, braking: Braking, now: float) -> Climb:
     if climb.stopped:
         if look.enabled:
             return _up(climb, look, now)
-        return climb if look.standing else replace(first(look, now), step=climb.step, runaway=climb.runaway)
+        stands = look.standing and (look.trusted or climb.assumed)
+        return climb if stands else replace(first(look, now), step=climb.step, runaway=climb.runaway)
     if look.standing and look.seen_at > climb.since and _holds(climb, look, braking, now):
         return replace(climb, stopped=True, assumed=not look.trusted)
     if not look.present:
