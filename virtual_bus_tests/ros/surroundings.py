@@ -50,6 +50,7 @@ class World:
             assert time.monotonic() < deadline_s, f"the safety filter goes on to stop: {cause}"
             if cause == SafetyState.CAUSE_ESTOP:
                 self.robot.reset("safety_filter/reset")
+        self.node.release(self.joystick)  # a zero from before the reset does not count
 
     def _cause(self) -> str:
         """What the safety filter says from now on."""
