@@ -10,6 +10,7 @@ import errno
 import os
 import queue
 import shutil
+import socket
 import stat
 import threading
 from collections.abc import Callable, Mapping
@@ -17,11 +18,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from canbase_config import latch_record
+from canbase_config import latch_record, sole
 from canbase_config.latch_record import Defect, Found, Record
 
 PARTS: Final = ("driver", "watchdog", "velocity")
 SUFFIX: Final = ".latch"
+WRITER: Final = "writer of records"
+"""What is held while a process writes one, beside `sole`'s other tasks."""
 RETRY_S: Final = 1.0
 _MACHINE: Final = (Path("/etc/machine-id"), Path("/sys/firmware/devicetree/base/serial-number"))
 _OPEN: Final = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
@@ -36,6 +39,22 @@ def latch_folder(environment: Mapping[str, str], home: Path, robot: str) -> Path
         return Path(given[-1])
     state = Path(given[0]) if given[0] else _state_home(environment, home) / "canbase"
     return state / robot
+
+
+def hold(folder: Path, part: str) -> socket.socket:
+    """Be the only one that writes the record of `part`, until it is closed or the process ends.
+
+    Raises sole.TakenError with the holder: two robots of one name would forget each other's latched stops.
+    """
+    try:
+        return sole.take(WRITER, record_name(folder, part))
+    except sole.TakenError as error:
+        raise sole.TakenError(f"{error}. Two robots on one computer need two names (`name` in robot.yaml)") from error
+
+
+def record_name(folder: Path, part: str) -> str:
+    """What `hold` holds."""
+    return str(folder.resolve() / f"{part}{SUFFIX}")
 
 
 def machine() -> str:

@@ -16,6 +16,8 @@ from typing import Any, Final
 
 _CREDENTIALS: Final = struct.Struct("iII")
 _LONGEST: Final = 60
+CALLERS: Final = 4096
+"""So many may ask who holds it: nobody takes their calls, and above it they are not told any more."""
 ADVICE: Final = "Only one may run; end it first (`canbase doctor` shows what runs)"
 
 
@@ -33,7 +35,7 @@ def take(task: str, name: str) -> socket.socket:
     holder = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         holder.bind(_address(task, name))
-        holder.listen(8)
+        holder.listen(CALLERS)
     except OSError as error:
         holder.close()
         if error.errno != errno.EADDRINUSE:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import time
+from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Annotated
 
@@ -48,11 +50,14 @@ def up(
 
 def _refuse_twice(robot: Robot) -> None:
     """Before any part starts: one that runs already is left alone."""
+    from canbase_config.latch_file import WRITER, latch_folder, record_name
     from canbase_config.sole import TakenError, bus_name, check
 
     bus = bus_name(robot.bus.arguments())
+    record = record_name(latch_folder(os.environ, Path.home(), robot.name), "driver")
+    held = ("driver", bus), ("watchdog", bus), ("velocity process", robot.lease.socket), (WRITER, record)
     try:
-        for task, name in (("driver", bus), ("watchdog", bus), ("velocity process", robot.lease.socket)):
+        for task, name in held:
             check(task, name)
     except TakenError as error:
         fail(f"{robot.name} is not started: {error}", FAILED)

@@ -21,7 +21,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
-from canbase_config.latch_file import LatchFile, LatchKeeper, latch_folder
+from canbase_config.latch_file import LatchFile, LatchKeeper, hold, latch_folder
 from canbase_config.priority import Priority
 from canbase_config.robot import DRIVER_NODE_ID, Robot
 from canbase_config.service import Service
@@ -56,8 +56,9 @@ def run(
     """Runs the driver until SIGINT or SIGTERM. Returns 0 after an orderly end, 1 when the bus cannot be opened or a
     thread failed. `ros_args`: arguments for rclpy. `autostart`: without it nothing is sent on the bus before the node
     is configured. `when_ready`: called when all is made and nothing runs yet. Call from the main thread (signals)."""
+    folder = latch_folder(os.environ, Path.home(), robot.name)
     try:
-        held = take("driver", bus_name(robot.bus.arguments()))
+        held = take("driver", bus_name(robot.bus.arguments())), hold(folder, "driver")
         bus = BusPort(robot.bus.arguments())
         _listen_for_another(bus, robot.timeouts.drive_heartbeat_s)
     except (BusError, TakenError) as error:
@@ -73,7 +74,7 @@ def run(
     rclpy.init(args=list(ros_args), signal_handler_options=SignalHandlerOptions.NO)
     aim = Aim.ACTIVE if autostart else Aim.RELEASED
     ring = Ring(robot.black_box.seconds)
-    keeper = LatchKeeper(LatchFile(latch_folder(os.environ, Path.home(), robot.name), "driver", robot.name))
+    keeper = LatchKeeper(LatchFile(folder, "driver", robot.name))
     core = DriverCore(robot, aim, keeper.found)
     loop = ControlLoop(core, bus, robot.rates.control_hz, robot.rates.odometry_hz, ring, keeper)
     writer = BlackBoxWriter(robot.black_box, robot.name, get_logger("motor_driver").warning)
@@ -95,7 +96,8 @@ def run(
         writer.finish(WRITE_S)
     finally:
         rclpy.shutdown()
-        held.close()
+        for each in held:
+            each.close()
     failure = failure or loop.failure
     if failure is not None:
         node.voice.tell(f"ended by {type(failure).__name__}: {failure}", Priority.ERROR, robot=robot.name)

@@ -15,7 +15,7 @@ import rclpy
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from canbase_config.latch_file import LatchFile, LatchKeeper, latch_folder
+from canbase_config.latch_file import LatchFile, LatchKeeper, hold, latch_folder
 from canbase_config.robot import Robot
 from canbase_config.service import Service
 from canbase_config.sole import TakenError, take
@@ -37,23 +37,24 @@ def run(robot: Robot, ros_args: Sequence[str], when_ready: Callable[[], None] = 
     process too: zeros go out, and it is raised here. `when_ready`: called when all is made and nothing runs yet. Call
     from the main thread (signals).
     """
+    folder = latch_folder(os.environ, Path.home(), robot.name)
     try:
-        held = take("velocity process", robot.lease.socket)
+        held, writer = take("velocity process", robot.lease.socket), hold(folder, "velocity")
     except TakenError as error:
         print(f"canbase velocity: {error}", file=sys.stderr)
         return 1
-    with held, _stop_signals() as received:
+    with held, writer, _stop_signals() as received:
         rclpy.init(args=list(ros_args), signal_handler_options=SignalHandlerOptions.NO)
         try:
-            _run_nodes(robot, received, when_ready)
+            _run_nodes(robot, folder, received, when_ready)
         finally:
             rclpy.shutdown()
     return 0
 
 
-def _run_nodes(robot: Robot, received: list[int], when_ready: Callable[[], None]) -> None:
+def _run_nodes(robot: Robot, folder: Path, received: list[int], when_ready: Callable[[], None]) -> None:
     mux = MuxNode(robot)
-    keeper = LatchKeeper(LatchFile(latch_folder(os.environ, Path.home(), robot.name), "velocity", robot.name))
+    keeper = LatchKeeper(LatchFile(folder, "velocity", robot.name))
     safety = FilterNode(robot, mux.moving_sources, keeper)
     mux.lead(safety)
     executor = EventsExecutor()

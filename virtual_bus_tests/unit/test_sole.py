@@ -8,10 +8,12 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from canbase_config.latch_file import hold
 from canbase_config.sole import TakenError, bus_name, check, take
 from canbase_watchdog import sole
 
@@ -84,3 +86,36 @@ def test_buses_are_told_apart_by_interface_channel_and_port() -> None:
     names = {bus_name(one), bus_name(one | {"port": 2}), bus_name(_bus("can0")), bus_name(_bus("can1"))}
     assert len(names) == 4
     assert bus_name(one | {"hop_limit": 1}) in names
+
+
+def test_whoever_comes_second_is_told_who_holds_it_also_after_many_have_asked(
+    kind: tuple[Take, type[Exception], str],
+) -> None:
+    """As systemd does that starts it again and again: nobody takes these calls."""
+    name = f"{os.getpid()}-asked"
+    with kind[0](name):
+        for _ in range(200):
+            with pytest.raises(kind[1], match=f"process {os.getpid()} of user"):
+                kind[0](name)
+
+
+RECORDS: Mapping[str, tuple[Take, type[Exception]]] = {
+    "driver": (lambda folder: hold(Path(folder), "driver"), TakenError),
+    "watchdog": (lambda folder: sole.take_record(Path(folder) / "watchdog.latch"), sole.TakenError),
+}
+
+
+@pytest.mark.parametrize("part", list(RECORDS))
+def test_two_robots_of_one_name_on_two_buses_do_not_write_one_record(tmp_path: Path, part: str) -> None:
+    """One that is reset or ends in order would make the other forget its latched stop. A link is the same folder."""
+    take_record, taken = RECORDS[part]
+    (tmp_path / "carl").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "carl")
+    with take_record(str(tmp_path / "carl")), take_record(str(tmp_path / "rosa")):
+        for same in ("carl", "link"):
+            with pytest.raises(taken, match="Two robots on one computer need two names") as refused:
+                take_record(str(tmp_path / same))
+            assert f"process {os.getpid()} of user" in str(refused.value)
+            assert f"{part}.latch" in str(refused.value)
+    with take_record(str(tmp_path / "carl")):
+        pass

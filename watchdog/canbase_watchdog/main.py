@@ -65,11 +65,13 @@ def _serve(config: WatchdogConfig) -> int:
     config = dataclasses.replace(config, lease_uid=uid)
     with ExitStack() as stack:
         stack.enter_context(sole.take(config.bus_arguments))
+        record = latch_file.path_of(os.environ, Path.home(), config.robot)
+        stack.enter_context(sole.take_record(record))
         bus = stack.enter_context(BusPort(config.bus_arguments))
         _listen_for_another(bus)
         leases = stack.enter_context(LeaseSocket(config.lease_socket, uid))
         relay = stack.enter_context(Relay(config.relay)) if config.relay else None
-        keeper = Keeper(latch_file.path_of(os.environ, Path.home(), config.robot), config.robot)
+        keeper = Keeper(record, config.robot)
         watchdog = Watchdog(config, time.monotonic(), keeper.past)
         try:
             _guard(Loop(watchdog, bus, leases, relay, keeper), keeper, asked)
