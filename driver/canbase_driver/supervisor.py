@@ -256,7 +256,8 @@ class Supervisor:
         blocker = _first(BLOCKERS, situation)
         if blocker is not None or not situation.unprepared:
             self._prepares_since_s = now
-        if situation.shutdown_requested:
+        latches = blocker is not None and blocker.state is DriverState.LATCHED
+        if situation.shutdown_requested and not latches:  # a stop that was asked for just before is not forgotten
             self._finish()
         elif blocker is None and situation.unprepared:
             self._prepare(situation, now)
@@ -267,7 +268,7 @@ class Supervisor:
             self.state, self.cause = DriverState.ENABLING, Cause("enabling", "", "operation enabled on all drives")
         else:
             self.state, self.cause = blocker.state, _cause(blocker, situation)
-            self.latches = blocker.state is DriverState.LATCHED
+            self.latches = latches
 
     def _prepare(self, situation: Situation, now: float) -> None:
         """The way to switched on takes some cycles; what takes longer needs a hand."""

@@ -222,3 +222,20 @@ def test_a_watchdog_that_is_tripped_from_the_start_leaves_the_boot_alone() -> No
 def test_a_core_without_a_record_has_nothing_to_keep() -> None:
     core = DriverCore(World().robot)
     assert core.state is DriverState.BOOTING
+
+
+@pytest.mark.parametrize("before_s", [0.0, 0.05, 2.0])
+@pytest.mark.parametrize("stop_first", [True, False])
+def test_a_stop_in_the_last_cycle_before_the_end_is_not_forgotten(before_s: float, stop_first: bool) -> None:
+    """The service has answered that nothing moves until a reset; SIGTERM comes in the same 10 ms, with power or not."""
+    world = keeping()
+    world.run(before_s)
+    requests = [world.core.request_stop, world.core.request_shutdown]
+    for request in requests if stop_first else reversed(requests):
+        request()
+    world.run(1.0)
+    assert world.core.finished
+    restart_driver(world)
+    assert (world.core.state, world.core.cause.name) == (DriverState.LATCHED, "stop requested")
+    stays_stopped(world)
+    assert world.recovered()

@@ -274,3 +274,14 @@ def test_one_reading_in_range_may_come_again_by_chance_and_many_may_not() -> Non
             told = told or watch.look(scan, 0.05 * number, moves=False)
         assert bool(told) is frozen
         assert not frozen or told.endswith("3 scans by turns")
+
+
+@pytest.mark.parametrize("command", [Twist(0.0, 5e-324), Twist(5e-324, 0.0), Twist(-5e-324, -5e-324)])
+def test_the_smallest_numbers_that_there_are_do_not_end_the_filter_where_no_scanner_looks(command: Twist) -> None:
+    made = world()
+    made.fault = blind(NAN, 0.5)
+    made.run(ZERO, 0.5)
+    made.run(command, 0.5)
+    made.fault = lambda scan: dataclasses.replace(scan, angle_increment_rad=1e-17, angle_max_rad=None)
+    made.run(command, 0.5)
+    assert made.path_m < 1e-9
