@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from canbase_config.foreign_text import printable
 from canbase_config.safety import Scan as ScanConfig
 from canbase_velocity.placement import Placement
 from canbase_velocity.scan import Scan, ScanError, check
@@ -113,6 +114,8 @@ class ScanReader:
         self._cos: Floats = np.empty(0)
         self._sin: Floats = np.empty(0)
         self._sign = 0.0
+        self._frame: str | None = None
+        self._other_frame: str | None = None
 
     def read(self, scan: Scan, placement: Placement) -> View:
         """What the scan shows. Raises ScanError for a scan that cannot be used, or in which no beam says something.
@@ -123,6 +126,7 @@ class ScanReader:
         beam says nothing.
         """
         check(scan)
+        self._hold_frame(scan.frame)
         self._hold_direction(scan.angle_increment_rad)
         self._aim(scan.count, scan.angle_min_rad, scan.angle_increment_rad)
         ranges_m = np.asarray(scan.ranges_m, dtype=np.float64)
@@ -158,6 +162,16 @@ class ScanReader:
             leaves_m = np.where(ways > 0.0, high / ways, np.where(ways < 0.0, low / ways, np.inf)).min(axis=1)
         beside_m: Floats = np.maximum(leaves_m + TOO_NEAR_M, 0.0)
         return beside_m
+
+    def _hold_frame(self, frame: str | None) -> None:
+        """Two scanners on one topic would each take away what the other one sees, and whose place is known is not."""
+        self._frame = frame if self._frame is None else self._frame
+        self._other_frame = frame if frame != self._frame else self._other_frame
+        if self._other_frame is not None:
+            raise ScanError(
+                f"scans of {printable(self._frame or '')} and of {printable(self._other_frame)} come on one topic: "
+                "give each scanner its own; start canbase again if the scanner was changed"
+            )
 
     def _hold_direction(self, increment_rad: float) -> None:
         """A scanner that counts the other way round than before is mirrored, or is another one."""

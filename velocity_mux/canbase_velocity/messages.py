@@ -73,6 +73,7 @@ def scan_of(message: LaserScan) -> Scan:
         scan_time_s,
         message.angle_max,
         message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec,
+        message.header.frame_id,
     )
 
 

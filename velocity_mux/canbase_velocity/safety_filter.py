@@ -19,6 +19,7 @@ reason, keeps it.
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -225,7 +226,8 @@ def _blind(command: Twist, cause: Cause, why: str, clears_on: str, config: Filte
     blind_mps = config.safety.blind_mps
     if blind_mps < config.standstill_mps:
         return stop(cause, f"{why}, safety.blind_mps is {blind_mps:g}", clears_on)
-    limited = _limit(command, min(1.0, blind_mps / fastest_mps(config.geometry.box, command)), cause, clears_on)
+    fastest = max(fastest_mps(config.geometry.box, command), sys.float_info.min)  # rounding makes 0 of the smallest
+    limited = _limit(command, min(1.0, blind_mps / fastest), cause, clears_on)
     return limited if limited is PASSED else replace(limited, detail=f"{why}: {limited.detail}")
 
 

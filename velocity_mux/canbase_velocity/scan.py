@@ -36,6 +36,8 @@ class Scan:
     """None: not stated, and not compared."""
     stamp_ns: int | None = None
     """Of its header. It is compared with the one before and with nothing else. None: not stated, and not compared."""
+    frame: str | None = None
+    """frame_id of its header: whose it is. None: not stated, and not compared."""
 
     @property
     def count(self) -> int:

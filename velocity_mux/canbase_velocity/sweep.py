@@ -7,7 +7,6 @@ line. Where that circle crosses the edges of the rectangle, the point enters or 
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -87,11 +86,10 @@ NO_TOUCH = Touch(math.inf, math.inf)
 
 
 def fastest_mps(box: Box, twist: Twist) -> float:
-    """Speed of the fastest point of the rectangle [m/s]: one of its corners. Above 0, however small `twist` is."""
+    """Speed of the fastest point of the rectangle [m/s]: one of its corners."""
     corners = ((x_m, y_m) for x_m in (box.front_m, -box.rear_m) for y_m in (box.left_m, -box.right_m))
     turn = twist.angular_radps
-    speeds_mps = (math.hypot(twist.linear_mps - turn * y_m, turn * x_m) for x_m, y_m in corners)
-    return max(*speeds_mps, sys.float_info.min)
+    return max(math.hypot(twist.linear_mps - turn * y_m, turn * x_m) for x_m, y_m in corners)
 
 
 def first_touch(points: Floats, box: Box, twist: Twist, stop_m: float) -> Touch:

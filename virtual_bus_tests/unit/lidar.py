@@ -115,3 +115,18 @@ def far_from(range_min_m: float, reading_m: float = -math.inf) -> Fault:
         return dataclasses.replace(scan, ranges_m=ranges_m, range_min_m=range_min_m)
 
     return fault
+
+
+class TwoOnOneTopic:
+    """A second scanner, which sees nothing but a far wall behind it, publishes on the same topic in turn."""
+
+    def __init__(self) -> None:
+        self._other = Lidar(seed=2)
+        self._sent = 0
+
+    def __call__(self, scan: Scan) -> Scan:
+        self._sent += 1
+        if self._sent % 2:
+            return dataclasses.replace(scan, frame="laser_front")
+        there = self._other.scan(np.array([(-2.0, 0.0), (0.0, 3.0)]))
+        return dataclasses.replace(there, stamp_ns=scan.stamp_ns, frame="laser_rear")

@@ -17,10 +17,10 @@ from canbase_velocity.decision import Cause
 from canbase_velocity.frozen import FrozenWatch
 from canbase_velocity.placement import Placement
 from canbase_velocity.scan import MAX_READINGS, Scan, ScanError, check
-from canbase_velocity.sweep import fastest_mps
+from canbase_velocity.sweep import Floats, fastest_mps
 from canbase_velocity.twist import ZERO, Twist
 from unit.filter_world import FilterWorld, robot_with
-from unit.lidar import ByTurns, Fault, Frozen, Lidar, blind, far_from, one_beam_left
+from unit.lidar import ByTurns, Fault, Frozen, Lidar, TwoOnOneTopic, blind, far_from, one_beam_left
 
 WALL = np.array([(2.0, y_m / 20.0) for y_m in range(-20, 21)] + [(-3.0, 0.5)])
 AHEAD = Twist(0.8, 0.0)
@@ -285,3 +285,23 @@ def test_the_smallest_numbers_that_there_are_do_not_end_the_filter_where_no_scan
     made.fault = lambda scan: dataclasses.replace(scan, angle_increment_rad=1e-17, angle_max_rad=None)
     made.run(command, 0.5)
     assert made.path_m < 1e-9
+
+
+def test_two_scanners_on_one_topic_stop_the_base_until_the_next_start() -> None:
+    """Taken for one, they would show the wall in every second scan: the base would touch it."""
+    made = world()
+    made.lidar = Framed()
+    least_m, causes, fastest = lies(made, TwoOnOneTopic(), 20.0)
+    assert least_m > 0.9
+    assert Cause.SCAN_INVALID in causes
+    assert fastest == 0.0
+    assert made.decision is not None
+    assert "scans of laser_front and of laser_rear come on one topic" in made.decision.detail
+    made.fault = lambda scan: scan
+    assert made.run(AHEAD, 3.0) > 0.9
+    assert made.decision.cause is Cause.SCAN_INVALID
+
+
+class Framed(Lidar):
+    def scan(self, obstacles: Floats) -> Scan:
+        return dataclasses.replace(super().scan(obstacles), frame="laser_front")
