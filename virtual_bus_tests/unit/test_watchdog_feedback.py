@@ -261,6 +261,27 @@ def test_one_jump_of_the_encoder_is_one_bad_sample_and_no_drift() -> None:
     assert wheel.sample(0.5, 0.5).implausible == 0
 
 
+def test_a_jump_forgets_nothing_of_the_drift_before_it() -> None:
+    wheel = Wheel()
+    wheel.way_m += 0.04
+    wheel.sample(0.0, 0.0)
+    wheel.way_m += 7.0
+    assert wheel.sample(0.0, 0.0).drift_m == pytest.approx(-0.04 * 0.999)
+
+
+def test_what_the_encoder_did_is_evidence_but_a_jump_is_none() -> None:
+    wheel = Wheel()
+    evidence = wheel.watch.evidence
+    evidence.on_setpoint(0.3, wheel.n / 1000)
+    wheel.samples(5, 0.3, 0.3, rolls=0.0)
+    assert evidence.last.unseen_m == pytest.approx(5 * 0.003)
+    wheel.way_m += 7.0
+    wheel.sample(0.3, 0.3)
+    assert evidence.last.unseen_m == pytest.approx(5 * 0.003)
+    wheel.sample(0.3, 0.3)
+    assert evidence.last.unseen_m == 0.0
+
+
 @pytest.mark.parametrize(("step_m", "jump"), [(0.0599, False), (0.0601, True), (-0.0599, False), (-0.0601, True)])
 def test_what_three_times_the_fastest_wheel_cannot_do_in_two_cycles_is_a_jump(step_m: float, jump: bool) -> None:
     wheel = Wheel()

@@ -9,16 +9,21 @@ from typing import Any
 import pytest
 
 from canbase_watchdog.frames import DriveState
+from canbase_watchdog.latch import Entry, Mark, Past
 from canbase_watchdog.lease import Lease
 from canbase_watchdog.policy import (
     CHECKS,
     FINE,
+    SENSOR_CAUSES,
     Cause,
     Verdict,
+    before_the_start,
     commanded,
     decide,
     in_motion,
+    is_off,
     moving,
+    near_power,
     next_expiry,
     stands,
     velocity_ordered,
@@ -202,6 +207,86 @@ def test_a_drive_that_is_off_may_be_silent() -> None:
     assert cause(of(replace(OFF, status_at=NEVER), nodes=(Node(1), Node(2)))) == 0
 
 
+# --- power: near it the record on disk says so, and it is over only when fresh feedback says so
+
+
+@pytest.mark.parametrize(
+    ("state", "near"),
+    [
+        (DriveState.NOT_READY_TO_SWITCH_ON, False),
+        (DriveState.SWITCH_ON_DISABLED, False),
+        (DriveState.READY_TO_SWITCH_ON, False),
+        (DriveState.SWITCHED_ON, True),  # the next controlword gives it power
+        (DriveState.OPERATION_ENABLED, True),
+        (DriveState.QUICK_STOP_ACTIVE, True),
+        (DriveState.FAULT_REACTION_ACTIVE, True),
+        (DriveState.FAULT, False),
+        (None, False),
+    ],
+)
+def test_near_power_is_power_the_step_before_it_and_the_order_to_have_it(state: DriveState | None, near: bool) -> None:
+    axis = replace(OFF, state=state)
+    assert near_power(axis) is near
+    assert near_power(replace(axis, asks_for_power=True))
+    assert is_off(axis, of(axis), CONFIG, NOW) is (not near and state is not None)
+    assert not is_off(replace(axis, asks_for_power=True), of(axis), CONFIG, NOW)
+
+
+@pytest.mark.parametrize(("age_s", "off"), [(0.0, True), (0.099, True), (0.101, False), (math.inf, False)])
+def test_old_feedback_does_not_say_that_the_power_is_off(age_s: float, off: bool) -> None:
+    axis = replace(OFF, status_at=NOW - age_s)
+    assert is_off(axis, of(axis), CONFIG, NOW) is off
+
+
+def test_a_drive_that_was_never_heard_of_is_not_there_unless_it_is_told_to_have_power() -> None:
+    axis = replace(OFF, state=None, status_at=NEVER)
+    nobody, silent = (Node(1), Node(2)), (Node(1, NEVER, 90.0), Node(2))
+    assert is_off(axis, of(axis, nodes=nobody), CONFIG, NOW)
+    assert not is_off(axis, of(axis, nodes=silent), CONFIG, NOW)
+    assert not is_off(replace(axis, asks_for_power=True), of(axis, nodes=nobody), CONFIG, NOW)
+
+
+# --- what was before the start
+
+
+@pytest.mark.parametrize(
+    ("past", "verdict"),
+    [
+        (Past(), FINE),
+        (Past(Entry(Mark.CLEAR, 6, 2, "too fast")), FINE),
+        (
+            Past(Entry(Mark.LIVE, 6, 2, "too fast")),
+            Verdict(Cause.POWER_AT_END, 0, "it ended while a drive had power, or the computer lost its supply"),
+        ),
+        (
+            Past(Entry(Mark.LATCHED, 6, 2, "too fast")),
+            Verdict(Cause.OVERSPEED, 2, "since before the start: too fast"),
+        ),
+        (
+            Past(Entry(Mark.LATCHED, 6, 2, "since before the start: too fast")),
+            Verdict(Cause.OVERSPEED, 2, "since before the start: too fast"),
+        ),
+        (Past(Entry(Mark.LATCHED, 0, 2, "?")), Verdict(Cause.RECORD_UNUSABLE, 2, "since before the start: ?")),
+        (Past(Entry(Mark.LATCHED, 17, 2, "?")), Verdict(Cause.RECORD_UNUSABLE, 2, "since before the start: ?")),
+        (
+            Past(Entry(Mark.LIVE, 6, 2, "too fast"), "damaged"),
+            Verdict(Cause.RECORD_UNUSABLE, 0, "the record of its last trip cannot be used: damaged"),
+        ),
+    ],
+)
+def test_it_starts_with_what_the_record_says_and_with_a_trip_when_it_says_nothing(past: Past, verdict: Verdict) -> None:
+    assert before_the_start(past) == verdict
+
+
+def test_each_cause_that_can_be_written_is_the_same_after_the_start() -> None:
+    for each in set(Cause) - {Cause.NONE}:
+        assert before_the_start(Past(Entry(Mark.LATCHED, int(each)))).cause is each
+
+
+def test_causes_after_which_a_sensor_is_no_evidence() -> None:
+    assert sorted(SENSOR_CAUSES) == [12, 13]
+
+
 # --- own loop late
 
 
@@ -279,6 +364,11 @@ def test_at_the_very_moment_it_trips() -> None:
 
 def test_at_the_very_moment_syncs_have_stopped() -> None:
     assert exactly(of(replace(AT_REST, status_at=99.0), sync_at=99.875)) is Cause.NONE
+
+
+def test_at_the_very_moment_feedback_is_too_old_to_say_that_the_power_is_off() -> None:
+    axis = replace(OFF, status_at=99.875)
+    assert not is_off(axis, of(axis), EXACT, NOW)
 
 
 def test_at_the_very_speed_a_wheel_stands() -> None:
