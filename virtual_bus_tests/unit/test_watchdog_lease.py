@@ -178,3 +178,12 @@ def test_a_refused_lease_of_the_first_does_not_keep_the_second_away() -> None:
     assert leases.take(lease(1, 1.0), 1000, 1.0, pid=7) is None
     assert leases.take(b"garbage", 1000, 1.2, pid=7) is Refusal.LENGTH
     assert leases.take(lease(2, 1.25), 1000, 1.25, pid=8) is None
+
+
+def test_processes_of_another_pid_namespace_cannot_be_told_apart_and_do_not_count() -> None:
+    """Two filters in containers: the kernel says 0 for both, and a second one would free what the first holds."""
+    leases = book()
+    assert leases.take(lease(5000, 1.0), 1000, 1.0, pid=0) is Refusal.SENDER
+    assert leases.take(lease(1, 1.1, 0.5), 1000, 1.1, pid=0) is Refusal.SENDER
+    assert leases.last is None
+    assert leases.take(lease(1, 1.2), 1000, 1.2, pid=1) is None

@@ -23,7 +23,7 @@ _CHECKED = LAYOUT.size - 4
 class Refusal(enum.Enum):
     """Why a datagram is no lease."""
 
-    SENDER = "sender: not the configured user"
+    SENDER = "sender: not the configured user, or a process in another PID namespace"
     SECOND = "second: another process, while the first one still sends"
     LENGTH = "length: not 44 bytes"
     MAGIC = "magic: does not begin with CBL1"
@@ -103,7 +103,7 @@ class LeaseBook:
         """Judge a datagram from the user `uid` (None: the system did not tell). Returns why it does not count.
 
         `pid`: the process that sent it. Leases of one process count; of another one when the first has sent nothing for
-        the timeout, as after a restart.
+        the timeout, as after a restart. 0, for all processes of another PID namespace, never counts.
         """
         refusal = self._judge(datagram, uid, now, pid)
         if refusal is not None:
@@ -111,7 +111,9 @@ class LeaseBook:
         return refusal
 
     def _judge(self, datagram: bytes, uid: int | None, now: float, pid: int | None) -> Refusal | None:
-        if self._uid is not None and uid != self._uid:
+        if (
+            self._uid is not None and uid != self._uid
+        ) or pid == 0:  # 0: not to be told from others (pid_namespaces(7))
             return Refusal.SENDER
         if pid != self._pid and now < self._heard_at + self._timeout_s:
             return Refusal.SECOND
