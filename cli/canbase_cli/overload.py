@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 LATE_S = 0.1
 """Doctor's own turns came so late: whatever it measured may be late by as much, and more."""
-LOAD_PER_CORE = 1.5
+LOAD_PER_CORE = 4.0
 """Processes that wait for or use each core, over the last minute (getloadavg(3)); 1 is a busy computer."""
 
 

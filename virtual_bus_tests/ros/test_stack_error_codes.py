@@ -142,11 +142,17 @@ def no_odometry(stage: Stage) -> None:
     stage.scene.sabotage(DRIVER, "withhold_odometry")
 
 
+def no_motion_in_the_odometry(stage: Stage) -> None:
+    """A wheel that really does not follow is the watchdog's: it trips long before the goal has waited."""
+    stage.broken.add(DRIVER)
+    stage.scene.sabotage(DRIVER, "freeze_odometry")
+
+
 ABORTS: Final[Mapping[ErrorCode, Provoke]] = {
     ErrorCode.BLOCKED: obstacle_ahead,
     ErrorCode.ODOMETRY_LOST: no_odometry,
     ErrorCode.ESTOP: of(estop_pressed),
-    ErrorCode.NO_PROGRESS: of(fault("weak")),
+    ErrorCode.NO_PROGRESS: no_motion_in_the_odometry,
     ErrorCode.TIMEOUT: somebody_beside,
     ErrorCode.DRIVE_FAULT: of(fault("fault", 1)),
     ErrorCode.WATCHDOG: of(fault("frozen_encoder", 1)),

@@ -320,7 +320,7 @@ def test_what_no_load_explains_fails_on_an_overloaded_computer_too(symptom: str,
 
 @pytest.mark.parametrize(
     ("overload", "is_one"),
-    [(Overload(), False), (Overload(0.1, 1.5), False), (Overload(0.11, 0.2), True), (Overload(0.0, 1.51), True)],
+    [(Overload(), False), (Overload(0.1, 4.0), False), (Overload(0.11, 0.2), True), (Overload(0.0, 4.01), True)],
 )
 def test_what_an_overload_is(overload: Overload, is_one: bool) -> None:
     assert bool(overload.sentence) is is_one

@@ -110,6 +110,21 @@ def withhold_odometry() -> None:
     MotorDriverNode.publish = publish  # type: ignore[method-assign]
 
 
+def freeze_odometry() -> None:
+    """The driver works, and the pose of its odometry stays where it is; the velocities are true."""
+    from canbase_driver.node import MotorDriverNode
+
+    usual = MotorDriverNode.publish
+    frozen: list[DriverSnapshot] = []
+
+    def publish(self: MotorDriverNode, snapshot: DriverSnapshot, stops: list[StopRecord]) -> None:
+        first = (frozen or [snapshot])[0]
+        frozen[:] = [first]
+        usual(self, replace(snapshot, x_m=first.x_m, y_m=first.y_m, yaw_rad=first.yaw_rad), stops)
+
+    MotorDriverNode.publish = publish  # type: ignore[method-assign]
+
+
 ORDERS: Mapping[str, Callable[[], None]] = {
     order.__name__: order
     for order in (
@@ -120,6 +135,7 @@ ORDERS: Mapping[str, Callable[[], None]] = {
         repeat_setpoints,
         ignore_zero,
         withhold_odometry,
+        freeze_odometry,
     )
 }
 
