@@ -36,7 +36,7 @@ from canbase_action_server.outcome import ErrorCode, Outcome
 from canbase_action_server.reception import Cycle, Reception
 from canbase_config.journal import Journal, Voice
 from canbase_config.priority import Priority
-from canbase_config.receive_time import ReceiveTimes
+from canbase_config.receive_time import REQUEST_GAP_S, RESENT_S, ReceiveTimes
 from canbase_config.robot import Robot
 from canbase_config.sim_time import refuse_sim_time
 
@@ -64,7 +64,7 @@ class DriveDistanceServer(Node):
         self._reception = Reception(robot)
         self._voice = Voice(self.get_logger(), Journal("drive_distance_server"))
         self._inputs = Inputs()
-        self._request_times = ReceiveTimes.of_requests()
+        self._request_times = ReceiveTimes(REQUEST_GAP_S, RESENT_S)
         self._keepalive_times = ReceiveTimes(robot.action.client_lease_s)
         """One that waited for longer than the lease does not say that the client lives now."""
         self._open: dict[str, OpenGoal] = {}

@@ -16,6 +16,9 @@ SETTLE_S: Final = 0.1
 REQUEST_GAP_S: Final = 0.5
 REQUEST_SETTLE_S: Final = 0.5
 """The same for requests, whose callers wait for seconds: a busy computer must not have them refused."""
+RESENT_S: Final = 3.5
+"""A request that did not fit into the buffers of a process that stood still is sent again by DDS: its heartbeat period
+is 3 s. So long after a pause a goal may be from before its end."""
 
 
 class ReceiveTimes:
