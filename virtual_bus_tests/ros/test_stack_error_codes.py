@@ -201,8 +201,10 @@ def test_client_lost_of_a_client_whose_keepalives_end(stage: Stage) -> None:
     keepalive = stage.robot.node.repeat(UUID, "drive_distance/keepalive", 10.0)
     stage.robot.node.wait_for_subscriber(keepalive.publisher)
     stage.robot.node.wait_for(bare.server_is_ready, READY_S, "the server")
+    stage.robot.node.spin_for(0.5)  # the joystick of the surroundings has shown zero, and is silent from then on
     answer = bare.send_goal_async(DriveDistance.Goal(distance_m=1.0, max_speed_mps=0.3))
-    stage.robot.node.wait_for(answer.done, READY_S, "the acceptance")
+    stage.robot.node.wait_for(answer.done, READY_S, "the answer")
+    assert answer.result().accepted, stage.robot.logs()
     keepalive.message = answer.result().goal_id
     stage.robot.wait_speed(0.27)
     keepalive.message = None
