@@ -35,8 +35,9 @@ GROWTH_BYTES = 4 * 2**20
 """The same for the memory of the whole process."""
 LEASES = 5
 """One lease to so many frames."""
-QUICK_STOP, PRE_OPERATIONAL = b"\x02\x00", 0x80
-STOPS_BY_SDO = (b"\x00\x00", b"\x02\x00")
+PRE_OPERATIONAL = 0x80
+STOPS = (b"\x00\x00", b"\x02\x00")
+"""6040h: disable voltage, quick stop."""
 
 
 class FuzzError(AssertionError):
@@ -116,14 +117,14 @@ def random_lease(random: Random, sequence: int, now: float) -> bytes:
 
 
 def is_stop(cob_id: int, data: bytes) -> bool:
-    """Quick stop, NMT pre-operational, an SDO that reads or takes power away. FuzzError: the watchdog sends no such."""
+    """Quick stop or power off, NMT pre-operational, an SDO that reads or takes power away. FuzzError: any other."""
     function = cob_id & 0x780
     if cob_id == 0x000:
         allowed = data[0] == PRE_OPERATIONAL
     elif function == 0x500:
-        allowed = data == QUICK_STOP
+        allowed = data in STOPS
     elif function == SDO_REQUEST:
-        allowed = data[0] == 0x40 or data[4:6] in STOPS_BY_SDO
+        allowed = data[0] == 0x40 or data[4:6] in STOPS
     else:
         allowed = cob_id in (0x1FE, 0x2FE, 0x77E)
     if not allowed or len(data) > 8:
