@@ -96,7 +96,9 @@ def test_asked_to_end_at_speed_it_stops_the_wheels_before_it_goes(rig: Rig) -> N
     rig.asked.set()
     rig.thread.join(timeout=2.0)
     assert not rig.thread.is_alive()
-    assert [drive.speed[0] for drive in rig.robot.drives] == pytest.approx([0, 0], abs=5)
+    # What a frame rounds to 5 is 0.005 m/s, a stand by robot.yaml; the quick stop goes on without the watchdog.
+    assert all(abs(drive.speed[0]) < 5.5 for drive in rig.robot.drives)
+    rig.robot.wait_until_still(0.1)
 
 
 def test_every_change_is_one_line_in_the_log(rig: Rig, caplog: pytest.LogCaptureFixture) -> None:
