@@ -28,6 +28,16 @@ def suffer(kind: str, heal: Callable[[SimulatedNode], None], **fixed: Any) -> tu
     return begin, end
 
 
+def join(node: SimulatedNode) -> None:
+    """Its cable is whole again."""
+    node.line.cut = False
+
+
+def speak(node: SimulatedNode) -> None:
+    """What it says gets onto the bus again."""
+    node.line.silent = False
+
+
 def heal_encoder(node: SimulatedNode) -> None:
     """Its first axis has its sensor again."""
     node.axes[0].encoder.heal()

@@ -138,16 +138,6 @@ def _cut(to_drives: bool, to_computer: bool) -> tuple[Change, Change]:
     return begin, end
 
 
-def _node_flag(field: str) -> tuple[Change, Change]:
-    def begin(world: World, around: Surroundings, given: Arguments) -> None:
-        setattr(world.drives.bench.nodes[given["node"]], field, True)
-
-    def end(world: World, around: Surroundings, given: Arguments) -> None:
-        setattr(world.drives.bench.nodes[given["node"]], field, False)
-
-    return begin, end
-
-
 def _fails(world: World, around: Surroundings, given: Arguments) -> None:
     world.drives.bench.nodes[given["node"]].fail(0, 0x7305, holds=True)
 
@@ -309,8 +299,8 @@ FAULTS: dict[str, Kind] = {
     "cable_cut": Kind("computer and drives do not hear each other", SHORT, _nothing, *_cut(True, True)),
     "cable_cut_to_drives": Kind("the drives do not hear the computer", SHORT, _nothing, *_cut(True, False)),
     "cable_cut_from_drives": Kind("the computer does not hear the drives", SHORT, _nothing, *_cut(False, True)),
-    "cable_cut_one_drive": Kind("one drive is cut off", SHORT, _node, *_node_flag("cut")),
-    "drive_silent": Kind("one drive hears and says nothing", SHORT, _node, *_node_flag("silent")),
+    "cable_cut_one_drive": Kind("one drive is cut off", SHORT, _node, *bench.suffer("cut", bench.join)),
+    "drive_silent": Kind("one drive hears and says nothing", SHORT, _node, *bench.suffer("silent", bench.speak)),
     "frame_loss": Kind("frames get lost", LONG, lambda r: {"value": r.uniform(0.01, 0.3)}, *_bus("loss")),
     "frame_duplication": Kind(
         "frames come twice", LONG, lambda r: {"value": r.uniform(0.01, 0.3)}, *_bus("duplication")

@@ -1,0 +1,80 @@
+"""No fault is a switch that nothing is connected to: each changes what is on the bus or on a topic."""
+
+from __future__ import annotations
+
+import os
+import zlib
+from random import Random
+
+import pytest
+
+from campaign.faults import FAULTS
+from campaign.scenario import Start
+from campaign.world import World
+from canbase_velocity.twist import Twist
+
+pytestmark = pytest.mark.campaign
+DRIVES_S, HOLDS_S, LASTS_S = 0.8, 0.6, 1.6
+"""Before the fault; until the operator orders zero; in all."""
+BY = ("joystick", "goal")
+
+
+@pytest.fixture(scope="module")
+def start() -> Start:
+    return Start()
+
+
+@pytest.fixture(scope="module")
+def undisturbed(start: Start) -> dict[str, int]:
+    return {by: digest(start, by, "") for by in BY}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_every_fault_changes_what_happens(start: Start, undisturbed: dict[str, int], fault: str) -> None:
+    assert any(digest(start, by, fault) != undisturbed[by] for by in BY)
+
+
+def test_without_a_fault_nothing_changes(start: Start, undisturbed: dict[str, int]) -> None:
+    assert {by: digest(start, by, "") for by in BY} == undisturbed
+
+
+def digest(start: Start, by: str, fault: str) -> int:
+    """Checksum of every frame and every message of a drive with this fault, in a copy of this process."""
+    reader, writer = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        try:
+            os.write(writer, _drive(start, by, fault).to_bytes(4, "big"))
+        finally:
+            os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader, "rb") as pipe:
+        told = pipe.read()
+    os.waitpid(pid, 0)
+    assert told, "the drive ended with an exception"
+    return int.from_bytes(told, "big")
+
+
+def _drive(start: Start, by: str, fault: str) -> int:
+    world, sums = start.world, [0]
+
+    def hear(*what: object) -> None:
+        sums[0] = zlib.crc32(repr(what).encode(), sums[0])
+
+    start.around.reset = lambda: hear("reset")
+    world.bus.watch = lambda sender, cob_id, data: hear(sender, cob_id, data)
+    world.topics.watch = lambda topic, message: hear(topic) if topic != "scan" else None
+    if by == "goal":
+        world.action.send_goal(2.0, 0.4)
+    else:
+        _push(world, world.clock.now + DRIVES_S + HOLDS_S)
+    world.clock.run_until(world.clock.now + DRIVES_S)
+    if fault:
+        FAULTS[fault].begin(world, start.around, FAULTS[fault].draw(Random(1)))
+    world.clock.run_until(world.clock.now + LASTS_S)
+    return sums[0]
+
+
+def _push(world: World, until: float) -> None:
+    world.topics.publish("cmd_vel_joy", Twist(0.4 if world.clock.now < until else 0.0, 0.0))
+    world.clock.after(0.05, _push, world, until)
