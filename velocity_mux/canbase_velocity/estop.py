@@ -70,6 +70,11 @@ class Estop:
         return self._ahead.wanted
 
     @property
+    def record_is_on_disk(self) -> bool:
+        """It is there."""
+        return self._ahead.is_on_disk
+
+    @property
     def unarmed(self) -> str:
         """A sentence while a press would not outlive this process: the record is not on disk yet; else empty."""
         if self._ahead.wanted.mark is not Mark.LIVE or self._ahead.is_on_disk:

@@ -73,13 +73,20 @@ class FilterNode(Node):
         self._timer = steady_timer(self, 1.0 / robot.rates.command_hz, self._tick)
 
     def shut_down(self) -> None:
-        """Orders zero once, with its lease, and says so in the state. Called several times: one may be lost."""
+        """Orders zero, with its lease, and says so in the state; from here on nothing else is ordered. Called several
+        times: one message may be lost.
+        """
         now = time.monotonic()
         self._issue(self._filter.shut_down(now), now)
 
-    def end(self) -> None:
-        """An orderly end has begun: a free emergency stop leaves nothing behind for the next start."""
+    def end(self) -> bool:
+        """The base is at standstill in an orderly end: a free emergency stop leaves nothing behind for the next start.
+
+        Call until it is True: that is on disk. A press that arrives afterwards is recorded all the same.
+        """
         self._filter.end()
+        self._keep_record()
+        return self._keeper is None or self._filter.record_is_on_disk
 
     @property
     def stands_from_s(self) -> float:

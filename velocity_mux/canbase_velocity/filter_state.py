@@ -112,6 +112,7 @@ class SafetyFilter:
         self._motion = ExpectedMotion(config.limits, longest_s)
         self._previous, self._previous_at_s = ZERO, -math.inf
         self._braking_hard = False
+        self._ending = False
 
     @property
     def estop(self) -> EstopState:
@@ -123,12 +124,17 @@ class SafetyFilter:
         """What shall be on disk now of the emergency stop."""
         return self._estop.record
 
+    @property
+    def record_is_on_disk(self) -> bool:
+        """It is there."""
+        return self._estop.record_is_on_disk
+
     def on_record(self, written: Record | None, problem: str) -> None:
         """The newest record on disk (None: none since the start), and what keeps the writer from writing."""
         self._estop.on_written(written, problem)
 
     def end(self) -> None:
-        """An orderly end has begun."""
+        """An orderly end is complete, but for messages of the emergency stop that still come."""
         self._estop.end()
 
     def on_command(self, twist: Twist, now: float) -> None:
@@ -200,11 +206,14 @@ class SafetyFilter:
 
     def decide(self, now: float) -> Decision:
         """The order at time `now` [s, monotonic]; it counts as given."""
+        if self._ending:
+            return self.shut_down(now)
         self._advance_estop(now)
         return self._ordered(decide(self.inputs(now), self._config), now)
 
     def shut_down(self, now: float) -> Decision:
-        """The zero of a filter that ends; where the base brakes hard, it goes on to do so."""
+        """The zero of a filter that ends, now and from here on; where the base brakes hard, it goes on to do so."""
+        self._ending = True
         emergency = brakes_hard(self.inputs(now), self._config)
         return self._ordered(replace(SHUTDOWN, emergency=emergency), now)
 

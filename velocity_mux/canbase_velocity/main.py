@@ -8,10 +8,12 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from types import FrameType
 
 import rclpy
+from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
@@ -28,6 +30,7 @@ SHUTDOWN_CYCLES = 5
 WAKE_S = 0.1
 WRITE_S = 1.0
 """For the record of the emergency stop at the end."""
+RECORD_LOOK_S = 0.005
 
 
 def run(robot: Robot, ros_args: Sequence[str], when_ready: Callable[[], None] = lambda: None) -> int:
@@ -68,12 +71,12 @@ def _run_nodes(robot: Robot, folder: Path, received: list[int], when_ready: Call
             executor.spin_once(timeout_sec=WAKE_S)
             service.alive(safety.state_text, time.monotonic())
         service.stopping()
-        safety.end()
         patience_s = time.monotonic() + standstill_s(robot)
-        _order_zero(mux, safety, period_s, min(safety.stands_from_s, patience_s))
+        _order_zero(mux, safety, partial(_spin, executor, period_s), min(safety.stands_from_s, patience_s))
+        _end_record(safety, executor)
     except BaseException:
-        # What failed may fail again: no waiting for standstill, the driver and the watchdog see to it.
-        _order_zero(mux, safety, period_s, 0.0)
+        # What failed may fail again: no callback, no waiting for standstill, the driver and the watchdog see to it.
+        _order_zero(mux, safety, partial(time.sleep, period_s), 0.0)
         raise
     finally:
         keeper.finish(WRITE_S)
@@ -82,14 +85,31 @@ def _run_nodes(robot: Robot, folder: Path, received: list[int], when_ready: Call
         mux.destroy_node()
 
 
-def _order_zero(mux: MuxNode, safety: FilterNode, period_s: float, until_s: float) -> None:
-    """Zeros and leases, until `until_s` (time.monotonic), so that an orderly end does not trip the watchdog."""
+def _order_zero(mux: MuxNode, safety: FilterNode, wait: Callable[[], None], until_s: float) -> None:
+    """Zeros and leases, until `until_s` (time.monotonic), so that an orderly end does not trip the watchdog.
+
+    `wait`: for one command period. An orderly end receives meanwhile: the emergency stop may be pressed in it.
+    """
     cycles = 0
     while cycles < SHUTDOWN_CYCLES or time.monotonic() < until_s:
         mux.shut_down()
         safety.shut_down()
-        time.sleep(period_s)
+        wait()
         cycles += 1
+
+
+def _spin(executor: Executor, seconds: float) -> None:
+    until_s = time.monotonic() + seconds
+    while (left_s := until_s - time.monotonic()) > 0.0:
+        executor.spin_once(timeout_sec=left_s)
+
+
+def _end_record(safety: FilterNode, executor: Executor) -> None:
+    """The base is at standstill: the record on disk loses its mark, unless the emergency stop is pressed until then."""
+    until_s = time.monotonic() + WRITE_S
+    while not safety.end() and time.monotonic() < until_s:
+        _spin(executor, RECORD_LOOK_S)
+    _spin(executor, RECORD_LOOK_S)
 
 
 @contextmanager

@@ -70,6 +70,7 @@ class MuxNode(Node):
         self._decision = self._mux.decide(time.monotonic())
         self._state_at_s = -math.inf
         self._deaf: list[str] = []
+        self._ending = False
         self._commands = self.create_publisher(
             TwistStamped, "cmd_vel_mux", COMMAND, event_callbacks=loud(self, "cmd_vel_mux", self._deaf)
         )
@@ -85,9 +86,12 @@ class MuxNode(Node):
         self._follower = follower
 
     def shut_down(self) -> None:
-        """Publishes one zero and the state. Called several times: one may be lost. The filter orders its own zeros."""
-        self._follower = None
-        self._send(self._mux.shutdown(time.monotonic()), time.monotonic())
+        """Publishes one zero and the state, and from here on nothing else. Called several times: one message may be
+        lost. The filter orders its own zeros.
+        """
+        self._follower, self._ending = None, True
+        now = time.monotonic()
+        self._send(self._decide(now), now)
 
     def moving_sources(self) -> tuple[str, ...]:
         """Names of the sources that order a velocity now, whoever drives."""
@@ -156,7 +160,7 @@ class MuxNode(Node):
     def _decide(self, now: float) -> MuxDecision:
         if self._follower is not None:
             self._mux.on_estop(self._follower.estop_free)
-        return self._mux.decide(now)
+        return self._mux.shutdown(now) if self._ending else self._mux.decide(now)
 
     def _send(self, decision: MuxDecision, now: float) -> None:
         """The filter first: what is published afterwards is for people."""

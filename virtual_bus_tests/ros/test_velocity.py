@@ -15,6 +15,7 @@ from geometry_msgs.msg import Twist, TwistStamped
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
+from ros.conftest import Spawn
 from ros.harness import Process, TestNode
 from ros.scanner import BEAMS, all_around
 from ros.velocity_chain import RUN, START_S, Chain, drive, scan
@@ -257,3 +258,32 @@ def test_a_namespace_gives_a_second_robot(
     test_node.wait_for(lambda: len(chain_of_the_other.messages) > 5, START_S, "zeros of /robot2")
     assert ours.messages == []
     assert watchdog.recv(100).startswith(b"CBL1")
+
+
+# drives at 0.8 m/s ── SIGTERM ── 0.2: the button is pressed, which it publishes once ── 1.2: the end ── start: pressed
+@pytest.mark.parametrize("spoke", [True, False], ids=["a button in use", "its first message"])
+def test_a_press_during_the_orderly_end_outlives_it(chain: Chain, spawn: Spawn, robot_yaml: Path, spoke: bool) -> None:
+    if spoke:
+        chain.estop.publisher.publish(Bool(data=False))
+        chain.node.spin_for(0.2)
+    chain.joystick.message = drive(0.8)
+    chain.wait_for_order(0.8)
+    chain.process.terminate()
+    chain.node.spin_for(0.2)
+    assert chain.wait_for_cause(SafetyState.CAUSE_SHUTDOWN)
+    chain.orders.clear()
+    chain.estop.publisher.publish(Bool(data=True))
+    chain.node.wait_for(lambda: chain.process.exit_code is not None, 10.0, "the end")
+    assert chain.process.exit_code == 0
+    assert {order.twist.linear.x for order in chain.orders.messages} == {0.0}
+    chain.joystick.message = None
+    chain.state.clear()
+    spawn(RUN.format(path=str(robot_yaml), ros_args=[]))
+    chain.node.wait_for(lambda: chain.state.last, START_S, "the next start")
+    assert "not seen released" in chain.wait_for_cause(SafetyState.CAUSE_ESTOP).detail
+    assert reset(chain)[0] is False
+    chain.orders.clear()
+    chain.node.release(chain.joystick)
+    chain.joystick.message = drive(0.8)
+    chain.node.spin_for(0.5)
+    assert {order.twist.linear.x for order in chain.orders.messages} == {0.0}

@@ -179,3 +179,26 @@ def test_every_state_is_on_disk_as_it_is() -> None:
         assert disk.found().record.mark is mark, event
         if mark is Mark.LATCHED:
             assert Estop(True, disk.found()).state is estop.state
+
+
+# drives ── the end begins: zeros ── pressed meanwhile ── the end is complete ── start: pressed
+@pytest.mark.parametrize("late", [False, True], ids=["before its record", "after its record"])
+def test_a_press_during_an_orderly_end_is_recorded(late: bool) -> None:
+    robot = Robot()
+    robot.button(False)
+    assert robot.drives
+    assert robot.filter.shut_down(robot.now).twist == ZERO
+    assert robot.order(FORWARD).cause is Cause.SHUTDOWN  # whatever still arrives
+    assert robot.disk.found().record.mark is Mark.LIVE
+    if late:
+        robot.filter.end()
+        robot.settle()
+        assert robot.filter.record_is_on_disk
+        assert robot.disk.found().record.mark is Mark.CLEAR
+    robot.button(True)
+    robot.filter.end()
+    robot.settle()
+    assert robot.filter.record_is_on_disk
+    robot.start()
+    assert robot.filter.estop is EstopState.HELD
+    assert not robot.drives
