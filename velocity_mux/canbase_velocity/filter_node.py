@@ -99,6 +99,11 @@ class FilterNode(Node):
         return self._filter.estop is EstopState.FREE
 
     @property
+    def without_scans(self) -> str:
+        """Why it has been without usable scans for long; empty: it has not."""
+        return self._filter.without_scans
+
+    @property
     def state_text(self) -> str:
         """What it does and why, in words. The detail is left out: its numbers change all the time."""
         return f"{self._decision.action.name} {self._decision.cause.value}"

@@ -11,7 +11,7 @@ import numpy as np
 from canbase_config.latch_record import Found, Record
 from canbase_config.safety import Scan as ScanConfig
 from canbase_velocity.clearance import FREE, Clearances, Field, Points, ScanReader, clearances
-from canbase_velocity.decision import Cause, Decision
+from canbase_velocity.decision import Action, Cause, Decision
 from canbase_velocity.estop import Estop, EstopEvent, EstopState
 from canbase_velocity.frozen import FrozenWatch
 from canbase_velocity.glitch import GlitchFilter
@@ -24,6 +24,9 @@ from canbase_velocity.sweep import Floats
 from canbase_velocity.twist import ZERO, Twist
 
 NOTHING_TO_RESET = "nothing to reset: the emergency stop waits for no reset"
+WITHOUT_SCANS_S = 1.0
+"""After so long without usable scans nobody who ordered motion meanwhile is followed by himself (neutral.py) [s]."""
+NO_SCAN = (Cause.SCAN_STALE, Cause.SCAN_UNPLACED, Cause.SCAN_INVALID, Cause.SCAN_FROZEN, Cause.SCAN_BLIND)
 LONGEST_SINCE_S = 0.1
 """Orders after a longer gap may grow as far as after this one [s]."""
 
@@ -113,6 +116,9 @@ class SafetyFilter:
         self._previous, self._previous_at_s = ZERO, -math.inf
         self._braking_hard = False
         self._ending = False
+        self._no_scan_from = math.inf
+        self.without_scans = ""
+        """Why the base is held for WITHOUT_SCANS_S or longer for want of usable scans; empty: it is not."""
 
     @property
     def estop(self) -> EstopState:
@@ -209,13 +215,21 @@ class SafetyFilter:
         if self._ending:
             return self.shut_down(now)
         self._advance_estop(now)
-        return self._ordered(decide(self.inputs(now), self._config), now)
+        decision = decide(self.inputs(now), self._config)
+        self._watch_scans(decision, now)
+        return self._ordered(decision, now)
 
     def shut_down(self, now: float) -> Decision:
         """The zero of a filter that ends, now and from here on; where the base brakes hard, it goes on to do so."""
         self._ending = True
         emergency = brakes_hard(self.inputs(now), self._config)
         return self._ordered(replace(SHUTDOWN, emergency=emergency), now)
+
+    def _watch_scans(self, decision: Decision, now: float) -> None:
+        missing = decision.action is Action.STOP and decision.cause in NO_SCAN
+        self._no_scan_from = min(self._no_scan_from, now) if missing else math.inf
+        long = now - self._no_scan_from >= WITHOUT_SCANS_S
+        self.without_scans = f"no usable scan for {WITHOUT_SCANS_S:.1f} s: {decision.cause.value}" if long else ""
 
     def _ordered(self, decision: Decision, now: float) -> Decision:
         self._motion.order(decision.twist, now)

@@ -185,6 +185,7 @@ class Mux:
         self._foreign: tuple[Foreign, ...] = ()
         self._foreign_lock = foreign_lock
         self._base = BaseReady(status_timeout_s)
+        self._without_scans = ""
         self._looked_at = -math.inf
 
     def on_command(
@@ -214,9 +215,14 @@ class Mux:
         """Takes what the safety filter knows of the emergency stop. False: it holds, or waits for a reset or a zero."""
         self._base.on_estop(free)
 
+    def on_scans(self, missing: str) -> None:
+        """Takes what the safety filter says of its scans: why it has been without them for long; empty: it has not."""
+        self._without_scans = missing
+
     def on_lock(self, name: str, locked: bool, now: float) -> None:
         """Takes the word of lock `name`. Raises KeyError for another name."""
         self._locks[name].hear(locked, now)
+        self._look(now)
 
     def on_foreign(self, foreign: Sequence[Foreign]) -> None:
         """Takes all foreign publishers that are there now."""
@@ -253,7 +259,8 @@ class Mux:
 
     def _arm(self, not_ready: str, now: float) -> None:
         for source in self._sources.values():
-            source.arming.look(not_ready, now, silent=not source.is_fresh(now))
+            paused = self._held_back(source, now) or self._without_scans
+            source.arming.look(not_ready, now, silent=not source.is_fresh(now), paused=paused)
 
     def _others(self, now: float) -> tuple[tuple[LockView, ...], tuple[Foreign, ...], bool, str]:
         locks = tuple(lock.view(now) for lock in self._locks.values())

@@ -46,6 +46,10 @@ class Follower(Protocol):
     def estop_free(self) -> bool:
         """No emergency stop holds or waits for its reset."""
 
+    @property
+    def without_scans(self) -> str:
+        """Why it has been without usable scans for long; empty: it has not."""
+
     def obey(self, twist: Twist, now: float) -> None:
         """Takes the order of the mux at `now` [s, monotonic]."""
 
@@ -160,6 +164,7 @@ class MuxNode(Node):
     def _decide(self, now: float) -> MuxDecision:
         if self._follower is not None:
             self._mux.on_estop(self._follower.estop_free)
+            self._mux.on_scans(self._follower.without_scans)
         return self._mux.shutdown(now) if self._ending else self._mux.decide(now)
 
     def _send(self, decision: MuxDecision, now: float) -> None:

@@ -9,6 +9,9 @@ Rules, for each source:
    gap across a reset changes nothing.
 5. Who is silent while the base is not ready is armed no more either, unless absence may arm him (rule 3): his last zero
    is old, and nobody knows whether he has pushed the stick since.
+6. A pause counts like 4 and 5 for whom only a zero arms: a lock held him back, or there was no usable scan for
+   WITHOUT_SCANS_S. People walk up to a base that is at standstill. A program with `absent_s` goes on after a pause:
+   docs/decisions/0047.
 """
 
 from __future__ import annotations
@@ -48,10 +51,15 @@ class Arming:
         """It needs a zero again. The first reason is kept."""
         self.waits_since = self.waits_since or why
 
-    def look(self, not_ready: str, now: float, *, silent: bool) -> None:
-        """Time has passed. `not_ready`: why the base cannot move; empty: it can. `silent`: it is not fresh."""
-        if not_ready and (self._moves or (silent and self._absent_s is None)):
-            self.disarm(not_ready)
+    def look(self, not_ready: str, now: float, *, silent: bool, paused: str = "") -> None:
+        """Time has passed. `not_ready`: why the base cannot move; empty: it can. `silent`: it is not fresh.
+
+        `paused`: why this source is not followed although the base is ready; empty: it is.
+        """
+        needs_zero = self._absent_s is None
+        stopped = not_ready or (paused if needs_zero else "")
+        if stopped and (self._moves or (silent and needs_zero)):
+            self.disarm(stopped)
         if self._absent_s is not None and now - self._absent_from >= self._absent_s:
             self.waits_since, self._moves = "", False
 

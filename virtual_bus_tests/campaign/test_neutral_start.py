@@ -136,6 +136,13 @@ def reset_before_an_obstacle(hand: Hand) -> None:
     hand.around.take_wall()
 
 
+def scans_return(hand: Hand) -> None:
+    """Without any stop in between; nobody resets anything."""
+    hand.around.scans = False
+    hand.run(2.0)
+    hand.around.scans = True
+
+
 EVENTS = (
     driver_restarts,
     velocity_restarts,
@@ -145,6 +152,7 @@ EVENTS = (
     estop_pressed_and_released,
     reset_while_no_scan_comes,
     reset_before_an_obstacle,
+    scans_return,
 )
 
 
@@ -202,6 +210,26 @@ def test_a_radio_gap_across_a_reset_is_no_release(hand: Hand, gap_s: float) -> N
     hand.holds = FORWARD
     assert hand.stays()
     assert hand.drives()
+
+
+@pytest.mark.parametrize(("gap_s", "followed"), [(0.5, True), (1.0, True), (1.6, False), (5.0, False)])
+def test_a_gap_in_the_scans_counts_like_a_stop_once_the_base_has_been_held_for_a_second(
+    hand: Hand, gap_s: float, followed: bool
+) -> None:
+    hand.around.scans = False
+    hand.run(gap_s)
+    hand.around.scans = True
+    hand.run(0.5)
+    assert (hand.run(1.0) > 0.1) is followed
+    assert hand.drives()
+
+
+def test_navigation_goes_on_when_the_scans_return() -> None:
+    hand = Hand("cmd_vel_nav")
+    hand.wait_enabled()
+    assert hand.drives()
+    scans_return(hand)
+    assert hand.run(1.5) > 0.2
 
 
 def test_navigation_that_was_idle_starts_with_a_velocity_and_not_while_it_goes_on_over_a_reset() -> None:

@@ -83,6 +83,7 @@ class VelocityProcess(Process):
 
     def _decide(self) -> MuxDecision:
         self.mux.on_estop(self.filter.estop is EstopState.FREE)
+        self.mux.on_scans(self.filter.without_scans)
         return self.mux.decide(self.clock.now)
 
     def _send(self, decision: MuxDecision) -> None:

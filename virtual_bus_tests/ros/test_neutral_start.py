@@ -95,6 +95,35 @@ def test_a_reset_while_no_scan_comes_does_not_release_a_held_stick(chain: Chain)
     release(chain)
 
 
+def test_scans_that_return_do_not_move_a_held_stick(chain: Chain) -> None:
+    release(chain)
+    scan, chain.scan.message = chain.scan.message, None
+    chain.wait_for_cause(SafetyState.CAUSE_SCAN_STALE)
+    chain.node.spin_for(1.5)  # somebody walks up to the base; nothing was stopped or reset
+    chain.scan.message = scan
+    chain.wait_for_cause(SafetyState.CAUSE_NONE)
+    assert not followed(chain)
+    assert waits(chain) == "waiting for zero (no usable scan for 1.0 s: scan_stale)"
+    release(chain)
+
+
+@pytest.mark.parametrize("held_s", [0.0, 1.0])
+def test_a_lock_that_opens_does_not_move_a_held_stick(
+    start: Callable[[Mapping[str, Any]], Chain], held_s: float
+) -> None:
+    chain = start({"mux": {"locks": {"gate": {"topic": "gate_lock", "priority": 200, "required": False}}}})
+    gate = chain.node.node.create_publisher(Bool, "gate_lock", 2)
+    chain.node.wait_for_subscriber(gate, count=2)
+    release(chain)
+    gate.publish(Bool(data=True))
+    chain.node.spin_for(held_s)
+    gate.publish(Bool(data=False))
+    chain.node.spin_for(0.3)
+    assert not followed(chain)
+    assert waits(chain) == "waiting for zero (locked: gate holds)"
+    release(chain)
+
+
 def test_without_the_drivers_state_nothing_moves(start: Callable[[Mapping[str, Any]], Chain]) -> None:
     chain = start({})
     chain.driver.message = None
