@@ -8,7 +8,8 @@ from signal import SIGCONT, Signals
 
 from std_msgs.msg import Bool
 
-from exit_matrix.scene import SPEED_MPS, Scene, forward
+from exit_matrix.layers import SPEED_MPS
+from exit_matrix.scene import Scene, forward
 
 Inject = Callable[[Scene], float]
 """Breaks something; the moment from which the stop is measured (time.monotonic)."""

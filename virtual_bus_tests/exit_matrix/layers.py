@@ -15,6 +15,8 @@ from canbase_config.robot import Robot
 from canbase_watchdog.feedback import DRIFT_M, DRIFT_S
 from canbase_watchdog.foreign import DISORDER_COUNT
 
+SPEED_MPS = 0.4
+"""The base drives at it when something fails."""
 ALLOWANCE_S = 0.25
 """On top of timeout and braking: signals, processes that wait for a processor, topics, one cycle."""
 

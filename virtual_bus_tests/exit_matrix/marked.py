@@ -8,6 +8,13 @@ def marks(command: str) -> tuple[str, str]:
     return f"<!-- {command}: begin -->", f"<!-- {command}: end -->"
 
 
+def section(text: str, command: str) -> str:
+    """What stands between the marks of `command` now. Raises ValueError when the page does not have both, once."""
+    begin, end = marks(command)
+    rewritten(text, command, "")
+    return text.partition(f"{begin}\n")[2].partition(end)[0]
+
+
 def rewritten(text: str, command: str, section: str) -> str:
     """`text` with `section` between the marks of `command`. Raises ValueError when it does not have both, once."""
     begin, end = marks(command)

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
-from exit_matrix.layers import ALLOWANCE_S
+from exit_matrix.layers import ALLOWANCE_S, SPEED_MPS
 from exit_matrix.runner import Result
-from exit_matrix.scene import SPEED_MPS
 
 COLUMNS = ("what", "how", "who caught it", "stood after", "way", "limit")
 LEFT = 3

@@ -21,10 +21,10 @@ from std_msgs.msg import Bool
 from canbase_action_server.goal_client import DriveError
 from canbase_bench.control import ControlError
 from exit_matrix.evidence import Evidence
-from exit_matrix.layers import Layer
+from exit_matrix.layers import SPEED_MPS, Layer
 from exit_matrix.rows import SERVER, Row
 from exit_matrix.said import Catch
-from exit_matrix.scene import CHANGES, SPEED_MPS, Scene, sabotaged
+from exit_matrix.scene import CHANGES, Scene, sabotaged
 from ros.running_robot import RESTS_M, Standstill, own_domain, robot_on
 from ros.surroundings import scan
 

@@ -16,12 +16,12 @@ from geometry_msgs.msg import TwistStamped
 
 from canbase_config.derive import mps_per_bit
 from canbase_config.robot import Robot
+from exit_matrix.layers import SPEED_MPS
 from exit_matrix.saboteur import sitecustomize as saboteur
 from ros.harness import Process, Repeater
 from ros.running_robot import READY_S, RunningRobot
 from ros.surroundings import World
 
-SPEED_MPS: Final = 0.4
 WAY_M: Final = 4.5
 """Of a goal: it takes longer than any row needs."""
 CRUISING_MPS: Final = 0.97 * SPEED_MPS

@@ -162,36 +162,44 @@ def page(tmp_path: Path) -> Path:
     return path
 
 
-def passed(page: Path, build: str, *found: table.Result) -> list[str]:
-    """The page's lines after a run of `build`."""
-    rows = table.Passed(page.with_name("passed.json"), build)
-    rows.add(found)
-    rows.write(page, ["goal", "freeze"])
-    return page.read_text().splitlines()
+CELLS = "canbase-driver | SIGKILL | drives: heartbeat lost | 0.45 s | 103 mm | 0.75 s | – | no power until reset"
+LINE = f"{CELLS} | 2026-11-2"
 
 
-LINE = "| canbase-driver | SIGKILL | drives: heartbeat lost | 0.45 s | 103 mm | 0.75 s | – | no power until reset |"
+def written(page: Path, today: str, *found: table.Result) -> list[str]:
+    """The rows of the page after a run on that day."""
+    table.write(page, found, ["goal", "freeze", "reboot"], f"2026-11-{today}")
+    return page.read_text().splitlines()[4:-1]
 
 
-def test_rows_of_several_runs_are_one_table(page: Path) -> None:
-    first = passed(page, "one", told("freeze"))
-    both = passed(page, "one", told("goal"))
+def test_a_run_of_some_scenarios_leaves_the_other_rows_alone(page: Path) -> None:
+    assert written(page, "20", told("reboot"), told("goal")) == [f"| goal | {LINE}0 |", f"| reboot | {LINE}0 |"]
 
-    assert "Not passed by this build, or not tried with it: goal." in first
-    assert both.count(LINE) == 2
-    assert not [line for line in both if line.startswith("Not passed")]
+    assert written(page, "21", told("reboot")) == [f"| goal | {LINE}0 |", f"| reboot | {LINE}1 |"]
 
 
-def test_rows_of_another_build_do_not_count(page: Path) -> None:
-    passed(page, "one", told("freeze"))
+def test_a_new_scenario_gets_its_place_in_the_order_of_all(page: Path) -> None:
+    written(page, "20", told("reboot"), told("goal"))
 
-    assert passed(page, "two", told("goal")).count(LINE) == 1
+    assert [line[:10] for line in written(page, "21", told("freeze"))] == ["| goal | c", "| freeze |", "| reboot |"]
 
 
-def test_what_fails_now_has_not_passed(page: Path) -> None:
-    passed(page, "one", told("goal"), told("freeze"))
+def test_what_fails_now_keeps_its_figures_and_says_so_until_it_passes(page: Path) -> None:
+    written(page, "20", told("goal"))
 
-    assert "Not passed by this build, or not tried with it: freeze." in passed(page, "one", told("freeze", "late"))
+    assert written(page, "21", told("goal", "late")) == [f"| goal | {LINE}0; failed 2026-11-21 |"]
+    assert written(page, "22", told("goal", "late")) == [f"| goal | {LINE}0; failed 2026-11-22 |"]
+    assert written(page, "23", told("goal")) == [f"| goal | {LINE}3 |"]
+
+
+def test_what_never_passed_is_told_as_well(page: Path) -> None:
+    assert written(page, "20", told("goal", "late")) == [f"| goal |{' – |' * 8} –; failed 2026-11-20 |"]
+
+
+def test_a_guest_that_died_is_no_scenario_and_a_row_of_no_scenario_goes(page: Path) -> None:
+    table.write(page, [told("gone")], ["gone"], "2026-11-20")
+
+    assert written(page, "21", told("job-1", "the guest died"), told("goal")) == [f"| goal | {LINE}1 |"]
 
 
 def test_robot_and_drives_are_on_two_controllers() -> None:

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from exit_matrix.marked import rewritten
+from exit_matrix.marked import rewritten, section
+from exit_matrix.page_table import NOTHING, Key, PageTable, Row
 from vm.guest.main import BEGINS
 
 COMMAND = "make vm-test"
 """Names our part of the page."""
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "stop_times.md"
-HEAD = """| what | how | who caught it | stood after | way | limit | again after | then |
-|---|---|---|---:|---:|---:|---:|---|"""
+MEASURED = "measured"
+FAILED = "; failed "
+TABLE = PageTable(
+    ("scenario",),
+    ("what", "how", "who caught it", "stood after", "distance", "limit", "again after", "then", MEASURED),
+    ("what", "how", "who caught it", "then", MEASURED),
+)
 
 Result = dict[str, Any]
 """A line of guest/main.py: name, failure, took_s, row."""
@@ -59,42 +65,33 @@ def report(found: Sequence[Result], took_s: float) -> int:
     return int(bool(bad) or not found)
 
 
-class Passed:
-    """The rows that one build of canbase has passed, over several runs: on a slow computer not all fit into one."""
+def write(page: Path, found: Sequence[Result], names: Sequence[str], today: str) -> None:
+    """Our part of the page: a row of `found` takes the place of the one before, all others stay, with their dates.
 
-    def __init__(self, path: Path, build: str) -> None:
-        """`build`: rows of another one do not count."""
-        self._path, self._build = path, build
-        kept = json.loads(path.read_text()) if path.exists() else {}
-        self.rows: dict[str, dict[str, Any]] = kept["rows"] if kept.get("build") == build else {}
+    A scenario that failed keeps the figures that it had, and says when it failed. Rows whose name is none of `names`,
+    all scenarios in their order, are of scenarios that are gone.
+    """
+    text = page.read_text(encoding="utf-8")
+    old = TABLE.rows(section(text, COMMAND))
+    known: dict[Key, Row] = {(name,): old[name,] for name in names if (name,) in old}
+    now: dict[Key, Row] = {(result["name"],): _row(result, known, today) for result in found if result["name"] in names}
+    merged = TABLE.merged(TABLE.merged("", known), now, [(name,) for name in names])
+    page.write_text(rewritten(text, COMMAND, merged), encoding="utf-8")
 
-    def add(self, found: Sequence[Result]) -> None:
-        """And keep them. What has failed now has not passed."""
-        for result in found:
-            self.rows.pop(result["name"], None)
-            if not result["failure"]:
-                self.rows[result["name"]] = result["row"]
-        self._path.write_text(json.dumps({"build": self._build, "rows": self.rows}))
 
-    def write(self, page: Path, names: Sequence[str]) -> None:
-        """Our part of the page: the rows in the order of `names`, and which of them this build has not passed yet."""
-        lines = [HEAD, *(_line(self.rows[name]) for name in names if name in self.rows)]
-        missing = [name for name in names if name not in self.rows]
-        if missing:
-            lines += ["", f"Not passed by this build, or not tried with it: {', '.join(missing)}."]
-        page.write_text(rewritten(page.read_text(encoding="utf-8"), COMMAND, "\n".join(lines)), encoding="utf-8")
+def _row(result: Result, known: Mapping[Key, Row], today: str) -> Row:
+    if not result["failure"]:
+        return dict(zip(TABLE.columns, (*_cells(result["row"]), today), strict=True))
+    before = known.get((result["name"],), {}).get(MEASURED, NOTHING).partition(FAILED)[0]
+    return {MEASURED: f"{before}{FAILED}{today}"}
 
 
 def _told(row: dict[str, Any]) -> str:
-    return ", ".join(cell for cell in _cells(row) if cell != "–")
-
-
-def _line(row: dict[str, Any]) -> str:
-    return f"| {' | '.join(_cells(row))} |"
+    return ", ".join(cell for cell in _cells(row) if cell != NOTHING)
 
 
 def _cells(row: dict[str, Any]) -> Iterator[str]:
-    yield from (row["what"], row["how"], row["caught"] or "–")
+    yield from (row["what"], row["how"], row["caught"] or NOTHING)
     yield _number(row["stands_s"], "{:.2f} s", 1.0)
     yield _number(row["way_m"], "{:.0f} mm", 1000.0)
     yield _number(row["limit_s"], "{:.2f} s", 1.0)
@@ -103,4 +100,4 @@ def _cells(row: dict[str, Any]) -> Iterator[str]:
 
 
 def _number(value: float | None, form: str, factor: float) -> str:
-    return "–" if value is None else form.format(value * factor)
+    return NOTHING if value is None else form.format(value * factor)
