@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from canbase_bench.cia402.axis import Supply
-from canbase_bench.faults import apply
+from canbase_bench.faults import KINDS, apply
 from canbase_bench.node import SimulatedNode
 
 if TYPE_CHECKING:
@@ -15,64 +15,69 @@ if TYPE_CHECKING:
     from campaign.world import World
 
 
-def suffer(kind: str, heal: Callable[[SimulatedNode], None], **fixed: Any) -> tuple[Change, Change]:
+def suffer(kind: str, heal: Callable[[SimulatedNode, int], None], **fixed: Any) -> tuple[Change, Change]:
     """A drive suffers `kind` with what was drawn and what is `fixed`; `heal` undoes that alone."""
 
     def begin(world: World, around: Surroundings, given: Arguments) -> None:
-        arguments = {name: value for name, value in given.items() if name != "node"}
-        apply(world.drives.bench.nodes, given["node"], kind, world.clock.now, arguments | fixed)
+        node_id, axis = world.drives.place(given["wheel"])
+        arguments = {name: value for name, value in given.items() if name != "wheel"} | fixed
+        takes = KINDS[kind][1]
+        if "axis" in takes:
+            arguments["axis"] = axis
+        apply(world.drives.bench.nodes, node_id, kind, world.clock.now, arguments)
 
     def end(world: World, around: Surroundings, given: Arguments) -> None:
-        heal(world.drives.bench.nodes[given["node"]])
+        node_id, axis = world.drives.place(given["wheel"])
+        heal(world.drives.bench.nodes[node_id], axis)
 
     return begin, end
 
 
-def join(node: SimulatedNode) -> None:
+def join(node: SimulatedNode, axis: int) -> None:
     """Its cable is whole again."""
     node.line.cut = False
 
 
-def speak(node: SimulatedNode) -> None:
+def speak(node: SimulatedNode, axis: int) -> None:
     """What it says gets onto the bus again."""
     node.line.silent = False
 
 
-def heal_encoder(node: SimulatedNode) -> None:
-    """Its first axis has its sensor again."""
-    node.axes[0].encoder.heal()
-    node.axes[0].motor.sensor = None
+def heal_encoder(node: SimulatedNode, axis: int) -> None:
+    """This axis has its sensor again."""
+    node.axes[axis].encoder.heal()
+    node.axes[axis].motor.sensor = None
 
 
-def let_loose(node: SimulatedNode) -> None:
+def let_loose(node: SimulatedNode, axis: int) -> None:
     """Nothing holds its wheel any more."""
-    node.axes[0].hold(0.0)
+    node.axes[axis].hold(0.0)
 
 
-def unlimit(node: SimulatedNode) -> None:
+def unlimit(node: SimulatedNode, axis: int) -> None:
     """Its motor gets the whole setpoint."""
-    node.axes[0].faults.setpoint_share = 1.0
+    node.axes[axis].faults.setpoint_share = 1.0
 
 
-def strengthen(node: SimulatedNode) -> None:
+def strengthen(node: SimulatedNode, axis: int) -> None:
     """Its motor has its whole force."""
-    node.axes[0].weaken(1.0)
+    node.axes[axis].weaken(1.0)
 
 
-def hear_setpoints(node: SimulatedNode) -> None:
+def hear_setpoints(node: SimulatedNode, axis: int) -> None:
     """Every setpoint reaches it."""
-    node.thin_out(0, 1)
+    node.thin_out(axis, 1)
 
 
-def give_feedback(node: SimulatedNode) -> None:
+def give_feedback(node: SimulatedNode, axis: int) -> None:
     """Its feedback is on the bus again."""
-    node.lose_feedback(0, lost=False)
+    node.lose_feedback(axis, lost=False)
 
 
-def give_torque(node: SimulatedNode) -> None:
+def give_torque(node: SimulatedNode, axis: int) -> None:
     """STO is closed again."""
-    node.axes[0].faults.supply = Supply.FULL
+    node.axes[axis].faults.supply = Supply.FULL
 
 
-def stay(node: SimulatedNode) -> None:
+def stay(node: SimulatedNode, axis: int) -> None:
     """This ends by itself."""

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 from campaign.can_bus import CanBus
 from campaign.clock import FINE, Pace
+from campaign.robots import DrawnRobot
 from canbase_bench.axis_parts import StateChange
+from canbase_bench.cia402.axis import Axis
 from canbase_bench.node import SimulatedNode
-from canbase_bench.plant.base import PlantParameters
 from canbase_bench.world.bench import Bench, BenchParameters
-from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
+from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID
 
 HEARTBEATS = {0x700 + DRIVER_NODE_ID: "driver", 0x700 + WATCHDOG_NODE_ID: "watchdog"}
 
@@ -18,10 +20,13 @@ HEARTBEATS = {0x700 + DRIVER_NODE_ID: "driver", 0x700 + WATCHDOG_NODE_ID: "watch
 class Drives:
     """`bench` is the simulated world. `heard`: when each node last heard the heartbeat of driver and watchdog."""
 
-    def __init__(self, robot: Robot, bus: CanBus, pace: Pace = FINE) -> None:
+    def __init__(self, drawn: DrawnRobot, bus: CanBus, pace: Pace = FINE) -> None:
         self._bus, self._clock, self._poll_s = bus, bus.clock, pace.drives_poll_s
-        body = PlantParameters(step_s=pace.plant_step_s, bandwidth_radps=pace.bandwidth_radps)
-        self.bench = Bench(robot, bus.clock.now, body, BenchParameters(sdo_delay_s=pace.sdo_delay_s))
+        self._robot = drawn.robot
+        bandwidth_radps = min(drawn.body.bandwidth_radps, pace.bandwidth_radps)
+        body = replace(drawn.body, step_s=pace.plant_step_s, bandwidth_radps=bandwidth_radps)
+        self.bench = Bench(drawn.robot, bus.clock.now, body, BenchParameters(sdo_delay_s=pace.sdo_delay_s))
+        self.bench.base.push_n = drawn.push_n
         self._members = {
             node_id: bus.join(f"drive{node_id}", partial(self._hear, node_id, node))
             for node_id, node in self.bench.nodes.items()
@@ -30,9 +35,29 @@ class Drives:
         for node_id in self.bench.nodes:
             self._urgent |= {0x500 + node_id, 0x600 + node_id}
         self.heard = dict.fromkeys(self.bench.nodes, bus.clock.now)
+        self.ordered = dict.fromkeys(self.bench.nodes, bus.clock.now)
+        """When each node last heard a setpoint of its own."""
+        motors = [self.axis(wheel).motor for wheel in range(len(drawn.robot.drives))]
+        pairs = list(zip(drawn.robot.drives, motors, strict=True))
+        self.sides = tuple(tuple(motor for drive, motor in pairs if drive.side == side) for side in ("left", "right"))
+        """The motors of each side, whose wheels turn together."""
         self.moved_at = bus.clock.now
         self._answers = False
         self._poll()
+
+    def place(self, wheel: int) -> tuple[int, int]:
+        """Node id and axis of a wheel, counted in the order of robot.yaml, and round again."""
+        drive = self._robot.drives[wheel % len(self._robot.drives)]
+        return drive.node_id, drive.axis
+
+    def axis(self, wheel: int) -> Axis:
+        """The axis of a wheel."""
+        node_id, axis = self.place(wheel)
+        return self.bench.nodes[node_id].axes[axis]
+
+    def node(self, wheel: int) -> SimulatedNode:
+        """The node of a wheel."""
+        return self.bench.nodes[self.place(wheel)[0]]
 
     def changes(self) -> list[StateChange]:
         """Transitions of all axes since the last call."""
@@ -49,8 +74,10 @@ class Drives:
                 self._clock.after(0.0, self._answer)
             return
         node.on_frame(cob_id, data, self._clock.now)
-        if cob_id in HEARTBEATS and not node.line.cut:
+        if cob_id in HEARTBEATS and node.line.hears:
             self.heard[node_id] = self._clock.now
+        elif cob_id & 0x7F == node_id and 0x200 <= cob_id < 0x500 and not cob_id & 0x80:
+            self.ordered[node_id] = self._clock.now
 
     def _answer(self) -> None:
         """All nodes have heard the frame."""

@@ -9,35 +9,53 @@ from __future__ import annotations
 
 import math
 
+from campaign.robots import DrawnRobot, rolls_out
+from canbase_config.derive import order_hold_s
 from canbase_config.robot import Robot
+from canbase_config.stopping import jerk_adds_s, max_wheel_mps
 
 TICK_S = 0.005
 """Of the watchdog, and of the drives' own timers."""
 BUS_S = 0.03
 """A frame that waits for its turn, and one that is lost."""
-JERK_S = 0.1
-"""The ordinary ramp begins and ends softly: limits.deceleration_mps2 / limits.jerk_mps3."""
 ORDER_S = 0.05
 """An order is renewed every 20 ms (rates.command_hz)."""
-TOLERANCE_MPS = 0.06
-TOLERANCE_RADPS = 0.24
-"""What no layer can tell from standing or from the ordered speed: tolerances of the layers, overshoot of a loop."""
+OVERSHOOT_MPS = 0.006
+"""Of a drive's velocity loop, on top of watchdog.target_tolerance."""
 ROUNDING_S = 1e-9
-COASTING = 0.2
-"""A wheel without power is braked by friction alone: its allowance shrinks this much slower."""
+
+
+def tolerance_mps(robot: Robot) -> float:
+    """At the rim: what no layer can tell from standing or from the ordered speed [m/s]."""
+    watchdog = robot.watchdog
+    return watchdog.target_tolerance_mps + watchdog.target_tolerance_share * max_wheel_mps(robot) + OVERSHOOT_MPS
+
+
+def tolerance_radps(robot: Robot) -> float:
+    """The same of a turn in place [rad/s]."""
+    return 2.0 * tolerance_mps(robot) / robot.base.track_m
+
+
+def coasting_share(drawn: DrawnRobot) -> float:
+    """A wheel without power is braked by friction alone: its allowance shrinks so much slower, on its slope."""
+    limits = drawn.robot.limits
+    linear_mps2, angular_radps2 = rolls_out(drawn)
+    return min(1.0, linear_mps2 / limits.deceleration_mps2, angular_radps2 / limits.angular_deceleration_radps2)
 
 
 def notice_s(robot: Robot) -> float:
     """Longest time until one layer notices that it must stop the base [s]."""
     t = robot.timeouts
     return (
-        max(t.command_s + 1.0 / robot.rates.control_hz, t.lease_s, t.watchdog_s, t.drive_heartbeat_s) + TICK_S + BUS_S
+        max(order_hold_s(robot) - jerk_adds_s(robot.limits), t.lease_s, t.watchdog_s, t.drive_heartbeat_s)
+        + TICK_S
+        + BUS_S
     )
 
 
 def react_s(robot: Robot, layers: int) -> float:
     """From the last lease to the beginning of the braking [s], when `layers` layers fail one after the other."""
-    return layers * notice_s(robot) + JERK_S
+    return layers * notice_s(robot) + jerk_adds_s(robot.limits)
 
 
 def braking_s(robot: Robot, linear_mps: float, angular_radps: float) -> float:
@@ -48,7 +66,8 @@ def braking_s(robot: Robot, linear_mps: float, angular_radps: float) -> float:
 
 def moving_s(robot: Robot, linear_mps: float, angular_radps: float) -> float:
     """τ of a motion as it is judged [s]: less the tolerance."""
-    return braking_s(robot, max(0.0, abs(linear_mps) - TOLERANCE_MPS), max(0.0, abs(angular_radps) - TOLERANCE_RADPS))
+    linear, angular = abs(linear_mps) - tolerance_mps(robot), abs(angular_radps) - tolerance_radps(robot)
+    return braking_s(robot, max(0.0, linear), max(0.0, angular))
 
 
 class Envelope:
@@ -59,8 +78,9 @@ class Envelope:
     3. Then that fades too, by one second a second.
     """
 
-    def __init__(self, react_s: float, now: float) -> None:
-        self._react_s = react_s
+    def __init__(self, react_s: float, now: float, coasting: float = 0.2) -> None:
+        """`coasting`: of `coasting_share`; 0.2: of the sample robot."""
+        self._react_s, self._coasting = react_s, coasting
         self._order_s, self._ordered_at = 0.0, -math.inf
         self._ordered_bound_s = self._peak_s = 0.0
         self._beyond_since = math.inf
@@ -70,19 +90,20 @@ class Envelope:
         """An order with this τ is given."""
         self._order_s, self._ordered_at = tau_s, now
 
-    def bound_s(self, tau_s: float, now: float, coasting: bool = False) -> float:
+    def bound_s(self, tau_s: float, now: float, coasting: bool = False, lost: bool = False) -> float:
         """The greatest τ allowed now, when the base has `tau_s`. To be asked again and again.
 
-        `coasting`: some wheel has no power.
+        `coasting`: some wheel has no power. `lost`: nobody reaches a drive that turns, so nothing brakes it; who
+        reaches it again has `react_s` from there on.
         """
-        fades_s = (now - self._at) * (COASTING if coasting else 1.0)
+        fades_s = (now - self._at) * (self._coasting if coasting else 1.0)
         self._at = now
         ordered_s = self._order_s if now <= self._ordered_at + ORDER_S else 0.0
         self._ordered_bound_s = max(ordered_s, self._ordered_bound_s - fades_s)
         if tau_s <= self._ordered_bound_s + ROUNDING_S:
             self._beyond_since, self._peak_s = math.inf, 0.0
             return self._ordered_bound_s + ROUNDING_S
-        self._beyond_since = min(self._beyond_since, now)
+        self._beyond_since = now if lost else min(self._beyond_since, now)
         if now <= self._beyond_since + self._react_s:
             self._peak_s = max(self._peak_s, tau_s)
         else:

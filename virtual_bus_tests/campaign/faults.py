@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 Arguments = Mapping[str, Any]
 Change = Callable[["World", "Surroundings", Arguments], None]
-NODES = (1, 2)
+WHEELS = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +59,9 @@ def _stays(world: World, around: Surroundings, given: Arguments) -> None:
     """This fault does not end by itself."""
 
 
-def _node(random: Random) -> Arguments:
-    return {"node": random.choice(NODES)}
+def _wheel(random: Random) -> Arguments:
+    """One of the robot's wheels; a robot with fewer counts on from the first one."""
+    return {"wheel": random.randrange(WHEELS)}
 
 
 def _dies(name: str) -> Kind:
@@ -114,6 +115,14 @@ def _intruder(field: str, key: str, off: object) -> tuple[Change, Change]:
     return begin, end
 
 
+def _twin(world: World, around: Surroundings, given: Arguments) -> None:
+    world.intruder.twin = world.drives.place(given["wheel"])[0]
+
+
+def _no_twin(world: World, around: Surroundings, given: Arguments) -> None:
+    world.intruder.twin = 0
+
+
 def _bus(field: str) -> tuple[Change, Change]:
     def begin(world: World, around: Surroundings, given: Arguments) -> None:
         setattr(world.bus.disturbance, field, given["value"])
@@ -125,38 +134,39 @@ def _bus(field: str) -> tuple[Change, Change]:
 
 
 def _cut(to_drives: bool, to_computer: bool) -> tuple[Change, Change]:
-    computer, drives = ("driver", "watchdog"), tuple(f"drive{node}" for node in NODES)
-    ways = {(here, there) for here in computer for there in drives if to_drives}
-    ways |= {(there, here) for here in computer for there in drives if to_computer}
+    def ways(world: World) -> set[tuple[str, str]]:
+        computer, drives = ("driver", "watchdog"), [f"drive{node_id}" for node_id in world.drives.bench.nodes]
+        there = {(here, drive) for here in computer for drive in drives if to_drives}
+        return there | {(drive, here) for here in computer for drive in drives if to_computer}
 
     def begin(world: World, around: Surroundings, given: Arguments) -> None:
-        world.bus.disturbance.blocked |= ways
+        world.bus.disturbance.blocked |= ways(world)
 
     def end(world: World, around: Surroundings, given: Arguments) -> None:
-        world.bus.disturbance.blocked -= ways
+        world.bus.disturbance.blocked -= ways(world)
 
     return begin, end
 
 
 def _fails(world: World, around: Surroundings, given: Arguments) -> None:
-    world.drives.bench.nodes[given["node"]].fail(0, 0x7305, holds=True)
+    world.drives.node(given["wheel"]).fail(world.drives.place(given["wheel"])[1], 0x7305, holds=True)
 
 
 def _heals(world: World, around: Surroundings, given: Arguments) -> None:
-    world.drives.bench.nodes[given["node"]].heal(0)
+    world.drives.node(given["wheel"]).heal(world.drives.place(given["wheel"])[1])
 
 
 def _power_cycle(world: World, around: Surroundings, given: Arguments) -> None:
-    world.drives.bench.nodes[given["node"]].power_cycle(world.clock.now, given["off_s"])
+    world.drives.node(given["wheel"]).power_cycle(world.clock.now, given["off_s"])
 
 
 def _axis_fault(field: str, value: Callable[[Any], object], off: object) -> tuple[Change, Change]:
     def begin(world: World, around: Surroundings, given: Arguments) -> None:
-        axis = world.drives.bench.nodes[given["node"]].axes[0]
+        axis = world.drives.axis(given["wheel"])
         setattr(axis.faults, field, value(axis))
 
     def end(world: World, around: Surroundings, given: Arguments) -> None:
-        setattr(world.drives.bench.nodes[given["node"]].axes[0].faults, field, off)
+        setattr(world.drives.axis(given["wheel"]).faults, field, off)
 
     return begin, end
 
@@ -299,33 +309,33 @@ FAULTS: dict[str, Kind] = {
     "cable_cut": Kind("computer and drives do not hear each other", SHORT, _nothing, *_cut(True, True)),
     "cable_cut_to_drives": Kind("the drives do not hear the computer", SHORT, _nothing, *_cut(True, False)),
     "cable_cut_from_drives": Kind("the computer does not hear the drives", SHORT, _nothing, *_cut(False, True)),
-    "cable_cut_one_drive": Kind("one drive is cut off", SHORT, _node, *bench.suffer("cut", bench.join)),
-    "drive_silent": Kind("one drive hears and says nothing", SHORT, _node, *bench.suffer("silent", bench.speak)),
+    "cable_cut_one_drive": Kind("one drive is cut off", SHORT, _wheel, *bench.suffer("cut", bench.join)),
+    "drive_silent": Kind("one drive hears and says nothing", SHORT, _wheel, *bench.suffer("silent", bench.speak)),
     "frame_loss": Kind("frames get lost", LONG, lambda r: {"value": r.uniform(0.01, 0.3)}, *_bus("loss")),
     "frame_duplication": Kind(
         "frames come twice", LONG, lambda r: {"value": r.uniform(0.01, 0.3)}, *_bus("duplication")
     ),
     "frame_delay": Kind("frames come late", LONG, lambda r: {"value": r.uniform(0.001, 0.03)}, *_bus("delay_s")),
-    "drive_fault": Kind("one drive is in fault", SHORT, _node, _fails, _heals),
+    "drive_fault": Kind("one drive is in fault", SHORT, _wheel, _fails, _heals),
     "drive_power_cycle": Kind(
-        "one drive is off for a while", SHORT, lambda r: {**_node(r), "off_s": r.uniform(0.05, 0.8)}, _power_cycle,
+        "one drive is off for a while", SHORT, lambda r: {**_wheel(r), "off_s": r.uniform(0.05, 0.8)}, _power_cycle,
         _stays,
     ),
     "frozen_encoder": Kind(
         "a position stands still",
         LONG,
-        _node,
+        _wheel,
         *_axis_fault("frozen_position", lambda axis: axis.position(), None),
         encoder_lies=True,
     ),
     "stuck_velocity": Kind(
         "an actual velocity stands still",
         LONG,
-        _node,
+        _wheel,
         *_axis_fault("stuck_velocity", lambda axis: axis.velocity(), None),
     ),
     "drive_ignores_setpoints": Kind(
-        "a drive ignores setpoints", LONG, _node, *_axis_fault("ignores_setpoints", lambda axis: True, False)
+        "a drive ignores setpoints", LONG, _wheel, *_axis_fault("ignores_setpoints", lambda axis: True, False)
     ),
     "odometry_lost": Kind("odom does not arrive", SHORT, _nothing, *_topic_lost("odom")),
     "status_lost": Kind("motor_driver/status does not arrive", SHORT, _nothing, *_topic_lost("motor_driver/status")),
@@ -354,69 +364,69 @@ FAULTS: dict[str, Kind] = {
     "encoder_lost": Kind(
         "all that hangs on one encoder shows nothing",
         LONG,
-        _node,
+        _wheel,
         *bench.suffer("encoder_lost", bench.heal_encoder),
         encoder_lies=True,
     ),
     "encoder_frozen": Kind(
         "an encoder counts nothing and shows its last speed",
         LONG,
-        _node,
+        _wheel,
         *bench.suffer("encoder_frozen", bench.heal_encoder),
         encoder_lies=True,
     ),
     "encoder_reversed": Kind(
-        "an encoder counts backward", LONG, _node, *bench.suffer("encoder_reversed", bench.heal_encoder),
+        "an encoder counts backward", LONG, _wheel, *bench.suffer("encoder_reversed", bench.heal_encoder),
         encoder_lies=True,
     ),
     "encoder_scaled": Kind(
         "an encoder counts a share of the motion",
         LONG,
-        lambda r: {**_node(r), "factor": r.choice((0.3, 0.5, 2.0))},
+        lambda r: {**_wheel(r), "factor": r.choice((0.3, 0.5, 2.0))},
         *bench.suffer("encoder_scaled", bench.heal_encoder),
         encoder_lies=True,
     ),
     "encoder_jumping": Kind(
-        "an encoder jumps to and fro", LONG, _node, *bench.suffer("encoder_jumping", bench.heal_encoder),
+        "an encoder jumps to and fro", LONG, _wheel, *bench.suffer("encoder_jumping", bench.heal_encoder),
         encoder_lies=True,
     ),
     "encoder_intermittent": Kind(
         "an encoder comes and goes",
         LONG,
-        lambda r: {**_node(r), "off_s": r.uniform(0.03, 0.2)},
+        lambda r: {**_wheel(r), "off_s": r.uniform(0.03, 0.2)},
         *bench.suffer("encoder_intermittent", bench.heal_encoder),
         encoder_lies=True,
     ),
-    "wheel_blocked": Kind("something holds a wheel", LONG, _node, *bench.suffer("blocked", bench.let_loose)),
+    "wheel_blocked": Kind("something holds a wheel", LONG, _wheel, *bench.suffer("blocked", bench.let_loose)),
     "wheel_limited": Kind(
         "a drive follows a share of its setpoint",
         LONG,
-        lambda r: {**_node(r), "share": r.uniform(0.0, 0.7)},
+        lambda r: {**_wheel(r), "share": r.uniform(0.0, 0.7)},
         *bench.suffer("limited", bench.unlimit),
     ),
     "motor_weak": Kind(
         "a motor has a share of its force",
         LONG,
-        lambda r: {**_node(r), "share": r.choice((0.0, r.uniform(0.0, 0.5)))},
+        lambda r: {**_wheel(r), "share": r.choice((0.0, r.uniform(0.0, 0.5)))},
         *bench.suffer("weak", bench.strengthen),
     ),
     "setpoints_lost": Kind(
         "setpoints do not reach one drive, or one of several does",
         LONG,
-        lambda r: {**_node(r), "every": r.choice((0, 0, 2, 5))},
+        lambda r: {**_wheel(r), "every": r.choice((0, 0, 2, 5))},
         *bench.suffer("rpdo_lost", bench.hear_setpoints),
     ),
     "feedback_lost": Kind(
-        "one drive's feedback is lost", LONG, _node, *bench.suffer("tpdo_lost", bench.give_feedback)
+        "one drive's feedback is lost", LONG, _wheel, *bench.suffer("tpdo_lost", bench.give_feedback)
     ),
-    "drive_sto": Kind("STO opens at one drive", SHORT, _node, *bench.suffer("sto", bench.give_torque)),
-    "drive_resets": Kind("one drive starts again", SHORT, _node, *bench.suffer("reset_node", bench.stay)),
+    "drive_sto": Kind("STO opens at one drive", SHORT, _wheel, *bench.suffer("sto", bench.give_torque)),
+    "drive_resets": Kind("one drive starts again", SHORT, _wheel, *bench.suffer("reset_node", bench.stay)),
     "drive_bus_off": Kind(
-        "one drive's CAN controller leaves the bus", SHORT, _node, *bench.suffer("bus_off", bench.stay)
+        "one drive's CAN controller leaves the bus", SHORT, _wheel, *bench.suffer("bus_off", bench.stay)
     ),
     "twin_node": Kind(
-        "a second drive has the node id of another one, and stands", SHORT, _node,
-        *_intruder("twin", "node", 0),
+        "a second drive has the node id of another one, and stands", SHORT, _wheel,
+        _twin, _no_twin,
     ),
     "all_processes_restart": Kind(
         "all processes are killed, and started again", LONG, _nothing, _all_die, _all_restart

@@ -44,7 +44,7 @@ class Intruder:
         if self.setpoints_mps:
             for drive in self._robot.drives:
                 bits = round(self.setpoints_mps / mps_per_bit(drive, self._robot.base.wheel_radius_m))
-                self._send(0x200 + drive.node_id, SETPOINT.pack(ENABLE, bits))
+                self._send(0x200 + 0x100 * drive.axis + drive.node_id, SETPOINT.pack(ENABLE, bits))
         if self.setpoints_mps or self.syncs:
             self._send(0x080, b"")
         if self.twin:

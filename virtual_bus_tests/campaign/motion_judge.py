@@ -4,18 +4,58 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import dataclass
+from math import sqrt
 
+from campaign.envelope import notice_s
 from campaign.world import World
+from canbase_config.robot import Robot
+from canbase_config.stopping import longest_ramp_s, max_wheel_mps
 from canbase_velocity.twist import Twist
 
-RUNAWAY_MPS, RUNAWAY_S = 0.35, 0.6
-"""So much faster than the fastest that was ordered of it a wheel may be, and for how long, while it has power."""
-PATH_RADPS, PATH_SHARE, PATH_S = 0.5, 0.25, 0.9
-"""So far beside what was ordered the base may turn, and for how long, while it has power."""
-REMEMBERED_S = 1.2
-"""An order counts for so long: hold times of the layers, their reaction, and the ramp that follows the order."""
-STANDS_MPS, STANDS_S = 0.15, 0.5
-"""A wheel that is faster for longer does not stand, whoever says so."""
+OBEY_S = 0.15
+"""From the trip until the drives have obeyed: a rung of the watchdog's ladder."""
+JITTER_S = 0.05
+"""Cycles that are late, and the samples in a row that the watchdog wants."""
+CARRIED_SHARE = 0.2
+"""So much of its greatest speed a wheel may gain beyond the tolerances before it is noticed."""
+PATH_SHARE = 0.25
+"""... and turn faster by this share of what was ordered."""
+STANDS_S = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Allowed:
+    """What robot.yaml lets a wheel do before somebody has to act."""
+
+    remembered_s: float
+    """An order counts for so long: hold times of the layers, their reaction, and the ramp that follows the order."""
+    runaway_mps: float
+    """So much faster than the fastest that was ordered of it a wheel may be ..."""
+    runaway_s: float
+    """... and for how long, while it has power."""
+    path_radps: float
+    """So far beside what was ordered the base may turn, on top of PATH_SHARE ..."""
+    path_s: float
+    """... and for how long, while it has power."""
+    stands_mps: float
+    """A wheel that is faster for longer than STANDS_S does not stand, whoever reports it."""
+
+    @classmethod
+    def of(cls, robot: Robot) -> Allowed:
+        """The watchdog's tolerances and times, each with the lag of a drive and the time until the drives obey."""
+        watchdog, fastest_mps = robot.watchdog, max_wheel_mps(robot)
+        margin_mps = watchdog.motion_tolerance_mps + watchdog.motion_tolerance_share * fastest_mps
+        ways_s = sqrt(2.0 * watchdog.motion_missing_m / robot.limits.acceleration_mps2)
+        acts_s = watchdog.drive_lag_s + JITTER_S + OBEY_S
+        return cls(
+            notice_s(robot) + longest_ramp_s(robot),
+            margin_mps + CARRIED_SHARE * fastest_mps,
+            max(watchdog.motion_missing_s, ways_s) + acts_s,
+            2.0 * margin_mps / robot.base.track_m,
+            max(watchdog.twist_s, watchdog.slow_wheel_s, watchdog.motion_missing_s) + acts_s + watchdog.drive_lag_s,
+            margin_mps + 0.02,
+        )
 
 
 class MotionJudge:
@@ -23,6 +63,7 @@ class MotionJudge:
 
     def __init__(self, world: World) -> None:
         self._world, self._half_m = world, world.robot.base.track_m / 2.0
+        self._allowed = Allowed.of(world.robot)
         now = world.clock.now
         self._orders: deque[tuple[float, Twist]] = deque([(now, Twist(0.0, 0.0))])
         self._fast_since = self._beside_since = self._lies_since = now
@@ -31,9 +72,14 @@ class MotionJudge:
         """The filter ordered this, with a lease."""
         self._orders.append((self._world.clock.now, twist))
 
-    def step(self, now: float) -> tuple[str, str]:
-        """Name of the property that does not hold now and what is seen; two empty texts: everything holds."""
-        while len(self._orders) > 1 and self._orders[1][0] < now - REMEMBERED_S:
+    def step(self, now: float, lost: bool) -> tuple[str, str]:
+        """Name of the property that does not hold now and what is seen; two empty texts: everything holds.
+
+        `lost`: nobody reaches a drive that turns; whoever does again has his time from there on.
+        """
+        if lost:
+            self._fast_since = self._beside_since = self._lies_since = now
+        while len(self._orders) > 1 and self._orders[1][0] < now - self._allowed.remembered_s:
             self._orders.popleft()
         return self._runaway(now) or self._path(now) or self._standstill(now) or ("", "")
 
@@ -48,9 +94,9 @@ class MotionJudge:
     def _runaway(self, now: float) -> tuple[str, str] | None:
         ordered_mps = max(abs(t.linear_mps) + abs(t.angular_radps) * self._half_m for _, t in self._orders)
         wheel_mps = self._fastest_mps()
-        if wheel_mps <= ordered_mps + RUNAWAY_MPS or not self._powered():
+        if wheel_mps <= ordered_mps + self._allowed.runaway_mps or not self._powered():
             self._fast_since = now
-        if now <= self._fast_since + RUNAWAY_S:
+        if now <= self._fast_since + self._allowed.runaway_s:
             return None
         return "runaway", f"a wheel turns at {wheel_mps:.2f} m/s, {ordered_mps:.2f} m/s was the most ordered of it"
 
@@ -59,17 +105,17 @@ class MotionJudge:
         turns = [twist.angular_radps for _, twist in self._orders]
         low, high = min(0.0, *turns, 0.0), max(0.0, *turns, 0.0)
         turn = self._world.drives.bench.base.w_radps
-        slack = PATH_RADPS + PATH_SHARE * max(-low, high)
+        slack = self._allowed.path_radps + PATH_SHARE * max(-low, high)
         if low - slack <= turn <= high + slack or not self._powered():
             self._beside_since = now
-        if now <= self._beside_since + PATH_S:
+        if now <= self._beside_since + self._allowed.path_s:
             return None
         return "path", f"the base turns at {turn:+.2f} rad/s, between {low:+.2f} and {high:+.2f} rad/s were ordered"
 
     def _standstill(self, now: float) -> tuple[str, str] | None:
         driver = self._world.driver
         says = driver.running and driver.snapshot is not None and driver.snapshot.standstill
-        if not says or self._fastest_mps() <= STANDS_MPS or math.isclose(now, self._lies_since):
+        if not says or self._fastest_mps() <= self._allowed.stands_mps or math.isclose(now, self._lies_since):
             self._lies_since = now
         if now <= self._lies_since + STANDS_S:
             return None

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from random import Random
 
 from campaign.faults import FAULTS, PlannedFault
+from campaign.robots import bitrates, robot_of
+from canbase_config.robot import Robot
+from canbase_velocity.twist import Twist
 
 FAULTS_S = (0.1, 0.9)
 """Faults begin in this part of a scenario."""
 SCENARIO_S = (1.7, 2.4)
 MOST_FAULTS = 4
+SAMPLE_MPS, SAMPLE_RADPS = 0.8, 2.0
+"""Limits of the sample robot."""
 KINDS = ("constant", "constant", "constant", "weave", "burst", "nan", "zero")
 """How a source behaves for a while; a word that stands more often is drawn more often."""
 
@@ -66,11 +71,16 @@ class Plan:
         """The plan in words."""
         resets = [f"{at_s:5.2f} s  operator resets" for at_s in self.resets_s]
         parts = [str(part) for part in (*self.segments, *self.goals, *self.faults)]
-        return [f"seed {self.seed}: {self.duration_s:.2f} s at {self.bitrate} bit/s", *sorted(parts + resets)]
+        head = f"seed {self.seed}: {self.duration_s:.2f} s at {self.bitrate} bit/s"
+        return [head, str(robot_of(self.seed)), *sorted(parts + resets)]
 
 
 def draw_plan(seed: int, only: Sequence[str] = ()) -> Plan:
-    """The same seed gives the same plan. `only`: the faults to draw from; empty: all."""
+    """The same seed gives the same plan. `only`: the faults to draw from; empty: all.
+
+    Speeds are drawn for the sample robot, and scaled to the limits of this one.
+    """
+    robot = robot_of(seed).robot
     pool = sorted(only or FAULTS)
     random = Random(seed)
     duration_s = random.uniform(*SCENARIO_S)
@@ -80,12 +90,29 @@ def draw_plan(seed: int, only: Sequence[str] = ()) -> Plan:
     return Plan(
         seed,
         duration_s,
-        random.choice((125_000, 250_000, 500_000, 1_000_000)),
-        tuple(segments),
+        random.choice(bitrates(robot)),
+        tuple(_scaled_segment(segment, robot) for segment in segments),
         _goals(random) if by_goals else (),
         tuple(random.uniform(0.8, duration_s) for _ in range(random.choice((0, 0, 1, 1, 2)))),
-        tuple(_fault(name, random) for name in names),
+        tuple(_fault(name, random, robot) for name in names),
     )
+
+
+def _scales(robot: Robot) -> tuple[float, float]:
+    """Limits of this robot in those of the sample: linear, angular."""
+    return robot.limits.linear_mps / SAMPLE_MPS, robot.limits.angular_radps / SAMPLE_RADPS
+
+
+def _scaled_segment(segment: Segment, robot: Robot) -> Segment:
+    linear, angular = _scales(robot)
+    return replace(segment, linear_mps=linear * segment.linear_mps, angular_radps=angular * segment.angular_radps)
+
+
+def _scaled(value: object, name: str, robot: Robot) -> object:
+    linear, angular = _scales(robot)
+    if isinstance(value, Twist):
+        return Twist(linear * value.linear_mps, angular * value.angular_radps)
+    return linear * value if name == "speed" and isinstance(value, float) else value
 
 
 def _segments(random: Random, duration_s: float, late: bool) -> tuple[Segment, ...]:
@@ -114,7 +141,8 @@ def _goals(random: Random) -> tuple[GoalRequest, ...]:
     return tuple(goals)
 
 
-def _fault(name: str, random: Random) -> PlannedFault:
+def _fault(name: str, random: Random, robot: Robot) -> PlannedFault:
     kind = FAULTS[name]
     start_s = random.uniform(*FAULTS_S)
-    return PlannedFault(name, start_s, random.uniform(*kind.lasts_s), kind.draw(random))
+    lasts_s, drawn = random.uniform(*kind.lasts_s), kind.draw(random)
+    return PlannedFault(name, start_s, lasts_s, {key: _scaled(value, key, robot) for key, value in drawn.items()})

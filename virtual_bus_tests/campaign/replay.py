@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from campaign.plan import Plan
+from campaign.robots import robot_of
 from campaign.scenario import Result, Start
 from campaign.world import World
 
@@ -42,7 +43,7 @@ class _Teller:
 
 def replay(plan: Plan, frames: bool, say: Callable[[str], None]) -> Result:
     """Run the scenario and `say` what happens, line by line."""
-    start = Start()
+    start = Start(robot_of(plan.seed))
     world = start.world
     for line in plan.lines():
         say(line)

@@ -1,4 +1,4 @@
-"""Many scenarios in several processes: each worker boots one world and forks it once per scenario."""
+"""Many scenarios in several processes: a worker boots the world of a robot, and forks it once per scenario."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import groupby
 
 from campaign.judge import Violation
 from campaign.plan import draw_plan
+from campaign.robots import SCENARIOS, robot_of
 from campaign.scenario import Result, Start
 from campaign.without import remove
 
-BATCH = 25
-"""Scenarios that a worker takes at once."""
-_start: Start | None = None
+_start: tuple[int, Start] | None = None
+"""The robot that this worker has booted, by its number."""
 
 
 @dataclass(slots=True)
@@ -57,11 +58,10 @@ def run(
 ) -> Tally:
     """Run the scenarios of these seeds, with faults from `only` (empty: all), `without` one of `SAFEGUARDS`."""
     tally = Tally()
-    listed = list(seeds)
-    batches = [listed[at : at + BATCH] for at in range(0, len(listed), BATCH)]
+    batches = [list(batch) for _, batch in groupby(seeds, lambda seed: seed // SCENARIOS)]
     # Not forked from here: who calls may have threads, and a forked scenario must have none.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, initializer=_boot, initargs=(without,)) as pool:
+    with ProcessPoolExecutor(workers, context, initializer=remove, initargs=(without,)) as pool:
         for results in pool.map(partial(_run, only), batches):
             for result in results:
                 tally.add(result)
@@ -70,13 +70,14 @@ def run(
     return tally
 
 
-def _boot(without: str) -> None:
+def start_of(seed: int) -> Start:
+    """The world of this seed's robot, booted when the seed before had another one."""
     global _start
-    remove(without)
-    _start = Start()
+    drawn = robot_of(seed)
+    if _start is None or _start[0] != drawn.number:
+        _start = drawn.number, Start(drawn)
+    return _start[1]
 
 
 def _run(only: Sequence[str], seeds: list[int]) -> list[Result]:
-    if _start is None:
-        raise RuntimeError("the worker has no world; _boot comes first")
-    return [_start.fork(draw_plan(seed, only)) for seed in seeds]
+    return [start_of(seed).fork(draw_plan(seed, only)) for seed in seeds]

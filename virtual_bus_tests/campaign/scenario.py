@@ -14,6 +14,7 @@ from campaign.faults import FAULTS, PlannedFault
 from campaign.judge import Judge, Violation
 from campaign.outside import Outside, Surroundings
 from campaign.plan import Plan
+from campaign.robots import DrawnRobot
 from campaign.world import World
 
 LOOK_S = 0.1
@@ -40,10 +41,11 @@ class Result:
 
 
 class Start:
-    """A world that is enabled and at rest, from which scenarios begin."""
+    """A world that is enabled and at rest, from which the scenarios of one robot begin."""
 
-    def __init__(self) -> None:
-        self.world = World()
+    def __init__(self, drawn: DrawnRobot | None = None) -> None:
+        """`drawn`: None: the sample robot."""
+        self.world = World(drawn=drawn)
         self.around = Surroundings(self.world)
         self.world.enable()
         gc.collect()

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from campaign.plan import draw_plan
-from campaign.scenario import Start
+from campaign.runner import start_of
 from campaign.without import SAFEGUARDS, remove
 
 SCENARIOS = 60
@@ -89,9 +89,8 @@ class Bite:
 def look(safeguard: str, scenarios: int = SCENARIOS) -> Bite:
     """Take a safeguard out of this process, which is spent then, and look for a violation."""
     remove(safeguard)
-    start = Start()
     for seed in range(scenarios):
-        result = start.fork(draw_plan(seed, DRAWN_FROM.get(safeguard, ())))
+        result = start_of(seed).fork(draw_plan(seed, DRAWN_FROM.get(safeguard, ())))
         if result.violations:
             return Bite(safeguard, result.violations[0].name, seed, seed + 1)
     return Bite(safeguard, "", -1, scenarios)

@@ -10,7 +10,7 @@ from campaign.can_bus import CanBus
 from campaign.clock import Clock
 from campaign.envelope import Envelope, moving_s, react_s
 from campaign.process import Process, Topics
-from campaign.world import campaign_robot
+from campaign.robots import campaign_robot
 
 pytestmark = pytest.mark.campaign
 

@@ -30,6 +30,11 @@ class WatchdogProcess(Process):
         """Its adapter takes and gives no frames from now on; or does again."""
         self._failed_since = self.clock.now if fails else math.inf
 
+    @property
+    def is_deaf(self) -> bool:
+        """Its adapter takes and gives no frames."""
+        return self._failed_since < math.inf
+
     def begin(self) -> None:
         """A new core, which knows of a trip before by its record."""
         self.core = Watchdog(self._config, self.clock.now, self.disk.past())

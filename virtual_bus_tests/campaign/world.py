@@ -12,35 +12,28 @@ from campaign.driver_process import DriverProcess
 from campaign.drives import Drives
 from campaign.intruder import Intruder
 from campaign.process import Process, Topics
+from campaign.robots import DrawnRobot, campaign_robot
 from campaign.velocity_process import VelocityProcess
 from campaign.watchdog_process import WatchdogProcess
+from canbase_bench.plant.base import PlantParameters
 from canbase_config.derive import watchdog_config
-from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_driver.snapshot import DriverState
 from canbase_velocity.twist import Twist
 
 LEASE_DELAY_S = 0.0002
-BOOT_S = 5.0
-
-
-def campaign_robot() -> Robot:
-    """The sample robot with scanner and stop button, and with goals that give up soon enough for a short scenario."""
-    robot = load_robot(sample("bench")).robot
-    scan = robot.safety.scan.model_copy(update={"required": True})
-    estop = robot.safety.estop.model_copy(update={"required": True})
-    safety = robot.safety.model_copy(update={"scan": scan, "estop": estop})
-    action = robot.action.model_copy(
-        update={"progress_timeout_s": 1.0, "overall_factor": 1.5, "overall_extra_s": 0.5, "control_hz": 50.0}
-    )
-    return robot.model_copy(update={"safety": safety, "action": action})
+BOOT_S = 10.0
 
 
 class World:
     """`note` tells a log what happens; `on_lease` hears every order whose lease reaches the watchdog's socket."""
 
-    def __init__(self, robot: Robot | None = None, seed: int = 0, pace: Pace = FINE) -> None:
-        self.robot = robot or campaign_robot()
+    def __init__(
+        self, robot: Robot | None = None, seed: int = 0, pace: Pace = FINE, drawn: DrawnRobot | None = None
+    ) -> None:
+        """`drawn`: a robot with its body and its floor; None: `robot`, or the sample, on a level floor."""
+        self.drawn = drawn or DrawnRobot(0, robot or campaign_robot(), PlantParameters())
+        self.robot = self.drawn.robot
         self.random = Random(seed)
         self.clock = clock = Clock(100.0)
         self.note: Callable[[str], None] = lambda text: None
@@ -52,7 +45,7 @@ class World:
         """Every lease comes with a mangled copy of it."""
         self.bus = CanBus(clock, self.random, self.robot.bus.bitrate)
         self.topics = Topics(clock, self.random, pace.topic_jitter_s)
-        self.drives = Drives(self.robot, self.bus, pace)
+        self.drives = Drives(self.drawn, self.bus, pace)
         self.driver = DriverProcess(self.robot, self.bus, self.topics, pace)
         self.watchdog = WatchdogProcess(watchdog_config(self.robot), self.bus, pace)
         self.velocity = VelocityProcess(self.robot, clock, self.topics, self._lease, pace)

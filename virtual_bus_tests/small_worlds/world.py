@@ -7,7 +7,8 @@ import math
 from campaign.clock import Pace
 from campaign.outside import Surroundings
 from campaign.process import Process
-from campaign.world import World, campaign_robot
+from campaign.robots import campaign_robot
+from campaign.world import World
 from canbase_config.robot import Robot
 from canbase_driver.reset import Outcome
 from canbase_velocity.twist import ZERO, Twist

@@ -43,6 +43,11 @@ class Encoder:
         """Travel as the encoder counts it [m]."""
         return self._shown_m + self._factor * (self._true_m() - self._at_m)
 
+    @property
+    def closes_loop(self) -> bool:
+        """A velocity loop on it can brake: it counts motion, all the time and in the right direction."""
+        return self._fault is None or (self._fault.factor > 0.0 and not self._fault.holds_speed)
+
     def suffer(self, fault: EncoderFault, speed_mps: float) -> None:
         """From now on `fault` holds; `speed_mps` was measured last."""
         self._count(fault.factor)

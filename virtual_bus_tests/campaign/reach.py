@@ -1,0 +1,79 @@
+"""Who can still do something about a drive that has power: a process with a line to it, or the drive itself.
+
+A drive that nobody reaches turns on until its own watch over its masters stops it. Two kinds do not stop then, and no
+software can change it: one that watches nothing (docs/drives.md), and one whose speed sensor lies, since its own
+quick stop closes its loop on that sensor. STO, wired, stops both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from campaign.envelope import tolerance_mps
+from campaign.world import World
+from canbase_bench.cia301.dictionary import key
+from canbase_bench.node import SimulatedNode
+from canbase_bench.personality import PERSONALITIES
+
+
+class Reach:
+    """`lost`: a wheel turns with power, and nobody reaches its drive; asked every step."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        profile = world.robot.drives[0].profile
+        self.personality = PERSONALITIES[profile]
+        self.alone_s = self.personality.alone_s(world.robot.timeouts.drive_heartbeat_s)
+        """After so long without a word a drive of this kind begins to stop by itself [s]; infinity: never."""
+        self._wheels = [(*world.drives.place(wheel), drive.side) for wheel, drive in enumerate(world.robot.drives)]
+        self._moves_mps = tolerance_mps(world.robot)
+        self.lost = False
+        self.was_lost = False
+        """It was so since the base last stood."""
+
+    def step(self, stands: bool) -> None:
+        """Look at all drives now."""
+        self.lost = not stands and any(
+            not self.stops_alone(node_id) and not self._reached(node_id) for node_id, _ in self.turning()
+        )
+        self.was_lost = self.lost or (self.was_lost and not stands)
+
+    def stops_alone(self, node_id: int) -> bool:
+        """The drive stops when it hears nobody: it watches its masters, and its sensors do not lie."""
+        node = self._world.drives.bench.nodes[node_id]
+        forgot = self.personality.heeds_heartbeats and not self._knows_masters(node)
+        return self.alone_s < math.inf and not self._lies(node) and not (forgot and self._world.intruder.bad_at > 0.0)
+
+    def turning(self) -> Iterator[tuple[int, int]]:
+        """Node id and axis of each wheel that turns with power."""
+        base, nodes = self._world.drives.bench.base, self._world.drives.bench.nodes
+        speeds = {"left": base.v_left_mps, "right": base.v_right_mps}
+        if max(map(abs, speeds.values())) > self._moves_mps:
+            for node_id, axis, side in self._wheels:
+                if abs(speeds[side]) > self._moves_mps and nodes[node_id].axes[axis].motor.powered:
+                    yield node_id, axis
+
+    def heard(self, node_id: int) -> float:
+        """When the drive last heard what it watches: heartbeats, or setpoints."""
+        drives = self._world.drives
+        return (drives.heard if self.personality.heeds_heartbeats else drives.ordered)[node_id]
+
+    def _reached(self, node_id: int) -> bool:
+        """A driver or a watchdog that runs, and that is not mad, has a line to it."""
+        world = self._world
+        driver, watchdog, blocked = world.driver, world.watchdog, world.bus.disturbance.blocked
+        sane = driver.running and not driver.bus_problem and not driver.repeats and not driver.ignores_zero
+        senders = {"driver": sane, "watchdog": watchdog.running and not watchdog.is_deaf}
+        return world.drives.bench.nodes[node_id].line.hears and any(
+            talks and (name, f"drive{node_id}") not in blocked for name, talks in senders.items()
+        )
+
+    @staticmethod
+    def _lies(node: SimulatedNode) -> bool:
+        """The loop of one of its motors closes on a sensor on which it cannot brake."""
+        return any(not axis.encoder.closes_loop for axis in node.axes)
+
+    def _knows_masters(self, node: SimulatedNode) -> bool:
+        subs = range(1, self.personality.heartbeat_entries + 1)
+        return any(node.dictionary.values[key(0x1016, sub)] for sub in subs)
