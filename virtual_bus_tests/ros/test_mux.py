@@ -129,6 +129,9 @@ def test_the_file_of_a_twist_mux_user_drives_with_its_locks(
     assert velocity.ordered_for(0.5) == {0.0}  # e_stop was never heard
     assert velocity.reasons()["nav"] == "locked: e_stop has never said anything on e_stop"
     e_stop.message = Bool(data=False)
+    assert velocity.ordered_for(0.5) == {0.0}  # nor does it drive off when the lock opens
+    velocity.node.release(nav, joy)
+    nav.message = drive(0.2).twist
     velocity.wait_for_order(0.2)
     pause.message = Bool(data=True)
     velocity.wait_for_order(0.0)
@@ -142,6 +145,7 @@ def test_the_file_of_a_twist_mux_user_drives_with_its_locks(
     assert "is silent for" in velocity.reasons()["joy"]
     nav.message = joy.message = None
     e_stop.message, pause.message = Bool(data=False), Bool(data=False)
+    velocity.node.release(action)
     action.message = drive(0.3)  # a stamped source beside plain ones
     velocity.wait_for_order(0.3)
 
@@ -154,7 +158,10 @@ def test_publishers_of_every_quality_of_service_are_heard(
     velocity = start({"locks": {"pause": lock}})
     joystick, pause = velocity.source(TwistStamped, "cmd_vel_joy", qos), velocity.source(Bool, "pause", qos)
     estop = velocity.source(Bool, "estop_state", qos)
-    joystick.message, pause.message = drive(0.2), Bool(data=False)
+    pause.message = Bool(data=False)
+    velocity.node.wait_for(lambda: not velocity.state.locks[0].holds, 2.0, "the lock to open")
+    velocity.node.release(joystick)
+    joystick.message = drive(0.2)
     velocity.wait_for_order(0.2)
     estop.message = Bool(data=True)
     velocity.wait_for_order(0.0)
@@ -220,7 +227,15 @@ def test_a_foreign_publisher_locks_its_source_when_the_configuration_says_so(
         other.node.create_publisher(TwistStamped, "cmd_vel", 1)
         velocity.wait_for_order(0.0, 5.0)
         assert velocity.ordered_for(0.3) == {0.0}
-    velocity.wait_for_order(0.1, 5.0)
+
+    def is_gone() -> bool:
+        return all(foreign.topic != "/cmd_vel" for foreign in velocity.state.foreign)
+
+    velocity.node.wait_for(is_gone, 5.0, "the end of the intruder")
+    assert velocity.ordered_for(0.3) == {0.0}  # the stick is still held
+    velocity.node.release(joystick)
+    joystick.message = drive(0.1)
+    velocity.wait_for_order(0.1)
 
 
 @pytest.mark.parametrize("policy", ["report", "lock"])
