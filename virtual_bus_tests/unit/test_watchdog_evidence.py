@@ -107,7 +107,7 @@ def test_from_a_stand_it_has_the_lag_besides(sign: int) -> None:
 
 def test_a_slow_order_needs_its_way_too() -> None:
     wheel = rolling(2.0**-6)
-    assert not wheel.samples(255, 2.0**-6, 0.0).unseen
+    assert not wheel.samples(254, 2.0**-6, 0.0).unseen  # one more since its last sign of life
     assert wheel.sample(2.0**-6, 0.0).unseen  # 1/64 m/s for 4 s
 
 
@@ -144,11 +144,18 @@ def test_an_encoder_that_moves_lives_whatever_the_direction(sign: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("m_per_count", "life_m"), [(2.0**-10, 2.0**-9), (2.0**-13, 2.0**-12), (-(2.0**-10), 2.0**-9), (2.0**-20, 0.0002)]
+    ("m_per_count", "missing_m", "life_m"),
+    [
+        (2.0**-10, 2.0**-4, 2.0**-9),
+        (-(2.0**-10), 2.0**-4, 2.0**-9),
+        (2.0**-13, 2.0**-4, 0.001),
+        (2.0**-20, 0.005, 0.001),
+        (2.0**-20, 0.001, 0.0002),
+    ],
 )
-def test_a_fifth_of_a_millimetre_or_two_increments_are_a_sign_of_life(m_per_count: float, life_m: float) -> None:
+def test_a_millimetre_or_two_increments_are_a_sign_of_life(m_per_count: float, missing_m: float, life_m: float) -> None:
     for step_m, lives in ((life_m, True), (life_m * 0.999, False)):
-        wheel = rolling(m_per_count=m_per_count)
+        wheel = rolling(m_per_count=m_per_count, motion_missing_m=missing_m)
         wheel.sample(0.25, 0.0)
         assert (wheel.sample(0.25, 0.0, rolls=step_m * HZ).unseen_s == 0.0) is lives
 
@@ -156,10 +163,22 @@ def test_a_fifth_of_a_millimetre_or_two_increments_are_a_sign_of_life(m_per_coun
 def test_small_steps_one_way_add_up_to_a_sign_of_life_and_noise_does_not() -> None:
     creeps, trembles = rolling(), rolling()
     for n in range(12):
-        creeps.sample(0.25, 0.0, rolls=2.0**-13 * HZ)
-        trembles.sample(0.25, 0.0, rolls=(-1) ** n * 2.0**-13 * HZ)
+        creeps.sample(0.25, 0.0, rolls=2.0**-12 * HZ)
+        trembles.sample(0.25, 0.0, rolls=(-1) ** n * 2.0**-12 * HZ)
     assert creeps.last.unseen_s < 5 / HZ
     assert trembles.last.unseen_s == 12 / HZ
+
+
+@pytest.mark.parametrize("jitter_m", [0.0002, 0.0005, 0.0009])
+def test_an_encoder_that_jitters_and_goes_nowhere_is_unseen(jitter_m: float) -> None:
+    """Dead, with 0.2 to 0.9 mm of noise from one sample to the next, at a slow order: 0.05 m/s, 0.8 mm a cycle."""
+    wheel = Wheel(motion_missing_m=0.005)
+    for n in range(40):
+        wheel.sample(0.05, 0.0, rolls=(-1) ** n * jitter_m * HZ)
+        if wheel.last.unseen:
+            break
+    assert wheel.last.unseen
+    assert n <= 25  # the lag, and 0.25 s
 
 
 def test_the_travel_of_short_orders_adds_up_and_then_the_time_does_without_an_order() -> None:

@@ -194,6 +194,46 @@ def test_answers_to_sdo_readings_count_as_feedback() -> None:
     assert node(it, 5).heard_at == 2.0
 
 
+def test_answers_to_sdo_readings_feed_nobody() -> None:
+    it = observer()
+    rx(it, 0x181, "37 02 00 00 00 00", 1.0)
+    assert rx(it, 0x281, "00 00 00 00", 1.1).fed_at == 1.0
+    rx(it, 0x581, "4b 41 60 00 37 02 00 00", 2.0)
+    axis = rx(it, 0x581, "43 6c 60 00 2c 01 00 00", 2.1)
+    assert (axis.fed_at, axis.seen_at) == (1.0, 2.0)
+    assert rx(it, 0x181, "37 02 00 00 00 00", 3.0).fed_at == 1.1
+    assert rx(it, 0x281, "00 00 00 00", 3.1).fed_at == 3.0
+
+
+@pytest.mark.parametrize(
+    ("state", "age_s", "data", "noted"),
+    [
+        ("37 02", 0.09, "00", True),
+        ("37 02", 0.1, "00", False),
+        ("37 02", 0.0, "05", False),
+        ("37 02", 0.0, "7f", False),
+        ("17 02", 0.0, "00", False),
+        ("40 02", 0.0, "00", False),
+    ],
+)
+def test_a_boot_up_is_noted_of_a_node_that_has_just_said_that_it_is_enabled(
+    state: str, age_s: float, data: str, noted: bool
+) -> None:
+    it = observer((1, 0), (1, 1), (2, 0))
+    it.on_frame(0x381, bytes.fromhex(state + " 00 00 00 00"), 1.0)
+    it.on_frame(0x701, bytes.fromhex(data), 1.0 + age_s)
+    it.on_frame(0x702, bytes.fromhex(data), 1.0 + age_s)
+    assert node(it, 1).boot_up_at == (1.0 + age_s if noted else NEVER)
+    assert node(it, 2).boot_up_at == NEVER
+
+
+def test_a_state_that_was_polled_is_no_reason_to_call_a_boot_up_a_restart() -> None:
+    it = observer()
+    it.on_frame(0x581, bytes.fromhex("4b 41 60 00 37 02 00 00"), 1.0)
+    it.on_frame(0x701, b"\x00", 1.01)
+    assert node(it, 1).boot_up_at == NEVER
+
+
 def test_other_sdo_answers_only_show_that_the_node_lives() -> None:
     it = observer()
     before = look(it).axes

@@ -37,7 +37,7 @@ def test_ordinary_driving_does_not_trip() -> None:
 
 
 def test_one_row_for_each_cause_that_the_bus_can_show() -> None:
-    assert sorted(check.cause for check in CHECKS) == [*range(1, 11), *range(12, 17)]
+    assert sorted(check.cause for check in CHECKS) == [*range(1, 11), *range(12, 17), 18]
 
 
 def test_causes_have_the_numbers_of_the_state_frame() -> None:
@@ -142,7 +142,7 @@ def test_the_sentences_about_silence_have_the_ages() -> None:
     assert verdict.detail == (
         "driver's heartbeat is 0.500 s old, its SYNC 0.750 s (allowed 0.300 s) while wheel_1_0 is enabled"
     )
-    verdict = decide(of(replace(AT_REST, velocity_at=99.75), nodes=(Node(1, 99.5, 99.99), Node(2))), CONFIG, NOW)
+    verdict = decide(of(replace(AT_REST, fed_at=99.75), nodes=(Node(1, 99.5, 99.99), Node(2))), CONFIG, NOW)
     assert verdict.detail == (
         "wheel_1_0 is enabled, its feedback is 0.250 s old (allowed 0.100 s), its heartbeat 0.500 s (allowed 0.300 s)"
     )
@@ -172,17 +172,35 @@ def test_without_an_enabled_drive_nobody_needs_the_driver() -> None:
     assert cause(of(replace(AT_REST, state=DriveState.QUICK_STOP_ACTIVE), driver_at=NEVER)) == 0
 
 
+# --- an enabled drive starts anew
+
+
+@pytest.mark.parametrize(("age_s", "trips"), [(0.0, 18), (0.999, 18), (1.0, 0)])
+def test_a_boot_up_of_an_enabled_drive_trips_and_keeps_a_reset_away_for_a_second(age_s: float, trips: int) -> None:
+    nodes = (Node(1, 99.95, 99.99), Node(2, 99.95, 99.99, NOW - age_s))
+    verdict = decide(of(AT_REST, nodes=nodes), CONFIG, NOW)
+    assert verdict.cause == trips
+    assert cause(of(OFF, replace(OFF, drive=RIGHT.drive), nodes=nodes)) == 0
+    if trips:
+        assert verdict.node_id == 2
+        assert verdict.detail == (
+            "node 2 (wheel_2_0) sends a boot-up while it is enabled: it has restarted (supply?), "
+            "or two drives have this node id"
+        )
+        assert stands(verdict, of(OFF, nodes=nodes), CONFIG, NOW)
+        assert not stands(verdict, of(OFF, nodes=nodes), CONFIG, NOW + 1.0)
+
+
 # --- drive silent
 
 
 @pytest.mark.parametrize(("age_s", "trips"), [(0.099, 0), (0.101, 3)])
 def test_an_enabled_drive_answers_the_syncs_with_state_and_velocity(age_s: float, trips: int) -> None:
-    assert cause(of(replace(AT_REST, status_at=NOW - age_s))) == trips
-    assert cause(of(replace(AT_REST, velocity_at=NOW - age_s))) == trips
+    assert cause(of(replace(AT_REST, fed_at=NOW - age_s))) == trips
 
 
 def test_feedback_may_be_old_when_syncs_are_or_have_just_begun_or_the_drive_was_just_enabled() -> None:
-    unfed = replace(AT_REST, status_at=99.8)
+    unfed = replace(AT_REST, fed_at=99.8)
     assert cause(of(unfed)) == 3
     assert cause(of(unfed, sync_at=99.899)) == 0
     assert cause(of(unfed, sync_at=99.901)) == 3
@@ -199,7 +217,7 @@ def test_an_enabled_drive_beats(age_s: float, trips: int) -> None:
 
 
 def test_a_silent_drive_is_named() -> None:
-    view = of(LEFT, replace(RIGHT, status_at=99.0))
+    view = of(LEFT, replace(RIGHT, fed_at=99.0))
     assert decide(view, CONFIG, NOW).node_id == 2
 
 
@@ -358,12 +376,12 @@ def exactly(view: View) -> Cause:
 def test_at_the_very_moment_it_trips() -> None:
     assert exactly(well(lease_at=99.75)) is Cause.LEASE_LOST
     assert exactly(of(AT_REST, driver_at=99.5)) is Cause.DRIVER_SILENT
-    assert exactly(of(replace(AT_REST, status_at=99.875))) is Cause.DRIVE_SILENT
+    assert exactly(of(replace(AT_REST, fed_at=99.875))) is Cause.DRIVE_SILENT
     assert exactly(of(AT_REST, nodes=(Node(1, 99.5, 99.99), Node(2, 99.95, 99.99)))) is Cause.DRIVE_SILENT
 
 
 def test_at_the_very_moment_syncs_have_stopped() -> None:
-    assert exactly(of(replace(AT_REST, status_at=99.0), sync_at=99.875)) is Cause.NONE
+    assert exactly(of(replace(AT_REST, fed_at=99.0), sync_at=99.875)) is Cause.NONE
 
 
 def test_at_the_very_moment_feedback_is_too_old_to_say_that_the_power_is_off() -> None:

@@ -362,3 +362,46 @@ def test_two_drives_with_one_node_id_trip(speed: float) -> None:
     verdict = watchdog(world).status.verdict
     assert (verdict.cause, verdict.node_id) == (Cause.ANSWERED_TWICE, 1)
     assert world.now - start <= 0.12
+
+
+# 0.3 m/s ── the left drive, or a second one with its id, sends a boot-up and goes on ── trip in the next turn
+def test_a_boot_up_of_an_enabled_drive_trips_at_once_whatever_the_driver_does() -> None:
+    world = driving(0.3)
+    deaf(world, 0x701)
+    start = world.now
+    world.inject(0x701, "00")
+    assert world.run(0.1, lambda: tripped(world))
+    verdict = watchdog(world).status.verdict
+    assert (verdict.cause, verdict.node_id) == (Cause.DRIVE_RESTARTED, 1)
+    assert world.now - start <= 0.006
+    assert world.run(1.0, lambda: world.truth.standing_s > 0.1)
+
+
+def test_a_boot_up_before_there_is_power_is_the_ordinary_start() -> None:
+    world = World()
+    world.run(0.2)
+    assert not world.powered[0]
+    world.inject(0x701, "00")
+    world.run(0.5)
+    assert not tripped(world)
+
+
+# 0.3 m/s ── the TPDOs of the left drive get lost, somebody polls it by SDO 50 times a second ── trip after 0.1 s
+def test_values_that_somebody_polls_do_not_stand_in_for_a_tpdo_that_is_lost() -> None:
+    world = driving(0.3)
+    deaf(world, 0x181, 0x281)  # the driver stops for it by itself, some cycles later
+    suffer(world, "tpdo_lost")
+    start = world.now
+    while not tripped(world) and world.now < start + 1.0:
+        world.inject(0x601, "40 41 60 00 00 00 00 00")
+        world.run(0.01)
+        world.inject(0x601, "40 6C 60 00 00 00 00 00")
+        world.run(0.01)
+    assert watchdog(world).status.verdict.cause is Cause.DRIVE_SILENT
+    assert world.now - start <= 0.13
+
+
+def deaf(world: World, *cob_ids: int) -> None:
+    """The driver does not receive these frames."""
+    take = world.core.on_frame
+    world.core.on_frame = lambda frame, now: [] if frame.cob_id in cob_ids else take(frame, now)  # type: ignore[method-assign]

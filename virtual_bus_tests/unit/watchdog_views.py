@@ -24,6 +24,7 @@ LEFT = Axis(
     target_mps=0.3,
     asks_for_power=True,
     command_at=99.99,
+    fed_at=99.99,
 )
 RIGHT = replace(LEFT, drive=CONFIG.drives[1])
 WELL = View(

@@ -2,7 +2,8 @@
 
 Rules, 1 and 4 for an enabled drive and the setpoint that a SYNC made effective, 2 and 3 for one with power: a wheel
 that is being stopped can lose its sensor as well (docs/decisions/0020)
-1. Unseen: ordered to move, and the encoder has not moved. The ordered travel adds up until it moves, however slow the
+1. Unseen: ordered to move, and the encoder has not moved: net, from one place to another, for an encoder that jitters
+   moves nothing. The ordered travel adds up until it moves, however slow the
    order is; a setpoint of zero adds nothing and forgets nothing, so short orders add up too, and most of it
    outlives the power. The time adds up while an order is older than `drive_lag_s`, and always once enough
    travel was ordered: a wheel runs away after its order too.
@@ -22,8 +23,9 @@ from dataclasses import dataclass, replace
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 from canbase_watchdog.envelope import Peak
 
-LIFE_M, LIFE_COUNTS = 0.0002, 2
-"""An encoder that moves by less may be noise; whichever is more."""
+LIFE_M, LIFE_SHARE, LIFE_COUNTS = 0.001, 0.2, 2
+"""An encoder that is nearer than this to the place of its last sign of life may jitter. Less where watchdog.
+motion_missing_m is: a share of it. More where the encoder is coarse: so many increments."""
 UNSEEN_COUNTS = 4
 """Of a coarse encoder nothing is missed before so many increments were ordered."""
 KEPT_SHARE = 0.875
@@ -60,8 +62,8 @@ class EvidenceWatch:
         """Before the monotonic time `now` [s] nothing was ordered."""
         self._config = config
         count_m = abs(drive.m_per_count)
-        self._life_m = max(LIFE_M, LIFE_COUNTS * count_m)
         self._unseen_m = max(config.motion_missing_m, UNSEEN_COUNTS * count_m)
+        self._life_m = max(min(LIFE_M, LIFE_SHARE * config.motion_missing_m), LIFE_COUNTS * count_m)
         self._slack_mps = config.motion_tolerance_mps + abs(drive.velocity_mps_per_bit)
         self._period_s = 1.0 / config.control_hz
         self._backward, self._forward = Peak(config.drive_lag_s), Peak(config.drive_lag_s)

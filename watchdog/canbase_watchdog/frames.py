@@ -33,6 +33,8 @@ QUICK_STOP_RPDO = 0x500
 """6040h u16 of every used axis, sent by the watchdog: quick stop, or disable voltage."""
 
 PRE_OPERATIONAL_COMMAND = 0x80
+BOOT_UP = b"\x00"
+"""What a node sends in place of its heartbeat when it starts."""
 OPERATIONAL = 5
 NMT_COMMANDS = (0x01, 0x02, 0x80, 0x81, 0x82)
 

@@ -32,6 +32,8 @@ class _Record:
         "doubles",
         "drive",
         "enabled_since",
+        "fed_status_at",
+        "fed_velocity_at",
         "feedback",
         "fresh",
         "misses",
@@ -50,6 +52,7 @@ class _Record:
         self.state: DriveState | None = None
         self.status_at = self.enabled_since = self.disabled_since = NEVER
         self.velocity_mps, self.velocity_at = 0.0, NEVER
+        self.fed_status_at = self.fed_velocity_at = NEVER
         self.target_mps, self.command_at = 0.0, NEVER
         self.setpoint_mps, self.setpoint_at = 0.0, NEVER
         self.asks_for_power = self.fresh = False
@@ -71,6 +74,7 @@ class _Record:
             self.setpoint_at,
             self.feedback.last,
             self.feedback.evidence.last,
+            min(self.fed_status_at, self.fed_velocity_at),
             self.misses.value,
             self.doubles.value,
         )
@@ -99,7 +103,7 @@ class Observer:
             (drive.node_id, drive.axis): _Record(drive, FeedbackWatch(drive, config, now)) for drive in config.drives
         }
         self._heartbeat_at = {node_id: NEVER for node_id, _ in self._records}
-        self._heard_at = dict(self._heartbeat_at)
+        self._heard_at, self._boot_up_at = dict(self._heartbeat_at), dict(self._heartbeat_at)
         self._foreign = Foreign(config)
         self._driver_at = self._sync_at = self._sync_since = NEVER
         self._routes: dict[int, Callable[[bytes, float], bool]] = {}
@@ -119,7 +123,12 @@ class Observer:
         """Everything as it stands."""
         return BusView(
             tuple([record.axis() for record in self._records.values()]),
-            tuple([Node(node_id, at, self._heard_at[node_id]) for node_id, at in self._heartbeat_at.items()]),
+            tuple(
+                [
+                    Node(node_id, at, self._heard_at[node_id], self._boot_up_at[node_id])
+                    for node_id, at in self._heartbeat_at.items()
+                ]
+            ),
             self._driver_at,
             self._sync_at,
             self._sync_since,
@@ -177,12 +186,20 @@ class Observer:
         if len(data) != 1:
             return False
         self._heartbeat_at[node_id] = self._heard_at[node_id] = now
+        if data == frames.BOOT_UP and self._is_enabled(node_id, now):
+            self._boot_up_at[node_id] = now
         return True
+
+    def _is_enabled(self, node_id: int, now: float) -> bool:
+        """A TPDO of the last moments said so."""
+        records = (record for key, record in self._records.items() if key[0] == node_id)
+        return any(each.state is ENABLED and now < each.fed_status_at + self._gap_s for each in records)
 
     def _on_status(self, record: _Record, data: bytes, now: float) -> bool:
         status = frames.decode_status(data, record.drive.layout, record.drive.axis)
         if status is None or not self._note_state(record, status[0], now):
             return False
+        record.fed_status_at = now
         record.feedback.on_position(status[1])
         return True
 
@@ -203,6 +220,7 @@ class Observer:
         if bits is None:
             return False
         self._note_velocity(record, bits, now)
+        record.fed_velocity_at = now
         record.answers += 1
         enabled = record.state is ENABLED
         record.feedback.on_velocity(record.velocity_mps, record.state in frames.POWERED, enabled, now)

@@ -35,6 +35,7 @@ class Cause(enum.IntEnum):
     TWIST_OUTSIDE = 14
     SETPOINT_MISSING = 15
     ANSWERED_TWICE = 16
+    DRIVE_RESTARTED = 18
     POWER_AT_END = 20
     RECORD_UNUSABLE = 21
 
@@ -42,7 +43,7 @@ class Cause(enum.IntEnum):
 SENSOR_CAUSES = (Cause.FEEDBACK_IMPLAUSIBLE, Cause.MOTION_MISSING)
 """After a trip of before the start with one of these, what the drive reports about its motion is no evidence."""
 SIGN_S = 1.0
-"""A sign of another master counts for so long."""
+"""A sign of another master, or of a drive that started anew, counts for so long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +155,23 @@ def _unfed(axis: Axis, view: View, config: WatchdogConfig, now: float) -> bool:
 
 def _beatless(node: Node, axis: Axis, config: WatchdogConfig, now: float) -> bool:
     return now >= max(node.heartbeat_at, axis.enabled_since) + config.drive_heartbeat_s
+
+
+def _has_restarted(view: View, node_id: int, config: WatchdogConfig, now: float) -> bool:
+    return now < view.node(node_id).boot_up_at + SIGN_S
+
+
+def _drive_restarted(view: View, config: WatchdogConfig, now: float) -> Verdict:
+    """A drive that starts anew has no power: this one said that it has. Or there are two drives with its node id."""
+    for axis in view.axes:
+        node_id = axis.drive.node_id
+        if view.enabled and _has_restarted(view, node_id, config, now):
+            detail = (
+                f"node {node_id} ({axis.drive.joint}) sends a boot-up while it is enabled: it has restarted (supply?), "
+                "or two drives have this node id"
+            )
+            return Verdict(Cause.DRIVE_RESTARTED, node_id, detail)
+    return FINE
 
 
 def _drive_silent(view: View, config: WatchdogConfig, now: float) -> Verdict:
@@ -371,6 +389,9 @@ CHECKS = (
         "leases arrive",
     ),
     Check(Cause.DRIVER_SILENT, _driver_silent, _driver_still_silent, "the driver's heartbeat is back"),
+    Check(
+        Cause.DRIVE_RESTARTED, _drive_restarted, _has_restarted, "its last boot-up is 1 s ago; see supply and node ids"
+    ),
     Check(
         Cause.DRIVE_SILENT,
         _drive_silent,

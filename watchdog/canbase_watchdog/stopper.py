@@ -84,7 +84,7 @@ class Stopper:
             standing=all(abs(axis.velocity_mps) <= self._config.standstill_mps for axis in axes),
             speed_mps=max(abs(axis.velocity_mps) for axis in axes),
             begin_mps=max(self._begin_mps(axis) for axis in axes),
-            seen_at=min(axis.fed_at for axis in axes),
+            seen_at=min(axis.seen_at for axis in axes),
             present=node.heard_at > NEVER or any(axis.asks_for_power for axis in axes),
             trusted=self._trusted and all(axis.trusted for axis in axes),
         )
@@ -135,6 +135,6 @@ class Stopper:
             number = axis.drive.axis
             if word is not None:
                 requests.append(frames.write_controlword(self._node_id, number, word, self._layout))
-            if word is not None or now >= axis.fed_at + self._config.feedback_timeout_s:
+            if word is not None or now >= axis.seen_at + self._config.feedback_timeout_s:
                 requests += frames.read_feedback(self._node_id, number, self._layout)
         return requests

@@ -38,6 +38,8 @@ class Axis:
     setpoint_at: float = NEVER
     feedback: Feedback = Feedback()  # noqa: RUF009 - immutable
     evidence: Evidence = Evidence()  # noqa: RUF009 - immutable
+    fed_at: float = NEVER
+    """When the older one of its TPDOs came: status and velocity. What somebody reads by SDO is not fed."""
     missed_setpoints: float = 0.0
     """SYNCs without a setpoint while it was enabled, less half of those with one."""
     double_answers: float = 0.0
@@ -59,8 +61,8 @@ class Axis:
         return self.evidence.trusted
 
     @property
-    def fed_at(self) -> float:
-        """When both statusword and velocity were last known."""
+    def seen_at(self) -> float:
+        """When both statusword and velocity were last known, by a TPDO or from an answer to an SDO."""
         return min(self.status_at, self.velocity_at)
 
 
@@ -71,6 +73,8 @@ class Node:
     node_id: int
     heartbeat_at: float = NEVER
     heard_at: float = NEVER
+    boot_up_at: float = NEVER
+    """When a boot-up came from it although it had just reported that it was enabled."""
 
 
 @dataclass(frozen=True, slots=True)
