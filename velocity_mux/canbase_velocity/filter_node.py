@@ -30,6 +30,7 @@ from canbase_velocity.changes import DropTeller, changed_order, is_told
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
+from canbase_velocity.graph import SCAN_KIND, publishers
 from canbase_velocity.io import LeaseSender
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.placement import Placement, PlacementError, Transform, placed_by_tf
@@ -39,6 +40,7 @@ from canbase_velocity.steady import steady_timer
 from canbase_velocity.twist import Twist
 
 STATE_PERIOD_S = 0.1
+GRAPH_PERIOD_S = 0.5
 MovingSources = Callable[[], Sequence[str]]
 
 
@@ -117,6 +119,7 @@ class FilterNode(Node):
         for scan in scans:
             callback = functools.partial(self._on_scan, scan, Placement.of(scan))
             self.create_subscription(LaserScan, scan.topic, callback, SCAN)
+        steady_timer(self, GRAPH_PERIOD_S, self._look_for_scanners)
         if any(scan.pose == "tf" for scan in scans):
             if messages.TFMessage is None:
                 raise ModuleNotFoundError("a scanner with `pose: tf` needs tf2_msgs; install ros-jazzy-tf2-msgs")
@@ -146,6 +149,14 @@ class FilterNode(Node):
             self._filter.on_unplaced_scan(config.topic, str(error))
             return
         self._filter.on_laser_scan(config.topic, messages.scan_of(message), placement, now)
+
+    def _look_for_scanners(self) -> None:
+        """Into the ROS graph: a message does not tell who sent it."""
+        now = time.monotonic()
+        for scan in self._robot.safety.scans:
+            found = publishers(self, self.resolve_topic_name(scan.topic))
+            nodes = [each.node or "a node without a name" for each in found if each.kind == SCAN_KIND]
+            self._filter.on_scan_publishers(scan.topic, nodes, now)
 
     def _on_tf_static(self, message: messages.TFMessage) -> None:
         self._transforms.update(messages.transforms_of(message))

@@ -20,6 +20,7 @@ from canbase_velocity.obstacle import Geometry, Sight
 from canbase_velocity.placement import Placement
 from canbase_velocity.safety_filter import SHUTDOWN, FilterConfig, Inputs, ScanState, brakes_hard, decide
 from canbase_velocity.scan import Scan, ScanError
+from canbase_velocity.sole_publisher import SolePublisher
 from canbase_velocity.sweep import Floats
 from canbase_velocity.twist import ZERO, Twist
 
@@ -40,6 +41,7 @@ class _Scanner:
         self._reader = ScanReader(config, geometry.box)
         self._frozen = FrozenWatch(config.frozen_s, noisy=config.noisy)
         self._glitches = GlitchFilter(config.min_points)
+        self.sole = SolePublisher()
         self._reach_m = geometry.reach_m(config.timeout_s)
         self.at_s: float | None = None
         self.field: Field | None = None
@@ -53,6 +55,9 @@ class _Scanner:
 
     def receive(self, scan: Scan, placement: Placement, now: float, *, moves: bool) -> None:
         """A scan as it came. One that cannot be used is dropped and counted."""
+        if self.sole.problem:
+            self.drop(Cause.SCAN_INVALID, self.sole.problem, at_once=True)
+            return
         if self._frozen.is_repeated(scan):
             self.drop(Cause.SCAN_FROZEN, "the stamp of its scans does not change")
             return
@@ -155,6 +160,12 @@ class SafetyFilter:
         """Takes a scan as it came; drops and counts one that cannot be used. Raises KeyError for another topic."""
         self._motion.advance(now)
         self._scanners[topic].receive(scan, placement, now, moves=not self._motion.moving.twist.is_zero)
+
+    def on_scan_publishers(self, topic: str, nodes: Sequence[str], now: float) -> None:
+        """Takes who publishes on the topic of a scanner: a node's name for each publisher. Raises KeyError for another
+        topic.
+        """
+        self._scanners[topic].sole.look(nodes, now)
 
     def on_unplaced_scan(self, topic: str, problem: str) -> None:
         """A scan came whose scanner cannot be placed. Raises KeyError for another topic."""

@@ -12,6 +12,8 @@ from typing import Any
 import pytest
 from canbase.msg import SafetyState
 from geometry_msgs.msg import Twist, TwistStamped
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
@@ -287,3 +289,15 @@ def test_a_press_during_the_orderly_end_outlives_it(chain: Chain, spawn: Spawn, 
     chain.joystick.message = drive(0.8)
     chain.node.spin_for(0.5)
     assert {order.twist.linear.x for order in chain.orders.messages} == {0.0}
+
+
+# two scanners on one topic, with one frame_id: each would show as free what only the other one sees
+def test_two_scanners_on_one_topic_stop_the_base_with_their_names(chain: Chain) -> None:
+    chain.joystick.message = drive(0.3)
+    chain.wait_for_order(0.3)
+    with TestNode("rear_scanner") as other:
+        other.node.create_publisher(LaserScan, "scan", qos_profile_sensor_data)
+        state = chain.wait_for_cause(SafetyState.CAUSE_SCAN_INVALID)
+        assert "2 publishers (/rear_scanner, /test_node)" in state.detail
+        chain.wait_for_order(0.0)
+    chain.wait_for_cause(SafetyState.CAUSE_NONE)
