@@ -37,8 +37,12 @@ teeth: $(VENV)/ready ## takes one safeguard out after the other; the campaign ha
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.teeth
 
 .PHONY: stops
-stops: $(VENV)/ready ## times and distances of each stop and each lie, 20 seeded runs each: docs/stop_times.md
-	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.stops --write docs/stop_times.md
+stops: $(VENV)/ready ## p50, p99 and max of each stop and each lie in virtual time: docs/stop_times.md; ONLY=encoder runs some
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.stops --write docs/stop_times.md --only '$(ONLY)'
+
+.PHONY: soak
+soak: $(VENV)/ready ## HOURS=20 of ordinary driving of random robots in virtual time: nothing may trip; SEED=7 tells one
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.soak $(if $(SEED),--seed $(SEED)) $(if $(HOURS),--hours $(HOURS)) $(if $(FIRST),--first $(FIRST))
 
 .PHONY: small-worlds
 small-worlds: $(VENV)/ready ## every failure with every action of an operator in small worlds; FAULTS=2 deeper, EVERY=1 denser

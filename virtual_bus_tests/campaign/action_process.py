@@ -67,6 +67,10 @@ class ActionProcess(Process):
         for goal in self.goals:
             goal.died = goal.died or not goal.ends
 
+    def end(self) -> None:
+        """Its goal ends first, with a base that stands."""
+        self._inputs = replace(self._inputs, shutdown=True)
+
     def send_goal(self, distance_m: float, speed_mps: float) -> None:
         """A client asks for a goal. It is accepted or refused as in node.py."""
         self.receive("goals", 10, self._on_goal, distance_m, speed_mps)

@@ -13,7 +13,7 @@ from canbase_driver.kinematics import Twist2D
 from canbase_driver.reset import Outcome
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_velocity.decision import Decision
-from canbase_velocity.twist import Twist
+from canbase_velocity.twist import ZERO, Twist
 
 SETPOINTS = (0x200, 0x300)
 """First identifiers of the RPDOs with setpoints: docs/bus.md."""
@@ -36,10 +36,13 @@ class DriverProcess(Process):
         """It sends the setpoints of its last cycle again and again, with heartbeat and SYNC."""
         self.ignores_zero = False
         """Where a setpoint is zero it sends the last one that was not."""
+        self.keeps_motion = False
+        """It follows each command but zero."""
         self.heartbeats = True
         """A mad driver may go on with its heartbeat or be silent there."""
         self._last_frames: list[Frame] = []
         self._last_moving: dict[int, bytes] = {}
+        self._moves = ZERO
         topics.subscribe("cmd_vel", self, self._on_command)
         topics.subscribe("safety_filter/state", self, self._on_safety)
         self.begin()
@@ -64,6 +67,10 @@ class DriverProcess(Process):
         if self.running:
             self.core.request_stop()
 
+    def end(self) -> None:
+        """The base is stopped first."""
+        self.core.request_shutdown()
+
     def _hear(self, cob_id: int, data: bytes) -> None:
         self.receive("frames", FRAMES_HELD, self._on_frame, cob_id, data)
 
@@ -72,6 +79,9 @@ class DriverProcess(Process):
             self._send(self.core.on_frame(Frame(cob_id, data), self.clock.now))
 
     def _on_command(self, twist: Twist) -> None:
+        if self.keeps_motion and twist.is_zero:
+            twist = self._moves
+        self._moves = twist
         self.core.on_command(Twist2D(twist.linear_mps, twist.angular_radps), self.clock.now)
 
     def _on_safety(self, decision: Decision) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -27,6 +28,8 @@ class Drives:
         body = replace(drawn.body, step_s=pace.plant_step_s, bandwidth_radps=bandwidth_radps)
         self.bench = Bench(drawn.robot, bus.clock.now, body, BenchParameters(sdo_delay_s=pace.sdo_delay_s))
         self.bench.base.push_n = drawn.push_n
+        self.measured: Callable[[int, bytes], bytes] = lambda cob_id, data: data
+        """What becomes of a drive's frame before it is sent: sensors with noise."""
         self._members = {
             node_id: bus.join(f"drive{node_id}", partial(self._hear, node_id, node))
             for node_id, node in self.bench.nodes.items()
@@ -87,7 +90,7 @@ class Drives:
     def _say(self) -> None:
         self.moved_at = self._clock.now
         for frame in self.bench.tick(self._clock.now):
-            self._members[frame.cob_id & 0x7F].send(frame.cob_id, frame.data)
+            self._members[frame.cob_id & 0x7F].send(frame.cob_id, self.measured(frame.cob_id, frame.data))
 
     def _poll(self) -> None:
         """While SYNCs come they move the world often enough."""

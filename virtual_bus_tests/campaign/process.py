@@ -56,6 +56,10 @@ class Process:
         self._kept.clear()
         self._late.clear()
 
+    def end(self) -> None:
+        """SIGTERM: an orderly end begins; the process goes on until it is through with it."""
+        raise NotImplementedError
+
     def restart(self) -> None:
         """Start again, if it is dead."""
         if not self.alive:

@@ -1,136 +1,214 @@
-"""`python -m campaign.stops`: how fast and how far until the base stands, for each stop and each lie, over many runs.
+"""`python -m campaign.stops`: how fast and how far until the base stands, for each failure, over many runs.
 
-Virtual time, ground truth of the plant. The base drives at a drawn speed, then one fault begins and stays.
+Virtual time, ground truth of the plant, measured as the exit matrix measures its single run of real processes, and put
+beside that into the table of docs/stop_times.md. Exit code 1: a base did not stop.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
+import multiprocessing
 import os
 import pickle
-from collections.abc import Iterable, Sequence
+import sys
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from random import Random
 
-from campaign.faults import FAULTS
-from campaign.scenario import Start
-from canbase_velocity.twist import Twist
-from exit_matrix.marked import rewritten
+from rich.console import Console
+from rich.progress import Progress
 
-COMMAND = "make stops"
-STOPS = (
-    "driver_dies", "velocity_dies", "watchdog_dies", "driver_hangs", "velocity_hangs", "watchdog_hangs",
-    "driver_repeats", "driver_ignores_zero", "cable_cut", "cable_cut_to_drives", "cable_cut_from_drives",
-    "cable_cut_one_drive", "drive_silent", "drive_fault", "drive_sto", "drive_resets", "lease_lost", "scan_stale",
-    "estop_stale", "estop_pressed", "radio_gap", "all_processes_restart",
-)  # fmt: skip
-"""Something stops being there."""
-LIES = (
-    "encoder_lost", "encoder_frozen", "encoder_reversed", "encoder_jumping", "encoder_intermittent", "frozen_encoder",
-    "stuck_velocity", "wheel_blocked", "wheel_limited", "motor_weak", "setpoints_lost", "feedback_lost",
-    "drive_ignores_setpoints", "twin_node",
-)  # fmt: skip
-"""Something is not what it says."""
-DRIVES_S, LONGEST_S, LOOK_S = 1.0, 4.0, 0.002
-STANDS_MPS, STANDS_RADPS = 0.01, 0.04
-SPEEDS_MPS = (0.2, 0.8)
-RELEASED_S = 1.0
-"""So long after the fault the operator releases the stick: what does not follow upward is seen by then."""
+from campaign.scenario import Start
+from campaign.twins import GOAL, JOYSTICK, TWINS, Twin
+from campaign.world import World
+from canbase_velocity.twist import ZERO, Twist
+from exit_matrix.layers import SPEED_MPS
+from exit_matrix.marked import rewritten, section
+from exit_matrix.page_table import Key, Row
+from exit_matrix.stop_table import COMMANDS, TABLE, VIRTUAL
+
+CRUISES_S, LONGEST_S, RESTS_S, LOOK_S = 1.5, 8.0, 0.6, 0.002
+"""Until the base drives steadily; longer than any stop; a base that stood so long has stopped; how often is looked."""
+GOAL_M, JOYSTICK_S = 4.5, 0.02
+PHASE_S = 0.1
+"""The failure comes up to so much later: SYNCs, leases and heartbeats are anywhere in their periods then."""
+RUNS = 100
+_cruises: dict[str, Cruise] = {}
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One run. `time_s`: from the fault until the base stood for good, infinity: it moved at the end."""
+    """One run. `time_s`: from the failure until the base stood for good, infinity: it never did.
+
+    `power_off_s`: until no motor had power, infinity: some always had. `peak_mps`: of the fastest rim.
+    """
 
     time_s: float
     distance_m: float
+    power_off_s: float
     peak_mps: float
 
 
-def measure(start: Start, fault: str, seed: int) -> Run:
-    """One run in a copy of this process."""
-    reader, writer = os.pipe()
-    pid = os.fork()
-    if pid == 0:
-        try:
-            os.write(writer, pickle.dumps(_run(start, fault, seed)))
-        finally:
-            os._exit(0)
-    os.close(writer)
-    with os.fdopen(reader, "rb") as pipe:
-        told = pipe.read()
-    os.waitpid(pid, 0)
-    run = pickle.loads(told)
-    assert isinstance(run, Run)
-    return run
+class Cruise:
+    """A world whose base drives steadily. The joystick says `ordered`, for ever; None: it says nothing."""
+
+    def __init__(self, by: str, speed_mps: float = SPEED_MPS) -> None:
+        start = Start()
+        self.world, self.around = start.world, start.around
+        self.ordered: Twist | None = Twist(speed_mps, 0.0) if by == JOYSTICK else None
+        if by == GOAL:
+            self.world.action.send_goal(GOAL_M, speed_mps)
+        self._push()
+        self.world.clock.run_until(self.world.clock.now + CRUISES_S)
+
+    def _push(self) -> None:
+        if self.ordered is not None:
+            self.world.topics.publish("cmd_vel_joy", self.ordered)
+        self.world.clock.after(JOYSTICK_S, self._push)
+
+    def fork(self, twin: Twin, seed: int) -> Run:
+        """One run in a copy of this process: the base goes on driving here."""
+        reader, writer = os.pipe()
+        pid = os.fork()
+        if pid == 0:
+            try:
+                os.write(writer, pickle.dumps(self.run(twin, seed)))
+            finally:
+                os._exit(0)
+        os.close(writer)
+        with os.fdopen(reader, "rb") as pipe:
+            told = pipe.read()
+        os.waitpid(pid, 0)
+        run = pickle.loads(told)
+        assert isinstance(run, Run)
+        return run
+
+    def run(self, twin: Twin, seed: int) -> Run:
+        """One run in this very world, which is spent then."""
+        world, clock, random = self.world, self.world.clock, Random(f"{twin.key} {seed}")
+        world.random.seed(seed)
+        clock.run_until(clock.now + random.uniform(0.0, PHASE_S))
+        watch = _Watch(self.world)
+        twin.begin(world, self.around, random)
+        if twin.then_zero_s:
+            watch.look_for(twin.then_zero_s)
+            self.ordered = ZERO
+            watch.begin()
+        watch.until_it_rests()
+        return watch.run
 
 
-def _run(start: Start, fault: str, seed: int) -> Run:
-    world, random = start.world, Random(f"{fault} {seed}")
-    world.random.seed(seed)
-    clock, base, kind = world.clock, world.drives.bench.base, FAULTS[fault]
-    twist, ends = Twist(random.uniform(*SPEEDS_MPS), 0.0), [clock.now + DRIVES_S + LONGEST_S]
+class _Watch:
+    """Looks at the ground truth, from now on."""
 
-    def hold() -> None:
-        if clock.now < ends[0]:
-            world.topics.publish("cmd_vel_joy", twist)
-            clock.after(0.05, hold)
+    def __init__(self, world: World) -> None:
+        self._world, self._peak_mps, self._power_off_at = world, 0.0, math.inf
+        self.begin()
 
-    hold()
-    clock.run_until(clock.now + DRIVES_S + random.uniform(0.0, 0.1))
-    began, path_m, moved_at, peak_mps = clock.now, base.path_m, clock.now, 0.0
-    kind.begin(world, start.around, kind.draw(random))
-    end, ends[0] = clock.now + LONGEST_S, clock.now + RELEASED_S
-    while clock.now < end:
+    def begin(self) -> None:
+        """What is measured begins now; the fastest wheel and the power are watched since this was made."""
+        base = self._world.drives.bench.base
+        self._began = self._moved_at = self._world.clock.now
+        self._from_m = (base.x_m, base.y_m)
+
+    def look_for(self, seconds: float) -> None:
+        """Let time pass."""
+        end = self._world.clock.now + seconds
+        while self._world.clock.now < end - LOOK_S / 2.0:
+            self._look()
+
+    def until_it_rests(self) -> None:
+        """Until it has been standing for a while, or LONGEST_S."""
+        while self._world.clock.now < min(self._moved_at + RESTS_S, self._began + LONGEST_S):
+            self._look()
+
+    def _look(self) -> None:
+        clock, drives = self._world.clock, self._world.drives.bench
         clock.run_until(clock.now + LOOK_S)
-        if abs(base.v_mps) > STANDS_MPS or abs(base.w_radps) > STANDS_RADPS:
-            moved_at = clock.now
-        peak_mps = max(peak_mps, abs(base.v_left_mps), abs(base.v_right_mps))
-    stood = moved_at < end - 2.0 * LOOK_S
-    return Run(moved_at - began if stood else float("inf"), base.path_m - path_m, peak_mps)
+        rim_mps = max(abs(drives.base.v_left_mps), abs(drives.base.v_right_mps))
+        self._peak_mps = max(self._peak_mps, rim_mps)
+        if rim_mps > self._world.robot.base.standstill_mps:
+            self._moved_at = clock.now
+        if any(axis.motor.powered for node in drives.nodes.values() for axis in node.axes):
+            self._power_off_at = math.inf
+        else:
+            self._power_off_at = min(self._power_off_at, clock.now)
+
+    @property
+    def run(self) -> Run:
+        """What was seen."""
+        base = self._world.drives.bench.base
+        stood = self._world.clock.now >= self._moved_at + RESTS_S - LOOK_S
+        distance_m = math.dist(self._from_m, (base.x_m, base.y_m))
+        time_s = self._moved_at - self._began if stood else math.inf
+        return Run(time_s, distance_m, self._power_off_at - self._began, self._peak_mps)
 
 
 def quantile(values: Iterable[float], share: float) -> float:
-    """The value below which `share` of them lie, the nearest one upward."""
+    """The least value that `share` of them do not exceed."""
     ordered = sorted(values)
-    return ordered[min(len(ordered) - 1, int(share * len(ordered)))]
+    return ordered[max(0, math.ceil(share * len(ordered)) - 1)]
 
 
-def row(fault: str, runs: Sequence[Run]) -> str:
-    """One line of the table."""
+def cells(twin: Twin, runs: Sequence[Run]) -> Row:
+    """The columns of docs/stop_times.md that are ours."""
     times, ways = [run.time_s for run in runs], [run.distance_m for run in runs]
-    spread = " | ".join(f"{quantile(times, share):.2f} s | {quantile(ways, share):.2f} m" for share in (0.5, 0.99, 1.0))
-    return f"| {FAULTS[fault].sentence} | {spread} | {max(run.peak_mps for run in runs):.2f} m/s |"
+    spread = (f"{_s(quantile(times, share))}, {quantile(ways, share) * 1000.0:.0f} mm" for share in (0.5, 0.99, 1.0))
+    lies = ("–", "–")
+    if twin.lies:
+        lies = _s(max(run.power_off_s for run in runs)), f"{max(run.peak_mps for run in runs):.2f} m/s"
+    return dict(zip(VIRTUAL, (str(len(runs)), *spread, *lies), strict=True))
 
 
-def table(title: str, faults: Sequence[str], runs: int) -> list[str]:
-    """The rows of one kind."""
-    start = Start()
-    lines = [f"| {title} | p50 | way | p99 | way | max | way | fastest wheel |", "|---|" + "---:|" * 7]
-    for fault in faults:
-        lines.append(row(fault, [measure(start, fault, seed) for seed in range(runs)]))
-        print(lines[-1], flush=True)
-    return lines
+def _s(seconds: float) -> str:
+    return f"{seconds:.2f} s" if math.isfinite(seconds) else "never"
 
 
-def main() -> None:
-    """Print the tables; with --write put them into a page, between its marks."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=20, help="of each fault")
+def measured(runs: int, workers: int, twins: Sequence[Twin] = TWINS) -> Iterator[tuple[Twin, list[Run]]]:
+    """Each row in one of `workers` processes, in their order."""
+    context = multiprocessing.get_context("spawn")
+    with context.Pool(workers, _begin) as pool:
+        indexes = [TWINS.index(twin) for twin in twins]
+        for index, found in zip(indexes, pool.imap(partial(_measure, runs), indexes), strict=True):
+            yield TWINS[index], found
+
+
+def _begin() -> None:
+    _cruises.update({by: Cruise(by) for by in (GOAL, JOYSTICK)})
+
+
+def _measure(runs: int, index: int) -> list[Run]:
+    twin = TWINS[index]
+    return [_cruises[twin.by].fork(twin, seed) for seed in range(runs)]
+
+
+def main() -> int:
+    """Print the rows; with --write put them into a page, between its marks."""
+    parser = argparse.ArgumentParser(prog="campaign.stops", description=__doc__)
+    parser.add_argument("--runs", type=int, default=RUNS, help="of each failure")
+    parser.add_argument("--workers", type=int, default=2, help="processes")
+    parser.add_argument("--only", default="", help="rows with this in their name")
     parser.add_argument("--write", type=Path, help="the page")
     given = parser.parse_args()
-    head = (
-        f"{given.runs} seeded runs each, driven at {SPEEDS_MPS[0]} to {SPEEDS_MPS[1]} m/s; the fault begins and stays, "
-        f"the stick is held for {RELEASED_S} s more. From the fault until the base stands for good; inf: it does not "
-        f"within {LONGEST_S} s."
-    )
-    lines = [head, "", *table("what stops being there", STOPS, given.runs), ""]
-    lines += table("what is not as it says", LIES, given.runs)
+    twins = [twin for twin in TWINS if given.only in f"{twin.what}: {twin.how}"]
+    out = Console()
+    found: dict[Key, Row] = {}
+    with Progress(console=out) as progress:
+        task = progress.add_task("", total=len(twins))
+        for twin, runs in measured(given.runs, given.workers, twins):
+            found[twin.key] = cells(twin, runs)
+            told = ", ".join(f"{name} {cell}" for name, cell in found[twin.key].items())
+            out.print(f"{twin.what}: {twin.how}: {told}", highlight=False, soft_wrap=True)
+            progress.update(task, advance=1, description=twin.what)
     if given.write is not None:
         page = given.write.read_text(encoding="utf-8")
-        given.write.write_text(rewritten(page, COMMAND, "\n".join(lines)), encoding="utf-8")
+        table = TABLE.merged(section(page, COMMANDS), found)
+        given.write.write_text(rewritten(page, COMMANDS, table), encoding="utf-8")
+    return int(any("never, " in cell for row in found.values() for cell in row.values()))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -55,7 +55,7 @@ class VelocityProcess(Process):
         now = self.clock.now
         self.mux = Mux(self._robot.mux.sources, status_timeout_s=status_timeout_s(self._robot.rates.status_hz))
         self.filter = SafetyFilter(FilterConfig.of(self._robot), self.disk.found())
-        self._sequence = 0
+        self._sequence, self._ending = 0, False
         self._mux_told: tuple[object, ...] = ()
         self._told: tuple[object, ...] = ()
         self._mux_state_at = self._state_at = -math.inf
@@ -63,6 +63,12 @@ class VelocityProcess(Process):
         self._mux_due = self._filter_due = now
         self._period_s = 1.0 / self._robot.rates.command_hz
         self.every(self._period_s / self._parts, self._on_timer, phase_s=0.003)
+
+    def end(self) -> None:
+        """It orders zero until the base stands."""
+        self._ending = True
+        self.filter.end()
+        self._issue(self.filter.shut_down(self.clock.now))
 
     def _on_timer(self) -> None:
         """Two timers that each message sets anew, at a quarter of their period's resolution."""
@@ -114,6 +120,8 @@ class VelocityProcess(Process):
 
     def _issue(self, decision: Decision) -> None:
         now = self.clock.now
+        if self._ending:
+            decision = self.filter.shut_down(now)
         self._filter_due = now + self._period_s
         self._sequence += 1
         stops = decision.action is Action.STOP

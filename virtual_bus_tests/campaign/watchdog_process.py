@@ -40,6 +40,10 @@ class WatchdogProcess(Process):
         self.core = Watchdog(self._config, self.clock.now, self.disk.past())
         self.every(self._tick_s, self._on_tick, phase_s=0.001)
 
+    def end(self) -> None:
+        """With a wheel in motion it stops it first."""
+        self.core.end(self.clock.now)
+
     def on_lease(self, datagram: bytes) -> None:
         """A datagram arrives at the socket."""
         self.receive("leases", FRAMES_HELD, self._on_lease, datagram)

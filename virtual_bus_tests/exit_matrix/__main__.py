@@ -13,16 +13,14 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from exit_matrix.marked import rewritten
-from exit_matrix.report import section, table
+from exit_matrix.marked import rewritten, section
+from exit_matrix.report import merged, table
 from exit_matrix.rows import ROWS, Row
 from exit_matrix.runner import Result, Runner
+from exit_matrix.stop_table import COMMANDS
 
 WIDTH = 140
 """Of the table where nobody tells how wide the terminal is."""
-
-COMMAND = "make exit-matrix"
-"""Names the part of a page that is ours."""
 
 PRIORITY = 25
 """Below the processes of the chain (`canbase_cli.priority`)."""
@@ -52,7 +50,9 @@ def main() -> int:
         console.print(f"what the processes said: {log}", soft_wrap=True)
     if arguments.write and not failed:
         page = arguments.write.read_text(encoding="utf-8")
-        arguments.write.write_text(rewritten(page, COMMAND, section(results)), encoding="utf-8")
+        arguments.write.write_text(
+            rewritten(page, COMMANDS, merged(section(page, COMMANDS), results)), encoding="utf-8"
+        )
     return 1 if failed or not results else 0
 
 

@@ -12,6 +12,7 @@ NOTHING: Final = "–"
 Key = tuple[str, ...]
 Row = Mapping[str, str]
 """Text by the name of its column."""
+Rows = Mapping[Key, Row]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +34,7 @@ class PageTable:
             found[tuple(row.get(key, NOTHING) for key in self.keys)] = row
         return found
 
-    def merged(self, section: str, new: Mapping[Key, Row], order: Iterable[Key] = ()) -> str:
+    def merged(self, section: str, new: Rows, order: Iterable[Key] = ()) -> str:
         """The table with the columns that `new` gives; every other row and column stays.
 
         Rows of `order` come first and in that order, the others as they were.

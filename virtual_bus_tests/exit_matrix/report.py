@@ -6,8 +6,10 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
-from exit_matrix.layers import ALLOWANCE_S, SPEED_MPS
+from exit_matrix.page_table import NOTHING, Rows
+from exit_matrix.rows import ROWS
 from exit_matrix.runner import Result
+from exit_matrix.stop_table import REAL, TABLE
 
 COLUMNS = ("what", "how", "who caught it", "stood after", "way", "limit")
 LEFT = 3
@@ -33,8 +35,12 @@ def cells(result: Result) -> tuple[str, ...]:
     return result.row.what, result.row.how, caught, *times
 
 
-def section(results: Sequence[Result]) -> str:
-    """The part of docs/stop_times.md that `make exit-matrix` writes."""
-    head = f"| {' | '.join(COLUMNS)} |\n|{'---|' * LEFT}{'---:|' * (len(COLUMNS) - LEFT)}"
-    rows = "\n".join(f"| {' | '.join(cells(result))} |" for result in results)
-    return f"Driven at {SPEED_MPS} m/s, {ALLOWANCE_S} s of allowance.\n\n{head}\n{rows}"
+def merged(before: str, results: Sequence[Result]) -> str:
+    """The part of docs/stop_times.md that was `before`, with the columns of real processes measured anew."""
+    rows: Rows = {(result.row.what, result.row.how): _row(result) for result in results}
+    return TABLE.merged(before, rows, [(row.what, row.how) for row in ROWS])
+
+
+def _row(result: Result) -> dict[str, str]:
+    _, _, caught, time, distance, limit = cells(result)
+    return dict(zip(REAL, (caught, limit, NOTHING if result.stop is None else f"{time}, {distance}"), strict=True))

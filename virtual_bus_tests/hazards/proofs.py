@@ -10,8 +10,10 @@ from __future__ import annotations
 import ast
 from functools import cache
 
-from exit_matrix.marked import marks
+from exit_matrix.marked import section
+from exit_matrix.page_table import NOTHING
 from exit_matrix.rows import ROWS
+from exit_matrix.stop_table import COMMANDS, REAL_RUN, TABLE
 from hazards.catalogue import ROOT, Catalogue
 from vm.guest.main import ALL
 
@@ -46,9 +48,10 @@ def _matrix_problem(name: str) -> str:
     if name not in {row.name for row in ROWS}:
         return f"{MATRIX}{name}: no such row in exit_matrix/rows.py"
     what, how = name.split(": ", 1)
-    begin, end = marks("make exit-matrix")
-    measured = STOP_TIMES.read_text(encoding="utf-8").partition(begin)[2].partition(end)[0]
-    return "" if f"| {what} | {how} |" in measured else f"{MATRIX}{name}: docs/stop_times.md has no measurement of it"
+    measured = TABLE.rows(section(STOP_TIMES.read_text(encoding="utf-8"), COMMANDS)).get((what, how), {})
+    if measured.get(REAL_RUN, NOTHING) == NOTHING:
+        return f"{MATRIX}{name}: docs/stop_times.md has no measurement of it"
+    return ""
 
 
 def _pytest_problem(name: str) -> str:

@@ -6,14 +6,16 @@ from pathlib import Path
 
 import pytest
 
+from campaign.twins import TWINS
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from exit_matrix import layers
 from exit_matrix.layers import Layer
 from exit_matrix.marked import rewritten
-from exit_matrix.report import section
+from exit_matrix.report import merged
 from exit_matrix.rows import ROWS
 from exit_matrix.runner import Result, judge
+from exit_matrix.stop_table import COMMANDS, TABLE
 from ros.running_robot import Standstill
 
 PROCESSES = ("motor_driver", "velocity process", "watchdog", "drive_distance_server", "client")
@@ -71,8 +73,23 @@ def test_a_row_fails_that_somebody_else_has_caught() -> None:
 
 def test_the_table_has_a_line_for_each_row() -> None:
     result = Result(ROW, (("drives", "heartbeat lost"),), Standstill(0.421, 0.1264), 0.75)
-    line = "| motor_driver | SIGKILL | drives: heartbeat lost | 0.42 s | 126 mm | 0.75 s |"
-    assert line in section([result]).splitlines()
+    line = "| motor_driver | SIGKILL | drives: heartbeat lost | 0.75 s | 0.42 s, 126 mm |" + " – |" * 6
+    assert line in merged("", [result]).splitlines()
+
+
+def test_real_rows_come_in_their_order_before_those_of_virtual_time_alone() -> None:
+    before = TABLE.merged("", {("encoder", "lost"): {"runs": "100"}})
+    lines = merged(before, [Result(row) for row in reversed(ROWS)]).splitlines()[2:]
+    assert [line.split(" | ")[:2] for line in lines[:-1]] == [[f"| {row.what}", row.how] for row in ROWS]
+    assert lines[-1] == "| encoder | lost | – | – | – | 100 | – | – | – | – | – |"
+
+
+def test_what_a_twin_in_virtual_time_is_called_is_a_row_of_the_matrix_or_of_none_of_its_names() -> None:
+    """A name that is spelt in two ways would make two rows."""
+    names, twins = {(row.what, row.how) for row in ROWS}, {twin.key for twin in TWINS}
+    alone = sorted(how for _, how in twins - names)
+    assert len(names & twins) >= 35
+    assert not [how for how in alone if any(how.lower() == real.lower() for _, real in names)]
 
 
 PAGE = """text
@@ -99,5 +116,5 @@ def test_a_page_without_both_marks_once_is_not_touched(page: str) -> None:
 def test_the_page_of_stop_times_has_the_marks() -> None:
     page = (Path(__file__).parents[2] / "docs" / "stop_times.md").read_text(encoding="utf-8")
 
-    for command in ("make exit-matrix", "make vm-test"):
+    for command in (COMMANDS, "make vm-test"):
         assert "new" in rewritten(page, command, "new")

@@ -84,6 +84,8 @@ class Axis:
     personality: Personality = GENERIC
     state: State = State.NOT_READY_TO_SWITCH_ON
     faults: AxisFaults = field(default_factory=AxisFaults)
+    ramp_up_mps2: float = AT_ONCE
+    """Its own ramp away from zero, where that is slower than 6083h: soft starts of the maker [m/s²]."""
     causes: set[int] = field(default_factory=set)
     """Error codes whose cause still holds; no fault reset before it is empty."""
     _base: int = field(default=0, init=False)
@@ -291,7 +293,8 @@ class Axis:
             return
         elif self._value(0x60) == PROFILE_VELOCITY:
             slope = self.scale.slope
-            self.motor.run(self._goal_mps(), slope(self._value(0x83)), slope(self._value(0x84)))
+            up = min(self.ramp_up_mps2, slope(self._value(0x83)))
+            self.motor.run(self._goal_mps(), up, slope(self._value(0x84)))
         else:
             self.motor.run(self._goal_mps(), AT_ONCE, AT_ONCE)
 

@@ -1,0 +1,46 @@
+"""Ordinary driving trips nothing: some robots for some seconds here, hours by `make soak`."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from campaign.ordinary import OrdinaryHour
+from campaign.soak import drive_all, told
+
+pytestmark = [pytest.mark.campaign, pytest.mark.timeout(600)]
+
+
+def test_robots_that_drive_as_they_should_are_not_stopped() -> None:
+    driven = list(drive_all(range(1, 7), 15.0, 2))
+    assert [told(each.trip) for each in driven if each.trip is not None] == []
+    assert sum(each.moving_s for each in driven) > 20.0
+    assert sum(each.path_m for each in driven) > 2.0
+
+
+def test_the_same_seed_drives_the_same_way() -> None:
+    assert [drive_all(range(3, 4), 8.0, 1).__next__() for _ in range(2)] == list(drive_all(range(3, 4), 8.0, 1)) * 2
+
+
+def test_a_drive_that_does_not_obey_is_told_with_its_robot_and_what_had_happened() -> None:
+    hour = OrdinaryHour(3)
+    assert len(hour.drawn.robot.drives) == 2, "alone on its side: no other motor turns its wheel"
+    assert hour.run(6.0) is None
+    hour.world.drives.axis(0).faults.ignores_setpoints = True
+    trip = hour.go_on(30.0)
+    assert trip is not None
+    lines = told(trip).splitlines()
+    assert lines[0].startswith("seed 3, after ")
+    assert "watchdog: " in lines[0]
+    assert "robot 3: " in lines[1]
+    assert len(lines) > 3
+
+
+def test_the_command_says_what_it_drove() -> None:
+    command = [sys.executable, "-m", "campaign.soak", "--hours", "0.001", "--seed", "1"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "1 robots, 0.00 h in virtual time" in done.stdout
+    assert "0 false trips" in done.stdout
