@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from canbase_config import latch_record
-from canbase_config.latch_record import SLOT, Found, Record
+from canbase_config.latch_record import SLOT, Defect, Found, Record
 from canbase_watchdog import latch
 from canbase_watchdog.latch import Entry, Past
 
@@ -19,10 +19,10 @@ class _File:
         self._sequence = 2
 
     def put(self, page: bytes, sequence: int) -> None:
-        """In place of the older page."""
+        """In place of the older page; of a file that was deleted nothing is left, and its writer does not notice."""
         at = latch_record.place_of(sequence)
-        assert self.data is not None
-        self.data[at : at + SLOT] = page
+        if self.data is not None:
+            self.data[at : at + SLOT] = page
         self._sequence = sequence
 
     @property
@@ -42,6 +42,11 @@ class StopDisk:
     def found(self) -> Found:
         """What a process finds that starts now."""
         return latch_record.read(bytes(self.file.data or b""), self._owner)
+
+    @property
+    def readable(self) -> bool:
+        """A process that starts now can read it."""
+        return self.found().defect is Defect.NONE
 
     def write(self, record: Record) -> tuple[Record | None, str]:
         """On disk at once; what the part is told of it."""
@@ -64,6 +69,11 @@ class WatchdogDisk:
     def past(self) -> Past:
         """What a watchdog finds that starts now."""
         return latch.decode(bytes(self.file.data or b""), self._owner)
+
+    @property
+    def readable(self) -> bool:
+        """A watchdog that starts now can read it."""
+        return not self.past().problem
 
     def write(self, entry: Entry) -> tuple[Entry | None, str]:
         """On disk at once; what the watchdog is told of it."""

@@ -6,20 +6,27 @@ Two worlds that differ in the fourth digit of a speed count as the same: that is
 
 from __future__ import annotations
 
+import marshal
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from enum import Enum
-from functools import partial
+from functools import cache, partial
 from random import Random
 from types import BuiltinFunctionType, FunctionType, GeneratorType, MethodType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from campaign.clock import Clock
 from campaign.process import Process, Topics
 from campaign.world import World
 from canbase_bench.cia301.dictionary import Dictionary
 
+if TYPE_CHECKING:
+    from small_worlds.properties import Properties
+    from small_worlds.world import SmallWorld
+
+PLAIN = 2
+"""The version of marshal's format in which equal values give equal bytes."""
 OLD_S = 1.05
 """Longer than any timeout of the small robot that ends in what the properties look at: what is older has run out."""
 EPOCH_S = 50.0
@@ -36,6 +43,8 @@ UNSEEN = frozenset((
     # what never changes
     "_robot", "robot", "_config", "config", "drive", "layout", "scale", "personality", "_geometry", "dictionary",
     "_timeouts", "clock", "_member", "_topics", "_late", "_kept", "_life", "_random", "_routes", "_handlers", "_values",
+    # only encoders that come and go, or jump, look at it
+    "_time_s",
     # of the records on the disk what was written last counts
     "file", "_owner", "_cycles", "reset",
 ))  # fmt: skip
@@ -63,51 +72,88 @@ class Canon:
         self._now = now
         self._known: dict[int, object] = {}
 
-    def form(self, thing: Any) -> object:
+    def form(self, thing: Any) -> Any:
         """`thing` as plain values; an object that is within itself ends there."""
-        kind = type(thing)
+        kind: Any = type(thing)
         if kind is float:
             return self._number(thing)
-        if thing is None or kind in (int, str, bytes, bool):
+        if kind in _PLAIN:
             return thing
-        if isinstance(thing, Enum):
-            return thing.name
-        if kind in (tuple, list, deque):
-            return tuple([self.form(each) for each in thing])
+        if kind in _SEQUENCES:
+            return tuple(self._forms(thing))
         if kind is dict:
             return tuple([(str(key), self.form(value)) for key, value in thing.items()])
-        if kind in (set, frozenset):
-            return tuple(sorted(str(each) for each in thing))
-        return self._object(thing)
+        if kind in _SETS:
+            return tuple(sorted([str(each) for each in thing]))
+        if _is_enum(kind):
+            return thing._name_
+        return "" if _is_fixed(kind) else self._object(thing, kind)
+
+    def _forms(self, things: Iterable[Any]) -> list[Any]:
+        number, form = self._number, self.form
+        told = []
+        for thing in things:
+            kind = type(thing)
+            told.append(number(thing) if kind is float else thing if kind in _PLAIN else form(thing))
+        return told
 
     def _number(self, number: float) -> object:
-        if not math.isfinite(number):
-            return str(number)
         age_s = self._now - number
-        if abs(age_s) < EPOCH_S:
+        if -EPOCH_S < age_s < EPOCH_S:
             return ("age", round(age_s, DIGITS) if age_s < OLD_S else "old")
-        return round(number, DIGITS) + 0.0
+        return round(number, DIGITS) + 0.0 if math.isfinite(number) else str(number)
 
-    def _object(self, thing: Any) -> object:
-        if isinstance(thing, _FIXED) or type(thing).__module__.startswith("canbase_config"):
-            return ""
-        if id(thing) not in self._known:
+    def _object(self, thing: Any, kind: Any) -> object:
+        known = self._known.get(id(thing))
+        if known is None:
             self._known[id(thing)] = "itself"
-            told = [self.form(value) for name, value in fields(thing) if name not in UNSEEN]
-            self._known[id(thing)] = (type(thing).__name__, *told)
-        return self._known[id(thing)]
+            known = self._known[id(thing)] = (kind.__name__, *self._forms(_seen(thing, kind)))
+        return known
 
 
-def fields(thing: Any) -> Iterable[tuple[str, Any]]:
-    """Name and value of each field, slots and all."""
-    names = [name for kind in type(thing).__mro__ for name in _slots(kind)]
-    yield from ((name, getattr(thing, name)) for name in names if hasattr(thing, name))
-    yield from getattr(thing, "__dict__", {}).items()
+_PLAIN = frozenset((int, str, bytes, bool, type(None)))
+_SEQUENCES = frozenset((tuple, list, deque))
+_SETS = frozenset((set, frozenset))
 
 
+def _seen(thing: Any, kind: Any) -> list[Any]:
+    """The value of each field that counts, slots and all."""
+    values = [getattr(thing, name) for name in _slots(kind) if hasattr(thing, name)]
+    return values + [value for name, value in getattr(thing, "__dict__", {}).items() if name not in UNSEEN]
+
+
+@cache
 def _slots(kind: type) -> tuple[str, ...]:
-    slots = vars(kind).get("__slots__", ())
-    return (slots,) if isinstance(slots, str) else tuple(slots)
+    names: list[str] = []
+    for base in kind.__mro__:
+        slots = vars(base).get("__slots__", ())
+        names += (slots,) if isinstance(slots, str) else slots
+    return tuple(name for name in names if name not in UNSEEN)
+
+
+@cache
+def _is_enum(kind: type) -> bool:
+    return issubclass(kind, Enum)
+
+
+@cache
+def _is_fixed(kind: type) -> bool:
+    return issubclass(kind, _FIXED) or kind.__module__.startswith("canbase_config")
+
+
+def told(small: SmallWorld, properties: Properties) -> bytes:
+    """All that decides, as bytes."""
+    now = small.world.clock.now
+    more = {
+        "ends": sorted((round(at_s - now, DIGITS), name) for at_s, name in small.ends),
+        "stick": (small.held, small.has_radio),
+        "button": small.around.pressed,
+        "disks": [(disk.file.writable, disk.readable) for disk in small.disks.values()],
+        "resets": len(small.resets) - sum(outcome.done for outcome in small.resets),
+        "properties": properties.memory,
+    }
+    told: Any = form(small.world, more)
+    return marshal.dumps(told, PLAIN)
 
 
 def form(world: World, more: Mapping[str, object]) -> tuple[object, ...]:

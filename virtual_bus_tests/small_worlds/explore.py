@@ -16,10 +16,11 @@ import resource
 import struct
 import time
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from small_worlds import canonical
+from small_worlds.copying import Snapshot
 from small_worlds.events import EVENTS, FAULT_EVENTS, OPERATOR_EVENTS, Event
 from small_worlds.properties import Found, Properties
 from small_worlds.world import POINT_S, SmallWorld
@@ -72,13 +73,13 @@ class Search:
 
 
 class _Shared:
-    """Memory that all forked branches share: the table of visited states, and three counters."""
+    """Memory that all processes share: the table of visited states, and three counters."""
 
-    SLOTS = 1 << 21
+    SLOTS = 1 << 22
     _HEAD = 24
 
     def __init__(self) -> None:
-        self._memory = mmap.mmap(-1, self._HEAD + 8 * self.SLOTS)
+        self._memory = mmap.mmap(-1, self._HEAD + 16 * self.SLOTS)
 
     def count(self, at: int) -> int:
         return int(struct.unpack_from("<Q", self._memory, 8 * at)[0])
@@ -86,113 +87,145 @@ class _Shared:
     def add(self, at: int) -> None:
         struct.pack_into("<Q", self._memory, 8 * at, self.count(at) + 1)
 
-    def is_new(self, key: int) -> bool:
-        """Whether it was not in the table; it is now. Raises MemoryError when the table is full."""
+    def seen(self, key: int, what: int) -> int:
+        """What was noted for `key` before; `what` is noted too. Raises MemoryError when the table is full."""
         slot = key % self.SLOTS
         for _ in range(self.SLOTS):
-            at = self._HEAD + 8 * slot
-            there = struct.unpack_from("<Q", self._memory, at)[0]
-            if there == key:
-                return False
-            if there == 0:
-                struct.pack_into("<Q", self._memory, at, key)
-                return True
+            at = self._HEAD + 16 * slot
+            there, noted = struct.unpack_from("<QQ", self._memory, at)
+            if there in (0, key):
+                struct.pack_into("<QQ", self._memory, at, key, noted | what)
+                return int(noted)
             slot = (slot + 1) % self.SLOTS
         raise MemoryError("more states than the table of visited ones has room for")
 
 
 STATES, STEPS, UNFINISHED = 0, 1, 2
+COLLECTED = (30_000, 5, 5)
+"""Worlds refer to themselves: many are thrown away at once."""
+ALL = (*FAULT_EVENTS, *OPERATOR_EVENTS)
 
 
-class _Branch:
-    """One process: a world, what has happened in it, and what may still happen."""
+@dataclass(frozen=True, slots=True)
+class _Left:
+    """What may still happen."""
 
-    def __init__(self, start: str, bounds: Bounds, shared: _Shared, writer: int, part: tuple[int, int]) -> None:
-        """`part`: of the first events it takes those of this remainder, of so many processes beside each other."""
-        self._start, self._bounds, self._shared, self._writer, self._part = start, bounds, shared, writer, part
-        self._small = SmallWorld(start)
-        self._properties = Properties(self._small)
-        self._began = self._small.world.clock.now
-        self._events: list[tuple[float, str]] = []
-        self._faults, self._operator = bounds.faults, bounds.operator
-        self._first = 0
+    faults: int
+    operator: int
 
-    def explore(self, least: int = 0) -> None:
+    def after(self, event: Event) -> _Left:
+        """When `event` has happened."""
+        if event in FAULT_EVENTS:
+            return _Left(self.faults - 1, self.operator)
+        return _Left(self.faults, self.operator - 1)
+
+    def allows(self, event: Event) -> bool:
+        """Whether it may happen still."""
+        return (self.faults if event in FAULT_EVENTS else self.operator) > 0
+
+    @property
+    def bit(self) -> int:
+        return 1 << self.faults * 8 + self.operator
+
+    @property
+    def as_much(self) -> int:
+        """The bits of all that has at least as much left."""
+        return sum(_Left(f, o).bit for f in range(self.faults, 4) for o in range(self.operator, 8))
+
+
+class _World:
+    """One world, and what has happened in it."""
+
+    def __init__(self, start: str) -> None:
+        self.start = start
+        self.small = SmallWorld(start)
+        self.properties = Properties(self.small)
+        self.began = self.small.world.clock.now
+        self.events: list[tuple[float, str]] = []
+
+    def happens(self, event: Event) -> None:
+        self.events.append((self.small.world.clock.now - self.began, event.name))
+        self.small.happens(event)
+
+
+class _Worker:
+    """One process of the search."""
+
+    def __init__(self, bounds: Bounds, shared: _Shared, writer: int) -> None:
+        self._bounds, self._shared, self._writer = bounds, shared, writer
+
+    def explore(self, world: _World, left: _Left, least: int = 0) -> None:
         """Everything that may happen from here on; now only events from the row `least` on."""
+        for snapshot, rows in self.nothing_happens(world, left, least):
+            for row in rows:
+                self.branch(snapshot, row, left)
+
+    def branch(self, snapshot: Snapshot, row: int, left: _Left) -> None:
+        """The event of this row happens, and everything that may come after it."""
+        world: _World = snapshot.restore()
+        if self._guard(world, lambda: world.happens(ALL[row])):
+            self.explore(world, left.after(ALL[row]), row)
+
+    def nothing_happens(self, world: _World, left: _Left, least: int) -> list[tuple[Snapshot, list[int]]]:
+        """From here on, until the world was there before; its points, and what may happen at each."""
+        points: list[tuple[Snapshot, list[int]]] = []
         for point in range(round(LONGEST_S / POINT_S)):
-            for row, event in self._choices(point, least):
-                child = os.fork() if self._is_mine() else -1
-                if child == 0:
-                    self._branch(row, event)
-                if child > 0:
-                    os.waitpid(child, 0)
-            least = 0
-            if not self._pass(point + 1):
-                return
+            rows = [] if point % self._bounds.every else self._rows(world, left, 0 if point else least)
+            if rows:
+                points.append((Snapshot(world), rows))
+            if not self._pass(world, left, (point + 1) % self._bounds.every):
+                return points
         self._shared.add(UNFINISHED)
+        return points
 
-    def _choices(self, point: int, least: int) -> Iterator[tuple[int, Event]]:
-        if point % self._bounds.every:
-            return
-        running = {name for _, name in self._small.ends}
-        for row, event in enumerate(ALL):
-            left = self._faults if event in FAULT_EVENTS else self._operator
-            wanted = event.name in (self._bounds.only or EVENTS)
-            if row >= least and left and wanted and event.name not in running:
-                yield row, event
+    def _rows(self, world: _World, left: _Left, least: int) -> list[int]:
+        return [row for row, event in enumerate(ALL) if row >= least and left.allows(event) and self._may(world, event)]
 
-    def _is_mine(self) -> bool:
-        """The first event of a story says which process goes on with it."""
-        self._first += not self._events
-        return bool(self._events) or self._first % self._part[1] == self._part[0]
+    def _may(self, world: _World, event: Event) -> bool:
+        wanted = not self._bounds.only or event.name in self._bounds.only
+        over = all(name != event.name for _, name in world.small.ends)
+        due = any(name.startswith(event.after) for _, name in world.events) or not event.after
+        return wanted and over and due and event.may(world.small)
 
-    def _branch(self, row: int, event: Event) -> None:
-        """The whole life of a forked process: it never returns."""
-        status = 1
-        try:
-            self._events.append((self._small.world.clock.now - self._began, event.name))
-            self._faults -= event in FAULT_EVENTS
-            self._operator -= event in OPERATOR_EVENTS
-            self._small.happens(event)
-            self.explore(row)
-            status = 0
-        except Exception:  # noqa: BLE001 - whatever a core raises is what this search is for
-            self._tell(Found("exception", self._small.world.clock.now, traceback.format_exc(limit=-3)))
-            status = 0
-        finally:
-            os._exit(status)
-
-    def _pass(self, point: int) -> bool:
+    def _pass(self, world: _World, left: _Left, phase: int) -> bool:
         """Time passes up to the next point. False: something did not hold, or the world was there before."""
-        self._small.pass_to_point()
         self._shared.add(STEPS)
-        if self._properties.found is not None:
-            self._tell(self._properties.found)
+        if not self._guard(world, world.small.pass_to_point):
             return False
-        is_new = self._shared.is_new(self._key(point))
+        if world.properties.found is not None:
+            self._tell(world, world.properties.found)
+            return False
+        is_new = self._is_new(world, left, phase)
         self._shared.add(STATES) if is_new else None
         return is_new
 
-    def _key(self, point: int) -> int:
-        small = self._small
-        now = small.world.clock.now
-        more = {
-            "left": (point % self._bounds.every, self._faults, self._operator),
-            "ends": sorted((round(at_s - now, 3), name) for at_s, name in small.ends),
-            "stick": (small.held, small.has_radio),
-            "button": small.around.pressed,
-            "resets": len(small.resets) - sum(outcome.done for outcome in small.resets),
-            "properties": self._properties.memory,
-        }
-        told = repr(canonical.form(small.world, more)).encode()
-        return int.from_bytes(hashlib.blake2b(told, digest_size=8).digest(), "little") or 1
+    def _guard(self, world: _World, do: Callable[[], None]) -> bool:
+        try:
+            do()
+        except Exception:  # noqa: BLE001 - whatever a core raises is what this search is for
+            now = world.small.world.clock.now
+            self._tell(world, Found("exception", now, traceback.format_exc(limit=-3)))
+            return False
+        return True
 
-    def _tell(self, found: Found) -> None:
-        told = [self._start, self._events, found.name, found.at_s - self._began, found.detail[:1500]]
+    def _is_new(self, world: _World, left: _Left, phase: int) -> bool:
+        """Not, where a world like it was seen to which as much may happen, as soon."""
+        told = canonical.told(world.small, world.properties)
+        before = self._shared.seen(_hash(told, b""), left.bit)
+        if left == NOTHING:
+            return not before & left.as_much
+        return not self._shared.seen(_hash(told, bytes((phase,))), left.bit) & left.as_much
+
+    def _tell(self, world: _World, found: Found) -> None:
+        told = [world.start, world.events, found.name, found.at_s - world.began, found.detail[:1500]]
         os.write(self._writer, json.dumps(told).encode() + b"\n")
 
 
-ALL = (*FAULT_EVENTS, *OPERATOR_EVENTS)
+NOTHING = _Left(0, 0)
+
+
+def _hash(told: bytes, salt: bytes) -> int:
+    return int.from_bytes(hashlib.blake2b(told, digest_size=8, salt=salt).digest(), "little") or 1
 
 
 def search(bounds: Bounds, starts: Sequence[str], workers: int = 2) -> Search:
@@ -200,9 +233,7 @@ def search(bounds: Bounds, starts: Sequence[str], workers: int = 2) -> Search:
     began, used_s = time.perf_counter(), _cpu_s()
     shared = _Shared()
     reader, writer = os.pipe()
-    gc.collect()
-    gc.freeze()
-    children = [_worker(starts, bounds, shared, (reader, writer), (at, workers)) for at in range(workers)]
+    children = _fork(bounds, starts, shared, (reader, writer), workers)
     os.close(writer)
     with os.fdopen(reader, "rb") as pipe:
         stories = [_story(line) for line in pipe]
@@ -213,29 +244,51 @@ def search(bounds: Bounds, starts: Sequence[str], workers: int = 2) -> Search:
     return Search(*counts, _cpu_s() - used_s, time.perf_counter() - began, stories)
 
 
-def _cpu_s() -> float:
-    """Of all processes that this one has waited for."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+def _fork(bounds: Bounds, starts: Sequence[str], shared: _Shared, pipe: tuple[int, int], workers: int) -> list[int]:
+    """The processes of the search. Each takes the next task when it has done one: a first event at some point."""
+    first = _Worker(bounds, shared, pipe[1])
+    left = _Left(bounds.faults, bounds.operator)
+    tasks = [
+        (snapshot, row)
+        for start in starts
+        for snapshot, rows in first.nothing_happens(_World(start), left, 0)
+        for row in rows
+    ]
+    todo, give = os.pipe()
+    os.write(give, b"".join(struct.pack("<H", number) for number in range(len(tasks))))
+    os.close(give)
+    children = []
+    for _ in range(workers):
+        child = os.fork()
+        if child == 0:
+            _work(first, tasks, left, todo, pipe[0])
+        children.append(child)
+    os.close(todo)
+    return children
 
 
-def _worker(
-    starts: Sequence[str], bounds: Bounds, shared: _Shared, pipe: tuple[int, int], part: tuple[int, int]
-) -> int:
-    child = os.fork()
-    if child:
-        return child
+def _work(worker: _Worker, tasks: list[tuple[Snapshot, int]], left: _Left, todo: int, reader: int) -> None:
+    """The whole life of a forked process: it never returns."""
     status = 1
-    gc.disable()
     try:
-        os.close(pipe[0])
-        for start in starts:
-            _Branch(start, bounds, shared, pipe[1], part).explore()
+        os.close(reader)
+        gc.collect()
+        gc.freeze()
+        gc.set_threshold(*COLLECTED)
+        while number := os.read(todo, 2):
+            snapshot, row = tasks[struct.unpack("<H", number)[0]]
+            worker.branch(snapshot, row, left)
         status = 0
     except BaseException:  # noqa: BLE001 - told, and an exit code
         traceback.print_exc()
     finally:
         os._exit(status)
+
+
+def _cpu_s() -> float:
+    """Of all processes that this one has waited for."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def _story(line: bytes) -> Story:

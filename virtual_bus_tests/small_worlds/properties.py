@@ -67,7 +67,10 @@ class Properties:
         self._latched: _Hold | None = None
         self._neutral: _Hold | None = None
         self._was_enabled = small.world.driver.core.state is DriverState.ENABLED
-        self._velocity_core: object = small.world.velocity.filter
+        self._lives = self._cores()
+        self._with_power = {part.name: False for part in small.parts}
+        """Whether there was power when the part was seen alive last."""
+        self._born: set[str] = set()
         self._resets, self._freed, self._watchdog_answer = len(small.resets), small.freed, (0, Answer.NONE)
         self._watching_at = self._fast_since = self._pressed_at = now
         self._alive_at = {part.name: now for part in small.parts}
@@ -79,7 +82,7 @@ class Properties:
     @property
     def memory(self) -> dict[str, object]:
         """What the properties remember: a part of a world's state."""
-        return {name: value for name, value in vars(self).items() if name not in ("_small", "_world", "_velocity_core")}
+        return {name: value for name, value in vars(self).items() if name not in ("_small", "_world", "_lives")}
 
     def _violate(self, name: str, detail: str) -> None:
         if self.found is None:
@@ -96,6 +99,7 @@ class Properties:
         base = world.drives.bench.base
         tau_s = moving_s(world.robot, base.v_mps, base.w_radps)
         coasting = tau_s > 0.0 and self._coasts()
+        self._note_new_lives(now)
         self._note_latches(now)
         self._note_starts(now)
         self._check_motion(tau_s, coasting, now)
@@ -104,6 +108,22 @@ class Properties:
         self._check_cut_off(tau_s, now)
         self._check_runaway(now)
         world.clock.after(STEP_S, self._step)
+
+    def _cores(self) -> dict[str, object]:
+        world = self._world
+        return {"driver": world.driver.core, "watchdog": world.watchdog.core, "velocity": world.velocity.filter}
+
+    def _note_new_lives(self, now: float) -> None:
+        """Who died while there was power, or whose record of stops cannot be read, comes back latched."""
+        before, self._lives = self._lives, self._cores()
+        self._born = {name for name, core in self._lives.items() if core is not before[name]}
+        for part in self._small.parts:
+            if part.name in self._born and not self._small.disks[part.name].readable:
+                self._latches.add("emergency stop" if part.name == "velocity" else part.name)
+            if part.name in self._born and part.name != "velocity" and self._with_power[part.name]:
+                self._latches.add(part.name)
+            if part.alive:
+                self._with_power[part.name] = self._powered()
 
     def _note_latches(self, now: float) -> None:
         """A latch is noted where it is seen, and forgotten by an accepted reset of its own part alone."""
@@ -134,9 +154,9 @@ class Properties:
         """Enabled, or a filter that is new: who holds the stick then has to show zero first."""
         world = self._world
         is_enabled = world.driver.alive and world.driver.core.state is DriverState.ENABLED
-        starts = (is_enabled and not self._was_enabled) or world.velocity.filter is not self._velocity_core
-        self._was_enabled, self._velocity_core = is_enabled, world.velocity.filter
-        if starts and self._small.held:
+        starts = is_enabled and not self._was_enabled
+        self._was_enabled = is_enabled
+        if (starts or "velocity" in self._born) and self._small.held:
             self._neutral = _Hold(self._react_s, now)
 
     def _check_motion(self, tau_s: float, coasting: bool, now: float) -> None:

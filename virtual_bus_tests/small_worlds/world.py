@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from campaign.clock import Pace
+from campaign.disk import StopDisk, WatchdogDisk
 from campaign.outside import Surroundings
 from campaign.process import Process
 from campaign.robots import campaign_robot
 from campaign.world import World
 from canbase_config.robot import Robot
+from canbase_driver.readiness import Aim
 from canbase_driver.reset import Outcome
 from canbase_velocity.twist import ZERO, Twist
-from small_worlds.events import EVER_S, Event
+from small_worlds.events import EVENTS, EVER_S, Event
 
 STEP_S = 0.05
 """Of all timers."""
@@ -30,22 +33,27 @@ COARSE = Pace(
     plant_step_s=STEP_S / 5.0,
     bandwidth_radps=40.0,
 )
+TORN_AT = 100
+"""A byte of the first of two pages."""
 STICK_S = 0.1
 """Between two messages of the joystick."""
 SPEED_MPS = 0.4
 SETTLES_S = 2.4
-STARTS = ("driving", "standing", "stopped", "stopped, stick held")
-"""Where a search begins: stick held since the start, nobody there, latched by a stop, and that with the stick held."""
 
 
 def small_robot() -> Robot:
-    """The campaign's robot with the slowest loops that its timeouts allow."""
+    """The campaign's robot with the slowest loops that its timeouts allow, and with the fastest drives."""
     robot = campaign_robot()
+    watchdog = robot.watchdog.model_copy(update={"slowest_ramp_mps2": robot.limits.acceleration_mps2})
     rates = robot.rates.model_copy(
         update={"control_hz": 1.0 / STEP_S, "command_hz": 1.0 / STEP_S, "odometry_hz": 1.0, "status_hz": 25.0}
     )
     timeouts = robot.timeouts.model_copy(update={"feedback_s": 0.2})
-    return robot.model_copy(update={"rates": rates, "timeouts": timeouts})
+    return robot.model_copy(update={"rates": rates, "timeouts": timeouts, "watchdog": watchdog})
+
+
+def _nobody(outcome: object) -> None:
+    """Nobody waits for it."""
 
 
 class SmallWorld:
@@ -57,6 +65,11 @@ class SmallWorld:
         self.world.bus.bitrate = math.inf  # type: ignore[assignment]
         self.around: Surroundings = Surroundings(self.world)
         self.parts: tuple[Process, ...] = (self.world.driver, self.world.watchdog, self.world.velocity)
+        self.disks: dict[str, StopDisk | WatchdogDisk] = {
+            "driver": self.world.driver.disk,
+            "watchdog": self.world.watchdog.disk,
+            "velocity": self.world.velocity.disk,
+        }
         self.resets: list[Outcome] = []
         self.freed = 0
         self.asked_s: list[float] = []
@@ -66,9 +79,9 @@ class SmallWorld:
         """What holds now, and until when."""
         self.world.processes["action"].die()
         self.world.enable()
-        {"driving": self._drive, "standing": lambda: None, "stopped": self._stop,
-         "stopped, stick held": self._stop_and_hold}[start]()  # fmt: skip
-        self.pass_to_point(SETTLES_S)
+        for do in BEGINS[start]:
+            do(self)
+            self.pass_to_point(SETTLES_S)
 
     def pass_to_point(self, least_s: float = POINT_S) -> None:
         """At least so much time passes, up to a moment at which something may happen: just after all timers."""
@@ -82,7 +95,7 @@ class SmallWorld:
             clock = self.world.clock
             end = clock.now - AFTER_S + event.lasts_s
             self.ends.append((end, event.name))
-            clock.at(end, self._over, event)
+            clock.at(end, self._over, event.name)
         elif event.once:
             self.ends.append((math.inf, event.name))
 
@@ -103,22 +116,35 @@ class SmallWorld:
             self.freed += 1
         self.world.driver.reset(self.resets)
 
-    def _over(self, event: Event) -> None:
-        self.ends = [end for end in self.ends if end[1] != event.name]
-        event.end(self)
+    def turn_lifecycle(self) -> None:
+        """Deactivate the driver if it is active, activate it if it is not."""
+        core = self.world.driver.core
+        core.request_aim(Aim.CONFIGURED if core.aim is Aim.ACTIVE else Aim.ACTIVE, self.world.clock.now, _nobody)
+
+    def kill_and_tear(self, name: str) -> None:
+        """A process dies while it writes its record of stops: one of the two pages is not whole."""
+        self.world.processes[name].die()
+        data = self.disks[name].file.data
+        if data is not None:
+            data[TORN_AT] ^= 0xFF
+
+    def _over(self, name: str) -> None:
+        self.ends = [end for end in self.ends if end[1] != name]
+        EVENTS[name].end(self)
 
     def _send(self) -> None:
         if self.has_radio:
             self.world.topics.publish("cmd_vel_joy", Twist(SPEED_MPS, 0.0) if self.held else ZERO)
         self.world.clock.after(STICK_S, self._send)
 
-    def _drive(self) -> None:
-        self.turn_stick()
 
-    def _stop(self) -> None:
-        self.world.driver.stop()
-
-    def _stop_and_hold(self) -> None:
-        self._stop()
-        self.pass_to_point(SETTLES_S)
-        self.turn_stick()
+BEGINS: dict[str, tuple[Callable[[SmallWorld], None], ...]] = {
+    "stopped": (lambda small: small.world.driver.stop(),),
+    "stopped, stick held": (lambda small: small.world.driver.stop(), SmallWorld.turn_stick),
+    "pressed, stick held": (lambda small: small.around.press(True), SmallWorld.turn_stick),
+    "inactive, stick held": (SmallWorld.turn_lifecycle, SmallWorld.turn_stick),
+    "standing": (lambda small: None,),
+    "driving": (SmallWorld.turn_stick,),
+}
+STARTS = tuple(BEGINS)
+"""Where a search begins: latched by a stop, the emergency stop pressed, the driver not active, ready, and driving."""

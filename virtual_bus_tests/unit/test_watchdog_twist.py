@@ -94,6 +94,15 @@ def test_a_curve_that_nobody_ordered_trips_after_its_time() -> None:
     assert straight(twist_s=0.5).trips_after((0.25, 0.25), (0.125, 0.25)) == 32
 
 
+def test_however_long_it_was_outside_as_long_inside_as_it_takes_to_trip_makes_up_for_it() -> None:
+    base = straight()
+    for _ in range(640):
+        base.cycle((0.25, 0.25), (0.125, 0.25))
+    for _ in range(24):  # 0.25 s, and the smoothing
+        base.cycle((0.25, 0.25))
+    assert base.trips_after((0.25, 0.25), (0.125, 0.25)) == 16
+
+
 def test_from_a_stand_each_cycle_counts() -> None:
     assert Base().trips_after((0.0, 0.0), (0.0, 0.25)) == 16
     assert Base().trips_after((0.0, 0.0), (0.25, 0.25)) == 16

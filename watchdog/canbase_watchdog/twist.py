@@ -3,7 +3,7 @@
 A base that is ordered straight on, with one slow wheel, turns. So the measured twist must be between standstill and
 what the setpoints of the last `drive_lag_s` ordered. After that the range falls to a new order as slowly as wheels on
 the slowest ramp get there, one of them after the other. Speeds are smoothed, as the noise of two wheels adds up. The
-time outside adds up, and goes down as fast while the base is inside (docs/decisions/0020).
+time outside adds up to `twist_s`, and goes down as fast while the base is inside (docs/decisions/0020).
 """
 
 from __future__ import annotations
@@ -68,7 +68,8 @@ class TwistWatch:
         bounds = self._bounds(bus, elapsed_s, now)
         self._smooth([axis.velocity_mps for axis in bus.axes], elapsed_s)
         why = self._why(bus, bounds)
-        self._outside_s = max(0.0, self._outside_s + (elapsed_s if why else -elapsed_s))
+        outside_s = self._outside_s + (elapsed_s if why else -elapsed_s)
+        self._outside_s = min(max(0.0, outside_s), self._config.twist_s)
         return why if self._outside_s >= self._config.twist_s else ""
 
     def _bounds(self, bus: BusView, elapsed_s: float, now: float) -> Bounds:
