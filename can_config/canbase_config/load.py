@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import resources
@@ -15,6 +16,7 @@ from canbase_config.errors import ConfigError, Loc, Problem
 from canbase_config.explain import explain
 from canbase_config.robot import Robot
 from canbase_config.ros_params import plain
+from canbase_config.runtime_folder import with_runtime_folder
 from canbase_config.schema import Schema
 from canbase_config.stop_checks import uncertain_stops
 from canbase_config.twist_mux import with_twist_mux
@@ -47,7 +49,8 @@ def load_robot(path: str | Path) -> Loaded:
     alone = plain(read_yaml(path))
     file = with_twist_mux(alone)
     try:
-        robot = Robot.model_validate(file.values, context={"folder": file.path.parent})
+        values = with_runtime_folder(file.values, os.environ, os.geteuid())
+        robot = Robot.model_validate(values, context={"folder": file.path.parent})
     except ValidationError as error:
         raise ConfigError(explain(error, file, ROBOT_SCHEMA)) from error
     keys = frozenset(leaf_keys(robot.model_dump()))

@@ -148,7 +148,9 @@ class Timeouts(Section):
 class Lease(Section):
     """The Unix datagram socket on which the safety filter tells the watchdog what it ordered."""
 
-    socket: Annotated[str, Field(min_length=1, max_length=100, description="path; its folder is made if missing")]
+    socket: Annotated[
+        str, Field(min_length=1, max_length=100, description="path, also below $XDG_RUNTIME_DIR; its folder is made")
+    ]
     uid: (
         Annotated[
             int, Field(ge=0, le=2**32 - 2, description="number of the only user whose leases count; none: watchdog's")

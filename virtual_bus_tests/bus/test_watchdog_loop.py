@@ -175,15 +175,34 @@ def test_the_lease_socket_is_for_its_owner_and_goes_with_the_process(tmp_path: P
     assert not path.exists()
 
 
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a socket away")
 def test_the_lease_socket_of_another_user_can_be_written_by_it(tmp_path: Path) -> None:
     path = tmp_path / "run" / "lease"
     with LeaseSocket(str(path), 12345):
-        found = path.stat()
-        if os.geteuid() == 0:  # it is that user's: nobody else can fill its queue
-            assert (found.st_mode & 0o777, found.st_uid) == (0o600, 12345)
-        else:
-            assert found.st_mode & 0o777 == 0o666
+        found = path.stat()  # nobody else can fill its queue
+        assert (found.st_mode & 0o777, found.st_uid) == (0o600, 12345)
         assert path.parent.stat().st_mode & 0o777 == 0o755
+
+
+def test_without_root_no_socket_is_made_for_another_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    me = os.getuid() or 1000
+    monkeypatch.setattr(os, "geteuid", lambda: me)
+    path = tmp_path / "run" / "lease"
+    with pytest.raises(LeaseSocketError, match=f"lease.uid is 12345, this is user {me}: only root"):
+        LeaseSocket(str(path), 12345)
+    assert not path.parent.exists()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can make a link of another user")
+def test_a_folder_that_is_a_link_of_another_user_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir(0o700)
+    link = tmp_path / "run"
+    link.symlink_to(tmp_path / "there")
+    with LeaseSocket(str(link / "lease"), 0):
+        pass
+    os.lchown(link, 12345, -1)
+    with pytest.raises(LeaseSocketError, match="is a link of user 12345"):
+        LeaseSocket(str(link / "lease"), 0)
 
 
 def test_a_folder_that_others_may_change_is_refused(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import selectors
 import socket
 from dataclasses import asdict
@@ -106,7 +107,10 @@ class ControlServer:
 
 def _listen(path: Path) -> socket.socket:
     """A listening socket at `path`; one that a dead simulator left behind is replaced."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    owner = path.parent.stat().st_uid
+    if owner not in (0, os.geteuid()):
+        raise ControlError(f"the folder {path.parent} belongs to user {owner}, this is user {os.geteuid()}")
     if path.is_socket():
         _remove_if_dead(path)
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)

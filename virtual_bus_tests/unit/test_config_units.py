@@ -104,7 +104,7 @@ def test_the_watchdog_is_told_what_the_bench_sample_says() -> None:
     assert (config.slow_wheel_share, config.slow_wheel_s, config.slowest_ramp_mps2) == pytest.approx((0.3, 0.5, 0.2))
     assert (config.twist_tolerance_mps, config.twist_tolerance_share, config.twist_s) == (0.01, 0.08, 0.5)
     assert [drive.answers_sync for drive in config.drives] == [True, True]
-    assert config.lease_socket == "/tmp/canbase-bench/lease.sock"
+    assert config.lease_socket.endswith("canbase-bench/lease.sock")
 
 
 def test_the_fastest_wheel_is_one_that_goes_straight_or_turns_in_place() -> None:

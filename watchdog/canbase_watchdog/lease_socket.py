@@ -26,7 +26,13 @@ class LeaseSocket:
     def __init__(self, path: str, uid: int) -> None:
         """Binds `path` for the user `uid` to send to; makes its folder. Raises LeaseSocketError with what to do."""
         self._path = Path(path)
-        foreign = uid != os.getuid()
+        foreign = uid != os.geteuid()
+        if foreign and os.geteuid() != 0:
+            raise LeaseSocketError(
+                f"lease.uid is {uid}, this is user {os.geteuid()}: only root can give the lease socket to another user "
+                "alone, and one that everybody may write to can be filled by anybody. Start the watchdog as root or as "
+                "the user of the safety filter, and leave lease.uid out for the latter"
+            )
         try:
             self._path.parent.mkdir(mode=0o755 if foreign else 0o700, parents=True, exist_ok=True)
             _check_folder(self._path.parent)
@@ -35,9 +41,9 @@ class LeaseSocket:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
             self._socket.setblocking(False)
             self._socket.bind(path)
-            if foreign and os.geteuid() == 0:
+            self._path.chmod(0o600)
+            if foreign:
                 os.chown(path, uid, -1)  # nobody else can fill its queue
-            self._path.chmod(0o600 if not foreign or os.geteuid() == 0 else 0o666)
         except OSError as error:
             raise LeaseSocketError(f"the lease socket {path} cannot be bound: {error}. Check lease.socket.") from error
 
@@ -72,7 +78,9 @@ def _sender(ancillary: list[tuple[int, int, bytes]]) -> tuple[int | None, int | 
 
 def _check_folder(folder: Path) -> None:
     """Whoever may change the folder of the socket can put another socket in its place. Raises LeaseSocketError."""
-    found = folder.stat()
+    link, found = folder.lstat(), folder.stat()
+    if stat.S_ISLNK(link.st_mode) and link.st_uid not in (0, os.geteuid()):
+        raise LeaseSocketError(f"the folder {folder} of the lease socket is a link of user {link.st_uid}. Remove it")
     if found.st_uid not in (0, os.geteuid()):
         raise LeaseSocketError(
             f"the folder {folder} of the lease socket belongs to user {found.st_uid}, this is user {os.geteuid()}: "
