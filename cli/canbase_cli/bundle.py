@@ -10,6 +10,7 @@ import sys
 import tarfile
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from importlib.metadata import distributions
 from pathlib import Path
 from types import MappingProxyType
@@ -35,6 +36,8 @@ MOST_FILES: Final = 200
 STATE: Final = Path("/var/lib/canbase")
 ETC: Final = Path("/etc/canbase")
 UNITS: Final = Path("/etc/systemd/system")
+PARTS: Final = ("driver", "watchdog", "velocity")
+"""Whose records of stops there are."""
 _KEY: Final = "it may be a key; such files are never taken"
 
 
@@ -130,6 +133,7 @@ def collect(
     for path in _listed(bundle, "config/installed/installed", etc / "installed", (".txt",)):
         bundle.file(f"config/installed/installed/{path.name}", path)
     _black_boxes(bundle, robot, state)
+    _records(bundle, robot.name if robot else config.stem, state)
     services = doctor_environment(config, robot.name if robot else config.stem, etc)
     for command in support.commands(config, since, services):
         bundle.output(command)
@@ -183,6 +187,40 @@ def _black_boxes(bundle: Bundle, robot: Robot | None, state: Path) -> None:
         bundle.missing["black_box"] = f"no recording of a stop {whose} in {', '.join(map(str, folders))}"
     for path in newest:
         bundle.file(f"black_box/{path.name}", path)
+
+
+def _records(bundle: Bundle, robot: str, state: Path) -> None:
+    """What the parts have on disk about their stops, in words: the files name the computer by a number of its own."""
+    from canbase_config.latch_file import SUFFIX, latch_folder
+
+    folders = {"installed": state / robot, "user": latch_folder(os.environ, Path.home(), robot)}
+    places = {
+        f"stops/{name}/{part}.txt": folder / f"{part}{SUFFIX}" for name, folder in folders.items() for part in PARTS
+    }
+    found = {name: path for name, path in places.items() if os.path.lexists(path)}
+    for name, path in found.items():
+        bundle.text(name, str(path), partial(_record_text, path, robot))
+    if not found:
+        bundle.missing["stops"] = f"no record of stops of {robot} in {', '.join(map(str, folders.values()))}"
+
+
+def _record_text(path: Path, robot: str) -> str:
+    from canbase_config import latch_record
+    from canbase_config.foreign_text import printable
+    from canbase_config.latch_file import machine
+
+    _, content = read_end(path, latch_record.SIZE + 1)
+    found = latch_record.read(content, latch_record.owner_of(path.stem, robot, machine()))
+    record = found.record
+    changed = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(modified(path)))
+    lines = (
+        f"needs a reset: {'yes' if found.latched else 'no'}",
+        f"mark: {record.mark.name}, code {record.code}, written {found.sequence} times, last at {changed}",
+        f"cause: {printable(record.cause)}",
+        f"detail: {printable(record.detail)}",
+        f"defect: {found.defect.value} {found.detail}",
+    )
+    return "".join(f"{line.rstrip()}\n" for line in lines)
 
 
 def _box_folders(robot: Robot | None, state: Path) -> list[Path]:

@@ -19,6 +19,8 @@ from canbase_cli.bundle import Bundle, collect
 from canbase_cli.careful_read import RefusedError, modified, names, read_end
 from canbase_cli.main import app
 from canbase_cli.support import Command
+from canbase_config.latch_file import LatchFile, create_first, machine
+from canbase_config.latch_record import Mark, Record
 from canbase_config.load import load_robot, sample
 
 ROBOT = load_robot(sample("bench")).robot
@@ -168,3 +170,32 @@ def test_of_a_robot_without_a_name_all_recordings_count(state: Path) -> None:
 
     assert "black_box/stop_bench_5.asc" in bundle.files
     assert bundle.files["config/problems.txt"] == b"broken"
+
+
+def test_the_records_of_stops_are_taken_in_words_and_name_no_computer(state: Path) -> None:
+    folder = state / ROBOT.name
+    create_first(folder, ROBOT.name)
+    stop = Record(Mark.LATCHED, 7, "drive fault", "left_wheel: EMCY 2310h\x1b[2J, token=abcdef123456789")
+    file = LatchFile(folder, "driver", ROBOT.name)
+    file.open()
+    file.write(stop)
+    file.close()
+    (folder / "velocity.latch").unlink()
+    (folder / "velocity.latch").symlink_to("/etc/machine-id")
+
+    bundle = collect(ROBOT, state / "none.yaml", "-1h", state / "etc", state)
+
+    text = bundle.files["stops/installed/driver.txt"].decode()
+    assert text.startswith("needs a reset: yes\nmark: LATCHED, code 7, written 3 times, last at 2")
+    assert "cause: drive fault\ndetail: left_wheel: EMCY 2310h" in text
+    assert "\x1b" not in text
+    assert "abcdef" not in text
+    assert bundle.files["stops/installed/watchdog.txt"].startswith(b"needs a reset: no\nmark: CLEAR")
+    assert bundle.missing["stops/installed/velocity.txt"].endswith("links are not followed")
+    everything = b"".join(content for name, content in bundle.files.items() if name.startswith("stops/"))
+    assert machine().encode() not in everything or not machine()
+
+
+def test_a_robot_that_has_no_records_of_stops_is_said(state: Path) -> None:
+    bundle = collect(ROBOT, state / "none.yaml", "-1h", state / "etc", state)
+    assert bundle.missing["stops"].startswith(f"no record of stops of {ROBOT.name} in ")
