@@ -2,7 +2,8 @@
 
 Standstill: the velocity is below base.standstill_mps and the encoder does not contradict it; or the encoder has not
 moved for STILL_S, and what is left of the velocity is noise. A sensor that did not show motion that was ordered is no
-evidence: then a stand is only assumed, when the power has been off for as long as a wheel rolls. Pure.
+evidence, nor is one that stopped as no wheel does, once the power is off: then a stand is only assumed, when the power
+has been off for as long as a wheel rolls. Pure.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ STILL_S = 0.2
 """An encoder that did not move for so long stands, even if the velocity is noisy."""
 STEP_FACTOR = 3.0
 """One step of the encoder may look so many times as fast as it is: samples come early and late."""
+SHORTEST_S = 0.005
+"""Samples that come together are one cycle apart all the same: rates.control_hz is 200 at most [s]."""
 COUNTS = 2.0
 """An encoder at an edge counts to and fro."""
 
@@ -30,13 +33,21 @@ class StillnessLimits:
     unshown_m: float
     """So much ordered travel without any sign of motion takes the trust."""
     coasting_s: float
+    jolt_mps2: float
+    """No wheel stops faster."""
 
     @classmethod
     def of(cls, robot: Robot) -> StillnessLimits:
         """Of this robot."""
         watchdog = robot.watchdog
         rolls_s = coasting_s(watchdog.overspeed_factor * max_wheel_mps(robot))
-        return cls(robot.base.standstill_mps, watchdog.motion_tolerance_mps, watchdog.travel_tolerance_m, rolls_s)
+        return cls(
+            robot.base.standstill_mps,
+            watchdog.motion_tolerance_mps,
+            watchdog.travel_tolerance_m,
+            rolls_s,
+            watchdog.jolt_mps2,
+        )
 
 
 class Stillness:
@@ -49,6 +60,10 @@ class Stillness:
         self._travel_m = self._anchor_m = self._unshown_m = 0.0
         self._off_since = math.inf
         self._quiet = False
+        self._rolled_mps = 0.0
+        """What encoder and velocity both showed in the last sample."""
+        self._jolt = ""
+        """The sensor stopped as no wheel does. Under power the watchdog tells a blocked wheel from a dead sensor."""
         self.doubt = ""
         """Why the sensors are no evidence; empty: they are."""
 
@@ -62,6 +77,7 @@ class Stillness:
         if has_torque and self.doubt and self.rolled_out(now):
             self.doubt, self._unshown_m = "", 0.0
         self._off_since = math.inf if has_torque else min(self._off_since, now)
+        self._heed_jolt()
 
     def on_sample(self, travel_m: float, velocity_mps: float, ordered_mps: float, now: float) -> None:
         """Encoder and velocity of one SYNC; `ordered_mps`: what an enabled drive was ordered before it, else 0."""
@@ -76,8 +92,22 @@ class Stillness:
         slow = speed_mps <= limits.standstill_mps and step_m <= max(slow_m, self._grain_m)
         self._quiet = slow or (speed_mps <= limits.noise_mps and now - self._still_since >= STILL_S)
         self._travel_m, self._at = travel_m, now
+        before_mps = 0.0 if first else self._rolled_mps
+        self._rolled_mps = 0.0 if first else min(speed_mps, step_m / max(elapsed_s, SHORTEST_S))
         if not first:
             self._compare(moved and speed_mps > limits.standstill_mps, abs(ordered_mps) * elapsed_s)
+            self._look_for_jolt(before_mps, elapsed_s)
+            self._heed_jolt()
+
+    def _look_for_jolt(self, before_mps: float, elapsed_s: float) -> None:
+        """It rolled a sample ago and shows nothing now: the sensor stopped, and not the wheel."""
+        possible_mps = self._limits.jolt_mps2 * max(elapsed_s, SHORTEST_S) + self._limits.noise_mps
+        if self._quiet and before_mps > possible_mps:
+            self._jolt = f"stopped from {before_mps:.2f} m/s within {elapsed_s:.3f} s, which no wheel can"
+
+    def _heed_jolt(self) -> None:
+        if self._jolt and self._off_since < math.inf:
+            self.doubt, self._jolt = self.doubt or self._jolt, ""
 
     def distrust(self, why: str) -> None:
         """Somebody else has caught the sensors with a lie."""
@@ -99,7 +129,7 @@ class Stillness:
 
     def _compare(self, shown: bool, ordered_m: float) -> None:
         if shown:
-            self._unshown_m, self.doubt = 0.0, ""
+            self._unshown_m, self.doubt, self._jolt = 0.0, "", ""
             return
         self._unshown_m += ordered_m
         if self._unshown_m > self._limits.unshown_m:

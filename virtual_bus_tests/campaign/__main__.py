@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemaining
 from rich.table import Table
 
 from campaign.faults import FAULTS
-from campaign.judge import EXCLUDED, OPEN, PROPERTIES
+from campaign.judge import OPEN, PROPERTIES
 from campaign.plan import draw_plan
 from campaign.replay import replay
 from campaign.runner import Tally, run
@@ -86,17 +86,18 @@ def _tell_sums(tally: Tally) -> None:
 
 
 def _tell_violations(tally: Tally, only: list[str]) -> None:
-    table = Table("property", "violations", "what must hold", "not asked for with")
+    table = Table("property", "violations", "what must hold")
     for name, sentence in PROPERTIES.items():
         count = sum(violation.name == name for _, violation in tally.violations)
-        table.add_row(name, str(count), sentence, ", ".join(EXCLUDED[name][0]) if name in EXCLUDED else "")
+        table.add_row(name, str(count), sentence)
     out.print(table)
     for seed, violation in tally.violations[:SHOWN]:
         out.print(f"[red]{violation.name}[/red] in seed {seed} at {violation.at_s:.2f} s: {violation.detail}")
         out.print(f"  {'; '.join(str(fault) for fault in draw_plan(seed, only).faults)}", highlight=False)
     if tally.open:
-        rows = Counter(f"{violation.name} ({OPEN[violation.name][1]})" for _, violation in tally.open)
-        out.print("known to be open: " + "; ".join(f"{count} × {row}" for row, count in rows.most_common()))
+        rows = Counter(violation.name for _, violation in tally.open)
+        names = ", ".join(f"{name} {count}" for name, count in rows.most_common())
+        out.print(f"known to be open: {names}: {'; '.join(OPEN.values())}")
         out.print(f"  seeds {', '.join(str(seed) for seed in sorted({seed for seed, _ in tally.open})[:SHOWN])}")
     if tally.violations:
         out.print("tell one of them: make campaign SEED=…, or python -m campaign --seed …")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from math import sqrt
 
 from campaign.envelope import notice_s
+from campaign.shown import Shown
 from campaign.world import World
 from canbase_config.robot import Robot
 from canbase_config.stopping import longest_ramp_s, max_wheel_mps
@@ -61,8 +62,9 @@ class Allowed:
 class MotionJudge:
     """To be asked every step. Times in seconds, virtual."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, shown: Shown) -> None:
         self._world, self._half_m = world, world.robot.base.track_m / 2.0
+        self._shown = shown
         self._allowed = Allowed.of(world.robot)
         now = world.clock.now
         self._orders: deque[tuple[float, Twist]] = deque([(now, Twist(0.0, 0.0))])
@@ -83,17 +85,13 @@ class MotionJudge:
             self._orders.popleft()
         return self._runaway(now) or self._path(now) or self._standstill(now) or ("", "")
 
-    def _fastest_mps(self) -> float:
-        base = self._world.drives.bench.base
-        return max(abs(base.v_left_mps), abs(base.v_right_mps))
-
     def _powered(self) -> bool:
         nodes = self._world.drives.bench.nodes.values()
         return any(axis.motor.powered for node in nodes for axis in node.axes)
 
     def _runaway(self, now: float) -> tuple[str, str] | None:
         ordered_mps = max(abs(t.linear_mps) + abs(t.angular_radps) * self._half_m for _, t in self._orders)
-        wheel_mps = self._fastest_mps()
+        wheel_mps = self._shown.fastest_mps
         if wheel_mps <= ordered_mps + self._allowed.runaway_mps or not self._powered():
             self._fast_since = now
         if now <= self._fast_since + self._allowed.runaway_s:
@@ -104,7 +102,7 @@ class MotionJudge:
         """Between the slowest and the fastest turn that was ordered, zero among them, as a stop may come any time."""
         turns = [twist.angular_radps for _, twist in self._orders]
         low, high = min(0.0, *turns, 0.0), max(0.0, *turns, 0.0)
-        turn = self._world.drives.bench.base.w_radps
+        turn = self._shown.angular_radps
         slack = self._allowed.path_radps + PATH_SHARE * max(-low, high)
         if low - slack <= turn <= high + slack or not self._powered():
             self._beside_since = now
@@ -115,8 +113,8 @@ class MotionJudge:
     def _standstill(self, now: float) -> tuple[str, str] | None:
         driver = self._world.driver
         says = driver.running and driver.snapshot is not None and driver.snapshot.standstill
-        if not says or self._fastest_mps() <= self._allowed.stands_mps or math.isclose(now, self._lies_since):
+        if not says or self._shown.fastest_mps <= self._allowed.stands_mps or math.isclose(now, self._lies_since):
             self._lies_since = now
         if now <= self._lies_since + STANDS_S:
             return None
-        return "standstill", f"the driver says standstill, a wheel turns at {self._fastest_mps():.2f} m/s"
+        return "standstill", f"the driver says standstill, a wheel turns at {self._shown.fastest_mps:.2f} m/s"

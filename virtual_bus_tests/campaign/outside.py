@@ -78,6 +78,8 @@ class Surroundings:
         self.scans = self.speaks = True
         """The scanner sends, the stop button sends."""
         self.wall_m: float | None = None
+        self.wall_at = -math.inf
+        """When it came."""
         self._wall_from_m = 0.0
         self.reset: Callable[[], None] = lambda: None
         """The operator asks for a reset; set by who plays the operator."""
@@ -91,6 +93,7 @@ class Surroundings:
         gentlest = limits.linear_mps**2 / (2.0 * (safety.slow_distance_m - safety.stop_distance_m))
         braking_m = base.v_mps**2 / (2.0 * min(gentlest, limits.deceleration_mps2))
         noticing_m = (abs(base.v_mps) + SPEEDING_UP_MPS) * (react_s(robot, layers=2) + self.SCAN_S)
+        self.wall_at = self._world.clock.now
         self.wall_m = safety.padding_m + safety.stop_distance_m + braking_m + noticing_m + margin_m
         self._wall_from_m = base.travel_m
 

@@ -7,7 +7,6 @@ from typer.testing import CliRunner
 
 from campaign.__main__ import app
 from campaign.faults import FAULTS
-from campaign.judge import EXCLUDED, PROPERTIES, STRANGE_HANDS, UNHEARD
 from campaign.plan import MOST_FAULTS, draw_plan
 from campaign.runner import run
 from campaign.scenario import Start
@@ -63,14 +62,6 @@ def test_what_is_covered_twice_and_what_is_taken_out_together_are_safeguards() -
     assert {name for names in TOGETHER for name in names.split("+")} <= set(SAFEGUARDS)
     assert set(DRAWN_FROM) <= {*SAFEGUARDS, *TOGETHER}
     assert {fault for faults in DRAWN_FROM.values() for fault in faults} <= set(FAULTS)
-
-
-def test_only_known_faults_are_excluded_and_only_from_known_properties() -> None:
-    for name, (faults, reason) in EXCLUDED.items():
-        assert name in PROPERTIES
-        assert set(faults) <= set(FAULTS)
-        assert reason
-    assert set(FAULTS) >= STRANGE_HANDS | UNHEARD
 
 
 def test_one_scenario_is_told_from_begin_to_end() -> None:

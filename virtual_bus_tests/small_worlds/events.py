@@ -67,17 +67,17 @@ def _process(name: str) -> list[Event]:
 
 def _drive(node: int, after: str = "") -> list[Event]:
     """What may befall one drive."""
-    power = f"drive {node} loses its supply for {SHORT_S} s"
+    power, wheel = f"drive {node} loses its supply for {SHORT_S} s", node - 1
     return [
         replace(event, after=after)
         for event in (
             _of_campaign(f"drive {node} mute", f"drive {node} sends nothing for {LONG_S} s", LONG_S, "drive_silent",
-                         node=node),
+                         wheel=wheel),
             _of_campaign(f"drive {node} fault", f"drive {node} is in fault for {LONG_S} s", LONG_S, "drive_fault",
-                         node=node),
-            _of_campaign(f"drive {node} power cycle", power, LONG_S, "drive_power_cycle", node=node, off_s=SHORT_S),
+                         wheel=wheel),
+            _of_campaign(f"drive {node} power cycle", power, LONG_S, "drive_power_cycle", wheel=wheel, off_s=SHORT_S),
             _of_campaign(f"drive {node} deaf to setpoints", f"drive {node} ignores setpoints", EVER_S,
-                         "drive_ignores_setpoints", node=node),
+                         "drive_ignores_setpoints", wheel=wheel),
             Event(f"drive {node} encoder dead", f"the encoder of drive {node} counts nothing and shows no speed",
                   EVER_S, partial(_kill_encoder, node), _nothing),
         )

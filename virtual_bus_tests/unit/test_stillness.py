@@ -156,3 +156,48 @@ def test_a_wheel_that_shows_motion_stands_never_however_long_its_power_is_off() 
     wheel.stillness.distrust("was caught with a lie")
     wheel.stillness.on_power(False, wheel.now)
     assert not wheel.turns(20.0, 0.0, 0.3)
+
+
+def test_a_sensor_that_stops_faster_than_a_wheel_can_is_no_evidence_until_the_wheel_has_rolled_out() -> None:
+    """1 m/s without power; then encoder and velocity show nothing from one sample to the next."""
+    wheel = Wheel()
+    wheel.stillness.on_power(False, wheel.now)
+    off_at = wheel.now
+    wheel.turns(0.3, 1.0, 1.0)
+    assert not wheel.turns(0.5, 0.0, 0.0)
+    assert wheel.stillness.doubt == "stopped from 1.00 m/s within 0.010 s, which no wheel can"
+    wheel.turns(off_at + 9.61 - wheel.now, 0.0, 0.0)
+    assert wheel.stillness.stands(wheel.now)
+    assert "a stand is assumed" in wheel.stillness.assumed(wheel.now)
+
+
+@pytest.mark.parametrize(
+    ("before_mps", "encoder_mps"),
+    [(0.24, 0.24), (3.0, 0.0)],  # hard braking against a wall; a velocity that jumps alone is a glitch
+)
+def test_what_a_wheel_can_do_and_a_glitch_of_the_velocity_are_no_reason_for_doubt(
+    before_mps: float, encoder_mps: float
+) -> None:
+    wheel = Wheel()
+    wheel.turns(0.3, encoder_mps, before_mps)
+    assert wheel.turns(0.5, 0.0, 0.0)
+    assert wheel.stillness.doubt == ""
+
+
+def test_a_sensor_that_stopped_so_under_power_is_no_evidence_once_the_power_is_off() -> None:
+    wheel = Wheel()
+    wheel.stillness.on_power(True, wheel.now)
+    wheel.turns(0.3, 1.0, 1.0)
+    assert wheel.turns(0.02, 0.0, 0.0), "the watchdog judges it as long as there is power"
+    wheel.stillness.on_power(False, wheel.now)
+    assert not wheel.turns(0.5, 0.0, 0.0)
+
+
+def test_a_sensor_that_shows_motion_again_is_trusted_again() -> None:
+    wheel = Wheel()
+    wheel.stillness.on_power(False, wheel.now)
+    wheel.turns(0.3, 1.0, 1.0)
+    wheel.turns(0.1, 0.0, 0.0)
+    assert wheel.stillness.doubt
+    wheel.turns(0.3, 0.2, 0.2)
+    assert wheel.turns(0.5, 0.0, 0.0)
