@@ -9,18 +9,20 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
-from campaign.disk import StopDisk
+from campaign.disk import StopDisk, WatchdogDisk
 from canbase_action_server import causes
 from canbase_action_server.outcome import ErrorCode
 from canbase_bench.cia301.heartbeat import HeartbeatConsumer
-from canbase_driver import command, supervisor, watchdog_link
+from canbase_config.latch_record import CLEAR, Defect, Found
+from canbase_driver import command, reset, supervisor, watchdog_link
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.odometry import WheelTravel
 from canbase_driver.snapshot import DriverState, WatchdogView
 from canbase_velocity import filter_state, mux, neutral, obstacle, safety_filter
 from canbase_velocity.estop import FREE, HELD
 from canbase_velocity.sweep import NO_TOUCH
-from canbase_watchdog import policy
+from canbase_watchdog import ladder, policy
+from canbase_watchdog.latch import Past
 from canbase_watchdog.watchdog import State, Watchdog
 
 
@@ -88,6 +90,35 @@ def _no_records() -> None:
     StopDisk.found = lambda self: found(StopDisk("driver"))  # type: ignore[method-assign]
 
 
+def _watchdog_forgets() -> None:
+    """Whatever stands on the disk, a watchdog that starts finds that it had not tripped."""
+    past = WatchdogDisk.past
+    WatchdogDisk.past = lambda self: past(WatchdogDisk())  # type: ignore[method-assign]
+
+
+def _unreadable_is_clear() -> None:
+    """A record of stops that cannot be read counts as one that says nothing."""
+    found, past = StopDisk.found, WatchdogDisk.past
+
+    def found_or_clear(self: StopDisk) -> Found:
+        return CLEAR if found(self).defect is not Defect.NONE else found(self)
+
+    StopDisk.found = found_or_clear  # type: ignore[method-assign]
+    WatchdogDisk.past = lambda self: Past() if past(self).problem else past(self)  # type: ignore[method-assign]
+
+
+def _resets_while_commanded() -> None:
+    """A reset is not refused, and not broken off, because a command asks for motion."""
+    commanded = reset._BUS_OR_COMMAND[0]
+    reset.REFUSALS = tuple(check for check in reset.REFUSALS if check is not commanded)
+    for phase, checks in reset.BREAKS.items():
+        reset.BREAKS[phase] = tuple(check for check in checks if check is not commanded)
+
+
+def _blocker(name: str) -> Callable[[], None]:
+    return _drop(supervisor, lambda row: not (isinstance(row, supervisor.Blocker) and row.name == name))
+
+
 SAFEGUARDS: dict[str, Callable[[], None]] = {
     **{f"watchdog:{check.cause.name.lower()}": _trip(check.cause) for check in policy.CHECKS},
     "watchdog:all": _all_trips,
@@ -102,6 +133,11 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "driver:command_is_finite": _put(Twist2D, "is_finite", property(lambda self: True)),
     "driver:odometry_jump_guard": _put(WheelTravel, "_is_near", lambda self, from_raw, raw, cycles: True),
     "driver:stop_record": _no_records,
+    "driver:waits_for_zero": _blocker("command not zero"),
+    "driver:reset_needs_zero": _resets_while_commanded,
+    "watchdog:stop_record": _watchdog_forgets,
+    "watchdog:ladder": _put(ladder, "_to", lambda step, climb, look, now: climb),
+    "records:unreadable": _unreadable_is_clear,
     "drives:heartbeat_consumer": _put(HeartbeatConsumer, "tick", lambda self, now: None),
     "mux:neutral_start": _put(neutral.Arming, "armed", property(lambda self: True)),
     "mux:timeout": _put(mux._Source, "is_fresh", lambda self, now: self.at_s is not None),

@@ -19,12 +19,11 @@ from typing import Any
 
 import numpy as np
 
-from canbase_bench.cia301.dictionary import Dictionary, Entry
 from canbase_driver import node_boot
 from canbase_driver.boot import boot
 from canbase_driver.boot_steps import BootError, Step
 
-_SHARED = (Entry, Enum, Random, Struct, MappingProxyType, np.ndarray)
+_SHARED = (Enum, Random, Struct, MappingProxyType, np.ndarray)
 """Kinds that nobody changes: of chance nothing is left in a small world."""
 _things: list[Any] = []
 """What the snapshot that is being restored shares with its copies."""
@@ -88,8 +87,6 @@ class _Pickler(pickle.Pickler):
             return self._function(thing)
         if kind is CellType:
             return _cell, (), (thing.cell_contents,), None, None, _fill
-        if kind is Dictionary:
-            return _dictionary, (self._place(thing.entries),), {k: v for k, v in vars(thing).items() if k != "entries"}
         return self._share(thing) if _is_shared(kind) else NotImplemented
 
     def _function(self, thing: FunctionType) -> Any:
@@ -129,12 +126,6 @@ def _cell() -> CellType:
 
 def _fill(cell: CellType, contents: tuple[Any]) -> None:
     (cell.cell_contents,) = contents
-
-
-def _dictionary(place: int) -> Dictionary:
-    made = Dictionary.__new__(Dictionary)
-    made.entries = _things[place]
-    return made
 
 
 setattr(node_boot, "boot", _Boot)  # noqa: B010 - what is replaced is a function

@@ -214,7 +214,7 @@ class _Worker:
         before = self._shared.seen(_hash(told, b""), left.bit)
         if left == NOTHING:
             return not before & left.as_much
-        return not self._shared.seen(_hash(told, bytes((phase,))), left.bit) & left.as_much
+        return not self._shared.seen(_hash(told, bytes((phase + 1,))), left.bit) & left.as_much
 
     def _tell(self, world: _World, found: Found) -> None:
         told = [world.start, world.events, found.name, found.at_s - world.began, found.detail[:1500]]

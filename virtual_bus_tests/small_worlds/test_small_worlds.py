@@ -12,7 +12,7 @@ from small_worlds.explore import Bounds, Story, search, shortest
 from small_worlds.open_holes import OPEN, unexpected
 from small_worlds.properties import PROPERTIES, Found, Properties
 from small_worlds.teeth import TEETH, Tooth, bite
-from small_worlds.world import STARTS, SmallWorld
+from small_worlds.world import POINT_S, STARTS, SmallWorld
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(900)]
 
@@ -59,6 +59,12 @@ def test_a_copy_goes_on_as_its_original_does(event: str) -> None:
         copied.happens(EVENTS["driver dies"])
         copied.pass_to_point()
         assert small.world.driver.alive
+
+
+def test_a_search_follows_a_world_until_it_rests() -> None:
+    found = search(Bounds(1, 0, 4, ("velocity restarts",)), ["driving"], workers=1)
+    assert (found.stories, found.unfinished) == ([], 0)
+    assert found.steps > 2.4 / POINT_S, "the base stands 0.8 s after the restart, the watchdog's bounds fall for 2 s"
 
 
 def test_the_shortest_story_has_the_fewest_events_and_then_ends_first() -> None:

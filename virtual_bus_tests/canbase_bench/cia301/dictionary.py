@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.resources import files
+from types import MappingProxyType
 
 from canopen import SdoAbortedError, import_od
 from canopen.objectdictionary import ODArray, ODRecord, ODVariable, datatypes
@@ -173,7 +174,7 @@ class Dictionary:
         personality: Personality = GENERIC,
     ) -> None:
         self.personality = personality
-        self.entries = visible(node_id, axes, personality)
+        self.entries: Mapping[int, Entry] = MappingProxyType(visible(node_id, axes, personality))
         self._factory = _factory(node_id, axes, personality) | dict(fixed or {})
         self._saved: dict[int, int] = {}
         self.values: dict[int, int] = dict(self._factory)
