@@ -9,7 +9,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from canbase_config.places import CONTROLWORD, POSITION_ACTUAL, STATUSWORD, TARGET_VELOCITY, VELOCITY_ACTUAL, place
+from canbase_config.places import (
+    CONTROLWORD,
+    POSITION_ACTUAL,
+    STATUSWORD,
+    TARGET_VELOCITY,
+    TORQUE_OBJECTS,
+    VELOCITY_ACTUAL,
+    place,
+)
 
 if TYPE_CHECKING:
     from canbase_config.drive import Drive
@@ -81,8 +89,10 @@ def _cycle_bits(robot: Robot) -> int:
 
 
 def _axis_bits(drive: Drive) -> int:
-    """Setpoint, status and velocity of one motor: docs/bus.md."""
-    pdos = (CONTROLWORD, TARGET_VELOCITY), (STATUSWORD, POSITION_ACTUAL), (VELOCITY_ACTUAL,)
+    """Setpoint, status, and velocity with torque, of one motor: docs/bus.md."""
+    torque = TORQUE_OBJECTS.get(drive.kind.options.torque)
+    velocity = (VELOCITY_ACTUAL,) if torque is None else (VELOCITY_ACTUAL, torque)
+    pdos = (CONTROLWORD, TARGET_VELOCITY), (STATUSWORD, POSITION_ACTUAL), velocity
     return sum(frame_bits(sum(_mapped_bits(drive, index) for index in pdo) // 8) for pdo in pdos)
 
 

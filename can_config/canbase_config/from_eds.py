@@ -177,6 +177,8 @@ def _options(eds: Eds, out: _Lines) -> None:
     }
     for key, index in objects.items():
         out.put(key, *_presence(eds, index))
+    torque = next((name for name, index in (("6077h", 0x6077), ("6078h", 0x6078)) if eds.has(index)), "none")
+    out.put("torque", torque, "no 6077h, 6078h" if torque == "none" else f"has {torque}", proven=torque == "none")
 
 
 def _presence(eds: Eds, index: int) -> tuple[str, str]:

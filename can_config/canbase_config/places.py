@@ -11,6 +11,9 @@ AXIS_OFFSET: Final = 0x800
 """The objects of the second axis are at 6800h (CiA 402-2)."""
 CONTROLWORD, STATUSWORD, MODE, MODE_DISPLAY = 0x6040, 0x6041, 0x6060, 0x6061
 POSITION_ACTUAL, VELOCITY_ACTUAL, TARGET_VELOCITY = 0x6064, 0x606C, 0x60FF
+TORQUE_ACTUAL, CURRENT_ACTUAL = 0x6077, 0x6078
+TORQUE_OBJECTS: Final = {"6077h": TORQUE_ACTUAL, "probe": TORQUE_ACTUAL, "6078h": CURRENT_ACTUAL}
+"""By `options.torque` of a profile; what is not here has none."""
 
 _BITS: Final = {
     0x6007: 16,
@@ -22,13 +25,17 @@ _BITS: Final = {
     MODE_DISPLAY: 8,
     POSITION_ACTUAL: 32,
     VELOCITY_ACTUAL: 32,
+    TORQUE_ACTUAL: 16,
+    CURRENT_ACTUAL: 16,
     0x6083: 32,
     0x6084: 32,
     0x6085: 32,
     TARGET_VELOCITY: 32,
 }
 """Widths by CiA 402-2."""
-_ARRAYS: Final = frozenset((POSITION_ACTUAL, VELOCITY_ACTUAL, TARGET_VELOCITY, 0x6083, 0x6084, 0x6085))
+_ARRAYS: Final = frozenset(
+    (POSITION_ACTUAL, VELOCITY_ACTUAL, TARGET_VELOCITY, TORQUE_ACTUAL, CURRENT_ACTUAL, 0x6083, 0x6084, 0x6085)
+)
 """What drives with the layout sub_index have once for each motor; of the rest they have one for both."""
 
 

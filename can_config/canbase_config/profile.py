@@ -30,6 +30,9 @@ AccelerationUnit = Literal[
 Presence = Literal["yes", "no", "probe"]
 """Whether the drive has an object; `probe`: unknown, the boot tries."""
 
+TorqueObject = Literal["6077h", "6078h", "none", "probe"]
+"""What tells the torque, in thousandths of the rated one; `probe`: unknown, the boot tries 6077h."""
+
 Index = Annotated[int, Field(ge=0x1000, le=0xFFFF, description="object index")]
 Sub = Annotated[int, Field(ge=0, le=0xFF, description="sub-index")]
 Bits = Annotated[Literal[8, 16, 32], Field(description="width")]
@@ -142,6 +145,9 @@ class Options(Section):
     ] = "probe"
     ramps: Annotated[Presence, Field(description="6083h, 6084h, 6085h")] = "probe"
     interpolation: Annotated[Presence, Field(description="60C2h, for mode 9")] = "probe"
+    torque: Annotated[
+        TorqueObject, Field(description="torque or current actual value that a PDO can take, in 0.1 % of the rated one")
+    ] = "probe"
     sync_counter: Annotated[Presence, Field(description="1019h")] = "probe"
     store: Annotated[Presence, Field(description="1010h")] = "probe"
 

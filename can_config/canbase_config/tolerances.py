@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -59,6 +59,21 @@ class Watchdog(Section):
     motion_missing_m: Annotated[
         float, Field(ge=0.001, le=0.1, description="... and for so much of the ordered travel [m]")
     ] = 0.005
+    stand_proof: Annotated[
+        Literal["let_go", "none"],
+        Field(
+            description="let_go: after an order, a wheel that is held at a stand is let go of for a moment, "
+            "as a dead encoder shows a stand too; none: never, and a dead encoder at a stand is not found"
+        ),
+    ] = "let_go"
+    stand_impulse_s: Annotated[
+        float,
+        Field(ge=0.02, le=2.0, description="... when it was pushed for so long at rated torque, or longer at less [s]"),
+    ] = 0.05
+    stand_answer_s: Annotated[
+        float,
+        Field(ge=0.1, le=2.0, description="a drive lets go, and says so, in this time; with a brake: longer [s]"),
+    ] = 0.2
     jolt_mps2: Annotated[
         float, Field(ge=5.0, le=200.0, description="no wheel changes its speed faster; a sensor that fails does [m/s²]")
     ] = 20.0

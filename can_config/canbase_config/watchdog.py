@@ -121,6 +121,13 @@ class WatchdogConfig:
     twist_s: float
     """The measured twist may be outside of the ordered one for so long."""
 
+    stand_impulse_s: float = 0.05
+    """A drive may push for so long at rated torque, or longer at less, while its wheel shows no motion."""
+    stand_answer_s: float = 0.2
+    """After that, with nothing ordered, it must have let go within this time."""
+    stand_proof: bool = True
+    """False: nobody lets go, and a stand needs no proof."""
+
     lease_uid: int | None = None
     """The only user whose leases count, None: the watchdog's own."""
     relay: RelayLine | None = None

@@ -8,9 +8,10 @@ from canbase_config.drive import Drive
 from canbase_config.robot import Robot
 from canbase_driver.cia402 import DriveState, PowerGoal, decode_statusword
 from canbase_driver.frame import Frame
+from canbase_driver.let_go import Push
 from canbase_driver.limits import Limiter
 from canbase_driver.odometry import WheelTravel
-from canbase_driver.pdo import NodeLayout, pack_setpoint, unpack_status, unpack_velocity
+from canbase_driver.pdo import NodeLayout, pack_setpoint, unpack_status, unpack_torque, unpack_velocity
 from canbase_driver.stillness import Stillness, StillnessLimits
 from canbase_driver.units import AxisUnits
 
@@ -36,6 +37,7 @@ class Axis:
         step_m = STEP_MARGIN * Limiter(robot.limits, robot.base.track_m).wheel_mps / robot.rates.control_hz
         self.travel = WheelTravel(metres_per_count, max(1.0, step_m / abs(metres_per_count)))
         self.stillness = Stillness(StillnessLimits.of(robot), metres_per_count)
+        self.push = Push(robot.watchdog.stand_impulse_s, metres_per_count)
         self._feedback_s = robot.timeouts.feedback_s
         self._layout = layout.profile.layout
         self._setpoint_cob_id = layout.setpoint_cob_id(drive.axis)
@@ -102,6 +104,9 @@ class Axis:
         self.velocity_at = now
         ordered_mps = self.target_mps if self.state is DriveState.OPERATION_ENABLED else 0.0
         self.stillness.on_sample(self.travel.travel_m, self.velocity_mps, ordered_mps, now)
+        has_torque = self.state is None or self.state.has_torque
+        torque = unpack_torque(data, self._layout)
+        self.push.on_sample(self.travel.travel_m, torque, ordered_mps, has_torque, now)
         self.has_new_sample = self._status_is_new
         return True
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from canbase_driver.boot_steps import BootError, NodeAccess, Steps, unsigned
 from canbase_driver.pdo import NodeLayout, Pdo
 from canbase_driver.sdo import Read, SdoAborted, Write
@@ -16,8 +18,10 @@ MAX_PDO_NUMBER = 64
 def configure_pdos(node: NodeAccess, layout: NodeLayout) -> Steps[None]:
     """Make the PDOs of the layout the only ones that are valid. What is right already is left alone.
 
-    Raises BootError when the drive has not these PDOs, or does not keep what is written to them.
+    A drive that has no torque, or maps none, does without. Raises BootError when it has not these PDOs, or does not
+    keep what is written to them.
     """
+    layout = yield from _with_what_it_has(node, layout)
     wanted = {pdo.communication: pdo for pdo in layout.pdos()}
     cob_ids = yield from _cob_ids(node)
     for pdo in wanted.values():
@@ -33,6 +37,14 @@ def configure_pdos(node: NodeAccess, layout: NodeLayout) -> Steps[None]:
             yield from _suspend(node, index, cob_ids[index])
             yield from _configure(node, pdo)
             yield from node.overwrite(Write(index, 1, cob_id, 4), f"{cob_ids[index]:08X}h")
+
+
+def _with_what_it_has(node: NodeAccess, layout: NodeLayout) -> Steps[NodeLayout]:
+    for index, sub in layout.torque_places():
+        if (yield from node.read_if_present(index, sub)) is None:
+            _note_no_torque(node, f"the drive has no {index:04X}h:{sub}")
+            return replace(layout, with_torque=False)
+    return layout
 
 
 def _cob_ids(node: NodeAccess) -> Steps[dict[int, int]]:
@@ -77,10 +89,25 @@ def _is_right(node: NodeAccess, pdo: Pdo) -> Steps[bool]:
 
 
 def _configure(node: NodeAccess, pdo: Pdo) -> Steps[None]:
-    yield from _map(node, pdo)
+    yield from _map_what_it_takes(node, pdo)
     yield from node.set(Write(pdo.communication, 2, pdo.transmission_type, 1))
     for time in _times(pdo):
         yield from node.set_if_present(time)
+
+
+def _map_what_it_takes(node: NodeAccess, pdo: Pdo) -> Steps[None]:
+    """Without what is optional, where the drive refuses that."""
+    try:
+        yield from _map(node, pdo)
+    except (SdoAborted, BootError) as refused:
+        if not pdo.optional:
+            raise
+        _note_no_torque(node, f"{pdo.name} does not take it ({refused})")
+        yield from _map(node, replace(pdo, mapping=pdo.mapping[: -pdo.optional], optional=0))
+
+
+def _note_no_torque(node: NodeAccess, why: str) -> None:
+    node.notes.append(f"torque unknown: {why}; see options.torque of its drive profile, watchdog.stand_proof")
 
 
 def _map(node: NodeAccess, pdo: Pdo) -> Steps[None]:

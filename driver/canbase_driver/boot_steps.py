@@ -92,6 +92,7 @@ PROFILE_KEYS: tuple[tuple[range, str], ...] = (
     (range(0x6060, 0x6061), "modes"),
     (range(0x6061, 0x6062), "options.mode_display"),
     (range(0x606C, 0x606D), "layout.velocity_bits"),
+    (range(0x6077, 0x6079), "options.torque"),
     (range(0x6083, 0x6086), "options.ramps"),
     (range(0x60C2, 0x60C3), "options.interpolation"),
     (range(0x60FF, 0x6100), "layout.target_bits"),

@@ -8,6 +8,7 @@ Rules of the goals
    it keeps the word; a drive that stays there when it stands (605Ah = 5…8) needs OFF first. In an unknown state it is
    a quick stop too.
    READY goes up to switched on, which needs main voltage and no STO, and is OFF in every state with torque.
+   LET_GO is READY, but for one step down: disable operation, from operation enabled to switched on (605Ch).
 4. ON never resets a fault. Only RESET sets bit 7, and only in FAULT; in every other state RESET is OFF.
 5. The drive acts on the 0 → 1 edge of bit 7 (transition 15), not on its level. Before RESET hold OFF, which keeps
    bit 7 at 0, for FAULT_RESET_CYCLES; then hold RESET until the state is no longer FAULT, at least FAULT_RESET_CYCLES.
@@ -87,6 +88,7 @@ class Command(Enum):
     QUICK_STOP = 0x02
     SHUTDOWN = 0x06
     SWITCH_ON = 0x07
+    """In operation enabled the same word is "disable operation"."""
     ENABLE_OPERATION = 0x0F
     FAULT_RESET = 0x80
 
@@ -100,6 +102,8 @@ class PowerGoal(Enum):
     """Operation enabled."""
     READY = "ready"
     """Switched on: no torque, but nothing that forbids it either."""
+    LET_GO = "let go"
+    """Switched on, from operation enabled: for a moment without torque."""
     QUICK_STOP = "quick stop"
     """Down the ramp 6085h and then, with 605Ah = 2, to switch on disabled."""
     RESET = "fault reset"
@@ -119,12 +123,17 @@ _UP = {
 }
 _STATES: tuple[DriveState | None, ...] = (None, *DriveState)
 
+_READY = (
+    dict.fromkeys(_STATES, Command.DISABLE_VOLTAGE)
+    | {DriveState.SWITCH_ON_DISABLED: Command.SHUTDOWN}
+    | dict.fromkeys((DriveState.READY_TO_SWITCH_ON, DriveState.SWITCHED_ON), Command.SWITCH_ON)
+)
+
 COMMANDS: dict[PowerGoal, dict[DriveState | None, Command]] = {
     PowerGoal.OFF: dict.fromkeys(_STATES, Command.DISABLE_VOLTAGE),
     PowerGoal.ON: _UP,
-    PowerGoal.READY: dict.fromkeys(_STATES, Command.DISABLE_VOLTAGE)
-    | {DriveState.SWITCH_ON_DISABLED: Command.SHUTDOWN}
-    | dict.fromkeys((DriveState.READY_TO_SWITCH_ON, DriveState.SWITCHED_ON), Command.SWITCH_ON),
+    PowerGoal.READY: _READY,
+    PowerGoal.LET_GO: _READY | {DriveState.OPERATION_ENABLED: Command.SWITCH_ON},
     PowerGoal.QUICK_STOP: dict.fromkeys(_STATES, Command.QUICK_STOP),
     PowerGoal.RESET: dict.fromkeys(_STATES, Command.DISABLE_VOLTAGE) | {DriveState.FAULT: Command.FAULT_RESET},
 }

@@ -35,6 +35,7 @@ from canbase_driver.cycle_stats import CycleStats
 from canbase_driver.drives import Drives
 from canbase_driver.frame import Frame
 from canbase_driver.kinematics import Twist2D, wheel_speeds
+from canbase_driver.let_go import LetGo
 from canbase_driver.limits import Limiter, MotionState
 from canbase_driver.odometry import Pose2D
 from canbase_driver.odometry_feed import OdometryFeed
@@ -75,6 +76,7 @@ class DriverCore:
         self._standstill_s = stopping.standstill_s(robot)
         self._supervisor = Supervisor(Braking(robot), self._standstill_s, cause_before_the_start(found))
         self._record = PowerRecord(found)
+        self._let_go = LetGo(robot)
         self._limiter = Limiter(robot.limits, robot.base.track_m)
         self._feed = OdometryFeed(self._drives, robot.base.track_m)
         self._command = Command(robot.timeouts.command_s)
@@ -240,7 +242,8 @@ class DriverCore:
 
     def _setpoints(self, orders: Orders, now: float, dt_s: float) -> list[Frame]:
         started = [node for node in self._drives.nodes if node.takes_pdos]
-        if orders.drive is Drive.ZERO:
+        self._hold_or_let_go(orders, now)
+        if orders.drive is Drive.ZERO or self._let_go.active:
             self._motion = MotionState.AT_REST
         else:
             target = self._command.target(now) if orders.drive is Drive.FOLLOW else Twist2D.ZERO
@@ -248,12 +251,19 @@ class DriverCore:
             self._motion = self._limiter.step(self._motion, target, dt_s, emergency=hard)
         if self._bus_problem or not started:
             return []
-        goal = (
-            PowerGoal.RESET if self._reset.fault_reset_bit else orders.goal
-        )  # to an axis without a fault RESET is OFF
+        goal = self._let_go.goal(now) if self._let_go.active else orders.goal
+        if self._reset.fault_reset_bit:  # to an axis without a fault RESET is OFF
+            goal = PowerGoal.RESET
         left_mps, right_mps = wheel_speeds(self._motion.twist, self._robot.base.track_m)
         frames = [frame for node in started for frame in node.setpoints(goal, left_mps, right_mps)]
         return [*frames, self._sync.next()]
+
+    def _hold_or_let_go(self, orders: Orders, now: float) -> None:
+        if orders.drive is not Drive.FOLLOW:
+            self._let_go.end()
+            return
+        rests = self._motion.twist == Twist2D.ZERO == self._command.target(now)
+        self._let_go.step(self._drives.axes, rests, now)
 
     def _stop_by_sdo(self, orders: Orders, situation: Situation, now: float) -> list[Frame]:
         """While a watchdog lives its ladder does this, and takes an SDO of ours for another master's."""
@@ -293,7 +303,7 @@ class DriverCore:
             fault=self._drives.fault(),
             absent=self._drives.absent(),
             silent=self._drives.silent(now, self._sync_since),
-            disabled=self._drives.disabled(),
+            disabled="" if self._let_go.excuses(now) else self._drives.disabled(),
             unprepared=self._drives.unprepared(),
             unarmed=self._record.unarmed or self._watchdog.unarmed,
             watchdog=watchdog,

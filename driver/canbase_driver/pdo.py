@@ -10,7 +10,15 @@ import struct
 from dataclasses import dataclass
 
 from canbase_config.drive import Drive
-from canbase_config.places import CONTROLWORD, POSITION_ACTUAL, STATUSWORD, TARGET_VELOCITY, VELOCITY_ACTUAL, place
+from canbase_config.places import (
+    CONTROLWORD,
+    POSITION_ACTUAL,
+    STATUSWORD,
+    TARGET_VELOCITY,
+    TORQUE_OBJECTS,
+    VELOCITY_ACTUAL,
+    place,
+)
 from canbase_config.profile import Layout, Profile
 from canbase_config.robot import Robot
 from canbase_driver.cia301 import RPDO, TPDO
@@ -28,6 +36,9 @@ _SETPOINT = {16: struct.Struct("<Hh"), 32: struct.Struct("<Hi")}
 _STATUS = {False: struct.Struct("<Hi"), True: struct.Struct("<Ii")}
 """By whether the statuswords of two axes are packed into one object."""
 _VELOCITY = {16: struct.Struct("<h"), 32: struct.Struct("<i")}
+_TORQUE = struct.Struct("<h")
+RATED = 1000.0
+"""6077h and 6078h at rated torque (CiA 402-2)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +52,8 @@ class Pdo:
     cob_id: int = 0
     transmission_type: int = EVERY_SYNC
     mapping: tuple[int, ...] = ()
+    optional: int = 0
+    """So many at the end of the mapping may stay away."""
     inhibit_100us: int | None = None
     """1800h:3, None: not written."""
     event_timer_ms: int | None = None
@@ -79,6 +92,8 @@ class NodeLayout:
     """Used axes in rising order; the first has RPDO1, TPDO1 and TPDO2, the second RPDO2, TPDO3 and TPDO4."""
     profile: Profile = GENERIC_PROFILE
     timing: Timing = Timing()
+    with_torque: bool = True
+    """False: the drive refuses to tell its torque in a PDO."""
 
     def __post_init__(self) -> None:
         if self.axes not in ((0,), (1,), (0, 1)):
@@ -95,6 +110,17 @@ class NodeLayout:
     def velocity_cob_id(self, axis: int) -> int:
         """Identifier of the TPDO for `unpack_velocity` of this axis. Raises ValueError for an unused axis."""
         return TPDO[2 * self.axes.index(axis) + 1] + self.node_id
+
+    @property
+    def torque_objects(self) -> tuple[int, ...]:
+        """6077h or 6078h where the velocity TPDO carries it behind 606Ch, else nothing."""
+        index = TORQUE_OBJECTS.get(self.profile.options.torque)
+        return () if index is None or not self.with_torque else (index,)
+
+    def torque_places(self) -> tuple[tuple[int, int], ...]:
+        """Index and sub-index of the torque of each axis."""
+        places = [place(self.profile.layout, index, axis) for index in self.torque_objects for axis in self.axes]
+        return tuple((at.index, at.sub) for at in places)
 
     def pdos(self) -> tuple[Pdo, ...]:
         """Every PDO in use, as docs/bus.md has them."""
@@ -124,17 +150,18 @@ class NodeLayout:
     def _feedback(self) -> list[Pdo]:
         pdos = []
         for i, axis in enumerate(self.axes):
-            status, velocity = self._entries(axis, STATUSWORD, POSITION_ACTUAL), self._entries(axis, VELOCITY_ACTUAL)
+            status = self._entries(axis, STATUSWORD, POSITION_ACTUAL)
+            velocity = self._entries(axis, VELOCITY_ACTUAL, *self.torque_objects)
             pdos.append(self._tpdo(2 * i + 1, self.status_cob_id(axis), status))
-            pdos.append(self._tpdo(2 * i + 2, self.velocity_cob_id(axis), velocity))
+            pdos.append(self._tpdo(2 * i + 2, self.velocity_cob_id(axis), velocity, len(self.torque_objects)))
         return pdos
 
-    def _tpdo(self, number: int, cob_id: int, mapping: tuple[int, ...]) -> Pdo:
+    def _tpdo(self, number: int, cob_id: int, mapping: tuple[int, ...], optional: int = 0) -> Pdo:
         """Without SYNC it goes by its timer, and never more often than once in a cycle."""
         if self.profile.pdo.synchronous:
-            return Pdo("TPDO", number, cob_id, mapping=mapping)
-        cycle_ms = max(1, round(1000 * self.timing.cycle_s))
-        return Pdo("TPDO", number, cob_id, AT_ONCE, mapping, inhibit_100us=10 * cycle_ms, event_timer_ms=cycle_ms)
+            return Pdo("TPDO", number, cob_id, mapping=mapping, optional=optional)
+        ms = max(1, round(1000 * self.timing.cycle_s))
+        return Pdo("TPDO", number, cob_id, AT_ONCE, mapping, optional, inhibit_100us=10 * ms, event_timer_ms=ms)
 
     def _entries(self, axis: int, *indexes: int) -> tuple[int, ...]:
         return tuple(place(self.profile.layout, index, axis).mapping_entry for index in indexes)
@@ -167,6 +194,13 @@ def unpack_status(data: bytes, layout: Layout = GENERIC, axis: int = 0) -> tuple
 
 
 def unpack_velocity(data: bytes, layout: Layout = GENERIC) -> int | None:
-    """Velocity 606Ch [raw]; None when the length is wrong: to be dropped and counted."""
+    """Velocity 606Ch [raw], with or without a torque behind it; None when the length is wrong: to be dropped and
+    counted."""
     form = _VELOCITY[layout.velocity_bits]
-    return int(form.unpack(data)[0]) if len(data) == form.size else None
+    return int(form.unpack_from(data)[0]) if len(data) in (form.size, form.size + _TORQUE.size) else None
+
+
+def unpack_torque(data: bytes, layout: Layout = GENERIC) -> float | None:
+    """Torque behind the velocity, as a share of the rated one; None: the drive does not tell it."""
+    form = _VELOCITY[layout.velocity_bits]
+    return _TORQUE.unpack_from(data, form.size)[0] / RATED if len(data) == form.size + _TORQUE.size else None

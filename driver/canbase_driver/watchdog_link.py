@@ -43,12 +43,13 @@ CAUSES = {
     14: "base moves otherwise than ordered",
     15: "setpoint missing",
     16: "two drives with one node id",
+    17: "power at a stand that nothing proves",
     18: "boot-up of an enabled drive",
     20: "ended while a drive had power",
     21: "record of its last trip unusable",
 }
-SENSOR_CAUSES = (12, 13)
-"""After these, what the node in the state frame reports about its motion is no evidence. 13: motion missing."""
+SENSOR_CAUSES = (12, 13, 17)
+"""After these, what the node in the state frame reports about its motion is no evidence."""
 DRIVE_CAUSES = (3, 7, 18)
 """What the driver sees at its drives itself, and can tell more about."""
 ANSWERS = {

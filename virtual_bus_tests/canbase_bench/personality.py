@@ -99,7 +99,7 @@ GENERIC = Personality()
 PERSONALITIES: Mapping[str, Personality] = {
     "generic": GENERIC,
     "epos4": Personality(
-        missing=_NO_SYNC_COUNTER,  # EDS
+        missing=_NO_SYNC_COUNTER | {0x6078},  # EDS
         missing_subs=_RPDO_TIMERS,  # EDS: no 1400h:5
         sets_no_rtr=True,  # EDS
         defaults={_key(0x6007): 3, _key(0x605A): 6, _key(0x1029, 1): 0},  # EDS
@@ -115,7 +115,7 @@ PERSONALITIES: Mapping[str, Personality] = {
         heartbeat_fault_needs_communication_reset=True,  # seen by users: 8130h and 8120h
     ),
     "roboteq": Personality(
-        missing=_NO_SYNC_COUNTER | {0x1005, 0x1029, 0x6007, 0x603F, 0x605A, 0x605E},  # EDS v80
+        missing=_NO_SYNC_COUNTER | {0x1005, 0x1029, 0x6007, 0x603F, 0x605A, 0x605E, 0x6078},  # EDS v80
         missing_subs=_RPDO_TIMERS,  # EDS
         sets_no_rtr=True,  # EDS
         defaults=_NO_REACTION | {_key(base + n, 2): 255 for base in (0x1400, 0x1800) for n in range(4)},  # EDS
@@ -136,7 +136,7 @@ PERSONALITIES: Mapping[str, Personality] = {
     "zlac8015d": Personality(
         missing=_NO_SYNC_COUNTER
         | _LACKS_SELF_STOP
-        | {0x1010, 0x1011, 0x605A, 0x605B, 0x605C, 0x605D, 0x605E, 0x60C2, 0x606B, 0x606D},
+        | {0x1010, 0x1011, 0x605A, 0x605B, 0x605C, 0x605D, 0x605E, 0x60C2, 0x606B, 0x606D, 0x6078},
         missing_subs=_RPDO_TIMERS,  # the EDS has them; nothing says that the firmware heeds them
         extras={
             _key(0x2000): Extra("H", 0, writable=True),  # EDS: communication offline time
@@ -190,7 +190,7 @@ PERSONALITIES: Mapping[str, Personality] = {
         boot_delay_s=0.6,  # assumed: a late boot-up
     ),
     "tmcm1636": Personality(
-        missing=_NO_SYNC_COUNTER | {0x6007, 0x603F},  # EDS
+        missing=_NO_SYNC_COUNTER | {0x6007, 0x603F, 0x6078},  # EDS
         missing_subs=_RPDO_TIMERS,  # EDS
         sets_no_rtr=True,  # EDS
         defaults=_NO_REACTION | {_key(0x1029, 1): 0},  # EDS
@@ -201,7 +201,7 @@ PERSONALITIES: Mapping[str, Personality] = {
         acceleration_unit="rpm/s",
     ),
     "dryve_d1": Personality(
-        missing=_NO_SYNC_COUNTER | {0x1011, 0x1029, 0x6007, 0x605A, 0x605E},  # EDS
+        missing=_NO_SYNC_COUNTER | {0x1011, 0x1029, 0x6007, 0x605A, 0x605E, 0x6077},  # EDS
         sets_no_rtr=True,  # EDS
         defaults=_NO_REACTION,
         heartbeat_entries=1,  # EDS

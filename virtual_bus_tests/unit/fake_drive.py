@@ -44,7 +44,7 @@ def factory_objects(axes: tuple[int, ...] = (0,), pdos: int = 4, consumers: int 
         base = 0x6000 + 0x800 * axis
         objects |= {(base + 0x07, 0): u16(0), (base + 0x40, 0): u16(0), (base + 0x41, 0): u16(0x0240)}
         objects |= {(base + 0x5A, 0): u16(6), (base + 0x5E, 0): u16(0), (base + 0x60, 0): u8(1)}
-        objects |= {(base + 0x6C, 0): u32(0), (base + 0xFF, 0): u32(777)}
+        objects |= {(base + 0x6C, 0): u32(0), (base + 0x77, 0): u16(0), (base + 0xFF, 0): u32(777)}
         objects |= {(base + ramp, 0): u32(10) for ramp in (0x83, 0x84, 0x85)}
     for i in range(pdos):
         for communication, cob_id in ((0x1400, 0x4000_0200), (0x1800, 0x4000_0180)):

@@ -102,8 +102,35 @@ def test_a_mode_that_can_only_be_written_is_believed() -> None:
 def test_a_fixed_mapping_that_is_right_is_left_alone() -> None:
     fixed = {(0x1A01, sub): READ_ONLY for sub in range(5)}
     drive = FakeDrive(refuse=fixed)
-    drive.objects |= {(0x1A01, 0): u8(1), (0x1A01, 1): u32(0x606C_0020)}
+    drive.objects |= {(0x1A01, 0): u8(2), (0x1A01, 1): u32(0x606C_0020), (0x1A01, 2): u32(0x6077_0010)}
     assert notes_of(boot_one_axis(drive)) == ()
+
+
+NO_TORQUE = "see options.torque of its drive profile, watchdog.stand_proof"
+
+
+def test_a_drive_without_torque_does_without() -> None:
+    drive = FakeDrive()
+    del drive.objects[0x6077, 0]
+    notes = ("torque unknown: the drive has no 6077h:0; " + NO_TORQUE,)
+    assert notes_of(boot_one_axis(drive)) == notes
+    assert [drive.number(0x1A01, sub) for sub in range(2)] == [1, 0x606C_0020]
+
+
+@pytest.mark.parametrize("refused", [{(0x1A01, 2): 0x06040041}, {(0x1A01, 0): READ_ONLY, (0x1A01, 1): READ_ONLY}])
+def test_a_drive_whose_pdo_does_not_take_the_torque_does_without(refused: dict[Key, int]) -> None:
+    drive = FakeDrive(refuse=refused)
+    drive.objects |= {(0x1A01, 0): u8(1), (0x1A01, 1): u32(0x606C_0020)}
+    (note,) = notes_of(boot_one_axis(drive))
+    assert note.startswith("torque unknown: TPDO2 does not take it (")
+    assert note.endswith(NO_TORQUE)
+    assert [drive.number(0x1A01, sub) for sub in range(2)] == [1, 0x606C_0020]
+    assert drive.number(0x1801, 1) == 0x4000_0281
+
+
+def test_a_velocity_that_no_pdo_takes_is_an_error_with_a_torque_too() -> None:
+    drive = FakeDrive(refuse={(0x1A01, 1): 0x06040041})
+    assert "1A01h:1" in error_of(boot_one_axis(drive))
 
 
 GENERAL_ERROR, LOCAL_CONTROL, TOO_HIGH, TOO_LOW = 0x08000000, 0x08000021, 0x06090031, 0x06090032
@@ -269,7 +296,8 @@ def test_an_unused_pdo_that_stays_on_is_a_note() -> None:
 
 def test_a_pdo_that_cannot_be_switched_off_is_a_note_where_its_fixed_identifier_and_mapping_are_right() -> None:
     drive = FakeDrive(refuse={(0x1801, 1): READ_ONLY})
-    drive.objects |= {(0x1801, 1): u32(0x4000_0281), (0x1A01, 0): u8(1), (0x1A01, 1): u32(0x606C_0020)}
+    mapping = {(0x1A01, 0): u8(2), (0x1A01, 1): u32(0x606C_0020), (0x1A01, 2): u32(0x6077_0010)}
+    drive.objects |= {(0x1801, 1): u32(0x4000_0281)} | mapping
     assert notes_of(boot_one_axis(drive)) == ("1801h:1: 0601 0002h the object is read-only",)
     assert drive.number(0x1801, 2) == 1
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canbase_driver.pdo import NodeLayout, Pdo, pack_setpoint, unpack_status, unpack_velocity
+from canbase_driver.pdo import NodeLayout, Pdo, pack_setpoint, unpack_status, unpack_torque, unpack_velocity
 
 
 def test_one_axis() -> None:
@@ -14,7 +14,7 @@ def test_one_axis() -> None:
         Pdo("RPDO", 1, 0x201, 1, (0x6040_00_10, 0x60FF_00_20)),
         Pdo("RPDO", 4, 0x501, 255, (0x6040_00_10,)),
         Pdo("TPDO", 1, 0x181, 1, (0x6041_00_10, 0x6064_00_20)),
-        Pdo("TPDO", 2, 0x281, 1, (0x606C_00_20,)),
+        Pdo("TPDO", 2, 0x281, 1, (0x606C_00_20, 0x6077_00_10), 1),
     )
 
 
@@ -24,9 +24,9 @@ def test_two_axes_on_one_node() -> None:
         Pdo("RPDO", 2, 0x305, 1, (0x6840_00_10, 0x68FF_00_20)),
         Pdo("RPDO", 4, 0x505, 255, (0x6040_00_10, 0x6840_00_10)),
         Pdo("TPDO", 1, 0x185, 1, (0x6041_00_10, 0x6064_00_20)),
-        Pdo("TPDO", 2, 0x285, 1, (0x606C_00_20,)),
+        Pdo("TPDO", 2, 0x285, 1, (0x606C_00_20, 0x6077_00_10), 1),
         Pdo("TPDO", 3, 0x385, 1, (0x6841_00_10, 0x6864_00_20)),
-        Pdo("TPDO", 4, 0x485, 1, (0x686C_00_20,)),
+        Pdo("TPDO", 4, 0x485, 1, (0x686C_00_20, 0x6877_00_10), 1),
     )
 
 
@@ -79,9 +79,14 @@ def test_bytes_of_the_feedback() -> None:
     #                                   6041h 6064h = -1
     assert unpack_status(bytes.fromhex("37 06 FF FF FF FF")) == (0x0637, -1)
     assert unpack_velocity(bytes.fromhex("00 00 00 80")) == -(2**31)
+    assert unpack_torque(bytes.fromhex("00 00 00 80")) is None
+    #                                   606Ch       6077h = -500: half of the rated torque
+    with_torque = bytes.fromhex("00 00 00 80 0C FE")
+    assert (unpack_velocity(with_torque), unpack_torque(with_torque)) == (-(2**31), -0.5)
 
 
 @given(st.binary(max_size=8))
 def test_only_the_right_length_is_read(data: bytes) -> None:
     assert (unpack_status(data) is not None) == (len(data) == 6)
-    assert (unpack_velocity(data) is not None) == (len(data) == 4)
+    assert (unpack_velocity(data) is not None) == (len(data) in (4, 6))
+    assert (unpack_torque(data) is not None) == (len(data) == 6)

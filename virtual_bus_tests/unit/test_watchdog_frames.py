@@ -189,6 +189,11 @@ def test_a_controlword_for_each_motor_by_sub_index() -> None:
 def test_velocities_of_16_bits() -> None:
     narrow = WatchedLayout(target_bits=16, velocity_bits=16)
     assert frames.decode_velocity(bytes.fromhex("0c fe"), narrow) == -500
-    assert frames.decode_velocity(bytes.fromhex("0c fe ff ff"), narrow) is None
+    assert frames.decode_velocity(bytes.fromhex("0c fe ff ff"), narrow) == -500
+    assert frames.decode_velocity(bytes.fromhex("0c fe ff"), narrow) is None
+    assert frames.decode_torque(bytes.fromhex("0c fe"), narrow) is None
+    assert frames.decode_torque(bytes.fromhex("00 00 0c fe"), narrow) == -0.5
+    assert frames.decode_torque(bytes.fromhex("00 00 00 00 e8 03")) == 1.0
+    assert frames.decode_torque(bytes.fromhex("00 00 00 00")) is None
     assert frames.decode_setpoint(bytes.fromhex("0f 00 0c fe"), narrow) == (0x0F, -500)
     assert frames.decode_setpoint(bytes.fromhex("0f 00 0c fe ff ff"), narrow) is None

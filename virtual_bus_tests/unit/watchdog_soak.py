@@ -146,11 +146,12 @@ class Soak:
 
     def _noisy(self, frame: Frame) -> Frame:
         """606Ch of a drive that measures badly."""
-        if not self._noise_mps or frame.cob_id & 0x780 != 0x280 or len(frame.data) != 4:
+        if not self._noise_mps or frame.cob_id & 0x780 != 0x280 or len(frame.data) not in (4, 6):
             return frame
         bits_per_mps = 1.0 / abs(self.watchdog_config.drives[0].velocity_mps_per_bit)
         noise = round(self.random.uniform(-1.0, 1.0) * self._noise_mps * bits_per_mps)
-        return Frame(frame.cob_id, struct.pack("<i", struct.unpack("<i", frame.data)[0] + noise))
+        noisy = struct.pack("<i", struct.unpack_from("<i", frame.data)[0] + noise)
+        return Frame(frame.cob_id, noisy + frame.data[4:])
 
     def _command(self, now: float) -> None:
         if now >= self._source_until:

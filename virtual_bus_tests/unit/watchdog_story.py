@@ -142,7 +142,7 @@ class FakeDrive:
                 self.control(axis, word)
             status = struct.pack("<Hi", self.words[axis], self.position(axis))
             out.append(Frame((0x180, 0x380)[place] + self.node_id, status))
-            out.append(Frame((0x280, 0x480)[place] + self.node_id, struct.pack("<i", self.velocity(axis))))
+            out.append(Frame((0x280, 0x480)[place] + self.node_id, struct.pack("<ih", self.velocity(axis), 1)))
         return [] if self.mute else out
 
     def position(self, axis: int) -> int:

@@ -26,7 +26,9 @@ WATCHDOG_HEARTBEAT = 0x77E
 STATUS_TPDO = (0x180, 0x380)
 """6041h u16, 6064h i32 of the node's first and second axis."""
 VELOCITY_TPDO = (0x280, 0x480)
-"""606Ch i32 of the node's first and second axis."""
+"""606Ch i32 of the node's first and second axis, and 6077h or 6078h i16 of a drive that tells its torque."""
+RATED = 1000.0
+"""6077h and 6078h at rated torque."""
 SETPOINT_RPDO = (0x200, 0x300)
 """6040h u16, 60FFh i32 of the node's first and second axis, sent by the driver."""
 QUICK_STOP_RPDO = 0x500
@@ -56,6 +58,7 @@ _STATUS = {False: struct.Struct("<Hi"), True: struct.Struct("<Ii")}
 """By whether the statusword is packed."""
 _SETPOINT = {16: struct.Struct("<Hh"), 32: struct.Struct("<Hi")}
 _VELOCITY = {16: struct.Struct("<h"), 32: struct.Struct("<i")}
+_TORQUE = struct.Struct("<h")
 _U16 = struct.Struct("<H")
 _SDO_HEAD = struct.Struct("<BHB")
 _STATE = struct.Struct("<BBBBHBB")
@@ -118,9 +121,16 @@ def own_statusword(value: int, layout: WatchedLayout, axis: int) -> int:
 
 
 def decode_velocity(data: bytes, layout: WatchedLayout = CIA_402) -> int | None:
-    """Velocity 606Ch of a velocity TPDO in the drive's own unit; None: of another length."""
+    """Velocity 606Ch of a velocity TPDO in the drive's own unit, with a torque behind it or not; None: of another
+    length."""
     form = _VELOCITY[layout.velocity_bits]
-    return int(form.unpack(data)[0]) if len(data) == form.size else None
+    return int(form.unpack_from(data)[0]) if len(data) in (form.size, form.size + _TORQUE.size) else None
+
+
+def decode_torque(data: bytes, layout: WatchedLayout = CIA_402) -> float | None:
+    """Torque of a velocity TPDO as a share of the rated one; None: there is none in it."""
+    form = _VELOCITY[layout.velocity_bits]
+    return _TORQUE.unpack_from(data, form.size)[0] / RATED if len(data) == form.size + _TORQUE.size else None
 
 
 def decode_setpoint(data: bytes, layout: WatchedLayout = CIA_402) -> tuple[int, int] | None:

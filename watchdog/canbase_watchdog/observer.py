@@ -14,6 +14,7 @@ from canbase_watchdog.feedback import FeedbackWatch
 from canbase_watchdog.foreign import Foreign
 from canbase_watchdog.frames import DriveState
 from canbase_watchdog.tally import Tally
+from canbase_watchdog.torque import PushWatch
 from canbase_watchdog.view import NEVER, Axis, BusView, Node
 
 ENABLED = DriveState.OPERATION_ENABLED
@@ -37,6 +38,7 @@ class _Record:
         "feedback",
         "fresh",
         "misses",
+        "push",
         "setpoint_at",
         "setpoint_mps",
         "state",
@@ -46,9 +48,10 @@ class _Record:
         "velocity_mps",
     )
 
-    def __init__(self, drive: WatchedDrive, feedback: FeedbackWatch) -> None:
+    def __init__(self, drive: WatchedDrive, config: WatchdogConfig, now: float) -> None:
         self.drive = drive
-        self.feedback = feedback
+        self.feedback = FeedbackWatch(drive, config, now)
+        self.push = PushWatch(drive, config)
         self.state: DriveState | None = None
         self.status_at = self.enabled_since = self.disabled_since = NEVER
         self.velocity_mps, self.velocity_at = 0.0, NEVER
@@ -77,7 +80,12 @@ class _Record:
             min(self.fed_status_at, self.fed_velocity_at),
             self.misses.value,
             self.doubles.value,
+            self.push.last,
         )
+
+    def rests(self, still_mps: float) -> bool:
+        """Nothing is ordered, and what it measures is noise."""
+        return self.setpoint_mps == 0.0 and abs(self.velocity_mps) <= still_mps
 
     def on_sync(self, now: float) -> None:
         """What came before it counts from now on; each SYNC wants one setpoint, and one answer from one drive."""
@@ -99,9 +107,8 @@ class Observer:
     def __init__(self, config: WatchdogConfig, now: float) -> None:
         """Listens for the drives in `config`; the lower axis number of a node uses the PDOs of its first axis."""
         self._gap_s = config.feedback_timeout_s
-        self._records = {
-            (drive.node_id, drive.axis): _Record(drive, FeedbackWatch(drive, config, now)) for drive in config.drives
-        }
+        self._still_mps = config.motion_tolerance_mps
+        self._records = {(drive.node_id, drive.axis): _Record(drive, config, now) for drive in config.drives}
         self._heartbeat_at = {node_id: NEVER for node_id, _ in self._records}
         self._heard_at, self._boot_up_at = dict(self._heartbeat_at), dict(self._heartbeat_at)
         self._foreign = Foreign(config)
@@ -139,6 +146,7 @@ class Observer:
         """A reset was accepted: what spoke against the sensors is over."""
         for record in self._records.values():
             record.feedback.evidence.trust()
+            record.push.trust()
 
     @property
     def driver_at(self) -> float:
@@ -170,6 +178,9 @@ class Observer:
         self._foreign.on_sync(now)
         for record in self._records.values():
             record.on_sync(now)
+        rests = all(record.rests(self._still_mps) for record in self._records.values())
+        for record in self._records.values():
+            record.push.on_sync(record.setpoint_mps, rests)
         if now >= self._sync_at + self._gap_s:
             self._sync_since = now
         self._sync_at = now
@@ -201,6 +212,7 @@ class Observer:
             return False
         record.fed_status_at = now
         record.feedback.on_position(status[1])
+        record.push.on_position(status[1])
         return True
 
     def _note_state(self, record: _Record, statusword: int, now: float) -> bool:
@@ -222,8 +234,11 @@ class Observer:
         self._note_velocity(record, bits, now)
         record.fed_velocity_at = now
         record.answers += 1
-        enabled = record.state is ENABLED
-        record.feedback.on_velocity(record.velocity_mps, record.state in frames.POWERED, enabled, now)
+        enabled, powered = record.state is ENABLED, record.state in frames.POWERED
+        record.feedback.on_velocity(record.velocity_mps, powered, enabled, now)
+        record.push.on_sample(frames.decode_torque(data, record.drive.layout), powered, now)
+        if record.push.lies:
+            record.feedback.evidence.doubt()
         return True
 
     def _note_velocity(self, record: _Record, bits: int, now: float) -> None:

@@ -35,12 +35,13 @@ class Cause(enum.IntEnum):
     TWIST_OUTSIDE = 14
     SETPOINT_MISSING = 15
     ANSWERED_TWICE = 16
+    POWER_AT_STAND = 17
     DRIVE_RESTARTED = 18
     POWER_AT_END = 20
     RECORD_UNUSABLE = 21
 
 
-SENSOR_CAUSES = (Cause.FEEDBACK_IMPLAUSIBLE, Cause.MOTION_MISSING)
+SENSOR_CAUSES = (Cause.FEEDBACK_IMPLAUSIBLE, Cause.MOTION_MISSING, Cause.POWER_AT_STAND)
 """After a trip of before the start with one of these, what the drive reports about its motion is no evidence."""
 SIGN_S = 1.0
 """A sign of another master, or of a drive that started anew, counts for so long."""
@@ -277,12 +278,35 @@ def _missing(axis: Axis, config: WatchdogConfig) -> str:
             f"and {evidence.unseen_m:.3f} m of that (allowed {config.motion_missing_s:.3f} s and "
             f"{config.motion_missing_m:.3f} m); it reports {axis.velocity_mps:.3f} m/s: see encoder, motor, wheel"
         )
+    if axis.push.vain_s >= config.motion_missing_s:
+        return (
+            f"is pushed with {_torque(axis)} and shows no motion for {axis.push.vain_s:.3f} s (allowed "
+            f"{config.motion_missing_s:.3f} s), ordered {evidence.setpoint_mps:.3f} m/s: see encoder, motor, wheel"
+        )
     if evidence.behind_s >= config.slow_wheel_s:
         return (
             f"turns at {axis.velocity_mps:.3f} m/s, its setpoints ask for {evidence.ordered_mps:.3f} m/s for "
             f"{evidence.behind_s:.3f} s (allowed {config.slow_wheel_s:.3f} s; slow ramps: watchdog.slowest_ramp_mps2)"
         )
     return ""
+
+
+def _torque(axis: Axis) -> str:
+    share = axis.push.share
+    return "a torque that the drive does not tell" if share is None else f"{share:.0%} of the rated torque"
+
+
+def _power_at_stand(view: View, config: WatchdogConfig, now: float) -> Verdict:
+    for axis in view.axes:
+        if axis.powered and axis.push.overdue_s >= config.stand_answer_s:
+            detail = (
+                f"{axis.drive.joint} is ordered {axis.setpoint_mps:.3f} m/s, reports {axis.velocity_mps:.3f} m/s and "
+                f"has been held with {_torque(axis)} for {axis.push.overdue_s:.3f} s (allowed "
+                f"{config.stand_answer_s:.3f} s) without letting go: that may be a dead encoder and not a stand "
+                "(watchdog.stand_proof, watchdog.stand_answer_s)"
+            )
+            return Verdict(Cause.POWER_AT_STAND, axis.drive.node_id, detail)
+    return FINE
 
 
 def _twist_outside(view: View, config: WatchdogConfig, now: float) -> Verdict:
@@ -403,6 +427,7 @@ CHECKS = (
     Check(Cause.DRIVE_DOWN, _drive_down, _over, "nothing else; the driver resets the drive's fault after it"),
     Check(Cause.FEEDBACK_IMPLAUSIBLE, _feedback_implausible, _over, "nothing else; look at the encoder first"),
     Check(Cause.MOTION_MISSING, _motion_missing, _over, "nothing else; look at encoder, motor and wheel first"),
+    Check(Cause.POWER_AT_STAND, _power_at_stand, _over, "nothing else; look at the encoder and the driver first"),
     Check(Cause.TARGET_OUTSIDE, _target_outside, _over, "nothing else"),
     Check(Cause.OVERSPEED, _overspeed, _over, "nothing else"),
     Check(Cause.MOTION_OUTSIDE, _motion_outside, _over, "nothing else"),

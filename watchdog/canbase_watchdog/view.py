@@ -12,6 +12,7 @@ from canbase_watchdog.feedback import Feedback
 from canbase_watchdog.foreign import Sign
 from canbase_watchdog.frames import POWERED, DriveState
 from canbase_watchdog.lease import Lease
+from canbase_watchdog.torque import Push
 
 NEVER = -math.inf
 """Receive time of what has not come yet."""
@@ -44,6 +45,7 @@ class Axis:
     """SYNCs without a setpoint while it was enabled, less half of those with one."""
     double_answers: float = 0.0
     """SYNCs that were answered twice while it was enabled, less half of the others."""
+    push: Push = Push()  # noqa: RUF009 - immutable
 
     @property
     def enabled(self) -> bool:

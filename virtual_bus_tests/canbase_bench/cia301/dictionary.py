@@ -110,7 +110,7 @@ def _entry(variable: ODVariable) -> Entry:
     )
 
 
-PER_MOTOR = (0x60FF, 0x606C, 0x6064, 0x6083, 0x6084, 0x6085, 0x6077)
+PER_MOTOR = (0x60FF, 0x606C, 0x6064, 0x6083, 0x6084, 0x6085, 0x6077, 0x6078)
 """What each motor has of its own where both are behind one controlword, at sub-index 1 and 2."""
 SHARED = (0x6040, 0x6060, 0x6061)
 """What both have in common there."""

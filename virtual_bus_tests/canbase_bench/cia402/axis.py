@@ -189,7 +189,7 @@ class Axis:
         values[base + 0x6C00] = actual
         values[base + 0x4100] = self._statusword(actual)
         values[base + 0x6B00] = self.scale.raw(motor.demand_mps)
-        values[base + 0x7700] = int(1000.0 * motor.force_n / motor.peak_force_n)
+        values[base + 0x7700] = values[base + 0x7800] = int(1000.0 * motor.force_n / motor.peak_force_n)
 
     def position(self) -> int:
         """6064h as the encoder has it."""

@@ -1,0 +1,123 @@
+"""When the drives let go of wheels that stand: power that holds a stand is taken off once for each order. Pure.
+
+A dead encoder shows a stand, and its drive pushes on with the integrator of its velocity loop, with nothing ordered.
+So a drive that was ordered motion, and gives torque to a wheel that shows none, loses its power as soon as zero is
+ordered of all wheels, and gets it back at once: its loop begins anew. A wheel that is held on a slope rolls a little
+and is held again; one that friction holds does not notice (docs/decisions/0041).
+
+    HELD ──pushed for stand_impulse_s──► LETTING GO ──no axis has torque──► RETURNING ──all enabled──► HELD
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from enum import Enum
+from typing import Protocol
+
+from canbase_config.robot import Robot
+from canbase_driver.cia402 import DriveState, PowerGoal
+
+LIFE_M, LIFE_COUNTS = 0.0002, 2
+"""An encoder that moves by less may be noise; whichever is more."""
+LONGEST_STEP_S = 0.1
+"""Time between two samples counts for so long at most."""
+RETURN_S = 1.0
+"""From the power off until all drives are enabled again; then one that is not is a failure."""
+
+
+class Push:
+    """How hard a drive pushes at a wheel that shows no motion, and whether it was ordered any since it last let go."""
+
+    def __init__(self, limit_s: float, m_per_count: float) -> None:
+        """`limit_s`: time at rated torque, or longer at less."""
+        self._limit_s = limit_s
+        self._life_m = max(LIFE_M, LIFE_COUNTS * abs(m_per_count))
+        self._anchor_m = self.pushed_s = 0.0
+        self._at = math.inf
+        self._owes = self._tells = False
+        self.share: float | None = None
+        """Torque, of the rated one; None: the drive does not tell it, or has only ever told zero."""
+
+    @property
+    def must_let_go(self) -> bool:
+        """With nothing ordered, only letting go tells whether the wheel stands."""
+        return self._owes and self.pushed_s >= self._limit_s
+
+    def on_sample(self, travel_m: float, share: float | None, ordered_mps: float, has_torque: bool, now: float) -> None:
+        """Encoder and torque of one SYNC, and what an enabled drive was ordered before it."""
+        elapsed_s, self._at = min(max(now - self._at, 0.0), LONGEST_STEP_S), now
+        self._tells = self._tells or bool(share)
+        self.share = share if self._tells else None
+        if abs(travel_m - self._anchor_m) >= self._life_m or not has_torque:
+            self._anchor_m, self.pushed_s = travel_m, 0.0
+        else:
+            self.pushed_s += (1.0 if self.share is None else abs(self.share)) * elapsed_s
+        self._owes = has_torque and (self._owes or ordered_mps != 0.0)
+
+
+class Wheel(Protocol):
+    """What is looked at: an axis of a drive."""
+
+    @property
+    def state(self) -> DriveState | None:
+        """By its last statusword."""
+
+    @property
+    def velocity_mps(self) -> float:
+        """Measured."""
+
+    @property
+    def push(self) -> Push:
+        """Of its drive."""
+
+
+class Phase(Enum):
+    """See the drawing at the head of this file."""
+
+    HELD = "held"
+    LETTING_GO = "letting go"
+    RETURNING = "returning"
+
+
+class LetGo:
+    """All drives let go together: the base keeps its heading, and none is enabled beside one that is not."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._proves = robot.watchdog.stand_proof == "let_go"
+        self._still_mps = robot.watchdog.motion_tolerance_mps
+        self._answer_s = robot.watchdog.stand_answer_s
+        self._phase = Phase.HELD
+        self._since = -math.inf
+
+    @property
+    def active(self) -> bool:
+        """Nothing is to be ordered."""
+        return self._phase is not Phase.HELD
+
+    def excuses(self, now: float) -> bool:
+        """A drive that is not enabled is so because of this."""
+        return self.active and now - self._since <= RETURN_S
+
+    def end(self) -> None:
+        """Something else decides about the power."""
+        self._phase = Phase.HELD
+
+    def step(self, wheels: Sequence[Wheel], rests: bool, now: float) -> None:
+        """One cycle in which the drives are to be enabled; `rests`: zero is ordered of all wheels."""
+        if self._phase is Phase.HELD and rests and self._is_due(wheels):
+            self._phase, self._since = Phase.LETTING_GO, now
+        elif self._phase is Phase.LETTING_GO and all(wheel.state and not wheel.state.has_torque for wheel in wheels):
+            self._phase = Phase.RETURNING
+        elif self._phase is Phase.RETURNING and all(wheel.state is DriveState.OPERATION_ENABLED for wheel in wheels):
+            self._phase = Phase.HELD
+
+    def goal(self, now: float) -> PowerGoal:
+        """What the drives are told: disable operation, and where that has no effect, disable voltage."""
+        if self._phase is not Phase.LETTING_GO:
+            return PowerGoal.ON
+        return PowerGoal.LET_GO if now - self._since <= self._answer_s / 2.0 else PowerGoal.READY
+
+    def _is_due(self, wheels: Sequence[Wheel]) -> bool:
+        stand = all(abs(wheel.velocity_mps) <= self._still_mps for wheel in wheels)
+        return self._proves and stand and any(wheel.push.must_let_go for wheel in wheels)

@@ -1,0 +1,123 @@
+"""How hard a drive pushes at a wheel that shows no motion. It measures; policy.py decides (docs/decisions/0041).
+
+A dead encoder shows a stand, and the integrator of the velocity loop that it left behind goes on to push with nothing
+ordered. A wheel that is held on a slope, or against a threshold, looks the same on the bus. They differ when the drive
+lets go: the healthy wheel rolls, which its encoder shows, or its friction holds it and no torque is needed.
+
+Rules, for a drive with power
+1. Pushed: torque × time since the last sign of life, or since there was no power, bounds the speed that a dead encoder
+   can hide. With nothing ordered of any wheel, a drive that was ordered motion before must let go once.
+2. In vain: the torque differs from that at the last sign of life by more than a wheel's friction does to and fro, and
+   nothing moves. It adds up over orders until the encoder moves, and most of it outlives the power.
+A drive that does not tell its torque may give the rated one: rule 1 alone. So may one that has only ever told zero.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from canbase_config.watchdog import WatchdogConfig, WatchedDrive
+from canbase_watchdog.evidence import KEPT_SHARE, LIFE_COUNTS, LIFE_M
+
+STRAIN_SHARE = 0.5
+"""Of the rated torque: friction, from one direction to the other, takes less."""
+LONGEST_STEP_S = 0.1
+"""Time between two samples counts for so long at most: a drive that is silent for longer is another cause."""
+_WRAP = 2**32
+
+
+@dataclass(frozen=True, slots=True)
+class Push:
+    """What a drive has given to a wheel that shows nothing. `share`: torque, of the rated one; None: it is not told."""
+
+    share: float | None = None
+    pushed_s: float = 0.0
+    """Rule 1: time at rated torque that gives the same impulse."""
+    owes: bool = False
+    """It was ordered motion, and has not let go since."""
+    overdue_s: float = 0.0
+    """It has pushed enough, nothing is ordered, and it has had power for so long since then."""
+    vain_s: float = 0.0
+    """Rule 2."""
+
+
+class PushWatch:
+    """Follows one axis. What is ordered counts from the SYNC that made it effective."""
+
+    def __init__(self, drive: WatchedDrive, config: WatchdogConfig) -> None:
+        self._config = config
+        self._m_per_count = abs(drive.m_per_count)
+        self._life_m = max(LIFE_M, LIFE_COUNTS * self._m_per_count)
+        self._counts: int | None = None
+        self._anchor: int | None = None
+        self._at = math.inf
+        self._tells = self._rests = False
+        self._usual = 0.0
+        """Torque at the last sign of life, of the rated one."""
+        self.last = Push()
+
+    def on_sync(self, setpoint_mps: float, rests: bool) -> None:
+        """The setpoint of this wheel; `rests`: those of all wheels are zero, and none moves by what it measures."""
+        self._rests = rests
+        if setpoint_mps != 0.0:
+            self.last = replace(self.last, owes=True)
+
+    def on_position(self, counts: int) -> None:
+        """6064h of a status TPDO; the velocity of the same SYNC follows."""
+        self._counts = counts
+
+    def trust(self) -> None:
+        """A reset was accepted: everything begins anew."""
+        self.last = Push()
+
+    @property
+    def lies(self) -> bool:
+        """What the encoder reports is no evidence any more."""
+        return self.overdue or self.in_vain
+
+    @property
+    def overdue(self) -> bool:
+        """It had to let go, and had time for it."""
+        return self.last.overdue_s >= self._config.stand_answer_s
+
+    @property
+    def in_vain(self) -> bool:
+        """It was pushed as long as an ordered wheel may show nothing."""
+        return self.last.vain_s >= self._config.motion_missing_s
+
+    def on_sample(self, share: float | None, powered: bool, now: float) -> None:
+        """A velocity TPDO with what it tells of the torque, None: nothing."""
+        elapsed_s, self._at = min(max(now - self._at, 0.0), LONGEST_STEP_S), now
+        self._tells = self._tells or bool(share)
+        known = share if self._tells else None
+        lives = self._lives()
+        vain_s = 0.0 if lives else self.last.vain_s
+        if not powered:
+            self._usual = 0.0
+            self.last = Push(known, vain_s=min(vain_s, KEPT_SHARE * self._config.motion_missing_s))
+            return
+        if lives:
+            self._usual = known or 0.0
+        owes = self.last.owes
+        pushed_s = 0.0 if lives else self.last.pushed_s + (1.0 if known is None else abs(known)) * elapsed_s
+        strained = owes and known is not None and abs(known - self._usual) > STRAIN_SHARE
+        overdue = owes and self._rests and self._config.stand_proof and pushed_s >= self._config.stand_impulse_s
+        self.last = Push(
+            share=known,
+            pushed_s=pushed_s,
+            owes=owes,
+            overdue_s=self.last.overdue_s + elapsed_s if overdue else 0.0,
+            vain_s=vain_s + elapsed_s if strained else vain_s,
+        )
+
+    def _lives(self) -> bool:
+        """The encoder has moved since it last did."""
+        if self._counts is None or self._anchor is None:
+            self._anchor = self._counts
+            return False
+        moved = (self._counts - self._anchor + _WRAP // 2) % _WRAP - _WRAP // 2
+        if abs(moved) * self._m_per_count < self._life_m:
+            return False
+        self._anchor = self._counts
+        return True
