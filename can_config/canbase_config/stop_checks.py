@@ -25,6 +25,23 @@ def uncertain_stops(robot: Robot) -> Iterator[tuple[Loc, str]]:
         sentence = _own_ramp(robot, drive) or _cut_short(robot, drive)
         if sentence:
             yield ("drives", index, "profile"), sentence
+    if robot.watchdog.stand_proof == "none":
+        yield ("watchdog", "stand_proof"), _unproven_stand(robot)
+
+
+def _unproven_stand(robot: Robot) -> str:
+    mute = [drive.joint for drive in robot.drives if drive.kind.options.torque == "none"]
+    if mute:
+        return (
+            f"{', '.join(mute)} cannot be watched for a dead encoder at a stand, as the drive tells no torque "
+            "(options.torque of its profile): after a tap of the stick the wheel may run away; let_go takes its power "
+            "off for a moment at each stand"
+        )
+    return (
+        "a dead encoder at a stand is found only where its drive pushes with half of the rated torque for "
+        f"watchdog.motion_missing_s ({robot.watchdog.motion_missing_s:g}); let_go takes the power off for a moment "
+        "instead"
+    )
 
 
 def _own_ramp(robot: Robot, drive: Drive) -> str:

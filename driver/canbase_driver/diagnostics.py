@@ -185,6 +185,7 @@ def _measured(drive: DriveSnapshot) -> dict[str, float]:
     """What the drive measures besides its motion, where it does."""
     values = {
         "voltage [V]": drive.voltage_v,
+        "torque [% of the rated one]": 100.0 * drive.torque_share,
         "current [A]": drive.current_a,
         "temperature [°C]": drive.temperature_c,
     }

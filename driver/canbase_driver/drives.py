@@ -192,6 +192,7 @@ def _snapshot(node: RemoteNode, axis: Axis, robot: Robot, now: float) -> DriveSn
         internal_limit=bool(axis.statusword & INTERNAL_LIMIT),
         remote=bool(axis.statusword & REMOTE),
         voltage_v=measured.voltage_v,
+        torque_share=math.nan if axis.push.share is None else axis.push.share,
         current_a=measured.current_a,
         temperature_c=measured.temperature_c,
         boot_notes=node.report.notes if node.report else (),

@@ -75,6 +75,8 @@ class DriveSnapshot:
     """Statusword bit 9; false: it ignores the controlword."""
     voltage_v: float = math.nan
     """Of its supply [V]; NaN: not measured."""
+    torque_share: float = math.nan
+    """Of the rated torque; NaN: the drive does not tell it."""
     current_a: float = math.nan
     """Of the motor [A]; NaN: not measured."""
     temperature_c: float = math.nan

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from bus.crews import robot_with
 from canbase_config.errors import ConfigError
 from canbase_config.load import load_robot, sample
 from canbase_config.profile_file import load_profile
@@ -87,3 +88,21 @@ def test_a_quick_stop_within_the_heartbeat_is_not_cut_short(tmp_path: Path) -> N
     text = bench(tmp_path, "    # profile: generic ", "    profile: own.yaml # ").read_text()
     (tmp_path / "robot.yaml").write_text(text.replace("lease:\n", "timeouts: {drive_heartbeat_s: 0.6}\nlease:\n"))
     assert load_robot(tmp_path / "robot.yaml").warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("profile", "told"),
+    [
+        (
+            "generic",
+            "found only where its drive pushes with half of the rated torque for watchdog.motion_missing_s (0.25)",
+        ),
+        ("kinco", "left_wheel, right_wheel cannot be watched for a dead encoder at a stand"),
+    ],
+)
+def test_a_robot_that_wants_no_proof_of_a_stand_is_told_what_is_not_found(profile: str, told: str) -> None:
+    robot = robot_with(profile)
+    watchdog = robot.watchdog.model_copy(update={"stand_proof": "none"})
+    sentences = dict(uncertain_stops(robot.model_copy(update={"watchdog": watchdog})))
+    assert told in sentences["watchdog", "stand_proof"]
+    assert ("watchdog", "stand_proof") not in dict(uncertain_stops(robot))
