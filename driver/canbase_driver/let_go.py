@@ -18,8 +18,10 @@ from typing import Protocol
 from canbase_config.robot import Robot
 from canbase_driver.cia402 import DriveState, PowerGoal
 
-LIFE_M, LIFE_COUNTS = 0.0002, 2
-"""An encoder that moves by less may be noise; whichever is more."""
+LIFE_M, LIFE_COUNTS = 0.001, 2
+"""An encoder that is nearer than this to the place of its last sign of life may jitter; whichever is more."""
+NOISE_SHARE = 0.01
+"""Of the rated torque: less moves no wheel."""
 LONGEST_STEP_S = 0.1
 """Time between two samples counts for so long at most."""
 RETURN_S = 1.0
@@ -33,7 +35,7 @@ class Push:
         """`limit_s`: time at rated torque, or longer at less."""
         self._limit_s = limit_s
         self._life_m = max(LIFE_M, LIFE_COUNTS * abs(m_per_count))
-        self._anchor_m = self.pushed_s = 0.0
+        self._seen_m = self._moved_m = self.pushed_s = 0.0
         self._at = math.inf
         self._owes = self._tells = False
         self.share: float | None = None
@@ -49,10 +51,14 @@ class Push:
         elapsed_s, self._at = min(max(now - self._at, 0.0), LONGEST_STEP_S), now
         self._tells = self._tells or bool(share)
         self.share = share if self._tells else None
-        if abs(travel_m - self._anchor_m) >= self._life_m or not has_torque:
-            self._anchor_m, self.pushed_s = travel_m, 0.0
+        torque = 1.0 if self.share is None else abs(self.share)
+        given_s = torque * elapsed_s if torque >= NOISE_SHARE else 0.0
+        self._moved_m += travel_m - self._seen_m
+        self._seen_m = travel_m
+        if abs(self._moved_m) >= self._life_m or not has_torque:
+            self._moved_m = self.pushed_s = 0.0
         else:
-            self.pushed_s += (1.0 if self.share is None else abs(self.share)) * elapsed_s
+            self.pushed_s = min(self.pushed_s + given_s, self._limit_s)
         self._owes = has_torque and (self._owes or ordered_mps != 0.0)
 
 

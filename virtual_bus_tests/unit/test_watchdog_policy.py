@@ -285,7 +285,7 @@ def test_a_drive_that_was_never_heard_of_is_not_there_unless_it_is_told_to_have_
             Verdict(Cause.OVERSPEED, 2, "since before the start: too fast"),
         ),
         (Past(Entry(Mark.LATCHED, 0, 2, "?")), Verdict(Cause.RECORD_UNUSABLE, 2, "since before the start: ?")),
-        (Past(Entry(Mark.LATCHED, 18, 2, "?")), Verdict(Cause.RECORD_UNUSABLE, 2, "since before the start: ?")),
+        (Past(Entry(Mark.LATCHED, 19, 2, "?")), Verdict(Cause.RECORD_UNUSABLE, 2, "since before the start: ?")),
         (
             Past(Entry(Mark.LIVE, 6, 2, "too fast"), "damaged"),
             Verdict(Cause.RECORD_UNUSABLE, 0, "the record of its last trip cannot be used: damaged"),

@@ -18,8 +18,10 @@ import math
 from dataclasses import dataclass, replace
 
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
-from canbase_watchdog.evidence import KEPT_SHARE, LIFE_COUNTS, LIFE_M
+from canbase_watchdog.evidence import KEPT_SHARE, LIFE_COUNTS, LIFE_M, LIFE_SHARE
 
+NOISE_SHARE = 0.01
+"""Of the rated torque: less moves no wheel."""
 STRAIN_SHARE = 0.5
 """Of the rated torque: friction, from one direction to the other, takes less."""
 LONGEST_STEP_S = 0.1
@@ -47,10 +49,11 @@ class PushWatch:
 
     def __init__(self, drive: WatchedDrive, config: WatchdogConfig) -> None:
         self._config = config
-        self._m_per_count = abs(drive.m_per_count)
-        self._life_m = max(LIFE_M, LIFE_COUNTS * self._m_per_count)
+        self._m_per_count = drive.m_per_count
+        self._life_m = max(min(LIFE_M, LIFE_SHARE * config.motion_missing_m), LIFE_COUNTS * abs(drive.m_per_count))
         self._counts: int | None = None
-        self._anchor: int | None = None
+        self._counts_before: int | None = None
+        self._moved_m = 0.0
         self._at = math.inf
         self._tells = self._rests = False
         self._usual = 0.0
@@ -99,25 +102,27 @@ class PushWatch:
             return
         if lives:
             self._usual = known or 0.0
-        owes = self.last.owes
-        pushed_s = 0.0 if lives else self.last.pushed_s + (1.0 if known is None else abs(known)) * elapsed_s
-        strained = owes and known is not None and abs(known - self._usual) > STRAIN_SHARE
-        overdue = owes and self._rests and self._config.stand_proof and pushed_s >= self._config.stand_impulse_s
-        self.last = Push(
-            share=known,
-            pushed_s=pushed_s,
-            owes=owes,
-            overdue_s=self.last.overdue_s + elapsed_s if overdue else 0.0,
-            vain_s=vain_s + elapsed_s if strained else vain_s,
-        )
+        self.last = self._with_power(known, elapsed_s, lives, vain_s)
+
+    def _with_power(self, share: float | None, elapsed_s: float, lives: bool, vain_s: float) -> Push:
+        config, owes = self._config, self.last.owes
+        torque = 1.0 if share is None else abs(share)
+        given_s = torque * elapsed_s if torque >= NOISE_SHARE else 0.0
+        pushed_s = 0.0 if lives else min(self.last.pushed_s + given_s, config.stand_impulse_s)
+        overdue = owes and self._rests and config.stand_proof and pushed_s >= config.stand_impulse_s
+        overdue_s = min(self.last.overdue_s + elapsed_s, config.stand_answer_s) if overdue else 0.0
+        strained = owes and share is not None and abs(share - self._usual) > STRAIN_SHARE
+        vain_s = min(vain_s + elapsed_s, config.motion_missing_s) if strained else vain_s
+        return Push(share, pushed_s, owes, overdue_s, vain_s)
 
     def _lives(self) -> bool:
-        """The encoder has moved since it last did."""
-        if self._counts is None or self._anchor is None:
-            self._anchor = self._counts
+        """The encoder is elsewhere than at its last sign of life."""
+        counts, before = self._counts, self._counts_before
+        self._counts_before = counts
+        if counts is None or before is None:
             return False
-        moved = (self._counts - self._anchor + _WRAP // 2) % _WRAP - _WRAP // 2
-        if abs(moved) * self._m_per_count < self._life_m:
+        self._moved_m += ((counts - before + _WRAP // 2) % _WRAP - _WRAP // 2) * self._m_per_count
+        if abs(self._moved_m) < self._life_m:
             return False
-        self._anchor = self._counts
+        self._moved_m = 0.0
         return True
