@@ -62,6 +62,7 @@ TARGETS = (
     _watchdog("envelope", then=("watchdog_trips", "watchdog_envelope_limiter")),
     _watchdog("feedback"),
     _watchdog("evidence", then=("watchdog_observer",)),
+    _watchdog("torque"),
     _watchdog("twist", then=("watchdog_observer",)),
     _watchdog("tally", then=("watchdog_observer",)),
     _watchdog("pair"),
