@@ -76,13 +76,20 @@ def _warnings(robot: Robot, file: YamlFile) -> Iterator[Problem]:
         yield Problem(place.file, place.line, place.key, sentence)
 
 
+def samples() -> list[str]:
+    """Names of the robot files that come with canbase."""
+    return sorted(file.stem for file in _samples().glob("*.yaml"))
+
+
 def sample(name: str) -> Path:
     """Path of a robot file that comes with canbase: `bench` or `example_can0`. Raises ValueError for another name."""
-    folder = Path(str(resources.files("canbase_config"))) / "robots"
-    names = sorted(file.stem for file in folder.glob("*.yaml"))
-    if name not in names:
-        raise ValueError(f"there is no sample {name!r}, expected one of {', '.join(names)}")
-    return folder / f"{name}.yaml"
+    if name not in samples():
+        raise ValueError(f"there is no sample {name!r}, expected one of {', '.join(samples())}")
+    return _samples() / f"{name}.yaml"
+
+
+def _samples() -> Path:
+    return Path(str(resources.files("canbase_config"))) / "robots"
 
 
 def leaf_keys(value: Any, loc: Loc = ()) -> Iterator[Loc]:

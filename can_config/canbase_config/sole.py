@@ -54,15 +54,27 @@ def _address(task: str, name: str) -> str:
     return f"\0canbase.{task}.{short}"
 
 
+def holder(task: str, name: str) -> int | None:
+    """Process id of who holds it now; None: nobody does. Raises OSError where the kernel does not tell."""
+    try:
+        return _holder(task, name)[0]
+    except ConnectionRefusedError:
+        return None
+
+
+def _holder(task: str, name: str) -> tuple[int, int]:
+    """Process and user id of the holder."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as caller:
+        caller.setblocking(False)
+        caller.connect(_address(task, name))
+        pid, uid, _ = _CREDENTIALS.unpack(caller.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size))
+    return pid, uid
+
+
 def _who(task: str, name: str) -> str:
     """Process, user and command of the holder, as far as this user may see them."""
     try:
-        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as caller:
-            caller.setblocking(False)
-            caller.connect(_address(task, name))
-            pid, uid, _ = _CREDENTIALS.unpack(
-                caller.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
-            )
+        pid, uid = _holder(task, name)
     except OSError as error:
         return f"who it is cannot be seen ({error.strerror or error})"
     try:

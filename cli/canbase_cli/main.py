@@ -15,11 +15,13 @@ from canbase_cli import (
     doctor,
     drive,
     fibonacci,
+    inject,
     install,
     jog,
     monitor,
     process,
     rotate,
+    sample,
     scan,
     sdo,
     trigger,
@@ -70,6 +72,8 @@ app.command("scan", epilog=scan.EPILOG)(scan.scan)
 app.add_typer(sdo.app, name="sdo")
 app.command("commission", epilog=commission.EPILOG)(commission.commission)
 app.command("jog", epilog=jog.EPILOG)(jog.jog)
+app.command("inject", epilog=inject.EPILOG)(inject.inject)
+app.command("sample")(sample.sample)
 app.command("bench")(bench.bench)
 app.add_typer(config.app, name="config")
 app.add_typer(fibonacci.app, name="fibonacci")

@@ -1,0 +1,113 @@
+"""`canbase inject`: breaks one thing of a simulated robot, to see how the others stop it."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+from canbase_cli.options import FAILED, WRONG_INPUT, ConfigOption, colour, fail, load_config
+
+if TYPE_CHECKING:
+    from canbase_config.robot import Robot
+
+SIGNALS: Final[Mapping[str, signal.Signals]] = MappingProxyType(
+    {"hang": signal.SIGSTOP, "continue": signal.SIGCONT, "kill": signal.SIGKILL}
+)
+PARTS: Final = ("driver", "watchdog", "velocity")
+ALL: Final = "all"
+SIMULATED: Final = ("udp_multicast", "virtual")
+EPILOG: Final = (
+    "Examples:  \ncanbase inject driver hang  \ncanbase inject watchdog kill  \n"
+    "canbase inject left_wheel encoder_lost  \ncanbase inject right_wheel weak share=0.3  \n"
+    "canbase inject all cut  \ncanbase inject all heal"
+)
+
+
+def inject(
+    target: Annotated[
+        str, typer.Argument(metavar="TARGET", help="driver, watchdog, velocity; a joint of robot.yaml; or all drives.")
+    ],
+    fault: Annotated[
+        str, typer.Argument(metavar="FAULT", help="A part: hang, continue, kill. A drive: cut, encoder_lost, …, heal.")
+    ],
+    values: Annotated[
+        list[str] | None, typer.Argument(metavar="[NAME=VALUE]…", help="What the fault of a drive takes.")
+    ] = None,
+    config: ConfigOption = None,
+) -> None:
+    """Break one thing of a robot on a simulated bus while `canbase up` runs. Refused on a real bus.
+
+    A part that hangs goes on with `continue`; what was killed is started again with `canbase up`. Faults of a drive
+    last until `canbase inject all heal`.
+
+    Exit codes: 0 done, 1 it does not run or the simulator refuses, 2 wrong command line or robot.yaml.
+    """
+    robot = load_config(config).robot
+    if robot.bus.interface not in SIMULATED:
+        fail(f"{robot.name} is on {robot.bus.interface}: faults are injected on a simulated bus alone", WRONG_INPUT)
+    if target in PARTS:
+        _signal(robot, target, fault)
+    else:
+        _break(robot, target, fault, _arguments(values or []))
+    typer.secho(f"canbase: {target}: {fault}", err=True, color=colour())
+
+
+def _signal(robot: Robot, part: str, fault: str) -> None:
+    from canbase_config.sole import bus_name, holder
+
+    if fault not in SIGNALS:
+        fail(f"{part} takes {', '.join(SIGNALS)}, not {fault!r}", WRONG_INPUT)
+    bus = bus_name(robot.bus.arguments())
+    task, name = ("velocity process", robot.lease.socket) if part == "velocity" else (part, bus)
+    pid = holder(task, name)
+    if pid is None:
+        fail(f"{part} of {robot.name} does not run; start it with `canbase up`", FAILED)
+    try:
+        os.kill(pid, SIGNALS[fault])
+    except OSError as error:
+        fail(f"{part} is process {pid}: {error.strerror}", FAILED)
+
+
+def _break(robot: Robot, target: str, fault: str, arguments: Mapping[str, Any]) -> None:
+    from canbase_bench.control import ControlError, SimControl, control_path
+    from canbase_bench.faults import KINDS
+
+    if fault not in KINDS:
+        fail(f"there is no fault {fault!r} of a drive, expected one of {', '.join(KINDS)}", WRONG_INPUT)
+    wheels = [drive for drive in robot.drives if target in (ALL, drive.joint)]
+    if not wheels:
+        known = ", ".join((*PARTS, ALL, *(drive.joint for drive in robot.drives)))
+        fail(f"{target!r} is no part and no joint of {robot.name}, expected one of {known}", WRONG_INPUT)
+    by_axis = "axis" in KINDS[fault][1]
+    places = sorted({(drive.node_id, drive.axis if by_axis else 0) for drive in wheels})
+    try:
+        with SimControl(control_path(robot)) as sim:
+            for node, axis in places:
+                sim.fault(node, fault, **({"axis": axis} if axis else {}), **arguments)
+    except ControlError as error:
+        fail(str(error), FAILED)
+
+
+def _arguments(values: list[str]) -> dict[str, Any]:
+    """`share=0.3` as the simulator takes it. It names what does not fit."""
+    found: dict[str, Any] = {}
+    for value in values:
+        name, equals, text = value.partition("=")
+        if not (name and equals):
+            fail(f"{value!r}: expected NAME=VALUE, such as share=0.3", WRONG_INPUT)
+        found[name] = _value(name, text)
+    return found
+
+
+def _value(name: str, text: str) -> bool | int | float:
+    if text in ("true", "false"):
+        return text == "true"
+    try:
+        return int(text) if text.lstrip("-").isdigit() else float(text)
+    except ValueError:
+        fail(f"{name} = {text!r}: expected a number, true or false", WRONG_INPUT)
