@@ -66,11 +66,7 @@ mutation: $(VENV)/ready ## mutants of watchdog policy and CiA 402 tables, of cha
 
 .PHONY: exit-matrix
 exit-matrix: $(VENV)/ready ## every way out of a driving robot, for real, measured: docs/stop_times.md; ONLY=watchdog runs some
-ifdef ONLY
-	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m exit_matrix --only '$(ONLY)'
-else
-	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m exit_matrix --write docs/stop_times.md
-endif
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m exit_matrix --write docs/stop_times.md --only '$(ONLY)'
 
 .PHONY: bench
 bench: $(VENV)/ready ## every budget of this computer, measured beside a floor: docs/performance.md; NAME=reaction runs one

@@ -30,7 +30,7 @@ def main() -> int:
     """Runs the rows and prints them."""
     parser = argparse.ArgumentParser(prog="exit_matrix", description="every way out stops the robot, measured")
     parser.add_argument("--only", metavar="TEXT", default="", help="rows with this in their name")
-    parser.add_argument("--write", type=Path, metavar="FILE", help="write the table there, between its marks")
+    parser.add_argument("--write", type=Path, metavar="FILE", help="put the rows that passed into its table")
     arguments = parser.parse_args()
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     _raise_priority()
@@ -48,11 +48,10 @@ def main() -> int:
         log = Path(tempfile.gettempdir()) / "canbase_exit_matrix.log"
         log.write_text(said.getvalue(), encoding="utf-8")
         console.print(f"what the processes said: {log}", soft_wrap=True)
-    if arguments.write and not failed:
-        page = arguments.write.read_text(encoding="utf-8")
-        arguments.write.write_text(
-            rewritten(page, COMMANDS, merged(section(page, COMMANDS), results)), encoding="utf-8"
-        )
+    if arguments.write:
+        page, passed = arguments.write.read_text(encoding="utf-8"), [result for result in results if not result.problem]
+        table_text = merged(section(page, COMMANDS), passed)
+        arguments.write.write_text(rewritten(page, COMMANDS, table_text), encoding="utf-8")
     return 1 if failed or not results else 0
 
 

@@ -9,7 +9,7 @@ from signal import SIGCONT, Signals
 from std_msgs.msg import Bool
 
 from exit_matrix.layers import SPEED_MPS
-from exit_matrix.scene import Scene, forward
+from exit_matrix.scene import Scene
 
 Inject = Callable[[Scene], float]
 """Breaks something; the moment from which the stop is measured (time.monotonic)."""
@@ -71,8 +71,7 @@ def then_zero(inject: Inject, wait_s: float = 0.2) -> Inject:
 
 def publish_straight(scene: Scene) -> float:
     """Past mux and filter, four times as often as these."""
-    scene.straight.message = forward(SPEED_MPS)
-    return time.monotonic()
+    return scene.push_straight(SPEED_MPS)
 
 
 def publish_no_more(scene: Scene) -> None:

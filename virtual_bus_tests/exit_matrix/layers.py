@@ -55,6 +55,23 @@ def coast(robot: Robot, speed_mps: float) -> float:
     return speed_mps * (body.mass_kg / wheels + body.wheel_mass_kg) / body.coulomb_n
 
 
+def sensor_dead(robot: Robot, speed_mps: float) -> float:
+    """Until a wheel at speed whose sensor shows nothing, or the contrary, has shown it often enough."""
+    return robot.watchdog.drive_lag_s + robot.watchdog.feedback_samples / robot.rates.control_hz
+
+
+def coast_from_runaway(robot: Robot, speed_mps: float) -> float:
+    """The simulated drive has pushed with its whole force until then, and the wheel coasts from what that made."""
+    body, wheels = DEFAULT_BODY, len(robot.drives)
+    push_mps2 = body.peak_force_n / (body.mass_kg / wheels + body.wheel_mass_kg)
+    return coast(robot, speed_mps + push_mps2 * sensor_dead(robot, speed_mps))
+
+
+def twisted(robot: Robot, speed_mps: float) -> float:
+    """Until the base has turned for so long as nobody ordered."""
+    return robot.watchdog.twist_s + robot.watchdog.drive_lag_s
+
+
 def at_once(robot: Robot, speed_mps: float) -> float:
     """It acts by itself, on its way out."""
     return 0.0
@@ -126,7 +143,11 @@ WATCHDOG_KEPT = Layer("watchdog", "target outside", kept_setpoint, quick)
 WATCHDOG_MOTION = Layer("watchdog", "motion outside", kept_motion, quick)
 WATCHDOG_STUCK = Layer("watchdog", "motion outside", at_once, ramp)
 """Only the report is stuck: the base follows the order."""
-WATCHDOG_FEEDBACK = Layer("watchdog", "feedback implausible", drift, quick)
+WATCHDOG_FEEDBACK = Layer("watchdog", "feedback implausible", drift, coast)
+"""A wheel whose sensor is no evidence loses its power: the drive's quick stop would close its loop on that sensor."""
+WATCHDOG_SENSOR = Layer("watchdog", "feedback implausible", sensor_dead, coast_from_runaway)
+WATCHDOG_BACKWARD = Layer("watchdog", "motion outside", sensor_dead, coast_from_runaway)
+WATCHDOG_TWIST = Layer("watchdog", "twist outside", twisted, quick)
 WATCHDOG_FOREIGN = Layer("watchdog", "foreign master", disorder, quick)
 WATCHDOG_ENDED = Layer("watchdog", "ended", at_once, quick)
 WATCHDOG_EXCEPTION = Layer("watchdog", "exception", at_once, quick)

@@ -11,7 +11,7 @@ from exit_matrix.rows import ROWS
 from exit_matrix.runner import Result
 from exit_matrix.stop_table import REAL, TABLE
 
-COLUMNS = ("what", "how", "who caught it", "stood after", "way", "limit")
+COLUMNS = ("what", "how", "who caught it", "stood after", "distance", "limit")
 LEFT = 3
 """So many columns are text."""
 

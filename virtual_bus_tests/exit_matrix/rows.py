@@ -31,6 +31,7 @@ from exit_matrix.scene import CLIENT, By
 
 DRIVER, VELOCITY, WATCHDOG, SERVER = "driver", "velocity", "watchdog", "action-server"
 """Parts of `canbase_cli.stack`."""
+BEHIND_FILTER = ("motor_driver", "watchdog", "drives")
 BROKEN = 1
 """Exit code after a defect."""
 
@@ -47,6 +48,8 @@ class Row:
     driven_by: By = By.GOAL
     ended: tuple[str, int] | None = None
     """The part that must have ended, and its exit code; all others still run."""
+    starves: str = ""
+    """The part that never waits: with real-time priority the system ends it sooner or later (RLIMIT_RTTIME)."""
     holds: bool = True
     """A joystick that orders motion moves nothing until `undo` and, where the stop is latched, a reset."""
     common: bool = False
@@ -56,6 +59,14 @@ class Row:
     def name(self) -> str:
         """As pytest and --only know it."""
         return f"{self.what}: {self.how}"
+
+    @property
+    def latched_behind_filter(self) -> bool:
+        """Driver, watchdog or drives hold the stop themselves: it must meet orders on cmd_vel too.
+
+        A joystick that is held does not get so far: the mux waits for its zero.
+        """
+        return self.holds and all(layer.who in BEHIND_FILTER for layer in self.caught_by)
 
 
 def _process(what: str, part: str, columns: dict[str, tuple[Layer, ...]], free: tuple[str, ...] = ()) -> list[Row]:
@@ -82,6 +93,7 @@ def _of_process(what: str, part: str, how: str, caught_by: tuple[Layer, ...], ho
         undo=resumes(part) if how == "SIGSTOP" else nothing,
         driven_by=By.CLIENT if part == CLIENT else By.GOAL,
         ended=None if exit_code is None or part == CLIENT else (part, exit_code),
+        starves=part if how == "busy loop" else "",
         holds=holds,
         common=how in ("SIGKILL", "SIGSTOP") and part != CLIENT,
     )
@@ -213,6 +225,16 @@ BUS = (
     Row("second master", "sends setpoints too", second_master, (by.WATCHDOG_FOREIGN,), no_second_master),
 )
 
+LIES = tuple(
+    Row(what, how, inject, caught_by, heal, By.JOYSTICK)
+    for what, how, inject, caught_by in (
+        ("encoder", "lost: nothing counts, no speed", fault("encoder_lost", 1), (by.WATCHDOG_SENSOR,)),
+        ("encoder", "counts backward", fault("encoder_reversed", 1), (by.WATCHDOG_SENSOR, by.WATCHDOG_BACKWARD)),
+        ("wheel", "blocked", fault("blocked", 1), (by.WATCHDOG_SENSOR,)),
+        ("wheel", "follows half of its setpoint", fault("limited", 1, share=0.5), (by.WATCHDOG_TWIST,)),
+    )
+)
+
 ROS = (
     Row("joystick", "dies", joystick_dies, (by.MUX_JOYSTICK,), driven_by=By.JOYSTICK, holds=False),
     Row(
@@ -228,4 +250,4 @@ ROS = (
     Row("emergency stop", "stale", estop_dies, (by.FILTER_ESTOP_STALE,)),
 )
 
-ROWS: tuple[Row, ...] = (*PROCESSES, *BUS, *ROS)
+ROWS: tuple[Row, ...] = (*PROCESSES, *BUS, *LIES, *ROS)

@@ -3,6 +3,8 @@
 SPEED ────────╮ failure                    ╭┄┄ the joystick orders motion: nothing, where the stop holds
 0     ────────╰────── stands ── QUIET_S ───┴── undo ── QUIET_S ── reset ── the next row drives
               │←time→│  by the simulator's ground truth; the limit by the layer that caught it (`layers.py`)
+
+Where driver, watchdog or drives hold the stop, somebody orders motion on cmd_vel too, until after `undo`.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ import time
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from signal import SIGKILL
+from signal import SIGKILL, SIGXCPU
 from types import TracebackType
 from typing import Final
 
@@ -139,6 +141,9 @@ class Runner:
         if row.holds:
             scene.push(SPEED_MPS)
             _check_rest(scene, "when a joystick ordered it")
+        if row.latched_behind_filter:
+            scene.push_straight(SPEED_MPS)
+            _check_rest(scene, "when somebody ordered it on cmd_vel")
         scene.joystick.message = None
         _check_end(row, scene)
         row.undo(scene)
@@ -146,6 +151,7 @@ class Runner:
         scene.robot.stack.start()
         self._restarted = len(scene.robot.stack.pids) > running
         _check_rest(scene, "after it was undone", RESTART_S if self._restarted else QUIET_S)
+        scene.straight.message = None
 
 
 def judge(row: Row, stop: Standstill, caught: list[Layer], catches: set[Catch], limit_s: float) -> str:
@@ -175,5 +181,9 @@ def _check_end(row: Row, scene: Scene) -> None:
         if death is None or (death.part, death.exit_code) != (part, exit_code):
             raise FailedError(f"{death}; expected {part} with exit code {exit_code}")
         stack.end(part)
-    elif stack.death() is not None:
-        raise FailedError(str(stack.death()))
+        return
+    death = stack.death()
+    if death is not None and (death.part, death.exit_code) == (row.starves, -SIGXCPU):
+        stack.end(row.starves)
+    elif death is not None:
+        raise FailedError(str(death))

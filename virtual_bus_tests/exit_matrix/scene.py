@@ -64,6 +64,7 @@ class Scene(World):
         if by is By.GOAL:
             self.robot.goal(WAY_M, SPEED_MPS)
         elif by is By.JOYSTICK:
+            self.node.release(self.joystick)  # the mux follows nobody who has not shown zero
             self.push(SPEED_MPS)
         else:
             self._start_client()
@@ -85,6 +86,11 @@ class Scene(World):
     def push(self, speed_mps: float) -> float:
         """The joystick orders that speed from now on (time.monotonic)."""
         self.joystick.message = forward(speed_mps)
+        return time.monotonic()
+
+    def push_straight(self, speed_mps: float) -> float:
+        """Somebody orders that speed on cmd_vel from now on, past mux and filter (time.monotonic)."""
+        self.straight.message = forward(speed_mps)
         return time.monotonic()
 
     def send_signal(self, part: str, number: signal.Signals) -> float:

@@ -34,6 +34,12 @@ def test_every_process_has_a_row_for_every_way_out() -> None:
     assert len(set(names)) == len(names)
 
 
+def test_orders_on_cmd_vel_meet_the_latches_of_driver_watchdog_and_drives_and_no_others() -> None:
+    latched = {row.name for row in ROWS if row.latched_behind_filter}
+    assert {"motor_driver: SIGKILL", "watchdog: SIGSTOP", "velocity process: SIGKILL", "drive: in fault"} <= latched
+    assert not latched & {"velocity process: SIGTERM", "scan: stale", "emergency stop: pressed", "joystick: dies"}
+
+
 @pytest.mark.parametrize(
     ("layer", "limit_s"),
     [
