@@ -20,6 +20,13 @@ def test_robots_that_drive_as_they_should_are_not_stopped() -> None:
     assert sum(each.path_m for each in driven) > 2.0
 
 
+@pytest.mark.parametrize("seed", [34])
+def test_robots_that_were_stopped_once_are_not_any_more(seed: int) -> None:
+    """34: soft drives with strong motors, 0.07 s against a threshold: free again, a wheel overshoots by half."""
+    (driven,) = drive_all(range(seed, seed + 1), 8.0, 1)
+    assert driven.trip is None, told(driven.trip)
+
+
 def test_the_same_seed_drives_the_same_way() -> None:
     assert [drive_all(range(3, 4), 8.0, 1).__next__() for _ in range(2)] == list(drive_all(range(3, 4), 8.0, 1)) * 2
 

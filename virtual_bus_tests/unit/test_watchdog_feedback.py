@@ -108,6 +108,60 @@ def test_the_lower_end_falls_too() -> None:
     assert (lows[51], wheel.last.high_mps) == (0.0, 0.0)
 
 
+# --- a wheel that comes free overshoots
+
+
+def held(count: int = 10, at_mps: float = 0.0, target: float = 0.4, mirrored: bool = False) -> Wheel:
+    """A wheel that something has held at this speed for so many cycles."""
+    wheel = Wheel(mirrored=mirrored)
+    wheel.samples(50, target, target)
+    wheel.samples(count, at_mps, target)
+    return wheel
+
+
+@pytest.mark.parametrize(("velocity", "outside"), [(0.8899, 0), (0.8901, 1)])  # 0.4 + 0.4 that it lacked + 0.09
+@pytest.mark.parametrize(("sign", "mirrored"), [(1.0, False), (-1.0, False), (1.0, True)])
+def test_held_at_zero_it_may_have_twice_its_setpoint(
+    velocity: float, outside: int, sign: float, mirrored: bool
+) -> None:
+    assert held(target=sign * 0.4, mirrored=mirrored).sample(sign * velocity, sign * 0.4).outside == outside
+
+
+def test_it_may_for_two_tenths_of_a_second_after_the_last_sample_that_lacked() -> None:
+    wheel = held()
+    counts = [wheel.sample(0.6, 0.4).outside for _ in range(24)]
+    assert counts[:19] == [0] * 19
+    assert counts[20:] in ([1, 2, 3, 4], [2, 3, 4, 5])
+
+
+@pytest.mark.parametrize(("held_mps", "outside"), [(0.3101, 1), (0.3099, 0)])
+def test_what_lacked_no_more_than_the_tolerance_was_not_held(held_mps: float, outside: int) -> None:
+    assert held(at_mps=held_mps).sample(0.5, 0.4).outside == outside
+
+
+def test_it_overshoots_by_what_it_lacked_and_the_other_way_not_at_all() -> None:
+    assert [held(at_mps=0.2).sample(velocity, 0.4).outside for velocity in (0.6899, 0.6901)] == [0, 1]
+    assert held(at_mps=0.0).sample(-0.0901, 0.4).outside == 1
+
+
+def test_a_wheel_that_turned_the_wrong_way_lacked_its_setpoint_and_no_more() -> None:
+    assert held(at_mps=-0.3).sample(0.8899, 0.4).outside == 0
+    assert held(at_mps=-0.3).sample(0.8901, 0.4).outside > 0
+
+
+def test_what_it_lacked_with_power_before_is_forgotten_without() -> None:
+    wheel = held()
+    for _ in range(21):
+        wheel.sample(0.0, 0.4, powered=False)
+    assert wheel.sample(0.6, 0.4).outside == 1
+
+
+def test_a_setpoint_of_zero_lacks_nothing() -> None:
+    wheel = Wheel()
+    wheel.samples(100, 0.0, 0.0)
+    assert wheel.sample(0.0511, 0.0).outside == 1
+
+
 def test_in_a_reversal_the_wheel_may_still_turn_the_old_way() -> None:
     wheel = Wheel()
     wheel.samples(10, 0.4, 0.4)

@@ -1,9 +1,10 @@
 """Whether what one drive reports fits its setpoints and itself: three counts of bad samples in a row. No judgement.
 
 The wheel follows its setpoints: it may have the speed of any setpoint of the last `drive_lag_s` and less, and after
-that it falls with the configured deceleration; what it must have at least is evidence.py. Encoder and velocity tell the
-same way, but for a small drift: a difference is forgotten over the way on which it did not grow, and very slowly with
-time, so that it is found at any speed (docs/decisions/0020).
+that it falls with the configured deceleration; what it must have at least is evidence.py. A wheel that something held
+back overshoots when it comes free (docs/decisions/0046). Encoder and velocity tell the same way, but for a small drift:
+a difference is forgotten over the way on which it did not grow, and very slowly with time, so that it is found at any
+speed (docs/decisions/0020).
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ scale that is a little wrong have no memory. An error of more than travel_tolera
 JUMP_FACTOR = 3.0
 """A step of the encoder beyond so many times the fastest wheel's is a jump: it tells nothing about the motion."""
 JUMP_CYCLES = 2.0
+OVERSHOOT_S = 0.2
+"""So long a wheel that was slower than its setpoint may be faster by as much: its drive's integrator is wound up."""
 _WRAP = 2**32
 
 
@@ -51,6 +54,8 @@ class FeedbackWatch:
         self._jump_mps, self._jump_s = JUMP_FACTOR * config.max_wheel_mps, JUMP_CYCLES / config.control_hz
         self._fastest_mps = config.overspeed_factor * config.max_wheel_mps
         self._forward, self._backward = Peak(config.drive_lag_s), Peak(config.drive_lag_s)
+        self._lack_forward, self._lack_backward = Peak(OVERSHOOT_S), Peak(OVERSHOOT_S)
+        self._target_mps = 0.0
         self._high = self._low = config.max_wheel_mps
         for peak in (self._forward, self._backward):
             peak.set(config.max_wheel_mps, now, now)
@@ -63,6 +68,7 @@ class FeedbackWatch:
 
     def on_target(self, target_mps: float, now: float) -> None:
         """A setpoint, which stays until the next one."""
+        self._target_mps = target_mps
         self._forward.set(target_mps, now, math.inf)
         self._backward.set(-target_mps, now, math.inf)
 
@@ -76,19 +82,20 @@ class FeedbackWatch:
         self._follow(elapsed_s, now)
         step_m, jumped = self._step(elapsed_s)
         drift_m = self._drift(velocity_mps, step_m, jumped, elapsed_s)
-        self._judge(velocity_mps, powered, drift_m, jumped)
+        self._judge(velocity_mps, powered, drift_m, jumped, now)
         self.evidence.on_sample(velocity_mps, None if jumped else step_m, powered, enabled, elapsed_s, now)
         if self.last.implausible >= self._config.feedback_samples:
             self.evidence.doubt()
         self._velocity_mps, self._counts_before = velocity_mps, self._counts
 
-    def _judge(self, velocity_mps: float, powered: bool, drift_m: float, jumped: bool) -> None:
+    def _judge(self, velocity_mps: float, powered: bool, drift_m: float, jumped: bool, now: float) -> None:
         if not powered:
             self.last = Feedback(-self._low, self._high)
             return
         config, last = self._config, self.last
         slack = self._fixed_mps + config.motion_tolerance_share * max(self._low, self._high)
-        inside = -self._low - slack <= velocity_mps <= self._high + slack
+        forward_mps, backward_mps = self._overshoot(velocity_mps, slack, now)
+        inside = -self._low - slack - backward_mps <= velocity_mps <= self._high + slack + forward_mps
         self.last = Feedback(
             low_mps=-self._low,
             high_mps=self._high,
@@ -97,6 +104,15 @@ class FeedbackWatch:
             implausible=last.implausible + 1 if jumped or abs(drift_m) > config.travel_tolerance_m else 0,
             drift_m=drift_m,
         )
+
+    def _overshoot(self, velocity_mps: float, slack_mps: float, now: float) -> tuple[float, float]:
+        """By how much the wheel may be faster than its setpoints, forward and backward, since it was slower."""
+        forward, backward = self._lack_forward, self._lack_backward
+        for peak, way in ((forward, 1.0), (backward, -1.0)):
+            target, velocity = way * self._target_mps, way * velocity_mps
+            lack_mps = min(target - velocity, target)
+            peak.set(lack_mps if lack_mps > slack_mps else 0.0, now, now)
+        return forward.greatest(now), backward.greatest(now)
 
     def _follow(self, elapsed_s: float, now: float) -> None:
         fallen_mps = elapsed_s * self._config.deceleration_mps2
