@@ -77,6 +77,8 @@ def _tell_sums(tally: Tally) -> None:
     trips = ", ".join(f"{name} {count}" for name, count in tally.trips.most_common())
     goals = ", ".join(f"{name} {count}" for name, count in tally.goals.most_common())
     out.print(f"scenarios by number of faults: {at_once}")
+    lives = ", ".join(f"{count} with {lives}" for lives, count in sorted(tally.lives.items()))
+    out.print(f"scenarios by lives, with a reset between: {lives}")
     out.print(f"trips of the watchdog: {trips or 'none'}")
     out.print(f"ends of goals: {goals or 'none'}")
     ratio = tally.virtual_s / tally.real_s if tally.real_s else 0.0

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from campaign import bench_faults as bench
 from campaign import people
+from campaign.scanner import LIES, Lie
 from canbase_velocity.twist import Twist
 
 if TYPE_CHECKING:
@@ -195,6 +196,28 @@ def _wall(world: World, around: Surroundings, given: Arguments) -> None:
 
 def _no_wall(world: World, around: Surroundings, given: Arguments) -> None:
     around.take_wall()
+
+
+def _scanner_lies(name: str, lie: Lie) -> Kind:
+    """Mostly a wall appears while it lies."""
+
+    def begin(world: World, around: Surroundings, given: Arguments) -> None:
+        if around.scanner is None:
+            around.look_closely()
+        assert around.scanner is not None
+        around.scanner.begin(name)
+        if given["margin_m"] is not None:
+            around.put_wall(given["margin_m"])
+
+    def end(world: World, around: Surroundings, given: Arguments) -> None:
+        assert around.scanner is not None
+        around.scanner.end(name)
+        around.take_wall()
+
+    def draw(random: Random) -> Arguments:
+        return {"margin_m": random.choice((None, random.uniform(0.0, 0.3), random.uniform(0.0, 0.3)))}
+
+    return Kind(lie.sentence, (0.8, 2.5), draw, begin, end)
 
 
 def _watchdog_deaf(world: World, around: Surroundings, given: Arguments) -> None:
@@ -460,6 +483,7 @@ FAULTS: dict[str, Kind] = {
         "the network reorders what sources order", LONG, lambda r: {"value": r.uniform(0.02, 0.25)},
         *_network("shuffles_s"),
     ),
+    **{name: _scanner_lies(name, lie) for name, lie in LIES.items()},
     "orders_twice": Kind("the network duplicates what sources order", LONG, _nothing, _twice, _once),
 }  # fmt: skip
 """Every fault that a scenario may draw."""

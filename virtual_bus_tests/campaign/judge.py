@@ -39,6 +39,8 @@ from canbase_watchdog.watchdog import State as WatchdogState
 STEP_S = 0.01
 OBEY_S = RUNGS[Step.QUICK_STOP].obey_s
 """A base that starts just when something is latched goes on until the stop has reached its drives."""
+LONGEST_S = 20.0
+"""No base needs longer to stop."""
 HEARD_S = 0.3
 """The stop button says ten times a second that it is pressed: the filter has heard it then, if it runs."""
 PROPERTIES = {
@@ -51,6 +53,7 @@ PROPERTIES = {
     "estop": "the base stands while the emergency stop is pressed",
     "zero": "after the emergency stop nothing is ordered before the command was zero once",
     "obstacle": "the base never touches what it could have seen in time",
+    "blind": "where no scanner sees the base is no faster than blind_mps, once that was noticed",
     "odometry": "the driver's pose never jumps, and is the true one as long as the encoders tell the truth",
     "goal": "every goal ends exactly once, in its time; one that succeeded is where it should be",
     "runaway": "no wheel is faster than it was ordered to be for longer than the stated time",
@@ -101,6 +104,9 @@ class Judge:
         self._envelope = Envelope(self.react_s, now, self._coasting)
         self._wishes = Wishes(world.robot, now)
         self._wish = Envelope(self.react_s + world.robot.safety.command_timeout_s, now, self._coasting)
+        sees_s = world.robot.safety.scan.timeout_s + world.robot.safety.scan.frozen_s
+        self._blind = Envelope(self.react_s + sees_s, now, self._coasting)
+        self._touched = False
         self._awaits_zero = False
         self._hold: Envelope | None = None
         self._stood = False
@@ -113,6 +119,8 @@ class Judge:
         self._odometry = OdometryJudge(world, exact=not lies)
         self._motion = MotionJudge(world, self._shown)
         self.trips: list[str] = []
+        self.lives, self._fresh = 1, False
+        """How often the base drove, with a reset between; whether one was done, and it has not moved since."""
         self.open: list[Violation] = []
         """What did not hold and is known not to: `OPEN`."""
         world.on_lease = self._on_lease
@@ -175,8 +183,9 @@ class Judge:
         self._check_speed(tau_s, coasting, now)
         self._check_drives(now)
         self._check_stop_button(tau_s, coasting, now)
-        if min(self._around.free_m) < 0.0 and not self._reach.was_lost and not self._was_pushed():
-            self._violate("obstacle", f"touched: {min(self._around.free_m):.3f} m")
+        self._check_wall(tau_s, coasting, now)
+        if self._fresh and tau_s > 0.0 and not self._latches:
+            self.lives, self._fresh = self.lives + 1, False
         problem = self._odometry.step(now)
         if problem:
             self._violate("odometry", problem)
@@ -184,6 +193,25 @@ class Judge:
         if name:
             self._violate(name, detail)
         self._world.clock.after(STEP_S, self._step)
+
+    def _check_wall(self, tau_s: float, coasting: bool, now: float) -> None:
+        """Where the scanner reports that it sees nothing the base may creep, and so touch what is there."""
+        blind = self._around.scanner is not None and self._around.scanner.hides and self._shown.linear_mps > 0.0
+        slowly_s = braking_s(self._world.robot, self._world.robot.safety.blind_mps, 0.0)
+        self._blind.order(slowly_s if blind else LONGEST_S, now)
+        allowed_s = self._blind.bound_s(tau_s, now, coasting, self._reach.lost)
+        pushed = self._reach.was_lost or self._was_pushed()
+        turns = abs(self._shown.angular_radps) * self._world.robot.base.track_m > abs(self._shown.linear_mps)
+        if blind and tau_s > allowed_s and not turns and now > self._strangers.acted_at + self.react_s:
+            self._violate(
+                "blind", f"{self._shown} where no scanner sees: {tau_s:.3f} s to stop, {allowed_s:.3f} allowed"
+            )
+        if min(self._around.free_m) >= 0.0:
+            self._touched = False
+        elif not self._touched:
+            self._touched = True
+            if not pushed and not (blind and tau_s <= slowly_s):
+                self._violate("obstacle", f"touched at {self._shown}")
 
     def _check_speed(self, tau_s: float, coasting: bool, now: float) -> None:
         allowed_s = self._envelope.bound_s(tau_s, now, coasting, self._reach.lost)
@@ -220,7 +248,7 @@ class Judge:
             self._violate("latched", "the driver left LATCHED without a reset")
         if self._gone("watchdog", latched) and status.reset[1] is not Answer.DONE:
             self._violate("latched", "the watchdog left TRIPPED without a reset")
-        self._resets_done = done
+        self._fresh, self._resets_done = self._fresh or done > self._resets_done, done
         if latched.keys() != self._latches.keys():
             self._note_latches(latched, now)
         self._latches = latched

@@ -9,6 +9,7 @@ import numpy as np
 
 from campaign.envelope import react_s
 from campaign.plan import GoalRequest, Plan, Segment
+from campaign.scanner import Scanner
 from campaign.world import World
 from canbase_driver.reset import Outcome
 from canbase_velocity.clearance import NOWHERE, Points
@@ -77,6 +78,8 @@ class Surroundings:
         self.pressed = False
         self.scans = self.speaks = True
         """The scanner sends, the stop button sends."""
+        self.scanner: Scanner | None = None
+        """Its readings go the whole way into the filter; None: places do."""
         self.wall_m: float | None = None
         self.wall_at = -math.inf
         """When it came."""
@@ -86,13 +89,19 @@ class Surroundings:
         self._scan()
         self._speak()
 
+    def look_closely(self) -> None:
+        """The scanner sends readings from now on."""
+        footprint = self._world.robot.safety.footprint
+        self.scanner = Scanner(footprint.front_m, footprint.rear_m)
+
     def put_wall(self, margin_m: float) -> None:
         """A wall appears in both directions of travel, where the base can still stop before it."""
         base, robot = self._world.drives.bench.base, self._world.robot
         limits, safety = robot.limits, robot.safety
         gentlest = limits.linear_mps**2 / (2.0 * (safety.slow_distance_m - safety.stop_distance_m))
         braking_m = base.v_mps**2 / (2.0 * min(gentlest, limits.deceleration_mps2))
-        noticing_m = (abs(base.v_mps) + SPEEDING_UP_MPS) * (react_s(robot, layers=2) + self.SCAN_S)
+        sees_s = self.SCAN_S if self.scanner is None else safety.scan.frozen_s + safety.scan.timeout_s
+        noticing_m = (abs(base.v_mps) + SPEEDING_UP_MPS) * (react_s(robot, layers=2) + sees_s)
         self.wall_at = self._world.clock.now
         self.wall_m = safety.padding_m + safety.stop_distance_m + braking_m + noticing_m + margin_m
         self._wall_from_m = base.travel_m
@@ -129,7 +138,9 @@ class Surroundings:
 
     def _scan(self) -> None:
         if self.scans:
-            self._world.topics.publish("scan", self._seen())
+            self._world.topics.publish(
+                "scan", self._seen() if self.scanner is None else self.scanner.scan(*self.free_m)
+            )
         self._world.clock.after(self.SCAN_S, self._scan)
 
     def _speak(self) -> None:

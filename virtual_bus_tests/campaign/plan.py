@@ -18,6 +18,10 @@ SCENARIO_S = (1.7, 2.4)
 MOST_FAULTS = 4
 SAMPLE_MPS, SAMPLE_RADPS = 0.8, 2.0
 """Limits of the sample robot."""
+SECOND_LIFE = 0.08
+"""Share of the scenarios that go on: stop, reset by a person, driving again, a second fault."""
+FIRST_LIFE_S = 1.5
+"""So long the faults of a first life last at most."""
 KINDS = ("constant", "constant", "constant", "weave", "burst", "nan", "zero")
 """How a source behaves for a while; a word that stands more often is drawn more often."""
 
@@ -87,7 +91,7 @@ def draw_plan(seed: int, only: Sequence[str] = ()) -> Plan:
     by_goals = random.random() < 0.35
     segments = () if by_goals and random.random() < 0.5 else _segments(random, duration_s, late=by_goals)
     names = random.sample(pool, min(random.randint(1, MOST_FAULTS), len(pool)))
-    return Plan(
+    plan = Plan(
         seed,
         duration_s,
         random.choice(bitrates(robot)),
@@ -95,6 +99,24 @@ def draw_plan(seed: int, only: Sequence[str] = ()) -> Plan:
         _goals(random) if by_goals else (),
         tuple(random.uniform(0.8, duration_s) for _ in range(random.choice((0, 0, 1, 1, 2)))),
         tuple(_fault(name, random, robot) for name in names),
+    )
+    return _with_second_life(plan, pool, random, robot) if random.random() < SECOND_LIFE else plan
+
+
+def _with_second_life(plan: Plan, pool: Sequence[str], random: Random, robot: Robot) -> Plan:
+    """Once the faults are over a person lets go of the stick, resets until it works, and drives again."""
+    faults = tuple(replace(fault, duration_s=min(fault.duration_s, FIRST_LIFE_S)) for fault in plan.faults)
+    over_s = max(plan.duration_s, *(fault.start_s + fault.duration_s for fault in faults)) + 0.2
+    drives_s = over_s + random.uniform(2.2, 2.8)
+    hand = Segment("joystick", over_s, drives_s - over_s, "zero", 0.0, 0.0, 20.0)
+    again = replace(hand, start_s=drives_s, duration_s=1.8, kind="constant", linear_mps=random.uniform(0.2, 0.8))
+    second = _fault(random.choice(pool), random, robot)
+    return replace(
+        plan,
+        duration_s=drives_s + 2.2,
+        segments=(*plan.segments, hand, _scaled_segment(again, robot)),
+        resets_s=(*plan.resets_s, *(over_s + wait_s for wait_s in (0.4, 1.0, 1.7))),
+        faults=(*faults, replace(second, start_s=drives_s + random.uniform(0.5, 1.2))),
     )
 
 

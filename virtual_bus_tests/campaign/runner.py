@@ -27,6 +27,7 @@ class Tally:
     scenarios: int = 0
     faults: Counter[str] = field(default_factory=Counter)
     at_once: Counter[int] = field(default_factory=Counter)
+    lives: Counter[int] = field(default_factory=Counter)
     trips: Counter[str] = field(default_factory=Counter)
     goals: Counter[str] = field(default_factory=Counter)
     violations: list[tuple[int, Violation]] = field(default_factory=list)
@@ -41,6 +42,7 @@ class Tally:
         self.faults.update(result.faults)
         self.at_once[len(result.faults)] += 1
         self.trips.update(result.trips)
+        self.lives[result.lives] += 1
         self.goals.update(result.goals)
         self.violations += [(result.seed, violation) for violation in result.violations]
         self.open += [(result.seed, violation) for violation in result.open]

@@ -15,6 +15,7 @@ from campaign.judge import Judge, Violation
 from campaign.outside import Outside, Surroundings
 from campaign.plan import Plan
 from campaign.robots import DrawnRobot
+from campaign.scanner import LIES
 from campaign.world import World
 
 LOOK_S = 0.1
@@ -34,6 +35,8 @@ class Result:
     violations: tuple[Violation, ...] = ()
     open: tuple[Violation, ...] = ()
     trips: tuple[str, ...] = ()
+    lives: int = 1
+    """How often the base drove in it, with a reset between."""
     goals: tuple[str, ...] = ()
     moved_m: float = 0.0
     virtual_s: float = 0.0
@@ -100,6 +103,8 @@ class _Run:
         if note is not None:
             world.note = lambda text: note(world.clock.now - self._start, text)
         self._moved_from_m = world.drives.bench.base.path_m
+        if any(fault.name in LIES for fault in plan.faults):
+            around.look_closely()
         outside = Outside(world, around, plan, self._start)
         self._judge = Judge(world, around, outside, plan)
         for fault in plan.faults:
@@ -149,6 +154,7 @@ class _Run:
             (*self._judge.violations, *self._crash),
             tuple(self._judge.open),
             tuple(self._judge.trips),
+            self._judge.lives,
             tuple(ends),
             self._world.drives.bench.base.path_m - self._moved_from_m,
             self._world.clock.now - self._start,

@@ -18,7 +18,9 @@ from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.mux import Mux, MuxDecision
+from canbase_velocity.placement import Placement
 from canbase_velocity.safety_filter import FilterConfig
+from canbase_velocity.scan import Scan
 from canbase_velocity.twist import Twist
 
 STATE_PERIOD_S = 0.1
@@ -110,8 +112,12 @@ class VelocityProcess(Process):
         if self.alive:
             self.filter.reset(self.mux.moving(self.clock.now), self.clock.now)
 
-    def _on_scan(self, points: Points) -> None:
-        self.filter.on_scan(self._robot.safety.scan.topic, points, None, self.clock.now)
+    def _on_scan(self, seen: Points | Scan) -> None:
+        scan = self._robot.safety.scan
+        if isinstance(seen, Scan):
+            self.filter.on_laser_scan(scan.topic, seen, Placement.of(scan), self.clock.now)
+        else:
+            self.filter.on_scan(scan.topic, seen, None, self.clock.now)
 
     def _on_estop(self, pressed: bool) -> None:
         self.filter.on_estop(pressed, self.clock.now)

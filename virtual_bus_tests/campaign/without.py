@@ -20,6 +20,8 @@ from canbase_driver.odometry import WheelTravel
 from canbase_driver.snapshot import DriverState, WatchdogView
 from canbase_velocity import filter_state, mux, neutral, obstacle, safety_filter
 from canbase_velocity.estop import FREE, HELD
+from canbase_velocity.frozen import FrozenWatch
+from canbase_velocity.scan import Scan
 from canbase_velocity.sweep import NO_TOUCH
 from canbase_watchdog import ladder, policy
 from canbase_watchdog.latch import Past
@@ -119,6 +121,11 @@ def _blocker(name: str) -> Callable[[], None]:
     return _drop(supervisor, lambda row: not (isinstance(row, supervisor.Blocker) and row.name == name))
 
 
+def _never_frozen(self: FrozenWatch, scan: Scan, now: float, *, moves: bool) -> str:
+    self.since = now
+    return ""
+
+
 SAFEGUARDS: dict[str, Callable[[], None]] = {
     **{f"watchdog:{check.cause.name.lower()}": _trip(check.cause) for check in policy.CHECKS},
     "watchdog:all": _all_trips,
@@ -143,6 +150,9 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "mux:timeout": _put(mux._Source, "is_fresh", lambda self, now: self.at_s is not None),
     "filter:estop": _put(filter_state.SafetyFilter, "_advance_estop", _no_estop),
     "filter:obstacle": _put(obstacle, "first_touch", lambda points, box, twist, stop_m: NO_TOUCH),
+    "filter:blind": _put(obstacle, "told_share", lambda order, sight, geometry: 1.0),
+    "filter:frozen": _put(FrozenWatch, "look", _never_frozen),
+    "filter:repeated_stamp": _put(FrozenWatch, "is_repeated", lambda self, scan: False),
     "filter:command": _put(safety_filter, "_command", lambda inputs, config: None),
     "filter:zero_after_estop": _put(filter_state.SafetyFilter, "_advance_estop", _forget_estop),
     "action:timeout_and_progress": _drop(
