@@ -23,9 +23,10 @@ def test_stopping_frames() -> None:
     assert frames.write_controlword(5, 1, 0x0000) == frame(0x605, "2b 40 68 00 00 00 00 00")
     assert list(frames.read_feedback(5, 0)) == [
         frame(0x605, "40 41 60 00 00 00 00 00"),
+        frame(0x605, "40 64 60 00 00 00 00 00"),
         frame(0x605, "40 6c 60 00 00 00 00 00"),
     ]
-    assert list(frames.read_feedback(5, 1))[1] == frame(0x605, "40 6c 68 00 00 00 00 00")
+    assert list(frames.read_feedback(5, 1))[2] == frame(0x605, "40 6c 68 00 00 00 00 00")
 
 
 def test_own_frames() -> None:
@@ -176,6 +177,7 @@ def test_the_words_that_stop_hub_motors() -> None:
     assert frames.write_controlword(5, 1, 0x0000, HUB_MOTORS) == frame(0x605, "2b 40 60 00 00 00 00 00")
     assert list(frames.read_feedback(5, 1, HUB_MOTORS)) == [
         frame(0x605, "40 41 60 00 00 00 00 00"),
+        frame(0x605, "40 64 60 02 00 00 00 00"),
         frame(0x605, "40 6c 60 02 00 00 00 00"),
     ]
 

@@ -199,6 +199,7 @@ def test_answers_to_sdo_readings_feed_nobody() -> None:
     rx(it, 0x181, "37 02 00 00 00 00", 1.0)
     assert rx(it, 0x281, "00 00 00 00", 1.1).fed_at == 1.0
     rx(it, 0x581, "4b 41 60 00 37 02 00 00", 2.0)
+    assert rx(it, 0x581, "43 64 60 00 00 00 00 00", 2.05).position_at == 2.05
     axis = rx(it, 0x581, "43 6c 60 00 2c 01 00 00", 2.1)
     assert (axis.fed_at, axis.seen_at) == (1.0, 2.0)
     assert rx(it, 0x181, "37 02 00 00 00 00", 3.0).fed_at == 1.1

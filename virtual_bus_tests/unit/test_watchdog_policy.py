@@ -83,7 +83,8 @@ def test_a_watchdog_that_just_started_gives_the_first_lease_as_long(listening_s:
     ],
 )
 def test_what_counts_as_motion(velocity_mps: float, target_mps: float, trips: int) -> None:
-    axis = replace(LEFT, velocity_mps=velocity_mps, target_mps=target_mps)
+    standing = abs(velocity_mps) <= CONFIG.standstill_mps
+    axis = replace(LEFT, velocity_mps=velocity_mps, target_mps=target_mps, standing=standing)
     assert cause(of(axis, lease_at=90.0)) == trips
 
 
@@ -389,8 +390,10 @@ def test_at_the_very_moment_feedback_is_too_old_to_say_that_the_power_is_off() -
     assert not is_off(axis, of(axis), EXACT, NOW)
 
 
-def test_at_the_very_speed_a_wheel_stands() -> None:
-    assert not moving(replace(LEFT, velocity_mps=0.0078125), EXACT)
+@pytest.mark.parametrize("velocity_mps", [0.0, 0.02, 0.3])
+def test_whether_a_wheel_stands_is_not_for_its_velocity_alone_to_say(velocity_mps: float) -> None:
+    assert not moving(replace(LEFT, velocity_mps=velocity_mps, standing=True), EXACT)
+    assert moving(replace(LEFT, velocity_mps=velocity_mps, standing=False), EXACT)
 
 
 def test_at_the_very_moment_a_drive_that_says_nothing_may_be_on() -> None:

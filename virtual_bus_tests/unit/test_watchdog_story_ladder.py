@@ -172,7 +172,7 @@ def test_two_axes_of_one_node_are_stopped_together() -> None:
     story.run(0.3)
     assert story.watchdog.status.settled
     asked = {frame.data[1:3].hex() for _, frame in story.since(begin, 0x605)}
-    assert asked == {"4160", "6c60", "4168", "6c68"}
+    assert asked == {"4160", "6460", "6c60", "4168", "6468", "6c68"}
 
 
 def test_a_target_for_one_of_two_axes_is_enough_to_stop_their_node() -> None:

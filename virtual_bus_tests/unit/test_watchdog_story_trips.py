@@ -117,7 +117,7 @@ def test_the_driver_dies_and_leases_go_on(bits: int) -> None:
     story.run(0.2)
     status = story.watchdog.status
     assert (status.settled, status.step) == (True, Step.QUICK_STOP)
-    assert {frame.data[1:3] for _, frame in story.since(begin, 0x601)} == {b"\x41\x60", b"\x6c\x60"}
+    assert {frame.data[1:3] for _, frame in story.since(begin, 0x601)} == {b"\x41\x60", b"\x64\x60", b"\x6c\x60"}
 
 
 def test_after_standstill_it_is_quiet_except_for_heartbeat_state_and_counters() -> None:

@@ -162,6 +162,8 @@ class FakeDrive:
             out = b"\x60" + out + bytes(4)
         elif index == 0x6041:
             out = b"\x4b" + out + struct.pack("<HH", self.words[axis], 0)
+        elif index == 0x6064:
+            out = b"\x43" + out + struct.pack("<i", self.position(axis))
         else:
             out = b"\x43" + out + struct.pack("<i", self.velocity(axis))
         return [] if self.mute else [Frame(0x580 + self.node_id, out)]

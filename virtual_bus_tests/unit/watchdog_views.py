@@ -25,6 +25,7 @@ LEFT = Axis(
     asks_for_power=True,
     command_at=99.99,
     fed_at=99.99,
+    position_at=99.99,
 )
 RIGHT = replace(LEFT, drive=CONFIG.drives[1])
 WELL = View(
@@ -40,9 +41,11 @@ WELL = View(
     lease=Lease(1, 99_990_000_000, 0.3, 0.0, 0),
     lease_at=99.99,
 )
-OFF = replace(LEFT, state=DriveState.SWITCH_ON_DISABLED, velocity_mps=0.0, target_mps=0.0, asks_for_power=False)
-AT_REST = replace(LEFT, velocity_mps=0.0, target_mps=0.0)
-STANDING = replace(RIGHT, velocity_mps=0.0, target_mps=0.0)
+OFF = replace(
+    LEFT, state=DriveState.SWITCH_ON_DISABLED, velocity_mps=0.0, target_mps=0.0, asks_for_power=False, standing=True
+)
+AT_REST = replace(LEFT, velocity_mps=0.0, target_mps=0.0, standing=True)
+STANDING = replace(RIGHT, velocity_mps=0.0, target_mps=0.0, standing=True)
 ON_THE_BUS = ("nodes", "driver_at", "sync_at", "sync_since", "foreign")
 
 

@@ -43,6 +43,7 @@ NMT_COMMANDS = (0x01, 0x02, 0x80, 0x81, 0x82)
 CONTROLWORD = 0x6040
 STATUSWORD = 0x6041
 MODE = 0x6060
+POSITION = 0x6064
 VELOCITY = 0x606C
 TARGET = 0x60FF
 AXIS_OFFSET = 0x800
@@ -220,7 +221,7 @@ def pre_operational(node_id: int) -> Frame:
 
 
 def place_of(index: int, axis: int, layout: WatchedLayout = CIA_402) -> tuple[int, int]:
-    """Index and sub-index of 6040h, 6041h or 606Ch of an axis."""
+    """Index and sub-index of 6040h, 6041h, 6064h or 606Ch of an axis."""
     if not layout.sub_index:
         return index + axis * AXIS_OFFSET, 0
     is_common = (index == CONTROLWORD and layout.shared_controlword) or (
@@ -236,6 +237,6 @@ def write_controlword(node_id: int, axis: int, word: int, layout: WatchedLayout 
 
 
 def read_feedback(node_id: int, axis: int, layout: WatchedLayout = CIA_402) -> Sequence[Frame]:
-    """SDO requests: uploads of statusword 6041h and velocity 606Ch of an axis."""
-    heads = (_SDO_HEAD.pack(0x40, *place_of(index, axis, layout)) for index in (STATUSWORD, VELOCITY))
+    """SDO requests: uploads of statusword 6041h, position 6064h and velocity 606Ch of an axis."""
+    heads = (_SDO_HEAD.pack(0x40, *place_of(index, axis, layout)) for index in (STATUSWORD, POSITION, VELOCITY))
     return tuple(Frame(SDO_REQUEST + node_id, head + bytes(4)) for head in heads)

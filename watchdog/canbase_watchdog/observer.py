@@ -13,6 +13,7 @@ from canbase_watchdog import frames
 from canbase_watchdog.feedback import FeedbackWatch
 from canbase_watchdog.foreign import Foreign
 from canbase_watchdog.frames import DriveState
+from canbase_watchdog.standing import StandWatch
 from canbase_watchdog.tally import Tally
 from canbase_watchdog.torque import PushWatch
 from canbase_watchdog.view import NEVER, Axis, BusView, Node
@@ -41,6 +42,7 @@ class _Record:
         "push",
         "setpoint_at",
         "setpoint_mps",
+        "stand",
         "state",
         "status_at",
         "target_mps",
@@ -51,7 +53,7 @@ class _Record:
     def __init__(self, drive: WatchedDrive, config: WatchdogConfig, now: float) -> None:
         self.drive = drive
         self.feedback = FeedbackWatch(drive, config, now)
-        self.push = PushWatch(drive, config)
+        self.push, self.stand = PushWatch(drive, config), StandWatch(drive, config)
         self.state: DriveState | None = None
         self.status_at = self.enabled_since = self.disabled_since = NEVER
         self.velocity_mps, self.velocity_at = 0.0, NEVER
@@ -78,6 +80,8 @@ class _Record:
             self.feedback.last,
             self.feedback.evidence.last,
             min(self.fed_status_at, self.fed_velocity_at),
+            self.stand.stands,
+            self.stand.position_at,
             self.misses.value,
             self.doubles.value,
             self.push.last,
@@ -213,6 +217,7 @@ class Observer:
         record.fed_status_at = now
         record.feedback.on_position(status[1])
         record.push.on_position(status[1])
+        record.stand.on_position(status[1], now)
         return True
 
     def _note_state(self, record: _Record, statusword: int, now: float) -> bool:
@@ -243,6 +248,7 @@ class Observer:
 
     def _note_velocity(self, record: _Record, bits: int, now: float) -> None:
         record.velocity_mps, record.velocity_at = bits * record.drive.velocity_mps_per_bit, now
+        record.stand.on_velocity(record.velocity_mps, now)
         self._heard_at[record.drive.node_id] = now
 
     def _on_setpoint(self, record: _Record, cob_id: int, data: bytes, now: float) -> bool:
@@ -257,7 +263,7 @@ class Observer:
         return True
 
     def _on_sdo_answer(self, node_id: int, data: bytes, now: float) -> bool:
-        """Answers to anybody's reading of 6041h and 606Ch are as true as a TPDO; all others are not for us."""
+        """Answers to anybody's reading of 6041h, 6064h and 606Ch are as true as a TPDO; all others are not for us."""
         self._heard_at[node_id] = now
         answer = frames.decode_sdo(data)
         understood = True
@@ -272,6 +278,8 @@ class Observer:
             return self._note_state(record, frames.own_statusword(value, drive.layout, drive.axis), now)
         if place == frames.place_of(frames.VELOCITY, drive.axis, drive.layout):
             self._note_velocity(record, value, now)
+        if place == frames.place_of(frames.POSITION, drive.axis, drive.layout):
+            record.stand.on_position(value, now)
         return True
 
     def _on_nmt(self, data: bytes, now: float) -> bool:

@@ -79,7 +79,7 @@ BEFORE = "since before the start: "
 
 def moving(axis: Axis, config: WatchdogConfig) -> bool:
     """True for a wheel that turns under power. One that is pushed by hand, its power off, may turn."""
-    return axis.powered and abs(axis.velocity_mps) > config.standstill_mps
+    return axis.powered and not axis.standing
 
 
 def commanded(axis: Axis, config: WatchdogConfig) -> bool:

@@ -81,7 +81,7 @@ class Stopper:
         return Look(
             enabled=any(axis.enabled for axis in axes),
             powered=any(axis.powered for axis in axes),
-            standing=all(abs(axis.velocity_mps) <= self._config.standstill_mps for axis in axes),
+            standing=all(axis.standing for axis in axes),
             speed_mps=max(abs(axis.velocity_mps) for axis in axes),
             begin_mps=max(self._begin_mps(axis) for axis in axes),
             seen_at=min(axis.seen_at for axis in axes),

@@ -41,6 +41,9 @@ class Axis:
     evidence: Evidence = Evidence()  # noqa: RUF009 - immutable
     fed_at: float = NEVER
     """When the older one of its TPDOs came: status and velocity. What somebody reads by SDO is not fed."""
+    standing: bool = False
+    """Its encoder and its velocity say that the wheel is at standstill: standing.py."""
+    position_at: float = NEVER
     missed_setpoints: float = 0.0
     """SYNCs without a setpoint while it was enabled, less half of those with one."""
     double_answers: float = 0.0
@@ -64,8 +67,8 @@ class Axis:
 
     @property
     def seen_at(self) -> float:
-        """When both statusword and velocity were last known, by a TPDO or from an answer to an SDO."""
-        return min(self.status_at, self.velocity_at)
+        """When statusword, position and velocity were all known, by a TPDO or from an answer to an SDO."""
+        return min(self.status_at, self.velocity_at, self.position_at)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,75 @@
+"""Whether one wheel is at standstill, judged from encoder and velocity together: each alone may be noisy, or a lie.
+
+Rules, with `standstill_mps` s and `motion_tolerance_mps` n:
+1. Slow: the velocity is at most s, the encoder's last step is no faster than STEP_FACTOR times s, and since the
+   velocity is so low the encoder has not gone further than s lasts for in STILL_S.
+2. Still: the encoder has stayed where it is for STILL_S, and the velocity is at most n: noise.
+Anything else is motion: so is a wheel of which position or velocity did not come. The driver has the same rules in code
+of its own. No frames here, no judgement of the sensor: that is evidence.py.
+"""
+
+from __future__ import annotations
+
+import math
+
+from canbase_config.watchdog import WatchdogConfig, WatchedDrive
+
+STILL_S = 0.2
+STEP_FACTOR = 3.0
+"""One step of the encoder may look so many times as fast as it is: samples come early and late."""
+GAP_S = 0.5
+"""Values that came further apart say nothing about each other. Two motors that are read by SDO take 0.15 s a turn."""
+COUNTS = 2
+"""An encoder at an edge counts to and fro."""
+_WRAP = 2**32
+
+
+class StandWatch:
+    """Follows one axis. Speeds and travel at the rim [m/s, m]."""
+
+    def __init__(self, drive: WatchedDrive, config: WatchdogConfig) -> None:
+        """Nothing has come yet: it moves."""
+        self._m_per_count = abs(drive.m_per_count)
+        self._slow_mps, self._noise_mps = config.standstill_mps, config.motion_tolerance_mps
+        self._grain_m = COUNTS * self._m_per_count
+        self._near_m = max(config.standstill_mps * STILL_S, self._grain_m)
+        self._counts: int | None = None
+        self._still_m = self._slow_m = 0.0
+        """How far it is from where it stayed, and from where it was when it became slow."""
+        self._steady = False
+        self._speed_mps = math.inf
+        self.position_at = self._still_since = self._crept_at = -math.inf
+        self._velocity_at = self._slow_since = -math.inf
+
+    def on_position(self, counts: int, now: float) -> None:
+        """6064h, of a TPDO or of an answer to an SDO, at the monotonic time `now` [s]."""
+        before, elapsed_s = self._counts, now - self.position_at
+        self._counts, self.position_at = counts, now
+        if before is None or elapsed_s >= GAP_S:
+            self._steady, self._still_since = False, now
+            self._still_m = self._slow_m = 0.0
+            return
+        step_m = ((counts - before + _WRAP // 2) % _WRAP - _WRAP // 2) * self._m_per_count
+        self._steady = abs(step_m) <= max(STEP_FACTOR * self._slow_mps * elapsed_s, self._grain_m)
+        self._still_m, self._slow_m = self._still_m + step_m, self._slow_m + step_m
+        if abs(self._still_m) > self._near_m:
+            self._still_m, self._still_since = 0.0, now
+        if abs(self._slow_m) > self._near_m:
+            if now - self._slow_since < STILL_S:
+                self._crept_at = now
+            self._slow_m, self._slow_since = 0.0, now
+
+    def on_velocity(self, velocity_mps: float, now: float) -> None:
+        """606Ch, of a TPDO or of an answer to an SDO."""
+        if abs(velocity_mps) <= self._slow_mps < self._speed_mps:
+            self._slow_m, self._slow_since, self._crept_at = 0.0, now, -math.inf
+        self._speed_mps, self._velocity_at = abs(velocity_mps), now
+
+    @property
+    def stands(self) -> bool:
+        """The last values of both say so."""
+        if not self._steady or not abs(self._velocity_at - self.position_at) < GAP_S:
+            return False
+        at = self.position_at
+        slow = self._speed_mps <= self._slow_mps and at - self._crept_at >= STILL_S
+        return slow or (self._speed_mps <= self._noise_mps and at - self._still_since >= STILL_S)
