@@ -174,3 +174,31 @@ def test_a_stick_held_while_parts_are_killed_and_started_again_moves_nothing(
     finally:
         joystick.message = None
         robot.wait_standing()
+
+
+# driving with the stick held ── a stop that latches ── motor_driver/reset alone, which sees zeros ── enabled: stays
+@pytest.mark.parametrize("stop", ["motor_driver/stop", "watchdog"])
+def test_a_reset_of_the_driver_alone_does_not_release_a_held_stick(running: RunningRobot, stop: str) -> None:
+    robot = running
+    robot.make_ready()
+    joystick = robot.node.source()
+    try:
+        joystick.message = drive(0.2)
+        robot.wait_speed(0.19)
+        if stop == "watchdog":
+            robot.send("watchdog", signal.SIGKILL)
+            assert robot.stack.end("watchdog") == -signal.SIGKILL
+            robot.stack.start()
+        else:
+            robot.reset(stop)
+        robot.wait_state(DriverStatus.LATCHED)
+        robot.wait_standing()
+        reset_s = time.monotonic()
+        robot.make_ready()  # motor_driver/reset, which resets the watchdog too; the stick is held all the time
+        assert robot.moved_since(reset_s, time.monotonic() - reset_s + 3.0) < RESTS_M
+        robot.node.release(joystick)
+        joystick.message = drive(0.2)
+        robot.wait_speed(0.19)
+    finally:
+        joystick.message = None
+        robot.wait_standing()
