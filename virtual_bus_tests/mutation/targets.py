@@ -63,6 +63,7 @@ TARGETS = (
     _watchdog("feedback"),
     _watchdog("evidence", then=("watchdog_observer",)),
     _watchdog("torque"),
+    _watchdog("standing", then=("watchdog_observer",)),
     _watchdog("twist", then=("watchdog_observer",)),
     _watchdog("tally", then=("watchdog_observer",)),
     _watchdog("pair"),
