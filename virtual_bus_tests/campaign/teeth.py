@@ -46,7 +46,12 @@ TOGETHER = (
 )
 """Layers that cover each other: taken out together."""
 _TELL_ALONE = "cannot stop anything then; driver:watchdog_missing and drives:heartbeat_consumer do"
+_SMALL = "small_worlds/teeth.py takes both out, and finds it"
 COVERED = {
+    "driver:waits_for_zero": f"mux:neutral_start and driver:zero_before_motion; {_SMALL}",
+    "driver:reset_needs_zero": f"mux:neutral_start and driver:zero_before_motion; {_SMALL}",
+    "watchdog:stop_record": f"driver:latch; {_SMALL}",
+    "records:unreadable": "no fault of the campaign tears a record; small_worlds/teeth.py finds it",
     "watchdog:bus_failed": f"it {_TELL_ALONE}",
     "watchdog:loop_late": f"a watchdog that stands still {_TELL_ALONE}",
     "watchdog:foreign_master": "watchdog:target_outside, for setpoints; strange NMT commands can but stop a drive",

@@ -23,7 +23,7 @@ from canbase_velocity.estop import FREE, HELD
 from canbase_velocity.frozen import FrozenWatch
 from canbase_velocity.scan import Scan
 from canbase_velocity.sweep import NO_TOUCH
-from canbase_watchdog import ladder, policy
+from canbase_watchdog import policy
 from canbase_watchdog.latch import Past
 from canbase_watchdog.watchdog import State, Watchdog
 
@@ -143,7 +143,6 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "driver:waits_for_zero": _blocker("command not zero"),
     "driver:reset_needs_zero": _resets_while_commanded,
     "watchdog:stop_record": _watchdog_forgets,
-    "watchdog:ladder": _put(ladder, "_to", lambda step, climb, look, now: climb),
     "records:unreadable": _unreadable_is_clear,
     "drives:heartbeat_consumer": _put(HeartbeatConsumer, "tick", lambda self, now: None),
     "mux:neutral_start": _put(neutral.Arming, "armed", property(lambda self: True)),

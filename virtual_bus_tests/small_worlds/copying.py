@@ -87,6 +87,8 @@ class _Pickler(pickle.Pickler):
             return self._function(thing)
         if kind is CellType:
             return _cell, (), (thing.cell_contents,), None, None, _fill
+        if issubclass(kind, Exception):
+            return _error, (kind, thing.args), vars(thing)
         return self._share(thing) if _is_shared(kind) else NotImplemented
 
     def _function(self, thing: FunctionType) -> Any:
@@ -118,6 +120,10 @@ def _function(place: int, cells: tuple[CellType, ...]) -> FunctionType:
     made = FunctionType(of.__code__, of.__globals__, of.__name__, of.__defaults__, cells)
     made.__kwdefaults__, made.__qualname__ = of.__kwdefaults__, of.__qualname__
     return made
+
+
+def _error(kind: type[Exception], arguments: tuple[Any, ...]) -> Exception:
+    return kind.__new__(kind, *arguments)
 
 
 def _cell() -> CellType:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from campaign.without import SAFEGUARDS
+from canbase_driver.sdo import Read, SdoAborted
 from small_worlds import canonical
 from small_worlds.copying import Snapshot
 from small_worlds.events import EVENTS, FAULT_EVENTS, OPERATOR_EVENTS
@@ -24,7 +25,7 @@ def test_with_each_single_event_at_any_time_everything_holds_that_is_not_known_t
     assert found.states > 1000
 
 
-@pytest.mark.parametrize("tooth", TEETH, ids=lambda tooth: tooth.safeguard)
+@pytest.mark.parametrize("tooth", TEETH, ids=lambda tooth: f"{tooth.safeguard} {tooth.start} {tooth.bounds.only}")
 def test_without_a_safeguard_a_small_world_misses_it(tooth: Tooth) -> None:
     stories = bite(tooth)
     assert tooth.found in stories, [story.lines() for story in stories.values()]
@@ -59,6 +60,13 @@ def test_a_copy_goes_on_as_its_original_does(event: str) -> None:
         copied.happens(EVENTS["driver dies"])
         copied.pass_to_point()
         assert small.world.driver.alive
+
+
+def test_a_copy_has_the_error_that_a_boot_was_answered_with() -> None:
+    error = SdoAborted(1, Read(0x1018, 1), 0x0602_0000)
+    copied = Snapshot(error).restore()
+    assert copied is not error
+    assert (type(copied), str(copied), vars(copied)) == (SdoAborted, str(error), vars(error))
 
 
 def test_a_search_follows_a_world_until_it_rests() -> None:
