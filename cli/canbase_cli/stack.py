@@ -79,9 +79,11 @@ class Stack:
     def start(self) -> None:
         """Starts the parts that do not run; they find each other by themselves, in whatever order they get ready.
 
-        A robot that has never run here begins with clear records of stops.
+        Simulated drives that have never run here begin with clear records of stops. Real ones begin latched: this user
+        has no record of them, and another one, such as that of the services, may have a stop in his.
         """
-        self._clear_first_records()
+        if "sim" in self._parts:
+            self._clear_first_records()
         for part in self._parts:
             if part not in self._running:
                 self._running[part] = self._spawn(part)

@@ -1,7 +1,8 @@
 """The memory of the emergency stop: what has to happen after it before the base may move again. A table, no clock.
 
 It outlives the process: the record on disk says LIVE from the first message of the button until an orderly end, so that
-a filter that was killed takes the button for pressed until it is seen released.
+a filter that was killed takes the button for pressed until it is seen released. A stop that waits for its reset comes
+back held for the same reason: the button may have been pressed again while nobody listened.
 """
 
 from __future__ import annotations
@@ -111,7 +112,8 @@ class Estop:
         if self.state is FREE:
             self._ahead.want(Mark.LIVE if self._heard and not self._ended else Mark.CLEAR)
         elif self._heard or self._latched:
-            self._ahead.want(Mark.LATCHED, STATES.index(self.state), self.state.value)
+            next_life = HELD if self._heard else self.state
+            self._ahead.want(Mark.LATCHED, STATES.index(next_life), self.state.value)
 
 
 STATES = tuple(EstopState)

@@ -30,10 +30,10 @@ from canbase_velocity.changes import DropTeller, changed_order, is_told
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
-from canbase_velocity.graph import SCAN_KIND, publishers
+from canbase_velocity.graph import BUTTON_KIND, SCAN_KIND, publishers
 from canbase_velocity.io import LeaseSender
 from canbase_velocity.lease import lease_datagram
-from canbase_velocity.placement import Placement, PlacementError, Transform, placed_by_tf
+from canbase_velocity.placement import HeldPlacement, Placement, PlacementError, Transform, placed_by_tf
 from canbase_velocity.qos import COMMAND, SCAN, STATE, STATIC_TF, listen_twice
 from canbase_velocity.safety_filter import FilterConfig
 from canbase_velocity.steady import steady_timer
@@ -41,6 +41,7 @@ from canbase_velocity.twist import Twist
 
 STATE_PERIOD_S = 0.1
 GRAPH_PERIOD_S = 0.5
+OLD = "refused: it may be old, safety_filter stood still before it was taken in; send it again"
 MovingSources = Callable[[], Sequence[str]]
 
 
@@ -57,6 +58,7 @@ class FilterNode(Node):
         self._robot = robot
         self._voice = Voice(self.get_logger(), Journal("safety_filter"))
         self._receive_times = ReceiveTimes()
+        self._request_times = ReceiveTimes.of_requests()
         self._moving_sources = moving_sources
         self._keeper = keeper
         self._filter = SafetyFilter(FilterConfig.of(robot), keeper.found if keeper else None)
@@ -72,6 +74,7 @@ class FilterNode(Node):
         listen_twice(self, Bool, robot.safety.estop.topic, self._on_estop)
         self._watch_scans(robot.safety.scans)
         self.create_service(Trigger, "safety_filter/reset", self._on_reset)
+        steady_timer(self, GRAPH_PERIOD_S, self._count_buttons)
         self._timer = steady_timer(self, 1.0 / robot.rates.command_hz, self._tick)
 
     def shut_down(self) -> None:
@@ -117,7 +120,7 @@ class FilterNode(Node):
 
     def _watch_scans(self, scans: Sequence[ScanConfig]) -> None:
         for scan in scans:
-            callback = functools.partial(self._on_scan, scan, Placement.of(scan))
+            callback = functools.partial(self._on_scan, scan, HeldPlacement())
             self.create_subscription(LaserScan, scan.topic, callback, SCAN)
         steady_timer(self, GRAPH_PERIOD_S, self._look_for_scanners)
         if any(scan.pose == "tf" for scan in scans):
@@ -137,14 +140,23 @@ class FilterNode(Node):
         if message.data:
             self._issue(self._filter.decide(now), now)
 
-    def _on_scan(self, config: ScanConfig, placement: Placement, message: LaserScan) -> None:
+    def _count_buttons(self) -> None:
+        before, topic = self._filter.estop_crowd, self.resolve_topic_name(self._robot.safety.estop.topic)
+        self._filter.on_estop_publishers(sum(each.kind == BUTTON_KIND for each in publishers(self, topic)))
+        crowd = self._filter.estop_crowd
+        if crowd and crowd != before:
+            self._voice.tell(crowd, Priority.ERROR, robot=self._robot.name)
+
+    def _on_scan(self, config: ScanConfig, held: HeldPlacement, message: LaserScan) -> None:
         now = time.monotonic()
         if self._receive_times.waited(now):
             return
         try:
             if config.pose == "tf":
                 frame, base_frame = message.header.frame_id.lstrip("/"), self._robot.base.base_frame
-                placement = placed_by_tf(frame, base_frame, self._transforms)
+                placement = held.hold(frame, placed_by_tf(frame, base_frame, self._transforms))
+            else:
+                placement = Placement.of(config)
         except PlacementError as error:
             self._filter.on_unplaced_scan(config.topic, str(error))
             return
@@ -162,7 +174,11 @@ class FilterNode(Node):
         self._transforms.update(messages.transforms_of(message))
 
     def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success, response.message = self._filter.reset(self._moving_sources(), time.monotonic())
+        now = time.monotonic()
+        if self._request_times.waited(now):  # whoever asked may have given up, and be near the base
+            response.success, response.message = False, OLD
+        else:
+            response.success, response.message = self._filter.reset(self._moving_sources(), now)
         self._voice.tell(f"reset: {response.message}", Priority.NOTICE, robot=self._robot.name)
         return response
 
@@ -174,6 +190,7 @@ class FilterNode(Node):
 
     def _issue(self, decision: Decision, now: float) -> None:
         """The lease goes first: the watchdog knows what is allowed before a wheel can move."""
+        self._request_times.at(now)
         self._send_lease(decision)
         stamp = self.get_clock().now().to_msg()
         self._commands.publish(messages.twist_message(decision.twist, stamp, self._robot.base.base_frame))

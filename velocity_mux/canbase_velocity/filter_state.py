@@ -12,6 +12,7 @@ from canbase_config.latch_record import Found, Record
 from canbase_config.safety import Scan as ScanConfig
 from canbase_velocity.clearance import FREE, Clearances, Field, Points, ScanReader, clearances
 from canbase_velocity.decision import Action, Cause, Decision
+from canbase_velocity.delay import Delay, Sent
 from canbase_velocity.estop import Estop, EstopEvent, EstopState
 from canbase_velocity.frozen import FrozenWatch
 from canbase_velocity.glitch import GlitchFilter
@@ -42,6 +43,7 @@ class _Scanner:
         self._frozen = FrozenWatch(config.frozen_s, noisy=config.noisy)
         self._glitches = GlitchFilter(config.min_points)
         self.sole = SolePublisher()
+        self._delay = Delay()
         self._reach_m = geometry.reach_m(config.timeout_s)
         self.at_s: float | None = None
         self.field: Field | None = None
@@ -70,8 +72,21 @@ class _Scanner:
         if frozen:
             self.drop(Cause.SCAN_FROZEN, frozen, at_once=True)
             return
+        late_s = self._late_s(scan, now)
+        if self._delay.set_back:
+            self.drop(Cause.SCAN_INVALID, "its stamp is below that of the scan before")
+            return
+        if late_s > self.config.timeout_s:
+            self.drop(Cause.SCAN_STALE, f"delayed by {late_s:.2f} s (limit {self.config.timeout_s:.2f} s)")
+            return
         self._share = view.share
-        self.take(view.points, view.field, now - self._frozen.since + scan.scan_time_s, now)
+        self.take(view.points, view.field, now - self._frozen.since + scan.scan_time_s + late_s, now)
+
+    def _late_s(self, scan: Scan, now: float) -> float:
+        """Above the fastest scan [s]. The stamps of a simulator are of its own time, which may be slower."""
+        if not (scan.stamp_ns and self.config.noisy):
+            return 0.0
+        return self._delay.take(Sent(scan.stamp_ns * 1e-9, math.nan, now))
 
     def drop(self, cause: Cause, why: str, *, at_once: bool = False) -> None:
         """A scan that does not count. `at_once`: neither does the one before; otherwise that counts until it is old."""
@@ -116,6 +131,8 @@ class SafetyFilter:
         self._estop = Estop(config.safety.estop.latched, found)
         self._pressed = self._estop.state is EstopState.HELD
         self._estop_at_s: float | None = None
+        self.estop_crowd = ""
+        """Why no release of the emergency stop can be told; empty: it can."""
         longest_s = max(2.0 * scan.timeout_s + scan.frozen_s for scan in config.safety.scans) + config.safety.reaction_s
         self._motion = ExpectedMotion(config.limits, longest_s)
         self._previous, self._previous_at_s = ZERO, -math.inf
@@ -177,17 +194,25 @@ class SafetyFilter:
         if pressed:
             self._estop.happens(EstopEvent.PRESS)
 
+    def on_estop_publishers(self, count: int) -> None:
+        """Takes how many publishers its topic has. The last word of one is not that of another."""
+        topic = self._config.safety.estop.topic
+        advice = "no release counts; give each button a lock of its own (mux.locks), or join them in one node"
+        self.estop_crowd = f"{topic} has {count} publishers: {advice}" if count > 1 else ""
+
     def reset(self, moving: Sequence[str], now: float) -> tuple[bool, str]:
         """Whether the emergency stop is free now, and a sentence. `moving`: sources that do not order zero."""
         self._advance_estop(now)
         inputs = self.inputs(now)
         if self._estop.state is EstopState.HELD:
-            held = "pressed" if self._pressed else "silent"
+            held = "pressed" if self._pressed else self.estop_crowd or "silent"
             if self._pressed and self._estop_at_s is None:
                 held = f"not seen released yet ({self._estop.before_the_start}): press and release it"
             return False, f"refused: the emergency stop on {self._config.safety.estop.topic} is {held}"
         if self._estop.state is EstopState.FREE and not moving:
             return True, NOTHING_TO_RESET
+        if self.estop_crowd and self._estop.state is not EstopState.FREE:
+            return False, f"refused: {self.estop_crowd}"
         if moving or not inputs.command.is_zero:
             who = ", ".join(moving) or "cmd_vel_mux"
             return False, f"refused: {who} orders a velocity; let go of the joystick or cancel the goal first"
@@ -210,6 +235,7 @@ class SafetyFilter:
             pressed=self._pressed,
             estop_age_s=_age_s(self._estop_at_s, now),
             estop_before=self._estop.before_the_start,
+            estop_crowd=self.estop_crowd,
             estop_unarmed=self._estop.unarmed,
             braking_hard=self._braking_hard,
         )
@@ -265,11 +291,13 @@ class SafetyFilter:
         return Sight(np.concatenate(parts), () if sees_all else fields)
 
     def _advance_estop(self, now: float) -> None:
-        """A fresh zero command counts only while the emergency stop is free."""
+        """A fresh zero command counts only while the emergency stop is free. In a crowd neither does a release."""
         settings = self._config.safety
         age_s, command_age_s = _age_s(self._estop_at_s, now), _age_s(self._command_at_s, now)
         if settings.estop.required and (age_s is None or age_s > settings.estop.timeout_s):
             self._estop.happens(EstopEvent.SILENCE)
+        elif self.estop_crowd:
+            return
         elif not self._pressed and age_s is not None:
             self._estop.happens(EstopEvent.RELEASE)
         fresh = command_age_s is not None and command_age_s <= settings.command_timeout_s

@@ -15,6 +15,7 @@ from canbase_velocity.foreign import Expected, Publisher
 STAMPED: Final = "geometry_msgs/msg/TwistStamped"
 PLAIN: Final = "geometry_msgs/msg/Twist"
 SCAN_KIND: Final = "sensor_msgs/msg/LaserScan"
+BUTTON_KIND: Final = "std_msgs/msg/Bool"
 OWNERS: Final = {"cmd_vel_mux": "velocity_mux", "cmd_vel": "safety_filter"}
 SHOWN: Final = "cmd_vel_mux"
 """Published for people to look at: the order itself stays in the process."""

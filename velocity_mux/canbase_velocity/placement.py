@@ -16,6 +16,8 @@ from canbase_velocity.sweep import Floats
 MAX_TILT_RAD = math.radians(10.0)
 """A scanner that is tilted more measures the floor or passes over obstacles; it is not used."""
 LONGEST_CHAIN = 32
+MOVED = 1e-3
+"""A scanner whose place, or the end of an axis of one metre, changes by more has moved [m]."""
 
 
 class PlacementError(ValueError):
@@ -51,6 +53,32 @@ class Placement:
         along_m = x_m * self.x_axis[0] + y_m * self.x_axis[1]
         aside_m = x_m * self.y_axis[0] + y_m * self.y_axis[1]
         return np.hypot(along_m, aside_m), np.arctan2(aside_m, along_m)
+
+
+class HeldPlacement:
+    """Where tf_static placed a scanner first: it does not move on its base, and who says so may be wrong."""
+
+    def __init__(self) -> None:
+        self._first: Placement | None = None
+        self._moved = False
+
+    def hold(self, frame: str, placement: Placement) -> Placement:
+        """The placement. Raises PlacementError from the first other one on, until the next start."""
+        self._first = self._first or placement
+        self._moved = self._moved or _apart(self._first, placement) > MOVED
+        if self._moved:
+            raise PlacementError(
+                f"tf_static has moved {printable(frame)}: two nodes publish it, or the scanner was changed; "
+                "start canbase again when one place is left"
+            )
+        return placement
+
+
+def _apart(one: Placement, other: Placement) -> float:
+    def numbers(placement: Placement) -> tuple[float, ...]:
+        return placement.x_m, placement.y_m, *placement.x_axis, *placement.y_axis
+
+    return max(abs(a - b) for a, b in zip(numbers(one), numbers(other), strict=True))
 
 
 @dataclass(frozen=True, slots=True)

@@ -107,6 +107,8 @@ class Inputs:
     estop_age_s: float | None
     estop_before: str = ""
     """Why the emergency stop holds since the start; empty: it does not."""
+    estop_crowd: str = ""
+    """Why no release of the emergency stop can be told; empty: it can."""
     estop_unarmed: str = ""
     """A press would not outlive this process: why; empty: it would."""
     braking_hard: bool = False
@@ -150,6 +152,8 @@ def _estop(inputs: Inputs, config: FilterConfig) -> Finding | None:
     if inputs.estop is EstopState.FREE:
         return stop(Cause.ESTOP, inputs.estop_unarmed, "the record on disk") if inputs.estop_unarmed else None
     then = "a reset" if estop.latched else "a zero command"
+    if not inputs.pressed and inputs.estop_crowd:
+        return stop(Cause.ESTOP, f"the emergency stop holds: {inputs.estop_crowd}", f"one publisher, then {then}")
     if not inputs.pressed:
         detail = _silence(estop.topic, inputs.estop_age_s, estop.timeout_s)
         return stop(Cause.ESTOP_STALE, detail, f"false on {estop.topic}, then {then}")
@@ -196,8 +200,10 @@ def _slower(inputs: Inputs, config: FilterConfig) -> list[Finding]:
 
 
 def _unseen(inputs: Inputs, config: FilterConfig) -> list[Finding]:
-    """Of rule 4: where no scanner looks, or where one looks and says nothing. Without any scanner nothing is asked."""
+    """Of rule 4: where no scanner looks, or where one looks and says nothing. Before any scan nothing is asked."""
     command, sight, geometry, safety = inputs.command, inputs.sight, config.geometry, config.safety
+    if _lost_all(inputs.scans):
+        return [_blind(command, Cause.BLIND, "the scans of every scanner have ended", "scans that can be used", config)]
     if not sight.fields:
         return []
     found = []
@@ -209,6 +215,11 @@ def _unseen(inputs: Inputs, config: FilterConfig) -> list[Finding]:
         why = f"{share:.0%} of the places ahead have usable readings, at least {safety.usable_share:.0%} are needed"
         found.append(_blind(command, Cause.SCAN_BLIND, why, "more usable readings, or another direction", config))
     return found
+
+
+def _lost_all(scans: tuple[ScanState, ...]) -> bool:
+    """None counts any more, and one did."""
+    return any(scan.age_s is not None for scan in scans) and not any(scan.is_fresh for scan in scans)
 
 
 def _limit(command: Twist, factor: float, cause: Cause, clears_on: str) -> Finding:

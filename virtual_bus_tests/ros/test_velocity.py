@@ -126,6 +126,23 @@ def test_the_emergency_stop_stops_until_a_reset_that_is_refused_while_anybody_wa
     chain.wait_for_order(0.2)
 
 
+# button A publishes its press once; button B says 20 times a second that it is free
+def test_a_second_button_on_the_topic_of_the_emergency_stop_does_not_release_the_first(chain: Chain) -> None:
+    chain.estop.message = Bool(data=False)
+    other = chain.node.node.create_publisher(Bool, "estop_state", 1)
+    chain.node.wait_for_subscriber(other)
+    chain.node.spin_for(0.7)
+    other.publish(Bool(data=True))
+    state = chain.wait_for_cause(SafetyState.CAUSE_ESTOP)
+    chain.node.spin_for(0.5)
+    done, sentence = reset(chain)
+    assert (done, "estop_state has 2 publishers" in sentence) == (False, True), sentence
+    chain.node.node.destroy_publisher(other)
+    chain.node.wait_for(lambda: reset(chain)[0], 5.0, "a reset with one button left")
+    state = chain.wait_for_cause(SafetyState.CAUSE_NONE)
+    assert not state.estop
+
+
 def test_an_obstacle_ahead_blocks_the_way_ahead_but_not_the_way_back(chain: Chain) -> None:
     chain.scan.message = scan(ahead_m=0.4)  # 0.10 m before the footprint, stop distance 0.15 m
     chain.action.message = drive(0.2)

@@ -88,8 +88,11 @@ class FilterWorld:
     def _scan(self, now: float) -> None:
         scanner = self.robot.safety.scan
         if self.lidar is not None:
-            scan = self.fault(self.lidar.scan(self.seen))
-            self.filter.on_laser_scan(scanner.topic, scan, Placement.of(scanner), now)
+            scan = self.fault(self.lidar.scan(self.seen))  # its stamps go on while nothing is published
+            if self.scans:
+                self.filter.on_laser_scan(scanner.topic, scan, Placement.of(scanner), now)
+            return
+        if not self.scans:
             return
         count = self.obstacles.shape[0]
         points = Points(self.seen, np.arange(count), max(count, 1) + 1)
@@ -97,7 +100,7 @@ class FilterWorld:
 
     def _turn(self) -> None:
         now = self.now
-        if self.scans and self._step % self._scan_steps == 0:
+        if self._step % self._scan_steps == 0:
             self._scan(now)
         if self._step % self._command_steps == 0:
             self.filter.on_command(self.command, now)

@@ -106,6 +106,23 @@ class ByTurns:
         return dataclasses.replace(old, stamp_ns=scan.stamp_ns) if self._new_stamps else old
 
 
+class Late:
+    """What a driver hands out that takes longer and longer: `per_s` more with each second, `most_s` at the end.
+
+    With the stamps of when it was measured; 10 scans a second.
+    """
+
+    def __init__(self, most_s: float, per_s: float = math.inf) -> None:
+        self._most_s, self._per_s = most_s, per_s
+        self._before: list[Scan] = []
+        self._late_s = 0.0
+
+    def __call__(self, scan: Scan) -> Scan:
+        self._before.append(scan)
+        self._late_s = min(self._late_s + self._per_s * 0.1, self._most_s)
+        return self._before[max(0, len(self._before) - 1 - round(self._late_s * 10.0))]
+
+
 def far_from(range_min_m: float, reading_m: float = -math.inf) -> Fault:
     """A scanner that measures nothing nearer than `range_min_m` reads `reading_m` there."""
 

@@ -81,17 +81,46 @@ def test_a_pressed_button_that_speaks_on_change_stays_pressed(restarts: int) -> 
     assert robot.drives
 
 
-def test_an_emergency_stop_that_waits_for_its_reset_waits_over_a_restart() -> None:
+# pressed, released ── restart, killed or in order ── zeros ── released; reset ── drives
+@pytest.mark.parametrize("orderly", [False, True])
+def test_an_emergency_stop_that_waits_for_its_reset_waits_over_a_restart(orderly: bool) -> None:
     robot = Robot()
     robot.button(True)
     robot.button(False)
+    assert robot.filter.estop is EstopState.AWAITS_RESET
+    if orderly:
+        robot.filter.end()
+        robot.settle()
     robot.start()
+    assert not robot.drives
+    robot.button(False)
     assert robot.filter.estop is EstopState.AWAITS_RESET
     assert not robot.drives
     assert "latched since before the start" in robot.order(FORWARD).detail
     assert robot.reset()
     assert robot.drives
     assert "latched" not in robot.order(FORWARD).detail
+
+
+# pressed, released ── the computer is restarted, the button pressed meanwhile: nobody hears it ── a reset is tried
+def test_a_press_that_nobody_heard_while_a_reset_was_due_is_not_reset_away() -> None:
+    robot = Robot()
+    robot.button(True)
+    robot.button(False)
+    robot.filter.end()
+    robot.settle()
+    robot.start()
+    assert not robot.reset()
+    assert not robot.drives
+    assert robot.filter.estop is EstopState.HELD
+
+
+def test_without_a_button_a_lost_record_needs_no_button_after_a_restart_either() -> None:
+    estop = Estop(True, Found(defect=Defect.MISSING))
+    estop = Estop(True, Found(estop.record))
+    assert estop.state is EstopState.AWAITS_RESET
+    estop.happens(EstopEvent.RESET)
+    assert estop.state is EstopState.FREE
 
 
 # the button is free ── SIGKILL, and a press that nobody heard ── start: taken for pressed
@@ -164,7 +193,7 @@ def test_a_full_disk_moves_nothing_from_the_first_word_of_the_button_on() -> Non
     assert robot.drives
 
 
-def test_every_state_is_on_disk_as_it_is() -> None:
+def test_every_state_is_on_disk_and_comes_back_held() -> None:
     disk = StopDisk("velocity")
     estop = Estop(True, disk.found())
     for event, mark in (
@@ -178,7 +207,7 @@ def test_every_state_is_on_disk_as_it_is() -> None:
         disk.write(estop.record)
         assert disk.found().record.mark is mark, event
         if mark is Mark.LATCHED:
-            assert Estop(True, disk.found()).state is estop.state
+            assert Estop(True, disk.found()).state is EstopState.HELD
 
 
 # drives ── the end begins: zeros ── pressed meanwhile ── the end is complete ── start: pressed

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from canbase_config.safety import Scan as ScanConfig
-from canbase_velocity.placement import MAX_TILT_RAD, Placement, PlacementError, Transform, placed_by_tf
+from canbase_velocity.placement import MAX_TILT_RAD, HeldPlacement, Placement, PlacementError, Transform, placed_by_tf
 
 AHEAD = (np.array([1.0]), np.array([0.0]))
 LEFT = (np.array([0.0]), np.array([1.0]))
@@ -80,3 +80,21 @@ def test_a_little_tilt_is_projected_to_the_floor() -> None:
 def test_an_empty_frame_id_is_named() -> None:
     with pytest.raises(PlacementError, match="the empty frame"):
         placed_by_tf("", "base_link", {})
+
+
+# a second robot_state_publisher, with another robot's description, says that the scanner looks backward
+@pytest.mark.parametrize("other", [{"yaw": math.pi}, {"yaw": 0.01}, {"x_m": 0.35}, {"roll": math.pi}])
+def test_a_scanner_that_tf_static_moves_counts_no_more_until_the_next_start(other: dict[str, float]) -> None:
+    held = HeldPlacement()
+    first = placed(turned("base_link", x_m=0.3))
+    assert held.hold("laser", first) == first
+    with pytest.raises(PlacementError, match="tf_static has moved laser"):
+        held.hold("laser", placed(turned("base_link", **{"x_m": 0.3, **other})))
+    with pytest.raises(PlacementError, match="tf_static has moved laser"):
+        held.hold("laser", first)
+
+
+def test_the_same_place_may_be_published_again_and_again() -> None:
+    held = HeldPlacement()
+    for step in range(5):
+        held.hold("laser", placed(turned("base_link", x_m=0.3 + 1e-7 * step)))

@@ -74,7 +74,7 @@ def test_an_input_is_fresh_until_exactly_its_timeout(changes: Any, timeout_s: fl
 def test_what_is_not_required_may_be_silent() -> None:
     silent = given_that(scans=scanned(None, required=False), estop_age_s=None)
     assert decide(silent, config(scan=False, estop=False)).twist == GOOD.command
-    unplaced = given_that(scans=scanned(0.0, required=False, problem="tf_static is empty"))
+    unplaced = given_that(scans=scanned(None, required=False, problem="tf_static is empty"))
     assert decide(unplaced, config(scan=False)).twist == GOOD.command
 
 

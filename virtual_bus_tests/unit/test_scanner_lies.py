@@ -20,7 +20,7 @@ from canbase_velocity.scan import MAX_READINGS, Scan, ScanError, check
 from canbase_velocity.sweep import Floats, fastest_mps
 from canbase_velocity.twist import ZERO, Twist
 from unit.filter_world import FilterWorld, robot_with
-from unit.lidar import ByTurns, Fault, Frozen, Lidar, TwoOnOneTopic, blind, far_from, one_beam_left
+from unit.lidar import ByTurns, Fault, Frozen, Late, Lidar, TwoOnOneTopic, blind, far_from, one_beam_left
 
 WALL = np.array([(2.0, y_m / 20.0) for y_m in range(-20, 21)] + [(-3.0, 0.5)])
 AHEAD = Twist(0.8, 0.0)
@@ -300,6 +300,62 @@ def test_two_scanners_on_one_topic_stop_the_base_until_the_next_start() -> None:
     made.fault = lambda scan: scan
     assert made.run(AHEAD, 3.0) > 0.9
     assert made.decision.cause is Cause.SCAN_INVALID
+
+
+# sound for 0.5 s ── each scan is handed out later, with the stamp of its measurement: a queue in the scanner's driver
+@pytest.mark.parametrize("per_s", [0.1, 0.3, 1.0, 100.0])
+@pytest.mark.parametrize("most_s", [1.0, 3.0])
+def test_scans_that_come_late_do_not_lead_into_the_wall(most_s: float, per_s: float) -> None:
+    """10 scans a second, and each one is new, noisy and complete."""
+    made = world()
+    made.obstacles = np.add(WALL, (4.0, 0.0))  # time enough for a queue to grow
+    least_m, causes, _ = lies(made, Late(most_s, per_s), 12.0)
+    assert least_m > 0.1
+    if most_s == 3.0 and per_s >= 0.3:
+        assert Cause.SCAN_STALE in causes
+        assert made.decision is not None
+        assert "delayed by" in made.decision.detail
+
+
+# sound for 0.5 s ── the only scanner ends: with one of two that ended, too, the base would creep on its side
+def test_when_the_last_scanner_ends_that_is_not_required_the_base_creeps() -> None:
+    made = FilterWorld(robot_with(scan={"required": False}), WALL)
+    made.lidar = Lidar()
+    made.run(AHEAD, 0.5)
+    made.scans = False
+    assert made.run(AHEAD, 6.0) > 0.1
+    assert made.decision is not None
+    assert made.decision.cause is Cause.BLIND
+    assert fastest_mps(made.box, made.decision.twist) <= 0.15 + 1e-9
+    made.scans = True
+    made.run(Twist(-0.3, 0.0), 0.5)
+    assert made.decision.cause is Cause.NONE
+
+
+def test_scans_that_are_always_as_late_are_the_scanner_s_own() -> None:
+    """A driver that stamps half a second before, by whatever clock: what it takes for each is no delay."""
+
+    def fault(scan: Scan) -> Scan:
+        assert scan.stamp_ns is not None
+        return dataclasses.replace(scan, stamp_ns=scan.stamp_ns + 10_000_000_000)
+
+    made = world()
+    made.fault = fault
+    made.run(AHEAD, 1.2)
+    assert made.decision is not None
+    assert made.decision.cause is Cause.NONE
+    assert made.path_m > 0.3
+
+
+def test_a_scanner_whose_clock_is_set_back_loses_one_scan() -> None:
+    made = world()
+    made.run(AHEAD, 0.5)
+    made.fault = lambda scan: dataclasses.replace(scan, stamp_ns=(scan.stamp_ns or 0) - 100_000_000_000)
+    made.run(AHEAD, 0.5)
+    (scanner,) = made.filter.inputs(made.now).scans
+    assert scanner.dropped == 1
+    assert made.decision is not None
+    assert made.decision.cause is Cause.NONE
 
 
 class Framed(Lidar):
