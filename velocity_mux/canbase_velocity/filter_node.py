@@ -34,7 +34,7 @@ from canbase_velocity.graph import BUTTON_KIND, SCAN_KIND, publishers
 from canbase_velocity.io import LeaseSender
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.placement import HeldPlacement, Placement, PlacementError, Transform, placed_by_tf
-from canbase_velocity.qos import COMMAND, SCAN, STATE, STATIC_TF, listen_twice
+from canbase_velocity.qos import COMMAND, SCAN, STATE, STATIC_TF, listen_closely
 from canbase_velocity.safety_filter import FilterConfig
 from canbase_velocity.steady import steady_timer
 from canbase_velocity.twist import Twist
@@ -71,7 +71,7 @@ class FilterNode(Node):
         self._stands_from_s = -math.inf
         self._commands = self.create_publisher(TwistStamped, "cmd_vel", COMMAND)
         self._states = self.create_publisher(SafetyState, "safety_filter/state", STATE)
-        listen_twice(self, Bool, robot.safety.estop.topic, self._on_estop)
+        listen_closely(self, Bool, robot.safety.estop.topic, self._on_estop)
         self._watch_scans(robot.safety.scans)
         self.create_service(Trigger, "safety_filter/reset", self._on_reset)
         steady_timer(self, GRAPH_PERIOD_S, self._count_buttons)

@@ -30,7 +30,7 @@ from canbase_velocity.graph import expected, publishers
 from canbase_velocity.messages import driver_state, sent_at, twist_message, twist_of
 from canbase_velocity.mux import Mux, MuxDecision
 from canbase_velocity.mux_messages import diagnostics, mux_state
-from canbase_velocity.qos import ANY_COMMAND, COMMAND, DRIVER_STATUS, STATE, listen_twice, loud
+from canbase_velocity.qos import ANY_COMMAND, COMMAND, DRIVER_STATUS, STATE, listen_closely, loud
 from canbase_velocity.steady import steady_timer
 from canbase_velocity.twist import Twist
 
@@ -108,7 +108,7 @@ class MuxNode(Node):
             callback = self._on_stamped if source.stamped else self._on_plain
             self.create_subscription(kind, source.topic, functools.partial(callback, name), ANY_COMMAND)
         for name, lock in self._robot.mux.locks.items():
-            listen_twice(self, Bool, lock.topic, functools.partial(self._on_lock, name))
+            listen_closely(self, Bool, lock.topic, functools.partial(self._on_lock, name))
             if not lock.required:
                 self.get_logger().warning(f"the silence of lock {name} is not noticed: it is not required (timeout 0)")
 

@@ -29,13 +29,14 @@ STATIC_TF = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """As tf2's static broadcasters publish, of which there may be many."""
 
 
-def listen_twice(node: Node, kind: type[Any], topic: str, callback: Callable[[Any], None]) -> None:
+def listen_closely(node: Node, kind: type[Any], topic: str, callback: Callable[[Any], None]) -> None:
     """Subscribes to a topic that may speak once and then be silent, such as a button or a lock.
 
-    With best effort, to hear every publisher; and reliably, so that nothing gets lost of one that is reliable. The
-    callback may be called twice for one message.
+    With best effort, to hear every publisher; reliably, so that nothing gets lost of one that is reliable; and what was
+    said before the start by one that keeps it (transient local). One message may call the callback three times.
     """
-    silent = SubscriptionEventCallbacks(use_default_callbacks=False)  # the other one hears what this one does not
+    silent = SubscriptionEventCallbacks(use_default_callbacks=False)  # another one hears what this one does not
+    node.create_subscription(kind, topic, callback, STATE, event_callbacks=silent)
     node.create_subscription(kind, topic, callback, COMMAND, event_callbacks=silent)
     node.create_subscription(kind, topic, callback, ANY_COMMAND)
 

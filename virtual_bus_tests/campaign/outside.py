@@ -139,7 +139,7 @@ class Surroundings:
     def _scan(self) -> None:
         if self.scans:
             self._world.topics.publish(
-                "scan", self._seen() if self.scanner is None else self.scanner.scan(*self.free_m)
+                "scan", self._seen() if self.scanner is None else self.scanner.scan(*self.free_m, self._world.clock.now)
             )
         self._world.clock.after(self.SCAN_S, self._scan)
 

@@ -10,17 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from canbase.msg import SafetyState
+from canbase.msg import MuxState, SafetyState
 from geometry_msgs.msg import Twist, TwistStamped
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
-from ros.conftest import Spawn
+from ros.conftest import MakeRobot, Spawn
 from ros.harness import Process, TestNode
 from ros.scanner import BEAMS, all_around
-from ros.velocity_chain import RUN, START_S, Chain, drive, scan
+from ros.velocity_chain import LATCHED, RUN, START_S, Chain, drive, scan
 
 pytestmark = pytest.mark.ros
 
@@ -124,6 +124,20 @@ def test_the_emergency_stop_stops_until_a_reset_that_is_refused_while_anybody_wa
     chain.node.spin_for(0.1)  # the action's zero after the reset
     chain.action.message, chain.joystick.message = drive(0.2), None
     chain.wait_for_order(0.2)
+
+
+# a press and a lock, published once by publishers that keep them (transient local) ── the process starts
+def test_what_a_button_and_a_lock_said_before_the_start_counts_where_their_publishers_keep_it(
+    spawn: Spawn, make_robot: MakeRobot, test_node: TestNode, watchdog: socket.socket
+) -> None:
+    for topic in ("estop_state", "pause"):
+        test_node.node.create_publisher(Bool, topic, LATCHED).publish(Bool(data=True))
+    lock = {"topic": "pause", "priority": 101, "required": False}
+    spawn(RUN.format(path=str(make_robot({"mux": {"locks": {"pause": lock}}})), ros_args=[]))
+    state = test_node.record(SafetyState, "safety_filter/state", LATCHED)
+    mux = test_node.record(MuxState, "velocity_mux/state", LATCHED)
+    test_node.wait_for(lambda: state.last is not None and state.last.estop, 2.0 * START_S, "the emergency stop")
+    test_node.wait_for(lambda: mux.last is not None and mux.last.locks[0].holds, START_S, "the lock")
 
 
 # button A publishes its press once; button B says 20 times a second that it is free

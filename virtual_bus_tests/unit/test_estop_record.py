@@ -118,9 +118,9 @@ def test_a_press_that_nobody_heard_while_a_reset_was_due_is_not_reset_away() -> 
 def test_without_a_button_a_lost_record_needs_no_button_after_a_restart_either() -> None:
     estop = Estop(True, Found(defect=Defect.MISSING))
     estop = Estop(True, Found(estop.record))
-    assert estop.state is EstopState.AWAITS_RESET
+    before = estop.state
     estop.happens(EstopEvent.RESET)
-    assert estop.state is EstopState.FREE
+    assert (before, estop.state) == (EstopState.AWAITS_RESET, EstopState.FREE)
 
 
 # the button is free ── SIGKILL, and a press that nobody heard ── start: taken for pressed

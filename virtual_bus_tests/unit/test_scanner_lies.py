@@ -325,11 +325,11 @@ def test_when_the_last_scanner_ends_that_is_not_required_the_base_creeps() -> No
     made.scans = False
     assert made.run(AHEAD, 6.0) > 0.1
     assert made.decision is not None
-    assert made.decision.cause is Cause.BLIND
+    assert cause_of(made) is Cause.BLIND
     assert fastest_mps(made.box, made.decision.twist) <= 0.15 + 1e-9
     made.scans = True
     made.run(Twist(-0.3, 0.0), 0.5)
-    assert made.decision.cause is Cause.NONE
+    assert cause_of(made) is Cause.NONE
 
 
 def test_scans_that_are_always_as_late_are_the_scanner_s_own() -> None:

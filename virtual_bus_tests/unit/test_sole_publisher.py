@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -61,7 +63,7 @@ class Base:
                 self.filter.on_scan_publishers(self.topic, in_graph, now)
             number = self.cycle % 2
             if number in alive:
-                scan = self.scanners[number].scan(FAR)
+                scan = dataclasses.replace(self.scanners[number].scan(FAR), stamp_ns=round(now * 1e9))
                 self.filter.on_laser_scan(self.topic, scan, PLACE, now)
             self.filter.on_command(Twist(0.3, 0.0), now)
             decision = self.filter.decide(now)
