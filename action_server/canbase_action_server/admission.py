@@ -9,7 +9,9 @@ STATE_TIMEOUT_S = 1.5
 """A state that is older says nothing: three periods of the slowest one (velocity_mux/state, 2 Hz)."""
 
 
-NO_SOURCE = "mux.sources has no stamped source with topic cmd_vel_action: the mux would never hear a goal; add it"
+NO_SOURCE = (
+    "mux.sources has no stamped source with topic cmd_vel_action: the mux would receive no command of a goal; add it"
+)
 
 
 def action_source(robot: Robot) -> str:

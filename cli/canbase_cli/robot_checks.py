@@ -78,7 +78,7 @@ def watchdog(evidence: Evidence) -> list[Check]:
     heard = evidence.on("motor_driver/status")
     status = heard.last
     if status is None:
-        return [fail("watchdog", "unknown: motor_driver tells about it", PARTS_RUN)]
+        return [fail("watchdog", "unknown: reported by motor_driver, which is not running", PARTS_RUN)]
     age = _age(status.watchdog_age_s)
     if status.watchdog == DriverStatus.WATCHDOG_MISSING:
         return [fail("watchdog", f"missing, last heard {age} ago", "start canbase watchdog on the same robot.yaml")]

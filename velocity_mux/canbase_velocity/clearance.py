@@ -133,7 +133,7 @@ class ScanReader:
         near = ranges_m < scan.range_min_m if self._config.below_range_min == "too_near" else np.isneginf(ranges_m)
         usable = near | (ranges_m >= scan.range_min_m)
         if not usable.any():
-            raise ScanError(f"none of its {ranges_m.size} readings says something")
+            raise ScanError(f"none of its {ranges_m.size} readings is usable")
         hit_m = np.where(usable & (ranges_m <= scan.range_max_m), ranges_m, np.inf)
         if near.any():
             hit_m = np.where(near, np.minimum(self._beside_m(placement), scan.range_min_m), hit_m)

@@ -106,7 +106,7 @@ class ForeignWatch:
 def _problem(publisher: Publisher, expected: Expected, count: int) -> str:
     """Empty: there is none."""
     if publisher.kind != expected.kind:
-        return f"of type {publisher.kind}, which is not heard; expected {expected.kind}"
+        return f"of type {publisher.kind}, which is not received; expected {expected.kind}"
     if not expected.nodes:
         return ""
     if publisher.node not in expected.nodes:

@@ -41,7 +41,7 @@ class Lock:
         if not self.config.required:
             return ""
         if self._at_s is None:
-            return f"has never said anything on {self.config.topic}"
+            return f"has published nothing yet on {self.config.topic}"
         age_s = now - self._at_s
         if age_s <= self.config.timeout_s:
             return ""

@@ -46,7 +46,7 @@ def loud(node: Node, topic: str, deaf: list[str]) -> PublisherEventCallbacks:
 
     def on_incompatible(event: Any) -> None:
         policy = qos_policy_name_from_kind(event.last_policy_kind)
-        sentence = f"a subscriber of {topic} hears nothing: it asks for another {policy} than is offered"
+        sentence = f"a subscriber of {topic} receives nothing: it requests another {policy} than is offered"
         if sentence not in deaf:
             deaf.append(sentence)
         node.get_logger().error(sentence)

@@ -127,7 +127,7 @@ def test_the_file_of_a_twist_mux_user_drives_with_its_locks(
     e_stop, pause = velocity.source(Bool, "e_stop"), velocity.source(Bool, "pause_navigation")
     nav.message = drive(0.2).twist
     assert velocity.ordered_for(0.5) == {0.0}  # e_stop was never heard
-    assert velocity.reasons()["nav"] == "locked: e_stop has never said anything on e_stop"
+    assert velocity.reasons()["nav"] == "locked: e_stop has published nothing yet on e_stop"
     e_stop.message = Bool(data=False)
     assert velocity.ordered_for(0.5) == {0.0}  # nor does it drive off when the lock opens
     velocity.node.release(nav, joy)
@@ -175,7 +175,7 @@ def test_a_subscriber_that_asks_for_more_than_is_offered_is_told_loudly(
 ) -> None:
     velocity = start({})
     velocity.node.record(TwistStamped, "cmd_vel_mux", LATCHED)
-    sentence = "a subscriber of cmd_vel_mux hears nothing: it asks for another DURABILITY than is offered"
+    sentence = "a subscriber of cmd_vel_mux receives nothing: it requests another DURABILITY than is offered"
 
     def told() -> bool:
         return any(sentence in status.message for message in velocity.diagnostics.messages for status in message.status)

@@ -49,7 +49,7 @@ def test_the_same_node_twice_on_a_source_is_nothing_wrong() -> None:
 def test_another_message_type_is_told_and_disturbs_nobody() -> None:
     watch = ForeignWatch([JOY])
     (foreign,) = watch.look({JOY.topic: [Publisher("/teleop", PLAIN)]}, 0.0)
-    assert foreign.problem == f"of type {PLAIN}, which is not heard; expected {STAMPED}"
+    assert foreign.problem == f"of type {PLAIN}, which is not received; expected {STAMPED}"
     assert foreign.disturbs("joystick") is False
 
 

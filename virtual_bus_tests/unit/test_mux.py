@@ -166,7 +166,7 @@ def test_a_source_with_the_priority_of_the_lock_is_not_held_back() -> None:
 def test_a_required_lock_holds_until_it_is_heard_and_again_when_it_falls_silent() -> None:
     mux = rested(DEFAULT_SOURCES, {"button": BUTTON})
     mux.on_command("joystick", FAST, 0.0)
-    assert reasons(mux.decide(0.0))["joystick"] == "locked: button has never said anything on button"
+    assert reasons(mux.decide(0.0))["joystick"] == "locked: button has published nothing yet on button"
     mux.on_lock("button", False, 0.1)
     assert mux.decide(0.1).active == "joystick"
     mux.on_command("joystick", FAST, 0.6)

@@ -420,7 +420,7 @@ CHECKS = (
         Cause.DRIVE_SILENT,
         _drive_silent,
         lambda view, node_id, config, now: now >= view.node(node_id).heard_at + config.drive_heartbeat_s,
-        "the drive is heard again",
+        "the drive answers again",
     ),
     Check(Cause.ANSWERED_TWICE, _answered_twice, _over, "nothing else; give each drive a node id of its own first"),
     Check(Cause.SETPOINT_MISSING, _setpoint_missing, _over, "nothing else"),
