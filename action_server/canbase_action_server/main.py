@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import time
 from collections.abc import Callable
@@ -14,6 +15,7 @@ from rclpy.signals import SignalHandlerOptions
 from canbase_action_server.drive_messages import drive_binding
 from canbase_action_server.node import DriveDistanceServer
 from canbase_action_server.rotate_messages import rotate_binding
+from canbase_config.private_process import guard_keys
 from canbase_config.robot import Robot
 from canbase_config.service import Service
 from canbase_config.stopping import standstill_s
@@ -26,6 +28,7 @@ SLICE_S = 0.1
 def run(robot: Robot, ros_args: list[str], when_ready: Callable[[], None] = lambda: None) -> int:
     """Serve until SIGINT or SIGTERM; 0 after an orderly end, 1 after a defect. `ros_args` as for rclpy.init;
     `when_ready`: called when all is made and nothing runs yet."""
+    guard_keys(os.environ)
     rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)
     executor = SingleThreadedExecutor()
     node = DriveDistanceServer(robot, [drive_binding(), rotate_binding(robot)])

@@ -23,6 +23,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from canbase_config.latch_file import LatchFile, LatchKeeper, hold, latch_folder
 from canbase_config.priority import Priority
+from canbase_config.private_process import guard_keys
 from canbase_config.robot import DRIVER_NODE_ID, Robot
 from canbase_config.service import Service
 from canbase_config.sole import TakenError, bus_name, take
@@ -56,6 +57,7 @@ def run(
     """Runs the driver until SIGINT or SIGTERM. Returns 0 after an orderly end, 1 when the bus cannot be opened or a
     thread failed. `ros_args`: arguments for rclpy. `autostart`: without it nothing is sent on the bus before the node
     is configured. `when_ready`: called when all is made and nothing runs yet. Call from the main thread (signals)."""
+    guard_keys(os.environ)
     folder = latch_folder(os.environ, Path.home(), robot.name)
     try:
         held = take("driver", bus_name(robot.bus.arguments())), hold(folder, "driver")

@@ -18,6 +18,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from canbase_config.latch_file import LatchFile, LatchKeeper, hold, latch_folder
+from canbase_config.private_process import guard_keys
 from canbase_config.robot import Robot
 from canbase_config.service import Service
 from canbase_config.sole import TakenError, take
@@ -40,6 +41,7 @@ def run(robot: Robot, ros_args: Sequence[str], when_ready: Callable[[], None] = 
     process too: zeros go out, and it is raised here. `when_ready`: called when all is made and nothing runs yet. Call
     from the main thread (signals).
     """
+    guard_keys(os.environ)
     folder = latch_folder(os.environ, Path.home(), robot.name)
     try:
         held, writer = take("velocity process", robot.lease.socket), hold(folder, "velocity")
