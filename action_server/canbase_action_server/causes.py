@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from canbase_action_server.inputs import (
     ENABLED,
     ESTOP_CAUSES,
+    OBSTACLE_CAUSE,
     SCAN_LOST_CAUSES,
     WATCHDOG_OK,
     Inputs,
@@ -38,9 +39,9 @@ class Situation:
     pose_was_reset: bool
     off_course: str
     """How far the base is beside its line or turned away from it, if that is too far; else empty."""
-    obstacle_age_s: float
-    """For how long the filter has been stopping this motion for an obstacle; 0: it does not."""
-    obstacle_patience_s: float
+    stopped_s: float
+    """For how long the filter has been stopping this motion, for whatever cause; 0: it does not."""
+    stopped_patience_s: float
     no_progress_s: float
     progress_timeout_s: float
     running_s: float
@@ -113,8 +114,10 @@ def _scan_lost(s: Situation) -> str | None:
 def _blocked(s: Situation) -> str | None:
     if s.inputs.mux is not None and s.inputs.mux.held_back:
         return f"velocity_mux holds {s.own_source} back: {s.inputs.mux.held_back}; free it and send a new goal"
-    if s.obstacle_age_s < s.obstacle_patience_s or s.inputs.safety is None:
+    if s.stopped_s < s.stopped_patience_s or s.inputs.safety is None:
         return None
+    if s.inputs.safety.cause != OBSTACLE_CAUSE:
+        return f"the safety filter stops the base ({s.inputs.safety.cause}): {s.inputs.safety.detail}"
     return f"obstacle in the way: {s.inputs.safety.detail}; clear the way and send a new goal for the rest"
 
 

@@ -11,15 +11,15 @@ from enum import Enum
 
 from canbase_action_server.admission import action_source
 from canbase_action_server.causes import Cause, Situation, cause_while_driving, cause_while_stopping
-from canbase_action_server.inputs import OBSTACLE_CAUSE, Inputs, Odometry
+from canbase_action_server.inputs import Inputs, Odometry
 from canbase_action_server.limits import standstill_limits
 from canbase_action_server.motion import STOP, Motion, Twist
 from canbase_action_server.outcome import ErrorCode, Outcome
 from canbase_action_server.standstill import Standstill, Verdict
 from canbase_config.robot import Robot
 
-OBSTACLE_PATIENCE_S = 0.3
-"""The filter stops at once; the goal gives up when the obstacle is still there after this, not for one bad scan."""
+STOPPED_PATIENCE_S = 0.3
+"""The filter stops at once; the goal gives up when it still does after this, not for one bad scan."""
 PROGRESS_M = 0.001
 """Less than this farther than ever before is not progress."""
 
@@ -75,7 +75,7 @@ class GoalRun:
         self._pose_resets: int | None = None
         """As the driver had counted them when the goal began."""
         self._pose_was_reset = False
-        self._obstacle_since: float | None = None
+        self._stopped_since: float | None = None
         self._best_remaining_m = self._motion.remaining_m
         self._progress_time = now
         self._next_feedback = now
@@ -110,9 +110,8 @@ class GoalRun:
             self._last_odometry = odometry
         if self._best_remaining_m - self._motion.remaining_m >= PROGRESS_M:
             self._best_remaining_m, self._progress_time = self._motion.remaining_m, now
-        blocked = safety is not None and safety.stops and safety.cause == OBSTACLE_CAUSE
-        since = now if self._obstacle_since is None else self._obstacle_since
-        self._obstacle_since = since if blocked else None
+        since = now if self._stopped_since is None else self._stopped_since
+        self._stopped_since = since if safety is not None and safety.stops else None
 
     def _situation(self, inputs: Inputs, now: float) -> Situation:
         action = self._robot.action
@@ -125,8 +124,8 @@ class GoalRun:
             odometry_jumped=self._jumped,
             pose_was_reset=self._pose_was_reset,
             off_course=self._motion.strayed(action.lateral_tolerance_m, action.heading_tolerance_rad),
-            obstacle_age_s=0.0 if self._obstacle_since is None else now - self._obstacle_since,
-            obstacle_patience_s=OBSTACLE_PATIENCE_S,
+            stopped_s=0.0 if self._stopped_since is None else now - self._stopped_since,
+            stopped_patience_s=STOPPED_PATIENCE_S,
             no_progress_s=now - self._progress_time,
             progress_timeout_s=action.progress_timeout_s,
             running_s=now - self._started,

@@ -20,8 +20,8 @@ GOOD = Situation(
     odometry_jumped=False,
     pose_was_reset=False,
     off_course="",
-    obstacle_age_s=0.0,
-    obstacle_patience_s=0.3,
+    stopped_s=0.0,
+    stopped_patience_s=0.3,
     no_progress_s=0.0,
     progress_timeout_s=2.0,
     running_s=0.0,
@@ -41,7 +41,7 @@ PROVOKED: dict[ErrorCode, Provoke] = {
     ErrorCode.ODOMETRY_LOST: lambda s: replace(s, now=10.21),
     ErrorCode.TAKEN_OVER: lambda s: with_inputs(s, mux=replace(GOOD_MUX, active="joystick")),
     ErrorCode.SCAN_LOST: lambda s: with_inputs(s, safety=replace(GOOD_SAFETY, cause="scan_stale")),
-    ErrorCode.BLOCKED: lambda s: replace(s, obstacle_age_s=0.3),
+    ErrorCode.BLOCKED: lambda s: replace(s, stopped_s=0.3),
     ErrorCode.CANCELED: lambda s: with_inputs(s, cancel_requested=True),
     ErrorCode.PREEMPTED: lambda s: with_inputs(s, preempted=True),
     ErrorCode.CLIENT_LOST: lambda s: with_inputs(s, client_lost=True),
@@ -59,7 +59,7 @@ ROWS.insert(5, (ErrorCode.DRIVE_FAULT, lambda s: replace(s, off_course=OFF_COURS
 
 def test_nothing_wrong_is_no_cause() -> None:
     assert cause_while_driving(GOOD) is None
-    almost = replace(GOOD, now=10.2, gap_s=0.2, obstacle_age_s=0.299, no_progress_s=2.0, running_s=20.0)
+    almost = replace(GOOD, now=10.2, gap_s=0.2, stopped_s=0.299, no_progress_s=2.0, running_s=20.0)
     assert cause_while_driving(almost) is None
     assert cause_while_driving(with_inputs(GOOD, mux=replace(GOOD_MUX, active="action"))) is None
 

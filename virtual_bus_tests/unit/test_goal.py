@@ -69,6 +69,18 @@ def test_an_obstacle_that_stays_ends_the_goal_and_one_bad_scan_does_not() -> Non
     assert zero_from(story, 2.35)
 
 
+# 1 s in front of a scanner that reads nothing there, with blind_mps 0 ── away: the base must not go on by itself
+@pytest.mark.parametrize("cause", ["scan_blind", "blind", "command_stale", "shutdown"])
+def test_every_stop_of_the_filter_that_stays_ends_the_goal(cause: str) -> None:
+    held = replace(GOOD_SAFETY, stops=True, cause=cause, detail="why it stops")
+    story = drive(Plant(), 3.0, 0.3, at={2.0: lambda s: safety(s, held), 3.0: lambda s: safety(s, GOOD_SAFETY)})
+    end = story.run()
+    assert end.code is ErrorCode.BLOCKED
+    assert "why it stops" in end.message
+    assert "obstacle" not in end.message
+    assert zero_from(story, 2.35)
+
+
 def test_odometry_lost_ends_on_the_word_of_the_driver() -> None:
     # Lost at 2.0, noticed at 2.2; the driver goes on telling that the base stands.
     at = {2.0: lose_odometry, 2.6: lambda s: driver(s, received=2.6, standstill=True)}
