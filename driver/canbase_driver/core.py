@@ -117,6 +117,11 @@ class DriverCore:
         return self._supervisor.cause
 
     @property
+    def lets_go(self) -> bool:
+        """It is ENABLED, and has taken the power off for a moment, as a stand with torque is no proof of itself."""
+        return self._let_go.active
+
+    @property
     def record(self) -> Record:
         """What shall be on disk now about its stops."""
         return self._record.wanted

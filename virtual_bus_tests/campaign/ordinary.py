@@ -109,7 +109,8 @@ class OrdinaryHour:
         if driver.state is not DriverState.ENABLED:
             return f"driver: {driver.state.name.lower()}: {driver.cause.name}: {driver.cause.detail}"
         for change in self.world.drives.changes():
-            if change.before is State.OPERATION_ENABLED:
+            lets_go = driver.lets_go and change.after is State.SWITCHED_ON
+            if change.before is State.OPERATION_ENABLED and not lets_go:
                 return f"drive {change.node_id}, axis {change.axis}: {change.before.name} → {change.after.name}"
         return ""
 
@@ -223,15 +224,14 @@ class OrdinaryHour:
                 axis.ramp_up_mps2 = self._ramps * self.drawn.robot.limits.acceleration_mps2
 
     def _measured(self, cob_id: int, data: bytes) -> bytes:
-        """606Ch with noise."""
+        """606Ch with noise, and the torque behind it as it is."""
         if cob_id & 0x780 not in (0x280, 0x480):
             return data
         node = self.world.drives.bench.nodes[cob_id & 0x7F]
         noise = round(self.random.uniform(-1.0, 1.0) * self._noise_mps / abs(node.axes[0].scale.actual_mps))
-        form = {2: "<h", 4: "<i"}.get(len(data))
-        if form is None:
-            return data
-        return struct.pack(form, struct.unpack(form, data)[0] + noise)
+        narrow = any(drive.kind.layout.velocity_bits == 16 for drive in self.drawn.robot.drives)
+        form = struct.Struct("<h" if narrow else "<i")
+        return form.pack(form.unpack_from(data)[0] + noise) + data[form.size :]
 
     # The computer and its people
 

@@ -179,7 +179,7 @@ def test_a_drive_that_does_not_obey_disable_operation_loses_its_power_by_disable
 
 
 def letting_go(world: World) -> bool:
-    return world.core._let_go.active
+    return world.core.lets_go
 
 
 def count_of(world: World, seconds: float) -> int:

@@ -103,7 +103,7 @@ def test_time_begins_anew_when_it_rests_anew() -> None:
     assert bus.run(15, 1.0).overdue_s == pytest.approx(0.15)
 
 
-@pytest.mark.parametrize(("share", "counts"), [(0.59, False), (0.61, True), (-0.39, False), (-0.41, True)])
+@pytest.mark.parametrize(("share", "counts"), [(0.59, False), (0.61, True), (-0.49, False), (-0.51, True)])
 def test_pushed_in_vain_is_a_torque_far_from_the_one_at_the_last_sign_of_life(share: float, counts: bool) -> None:
     """That was a tenth of the rated one."""
     bus = Bus().moved()

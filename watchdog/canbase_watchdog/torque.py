@@ -7,8 +7,8 @@ lets go: the healthy wheel rolls, which its encoder shows, or its friction holds
 Rules, for a drive with power
 1. Pushed: torque × time since the last sign of life, or since there was no power, bounds the speed that a dead encoder
    can hide. With nothing ordered of any wheel, a drive that was ordered motion before must let go once.
-2. In vain: the torque differs from that at the last sign of life by more than a wheel's friction does to and fro, and
-   nothing moves. It adds up over orders until the encoder moves, and most of it outlives the power.
+2. In vain: the torque is more than friction takes, and by as much another one than at the last sign of life (a hill),
+   and nothing moves. It adds up over orders until the encoder moves, and most of it outlives the power.
 A drive that does not tell its torque may give the rated one: rule 1 alone. So may one that has only ever told zero.
 """
 
@@ -23,7 +23,7 @@ from canbase_watchdog.evidence import KEPT_SHARE, LIFE_COUNTS, LIFE_M, LIFE_SHAR
 NOISE_SHARE = 0.01
 """Of the rated torque: less moves no wheel."""
 STRAIN_SHARE = 0.5
-"""Of the rated torque: friction, from one direction to the other, takes less."""
+"""Of the rated torque: friction takes less, and from one direction to the other changes it by less."""
 LONGEST_STEP_S = 0.1
 """Time between two samples counts for so long at most: a drive that is silent for longer is another cause."""
 _WRAP = 2**32
@@ -111,7 +111,7 @@ class PushWatch:
         pushed_s = 0.0 if lives else min(self.last.pushed_s + given_s, config.stand_impulse_s)
         overdue = owes and self._rests and config.stand_proof and pushed_s >= config.stand_impulse_s
         overdue_s = min(self.last.overdue_s + elapsed_s, config.stand_answer_s) if overdue else 0.0
-        strained = owes and share is not None and abs(share - self._usual) > STRAIN_SHARE
+        strained = owes and share is not None and min(torque, abs(share - self._usual)) > STRAIN_SHARE
         vain_s = min(vain_s + elapsed_s, config.motion_missing_s) if strained else vain_s
         return Push(share, pushed_s, owes, overdue_s, vain_s)
 
