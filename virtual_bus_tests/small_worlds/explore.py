@@ -26,7 +26,7 @@ from small_worlds.properties import Found, Properties
 from small_worlds.world import POINT_S, SmallWorld
 
 LONGEST_S = 8.0
-"""A world that is still new so long after the last event is given up, and counted: `Search.unfinished`."""
+"""A world that is still new so long after the last event does not come to rest: a story."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,17 +66,16 @@ class Search:
 
     states: int = 0
     steps: int = 0
-    unfinished: int = 0
     cpu_s: float = 0.0
     real_s: float = 0.0
     stories: list[Story] = field(default_factory=list)
 
 
 class _Shared:
-    """Memory that all processes share: the table of visited states, and three counters."""
+    """Memory that all processes share: the table of visited states, and two counters."""
 
     SLOTS = 1 << 22
-    _HEAD = 24
+    _HEAD = 16
 
     def __init__(self) -> None:
         self._memory = mmap.mmap(-1, self._HEAD + 16 * self.SLOTS)
@@ -100,7 +99,7 @@ class _Shared:
         raise MemoryError("more states than the table of visited ones has room for")
 
 
-STATES, STEPS, UNFINISHED = 0, 1, 2
+STATES, STEPS = 0, 1
 COLLECTED = (30_000, 5, 5)
 """Worlds refer to themselves: many are thrown away at once."""
 ALL = (*FAULT_EVENTS, *OPERATOR_EVENTS)
@@ -140,6 +139,7 @@ class _World:
         self.start = start
         self.small = SmallWorld(start)
         self.properties = Properties(self.small)
+        self.small.pass_to_point(canonical.OLD_S)
         self.began = self.small.world.clock.now
         self.events: list[tuple[float, str]] = []
 
@@ -153,6 +153,11 @@ class _Worker:
 
     def __init__(self, bounds: Bounds, shared: _Shared, writer: int) -> None:
         self._bounds, self._shared, self._writer = bounds, shared, writer
+
+    def begin(self, world: _World, left: _Left) -> list[tuple[Snapshot, list[int]]]:
+        """As `nothing_happens`, from a world at rest: what it comes back to was there before."""
+        self._is_new(world, left, 0)
+        return self.nothing_happens(world, left, 0)
 
     def explore(self, world: _World, left: _Left, least: int = 0) -> None:
         """Everything that may happen from here on; now only events from the row `least` on."""
@@ -175,7 +180,7 @@ class _Worker:
                 points.append((Snapshot(world), rows))
             if not self._pass(world, left, (point + 1) % self._bounds.every):
                 return points
-        self._shared.add(UNFINISHED)
+        self._tell(world, Found("rest", world.small.world.clock.now, f"still new {LONGEST_S} s after the last event"))
         return points
 
     def _rows(self, world: _World, left: _Left, least: int) -> list[int]:
@@ -240,7 +245,7 @@ def search(bounds: Bounds, starts: Sequence[str], workers: int = 2) -> Search:
     failed = [child for child in children if os.waitpid(child, 0)[1]]
     if failed:
         raise RuntimeError(f"{len(failed)} of {workers} searching processes died")
-    counts = (shared.count(STATES), shared.count(STEPS), shared.count(UNFINISHED))
+    counts = (shared.count(STATES), shared.count(STEPS))
     return Search(*counts, _cpu_s() - used_s, time.perf_counter() - began, stories)
 
 
@@ -248,12 +253,7 @@ def _fork(bounds: Bounds, starts: Sequence[str], shared: _Shared, pipe: tuple[in
     """The processes of the search. Each takes the next task when it has done one: a first event at some point."""
     first = _Worker(bounds, shared, pipe[1])
     left = _Left(bounds.faults, bounds.operator)
-    tasks = [
-        (snapshot, row)
-        for start in starts
-        for snapshot, rows in first.nothing_happens(_World(start), left, 0)
-        for row in rows
-    ]
+    tasks = [(snapshot, row) for start in starts for snapshot, rows in first.begin(_World(start), left) for row in rows]
     todo, give = os.pipe()
     os.write(give, b"".join(struct.pack("<H", number) for number in range(len(tasks))))
     os.close(give)

@@ -24,6 +24,8 @@ PROPERTIES = {
     "alive": "after a part stopped living the base stands, or is without power, within the stated time",
     "cut off": "a drive that receives neither watchdog nor driver stops by itself",
     "neutral": "after a reset or a restart nobody is followed who ordered motion then and has not shown zero since",
+    "rest": "a world to which nothing happens any more comes to rest: the search has looked at all of its future",
+    "exception": "no core raises an exception",
     "runaway": "no wheel is faster than it was ordered to be for longer than the stated time",
 }
 HEARD_S = 0.1
