@@ -206,6 +206,8 @@ def _target_outside(view: View, config: WatchdogConfig, now: float) -> Verdict:
                 f"the leases allow {low:.3f} to {high:.3f} m/s (tolerance {slack:.3f} m/s)"
             )
             return Verdict(Cause.TARGET_OUTSIDE, axis.drive.node_id, detail)
+    if view.creep:
+        return Verdict(Cause.TARGET_OUTSIDE, 0, f"{view.creep}, while the leases allow no motion")
     if view.skew:
         return Verdict(Cause.TARGET_OUTSIDE, 0, f"left and right wheels are ordered {view.skew}")
     return FINE

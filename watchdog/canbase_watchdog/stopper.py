@@ -16,6 +16,8 @@ NMT_PERIOD_S = 0.05
 SDO_PERIOD_S = 0.01
 """One SDO request at a time: most drives have a single SDO server that keeps one request."""
 IDLE_SDO_PERIOD_S = 0.05
+SEEK_PERIOD_S = 0.5
+"""A node of which nothing is known after the start is asked so seldom that tools find the SDO channel free."""
 
 _WORD_BY_STEP = {
     Step.PRE_OPERATIONAL: frames.QUICK_STOP_WORD,
@@ -39,12 +41,13 @@ class Stopper:
         """Begins at the foot of the ladder at the monotonic time `now` [s]; without `trusted`, a sensor lied.
 
         `resting`: for a trip of before the start. A drive that is off is left alone, so that it can be booted; one that
-        has power or moves is stopped.
+        has power or moves is stopped. One that tells nothing is asked, unless a driver is there, which boots it.
         """
         self._node_id = node_id
         self._config = config
         self._braking = Braking.of(config)
         self._trusted = trusted
+        self._resting = resting
         drives = [drive for drive in config.drives if drive.node_id == node_id]
         self._layout, self._axis_count = drives[0].layout, len(drives)
         self._seen = self._look(view)
@@ -117,8 +120,10 @@ class Stopper:
 
     def _sdo(self, view: View, defied: bool, now: float) -> list[Frame]:
         """The next request in turn. A stopped node that nobody commands is left alone: the driver may configure it."""
-        period_s = IDLE_SDO_PERIOD_S if self.climb.stopped else SDO_PERIOD_S
-        if now < self._sdo_at + period_s or (self.climb.stopped and not defied):
+        seeks = self.climb.stopped and not defied and self._is_unknown(view, now)
+        stopped_s = SEEK_PERIOD_S if seeks else IDLE_SDO_PERIOD_S
+        period_s = stopped_s if self.climb.stopped else SDO_PERIOD_S
+        if now < self._sdo_at + period_s or (self.climb.stopped and not defied and not seeks):
             return []
         requests = self._requests(view, now)
         if not requests:
@@ -126,6 +131,11 @@ class Stopper:
         self._sdo_at = now
         self._sdo_turn += 1
         return [requests[(self._sdo_turn - 1) % len(requests)]]
+
+    def _is_unknown(self, view: View, now: float) -> bool:
+        """Since the start it has told nothing, and no driver makes it: it may turn as it did before the start."""
+        unseen = self._resting and self._seen.seen_at <= self.climb.since
+        return unseen and now >= max(self.climb.since, view.bus.driver_at) + self._config.drive_heartbeat_s
 
     def _requests(self, view: View, now: float) -> Sequence[Frame]:
         """Writes of this rung, and readings of what TPDOs do not tell (no SYNC, or pre-operational)."""

@@ -107,6 +107,8 @@ class View:
     """Why the setpoints of both sides do not go together, for two SYNCs in a row; empty when they do."""
     twist: str = ""
     """Why the base has not moved as ordered for `twist_s`; empty when it has."""
+    creep: str = ""
+    """Which wheel is ordered to turn, and for how long, while no lease allows it; empty: none."""
     tick_gap_s: float = 0.0
     bus_failed_since: float = math.inf
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog import frames, policy
+from canbase_watchdog.creep import CreepWatch
 from canbase_watchdog.envelope import Envelope
 from canbase_watchdog.frames import Frame
 from canbase_watchdog.ladder import Step
@@ -56,7 +57,7 @@ class Status:
     assumed: bool = False
     """Some drive was not seen to stand: its sensor cannot be trusted, and its power is off for longer than it rolls."""
     armed: bool = False
-    """The record on disk says that there is power."""
+    """The record on disk says that there is power, and the driver is heard: a deaf watchdog never says so."""
 
 
 class Watchdog:
@@ -76,6 +77,7 @@ class Watchdog:
         self._envelope = Envelope(config, now)
         self._pair = PairWatch(config)
         self._twist = TwistWatch(config, now)
+        self._creep = CreepWatch(config)
         self._leases = LeaseBook(config.lease_timeout_s, config.lease_uid)
         self._started_at = self._ticked_at = now
         self._bus_failed_since, self._bus_errors = math.inf, 0
@@ -100,7 +102,8 @@ class Watchdog:
     def status(self) -> Status:
         """State, cause and rung as of now."""
         assumed = any(stopper.climb.assumed for stopper in self._stoppers)
-        armed = self._ledger.wanted.mark is Mark.LIVE and self._ledger.is_on_disk
+        hears = self._ticked_at < self._observer.driver_at + self._config.drive_heartbeat_s
+        armed = hears and self._ledger.wanted.mark is Mark.LIVE and self._ledger.is_on_disk
         return Status(self._state, self._verdict, self._step, self._settled, self._reset, assumed, armed)
 
     @property
@@ -198,7 +201,8 @@ class Watchdog:
         gap_s = now - self._ticked_at
         leases, failed = self._leases, self._bus_failed_since
         twist = self._twist.look(bus, now)
-        return View(bus, bounds, self._started_at, leases.last, leases.valid_at, skew, twist, gap_s, failed)
+        creep = self._creep.look(bus, bounds, now)
+        return View(bus, bounds, self._started_at, leases.last, leases.valid_at, skew, twist, creep, gap_s, failed)
 
     def _trip(self, verdict: Verdict, now: float) -> None:
         self.trips += 1

@@ -1,0 +1,89 @@
+"""Setpoints within the tolerance, while nothing may move: forgiven for `order_hold_s` (0.35 s here), then a trip."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from canbase_driver.kinematics import Twist2D
+from canbase_watchdog.creep import CreepWatch
+from canbase_watchdog.envelope import Bounds
+from canbase_watchdog.frames import DriveState
+from canbase_watchdog.policy import Cause, decide
+from canbase_watchdog.view import Axis, BusView
+from canbase_watchdog.watchdog import State
+from unit.chain_world import World
+from unit.test_watchdog_lies import lies
+from unit.watchdog_story import config
+from unit.watchdog_views import AT_REST, CONFIG, NOW, well
+
+REST = Bounds(0.0, 0.0, 0.0, 0.0)
+HOLD_S = config().order_hold_s
+CREEPS = replace(AT_REST, target_mps=0.001)
+
+
+def look(watch: CreepWatch, axis: Axis, bounds: Bounds, now: float) -> str:
+    return watch.look(BusView((AT_REST, axis), ()), bounds, now)
+
+
+@pytest.mark.parametrize("target_mps", [0.001, -0.001, 0.029, 0.8])
+def test_a_setpoint_that_nothing_allows_is_told_after_the_hold_and_not_before(target_mps: float) -> None:
+    watch = CreepWatch(config())
+    axis = replace(AT_REST, target_mps=target_mps)
+    assert look(watch, axis, REST, 10.0) == ""
+    assert look(watch, axis, REST, 10.0 + HOLD_S - 0.001) == ""
+    assert f"{target_mps:.4f} m/s for 0.35" in look(watch, axis, REST, 10.0 + HOLD_S + 0.001)
+
+
+@pytest.mark.parametrize(
+    "bounds", [Bounds(-0.01, 0, 0, 0), Bounds(0, 0.01, 0, 0), Bounds(0, 0, -0.1, 0), Bounds(0, 0, 0, 0.1)]
+)
+def test_as_soon_as_anything_is_allowed_it_begins_anew(bounds: Bounds) -> None:
+    watch = CreepWatch(config())
+    look(watch, CREEPS, REST, 10.0)
+    assert look(watch, CREEPS, bounds, 11.0) == ""
+    assert look(watch, CREEPS, REST, 11.01) == ""
+    assert look(watch, CREEPS, REST, 11.0 + HOLD_S) == ""
+    assert look(watch, CREEPS, REST, 11.011 + HOLD_S) != ""
+
+
+@pytest.mark.parametrize("changes", [{"target_mps": 0.0}, {"state": DriveState.SWITCHED_ON}, {"state": None}])
+def test_a_zero_and_a_drive_without_power_are_no_order(changes: dict[str, object]) -> None:
+    watch = CreepWatch(config())
+    look(watch, CREEPS, REST, 10.0)
+    assert look(watch, replace(CREEPS, **changes), REST, 11.0) == ""  # type: ignore[arg-type]
+    assert look(watch, CREEPS, REST, 11.01) == ""
+
+
+def test_it_is_a_setpoint_outside_of_the_leases() -> None:
+    verdict = decide(well(creep="left is ordered 0.0280 m/s for 0.400 s"), CONFIG, NOW)
+    assert verdict.cause is Cause.TARGET_OUTSIDE
+    assert verdict.detail == "left is ordered 0.0280 m/s for 0.400 s, while the leases allow no motion"
+
+
+@pytest.mark.parametrize("slow", [Twist2D(0.028, 0.0), Twist2D(0.0, 0.1)])
+def test_a_driver_that_repeats_a_slow_setpoint_for_ever_is_stopped(slow: Twist2D) -> None:
+    """2.8 cm/s and 5.7 degrees/s are within the tolerance: they went on for ever after the filter had ordered zero."""
+    world = World()
+    world.drive(slow, 0.6)
+    lies(world, lambda cob_id, target: target, parrot=True)
+    world.run(0.02)
+    world.command = Twist2D.ZERO
+    assert world.run(1.0, lambda: world.watchdog is not None and world.watchdog.status.state is State.TRIPPED)
+    assert world.watchdog is not None
+    assert world.watchdog.status.verdict.cause is Cause.TARGET_OUTSIDE
+    assert world.run(0.2, lambda: not any(world.powered))
+
+
+def test_an_honest_driver_that_creeps_to_its_stop_is_left_alone() -> None:
+    """Slow orders one after the other, each with a rest that is as long as the hold, or shorter."""
+    world = World()
+    world.enable()
+    for rest_s in (0.1, 0.36, 0.5):
+        world.command = Twist2D(0.02, 0.05)
+        world.run(0.3)
+        world.command = Twist2D.ZERO
+        world.run(rest_s)
+    assert world.watchdog is not None
+    assert world.watchdog.status.state is State.WATCHING, world.watchdog.status
