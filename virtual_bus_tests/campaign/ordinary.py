@@ -42,6 +42,8 @@ NOISE_MPS: Final = (0.0, 0.0, 0.002, 0.005)
 """606Ch beside the true speed, of drives that measure badly; below base.standstill_mps, or the base never stands."""
 LATE_S: Final = {"driver": 0.02, "watchdog": 0.06, "velocity": 0.05, "action": 0.1}
 """So long a process may get no processor now and then: shorter than the shortest of its timeouts allows."""
+LET_GO: Final = (State.SWITCHED_ON, State.SWITCH_ON_DISABLED)
+"""At a stand the driver takes the power off for a moment: docs/decisions/0041."""
 STORY: Final = 40
 
 
@@ -109,7 +111,7 @@ class OrdinaryHour:
         if driver.state is not DriverState.ENABLED:
             return f"driver: {driver.state.name.lower()}: {driver.cause.name}: {driver.cause.detail}"
         for change in self.world.drives.changes():
-            lets_go = driver.lets_go and change.after is State.SWITCHED_ON
+            lets_go = driver.lets_go and change.after in LET_GO
             if change.before is State.OPERATION_ENABLED and not lets_go:
                 return f"drive {change.node_id}, axis {change.axis}: {change.before.name} → {change.after.name}"
         return ""
