@@ -6,7 +6,7 @@ A rim slower than 5 mm/s stands; up to 50 mm/s is noise if the encoder stays whe
 from __future__ import annotations
 
 import random
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import pytest
 
@@ -190,3 +190,110 @@ def test_after_a_trip_a_wheel_with_noise_settles_and_can_be_reset() -> None:
     story.run(2.0)
     assert story.watchdog.status.settled
     assert story.reset(1) == 1
+
+
+# --- the limits, in binary fractions: a rim slower than 1/128 m/s stands, up to 1/16 m/s is noise
+
+
+def exact(m_per_count: float = 2.0**-9) -> StandWatch:
+    """One count is 2 mm, two of them are near: 4 mm."""
+    drive = replace(CONFIG.drives[0], m_per_count=m_per_count)
+    return StandWatch(drive, replace(CONFIG, standstill_mps=2.0**-7, motion_tolerance_mps=2.0**-4))
+
+
+@pytest.mark.parametrize(("counts", "stands"), [(384, True), (-384, True), (385, False), (-385, False)])
+def test_one_step_may_be_three_times_as_fast(counts: int, stands: bool) -> None:
+    watch = exact(2.0**-20)
+    watch.on_position(0, 0.0)
+    watch.on_velocity(0.0, 0.0)
+    watch.on_position(counts, 2.0**-6)
+    assert watch.stands is stands
+
+
+@pytest.mark.parametrize(("velocity_mps", "stands"), [(2.0**-4, True), (2.0**-4 + 2.0**-20, False)])
+def test_two_counts_to_and_fro_are_still_and_noise_counts_after_exactly_its_time(
+    velocity_mps: float, stands: bool
+) -> None:
+    watch = exact()
+    watch.on_velocity(velocity_mps, 0.0)
+    for at, counts in ((0.0, 0), (0.125, 2)):
+        watch.on_position(counts, at)
+        assert not watch.stands
+    watch.on_position(2, STILL_S)
+    assert watch.stands is stands
+    watch.on_position(3, 0.25)
+    assert not watch.stands
+
+
+def test_two_counts_under_a_velocity_of_zero_are_no_creeping_and_three_are() -> None:
+    for counts, stands in ((2, True), (-2, True), (3, False), (-3, False)):
+        watch = exact()
+        watch.on_position(0, 0.0)
+        watch.on_velocity(0.0, 0.0)
+        watch.on_position(counts, 0.01)
+        watch.on_position(counts, 0.02)
+        assert watch.stands is stands
+
+
+def test_after_creeping_it_stands_after_exactly_its_time() -> None:
+    watch = exact()
+    watch.on_position(0, -0.0625)
+    watch.on_velocity(0.0, -0.0625)
+    watch.on_position(3, 0.0)
+    watch.on_velocity(0.0, 0.0)
+    watch.on_position(3, 0.19)
+    assert not watch.stands
+    watch.on_position(3, STILL_S)
+    assert watch.stands
+
+
+def test_what_takes_as_long_as_the_slowest_motion_is_no_creeping() -> None:
+    watch = exact()
+    watch.on_position(0, 0.0)
+    watch.on_velocity(0.0, 0.0)
+    watch.on_position(3, STILL_S)
+    watch.on_position(3, 0.25)
+    assert watch.stands
+
+
+def test_what_it_rolled_before_it_was_slow_is_no_creeping() -> None:
+    watch = exact()
+    watch.on_velocity(0.25, 0.0)
+    watch.on_position(0, 0.0)
+    watch.on_position(3, 0.0625)
+    watch.on_velocity(0.0, 0.07)
+    watch.on_position(3, 0.08)
+    assert watch.stands
+
+
+def test_it_is_slow_from_exactly_the_limit_on_and_only_once() -> None:
+    watch = exact()
+    watch.on_velocity(0.25, 0.0)
+    watch.on_position(0, 0.0)
+    watch.on_position(3, 0.0625)
+    watch.on_velocity(2.0**-7, 0.3125)
+    watch.on_position(6, 0.375)  # soon after it became slow
+    watch.on_position(6, 0.4375)
+    assert not watch.stands
+    watch = exact()
+    watch.on_position(0, 0.0)
+    watch.on_velocity(2.0**-7, 0.0)
+    watch.on_velocity(2.0**-7, 0.25)
+    watch.on_position(3, 0.3125)  # long after it
+    watch.on_position(3, 0.375)
+    assert watch.stands
+
+
+def test_after_a_gap_everything_begins_anew() -> None:
+    watch = exact()
+    watch.on_velocity(2.0**-4, 0.0)
+    watch.on_position(0, 0.0)
+    watch.on_position(2, 0.25)
+    assert watch.stands
+    watch.on_position(9, 2.0)
+    watch.on_velocity(2.0**-4, 2.0)
+    assert not watch.stands
+    watch.on_position(10, 2.125)
+    assert not watch.stands
+    watch.on_position(10, 2.25)
+    assert watch.stands
