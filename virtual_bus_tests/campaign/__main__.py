@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import enum
-from collections import Counter
 from typing import Annotated
 
 import typer
@@ -12,7 +11,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemaining
 from rich.table import Table
 
 from campaign.faults import FAULTS
-from campaign.judge import OPEN, PROPERTIES
+from campaign.judge import PROPERTIES
 from campaign.plan import draw_plan
 from campaign.replay import replay
 from campaign.runner import Tally, run
@@ -96,11 +95,6 @@ def _tell_violations(tally: Tally, only: list[str]) -> None:
     for seed, violation in tally.violations[:SHOWN]:
         out.print(f"[red]{violation.name}[/red] in seed {seed} at {violation.at_s:.2f} s: {violation.detail}")
         out.print(f"  {'; '.join(str(fault) for fault in draw_plan(seed, only).faults)}", highlight=False)
-    if tally.open:
-        rows = Counter(violation.name for _, violation in tally.open)
-        names = ", ".join(f"{name} {count}" for name, count in rows.most_common())
-        out.print(f"known to be open: {names}: {'; '.join(OPEN.values())}")
-        out.print(f"  seeds {', '.join(str(seed) for seed in sorted({seed for seed, _ in tally.open})[:SHOWN])}")
     if tally.violations:
         out.print("tell one of them: make campaign SEED=…, or python -m campaign --seed …")
 

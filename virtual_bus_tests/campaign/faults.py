@@ -217,7 +217,7 @@ def _scanner_lies(name: str, lie: Lie) -> Kind:
     def draw(random: Random) -> Arguments:
         return {"margin_m": random.choice((None, random.uniform(0.0, 0.3), random.uniform(0.0, 0.3)))}
 
-    return Kind(lie.sentence, (0.8, 2.5), draw, begin, end)
+    return Kind(lie.sentence, (1.5, 3.5), draw, begin, end)
 
 
 def _watchdog_deaf(world: World, around: Surroundings, given: Arguments) -> None:

@@ -29,7 +29,8 @@ from campaign.wishes import Wishes
 from campaign.world import World
 from canbase_action_server.outcome import ErrorCode
 from canbase_bench.cia402.states import State
-from canbase_config.stopping import max_wheel_mps, standstill_s
+from canbase_config.robot import Robot
+from canbase_config.stopping import jerk_adds_s, lag_s, max_wheel_mps, standstill_s
 from canbase_driver.snapshot import DriverState
 from canbase_velocity.twist import Twist
 from canbase_watchdog.ladder import RUNGS, Step
@@ -74,11 +75,11 @@ EXCUSES = {
     "no watch": "a drive of a kind that watches neither heartbeats nor setpoints goes on turning (heartbeat)",
 }
 """What no software can do, each as a state of the world that is looked at, and never by a fault's name."""
-OPEN = {
-    "tap": "an encoder that died while its wheel hardly moved and was ordered to stand: it shows what a wheel shows "
-    "that stands, while the drive's loop may turn it",
-}
-"""What does not hold yet, as states of the world: counted and printed. A row goes when its mend has landed."""
+
+
+def longest_lag_s(robot: Robot) -> float:
+    """From an order of the filter until the wheels brake, the soft begin of the ramp included [s]."""
+    return robot.safety.reaction_s + lag_s(robot) + jerk_adds_s(robot.limits)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +105,8 @@ class Judge:
         self._envelope = Envelope(self.react_s, now, self._coasting)
         self._wishes = Wishes(world.robot, now)
         self._wish = Envelope(self.react_s + world.robot.safety.command_timeout_s, now, self._coasting)
-        sees_s = world.robot.safety.scan.timeout_s + world.robot.safety.scan.frozen_s
-        self._blind = Envelope(self.react_s + sees_s, now, self._coasting)
+        sees_s = world.robot.safety.scan.timeout_s + 2.0 * around.SCAN_S + longest_lag_s(world.robot)
+        self._blind = Envelope(sees_s + (self.react_s if len(plan.faults) > 1 else 0.0), now, self._coasting)
         self._touched = False
         self._awaits_zero = False
         self._hold: Envelope | None = None
@@ -121,8 +122,6 @@ class Judge:
         self.trips: list[str] = []
         self.lives, self._fresh = 1, False
         """How often the base drove, with a reset between; whether one was done, and it has not moved since."""
-        self.open: list[Violation] = []
-        """What did not hold and is known not to: `OPEN`."""
         world.on_lease = self._on_lease
         world.on_goal_end = self._on_goal_end
         world.topics.watch = self._on_message
@@ -150,11 +149,9 @@ class Judge:
         return reaction_s
 
     def _violate(self, name: str, detail: str) -> None:
-        is_open = self._reach.was_quiet
-        found = self.open if is_open else self.violations
-        if all(violation.name != name for violation in found):
-            found.append(Violation(name, self._world.clock.now - self._start, detail))
-            self._world.note(f"VIOLATION of {name}{' (known to be open)' if is_open else ''}: {detail}")
+        if all(violation.name != name for violation in self.violations):
+            self.violations.append(Violation(name, self._world.clock.now - self._start, detail))
+            self._world.note(f"VIOLATION of {name}: {detail}")
 
     def _on_lease(self, twist: Twist) -> None:
         if self._awaits_zero and not twist.is_zero:
@@ -275,7 +272,7 @@ class Judge:
         fastest_mps = max(max_wheel_mps(robot), self._reach.fastest_mps)
         brakes_s = fastest_mps / robot.limits.emergency_deceleration_mps2
         for node_id, axis in self._reach.turning():
-            alone_s = now - self._reach.heard(node_id)
+            alone_s = now - max(self._reach.heard(node_id), self._reach.lost_at)
             if alone_s > self._reach.alone_s + brakes_s + 0.1 and self._reach.stops_alone(node_id):
                 self._violate("heartbeat", f"drive {node_id}.{axis} turns, {alone_s:.2f} s without its masters")
 

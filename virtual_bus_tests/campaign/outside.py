@@ -100,8 +100,10 @@ class Surroundings:
         limits, safety = robot.limits, robot.safety
         gentlest = limits.linear_mps**2 / (2.0 * (safety.slow_distance_m - safety.stop_distance_m))
         braking_m = base.v_mps**2 / (2.0 * min(gentlest, limits.deceleration_mps2))
-        sees_s = self.SCAN_S if self.scanner is None else safety.scan.frozen_s + safety.scan.timeout_s
-        noticing_m = (abs(base.v_mps) + SPEEDING_UP_MPS) * (react_s(robot, layers=2) + sees_s)
+        sees_s = react_s(robot, layers=2) + self.SCAN_S
+        if self.scanner is not None and self.scanner.lies:
+            sees_s = max(sees_s, react_s(robot, layers=1) + safety.scan.frozen_s + safety.scan.timeout_s)
+        noticing_m = (abs(base.v_mps) + SPEEDING_UP_MPS) * sees_s
         self.wall_at = self._world.clock.now
         self.wall_m = safety.padding_m + safety.stop_distance_m + braking_m + noticing_m + margin_m
         self._wall_from_m = base.travel_m

@@ -9,6 +9,7 @@ from random import Random
 
 from campaign.faults import FAULTS, PlannedFault
 from campaign.robots import bitrates, robot_of
+from campaign.scanner import LIES
 from canbase_config.robot import Robot
 from canbase_velocity.twist import Twist
 
@@ -20,6 +21,8 @@ SAMPLE_MPS, SAMPLE_RADPS = 0.8, 2.0
 """Limits of the sample robot."""
 SECOND_LIFE = 0.08
 """Share of the scenarios that go on: stop, reset by a person, driving again, a second fault."""
+LIES_S = 2.0
+"""So much longer is a scenario whose scanner lies: until the base has come to where the wall is."""
 FIRST_LIFE_S = 1.5
 """So long the faults of a first life last at most."""
 KINDS = ("constant", "constant", "constant", "weave", "burst", "nan", "zero")
@@ -100,7 +103,16 @@ def draw_plan(seed: int, only: Sequence[str] = ()) -> Plan:
         tuple(random.uniform(0.8, duration_s) for _ in range(random.choice((0, 0, 1, 1, 2)))),
         tuple(_fault(name, random, robot) for name in names),
     )
+    if any(name in LIES for name in names):
+        plan = _longer(plan)
     return _with_second_life(plan, pool, random, robot) if random.random() < SECOND_LIFE else plan
+
+
+def _longer(plan: Plan) -> Plan:
+    """Somebody drives on, whatever the scanner shows."""
+    first, rest = plan.segments[:1], plan.segments[1:]
+    longer = tuple(replace(segment, duration_s=segment.duration_s + LIES_S) for segment in first)
+    return replace(plan, duration_s=plan.duration_s + LIES_S, segments=(*longer, *rest))
 
 
 def _with_second_life(plan: Plan, pool: Sequence[str], random: Random, robot: Robot) -> Plan:

@@ -15,7 +15,6 @@ from campaign.world import World
 from canbase_bench.cia301.dictionary import key
 from canbase_bench.node import SimulatedNode
 from canbase_bench.personality import PERSONALITIES
-from canbase_config.stopping import max_wheel_mps
 
 
 class Reach:
@@ -32,28 +31,18 @@ class Reach:
         self.lost = False
         self.was_lost = False
         """It was so since the base last stood."""
-        self.was_quiet = False
-        """A wheel had power on a sensor that died quietly, since the base last stood."""
         self.fastest_mps = 0.0
         """The fastest wheel since the base last stood."""
-        watchdog = world.robot.watchdog
-        self._tap_mps = watchdog.motion_tolerance_mps + watchdog.motion_tolerance_share * max_wheel_mps(world.robot)
-        self._tap_m = 2.0 * watchdog.motion_missing_m
-        self._dead: dict[tuple[int, int], tuple[float, float]] = {}
-        """By node and axis with a dead encoder: rim speed when it died [m/s], what was ordered since [m]."""
-        self._lost_at, self._looked_at = -math.inf, world.clock.now
+        self.lost_at = -math.inf
 
     def step(self, stands: bool) -> None:
         """Look at all drives now."""
         now, bench = self._world.clock.now, self._world.drives.bench
-        self.lost = not stands and any(
-            not self.stops_alone(node_id) and not self._reached(node_id) for node_id, _ in self.turning()
-        )
+        self.lost = not stands and any(self._is_lost(node_id, now) for node_id, _ in self.turning())
         self.was_lost = self.lost or (self.was_lost and not stands)
-        self._lost_at = now if self.lost else self._lost_at
+        self.lost_at = now if self.lost else self.lost_at
         wheel_mps = max(abs(bench.base.v_left_mps), abs(bench.base.v_right_mps))
         self.fastest_mps = 0.0 if stands else max(self.fastest_mps, wheel_mps)
-        self.was_quiet = self._is_quiet(now, wheel_mps) or (self.was_quiet and not stands)
 
     def stops_alone(self, node_id: int) -> bool:
         """The drive stops when it hears nobody: it watches its masters, and its sensors do not lie."""
@@ -74,22 +63,12 @@ class Reach:
         """When the drive last heard what it watches: heartbeats, or setpoints."""
         drives = self._world.drives
         heard = drives.heard if self.personality.heeds_heartbeats else drives.ordered
-        return max(heard[node_id], self._lost_at)
+        return heard[node_id]
 
-    def _is_quiet(self, now: float, wheel_mps: float) -> bool:
-        """A dead encoder under power whose wheel hardly moved when it died, and was not ordered to move since."""
-        elapsed_s, self._looked_at = now - self._looked_at, now
-        quiet = False
-        for node_id, axis, _ in self._wheels:
-            drive = self._world.drives.bench.nodes[node_id].axes[axis]
-            if not drive.encoder.is_dead:
-                self._dead.pop((node_id, axis), None)
-                continue
-            died_mps, ordered_m = self._dead.get((node_id, axis), (wheel_mps, 0.0))
-            ordered_m += abs(drive.motor.goal_mps) * elapsed_s
-            self._dead[node_id, axis] = died_mps, ordered_m
-            quiet |= drive.motor.powered and died_mps < self._tap_mps and ordered_m < self._tap_m
-        return quiet
+    def _is_lost(self, node_id: int, now: float) -> bool:
+        """Nobody reaches it, and it does not stop by itself, or not yet: a maker's own watch has a time of its own."""
+        waits = not self.personality.heeds_heartbeats and now <= self.heard(node_id) + self.alone_s
+        return (waits or not self.stops_alone(node_id)) and not self._reached(node_id)
 
     def _reached(self, node_id: int) -> bool:
         """A driver or a watchdog that runs, and that is not mad, has a line to it."""

@@ -126,7 +126,7 @@ def _about(random: Random, low: float, high: float) -> float:
 
 def _drives(random: Random) -> list[dict[str, Any]]:
     profile = random.choice(STOP_THEMSELVES if random.random() < 0.7 else RELY_ON_OTHERS)
-    kind, wheels = load_profile(profile), random.choice((2, 2, 2, 4, 4, 6, 8))
+    kind, wheels = load_profile(profile), random.choice((2, 2, 2, 2, 2, 2, 4, 4, 6, 8))
     axes = random.choice((1, kind.layout.axes)) if kind.layout.controlword == "own" else kind.layout.axes
     gear, counts = random.choice((10.0, 20.0, 33.0)), random.choice((1024, 4096, 65536))
     mode = random.choice(kind.modes)

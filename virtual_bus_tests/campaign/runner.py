@@ -31,7 +31,6 @@ class Tally:
     trips: Counter[str] = field(default_factory=Counter)
     goals: Counter[str] = field(default_factory=Counter)
     violations: list[tuple[int, Violation]] = field(default_factory=list)
-    open: list[tuple[int, Violation]] = field(default_factory=list)
     virtual_s: float = 0.0
     real_s: float = 0.0
     moved_m: float = 0.0
@@ -45,7 +44,6 @@ class Tally:
         self.lives[result.lives] += 1
         self.goals.update(result.goals)
         self.violations += [(result.seed, violation) for violation in result.violations]
-        self.open += [(result.seed, violation) for violation in result.open]
         self.virtual_s += result.virtual_s
         self.real_s += result.real_s
         self.moved_m += result.moved_m

@@ -33,7 +33,6 @@ class Result:
     seed: int
     faults: tuple[str, ...]
     violations: tuple[Violation, ...] = ()
-    open: tuple[Violation, ...] = ()
     trips: tuple[str, ...] = ()
     lives: int = 1
     """How often the base drove in it, with a reset between."""
@@ -152,7 +151,6 @@ class _Run:
             self._plan.seed,
             tuple(fault.name for fault in self._plan.faults),
             (*self._judge.violations, *self._crash),
-            tuple(self._judge.open),
             tuple(self._judge.trips),
             self._judge.lives,
             tuple(ends),

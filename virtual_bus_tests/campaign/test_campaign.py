@@ -50,6 +50,8 @@ def test_the_same_seed_gives_the_same_scenario() -> None:
         ("filter:estop", ["estop_pressed", "estop_stale"], "estop"),
         ("filter:zero_after_estop+mux:neutral_start", ["estop_pressed"], "zero"),
         ("filter:obstacle", ["obstacle"], "obstacle"),
+        ("filter:blind", ["scanner_blind_ahead", "scanner_one_beam", "scanner_zero_ahead"], "obstacle"),
+        ("filter:frozen", ["scanner_frozen", "scanner_by_turns"], "obstacle"),
         ("driver:watchdog_missing+drives:heartbeat_consumer", ["watchdog_dies", "watchdog_hangs"], "envelope"),
     ],
 )

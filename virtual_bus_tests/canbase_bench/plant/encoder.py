@@ -49,11 +49,6 @@ class Encoder:
         return self._fault is None or (self._fault.factor > 0.0 and not self._fault.holds_speed)
 
     @property
-    def is_dead(self) -> bool:
-        """It shows no motion, at least for a while."""
-        return self._fault is not None and (self._fault.factor == 0.0 or self._fault.holds_speed)
-
-    @property
     def scale(self) -> float:
         """It counts so many times the motion; 1 for one that counts none of it, or backward."""
         return self._factor if self.closes_loop else 1.0
