@@ -31,7 +31,6 @@ DRAWN_FROM: dict[str, tuple[str, ...]] = {
     "watchdog:answered_twice": ("twin_node", "stick_held"),
     "watchdog:drive_restarted": ("drive_resets", "drive_power_cycle", "stick_held"),
     "watchdog:stop_record": ("all_processes_restart", "watchdog_dies", "encoder_lost", "lease_lost"),
-    "watchdog:ladder": ("encoder_lost", "encoder_reversed", "drive_ignores_setpoints"),
     "driver:waits_for_zero": ("stick_held", "drive_fault", "resets_too_early"),
     "driver:reset_needs_zero": ("stick_held", "drive_fault", "resets_too_early"),
     "filter:blind": ("scanner_blind_ahead", "scanner_one_beam", "scanner_zero_ahead"),
