@@ -30,6 +30,7 @@ from canbase_velocity.changes import DropTeller, changed_order, is_told
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
+from canbase_velocity.foreign import UNKNOWN
 from canbase_velocity.graph import BUTTON_KIND, SCAN_KIND, publishers
 from canbase_velocity.io import LeaseSender
 from canbase_velocity.lease import lease_datagram
@@ -142,7 +143,10 @@ class FilterNode(Node):
 
     def _count_buttons(self) -> None:
         before, topic = self._filter.estop_crowd, self.resolve_topic_name(self._robot.safety.estop.topic)
-        self._filter.on_estop_publishers(sum(each.kind == BUTTON_KIND for each in publishers(self, topic)))
+        found = publishers(self, topic)
+        other = (each for each in found if each.kind != BUTTON_KIND)
+        unheard = (f"{each.node or UNKNOWN} publishes it as {each.kind}, which is not heard" for each in other)
+        self._filter.on_estop_publishers(sum(each.kind == BUTTON_KIND for each in found), next(unheard, ""))
         crowd = self._filter.estop_crowd
         if crowd and crowd != before:
             self._voice.tell(crowd, Priority.ERROR, robot=self._robot.name)

@@ -131,6 +131,7 @@ class SafetyFilter:
         self._estop = Estop(config.safety.estop.latched, found)
         self._pressed = self._estop.state is EstopState.HELD
         self._estop_at_s: float | None = None
+        self._estop_unheard = ""
         self.estop_crowd = ""
         """Why no release of the emergency stop can be told; empty: it can."""
         longest_s = max(2.0 * scan.timeout_s + scan.frozen_s for scan in config.safety.scans) + config.safety.reaction_s
@@ -194,8 +195,12 @@ class SafetyFilter:
         if pressed:
             self._estop.happens(EstopEvent.PRESS)
 
-    def on_estop_publishers(self, count: int) -> None:
-        """Takes how many publishers its topic has. The last word of one is not that of another."""
+    def on_estop_publishers(self, count: int, unheard: str = "") -> None:
+        """Takes how many publishers its topic has: the last word of one is not that of another.
+
+        `unheard`: of one whose messages do not arrive, which counts as pressed; empty: there is none.
+        """
+        self._estop_unheard = unheard
         topic = self._config.safety.estop.topic
         advice = "no release counts; give each button a lock of its own (mux.locks), or join them in one node"
         self.estop_crowd = f"{topic} has {count} publishers: {advice}" if count > 1 else ""
@@ -205,7 +210,7 @@ class SafetyFilter:
         self._advance_estop(now)
         inputs = self.inputs(now)
         if self._estop.state is EstopState.HELD:
-            held = "pressed" if self._pressed else self.estop_crowd or "silent"
+            held = "pressed" if self._pressed else self._estop_unheard or self.estop_crowd or "silent"
             if self._pressed and self._estop_at_s is None:
                 held = f"not seen released yet ({self._estop.before_the_start}): press and release it"
             return False, f"refused: the emergency stop on {self._config.safety.estop.topic} is {held}"
@@ -235,7 +240,7 @@ class SafetyFilter:
             pressed=self._pressed,
             estop_age_s=_age_s(self._estop_at_s, now),
             estop_before=self._estop.before_the_start,
-            estop_crowd=self.estop_crowd,
+            estop_crowd=self._estop_unheard or self.estop_crowd,
             estop_unarmed=self._estop.unarmed,
             braking_hard=self._braking_hard,
         )
@@ -294,7 +299,8 @@ class SafetyFilter:
         """A fresh zero command counts only while the emergency stop is free. In a crowd neither does a release."""
         settings = self._config.safety
         age_s, command_age_s = _age_s(self._estop_at_s, now), _age_s(self._command_at_s, now)
-        if settings.estop.required and (age_s is None or age_s > settings.estop.timeout_s):
+        silent = age_s is None or age_s > settings.estop.timeout_s
+        if self._estop_unheard or (settings.estop.required and silent):
             self._estop.happens(EstopEvent.SILENCE)
         elif self.estop_crowd:
             return

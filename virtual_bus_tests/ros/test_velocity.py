@@ -14,7 +14,7 @@ from canbase.msg import MuxState, SafetyState
 from geometry_msgs.msg import Twist, TwistStamped
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import LaserScan
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, Int8
 from std_srvs.srv import Trigger
 
 from ros.conftest import MakeRobot, Spawn
@@ -124,6 +124,13 @@ def test_the_emergency_stop_stops_until_a_reset_that_is_refused_while_anybody_wa
     chain.node.spin_for(0.1)  # the action's zero after the reset
     chain.action.message, chain.joystick.message = drive(0.2), None
     chain.wait_for_order(0.2)
+
+
+def test_a_button_that_publishes_another_type_holds_the_base(chain: Chain) -> None:
+    with TestNode("button") as button:
+        button.node.create_publisher(Int8, "estop_state", 1).publish(Int8(data=1))
+        state = chain.wait_for_cause(SafetyState.CAUSE_ESTOP)
+        assert "publishes it as std_msgs/msg/Int8, which is not heard" in state.detail
 
 
 # a press and a lock, published once by publishers that keep them (transient local) ── the process starts
