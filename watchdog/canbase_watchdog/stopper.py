@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -47,7 +48,7 @@ class Stopper:
         self._config = config
         self._braking = Braking.of(config)
         self._trusted = trusted
-        self._resting = resting
+        self._resting_since = now if resting else math.inf
         drives = [drive for drive in config.drives if drive.node_id == node_id]
         self._layout, self._axis_count = drives[0].layout, len(drives)
         self._seen = self._look(view)
@@ -81,16 +82,26 @@ class Stopper:
     def _look(self, view: View) -> Look:
         axes = self._axes(view)
         node = view.node(self._node_id)
+        seen_at = min(axis.seen_at for axis in axes)
         return Look(
             enabled=any(axis.enabled for axis in axes),
             powered=any(axis.powered for axis in axes),
-            standing=all(axis.standing for axis in axes),
+            standing=self._is_untold(seen_at) or all(self._stands(axis) for axis in axes),
             speed_mps=max(abs(axis.velocity_mps) for axis in axes),
             begin_mps=max(self._begin_mps(axis) for axis in axes),
-            seen_at=min(axis.seen_at for axis in axes),
+            seen_at=seen_at,
             present=node.heard_at > NEVER or any(axis.asks_for_power for axis in axes),
             trusted=self._trusted and all(axis.trusted for axis in axes),
         )
+
+    def _is_untold(self, seen_at: float) -> bool:
+        """Nothing is known of it since the start: it is neither said to move, nor stopped."""
+        return seen_at <= self._resting_since < math.inf
+
+    def _stands(self, axis: Axis) -> bool:
+        """Standing takes several samples to prove. Until then a drive that was found off is not stopped in vain."""
+        off = self._resting_since < math.inf and not axis.powered
+        return axis.standing or (off and abs(axis.velocity_mps) <= self._config.standstill_mps)
 
     def _begin_mps(self, axis: Axis) -> float:
         """How fast it may get before it begins to brake: towards its setpoint, for as long as the drive lags."""
@@ -134,8 +145,8 @@ class Stopper:
 
     def _is_unknown(self, view: View, now: float) -> bool:
         """Since the start it has told nothing, and no driver makes it: it may turn as it did before the start."""
-        unseen = self._resting and self._seen.seen_at <= self.climb.since
-        return unseen and now >= max(self.climb.since, view.bus.driver_at) + self._config.drive_heartbeat_s
+        heard_at = max(self._resting_since, view.bus.driver_at)
+        return self._is_untold(self._seen.seen_at) and now >= heard_at + self._config.drive_heartbeat_s
 
     def _requests(self, view: View, now: float) -> Sequence[Frame]:
         """Writes of this rung, and readings of what TPDOs do not tell (no SYNC, or pre-operational)."""
