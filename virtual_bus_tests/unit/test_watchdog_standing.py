@@ -211,9 +211,7 @@ def test_one_step_may_be_three_times_as_fast(counts: int, stands: bool) -> None:
 
 
 @pytest.mark.parametrize(("velocity_mps", "stands"), [(2.0**-4, True), (2.0**-4 + 2.0**-20, False)])
-def test_two_counts_to_and_fro_are_still_and_noise_counts_after_exactly_its_time(
-    velocity_mps: float, stands: bool
-) -> None:
+def test_two_counts_to_and_fro_are_still_after_exactly_the_time(velocity_mps: float, stands: bool) -> None:
     watch = exact()
     watch.on_velocity(velocity_mps, 0.0)
     for at, counts in ((0.0, 0), (0.125, 2)):
@@ -297,3 +295,34 @@ def test_after_a_gap_everything_begins_anew() -> None:
     assert not watch.stands
     watch.on_position(10, 2.25)
     assert watch.stands
+
+
+def test_creeping_ends_after_exactly_its_time_also_where_the_encoder_was_still_for_less() -> None:
+    watch = exact()
+    watch.on_velocity(0.25, -0.125)
+    watch.on_position(0, -0.125)
+    watch.on_position(-2, -0.0625)
+    watch.on_velocity(0.0, -0.0625)
+    watch.on_position(1, 0.0)
+    watch.on_position(3, 0.1)
+    assert not watch.stands
+    watch.on_position(3, STILL_S)
+    assert watch.stands
+
+
+def test_a_jump_by_half_of_all_counts_is_no_standstill() -> None:
+    watch = exact()
+    watch.on_velocity(0.0, 0.0)
+    watch.on_position(0, 0.0)
+    watch.on_position(-(2**31), 0.01)
+    assert not watch.stands
+
+
+@pytest.mark.parametrize(("gap_s", "stands"), [(0.45, True), (0.55, False), (1.4, False)])
+def test_half_a_second_apart_is_a_gap(gap_s: float, stands: bool) -> None:
+    watch = exact()
+    watch.on_velocity(0.0, 0.0)
+    watch.on_position(0, 0.0)
+    watch.on_velocity(0.0, gap_s)
+    watch.on_position(0, gap_s)
+    assert watch.stands is stands
