@@ -13,6 +13,9 @@ from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog.envelope import Bounds
 from canbase_watchdog.view import BusView
 
+AT_REST = Bounds(0.0, 0.0, 0.0, 0.0)
+"""Nothing may move."""
+
 
 class CreepWatch:
     """Remembers since when a wheel is ordered to turn and nothing allows it."""
@@ -25,7 +28,7 @@ class CreepWatch:
     def look(self, bus: BusView, bounds: Bounds, now: float) -> str:
         """What is ordered though nothing is allowed, for `order_hold_s`; empty: nothing is."""
         wheel = next((axis for axis in bus.axes if axis.enabled and axis.target_mps != 0.0), None)
-        if wheel is None or not bounds.are_zero:
+        if wheel is None or bounds != AT_REST:
             self._since = math.inf
             return ""
         self._since = min(self._since, now)

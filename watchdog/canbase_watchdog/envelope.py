@@ -101,11 +101,6 @@ class Bounds:
     angular_low: float
     angular_high: float
 
-    @property
-    def are_zero(self) -> bool:
-        """Nothing may move."""
-        return not any((self.linear_low, self.linear_high, self.angular_low, self.angular_high))
-
     def wheel(self, arm_m: float) -> tuple[float, float]:
         """Least and greatest speed [m/s] of a wheel that is `arm_m` to the right of the middle (left: negative)."""
         turns = (arm_m * self.angular_low, arm_m * self.angular_high)
