@@ -43,7 +43,9 @@ NOISE_MPS: Final = (0.0, 0.0, 0.002, 0.005)
 LATE_S: Final = {"driver": 0.02, "watchdog": 0.06, "velocity": 0.05, "action": 0.1}
 """So long a process may get no processor now and then: shorter than the shortest of its timeouts allows."""
 LET_GO: Final = (State.SWITCHED_ON, State.SWITCH_ON_DISABLED)
-"""At a stand the driver takes the power off for a moment: docs/decisions/0041."""
+"""At a stand the driver takes the power off for a moment, which may be over at the next look: docs/decisions/0041."""
+ROLLS_MPS: Final = 0.1
+"""On a slope the wheels roll a little meanwhile."""
 STORY: Final = 40
 
 
@@ -111,10 +113,15 @@ class OrdinaryHour:
         if driver.state is not DriverState.ENABLED:
             return f"driver: {driver.state.name.lower()}: {driver.cause.name}: {driver.cause.detail}"
         for change in self.world.drives.changes():
-            lets_go = driver.lets_go and change.after in LET_GO
+            lets_go = change.after in LET_GO and self._stands
             if change.before is State.OPERATION_ENABLED and not lets_go:
                 return f"drive {change.node_id}, axis {change.axis}: {change.before.name} → {change.after.name}"
         return ""
+
+    @property
+    def _stands(self) -> bool:
+        base = self.world.drives.bench.base
+        return max(abs(base.v_left_mps), abs(base.v_right_mps)) <= ROLLS_MPS
 
     def _found(self, what: str) -> FalseTrip:
         setup = f"{self.drawn}, ramps × {self._ramps:g}, noise {self._noise_mps:g} m/s"
