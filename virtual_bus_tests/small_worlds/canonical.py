@@ -30,7 +30,9 @@ PLAIN = 2
 OLD_S = 1.05
 """Longer than any timeout of the small robot that ends in what the properties look at: what is older has run out."""
 EPOCH_S = 50.0
-"""A number nearer than this to the present is a time: the clock begins at 100 s, nothing else is as large."""
+"""A number nearer than this to the present is a time, if it is not before BEGAN_S: nothing else is as large."""
+BEGAN_S = 99.0
+"""The clock begins at 100 s."""
 DIGITS = 3
 UNSEEN = frozenset((
     # counters, and what is only said to people
@@ -40,7 +42,7 @@ UNSEEN = frozenset((
     "_sdo_turn", "changes", "lost_producers", "_measures", "report",
     # where the base is: no decision of these parts looks at it; that of the scanner sees nothing
     "_feed", "travel", "travel_m", "_travel_m", "_anchor_m", "_counts", "_counts_before", "_poses", "encoder_offset",
-    "_seen_m",
+    "_seen_m", "_restarts",
     # what never changes
     "_robot", "robot", "_config", "config", "drive", "layout", "scale", "personality", "_geometry", "dictionary",
     "_timeouts", "clock", "_member", "_topics", "_late", "_kept", "_life", "_random", "_routes", "_handlers", "_values",
@@ -100,7 +102,7 @@ class Canon:
 
     def _number(self, number: float) -> object:
         age_s = self._now - number
-        if -EPOCH_S < age_s < EPOCH_S:
+        if number >= BEGAN_S and -EPOCH_S < age_s < EPOCH_S:
             return ("age", round(age_s, DIGITS) if age_s < OLD_S else "old")
         return round(number, DIGITS) + 0.0 if math.isfinite(number) else str(number)
 

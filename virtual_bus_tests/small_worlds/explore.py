@@ -1,8 +1,8 @@
-"""All interleavings of a few events in a small world: each branch in a forked copy of the process.
+"""All interleavings of a few events in a small world: each branch in a copy of its own (`copying.py`).
 
 At every point something of what is left may happen, or nothing, until the world has been there before (`canonical.py`)
-with as much left to happen. So there is no longest time: a world that comes to rest is gone on with once. What was
-visited is a table in shared memory: all branches, which are processes, write into it.
+with as much left to happen, or more. So there is no longest time: a world that comes to rest, or goes in a circle, is
+gone on with once. What was visited is a table in shared memory: all searching processes write into it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from small_worlds.events import EVENTS, FAULT_EVENTS, OPERATOR_EVENTS, Event
 from small_worlds.properties import Found, Properties
 from small_worlds.world import POINT_S, SmallWorld
 
-LONGEST_S = 8.0
+LONGEST_S = 20.0
 """A world that is still new so long after the last event does not come to rest: a story."""
 
 
