@@ -82,8 +82,7 @@ class Stack:
         Simulated drives that have never run here begin with clear records of stops. Real ones begin latched: this user
         has no record of them, and another one, such as that of the services, may have a stop in his.
         """
-        if "sim" in self._parts:
-            self._clear_first_records()
+        self._clear_first_records()
         for part in self._parts:
             if part not in self._running:
                 self._running[part] = self._spawn(part)
@@ -92,7 +91,10 @@ class Stack:
         from canbase_config.latch_file import create_first, latch_folder
         from canbase_config.load import load_robot
 
-        name = load_robot(self._config).robot.name
+        robot = load_robot(self._config).robot
+        if "sim" not in self._parts and not robot.bus.is_virtual:
+            return
+        name = robot.name
         folder = latch_folder(os.environ if self._env is None else self._env, Path.home(), name)
         # Where they cannot be made the parts start latched, and say why.
         with suppress(OSError):
