@@ -5,8 +5,9 @@ that is being stopped can lose its sensor as well (docs/decisions/0020)
 1. Unseen: ordered to move, and the encoder has not moved: net, from one place to another, for an encoder that jitters
    moves nothing. The ordered travel adds up until it moves, however slow the
    order is; a setpoint of zero adds nothing and forgets nothing, so short orders add up too, and most of it
-   outlives the power. The time adds up while an order is older than `drive_lag_s`, and always once enough
-   travel was ordered: a wheel runs away after its order too.
+   outlives the power. The time adds up while an order is older than `drive_lag_s`, once it asked for the travel that a
+   sign of life takes: a slow wheel needs its time for that. It always adds up once enough travel was ordered: a wheel
+   runs away after its order too.
 2. Halted: the velocity of a wheel that rolled drops at once to standstill, as no wheel can, whatever is ordered, and
    the encoder does not move from then on.
 3. Jolts: velocities that change as no wheel can, again and again.
@@ -142,7 +143,8 @@ class EvidenceWatch:
         if not known:
             return unseen_s, unseen_m
         unseen_m += abs(self._setpoint_mps) * elapsed_s
-        if self._is_visible(self._least_mps) or unseen_m >= self._unseen_m:
+        visible = self._is_visible(self._least_mps) and unseen_m >= self._life_m
+        if visible or unseen_m >= self._unseen_m:
             unseen_s += elapsed_s
         return unseen_s, unseen_m
 
