@@ -18,7 +18,8 @@ STILL_S = 0.2
 STEP_FACTOR = 3.0
 """One step of the encoder may look so many times as fast as it is: samples come early and late."""
 GAP_S = 0.5
-"""Values that came further apart say nothing about each other. Two motors that are read by SDO take 0.15 s a turn."""
+"""Values that came further apart say no more about each other than whether the wheel is where it was. Two motors that
+are read by SDO take 0.15 s a turn."""
 COUNTS = 2
 """An encoder at an edge counts to and fro."""
 _WRAP = 2**32
@@ -45,11 +46,11 @@ class StandWatch:
         """6064h, of a TPDO or of an answer to an SDO, at the monotonic time `now` [s]."""
         before, elapsed_s = self._counts, now - self.position_at
         self._counts, self.position_at = counts, now
+        step_m = 0.0 if before is None else ((counts - before + _WRAP // 2) % _WRAP - _WRAP // 2) * self._m_per_count
         if before is None or elapsed_s >= GAP_S:
-            self._steady, self._still_since = False, now
+            self._steady, self._still_since = before is not None and abs(step_m) <= self._grain_m, now
             self._still_m = self._slow_m = 0.0
             return
-        step_m = ((counts - before + _WRAP // 2) % _WRAP - _WRAP // 2) * self._m_per_count
         self._steady = abs(step_m) <= max(STEP_FACTOR * self._slow_mps * elapsed_s, self._grain_m)
         self._still_m, self._slow_m = self._still_m + step_m, self._slow_m + step_m
         if abs(self._still_m) > self._near_m:
