@@ -69,6 +69,9 @@ EXCUSES = {
     "compared with the motion in the measure of its encoder",
     "strange hands": "who sends to the drives past all layers asks no watchdog (enabling), and moves them again after "
     "a stop, until that is stopped too (held: for T_react); its way may be longer than the free one (obstacle)",
+    "fault reaction": "a drive whose sensor lies takes no controlword in its fault reaction (CiA 402-2), which never "
+    "ends: as unreachable. And a wheel that stood may turn again for the time that its lie takes to be found (held)",
+    "cut off": "one drive of several is cut off and turns the base on until its own watch stops it (held)",
     "deaf watchdog": "it cannot keep a standing base from starting; driver and drives miss it within T_react (held)",
     "reset by a stranger": "a drive that another master has reset has forgotten 1016h (heartbeat)",
     "unheard button": "a filter that never heard the button knows of no emergency stop (zero)",
@@ -111,7 +114,8 @@ class Judge:
         self._awaits_zero = False
         self._hold: Envelope | None = None
         self._stood = False
-        self._latched_at = now
+        self._latched_at = self._again_since = now
+        self._again_tau_s = 0.0
         self._latches: dict[str, object] = {}
         self._resets_done = 0
         self._watching_at = now
@@ -224,9 +228,23 @@ class Judge:
         stands = tau_s == 0.0 and moving_s(self._world.robot, base.v_mps, base.w_radps) == 0.0
         self._stood = self._stood or (stands and now >= self._latched_at + OBEY_S)
         excused = self._reach.was_lost or now < max(self._strangers.sent_at, self._strangers.deaf_at) + self.react_s
-        again = self._stood and tau_s > 0.0 and not excused
+        again = self._moves_again(tau_s, now) if self._stood and tau_s > 0.0 and not excused else self._rest_again(now)
         if tau_s > self._hold.bound_s(tau_s, now, coasting, self._reach.lost) or again:
             self._violate("held", f"{self._shown} while {' and '.join(self._latches)} latched")
+
+    def _rest_again(self, now: float) -> bool:
+        self._again_since, self._again_tau_s = now, 0.0
+        return False
+
+    def _moves_again(self, tau_s: float, now: float) -> bool:
+        """After a stop: longer than what moves it may, or faster and faster when that has lost its power."""
+        acts_s = self._reach.acts_s(now, self._motion.runaway_s)
+        if acts_s > 0.0:
+            self._again_tau_s = tau_s
+            return now > self._again_since + acts_s
+        rolls_out = tau_s <= self._again_tau_s and not any(self._reach.turning())
+        self._again_tau_s = min(tau_s, self._again_tau_s)
+        return not rolls_out
 
     def _check_latches(self, now: float) -> None:
         driver, watchdog = self._world.driver, self._world.watchdog

@@ -70,6 +70,11 @@ class MotionJudge:
         self._orders: deque[tuple[float, Twist]] = deque([(now, Twist(0.0, 0.0))])
         self._fast_since = self._beside_since = self._lies_since = now
 
+    @property
+    def runaway_s(self) -> float:
+        """For so long a wheel with power may be wrong before somebody has to have acted [s]."""
+        return self._allowed.runaway_s
+
     def order(self, twist: Twist) -> None:
         """The filter ordered this, with a lease."""
         self._orders.append((self._world.clock.now, twist))

@@ -13,8 +13,12 @@ from collections.abc import Iterator
 from campaign.envelope import tolerance_mps
 from campaign.world import World
 from canbase_bench.cia301.dictionary import key
+from canbase_bench.cia402.states import State
 from canbase_bench.node import SimulatedNode
 from canbase_bench.personality import PERSONALITIES
+
+BRAKES_S = 0.3
+"""A wheel that turns again after a stop is slow: so long its drive takes to brake it [s]."""
 
 
 class Reach:
@@ -65,8 +69,24 @@ class Reach:
         heard = drives.heard if self.personality.heeds_heartbeats else drives.ordered
         return heard[node_id]
 
+    def acts_s(self, now: float, lies_s: float) -> float:
+        """So long a wheel may turn again after a stop, before somebody has to have acted [s]; 0: nobody has a reason.
+
+        `lies_s`: for a wheel with power whose encoder lies. A drive that nobody reaches ends its setpoint by itself.
+        """
+        nodes = self._world.drives.bench.nodes
+        longest_s = 0.0
+        for node_id, _ in self.turning():
+            lies = any(axis.encoder.scale != 1.0 or not axis.encoder.closes_loop for axis in nodes[node_id].axes)
+            left_s = self.heard(node_id) + self.alone_s - now + BRAKES_S
+            alone = not self._reached(node_id) and self.stops_alone(node_id)
+            longest_s = max(longest_s, lies_s if lies else 0.0, left_s if alone else 0.0)
+        return longest_s
+
     def _is_lost(self, node_id: int, now: float) -> bool:
         """Nobody reaches it, and it does not stop by itself, or not yet: a maker's own watch has a time of its own."""
+        if self._reacts(node_id):
+            return True
         waits = not self.personality.heeds_heartbeats and now <= self.heard(node_id) + self.alone_s
         return (waits or not self.stops_alone(node_id)) and not self._reached(node_id)
 
@@ -79,6 +99,11 @@ class Reach:
         return world.drives.bench.nodes[node_id].line.hears and any(
             talks and (name, f"drive{node_id}") not in blocked for name, talks in senders.items()
         )
+
+    def _reacts(self, node_id: int) -> bool:
+        """In its fault reaction a drive takes no controlword (CiA 402-2, transition 14), and it ends on its sensor."""
+        node = self._world.drives.bench.nodes[node_id]
+        return self._lies(node) and any(axis.state is State.FAULT_REACTION_ACTIVE for axis in node.axes)
 
     @staticmethod
     def _lies(node: SimulatedNode) -> bool:
