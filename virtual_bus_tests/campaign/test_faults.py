@@ -17,6 +17,8 @@ pytestmark = pytest.mark.campaign
 DRIVES_S, HOLDS_S, LASTS_S = 0.8, 0.6, 1.6
 """Before the fault; until the operator orders zero; in all."""
 BY = ("joystick", "goal")
+SEEN_THE_SAME = {"scanner_mirrored"}
+"""It says in each scan which way round it counts: the filter sees the same room."""
 
 
 @pytest.fixture(scope="module")
@@ -30,8 +32,10 @@ def undisturbed(start: Start) -> dict[str, int]:
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_every_fault_changes_what_happens(start: Start, undisturbed: dict[str, int], fault: str) -> None:
-    assert any(digest(start, by, fault) != undisturbed[by] for by in BY)
+def test_every_fault_changes_what_happens_but_for_what_is_seen_the_same(
+    start: Start, undisturbed: dict[str, int], fault: str
+) -> None:
+    assert any(digest(start, by, fault) != undisturbed[by] for by in BY) is (fault not in SEEN_THE_SAME)
 
 
 def test_without_a_fault_nothing_changes(start: Start, undisturbed: dict[str, int]) -> None:

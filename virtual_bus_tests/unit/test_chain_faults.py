@@ -71,7 +71,7 @@ Act = Callable[[World], None]
 STOPS: tuple[tuple[Act, float, str], ...] = (
     (lose_leases, 0.45, "watchdog tripped"),
     (lose_filter, 0.45, "watchdog tripped"),
-    (lose_watchdog, 0.55, "watchdog missing"),  # the driver's ramp, where the drives do not stop by themselves first
+    (lose_watchdog, 0.6, "watchdog missing"),  # 0.2 s, and the driver's ramp where the drives do not stop by themselves
     (cut_the_drivers_cable, 0.5, "bus failed"),
     (drive_fault, 0.2, "drive fault"),
     (power_cycle, 0.85, "drive silent"),  # that wheel coasts, the other one brakes

@@ -128,7 +128,7 @@ def test_the_status_carries_every_field_of_the_snapshot_that_the_interface_has()
 
 DIAGNOSTICS_ALONE = {
     *("self_stop", "warning", "internal_limit", "remote", "voltage_v", "current_a", "temperature_c"),
-    *("boot_notes", "boot_changes", "configured"),
+    *("boot_notes", "boot_changes", "configured", "torque_share"),
 }
 """What is in /diagnostics and not in the status."""
 
