@@ -15,6 +15,7 @@ from canbase_watchdog.feedback import Feedback
 from canbase_watchdog.foreign import Sign
 from canbase_watchdog.frames import DriveState
 from canbase_watchdog.policy import CHECKS, FINE, Cause, Verdict, clears_on, decide, stands
+from canbase_watchdog.torque import Push
 from canbase_watchdog.view import Axis
 from unit.watchdog_views import AT_REST, CONFIG, LEFT, NOW, OFF, RIGHT, STANDING, cause, of, well
 
@@ -190,6 +191,35 @@ def test_the_sentences_about_evidence_have_the_values() -> None:
         "wheel_1_0 turns at 0.100 m/s, its setpoints ask for 0.300 m/s for 0.500 s "
         "(allowed 0.500 s; slow ramps: watchdog.slowest_ramp_mps2)",
     ]
+
+
+# --- a drive that pushes at a stand
+
+
+@pytest.mark.parametrize(("overdue_s", "trips"), [(0.199, 0), (0.2, 17), (0.5, 17)])
+def test_a_drive_that_pushes_at_a_stand_and_does_not_let_go_trips(overdue_s: float, trips: int) -> None:
+    held = replace(AT_REST, push=Push(0.4, 0.05, owes=True, overdue_s=overdue_s))
+    assert cause(of(held)) == trips
+    assert cause(of(replace(held, state=DriveState.SWITCH_ON_DISABLED), replace(OFF, drive=RIGHT.drive))) == 0
+
+
+def test_the_sentence_about_power_at_a_stand_has_the_values() -> None:
+    verdict = decide(of(AT_REST, replace(STANDING, push=Push(0.4, overdue_s=0.3))), CONFIG, NOW)
+    assert (verdict.cause, verdict.node_id) == (Cause.POWER_AT_STAND, 2)
+    assert verdict.detail == (
+        "wheel_2_0 is ordered 0.000 m/s, reports 0.000 m/s and has been held with 40% of the rated torque for "
+        "0.300 s (allowed 0.200 s) without letting go: that may be a dead encoder and not a stand "
+        "(watchdog.stand_proof, watchdog.stand_answer_s)"
+    )
+    untold = replace(AT_REST, push=Push(None, overdue_s=0.3))
+    assert "held with a torque that the drive does not tell for 0.300 s" in detail(untold)
+
+
+def test_the_sentence_about_a_push_in_vain_has_the_torque() -> None:
+    assert detail(replace(AT_REST, push=Push(0.7, vain_s=CONFIG.motion_missing_s))) == (
+        "wheel_1_0 is pushed with 70% of the rated torque and shows no motion for 0.250 s (allowed 0.250 s), "
+        "ordered 0.000 m/s: see encoder, motor, wheel"
+    )
 
 
 def test_a_base_that_moves_otherwise_trips_without_a_node() -> None:
