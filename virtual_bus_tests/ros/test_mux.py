@@ -303,7 +303,7 @@ def test_a_publisher_of_the_other_message_type_is_told(start: Callable[[Mapping[
     velocity.node.wait_for(lambda: velocity.state.foreign, 5.0, "the wrong type")
     (foreign,) = velocity.state.foreign
     assert (foreign.type, foreign.locks) == ("geometry_msgs/msg/Twist", False)
-    assert foreign.problem.endswith("which is not heard; expected geometry_msgs/msg/TwistStamped")
+    assert foreign.problem.endswith("which is not received; expected geometry_msgs/msg/TwistStamped")
 
 
 def test_infinity_is_counted_for_its_source_alone(start: Callable[[Mapping[str, Any]], Velocity]) -> None:
