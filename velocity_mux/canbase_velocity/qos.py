@@ -16,9 +16,13 @@ from rclpy.qos import (
 )
 
 COMMAND = QoSProfile(depth=1)
-"""Velocities and the emergency stop: only the newest counts."""
+"""Velocities: only the newest counts."""
 ANY_COMMAND = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """For subscriptions: hears reliable publishers and those of best effort. A reliable one would not hear the latter."""
+SWITCH = QoSProfile(depth=10)
+"""Buttons and locks: every message counts, also a press that is released again before this process gets to it."""
+ANY_SWITCH = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+KEPT_SWITCH = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Latched: who comes late sees the newest state."""
 DRIVER_STATUS = QoSProfile(depth=10)
@@ -36,9 +40,9 @@ def listen_closely(node: Node, kind: type[Any], topic: str, callback: Callable[[
     said before the start by one that keeps it (transient local). One message may call the callback three times.
     """
     silent = SubscriptionEventCallbacks(use_default_callbacks=False)  # another one hears what this one does not
-    node.create_subscription(kind, topic, callback, STATE, event_callbacks=silent)
-    node.create_subscription(kind, topic, callback, COMMAND, event_callbacks=silent)
-    node.create_subscription(kind, topic, callback, ANY_COMMAND)
+    node.create_subscription(kind, topic, callback, KEPT_SWITCH, event_callbacks=silent)
+    node.create_subscription(kind, topic, callback, SWITCH, event_callbacks=silent)
+    node.create_subscription(kind, topic, callback, ANY_SWITCH)
 
 
 def loud(node: Node, topic: str, deaf: list[str]) -> PublisherEventCallbacks:

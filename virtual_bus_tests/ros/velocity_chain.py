@@ -24,6 +24,8 @@ LEASE = struct.Struct("<4sQQddII")
 START_S = 15.0
 SILENT_S = 0.4
 """After it no source of the sample robot is fresh that says nothing."""
+CAUSE_S = 10.0
+"""For a cause to be shown: some follow from the ROS graph, which DDS tells of late."""
 RUN = """
 import sys
 from canbase_config.load import load_robot
@@ -90,7 +92,7 @@ class Chain:
             last = self.state.last
             return last if last is not None and last.cause == cause else None
 
-        found = self.node.wait_for(state, 3.0, f"cause {cause}, state is {self.state.last}")
+        found = self.node.wait_for(state, CAUSE_S, f"cause {cause}, state is {self.state.last}")
         assert found is not None
         return found
 
