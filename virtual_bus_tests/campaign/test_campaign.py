@@ -14,7 +14,7 @@ from campaign.teeth import COVERED, DRAWN_FROM, TOGETHER
 from campaign.without import SAFEGUARDS
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(1800)]
-SCENARIOS = 120
+SCENARIOS = 180
 WORKERS = 2
 
 
