@@ -31,7 +31,8 @@ Presence = Literal["yes", "no", "probe"]
 """Whether the drive has an object; `probe`: unknown, the boot tries."""
 
 TorqueObject = Literal["6077h", "6078h", "none", "probe"]
-"""What tells the torque, in thousandths of the rated one; `probe`: unknown, the boot tries 6077h."""
+"""The object that reports the torque, in thousandths of the rated torque (CiA 402-2: 6077h, or the current 6078h);
+`probe`: unknown, the boot tries 6077h."""
 
 Index = Annotated[int, Field(ge=0x1000, le=0xFFFF, description="object index")]
 Sub = Annotated[int, Field(ge=0, le=0xFF, description="sub-index")]

@@ -55,7 +55,7 @@ def _address(task: str, name: str) -> str:
 
 
 def holder(task: str, name: str) -> int | None:
-    """Process id of who holds it now; None: nobody does. Raises OSError where the kernel does not tell."""
+    """Process id of the present holder; None: there is none. Raises OSError where the kernel does not report it."""
     try:
         return _holder(task, name)[0]
     except ConnectionRefusedError:

@@ -33,12 +33,12 @@ def _unproven_stand(robot: Robot) -> str:
     mute = [drive.joint for drive in robot.drives if drive.kind.options.torque == "none"]
     if mute:
         return (
-            f"{', '.join(mute)} cannot be watched for a dead encoder at a stand, as the drive tells no torque "
-            "(options.torque of its profile): after a tap of the stick the wheel may run away; let_go takes its power "
-            "off for a moment at each stand"
+            f"{', '.join(mute)} cannot be watched for a dead encoder at standstill: the drive reports no torque "
+            "(options.torque of its profile), and after a short push of the joystick the wheel may run away; let_go "
+            "takes its power off for a moment at each standstill"
         )
     return (
-        "a dead encoder at a stand is found only where its drive pushes with half of the rated torque for "
+        "a dead encoder at standstill is detected only where its drive gives half of the rated torque for "
         f"watchdog.motion_missing_s ({robot.watchdog.motion_missing_s:g}); let_go takes the power off for a moment "
         "instead"
     )

@@ -62,17 +62,24 @@ class Watchdog(Section):
     stand_proof: Annotated[
         Literal["let_go", "none"],
         Field(
-            description="let_go: after an order, a wheel that is held at a stand is let go of for a moment, "
-            "as a dead encoder shows a stand too; none: never, and a dead encoder at a stand is not found"
+            description="let_go: after an order, a drive that holds a wheel at standstill loses its power for a "
+            "moment, as a dead encoder reports standstill too; none: never, and a dead encoder at standstill is not "
+            "detected"
         ),
     ] = "let_go"
     stand_impulse_s: Annotated[
         float,
-        Field(ge=0.02, le=2.0, description="... when it was pushed for so long at rated torque, or longer at less [s]"),
+        Field(
+            ge=0.02, le=2.0, description="... once it gave the rated torque for so long, or less torque for longer [s]"
+        ),
     ] = 0.05
     stand_answer_s: Annotated[
         float,
-        Field(ge=0.1, le=2.0, description="a drive lets go, and says so, in this time; with a brake: longer [s]"),
+        Field(
+            ge=0.1,
+            le=2.0,
+            description="a drive switches its power off and reports it within this time; with a brake: longer [s]",
+        ),
     ] = 0.2
     jolt_mps2: Annotated[
         float, Field(ge=5.0, le=200.0, description="no wheel changes its speed faster; a sensor that fails does [m/s²]")

@@ -124,9 +124,9 @@ class WatchdogConfig:
     stand_impulse_s: float = 0.05
     """A drive may push for so long at rated torque, or longer at less, while its wheel shows no motion."""
     stand_answer_s: float = 0.2
-    """After that, with nothing ordered, it must have let go within this time."""
+    """With zero ordered, a drive that did so must switch its power off within this time after it [s]."""
     stand_proof: bool = True
-    """False: nobody lets go, and a stand needs no proof."""
+    """False: drives keep their power at standstill."""
 
     lease_uid: int | None = None
     """The only user whose leases count, None: the watchdog's own."""

@@ -95,9 +95,9 @@ def test_a_quick_stop_within_the_heartbeat_is_not_cut_short(tmp_path: Path) -> N
     [
         (
             "generic",
-            "found only where its drive pushes with half of the rated torque for watchdog.motion_missing_s (0.25)",
+            "detected only where its drive gives half of the rated torque for watchdog.motion_missing_s (0.25)",
         ),
-        ("kinco", "left_wheel, right_wheel cannot be watched for a dead encoder at a stand"),
+        ("kinco", "left_wheel, right_wheel cannot be watched for a dead encoder at standstill"),
     ],
 )
 def test_a_robot_that_wants_no_proof_of_a_stand_is_told_what_is_not_found(profile: str, told: str) -> None:

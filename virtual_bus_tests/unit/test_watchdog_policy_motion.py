@@ -212,7 +212,7 @@ def test_the_sentence_about_power_at_a_stand_has_the_values() -> None:
         "(watchdog.stand_proof, watchdog.stand_answer_s)"
     )
     untold = replace(AT_REST, push=Push(None, overdue_s=0.3))
-    assert "held with a torque that the drive does not tell for 0.300 s" in detail(untold)
+    assert "held with a torque that the drive does not report for 0.300 s" in detail(untold)
 
 
 def test_the_sentence_about_a_push_in_vain_has_the_torque() -> None:

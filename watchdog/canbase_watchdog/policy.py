@@ -295,7 +295,7 @@ def _missing(axis: Axis, config: WatchdogConfig) -> str:
 
 def _torque(axis: Axis) -> str:
     share = axis.push.share
-    return "a torque that the drive does not tell" if share is None else f"{share:.0%} of the rated torque"
+    return "a torque that the drive does not report" if share is None else f"{share:.0%} of the rated torque"
 
 
 def _power_at_stand(view: View, config: WatchdogConfig, now: float) -> Verdict:
