@@ -14,6 +14,7 @@ from typing import Any
 
 import can
 
+from canbase_config.local_frames import keep_to_this_computer
 from canbase_driver.bus_health import BusReport
 from canbase_driver.frame import Frame
 
@@ -175,7 +176,9 @@ class BusPort:
 
     def _open(self) -> can.BusABC:
         try:
-            return can.Bus(**self._arguments)
+            bus = can.Bus(**self._arguments)
+            keep_to_this_computer(self._arguments, bus)
+            return bus
         except (*_ERRORS, TypeError, ImportError, NotImplementedError) as error:
             raise BusError(
                 f"the CAN bus {self._arguments} cannot be opened: {error}. "

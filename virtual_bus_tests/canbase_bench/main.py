@@ -19,6 +19,7 @@ from canbase_bench.control_server import ControlServer
 from canbase_bench.loop import Loop
 from canbase_bench.world.bench import Bench
 from canbase_bench.world.trace import Trace
+from canbase_config.local_frames import keep_to_this_computer
 from canbase_config.robot import Robot
 
 log = logging.getLogger(__name__)
@@ -46,6 +47,7 @@ def run(robot: Robot, control: str | None = None) -> int:
 
 def _simulate(robot: Robot, path: Path, stop: Event) -> None:
     with can.Bus(**robot.bus.arguments()) as bus:
+        keep_to_this_computer(robot.bus.arguments(), bus)
         now = time.monotonic()
         bench = Bench(robot, now)
         trace = Trace(bench, now)

@@ -10,6 +10,7 @@ import can
 
 from canbase_watchdog.bus_health import BusHealth
 from canbase_watchdog.frames import Frame
+from canbase_watchdog.local_frames import keep_to_this_computer
 
 SEND_TIMEOUT_S = 0.001
 """What the bus does not take within this time is dropped: each turn of the loop repeats what still matters."""
@@ -34,6 +35,7 @@ class BusPort:
         """Opens `can.Bus(**arguments)`. Raises BusError with what to look at."""
         try:
             self._bus = can.Bus(**arguments)
+            keep_to_this_computer(arguments, self._bus)
         except (*_ERRORS, TypeError, ImportError, NotImplementedError) as error:
             raise BusError(
                 f"the CAN bus {arguments} cannot be opened: {error}. "
