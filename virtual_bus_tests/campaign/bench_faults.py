@@ -10,7 +10,7 @@ from canbase_bench.faults import KINDS, apply
 from canbase_bench.node import SimulatedNode
 
 if TYPE_CHECKING:
-    from campaign.faults import Arguments, Change
+    from campaign.fault import Arguments, Change
     from campaign.outside import Surroundings
     from campaign.world import World
 

@@ -6,15 +6,15 @@ from collections.abc import Callable
 from random import Random
 from typing import TYPE_CHECKING
 
+from campaign.fault import LONG, Arguments, Change, Kind, nothing
 from canbase_velocity.twist import ZERO, Twist
 
 if TYPE_CHECKING:
-    from campaign.faults import Arguments, Change
     from campaign.outside import Surroundings
     from campaign.world import World
 
 AGAIN_S = 0.05
-Do = Callable[["World", "Surroundings", "Arguments", int], None]
+Do = Callable[["World", "Surroundings", Arguments, int], None]
 
 
 def goes_on(do: Do, after: Do | None = None, every_s: float = AGAIN_S) -> tuple[Change, Change]:
@@ -74,3 +74,21 @@ def steady(random: Random) -> Arguments:
     """A motion to hold."""
     speed_mps = random.choice((-1.0, 1.0)) * random.uniform(0.15, 0.8)
     return {"twist": Twist(speed_mps, random.choice((0.0, random.uniform(-2.0, 2.0))))}
+
+
+PEOPLE: dict[str, Kind] = {
+    "stick_held": Kind(
+        "a stick is held through everything", (0.8, 4.0), steady,
+        *goes_on(hold_stick, release_stick),
+    ),
+    "two_hands": Kind(
+        "joystick and navigation order opposite motions", LONG, steady, *goes_on(two_hands)
+    ),
+    "button_tapped": Kind(
+        "the emergency stop is pressed and released again and again", (0.05, 0.6), nothing,
+        *goes_on(tap_button, release_button),
+    ),
+    "resets_too_early": Kind(
+        "an operator resets again and again", LONG, nothing, *goes_on(reset_again, every_s=0.2)
+    ),
+}  # fmt: skip

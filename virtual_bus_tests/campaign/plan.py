@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from random import Random
 
-from campaign.faults import FAULTS, PlannedFault
+from campaign.fault import PlannedFault
+from campaign.faults import FAULTS
 from campaign.robots import bitrates, robot_of
 from campaign.scanner import LIES
 from canbase_config.robot import Robot

@@ -10,12 +10,14 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from campaign.faults import FAULTS, PlannedFault
+from campaign.fault import PlannedFault
+from campaign.faults import FAULTS
 from campaign.judge import Judge, Violation
 from campaign.outside import Outside, Surroundings
 from campaign.plan import Plan
 from campaign.robots import DrawnRobot
 from campaign.scanner import LIES
+from campaign.without import remove
 from campaign.world import World
 
 LOOK_S = 0.1
@@ -59,13 +61,13 @@ class Start:
         run = _Run(self.world, self.around, plan, note)
         return run.result(time.perf_counter() - began)
 
-    def fork(self, plan: Plan) -> Result:
-        """Run one scenario in a copy of this process: the world stays as it is."""
+    def fork(self, plan: Plan, without: str = "") -> Result:
+        """Run one scenario in a copy of this process: the world stays as it is. `without`: safeguards, see remove."""
         reader, writer = os.pipe()
         pid = os.fork()
         if pid == 0:
             os.close(reader)
-            self._tell(plan, writer)
+            self._tell(plan, without, writer)
         os.close(writer)
         with os.fdopen(reader, "rb") as pipe:
             told = pipe.read()
@@ -77,11 +79,12 @@ class Start:
         lost = Violation("exception", 0.0, "the scenario's process died")
         return Result(plan.seed, tuple(fault.name for fault in plan.faults), (lost,))
 
-    def _tell(self, plan: Plan, writer: int) -> None:
+    def _tell(self, plan: Plan, without: str, writer: int) -> None:
         """The child's whole life; it never returns."""
         status = 1
         gc.disable()
         try:
+            remove(without)
             with os.fdopen(writer, "wb") as pipe:
                 pipe.write(pickle.dumps(self.run(plan)))
             status = 0

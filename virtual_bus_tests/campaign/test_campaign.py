@@ -5,12 +5,14 @@ from __future__ import annotations
 import pytest
 from typer.testing import CliRunner
 
+from campaign import teeth
 from campaign.__main__ import app
 from campaign.faults import FAULTS
+from campaign.needs import NEEDS, Need
 from campaign.plan import MOST_FAULTS, draw_plan
 from campaign.runner import run
 from campaign.scenario import Start
-from campaign.teeth import COVERED, DRAWN_FROM, TOGETHER
+from campaign.teeth import look_at
 from campaign.without import SAFEGUARDS
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(1800)]
@@ -36,35 +38,27 @@ def test_the_same_seed_gives_the_same_scenario() -> None:
     assert start.fork(draw_plan(18)) != start.fork(plan)
 
 
-@pytest.mark.parametrize(
-    ("safeguard", "faults", "found"),
-    [
-        ("watchdog:target_outside", ["straight_to_cmd_vel", "driver_repeats", "driver_ignores_zero"], "envelope"),
-        ("watchdog:all", ["straight_to_cmd_vel", "driver_repeats", "driver_ignores_zero", "lease_lost"], "envelope"),
-        ("watchdog:latch", ["velocity_hangs", "lease_lost", "driver_hangs"], "latched"),
-        ("driver:latch", ["watchdog_hangs", "drive_fault"], "latched"),
-        ("driver:stop_record", ["driver_dies", "drive_fault", "all_processes_restart"], "latched"),
-        ("drives:heartbeat_consumer", ["cable_cut", "cable_cut_to_drives", "cable_cut_one_drive"], "heartbeat"),
-        ("mux:timeout", ["action_dies", "action_hangs"], "sources"),
-        ("filter:command", ["mux_lossy"], "sources"),
-        ("filter:estop", ["estop_pressed", "estop_stale"], "estop"),
-        ("filter:zero_after_estop+mux:neutral_start", ["estop_pressed"], "zero"),
-        ("filter:obstacle", ["obstacle"], "obstacle"),
-        ("filter:blind", ["scanner_blind_ahead", "scanner_one_beam", "scanner_zero_ahead"], "obstacle"),
-        ("filter:frozen", ["scanner_frozen", "scanner_by_turns"], "obstacle"),
-        ("driver:watchdog_missing+drives:heartbeat_consumer", ["watchdog_dies", "watchdog_hangs"], "envelope"),
-    ],
-)
-def test_without_a_safeguard_the_campaign_finds_it_missing(safeguard: str, faults: list[str], found: str) -> None:
-    tally = run(range(50), WORKERS, faults, safeguard)
-    assert found in {violation.name for _, violation in tally.violations}
+def test_every_row_of_the_teeth_names_safeguards_and_faults_that_exist() -> None:
+    assert {name for need in NEEDS for name in need.taken_out.split("+")} <= set(SAFEGUARDS)
+    assert {fault for need in NEEDS for fault in need.faults} <= set(FAULTS)
+    assert len({need.safeguard for need in NEEDS}) == len(NEEDS), "one row each"
 
 
-def test_what_is_covered_twice_and_what_is_taken_out_together_are_safeguards() -> None:
-    assert set(COVERED) <= set(SAFEGUARDS)
-    assert {name for names in TOGETHER for name in names.split("+")} <= set(SAFEGUARDS)
-    assert set(DRAWN_FROM) <= {*SAFEGUARDS, *TOGETHER}
-    assert {fault for faults in DRAWN_FROM.values() for fault in faults} <= set(FAULTS)
+def test_without_a_safeguard_a_scenario_shows_it_missing_and_with_it_the_same_one_does_not() -> None:
+    """Some that take no time; all of them: make teeth."""
+    quick = {"watchdog:target_outside", "watchdog:latch", "driver:latch", "filter:obstacle", "watchdog:driver_silent"}
+    bites = list(look_at([need for need in NEEDS if need.safeguard in quick], 40, WORKERS))
+    assert len(bites) == len(quick)
+    assert [bite.need.safeguard for bite in bites if not bite.found] == []
+
+
+def test_a_safeguard_that_nothing_needs_is_reported_and_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stop that no scenario asks for."""
+    monkeypatch.setattr(teeth, "NEEDS", (Need("driver:stop_requested", ("frame_delay",)),))
+    told = CliRunner().invoke(teeth.app, ["--scenarios", "2", "--workers", "1"])
+    assert told.exit_code == 1, told.output
+    assert "NOT IN 2" in told.output
+    assert "0 of 1 safeguards are found missing" in told.output
 
 
 def test_one_scenario_is_told_from_begin_to_end() -> None:

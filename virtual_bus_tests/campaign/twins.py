@@ -8,7 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from random import Random
 
-from campaign.faults import FAULTS, Arguments
+from campaign.fault import Arguments
+from campaign.faults import FAULTS
 from campaign.outside import Surroundings
 from campaign.world import World
 from canbase_bench.faults import KINDS, apply
