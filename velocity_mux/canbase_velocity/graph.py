@@ -27,6 +27,12 @@ def expected(robot: Robot, node: Node) -> tuple[Expected, ...]:
     return (*_of_sources(robot, node), *_of_chain(node))
 
 
+def heard(robot: Robot) -> dict[str, str]:
+    """The topics of sources and locks as robot.yaml has them, each with its message type."""
+    locks = {lock.topic: BUTTON_KIND for lock in robot.mux.locks.values()}
+    return {source.topic: kind_of(source) for source in robot.mux.sources.values()} | locks
+
+
 def publishers(node: Node, topic: str) -> list[Publisher]:
     """Every publisher on the topic of this full name; this process's own too."""
     return [

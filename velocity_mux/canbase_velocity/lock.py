@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from canbase_config.mux import MuxLock
+
+
+def crowd(topic: str, nodes: Sequence[str]) -> str:
+    """What more than one publisher on a topic means for its source or lock; empty: there is one, or none."""
+    if len(nodes) < 2:
+        return ""
+    return (
+        f"{len(nodes)} publishers on {topic} ({', '.join(sorted(nodes)[:3])}): give each a topic and a key of its own"
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +39,11 @@ class Lock:
         self.config = config
         self._locked = False
         self._at_s: float | None = None
+        self._crowd = ""
+
+    def published_by(self, nodes: Sequence[str]) -> None:
+        """Takes who publishes on its topic. It holds while there is more than one: which of them spoke is not known."""
+        self._crowd = crowd(self.config.topic, nodes)
 
     def hear(self, locked: bool, now: float) -> None:
         """Takes its word: true = locked."""
@@ -38,6 +53,8 @@ class Lock:
         """Why it holds at time `now` [s, monotonic]; empty: it does not."""
         if self._locked:
             return "holds"
+        if self._crowd:
+            return f"has {self._crowd}"
         if not self.config.required:
             return ""
         if self._at_s is None:

@@ -12,6 +12,9 @@ Rules:
 6. A source that is not armed (neutral.py), or whose commands arrive later than its timeout, is not followed. While it
    publishes it has the base all the same: the order is zero, and no lower source moves the base under the hand of
    somebody who wants to drive it himself.
+7. A message does not tell who sent it. Where two publish on the topic of a source that only a zero arms, the zero of
+   one would arm the stick of the other: while the ROS graph has more than one there, it is disarmed. A lock with more
+   than one publisher holds: nobody's word frees what another one holds.
 """
 
 from __future__ import annotations
@@ -25,7 +28,7 @@ from canbase_config.mux import MuxLock, MuxSource
 from canbase_velocity.base_ready import STATUS_TIMEOUT_S, BaseReady
 from canbase_velocity.delay import Delay, Sent
 from canbase_velocity.foreign import Foreign
-from canbase_velocity.lock import Lock, LockView
+from canbase_velocity.lock import Lock, LockView, crowd
 from canbase_velocity.neutral import BLIND_S, Arming
 from canbase_velocity.twist import ZERO, Twist
 
@@ -116,6 +119,8 @@ class _Source:
         self.refused = 0
         self.arming = Arming(config.neutral_after_s)
         self.delay_s: float | None = None
+        self.crowd = ""
+        """Why no zero arms it; empty: one does."""
         self._delay = Delay(config.same_clock)
         self._late_from = math.inf
 
@@ -129,7 +134,13 @@ class _Source:
         self._late_from = min(self._late_from, now) if self.is_late else math.inf
         if now - self._late_from > LATE_S:
             self.arming.disarm("its commands arrived late")
-        self.arming.command(twist, now, on_time=not self.is_late and received == now)
+        self.arming.command(twist, now, on_time=not self.is_late and received == now and not self.crowd)
+
+    def published_by(self, nodes: Sequence[str]) -> None:
+        """Takes who publishes on its topic."""
+        self.crowd = crowd(self.config.topic, nodes) if self.config.neutral_after_s is None else ""
+        if self.crowd:
+            self.arming.disarm(self.crowd)
 
     @property
     def is_late(self) -> bool:
@@ -151,7 +162,7 @@ class _Source:
             what = "delayed by" if (self.delay_s or 0.0) > 0.0 else "stamped in the future by"
             limit = f"(limit {self.config.timeout_s:.2f} s)"
             return Standing.DELAYED, f"{what} {abs(self.delay_s or 0.0):.2f} s {limit}"
-        return (Standing.ACTIVE, "") if self.arming.armed else (Standing.UNARMED, self.arming.reason)
+        return (Standing.ACTIVE, "") if self.arming.armed else (Standing.UNARMED, self.crowd or self.arming.reason)
 
     def view(self, now: float, standing: Standing, reason: str, locked: bool = False) -> SourceView:
         config = self.config
@@ -223,6 +234,13 @@ class Mux:
         """Takes the word of lock `name`. Raises KeyError for another name."""
         self._locks[name].hear(locked, now)
         self._look(now)
+
+    def on_publishers(self, topic: str, nodes: Sequence[str]) -> None:
+        """Takes who publishes on this topic of robot.yaml: a node's name for each publisher of the type heard there."""
+        listeners: tuple[_Source | Lock, ...] = (*self._sources.values(), *self._locks.values())
+        for listener in listeners:
+            if listener.config.topic == topic:
+                listener.published_by(nodes)
 
     def on_foreign(self, foreign: Sequence[Foreign]) -> None:
         """Takes all foreign publishers that are there now."""

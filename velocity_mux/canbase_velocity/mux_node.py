@@ -26,7 +26,7 @@ from canbase_velocity.base_ready import status_timeout_s
 from canbase_velocity.changes import changes
 from canbase_velocity.delay import Sent
 from canbase_velocity.foreign import ForeignWatch
-from canbase_velocity.graph import expected, publishers
+from canbase_velocity.graph import expected, heard, publishers
 from canbase_velocity.messages import driver_state, sent_at, twist_message, twist_of
 from canbase_velocity.mux import Mux, MuxDecision
 from canbase_velocity.mux_messages import diagnostics, mux_state
@@ -71,6 +71,7 @@ class MuxNode(Node):
             status_timeout_s=status_timeout_s(robot.rates.status_hz),
         )
         self._watch = ForeignWatch(expected(robot, self))
+        self._heard = heard(robot)
         self._decision = self._mux.decide(time.monotonic())
         self._state_at_s = -math.inf
         self._deaf: list[str] = []
@@ -148,6 +149,9 @@ class MuxNode(Node):
                 told = {"topic": found.topic, "node": found.node}
                 self._voice.tell(found.sentence, found.priority, robot=self._robot.name, **told)
         self._mux.on_foreign(foreign)
+        for topic, kind in self._heard.items():
+            found_there = publishers(self, self.resolve_topic_name(topic))
+            self._mux.on_publishers(topic, [found.node for found in found_there if found.kind == kind])
         self._send_if_changed(now)
 
     def _send_if_changed(self, now: float) -> None:

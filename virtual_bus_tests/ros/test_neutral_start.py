@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from canbase.msg import DriverStatus, MuxState, SafetyState
+from geometry_msgs.msg import TwistStamped
 from std_msgs.msg import Bool
 
 from ros.running_robot import LATCHED as STATE
@@ -122,6 +123,36 @@ def test_a_lock_that_opens_does_not_move_a_held_stick(
     assert not followed(chain)
     assert waits(chain) == "waiting for zero (locked: gate holds)"
     release(chain)
+
+
+def test_while_two_nodes_publish_on_the_topic_of_a_stick_neither_is_followed(chain: Chain) -> None:
+    release(chain)
+    second = chain.node.node.create_publisher(TwistStamped, "cmd_vel_joy", 2)
+    chain.node.spin_for(1.0)
+    for _ in range(5):
+        second.publish(drive(0.0))
+        assert not followed(chain, 0.2)
+    assert waits(chain).startswith("2 publishers on cmd_vel_joy (")
+    chain.node.node.destroy_publisher(second)
+    chain.node.spin_for(1.0)
+    assert not followed(chain)
+    release(chain)
+
+
+def test_a_lock_with_two_publishers_holds(start: Callable[[Mapping[str, Any]], Chain]) -> None:
+    chain = start({"mux": {"locks": {"gate": {"topic": "gate_lock", "priority": 200, "required": False}}}})
+    gates = [chain.node.node.create_publisher(Bool, "gate_lock", 2) for _ in range(2)]
+    for gate in gates:
+        chain.node.wait_for_subscriber(gate, count=2)
+    chain.node.spin_for(1.0)
+    for gate, locked in zip(gates, (True, False), strict=True):
+        gate.publish(Bool(data=locked))
+    chain.joystick.message = drive(0.0)
+    chain.node.spin_for(0.2)
+    chain.joystick.message = drive(0.2)
+    assert not followed(chain)
+    assert chain.mux.last is not None
+    assert chain.mux.last.sources[0].reason.startswith("locked: gate has 2 publishers on gate_lock (")
 
 
 def test_without_the_drivers_state_nothing_moves(start: Callable[[Mapping[str, Any]], Chain]) -> None:

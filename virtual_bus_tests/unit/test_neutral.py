@@ -447,3 +447,49 @@ def test_navigation_goes_on_after_a_pause_unless_its_key_says_otherwise(
         story.run(3.0)
         all_is_well(story)
         assert (story.run(1.0).twist == FORWARD) is goes_on
+
+
+STICK = DEFAULT_SOURCES["joystick"].topic
+PLANNER = DEFAULT_SOURCES["navigation"].topic
+
+
+def test_the_zero_of_one_joystick_node_does_not_arm_the_stick_of_another(story: Story) -> None:
+    story.release()
+    assert story.followed("joystick", 0.2)
+    story.mux.on_publishers(STICK, ["/joy_teleop", "/phone"])  # somebody has started a second one
+    assert story.run(0.02).twist == ZERO
+    for _ in range(10):  # they take turns
+        story.release()
+        assert not story.followed("joystick", 0.1)
+    told = f"2 publishers on {STICK} (/joy_teleop, /phone): give each a topic and a key of its own"
+    assert story.decide().sources[0].reason == told
+    story.mux.on_publishers(STICK, ["/phone"])  # the first one has ended
+    assert not story.followed("joystick", 1.0)
+    assert story.decide().sources[0].reason == f"waiting for zero ({told})"
+    story.release()
+    assert story.followed("joystick", 0.2)
+
+
+def test_many_nodes_of_a_planner_share_its_topic(story: Story) -> None:
+    story.mux.on_publishers(PLANNER, ["/controller_server", "/behavior_server"])
+    story.run(2.5)
+    assert story.followed("navigation", 0.2)
+
+
+@pytest.mark.parametrize("locked", [False, True])
+def test_a_lock_with_two_publishers_holds_whatever_the_last_one_said(locked: bool) -> None:
+    story = paused(MuxLock(topic="pause", priority=200, required=False))
+    story.mux.on_publishers("pause", ["/gate", "/panel"])
+    story.mux.on_lock(HOLD, locked, story.now)
+    story.release()
+    assert not story.followed("joystick", 1.0)
+    story.mux.on_publishers("pause", ["/gate"])
+    story.mux.on_lock(HOLD, False, story.now)
+    story.release()
+    assert story.followed("joystick", 0.2)
+
+
+def test_a_topic_that_is_no_source_and_no_lock_concerns_nobody(story: Story) -> None:
+    story.release()
+    story.mux.on_publishers("elsewhere", ["/a", "/b"])
+    assert story.followed("joystick", 0.2)
