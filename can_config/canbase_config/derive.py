@@ -7,7 +7,15 @@ import math
 from canbase_config.drive import Drive
 from canbase_config.profile import Layout
 from canbase_config.robot import Robot
-from canbase_config.stopping import BRAKING_SHARE, CYCLES_TO_SETPOINT, coasting_s, jerk_adds_s, max_wheel_mps
+from canbase_config.stopping import (
+    BRAKING_SHARE,
+    CYCLES_TO_SETPOINT,
+    SLOPE_S,
+    SLOPE_SHARE,
+    coasting_s,
+    jerk_adds_s,
+    max_wheel_mps,
+)
 from canbase_config.units import motor_rev_per_s
 from canbase_config.watchdog import RelayLine, WatchdogConfig, WatchedDrive, WatchedLayout
 
@@ -30,6 +38,18 @@ def velocity_scale(drive: Drive) -> float:
 def m_per_count(drive: Drive, wheel_radius_m: float) -> float:
     """Travel of the wheel's rim [m] for one increment of the drive's 6064h; the sign makes forward positive."""
     return _m_per_motor_rev(drive, wheel_radius_m) / drive.counts_per_motor_rev
+
+
+def speed_noise_mps(robot: Robot) -> float:
+    """How far one value of 606Ch may be from the speed of the rim [m/s]: base.standstill_mps, or one coarse bit."""
+    radius_m = robot.base.wheel_radius_m
+    bits = (mps_per_bit(drive, radius_m) * velocity_scale(drive) for drive in robot.drives)
+    return max(robot.base.standstill_mps, *map(abs, bits))
+
+
+def slope_window_s(robot: Robot) -> float:
+    """Two speeds that are so far apart in time tell a slope of SLOPE_SHARE from noise, up and down [s]."""
+    return max(SLOPE_S, 4.0 * speed_noise_mps(robot) / (SLOPE_SHARE * robot.limits.deceleration_mps2))
 
 
 def order_hold_s(robot: Robot) -> float:

@@ -21,6 +21,12 @@ CYCLES_TO_SETPOINT: Final = 2
 BRAKING_SHARE: Final = 0.5
 """A wheel that loses less speed than this share of its stated deceleration does not brake as it must: half is left to
 double payload, slopes and slow current limits."""
+SLOPE_SHARE: Final = 0.25
+"""A wheel in a quick stop that is seen to lose less than this share of deceleration_mps2 does not brake at all."""
+SLOPE_S: Final = 0.15
+"""The shortest time between two speeds that are compared for that: a ramp that grows for 0.4 s is steep enough then."""
+HELD_S: Final = 0.25
+"""A threshold holds a wheel for so long at most, with its way back to the ramp of its drive."""
 SETTLE_S: Final = 0.5
 """Until a wheel that has braked is seen to stand."""
 ROLLING_MPS2: Final = 0.1

@@ -2,17 +2,53 @@
 
 A wheel may keep its speed for the lag of driver and drive, and must then be on its way to zero in twice the time of
 its ramp (half is room for double payload, slopes, slow current limits). It fails in the third cycle in a row above
-that; a wheel that stands is never looked at, so that the end of this way is the deadline of the stop. Pure.
+that; a wheel that stands is never looked at, so that the end of this way is the deadline of the stop.
+
+In a quick stop the fastest wheel with power must also be slower than it was one window of time ago: by a quarter of the
+deceleration, as soon as that can be told from noise, at any speed (docs/decisions/0023). A wheel without power brakes
+by nobody's order, and costs the others nothing. Pure.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 
+from canbase_config.derive import slope_window_s, speed_noise_mps
 from canbase_config.robot import Robot
-from canbase_config.stopping import BRAKING_SHARE, lag_s, ramp
+from canbase_config.stopping import BRAKING_SHARE, HELD_S, SLOPE_SHARE, lag_s, ramp
 
 CYCLES = 3
+LASTS_S = 0.08
+"""So long it must not be slower: a wheel that was held may swing beyond the ramp of its drive."""
+
+
+class Slowing:
+    """The fastest speed of the last moments, each as a height above the line that falls as it must at least."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._least_mps2 = SLOPE_SHARE * robot.limits.deceleration_mps2
+        self._noise_mps, self._floor_mps = speed_noise_mps(robot), robot.watchdog.motion_tolerance_mps
+        self._window_s, self._lag_s = slope_window_s(robot), lag_s(robot)
+        self._past: deque[tuple[float, float]] = deque()
+        self._since = self._slow_at = -math.inf
+
+    def begin(self, now: float) -> None:
+        """A quick stop begins now."""
+        self._past.clear()
+        self._since = self._slow_at = now
+
+    def fails(self, speed_mps: float, now: float) -> bool:
+        """Once a cycle: for LASTS_S the wheel has been above all lines of HELD_S that are a window old."""
+        height_mps = speed_mps + self._least_mps2 * (now - self._since)
+        self._past.append((now, height_mps))
+        while self._past[0][0] < now - self._window_s - HELD_S:
+            self._past.popleft()
+        heights = [height for at, height in self._past if at <= now - self._window_s]
+        slows = not heights or height_mps <= max(heights) + self._noise_mps
+        if slows or speed_mps <= self._floor_mps or now < self._since + self._lag_s + self._window_s:
+            self._slow_at = now
+        return now - self._slow_at >= LASTS_S
 
 
 class Braking:
@@ -25,11 +61,13 @@ class Braking:
         self._since = -math.inf
         self._from_mps = self._slope_mps2 = 0.0
         self._against = 0
+        self._slowing = Slowing(robot)
 
     def begin(self, speed_mps: float, turn_radps: float, now: float, quick: bool) -> None:
         """A ramp, or a quick stop of the drives, from this wheel speed and turn of the base, begins now."""
         speed_mps, turn_radps = abs(speed_mps), abs(turn_radps)
         self._since, self._against = now, 0
+        self._slowing.begin(now)
         self._from_mps = speed_mps * (1.0 + self._share) + self._fixed_mps
         ordinary = self._limits.deceleration_mps2
         if quick:
@@ -46,3 +84,7 @@ class Braking:
         """Once a cycle, while some wheel does not stand: its speed is too high now and was in the last cycles."""
         self._against = self._against + 1 if abs(speed_mps) > self.allowed_mps(now) else 0
         return self._against >= CYCLES
+
+    def keeps_speed(self, speed_mps: float, now: float) -> bool:
+        """Once a cycle of a quick stop, with the speed of the fastest wheel with power: it has not lost any."""
+        return self._slowing.fails(abs(speed_mps), now)

@@ -319,6 +319,7 @@ class DriverCore:
             standstill=self._drives.stand(now),
             turning=self._drives.turning(now),
             speed_mps=measured_mps,
+            braking_mps=self._drives.braking_mps(now),
             begin_mps=max(measured_mps, ordered_mps),
             turn_radps=self._motion.twist.angular_radps,
             doubted=self._drives.doubted(),

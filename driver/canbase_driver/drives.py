@@ -145,6 +145,11 @@ class Drives:
         """The axis with the greatest measured speed."""
         return max(self.axes, key=lambda axis: abs(axis.velocity_mps))
 
+    def braking_mps(self, now: float) -> float:
+        """The greatest speed of a wheel with power that was measured in the last moments; 0: there is none [m/s]."""
+        driven = (each for each in self.axes if self._is_fresh(each, now) and each.state and each.state.has_torque)
+        return max((abs(each.velocity_mps) for each in driven), default=0.0)
+
     def snapshots(self, now: float) -> tuple[DriveSnapshot, ...]:
         """One per axis, in the order of robot.yaml."""
         return tuple(_snapshot(node, axis, self._robot, now) for node, axis in self._with_node)

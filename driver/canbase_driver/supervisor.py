@@ -56,6 +56,7 @@ class Situation:
     standstill: bool = True  # measured, on all wheels
     turning: str = ""  # which wheel does not stand
     speed_mps: float = 0.0  # of the fastest wheel, measured
+    braking_mps: float = 0.0  # of the fastest one with power and fresh feedback
     begin_mps: float = 0.0  # the same, or what it was ordered last where that is more
     turn_radps: float = 0.0  # of the base, ordered last
     doubted: str = ""  # a wheel's sensors are no evidence of anything
@@ -316,7 +317,8 @@ class Supervisor:
             self._latch(DID_NOT_STOP, f"{situation.turning} on its ramp, {now - self._since_s:.2f} s after it began")
 
     def _quick(self, situation: Situation, now: float) -> None:
-        if situation.standstill or situation.doubted or self._braking.fails(situation.speed_mps, now):
+        unslowed = self._braking.keeps_speed(situation.braking_mps, now)
+        if unslowed or situation.standstill or situation.doubted or self._braking.fails(situation.speed_mps, now):
             self._step = Step.OFF
 
     def _latch(self, name: str, detail: str) -> None:

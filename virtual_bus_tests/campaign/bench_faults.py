@@ -59,6 +59,11 @@ def unlimit(node: SimulatedNode, axis: int) -> None:
     node.axes[axis].faults.setpoint_share = 1.0
 
 
+def brake(node: SimulatedNode, axis: int) -> None:
+    """Its next stop is a stop."""
+    node.axes[axis].faults.stop_share = 1.0
+
+
 def strengthen(node: SimulatedNode, axis: int) -> None:
     """Its motor has its whole force."""
     node.axes[axis].weaken(1.0)

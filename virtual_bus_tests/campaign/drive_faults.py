@@ -48,6 +48,12 @@ DRIVE_FAULTS: dict[str, Kind] = {
         lambda r: {**wheel(r), "share": r.choice((0.0, r.uniform(0.0, 0.5)))},
         *bench.suffer("weak", bench.strengthen),
     ),
+    "drive_unbraked": Kind(
+        "a drive reports its stops and brakes with a share of their slopes, or not at all",
+        LONG,
+        lambda r: {**wheel(r), "share": r.choice((0.0, 0.0, r.uniform(0.0, 0.3)))},
+        *bench.suffer("unbraked", bench.brake),
+    ),
     "setpoints_lost": Kind(
         "setpoints do not reach one drive, or one of several does",
         LONG,

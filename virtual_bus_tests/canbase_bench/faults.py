@@ -63,6 +63,10 @@ def _limited(node: SimulatedNode, now: float, axis: int = 0, share: float = 0.5)
     node.axes[axis].faults.setpoint_share = share
 
 
+def _unbraked(node: SimulatedNode, now: float, axis: int = 0, share: float = 0.0) -> None:
+    node.axes[axis].faults.stop_share = share
+
+
 def _encoder(**fixed: float | bool) -> Callable[..., None]:
     """A fault of all that hangs on one encoder; what is not `fixed` is an argument of EncoderFault."""
 
@@ -139,6 +143,7 @@ KINDS: Mapping[str, tuple[Callable[..., None], frozenset[str]]] = {
     "weak": (_weak, frozenset({"axis", "share"})),
     "blocked": (_blocked, frozenset({"axis", "force_n"})),
     "limited": (_limited, frozenset({"axis", "share"})),
+    "unbraked": (_unbraked, frozenset({"axis", "share"})),
     "encoder_lost": (_encoder(), frozenset({"axis"})),
     "encoder_frozen": (_encoder(holds_speed=True), frozenset({"axis"})),
     "encoder_zero": (_encoder_zero, frozenset({"axis"})),
@@ -161,7 +166,8 @@ KINDS: Mapping[str, tuple[Callable[..., None], frozenset[str]]] = {
 """Each fault and the arguments that it takes. silent: sends nothing. deaf: receives nothing. cut: both.
 weak: its motor gives a share of its force, none by default, and holds its power.
 blocked: something holds its wheel, with `force_n` beyond its friction, by default more than any motor. limited: its
-motor gets a share of each setpoint, half by default.
+motor gets a share of each setpoint, half by default. unbraked: it reports its stops (quick stop, fault reaction) and
+brakes with a share of their slopes, none by default.
 encoder_…: all that hangs on one encoder, 6064h, 606Ch and the drive's own loops. lost: it counts nothing and shows no
 speed. frozen: it counts nothing and shows its last speed. zero: lost, and 6064h is 0. jumping: `jump_m` ahead and back
 in turn, each `every_s`. scaled: it counts `factor` times the motion, 0.5 by default. reversed: it counts backward.

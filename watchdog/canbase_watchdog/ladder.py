@@ -88,6 +88,8 @@ class Look:
     seen_at: float
     present: bool
     trusted: bool
+    unslowed: bool = False
+    """A wheel with power has not lost speed for a window of time, on this rung: slowing.py."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +125,8 @@ def advance(before: Climb, look: Look, braking: Braking, now: float) -> Climb:
        power must be off as well, for as long as a wheel may roll: then a stand is assumed;
     4. never heard of, and not told to have power: stays, there is nothing to climb for;
     5. a sensor that cannot be trusted: power off at once, for quick stop closes its loop on that sensor;
-    6. powered and faster than braking allows, SAMPLES in a row: power off at once, or the last rung; the relay opens;
+    6. powered and faster than braking allows, SAMPLES in a row, or not slower than a moment ago: power off at once, or
+       the last rung; the relay opens;
     7. what the rung orders is not done, or not seen, within `obey_s`: next rung;
     8. stays. A wheel that rolls without power is waited for: no rung can brake it.
     """
@@ -139,7 +142,7 @@ def advance(before: Climb, look: Look, braking: Braking, now: float) -> Climb:
         return climb
     if not look.trusted and climb.step < Step.DISABLE_VOLTAGE:
         return _to(Step.DISABLE_VOLTAGE, climb, look, now)
-    if climb.against >= SAMPLES:
+    if climb.against >= SAMPLES or look.unslowed:
         return replace(_to(max(climb.step + 1, Step.DISABLE_VOLTAGE), climb, look, now), runaway=True)
     return _up(climb, look, now) if _disobeys(climb, look, now) else climb
 

@@ -10,6 +10,7 @@ from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog import frames
 from canbase_watchdog.frames import Frame
 from canbase_watchdog.ladder import Braking, Climb, Look, Step, advance, first
+from canbase_watchdog.slowing import Slope, SlowingWatch
 from canbase_watchdog.view import NEVER, Axis, View
 
 QUICK_STOP_PERIOD_S = 0.01
@@ -51,6 +52,9 @@ class Stopper:
         self._resting_since = now if resting else math.inf
         drives = [drive for drive in config.drives if drive.node_id == node_id]
         self._layout, self._axis_count = drives[0].layout, len(drives)
+        self._slopes = [Slope.of(config, drive.velocity_mps_per_bit) for drive in drives]
+        self._slowing: list[SlowingWatch] = []
+        self._begin_slowing(now)
         self._seen = self._look(view)
         self.climb: Climb = replace(first(self._seen, now), stopped=resting, assumed=resting and not trusted)
         self._quick_stop_at = self._nmt_at = self._sdo_at = NEVER
@@ -63,9 +67,12 @@ class Stopper:
 
     def tick(self, view: View, now: float) -> list[Frame]:
         """Look at the node, climb where the rules say so, and return the frames that are due."""
+        self._follow(view)
         self._seen = self._look(view)
         before = self.climb
         self.climb = advance(before, self._seen, self._braking, now)
+        if self.climb.since > before.since:
+            self._begin_slowing(now)
         if self.climb.step is not before.step:
             self._quick_stop_at = self._nmt_at = self._sdo_at = NEVER
             self._sdo_turn = 0
@@ -75,6 +82,14 @@ class Stopper:
             # The PDO first: pre-operational makes the node deaf to it.
             out += self._stop_word(now) + self._pre_operational(now)
         return out + self._sdo(view, defied, now)
+
+    def _begin_slowing(self, now: float) -> None:
+        """A rung begins now."""
+        self._slowing = [SlowingWatch(slope, now) for slope in self._slopes]
+
+    def _follow(self, view: View) -> None:
+        for axis, watch in zip(self._axes(view), self._slowing, strict=True):
+            watch.on_sample(axis.velocity_mps, axis.powered, axis.velocity_at)
 
     def _axes(self, view: View) -> list[Axis]:
         return [axis for axis in view.axes if axis.drive.node_id == self._node_id]
@@ -92,6 +107,7 @@ class Stopper:
             seen_at=seen_at,
             present=node.heard_at > NEVER or any(axis.asks_for_power for axis in axes),
             trusted=self._trusted and all(axis.trusted for axis in axes),
+            unslowed=any(watch.fails for watch in self._slowing),
         )
 
     def _is_untold(self, seen_at: float) -> bool:

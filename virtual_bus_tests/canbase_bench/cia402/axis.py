@@ -58,6 +58,8 @@ class AxisFaults:
     """60FFh is taken, and has no effect on the motor."""
     setpoint_share: float = 1.0
     """Of 60FFh, that the motor is given."""
+    stop_share: float = 1.0
+    """Of the slopes with which it stops by itself, quick stop and fault reaction among them; 0: it keeps its speed."""
     force_share: float = 1.0
     """Of the force that 6072h allows. Set by `Axis.weaken`."""
     supply: Supply = Supply.FULL
@@ -310,7 +312,7 @@ class Axis:
             return
         ramps = {1: self._value(0x84), 2: self._value(0x85)}
         slope = self.scale.slope(ramps[option]) if option in ramps else AT_ONCE
-        self.motor.stop(slope, then)
+        self.motor.stop(slope * self.faults.stop_share if self.faults.stop_share else 0.0, then)
 
     # What the bus sees
 
