@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
+    from canbase_config.drive import Drive
     from canbase_config.robot import Limits, Robot
 
 CYCLES_TO_SETPOINT: Final = 2
@@ -32,6 +33,12 @@ SETTLE_S: Final = 0.5
 ROLLING_MPS2: Final = 0.1
 """What a wheel without power loses at least: rolling resistance 0.01 × 9.81 m/s² of a hard wheel on a hard, level floor
 (soft floors, gears and motors brake more; on a slope nothing is known)."""
+
+HARDEST_SHARE: Final = 2.0
+"""A drive brakes no harder than so many times its stated ramp: overshoot of its loop, light loads, noise."""
+GRIP_MPS2: Final = 8.0
+"""What the floor takes from a wheel at most: a rubber tyre on a dry floor (friction 0.8) slips beyond that. A brake or
+a worm gear may stop a wheel harder: such a standstill is not taken for measured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +120,19 @@ def jerk_adds_s(limits: Limits) -> float:
 def coasting_s(wheel_mps: float) -> float:
     """How long a wheel that was so fast may roll when its power is off, on a level floor [s]."""
     return abs(wheel_mps) / ROLLING_MPS2
+
+
+def hardest_stop_mps2(robot: Robot) -> float:
+    """A wheel without power, or braked by a ramp that is not known, loses no more [m/s²]."""
+    return max(HARDEST_SHARE * robot.limits.emergency_deceleration_mps2, GRIP_MPS2)
+
+
+def hardest_braking_mps2(robot: Robot, drive: Drive) -> float:
+    """With power its drive brakes it no harder [m/s²]: by 6085h where that is known."""
+    kind = drive.kind
+    if kind.options.ramps == "no" or kind.is_unproven("options.ramps") or kind.is_unproven("units.acceleration"):
+        return hardest_stop_mps2(robot)
+    return HARDEST_SHARE * robot.limits.emergency_deceleration_mps2
 
 
 def _rounded_s(straight_s: float, linear: float, jerk: float) -> float:

@@ -36,7 +36,7 @@ class Axis:
         metres_per_count = self.units.position_m(1)
         step_m = STEP_MARGIN * Limiter(robot.limits, robot.base.track_m).wheel_mps / robot.rates.control_hz
         self.travel = WheelTravel(metres_per_count, max(1.0, step_m / abs(metres_per_count)))
-        self.stillness = Stillness(StillnessLimits.of(robot), metres_per_count)
+        self.stillness = Stillness(StillnessLimits.of(robot, drive), metres_per_count)
         self.push = Push(robot.watchdog.stand_impulse_s, metres_per_count)
         self._feedback_s = robot.timeouts.feedback_s
         self._layout = layout.profile.layout
@@ -90,7 +90,8 @@ class Axis:
         self.travel.update(counts, max(1, round(gap_s * self._control_hz)))
         self.status_at = now
         self._status_is_new = True
-        self.stillness.on_power(self.state is None or self.state.has_torque, now)
+        has_torque = self.state is None or self.state.has_torque
+        self.stillness.on_power(has_torque, now, self.state is DriveState.OPERATION_ENABLED)
         return True
 
     def on_velocity(self, data: bytes, now: float) -> bool:
@@ -100,7 +101,7 @@ class Axis:
             return False
         self.velocity_mps = self.units.velocity_mps(raw)
         if now - self.velocity_at > self._feedback_s:
-            self.stillness.forget()
+            self.stillness.pause()
         self.velocity_at = now
         ordered_mps = self.target_mps if self.state is DriveState.OPERATION_ENABLED else 0.0
         self.stillness.on_sample(self.travel.travel_m, self.velocity_mps, ordered_mps, now)

@@ -2,8 +2,8 @@
 
 Standstill: the velocity is below base.standstill_mps and the encoder does not contradict it; or the encoder has not
 moved for STILL_S, and what is left of the velocity is noise. A sensor that did not show motion that was ordered is no
-evidence, nor is one that stopped as no wheel does, once the power is off: then a stand is only assumed, when the power
-has been off for as long as a wheel rolls. Pure.
+evidence, nor is one that stopped on less travel than a wheel can, in a quick stop and without power: then a stand is
+only assumed, when the power has been off for as long as a wheel rolls. Pure.
 """
 
 from __future__ import annotations
@@ -11,8 +11,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from canbase_config.drive import Drive
 from canbase_config.robot import Robot
-from canbase_config.stopping import coasting_s, max_wheel_mps
+from canbase_config.stopping import coasting_s, hardest_braking_mps2, hardest_stop_mps2, max_wheel_mps
+from canbase_driver.stopping_distance import StoppingDistance
 
 STILL_S = 0.2
 """An encoder that did not move for so long stands, even if the velocity is noisy."""
@@ -33,12 +35,14 @@ class StillnessLimits:
     unshown_m: float
     """So much ordered travel without any sign of motion takes the trust."""
     coasting_s: float
-    jolt_mps2: float
-    """No wheel stops faster."""
+    braking_mps2: float
+    """With power it loses no more ..."""
+    rolling_mps2: float
+    """... and this without."""
 
     @classmethod
-    def of(cls, robot: Robot) -> StillnessLimits:
-        """Of this robot."""
+    def of(cls, robot: Robot, drive: Drive) -> StillnessLimits:
+        """Of this wheel."""
         watchdog = robot.watchdog
         rolls_s = coasting_s(watchdog.overspeed_factor * max_wheel_mps(robot))
         return cls(
@@ -46,7 +50,8 @@ class StillnessLimits:
             watchdog.motion_tolerance_mps,
             watchdog.travel_tolerance_m,
             rolls_s,
-            watchdog.jolt_mps2,
+            hardest_braking_mps2(robot, drive),
+            hardest_stop_mps2(robot),
         )
 
 
@@ -59,25 +64,39 @@ class Stillness:
         self._at = self._still_since = -math.inf
         self._travel_m = self._anchor_m = self._unshown_m = 0.0
         self._off_since = math.inf
-        self._quiet = False
-        self._rolled_mps = 0.0
-        """What encoder and velocity both showed in the last sample."""
-        self._jolt = ""
-        """The sensor stopped as no wheel does. Under power the watchdog tells a blocked wheel from a dead sensor."""
-        self.doubt = ""
-        """Why the sensors are no evidence; empty: they are."""
+        self._quiet = self._follows = self._had_torque = False
+        self._stopping = StoppingDistance(limits.noise_mps, self._grain_m)
+        self._lie = ""
+        """Why the sensors are no evidence, whatever they show."""
+        self._sudden = ""
+        """The wheel stopped within less than it can."""
 
-    def forget(self) -> None:
-        """What was measured no longer counts: a gap, or a restart. Doubts and the time without power stay."""
+    @property
+    def doubt(self) -> str:
+        """Why the sensors are no evidence; empty: they are."""
+        return self._lie or ("" if self._follows else self._sudden)
+
+    def pause(self) -> None:
+        """Samples did not come for a while. What the wheel rolled meanwhile the encoder has counted."""
         self._at = self._still_since = -math.inf
         self._quiet = False
 
-    def on_power(self, has_torque: bool, now: float) -> None:
-        """What the statusword tells. Power after a stand that was assumed: the sensors get a new trial."""
+    def forget(self) -> None:
+        """What was measured no longer counts, after a restart. Doubts and the time without power stay."""
+        if not self._sudden:
+            self._stopping.forget()
+        self.pause()
+
+    def on_power(self, has_torque: bool, now: float, follows: bool = False) -> None:
+        """What the statusword tells; `follows`: operation enabled, where it is the watchdog that judges a sudden stop.
+
+        Power after a stand that was assumed: the sensors get a new trial.
+        """
         if has_torque and self.doubt and self.rolled_out(now):
-            self.doubt, self._unshown_m = "", 0.0
+            self._lie, self._sudden, self._unshown_m = "", "", 0.0
+            self._stopping.forget()
+        self._follows = follows
         self._off_since = math.inf if has_torque else min(self._off_since, now)
-        self._heed_jolt()
 
     def on_sample(self, travel_m: float, velocity_mps: float, ordered_mps: float, now: float) -> None:
         """Encoder and velocity of one SYNC; `ordered_mps`: what an enabled drive was ordered before it, else 0."""
@@ -92,26 +111,29 @@ class Stillness:
         slow = speed_mps <= limits.standstill_mps and step_m <= max(slow_m, self._grain_m)
         self._quiet = slow or (speed_mps <= limits.noise_mps and now - self._still_since >= STILL_S)
         self._travel_m, self._at = travel_m, now
-        before_mps = 0.0 if first else self._rolled_mps
-        self._rolled_mps = 0.0 if first else min(speed_mps, step_m / max(elapsed_s, SHORTEST_S))
         if not first:
             self._compare(moved and speed_mps > limits.standstill_mps, abs(ordered_mps) * elapsed_s)
-            self._look_for_jolt(before_mps, elapsed_s)
-            self._heed_jolt()
+        shown_mps = 0.0 if first else min(speed_mps, step_m / max(elapsed_s, SHORTEST_S))
+        self._stopping.on_sample(shown_mps, travel_m, self._hardest_mps2())
+        self._sudden = self._too_soon() if self._quiet and self._stopping.missing_m else ""
 
-    def _look_for_jolt(self, before_mps: float, elapsed_s: float) -> None:
-        """It rolled a sample ago and shows nothing now: the sensor stopped, and not the wheel."""
-        possible_mps = self._limits.jolt_mps2 * max(elapsed_s, SHORTEST_S) + self._limits.noise_mps
-        if self._quiet and before_mps > possible_mps:
-            self._jolt = f"stopped from {before_mps:.2f} m/s within {elapsed_s:.3f} s, which no wheel can"
+    def _hardest_mps2(self) -> float:
+        """The hardest braking since the last sample: by its drive, or without power; it may have been either."""
+        had_torque, self._had_torque = self._had_torque, self._off_since == math.inf
+        limits = self._limits
+        return limits.braking_mps2 if had_torque and self._had_torque else limits.rolling_mps2
 
-    def _heed_jolt(self) -> None:
-        if self._jolt and self._off_since < math.inf:
-            self.doubt, self._jolt = self.doubt or self._jolt, ""
+    def _too_soon(self) -> str:
+        stopping = self._stopping
+        return (
+            f"shows standstill and nothing of how it braked from {stopping.least_mps:.2f} m/s: it met something hard, "
+            f"or its encoder is dead; turn it by hand by {stopping.missing_m + 0.001:.3f} m, or wait until its power "
+            f"has been off for {self._limits.coasting_s:.0f} s"
+        )
 
     def distrust(self, why: str) -> None:
         """Somebody else has caught the sensors with a lie."""
-        self.doubt = why
+        self._lie = why
 
     def stands(self, now: float) -> bool:
         """The last sample says so, and is evidence; or nothing has driven it for longer than it rolls."""
@@ -129,8 +151,8 @@ class Stillness:
 
     def _compare(self, shown: bool, ordered_m: float) -> None:
         if shown:
-            self._unshown_m, self.doubt, self._jolt = 0.0, "", ""
+            self._unshown_m, self._lie = 0.0, ""
             return
         self._unshown_m += ordered_m
         if self._unshown_m > self._limits.unshown_m:
-            self.doubt = f"showed no motion for {self._unshown_m:.3f} m that were ordered"
+            self._lie = f"showed no motion for {self._unshown_m:.3f} m that were ordered"
