@@ -83,25 +83,72 @@ def test_what_comes_late_comes_in_bursts_and_is_no_sign(seed: int) -> None:
 # --- two setpoints in one period
 
 
-def test_three_times_within_a_second_two_setpoints_for_one_axis() -> None:
-    bus = Bus()
-    for n in range(3):
-        assert bus.sign is None
-        bus.setpoint(A)
-        bus.setpoint(B)
-        bus.sync()
-        bus.t += 499 - 10 * n
-    assert bus.sign == Sign(0.988, 1, "two different setpoints 201h between two SYNCs")
+def two_setpoints(bus: Bus, wait_cycles: int) -> None:
+    """Somebody else's comes 2 ms before the driver's, once; then so many cycles of the driver alone."""
+    bus.setpoint(B, at=(bus.t - 2) / 1000)
+    for _ in range(wait_cycles):
+        bus.cycle()
 
 
-def test_as_rare_as_lost_frames_they_are_no_sign() -> None:
+@pytest.mark.parametrize(("wait_cycles", "sign"), [(49, True), (51, False)])
+def test_three_times_within_a_second_two_setpoints_for_one_axis(wait_cycles: int, sign: bool) -> None:
     bus = Bus()
-    for _ in range(100):
-        bus.setpoint(A)
-        bus.setpoint(B)
-        bus.sync()
-        bus.t += 500
+    bus.cycle()
+    for _ in range(2):
+        two_setpoints(bus, wait_cycles)
     assert bus.sign is None
+    at = bus.t / 1000
+    two_setpoints(bus, 1)
+    assert bus.sign == (Sign(at, 1, "two different setpoints 201h between two SYNCs") if sign else None)
+
+
+def test_as_rare_as_disturbed_frames_they_are_no_sign() -> None:
+    bus = Bus()
+    bus.cycle()
+    for _ in range(100):
+        two_setpoints(bus, 51)
+    assert bus.sign is None
+
+
+# A SYNC is missing when the last one is 1.5 periods old: 15 ms at 100 Hz
+@pytest.mark.parametrize(("after_ms", "sign"), [(14.9, True), (15.0, False), (20.0, False)])
+def test_of_two_setpoints_one_period_apart_the_sync_between_them_was_lost(after_ms: float, sign: bool) -> None:
+    bus = Bus()
+    for n in range(0, 300, 30):
+        bus.cycle(A, n / 1000)
+        bus.setpoint(A, at=(n + 10) / 1000)
+        bus.setpoint(B, at=(n + after_ms) / 1000)
+    assert (bus.sign is not None) is sign
+
+
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.3])
+@pytest.mark.parametrize("seed", range(5))
+def test_frames_that_get_lost_are_no_sign(share: float, seed: int) -> None:
+    """A ramp: each setpoint is another one. RPDOs and SYNCs get lost, each by itself, for 20 s."""
+    random, bus = Random(seed), Bus()
+    for n in range(2000):
+        for cob_id in (0x201, 0x202):
+            if random.random() >= share:
+                bus.setpoint(n.to_bytes(6, "little"), cob_id)
+        if random.random() >= share:
+            bus.sync()
+        bus.t += 10
+    assert bus.sign is None
+
+
+@pytest.mark.parametrize("phase_ms", [0.0, 1.0, 5.0, 9.0, 9.9])
+def test_a_second_master_is_found_at_any_phase_also_while_frames_get_lost(phase_ms: float) -> None:
+    """Its setpoints come each 10 ms, so long after the driver's SYNC; every tenth frame is lost."""
+    random, bus = Random(1), Bus()
+    while bus.sign is None:
+        if random.random() >= 0.1:
+            bus.setpoint(A)
+        if random.random() >= 0.1:
+            bus.sync()
+        if random.random() >= 0.1:
+            bus.setpoint(B, at=(bus.t + phase_ms) / 1000)
+        bus.t += 10
+        assert bus.t < 200
 
 
 def test_the_same_setpoint_twice_is_no_sign() -> None:
@@ -136,11 +183,21 @@ def test_back_and_forth_each_change_counts() -> None:
 def test_three_syncs_without_setpoints_within_a_second() -> None:
     bus = Bus()
     bus.cycle()
-    bus.sync()
-    bus.sync()
+    bus.sync(0.002)
+    bus.sync(0.004)
     assert bus.sign is None
-    bus.sync()
-    assert bus.sign == Sign(0.01, 0, "SYNCs without setpoints")
+    bus.sync(0.006)
+    assert bus.sign == Sign(0.006, 0, "SYNCs without setpoints")
+
+
+# 0.75 periods after the last one a SYNC keeps the beat: 7.5 ms at 100 Hz
+@pytest.mark.parametrize(("after_ms", "sign"), [(1.0, True), (7.4, True), (7.5, False), (10.0, False)])
+def test_a_sync_without_setpoints_is_one_too_many_where_it_is_off_the_beat(after_ms: float, sign: bool) -> None:
+    bus = Bus()
+    for n in range(0, 1500, 300):
+        bus.cycle(A, n / 1000)
+        bus.sync((n + after_ms) / 1000)
+    assert (bus.sign is not None) is sign
 
 
 # 0.5 s at 100 Hz: 50 SYNCs; 75 and one more are too many

@@ -1,8 +1,9 @@
 """Signs of a second master. CAN frames carry no sender: only what one driver alone cannot have sent tells of another.
 
 Signs, each while a drive that it concerns is enabled or at any time where that does not matter
-1. two different setpoints for one axis between two SYNCs, or a SYNC without any setpoint before it: three times in 1 s,
-   as a frame that is lost looks the same once;
+1. two different setpoints for one axis in one period, or a SYNC off the beat without any setpoint before it: three
+   times in 1 s. Frames that get lost look otherwise: where a SYNC is missing the last one is two periods old, and a
+   SYNC whose setpoints are missing keeps the beat;
 2. more SYNCs or driver's heartbeats than half as many again as configured. Counted over a window that is long against
    any burst: a loaded machine delivers late, yet not more;
 3. once: an NMT command to an enabled drive, a quick stop PDO, or an SDO that writes its controlword, target or mode.
@@ -18,6 +19,8 @@ from dataclasses import dataclass
 from canbase_config.watchdog import WatchdogConfig
 
 DISORDER_COUNT, DISORDER_S = 3, 1.0
+SYNC_LOST, OFF_BEAT = 1.5, 0.75
+"""Periods since the last SYNC: after more, one was lost; a SYNC after less is another one than the driver's."""
 EXCESS = 1.5
 SYNC_WINDOW_S = 0.5
 HEARTBEATS_PER_TIMEOUT = 3
@@ -58,6 +61,8 @@ class Foreign:
         self._heartbeats = Pace(math.ceil(EXCESS * HEARTBEAT_PERIODS) + 1, HEARTBEAT_PERIODS * period_s)
         self._disorder = Pace(DISORDER_COUNT, DISORDER_S)
         self._control_hz, self._period_s = config.control_hz, period_s
+        self._lost_s, self._off_beat_s = SYNC_LOST / config.control_hz, OFF_BEAT / config.control_hz
+        self._sync_at = math.inf
         self._setpoints: dict[int, bytes] = {}
         """COB-ID and data of the setpoints since the last SYNC."""
         self.last: Sign | None = None
@@ -67,14 +72,16 @@ class Foreign:
         other = self._setpoints.setdefault(cob_id, data)
         if other != data:
             self._setpoints[cob_id] = data
-            if self._disorder.too_fast(now):
+            if now - self._sync_at < self._lost_s and self._disorder.too_fast(now):
                 self.note(node_id, f"two different setpoints {cob_id:03X}h between two SYNCs", now)
 
     def on_sync(self, now: float) -> None:
         """A SYNC of the driver, or of somebody else."""
-        if not self._setpoints and self._disorder.too_fast(now):
+        off_beat = now - self._sync_at < self._off_beat_s
+        if not self._setpoints and off_beat and self._disorder.too_fast(now):
             self.note(0, "SYNCs without setpoints", now)
         self._setpoints.clear()
+        self._sync_at = now
         if self._syncs.too_fast(now):
             self.note(0, f"more SYNCs than the driver's {self._control_hz:g} per second", now)
 
