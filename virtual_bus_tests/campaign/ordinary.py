@@ -240,6 +240,8 @@ class OrdinaryHour:
         noise = round(self.random.uniform(-1.0, 1.0) * self._noise_mps / abs(node.axes[0].scale.actual_mps))
         narrow = any(drive.kind.layout.velocity_bits == 16 for drive in self.drawn.robot.drives)
         form = struct.Struct("<h" if narrow else "<i")
+        if len(data) < form.size:  # the drive's own mapping, before its boot
+            return data
         return form.pack(form.unpack_from(data)[0] + noise) + data[form.size :]
 
     # The computer and its people
