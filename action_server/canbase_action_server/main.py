@@ -15,6 +15,7 @@ from rclpy.signals import SignalHandlerOptions
 from canbase_action_server.drive_messages import drive_binding
 from canbase_action_server.node import DriveDistanceServer
 from canbase_action_server.rotate_messages import rotate_binding
+from canbase_config.output import never_wait
 from canbase_config.private_process import guard_keys
 from canbase_config.robot import Robot
 from canbase_config.service import Service
@@ -29,6 +30,7 @@ def run(robot: Robot, ros_args: list[str], when_ready: Callable[[], None] = lamb
     """Serve until SIGINT or SIGTERM; 0 after an orderly end, 1 after a defect. `ros_args` as for rclpy.init;
     `when_ready`: called when all is made and nothing runs yet."""
     guard_keys(os.environ)
+    never_wait(os.environ)
     rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)
     executor = SingleThreadedExecutor()
     node = DriveDistanceServer(robot, [drive_binding(), rotate_binding(robot)])

@@ -22,6 +22,7 @@ from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
 from canbase_config.latch_file import LatchFile, LatchKeeper, hold, latch_folder
+from canbase_config.output import never_wait
 from canbase_config.priority import Priority
 from canbase_config.private_process import guard_keys
 from canbase_config.robot import DRIVER_NODE_ID, Robot
@@ -58,6 +59,7 @@ def run(
     thread failed. `ros_args`: arguments for rclpy. `autostart`: without it nothing is sent on the bus before the node
     is configured. `when_ready`: called when all is made and nothing runs yet. Call from the main thread (signals)."""
     guard_keys(os.environ)
+    never_wait(os.environ)
     folder = latch_folder(os.environ, Path.home(), robot.name)
     try:
         held = take("driver", bus_name(robot.bus.arguments())), hold(folder, "driver")

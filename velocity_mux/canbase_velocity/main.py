@@ -18,6 +18,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from canbase_config.latch_file import LatchFile, LatchKeeper, hold, latch_folder
+from canbase_config.output import never_wait
 from canbase_config.private_process import guard_keys
 from canbase_config.robot import Robot
 from canbase_config.service import Service
@@ -42,6 +43,7 @@ def run(robot: Robot, ros_args: Sequence[str], when_ready: Callable[[], None] = 
     from the main thread (signals).
     """
     guard_keys(os.environ)
+    never_wait(os.environ)
     folder = latch_folder(os.environ, Path.home(), robot.name)
     try:
         held, writer = take("velocity process", robot.lease.socket), hold(folder, "velocity")

@@ -15,6 +15,7 @@ import can
 import pytest
 
 from bus.watchdog_live import LiveRobot
+from canbase_watchdog import loop
 from canbase_watchdog.bus_port import BusError, BusPort
 from canbase_watchdog.frames import Frame
 from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
@@ -65,6 +66,17 @@ def test_driving_with_leases_goes_on(rig: Rig) -> None:
     rig.robot.drive_at(300)
     time.sleep(1.0)
     assert cause(rig) is Cause.NONE
+
+
+# driving ── CLOCK_BOOTTIME is 60 s ahead of CLOCK_MONOTONIC at once: the computer was suspended ── quick stop
+def test_a_suspend_at_speed_stops_the_base(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    rig.robot.drive_at(300)
+    begin, before_s = time.monotonic(), loop.suspended_s()
+    monkeypatch.setattr(loop, "suspended_s", lambda: before_s + 60.0)
+    at, frame = rig.robot.first(0x501, begin)
+    assert frame == QUICK_STOP
+    assert at - begin < 0.1
+    assert cause(rig) is Cause.LOOP_LATE
 
 
 # last lease ── 0.25 s ── quick stop on the bus, and the wheels brake for 0.3 s
@@ -136,9 +148,9 @@ def test_a_bus_that_takes_nothing_for_a_second_ends_the_loop(tmp_path: Path, mon
     monkeypatch.setattr("can.Bus", lambda **arguments: DeadBus("x"))
     begin = time.monotonic()
     with BusPort({}) as bus, LeaseSocket(str(tmp_path / "lease"), 0) as leases:
-        loop = Loop(Watchdog(config(), begin), bus, leases)
+        dead = Loop(Watchdog(config(), begin), bus, leases)
         with pytest.raises(BusDeadError, match=r"no frame could be sent for 1\.0 s"):
-            loop.run(lambda: False)
+            dead.run(lambda: False)
         assert 1.0 <= time.monotonic() - begin < 2.0
         assert bus.health.send_errors >= 10
         assert 10 <= bus.health.receive_errors <= 2000

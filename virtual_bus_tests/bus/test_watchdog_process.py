@@ -17,6 +17,7 @@ import pytest
 from bus.watchdog_live import LiveRobot
 from canbase_watchdog.frames import Frame
 from ros.harness import clear_records
+from unit.test_output import full_pipe
 from unit.watchdog_story import config
 
 pytestmark = pytest.mark.bus
@@ -33,7 +34,7 @@ def free_port() -> int:
 class Watched:
     """The process, the robot, and a stand-in for systemd's notify socket."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, stderr: int = subprocess.PIPE) -> None:
         bus = {"interface": "udp_multicast", "channel": "239.74.163.2", "port": free_port(), "hop_limit": 0}
         self.config = replace(config(), bus_arguments=bus, lease_socket=str(folder / "run" / "lease"))
         self.systemd = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -46,7 +47,7 @@ class Watched:
             env=os.environ
             | {"NOTIFY_SOCKET": str(folder / "notify"), "_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"}
             | self.state,
-            stderr=subprocess.PIPE,
+            stderr=stderr,
             text=True,
         )
 
@@ -127,6 +128,25 @@ def test_stopped_and_continued_at_speed_it_trips_because_it_was_away(watched: Wa
     watched.process.send_signal(signal.SIGCONT)
     assert watched.robot.first(0x501, begin)[0] - begin < 0.3
     assert watched.end(signal.SIGTERM)[1].count("own loop stood still") == 1
+
+
+# nobody reads its log ── quick stop ── 0.5 s later its heartbeat still comes
+def test_a_log_that_nobody_reads_does_not_hold_up_the_stop(tmp_path: Path) -> None:
+    with full_pipe() as (_, stderr):
+        it = Watched(tmp_path, stderr)
+        try:
+            with it.robot:
+                it.robot.first(0x1FE, 0.0, timeout_s=10.0)
+                it.robot.drive_at(300)
+                begin = time.monotonic()
+                it.robot.filter = False
+                assert it.robot.first(0x501, begin)[1] == QUICK_STOP
+                tripped = time.monotonic()
+                it.robot.first(0x77E, tripped + 0.5)  # its line is long due: it lives and goes on
+        finally:
+            it.process.kill()
+            it.process.communicate()
+            it.systemd.close()
 
 
 def test_systemd_is_told_ready_alive_and_the_state(watched: Watched) -> None:

@@ -91,6 +91,13 @@ def directives(part: str) -> dict[str, list[str]]:
 
 
 @pytest.mark.parametrize("part", PARTS)
+def test_every_part_has_ended_before_the_computer_is_suspended(part: str) -> None:
+    found = directives(part)
+    assert "sleep.target" in found["Conflicts"]
+    assert "sleep.target" in found["Before"]
+
+
+@pytest.mark.parametrize("part", PARTS)
 def test_a_loop_that_hangs_is_found_and_a_dead_process_comes_back(part: str) -> None:
     unit = directives(part)
 

@@ -227,3 +227,22 @@ def test_its_own_frames_that_come_back_change_nothing() -> None:
         story.watchdog.on_frame(frame.cob_id, frame.data, story.t)
     assert story.watchdog.status == before
     assert story.watchdog.dropped_frames == 0
+
+
+# driving ── the computer is suspended for an hour, and no clock of the watchdog shows it ── quick stop in the next turn
+def test_a_computer_that_was_suspended_at_speed_stops_as_soon_as_it_wakes_up() -> None:
+    story = driving()
+    story.watchdog.on_suspend(3600.0)
+    begin = story.t
+    story.run(0.006)
+    assert [frame for _, frame in story.since(0.006, 0x501)] == [QUICK_STOP]
+    assert cause(story) is Cause.LOOP_LATE
+    assert story.t - begin < 0.01
+
+
+def test_a_suspend_without_power_trips_nothing() -> None:
+    story = Story()
+    story.run(0.5)
+    story.watchdog.on_suspend(3600.0)
+    story.run(0.5)
+    assert state(story) is State.WATCHING

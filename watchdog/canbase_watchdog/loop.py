@@ -21,6 +21,8 @@ BUS_DEAD_S = 1.0
 END_S = 1.0
 """How long it goes on stopping the drives after it was asked to end."""
 COLLECT_S = 10.0
+SUSPENDED_S = 0.02
+"""CLOCK_BOOTTIME goes on in a suspend and CLOCK_MONOTONIC does not: so much between two turns is no lateness."""
 
 _log = logging.getLogger("canbase.watchdog")
 
@@ -51,6 +53,7 @@ class Loop:
         self._reporter = Reporter(watchdog)
         self._bus_fd = bus.fileno()
         self._due = self._sent_at = self._collected_at = time.monotonic()
+        self._suspended_s = suspended_s()
         self._acted_at = self._due
         """A timeout that ran out since then, while frames were taken in, is acted on at once."""
 
@@ -90,6 +93,7 @@ class Loop:
         return now
 
     def _act(self, now: float) -> None:
+        self._look_for_a_suspend()
         health = self._bus.health
         self._watchdog.on_bus(health.failed_since, health.errors)
         if self._keeper is not None:
@@ -102,6 +106,11 @@ class Loop:
         self._check_bus(now)
         self._reporter.tick(health, now, self._bus.datagrams_dropped)
         self._collect(now)
+
+    def _look_for_a_suspend(self) -> None:
+        before_s, self._suspended_s = self._suspended_s, suspended_s()
+        if self._suspended_s > before_s + SUSPENDED_S:
+            self._watchdog.on_suspend(self._suspended_s - before_s)
 
     def _keep_record(self) -> None:
         """Hands over what shall be on disk; the writer's defect is this loop's."""
@@ -129,3 +138,8 @@ class Loop:
         if now >= self._collected_at + COLLECT_S:
             self._collected_at = now
             gc.collect()
+
+
+def suspended_s() -> float:
+    """How long this computer was suspended since its start [s]."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME) - time.monotonic()

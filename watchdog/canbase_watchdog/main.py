@@ -7,7 +7,6 @@ import dataclasses
 import logging
 import os
 import signal
-import sys
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -19,7 +18,7 @@ from canbase_watchdog import frames, latch_file, realtime, sole
 from canbase_watchdog.bus_port import BusError, BusPort
 from canbase_watchdog.latch_file import Keeper
 from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
-from canbase_watchdog.log import formatter
+from canbase_watchdog.log import Lines, formatter, never_wait
 from canbase_watchdog.loop import BusDeadError, Loop
 from canbase_watchdog.notify import notify
 from canbase_watchdog.relay import Relay, RelayError
@@ -35,7 +34,8 @@ _log = logging.getLogger("canbase.watchdog")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run until SIGINT or SIGTERM. Exit code 0: as asked; 1: bus, socket or relay failed; 2: bad configuration."""
-    handler = logging.StreamHandler(sys.stderr)
+    never_wait(os.environ)
+    handler = Lines()
     handler.setFormatter(formatter(os.environ, os.fstat(2)))
     logging.basicConfig(level=logging.INFO, handlers=[handler])
     parser = argparse.ArgumentParser(prog="canbase_watchdog", description="the independent watchdog of a canbase robot")

@@ -155,6 +155,10 @@ class Watchdog:
         """How the bus does: since when it has failed [s], infinity when it works, and its errors since the start."""
         self._bus_failed_since, self._bus_errors = failed_since, errors
 
+    def on_suspend(self, duration_s: float) -> None:
+        """The computer was suspended for so long [s]. The monotonic clock, and so every age, knows nothing of it."""
+        self._ticked_at -= duration_s
+
     def tick(self, now: float) -> list[Frame]:
         """Judge and act. Returns the frames to send at once, the stop first. To be called at least every 5 ms."""
         self._view = self._look(now)
