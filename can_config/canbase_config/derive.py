@@ -13,6 +13,8 @@ from canbase_config.stopping import (
     SLOPE_S,
     SLOPE_SHARE,
     coasting_s,
+    hardest_braking_mps2,
+    hardest_stop_mps2,
     jerk_adds_s,
     max_wheel_mps,
 )
@@ -76,7 +78,10 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
     limits, timeouts, watchdog = robot.limits, robot.timeouts, robot.watchdog
     return WatchdogConfig(
         bus_arguments=robot.bus.arguments(),
-        drives=tuple(watched_drive(drive, robot.base.wheel_radius_m) for drive in robot.drives),
+        drives=tuple(
+            watched_drive(drive, robot.base.wheel_radius_m, hardest_braking_mps2(robot, drive))
+            for drive in robot.drives
+        ),
         track_m=robot.base.track_m,
         control_hz=robot.rates.control_hz,
         lease_socket=robot.lease.socket,
@@ -111,6 +116,7 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
         stand_answer_s=watchdog.stand_answer_s,
         stand_proof=watchdog.stand_proof == "let_go",
         jolt_mps2=watchdog.jolt_mps2,
+        hardest_stop_mps2=hardest_stop_mps2(robot),
         slow_wheel_share=watchdog.slow_wheel_share,
         slow_wheel_s=watchdog.slow_wheel_s,
         slowest_ramp_mps2=watchdog.slowest_ramp_mps2 or slowest_ramp_mps2(robot),
@@ -122,8 +128,8 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
     )
 
 
-def watched_drive(drive: Drive, wheel_radius_m: float) -> WatchedDrive:
-    """What the watchdog is told about one axis."""
+def watched_drive(drive: Drive, wheel_radius_m: float, hardest_mps2: float) -> WatchedDrive:
+    """What the watchdog is told about one axis; `hardest_mps2`: stopping.hardest_braking_mps2 of it."""
     return WatchedDrive(
         drive.joint,
         drive.node_id,
@@ -134,6 +140,7 @@ def watched_drive(drive: Drive, wheel_radius_m: float) -> WatchedDrive:
         velocity_scale(drive),
         drive.kind.pdo.synchronous,
         _layout(drive.kind.layout),
+        hardest_mps2,
     )
 
 

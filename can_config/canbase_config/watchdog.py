@@ -42,6 +42,8 @@ class WatchedDrive:
     answers_sync: bool = True
     """Its feedback PDOs are sent once for each SYNC, and not by its own clock."""
     layout: WatchedLayout = WatchedLayout()
+    hardest_braking_mps2: float = 8.0
+    """With power it brakes its wheel no harder."""
 
     @property
     def velocity_mps_per_bit(self) -> float:
@@ -127,6 +129,9 @@ class WatchdogConfig:
     """With zero ordered, a drive that did so must switch its power off within this time after it [s]."""
     stand_proof: bool = True
     """False: drives keep their power at standstill."""
+
+    hardest_stop_mps2: float = 8.0
+    """A wheel without power loses no more speed."""
 
     lease_uid: int | None = None
     """The only user whose leases count, None: the watchdog's own."""

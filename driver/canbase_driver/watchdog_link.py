@@ -54,7 +54,7 @@ DRIVE_CAUSES = (3, 7, 18)
 """What the driver sees at its drives itself, and can tell more about."""
 ANSWERS = {
     1: "reset done",
-    2: "the cause stands",
+    2: "the cause stands, or a wheel is not proven to be at standstill (its log says which)",
     3: "a velocity is ordered",
     4: "not tripped",
 }

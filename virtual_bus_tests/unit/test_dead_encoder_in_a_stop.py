@@ -11,6 +11,7 @@ from __future__ import annotations
 import pytest
 
 from canbase_bench import faults
+from canbase_config.stopping import coasting_s, max_wheel_mps
 from canbase_driver.frame import Frame
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.snapshot import DriverState
@@ -28,6 +29,7 @@ class Course(World):
 
     lost = False
     said_falsely = ""
+    settled_falsely = False
 
     def _send(self, frames: list[Frame]) -> None:
         super()._send([frame for frame in frames if not (self.lost and frame.cob_id in (STATUS, VELOCITY))])
@@ -39,8 +41,10 @@ class Course(World):
 
     def look(self) -> bool:
         """For `run`: notes who says that it stands while the left wheel turns; never True."""
-        if abs(self.truth.v_left_mps) > TURNS_MPS and self.snapshot.standstill:
-            self.said_falsely = self.said_falsely or f"{self.truth.v_left_mps:.2f} m/s"
+        if abs(self.truth.v_left_mps) > TURNS_MPS:
+            if self.snapshot.standstill:
+                self.said_falsely = self.said_falsely or f"{self.truth.v_left_mps:.2f} m/s"
+            self.settled_falsely |= self.dog.status.settled
         return False
 
     def quick_stop(self, until_mps: float) -> None:
@@ -55,6 +59,10 @@ class Course(World):
         self.run(gap_s, self.look)
         self.lost = False
 
+    @property
+    def rolls_s(self) -> float:
+        return coasting_s(self.robot.watchdog.overspeed_factor * max_wheel_mps(self.robot))
+
 
 @pytest.mark.parametrize(("speed", "gap_s"), [(0.55, 0.0), (0.55, 0.05), (0.35, 0.03), (0.35, 0.08), (0.2, 0.0)])
 def test_an_encoder_that_is_lost_in_a_quick_stop_is_no_standstill_with_or_without_lost_frames(
@@ -65,5 +73,23 @@ def test_an_encoder_that_is_lost_in_a_quick_stop_is_no_standstill_with_or_withou
     world.lose(gap_s)
     world.run(1.0, world.look)
     assert not world.said_falsely
+    assert not world.settled_falsely
     assert world.core.state is DriverState.LATCHED
     assert not world.snapshot.standstill
+    assert not world.dog.status.settled
+    world.leases = True
+    world.command = Twist2D.ZERO
+    world.run(0.1)
+    refused = world.reset()
+    assert not refused.done
+    assert "a wheel is not proven to be at standstill" in refused.sentence
+    assert world.dog.status.unproven == "left_wheel"
+
+
+def test_after_a_lost_encoder_in_a_quick_stop_standstill_is_assumed_once_the_wheel_must_have_rolled_out() -> None:
+    world = Course()
+    world.quick_stop(0.35)
+    world.lose(0.03)
+    assert world.run(world.rolls_s + 0.5, lambda: world.dog.status.settled)
+    assert world.dog.status.assumed
+    assert abs(world.truth.v_left_mps) < TURNS_MPS

@@ -130,7 +130,7 @@ def test_both_sides_read_and_write_every_kind_of_drive_alike(name: str) -> None:
     layout = profile.layout
     for axis in range(layout.axes):
         drive = Drive.model_validate(WHEEL | NEEDED.get(name, {}) | {"profile": name, "axis": axis})
-        watched = watched_drive(drive, 0.1)
+        watched = watched_drive(drive, 0.1, 8.0)
         bits = pdo.pack_setpoint(0x0F, -300, layout)
         assert frames.decode_setpoint(bits, watched.layout) == (0x0F, -300)
         status = bytes.fromhex("37 02 21 06 fe ff ff ff")[: 8 if layout.statusword == "packed" else 6]

@@ -115,7 +115,11 @@ def test_with_nothing_else_wrong_it_is_done_two_cycles_after_the_watchdogs_answe
 
 @pytest.mark.parametrize(
     ("answer", "why"),
-    [(CAUSE_STANDS, "the cause stands"), (VELOCITY_ORDERED, "a velocity is ordered"), (9, "answer 9")],
+    [
+        (CAUSE_STANDS, "the cause stands, or a wheel is not proven to be at standstill (its log says which)"),
+        (VELOCITY_ORDERED, "a velocity is ordered"),
+        (9, "answer 9"),
+    ],
 )
 def test_what_the_watchdog_refuses_is_refused(answer: int, why: str) -> None:
     assert sentence(Story().run(TRIPPED, 0.01, answer)) == f"the watchdog refused: {why}"

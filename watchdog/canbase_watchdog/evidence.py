@@ -22,11 +22,9 @@ import math
 from dataclasses import dataclass, replace
 
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
+from canbase_watchdog.counts import life_m
 from canbase_watchdog.envelope import Peak
 
-LIFE_M, LIFE_SHARE, LIFE_COUNTS = 0.001, 0.2, 2
-"""An encoder that is nearer than this to the place of its last sign of life may jitter. Less where watchdog.
-motion_missing_m is: a share of it. More where the encoder is coarse: so many increments."""
 UNSEEN_COUNTS = 4
 """Of a coarse encoder nothing is missed before so many increments were ordered."""
 KEPT_SHARE = 0.875
@@ -64,7 +62,7 @@ class EvidenceWatch:
         self._config = config
         count_m = abs(drive.m_per_count)
         self._unseen_m = max(config.motion_missing_m, UNSEEN_COUNTS * count_m)
-        self._life_m = max(min(LIFE_M, LIFE_SHARE * config.motion_missing_m), LIFE_COUNTS * count_m)
+        self._life_m = life_m(drive, config)
         self._slack_mps = config.motion_tolerance_mps + abs(drive.velocity_mps_per_bit)
         self._period_s = 1.0 / config.control_hz
         self._backward, self._forward = Peak(config.drive_lag_s), Peak(config.drive_lag_s)

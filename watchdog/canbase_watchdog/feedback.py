@@ -13,6 +13,7 @@ import math
 from dataclasses import dataclass
 
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
+from canbase_watchdog.counts import difference
 from canbase_watchdog.envelope import Peak
 from canbase_watchdog.evidence import EvidenceWatch
 
@@ -24,7 +25,6 @@ JUMP_FACTOR = 3.0
 JUMP_CYCLES = 2.0
 OVERSHOOT_S = 0.2
 """So long a wheel that was slower than its setpoint may be faster by as much: its drive's integrator is wound up."""
-_WRAP = 2**32
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,8 +126,7 @@ class FeedbackWatch:
         """
         if self._counts is None or self._counts_before is None or elapsed_s >= self._config.feedback_timeout_s:
             return None, False
-        counts = (self._counts - self._counts_before + _WRAP // 2) % _WRAP - _WRAP // 2
-        step_m = counts * self._m_per_count
+        step_m = difference(self._counts, self._counts_before) * self._m_per_count
         return step_m, abs(step_m) > self._jump_mps * max(elapsed_s, self._jump_s)
 
     def _drift(self, velocity_mps: float, step_m: float | None, jumped: bool, elapsed_s: float) -> float:

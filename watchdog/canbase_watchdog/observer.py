@@ -85,6 +85,7 @@ class _Record:
             self.misses.value,
             self.doubles.value,
             self.push.last,
+            self.stand.unproven,
         )
 
     def rests(self, still_mps: float) -> bool:
@@ -151,6 +152,7 @@ class Observer:
         for record in self._records.values():
             record.feedback.evidence.trust()
             record.push.trust()
+            record.stand.trust()
 
     @property
     def driver_at(self) -> float:
@@ -248,7 +250,7 @@ class Observer:
 
     def _note_velocity(self, record: _Record, bits: int, now: float) -> None:
         record.velocity_mps, record.velocity_at = bits * record.drive.velocity_mps_per_bit, now
-        record.stand.on_velocity(record.velocity_mps, now)
+        record.stand.on_velocity(record.velocity_mps, now, record.state in frames.POWERED)
         self._heard_at[record.drive.node_id] = now
 
     def _on_setpoint(self, record: _Record, cob_id: int, data: bytes, now: float) -> bool:

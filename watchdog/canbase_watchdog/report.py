@@ -14,6 +14,10 @@ COUNTERS_PERIOD_S = 10.0
 ALIVE_PERIOD_S = 0.2
 
 ASSUMED = "standstill is assumed, not measured: a sensor is not to be trusted, and the power is off long enough"
+UNPROVEN = (
+    "%s stopped faster than a wheel can: it met something hard, or its encoder is dead; no reset until it is turned by "
+    "hand, or its power has been off for as long as it may roll"
+)
 
 _log = logging.getLogger("canbase.watchdog")
 
@@ -73,6 +77,8 @@ def _words(name: enum.Enum) -> str:
 def _tell_ladder(old: Status, status: Status) -> None:
     if old.step is not status.step:
         _log.warning("ladder: %s", _words(status.step))
+    if status.unproven and status.unproven != old.unproven:
+        _log.warning(UNPROVEN, status.unproven)
     if status.settled and not old.settled:
         _log.warning(ASSUMED if status.assumed else "all drives stand")
 

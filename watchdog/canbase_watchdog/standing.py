@@ -5,7 +5,9 @@ Rules, with `standstill_mps` s and `motion_tolerance_mps` n:
    velocity is so low the encoder has not gone further than s lasts for in STILL_S.
 2. Still: the encoder has stayed where it is for STILL_S, and the velocity is at most n: noise.
 Anything else is motion: so is a wheel of which position or velocity did not come. The driver has the same rules in code
-of its own. No frames here, no judgement of the sensor: that is evidence.py.
+of its own. No frames here, no judgement of the sensor: that is evidence.py. But a standstill that came on less travel
+than a wheel needs to stop is unproven (stopping_distance.py), until the encoder has shown it, or the wheel has been
+without power for so long that it has rolled out and gets power again.
 """
 
 from __future__ import annotations
@@ -13,6 +15,8 @@ from __future__ import annotations
 import math
 
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
+from canbase_watchdog.counts import difference
+from canbase_watchdog.stopping_distance import StoppingDistance
 
 STILL_S = 0.2
 STEP_FACTOR = 3.0
@@ -22,7 +26,8 @@ GAP_S = 0.5
 are read by SDO take 0.15 s a turn."""
 COUNTS = 2
 """An encoder at an edge counts to and fro."""
-_WRAP = 2**32
+JUMP_FACTOR = 3.0
+"""A step beyond so many times the fastest wheel's is no travel."""
 
 
 class StandWatch:
@@ -41,12 +46,20 @@ class StandWatch:
         self._speed_mps = math.inf
         self.position_at = self._still_since = self._crept_at = -math.inf
         self._velocity_at = self._slow_since = -math.inf
+        self._samples, self._rolls_s = config.feedback_samples, config.coasting_s
+        self._jump_mps, self._period_s = JUMP_FACTOR * config.max_wheel_mps, 1.0 / config.control_hz
+        self._braking_mps2 = drive.hardest_braking_mps2, config.hardest_stop_mps2
+        """With power, and without."""
+        self._stopping = StoppingDistance(config.motion_tolerance_mps, self._grain_m)
+        self._encoder_mps, self._sudden = 0.0, 0
+        self._off_since, self._was_powered = math.inf, False
 
     def on_position(self, counts: int, now: float) -> None:
         """6064h, of a TPDO or of an answer to an SDO, at the monotonic time `now` [s]."""
         before, elapsed_s = self._counts, now - self.position_at
         self._counts, self.position_at = counts, now
-        step_m = 0.0 if before is None else ((counts - before + _WRAP // 2) % _WRAP - _WRAP // 2) * self._m_per_count
+        step_m = 0.0 if before is None else difference(counts, before) * self._m_per_count
+        self._note_travel(step_m, elapsed_s)
         if before is None or elapsed_s >= GAP_S:
             self._steady, self._still_since = before is not None and abs(step_m) <= self._grain_m, now
             self._still_m = self._slow_m = 0.0
@@ -60,11 +73,41 @@ class StandWatch:
                 self._crept_at = now
             self._slow_m, self._slow_since = 0.0, now
 
-    def on_velocity(self, velocity_mps: float, now: float) -> None:
-        """606Ch, of a TPDO or of an answer to an SDO."""
+    def on_velocity(self, velocity_mps: float, now: float, powered: bool = True) -> None:
+        """606Ch, of a TPDO or of an answer to an SDO; `powered`: by the last statusword."""
         if abs(velocity_mps) <= self._slow_mps < self._speed_mps:
             self._slow_m, self._slow_since, self._crept_at = 0.0, now, -math.inf
         self._speed_mps, self._velocity_at = abs(velocity_mps), now
+        self._note_power(powered, now)
+        self._stopping.on_speed(min(self._speed_mps, self._encoder_mps), self._hardest_mps2(powered))
+        self._sudden = self._sudden + 1 if self.stands and self._stopping.lacks else 0
+
+    def trust(self) -> None:
+        """A reset was accepted: everything begins anew."""
+        self._stopping.forget()
+        self._sudden = 0
+
+    @property
+    def unproven(self) -> bool:
+        """It is at standstill by what its sensors report, and nothing brakes a wheel so hard."""
+        return self._sudden >= self._samples
+
+    def _note_travel(self, step_m: float, elapsed_s: float) -> None:
+        elapsed_s = max(elapsed_s, self._period_s)
+        jumped = abs(step_m) > self._jump_mps * elapsed_s
+        self._encoder_mps = 0.0 if jumped else abs(step_m) / elapsed_s
+        self._stopping.on_travel(0.0 if jumped else step_m)
+
+    def _note_power(self, powered: bool, now: float) -> None:
+        if powered and now >= self._off_since + self._rolls_s:
+            self.trust()
+        self._off_since = math.inf if powered else min(self._off_since, now)
+
+    def _hardest_mps2(self, powered: bool) -> float:
+        """What brakes it may have changed since the last sample."""
+        braked, rolled = self._braking_mps2
+        both, self._was_powered = powered and self._was_powered, powered
+        return braked if both else rolled
 
     @property
     def stands(self) -> bool:

@@ -18,7 +18,8 @@ import math
 from dataclasses import dataclass, replace
 
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
-from canbase_watchdog.evidence import KEPT_SHARE, LIFE_COUNTS, LIFE_M, LIFE_SHARE
+from canbase_watchdog.counts import difference, life_m
+from canbase_watchdog.evidence import KEPT_SHARE
 
 NOISE_SHARE = 0.01
 """Of the rated torque: less moves no wheel."""
@@ -26,7 +27,6 @@ STRAIN_SHARE = 0.5
 """Of the rated torque: friction takes less, and from one direction to the other changes it by less."""
 LONGEST_STEP_S = 0.1
 """Time between two samples counts for so long at most: a drive that is silent for longer is another cause."""
-_WRAP = 2**32
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class PushWatch:
     def __init__(self, drive: WatchedDrive, config: WatchdogConfig) -> None:
         self._config = config
         self._m_per_count = drive.m_per_count
-        self._life_m = max(min(LIFE_M, LIFE_SHARE * config.motion_missing_m), LIFE_COUNTS * abs(drive.m_per_count))
+        self._life_m = life_m(drive, config)
         self._counts: int | None = None
         self._counts_before: int | None = None
         self._moved_m = 0.0
@@ -121,7 +121,7 @@ class PushWatch:
         self._counts_before = counts
         if counts is None or before is None:
             return False
-        self._moved_m += ((counts - before + _WRAP // 2) % _WRAP - _WRAP // 2) * self._m_per_count
+        self._moved_m += difference(counts, before) * self._m_per_count
         if abs(self._moved_m) < self._life_m:
             return False
         self._moved_m = 0.0

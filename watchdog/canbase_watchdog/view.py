@@ -49,6 +49,8 @@ class Axis:
     double_answers: float = 0.0
     """SYNCs that were answered twice while it was enabled, less half of the others."""
     push: Push = Push()  # noqa: RUF009 - immutable
+    unproven: bool = False
+    """It stopped as no wheel can, by what its sensors report: standing.py."""
 
     @property
     def enabled(self) -> bool:
@@ -62,8 +64,11 @@ class Axis:
 
     @property
     def trusted(self) -> bool:
-        """False when its sensor was found to show no motion, or a wrong one: no standstill is proven by it."""
-        return self.evidence.trusted
+        """False when its sensor was found to show no motion, or a wrong one: no standstill is proven by it.
+
+        Operation enabled, a wheel that met something hard is told from a dead sensor by evidence.py.
+        """
+        return self.evidence.trusted and (self.enabled or not self.unproven)
 
     @property
     def seen_at(self) -> float:

@@ -58,6 +58,8 @@ class Status:
     """Some drive was not seen to stand: its sensor cannot be trusted, and its power is off for longer than it rolls."""
     armed: bool = False
     """The record on disk says that there is power, and the driver is heard: a deaf watchdog never says so."""
+    unproven: str = ""
+    """While it is tripped: the joint that stopped as no wheel can, by what its sensors report; empty: none did."""
 
 
 class Watchdog:
@@ -104,7 +106,11 @@ class Watchdog:
         assumed = any(stopper.climb.assumed for stopper in self._stoppers)
         hears = self._ticked_at < self._observer.driver_at + self._config.drive_heartbeat_s
         armed = hears and self._ledger.wanted.mark is Mark.LIVE and self._ledger.is_on_disk
-        return Status(self._state, self._verdict, self._step, self._settled, self._reset, assumed, armed)
+        unproven = self._unproven() if self._state is State.TRIPPED else ""
+        return Status(self._state, self._verdict, self._step, self._settled, self._reset, assumed, armed, unproven)
+
+    def _unproven(self) -> str:
+        return next((axis.drive.joint for axis in self._view.axes if axis.unproven and not axis.enabled), "")
 
     @property
     def record(self) -> Entry:
