@@ -80,6 +80,19 @@ endif
 hazards: $(VENV)/ready ## checks docs/hazards.yaml and writes the tables of docs/safety.md
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m hazards
 
+.PHONY: structure
+structure: $(VENV)/ready ## writes what each file is for into docs/architecture.md
+	PYTHONPATH=$(CURDIR)/docs:$(CURDIR)/virtual_bus_tests python -m site_builder
+
+.PHONY: recording
+recording: $(VENV)/ready ## docs/demo.svg: what `canbase demo` prints now
+	PYTHONPATH=$(CURDIR)/docs python -m site_builder.recording
+
+.PHONY: docs
+docs: $(VENV)/ready ## the documentation as a site in build/site, without network; a dead link or a warning fails
+	sphinx-build --quiet --fail-on-warning --keep-going -c docs/site_builder -d build/doctrees docs build/site
+	@echo "open build/site/index.html"
+
 .PHONY: lint
 lint: $(VENV)/ready ## ruff, mypy, import rules, and that colcon sees a ROS 2 package
 	ruff check .
@@ -88,6 +101,10 @@ lint: $(VENV)/ready ## ruff, mypy, import rules, and that colcon sees a ROS 2 pa
 	lint-imports --no-logo
 	@found=$$(colcon --log-base /dev/null list); echo "$$found"; [[ $$found == *"(ros.ament_cmake)" ]]
 
+.PHONY: release-check
+release-check: $(VENV)/ready ## version, changelog entry, sdist and wheel, and the wheel tried in a fresh environment
+	.ci/release-check
+
 .PHONY: vm-test
 vm-test: $(VENV)/ready ## a Linux guest with systemd and CAN: killed, unplugged, frozen; SCENARIOS=driver runs some
 	virtual_bus_tests/vm/build.sh
@@ -95,7 +112,7 @@ vm-test: $(VENV)/ready ## a Linux guest with systemd and CAN: killed, unplugged,
 
 .PHONY: clean
 clean: ## remove what make and the tools created
-	rm -rf $(VENV) build install log dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) build docs/generated install log dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # ---- the environment -------------------------------------------------------------------------------------------------

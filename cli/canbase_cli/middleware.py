@@ -1,5 +1,6 @@
-"""How this process talks DDS: with this computer alone unless somebody asks for more, and over UDP, never over Fast
-DDS's shared memory. To be called before ROS starts.
+"""Settings of DDS for this process, to be made before ROS starts: this computer alone by default, and UDP.
+
+Never over Fast DDS's shared memory.
 
 There a sender waits up to 0.3 s for a receiver that is slow to answer, such as one that is just starting on a loaded
 computer. rclpy holds Python's interpreter lock meanwhile, so one late process would stop the control loop of another,

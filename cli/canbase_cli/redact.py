@@ -1,5 +1,7 @@
-"""Hides secrets in text for a support bundle: values after names like password or token, what is in URLs, headers and
-command lines, tokens of known forms, and private keys. Pure. Why no library: docs/decisions/0037.
+"""Hides secrets in text for a support bundle.
+
+These are values after names like password or token, what is in URLs, headers and command lines, tokens of known forms,
+and private keys. Pure. Why no library: docs/decisions/0037.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The checks of `canbase doctor` without --symptom: is every part there, and does it say that all is well?
+"""The checks of `canbase doctor` without --symptom: whether every part is there and reports that all is well.
 
 Pure: from `Evidence` to rows. `CHECKS` is the order in which they are shown: from what explains most to the rest.
 """

@@ -1,5 +1,6 @@
-"""From a `DriverSnapshot` to /diagnostics: levels, sentences and values, one entry each for the loop, the bus, the
-watchdog and every drive. No node or clock.
+"""From a `DriverSnapshot` to /diagnostics: levels, sentences and values. No node or clock.
+
+One entry each for the loop, the bus, the watchdog and every drive.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
-"""The node safety_filter: ROS and the lease around filter_state.py. Orders of the mux, scans and estop_state in;
-cmd_vel, safety_filter/state and leases out; the service safety_filter/reset. See docs/ros_api.md.
+"""The ROS node safety_filter: topics, its service and the lease around filter_state.py.
+
+Orders of the mux, scans and estop_state in; cmd_vel, safety_filter/state and leases out; the service
+safety_filter/reset. See docs/ros_api.md.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
-"""The node velocity_mux: ROS around mux.py. Sources, locks and motor_driver/status in, velocity_mux/state out. Orders
-reach the safety filter within the process; cmd_vel_mux shows them. It also looks into the ROS graph for publishers that
-should not be there. See docs/ros_api.md.
+"""The ROS node velocity_mux around mux.py: sources, locks and motor_driver/status in, velocity_mux/state out.
+
+Orders reach the safety filter within the process; cmd_vel_mux shows them. It also looks into the ROS graph for
+publishers that should not be there. See docs/ros_api.md.
 """
 
 from __future__ import annotations

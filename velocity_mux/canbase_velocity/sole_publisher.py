@@ -1,5 +1,7 @@
-"""Whether one scanner publishes on a topic. Two with one frame_id take turns: each shows as free what only the other
-sees, and one that dies is hidden by the other. A message does not tell who sent it, so the ROS graph is what is left.
+"""Whether exactly one scanner publishes on a topic of scans.
+
+Two with one frame_id take turns: each shows as free what only the other sees, and one that dies is hidden by the other.
+A message does not tell who sent it, so the ROS graph is what is left.
 
 Rules:
 1. While more than one publisher is in the graph, no scan of the topic counts. A killed driver stays there until

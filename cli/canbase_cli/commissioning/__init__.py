@@ -1,1 +1,1 @@
-"""What the commissioning commands decide and measure, without a bus, a clock or a terminal: `canbase scan`, `sdo`, …"""
+"""What the commissioning commands decide and measure, without a bus, a clock or a terminal."""

@@ -1,0 +1,22 @@
+"""`make structure`: writes the tree of the sources into docs/architecture.md."""
+
+from __future__ import annotations
+
+import sys
+
+from exit_matrix.marked import rewritten
+from site_builder import structure
+from site_builder.modules import ROOT
+
+PAGE = ROOT / "docs" / "architecture.md"
+
+
+def main() -> int:
+    """Writes the section between the marks of `make structure`."""
+    text = PAGE.read_text(encoding="utf-8")
+    PAGE.write_text(rewritten(text, structure.COMMAND, structure.section(ROOT)), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
