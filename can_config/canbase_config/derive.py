@@ -54,13 +54,17 @@ def slope_window_s(robot: Robot) -> float:
     return max(SLOPE_S, 4.0 * speed_noise_mps(robot) / (SLOPE_SHARE * robot.limits.deceleration_mps2))
 
 
-def order_hold_s(robot: Robot) -> float:
-    """How long the driver may follow an order that another one has replaced [s].
+def order_wait_s(robot: Robot) -> float:
+    """When the last order that another one has replaced gets into the driver's setpoints [s].
 
-    Its command timeout, two cycles, the latency on the way to it, and what the jerk limit adds to a change of speed.
+    Its command timeout, two cycles, and the latency on the way to it.
     """
-    waiting_s = robot.timeouts.command_s + CYCLES_TO_SETPOINT / robot.rates.control_hz + robot.watchdog.latency_s
-    return waiting_s + jerk_adds_s(robot.limits)
+    return robot.timeouts.command_s + CYCLES_TO_SETPOINT / robot.rates.control_hz + robot.watchdog.latency_s
+
+
+def order_hold_s(robot: Robot) -> float:
+    """How long the driver may follow an order that another one has replaced [s]: the jerk limit draws it out."""
+    return order_wait_s(robot) + jerk_adds_s(robot.limits)
 
 
 def slowest_ramp_mps2(robot: Robot) -> float:
@@ -100,6 +104,8 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
         angular_deceleration_radps2=limits.angular_deceleration_radps2,
         max_wheel_mps=max_wheel_mps(robot),
         order_hold_s=order_hold_s(robot),
+        order_wait_s=order_wait_s(robot),
+        jerk_mps3=limits.jerk_mps3,
         drive_lag_s=watchdog.drive_lag_s,
         target_tolerance_mps=watchdog.target_tolerance_mps,
         target_tolerance_share=watchdog.target_tolerance_share,

@@ -123,6 +123,10 @@ class WatchdogConfig:
     twist_s: float
     """The measured twist may be outside of the ordered one for so long."""
 
+    order_wait_s: float = 0.5
+    """An order that another one has replaced gets to the driver, and into its setpoints, within this time."""
+    jerk_mps3: float = 100.0
+    """The driver's limit; order_hold_s has what it adds to a change of speed."""
     stand_impulse_s: float = 0.05
     """A drive may push for so long at rated torque, or longer at less, while its wheel shows no motion."""
     stand_answer_s: float = 0.2

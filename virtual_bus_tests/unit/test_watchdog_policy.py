@@ -141,7 +141,7 @@ def test_the_sentence_has_the_values() -> None:
 def test_the_sentences_about_silence_have_the_ages() -> None:
     verdict = decide(of(AT_REST, driver_at=99.5, sync_at=99.25), CONFIG, NOW)
     assert verdict.detail == (
-        "driver's heartbeat is 0.500 s old, its SYNC 0.750 s (allowed 0.300 s) while wheel_1_0 is enabled"
+        "driver's heartbeat is 0.500 s old, its SYNC 0.750 s (allowed 0.300 s) while wheel_1_0 has power"
     )
     verdict = decide(of(replace(AT_REST, fed_at=99.75), nodes=(Node(1, 99.5, 99.99), Node(2))), CONFIG, NOW)
     assert verdict.detail == (

@@ -134,11 +134,12 @@ def _driver_is_silent(view: View, since: float, config: WatchdogConfig, now: flo
 
 def _driver_silent(view: View, config: WatchdogConfig, now: float) -> Verdict:
     for axis in view.axes:
-        if axis.enabled and _driver_is_silent(view, max(axis.enabled_since, view.started_at), config, now):
+        since = max(axis.enabled_since, view.started_at)
+        if (axis.enabled or moving(axis, config)) and _driver_is_silent(view, since, config, now):
             bus = view.bus
             detail = (
                 f"driver's heartbeat is {now - bus.driver_at:.3f} s old, its SYNC {now - bus.sync_at:.3f} s "
-                f"(allowed {config.drive_heartbeat_s:.3f} s) while {axis.drive.joint} is enabled"
+                f"(allowed {config.drive_heartbeat_s:.3f} s) while {axis.drive.joint} has power"
             )
             return Verdict(Cause.DRIVER_SILENT, 0, detail)
     return FINE
@@ -206,6 +207,8 @@ def _target_outside(view: View, config: WatchdogConfig, now: float) -> Verdict:
                 f"the leases allow {low:.3f} to {high:.3f} m/s (tolerance {slack:.3f} m/s)"
             )
             return Verdict(Cause.TARGET_OUTSIDE, axis.drive.node_id, detail)
+    if view.halt:
+        return Verdict(Cause.TARGET_OUTSIDE, 0, view.halt)
     if view.creep:
         return Verdict(Cause.TARGET_OUTSIDE, 0, f"{view.creep}, while the leases allow no motion")
     if view.skew:

@@ -116,6 +116,8 @@ class View:
     """Which wheel is ordered to turn, and for how long, while no lease allows it; empty: none."""
     tick_gap_s: float = 0.0
     bus_failed_since: float = math.inf
+    halt: str = ""
+    """Which wheel's setpoint does not fall while nothing but zero is leased, for two SYNCs in a row; empty: all do."""
 
     @property
     def axes(self) -> tuple[Axis, ...]:

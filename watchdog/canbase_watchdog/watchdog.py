@@ -11,6 +11,7 @@ from canbase_watchdog import frames, policy
 from canbase_watchdog.creep import CreepWatch
 from canbase_watchdog.envelope import Envelope
 from canbase_watchdog.frames import Frame
+from canbase_watchdog.halt import HaltWatch
 from canbase_watchdog.ladder import Step
 from canbase_watchdog.latch import Entry, Ledger, Mark, Past
 from canbase_watchdog.lease import LeaseBook, Refusal
@@ -79,7 +80,7 @@ class Watchdog:
         self._envelope = Envelope(config, now)
         self._pair = PairWatch(config)
         self._twist = TwistWatch(config, now)
-        self._creep = CreepWatch(config)
+        self._creep, self._halt = CreepWatch(config), HaltWatch(config)
         self._leases = LeaseBook(config.lease_timeout_s, config.lease_uid)
         self._started_at = self._ticked_at = now
         self._bus_failed_since, self._bus_errors = math.inf, 0
@@ -212,7 +213,9 @@ class Watchdog:
         leases, failed = self._leases, self._bus_failed_since
         twist = self._twist.look(bus, now)
         creep = self._creep.look(bus, bounds, now)
-        return View(bus, bounds, self._started_at, leases.last, leases.valid_at, skew, twist, creep, gap_s, failed)
+        halt = self._halt.look(bus, leases.last, now)
+        started_at, at = self._started_at, leases.valid_at
+        return View(bus, bounds, started_at, leases.last, at, skew, twist, creep, gap_s, failed, halt)
 
     def _trip(self, verdict: Verdict, now: float) -> None:
         self.trips += 1
