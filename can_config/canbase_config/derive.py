@@ -9,7 +9,6 @@ from canbase_config.profile import Layout
 from canbase_config.robot import Robot
 from canbase_config.stopping import (
     BRAKING_SHARE,
-    CYCLES_TO_SETPOINT,
     SLOPE_S,
     SLOPE_SHARE,
     coasting_s,
@@ -17,10 +16,14 @@ from canbase_config.stopping import (
     hardest_stop_mps2,
     jerk_adds_s,
     max_wheel_mps,
+    order_wait_s,
 )
 from canbase_config.units import motor_rev_per_s
 from canbase_config.watchdog import RelayLine, WatchdogConfig, WatchedDrive, WatchedLayout
 
+NOMINAL_HZ, LEAST_SAMPLES = 100.0, 2
+"""Samples in a row stand for a time, which a slow cycle must not draw out. One bad sample alone may be an outlier."""
+BRAKING_SAMPLES = 3
 SLOWEST_RAMP_SHARE = 0.25
 """Of the limits' acceleration, where watchdog.slowest_ramp_mps2 is not given."""
 
@@ -54,12 +57,9 @@ def slope_window_s(robot: Robot) -> float:
     return max(SLOPE_S, 4.0 * speed_noise_mps(robot) / (SLOPE_SHARE * robot.limits.deceleration_mps2))
 
 
-def order_wait_s(robot: Robot) -> float:
-    """When the last order that another one has replaced gets into the driver's setpoints [s].
-
-    Its command timeout, two cycles, and the latency on the way to it.
-    """
-    return robot.timeouts.command_s + CYCLES_TO_SETPOINT / robot.rates.control_hz + robot.watchdog.latency_s
+def samples(robot: Robot, count: int) -> int:
+    """So many samples in a row take as long as `count` take at NOMINAL_HZ: two at least, and no more than `count`."""
+    return min(count, max(LEAST_SAMPLES, math.ceil(count * robot.rates.control_hz / NOMINAL_HZ)))
 
 
 def order_hold_s(robot: Robot) -> float:
@@ -111,7 +111,9 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
         target_tolerance_share=watchdog.target_tolerance_share,
         motion_tolerance_mps=watchdog.motion_tolerance_mps,
         motion_tolerance_share=watchdog.motion_tolerance_share,
-        feedback_samples=watchdog.feedback_samples,
+        feedback_samples=samples(robot, watchdog.feedback_samples),
+        jolts=watchdog.feedback_samples,
+        braking_samples=samples(robot, BRAKING_SAMPLES),
         overspeed_factor=watchdog.overspeed_factor,
         travel_tolerance_m=watchdog.travel_tolerance_m,
         braking_mps2=BRAKING_SHARE * limits.deceleration_mps2,

@@ -9,7 +9,14 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
 from canbase_config.errors import Loc
-from canbase_config.stopping import longest_quick_stop_s, max_wheel_mps, quick_stop
+from canbase_config.stopping import (
+    CYCLES_TO_SETPOINT,
+    longest_quick_stop_s,
+    max_wheel_mps,
+    quick_stop,
+    stuck_otherwise_s,
+    stuck_s,
+)
 
 if TYPE_CHECKING:
     from canbase_config.drive import Drive
@@ -17,6 +24,13 @@ if TYPE_CHECKING:
 
 DISABLE_VOLTAGE: Final = 2
 """6007h: a drive that loses its masters lets its motor coast (CiA 402-2)."""
+
+LONGEST_STUCK_S: Final = 1.0
+"""So long a driver that hangs may be followed without a word about it."""
+SLOWEST_HZ: Final = 50.0
+"""Below this the peak speed of a wheel without an encoder is noticeably above that of the bench."""
+RUNAWAY_MPS2: Final = 5.0
+"""A wheel of the bench gains so much by the whole force of its motor, when its encoder is dead."""
 
 
 def uncertain_stops(robot: Robot) -> Iterator[tuple[Loc, str]]:
@@ -27,6 +41,10 @@ def uncertain_stops(robot: Robot) -> Iterator[tuple[Loc, str]]:
             yield ("drives", index, "profile"), sentence
     if robot.watchdog.stand_proof == "none":
         yield ("watchdog", "stand_proof"), _unproven_stand(robot)
+    if stuck_otherwise_s(robot) > LONGEST_STUCK_S:
+        yield ("limits", "jerk_mps3"), _stuck(robot)
+    if robot.rates.control_hz < SLOWEST_HZ:
+        yield ("rates", "control_hz"), _slow_cycles(robot)
 
 
 def _unproven_stand(robot: Robot) -> str:
@@ -41,6 +59,27 @@ def _unproven_stand(robot: Robot) -> str:
         "a dead encoder at standstill is detected only where its drive gives half of the rated torque for "
         f"watchdog.motion_missing_s ({robot.watchdog.motion_missing_s:g}); let_go takes the power off for a moment "
         "instead"
+    )
+
+
+def _stuck(robot: Robot) -> str:
+    zero_s, other_s, mps = stuck_s(robot), stuck_otherwise_s(robot), robot.limits.linear_mps
+    return (
+        f"jerk_mps3 {robot.limits.jerk_mps3:g} draws every ramp out, and a driver that hangs and repeats its setpoints "
+        f"looks like one on such a ramp: from {mps:g} m/s it is followed for up to {zero_s:.2f} s "
+        f"({zero_s * mps:.2f} m) after an order of zero, and for up to {other_s:.2f} s ({other_s * mps:.2f} m) after "
+        "another one; a higher jerk_mps3 makes it shorter"
+    )
+
+
+def _slow_cycles(robot: Robot) -> str:
+    hz, missing_s = robot.rates.control_hz, robot.watchdog.motion_missing_s
+    found_s = missing_s + CYCLES_TO_SETPOINT / hz
+    return (
+        f"with {hz:g} cycles a second a wheel whose encoder is dead keeps its power for up to {found_s:.2f} s "
+        f"(watchdog.motion_missing_s {missing_s:g} and two cycles); a motor that gives it {RUNAWAY_MPS2:g} m/s² makes "
+        f"it up to {RUNAWAY_MPS2 * found_s:.1f} m/s faster than ordered meanwhile; {SLOWEST_HZ:g} Hz or more make it "
+        "less"
     )
 
 

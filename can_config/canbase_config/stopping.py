@@ -28,6 +28,8 @@ SLOPE_S: Final = 0.15
 """The shortest time between two speeds that are compared for that: a ramp that grows for 0.4 s is steep enough then."""
 HELD_S: Final = 0.25
 """A threshold holds a wheel for so long at most, with its way back to the ramp of its drive."""
+SEEN_LATE_S: Final = 0.1
+"""A SYNC may wait for the watchdog's process for so long."""
 SETTLE_S: Final = 0.5
 """Until a wheel that has braked is seen to stand."""
 ROLLING_MPS2: Final = 0.1
@@ -109,6 +111,33 @@ def given_up_s(robot: Robot) -> float:
     fastest_mps = wheel.overspeed_factor * max_wheel_mps(robot)
     begin_mps = fastest_mps * (1.0 + wheel.motion_tolerance_share) + wheel.motion_tolerance_mps
     return standstill_s(robot) + lag_s(robot) + begin_mps / (BRAKING_SHARE * robot.limits.deceleration_mps2)
+
+
+def stuck_s(robot: Robot) -> float:
+    """A driver that repeats its setpoints is followed for so long after an order of zero [s].
+
+    Until no other order may be under way, and the jerk-limited ramp has lost the tolerance.
+    """
+    limits, slack_mps = robot.limits, robot.watchdog.target_tolerance_mps
+    soft_s = math.sqrt(2.0 * slack_mps / limits.jerk_mps3)
+    straight_s = slack_mps / limits.deceleration_mps2 + limits.deceleration_mps2 / limits.jerk_mps3 / 2.0
+    falls_s = soft_s if soft_s <= limits.deceleration_mps2 / limits.jerk_mps3 else straight_s
+    return order_wait_s(robot) + SEEN_LATE_S + falls_s
+
+
+def stuck_otherwise_s(robot: Robot) -> float:
+    """The same after an order that is lower and not zero [s]: until the range of what may be ordered has fallen."""
+    limits, watchdog = robot.limits, robot.watchdog
+    slack_mps = watchdog.target_tolerance_mps + watchdog.target_tolerance_share * limits.linear_mps
+    return order_wait_s(robot) + jerk_adds_s(limits) + slack_mps / limits.deceleration_mps2
+
+
+def order_wait_s(robot: Robot) -> float:
+    """When the last order that another one has replaced gets into the driver's setpoints [s].
+
+    Its command timeout, two cycles, and the latency on the way to it.
+    """
+    return robot.timeouts.command_s + CYCLES_TO_SETPOINT / robot.rates.control_hz + robot.watchdog.latency_s
 
 
 def jerk_adds_s(limits: Limits) -> float:

@@ -39,7 +39,12 @@ class Watchdog(Section):
         float, Field(ge=0.0, le=0.5, description="the same as a share of the allowed speed, added to it")
     ] = 0.1
     feedback_samples: Annotated[
-        int, Field(ge=1, le=20, description="so many velocity samples in a row must be bad before they stop the base")
+        int,
+        Field(
+            ge=1,
+            le=20,
+            description="so many velocity samples in a row must be bad before they stop the base; fewer below 100 Hz",
+        ),
     ] = 5
     overspeed_factor: Annotated[
         float, Field(ge=1.05, le=2.0, description="a wheel may be so many times as fast as the limits allow")

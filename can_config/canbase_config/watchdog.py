@@ -127,6 +127,10 @@ class WatchdogConfig:
     """An order that another one has replaced gets to the driver, and into its setpoints, within this time."""
     jerk_mps3: float = 100.0
     """The driver's limit; order_hold_s has what it adds to a change of speed."""
+    jolts: int = 5
+    """So many changes of its velocity that no wheel can do tell that a sensor lies."""
+    braking_samples: int = 3
+    """So many samples in a row of a wheel that brakes too little count."""
     stand_impulse_s: float = 0.05
     """A drive may push for so long at rated torque, or longer at less, while its wheel shows no motion."""
     stand_answer_s: float = 0.2

@@ -2,7 +2,8 @@
 
 A wheel may keep its speed for the lag of driver and drive, and must then be on its way to zero in twice the time of
 its ramp (half is room for double payload, slopes, slow current limits). It fails in the third cycle in a row above
-that; a wheel that stands is never looked at, so that the end of this way is the deadline of the stop.
+that, in the second one where cycles are slow; a wheel that stands is never looked at, so that the end of this way is
+the deadline of the stop.
 
 In a quick stop the fastest wheel with power must also be slower than it was one window of time ago: by a quarter of the
 deceleration, as soon as that can be told from noise, at any speed (docs/decisions/0023). A wheel without power brakes
@@ -14,11 +15,10 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from canbase_config.derive import slope_window_s, speed_noise_mps
+from canbase_config.derive import BRAKING_SAMPLES, samples, slope_window_s, speed_noise_mps
 from canbase_config.robot import Robot
 from canbase_config.stopping import BRAKING_SHARE, HELD_S, SLOPE_SHARE, lag_s, ramp
 
-CYCLES = 3
 LASTS_S = 0.08
 """So long it must not be slower: a wheel that was held may swing beyond the ramp of its drive."""
 
@@ -61,7 +61,7 @@ class Braking:
         self._since = -math.inf
         self._from_mps = self._slope_mps2 = 0.0
         self._against = 0
-        self._slowing = Slowing(robot)
+        self._slowing, self._cycles = Slowing(robot), samples(robot, BRAKING_SAMPLES)
 
     def begin(self, speed_mps: float, turn_radps: float, now: float, quick: bool) -> None:
         """A ramp, or a quick stop of the drives, from this wheel speed and turn of the base, begins now."""
@@ -83,7 +83,7 @@ class Braking:
     def fails(self, speed_mps: float, now: float) -> bool:
         """Once a cycle, while some wheel does not stand: its speed is too high now and was in the last cycles."""
         self._against = self._against + 1 if abs(speed_mps) > self.allowed_mps(now) else 0
-        return self._against >= CYCLES
+        return self._against >= self._cycles
 
     def keeps_speed(self, speed_mps: float, now: float) -> bool:
         """Once a cycle of a quick stop, with the speed of the fastest wheel with power: it has not lost any."""

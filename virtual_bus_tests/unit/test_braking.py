@@ -44,6 +44,14 @@ def test_it_fails_in_the_third_cycle_in_a_row() -> None:
     assert [braking.fails(speed, 100.01 + i / 100) for i, speed in enumerate(speeds)] == [False] * 5 + [True]
 
 
+def test_at_20_hz_it_fails_in_the_second_cycle() -> None:
+    slow = load_robot(sample("bench")).robot
+    slow = slow.model_copy(update={"rates": slow.rates.model_copy(update={"control_hz": 20.0})})
+    braking = Braking(slow)
+    braking.begin(0.5, 0.0, 100.0, quick=True)
+    assert [braking.fails(0.7, 100.0 + i / 20) for i in range(2)] == [False, True]
+
+
 def test_a_new_step_counts_anew() -> None:
     braking = begun(0.5, quick=True)
     braking.fails(0.7, 100.01)
@@ -72,3 +80,25 @@ def test_a_base_that_follows_the_ramp_with_the_lag_never_fails(linear: float, an
         assert not braking.fails(late.pop(0), now)
         if motion.twist == Twist2D.ZERO and max(late) == 0.0:
             break
+
+
+@pytest.mark.parametrize(("mps", "found"), [(0.05, False), (0.06, True), (0.5, True), (3.0, True)])
+def test_a_wheel_that_keeps_its_speed_is_found_at_any_speed_in_the_same_time(mps: float, found: bool) -> None:
+    """0.12 s of lag, 0.15 s of window, 0.08 s in which it stays so."""
+    braking = begun(mps, quick=True)
+    told = [braking.keeps_speed(mps, 100.0 + i / 100) for i in range(100)]
+    assert any(told) == found
+    if found:
+        assert told.index(True) == pytest.approx(35, abs=2)
+
+
+def test_a_wheel_that_brakes_with_half_of_it_never_keeps_its_speed() -> None:
+    braking = begun(3.0, quick=True)
+    speeds = [3.0 - 0.5 * max(0.0, i / 100 - 0.12) for i in range(600)]
+    assert not any(braking.keeps_speed(speed, 100.0 + i / 100) for i, speed in enumerate(speeds))
+
+
+def test_a_wheel_that_a_threshold_held_comes_back_to_its_ramp() -> None:
+    braking = begun(0.8, quick=True)
+    speeds = [0.1 if 30 <= i < 50 else 0.8 - max(0.0, i / 100 - 0.12) for i in range(80)]
+    assert not any(braking.keeps_speed(speed, 100.0 + i / 100) for i, speed in enumerate(speeds))

@@ -106,3 +106,25 @@ def test_a_robot_that_wants_no_proof_of_a_stand_is_told_what_is_not_found(profil
     sentences = dict(uncertain_stops(robot.model_copy(update={"watchdog": watchdog})))
     assert told in sentences["watchdog", "stand_proof"]
     assert ("watchdog", "stand_proof") not in dict(uncertain_stops(robot))
+
+
+@pytest.mark.parametrize(
+    ("jerk", "told"), [(0.1, "up to 1.14 s (0.92 m) after an order of zero"), (0.5, "0.72 s"), (5.0, "")]
+)
+def test_a_low_jerk_says_how_long_a_driver_that_hangs_is_followed(jerk: float, told: str) -> None:
+    robot = load_robot(sample("bench")).robot
+    soft = robot.model_copy(update={"limits": robot.limits.model_copy(update={"jerk_mps3": jerk})})
+    sentences = dict(uncertain_stops(soft))
+    assert (("limits", "jerk_mps3") in sentences) == bool(told)
+    assert told in sentences.get(("limits", "jerk_mps3"), "")
+
+
+@pytest.mark.parametrize(
+    ("hz", "told"), [(20.0, "up to 0.35 s"), (25.0, "up to 1.7 m/s faster"), (49.0, "0.29 s"), (50.0, ""), (100.0, "")]
+)
+def test_slow_cycles_say_how_fast_a_wheel_without_an_encoder_gets(hz: float, told: str) -> None:
+    robot = load_robot(sample("bench")).robot
+    slow = robot.model_copy(update={"rates": robot.rates.model_copy(update={"control_hz": hz})})
+    sentences = dict(uncertain_stops(slow))
+    assert (("rates", "control_hz") in sentences) == bool(told)
+    assert told in sentences.get(("rates", "control_hz"), "")

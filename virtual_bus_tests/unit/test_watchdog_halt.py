@@ -19,7 +19,7 @@ from canbase_driver.limits import Limiter, MotionState
 from canbase_watchdog.halt import RECEIVED_S, HaltWatch
 from canbase_watchdog.lease import Lease
 from canbase_watchdog.policy import Cause, decide
-from canbase_watchdog.view import Axis, BusView
+from canbase_watchdog.view import BusView
 from canbase_watchdog.watchdog import State
 from unit.chain_world import World, bench_robot
 from unit.test_watchdog_envelope_limiter import some_limits
@@ -37,7 +37,9 @@ def bus(speeds: tuple[float, float], at: float, came: bool = True, enabled: bool
     return BusView(tuple(replace(axis, state=state) for axis in axes), (), sync_at=at)
 
 
-def found_s(wheels: Callable[[float], tuple[float, float]], jerk: float, longest_s: float = 20.0, **changes: object) -> float:
+def found_s(
+    wheels: Callable[[float], tuple[float, float]], jerk: float, longest_s: float = 20.0, **changes: object
+) -> float:
     """Seconds since zero was leased until it is found that the setpoints, by time since then, do not fall."""
     watch = HaltWatch(replace(config(), order_wait_s=WAIT_S, jerk_mps3=jerk, **changes))  # type: ignore[arg-type]
     for i in range(round(longest_s / CYCLE_S)):

@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import pytest
 
-from canbase_watchdog.ladder import RUNGS, SAMPLES, Braking, Climb, Look, Step, advance, first
+from canbase_watchdog.ladder import RUNGS, Braking, Climb, Look, Step, advance, first
 
-RULES = Braking(lag_s=0.1, least_mps2=0.5, tolerance_mps=0.05, tolerance_share=0.1, coasting_s=2.0)
+RULES = Braking(lag_s=0.1, least_mps2=0.5, tolerance_mps=0.05, tolerance_share=0.1, coasting_s=2.0, samples=3)
 BRAKING = Look(
     enabled=False, powered=True, standing=False, speed_mps=0.4, begin_mps=0.5, seen_at=10.0, present=True, trusted=True
 )
@@ -39,7 +39,6 @@ def test_the_ladder_has_four_rungs_and_each_but_the_last_has_its_deadline() -> N
     assert list(RUNGS) == list(Step)[1:]
     assert [step for step, rung in RUNGS.items() if rung.step is not step] == []
     assert [rung.obey_s for rung in RUNGS.values()] == [0.15, 0.15, 0.1, math.inf]
-    assert SAMPLES == 3
 
 
 def test_it_begins_with_the_quick_stop() -> None:
@@ -110,6 +109,20 @@ def test_a_wheel_that_does_not_brake_has_its_power_taken_at_once(
 ) -> None:
     climb = fed(replace(FOOT), BRAKING, *samples)
     assert (climb.step, climb.runaway) == (step, step is Step.DISABLE_VOLTAGE)
+
+
+def test_at_20_hz_two_samples_count() -> None:
+    two = replace(RULES, samples=2)
+    look = replace(BRAKING, speed_mps=0.601)
+    climb = advance(FOOT, replace(look, seen_at=9.91), two, 9.91)
+    assert climb.step is Step.QUICK_STOP
+    assert advance(climb, replace(look, seen_at=9.96), two, 9.96).step is Step.DISABLE_VOLTAGE
+
+
+def test_a_wheel_that_keeps_its_speed_within_the_bound_has_its_power_taken_too() -> None:
+    climb = go(FOOT, replace(BRAKING, unslowed=True), 10.0)
+    assert (climb.step, climb.runaway) == (Step.DISABLE_VOLTAGE, True)
+    assert not go(FOOT, replace(STANDING, unslowed=True), 10.0).runaway
 
 
 def test_the_limit_itself_is_allowed() -> None:

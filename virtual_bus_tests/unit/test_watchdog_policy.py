@@ -217,6 +217,17 @@ def test_an_enabled_drive_beats(age_s: float, trips: int) -> None:
     assert cause(of(replace(AT_REST, enabled_since=99.701), nodes=nodes)) == 0
 
 
+@pytest.mark.parametrize(("standing", "trips"), [(False, Cause.DRIVER_SILENT), (True, Cause.NONE)])
+@pytest.mark.parametrize("state", [DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE])
+def test_a_drive_that_brakes_by_itself_needs_the_driver_as_long_as_its_wheel_turns(
+    state: DriveState, standing: bool, trips: Cause
+) -> None:
+    """The driver dies in its own quick stop: nobody else would see whether the wheel brakes."""
+    axis = replace(LEFT, state=state, standing=standing, target_mps=0.0)
+    assert cause(of(axis, driver_at=NOW - 0.301)) == trips
+    assert cause(of(axis, driver_at=NOW - 0.299)) == Cause.NONE
+
+
 def test_a_silent_drive_is_named() -> None:
     view = of(LEFT, replace(RIGHT, fed_at=99.0))
     assert decide(view, CONFIG, NOW).node_id == 2

@@ -15,10 +15,11 @@ from canbase_bench.faults import KINDS
 from canbase_config.robot import Robot
 from canbase_config.stopping import ramp
 from canbase_driver.kinematics import Twist2D
-from canbase_watchdog.ladder import SAMPLES, Braking, Step
+from canbase_watchdog.ladder import Braking, Step
 from canbase_watchdog.watchdog import State
 from unit.chain_world import STEP_S, World
 
+SAMPLES = 3
 SEEN_S = 0.02
 """A sample waits for its SYNC, and the order to take the power for the next tick."""
 

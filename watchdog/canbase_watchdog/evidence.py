@@ -114,7 +114,7 @@ class EvidenceWatch:
             halted=halted,
             jolts=jolts,
             behind_s=self._behind_s(velocity_mps, elapsed_s) if enabled else 0.0,
-            trusted=self.last.trusted and not unseen and halted < samples and jolts < samples,
+            trusted=self.last.trusted and not unseen and halted < samples and jolts < self._config.jolts,
         )
 
     def _is_visible(self, ordered_mps: float) -> bool:

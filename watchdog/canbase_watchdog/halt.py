@@ -1,9 +1,9 @@
 """Whether the driver's setpoints fall when nothing but zero is leased: a living driver is on its ramp then.
 
 The envelope (envelope.py) has to allow every order of the recent past, each for as long as the jerk limit may draw out
-its change: 5 s and more with a low jerk_mps3. Once zero alone was leased for `order_wait_s` there is one order left, and
-the setpoints of that moment are known. From there all wheels go to zero together: along the S-curve that a driver makes
-which has only begun to brake, RECEIVED_S later at most. One that had begun before is below it.
+its change: 5 s and more with a low jerk_mps3. Once zero alone was leased for `order_wait_s` there is one order left,
+and the setpoints of that moment are known. From there all wheels go to zero together: along the S-curve that a driver
+makes which has only begun to brake, RECEIVED_S later at most. One that had begun before is below it.
 
 Pure; written apart from the driver's limits.py on purpose.
 """

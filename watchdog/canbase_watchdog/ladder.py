@@ -38,8 +38,6 @@ RUNGS = {
     Step.DISABLE_VOLTAGE: Rung(Step.DISABLE_VOLTAGE, obey_s=0.1),
     Step.HEARTBEAT_WITHHELD: Rung(Step.HEARTBEAT_WITHHELD, obey_s=math.inf),
 }
-SAMPLES = 3
-"""So many velocity samples in a row must show that a wheel does not brake: one may be an outlier."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +52,8 @@ class Braking:
     tolerance_share: float
     coasting_s: float
     """A wheel without power has rolled out after this, whatever its sensor reports."""
+    samples: int
+    """So many in a row must show that it does not brake: one may be an outlier."""
 
     @classmethod
     def of(cls, config: WatchdogConfig) -> Braking:
@@ -64,6 +64,7 @@ class Braking:
             config.motion_tolerance_mps,
             config.motion_tolerance_share,
             config.coasting_s,
+            config.braking_samples,
         )
 
     def allowed_mps(self, from_mps: float, elapsed_s: float) -> float:
@@ -125,8 +126,8 @@ def advance(before: Climb, look: Look, braking: Braking, now: float) -> Climb:
        power must be off as well, for as long as a wheel may roll: then a stand is assumed;
     4. never heard of, and not told to have power: stays, there is nothing to climb for;
     5. a sensor that cannot be trusted: power off at once, for quick stop closes its loop on that sensor;
-    6. powered and faster than braking allows, SAMPLES in a row, or not slower than a moment ago: power off at once, or
-       the last rung; the relay opens;
+    6. powered and faster than braking allows, `samples` in a row, or not slower than a moment ago: power off at once,
+       or the last rung; the relay opens;
     7. what the rung orders is not done, or not seen, within `obey_s`: next rung;
     8. stays. A wheel that rolls without power is waited for: no rung can brake it.
     """
@@ -142,7 +143,7 @@ def advance(before: Climb, look: Look, braking: Braking, now: float) -> Climb:
         return climb
     if not look.trusted and climb.step < Step.DISABLE_VOLTAGE:
         return _to(Step.DISABLE_VOLTAGE, climb, look, now)
-    if climb.against >= SAMPLES or look.unslowed:
+    if climb.against >= braking.samples or look.unslowed:
         return replace(_to(max(climb.step + 1, Step.DISABLE_VOLTAGE), climb, look, now), runaway=True)
     return _up(climb, look, now) if _disobeys(climb, look, now) else climb
 

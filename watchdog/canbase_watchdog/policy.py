@@ -253,7 +253,7 @@ def _implausible(axis: Axis, config: WatchdogConfig) -> str:
             f"reports standstill at once, and no motion since, with {evidence.setpoint_mps:.3f} m/s ordered: "
             f"no wheel stops so fast (watchdog.jolt_mps2 {config.jolt_mps2:g} m/s²)"
         )
-    if evidence.jolts >= samples:
+    if evidence.jolts >= config.jolts:
         return (
             f"reports {axis.velocity_mps:.3f} m/s, and {evidence.jolts} changes of speed that no wheel can do "
             f"(watchdog.jolt_mps2 {config.jolt_mps2:g} m/s²)"
