@@ -12,6 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from canbase_config import bus_load
+from canbase_config.commissioned import uncommissioned
 from canbase_config.errors import ConfigError, Loc, Problem
 from canbase_config.explain import explain
 from canbase_config.robot import Robot
@@ -71,6 +72,10 @@ def _warnings(robot: Robot, file: YamlFile) -> Iterator[Problem]:
         at = next((loc for loc in (("bus", "bitrate"), ("rates", "control_hz")) if loc in file.lines), ("bus",))
         place = file.place(at)
         yield Problem(place.file, place.line, place.key, busy)
+    if why := uncommissioned(robot):
+        place = file.place(("commissioned",) if ("commissioned",) in file.lines else ("drives",))
+        slow = f"until canbase commission it goes {robot.safety.uncommissioned_mps:g} m/s (safety.uncommissioned_mps)"
+        yield Problem(place.file, place.line, place.key, f"{why}: {slow}")
     for loc, sentence in uncertain_stops(robot):
         place = file.place(loc if loc in file.lines else loc[:-1])
         yield Problem(place.file, place.line, place.key, sentence)

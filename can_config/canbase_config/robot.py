@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from canbase_config import bus_load, stopping
 from canbase_config.action import Action
 from canbase_config.black_box import BlackBox
+from canbase_config.commissioned import Commissioned
 from canbase_config.drive import Drive
 from canbase_config.mux import Mux
 from canbase_config.safety import Safety
@@ -178,6 +179,7 @@ class Robot(Section):
     watchdog: Watchdog = Watchdog()
     action: Action = Action()
     black_box: BlackBox = BlackBox()
+    commissioned: Commissioned = Commissioned()
 
     @model_validator(mode="after")
     def _drives_fit_together(self) -> Robot:

@@ -107,6 +107,9 @@ class Safety(Section):
         float,
         Field(ge=0.0, le=5.0, description="at most, where no scanner looks or says something; 0: not at all [m/s]"),
     ] = 0.15
+    uncommissioned_mps: Annotated[
+        float, Field(ge=0.02, le=5.0, description="at most, until canbase commission has done all its steps [m/s]")
+    ] = 0.3
     usable_share: Annotated[
         float,
         Field(ge=0.5, le=1.0, description="of the places ahead that scanners face: share with usable readings"),

@@ -76,6 +76,21 @@ def good_file(loaded: Loaded) -> Check:
     return ok("robot.yaml", f"{loaded.path} is good: {robot.name}, {len(robot.drives)} drives")
 
 
+def commissioning(loaded: Loaded) -> list[Check]:
+    """Whether a person has looked at the wheels and measured the floor; nothing where the bus has no wire."""
+    from canbase_config.commissioned import uncommissioned
+
+    if loaded.robot.bus.is_virtual:
+        return []
+    why = uncommissioned(loaded.robot)
+    if not why:
+        return [ok("commissioning", "done, and robot.yaml has not changed since")]
+    slow = f"no faster than safety.uncommissioned_mps, {loaded.robot.safety.uncommissioned_mps:g} m/s"
+    return [
+        warn("commissioning", f"{why}; {slow}", "canbase commission: wrong signs and scales show on the floor alone")
+    ]
+
+
 def first_failure(checks: Sequence[Check]) -> Check | None:
     """The first row that failed; None when none did."""
     return next((check for check in checks if check.verdict is Verdict.FAIL), None)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from canbase_cli.checks import Check, exit_code, first_failure, good_file, table
+from canbase_cli.checks import Check, commissioning, exit_code, first_failure, good_file, table
 from canbase_cli.options import ConfigOption, NamespaceOption, load_config, ros_arguments, ros_needed
 from canbase_cli.symptoms import SYMPTOMS
 
@@ -77,13 +77,14 @@ def _walk(symptom: str, loaded: Loaded, arguments: list[str], seconds: float) ->
 def _all(loaded: Loaded, arguments: list[str], seconds: float, *, with_bus: bool) -> list[Check]:
     """Without any part of canbase on the bus, its parts are not looked for: the drives are there alone."""
     if not with_bus:
-        return _parts(loaded, arguments, seconds)
+        rows = _parts(loaded, arguments, seconds)
+        return [rows[0], *commissioning(loaded), *rows[1:]]
     from canbase_cli.bus_checks import bus_checks
     from canbase_cli.onbus.doctor import look
 
     seen = look(loaded.robot)
     rows = _parts(loaded, arguments, seconds) if seen.canbase_runs or seen.problem else [good_file(loaded)]
-    return [rows[0], *bus_checks(seen), *rows[1:]]
+    return [rows[0], *commissioning(loaded), *bus_checks(seen), *rows[1:]]
 
 
 def _parts(loaded: Loaded, arguments: list[str], seconds: float) -> list[Check]:

@@ -5,8 +5,8 @@ Rules, in the order of their precedence:
    estop.py.
 2. Command silent, or with NaN or infinity: stop.
 3. A required scan silent, frozen, not usable, or of a scanner whose place is unknown: stop.
-4. Faster than the limits, the ceiling, a limit zone with something in it, or the speed for where no scanner looks or
-   says something: slower, on the same curve.
+4. Faster than the limits, the ceiling, the speed of a robot that is not commissioned, a limit zone with something in
+   it, or the speed for where no scanner looks or says something: slower, on the same curve.
 5. Growing faster than the ceiling: slower. What falls is never held up.
 6. Obstacle where the footprint will be: slower, on the same curve, so that the base can stop before the stop distance;
    there it stops. Driving away from an obstacle is free. See obstacle.py.
@@ -23,6 +23,7 @@ import sys
 from dataclasses import dataclass, replace
 from typing import Final
 
+from canbase_config.commissioned import uncommissioned
 from canbase_config.robot import Limits, Robot
 from canbase_config.safety import Ceiling, Safety
 from canbase_velocity import obstacle
@@ -53,12 +54,15 @@ class FilterConfig:
     safety: Safety
     standstill_mps: float
     geometry: Geometry
+    uncommissioned: str = ""
+    """Why the robot counts as not commissioned; empty: it is."""
 
     @staticmethod
     def of(robot: Robot) -> FilterConfig:
         """The filter's part of `robot`."""
         geometry = Geometry.of(robot.limits, robot.safety, robot.rates.command_hz)
-        return FilterConfig(robot.limits, robot.safety, robot.base.standstill_mps, geometry)
+        standstill_mps, why = robot.base.standstill_mps, uncommissioned(robot)
+        return FilterConfig(robot.limits, robot.safety, standstill_mps, geometry, why)
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,6 +197,8 @@ def _slower(inputs: Inputs, config: FilterConfig) -> list[Finding]:
     found = [
         _limit(command, obstacle.speed_factor(command, linear_mps, angular_radps), Cause.SPEED, "a slower command")
     ]
+    if config.uncommissioned:
+        found.append(_corners(command, config.safety.uncommissioned_mps, config, Cause.SPEED, *_commission(config)))
     for zone in config.safety.limit_zones:
         factor = obstacle.zone_factor(command, zone, inputs.sight)
         found.append(_limit(command, factor, Cause.ZONE, "nothing in the limit zone"))
@@ -237,8 +243,17 @@ def _blind(command: Twist, cause: Cause, why: str, clears_on: str, config: Filte
     blind_mps = config.safety.blind_mps
     if blind_mps < config.standstill_mps:
         return stop(cause, f"{why}, safety.blind_mps is {blind_mps:g}", clears_on)
+    return _corners(command, blind_mps, config, cause, why, clears_on)
+
+
+def _commission(config: FilterConfig) -> tuple[str, str]:
+    return f"{config.uncommissioned}, see safety.uncommissioned_mps", "canbase commission"
+
+
+def _corners(command: Twist, mps: float, config: FilterConfig, cause: Cause, why: str, clears_on: str) -> Finding:
+    """No corner of the base faster than `mps`."""
     fastest = max(fastest_mps(config.geometry.box, command), sys.float_info.min)  # rounding makes 0 of the smallest
-    limited = _limit(command, min(1.0, blind_mps / fastest), cause, clears_on)
+    limited = _limit(command, min(1.0, mps / fastest), cause, clears_on)
     return limited if limited is PASSED else replace(limited, detail=f"{why}: {limited.detail}")
 
 

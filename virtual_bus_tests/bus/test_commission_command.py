@@ -11,6 +11,7 @@ import can
 import pytest
 
 from bus.tool import ENVIRONMENT, argv, canbase, drives, free_port, write_robot
+from canbase_config.commissioned import mark
 from canbase_config.load import load_robot
 
 pytestmark = [pytest.mark.bus, pytest.mark.timeout(180)]
@@ -87,6 +88,9 @@ def test_a_wrong_direction_is_corrected_and_the_self_stop_proven(tmp_path: Path)
     commissioned = load_robot(config).robot
     assert commissioned.drives[1].direction == -1
     assert [drive.identity.serial for drive in commissioned.drives] == [1, 2]
+    marks = commissioned.commissioned
+    assert (marks.directions, marks.proof) == (mark(commissioned, "directions"), mark(commissioned, "proof"))
+    assert (marks.scale, marks.floor) == (None, None)
     assert {drive.identity.product_code for drive in commissioned.drives} == {0xCB402}
     assert "# mounted mirrored" in config.read_text(encoding="utf-8")
     assert load_robot(tmp_path / "robot.yaml.before").robot.drives[1].direction == 1

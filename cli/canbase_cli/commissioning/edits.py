@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from ruamel.yaml.scalarint import HexCapsInt
 
 from canbase_cli.commissioning.floor import FloorFound
 from canbase_cli.commissioning.wheels import WheelFound
+from canbase_config.commissioned import Step, mark
 from canbase_config.errors import Loc, key_path
 from canbase_config.robot import Robot
 from canbase_driver.boot import NUMBERS, BootReport
@@ -75,6 +76,13 @@ def identity_edits(robot: Robot, boots: Mapping[int, BootReport]) -> list[Edit]:
             if after is not None:
                 edits.append(Edit(("drives", i, "identity", name), before, HexCapsInt(after)))
     return [edit for edit in edits if _differs(edit)]
+
+
+def commissioned_edits(robot: Robot, edits: Sequence[Edit], done: Collection[Step]) -> list[Edit]:
+    """The marks of the steps that were done, with `edits` in robot.yaml."""
+    after = with_edits(robot, edits)
+    marks = [Edit(("commissioned", step), getattr(robot.commissioned, step), mark(after, step)) for step in done]
+    return [edit for edit in marks if _differs(edit)]
 
 
 def with_edits(robot: Robot, edits: Sequence[Edit]) -> Robot:

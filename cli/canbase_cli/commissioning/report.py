@@ -8,6 +8,7 @@ from canbase_cli.commissioning.edits import Edit
 from canbase_cli.commissioning.floor import FloorFound
 from canbase_cli.commissioning.proof import HEARTBEAT, SILENCE, Outcome
 from canbase_cli.commissioning.wheels import WheelFound
+from canbase_config.commissioned import Step
 from canbase_config.robot import Robot
 from canbase_driver.boot import BootReport
 
@@ -21,6 +22,8 @@ class Results:
     outcomes: tuple[Outcome, ...] = ()
     floor: FloorFound | None = None
     edits: list[Edit] = field(default_factory=list)
+    done: set[Step] = field(default_factory=set)
+    """Steps that have come to their end, with what robot.yaml says by `edits`."""
     ended_by: str = ""
     """Why it did not come to its end; empty: it did."""
     dry_run: bool = False

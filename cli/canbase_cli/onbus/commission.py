@@ -10,7 +10,15 @@ from pathlib import Path
 import typer
 from pydantic import ValidationError
 
-from canbase_cli.commissioning.edits import Edit, edited, floor_edits, identity_edits, wheel_edits, with_edits
+from canbase_cli.commissioning.edits import (
+    Edit,
+    commissioned_edits,
+    edited,
+    floor_edits,
+    identity_edits,
+    wheel_edits,
+    with_edits,
+)
 from canbase_cli.commissioning.floor import FloorFound, measure_floor
 from canbase_cli.commissioning.guide import Ask, CommissionError, Script, Tell
 from canbase_cli.commissioning.judge import JudgeError
@@ -62,6 +70,7 @@ def run(config: Path, plan: Plan, answers: Path | None, *, yes: bool, dry_run: b
             results.ended_by = str(error)
         except Stopped as stopped:
             results.ended_by = str(stopped)
+    results.edits += commissioned_edits(robot, results.edits, sorted(results.done))
     _write_report(robot, plan.report, config, results)
     _change(config, results.edits, dry_run=dry_run)
     person.tell(Tell(verdict(results), is_loud=not results.proven))
@@ -74,10 +83,12 @@ def run(config: Path, plan: Plan, answers: Path | None, *, yes: bool, dry_run: b
 def _go(line: BusLine, robot: Robot, plan: Plan, person: Person, results: Results) -> None:
     if plan.steps & {"directions", "scale"}:
         robot = _measure_wheels(line, robot, plan, person, results)
+        results.done |= {step for step in ("directions", "scale") if step in plan.steps}
     if "proof" in plan.steps:
         results.outcomes = run_script(line, robot, lambda rig: _proof(rig, plan, results), person)
         for outcome in results.outcomes:
             person.tell(Tell(str(outcome), is_loud=not outcome.stopped))
+        results.done |= {"proof"} if results.proven else set()
     if "floor" not in plan.steps:
         return
     if "proof" in plan.steps and not results.proven:
@@ -85,6 +96,7 @@ def _go(line: BusLine, robot: Robot, plan: Plan, person: Person, results: Result
         return
     results.floor = run_script(line, robot, lambda rig: _floor(rig, plan, results), person)
     results.edits += floor_edits(robot, results.floor)
+    results.done.add("floor")
 
 
 def _measure_wheels(line: BusLine, robot: Robot, plan: Plan, person: Person, results: Results) -> Robot:
