@@ -92,7 +92,7 @@ class LetGo:
     def __init__(self, robot: Robot) -> None:
         self._proves = robot.watchdog.stand_proof == "let_go"
         self._still_mps = robot.watchdog.motion_tolerance_mps
-        self._answer_s = robot.watchdog.stand_answer_s
+        self._disable_s = min(robot.watchdog.stand_answer_s, robot.timeouts.feedback_s) / 2.0
         self._phase = Phase.HELD
         self._since = -math.inf
 
@@ -119,10 +119,14 @@ class LetGo:
             self._phase = Phase.HELD
 
     def goal(self, now: float) -> PowerGoal:
-        """What the drives are told: disable operation, and where that has no effect, disable voltage."""
+        """What the drives are told: disable operation, and where that has no effect, disable voltage.
+
+        A wheel that a threshold releases at that moment turns, and its drive brakes it first (605Ch). None may have
+        power beside one without it for as long as feedback_s: for the watchdog that is a drive that has failed.
+        """
         if self._phase is not Phase.LETTING_GO:
             return PowerGoal.ON
-        return PowerGoal.LET_GO if now - self._since <= self._answer_s / 2.0 else PowerGoal.READY
+        return PowerGoal.LET_GO if now - self._since <= self._disable_s else PowerGoal.READY
 
     def _is_due(self, wheels: Sequence[Wheel]) -> bool:
         stand = all(abs(wheel.velocity_mps) <= self._still_mps for wheel in wheels)

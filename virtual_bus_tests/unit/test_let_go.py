@@ -144,11 +144,17 @@ def test_an_order_does_not_end_it_and_another_stop_does() -> None:
     assert (each.active, each.excuses(1.02)) == (False, False)
 
 
-def test_a_drive_that_ignores_disable_operation_is_told_disable_voltage() -> None:
-    """Half of stand_answer_s (0.2 s) later: before the watchdog trips."""
-    wheels, each = (due(), Wheel()), LetGo(robot())
+@pytest.mark.parametrize(("answer_s", "feedback_s", "until_s"), [(0.2, 0.1, 0.05), (0.2, 0.5, 0.1), (0.06, 0.1, 0.03)])
+def test_a_drive_that_ignores_disable_operation_is_told_disable_voltage(
+    answer_s: float, feedback_s: float, until_s: float
+) -> None:
+    """Before the watchdog trips: nobody answered, or one drive has no power while another turns."""
+    mine = robot()
+    watchdog = mine.watchdog.model_copy(update={"stand_answer_s": answer_s})
+    timeouts = mine.timeouts.model_copy(update={"feedback_s": feedback_s})
+    wheels, each = (due(), Wheel()), LetGo(mine.model_copy(update={"watchdog": watchdog, "timeouts": timeouts}))
     each.step(wheels, True, 1.0)
-    words = [next_controlword(ENABLED, each.goal(at)) for at in (1.0, 1.09, 1.11)]
+    words = [next_controlword(ENABLED, each.goal(at)) for at in (1.0, 0.999 + until_s, 1.001 + until_s)]
     assert words == [0x07, 0x07, Command.DISABLE_VOLTAGE.value]
 
 
