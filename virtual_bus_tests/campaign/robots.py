@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 from canbase_bench.plant.base import PlantParameters
 from canbase_config import bus_load
+from canbase_config.commissioned import STEPS, Commissioned, mark
 from canbase_config.load import load_robot, sample
 from canbase_config.profile_file import load_profile
 from canbase_config.robot import Robot
@@ -67,12 +68,18 @@ def draw_robot(number: int) -> DrawnRobot:
     random = Random(f"robot {number}")
     for _ in range(TRIES):
         try:
-            robot = Robot.model_validate(_file(random))
+            robot = _commissioned(Robot.model_validate(_file(random)))
         except ValidationError:
             continue
         if bitrates(robot):
             return _with_body(number, robot, random)
     raise RuntimeError(f"robot {number}: none of {TRIES} drawn files passes robot.yaml's checks")
+
+
+def _commissioned(robot: Robot) -> Robot:
+    """So that its limits are those that were drawn."""
+    marks = {step: mark(robot, step) for step in STEPS}
+    return robot.model_copy(update={"commissioned": Commissioned(**marks)})
 
 
 def bitrates(robot: Robot) -> tuple[int, ...]:

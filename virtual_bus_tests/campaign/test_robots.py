@@ -10,6 +10,7 @@ from campaign.robots import BITRATES, GRAVITY_MPS2, bitrates, draw_robot, robot_
 from campaign.shown import Shown
 from campaign.world import World
 from canbase_bench.faults import apply
+from canbase_config.commissioned import uncommissioned
 from canbase_config.robot import Robot
 from canbase_velocity.twist import Twist
 
@@ -21,6 +22,7 @@ def test_a_drawn_robot_passes_the_checks_and_can_do_what_its_file_states(number:
     drawn = draw_robot(number)
     body, limits, wheels = drawn.body, drawn.robot.limits, len(drawn.robot.drives)
     Robot.model_validate(drawn.robot.model_dump())
+    assert not uncommissioned(drawn.robot), "it is as fast as its limits"
     assert set(bitrates(drawn.robot)) <= set(BITRATES)
     inertia_kg = body.mass_kg * body.payload_factor + wheels * body.wheel_mass_kg
     friction_n = wheels * body.coulomb_n
