@@ -192,7 +192,7 @@ or 100 Hz, odometry comes at 20 to 50 Hz with jitter. Each goal is driven four t
   published source, not run from it.
 
 **Faster than allowed** is what the encoders saw beyond the goal's `max_speed_mps`, in mm/s: the order never exceeds it,
-the drive's servo does for a moment when friction lets go.
+the drive's servo does for a moment at breakaway.
 
 Slip is not in these numbers: an encoder does not see it. 3 % of slip over 1 m are 30 mm on the floor, whatever the
 controller.

@@ -12,12 +12,15 @@ import sys
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from canbase_config.load import load_robot, sample
 from canbase_velocity.motion import Pose
 from canbase_velocity.obstacle import Geometry, Sight, judge
+from canbase_velocity.ramp import AT_REST
 from canbase_velocity.sweep import fastest_mps
-from canbase_velocity.twist import ZERO, Twist
+from canbase_velocity.twist import Twist
 
 COMMANDS = {
     "straight on": Twist(0.6, 0.0),
@@ -38,8 +41,8 @@ def draw(axes: mpl.axes.Axes, name: str, twist: Twist, geometry: Geometry) -> No
         outline = Pose().from_here(corners, pose)
         axes.fill(*outline.T, facecolor="tab:blue", alpha=0.05)
     axes.fill(*corners.T, facecolor="none", edgecolor="black", linewidth=1.5)
-    judgement = judge(twist, ZERO, Sight(OBSTACLES_M), geometry)
-    each = [judge(twist, ZERO, Sight(point[np.newaxis, :]), geometry).share for point in OBSTACLES_M]
+    judgement = judge(twist, AT_REST, Sight(OBSTACLES_M), geometry)
+    each = [judge(twist, AT_REST, Sight(point[np.newaxis, :]), geometry).share for point in OBSTACLES_M]
     colours = ["tab:red" if share == judgement.share < 1.0 else "tab:gray" for share in each]
     axes.scatter(*OBSTACLES_M.T, c=colours, s=30, zorder=3)
     speed_mps = fastest_mps(geometry.box, twist)
@@ -55,10 +58,23 @@ def main(path: str) -> None:
     figure, grid = plt.subplots(2, 2, figsize=(9, 8))
     for axes, (name, twist) in zip(grid.flat, COMMANDS.items(), strict=True):
         draw(axes, name, twist, geometry)
+    figure.legend(handles=_legend(), loc="upper center", ncols=2, fontsize=9)
     figure.supxlabel("x in base_link [m]; ahead is to the right")
     figure.supylabel("y in base_link [m]")
-    figure.tight_layout()
+    figure.tight_layout(rect=(0.0, 0.0, 1.0, 0.92), h_pad=2.0)
     figure.savefig(path, dpi=90)
+
+
+def _legend() -> list[Line2D | Patch]:
+    def dot(colour: str, label: str) -> Line2D:
+        return Line2D([], [], marker="o", linestyle="", color=colour, label=label)
+
+    return [
+        Patch(facecolor="none", edgecolor="black", linewidth=1.5, label="footprint and its padding, now"),
+        Patch(facecolor="tab:blue", alpha=0.3, label=f"what it sweeps in the next {LOOK_S} s"),
+        dot("tab:red", "obstacle that decides: title has the share of the speed that is left"),
+        dot("tab:gray", "other obstacle"),
+    ]
 
 
 if __name__ == "__main__":
