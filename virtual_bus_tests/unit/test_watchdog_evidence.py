@@ -53,13 +53,14 @@ class Wheel:
         powered: bool = True,
         known: bool = True,
         cycles: float = 1.0,
+        torque: float | None = None,
     ) -> Evidence:
         """One cycle. The encoder rolls like the velocity unless it is told otherwise."""
         self.n += 1
         now, elapsed_s = self.n / HZ, cycles / HZ
         self.watch.on_setpoint(setpoint, now)
         step_m = (velocity if rolls is None else rolls) * elapsed_s
-        self.watch.on_sample(velocity, step_m if known else None, powered, enabled and powered, elapsed_s, now)
+        self.watch.on_sample(velocity, step_m if known else None, powered, enabled and powered, elapsed_s, now, torque)
         return self.last
 
     def samples(self, count: int, setpoint: float, velocity: float, **how: Any) -> Evidence:
@@ -241,6 +242,77 @@ def test_a_sensor_that_contradicts_itself_is_doubted_until_a_reset() -> None:
     assert not wheel.samples(50, 0.25, 0.25).trusted
     wheel.watch.trust()
     assert wheel.samples(50, 0.25, 0.25).trusted
+
+
+def held_until_its_order_has_gone(**changes: Any) -> Wheel:
+    """Against a threshold for 12/64 s; then zero is ordered, and it is free."""
+    wheel = rolling(0.5, **changes)
+    last = wheel.samples(12, 0.5, 0.0, torque=1.0)
+    assert (last.unseen_s, last.unseen_m) == (12 / HZ, 6 / HZ)
+    return wheel
+
+
+@pytest.mark.parametrize("creep", [0.0, 2.0**-9, -(2.0**-7)])
+@pytest.mark.parametrize(("torque", "misses"), [(0.5, False), (-0.5, False), (0.51, True), (-0.51, True), (None, True)])
+def test_a_wheel_that_is_hardly_pushed_has_nothing_to_show_of_an_order_that_went_through_zero(
+    creep: float, torque: float | None, misses: bool
+) -> None:
+    wheel = held_until_its_order_has_gone()
+    wheel.samples(3, creep, 0.0, torque=torque)
+    assert not wheel.last.unseen
+    last = wheel.sample(creep, 0.0, torque=torque)
+    assert (last.unseen, last.unseen_s) == (misses, 16 / HZ if misses else 12 / HZ)
+
+
+@pytest.mark.parametrize("torque", [0.25, -0.5])
+def test_torque_and_time_bound_what_is_not_counted(torque: float) -> None:
+    """0.25 s at rated torque: 64 samples with a quarter of it."""
+    wheel = held_until_its_order_has_gone()
+    last = wheel.samples(round(16 / abs(torque)), 0.0, 0.0, torque=torque)
+    assert last.unseen_s == 12 / HZ
+    assert not wheel.samples(3, 0.0, 0.0, torque=torque).unseen
+    assert wheel.sample(0.0, 0.0, torque=torque).unseen
+
+
+def test_what_was_not_counted_adds_up_over_orders_until_a_sign_of_life() -> None:
+    wheel = held_until_its_order_has_gone()
+    wheel.samples(60, 0.0, 0.0, torque=0.25)
+    assert wheel.samples(1, 0.0, 0.0, torque=1.0).unseen_s == 13 / HZ
+    wheel.samples(4, 0.0, 0.0, torque=0.25)
+    assert wheel.sample(0.0, 0.0, torque=0.25).unseen_s == 14 / HZ
+    wheel.sample(0.0, 0.0, rolls=0.25)
+    before = wheel.samples(12, 0.5, 0.0, torque=1.0).unseen_s
+    assert before > 0.0
+    assert wheel.samples(64, 0.0, 0.0, torque=0.25).unseen_s == before
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_new_order_has_to_be_seen_once_it_asked_for_twice_a_sign_of_life(sign: int) -> None:
+    """1/64 m/s, 1/4096 m a sample: nine after the lag of eight ask for 2 mm; then three of the 0.25 s are left."""
+    wheel = held_until_its_order_has_gone()
+    wheel.sample(0.0, 0.0, torque=0.25)
+    last = wheel.samples(8 + 9, sign * 2.0**-6, 0.0, torque=0.25)
+    assert last.unseen_s == 12 / HZ
+    assert not wheel.samples(3, sign * 2.0**-6, 0.0, torque=0.25).unseen
+    assert wheel.sample(sign * 2.0**-6, 0.0, torque=0.25).unseen
+
+
+def test_an_order_that_goes_through_zero_again_begins_to_ask_anew() -> None:
+    wheel = held_until_its_order_has_gone()
+    wheel.sample(0.0, 0.0, torque=0.01)
+    wheel.samples(8 + 8, 2.0**-6, 0.0, torque=0.01)
+    wheel.sample(0.0, 0.0, torque=0.01)
+    last = wheel.samples(8 + 8, 2.0**-6, 0.0, torque=0.01)
+    assert last.unseen_s == 12 / HZ
+
+
+def test_a_reset_forgets_what_was_not_counted() -> None:
+    wheel = held_until_its_order_has_gone()
+    wheel.samples(64, 0.0, 0.0, torque=0.25)
+    wheel.watch.trust()
+    wheel.samples(16, 0.5, 0.5)
+    wheel.samples(12, 0.5, 0.0, torque=1.0)
+    assert wheel.samples(64, 0.0, 0.0, torque=0.25).unseen_s == 12 / HZ
 
 
 # --- 2: halted at once. 16 m/s² in 1/64 s are 0.25 m/s, and 0.0625 m/s tolerance

@@ -256,6 +256,22 @@ def test_a_wheel_against_a_threshold_for_a_moment_goes_on(speed: float, force_n:
     assert not world.run(2.0, lambda: tripped(world)), watchdog(world).status
 
 
+@pytest.mark.parametrize(
+    ("speed", "force_n", "held_s", "creep"),
+    [(0.08, 150.0, 0.15, -0.004), (0.1, 250.0, 0.2, -0.006), (0.15, 150.0, 0.2, -0.004)],
+)
+def test_a_wheel_that_is_held_while_its_order_goes_through_zero_goes_on(
+    speed: float, force_n: float, held_s: float, creep: float
+) -> None:
+    """Free again it has to creep the other way: friction holds it until the drive pushes enough."""
+    world = driving(speed)
+    suffer(world, "blocked", force_n=force_n)
+    world.command = Twist2D(creep, 0.0)
+    world.run(held_s)
+    suffer(world, "heal")
+    assert not world.run(2.0, lambda: tripped(world)), watchdog(world).status
+
+
 def test_a_glitch_of_the_velocity_is_no_reason() -> None:
     for speed in (0.0, 0.3):
         world = driving(speed)

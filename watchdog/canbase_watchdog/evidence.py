@@ -3,11 +3,13 @@
 Rules, 1 and 4 for an enabled drive and the setpoint that a SYNC made effective, 2 and 3 for one with power: a wheel
 that is being stopped can lose its sensor as well (docs/decisions/0020)
 1. Unseen: ordered to move, and the encoder has not moved: net, from one place to another, for an encoder that jitters
-   moves nothing. The ordered travel adds up until it moves, however slow the
-   order is; a setpoint of zero adds nothing and forgets nothing, so short orders add up too, and most of it
-   outlives the power. The time adds up while an order is older than `drive_lag_s`, once it asked for the travel that a
-   sign of life takes: a slow wheel needs its time for that. It always adds up once enough travel was ordered: a wheel
-   runs away after its order too.
+   moves nothing. The ordered travel adds up until it moves, however slow the order is; a setpoint of zero adds nothing
+   and forgets nothing, so short orders add up too, and most of it outlives the power. The time adds up while an order
+   is older than `drive_lag_s`, once it asked for the travel that a sign of life takes: a slow wheel needs its time for
+   that. Once enough travel was ordered it adds up without such an order too: a wheel runs away after its order.
+   But a wheel that was held, and comes free as its order goes through zero, has nothing to show until the new order
+   asked for it. That time does not count where the drive reports no more torque than friction takes; torque × time
+   bounds how much of it, and so the speed that a dead encoder hides.
 2. Halted: the velocity of a wheel that rolled drops at once to standstill, as no wheel can, whatever is ordered, and
    the encoder does not move from then on.
 3. Jolts: velocities that change as no wheel can, again and again.
@@ -30,6 +32,10 @@ UNSEEN_COUNTS = 4
 KEPT_SHARE = 0.875
 """So much of the ordered travel that is allowed without a sign of life is remembered while there is no power. Not all:
 a wheel that gets power again needs an order before it can show anything."""
+STRAIN_SHARE = 0.5
+"""Of the rated torque: friction takes less, and from one direction to the other changes it by less."""
+ASKED_LIVES = 2.0
+"""An order asks for a sign of life once it asked for so much travel of one: friction and slack take their part."""
 ROLLING_SHARE = 0.5
 """An encoder that moved by more than this share of what the velocity says: the wheel really rolled."""
 JOLT_MEMORY_S = 1.0
@@ -69,6 +75,10 @@ class EvidenceWatch:
         self._setpoint_mps = self._ordered_mps = 0.0
         self._least_mps = self._velocity_mps = self._moved_m = 0.0
         self._rolled = False
+        self._asked_m = 0.0
+        """What the setpoints ask for at least, since one of the last `drive_lag_s` was no faster than standstill."""
+        self._idle_s = 0.0
+        """Time at rated torque, or longer at less, that did not count as unseen since the last sign of life."""
         self._jolted_at = -math.inf
         self.last = Evidence()
 
@@ -80,7 +90,7 @@ class EvidenceWatch:
 
     def trust(self) -> None:
         """A reset was accepted: everything begins anew."""
-        self._moved_m = 0.0
+        self._moved_m = self._idle_s = self._asked_m = 0.0
         self.last = Evidence()
 
     def doubt(self) -> None:
@@ -88,9 +98,19 @@ class EvidenceWatch:
         self.last = replace(self.last, trusted=False)
 
     def on_sample(
-        self, velocity_mps: float, step_m: float | None, powered: bool, enabled: bool, elapsed_s: float, now: float
+        self,
+        velocity_mps: float,
+        step_m: float | None,
+        powered: bool,
+        enabled: bool,
+        elapsed_s: float,
+        now: float,
+        torque: float | None = None,
     ) -> None:
-        """606Ch, and the travel of the encoder since the last sample; None: it is not known, or a jump."""
+        """606Ch, and the travel of the encoder since the last sample; None: it is not known, or a jump.
+
+        `torque`: 6077h as a share of the rated torque, None: the drive does not tell it.
+        """
         jolted, rolled = self._is_jolt(velocity_mps, elapsed_s), self._rolled
         lives = self._lives(step_m, jolted)
         self._velocity_mps = velocity_mps
@@ -101,7 +121,7 @@ class EvidenceWatch:
             return
         unseen_s, unseen_m = 0.0, self._kept_m(lives)
         if enabled:
-            unseen_s, unseen_m = self._unseen(lives, step_m is not None, elapsed_s)
+            unseen_s, unseen_m = self._unseen(lives, step_m is not None, elapsed_s, torque)
         unseen = unseen_s >= self._config.motion_missing_s and unseen_m >= self._unseen_m
         halted, jolts = self._halted(jolted and rolled, lives), self._jolts(jolted, now)
         samples = self._config.feedback_samples
@@ -134,17 +154,27 @@ class EvidenceWatch:
             self._moved_m = 0.0
         return moved
 
-    def _unseen(self, lives: bool, known: bool, elapsed_s: float) -> tuple[float, float]:
+    def _unseen(self, lives: bool, known: bool, elapsed_s: float, torque: float | None) -> tuple[float, float]:
         unseen_s, unseen_m = self.last.unseen_s, self.last.unseen_m
         if lives:
+            self._idle_s = 0.0
             return 0.0, 0.0
         if not known:
             return unseen_s, unseen_m
         unseen_m += abs(self._setpoint_mps) * elapsed_s
-        visible = self._is_visible(self._least_mps) and unseen_m >= self._life_m
-        if visible or unseen_m >= self._unseen_m:
+        visible = self._is_visible(self._least_mps)
+        self._asked_m = self._asked_m + abs(self._least_mps) * elapsed_s if visible else 0.0
+        counts = unseen_m >= self._unseen_m or (visible and unseen_m >= self._life_m)
+        if counts and not self._idles(torque, elapsed_s):
             unseen_s += elapsed_s
         return unseen_s, unseen_m
+
+    def _idles(self, torque: float | None, elapsed_s: float) -> bool:
+        """The order has not asked for a sign of life since it went through zero, and the drive hardly pushes."""
+        if torque is None or abs(torque) > STRAIN_SHARE or self._asked_m >= ASKED_LIVES * self._life_m:
+            return False
+        self._idle_s += abs(torque) * elapsed_s
+        return self._idle_s <= self._config.motion_missing_s
 
     def _kept_m(self, lives: bool) -> float:
         return 0.0 if lives else min(self.last.unseen_m, KEPT_SHARE * self._unseen_m)

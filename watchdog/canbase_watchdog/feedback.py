@@ -76,14 +76,20 @@ class FeedbackWatch:
         """6064h of a status TPDO; the velocity of the same SYNC follows."""
         self._counts = counts
 
-    def on_velocity(self, velocity_mps: float, powered: bool, enabled: bool, now: float) -> None:
-        """606Ch of a velocity TPDO. A wheel without power may be pushed: nothing of it is bad."""
+    def on_velocity(
+        self, velocity_mps: float, powered: bool, enabled: bool, now: float, torque: float | None = None
+    ) -> None:
+        """606Ch of a velocity TPDO. A wheel without power may be pushed: nothing of it is bad.
+
+        `torque`: what it tells of 6077h, as a share of the rated one; None: nothing.
+        """
         elapsed_s, self._at = now - self._at, now
         self._follow(elapsed_s, now)
         step_m, jumped = self._step(elapsed_s)
         drift_m = self._drift(velocity_mps, step_m, jumped, elapsed_s)
         self._judge(velocity_mps, powered, drift_m, jumped, now)
-        self.evidence.on_sample(velocity_mps, None if jumped else step_m, powered, enabled, elapsed_s, now)
+        step_m = None if jumped else step_m
+        self.evidence.on_sample(velocity_mps, step_m, powered, enabled, elapsed_s, now, torque)
         if self.last.implausible >= self._config.feedback_samples:
             self.evidence.doubt()
         self._velocity_mps, self._counts_before = velocity_mps, self._counts

@@ -242,8 +242,8 @@ class Observer:
         record.fed_velocity_at = now
         record.answers += 1
         enabled, powered = record.state is ENABLED, record.state in frames.POWERED
-        record.feedback.on_velocity(record.velocity_mps, powered, enabled, now)
         record.push.on_sample(frames.decode_torque(data, record.drive.layout), powered, now)
+        record.feedback.on_velocity(record.velocity_mps, powered, enabled, now, record.push.last.share)
         if record.push.lies:
             record.feedback.evidence.doubt()
         return True

@@ -19,12 +19,10 @@ from dataclasses import dataclass, replace
 
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 from canbase_watchdog.counts import difference, life_m
-from canbase_watchdog.evidence import KEPT_SHARE
+from canbase_watchdog.evidence import KEPT_SHARE, STRAIN_SHARE
 
 NOISE_SHARE = 0.01
 """Of the rated torque: less moves no wheel."""
-STRAIN_SHARE = 0.5
-"""Of the rated torque: friction takes less, and from one direction to the other changes it by less."""
 LONGEST_STEP_S = 0.1
 """Time between two samples counts for so long at most: a drive that is silent for longer is another cause."""
 
