@@ -17,6 +17,14 @@ HEARTBEAT_CONSUMER, HEARTBEAT_PRODUCER, SYNC_COUNTER, ERROR_BEHAVIOUR = 0x1016, 
 ABORT_CONNECTION_OPTION, QUICK_STOP_OPTION, FAULT_REACTION_OPTION = 0x6007, 0x605A, 0x605E
 PROFILE_ACCELERATION, PROFILE_DECELERATION, QUICK_STOP_DECELERATION = 0x6083, 0x6084, 0x6085
 INTERPOLATION = 0x60C2
+STOPPING_LIMITS = {
+    PROFILE_DECELERATION: "deceleration_mps2",
+    QUICK_STOP_DECELERATION: "emergency_deceleration_mps2",
+}
+"""Which limit of robot.yaml a drive must brake with at least by its own ramps, whatever it refuses."""
+KEPT_SHARE = 0.95
+"""Of that limit: drives round."""
+COASTS = 0
 
 ENTER_PRE_OPERATIONAL_ON_LOSS = 0
 MILLISECONDS = -3
@@ -43,9 +51,7 @@ def configure_motion(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None
         yield from node.set_if_present(Write(INTERPOLATION, 1, cycle_ms, 1), kind.options.interpolation)
         yield from node.set_if_present(Write(INTERPOLATION, 2, MILLISECONDS, 1), kind.options.interpolation)
     yield from node.set(write_at(drive, TARGET_VELOCITY, 0))
-    units = AxisUnits(drive, robot.base)
-    for index, mps2 in _ramps_mps2(robot).items():
-        yield from node.set_if_present(write_at(drive, index, units.acceleration_raw(mps2)), kind.options.ramps)
+    yield from _configure_ramps(node, drive, robot)
 
 
 def configure_self_stop(node: NodeAccess, drives: tuple[Drive, ...], robot: Robot) -> Steps[str]:
@@ -60,7 +66,8 @@ def configure_self_stop(node: NodeAccess, drives: tuple[Drive, ...], robot: Robo
         took = yield from node.set_if_present(on_loss(drive), kind.self_stop.abort_connection)
         stops = took and stops
         quick_stop = write_at(drive, QUICK_STOP_OPTION, options.quick_stop_code)
-        yield from node.set_if_present(quick_stop, options.quick_stop)
+        if not (yield from node.set_if_present(quick_stop, options.quick_stop)):
+            yield from _refuse_coasting(node, drive)
         reaction = write_at(drive, FAULT_REACTION_OPTION, options.fault_reaction_code)
         yield from node.set_if_present(reaction, options.fault_reaction)
     by_vendor = yield from _set_vendor_watchdog(node, kind, robot.timeouts.drive_heartbeat_s)
@@ -107,6 +114,35 @@ def _check_mode(node: NodeAccess, drive: Drive, mode: int) -> Steps[None]:
     shown = yield from node.read_if_present(at.index, at.sub)
     if shown is not None and shown != mode & 0xFF:
         node.notes.append(f"{at.index:04X}h:{at.sub} shows mode {shown}, {mode} was set; it may take power to change")
+
+
+def _configure_ramps(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None]:
+    """Raises BootError when the drive keeps a softer stop: its way would be longer than all others count with."""
+    units, presence = AxisUnits(drive, robot.base), drive.kind.options.ramps
+    for index, mps2 in _ramps_mps2(robot).items():
+        write = write_at(drive, index, units.acceleration_raw(mps2))
+        took = yield from node.set_if_present(write, presence)
+        if took or presence == "no" or index not in STOPPING_LIMITS:
+            continue
+        raw = yield from node.read_if_present(write.index, write.sub)
+        key = STOPPING_LIMITS[index]
+        needed = getattr(robot.limits, key)
+        if raw is None or units.acceleration_mps2(raw) >= KEPT_SHARE * needed:
+            continue
+        kept = units.acceleration_mps2(raw)
+        problem = f"{write.index:04X}h:{write.sub} stays at {raw}: {drive.joint} brakes with {kept:.3g} m/s² by it"
+        hint = f"Lower limits.{key} ({needed:g}) to that in robot.yaml, or set the object with the maker's tool"
+        raise BootError(node.node_id, problem, hint)
+
+
+def _refuse_coasting(node: NodeAccess, drive: Drive) -> Steps[None]:
+    """605Ah of 0 that the drive keeps: a quick stop takes the power away, and the wheel rolls out."""
+    at = place(drive.kind.layout, QUICK_STOP_OPTION, drive.axis)
+    if drive.kind.options.quick_stop == "no" or (yield from node.read_if_present(at.index, at.sub)) != COASTS:
+        return
+    problem = f"{at.index:04X}h:{at.sub} stays at 0: a quick stop lets {drive.joint} coast"
+    hint = "Set it to 2 with the maker's tool; where rolling out is right, options.quick_stop: no in its drive profile"
+    raise BootError(node.node_id, problem, hint)
 
 
 def _ramps_mps2(robot: Robot) -> dict[int, float]:

@@ -62,3 +62,11 @@ class AxisUnits:
         drive, rev_per_s2 = self._drive, mps2 / self._rim_m_per_motor_rev
         raw = ramp_raw(drive.kind.units, drive.target_unit, drive.counts_per_motor_rev, rev_per_s2)
         return min(max(round(raw), 1), UINT32_MAX)
+
+    def acceleration_mps2(self, raw: int) -> float:
+        """What a value of 6083h, 6084h, 6085h means [m/s²]; 0 is no acceleration, or a time of 0."""
+        drive, one = self._drive, 1.0 / self._rim_m_per_motor_rev
+        unit = ramp_raw(drive.kind.units, drive.target_unit, drive.counts_per_motor_rev, one)
+        if drive.kind.units.acceleration == "ms":
+            return unit / raw if raw else math.inf
+        return raw / unit

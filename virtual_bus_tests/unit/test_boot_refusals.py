@@ -315,3 +315,48 @@ def test_an_answer_that_is_wider_than_the_object_is_another_value() -> None:
     drive.objects[0x6007, 0] = u32(0x0001_0003)
     assert notes_of(boot_one_axis(drive)) == ()
     assert drive.objects[0x6007, 0] == u16(3)
+
+
+def test_a_drive_that_keeps_a_softer_quick_stop_is_refused_with_what_it_can_do() -> None:
+    """The safety filter and the watchdog count with limits.emergency_deceleration_mps2."""
+    drive = FakeDrive()
+    drive.objects[0x6085, 0] = u32(286)
+    drive.refuse[0x6085, 0] = 0x06090031
+    problem = str(error_of(boot_one_axis(drive)))
+    assert "6085h:0 stays at 286: left brakes with 0.15 m/s² by it" in problem
+    assert "Lower limits.emergency_deceleration_mps2 (1.5) to that in robot.yaml" in problem
+
+
+@pytest.mark.parametrize("kept", [2723, 2865, 9999])
+def test_a_drive_that_keeps_a_quick_stop_as_hard_or_harder_is_noted(kept: int) -> None:
+    drive = FakeDrive()
+    drive.objects[0x6085, 0] = u32(kept)
+    drive.refuse[0x6085, 0] = 0x06090031
+    boot = boot_one_axis(drive)
+    assert boot.report is not None
+    assert [note for note in notes_of(boot) if "6085h" in note] == (
+        [] if kept == 2865 else ["6085h:0: 0609 0031h value too high"]
+    )
+
+
+def test_an_ordinary_ramp_that_is_softer_than_the_driver_brakes_is_refused_too() -> None:
+    drive = FakeDrive()
+    drive.objects[0x6084, 0] = u32(500)
+    drive.refuse[0x6084, 0] = 0x06090031
+    assert "Lower limits.deceleration_mps2 (0.5)" in str(error_of(boot_one_axis(drive)))
+
+
+def test_a_drive_whose_quick_stop_coasts_and_cannot_be_told_otherwise_is_refused() -> None:
+    drive = FakeDrive()
+    drive.objects[0x605A, 0] = u16(0)
+    drive.refuse[0x605A, 0] = READ_ONLY
+    problem = str(error_of(boot_one_axis(drive)))
+    assert "605Ah:0 stays at 0: a quick stop lets left coast" in problem
+    assert "options.quick_stop: no in its drive profile" in problem
+
+
+def test_a_drive_that_keeps_another_way_to_brake_in_a_quick_stop_is_noted() -> None:
+    drive = FakeDrive()
+    drive.objects[0x605A, 0] = u16(6)
+    drive.refuse[0x605A, 0] = READ_ONLY
+    assert boot_one_axis(drive).report is not None

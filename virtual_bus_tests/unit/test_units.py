@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bus.crews import robot_with
 from canbase_config.drive import Drive
 from canbase_config.profile import VelocityUnit
 from canbase_config.robot import Base
@@ -99,3 +100,10 @@ def test_a_ramp_that_is_no_ramp_raises(mps2: float) -> None:
 def test_every_target_comes_back_from_si_as_it_was(raw: int, direction: int) -> None:
     units = AxisUnits(drive("0.1rpm", direction), BASE)
     assert units.velocity_raw(units.velocity_mps(raw)) == raw
+
+
+def test_what_a_ramp_of_each_kind_of_drive_means(kind: str) -> None:
+    robot = robot_with(kind)
+    units = AxisUnits(robot.drives[0], robot.base)
+    for mps2 in (0.5, 2.0):
+        assert units.acceleration_mps2(units.acceleration_raw(mps2)) == pytest.approx(mps2, rel=0.01)
