@@ -10,6 +10,7 @@ from canbase_config.robot import DRIVER_NODE_ID, Robot
 from canbase_driver.core import DriverCore
 from canbase_driver.frame import Frame
 from canbase_driver.kinematics import Twist2D
+from canbase_driver.readiness import Aim
 from canbase_driver.reset import Outcome
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_velocity.decision import Decision
@@ -17,6 +18,8 @@ from canbase_velocity.twist import ZERO, Twist
 
 SETPOINTS = (0x200, 0x300)
 """First identifiers of the RPDOs with setpoints: docs/bus.md."""
+ENABLE = b"\x0f\x00"
+"""Controlword: enable operation."""
 
 
 class DriverProcess(Process):
@@ -38,6 +41,12 @@ class DriverProcess(Process):
         """Where a setpoint is zero it sends the last one that was not."""
         self.keeps_motion = False
         """It follows each command but zero."""
+        self.omits = 0
+        """It sends no setpoints with this identifier; 0: it sends all."""
+        self.never_lets_go = False
+        """At a stand it leaves the power on, where it should take it off for a moment."""
+        self.asked = ""
+        """It was asked to stop, or to give up the power: until a reset or an activation. Empty: it was not."""
         self.heartbeats = True
         """A mad driver may go on with its heartbeat or be silent there."""
         self._last_frames: list[Frame] = []
@@ -50,6 +59,7 @@ class DriverProcess(Process):
     def begin(self) -> None:
         """A new core: nothing is booted, and what its record says is latched."""
         self.core = DriverCore(self._robot, found=self.disk.found())
+        self.asked = ""
         self._period_s = 1.0 / self._robot.rates.control_hz
         self._cycle = 0
         self.snapshot: DriverSnapshot | None = None
@@ -60,16 +70,29 @@ class DriverProcess(Process):
     def reset(self, on_outcome: list[Outcome]) -> None:
         """Service motor_driver/reset; nobody answers while the process does not run."""
         if self.running:
-            self.core.request_reset(self.clock.now, on_outcome.append)
+            self.core.request_reset(self.clock.now, lambda outcome: self._on_reset(outcome, on_outcome))
+
+    def _on_reset(self, outcome: Outcome, on_outcome: list[Outcome]) -> None:
+        self.asked = "" if outcome.done and self.asked == "stop" else self.asked
+        on_outcome.append(outcome)
 
     def stop(self) -> None:
         """Service motor_driver/stop."""
         if self.running:
             self.core.request_stop()
+            self.asked = "stop"
+
+    def aim(self, aim: Aim) -> None:
+        """Lifecycle transitions activate and deactivate."""
+        if self.running:
+            self.core.request_aim(aim, self.clock.now, lambda outcome: None)
+            self.asked = "" if aim is Aim.ACTIVE else "deactivate"
 
     def end(self) -> None:
         """The base is stopped first."""
-        self.core.request_shutdown()
+        if self.running:
+            self.core.request_shutdown()
+            self.asked = "end"
 
     def _hear(self, cob_id: int, data: bytes) -> None:
         self.receive("frames", FRAMES_HELD, self._on_frame, cob_id, data)
@@ -107,6 +130,7 @@ class DriverProcess(Process):
         if self.repeats:
             beats = [frame for frame in frames if frame.cob_id == 0x700 + DRIVER_NODE_ID and self.heartbeats]
             return beats + self._last_frames
+        frames = [self._holding(frame) for frame in frames if not self.omits or frame.cob_id != self.omits]
         self._last_frames = [frame for frame in frames if frame.cob_id != 0x700 + DRIVER_NODE_ID]
         return [self._never_zero(frame) for frame in frames] if self.ignores_zero else self._note(frames)
 
@@ -115,6 +139,11 @@ class DriverProcess(Process):
             if frame.cob_id & 0x780 in SETPOINTS and any(frame.data[2:]):
                 self._last_moving[frame.cob_id] = frame.data
         return frames
+
+    def _holding(self, frame: Frame) -> Frame:
+        """Enable operation, where it takes the power off for a moment to see whether a wheel stands."""
+        lets_go = self.never_lets_go and self.core.lets_go and frame.cob_id & 0x780 in SETPOINTS
+        return Frame(frame.cob_id, ENABLE + frame.data[2:]) if lets_go else frame
 
     def _never_zero(self, frame: Frame) -> Frame:
         stands = frame.cob_id & 0x780 in SETPOINTS and not any(frame.data[2:])

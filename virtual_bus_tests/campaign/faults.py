@@ -22,3 +22,18 @@ FAULTS: dict[str, Kind] = {
     **PEOPLE,
 }
 """Every fault that a scenario may draw."""
+ADDED = (
+    "drive_unbraked",
+    "driver_asked_to_end",
+    "driver_deactivated",
+    "driver_dies_torn",
+    "driver_never_lets_go",
+    "scanner_late",
+    "setpoints_not_sent",
+    "stick_tapped",
+    "stop_requested",
+    "two_on_a_lock",
+    "watchdog_dies_torn",
+    "watchdog_starved",
+)
+"""Drawn beside the others, each by itself: a new one here leaves the scenarios without it as they were."""

@@ -46,9 +46,10 @@ HEARD_S = 0.3
 """The stop button says ten times a second that it is pressed: the filter has heard it then, if it runs."""
 PROPERTIES = {
     "envelope": "the base is beyond what its leases order for T_react at most, and then brakes",
-    "sources": "the base moves only while a source orders it, and for the timeouts of mux and filter and T_react after",
+    "sources": "the base moves only while a source orders it (none held over a reset), and for the timeouts of mux "
+    "and filter and T_react after",
     "latched": "a trip of the watchdog and a latched stop of the driver end by an accepted reset alone, in all lives",
-    "held": "after a latched stop the base brakes, stands, and does not move again before the reset",
+    "held": "after a latched stop, or a requested one, the base brakes, stands, and does not move before the reset",
     "enabling": "no drive gets power without a watchdog that lives and is not tripped",
     "heartbeat": "a drive that hears neither watchdog nor driver stops by itself",
     "estop": "the base stands while the emergency stop is pressed",
@@ -56,6 +57,7 @@ PROPERTIES = {
     "obstacle": "the base never touches what it could have seen in time",
     "blind": "where no scanner sees the base is no faster than blind_mps, once that was noticed",
     "odometry": "the driver's pose never jumps, and is the true one as long as the encoders tell the truth",
+    "locked": "the base stands while somebody publishes that a lock holds",
     "goal": "every goal ends exactly once, in its time; one that succeeded is where it should be",
     "runaway": "no wheel is faster than it was ordered to be for longer than the stated time",
     "path": "the base turns as it was ordered to, or not at all, but for the stated time",
@@ -75,6 +77,8 @@ EXCUSES = {
     "deaf watchdog": "it cannot keep a standing base from starting; driver and drives miss it within T_react (held)",
     "reset by a stranger": "a drive that another master has reset has forgotten 1016h (heartbeat)",
     "unheard button": "a filter that never heard the button knows of no emergency stop (zero)",
+    "unproven stand": "a drive with a dead encoder may push for stand_impulse_s before it has to let go, and its wheel "
+    "rolls out after that: nothing shows it (standstill)",
     "no watch": "a drive of a kind that watches neither heartbeats nor setpoints goes on turning (heartbeat)",
 }
 """What no software can do, each as a state of the world that is looked at, and never by a fault's name."""
@@ -119,7 +123,7 @@ class Judge:
         self._latches: dict[str, object] = {}
         self._resets_done = 0
         self._watching_at = now
-        self._pressed_at, self._unheard_at = math.inf, -math.inf
+        self._pressed_at, self._unheard_at, self._lock_from = math.inf, -math.inf, -math.inf
         lies = any(FAULTS[name].encoder_lies for name in self._faults)
         self._odometry = OdometryJudge(world, exact=not lies)
         self._motion = MotionJudge(world, self._shown)
@@ -184,6 +188,7 @@ class Judge:
         self._check_speed(tau_s, coasting, now)
         self._check_drives(now)
         self._check_stop_button(tau_s, coasting, now)
+        self._check_lock(tau_s, coasting, now)
         self._check_wall(tau_s, coasting, now)
         if self._fresh and tau_s > 0.0 and not self._latches:
             self.lives, self._fresh = self.lives + 1, False
@@ -247,26 +252,38 @@ class Judge:
         return not rolls_out
 
     def _check_latches(self, now: float) -> None:
-        driver, watchdog = self._world.driver, self._world.watchdog
+        watchdog = self._world.watchdog
         status = watchdog.core.status
         done = sum(outcome.done for outcome in self._outside.resets)
         if watchdog.running and status.state is WatchdogState.WATCHING:
             self._watching_at = now
-        latched = {name: core for name, core in self._latches.items() if not self._world.processes[name].alive}
-        if driver.alive and driver.core.state is DriverState.LATCHED:
-            latched["driver"] = driver.core
-        if watchdog.alive and status.state is WatchdogState.TRIPPED:
-            latched["watchdog"] = watchdog.core
-            if "watchdog" not in self._latches:
-                self.trips.append(status.verdict.cause.name.lower())
+        latched = self._latched_now()
+        if "watchdog" in latched.keys() - self._latches.keys():
+            self.trips.append(status.verdict.cause.name.lower())
         if self._gone("driver", latched) and done == self._resets_done:
             self._violate("latched", "the driver left LATCHED without a reset")
         if self._gone("watchdog", latched) and status.reset[1] is not Answer.DONE:
             self._violate("latched", "the watchdog left TRIPPED without a reset")
+        if done > self._resets_done:
+            self._wishes.on_reset(now)
         self._fresh, self._resets_done = self._fresh or done > self._resets_done, done
         if latched.keys() != self._latches.keys():
             self._note_latches(latched, now)
         self._latches = latched
+
+    def _latched_now(self) -> dict[str, object]:
+        """What is latched, or was when its process died; and what somebody asked the driver for."""
+        driver, watchdog, processes = self._world.driver, self._world.watchdog, self._world.processes
+        latched = {
+            name: core for name, core in self._latches.items() if name in processes and not processes[name].alive
+        }
+        if driver.alive and driver.core.state is DriverState.LATCHED:
+            latched["driver"] = driver.core
+        if driver.alive and driver.asked:
+            latched[f"the request to {driver.asked}"] = driver.core
+        if watchdog.alive and watchdog.core.status.state is WatchdogState.TRIPPED:
+            latched["watchdog"] = watchdog.core
+        return latched
 
     def _gone(self, name: str, latched: dict[str, object]) -> bool:
         """It was latched and is not any more, in this life or after a start: what is dead stays as it was."""
@@ -308,6 +325,15 @@ class Judge:
         longest_s = braking_s(self._world.robot, limits.linear_mps, limits.angular_radps)
         if tau_s > 0.0 and not coasting and now > self._pressed_at + 0.1 + self.react_s + longest_s:
             self._violate("estop", f"{self._shown}, {now - self._pressed_at:.2f} s after it was pressed")
+
+    def _check_lock(self, tau_s: float, coasting: bool, now: float) -> None:
+        """As the stop button; a process that does not run has not heard of it."""
+        if self._reach.lost or not self._world.velocity.running or self._strangers.acted_at == now:
+            self._lock_from = now
+        limits, since = self._world.robot.limits, max(self._world.locked_at, self._lock_from)
+        longest_s = braking_s(self._world.robot, limits.linear_mps, limits.angular_radps)
+        if tau_s > 0.0 and not coasting and now > since + 0.1 + self.react_s + longest_s:
+            self._violate("locked", f"{self._shown}, {now - since:.2f} s after the lock was closed")
 
     def _on_goal_end(self, goal: Goal) -> None:
         robot, outcome = self._world.robot, goal.ends[-1]

@@ -69,6 +69,8 @@ class MotionJudge:
         now = world.clock.now
         self._orders: deque[tuple[float, Twist]] = deque([(now, Twist(0.0, 0.0))])
         self._fast_since = self._beside_since = self._lies_since = now
+        self._before_mps = 0.0
+        self._impulse_s = world.robot.watchdog.stand_impulse_s + JITTER_S
 
     @property
     def runaway_s(self) -> float:
@@ -115,9 +117,16 @@ class MotionJudge:
             return None
         return "path", f"the base turns at {turn:+.2f} rad/s, between {low:+.2f} and {high:+.2f} rad/s were ordered"
 
+    def _unproven(self) -> bool:
+        """A dead encoder shows a stand, and its drive has not given more torque yet than it may before it lets go, or
+        the wheel rolls out after that."""
+        slower = self._shown.fastest_mps < self._before_mps
+        self._before_mps = self._shown.fastest_mps
+        return self._shown.is_blind and (slower or self._shown.pushed_blindly_s <= self._impulse_s)
+
     def _standstill(self, now: float) -> tuple[str, str] | None:
         driver = self._world.driver
-        says = driver.running and driver.snapshot is not None and driver.snapshot.standstill
+        says = not self._unproven() and driver.running and driver.snapshot is not None and driver.snapshot.standstill
         if not says or self._shown.fastest_mps <= self._allowed.stands_mps or math.isclose(now, self._lies_since):
             self._lies_since = now
         if now <= self._lies_since + STANDS_S:

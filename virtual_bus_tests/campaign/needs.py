@@ -31,6 +31,10 @@ class Need:
     faults: tuple[str, ...]
     beside: str = ""
     robots: Callable[[Robot], bool] = any_robot
+    quiet: bool = False
+    """Nobody orders motion but in a fault."""
+    proof: str = ""
+    """Why no scenario can need it alone: then one has to show that all of them together are needed."""
 
     @property
     def taken_out(self) -> str:
@@ -39,36 +43,79 @@ class Need:
 
 
 _SILENT = ("feedback_lost", "cable_cut_from_drives", "drive_silent")
-_DRIVER_GONE = ("driver_dies", "driver_hangs")
 _MAD = ("straight_to_cmd_vel", "driver_repeats", "driver_ignores_zero")
+_DRIVER_GONE = ("driver_dies", "driver_hangs")
+_WATCHDOG_GONE = ("watchdog_dies", "watchdog_hangs")
+_VELOCITY_GONE = ("velocity_dies", "velocity_hangs")
+_HELD = ("stick_held", "drive_fault", "resets_too_early")
+_LIES = ("encoder_frozen", "frozen_encoder", "stuck_velocity", "encoder_jumping", "encoder_intermittent")
+_OFF = ("drive_sto", "drive_fault")
+_DRIVER_SEES = "driver:drive_fault+driver:drive_restarted+driver:drive_silent+driver:drive_disabled"
+_DRIVER_HEEDS = "driver:waits_for_zero+driver:reset_needs_zero+driver:zero_before_motion"
+_DEAF = "a watchdog that cannot send stops nothing; what it would trip for stays tripped until it can send again"
+_AWAY = "driver:watchdog_missing+drives:heartbeat_consumer"
 
 NEEDS: tuple[Need, ...] = (
     # watchdog: rows of canbase_watchdog.policy.CHECKS
-    Need("watchdog:lease_lost", ("velocity_dies", "velocity_hangs", "lease_lost"), "driver:command_timeout"),
-    Need(
-        "watchdog:driver_silent", ("driver_dies", "driver_hangs"), "watchdog:target_outside+drives:heartbeat_consumer"
-    ),
+    Need("watchdog:bus_failed", ("watchdog_bus_problem",), _AWAY, proof=f"{_DEAF}: driver and drives miss it"),
+    Need("watchdog:loop_late", ("watchdog_starved", "encoder_lost", "driver_repeats")),
+    Need("watchdog:foreign_master", ("second_master_setpoints",), "watchdog:setpoint_missing+watchdog:target_outside"),
+    Need("watchdog:lease_lost", (*_VELOCITY_GONE, "lease_lost"), "driver:command_timeout"),
+    Need("watchdog:driver_silent", _DRIVER_GONE, "watchdog:target_outside+drives:heartbeat_consumer"),
+    Need("watchdog:drive_restarted", ("drive_resets",), f"watchdog:drive_silent+watchdog:drive_down+{_DRIVER_SEES}"),
     Need("watchdog:drive_silent", _SILENT, "driver:drive_silent"),
-    Need("watchdog:target_outside", _MAD),
+    Need("watchdog:answered_twice", ("twin_node", "stick_held")),
+    Need("watchdog:setpoint_missing", ("setpoints_not_sent", "stick_held")),
+    Need("watchdog:drive_down", _OFF, "driver:drive_fault+driver:drive_disabled"),
+    Need("watchdog:feedback_implausible", _LIES, "watchdog:motion_missing"),
     Need("watchdog:motion_missing", ("encoder_lost", "wheel_blocked", "stick_held")),
+    Need("watchdog:power_at_stand", ("driver_never_lets_go", "encoder_lost", "stick_tapped"), quiet=True),
+    Need("watchdog:target_outside", _MAD),
+    Need("watchdog:overspeed", ("encoder_reversed",), "watchdog:motion_outside"),
+    Need("watchdog:motion_outside", ("drive_ignores_setpoints",), "driver:did_not_stop"),
     Need("watchdog:twist_outside", ("wheel_limited", "motor_weak", "stick_held")),
     Need("watchdog:all", (*_MAD, "lease_lost")),
     Need("watchdog:latch", ("velocity_hangs", "lease_lost", "driver_hangs")),
-    # driver
+    Need("watchdog:stop_record", ("all_processes_restart", "watchdog_dies", "encoder_lost", "lease_lost")),
+    # driver: rows of canbase_driver.supervisor.HAZARDS
+    Need("driver:bus_failed", ("bus_problem",), f"driver:watchdog_tripped+{_DRIVER_SEES}+{_AWAY}"),
+    Need("driver:watchdog_tripped", ("lease_lost", "driver_repeats"), "driver:drive_disabled"),
+    Need("driver:drive_fault", _OFF, "driver:drive_disabled+watchdog:drive_down"),
+    Need("driver:drive_restarted", ("drive_power_cycle", "second_master_nmt", "drive_resets"),
+         "driver:drive_disabled+driver:drive_silent+watchdog:foreign_master+watchdog:drive_silent+watchdog:drive_down"),
+    Need("driver:drive_silent", _SILENT, "watchdog:drive_silent"),
+    Need("driver:watchdog_missing", _WATCHDOG_GONE, "drives:heartbeat_consumer"),
+    Need("driver:drive_disabled", _OFF, "driver:drive_fault+watchdog:drive_down"),
+    Need("driver:did_not_stop", ("drive_ignores_setpoints",), "watchdog:motion_outside"),
+    Need("driver:stop_requested", ("stop_requested", "stick_held")),
+    Need("driver:shutdown", ("driver_asked_to_end", "stick_held")),
+    Need("driver:inactive", ("driver_deactivated", "stick_held")),
+    # driver: the others
     Need("driver:latch", ("watchdog_hangs", "drive_fault")),
-    Need("driver:asks_for_watchdog", ("watchdog_dies", "watchdog_hangs"), "drives:heartbeat_consumer"),
-    Need("driver:watchdog_missing", ("watchdog_dies", "watchdog_hangs"), "drives:heartbeat_consumer"),
-    Need("driver:command_timeout", ("velocity_dies", "velocity_hangs"), "watchdog:lease_lost"),
+    Need("driver:asks_for_watchdog", _WATCHDOG_GONE),
+    Need("driver:command_timeout", _VELOCITY_GONE, "watchdog:lease_lost"),
+    Need("driver:zero_before_motion", _HELD, "mux:neutral_start+driver:waits_for_zero+driver:reset_needs_zero"),
+    Need("driver:waits_for_zero", _HELD, "mux:neutral_start+driver:zero_before_motion+driver:reset_needs_zero"),
+    Need("driver:reset_needs_zero", _HELD, "mux:neutral_start+driver:zero_before_motion+driver:waits_for_zero"),
+    Need("driver:command_is_finite", ("straight_to_cmd_vel",)),
+    Need("driver:odometry_jump_guard", ("encoder_jumping",), "watchdog:feedback_implausible"),
+    Need("driver:lets_go", ("encoder_lost", "stick_tapped"), "watchdog:power_at_stand", quiet=True),
     Need("driver:stop_record", ("driver_dies", "drive_fault", "all_processes_restart")),
+    Need("records:unreadable", ("driver_dies_torn", "watchdog_dies_torn", "lease_lost")),
     # drives
     Need("drives:heartbeat_consumer", ("cable_cut", "cable_cut_to_drives", "cable_cut_one_drive")),
     # velocity
     Need("mux:timeout", ("action_dies", "action_hangs")),
-    Need("mux:neutral_start", ("estop_pressed", "stick_held"), "filter:zero_after_estop"),
+    Need("mux:lock_publishers", ("two_on_a_lock", "stick_held")),
+    Need("mux:neutral_start", _HELD, _DRIVER_HEEDS),
     Need("filter:zero_after_estop", ("estop_pressed", "stick_held"), "mux:neutral_start"),
+    Need("filter:scan", ("scan_stale", "obstacle")),
+    Need("filter:late_scans", ("scanner_late",)),
     Need("filter:command", ("mux_lossy",)),
     Need("filter:estop", ("estop_pressed", "estop_stale")),
     Need("filter:obstacle", ("obstacle",)),
     Need("filter:blind", ("scanner_blind_ahead", "scanner_one_beam", "scanner_zero_ahead")),
     Need("filter:frozen", ("scanner_frozen", "scanner_by_turns")),
-)
+    Need("filter:repeated_stamp", ("scanner_old_stamps",), "filter:frozen"),
+    Need("action:timeout_and_progress", ("cmd_vel_lossy", "drive_ignores_setpoints", "obstacle")),
+)  # fmt: skip

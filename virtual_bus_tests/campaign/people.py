@@ -6,7 +6,8 @@ from collections.abc import Callable
 from random import Random
 from typing import TYPE_CHECKING
 
-from campaign.fault import LONG, Arguments, Change, Kind, nothing
+from campaign.fault import LONG, SHORT, Arguments, Change, Kind, nothing, stays
+from canbase_driver.readiness import Aim
 from canbase_velocity.twist import ZERO, Twist
 
 if TYPE_CHECKING:
@@ -70,6 +71,31 @@ def reset_again(world: World, around: Surroundings, given: Arguments, number: in
     around.reset()
 
 
+def tap_stick(world: World, around: Surroundings, given: Arguments, number: int) -> None:
+    """A touch each second, of a few millimetres; else the stick is at rest."""
+    world.topics.publish("cmd_vel_joy", given["twist"] if 0 < number % 50 < 4 else ZERO)
+
+
+def ask_to_stop(world: World, around: Surroundings, given: Arguments) -> None:
+    """Service motor_driver/stop."""
+    world.driver.stop()
+
+
+def deactivate(world: World, around: Surroundings, given: Arguments) -> None:
+    """Lifecycle transition of motor_driver."""
+    world.driver.aim(Aim.CONFIGURED)
+
+
+def activate(world: World, around: Surroundings, given: Arguments) -> None:
+    """Lifecycle transition of motor_driver."""
+    world.driver.aim(Aim.ACTIVE)
+
+
+def touch(random: Random) -> Arguments:
+    """A motion that is too slow and too short to be missed: about 5 mm."""
+    return {"twist": Twist(random.choice((-1.0, 1.0)) * random.uniform(0.04, 0.08), 0.0)}
+
+
 def steady(random: Random) -> Arguments:
     """A motion to hold."""
     speed_mps = random.choice((-1.0, 1.0)) * random.uniform(0.15, 0.8)
@@ -77,6 +103,14 @@ def steady(random: Random) -> Arguments:
 
 
 PEOPLE: dict[str, Kind] = {
+    "stick_tapped": Kind(
+        "a stick is touched for a moment, again and again", (2.0, 4.0), touch,
+        *goes_on(tap_stick, release_stick, every_s=0.02),
+    ),
+    "stop_requested": Kind("motor_driver is asked to stop", SHORT, nothing, ask_to_stop, stays),
+    "driver_deactivated": Kind(
+        "motor_driver is deactivated, and activated again", LONG, nothing, deactivate, activate
+    ),
     "stick_held": Kind(
         "a stick is held through everything", (0.8, 4.0), steady,
         *goes_on(hold_stick, release_stick),

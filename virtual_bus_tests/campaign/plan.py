@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from random import Random
 
 from campaign.fault import PlannedFault
-from campaign.faults import FAULTS
+from campaign.faults import ADDED, FAULTS
 from campaign.robots import bitrates, robot_of
 from campaign.scanner import LIES
 from canbase_config.robot import Robot
@@ -26,6 +26,8 @@ LIES_S = 2.0
 """So much longer is a scenario whose scanner lies: until the base has come to where the wall is."""
 FIRST_LIFE_S = 1.5
 """So long the faults of a first life last at most."""
+ADDED_SHARE = 0.03
+"""Share of the scenarios that have one of campaign.faults.ADDED."""
 KINDS = ("constant", "constant", "constant", "weave", "burst", "nan", "zero")
 """How a source behaves for a while; a word that stands more often is drawn more often."""
 
@@ -83,13 +85,18 @@ class Plan:
         return [head, str(robot_of(self.seed)), *sorted(parts + resets)]
 
 
+def _added(seed: int) -> Iterator[str]:
+    """Those of ADDED that this scenario has too. Each is drawn by itself: the others stay what they were."""
+    return (name for name in ADDED if Random(f"{seed} {name}").random() < ADDED_SHARE)
+
+
 def draw_plan(seed: int, only: Sequence[str] = ()) -> Plan:
     """The same seed gives the same plan. `only`: the faults to draw from; empty: all.
 
     Speeds are drawn for the sample robot, and scaled to the limits of this one.
     """
     robot = robot_of(seed).robot
-    pool = sorted(only or FAULTS)
+    pool = sorted(only or FAULTS.keys() - ADDED)
     random = Random(seed)
     duration_s = random.uniform(*SCENARIO_S)
     by_goals = random.random() < 0.35
@@ -104,7 +111,9 @@ def draw_plan(seed: int, only: Sequence[str] = ()) -> Plan:
         tuple(random.uniform(0.8, duration_s) for _ in range(random.choice((0, 0, 1, 1, 2)))),
         tuple(_fault(name, random, robot) for name in names),
     )
-    if any(name in LIES for name in names):
+    more = () if only else tuple(_fault(name, Random(f"{seed} {name}"), robot) for name in _added(seed))
+    plan = replace(plan, faults=(*plan.faults, *more))
+    if any(fault.name in LIES for fault in plan.faults):
         plan = _longer(plan)
     return _with_second_life(plan, pool, random, robot) if random.random() < SECOND_LIFE else plan
 

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from random import Random
 from typing import TYPE_CHECKING
 
-from campaign.fault import LONG, SHORT, Arguments, Change, Kind, nothing
+from campaign.driver_process import SETPOINTS
+from campaign.fault import LONG, SHORT, Arguments, Change, Kind, nothing, wheel
 
 if TYPE_CHECKING:
     from campaign.outside import Surroundings
     from campaign.world import World
 
+TORN_AT = 100
+"""In a record of stops: within the first of its two pages."""
+TURN_S = 0.01
 PROCESSES = ("driver", "velocity", "watchdog", "action")
 
 
@@ -52,6 +57,67 @@ def _driver(field: str, *, on: object = True, off: object = False) -> tuple[Chan
         setattr(world.driver, field, off)
 
     return begin, end
+
+
+def _omits(world: World, around: Surroundings, given: Arguments) -> None:
+    node_id, axis = world.drives.place(given["wheel"])
+    world.driver.omits = SETPOINTS[axis] + node_id
+
+
+def _omits_nothing(world: World, around: Surroundings, given: Arguments) -> None:
+    world.driver.omits = 0
+
+
+def _asked_to_end(world: World, around: Surroundings, given: Arguments) -> None:
+    world.driver.end()
+
+
+def _ended(world: World, around: Surroundings, given: Arguments) -> None:
+    world.driver.die()
+    world.driver.restart()
+
+
+def _torn(name: str) -> Kind:
+    def begin(world: World, around: Surroundings, given: Arguments) -> None:
+        process = world.processes[name]
+        process.die()
+        data = process.disk.file.data  # type: ignore[attr-defined]
+        if data is not None:
+            data[TORN_AT] ^= 0xFF
+
+    def end(world: World, around: Surroundings, given: Arguments) -> None:
+        world.processes[name].restart()
+
+    return Kind(f"{name} is killed while it writes its record of stops", (0.3, 1.5), nothing, begin, end)
+
+
+def _starved(name: str) -> Kind:
+    """Again and again it gets its processor just before it is missed."""
+    waits: dict[int, bool] = {}
+
+    def begin(world: World, around: Surroundings, given: Arguments) -> None:
+        waits[id(given)] = True
+        away_s = given["share"] * world.robot.timeouts.watchdog_s
+
+        def away() -> None:
+            if id(given) in waits:
+                world.processes[name].hang("starved")
+                world.clock.after(away_s, back)
+
+        def back() -> None:
+            world.processes[name].go_on("starved")
+            world.clock.after(TURN_S, away)
+
+        away()
+
+    def end(world: World, around: Surroundings, given: Arguments) -> None:
+        waits.pop(id(given), None)
+        world.processes[name].go_on("starved")
+
+    def draw(random: Random) -> Arguments:
+        return {"share": random.uniform(0.5, 0.9)}
+
+    return Kind(f"{name} gets its processor for moments only", LONG, draw, begin, end)
 
 
 def _watchdog_deaf(world: World, around: Surroundings, given: Arguments) -> None:
@@ -98,6 +164,17 @@ PROCESS_FAULTS: dict[str, Kind] = {
         lambda r: {"heartbeats": r.random() < 0.8},
         *_driver("repeats"),
     ),
+    "setpoints_not_sent": Kind(
+        "the driver sends no setpoints to one axis", (0.8, 3.0), wheel, _omits, _omits_nothing
+    ),
+    "driver_asked_to_end": Kind(
+        "the driver is asked to end, and started again later", (1.0, 2.0), nothing, _asked_to_end, _ended
+    ),
+    "driver_never_lets_go": Kind(
+        "the driver leaves the power on at a stand that nothing proves", (2.0, 4.0), nothing, *_driver("never_lets_go")
+    ),
+    **{f"{name}_dies_torn": _torn(name) for name in ("driver", "watchdog")},
+    "watchdog_starved": _starved("watchdog"),
     "driver_ignores_zero": Kind("the driver never sends zero", (0.8, 3.0), nothing, *_driver("ignores_zero")),
     "bus_problem": Kind(
         "the driver's adapter fails", SHORT, nothing, *_driver("bus_problem", on="adapter gone", off="")

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from canbase_velocity.scan import Scan
-from unit.lidar import ByTurns, Fault, Frozen, Lidar, blind, one_beam_left
+from unit.lidar import ByTurns, Fault, Frozen, Late, Lidar, blind, one_beam_left
 
 NAN = math.nan
 HALF_WALL_M = 0.6
@@ -52,6 +52,7 @@ LIES = {
     "scanner_frozen": Lie("old readings come with new stamps", lambda: Frozen(new_stamps=True)),
     "scanner_old_stamps": Lie("the same scan comes again and again", lambda: Frozen(new_stamps=False)),
     "scanner_by_turns": Lie("three old scans come by turns, with new stamps", lambda: ByTurns(3, new_stamps=True)),
+    "scanner_late": Lie("each scan comes later than the one before", lambda: Late(2.0, per_s=1.0)),
     "scanner_mirrored": Lie("a scanner counts the other way round", lambda: _mirrored),
 }
 

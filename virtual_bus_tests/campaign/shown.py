@@ -16,15 +16,22 @@ class Shown:
     def __init__(self, world: World) -> None:
         self._base, self._track_m = world.drives.bench.base, world.robot.base.track_m
         drives = world.robot.drives
+        self._clock, self._at = world.clock, world.clock.now
+        self._axes = [world.drives.axis(wheel) for wheel in range(len(drives))]
         self._encoders = tuple(
-            [world.drives.axis(wheel).encoder for wheel, drive in enumerate(drives) if drive.side == side]
+            [axis.encoder for axis, drive in zip(self._axes, drives, strict=True) if drive.side == side]
             for side in ("left", "right")
         )
+        self._pushed_s = [0.0 for _ in drives]
         self.left_mps = self.right_mps = self.linear_mps = self.angular_radps = 0.0
 
     def look(self) -> None:
         """Now."""
-        base = self._base
+        base, elapsed_s, self._at = self._base, self._clock.now - self._at, self._clock.now
+        for wheel, axis in enumerate(self._axes):
+            motor = axis.motor
+            given_s = elapsed_s * abs(motor.force_n) / motor.peak_force_n
+            self._pushed_s[wheel] = self._pushed_s[wheel] + given_s if motor.powered else 0.0
         if base.resting:
             self.left_mps = self.right_mps = self.linear_mps = self.angular_radps = 0.0
             return
@@ -32,6 +39,17 @@ class Shown:
         self.left_mps, self.right_mps = left * base.v_left_mps, right * base.v_right_mps
         self.linear_mps = (self.left_mps + self.right_mps) / 2.0
         self.angular_radps = (self.right_mps - self.left_mps) / self._track_m
+
+    @property
+    def is_blind(self) -> bool:
+        """An encoder shows nothing that its drive could brake."""
+        return any(not axis.encoder.closes_loop for axis in self._axes)
+
+    @property
+    def pushed_blindly_s(self) -> float:
+        """So long a drive with such an encoder has given its rated torque, or less for longer, without letting go."""
+        pushed = zip(self._axes, self._pushed_s, strict=True)
+        return max((given_s for axis, given_s in pushed if not axis.encoder.closes_loop), default=0.0)
 
     @property
     def fastest_mps(self) -> float:

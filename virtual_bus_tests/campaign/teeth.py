@@ -9,7 +9,7 @@ from __future__ import annotations
 import multiprocessing
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import count, islice
 from typing import Annotated
@@ -60,8 +60,11 @@ def look(need: Need, most: int = MOST) -> Bite:
 def missed(need: Need, seed: int) -> str:
     """The property that holds in this scenario with the safeguard alone; empty: there is none."""
     start, plan = _start(seed // SEEDS_A_ROBOT), draw_plan(seed, need.faults)
-    without = _properties(start.fork(plan, need.taken_out))
-    found = without and without - _properties(start.fork(plan, need.beside))
+    if need.quiet:
+        plan = replace(plan, segments=(), goals=())
+    found = _properties(start.fork(plan, need.taken_out))
+    if found:
+        found -= _properties(start.fork(plan, "" if need.proof else need.beside))
     return min(found) if found else ""
 
 
@@ -110,12 +113,17 @@ def main(
     if unknown:
         raise typer.BadParameter(f"no such safeguard: {', '.join(sorted(unknown))}")
     bites: list[Bite] = []
-    with Progress("{task.description}", BarColumn(), MofNCompleteColumn(), "{task.fields[last]}", console=out) as bar:
-        task = bar.add_task("safeguards", total=len(needs), last="")
+    with Progress("{task.description}", BarColumn(), MofNCompleteColumn(), console=out) as bar:
+        task = bar.add_task("safeguards", total=len(needs))
         for bite in look_at(needs, scenarios, min(workers, len(needs))):
             bites.append(bite)
-            bar.update(task, advance=1, last=f"{bite.need.safeguard}: {bite.found or 'NOT FOUND'}")
+            found = f"{bite.found} after {bite.tried}" if bite.found else f"NOT FOUND IN {bite.tried}"
+            bar.console.print(f"without {bite.need.safeguard}: {found}", highlight=False)
+            bar.advance(task)
     out.print(table(bites))
+    for need in needs:
+        if need.proof:
+            out.print(f"{need.safeguard}: no scenario can need it alone: {need.proof}", highlight=False)
     missing = sum(not bite.found for bite in bites)
     out.print(f"{len(bites) - missing} of {len(bites)} safeguards are found missing")
     raise typer.Exit(1 if missing else 0)

@@ -14,6 +14,7 @@ from campaign.runner import run
 from campaign.scenario import Start
 from campaign.teeth import look_at
 from campaign.without import SAFEGUARDS
+from hazards.catalogue import load
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(1800)]
 SCENARIOS = 180
@@ -41,7 +42,9 @@ def test_the_same_seed_gives_the_same_scenario() -> None:
 def test_every_row_of_the_teeth_names_safeguards_and_faults_that_exist() -> None:
     assert {name for need in NEEDS for name in need.taken_out.split("+")} <= set(SAFEGUARDS)
     assert {fault for need in NEEDS for fault in need.faults} <= set(FAULTS)
-    assert len({need.safeguard for need in NEEDS}) == len(NEEDS), "one row each"
+    named = {name for row in load().rows for name in row.safeguard.split("+") if name}
+    assert named <= {need.safeguard for need in NEEDS}, "each safeguard of docs/hazards.yaml"
+    assert sorted(need.safeguard for need in NEEDS) == sorted(SAFEGUARDS), "one row each"
 
 
 def test_without_a_safeguard_a_scenario_shows_it_missing_and_with_it_the_same_one_does_not() -> None:

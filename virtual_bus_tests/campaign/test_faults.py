@@ -11,7 +11,9 @@ import pytest
 from campaign.faults import FAULTS
 from campaign.scenario import Start
 from campaign.world import World
-from canbase_velocity.twist import Twist
+from canbase_bench.cia402.states import State
+from canbase_bench.plant.encoder import EncoderFault
+from canbase_velocity.twist import ZERO, Twist
 
 pytestmark = pytest.mark.campaign
 DRIVES_S, HOLDS_S, LASTS_S = 0.8, 0.6, 1.6
@@ -33,7 +35,7 @@ def undisturbed(start: Start) -> dict[str, int]:
     return {by: digest(start, by) for by in BY}
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("fault", [fault for fault in FAULTS if fault != "driver_never_lets_go"])
 def test_every_fault_changes_what_happens_but_for_what_is_seen_the_same(
     start: Start, undisturbed: dict[str, int], fault: str
 ) -> None:
@@ -41,6 +43,22 @@ def test_every_fault_changes_what_happens_but_for_what_is_seen_the_same(
     usual = {by: digest(start, by, other) for by in BY} if other else undisturbed
     changes = any(digest(start, by, *filter(None, (fault, other))) != usual[by] for by in BY)
     assert changes is (fault not in SEEN_THE_SAME)
+
+
+@pytest.mark.parametrize("holds", [False, True])
+def test_a_driver_that_never_lets_go_leaves_the_power_on_after_a_touch(holds: bool) -> None:
+    """t   0 encoder dead; 0.1 a touch of 0.08 s; 0.4 the power has been off for a moment, or not"""
+    start = Start()
+    world = start.world
+    world.drives.axis(0).lose_encoder(EncoderFault())
+    world.driver.never_lets_go = holds
+    world.drives.changes()
+    for step in range(8):
+        twist = Twist(0.05, 0.0) if step < 4 else ZERO
+        world.clock.at(world.clock.now + 0.1 + 0.02 * step, world.topics.publish, "cmd_vel_joy", twist)
+    world.clock.run_until(world.clock.now + 0.4)
+    without_power = [change for change in world.drives.changes() if change.after is State.SWITCHED_ON]
+    assert bool(without_power) is not holds
 
 
 def test_without_a_fault_nothing_changes(start: Start, undisturbed: dict[str, int]) -> None:

@@ -6,11 +6,15 @@ from random import Random
 
 import pytest
 
+from campaign import plan
 from campaign.can_bus import CanBus
 from campaign.clock import Clock
 from campaign.envelope import Envelope, moving_s, react_s
+from campaign.faults import ADDED, FAULTS
 from campaign.process import Process, Topics
 from campaign.robots import campaign_robot
+from campaign.wishes import Wishes
+from canbase_velocity.twist import ZERO, Twist
 
 pytestmark = pytest.mark.campaign
 
@@ -147,3 +151,39 @@ def test_what_is_within_the_tolerance_counts_as_standing() -> None:
     assert moving_s(robot, 0.05, -0.2) == 0.0
     assert moving_s(robot, 0.86, 0.0) == pytest.approx(0.8 / robot.limits.deceleration_mps2)
     assert moving_s(robot, 0.0, -1.24) == pytest.approx(1.0 / robot.limits.angular_deceleration_radps2)
+
+
+def test_who_orders_motion_over_a_reset_counts_from_its_next_zero_on() -> None:
+    """t   0 joystick and navigation order; 0.1 reset; joystick goes on; 0.3 zero; 0.35 it orders again"""
+    robot = campaign_robot()
+    wishes, forward = Wishes(robot, 0.0), Twist(0.4, 0.0)
+    for at in (0.0, 0.05):
+        wishes.take("cmd_vel_joy", forward, at)
+    wishes.on_reset(0.1)
+    wishes.take("cmd_vel_joy", forward, 0.2)
+    assert wishes.greatest_s(0.2) == 0.0
+    wishes.take("cmd_vel_nav", forward, 0.25)
+    assert wishes.greatest_s(0.25) > 0.0, "navigation had ordered nothing when the reset was done"
+    wishes.take("cmd_vel_nav", ZERO, 0.26)
+    wishes.take("cmd_vel_joy", ZERO, 0.3)
+    wishes.take("cmd_vel_joy", forward, 0.35)
+    assert wishes.greatest_s(0.35) == pytest.approx(0.4 / robot.limits.deceleration_mps2)
+
+
+def test_a_program_that_was_silent_for_its_time_counts_again_a_joystick_does_not() -> None:
+    robot = campaign_robot()
+    for topic, counts in (("cmd_vel_nav", True), ("cmd_vel_joy", False)):
+        wishes = Wishes(robot, 0.0)
+        wishes.take(topic, Twist(0.4, 0.0), 0.0)
+        wishes.on_reset(0.1)
+        wishes.take(topic, Twist(0.4, 0.0), 5.0)
+        assert (wishes.greatest_s(5.0) > 0.0) is counts
+
+
+def test_a_fault_that_was_added_leaves_the_scenarios_without_it_as_they_were(monkeypatch: pytest.MonkeyPatch) -> None:
+    plans = {seed: plan.draw_plan(seed) for seed in range(60)}
+    monkeypatch.setattr(plan, "ADDED", tuple(name for name in ADDED if name != "stop_requested"))
+    monkeypatch.setattr(plan, "FAULTS", {name: kind for name, kind in FAULTS.items() if name != "stop_requested"})
+    without = {seed for seed, each in plans.items() if "stop_requested" not in {fault.name for fault in each.faults}}
+    assert 50 < len(without) < 60
+    assert {seed: plan.draw_plan(seed) for seed in without} == {seed: plans[seed] for seed in without}

@@ -7,6 +7,7 @@ from random import Random
 from typing import TYPE_CHECKING
 
 from campaign.fault import LONG, SHORT, Arguments, Change, Kind, intruder, nothing, share, speed
+from campaign.people import goes_on
 from canbase_velocity.twist import Twist
 
 if TYPE_CHECKING:
@@ -62,6 +63,21 @@ def _once(world: World, around: Surroundings, given: Arguments) -> None:
     world.topics.twice.clear()
 
 
+def two_on_a_lock(world: World, around: Surroundings, given: Arguments, number: int) -> None:
+    """The graph has both of them; each publishes ten times a second."""
+    if number == 0:
+        world.topics.publish("publishers", ("lock", ("button", "panel")))
+        world.locked_at = world.clock.now
+    world.topics.publish("lock", number % 2 == 0)
+
+
+def one_on_a_lock(world: World, around: Surroundings, given: Arguments, number: int) -> None:
+    """The one that is left says that it does not hold."""
+    world.topics.publish("publishers", ("lock", ("panel",)))
+    world.topics.publish("lock", False)
+    world.locked_at = math.inf
+
+
 def _strange_twist(random: Random) -> Arguments:
     """Mostly a motion, sometimes nonsense."""
     nonsense = Twist(math.nan, math.inf)
@@ -70,6 +86,10 @@ def _strange_twist(random: Random) -> Arguments:
 
 
 TOPIC_FAULTS: dict[str, Kind] = {
+    "two_on_a_lock": Kind(
+        "two nodes publish on one lock: one of them says locked, and the other one not", LONG, nothing,
+        *goes_on(two_on_a_lock, one_on_a_lock),
+    ),
     "straight_to_cmd_vel": Kind(
         "somebody publishes to cmd_vel",
         LONG,

@@ -9,6 +9,7 @@ from functools import partial
 from campaign.clock import FINE, Clock, Pace
 from campaign.disk import StopDisk
 from campaign.process import Process, Topics
+from canbase_config.mux import MuxLock
 from canbase_config.robot import Robot
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_velocity.base_ready import status_timeout_s
@@ -25,6 +26,8 @@ from canbase_velocity.twist import Twist
 
 STATE_PERIOD_S = 0.1
 MUX_STATE_PERIOD_S = 0.5
+LOCKS = {"lock": MuxLock(topic="lock", priority=255, required=False)}
+"""Nobody publishes on it but in a fault."""
 
 
 class VelocityProcess(Process):
@@ -48,6 +51,8 @@ class VelocityProcess(Process):
         topics.subscribe("motor_driver/status", self, self._on_driver)
         topics.subscribe(robot.safety.scan.topic, self, self._on_scan)
         topics.subscribe(robot.safety.estop.topic, self, self._on_estop)
+        topics.subscribe("lock", self, self._on_lock)
+        topics.subscribe("publishers", self, self._on_publishers)
         self.disk = StopDisk("velocity")
         """Its record of the emergency stop, which outlives it."""
         self.begin()
@@ -55,7 +60,7 @@ class VelocityProcess(Process):
     def begin(self) -> None:
         """A new mux and a new filter; the sequence of the leases starts again."""
         now = self.clock.now
-        self.mux = Mux(self._robot.mux.sources, status_timeout_s=status_timeout_s(self._robot.rates.status_hz))
+        self.mux = Mux(self._robot.mux.sources, LOCKS, status_timeout_s=status_timeout_s(self._robot.rates.status_hz))
         self.filter = SafetyFilter(FilterConfig.of(self._robot), self.disk.found())
         self._sequence, self._ending = 0, False
         self._mux_told: tuple[object, ...] = ()
@@ -118,6 +123,13 @@ class VelocityProcess(Process):
             self.filter.on_laser_scan(scan.topic, seen, Placement.of(scan), self.clock.now)
         else:
             self.filter.on_scan(scan.topic, seen, None, self.clock.now)
+
+    def _on_lock(self, locked: bool) -> None:
+        self.mux.on_lock("lock", locked, self.clock.now)
+
+    def _on_publishers(self, found: tuple[str, tuple[str, ...]]) -> None:
+        """A look into the ROS graph: a topic, and the nodes that publish on it."""
+        self.mux.on_publishers(*found)
 
     def _on_estop(self, pressed: bool) -> None:
         self.filter.on_estop(pressed, self.clock.now)

@@ -8,18 +8,36 @@ from canbase_velocity.twist import Twist
 
 
 class Wishes:
-    """Each source's last command holds for its timeout in robot.yaml."""
+    """Each source's last command holds for its timeout in robot.yaml.
+
+    One that orders motion while a reset is done does not count from then on, until it orders zero or was silent for its
+    neutral_after_s.
+    """
 
     def __init__(self, robot: Robot, now: float) -> None:
         self._robot = robot
         self._timeouts = {source.topic: source.timeout_s for source in robot.mux.sources.values()}
+        self._neutral_after = {source.topic: source.neutral_after_s for source in robot.mux.sources.values()}
+        self._held: set[str] = set()
         self._last: dict[str, tuple[float, float]] = dict.fromkeys(self._timeouts, (0.0, now))
 
     def take(self, topic: str, twist: Twist, now: float) -> None:
         """A message on any topic; only sources count, and only finite commands."""
-        if topic in self._timeouts and twist.is_finite:
-            self._last[topic] = braking_s(self._robot, twist.linear_mps, twist.angular_radps), now
+        if topic not in self._timeouts or not twist.is_finite:
+            return
+        patience_s = self._neutral_after[topic]
+        if twist.is_zero or (patience_s and now > self._last[topic][1] + patience_s):
+            self._held.discard(topic)
+        self._last[topic] = braking_s(self._robot, twist.linear_mps, twist.angular_radps), now
+
+    def on_reset(self, now: float) -> None:
+        """A reset is done: who orders motion now has held the stick over it."""
+        self._held = {topic for topic in self._last if self._orders_s(topic, now) > 0.0}
 
     def greatest_s(self, now: float) -> float:
         """τ of the greatest command that holds [s]."""
-        return max(tau_s if now <= at + self._timeouts[topic] else 0.0 for topic, (tau_s, at) in self._last.items())
+        return max(0.0 if topic in self._held else self._orders_s(topic, now) for topic in self._last)
+
+    def _orders_s(self, topic: str, now: float) -> float:
+        tau_s, at = self._last[topic]
+        return tau_s if now <= at + self._timeouts[topic] else 0.0

@@ -16,9 +16,10 @@ from canbase_bench.cia301.heartbeat import HeartbeatConsumer
 from canbase_config.latch_record import CLEAR, Defect, Found
 from canbase_driver import command, reset, supervisor, watchdog_link
 from canbase_driver.kinematics import Twist2D
+from canbase_driver.let_go import LetGo
 from canbase_driver.odometry import WheelTravel
 from canbase_driver.snapshot import DriverState, WatchdogView
-from canbase_velocity import filter_state, mux, neutral, obstacle, safety_filter
+from canbase_velocity import filter_state, lock, mux, neutral, obstacle, safety_filter
 from canbase_velocity.estop import FREE, HELD
 from canbase_velocity.frozen import FrozenWatch
 from canbase_velocity.scan import Scan
@@ -146,12 +147,16 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "records:unreadable": _unreadable_is_clear,
     "drives:heartbeat_consumer": _put(HeartbeatConsumer, "tick", lambda self, now: None),
     "mux:neutral_start": _put(neutral.Arming, "armed", property(lambda self: True)),
+    "mux:lock_publishers": _put(lock.Lock, "published_by", lambda self, nodes: None),
+    "driver:lets_go": _put(LetGo, "_is_due", lambda self, wheels: False),
     "mux:timeout": _put(mux._Source, "is_fresh", lambda self, now: self.at_s is not None),
     "filter:estop": _put(filter_state.SafetyFilter, "_advance_estop", _no_estop),
     "filter:obstacle": _put(obstacle, "first_touch", lambda points, box, twist, stop_m: NO_TOUCH),
     "filter:blind": _put(obstacle, "told_share", lambda order, sight, geometry: 1.0),
     "filter:frozen": _put(FrozenWatch, "look", _never_frozen),
     "filter:repeated_stamp": _put(FrozenWatch, "is_repeated", lambda self, scan: False),
+    "filter:scan": _put(safety_filter, "_scan", lambda inputs: None),
+    "filter:late_scans": _put(filter_state._Scanner, "_late_s", lambda self, scan, now: 0.0),
     "filter:command": _put(safety_filter, "_command", lambda inputs, config: None),
     "filter:zero_after_estop": _put(filter_state.SafetyFilter, "_advance_estop", _forget_estop),
     "action:timeout_and_progress": _drop(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from random import Random
 
@@ -41,6 +42,8 @@ class World:
         self.on_goal_end: Callable[[Goal], None] = lambda goal: None
         self.lease_loss = 0.0
         """Chance that a lease is lost on its way."""
+        self.locked_at = math.inf
+        """Since when somebody publishes on the lock that it holds."""
         self.lease_garbage = False
         """Every lease comes with a mangled copy of it."""
         self.bus = CanBus(clock, self.random, self.robot.bus.bitrate)
