@@ -52,6 +52,7 @@ _LIES = ("encoder_frozen", "frozen_encoder", "stuck_velocity", "encoder_jumping"
 _OFF = ("drive_sto", "drive_fault")
 _DRIVER_SEES = "driver:drive_fault+driver:drive_restarted+driver:drive_silent+driver:drive_disabled"
 _DRIVER_HEEDS = "driver:waits_for_zero+driver:reset_needs_zero+driver:zero_before_motion"
+_MOTION = "watchdog:feedback_implausible+watchdog:motion_missing+watchdog:twist_outside"
 _DEAF = "a watchdog that cannot send stops nothing; what it would trip for stays tripped until it can send again"
 _AWAY = "driver:watchdog_missing+drives:heartbeat_consumer"
 
@@ -62,17 +63,19 @@ NEEDS: tuple[Need, ...] = (
     Need("watchdog:foreign_master", ("second_master_setpoints",), "watchdog:setpoint_missing+watchdog:target_outside"),
     Need("watchdog:lease_lost", (*_VELOCITY_GONE, "lease_lost"), "driver:command_timeout"),
     Need("watchdog:driver_silent", _DRIVER_GONE, "watchdog:target_outside+drives:heartbeat_consumer"),
-    Need("watchdog:drive_restarted", ("drive_resets",), f"watchdog:drive_silent+watchdog:drive_down+{_DRIVER_SEES}"),
+    Need("watchdog:drive_restarted", ("drive_resets", "drive_power_cycle"),
+         f"watchdog:drive_silent+watchdog:drive_down+{_MOTION}+{_DRIVER_SEES}"),
     Need("watchdog:drive_silent", _SILENT, "driver:drive_silent"),
-    Need("watchdog:answered_twice", ("twin_node", "stick_held")),
+    Need("watchdog:answered_twice", ("twin_node", "drive_ignores_setpoints"),
+         f"{_MOTION}+watchdog:motion_outside+driver:did_not_stop"),
     Need("watchdog:setpoint_missing", ("setpoints_not_sent", "stick_held")),
     Need("watchdog:drive_down", _OFF, "driver:drive_fault+driver:drive_disabled"),
     Need("watchdog:feedback_implausible", _LIES, "watchdog:motion_missing"),
     Need("watchdog:motion_missing", ("encoder_lost", "wheel_blocked", "stick_held")),
     Need("watchdog:power_at_stand", ("driver_never_lets_go", "encoder_lost", "stick_tapped"), quiet=True),
     Need("watchdog:target_outside", _MAD),
-    Need("watchdog:overspeed", ("encoder_reversed",), "watchdog:motion_outside"),
-    Need("watchdog:motion_outside", ("drive_ignores_setpoints",), "driver:did_not_stop"),
+    Need("watchdog:overspeed", ("encoder_reversed", "driver_ignores_zero"), "watchdog:motion_outside"),
+    Need("watchdog:motion_outside", ("drive_ignores_setpoints",), f"{_MOTION}+driver:did_not_stop"),
     Need("watchdog:twist_outside", ("wheel_limited", "motor_weak", "stick_held")),
     Need("watchdog:all", (*_MAD, "lease_lost")),
     Need("watchdog:latch", ("velocity_hangs", "lease_lost", "driver_hangs")),
@@ -86,7 +89,7 @@ NEEDS: tuple[Need, ...] = (
     Need("driver:drive_silent", _SILENT, "watchdog:drive_silent"),
     Need("driver:watchdog_missing", _WATCHDOG_GONE, "drives:heartbeat_consumer"),
     Need("driver:drive_disabled", _OFF, "driver:drive_fault+watchdog:drive_down"),
-    Need("driver:did_not_stop", ("drive_ignores_setpoints",), "watchdog:motion_outside"),
+    Need("driver:did_not_stop", ("drive_ignores_setpoints",), f"{_MOTION}+watchdog:motion_outside"),
     Need("driver:stop_requested", ("stop_requested", "stick_held")),
     Need("driver:shutdown", ("driver_asked_to_end", "stick_held")),
     Need("driver:inactive", ("driver_deactivated", "stick_held")),
@@ -98,7 +101,7 @@ NEEDS: tuple[Need, ...] = (
     Need("driver:waits_for_zero", _HELD, "mux:neutral_start+driver:zero_before_motion+driver:reset_needs_zero"),
     Need("driver:reset_needs_zero", _HELD, "mux:neutral_start+driver:zero_before_motion+driver:waits_for_zero"),
     Need("driver:command_is_finite", ("straight_to_cmd_vel",)),
-    Need("driver:odometry_jump_guard", ("encoder_jumping",), "watchdog:feedback_implausible"),
+    Need("driver:odometry_jump_guard", ("frozen_encoder",), f"{_MOTION}+watchdog:motion_outside"),
     Need("driver:lets_go", ("encoder_lost", "stick_tapped"), "watchdog:power_at_stand", quiet=True),
     Need("driver:stop_record", ("driver_dies", "drive_fault", "all_processes_restart")),
     Need("records:unreadable", ("driver_dies_torn", "watchdog_dies_torn", "lease_lost")),
