@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar
 
 from canbase_driver.cia402 import FAULT_RESET_CYCLES
 from canbase_driver.snapshot import WatchdogView
@@ -108,7 +107,7 @@ class Reset:
         problem = _first(BREAKS[self.phase], situation)
         if problem:
             return Outcome(False, f"broken off: {problem}")
-        return self._RULES[self.phase](self, situation, answer, now)
+        return RULES[self.phase](self, situation, answer, now)
 
     def _watchdog(self, situation: Situation, answer: int | None, now: float) -> Outcome | None:
         if answer is not None and answer not in ACCEPTED:
@@ -145,13 +144,15 @@ class Reset:
     def _go(self, phase: Phase, now: float) -> None:
         self.phase, self._since_s = phase, now
 
-    _RULES: ClassVar[dict[Phase, Callable[[Reset, Situation, int | None, float], Outcome | None]]] = {
-        Phase.WATCHDOG: _watchdog,
-        Phase.DRIVES: _drives,
-        Phase.EDGE_LOW: _edge,
-        Phase.EDGE_HIGH: _edge,
-        Phase.FAULTS: _faults,
-    }
+
+RULES: dict[Phase, Callable[[Reset, Situation, int | None, float], Outcome | None]] = {
+    Phase.WATCHDOG: Reset._watchdog,
+    Phase.DRIVES: Reset._drives,
+    Phase.EDGE_LOW: Reset._edge,
+    Phase.EDGE_HIGH: Reset._edge,
+    Phase.FAULTS: Reset._faults,
+}
+"""What is decided in each phase."""
 
 
 def _first(checks: tuple[Callable[[Situation], str], ...], situation: Situation) -> str:

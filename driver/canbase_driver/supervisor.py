@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar, TypeVar
+from typing import TypeVar
 
 from canbase_driver.braking import Braking
 from canbase_driver.cia402 import PowerGoal
@@ -236,7 +236,7 @@ class Supervisor:
     def step(self, situation: Situation, now: float) -> Orders:
         """Judge the situation, move on, and say what to do in this cycle."""
         before = (self.state, self._step)
-        self._RULES[self.state](self, situation, now)
+        RULES[self.state](self, situation, now)
         if (self.state, self._step) != before:
             self._since_s = now
             if self.state is DriverState.STOPPING:
@@ -302,7 +302,7 @@ class Supervisor:
             worse = _first(_LATCHED_HAZARDS if ramps else _LATCHED_HAZARDS_ON_THE_WAY_DOWN, situation)
             if worse is not None:
                 self.cause, self.latches = _cause(worse, situation), True
-        self._STEPS[self._step](self, situation, now)
+        STEPS[self._step](self, situation, now)
 
     def _ramp(self, situation: Situation, now: float) -> None:
         if _first(_QUICK_HAZARDS, situation) is not None:
@@ -340,20 +340,23 @@ class Supervisor:
         self.finished = True
         self.cause = Cause(SHUTDOWN, "the driver is ending", "a new start")
 
-    _RULES: ClassVar[dict[DriverState, Callable[[Supervisor, Situation, float], None]]] = {
-        DriverState.OFFLINE: _without_power,
-        DriverState.BOOTING: _without_power,
-        DriverState.DISARMED: _without_power,
-        DriverState.ENABLING: _enabling,
-        DriverState.ENABLED: _enabled,
-        DriverState.STOPPING: _stopping,
-        DriverState.LATCHED: _latched,
-    }
-    _STEPS: ClassVar[dict[Step, Callable[[Supervisor, Situation, float], None]]] = {
-        Step.RAMP: _ramp,
-        Step.QUICK: _quick,
-        Step.OFF: _off,
-    }
+
+RULES: dict[DriverState, Callable[[Supervisor, Situation, float], None]] = {
+    DriverState.OFFLINE: Supervisor._without_power,
+    DriverState.BOOTING: Supervisor._without_power,
+    DriverState.DISARMED: Supervisor._without_power,
+    DriverState.ENABLING: Supervisor._enabling,
+    DriverState.ENABLED: Supervisor._enabled,
+    DriverState.STOPPING: Supervisor._stopping,
+    DriverState.LATCHED: Supervisor._latched,
+}
+"""What is decided in each state."""
+STEPS: dict[Step, Callable[[Supervisor, Situation, float], None]] = {
+    Step.RAMP: Supervisor._ramp,
+    Step.QUICK: Supervisor._quick,
+    Step.OFF: Supervisor._off,
+}
+"""What is decided in each step of a stop."""
 
 
 def _first(reasons: tuple[Reason, ...], situation: Situation) -> Reason | None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.resources import files
 from types import MappingProxyType
+from typing import Any
 
 from canopen import SdoAbortedError, import_od
 from canopen.objectdictionary import ODArray, ODRecord, ODVariable, datatypes
@@ -95,7 +96,8 @@ def _variables(described: ODVariable | ODArray | ODRecord) -> Iterator[ODVariabl
         yield from (described[subindex] for subindex in described)
 
 
-def _entry(variable: ODVariable) -> Entry:
+def _entry(variable: Any) -> Entry:
+    """Of an ODVariable, whose `default` canopen annotates as int: of texts it is a str."""
     code = CODECS.get(variable.data_type or 0)
     default = variable.default if variable.default is not None else 0
     return Entry(

@@ -338,7 +338,7 @@ class Axis:
         return self.state is _ENABLED and abs(actual - target) <= self._value(0x6D)
 
     def _check_mode(self, subindex: int, value: int) -> None:
-        if value not in (NO_MODE, *self.personality.modes):
+        if value != NO_MODE and value not in self.personality.modes:
             raise SdoAbortedError(abort.INVALID_VALUE)
         if self.state in POWERED and value != self._value(0x60):
             raise SdoAbortedError(abort.DEVICE_STATE)
