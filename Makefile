@@ -24,25 +24,44 @@ test: $(VENV)/ready ## all tests: pure units, simulated drives on a bus, process
 	pytest --numprocesses auto virtual_bus_tests/unit virtual_bus_tests/campaign virtual_bus_tests/small_worlds
 	pytest virtual_bus_tests/bus virtual_bus_tests/ros
 
+# COMPILED=1: campaign, stops and soak run with their hot modules compiled, several times as fast, frame by frame the same.
+WORLD := $(if $(COMPILED),$(CURDIR)/build/compiled:)$(CURDIR)/virtual_bus_tests
+WORLD_READY := $(VENV)/ready $(if $(COMPILED),build/compiled/ready)
+
 .PHONY: campaign
-campaign: $(VENV)/ready ## 10,000 robots with overlapping faults in virtual time; SCENARIOS=500 fewer, SEED=7 tells one
+campaign: $(WORLD_READY) ## 10,000 robots with overlapping faults in virtual time; SCENARIOS=500 fewer, SEED=7 tells one
 ifdef SEED
-	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign --seed $(SEED)
+	PYTHONPATH=$(WORLD) python -m campaign --seed $(SEED)
 else
-	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign $(if $(SCENARIOS),--scenarios $(SCENARIOS))
+	PYTHONPATH=$(WORLD) python -m campaign $(if $(SCENARIOS),--scenarios $(SCENARIOS))
 endif
+
+HOT_SOURCES := $(wildcard can_config/canbase_config/*.py driver/canbase_driver/*.py velocity_mux/canbase_velocity/*.py \
+  watchdog/canbase_watchdog/*.py action_server/canbase_action_server/*.py virtual_bus_tests/canbase_bench/*.py \
+  virtual_bus_tests/canbase_bench/*/*.py virtual_bus_tests/campaign/*.py virtual_bus_tests/compiled/*.py)
+
+build/compiled/ready: $(VENV)/ready $(HOT_SOURCES)
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m compiled
+	@touch $@
+
+.PHONY: compiled
+compiled: build/compiled/ready ## compiles the hot modules by mypyc into build/compiled: campaign, stops and soak take COMPILED=1
+
+.PHONY: same-frames
+same-frames: build/compiled/ready ## SEEDS=10 scenarios and robots, interpreted and compiled: every frame the same, to the last bit
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m compiled.same $(if $(SEEDS),--seeds $(SEEDS)) $(if $(FIRST),--first $(FIRST))
 
 .PHONY: teeth
 teeth: $(VENV)/ready ## takes one safeguard out after the other; the campaign has to find it missing; ONLY=filter:estop one
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.teeth $(ONLY)
 
 .PHONY: stops
-stops: $(VENV)/ready ## p50, p99 and max of each stop and each lie in virtual time: docs/stop_times.md; ONLY=encoder runs some
-	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.stops --write docs/stop_times.md --only '$(ONLY)'
+stops: $(WORLD_READY) ## p50, p99 and max of each stop and each lie in virtual time: docs/stop_times.md; ONLY=encoder runs some
+	PYTHONPATH=$(WORLD) python -m campaign.stops --write docs/stop_times.md --only '$(ONLY)'
 
 .PHONY: soak
-soak: $(VENV)/ready ## HOURS=20 of ordinary driving of random robots in virtual time: nothing may trip; SEED=7 tells one
-	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.soak $(if $(SEED),--seed $(SEED)) $(if $(HOURS),--hours $(HOURS)) $(if $(FIRST),--first $(FIRST))
+soak: $(WORLD_READY) ## HOURS=20 of ordinary driving of random robots in virtual time: nothing may trip; SEED=7 tells one
+	PYTHONPATH=$(WORLD) python -m campaign.soak $(if $(SEED),--seed $(SEED)) $(if $(HOURS),--hours $(HOURS)) $(if $(FIRST),--first $(FIRST))
 
 .PHONY: small-worlds
 small-worlds: $(VENV)/ready ## every failure with every action of an operator in small worlds; FAULTS=2 deeper, EVERY=1 denser

@@ -1,0 +1,102 @@
+"""`python -m compiled`: copies the packages to build/compiled and compiles there what `modules.HOT` names, by mypyc."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+
+import setuptools  # type: ignore[import-untyped]
+from mypyc.build import mypycify
+
+from compiled import finder
+from compiled.modules import BUILD, ROOT, SOURCES, hot_modules
+from compiled.native_form import native_form
+
+MYPY = (
+    "--config-file=",
+    "--explicit-package-bases",
+    "--ignore-missing-imports",
+    "--python-version",
+    f"3.{sys.version_info.minor}",
+)
+FLAGS = ("-fPIC", "-fwrapv", "-g0", "-w", "-UNDEBUG")
+"""Of the C compiler. Nothing like -ffast-math: floats have to come out bit for bit."""
+
+
+def path_of(module: str) -> Path:
+    """Of the copy, from the folder of the build."""
+    return Path(*module.split(".")).with_suffix(".py")
+
+
+def copy() -> None:
+    """All packages; dataclasses of compiled modules in their native form. What has not changed keeps its time."""
+    hot = set(hot_modules())
+    for package, folder in SOURCES.items():
+        for source in (ROOT / folder / package).rglob("*"):
+            name = source.relative_to(ROOT / folder)
+            if source.is_file() and "__pycache__" not in name.parts and not source.name.startswith("test_"):
+                is_hot = ".".join(name.with_suffix("").parts) in hot and name.suffix == ".py"
+                _put(BUILD / name, source.read_bytes(), is_hot)
+
+
+def _put(path: Path, data: bytes, is_hot: bool) -> None:
+    data = native_form(data.decode()).encode() if is_hot else data
+    if not path.exists() or path.read_bytes() != data:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
+
+
+def translate(level: str) -> list[setuptools.Extension]:
+    """C sources of one library with all of it, and of a small one for each module, which leads there."""
+    os.environ["MYPYPATH"] = "."
+    paths = [str(path_of(module)) for module in hot_modules()]
+    made = mypycify([*MYPY, *paths], opt_level=level, debug_level="0", multi_file=True, group_name="canbase")
+    assert isinstance(made, list)
+    return made
+
+
+def build(extensions: list[setuptools.Extension], level: str, jobs: int) -> None:
+    """Compile what has changed, `jobs` at a time, and link."""
+    for library in Path().rglob("*.so"):
+        library.unlink()
+    with ThreadPoolExecutor(jobs) as pool:
+        jobs_of = [partial(_compile, source, one.include_dirs, level) for one in extensions for source in one.sources]
+        list(pool.map(lambda job: job(), jobs_of))
+        list(pool.map(partial(_link, level), extensions))
+
+
+def _compile(source: str, include: list[str], level: str) -> None:
+    made, headers = Path(f"{source}.O{level}.o"), Path("build").glob("*.h")
+    if not made.exists() or made.stat().st_mtime <= max(path.stat().st_mtime for path in (Path(source), *headers)):
+        folders = [f"-I{folder}" for folder in (*include, sysconfig.get_path("include"))]
+        subprocess.run(["gcc", *FLAGS, f"-O{level}", *folders, "-c", source, "-o", f"{source}.part"], check=True)
+        Path(f"{source}.part").rename(made)
+
+
+def _link(level: str, extension: setuptools.Extension) -> None:
+    library = extension.name.replace(".", "/") + sysconfig.get_config_var("EXT_SUFFIX")
+    objects = [f"{source}.O{level}.o" for source in extension.sources]
+    subprocess.run(["gcc", "-shared", *objects, "-o", library], check=True)
+
+
+def main() -> None:
+    """Number of C compilers and level of optimization from the command line."""
+    parser = argparse.ArgumentParser(prog="compiled", description=__doc__)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="C compilers at a time")
+    parser.add_argument("--level", default="2", help="of optimization: 0 compiles fastest")
+    given = parser.parse_args()
+    copy()
+    os.chdir(BUILD)
+    build(translate(given.level), given.level, given.jobs)
+    shutil.copy(finder.__file__, "sitecustomize.py")
+
+
+if __name__ == "__main__":
+    main()

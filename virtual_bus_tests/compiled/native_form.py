@@ -1,0 +1,121 @@
+"""Dataclasses as the compiler makes them fast: with their own `__init__`, `__eq__` and `__hash__`, written out.
+
+The module `dataclasses` writes these methods as Python text at run time, which no compiler sees. Frozen ones lose the
+check at run time that nobody changes them; mypy has made it before.
+"""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class _Field:
+    name: str
+    kind: str
+    default: ast.expr | None
+    factory: ast.expr | None
+    in_init: bool
+    compared: bool
+
+
+def native_form(source: str) -> str:
+    """The same module, its dataclasses with methods of their own."""
+    tree = ast.parse(source)
+    for node in tree.body:
+        if isinstance(node, ast.ClassDef):
+            _rewrite(node)
+    return ast.unparse(ast.fix_missing_locations(tree))
+
+
+def _rewrite(node: ast.ClassDef) -> None:
+    at = next((n for n, one in enumerate(node.decorator_list) if _is_dataclass(one)), None)
+    if at is None:
+        return
+    decorator = node.decorator_list[at]
+    given = {word.arg: word.value for word in decorator.keywords} if isinstance(decorator, ast.Call) else {}
+    if "kw_only" in given:
+        return  # mypyc 2.4 stumbles over the text signature of such an __init__
+    frozen, equal = _is_true(given.get("frozen")), "eq" not in given
+    node.decorator_list[at] = ast.parse("dataclass(init=False, eq=False, slots=True)", mode="eval").body
+    fields = _fields(node)
+    named = {item.name for item in node.body if isinstance(item, ast.FunctionDef)}
+    texts = [_init(fields, "__post_init__" in named)]
+    if equal and "__eq__" not in named:
+        texts.append(_eq(node.name, fields))
+        if frozen:
+            texts.append(_hash(fields))
+    if all(field.in_init for field in fields):
+        texts.append(_reduce(node.name, fields))
+    for text in texts:
+        node.body += ast.parse(text).body
+
+
+def _is_dataclass(decorator: ast.expr) -> bool:
+    function = decorator.func if isinstance(decorator, ast.Call) else decorator
+    return isinstance(function, ast.Name) and function.id == "dataclass"
+
+
+def _is_true(value: ast.expr | None) -> bool:
+    return isinstance(value, ast.Constant) and value.value is True
+
+
+def _fields(node: ast.ClassDef) -> list[_Field]:
+    return [
+        _field(item.target.id, ast.unparse(item.annotation), item.value)
+        for item in node.body
+        if isinstance(item, ast.AnnAssign) and isinstance(item.target, ast.Name)
+    ]
+
+
+def _field(name: str, kind: str, value: ast.expr | None) -> _Field:
+    if not (isinstance(value, ast.Call) and isinstance(value.func, ast.Name) and value.func.id == "field"):
+        return _Field(name, kind, value, None, in_init=True, compared=True)
+    given = {word.arg: word.value for word in value.keywords}
+    in_init = "init" not in given or _is_true(given["init"])
+    compared = "compare" not in given or _is_true(given["compare"])
+    return _Field(name, kind, given.get("default"), given.get("default_factory"), in_init, compared)
+
+
+def _init(fields: list[_Field], post: bool) -> str:
+    parameters, lines = [], []
+    for field in fields:
+        default = "" if field.default is None else f" = {ast.unparse(field.default)}"
+        made = "" if field.factory is None else f"{ast.unparse(field.factory)}()"
+        if not field.in_init:
+            lines.append(f"    self.{field.name} = {made or default.removeprefix(' = ')}")
+        elif made:
+            parameters.append(f"{field.name}: {field.kind} | None = None")
+            lines.append(f"    self.{field.name} = {made} if {field.name} is None else {field.name}")
+        else:
+            parameters.append(f"{field.name}: {field.kind}{default}")
+            lines.append(f"    self.{field.name} = {field.name}")
+    head = f"def __init__({', '.join(['self', *parameters])}) -> None:"
+    return "\n".join([head, *lines, *(["    self.__post_init__()"] if post else []), "    pass"])
+
+
+def _eq(name: str, fields: list[_Field]) -> str:
+    """As that of `dataclasses`, which compares tuples: what is the same object is equal, a NaN too."""
+    parts = [_same(field) for field in fields if field.compared]
+    test = " and ".join(parts) or "True"
+    return f"def __eq__(self, other: object) -> bool:\n    return isinstance(other, {name}) and ({test})"
+
+
+def _same(field: _Field) -> str:
+    mine, theirs = f"self.{field.name}", f"other.{field.name}"
+    if field.kind in ("int", "bool", "str", "bytes"):
+        return f"{mine} == {theirs}"
+    if field.kind == "float":
+        return f"({mine} == {theirs} or ({mine} != {mine} and {theirs} != {theirs}))"
+    return f"({mine} is {theirs} or {mine} == {theirs})"
+
+
+def _hash(fields: list[_Field]) -> str:
+    values = "".join(f"self.{field.name}, " for field in fields if field.compared)
+    return f"def __hash__(self) -> int:\n    return hash(({values}))"
+
+
+def _reduce(name: str, fields: list[_Field]) -> str:
+    values = "".join(f"self.{field.name}, " for field in fields)
+    return f"def __reduce__(self) -> tuple[object, ...]:\n    return ({name}, ({values}))"

@@ -1,0 +1,100 @@
+"""The form in which dataclasses are compiled behaves as the one in which they are written."""
+
+from __future__ import annotations
+
+import math
+import pickle
+import sys
+from dataclasses import fields, replace
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import pytest
+
+from campaign import without
+from compiled.modules import BUILD, ROOT, SOURCES, hot_modules
+from compiled.native_form import native_form
+
+SOURCE = '''
+from __future__ import annotations
+import math
+from dataclasses import dataclass, field
+
+@dataclass(frozen=True, slots=True)
+class Wheel:
+    """With a docstring."""
+    speed_mps: float
+    name: str = "left"
+    notes: tuple[float, ...] = ()
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Alone:
+    number: int = 3
+
+@dataclass(slots=True)
+class Box:
+    wheel: Wheel
+    kept: list[int] = field(default_factory=list)
+    cost_s: float = field(default=0.0, compare=False)
+    _twice: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        self._twice = 2 * len(self.kept)
+'''
+
+
+def module(name: str, source: str) -> Any:
+    made = ModuleType(name)
+    sys.modules[name] = made
+    exec(compile(source, name, "exec"), vars(made))
+    return made
+
+
+@pytest.fixture(params=["written", "compiled"])
+def forms(request: pytest.FixtureRequest) -> Any:
+    native = native_form(SOURCE)
+    assert native.count("def __init__") == 3
+    return module(f"a_form_{request.param}", SOURCE if request.param == "written" else native)
+
+
+def test_defaults_and_what_is_made_after_them(forms: Any) -> None:
+    box = forms.Box(forms.Wheel(0.5), [1, 2, 3])
+    assert (box.wheel.name, box.wheel.notes, box._twice, box.cost_s) == ("left", (), 6, 0.0)
+    first, second = forms.Box(box.wheel), forms.Box(wheel=box.wheel)
+    first.kept.append(1)
+    assert second.kept == []
+
+
+def test_what_is_equal_and_what_is_not(forms: Any) -> None:
+    wheel = forms.Wheel(0.5)
+    assert wheel == forms.Wheel(0.5)
+    assert hash(wheel) == hash(forms.Wheel(0.5)) == hash((0.5, "left", ()))
+    assert wheel != forms.Wheel(0.6)
+    assert wheel != forms.Wheel(0.5, notes=(1.0,))
+    assert wheel != (0.5, "left", ())
+    assert forms.Wheel(math.nan) == forms.Wheel(math.nan), "one and the same NaN is equal in tuples, and so here"
+    assert forms.Box(wheel, cost_s=1.0) == forms.Box(wheel, cost_s=2.0)
+    assert forms.Alone() != forms.Alone()
+
+
+def test_text_fields_copies_and_pickles(forms: Any) -> None:
+    wheel = forms.Wheel(0.5, "right")
+    assert repr(wheel) == "Wheel(speed_mps=0.5, name='right', notes=())"
+    assert [field.name for field in fields(wheel)] == ["speed_mps", "name", "notes"]
+    assert replace(wheel, name="left") == forms.Wheel(0.5)
+    assert pickle.loads(pickle.dumps(wheel)) == wheel
+
+
+def test_every_hot_module_exists() -> None:
+    assert BUILD.is_relative_to(ROOT)
+    for name in hot_modules():
+        package = name.partition(".")[0]
+        assert (ROOT / SOURCES[package] / name.replace(".", "/")).with_suffix(".py").is_file(), name
+
+
+def test_no_safeguard_is_taken_out_of_compiled_modules(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It would have no effect, and the campaign would find nothing: a check that cannot fail."""
+    monkeypatch.setattr(without, "policy", SimpleNamespace(__file__="policy.cpython-311-x86_64-linux-gnu.so"))
+    with pytest.raises(RuntimeError, match="without COMPILED=1"):
+        without.remove("watchdog:latch")
+    without.remove("")
