@@ -36,8 +36,9 @@ class Pose:
     def moved(self, twist: Twist, dt_s: float) -> Pose:
         """After `dt_s` of `twist`: an arc."""
         way_m, turn_rad = twist.linear_mps * dt_s, twist.angular_radps * dt_s
-        chord_m = way_m * float(np.sinc(turn_rad / (2.0 * math.pi)))
-        heading_rad = self.yaw_rad + turn_rad / 2.0
+        half_rad = turn_rad / 2.0
+        chord_m = way_m * math.sin(half_rad) / half_rad if half_rad else way_m
+        heading_rad = self.yaw_rad + half_rad
         x_m, y_m = self.x_m + chord_m * math.cos(heading_rad), self.y_m + chord_m * math.sin(heading_rad)
         return Pose(x_m, y_m, self.yaw_rad + turn_rad)
 

@@ -75,6 +75,8 @@ class OrdinaryHour:
         self.world.note = self._note
         self._ramps = self.random.choice(RAMP_SHARES)
         self._noise_mps = self.random.choice(NOISE_MPS)
+        narrow = any(drive.kind.layout.velocity_bits == 16 for drive in self.drawn.robot.drives)
+        self._velocity = struct.Struct("<h" if narrow else "<i")
         if self._noise_mps:
             self.world.drives.measured = self._measured
         self._carpet()
@@ -238,8 +240,7 @@ class OrdinaryHour:
             return data
         node = self.world.drives.bench.nodes[cob_id & 0x7F]
         noise = round(self.random.uniform(-1.0, 1.0) * self._noise_mps / abs(node.axes[0].scale.actual_mps))
-        narrow = any(drive.kind.layout.velocity_bits == 16 for drive in self.drawn.robot.drives)
-        form = struct.Struct("<h" if narrow else "<i")
+        form = self._velocity
         if len(data) < form.size:  # the drive's own mapping, before its boot
             return data
         return form.pack(form.unpack_from(data)[0] + noise) + data[form.size :]

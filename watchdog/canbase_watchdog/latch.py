@@ -111,7 +111,7 @@ class Ledger:
 
     def want(self, mark: Mark, cause: int = 0, node_id: int = 0, detail: str = "") -> None:
         """From now on this."""
-        entry = replace(Entry(mark, cause, node_id, detail), number=self.wanted.number)
+        entry = Entry(mark, cause, node_id, detail, self.wanted.number)
         if entry != self.wanted:
             self.wanted = replace(entry, number=entry.number + 1)
         if not self._kept:

@@ -21,7 +21,9 @@ class _Store:
     def __init__(self, dictionary: Dictionary) -> None:
         self.object_dictionary = dictionary
         self.get_data = dictionary.get_data
-        self.set_data = dictionary.set_data
+
+    def set_data(self, index: int, subindex: int, data: bytes | bytearray, check_writable: bool = False) -> None:
+        self.object_dictionary.set_data(index, subindex, bytes(data), check_writable)
 
 
 class _Wire:
