@@ -54,8 +54,8 @@ class DriveState(Enum):
         return self in _WITH_TORQUE
 
 
-_WITH_TORQUE = frozenset((DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE))
-PREPARED = frozenset((DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED))
+_WITH_TORQUE = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
+PREPARED = (DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED)
 """As far as switched on: nothing but the enable is missing."""
 
 STATUSWORD_STATES = (

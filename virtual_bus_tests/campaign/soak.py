@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import math
 import multiprocessing
 import sys
@@ -35,6 +36,7 @@ class Driven:
 
 def drive(seed: int, seconds: float = RUN_S) -> Driven:
     """One robot."""
+    gc.set_threshold(100_000)
     hour = OrdinaryHour(seed)
     trip = hour.run(seconds)
     return Driven(seed, hour.now_s, hour.moving_s, hour.world.drives.bench.base.path_m, trip)

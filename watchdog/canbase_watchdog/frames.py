@@ -95,11 +95,13 @@ POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveStat
 
 def decode_state(statusword: int) -> DriveState | None:
     """The state that a statusword 6041h tells; None: bits that no state has."""
-    for state in DriveState:
-        mask, value = state.value
+    for mask, value, state in _STATES:
         if statusword & mask == value:
             return state
     return None
+
+
+_STATES: tuple[tuple[int, int, DriveState], ...] = tuple((*state.value, state) for state in DriveState)
 
 
 def asks_for_power(controlword: int) -> bool:
