@@ -42,6 +42,7 @@ def setup(app: Any) -> None:
     """Writes the generated pages before Sphinx looks for sources, and the pages of the source code at the end."""
     pages.write(modules.ROOT)
     app.connect("autodoc-process-docstring", docstrings.as_restructured_text)
+    app.connect("doctree-read", docstrings.without_builtins)
     app.connect("build-finished", _finish)
 
 

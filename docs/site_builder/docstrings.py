@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import builtins
 import re
 from typing import Any
+
+from docutils import nodes
+from sphinx.addnodes import pending_xref
 
 _CODE = re.compile(r"(`+[^`]+`+)")
 _MARKUP = re.compile(r"([*|\\])|(?<=\w)(_)(?!\w)")
@@ -13,6 +17,13 @@ _ITEM = re.compile(r"\s*(?:[-*•]|\d+\.|#\.)\s+")
 def as_restructured_text(_app: Any, _what: str, _name: str, _thing: Any, _options: Any, lines: list[str]) -> None:
     """Sphinx's event autodoc-process-docstring: changes `lines` in place."""
     lines[:] = converted(lines)
+
+
+def without_builtins(_app: Any, doctree: nodes.document) -> None:
+    """Sphinx's event doctree-read: `float` and its like are no links. Sphinx would search all names for each."""
+    for link in list(doctree.findall(pending_xref)):
+        if hasattr(builtins, link.get("reftarget", "")):
+            link.replace_self(link.children)
 
 
 def converted(lines: list[str]) -> list[str]:
