@@ -119,16 +119,32 @@ def held(count: int = 10, at_mps: float = 0.0, target: float = 0.4, mirrored: bo
     return wheel
 
 
-@pytest.mark.parametrize(("velocity", "outside"), [(0.8899, 0), (0.8901, 1)])  # 0.4 + 0.4 that it lacked + 0.09
+@pytest.mark.parametrize(("velocity", "outside"), [(1.6899, 0), (1.6901, 1)])  # 0.4 + 3 x 0.4 that it lacked + 0.09
 @pytest.mark.parametrize(("sign", "mirrored"), [(1.0, False), (-1.0, False), (1.0, True)])
-def test_held_at_zero_it_may_have_twice_its_setpoint(
+def test_held_at_zero_it_may_come_back_three_times_as_fast_as_it_lacked(
     velocity: float, outside: int, sign: float, mirrored: bool
 ) -> None:
     assert held(target=sign * 0.4, mirrored=mirrored).sample(sign * velocity, sign * 0.4).outside == outside
 
 
-def test_it_may_for_two_tenths_of_a_second_after_the_last_sample_that_lacked() -> None:
+@pytest.mark.parametrize(("ahead_mps", "samples"), [(1.0, 4), (0.5, 8), (0.41, 10), (0.25, 16)])
+def test_what_it_catches_up_is_the_way_that_it_lost_and_no_more(ahead_mps: float, samples: int) -> None:
+    """10 cycles at 0.4 m/s are 0.04 m. The sample that goes beyond it may."""
     wheel = held()
+    counts = [wheel.sample(0.4 + ahead_mps, 0.4).outside for _ in range(samples + 3)]
+    assert counts[:samples] == [0] * samples
+    assert counts[samples + 1 :] in ([1, 2], [2, 3])
+
+
+def test_it_loses_what_it_lacks_in_three_tenths_of_a_second_at_most() -> None:
+    """0.12 m; 0.9 m/s ahead are 9 mm a cycle, 14 of them 0.126 m."""
+    for cycles in (31, 100):
+        wheel = held(cycles)
+        assert [wheel.sample(1.3, 0.4).outside for _ in range(17)][12:] == [0, 0, 1, 2, 3]
+
+
+def test_it_may_for_two_tenths_of_a_second_after_the_last_sample_that_lacked() -> None:
+    wheel = held(30)
     counts = [wheel.sample(0.6, 0.4).outside for _ in range(24)]
     assert counts[:19] == [0] * 19
     assert counts[20:] in ([1, 2, 3, 4], [2, 3, 4, 5])
@@ -139,14 +155,27 @@ def test_what_lacked_no_more_than_the_tolerance_was_not_held(held_mps: float, ou
     assert held(at_mps=held_mps).sample(0.5, 0.4).outside == outside
 
 
+@pytest.mark.parametrize(("held_mps", "outside"), [(0.0201, 1), (0.0199, 0)])
+def test_below_twice_the_tolerance_half_of_the_setpoint_is_what_tells(held_mps: float, outside: int) -> None:
+    """A threshold holds a wheel at 0.04 m/s; its drive has a tenth of a second to wind up."""
+    assert held(at_mps=held_mps, target=0.04).sample(0.0941 + 0.01, 0.04).outside == outside
+
+
 def test_it_overshoots_by_what_it_lacked_and_the_other_way_not_at_all() -> None:
-    assert [held(at_mps=0.2).sample(velocity, 0.4).outside for velocity in (0.6899, 0.6901)] == [0, 1]
+    assert [held(at_mps=0.2).sample(velocity, 0.4).outside for velocity in (1.0899, 1.0901)] == [0, 1]
     assert held(at_mps=0.0).sample(-0.0901, 0.4).outside == 1
 
 
 def test_a_wheel_that_turned_the_wrong_way_lacked_its_setpoint_and_no_more() -> None:
-    assert held(at_mps=-0.3).sample(0.8899, 0.4).outside == 0
-    assert held(at_mps=-0.3).sample(0.8901, 0.4).outside > 0
+    assert held(at_mps=-0.3).sample(1.6899, 0.4).outside == 0
+    assert held(at_mps=-0.3).sample(1.6901, 0.4).outside > 0
+
+
+def test_a_setpoint_that_went_to_zero_meanwhile_takes_nothing_of_what_it_lost() -> None:
+    wheel = held()
+    counts = [wheel.sample(0.8, 0.0).outside for _ in range(9)]  # 8 mm a cycle, of 0.04 m
+    assert counts[:5] == [0] * 5
+    assert counts[6:] == [1, 2, 3] or counts[6:] == [2, 3, 4]
 
 
 def test_what_it_lacked_with_power_before_is_forgotten_without() -> None:

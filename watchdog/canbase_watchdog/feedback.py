@@ -2,7 +2,7 @@
 
 The wheel follows its setpoints: it may have the speed of any setpoint of the last `drive_lag_s` and less, and after
 that it falls with the configured deceleration; what it must have at least is evidence.py. A wheel that something held
-back overshoots when it comes free (docs/decisions/0046). Encoder and velocity tell the same way, but for a small drift:
+back catches up when it comes free (overshoot.py). Encoder and velocity tell the same way, but for a small drift:
 a difference is forgotten over the way on which it did not grow, and very slowly with time, so that it is found at any
 speed (docs/decisions/0020).
 """
@@ -16,6 +16,7 @@ from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 from canbase_watchdog.counts import difference
 from canbase_watchdog.envelope import Peak
 from canbase_watchdog.evidence import EvidenceWatch
+from canbase_watchdog.overshoot import Overshoot
 
 DRIFT_M, DRIFT_S = 0.25, 10.0
 """Differences between encoder and velocity are forgotten over this way, and within this time: noise, filters and a
@@ -23,8 +24,6 @@ scale that is a little wrong have no memory. An error of more than travel_tolera
 JUMP_FACTOR = 3.0
 """A step of the encoder beyond so many times the fastest wheel's is a jump: it tells nothing about the motion."""
 JUMP_CYCLES = 2.0
-OVERSHOOT_S = 0.2
-"""So long a wheel that was slower than its setpoint may be faster by as much: its drive's integrator is wound up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +53,7 @@ class FeedbackWatch:
         self._jump_mps, self._jump_s = JUMP_FACTOR * config.max_wheel_mps, JUMP_CYCLES / config.control_hz
         self._fastest_mps = config.overspeed_factor * config.max_wheel_mps
         self._forward, self._backward = Peak(config.drive_lag_s), Peak(config.drive_lag_s)
-        self._lack_forward, self._lack_backward = Peak(OVERSHOOT_S), Peak(OVERSHOOT_S)
+        self._ahead, self._behind = Overshoot(), Overshoot()
         self._target_mps = 0.0
         self._high = self._low = config.max_wheel_mps
         for peak in (self._forward, self._backward):
@@ -87,20 +86,22 @@ class FeedbackWatch:
         self._follow(elapsed_s, now)
         step_m, jumped = self._step(elapsed_s)
         drift_m = self._drift(velocity_mps, step_m, jumped, elapsed_s)
-        self._judge(velocity_mps, powered, drift_m, jumped, now)
+        self._judge(velocity_mps, powered, drift_m, jumped, elapsed_s, now)
         step_m = None if jumped else step_m
         self.evidence.on_sample(velocity_mps, step_m, powered, enabled, elapsed_s, now, torque)
         if self.last.implausible >= self._config.feedback_samples:
             self.evidence.doubt()
         self._velocity_mps, self._counts_before = velocity_mps, self._counts
 
-    def _judge(self, velocity_mps: float, powered: bool, drift_m: float, jumped: bool, now: float) -> None:
+    def _judge(
+        self, velocity_mps: float, powered: bool, drift_m: float, jumped: bool, elapsed_s: float, now: float
+    ) -> None:
         if not powered:
             self.last = Feedback(-self._low, self._high)
             return
         config, last = self._config, self.last
         slack = self._fixed_mps + config.motion_tolerance_share * max(self._low, self._high)
-        forward_mps, backward_mps = self._overshoot(velocity_mps, slack, now)
+        forward_mps, backward_mps = self._overshoots(velocity_mps, slack, elapsed_s, now)
         inside = -self._low - slack - backward_mps <= velocity_mps <= self._high + slack + forward_mps
         self.last = Feedback(
             low_mps=-self._low,
@@ -111,14 +112,19 @@ class FeedbackWatch:
             drift_m=drift_m,
         )
 
-    def _overshoot(self, velocity_mps: float, slack_mps: float, now: float) -> tuple[float, float]:
+    def _overshoots(self, velocity_mps: float, slack_mps: float, elapsed_s: float, now: float) -> tuple[float, float]:
         """By how much the wheel may be faster than its setpoints, forward and backward, since it was slower."""
-        forward, backward = self._lack_forward, self._lack_backward
-        for peak, way in ((forward, 1.0), (backward, -1.0)):
-            target, velocity = way * self._target_mps, way * velocity_mps
-            lack_mps = min(target - velocity, target)
-            peak.set(lack_mps if lack_mps > slack_mps else 0.0, now, now)
-        return forward.greatest(now), backward.greatest(now)
+        forward_mps, backward_mps = (
+            overshoot.on_sample(
+                target_mps=way * self._target_mps,
+                velocity_mps=way * velocity_mps,
+                slack_mps=slack_mps,
+                elapsed_s=elapsed_s,
+                now_s=now,
+            )
+            for overshoot, way in ((self._ahead, 1.0), (self._behind, -1.0))
+        )
+        return forward_mps, backward_mps
 
     def _follow(self, elapsed_s: float, now: float) -> None:
         fallen_mps = elapsed_s * self._config.deceleration_mps2
