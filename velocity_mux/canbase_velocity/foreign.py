@@ -39,10 +39,11 @@ class Expected:
 
 @dataclass(frozen=True, slots=True)
 class Publisher:
-    """A publisher in the ROS graph. `node`: namespace and name; empty: not known."""
+    """A publisher in the ROS graph. `node`: namespace and name; empty: not known. `key`: no other one ever has it."""
 
     node: str
     kind: str
+    key: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,6 +39,7 @@ def publishers(node: Node, topic: str) -> list[Publisher]:
         Publisher(
             "" if info.node_name == _NO_NAME else printable(full_name(info.node_name, info.node_namespace)),
             printable(info.topic_type),
+            bytes(info.endpoint_gid).hex(),
         )
         for info in node.get_publishers_info_by_topic(topic)
     ]

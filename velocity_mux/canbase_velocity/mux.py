@@ -14,7 +14,8 @@ Rules:
    somebody who wants to drive it himself.
 7. A message does not tell who sent it. Where two publish on the topic of a source that only a zero arms, the zero of
    one would arm the stick of the other: while the ROS graph has more than one there, it is disarmed. A lock with more
-   than one publisher holds: nobody's word frees what another one holds.
+   than one publisher holds: nobody's word frees what another one holds. Nor does the zero of a publisher that has ended
+   arm the one that comes after it, such as a joystick node that was started again.
 """
 
 from __future__ import annotations
@@ -121,6 +122,7 @@ class _Source:
         self.delay_s: float | None = None
         self.crowd = ""
         """Why no zero arms it; empty: one does."""
+        self._publishers: frozenset[str] = frozenset()
         self._delay = Delay(config.same_clock)
         self._late_from = math.inf
 
@@ -136,11 +138,16 @@ class _Source:
             self.arming.disarm("its commands arrived late")
         self.arming.command(twist, now, on_time=not self.is_late and received == now and not self.crowd)
 
-    def published_by(self, nodes: Sequence[str]) -> None:
+    def published_by(self, nodes: Sequence[str], keys: Sequence[str]) -> None:
         """Takes who publishes on its topic."""
-        self.crowd = crowd(self.config.topic, nodes) if self.config.neutral_after_s is None else ""
+        if self.config.neutral_after_s is not None:
+            return
+        self.crowd = crowd(self.config.topic, nodes)
+        before, self._publishers = self._publishers, frozenset(keys)
         if self.crowd:
             self.arming.disarm(self.crowd)
+        if before - self._publishers:
+            self.arming.disarm(f"a publisher on {self.config.topic} has ended")
 
     @property
     def is_late(self) -> bool:
@@ -235,12 +242,15 @@ class Mux:
         self._locks[name].hear(locked, now)
         self._look(now)
 
-    def on_publishers(self, topic: str, nodes: Sequence[str]) -> None:
-        """Takes who publishes on this topic of robot.yaml: a node's name for each publisher of the type heard there."""
-        listeners: tuple[_Source | Lock, ...] = (*self._sources.values(), *self._locks.values())
-        for listener in listeners:
-            if listener.config.topic == topic:
-                listener.published_by(nodes)
+    def on_publishers(self, topic: str, nodes: Sequence[str], keys: Sequence[str] = ()) -> None:
+        """Takes who publishes on this topic of robot.yaml: a node's name for each publisher of the type heard there,
+        and what tells it from one that comes after it under the same name."""
+        for source in self._sources.values():
+            if source.config.topic == topic:
+                source.published_by(nodes, keys or nodes)
+        for lock in self._locks.values():
+            if lock.config.topic == topic:
+                lock.published_by(nodes)
 
     def on_foreign(self, foreign: Sequence[Foreign]) -> None:
         """Takes all foreign publishers that are there now."""

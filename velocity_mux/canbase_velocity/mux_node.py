@@ -151,8 +151,8 @@ class MuxNode(Node):
                 self._voice.tell(found.sentence, found.priority, robot=self._robot.name, **told)
         self._mux.on_foreign(foreign)
         for topic, kind in self._heard.items():
-            found_there = publishers(self, self.resolve_topic_name(topic))
-            self._mux.on_publishers(topic, [found.node for found in found_there if found.kind == kind])
+            there = [found for found in publishers(self, self.resolve_topic_name(topic)) if found.kind == kind]
+            self._mux.on_publishers(topic, [found.node for found in there], [found.key for found in there])
         self._send_if_changed(now)
 
     def _send_if_changed(self, now: float) -> None:

@@ -139,6 +139,23 @@ def test_while_two_nodes_publish_on_the_topic_of_a_stick_neither_is_followed(cha
     release(chain)
 
 
+# armed ── the joystick's publisher ends ── 1 s ── another one with a pushed stick: not followed before a zero
+def test_a_joystick_node_that_is_started_again_with_the_stick_held_is_not_followed(chain: Chain) -> None:
+    release(chain)
+    chain.joystick.message = drive(0.0)
+    chain.node.spin_for(1.0)  # the mux has looked into the graph
+    ended = chain.joystick
+    ended.message = None
+    chain.node.node.destroy_publisher(ended.publisher)
+    chain.joystick = chain.node.repeat(TwistStamped, "cmd_vel_joy", 50.0)
+    chain.node.wait_for_subscriber(chain.joystick.publisher)
+    chain.node.spin_for(1.0)
+    chain.joystick.message = drive(0.2)
+    assert not followed(chain)
+    assert waits(chain) == "waiting for zero (a publisher on cmd_vel_joy has ended)"
+    release(chain)
+
+
 def test_a_lock_with_two_publishers_holds(start: Callable[[Mapping[str, Any]], Chain]) -> None:
     chain = start({"mux": {"locks": {"gate": {"topic": "gate_lock", "priority": 200, "required": False}}}})
     gates = [chain.node.node.create_publisher(Bool, "gate_lock", 2) for _ in range(2)]

@@ -470,6 +470,41 @@ def test_the_zero_of_one_joystick_node_does_not_arm_the_stick_of_another(story: 
     assert story.followed("joystick", 0.2)
 
 
+# armed ── its node ends ── a minute ── another one begins with a pushed stick: not followed
+@pytest.mark.parametrize("gone_s", [0.0, 0.5, 60.0])
+def test_the_zero_of_a_joystick_node_that_has_ended_does_not_arm_the_next_one(story: Story, gone_s: float) -> None:
+    story.mux.on_publishers(STICK, ["/joy_teleop"], ["1f"])
+    story.release()
+    assert story.followed("joystick", 0.2)
+    story.release()
+    story.sends = {}
+    if gone_s:
+        story.mux.on_publishers(STICK, [], [])
+        story.run(gone_s)
+    story.mux.on_publishers(STICK, ["/joy_teleop"], ["2f"])  # the same name
+    assert not story.followed("joystick", 1.0)
+    assert story.decide().sources[0].reason == f"waiting for zero (a publisher on {STICK} has ended)"
+    story.release()
+    assert story.followed("joystick", 0.2)
+
+
+def test_the_first_publisher_that_is_seen_disarms_nobody(story: Story) -> None:
+    """The graph is looked at every 0.5 s: the zero may be there before its sender is seen."""
+    story.release()
+    story.mux.on_publishers(STICK, ["/joy_teleop"], ["1f"])
+    assert story.followed("joystick", 0.2)
+    story.mux.on_publishers(STICK, ["/joy_teleop"], ["1f"])
+    assert story.followed("joystick", 0.2)
+
+
+def test_a_planner_whose_node_is_started_again_goes_on(story: Story) -> None:
+    story.mux.on_publishers(PLANNER, ["/controller_server"], ["1f"])
+    story.run(2.5)
+    assert story.followed("navigation", 0.2)
+    story.mux.on_publishers(PLANNER, ["/controller_server"], ["2f"])
+    assert story.followed("navigation", 0.2)
+
+
 def test_many_nodes_of_a_planner_share_its_topic(story: Story) -> None:
     story.mux.on_publishers(PLANNER, ["/controller_server", "/behavior_server"])
     story.run(2.5)
