@@ -22,7 +22,7 @@ from canbase_driver.watchdog_link import LEASE_AGE_UNKNOWN, TRIPPED, WATCHING, W
 SHORT_QUEUE, GOOD_QUEUE, LONG_QUEUE = 32, 64, 100
 """Frames. Into the kernel's 10 a cycle of several axes does not fit; what waits in a long one while nobody acknowledges
 goes out late."""
-RUNGS: Final = ("none", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld")
+RUNGS: Final = ("none", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld", "NMT reset node")
 _SHOWN: Final = 4
 
 

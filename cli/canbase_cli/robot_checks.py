@@ -33,7 +33,7 @@ STATES = {
     DriverStatus.LATCHED: "latched",
 }
 ON_ITS_WAY = (DriverStatus.BOOTING, DriverStatus.ENABLING, DriverStatus.STOPPING)
-RUNGS = ("no rung", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld")
+RUNGS = ("no rung", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld", "NMT reset node")
 WATCHDOG_COUNTERS = ("leases_refused", "frames_dropped", "bus_errors", "trips")
 MOSTLY_USABLE = 0.5
 """Share of beams: a scanner of which more says nothing is covered, dirty or defective."""

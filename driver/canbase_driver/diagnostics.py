@@ -17,7 +17,7 @@ _LOOP_COUNTERS = ("commands_refused", "overruns", "travel_losses")
 _BUS_COUNTERS = ("frames_dropped", "send_errors", "receive_errors", "error_frames", "bus_failures")
 _WATCHDOG_COUNTERS = ("trips", "leases_refused", "frames_dropped", "bus_errors")
 _TRANSIENT = {DriverState.BOOTING, DriverState.DISARMED, DriverState.ENABLING, DriverState.STOPPING}
-_RUNGS = ("none", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld")
+_RUNGS = ("none", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld", "NMT reset node")
 _PAUSE_WARNING_S = 0.05
 """A pause of the watchdog's loop that is worth a look: ten of its turns."""
 

@@ -153,7 +153,7 @@ class Judge:
             if fault.name == "frame_delay":
                 reaction_s += 2.0 * fault.arguments["value"]
             if fault.name.startswith("second_master"):
-                reaction_s += sum(rung.obey_s for rung in RUNGS.values() if math.isfinite(rung.obey_s))
+                reaction_s += sum(rung.obey_s for rung in RUNGS.values() if rung.step < Step.HEARTBEAT_WITHHELD)
         return reaction_s
 
     def _violate(self, name: str, detail: str) -> None:

@@ -35,10 +35,10 @@ def fed(climb: Climb, look: Look, *samples: tuple[float, float]) -> Climb:
     return climb
 
 
-def test_the_ladder_has_four_rungs_and_each_but_the_last_has_its_deadline() -> None:
+def test_the_ladder_has_five_rungs_and_each_but_the_last_has_its_deadline() -> None:
     assert list(RUNGS) == list(Step)[1:]
     assert [step for step, rung in RUNGS.items() if rung.step is not step] == []
-    assert [rung.obey_s for rung in RUNGS.values()] == [0.15, 0.15, 0.1, math.inf]
+    assert [rung.obey_s for rung in RUNGS.values()] == [0.15, 0.15, 0.1, 0.1, math.inf]
 
 
 def test_it_begins_with_the_quick_stop() -> None:
@@ -148,7 +148,8 @@ def test_a_rolling_wheel_without_power_and_one_that_stands_count_nothing_against
         (Step.QUICK_STOP, Step.DISABLE_VOLTAGE),
         (Step.PRE_OPERATIONAL, Step.DISABLE_VOLTAGE),
         (Step.DISABLE_VOLTAGE, Step.HEARTBEAT_WITHHELD),
-        (Step.HEARTBEAT_WITHHELD, Step.HEARTBEAT_WITHHELD),
+        (Step.HEARTBEAT_WITHHELD, Step.RESET_NODE),
+        (Step.RESET_NODE, Step.RESET_NODE),
     ],
 )
 def test_a_runaway_leaves_out_the_rungs_that_leave_the_braking_to_the_drive(step: Step, above: Step) -> None:
@@ -226,7 +227,7 @@ def test_enabled_again_after_it_stood_climbs_at_once() -> None:
     assert go(stood, replace(STANDING, enabled=True), 10.0) == Climb(Step.PRE_OPERATIONAL, 10.0, 0.0)
     end = replace(FOOT, step=Step.HEARTBEAT_WITHHELD, stopped=True)
     again = go(end, replace(STANDING, enabled=True), 10.0)
-    assert (again.step, again.stopped) == (Step.HEARTBEAT_WITHHELD, False)
+    assert (again.step, again.stopped, again.since) == (Step.HEARTBEAT_WITHHELD, False, 10.0)
 
 
 def test_moving_again_begins_the_same_rung_anew() -> None:
@@ -256,9 +257,51 @@ def test_it_stays_stopped_while_it_stands() -> None:
         (Step.QUICK_STOP, Step.PRE_OPERATIONAL),
         (Step.PRE_OPERATIONAL, Step.DISABLE_VOLTAGE),
         (Step.DISABLE_VOLTAGE, Step.HEARTBEAT_WITHHELD),
-        (Step.HEARTBEAT_WITHHELD, Step.HEARTBEAT_WITHHELD),
+        (Step.HEARTBEAT_WITHHELD, Step.RESET_NODE),
+        (Step.RESET_NODE, Step.RESET_NODE),
     ],
 )
 def test_rungs_follow_each_other_and_the_last_is_the_last(step: Step, above: Step) -> None:
     assert go(replace(FOOT, step=step), ENABLED, 99.0).step is above
-    assert go(replace(FOOT, step=step, stopped=True), ENABLED, 99.0).step is above
+    assert go(replace(FOOT, step=step, stopped=True), ENABLED, 99.0).step is min(above, Step.HEARTBEAT_WITHHELD)
+
+
+# power off ordered, own heartbeat withheld at 9.900 ── 0.1 s ── NMT reset node, if the drive says that it has power
+WITHHELD = Climb(Step.HEARTBEAT_WITHHELD, since=9.9, begin_mps=0.5)
+
+
+@pytest.mark.parametrize(
+    ("now", "look", "step"),
+    [
+        (9.999, replace(BRAKING, seen_at=9.99), Step.HEARTBEAT_WITHHELD),
+        (10.001, BRAKING, Step.RESET_NODE),
+        (10.001, ENABLED, Step.RESET_NODE),
+        (10.001, replace(BRAKING, seen_at=9.901), Step.RESET_NODE),
+        (10.001, replace(BRAKING, seen_at=9.9), Step.HEARTBEAT_WITHHELD),  # said on the rung before, and nothing since
+        (99.0, replace(BRAKING, seen_at=9.8), Step.HEARTBEAT_WITHHELD),  # not heard: it may be off
+        (10.001, ROLLING, Step.HEARTBEAT_WITHHELD),
+        (99.0, replace(ROLLING, seen_at=98.99), Step.HEARTBEAT_WITHHELD),
+        (99.0, replace(ROLLING, seen_at=98.99, trusted=False), Step.HEARTBEAT_WITHHELD),
+        (10.001, replace(BRAKING, trusted=False), Step.RESET_NODE),
+        (10.001, replace(BRAKING, present=False), Step.HEARTBEAT_WITHHELD),
+        (10.001, replace(STANDING, seen_at=10.0), Step.HEARTBEAT_WITHHELD),
+    ],
+)
+def test_only_a_drive_that_says_itself_that_it_kept_its_power_is_reset(now: float, look: Look, step: Step) -> None:
+    assert go(WITHHELD, look, now).step is step
+
+
+def test_at_its_very_deadline_it_is_reset() -> None:
+    assert go(WITHHELD, BRAKING, WITHHELD.since + 0.1).step is Step.RESET_NODE
+
+
+def test_a_reset_drive_that_rolls_without_power_is_waited_for() -> None:
+    reset = replace(WITHHELD, step=Step.RESET_NODE)
+    for at in (10.0, 12.0, 99.0):
+        assert go(reset, replace(ROLLING, seen_at=at), at) == replace(reset, judged_at=at, off_since=at)
+
+
+@pytest.mark.parametrize("look", [ENABLED, BRAKING, ROLLING])
+def test_after_a_reset_power_is_ordered_off_before_the_next_one(look: Look) -> None:
+    stood = Climb(Step.RESET_NODE, 9.9, 0.5, stopped=True)
+    assert go(stood, replace(look, seen_at=10.5), 10.5) == Climb(Step.HEARTBEAT_WITHHELD, 10.5, 0.5)

@@ -138,13 +138,79 @@ def test_a_drive_that_hears_nothing_at_all_loses_the_heartbeat_until_the_reset()
     withheld = story.t
     story.run(1.0)
     assert story.since(withheld, HEARTBEAT) == []
-    assert story.since(withheld, STATE)[-1][1].data[:3] == b"\x02\x01\x04"
+    assert story.since(withheld, STATE)[-1][1].data[:3] == b"\x02\x01\x05"
     drive.hears_sdo = story.filter = True
     story.run(1.0)
     assert story.since(withheld, HEARTBEAT) == []
     assert story.reset(1) == Answer.DONE
     story.run(0.02)
     assert story.since(withheld, HEARTBEAT) != []
+
+
+RESET = Frame(0x000, b"\x81\x01")
+
+
+def keeps_power(drive: FakeDrive) -> Story:
+    """Driving, then its leases end: it hears its masters, and takes no controlword (as in a fault reaction)."""
+    story = driving(drive)
+    drive.hears_pdo = drive.hears_quick_stop = False
+    drive.control = lambda axis, word: None  # type: ignore[method-assign]
+    drive.brakes = story.filter = story.obedient = False
+    until_tripped(story)
+    return story
+
+
+def test_a_drive_that_takes_no_controlword_is_reset_and_has_no_power() -> None:
+    """trip ── 0.3 s ── power off ── 0.1 s ── heartbeat withheld, relay open ── 0.1 s ── NMT reset node."""
+    drive = FakeDrive(1)
+    story = keeps_power(drive)
+    trip = story.t
+    story.run(0.45)
+    assert story.since(trip, 0x000) != []
+    assert RESET not in [frame for _, frame in story.since(trip, 0x000)]
+    assert step(story) is Step.HEARTBEAT_WITHHELD
+    story.run(0.15)
+    assert drive.words[0] == SOD
+    assert step(story) is Step.RESET_NODE
+    drive.brakes = True
+    until_still(story)
+    story.run(2.0)
+    resets = [at for at, frame in story.since(trip, 0x000) if frame == RESET]
+    assert len(resets) == 1
+    assert resets[0] - trip == pytest.approx(0.5, abs=0.02)
+    assert drive.words[0] == SOD  # and nothing switches it on again
+    assert story.since(story.t - 1.0, HEARTBEAT) == []
+    assert story.watchdog.status.settled
+    story.filter, story.obedient = True, True
+    story.run(0.3)
+    assert story.reset(1) == Answer.DONE
+
+
+def test_a_drive_that_keeps_its_power_through_a_reset_is_reset_once_a_second() -> None:
+    drive = FakeDrive(1)
+    story = keeps_power(drive)
+    trip = story.t
+    words = drive.words
+
+    def hold() -> None:
+        drive.words = {0: ENABLED}
+
+    story.on_step = hold
+    story.run(3.2)
+    resets = [at for at, frame in story.since(trip, 0x000) if frame == RESET]
+    assert [round(at - resets[0], 1) for at in resets] == [0.0, 1.0, 2.0]
+    assert words is not drive.words
+
+
+def test_a_drive_that_is_not_heard_any_more_is_not_reset() -> None:
+    """It may have obeyed long ago, and its own watch over its masters is what is left."""
+    drive = FakeDrive(1)
+    story = keeps_power(drive)
+    drive.mute = True
+    trip = story.t
+    story.run(3.0)
+    assert step(story) is Step.HEARTBEAT_WITHHELD
+    assert RESET not in [frame for _, frame in story.since(trip, 0x000)]
 
 
 def test_targets_against_a_stopped_drive_are_answered_by_quick_stops() -> None:

@@ -118,7 +118,9 @@ class FakeDrive:
         """Take a frame from the bus and answer."""
         cob_id, data, node = frame.cob_id, frame.data, self.node_id
         if cob_id == 0x000 and data[1] == node and self.hears_nmt:
-            self.nmt = {0x80: PRE_OPERATIONAL, 0x01: OPERATIONAL}[data[0]]
+            self.nmt = {0x80: PRE_OPERATIONAL, 0x81: PRE_OPERATIONAL, 0x01: OPERATIONAL}[data[0]]
+            if data[0] == 0x81:
+                self.words = dict.fromkeys(self.axes, SOD)
         if cob_id == 0x600 + node and self.hears_sdo:
             return self._answer(data)
         if self.nmt == OPERATIONAL and self.hears_pdo:

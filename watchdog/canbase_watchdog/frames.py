@@ -34,7 +34,7 @@ SETPOINT_RPDO = (0x200, 0x300)
 QUICK_STOP_RPDO = 0x500
 """6040h u16 of every used axis, sent by the watchdog: quick stop, or disable voltage."""
 
-PRE_OPERATIONAL_COMMAND = 0x80
+PRE_OPERATIONAL_COMMAND, RESET_NODE_COMMAND = 0x80, 0x81
 BOOT_UP = b"\x00"
 """What a node sends in place of its heartbeat when it starts."""
 OPERATIONAL = 5
@@ -220,6 +220,11 @@ def _own_pdo(node_id: int, axis_count: int, layout: WatchedLayout, word: int) ->
 def pre_operational(node_id: int) -> Frame:
     """NMT: the node leaves OPERATIONAL, so that nobody's PDO counts there any more."""
     return Frame(NMT, bytes([PRE_OPERATIONAL_COMMAND, node_id]))
+
+
+def reset_node(node_id: int) -> Frame:
+    """NMT: the node starts anew, as after power on. It forgets what was not saved, 1016h and its PDOs among that."""
+    return Frame(NMT, bytes([RESET_NODE_COMMAND, node_id]))
 
 
 def place_of(index: int, axis: int, layout: WatchedLayout = CIA_402) -> tuple[int, int]:

@@ -2,7 +2,8 @@
 
 Each node has a ladder of its own: a drive that brakes well is not made to coast because another one is silent.
 Quick stop and pre-operational leave the braking to the drive's velocity loop. Where that loop does not brake, or its
-sensor cannot be trusted, only the power can go: then the rungs between are left out.
+sensor cannot be trusted, only the power can go: then the rungs between are left out. The last rung makes the drive
+start anew; it is for a drive that says itself that it kept its power, and for no other (docs/decisions/0044).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ class Step(enum.IntEnum):
     PRE_OPERATIONAL = 2
     DISABLE_VOLTAGE = 3
     HEARTBEAT_WITHHELD = 4
+    RESET_NODE = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +38,8 @@ RUNGS = {
     Step.QUICK_STOP: Rung(Step.QUICK_STOP, obey_s=0.15),
     Step.PRE_OPERATIONAL: Rung(Step.PRE_OPERATIONAL, obey_s=0.15),
     Step.DISABLE_VOLTAGE: Rung(Step.DISABLE_VOLTAGE, obey_s=0.1),
-    Step.HEARTBEAT_WITHHELD: Rung(Step.HEARTBEAT_WITHHELD, obey_s=math.inf),
+    Step.HEARTBEAT_WITHHELD: Rung(Step.HEARTBEAT_WITHHELD, obey_s=0.1),
+    Step.RESET_NODE: Rung(Step.RESET_NODE, obey_s=math.inf),
 }
 
 
@@ -120,23 +123,26 @@ def first(look: Look, now: float) -> Climb:
 def advance(before: Climb, look: Look, braking: Braking, now: float) -> Climb:
     """The place of a node after this look at it. Rules, the first that fits:
 
-    1. stopped, and enabled again: next rung, somebody works against us;
-    2. stopped, and moving, or its sensor is caught with a lie after that: not stopped, same rung from the start;
+    1. stopped, and enabled again: next rung, somebody works against us; but no reset before the power was ordered off;
+    2. stopped, and moving, or its sensor is caught with a lie after that: not stopped, same rung from the start, or the
+       one before the reset;
     3. not enabled and standing, by feedback that came on this rung: stopped. Where the sensor cannot be trusted, its
        power must be off as well, for as long as a wheel may roll: then a stand is assumed;
     4. never heard of, and not told to have power: stays, there is nothing to climb for;
     5. a sensor that cannot be trusted: power off at once, for quick stop closes its loop on that sensor;
     6. powered and faster than braking allows, `samples` in a row, or not slower than a moment ago: power off at once,
-       or the last rung; the relay opens;
-    7. what the rung orders is not done, or not seen, within `obey_s`: next rung;
+       or the next rung; the relay opens;
+    7. what the rung orders is not done, or not seen, within `obey_s`: next rung. The last one only for a drive that was
+       seen to have power on the rung before: one that is not heard may be off, and a reset makes it forget 1016h;
     8. stays. A wheel that rolls without power is waited for: no rung can brake it.
     """
     climb = _judged(before, look, braking, now)
     if climb.stopped:
         if look.enabled:
-            return _up(climb, look, now)
+            return _to(min(climb.step + 1, Step.HEARTBEAT_WITHHELD), climb, look, now)
         stands = look.standing and (look.trusted or climb.assumed)
-        return climb if stands else replace(first(look, now), step=climb.step, runaway=climb.runaway)
+        step = min(climb.step, Step.HEARTBEAT_WITHHELD)
+        return climb if stands else replace(first(look, now), step=step, runaway=climb.runaway)
     if look.standing and look.seen_at > climb.since and _holds(climb, look, braking, now):
         return replace(climb, stopped=True, assumed=not look.trusted)
     if not look.present:
@@ -165,6 +171,8 @@ def _holds(climb: Climb, look: Look, braking: Braking, now: float) -> bool:
 
 def _disobeys(climb: Climb, look: Look, now: float) -> bool:
     obey_s = RUNGS[climb.step].obey_s
+    if climb.step is Step.HEARTBEAT_WITHHELD:
+        return look.powered and look.seen_at > climb.since and now >= climb.since + obey_s
     if now >= max(climb.since, look.seen_at) + obey_s:
         return True
     asked = look.powered if climb.step >= Step.DISABLE_VOLTAGE else look.enabled
@@ -177,6 +185,6 @@ def _up(climb: Climb, look: Look, now: float) -> Climb:
 
 def _to(step: int, climb: Climb, look: Look, now: float) -> Climb:
     """The last rung is the end: there it stays as it is."""
-    if climb.step is Step.HEARTBEAT_WITHHELD and not climb.stopped:
+    if climb.step is Step.RESET_NODE and not climb.stopped:
         return climb
-    return Climb(Step(min(step, Step.HEARTBEAT_WITHHELD)), now, look.begin_mps, runaway=climb.runaway)
+    return Climb(Step(min(step, Step.RESET_NODE)), now, look.begin_mps, runaway=climb.runaway)

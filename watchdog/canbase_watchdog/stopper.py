@@ -18,6 +18,8 @@ NMT_PERIOD_S = 0.05
 SDO_PERIOD_S = 0.01
 """One SDO request at a time: most drives have a single SDO server that keeps one request."""
 IDLE_SDO_PERIOD_S = 0.05
+RESET_PERIOD_S = 1.0
+"""A drive needs so long to start anew."""
 SEEK_PERIOD_S = 0.5
 """A node of which nothing is known after the start is asked so seldom that tools find the SDO channel free."""
 
@@ -25,6 +27,7 @@ _WORD_BY_STEP = {
     Step.PRE_OPERATIONAL: frames.QUICK_STOP_WORD,
     Step.DISABLE_VOLTAGE: frames.DISABLE_VOLTAGE_WORD,
     Step.HEARTBEAT_WITHHELD: frames.DISABLE_VOLTAGE_WORD,
+    Step.RESET_NODE: frames.DISABLE_VOLTAGE_WORD,
 }
 
 
@@ -57,7 +60,7 @@ class Stopper:
         self._begin_slowing(now)
         self._seen = self._look(view)
         self.climb: Climb = replace(first(self._seen, now), stopped=resting, assumed=resting and not trusted)
-        self._quick_stop_at = self._nmt_at = self._sdo_at = NEVER
+        self._quick_stop_at = self._nmt_at = self._sdo_at = self._reset_at = NEVER
         self._sdo_turn = 0
 
     @property
@@ -80,7 +83,7 @@ class Stopper:
         out: list[Frame] = []
         if not self.climb.stopped or defied:
             # The PDO first: pre-operational makes the node deaf to it.
-            out += self._stop_word(now) + self._pre_operational(now)
+            out += self._stop_word(now) + self._reset_node(now) + self._pre_operational(now)
         return out + self._sdo(view, defied, now)
 
     def _begin_slowing(self, now: float) -> None:
@@ -138,6 +141,14 @@ class Stopper:
         off = self.climb.step >= Step.DISABLE_VOLTAGE
         order = frames.disable_voltage if off else frames.quick_stop
         return [order(self._node_id, self._axis_count, self._layout)]
+
+    def _reset_node(self, now: float) -> list[Frame]:
+        """Once, and again where the drive says after it that it still has power. No other one is made to boot."""
+        has_power = self._seen.powered and self._seen.seen_at > self._reset_at
+        if self.climb.step < Step.RESET_NODE or not has_power or now < self._reset_at + RESET_PERIOD_S:
+            return []
+        self._reset_at = now
+        return [frames.reset_node(self._node_id)]
 
     def _pre_operational(self, now: float) -> list[Frame]:
         if self.climb.step < Step.PRE_OPERATIONAL or now < self._nmt_at + NMT_PERIOD_S:

@@ -124,13 +124,13 @@ class Watchdog:
 
     @property
     def keeps_relay(self) -> bool:
-        """False on the last rung, and for a wheel that was seen not to brake: then a safety relay opens."""
+        """False on the last two rungs, and for a wheel that was seen not to brake: then a safety relay opens."""
         return self._beats and not any(stopper.climb.runaway for stopper in self._stoppers)
 
     @property
     def _beats(self) -> bool:
-        """False on the last rung: then the own heartbeat is withheld."""
-        return self._step is not Step.HEARTBEAT_WITHHELD
+        """False on the last two rungs: then the own heartbeat is withheld."""
+        return self._step < Step.HEARTBEAT_WITHHELD
 
     @property
     def refused_leases(self) -> dict[Refusal, int]:
