@@ -71,8 +71,9 @@ EXCUSES = {
     "compared with the motion in the measure of its encoder",
     "strange hands": "who sends to the drives past all layers asks no watchdog (enabling), and moves them again after "
     "a stop, until that is stopped too (held: for T_react); its way may be longer than the free one (obstacle)",
-    "fault reaction": "a drive whose sensor lies takes no controlword in its fault reaction (CiA 402-2), which never "
-    "ends: as unreachable. And a wheel that stood may turn again for the time that its lie takes to be found (held)",
+    "fault reaction": "a drive whose sensor lies, or that does not brake, takes no controlword in its fault reaction "
+    "(CiA 402-2): as unreachable, until the watchdog has found it, ordered its power off and reset its node; and while "
+    "no watchdog reaches it. A wheel that stood may turn again for the time that its lie takes to be found (held)",
     "cut off": "one drive of several is cut off and turns the base on until its own watch stops it (held)",
     "deaf watchdog": "it cannot keep a standing base from starting; driver and drives miss it within T_react (held)",
     "reset by a stranger": "a drive that another master has reset has forgotten 1016h (heartbeat)",

@@ -2,7 +2,7 @@
 
 A drive that nobody reaches turns on until its own watch over its masters stops it. Two kinds do not stop then, and no
 software can change it: one that watches nothing (docs/drives.md), and one whose speed sensor lies, since its own
-quick stop closes its loop on that sensor. STO, wired, stops both.
+quick stop closes its loop on that sensor. STO, wired, stops both. A watchdog that reaches it resets the node.
 """
 
 from __future__ import annotations
@@ -16,7 +16,11 @@ from canbase_bench.cia301.dictionary import key
 from canbase_bench.cia402.states import State
 from canbase_bench.node import SimulatedNode
 from canbase_bench.personality import PERSONALITIES
+from canbase_config.stopping import BRAKING_SHARE
+from canbase_watchdog.ladder import RUNGS, Step
 
+RESETS_S = 0.2
+"""From the last rung of the watchdog's ladder until the drive is without power: feedback by SDO, late cycles [s]."""
 BRAKES_S = 0.3
 """A wheel that turns again after a stop is slow: so long its drive takes to brake it [s]."""
 
@@ -38,6 +42,12 @@ class Reach:
         self.fastest_mps = 0.0
         """The fastest wheel since the base last stood."""
         self.lost_at = -math.inf
+        self._reacts_since: dict[int, float] = {}
+        """Drives in a fault reaction that their own sensor never ends; since when the watchdog reaches them."""
+        watchdog = world.robot.watchdog
+        rungs_s = RUNGS[Step.DISABLE_VOLTAGE].obey_s + RUNGS[Step.HEARTBEAT_WITHHELD].obey_s
+        found_s = max(watchdog.motion_missing_s, world.robot.timeouts.feedback_s) + watchdog.drive_lag_s
+        self._reset_s = found_s + rungs_s + RESETS_S
 
     def step(self, stands: bool) -> None:
         """Look at all drives now."""
@@ -86,7 +96,11 @@ class Reach:
     def _is_lost(self, node_id: int, now: float) -> bool:
         """Nobody reaches it, and it does not stop by itself, or not yet: a maker's own watch has a time of its own."""
         if self._reacts(node_id):
-            return True
+            since = self._reacts_since.setdefault(node_id, now)
+            if not self._watchdog_reaches(node_id):
+                self._reacts_since[node_id] = now
+            return now <= since + self._reset_s
+        self._reacts_since.pop(node_id, None)
         waits = not self.personality.heeds_heartbeats and now <= self.heard(node_id) + self.alone_s
         return (waits or not self.stops_alone(node_id)) and not self._reached(node_id)
 
@@ -100,10 +114,23 @@ class Reach:
             talks and (name, f"drive{node_id}") not in blocked for name, talks in senders.items()
         )
 
+    def _watchdog_reaches(self, node_id: int) -> bool:
+        """It runs, and has a line to the drive and from it: it resets no drive that it does not hear."""
+        world, drive = self._world, f"drive{node_id}"
+        line, blocked = world.drives.bench.nodes[node_id].line, world.bus.disturbance.blocked
+        ways = {("watchdog", drive), (drive, "watchdog")}
+        talks = world.watchdog.running and not world.watchdog.is_deaf
+        return talks and line.hears and not line.silent and not ways & blocked
+
     def _reacts(self, node_id: int) -> bool:
-        """In its fault reaction a drive takes no controlword (CiA 402-2, transition 14), and it ends on its sensor."""
+        """In its fault reaction a drive takes no controlword (CiA 402-2, transition 14), and it ends on its sensor.
+
+        Or it does not brake in it.
+        """
         node = self._world.drives.bench.nodes[node_id]
-        return self._lies(node) and any(axis.state is State.FAULT_REACTION_ACTIVE for axis in node.axes)
+        least_mps2 = BRAKING_SHARE * self._world.robot.limits.deceleration_mps2
+        weak = any(axis.motor.stop_mps2 < least_mps2 for axis in node.axes)
+        return (self._lies(node) or weak) and any(axis.state is State.FAULT_REACTION_ACTIVE for axis in node.axes)
 
     @staticmethod
     def _lies(node: SimulatedNode) -> bool:

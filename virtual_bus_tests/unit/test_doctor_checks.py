@@ -103,7 +103,7 @@ def test_a_robot_that_is_well_has_nothing_but_good_rows_and_exit_code_0() -> Non
         (changed("motor_driver/status", state=200), "motor_driver", "FAIL", "state 200"),
         (changed("motor_driver/status", watchdog="missing"), "watchdog", "FAIL", "start canbase watchdog"),
         (changed("motor_driver/status", watchdog="tripped", watchdog_rung=3), "watchdog", "FAIL", "disable voltage"),
-        (changed("motor_driver/status", watchdog="tripped", watchdog_rung=9), "watchdog", "FAIL", "withheld"),
+        (changed("motor_driver/status", watchdog="tripped", watchdog_rung=9), "watchdog", "FAIL", "reset node"),
         (changed("motor_driver/status", watchdog_trips=2), "watchdog's counters", "warn", "trips grew"),
         (changed("motor_driver/status", watchdog_leases_refused=2), "watchdog's counters", "warn", "leases_refused 2"),
         (changed("motor_driver/status", watchdog_pause_max_s=0.051), "watchdog's counters", "warn", "51 ms"),

@@ -18,6 +18,8 @@ NMT_PERIOD_S = 0.05
 SDO_PERIOD_S = 0.01
 """One SDO request at a time: most drives have a single SDO server that keeps one request."""
 IDLE_SDO_PERIOD_S = 0.05
+STALE_S = 0.02
+"""While it is stopped, feedback that is older is read: two cycles, or an SDO's way to and fro."""
 RESET_PERIOD_S = 1.0
 """A drive needs so long to start anew."""
 SEEK_PERIOD_S = 0.5
@@ -55,6 +57,7 @@ class Stopper:
         self._resting_since = now if resting else math.inf
         drives = [drive for drive in config.drives if drive.node_id == node_id]
         self._layout, self._axis_count = drives[0].layout, len(drives)
+        self._stale_s = min(config.feedback_timeout_s, max(STALE_S, 2.0 / config.control_hz))
         self._slopes = [Slope.of(config, drive.velocity_mps_per_bit) for drive in drives]
         self._slowing: list[SlowingWatch] = []
         self._begin_slowing(now)
@@ -74,7 +77,8 @@ class Stopper:
         self._seen = self._look(view)
         before = self.climb
         self.climb = advance(before, self._seen, self._braking, now)
-        if self.climb.since > before.since:
+        brakes_already = self.climb.step is Step.PRE_OPERATIONAL and not self._seen.enabled
+        if self.climb.since > before.since and not brakes_already:
             self._begin_slowing(now)
         if self.climb.step is not before.step:
             self._quick_stop_at = self._nmt_at = self._sdo_at = NEVER
@@ -87,7 +91,7 @@ class Stopper:
         return out + self._sdo(view, defied, now)
 
     def _begin_slowing(self, now: float) -> None:
-        """A rung begins now."""
+        """A rung begins now. A drive that is braking by its own ramp goes on with it when nothing but NMT changes."""
         self._slowing = [SlowingWatch(slope, now) for slope in self._slopes]
 
     def _follow(self, view: View) -> None:
@@ -183,6 +187,7 @@ class Stopper:
             number = axis.drive.axis
             if word is not None:
                 requests.append(frames.write_controlword(self._node_id, number, word, self._layout))
-            if word is not None or now >= axis.seen_at + self._config.feedback_timeout_s:
+            stale_s = self._config.feedback_timeout_s if self.climb.stopped else self._stale_s
+            if word is not None or now >= axis.seen_at + stale_s:
                 requests += frames.read_feedback(self._node_id, number, self._layout)
         return requests

@@ -60,6 +60,11 @@ class Motor:
         self._stopping, self._on_stopped = True, then
 
     @property
+    def stop_mps2(self) -> float:
+        """Slope of the stop that is under way; infinity: there is none."""
+        return self._down / self._dt if self._stopping else AT_ONCE
+
+    @property
     def at_rest(self) -> bool:
         """True when the next step would do what the last one did, as long as the wheel stands."""
         if self.sensor is not None:
