@@ -35,7 +35,7 @@ GROWTH_BYTES = 4 * 2**20
 """The same for the memory of the whole process."""
 LEASES = 5
 """One lease to so many frames."""
-PRE_OPERATIONAL = 0x80
+PRE_OPERATIONAL, RESET_NODE = 0x80, 0x81
 STOPS = (b"\x00\x00", b"\x02\x00")
 """6040h: disable voltage, quick stop."""
 
@@ -120,7 +120,7 @@ def is_stop(cob_id: int, data: bytes) -> bool:
     """Quick stop or power off, NMT pre-operational, an SDO that reads or takes power away. FuzzError: any other."""
     function = cob_id & 0x780
     if cob_id == 0x000:
-        allowed = data[0] == PRE_OPERATIONAL
+        allowed = data[0] in (PRE_OPERATIONAL, RESET_NODE)
     elif function == 0x500:
         allowed = data in STOPS
     elif function == SDO_REQUEST:
