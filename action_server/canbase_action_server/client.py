@@ -1,4 +1,4 @@
-"""A client of drive_distance for applications. What it tells apart is in `goal_client.py`.
+"""A client of drive_distance for applications. Its outcomes and errors: `goal_client.py`.
 
 drive = DriveClient(node).send(1.0, 0.2)      # raises NoServerError, NoResponseError, RejectedError
 result = drive.wait()                         # read result.status first

@@ -1,4 +1,4 @@
-"""What the clients of the actions share: discovery, acceptance, feedback, cancel and final status, told apart.
+"""What the clients of the actions share: discovery, acceptance, feedback, cancel and final status, each with its error.
 
 A goal is sent once. When its result is lost it may still have run: nothing here sends it again. While a goal runs and
 its executor spins, the server is told that the client lives (action.require_client_lease in robot.yaml).

@@ -1,4 +1,4 @@
-"""A motion over a signed way: joins the profile with what odometry says. What kind of motion it is, a subclass says.
+"""A motion over a signed distance or angle: combines the profile with odometry. Subclasses: straight.py, turn.py.
 
 A way is in metres: that of the base, or for a turn in place that of the wheels on their circle. So one profile, one
 tolerance and one standstill serve both.

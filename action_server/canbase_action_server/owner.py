@@ -1,4 +1,4 @@
-"""Who owns the base: nobody, or one goal. Runs the goal that took it, and ends it exactly once.
+"""The goal that has the base, if any: runs it, and ends it exactly once.
 
 Who may take it, and when, is decided in `reception.py`. After `fail` the goal only stops, and ends with INTERNAL.
 """

@@ -1,4 +1,4 @@
-"""How fast to go now, so that the base stands at the distance: a ramp with a jerk limit, a braking curve, a gentle end.
+"""The speed now, so that the base comes to standstill at the distance: a ramp with jerk limit, a braking curve.
 
 What was ordered during the latency of the loop has not been seen by the odometry yet, but will be driven: it counts as
 driven already, so that neither old odometry nor slow drives make the base overshoot. Magnitudes only: no signs here.

@@ -1,4 +1,4 @@
-"""What a client asks for: the numbers of a goal, which of them are good, and the motion that they mean."""
+"""The request of a client: the numbers of a goal, their valid ranges, and the motion that they mean."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A client of rotate_angle for applications. What it tells apart is in `goal_client.py`.
+"""A client of rotate_angle for applications. Its outcomes and errors: `goal_client.py`.
 
 turn = RotateClient(node).send(math.pi, 0.5)  # raises NoServerError, NoResponseError, RejectedError
 result = turn.wait()                          # read result.status first

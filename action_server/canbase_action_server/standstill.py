@@ -1,4 +1,4 @@
-"""Does the base stand, after it was ordered to? By odometry, else by the driver's own word, else only by waiting.
+"""Whether the base is at standstill after the order: by odometry, else by the driver's status, else by waiting.
 
 A sample counts only when it was received after the order had time to reach the wheels: what stood before a motion began
 proves nothing about its end.

@@ -1,4 +1,4 @@
-"""How grave a sentence of a log is. Apart from journal.py, which opens sockets: what decides may know it."""
+"""The severity of a log line. Apart from journal.py, which opens sockets, so that pure modules may use it."""
 
 from __future__ import annotations
 

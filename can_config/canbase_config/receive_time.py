@@ -1,4 +1,4 @@
-"""When a message counts as received, also after this process stood still (SIGSTOP, a busy loop, a frozen computer).
+"""When a message counts as received, also after a pause of this process (SIGSTOP, a busy loop, a frozen computer).
 
 A message that waited in a queue meanwhile looks new when it is taken out. It may be as old as the pause, so it counts
 from before it: what a source said then orders nothing now.

@@ -1,4 +1,4 @@
-"""The keys of robot.yaml below `safety`: what the safety filter looks at and how near it lets the base come."""
+"""The keys of robot.yaml below `safety`: what the safety filter evaluates, and how near the base may come."""
 
 from __future__ import annotations
 

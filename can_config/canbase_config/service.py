@@ -1,4 +1,4 @@
-"""What a process tells systemd, and nothing where there is none: ready, its state in words, that its loop lives.
+"""Notifications to systemd, if it is there: ready, the state as text, and that the loop still runs.
 
 Standard library only. The protocol is sd_notify(3). The watchdog has its own copy of the datagram: it shares no code.
 """

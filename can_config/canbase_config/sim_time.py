@@ -1,4 +1,4 @@
-"""Nodes that move a robot refuse simulation time: with a clock that is paused or set back nobody would send zeros."""
+"""Nodes that move a robot refuse simulation time: with a clock that is paused or set back no node would send zeros."""
 
 from __future__ import annotations
 

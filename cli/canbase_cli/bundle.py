@@ -1,4 +1,4 @@
-"""`canbase support-bundle`: one file with everything that somebody far away needs. What is taken: `support.py`."""
+"""`canbase support-bundle`: one file with everything that remote help needs. What is collected: `support.py`."""
 
 from __future__ import annotations
 

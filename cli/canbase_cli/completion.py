@@ -1,4 +1,4 @@
-"""What the shell proposes on Tab: names out of the robot.yaml that stands on the line before, or the bench sample.
+"""Shell completion by Tab: names from the robot.yaml that is named earlier on the line, or the bench sample.
 
 A robot.yaml that cannot be read proposes nothing: the command itself tells what is wrong in it.
 """

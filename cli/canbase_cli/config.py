@@ -1,4 +1,4 @@
-"""`canbase config`: what a robot.yaml says and what is wrong with it."""
+"""`canbase config`: the effective configuration of a robot.yaml, and its mistakes."""
 
 from __future__ import annotations
 

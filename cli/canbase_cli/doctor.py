@@ -1,4 +1,4 @@
-"""`canbase doctor`: looks at a robot and says what is wrong with it. Orders nothing, changes nothing."""
+"""`canbase doctor`: checks a robot and reports what is wrong with it. Orders nothing, changes nothing."""
 
 from __future__ import annotations
 

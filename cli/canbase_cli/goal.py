@@ -1,4 +1,4 @@
-"""What `canbase drive` and `canbase rotate` share: send one goal, show it, cancel it with Ctrl-C, tell how it ended."""
+"""What `canbase drive` and `canbase rotate` share: send one goal, show it, cancel it with Ctrl-C, report its result."""
 
 from __future__ import annotations
 

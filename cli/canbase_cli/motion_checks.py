@@ -1,4 +1,4 @@
-"""Checks of `canbase doctor --symptom` about motion: who orders it, who lets it through, what tells of it.
+"""Checks of `canbase doctor --symptom` about motion: its sources, mux and filter, and the topics that report it.
 
 Pure: from `Evidence` to one `Check` each. symptoms.py says which belong to which symptom.
 """

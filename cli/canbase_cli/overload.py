@@ -1,4 +1,4 @@
-"""Whether this computer is too busy for `canbase doctor` to judge times: then a late message accuses nobody.
+"""Whether this computer is too busy for `canbase doctor` to judge times: then a late message proves nothing.
 
 Reading the system is a few lines at the end; the judgement is pure.
 """

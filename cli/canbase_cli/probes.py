@@ -1,4 +1,4 @@
-"""Questions that `canbase doctor` asks the action server while it listens: none of them changes anything.
+"""Requests of `canbase doctor` to the action server: none of them changes anything.
 
 The cancel is for a goal id that no goal has: the server has to look for it, and finds none. One question is on its way
 at a time, so that each is timed alone.

@@ -1,4 +1,4 @@
-"""`canbase stop` and `canbase reset`: call services of the robot and tell their answers."""
+"""`canbase stop` and `canbase reset`: call services of the robot and print their answers."""
 
 from __future__ import annotations
 

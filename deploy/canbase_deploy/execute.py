@@ -1,4 +1,4 @@
-"""Carries out a plan on this machine or below a prefix, and says what it did. All side effects are here."""
+"""Carries out a plan on this machine or below a prefix, and reports what it did. All side effects are here."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from site_builder import docstrings, modules, pages, source_pages
+from site_builder import docstrings, modules, offline, pages, source_pages
 
 project = "canbase"
 release = modules.version()
@@ -50,3 +50,4 @@ def _finish(app: Any, exception: Exception | None) -> None:
     if exception is None:
         source_pages.write(Path(app.outdir))
         (Path(app.outdir) / "_static" / "source.css").write_text(source_pages.styles(), encoding="utf-8")
+        offline.check(Path(app.outdir))

@@ -1,4 +1,4 @@
-"""What mux and filter tell when they decide differently: a sentence, how grave it is, and its fields (docs/logs.md)."""
+"""The log entries of mux and filter for each changed decision: sentence, severity and fields (docs/logs.md)."""
 
 from __future__ import annotations
 

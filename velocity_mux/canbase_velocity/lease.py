@@ -1,4 +1,4 @@
-"""The datagram that tells the watchdog what the safety filter ordered: docs/bus.md, "The lease". Sending is io.py."""
+"""The datagram that reports the safety filter's order to the watchdog: docs/bus.md, "The lease". Sending is io.py."""
 
 from __future__ import annotations
 

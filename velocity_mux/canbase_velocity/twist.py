@@ -1,4 +1,4 @@
-"""What a velocity command says about a two-wheeled base: forward speed and turning speed (REP 103)."""
+"""The velocity of a two-wheeled base: forward speed and turning speed (REP 103)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a simulated node is given for each axis, and what it tells about it."""
+"""The parameters of a simulated node for each axis, and the state that it reports of each."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ import pytest
 
 from canbase_cli.main import app
 from exit_matrix.marked import section
-from site_builder import api_pages, command_page, decision_page, message_page, structure
+from site_builder import api_pages, command_page, decision_page, message_page, offline, structure
 from site_builder.docstrings import converted
 from site_builder.modules import ROOT, Module, modules, purpose, shipped_packages
 
@@ -93,3 +93,32 @@ def test_the_page_of_decisions_has_every_record() -> None:
 )
 def test_a_docstring_becomes_restructured_text(docstring: str, restructured: str) -> None:
     assert "\n".join(converted(docstring.splitlines())) == restructured
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<script defer src="https://cdn.example/a.js"></script>',
+        '<link rel="stylesheet" href="//fonts.example/b.css">',
+        "<img alt='' src=http://pictures.example/c.png>",
+        "@font-face { src: local('F'), url('https://fonts.example/d.woff2') }",
+        '@import "https://styles.example/e.css";',
+    ],
+)
+def test_what_a_page_would_load_from_the_network_is_found_and_named(tmp_path: Path, text: str) -> None:
+    page = tmp_path / "page.html"
+    page.write_text(text, encoding="utf-8")
+
+    with pytest.raises(ValueError, match=r"page\.html: (http:|https:)?//\w+\.example/"):
+        offline.check(tmp_path)
+
+
+def test_links_to_read_and_own_files_are_no_loads(tmp_path: Path) -> None:
+    text = '<a href="https://example.org">x</a><img src="_images/a.png"><link href="_static/b.css"><svg xmlns="http://w3"/>'
+    (tmp_path / "page.html").write_text(text, encoding="utf-8")
+
+    offline.check(tmp_path)
+
+
+def test_no_picture_of_the_docs_loads_from_the_network() -> None:
+    offline.check(ROOT / "docs")

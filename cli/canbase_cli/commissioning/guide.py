@@ -1,4 +1,4 @@
-"""A guided procedure as a script to be read from top to bottom: it moves, waits, asks and tells. The runner is pure.
+"""A guided procedure as a script to be read from top to bottom: it moves, waits, asks and reports. The runner is pure.
 
 A script is a generator: it yields `Until`, `Ask` or `Tell`, and is sent the answer. While it waits, the rig goes on.
 """

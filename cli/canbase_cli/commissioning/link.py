@@ -1,4 +1,4 @@
-"""A CAN interface as `ip -details -statistics -json link show` tells about it (iproute2, SocketCAN). Pure."""
+"""A CAN interface as `ip -details -statistics -json link show` reports it (iproute2, SocketCAN). Pure."""
 
 from __future__ import annotations
 

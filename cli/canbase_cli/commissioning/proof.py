@@ -1,4 +1,4 @@
-"""The watchdog proof: does each drive stop by itself when nobody commands it any more, and in what time? Wheels up.
+"""The watchdog proof: whether each drive stops by itself when no commands come any more, and how fast. Wheels up.
 
 Two trials at a low speed. First this computer falls silent, as if it had died; then only the watchdog's heartbeat is
 missing, while setpoints go on, as at the last rung of the watchdog's ladder.

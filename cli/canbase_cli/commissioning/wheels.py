@@ -1,4 +1,4 @@
-"""Wheels up: which way each wheel turns, and how far. One wheel at a time, slowly; a person says what it really did."""
+"""Wheels up: which way each wheel turns, and how far. One wheel at a time, slowly; a person enters what it did."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`canbase scan` on the bus, and its table. What is asked and concluded is in `commissioning`."""
+"""`canbase scan` on the bus, and its table. What is queried and concluded is in `commissioning`."""
 
 from __future__ import annotations
 

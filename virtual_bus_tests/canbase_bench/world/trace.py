@@ -1,4 +1,4 @@
-"""The last minutes of the truth, so that a test can tell afterwards when the wheels came to stand. Pure."""
+"""The last minutes of ground truth, from which tests find the time of standstill of the wheels. Pure."""
 
 from __future__ import annotations
 
