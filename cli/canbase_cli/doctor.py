@@ -76,15 +76,18 @@ def _walk(symptom: str, loaded: Loaded, arguments: list[str], seconds: float) ->
 
 def _all(loaded: Loaded, arguments: list[str], seconds: float, *, with_bus: bool) -> list[Check]:
     """Without any part of canbase on the bus, its parts are not looked for: the drives are there alone."""
+    from canbase_cli.running import changes, running, running_checks
+
+    files = [*commissioning(loaded), *running_checks(loaded.robot, running(loaded.robot), changes(loaded))]
     if not with_bus:
         rows = _parts(loaded, arguments, seconds)
-        return [rows[0], *commissioning(loaded), *rows[1:]]
+        return [rows[0], *files, *rows[1:]]
     from canbase_cli.bus_checks import bus_checks
     from canbase_cli.onbus.doctor import look
 
     seen = look(loaded.robot)
     rows = _parts(loaded, arguments, seconds) if seen.canbase_runs or seen.problem else [good_file(loaded)]
-    return [rows[0], *commissioning(loaded), *bus_checks(seen), *rows[1:]]
+    return [rows[0], *files, *bus_checks(seen), *rows[1:]]
 
 
 def _parts(loaded: Loaded, arguments: list[str], seconds: float) -> list[Check]:
