@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import inspect
-import sys
-from collections.abc import Mapping
+import ast
+import functools
+from collections.abc import Iterator, Mapping
 from html import escape
 from pathlib import Path
 
@@ -48,18 +48,26 @@ def styles() -> str:
 
 def link(domain: str, info: Mapping[str, str]) -> str | None:
     """Where sphinx.ext.linkcode finds the source of a documented name, relative to a page in generated/api."""
-    module = sys.modules.get(info["module"]) if domain == "py" else None
-    if module is None or module.__file__ is None:
-        return None
-    thing = module
-    for name in info["fullname"].split("."):
-        thing = getattr(thing, name, None)  # type: ignore[assignment]
-    try:
-        line = inspect.getsourcelines(inspect.unwrap(thing))[1]  # type: ignore[arg-type]
-        file = Path(inspect.getsourcefile(inspect.unwrap(thing)) or "")  # type: ignore[arg-type]
-    except (OSError, TypeError):
-        return None
-    return f"{_FROM_API}/{file.relative_to(ROOT)}.html#L-{line}" if file.is_relative_to(ROOT) else None
+    path = _paths().get(info["module"]) if domain == "py" else None
+    line = _lines(path).get(info["fullname"]) if path else None
+    return f"{_FROM_API}/{path}.html#L-{line}" if line else None
+
+
+@functools.cache
+def _paths() -> dict[str, Path]:
+    return {module.name: module.path for package in shipped_packages() for module in modules(package)}
+
+
+@functools.cache
+def _lines(path: Path) -> dict[str, int]:
+    return dict(_definitions(ast.parse((ROOT / path).read_text(encoding="utf-8")).body, ""))
+
+
+def _definitions(body: list[ast.stmt], prefix: str) -> Iterator[tuple[str, int]]:
+    for node in body:
+        if isinstance(node, (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)):
+            yield f"{prefix}{node.name}", node.lineno
+            yield from _definitions(node.body, f"{prefix}{node.name}.")
 
 
 def _write(page: Path, path: Path, formatter: HtmlFormatter) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from canbase_cli.main import app
 from exit_matrix.marked import section
-from site_builder import api_pages, command_page, decision_page, message_page, offline, structure
+from site_builder import api_pages, command_page, decision_page, message_page, offline, source_pages, structure
 from site_builder.docstrings import converted
 from site_builder.modules import ROOT, Module, modules, purpose, shipped_packages
 
@@ -122,3 +122,13 @@ def test_links_to_read_and_own_files_are_no_loads(tmp_path: Path) -> None:
 
 def test_no_picture_of_the_docs_loads_from_the_network() -> None:
     offline.check(ROOT / "docs")
+
+
+def test_a_documented_name_links_to_the_line_of_its_definition() -> None:
+    link = source_pages.link("py", {"module": "canbase_config.errors", "fullname": "Problem"})
+
+    assert link is not None
+    page, _, line = link.removeprefix("../../source/").partition(".html#L-")
+    assert (ROOT / page).read_text(encoding="utf-8").splitlines()[int(line) - 1] == "class Problem:"
+    assert source_pages.link("py", {"module": "canbase_config.errors", "fullname": "no_such_name"}) is None
+    assert source_pages.link("py", {"module": "typing", "fullname": "Any"}) is None
