@@ -44,10 +44,12 @@ LONGEST_S = 20.0
 """No base needs longer to stop."""
 HEARD_S = 0.3
 """The stop button says ten times a second that it is pressed: the filter has heard it then, if it runs."""
+FOUND_S = 0.6
+"""After its start a process has found out who publishes on a topic."""
 PROPERTIES = {
     "envelope": "the base is beyond what its leases order for T_react at most, and then brakes",
-    "sources": "the base moves only while a source orders it (none held over a reset), and for the timeouts of mux "
-    "and filter and T_react after",
+    "sources": "the base moves only while a source orders it, and for the timeouts of mux and filter and T_react after",
+    "neutral": "after a reset the base does not move for a source that ordered motion then and has shown no zero since",
     "latched": "a trip of the watchdog and a latched stop of the driver end by an accepted reset alone, in all lives",
     "held": "after a latched stop, or a requested one, the base brakes, stands, and does not move before the reset",
     "enabling": "no drive gets power without a watchdog that lives and is not tripped",
@@ -57,7 +59,7 @@ PROPERTIES = {
     "obstacle": "the base never touches what it could have seen in time",
     "blind": "where no scanner sees the base is no faster than blind_mps, once that was noticed",
     "odometry": "the driver's pose never jumps, and is the true one as long as the encoders tell the truth",
-    "locked": "the base stands while somebody publishes that a lock holds",
+    "locked": "nothing is ordered while somebody publishes that a lock holds",
     "goal": "every goal ends exactly once, in its time; one that succeeded is where it should be",
     "runaway": "no wheel is faster than it was ordered to be for longer than the stated time",
     "path": "the base turns as it was ordered to, or not at all, but for the stated time",
@@ -117,6 +119,8 @@ class Judge:
         self._blind = Envelope(sees_s + (self.react_s if len(plan.faults) > 1 else 0.0), now, self._coasting)
         self._touched = False
         self._awaits_zero = False
+        self._rests_since = math.inf
+        """When the last reset was done, as long as nobody has had the base move since."""
         self._hold: Envelope | None = None
         self._stood = False
         self._latched_at = self._again_since = now
@@ -165,6 +169,9 @@ class Judge:
     def _on_lease(self, twist: Twist) -> None:
         if self._awaits_zero and not twist.is_zero:
             self._violate("zero", f"{twist} is ordered, and the command was not zero since the emergency stop")
+        locked_s = self._world.clock.now - max(self._world.locked_at, self._lock_from)
+        if locked_s > HEARD_S and not twist.is_zero:
+            self._violate("locked", f"{twist} is ordered, {locked_s:.2f} s after a lock was closed")
         tau_s = braking_s(self._world.robot, twist.linear_mps, twist.angular_radps)
         self._envelope.order(tau_s, self._world.clock.now)
         self._motion.order(twist)
@@ -187,9 +194,11 @@ class Judge:
         self._strangers.step(now)
         self._check_latches(now)
         self._check_speed(tau_s, coasting, now)
+        self._check_neutral(tau_s, now)
         self._check_drives(now)
         self._check_stop_button(tau_s, coasting, now)
-        self._check_lock(tau_s, coasting, now)
+        if not self._world.velocity.running:
+            self._lock_from = now + FOUND_S
         self._check_wall(tau_s, coasting, now)
         if self._fresh and tau_s > 0.0 and not self._latches:
             self.lives, self._fresh = self.lives + 1, False
@@ -238,6 +247,15 @@ class Judge:
         if tau_s > self._hold.bound_s(tau_s, now, coasting, self._reach.lost) or again:
             self._violate("held", f"{self._shown} while {' and '.join(self._latches)} latched")
 
+    def _check_neutral(self, tau_s: float, now: float) -> None:
+        """From a reset on, at which the base stands, until somebody orders motion who may, or moves it past all."""
+        pushed = self._reach.was_lost or self._strangers.acted_at > self._rests_since
+        if self._latches or pushed or self._wishes.greatest_s(now) > 0.0:
+            self._rests_since = math.inf
+        lies = self._reach.acts_s(now, self._motion.runaway_s) > 0.0
+        if tau_s > 0.0 and now > self._rests_since and not lies:
+            self._violate("neutral", f"{self._shown}, {now - self._rests_since:.2f} s after a reset")
+
     def _rest_again(self, now: float) -> bool:
         self._again_since, self._again_tau_s = now, 0.0
         return False
@@ -267,6 +285,7 @@ class Judge:
             self._violate("latched", "the watchdog left TRIPPED without a reset")
         if done > self._resets_done:
             self._wishes.on_reset(now)
+            self._rests_since = now
         self._fresh, self._resets_done = self._fresh or done > self._resets_done, done
         if latched.keys() != self._latches.keys():
             self._note_latches(latched, now)
@@ -326,15 +345,6 @@ class Judge:
         longest_s = braking_s(self._world.robot, limits.linear_mps, limits.angular_radps)
         if tau_s > 0.0 and not coasting and now > self._pressed_at + 0.1 + self.react_s + longest_s:
             self._violate("estop", f"{self._shown}, {now - self._pressed_at:.2f} s after it was pressed")
-
-    def _check_lock(self, tau_s: float, coasting: bool, now: float) -> None:
-        """As the stop button; a process that does not run has not heard of it."""
-        if self._reach.lost or not self._world.velocity.running or self._strangers.acted_at == now:
-            self._lock_from = now
-        limits, since = self._world.robot.limits, max(self._world.locked_at, self._lock_from)
-        longest_s = braking_s(self._world.robot, limits.linear_mps, limits.angular_radps)
-        if tau_s > 0.0 and not coasting and now > since + 0.1 + self.react_s + longest_s:
-            self._violate("locked", f"{self._shown}, {now - since:.2f} s after the lock was closed")
 
     def _on_goal_end(self, goal: Goal) -> None:
         robot, outcome = self._world.robot, goal.ends[-1]

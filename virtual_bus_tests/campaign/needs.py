@@ -59,12 +59,14 @@ _AWAY = "driver:watchdog_missing+drives:heartbeat_consumer"
 NEEDS: tuple[Need, ...] = (
     # watchdog: rows of canbase_watchdog.policy.CHECKS
     Need("watchdog:bus_failed", ("watchdog_bus_problem",), _AWAY, proof=f"{_DEAF}: driver and drives miss it"),
-    Need("watchdog:loop_late", ("watchdog_starved", "encoder_lost", "driver_repeats")),
+    Need("watchdog:loop_late", ("watchdog_starved", "encoder_lost")),
     Need("watchdog:foreign_master", ("second_master_setpoints",), "watchdog:setpoint_missing+watchdog:target_outside"),
     Need("watchdog:lease_lost", (*_VELOCITY_GONE, "lease_lost"), "driver:command_timeout"),
     Need("watchdog:driver_silent", _DRIVER_GONE, "watchdog:target_outside+drives:heartbeat_consumer"),
-    Need("watchdog:drive_restarted", ("drive_resets", "drive_power_cycle"),
-         f"watchdog:drive_silent+watchdog:drive_down+{_MOTION}+{_DRIVER_SEES}"),
+    Need("watchdog:drive_restarted", ("drive_power_cycle", "drive_resets"),
+         f"watchdog:drive_silent+watchdog:drive_down+{_MOTION}+{_DRIVER_SEES}",
+         proof="a drive that starts anew has no power, and its TPDOs and heartbeat end or say so: the rows for a "
+         "silent, disabled or restarted drive, of both parts, see that too; this one is sooner and names the cause"),
     Need("watchdog:drive_silent", _SILENT, "driver:drive_silent"),
     Need("watchdog:answered_twice", ("twin_node", "drive_ignores_setpoints"),
          f"{_MOTION}+watchdog:motion_outside+driver:did_not_stop"),
@@ -82,14 +84,16 @@ NEEDS: tuple[Need, ...] = (
     Need("watchdog:stop_record", ("all_processes_restart", "watchdog_dies", "encoder_lost", "lease_lost")),
     # driver: rows of canbase_driver.supervisor.HAZARDS
     Need("driver:bus_failed", ("bus_problem",), f"driver:watchdog_tripped+{_DRIVER_SEES}+{_AWAY}"),
-    Need("driver:watchdog_tripped", ("lease_lost", "driver_repeats"), "driver:drive_disabled"),
+    Need("driver:watchdog_tripped", ("lease_lost", "driver_repeats", "encoder_lost"), "driver:drive_disabled"),
     Need("driver:drive_fault", _OFF, "driver:drive_disabled+watchdog:drive_down"),
     Need("driver:drive_restarted", ("drive_power_cycle", "second_master_nmt", "drive_resets"),
          "driver:drive_disabled+driver:drive_silent+watchdog:foreign_master+watchdog:drive_silent+watchdog:drive_down"),
     Need("driver:drive_silent", _SILENT, "watchdog:drive_silent"),
     Need("driver:watchdog_missing", _WATCHDOG_GONE, "drives:heartbeat_consumer"),
     Need("driver:drive_disabled", _OFF, "driver:drive_fault+watchdog:drive_down"),
-    Need("driver:did_not_stop", ("drive_ignores_setpoints",), f"{_MOTION}+watchdog:motion_outside"),
+    Need("driver:did_not_stop", ("drive_ignores_setpoints",), f"{_MOTION}+watchdog:motion_outside",
+         proof="it acts after the whole ramp and its reserve (timeouts.standstill_s); who has watched the bus "
+         "meanwhile trips within feedback_samples of the first sample that is too fast"),
     Need("driver:stop_requested", ("stop_requested", "stick_held")),
     Need("driver:shutdown", ("driver_asked_to_end", "stick_held")),
     Need("driver:inactive", ("driver_deactivated", "stick_held")),

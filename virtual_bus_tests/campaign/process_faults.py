@@ -115,7 +115,7 @@ def _starved(name: str) -> Kind:
         world.processes[name].go_on("starved")
 
     def draw(random: Random) -> Arguments:
-        return {"share": random.uniform(0.5, 0.9)}
+        return {"share": random.uniform(0.6, 0.95)}
 
     return Kind(f"{name} gets its processor for moments only", LONG, draw, begin, end)
 

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from campaign.outside import Surroundings
     from campaign.world import World
 
+LOOK = 10
+"""Each half second the process looks who publishes what."""
 SOURCES = ("cmd_vel_joy", "cmd_vel_nav")
 
 
@@ -65,9 +67,9 @@ def _once(world: World, around: Surroundings, given: Arguments) -> None:
 
 def two_on_a_lock(world: World, around: Surroundings, given: Arguments, number: int) -> None:
     """The graph has both of them; each publishes ten times a second."""
-    if number == 0:
+    if number % LOOK == 0:
         world.topics.publish("publishers", ("lock", ("button", "panel")))
-        world.locked_at = world.clock.now
+    world.locked_at = min(world.locked_at, world.clock.now)
     world.topics.publish("lock", number % 2 == 0)
 
 
@@ -87,7 +89,7 @@ def _strange_twist(random: Random) -> Arguments:
 
 TOPIC_FAULTS: dict[str, Kind] = {
     "two_on_a_lock": Kind(
-        "two nodes publish on one lock: one of them says locked, and the other one not", LONG, nothing,
+        "two nodes publish on one lock: one of them says locked, and the other one not", (1.0, 2.5), nothing,
         *goes_on(two_on_a_lock, one_on_a_lock),
     ),
     "straight_to_cmd_vel": Kind(
