@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from canbase_watchdog.frames import DriveState
-from canbase_watchdog.twist import Reach, TwistWatch
+from canbase_watchdog.twist import Reach, SlowWheels, TwistWatch
 from canbase_watchdog.view import Axis, BusView
 from unit.watchdog_story import config
 
@@ -196,6 +196,43 @@ def test_a_base_that_goes_on_after_its_order_is_outside_when_the_slowest_ramp_ha
     assert base.trips_after((0.0, 0.0), going) == 1 + 8 + 26
 
 
+# ramps of the drives: 0.5 m/s² upward; 0.2 m/s apart, they reach 1 m/s after 2.4 and 2 s
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_from_a_turn_to_fast_straight_on_slow_wheels_keep_their_distance_until_the_first_is_there(sign: float) -> None:
+    base, wheels = straight(0.0, twist_tolerance_mps=0.02), SlowWheels(0.5, 2.0)
+    for _ in range(64):
+        base.cycle((-0.1 * sign, 0.1 * sign), wheels.follow((-0.1 * sign, 0.1 * sign), 1.0 / HZ))
+    for _ in range(200):
+        assert base.cycle((1.0, 1.0), wheels.follow((1.0, 1.0), 1.0 / HZ)) == ""
+    assert wheels.speeds == (1.0, 1.0)
+
+
+def test_a_base_that_turns_on_when_wheels_on_the_slowest_ramp_are_there_trips() -> None:
+    base = straight(0.0, twist_s=0.05)
+    for _ in range(64):
+        base.cycle((-0.1, 0.1))
+    assert base.trips_after((1.0, 1.0), (0.8, 1.0), 128) is None  # 0.9 m/s at 0.5 m/s² are 115 cycles, and the lag
+    assert base.trips_after((1.0, 1.0), (0.8, 1.0), 64) is not None
+
+
+@pytest.mark.parametrize(
+    ("speeds", "setpoint_mps", "after"),
+    [
+        ((0.0, 0.0), 1.0, (0.05, 0.05)),
+        ((0.98, -0.5), 1.0, (1.0, -0.3)),  # the right one turns round: downward first
+        ((1.0, 0.1), 0.0, (0.8, 0.0)),
+        ((-1.0, 0.5), -0.5, (-0.8, 0.3)),
+        ((-0.5, 0.4), -1.0, (-0.55, 0.2)),
+        ((0.3, 0.3), 0.3, (0.3, 0.3)),
+    ],
+)
+def test_slow_wheels(speeds: tuple[float, float], setpoint_mps: float, after: tuple[float, float]) -> None:
+    """A tenth of a second with 0.5 m/s² upward and 2 m/s² downward."""
+    wheels = SlowWheels(0.5, 2.0)
+    wheels.speeds = speeds
+    assert wheels.follow((setpoint_mps, setpoint_mps), 0.1) == pytest.approx(after)
+
+
 def test_after_a_gap_the_smoothed_speed_is_the_measured_one_and_not_beyond_it() -> None:
     base = straight(twist_s=0.01)
     assert base.cycle((0.25, 0.25), (0.25, 0.25 - 0.0199), cycles=6) == ""
@@ -258,14 +295,14 @@ def test_a_base_of_one_side_has_no_twist() -> None:
 
 def test_reach_is_what_was_ordered_within_the_lag_and_falls() -> None:
     reach = Reach(0.25, 1.0, 0.0)
-    reach.order(0.5, 1.0)
+    reach.order([0.5, 0.1], 1.0)
     reach.advance(1.0, 1.0)
     assert (reach.low, reach.high) == (0.0, 0.5)
-    reach.order(-0.25, 1.0)
+    reach.order([-0.25], 1.0)
     reach.advance(0.25, 1.25)
     assert (reach.low, reach.high) == (0.25, 0.5)
     reach.advance(0.125, 1.375)
     assert (reach.low, reach.high) == (0.25, 0.375)
-    reach.order(0.0, 1.375)
+    reach.order([0.0], 1.375)
     reach.advance(1.0, 2.375)
     assert (reach.low, reach.high) == (0.0, 0.0)

@@ -2,13 +2,17 @@
 
 A base that is ordered straight on, with one slow wheel, turns. So the measured twist must be between standstill and
 what the setpoints of the last `drive_lag_s` ordered. After that the range falls to a new order as slowly as wheels on
-the slowest ramp get there, one of them after the other. Speeds are smoothed, as the noise of two wheels adds up. The
-time outside adds up to `twist_s`, and goes down as fast while the base is inside (docs/decisions/0020).
+the slowest ramp get there, one of them after the other. Drives with slow ramps have more than that: ordered from a turn
+to fast straight on, both wheels are on their ramps, and the base turns until the first one is there. So what wheels on
+the slowest ramp do with these setpoints is allowed as if it were ordered. Speeds are smoothed, as the noise of two
+wheels adds up. The time outside adds up to `twist_s`, and goes down as fast while the base is inside
+(docs/decisions/0020).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog.envelope import Bounds, Peak
@@ -26,16 +30,36 @@ class Reach:
         self._up, self._down, self._slope = Peak(lag_s), Peak(lag_s), slope
         self.high = self.low = most
 
-    def order(self, value: float, now: float) -> None:
-        """Ordered from now on."""
-        self._up.set(value, now, math.inf)
-        self._down.set(-value, now, math.inf)
+    def order(self, values: Sequence[float], now: float) -> None:
+        """All that may be ordered from now on."""
+        self._up.set(max(values), now, math.inf)
+        self._down.set(-min(values), now, math.inf)
 
     def advance(self, elapsed_s: float, now: float) -> None:
         """Bring `high` and `low`, which counts the other way, up to the time `now`."""
         fallen = elapsed_s * self._slope
         self.high = max(self.high - fallen, self._up.greatest(now), 0.0)
         self.low = max(self.low - fallen, self._down.greatest(now), 0.0)
+
+
+class SlowWheels:
+    """The speeds of left and right on their ramps [m/s]: those of the drives, upward and downward."""
+
+    def __init__(self, up_mps2: float, down_mps2: float) -> None:
+        """They stand."""
+        self._up_mps2, self._down_mps2 = up_mps2, down_mps2
+        self.speeds = (0.0, 0.0)
+
+    def follow(self, setpoints: tuple[float, float], elapsed_s: float) -> tuple[float, float]:
+        """Where they are after so much time."""
+        left, right = (self._ramp(*each, elapsed_s) for each in zip(self.speeds, setpoints, strict=True))
+        self.speeds = left, right
+        return self.speeds
+
+    def _ramp(self, speed_mps: float, setpoint_mps: float, elapsed_s: float) -> float:
+        slows = speed_mps * setpoint_mps < 0.0 or abs(setpoint_mps) < abs(speed_mps)
+        most_mps = (self._down_mps2 if slows else self._up_mps2) * elapsed_s
+        return speed_mps + min(max(setpoint_mps - speed_mps, -most_mps), most_mps)
 
 
 class TwistWatch:
@@ -53,6 +77,8 @@ class TwistWatch:
         config = self._config
         self._linear = Reach(config.drive_lag_s, config.slowest_ramp_mps2 / 2.0, linear_mps)
         self._angular = Reach(config.drive_lag_s, config.slowest_ramp_mps2 / config.track_m, angular_radps)
+        slowest = config.slowest_ramp_mps2
+        self._slow = SlowWheels(slowest, slowest), SlowWheels(slowest, max(slowest, config.deceleration_mps2))
         self._speeds: list[float] = []
         self._outside_s = 0.0
 
@@ -73,10 +99,11 @@ class TwistWatch:
         return why if self._outside_s >= self._config.twist_s else ""
 
     def _bounds(self, bus: BusView, elapsed_s: float, now: float) -> Bounds:
-        left, right = _mean(bus.axes, "left"), _mean(bus.axes, "right")
+        setpoints = _mean(bus.axes, "left"), _mean(bus.axes, "right")
+        wheels = (setpoints, *(slow.follow(setpoints, elapsed_s) for slow in self._slow))
         linear, angular = self._linear, self._angular
-        linear.order((left + right) / 2.0, now)
-        angular.order((right - left) / self._config.track_m, now)
+        linear.order([(left + right) / 2.0 for left, right in wheels], now)
+        angular.order([(right - left) / self._config.track_m for left, right in wheels], now)
         linear.advance(elapsed_s, now)
         angular.advance(elapsed_s, now)
         return Bounds(-linear.low, linear.high, -angular.low, angular.high)
