@@ -80,9 +80,10 @@ def _tell_sums(tally: Tally) -> None:
     out.print(f"scenarios by lives, with a reset between: {lives}")
     out.print(f"trips of the watchdog: {trips or 'none'}")
     out.print(f"ends of goals: {goals or 'none'}")
-    ratio = tally.virtual_s / tally.real_s if tally.real_s else 0.0
+    ratio = tally.virtual_s / tally.processor_s if tally.processor_s else 0.0
     out.print(
-        f"{tally.virtual_s:.0f} s of virtual time, {tally.moved_m:.0f} m driven, {ratio:.0f} × real time a process"
+        f"{tally.virtual_s:.0f} s of virtual time, {tally.moved_m:.0f} m driven, "
+        f"{ratio:.0f} s for each second of processor time"
     )
 
 

@@ -14,7 +14,7 @@ from campaign.judge import Violation
 from campaign.plan import draw_plan
 from campaign.robots import SCENARIOS, robot_of
 from campaign.scenario import Result, Start
-from campaign.without import remove
+from campaign.without import refuse_compiled, remove
 
 _start: tuple[int, Start] | None = None
 """The robot that this worker has booted, by its number."""
@@ -32,7 +32,7 @@ class Tally:
     goals: Counter[str] = field(default_factory=Counter)
     violations: list[tuple[int, Violation]] = field(default_factory=list)
     virtual_s: float = 0.0
-    real_s: float = 0.0
+    processor_s: float = 0.0
     moved_m: float = 0.0
 
     def add(self, result: Result) -> None:
@@ -45,7 +45,7 @@ class Tally:
         self.goals.update(result.goals)
         self.violations += [(result.seed, violation) for violation in result.violations]
         self.virtual_s += result.virtual_s
-        self.real_s += result.real_s
+        self.processor_s += result.processor_s
         self.moved_m += result.moved_m
 
 
@@ -57,6 +57,7 @@ def run(
     on_result: Callable[[Result], None] | None = None,
 ) -> Tally:
     """Run the scenarios of these seeds, with faults from `only` (empty: all), `without` one of `SAFEGUARDS`."""
+    refuse_compiled(without)
     tally = Tally()
     batches = [list(batch) for _, batch in groupby(seeds, lambda seed: seed // SCENARIOS)]
     # Not forked from here: who calls may have threads, and a forked scenario must have none.

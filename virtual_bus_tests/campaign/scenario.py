@@ -41,7 +41,7 @@ class Result:
     goals: tuple[str, ...] = ()
     moved_m: float = 0.0
     virtual_s: float = 0.0
-    real_s: float = field(default=0.0, compare=False)
+    processor_s: float = field(default=0.0, compare=False)
 
 
 class Start:
@@ -57,9 +57,9 @@ class Start:
 
     def run(self, plan: Plan, note: Callable[[float, str], None] | None = None) -> Result:
         """Run one scenario in this very world, which is spent then."""
-        began = time.perf_counter()
+        began = time.process_time()
         run = _Run(self.world, self.around, plan, note)
-        return run.result(time.perf_counter() - began)
+        return run.result(time.process_time() - began)
 
     def fork(self, plan: Plan, without: str = "") -> Result:
         """Run one scenario in a copy of this process: the world stays as it is. `without`: safeguards, see remove."""
@@ -147,7 +147,7 @@ class _Run:
     def _goals_run(self) -> bool:
         return any(not goal.ends and not goal.died for goal in self._world.action.goals)
 
-    def result(self, real_s: float) -> Result:
+    def result(self, processor_s: float) -> Result:
         """The result of the whole."""
         ends = [end.code.name for goal in self._world.action.goals for end in goal.ends]
         return Result(
@@ -159,5 +159,5 @@ class _Run:
             tuple(ends),
             self._world.drives.bench.base.path_m - self._moved_from_m,
             self._world.clock.now - self._start,
-            real_s,
+            processor_s,
         )

@@ -10,8 +10,9 @@ import gc
 import math
 import multiprocessing
 import sys
+import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 from rich.console import Console
@@ -32,14 +33,18 @@ class Driven:
     moving_s: float
     path_m: float
     trip: FalseTrip | None
+    processor_s: float = field(default=0.0, compare=False)
 
 
 def drive(seed: int, seconds: float = RUN_S) -> Driven:
     """One robot."""
     gc.set_threshold(100_000)
+    began = time.process_time()
     hour = OrdinaryHour(seed)
     trip = hour.run(seconds)
-    return Driven(seed, hour.now_s, hour.moving_s, hour.world.drives.bench.base.path_m, trip)
+    return Driven(
+        seed, hour.now_s, hour.moving_s, hour.world.drives.bench.base.path_m, trip, time.process_time() - began
+    )
 
 
 def drive_all(seeds: range, seconds: float, workers: int) -> Iterator[Driven]:
@@ -70,20 +75,21 @@ def main() -> int:
     seeds = range(given.first, given.first + math.ceil(given.hours * 3600.0 / RUN_S))
     if given.seed is not None:
         seeds = range(given.seed, given.seed + 1)
-    time_s = moving_s = path_m = 0.0
+    time_s = moving_s = path_m = processor_s = 0.0
     trips = 0
     columns = TextColumn("{task.fields[told]}"), BarColumn(), TimeRemainingColumn()
     with Progress(*columns, console=out) as progress:
         task = progress.add_task("", total=len(seeds), told="")
         for driven in drive_all(seeds, seconds, min(given.workers, len(seeds))):
             time_s, moving_s, path_m = time_s + driven.time_s, moving_s + driven.moving_s, path_m + driven.path_m
+            processor_s += driven.processor_s
             if driven.trip is not None:
                 trips += 1
                 out.print(told(driven.trip), highlight=False, soft_wrap=True, markup=False)
             progress.update(task, advance=1, told=f"{time_s / 3600.0:.1f} h, {trips} false trips")
     out.print(
         f"{len(seeds)} robots, {time_s / 3600.0:.2f} h in virtual time, {moving_s / 3600.0:.2f} h of them in motion, "
-        f"{path_m / 1000.0:.2f} km: {trips} false trips"
+        f"{path_m / 1000.0:.2f} km, {time_s / processor_s:.0f} s for each second of processor time: {trips} false trips"
     )
     return 1 if trips else 0
 

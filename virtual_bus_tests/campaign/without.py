@@ -169,12 +169,17 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
 """Name → how to take it out."""
 
 
+def refuse_compiled(names: str) -> None:
+    """Raises RuntimeError where `names` shall be taken out of compiled modules: it would have no effect."""
+    if names and not str(policy.__file__).endswith(".py"):
+        raise RuntimeError(f"{names} cannot be taken out of compiled modules: run it without COMPILED=1")
+
+
 def remove(names: str) -> None:
     """Take `names`, with + between them, out of the code of this process.
 
-    Raises KeyError for an unknown one, and RuntimeError in a compiled world: nothing can be taken out of it.
+    Raises KeyError for an unknown one, and RuntimeError in a compiled world.
     """
-    if names and not str(policy.__file__).endswith(".py"):
-        raise RuntimeError(f"{names} cannot be taken out of compiled modules: run it without COMPILED=1")
+    refuse_compiled(names)
     for name in names.split("+") if names else ():
         SAFEGUARDS[name]()

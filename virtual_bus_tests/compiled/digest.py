@@ -46,7 +46,7 @@ def of_scenario(seed: int) -> str:
     """A scenario of the campaign, with the boot before it."""
     start = Start(robot_of(seed))
     digest = Digest(start.world)
-    return digest.line(f"scenario {seed}", replace(start.run(draw_plan(seed)), real_s=0.0))
+    return digest.line(f"scenario {seed}", replace(start.run(draw_plan(seed)), processor_s=0.0))
 
 
 def of_robot(seed: int) -> str:
