@@ -42,7 +42,7 @@ class Course(World):
     def look(self) -> bool:
         """For `run`: notes who says that it stands while the left wheel turns; never True."""
         if abs(self.truth.v_left_mps) > TURNS_MPS:
-            if self.snapshot.standstill:
+            if self.driver is not None and self.snapshot.standstill:
                 self.said_falsely = self.said_falsely or f"{self.truth.v_left_mps:.2f} m/s"
             self.settled_falsely |= self.dog.status.settled
         return False
@@ -93,3 +93,17 @@ def test_after_a_lost_encoder_in_a_quick_stop_standstill_is_assumed_once_the_whe
     assert world.run(world.rolls_s + 0.5, lambda: world.dog.status.settled)
     assert world.dog.status.assumed
     assert abs(world.truth.v_left_mps) < TURNS_MPS
+
+
+def test_with_a_dead_driver_the_watchdog_reads_on_until_it_knows_how_the_wheel_stopped() -> None:
+    """No SYNC any more: values come by SDO each 0.1 s, and one look at a standstill is not enough."""
+    world = Course()
+    world.drive(Twist2D(0.6, 0.0), 1.5)
+    world.leases = False
+    world.kill_driver()
+    assert world.run(2.0, lambda: abs(world.truth.v_left_mps) <= 0.35)
+    world.lose(0.0)
+    world.run(1.5, world.look)
+    assert not world.settled_falsely
+    assert world.dog.status.unproven == "left_wheel"
+    assert not world.powered[0]

@@ -310,9 +310,25 @@ def test_a_reset_forgets_what_was_not_counted() -> None:
     wheel = held_until_its_order_has_gone()
     wheel.samples(64, 0.0, 0.0, torque=0.25)
     wheel.watch.trust()
-    wheel.samples(16, 0.5, 0.5)
-    wheel.samples(12, 0.5, 0.0, torque=1.0)
-    assert wheel.samples(64, 0.0, 0.0, torque=0.25).unseen_s == 12 / HZ
+    before = wheel.samples(12, 0.5, 0.0, torque=1.0).unseen_s
+    assert before > 0.0
+    assert wheel.samples(64, 0.0, 0.0, torque=0.25).unseen_s == before
+    assert wheel.sample(0.0, 0.0, torque=0.25).unseen_s > before
+
+
+def test_before_the_first_sign_of_life_torque_and_time_count_as_after_it() -> None:
+    wheel = Wheel()
+    before = wheel.samples(8, 0.5, 0.0, torque=1.0).unseen_s
+    assert wheel.samples(64, 0.0, 0.0, torque=0.25).unseen_s == before
+    assert wheel.sample(0.0, 0.0, torque=0.25).unseen_s > before
+
+
+def test_exactly_twice_a_sign_of_life_is_asked_for() -> None:
+    """A coarse encoder: 1/512 m is a sign of life, 1/4096 m a sample."""
+    wheel = held_until_its_order_has_gone(m_per_count=2.0**-10)
+    wheel.sample(0.0, 0.0, torque=0.25)
+    assert wheel.samples(9 + 15, 2.0**-6, 0.0, torque=0.25).unseen_s == 12 / HZ
+    assert wheel.sample(2.0**-6, 0.0, torque=0.25).unseen_s == 13 / HZ
 
 
 # --- 2: halted at once. 16 m/s² in 1/64 s are 0.25 m/s, and 0.0625 m/s tolerance

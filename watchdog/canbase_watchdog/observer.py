@@ -85,6 +85,7 @@ class _Record:
             self.misses.value,
             self.doubles.value,
             self.push.last,
+            self.stand.sudden,
             self.stand.unproven,
         )
 

@@ -26,6 +26,9 @@ GAP_S = 0.5
 are read by SDO take 0.15 s a turn."""
 COUNTS = 2
 """An encoder at an edge counts to and fro."""
+SELDOM_S = 0.05
+"""Positions that are further apart, as those that are read by SDO, tell a mean speed well: at its end the wheel had
+this, less what half of the time can brake. Velocities come too seldom then."""
 JUMP_FACTOR = 3.0
 """A step beyond so many times the fastest wheel's is no travel."""
 
@@ -51,7 +54,8 @@ class StandWatch:
         self._braking_mps2 = drive.hardest_braking_mps2, config.hardest_stop_mps2
         """With power, and without."""
         self._stopping = StoppingDistance(config.motion_tolerance_mps, self._grain_m)
-        self._encoder_mps, self._sudden = 0.0, 0
+        self._encoder_mps, self._mean_s = 0.0, math.inf
+        self._sudden, self._sudden_since = 0, -math.inf
         self._off_since, self._was_powered = math.inf, False
 
     def on_position(self, counts: int, now: float) -> None:
@@ -79,8 +83,13 @@ class StandWatch:
             self._slow_m, self._slow_since, self._crept_at = 0.0, now, -math.inf
         self._speed_mps, self._velocity_at = abs(velocity_mps), now
         self._note_power(powered, now)
-        self._stopping.on_speed(min(self._speed_mps, self._encoder_mps), self._hardest_mps2(powered))
-        self._sudden = self._sudden + 1 if self.stands and self._stopping.lacks else 0
+        hardest_mps2 = self._hardest_mps2(powered)
+        at_end_mps = self._encoder_mps - hardest_mps2 * self._mean_s / 2.0
+        self._mean_s = math.inf
+        self._stopping.on_speed(max(min(self._speed_mps, self._encoder_mps), at_end_mps), hardest_mps2)
+        self._sudden = self._sudden + 1 if self.sudden else 0
+        if self._sudden == 1:
+            self._sudden_since = now
 
     def trust(self) -> None:
         """A reset was accepted: everything begins anew."""
@@ -88,15 +97,22 @@ class StandWatch:
         self._sudden = 0
 
     @property
+    def sudden(self) -> bool:
+        """By its last values it is at standstill, and nothing brakes a wheel so hard."""
+        return self._stopping.lacks and self.stands
+
+    @property
     def unproven(self) -> bool:
-        """It is at standstill by what its sensors report, and nothing brakes a wheel so hard."""
-        return self._sudden >= self._samples
+        """The same, for as long as it takes to be no error of one sample. Answers to SDOs come seldom."""
+        lasts = self._sudden >= 2 and self._velocity_at - self._sudden_since >= self._samples * self._period_s
+        return lasts or self._sudden >= self._samples
 
     def _note_travel(self, step_m: float, elapsed_s: float) -> None:
         elapsed_s = max(elapsed_s, self._period_s)
         jumped = abs(step_m) > self._jump_mps * elapsed_s
         self._encoder_mps = 0.0 if jumped else abs(step_m) / elapsed_s
         self._stopping.on_travel(0.0 if jumped else step_m)
+        self._mean_s = elapsed_s if SELDOM_S <= elapsed_s < GAP_S else math.inf
 
     def _note_power(self, powered: bool, now: float) -> None:
         if powered and now >= self._off_since + self._rolls_s:

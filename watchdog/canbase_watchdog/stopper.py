@@ -122,9 +122,13 @@ class Stopper:
         return seen_at <= self._resting_since < math.inf
 
     def _stands(self, axis: Axis) -> bool:
-        """Standing takes several samples to prove. Until then a drive that was found off is not stopped in vain."""
+        """Standing takes several samples to prove. Until then a drive that was found off is not stopped in vain.
+
+        One that stopped as no wheel can is looked at again, until it is trusted no more.
+        """
         off = self._resting_since < math.inf and not axis.powered
-        return axis.standing or (off and abs(axis.velocity_mps) <= self._config.standstill_mps)
+        sudden = axis.sudden and axis.trusted and not axis.enabled
+        return (axis.standing and not sudden) or (off and abs(axis.velocity_mps) <= self._config.standstill_mps)
 
     def _begin_mps(self, axis: Axis) -> float:
         """How fast it may get before it begins to brake: towards its setpoint, for as long as the drive lags."""

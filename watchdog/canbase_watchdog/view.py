@@ -49,8 +49,10 @@ class Axis:
     double_answers: float = 0.0
     """SYNCs that were answered twice while it was enabled, less half of the others."""
     push: Push = Push()  # noqa: RUF009 - immutable
+    sudden: bool = False
+    """It stopped as no wheel can, by its last values: standing.py."""
     unproven: bool = False
-    """It stopped as no wheel can, by what its sensors report: standing.py."""
+    """The same, for some samples."""
 
     @property
     def enabled(self) -> bool:
