@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from canbase_config.derive import BRAKING_SAMPLES, samples, slope_window_s, speed_noise_mps
+from canbase_config.derive import BRAKING_SAMPLES, LEAST_SAMPLES, samples, slope_window_s, speed_noise_mps
 from canbase_config.robot import Robot
 from canbase_config.stopping import BRAKING_SHARE, HELD_S, SLOPE_SHARE, lag_s, ramp
 
@@ -32,11 +32,13 @@ class Slowing:
         self._window_s, self._lag_s = slope_window_s(robot), lag_s(robot)
         self._past: deque[tuple[float, float]] = deque()
         self._since = self._slow_at = -math.inf
+        self._bad = 0
 
     def begin(self, now: float) -> None:
         """A quick stop begins now."""
         self._past.clear()
         self._since = self._slow_at = now
+        self._bad = 0
 
     def fails(self, speed_mps: float, now: float) -> bool:
         """Once a cycle: for LASTS_S the wheel has been above all lines of HELD_S that are a window old."""
@@ -47,8 +49,9 @@ class Slowing:
         heights = [height for at, height in self._past if at <= now - self._window_s]
         slows = not heights or height_mps <= max(heights) + self._noise_mps
         if slows or speed_mps <= self._floor_mps or now < self._since + self._lag_s + self._window_s:
-            self._slow_at = now
-        return now - self._slow_at >= LASTS_S
+            self._slow_at, self._bad = now, -1
+        self._bad += 1
+        return self._bad >= LEAST_SAMPLES and now - self._slow_at >= LASTS_S
 
 
 class Braking:

@@ -102,3 +102,11 @@ def test_a_wheel_that_a_threshold_held_comes_back_to_its_ramp() -> None:
     braking = begun(0.8, quick=True)
     speeds = [0.1 if 30 <= i < 50 else 0.8 - max(0.0, i / 100 - 0.12) for i in range(80)]
     assert not any(braking.keeps_speed(speed, 100.0 + i / 100) for i, speed in enumerate(speeds))
+
+
+def test_one_bad_sample_after_a_late_cycle_is_not_enough() -> None:
+    braking = begun(0.8, quick=True)
+    for i in range(40):
+        assert not braking.keeps_speed(max(0.3, 0.8 - max(0.0, i / 100 - 0.12)), 100.0 + i / 100)
+    assert not braking.keeps_speed(0.8, 100.6)
+    assert braking.keeps_speed(0.8, 100.61)
