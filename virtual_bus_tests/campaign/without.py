@@ -115,12 +115,6 @@ def _resets_while_commanded() -> None:
         reset.BREAKS[phase] = tuple(check for check in checks if check is not commanded)
 
 
-def _no_word_about_scans() -> None:
-    """Scans that end stop nothing and slow nothing down."""
-    _put(safety_filter, "_scan", lambda inputs: None)()
-    _put(safety_filter, "_lost_all", lambda scans: False)()
-
-
 def _blocker(name: str) -> Callable[[], None]:
     return _drop(supervisor, lambda row: not (isinstance(row, supervisor.Blocker) and row.name == name))
 
@@ -158,7 +152,6 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "filter:blind": _put(obstacle, "told_share", lambda order, sight, geometry: 1.0),
     "filter:frozen": _put(FrozenWatch, "look", _never_frozen),
     "filter:repeated_stamp": _put(FrozenWatch, "is_repeated", lambda self, scan: False),
-    "filter:scan": _no_word_about_scans,
     "filter:late_scans": _put(filter_state._Scanner, "_late_s", lambda self, scan, now: 0.0),
     "filter:command": _put(safety_filter, "_command", lambda inputs, config: None),
     "filter:zero_after_estop": _put(filter_state.SafetyFilter, "_advance_estop", _forget_estop),
