@@ -23,6 +23,7 @@ FAULTS: dict[str, Kind] = {
 }
 """Every fault that a scenario may draw."""
 ADDED = (
+    "cmd_vel_ends",
     "drive_unbraked",
     "driver_asked_to_end",
     "driver_deactivated",

@@ -124,5 +124,5 @@ NEEDS: tuple[Need, ...] = (
     Need("filter:blind", ("scanner_blind_ahead", "scanner_one_beam", "scanner_zero_ahead")),
     Need("filter:frozen", ("scanner_frozen", "scanner_by_turns")),
     Need("filter:repeated_stamp", ("scanner_old_stamps",), "filter:frozen+filter:late_scans"),
-    Need("action:timeout_and_progress", ("cmd_vel_lossy",)),
+    Need("action:timeout_and_progress", ("cmd_vel_ends",)),
 )  # fmt: skip

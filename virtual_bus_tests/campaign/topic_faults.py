@@ -103,6 +103,9 @@ TOPIC_FAULTS: dict[str, Kind] = {
     "cmd_vel_lossy": Kind(
         "messages of cmd_vel get lost", (0.3, 2.5), share, *_topic_lost("cmd_vel")
     ),
+    "cmd_vel_ends": Kind(
+        "cmd_vel does not arrive any more", (6.0, 10.0), nothing, *_topic_lost("cmd_vel")
+    ),
     "mux_lossy": Kind(
         "orders of the mux do not reach the filter in its own process", (0.5, 4.0), share, *_topic_lost("cmd_vel_mux")
     ),
