@@ -16,8 +16,8 @@ import setuptools  # type: ignore[import-untyped]
 from mypyc.build import mypycify
 
 from compiled import finder
-from compiled.modules import BUILD, ROOT, SOURCES, hot_modules
-from compiled.native_form import native_form
+from compiled.copies import copies
+from compiled.modules import BUILD, hot_modules
 
 MYPY = (
     "--config-file=",
@@ -36,21 +36,11 @@ def path_of(module: str) -> Path:
 
 
 def copy() -> None:
-    """All packages; dataclasses of compiled modules in their native form. What has not changed keeps its time."""
-    hot = set(hot_modules())
-    for package, folder in SOURCES.items():
-        for source in (ROOT / folder / package).rglob("*"):
-            name = source.relative_to(ROOT / folder)
-            if source.is_file() and "__pycache__" not in name.parts and not source.name.startswith("test_"):
-                is_hot = ".".join(name.with_suffix("").parts) in hot and name.suffix == ".py"
-                _put(BUILD / name, source.read_bytes(), is_hot)
-
-
-def _put(path: Path, data: bytes, is_hot: bool) -> None:
-    data = native_form(data.decode()).encode() if is_hot else data
-    if not path.exists() or path.read_bytes() != data:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(data)
+    """All packages. What has not changed keeps its time."""
+    for path, data in copies():
+        if not path.exists() or path.read_bytes() != data:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
 
 
 def translate(level: str) -> list[setuptools.Extension]:

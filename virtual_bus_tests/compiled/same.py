@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 
+from compiled.copies import outdated
 from compiled.modules import BUILD, ROOT, hot_modules
 
 TESTS = ROOT / "virtual_bus_tests"
@@ -25,6 +26,9 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seeds", type=int, default=10)
     given = parser.parse_args()
+    if outdated():
+        print(f"changed since they were compiled: {', '.join(outdated())}; run make compiled")
+        return 1
     both = [lines(compiled, given.first, given.seeds) for compiled in (False, True)]
     told = [process.communicate()[0].splitlines() for process in both]
     counts = [int(each.pop(0)) for each in told]
