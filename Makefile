@@ -109,7 +109,7 @@ recording: $(VENV)/ready ## docs/demo.svg: what `canbase demo` prints now
 
 .PHONY: docs
 docs: $(VENV)/ready ## the documentation as a site in build/site, without network; a dead link or a warning fails
-	sphinx-build --quiet --fail-on-warning --keep-going -c docs/site_builder -d build/doctrees docs build/site
+	sphinx-build --quiet --jobs auto --fail-on-warning --keep-going -c docs/site_builder -d build/doctrees docs build/site
 	@echo "open build/site/index.html"
 
 .PHONY: lint
