@@ -181,3 +181,11 @@ def test_what_is_unproven_is_not_trusted_but_for_an_enabled_drive() -> None:
 )
 def test_counts_wrap_around_the_short_way(counts: int, before: int, steps: int) -> None:
     assert difference(counts, before) == steps
+
+
+def test_what_was_braked_with_power_is_not_braked_again_without_it() -> None:
+    """0.5 m/s, then 0.02 m with power: 0.3 m/s are left. Dead when the power goes: as much again would not do."""
+    wheel = Wheel().turns(30, 0.5)
+    wheel.sample(0.02, 0.0, 0.04)
+    wheel.powered = False
+    assert wheel.lost(samples=30)

@@ -14,8 +14,9 @@ class StoppingDistance:
     def __init__(self, noise_mps: float, grain_m: float) -> None:
         """`noise_mps`: a speed that may be noise; `grain_m`: the encoder may count so much too little."""
         self._noise, self._grain_m = noise_mps**2, grain_m
-        self._square = self._braking_mps2 = self._travel_m = self._way_m = 0.0
-        """Of the last speed that is not braked away, with the hardest braking and the net travel since then."""
+        self._square = self._braking_mps2 = self._travel_m = self._way_m = self._way_before_m = 0.0
+        """Of the last speed that is not braked away, with the hardest braking and the net travel since then; the last
+        one until the speed before."""
 
     @property
     def lacks(self) -> bool:
@@ -29,10 +30,14 @@ class StoppingDistance:
 
     def on_speed(self, shown_mps: float, braking_mps2: float) -> None:
         """What encoder and velocity both show now, and the hardest braking since the last time."""
-        self._braking_mps2 = max(self._braking_mps2, braking_mps2)
-        if shown_mps**2 >= self._square - 2.0 * self._braking_mps2 * self._way_m:
-            self._square, self._braking_mps2 = shown_mps**2, braking_mps2
+        if braking_mps2 != self._braking_mps2:
+            self._square -= 2.0 * self._braking_mps2 * self._way_before_m
+            self._travel_m = self._way_m = self._way_m - self._way_before_m
+            self._braking_mps2 = braking_mps2
+        if shown_mps**2 >= self._square - 2.0 * braking_mps2 * self._way_m:
+            self._square = shown_mps**2
             self._travel_m = self._way_m = 0.0
+        self._way_before_m = self._way_m
 
     def forget(self) -> None:
         """A new trial: it may be at standstill."""
