@@ -67,6 +67,7 @@ def test_a_timeout_is_acted_on_when_it_runs_out_whatever_the_loop_does(
 ) -> None:
     machine = Machine(START_S + 0.02 + late_us * 1e-6)
     monkeypatch.setattr("canbase_watchdog.loop.time", SimpleNamespace(monotonic=machine.monotonic))
+    monkeypatch.setattr("canbase_watchdog.loop.suspended_s", lambda: 0.0)
     monkeypatch.setattr("canbase_watchdog.loop.select", SimpleNamespace(select=machine.select))
     anything = cast(Any, machine)
     loop = Loop(anything, anything, anything)
