@@ -31,10 +31,14 @@ def run_with_poses(world: World, seconds: float) -> list[float]:
 
 @pytest.mark.parametrize("loss", LOSSES)
 def test_a_drive_that_comes_back_is_booted_again_stays_disarmed_and_waits_for_a_reset(kind: str, loss: str) -> None:
-    """t   0  0.3 m/s: the drive is lost ── base stands ── 4.0  booted, no power ── reset ── drives again"""
+    """t   0  0.3 m/s: the drive is lost ── base stands ── 4.0  booted, no power ── reset ── drives again
+
+    After a power cycle the encoder counts anew, so it has not shown how the wheel stopped: the watchdog waits until it
+    must have rolled out (10 s).
+    """
     world = driving(kind)
     apply(world.bench.nodes, 1, loss, world.now, {})
-    steps = run_with_poses(world, 4.0)
+    steps = run_with_poses(world, 12.5 if loss == "power_cycle" else 4.0)
     assert max(steps) < FORWARD.linear_mps * 0.01 * 1.5 + 0.01
     assert world.truth.standing_s > 1.0
     assert world.core.state is DriverState.LATCHED
