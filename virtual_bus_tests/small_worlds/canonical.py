@@ -42,7 +42,7 @@ UNSEEN = frozenset((
     "_sdo_turn", "changes", "lost_producers", "_measures", "report",
     # where the base is: no decision of these parts looks at it; that of the scanner sees nothing
     "_feed", "travel", "travel_m", "_travel_m", "_anchor_m", "_counts", "_counts_before", "_poses", "encoder_offset",
-    "_seen_m", "_restarts",
+    "_seen_m", "_from_m", "_restarts",
     # what never changes
     "_robot", "robot", "_config", "config", "drive", "layout", "scale", "personality", "_geometry", "dictionary",
     "_timeouts", "clock", "_member", "_topics", "_late", "_kept", "_life", "_random", "_routes", "_handlers", "_values",

@@ -64,7 +64,8 @@ class HaltWatch:
         self._since = min(self._since, now)
         if not is_new or now < self._since + self._config.order_wait_s or not all(axis.enabled for axis in bus.axes):
             return ""
-        self._after_s += min(elapsed_s, LONGEST_STEP_S)
+        if self._ramp is None or self._left(self._ramp) > 0.0:  # at its end time is of no matter any more
+            self._after_s += min(elapsed_s, LONGEST_STEP_S)
         if elapsed_s > self._gap_s:
             self._ramp = None
         if not all(axis.setpoint_at == bus.sync_at for axis in bus.axes):
@@ -81,8 +82,11 @@ class HaltWatch:
         straight_s = max(linear_mps / config.deceleration_mps2, angular_radps / config.angular_deceleration_radps2)
         return _Ramp(tuple(axis.setpoint_mps for axis in axes), linear_mps, straight_s)
 
+    def _left(self, ramp: _Ramp) -> float:
+        return ramp.share(self._config.jerk_mps3, max(0.0, self._after_s - RECEIVED_S))
+
     def _why(self, axes: tuple[Axis, ...], ramp: _Ramp) -> str:
-        share = ramp.share(self._config.jerk_mps3, max(0.0, self._after_s - RECEIVED_S))
+        share = self._left(ramp)
         for axis, begin_mps in zip(axes, ramp.setpoints_mps, strict=True):
             allowed_mps = abs(begin_mps) * share + self._config.target_tolerance_mps + abs(axis.drive.mps_per_bit)
             if abs(axis.setpoint_mps) > allowed_mps:

@@ -87,7 +87,7 @@ class StandWatch:
         at_end_mps = self._encoder_mps - hardest_mps2 * self._mean_s / 2.0
         self._mean_s = math.inf
         self._stopping.on_speed(max(min(self._speed_mps, self._encoder_mps), at_end_mps), hardest_mps2)
-        self._sudden = self._sudden + 1 if self.sudden else 0
+        self._sudden = min(self._sudden + 1, max(self._samples, 2)) if self.sudden else 0
         if self._sudden == 1:
             self._sudden_since = now
 
