@@ -152,10 +152,10 @@ class Driver:
         return self.order(twist, within_s, lambda snapshot: snapshot.state is DriverState.LATCHED)
 
     def heard_again(self) -> DriverSnapshot:
-        """Wait, with zero commands, until every drive is booted and its encoder known."""
+        """Wait, with zero commands, until every drive is booted and its encoder known: after the wheels rolled out."""
         return self.order(
             Twist2D.ZERO,
-            10.0,
+            16.0,
             lambda s: all(drive.nmt_state == "operational" for drive in s.drives) and s.odometry_valid,
         )
 
