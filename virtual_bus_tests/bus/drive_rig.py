@@ -159,9 +159,13 @@ class Driver:
             lambda s: all(drive.nmt_state == "operational" for drive in s.drives) and s.odometry_valid,
         )
 
-    def reset(self) -> None:
-        """Reset, which must be done."""
+    def reset(self, within_s: float = 0.0) -> None:
+        """Reset, which must be done; a refusal within this time only means to try again."""
+        deadline_s = time.monotonic() + within_s
         outcome = self.try_reset()
+        while not outcome.done and time.monotonic() < deadline_s:
+            time.sleep(0.5)
+            outcome = self.try_reset()
         assert outcome.done, outcome.sentence
 
     def stop(self) -> None:

@@ -20,6 +20,8 @@ from ros.velocity_chain import START_S, Chain, drive
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 
 DELAY_S = 2.0
+LOOKS_S = 1.0
+"""The mux looks for publishers twice a second: whoever takes the place of another one needs a zero after that."""
 TIMEOUT_S = 0.3
 """Of the joystick."""
 RELAY = """
@@ -53,6 +55,7 @@ def delayed(chain: Chain, spawn: Spawn) -> Chain:
     spawn(RELAY)
     chain.node.wait_for_subscriber(chain.joystick.publisher, START_S)
     chain.node.wait_for(lambda: chain.node.node.count_publishers("cmd_vel_joy") == 1, START_S, "the relay alone")
+    chain.node.spin_for(LOOKS_S)
     chain.node.release(chain.joystick)
     chain.joystick.message = drive(0.2)
     chain.wait_for_order(0.2)
