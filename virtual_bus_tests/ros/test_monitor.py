@@ -50,6 +50,7 @@ def test_in_a_terminal_it_shows_the_robot_until_ctrl_c(robot: RunningRobot) -> N
         joystick.message = TwistStamped()
         robot.node.wait_for(lambda: sees("joystick drives", "operation enabled"), 20.0, f"the joystick in {shown!r}")
         joystick.message = None
+        robot.node.node.destroy_publisher(joystick.publisher)
         os.write(ours, CTRL_C)
         deadline_s = time.monotonic() + 10.0
         while process.poll() is None and time.monotonic() < deadline_s:
