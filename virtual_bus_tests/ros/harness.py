@@ -161,6 +161,7 @@ class TestNode:
         no_signals = SignalHandlerOptions.NO
         rclpy.init(args=[], context=self.context, domain_id=domain_id, signal_handler_options=no_signals)
         self.node = Node(name, namespace=namespace, context=self.context, enable_rosout=False)
+        self._sources: dict[str, Repeater[Any]] = {}
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
 
@@ -175,8 +176,13 @@ class TestNode:
         return Repeater(self.node, kind, topic, rate_hz, qos)
 
     def source(self, topic: str = "cmd_vel_joy", kind: type[Any] = TwistStamped, qos: QoSProfile | int = 1) -> Any:
-        """A source of the mux at 50 Hz that may drive: it was found, and has commanded zero for a moment."""
-        repeater = self.repeat(kind, topic, 50.0, qos)
+        """A source of the mux at 50 Hz that may drive: it was found, and has commanded zero for a moment.
+
+        One for each topic: of two publishers there the mux would follow neither.
+        """
+        if topic not in self._sources:
+            self._sources[topic] = self.repeat(kind, topic, 50.0, qos)
+        repeater = self._sources[topic]
         self.wait_for_subscriber(repeater.publisher, 15.0)
         self.release(repeater)
         return repeater
