@@ -33,10 +33,13 @@ def test_the_higher_priority_drives_and_silence_ends_in_explicit_zeros(chain: Ch
     chain.joystick.message = drive(-0.3)
     assert chain.wait_for_order(-0.3) < 0.5
     chain.node.wait_for(lambda: chain.mux.messages[-1].active == "joystick", 1.0, "the state")
-    state = chain.mux.messages[-1]
-    assert {source.name: source.reason for source in state.sources} == {
-        "joystick": "", "navigation": "never received", "action": "joystick has priority",
-    }  # fmt: skip
+    reasons = {"joystick": "", "navigation": "never received", "action": "joystick has priority"}
+
+    def told() -> dict[str, str]:
+        return {source.name: source.reason for source in chain.mux.messages[-1].sources}
+
+    # a pause of this process makes a source silent for a moment
+    chain.node.wait_for(lambda: told() == reasons, 2.0, f"the reasons {reasons}")
     chain.action.message = None
     chain.node.spin_for(0.4)  # the old command of the action is stale when the joystick is let go
     chain.joystick.message = None
