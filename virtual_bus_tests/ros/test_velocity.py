@@ -75,7 +75,7 @@ def test_a_source_faster_than_the_timer_is_not_doubled(chain: Chain) -> None:
     chain.orders.clear()
     sent_before = fast.sent
     chain.node.spin_for(2.0)
-    assert chain.ordered == (pytest.approx(0.2), 0.0)
+    assert chain.ordered == pytest.approx((0.2, 0.0))
     assert len(chain.orders.messages) <= 1.3 * (fast.sent - sent_before)  # with the timers' 2 × 50 Hz it were twice
 
 
