@@ -47,9 +47,9 @@ def uncommissioned(robot: Robot) -> str:
         return ""
     missing = [step for step in STEPS if getattr(robot.commissioned, step) is None]
     changed = [step for step in STEPS if getattr(robot.commissioned, step) not in (None, mark(robot, step))]
-    told = [f"not done: {', '.join(missing)}"] if missing else []
-    told += [f"robot.yaml has changed since: {', '.join(changed)}"] if changed else []
-    return f"this robot is not commissioned ({'; '.join(told)})" if told else ""
+    defects = [f"not done: {', '.join(missing)}"] if missing else []
+    defects += [f"robot.yaml has changed since: {', '.join(changed)}"] if changed else []
+    return f"this robot is not commissioned ({'; '.join(defects)})" if defects else ""
 
 
 def _shown(robot: Robot, step: Step) -> list[Any]:

@@ -87,8 +87,8 @@ def _otherwise(part: Running, robot: Robot) -> str:
         return ""
     here = json.loads(watchdog_config(robot).to_json())
     differ = sorted(key for key in here.keys() | there.keys() if here.get(key) != there.get(key))
-    told = [key for key in differ if key not in OF_THE_USER]
-    return f"it runs with another robot.yaml, or an earlier one ({', '.join(told)} differ)" if told else ""
+    keys = [key for key in differ if key not in OF_THE_USER]
+    return f"it runs with another robot.yaml, or an earlier one ({', '.join(keys)} differ)" if keys else ""
 
 
 def _running(part: str, name: str, proc: Path) -> Iterator[Running]:

@@ -1,4 +1,4 @@
-"""When the drives let go of wheels that stand: power that holds a stand is taken off once for each order. Pure.
+"""When the drives let go of wheels at standstill: each order that ends in one takes their power off once. Pure.
 
 A dead encoder shows a stand, and its drive pushes on with the integrator of its velocity loop, with nothing ordered.
 So a drive that was ordered motion, and gives torque to a wheel that shows none, loses its power as soon as zero is

@@ -38,5 +38,5 @@ class Overshoot:
             self._lack_mps = max(self._lack_mps, lack_mps)
             self._lost_m = min(self._lost_m + lack_mps * elapsed_s, self._lack_mps * HELD_S)
         allowed_mps = FASTER * self._lack_mps if self._lost_m > 0.0 else 0.0
-        self._lost_m -= max(0.0, velocity_mps - max(target_mps, 0.0)) * elapsed_s
+        self._lost_m = max(0.0, self._lost_m - max(0.0, velocity_mps - max(target_mps, 0.0)) * elapsed_s)
         return allowed_mps
