@@ -152,10 +152,13 @@ class Driver:
         return self.order(twist, within_s, lambda snapshot: snapshot.state is DriverState.LATCHED)
 
     def heard_again(self) -> DriverSnapshot:
-        """Wait, with zero commands, until every drive is booted and its encoder known: after the wheels rolled out."""
+        """Wait, with zero commands, until every drive is booted and its encoder known.
+
+        That is after the wheels rolled out, and after the watchdog has let go: a boot before it is tried again.
+        """
         return self.order(
             Twist2D.ZERO,
-            16.0,
+            25.0,
             lambda s: all(drive.nmt_state == "operational" for drive in s.drives) and s.odometry_valid,
         )
 

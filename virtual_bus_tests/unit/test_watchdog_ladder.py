@@ -199,6 +199,38 @@ def test_power_in_between_begins_the_rolling_anew() -> None:
     assert go(off, replace(liar, seen_at=12.07), 12.07).stopped
 
 
+# power off, by feedback, at 10.000 ── 12.0 assumed ── 12.5 half of its values come after a pause ── 12.51 the others
+def test_a_look_that_cannot_tell_does_not_let_a_wheel_without_power_roll_anew() -> None:
+    liar = replace(STANDING, trusted=False)
+    assumed = go(go(OFF, liar, 10.0), replace(liar, seen_at=12.0), 12.0)
+    assert assumed.assumed
+    unclear = go(assumed, replace(liar, standing=False, seen_at=12.5), 12.5)
+    assert (unclear.step, unclear.stopped) == (Step.DISABLE_VOLTAGE, False)
+    again = go(unclear, replace(liar, seen_at=12.51), 12.51)
+    assert (again.stopped, again.assumed) == (True, True)
+    powered = go(unclear, replace(liar, powered=True, seen_at=12.51), 12.51)
+    assert not go(powered, replace(liar, seen_at=12.6), 12.6).stopped
+
+
+# off since 10.0 ── 11.0 not read for 0.1 s, next rung ── 12.0 off for 2 s all the same
+def test_a_rung_more_gives_a_wheel_without_power_none() -> None:
+    liar = replace(STANDING, trusted=False)
+    off = go(OFF, liar, 10.0)
+    above = go(off, liar, 11.0)
+    assert (above.step, above.off_since) == (Step.HEARTBEAT_WITHHELD, 10.0)
+    assert not go(above, replace(liar, seen_at=11.999), 11.999).stopped
+    assert go(above, replace(liar, seen_at=12.0), 12.0).stopped
+
+
+# a turn of readings takes 0.08 s, of two axes: one may be lost
+@pytest.mark.parametrize(("now", "step"), [(10.059, Step.DISABLE_VOLTAGE), (10.061, Step.HEARTBEAT_WITHHELD)])
+def test_a_node_of_several_axes_has_the_time_of_two_readings(now: float, step: Step) -> None:
+    rolling = replace(ROLLING, seen_at=9.9, reading_s=0.08)
+    assert go(OFF, rolling, now).step is step
+    powered = replace(rolling, powered=True, speed_mps=0.0, seen_at=now)
+    assert go(OFF, powered, now).step is step
+
+
 def test_a_trusted_stand_is_seen_not_assumed() -> None:
     assert not go(FOOT, STANDING, 10.0).assumed
 
@@ -224,15 +256,15 @@ def test_old_feedback_does_not_end_it(seen_at: float) -> None:
 
 def test_enabled_again_after_it_stood_climbs_at_once() -> None:
     stood = replace(FOOT, stopped=True)
-    assert go(stood, replace(STANDING, enabled=True), 10.0) == Climb(Step.PRE_OPERATIONAL, 10.0, 0.0)
+    assert go(stood, replace(STANDING, enabled=True, powered=True), 10.0) == Climb(Step.PRE_OPERATIONAL, 10.0, 0.0)
     end = replace(FOOT, step=Step.HEARTBEAT_WITHHELD, stopped=True)
-    again = go(end, replace(STANDING, enabled=True), 10.0)
+    again = go(end, replace(STANDING, enabled=True, powered=True), 10.0)
     assert (again.step, again.stopped, again.since) == (Step.HEARTBEAT_WITHHELD, False, 10.0)
 
 
 def test_moving_again_begins_the_same_rung_anew() -> None:
     stood = Climb(Step.DISABLE_VOLTAGE, 9.9, 0.5, stopped=True)
-    assert go(stood, ROLLING, 10.0) == Climb(Step.DISABLE_VOLTAGE, 10.0, 0.5)
+    assert go(stood, ROLLING, 10.0) == Climb(Step.DISABLE_VOLTAGE, 10.0, 0.5, off_since=10.0)
     assert go(replace(stood, runaway=True), ROLLING, 10.0).runaway
 
 
@@ -304,4 +336,6 @@ def test_a_reset_drive_that_rolls_without_power_is_waited_for() -> None:
 @pytest.mark.parametrize("look", [ENABLED, BRAKING, ROLLING])
 def test_after_a_reset_power_is_ordered_off_before_the_next_one(look: Look) -> None:
     stood = Climb(Step.RESET_NODE, 9.9, 0.5, stopped=True)
-    assert go(stood, replace(look, seen_at=10.5), 10.5) == Climb(Step.HEARTBEAT_WITHHELD, 10.5, 0.5)
+    off_since = math.inf if look.powered else 10.5
+    expected = Climb(Step.HEARTBEAT_WITHHELD, 10.5, 0.5, off_since=off_since)
+    assert go(stood, replace(look, seen_at=10.5), 10.5) == expected

@@ -28,7 +28,10 @@ class Step(enum.IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Rung:
-    """One way to stop. `obey_s`: until the drive, by fresh feedback, has done what this rung orders [s]."""
+    """One way to stop. `obey_s`: until the drive, by fresh feedback, has done what this rung orders [s].
+
+    Where a node has several axes, that are read one after the other, it may take READINGS turns of all of them.
+    """
 
     step: Step
     obey_s: float
@@ -41,6 +44,10 @@ RUNGS = {
     Step.HEARTBEAT_WITHHELD: Rung(Step.HEARTBEAT_WITHHELD, obey_s=0.1),
     Step.RESET_NODE: Rung(Step.RESET_NODE, obey_s=math.inf),
 }
+
+
+READINGS = 2.0
+"""One reading may be lost."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +88,7 @@ class Look:
     """What the feedback of one node says. `seen_at`: when the oldest of its values came (monotonic, s).
 
     `begin_mps`: the speed from which it may begin to brake, which its last setpoint may have raised within the lag.
-    `trusted`: its sensors have not been caught with a lie.
+    `trusted`: its sensors have not been caught with a lie. `reading_s`: so long it takes to read all its axes by SDO.
     """
 
     enabled: bool
@@ -94,6 +101,7 @@ class Look:
     trusted: bool
     unslowed: bool = False
     """A wheel with power has not lost speed for a window of time, on this rung: slowing.py."""
+    reading_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +133,7 @@ def advance(before: Climb, look: Look, braking: Braking, now: float) -> Climb:
 
     1. stopped, and enabled again: next rung, somebody works against us; but no reset before the power was ordered off;
     2. stopped, and moving, or its sensor is caught with a lie after that: not stopped, same rung from the start, or the
-       one before the reset;
+       one before the reset. How long its power is off goes on counting: a look that cannot tell drives no wheel;
     3. not enabled and standing, by feedback that came on this rung: stopped. Where the sensor cannot be trusted, its
        power must be off as well, for as long as a wheel may roll: then a stand is assumed;
     4. never heard of, and not told to have power: stays, there is nothing to climb for;
@@ -142,7 +150,9 @@ def advance(before: Climb, look: Look, braking: Braking, now: float) -> Climb:
             return _to(min(climb.step + 1, Step.HEARTBEAT_WITHHELD), climb, look, now)
         stands = look.standing and (look.trusted or climb.assumed)
         step = min(climb.step, Step.HEARTBEAT_WITHHELD)
-        return climb if stands else replace(first(look, now), step=step, runaway=climb.runaway)
+        return (
+            climb if stands else replace(first(look, now), step=step, runaway=climb.runaway, off_since=climb.off_since)
+        )
     if look.standing and look.seen_at > climb.since and _holds(climb, look, braking, now):
         return replace(climb, stopped=True, assumed=not look.trusted)
     if not look.present:
@@ -170,7 +180,7 @@ def _holds(climb: Climb, look: Look, braking: Braking, now: float) -> bool:
 
 
 def _disobeys(climb: Climb, look: Look, now: float) -> bool:
-    obey_s = RUNGS[climb.step].obey_s
+    obey_s = max(RUNGS[climb.step].obey_s, READINGS * look.reading_s)
     if climb.step is Step.HEARTBEAT_WITHHELD:
         return look.powered and look.seen_at > climb.since and now >= climb.since + obey_s
     if now >= max(climb.since, look.seen_at) + obey_s:
@@ -184,7 +194,8 @@ def _up(climb: Climb, look: Look, now: float) -> Climb:
 
 
 def _to(step: int, climb: Climb, look: Look, now: float) -> Climb:
-    """The last rung is the end: there it stays as it is."""
+    """The last rung is the end: there it stays as it is. No rung gives power to a wheel that has none."""
     if climb.step is Step.RESET_NODE and not climb.stopped:
         return climb
-    return Climb(Step(min(step, Step.RESET_NODE)), now, look.begin_mps, runaway=climb.runaway)
+    off_since = math.inf if look.powered else climb.off_since
+    return Climb(Step(min(step, Step.RESET_NODE)), now, look.begin_mps, runaway=climb.runaway, off_since=off_since)

@@ -17,6 +17,8 @@ QUICK_STOP_PERIOD_S = 0.01
 NMT_PERIOD_S = 0.05
 SDO_PERIOD_S = 0.01
 """One SDO request at a time: most drives have a single SDO server that keeps one request."""
+REQUESTS = 4
+"""Of one axis in a turn: the controlword is written; statusword, position and velocity are read."""
 IDLE_SDO_PERIOD_S = 0.05
 STALE_S = 0.02
 """While it is stopped, feedback that is older is read: two cycles, or an SDO's way to and fro."""
@@ -115,6 +117,7 @@ class Stopper:
             present=node.heard_at > NEVER or any(axis.asks_for_power for axis in axes),
             trusted=self._trusted and all(axis.trusted for axis in axes),
             unslowed=any(watch.fails for watch in self._slowing),
+            reading_s=self._axis_count * REQUESTS * SDO_PERIOD_S,
         )
 
     def _is_untold(self, seen_at: float) -> bool:
