@@ -19,7 +19,7 @@ from canbase_config.robot import Robot
 from canbase_driver.cia402 import DriveState, PowerGoal
 
 LIFE_M, LIFE_COUNTS = 0.001, 2
-"""An encoder that is nearer than this to the place of its last sign of life may jitter; whichever is more."""
+"""Places that are nearer to each other than this may be jitter; whichever is more. Others are a sign of life."""
 NOISE_SHARE = 0.01
 """Of the rated torque: less moves no wheel."""
 LONGEST_STEP_S = 0.1
@@ -35,7 +35,8 @@ class Push:
         """`limit_s`: time at rated torque, or longer at less."""
         self._limit_s = limit_s
         self._life_m = max(LIFE_M, LIFE_COUNTS * abs(m_per_count))
-        self._seen_m = self._moved_m = self.pushed_s = 0.0
+        self._low_m = self._high_m = self.pushed_s = 0.0
+        """Between these places it has been since its last sign of life."""
         self._at = math.inf
         self._owes = self._tells = False
         self.share: float | None = None
@@ -53,10 +54,10 @@ class Push:
         self.share = share if self._tells else None
         torque = 1.0 if self.share is None else abs(self.share)
         given_s = torque * elapsed_s if torque >= NOISE_SHARE else 0.0
-        self._moved_m += travel_m - self._seen_m
-        self._seen_m = travel_m
-        if abs(self._moved_m) >= self._life_m or not has_torque:
-            self._moved_m = self.pushed_s = 0.0
+        self._low_m, self._high_m = min(self._low_m, travel_m), max(self._high_m, travel_m)
+        if self._high_m - self._low_m >= self._life_m or not has_torque:
+            self._low_m = self._high_m = travel_m
+            self.pushed_s = 0.0
         else:
             self.pushed_s = min(self.pushed_s + given_s, self._limit_s)
         self._owes = has_torque and (self._owes or ordered_mps != 0.0)

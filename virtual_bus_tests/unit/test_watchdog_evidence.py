@@ -73,7 +73,7 @@ class Wheel:
 
 
 def test_at_the_start_nothing_speaks_against_a_wheel() -> None:
-    assert Wheel().last == Evidence(0.0, 0.0, 0.0, 0.0, False, 0, 0, 0.0, True)
+    assert Wheel().last == Evidence(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False, 0, 0, 0.0, True)
 
 
 def test_before_the_first_setpoint_nothing_is_ordered() -> None:
@@ -252,83 +252,98 @@ def held_until_its_order_has_gone(**changes: Any) -> Wheel:
     return wheel
 
 
-@pytest.mark.parametrize("creep", [0.0, 2.0**-9, -(2.0**-7)])
-@pytest.mark.parametrize(("torque", "misses"), [(0.5, False), (-0.5, False), (0.51, True), (-0.51, True), (None, True)])
-def test_a_wheel_that_is_hardly_pushed_has_nothing_to_show_of_an_order_that_went_through_zero(
-    creep: float, torque: float | None, misses: bool
+@pytest.mark.parametrize("creep", [0.0, 2.0**-9, 2.0**-4])
+@pytest.mark.parametrize(
+    ("torque", "samples"), [(None, 4), (1.0, 4), (-0.51, 4), (0.5, 8), (-0.5, 8), (0.25, 16), (0.1, 16), (0.0, 16)]
+)
+def test_of_a_slow_order_the_time_is_one_at_rated_torque_or_longer_at_less(
+    creep: float, torque: float | None, samples: int
 ) -> None:
+    """4/64 s are left; a wheel that takes no torque at all has four times as much."""
     wheel = held_until_its_order_has_gone()
-    wheel.samples(3, creep, 0.0, torque=torque)
-    assert not wheel.last.unseen
-    last = wheel.sample(creep, 0.0, torque=torque)
-    assert (last.unseen, last.unseen_s) == (misses, 16 / HZ if misses else 12 / HZ)
+    assert not wheel.samples(samples - 1, creep, 0.0, torque=torque).unseen
+    assert wheel.sample(creep, 0.0, torque=torque).unseen
 
 
-@pytest.mark.parametrize("torque", [0.25, -0.5])
-def test_torque_and_time_bound_what_is_not_counted(torque: float) -> None:
-    """0.25 s at rated torque: 64 samples with a quarter of it."""
+def test_of_a_faster_order_each_moment_counts_whatever_the_torque_is() -> None:
+    """Faster than the tolerance of motion, 1/16 m/s; the lag is 8 samples."""
     wheel = held_until_its_order_has_gone()
-    last = wheel.samples(round(16 / abs(torque)), 0.0, 0.0, torque=torque)
-    assert last.unseen_s == 12 / HZ
-    assert not wheel.samples(3, 0.0, 0.0, torque=torque).unseen
-    assert wheel.sample(0.0, 0.0, torque=torque).unseen
-
-
-def test_what_was_not_counted_adds_up_over_orders_until_a_sign_of_life() -> None:
-    wheel = held_until_its_order_has_gone()
-    wheel.samples(60, 0.0, 0.0, torque=0.25)
-    assert wheel.samples(1, 0.0, 0.0, torque=1.0).unseen_s == 13 / HZ
-    wheel.samples(4, 0.0, 0.0, torque=0.25)
-    assert wheel.sample(0.0, 0.0, torque=0.25).unseen_s == 14 / HZ
-    wheel.sample(0.0, 0.0, rolls=0.25)
-    before = wheel.samples(12, 0.5, 0.0, torque=1.0).unseen_s
-    assert before > 0.0
-    assert wheel.samples(64, 0.0, 0.0, torque=0.25).unseen_s == before
+    wheel.sample(0.0, 0.0, torque=0.25)
+    assert wheel.samples(8, 2.0**-3, 0.0, torque=0.25).unseen_s == (12 + 9 * 0.25) / HZ
+    last = wheel.sample(2.0**-3, 0.0, torque=0.25)
+    assert (last.unseen_s, last.unseen) == ((12 + 10 * 0.25) / HZ, False)
+    last = wheel.sample(2.0**-3, 0.0, torque=0.25)
+    assert (last.unseen_s, last.unseen) == ((12 + 10 * 0.25 + 1) / HZ, False)
+    assert wheel.sample(2.0**-3, 0.0, torque=0.25).unseen
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_a_new_order_has_to_be_seen_once_it_asked_for_twice_a_sign_of_life(sign: int) -> None:
-    """1/64 m/s, 1/4096 m a sample: nine after the lag of eight ask for 2 mm; then three of the 0.25 s are left."""
+def test_an_order_to_the_other_side_counts_apart(sign: int) -> None:
+    """Held for 12/64 s with 1/2 m/s; then 1/4 m/s to the other side, of which the lag's nine samples do not count."""
+    wheel = rolling(sign * 0.5)
+    wheel.samples(12, sign * 0.5, 0.0)
+    last = wheel.sample(-sign * 0.25, 0.0)
+    assert (last.unseen_s, last.unseen_m, last.both_s, last.both_m) == (0.0, 0.25 / HZ, 12 / HZ, 6.25 / HZ)
+    last = wheel.samples(8 + 8, -sign * 0.25, 0.0)
+    assert (last.unseen, last.unseen_s, last.both_s) == (False, 8 / HZ, 20 / HZ)
+
+
+def test_orders_to_and_fro_have_half_as_much_again_in_all() -> None:
+    """Of each order the time counts once it asked for 1/16 m, its eighth sample; 24/64 s are allowed."""
+    wheel = rolling(0.5)
+    wheel.samples(12, 0.5, 0.0)
+    wheel.samples(8 + 8, -0.5, 0.0)
+    last = wheel.samples(8 + 1, 0.5, 0.0)
+    assert (last.both_s, last.unseen) == ((12 + 9 + 2) / HZ, False)
+    last = wheel.sample(0.5, 0.0)
+    assert (last.both_s, last.unseen_s, last.unseen) == (24 / HZ, 3 / HZ, True)
+
+
+def test_to_and_fro_needs_its_way_too() -> None:
+    """3/2 of 1/16 m, of 1/32 m/s: 3 s."""
+    wheel = rolling(2.0**-5)
+    last = wheel.samples(100, 2.0**-5, 0.0)
+    assert (last.both_s > 0.375, last.unseen) == (True, False)
+    assert not wheel.samples(90, -(2.0**-5), 0.0).unseen
+    assert wheel.samples(2, -(2.0**-5), 0.0).unseen
+
+
+def test_a_sign_of_life_begins_both_directions_anew() -> None:
+    wheel = rolling(0.5)
+    wheel.samples(12, 0.5, 0.0)
+    wheel.samples(12, -0.5, 0.0)
+    last = wheel.sample(-0.5, 0.0, rolls=0.25)
+    assert (last.unseen_s, last.unseen_m, last.both_s, last.both_m) == (0.0, 0.0, 0.0, 0.0)
+    last = wheel.sample(0.5, 0.0)
+    assert last.unseen_m == last.both_m == 0.5 / HZ
+
+
+def test_while_nothing_is_ordered_of_any_wheel_and_none_moves_its_drive_has_to_let_go_instead() -> None:
     wheel = held_until_its_order_has_gone()
-    wheel.sample(0.0, 0.0, torque=0.25)
-    last = wheel.samples(8 + 9, sign * 2.0**-6, 0.0, torque=0.25)
-    assert last.unseen_s == 12 / HZ
-    assert not wheel.samples(3, sign * 2.0**-6, 0.0, torque=0.25).unseen
-    assert wheel.sample(sign * 2.0**-6, 0.0, torque=0.25).unseen
+    wheel.watch.on_sync(rests=True)
+    assert wheel.samples(640, 0.0, 0.0).unseen_s == 12 / HZ
+    wheel.watch.on_sync(rests=False)
+    assert not wheel.samples(3, 0.0, 0.0).unseen
+    assert wheel.sample(0.0, 0.0).unseen
 
 
-def test_an_order_that_goes_through_zero_again_begins_to_ask_anew() -> None:
-    wheel = held_until_its_order_has_gone()
-    wheel.sample(0.0, 0.0, torque=0.01)
-    wheel.samples(8 + 8, 2.0**-6, 0.0, torque=0.01)
-    wheel.sample(0.0, 0.0, torque=0.01)
-    last = wheel.samples(8 + 8, 2.0**-6, 0.0, torque=0.01)
-    assert last.unseen_s == 12 / HZ
+def test_without_the_proof_by_letting_go_it_counts_at_rest_too() -> None:
+    wheel = held_until_its_order_has_gone(stand_proof=False)
+    wheel.watch.on_sync(rests=True)
+    assert not wheel.samples(3, 0.0, 0.0).unseen
+    assert wheel.sample(0.0, 0.0).unseen
 
 
-def test_a_reset_forgets_what_was_not_counted() -> None:
-    wheel = held_until_its_order_has_gone()
-    wheel.samples(64, 0.0, 0.0, torque=0.25)
-    wheel.watch.trust()
-    before = wheel.samples(12, 0.5, 0.0, torque=1.0).unseen_s
-    assert before > 0.0
-    assert wheel.samples(64, 0.0, 0.0, torque=0.25).unseen_s == before
-    assert wheel.sample(0.0, 0.0, torque=0.25).unseen_s > before
-
-
-def test_before_the_first_sign_of_life_torque_and_time_count_as_after_it() -> None:
-    wheel = Wheel()
-    before = wheel.samples(8, 0.5, 0.0, torque=1.0).unseen_s
-    assert wheel.samples(64, 0.0, 0.0, torque=0.25).unseen_s == before
-    assert wheel.sample(0.0, 0.0, torque=0.25).unseen_s > before
-
-
-def test_exactly_twice_a_sign_of_life_is_asked_for() -> None:
-    """A coarse encoder: 1/512 m is a sign of life, 1/4096 m a sample."""
-    wheel = held_until_its_order_has_gone(m_per_count=2.0**-10)
-    wheel.sample(0.0, 0.0, torque=0.25)
-    assert wheel.samples(9 + 15, 2.0**-6, 0.0, torque=0.25).unseen_s == 12 / HZ
-    assert wheel.sample(2.0**-6, 0.0, torque=0.25).unseen_s == 13 / HZ
+# places that are a sign of life apart, whatever it did between them
+def test_a_wheel_that_turns_round_lives_by_the_way_from_where_it_turned() -> None:
+    wheel = rolling(0.5)
+    life_m = wheel.watch._life_m
+    wheel.sample(0.5, 0.0, rolls=-0.75 * life_m * HZ)
+    assert wheel.last.unseen_m > 0.0
+    wheel.sample(0.5, 0.0, rolls=0.75 * life_m * HZ)
+    assert wheel.last.unseen_m > 0.0
+    wheel.sample(0.5, 0.0, rolls=0.25 * life_m * HZ)
+    assert wheel.last.unseen_m == 0.0
 
 
 # --- 2: halted at once. 16 m/s² in 1/64 s are 0.25 m/s, and 0.0625 m/s tolerance

@@ -6,10 +6,13 @@ that is being stopped can lose its sensor as well (docs/decisions/0020)
    moves nothing. The ordered travel adds up until it moves, however slow the order is; a setpoint of zero adds nothing
    and forgets nothing, so short orders add up too, and most of it outlives the power. The time adds up while an order
    is older than `drive_lag_s`, once it asked for the travel that a sign of life takes: a slow wheel needs its time for
-   that. Once enough travel was ordered it adds up without such an order too: a wheel runs away after its order.
+   that. Once enough travel was ordered it adds up without such an order too: a wheel runs away after its order; but
+   not while nothing is ordered of any wheel and none moves: then its drive has to let go, which torque.py watches.
    But a wheel that was held, and comes free as its order goes through zero, has nothing to show until the new order
-   asked for it. That time does not count where the drive reports no more torque than friction takes; torque × time
-   bounds how much of it, and so the speed that a dead encoder hides.
+   asked for it: the loop's integral has to turn round, against its friction. So each direction counts apart, and
+   orders of both directions have BOTH_WAYS times as much in all. And a slow order may need long until its drive has
+   got over the friction: where that reports no more torque than friction takes, the time counts as time at rated
+   torque, which bounds the speed that a dead encoder hides.
 2. Halted: the velocity of a wheel that rolled drops at once to standstill, as no wheel can, whatever is ordered, and
    the encoder does not move from then on.
 3. Jolts: velocities that change as no wheel can, again and again.
@@ -24,7 +27,7 @@ import math
 from dataclasses import dataclass, replace
 
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
-from canbase_watchdog.counts import life_m
+from canbase_watchdog.counts import Life, life_m
 from canbase_watchdog.envelope import Peak
 
 UNSEEN_COUNTS = 4
@@ -34,8 +37,10 @@ KEPT_SHARE = 0.875
 a wheel that gets power again needs an order before it can show anything."""
 STRAIN_SHARE = 0.5
 """Of the rated torque: friction takes less, and from one direction to the other changes it by less."""
-ASKED_LIVES = 2.0
-"""An order asks for a sign of life once it asked for so much travel of one: friction and slack take their part."""
+LEAST_WEIGHT = 0.25
+"""A wheel that cannot turn, and takes no torque for it, is found all the same."""
+BOTH_WAYS = 1.5
+"""Of what one direction may lack. What was ordered in both of them winds up the integral less than it adds up here."""
 ROLLING_SHARE = 0.5
 """An encoder that moved by more than this share of what the velocity says: the wheel really rolled."""
 JOLT_MEMORY_S = 1.0
@@ -49,8 +54,12 @@ class Evidence:
     setpoint_mps: float = 0.0
     unseen_s: float = 0.0
     unseen_m: float = 0.0
+    """Since the order last went through zero."""
+    both_s: float = 0.0
+    both_m: float = 0.0
+    """Of both directions."""
     unseen: bool = False
-    """Both are beyond what is allowed: rule 1."""
+    """Time and travel are beyond what is allowed, of one direction or of both: rule 1."""
     halted: int = 0
     """Samples in a row without any motion after a drop that no wheel can do: rule 2."""
     jolts: int = 0
@@ -69,18 +78,19 @@ class EvidenceWatch:
         count_m = abs(drive.m_per_count)
         self._unseen_m = max(config.motion_missing_m, UNSEEN_COUNTS * count_m)
         self._life_m = life_m(drive, config)
+        self._life = Life(self._life_m)
         self._slack_mps = config.motion_tolerance_mps + abs(drive.velocity_mps_per_bit)
         self._period_s = 1.0 / config.control_hz
         self._backward, self._forward = Peak(config.drive_lag_s), Peak(config.drive_lag_s)
         self._setpoint_mps = self._ordered_mps = 0.0
-        self._least_mps = self._velocity_mps = self._moved_m = 0.0
-        self._rolled = False
-        self._asked_m = 0.0
-        """What the setpoints ask for at least, since one of the last `drive_lag_s` was no faster than standstill."""
-        self._idle_s = 0.0
-        """Time at rated torque, or longer at less, that did not count as unseen since the last sign of life."""
+        self._least_mps = self._velocity_mps = self._direction = 0.0
+        self._rolled = self._rests = False
         self._jolted_at = -math.inf
         self.last = Evidence()
+
+    def on_sync(self, rests: bool) -> None:
+        """After the setpoints: `rests`: those of all wheels are zero, and none moves by what it measures."""
+        self._rests = rests and self._config.stand_proof
 
     def on_setpoint(self, setpoint_mps: float, now: float) -> None:
         """A SYNC made it effective."""
@@ -90,7 +100,7 @@ class EvidenceWatch:
 
     def trust(self) -> None:
         """A reset was accepted: everything begins anew."""
-        self._moved_m = self._idle_s = self._asked_m = 0.0
+        self._life.begin()
         self.last = Evidence()
 
     def doubt(self) -> None:
@@ -116,20 +126,19 @@ class EvidenceWatch:
         self._velocity_mps = velocity_mps
         self._rolled = step_m is not None and abs(step_m) > ROLLING_SHARE * abs(velocity_mps) * elapsed_s
         self._ask(elapsed_s, now, enabled)
+        kept_m = self._kept_m(lives)
+        before = Evidence(unseen_m=kept_m, both_m=kept_m, trusted=self.last.trusted)
         if not powered:
-            self.last = Evidence(unseen_m=self._kept_m(lives), trusted=self.last.trusted)
+            self.last = before
             return
-        unseen_s, unseen_m = 0.0, self._kept_m(lives)
         if enabled:
-            unseen_s, unseen_m = self._unseen(lives, step_m is not None, elapsed_s, torque)
-        unseen = unseen_s >= self._config.motion_missing_s and unseen_m >= self._unseen_m
+            before = self._unseen(lives, step_m is not None, elapsed_s, torque)
         halted, jolts = self._halted(jolted and rolled, lives), self._jolts(jolted, now)
-        samples = self._config.feedback_samples
-        self.last = Evidence(
+        samples, unseen = self._config.feedback_samples, self._is_unseen(before)
+        self.last = replace(
+            before,
             ordered_mps=self._ordered_mps,
             setpoint_mps=self._setpoint_mps,
-            unseen_s=unseen_s,
-            unseen_m=unseen_m,
             unseen=unseen,
             halted=halted,
             jolts=jolts,
@@ -148,36 +157,48 @@ class EvidenceWatch:
 
     def _lives(self, step_m: float | None, jolted: bool) -> bool:
         """The encoder has moved since it last did. What it did until a jolt was before it."""
-        self._moved_m += step_m or 0.0
-        moved = abs(self._moved_m) >= self._life_m
-        if moved or jolted:
-            self._moved_m = 0.0
-        return moved
+        lives = self._life.on_step(step_m or 0.0)
+        if jolted:
+            self._life.begin()
+        return lives
 
-    def _unseen(self, lives: bool, known: bool, elapsed_s: float, torque: float | None) -> tuple[float, float]:
-        unseen_s, unseen_m = self.last.unseen_s, self.last.unseen_m
+    def _unseen(self, lives: bool, known: bool, elapsed_s: float, torque: float | None) -> Evidence:
+        """What rule 1 counts."""
+        last, trusted = self.last, self.last.trusted
         if lives:
-            self._idle_s = 0.0
-            return 0.0, 0.0
+            self._direction = 0.0
+            return Evidence(trusted=trusted)
         if not known:
-            return unseen_s, unseen_m
-        unseen_m += abs(self._setpoint_mps) * elapsed_s
-        visible = self._is_visible(self._least_mps)
-        self._asked_m = self._asked_m + abs(self._least_mps) * elapsed_s if visible else 0.0
-        counts = unseen_m >= self._unseen_m or (visible and unseen_m >= self._life_m)
-        if counts and not self._idles(torque, elapsed_s):
-            unseen_s += elapsed_s
-        return unseen_s, unseen_m
+            return Evidence(
+                unseen_s=last.unseen_s, unseen_m=last.unseen_m, both_s=last.both_s, both_m=last.both_m, trusted=trusted
+            )
+        turned = self._setpoint_mps * self._direction < 0.0
+        self._direction = self._setpoint_mps or self._direction
+        step_m = abs(self._setpoint_mps) * elapsed_s
+        unseen_m = step_m + (0.0 if turned else last.unseen_m)
+        asked = unseen_m >= self._unseen_m or (self._is_visible(self._least_mps) and unseen_m >= self._life_m)
+        step_s = elapsed_s * self._weight(torque) if asked and not self._rests else 0.0
+        return Evidence(
+            unseen_s=step_s + (0.0 if turned else last.unseen_s),
+            unseen_m=unseen_m,
+            both_s=last.both_s + step_s,
+            both_m=last.both_m + step_m,
+            trusted=trusted,
+        )
 
-    def _idles(self, torque: float | None, elapsed_s: float) -> bool:
-        """The order has not asked for a sign of life since it went through zero, and the drive hardly pushes."""
-        if torque is None or abs(torque) > STRAIN_SHARE or self._asked_m >= ASKED_LIVES * self._life_m:
-            return False
-        self._idle_s += abs(torque) * elapsed_s
-        return self._idle_s <= self._config.motion_missing_s
+    def _is_unseen(self, counted: Evidence) -> bool:
+        least_s, least_m = self._config.motion_missing_s, self._unseen_m
+        one_way = counted.unseen_s >= least_s and counted.unseen_m >= least_m
+        return one_way or (counted.both_s >= BOTH_WAYS * least_s and counted.both_m >= BOTH_WAYS * least_m)
+
+    def _weight(self, torque: float | None) -> float:
+        fast = abs(self._least_mps) > self._slack_mps
+        if torque is None or fast or abs(torque) > STRAIN_SHARE:
+            return 1.0
+        return max(abs(torque), LEAST_WEIGHT)
 
     def _kept_m(self, lives: bool) -> float:
-        return 0.0 if lives else min(self.last.unseen_m, KEPT_SHARE * self._unseen_m)
+        return 0.0 if lives else min(self.last.both_m, KEPT_SHARE * self._unseen_m)
 
     def _halted(self, halts: bool, lives: bool) -> int:
         if self._is_visible(self._velocity_mps):

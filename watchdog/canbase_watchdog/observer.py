@@ -188,6 +188,7 @@ class Observer:
         rests = all(record.rests(self._still_mps) for record in self._records.values())
         for record in self._records.values():
             record.push.on_sync(record.setpoint_mps, rests)
+            record.feedback.evidence.on_sync(rests)
         if now >= self._sync_at + self._gap_s:
             self._sync_since = now
         self._sync_at = now

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from canbase_config.watchdog import WatchdogConfig
+from canbase_watchdog.evidence import BOTH_WAYS
 from canbase_watchdog.frames import DriveState
 from canbase_watchdog.latch import Mark, Past
 from canbase_watchdog.view import NEVER, Axis, Node, View
@@ -279,9 +280,10 @@ def _missing(axis: Axis, config: WatchdogConfig) -> str:
     evidence = axis.evidence
     if evidence.unseen:
         return (
-            f"is ordered {evidence.setpoint_mps:.3f} m/s, and its encoder has not moved for {evidence.unseen_s:.3f} s "
-            f"and {evidence.unseen_m:.3f} m of that (allowed {config.motion_missing_s:.3f} s and "
-            f"{config.motion_missing_m:.3f} m); it reports {axis.velocity_mps:.3f} m/s: see encoder, motor, wheel"
+            f"is ordered {evidence.setpoint_mps:.3f} m/s, and its encoder has not moved for {evidence.both_s:.3f} s "
+            f"and {evidence.both_m:.3f} m of its orders (allowed {config.motion_missing_s:.3f} s and "
+            f"{config.motion_missing_m:.3f} m, to and fro {BOTH_WAYS:g} times that); it reports "
+            f"{axis.velocity_mps:.3f} m/s: see encoder, motor, wheel"
         )
     if axis.push.vain_s >= config.motion_missing_s:
         return (

@@ -8,7 +8,8 @@ Rules, for a drive with power
 1. Pushed: torque × time since the last sign of life, or since there was no power, bounds the speed that a dead encoder
    can hide. With nothing ordered of any wheel, a drive that was ordered motion before must let go once.
 2. In vain: the torque is more than friction takes, and by as much another one than at the last sign of life (a hill),
-   and nothing moves. It adds up over orders until the encoder moves, and most of it outlives the power.
+   and nothing moves. Its time at rated torque, or longer at less, adds up over orders until the encoder moves, and most
+   of it outlives the power.
 A drive that does not tell its torque may give the rated one: rule 1 alone. So may one that has only ever told zero.
 """
 
@@ -18,7 +19,7 @@ import math
 from dataclasses import dataclass, replace
 
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
-from canbase_watchdog.counts import difference, life_m
+from canbase_watchdog.counts import Life, difference, life_m
 from canbase_watchdog.evidence import KEPT_SHARE, STRAIN_SHARE
 
 NOISE_SHARE = 0.01
@@ -48,10 +49,9 @@ class PushWatch:
     def __init__(self, drive: WatchedDrive, config: WatchdogConfig) -> None:
         self._config = config
         self._m_per_count = drive.m_per_count
-        self._life_m = life_m(drive, config)
+        self._life = Life(life_m(drive, config))
         self._counts: int | None = None
         self._counts_before: int | None = None
-        self._moved_m = 0.0
         self._at = math.inf
         self._tells = self._rests = False
         self._usual = 0.0
@@ -109,18 +109,15 @@ class PushWatch:
         pushed_s = 0.0 if lives else min(self.last.pushed_s + given_s, config.stand_impulse_s)
         overdue = owes and self._rests and config.stand_proof and pushed_s >= config.stand_impulse_s
         overdue_s = min(self.last.overdue_s + elapsed_s, config.stand_answer_s) if overdue else 0.0
-        strained = owes and share is not None and min(torque, abs(share - self._usual)) > STRAIN_SHARE
-        vain_s = min(vain_s + elapsed_s, config.motion_missing_s) if strained else vain_s
+        strain = min(torque, abs(share - self._usual), 1.0) if owes and share is not None else 0.0
+        if strain > STRAIN_SHARE:
+            vain_s = min(vain_s + strain * elapsed_s, config.motion_missing_s)
         return Push(share, pushed_s, owes, overdue_s, vain_s)
 
     def _lives(self) -> bool:
-        """The encoder is elsewhere than at its last sign of life."""
+        """The encoder shows a sign of life."""
         counts, before = self._counts, self._counts_before
         self._counts_before = counts
         if counts is None or before is None:
             return False
-        self._moved_m += difference(counts, before) * self._m_per_count
-        if abs(self._moved_m) < self._life_m:
-            return False
-        self._moved_m = 0.0
-        return True
+        return self._life.on_step(difference(counts, before) * self._m_per_count)
