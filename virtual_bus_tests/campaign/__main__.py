@@ -11,7 +11,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemaining
 from rich.table import Table
 
 from campaign.faults import FAULTS
-from campaign.judge import PROPERTIES
+from campaign.judge import PROPERTIES, Violation
 from campaign.plan import draw_plan
 from campaign.replay import replay
 from campaign.runner import Tally, run
@@ -19,7 +19,7 @@ from campaign.scenario import Result
 from campaign.without import SAFEGUARDS, remove
 
 SHOWN = 50
-"""Violations that are listed one by one."""
+"""Violations that are told one by one, as they are found."""
 app = typer.Typer(add_completion=False)
 out = Console()
 Fault = enum.Enum("Fault", {name: name for name in FAULTS}, type=str)  # type: ignore[misc]
@@ -58,10 +58,18 @@ def _run(seeds: range, workers: int, only: list[str], without: str) -> Tally:
 
         def on_result(result: Result) -> None:
             nonlocal found
-            found += len(result.violations)
+            before, found = found, found + len(result.violations)
+            for violation in result.violations[: max(0, SHOWN - before)]:
+                _tell(result.seed, violation, only)
             progress.update(task, advance=1, found=f"{found} violations")
 
         return run(seeds, workers, only, without, on_result)
+
+
+def _tell(seed: int, violation: Violation, only: list[str]) -> None:
+    """As soon as it is found."""
+    out.print(f"[red]{violation.name}[/red] in seed {seed} at {violation.at_s:.2f} s: {violation.detail}")
+    out.print(f"  {'; '.join(str(fault) for fault in draw_plan(seed, only).faults)}", highlight=False)
 
 
 def _tell_faults(tally: Tally) -> None:
@@ -93,9 +101,6 @@ def _tell_violations(tally: Tally, only: list[str]) -> None:
         count = sum(violation.name == name for _, violation in tally.violations)
         table.add_row(name, str(count), sentence)
     out.print(table)
-    for seed, violation in tally.violations[:SHOWN]:
-        out.print(f"[red]{violation.name}[/red] in seed {seed} at {violation.at_s:.2f} s: {violation.detail}")
-        out.print(f"  {'; '.join(str(fault) for fault in draw_plan(seed, only).faults)}", highlight=False)
     if tally.violations:
         out.print("tell one of them: make campaign SEED=…, or python -m campaign --seed …")
 
