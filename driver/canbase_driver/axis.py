@@ -111,6 +111,10 @@ class Axis:
         self.has_new_sample = self._status_is_new
         return True
 
+    def on_speed(self, raw: int, now: float) -> None:
+        """Take 606Ch that was read by SDO, after `forget`: how fast it is, and no evidence that it stands."""
+        self.velocity_mps, self.velocity_at = self.units.velocity_mps(raw), now
+
     def sample_taken(self) -> None:
         """The core has taken the new sample into the odometry."""
         self._status_is_new = self.has_new_sample = False

@@ -33,6 +33,7 @@ from canbase_driver.boot_steps import (
     boot_error,
     unsigned,
 )
+from canbase_driver.braking import Braking
 from canbase_driver.cia301 import NmtCommand
 from canbase_driver.cia402 import Command, DriveState, decode_statusword
 from canbase_driver.pdo import node_layout
@@ -171,23 +172,28 @@ class _Boot:
                 yield _control(drive, Command.DISABLE_VOLTAGE)
 
     def _wait_for_standstill(self, drive: Drive) -> Steps[None]:
-        units = AxisUnits(drive, self._robot.base)
+        """Polls take longer than they count here: it has at least the time that it needs."""
+        units, braking = AxisUnits(drive, self._robot.base), Braking(self._robot)
         slow = 0
-        for _ in range(math.ceil(standstill_s(self._robot) / POLL_S)):
+        for poll in range(math.ceil(standstill_s(self._robot) / POLL_S)):
             if not _has_torque((yield from _state(drive))) or slow == STANDING_POLLS:
                 return
             raw = int.from_bytes((yield _read(drive, VELOCITY_ACTUAL)), "little", signed=True)
-            slow = slow + 1 if abs(units.velocity_mps(raw)) < self._robot.base.standstill_mps else 0
+            speed_mps, elapsed_s = abs(units.velocity_mps(raw)), poll * POLL_S
+            if poll == 0:
+                braking.begin(speed_mps, 0.0, elapsed_s, quick=True)
+            slow = slow + 1 if speed_mps < self._robot.base.standstill_mps else 0
+            if not slow and braking.fails(speed_mps, elapsed_s):
+                yield from self._give_up(drive, f"turns at {speed_mps:.3f} m/s {elapsed_s:.1f} s after a quick stop")
             yield Pause(POLL_S, f"{drive.joint} to stand after a quick stop")
-        yield from self._give_up(drive)
+        yield from self._give_up(drive, f"did not stand {standstill_s(self._robot):.1f} s after a quick stop")
 
-    def _give_up(self, drive: Drive) -> Steps[None]:
+    def _give_up(self, drive: Drive, what: str) -> Steps[None]:
         """Setpoints of whoever keeps it moving count no more, then the power goes."""
         yield SendNmt(NmtCommand.ENTER_PRE_OPERATIONAL)
         yield _control(drive, Command.DISABLE_VOLTAGE)
-        problem = f"{drive.joint} did not stand {standstill_s(self._robot):.1f} s after a quick stop"
-        hint = "Its voltage is now disabled; look for another master, and at 605Ah and 6085h"
-        raise BootError(self._node.node_id, problem, hint)
+        hint = "Its voltage is now disabled; look for another master, and at its encoder, 605Ah and 6085h"
+        raise BootError(self._node.node_id, f"{drive.joint} {what}", hint)
 
     def _forget_earlier_masters(self) -> Steps[None]:
         """What they set goes with an NMT reset. Some drives keep a fault for a lost heartbeat until then."""

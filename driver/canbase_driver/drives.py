@@ -147,8 +147,13 @@ class Drives:
 
     def braking_mps(self, now: float) -> float:
         """The greatest speed of a wheel with power that was measured in the last moments; 0: there is none [m/s]."""
-        driven = (each for each in self.axes if self._is_fresh(each, now) and each.state and each.state.has_torque)
-        return max((abs(each.velocity_mps) for each in driven), default=0.0)
+        return max((abs(each.velocity_mps) for each in self.axes if self._is_driven(each, now)), default=0.0)
+
+    def _is_driven(self, axis: Axis, now: float) -> bool:
+        """With power, by fresh values; or it tells its speed alone, by SDO, and may have power."""
+        if axis.state is None:
+            return now - axis.velocity_at <= self._robot.timeouts.feedback_s
+        return self._is_fresh(axis, now) and axis.state.has_torque
 
     def snapshots(self, now: float) -> tuple[DriveSnapshot, ...]:
         """One per axis, in the order of robot.yaml."""

@@ -229,7 +229,7 @@ class RemoteNode:
         return [axis.setpoint(goal, speeds[axis.drive.side], word) for axis, word in zip(self.axes, words, strict=True)]
 
     def stop_by_sdo(self, goal: PowerGoal, now: float) -> list[Frame]:
-        """The controlwords by SDO while it takes no PDOs; it may have left NMT operational with its motors turning."""
+        """Controlwords and speeds by SDO while it takes no PDOs; it may have left NMT operational, motors turning."""
         return [] if self.has_pdos else self._sdo_stop.frames(self.controlwords(goal), now)
 
     def controlwords(self, goal: PowerGoal) -> list[int]:
@@ -297,6 +297,8 @@ class RemoteNode:
             self._boot.on_frame(frame, now)
         elif self.presence is Presence.READY:
             self._measures.on_frame(frame, now)
+        elif (speed := self._sdo_stop.speed(frame)) is not None:
+            self.axes[speed[0]].on_speed(speed[1], now)
         return True
 
     def tick(self, now: float) -> list[Frame]:

@@ -1,7 +1,8 @@
-"""The last way to stop a motor that takes no setpoints any more: its controlword by SDO. Source: CiA 402-2, 6040h.
+"""The last way to stop a motor that takes no setpoints any more: its controlword by SDO, and a look at its speed.
 
 A drive without 6007h that misses a heartbeat leaves NMT operational (CiA 301, 1029h) and may go on turning, deaf to
-PDOs. While the watchdog lives that is its ladder's business; without it nobody else is left.
+PDOs. One that brakes by itself then may do so by a sensor that lies, and sends no TPDO that tells it. While the
+watchdog lives that is its ladder's business; without it nobody else is left. Objects: CiA 402-2, 6040h and 606Ch.
 """
 
 from __future__ import annotations
@@ -10,28 +11,50 @@ import math
 from collections.abc import Sequence
 
 from canbase_config.drive import Drive
-from canbase_config.places import CONTROLWORD
+from canbase_config.places import CONTROLWORD, VELOCITY_ACTUAL, place
 from canbase_driver.boot_settings import write_at
+from canbase_driver.cia301 import SDO_TO_CLIENT
 from canbase_driver.frame import Frame
-from canbase_driver.sdo import SdoClient
+from canbase_driver.sdo import Read, SdoClient, Write
 
-PERIOD_S = 0.05
-"""Between two writes: a drive answers within this, and the answer may be lost."""
+PERIOD_S = 0.02
+"""Between two requests: a drive keeps one, and answers within this."""
+_UPLOADED, _COMMAND, _EXPEDITED = 2 << 5, 7 << 5, 0x02
+"""First byte of an answer to a Read (CiA 301, SDO upload)."""
 
 
 class SdoStop:
-    """Writes the controlwords of one node again and again. Nobody waits for the answers: the wheels tell."""
+    """Writes the controlwords of one node and reads its speeds in turn. Nobody waits: an answer may be lost."""
 
     def __init__(self, node_id: int, drives: Sequence[Drive]) -> None:
         """`drives`: its axes, in the order of the controlwords."""
         self._node_id, self._drives = node_id, drives
+        speeds = [place(drive.kind.layout, VELOCITY_ACTUAL, drive.axis) for drive in drives]
+        self._reads = [Read(at.index, at.sub) for at in speeds]
+        self._sizes = [at.bits // 8 for at in speeds]
         self._sent_at = -math.inf
+        self._turn = 0
 
     def frames(self, controlwords: Sequence[int], now: float) -> list[Frame]:
-        """6040h of each axis, once each PERIOD_S; motors that share one have it written once."""
+        """The next request, once each PERIOD_S: 6040h of each axis, once where motors share one, then 606Ch of each."""
         if now - self._sent_at < PERIOD_S:
             return []
-        self._sent_at = now
         words = zip(self._drives, controlwords, strict=True)
         writes = dict.fromkeys(write_at(drive, CONTROLWORD, word) for drive, word in words)
-        return [SdoClient(self._node_id, PERIOD_S, attempts=1).start(write, now) for write in writes]
+        steps: list[Read | Write] = [*writes, *self._reads]
+        step = steps[self._turn % len(steps)]
+        self._sent_at, self._turn = now, self._turn + 1
+        return [SdoClient(self._node_id, PERIOD_S, attempts=1).start(step, now)]
+
+    def speed(self, frame: Frame) -> tuple[int, int] | None:
+        """Which axis an answer is about, as its place in `drives`, and its 606Ch [raw]. None: it is no speed."""
+        data = frame.data
+        if frame.cob_id != SDO_TO_CLIENT + self._node_id or len(data) != 8:
+            return None
+        if data[0] & _COMMAND != _UPLOADED or not data[0] & _EXPEDITED:
+            return None
+        address = Read(int.from_bytes(data[1:3], "little"), data[3])
+        if address not in self._reads:
+            return None
+        axis = self._reads.index(address)
+        return axis, int.from_bytes(data[4 : 4 + self._sizes[axis]], "little", signed=True)

@@ -118,6 +118,8 @@ class DriverProcess(Process):
         self._send(self._changed(frames))
         self._cycle += 1
         self._publish(now)
+        if self.core.finished:  # as loop.py does
+            self.die()
 
     def _send(self, frames: list[Frame]) -> None:
         if self.bus_problem:

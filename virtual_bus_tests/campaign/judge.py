@@ -80,6 +80,8 @@ EXCUSES = {
     "deaf watchdog": "it cannot keep a standing base from starting; driver and drives miss it within T_react (held)",
     "reset by a stranger": "a drive that another master has reset has forgotten 1016h (heartbeat)",
     "unheard button": "a filter that never heard the button knows of no emergency stop (zero)",
+    "ran away": "a wheel whose sensor lies is faster than ordered, or turns the base, for the times of runaway and "
+    "path at most, and rolls out without power then; its way may be longer than the free one (obstacle)",
     "unproven stand": "a drive with a dead encoder may push for stand_impulse_s before it has to let go, and its wheel "
     "rolls out after that: nothing shows it (standstill)",
     "no watch": "a drive of a kind that watches neither heartbeats nor setpoints goes on turning (heartbeat)",
@@ -226,7 +228,7 @@ class Judge:
             self._touched = False
         elif not self._touched:
             self._touched = True
-            if not pushed and not (blind and tau_s <= slowly_s):
+            if not pushed and not self._motion.ran_away and not (blind and tau_s <= slowly_s):
                 self._violate("obstacle", f"touched at {self._shown}")
 
     def _check_speed(self, tau_s: float, coasting: bool, now: float) -> None:

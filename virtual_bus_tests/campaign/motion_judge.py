@@ -71,6 +71,9 @@ class MotionJudge:
         self._fast_since = self._beside_since = self._lies_since = now
         self._before_mps = 0.0
         self._impulse_s = world.robot.watchdog.stand_impulse_s + JITTER_S
+        self.ran_away = False
+        """Since the base last stood, some wheel was faster than ordered, or the base turned otherwise: `runaway` and
+        `path` bound for how long."""
 
     @property
     def runaway_s(self) -> float:
@@ -90,7 +93,10 @@ class MotionJudge:
             self._fast_since = self._beside_since = self._lies_since = now
         while len(self._orders) > 1 and self._orders[1][0] < now - self._allowed.remembered_s:
             self._orders.popleft()
-        return self._runaway(now) or self._path(now) or self._standstill(now) or ("", "")
+        found = self._runaway(now) or self._path(now) or self._standstill(now) or ("", "")
+        beyond = not math.isclose(now, min(self._fast_since, self._beside_since))
+        self.ran_away = beyond or (self.ran_away and self._shown.fastest_mps > self._allowed.stands_mps)
+        return found
 
     def _powered(self) -> bool:
         nodes = self._world.drives.bench.nodes.values()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bus.crews import robot_with
+from canbase_driver.frame import Frame
 from canbase_driver.sdo_stop import PERIOD_S, SdoStop
 from canbase_driver.snapshot import DriverState
 from unit.chain_world import World, robot_of, world_of
@@ -12,24 +13,64 @@ from unit.chain_world import World, robot_of, world_of
 QUICK_STOP, OFF = 0x02, 0x00
 
 
-def shown(stop: SdoStop, words: list[int], now: float) -> list[str]:
-    return [str(frame) for frame in stop.frames(words, now)]
+def shown(stop: SdoStop, words: list[int], count: int) -> list[str]:
+    """So many requests, one each PERIOD_S."""
+    return [str(frame) for n in range(count) for frame in stop.frames(words, 1.0 + n * 1.001 * PERIOD_S)]
 
 
-def test_each_motor_of_a_node_has_its_own_controlword_written() -> None:
+def test_each_motor_of_a_node_has_its_own_controlword_written_and_its_speed_read() -> None:
     stop = SdoStop(5, robot_of((5, 0, "left"), (5, 1, "right")).drives)
-    assert shown(stop, [QUICK_STOP, OFF], 1.0) == ["605h [2B 40 60 00 02 00 00 00]", "605h [2B 40 68 00 00 00 00 00]"]
+    assert shown(stop, [QUICK_STOP, OFF], 5) == [
+        "605h [2B 40 60 00 02 00 00 00]",
+        "605h [2B 40 68 00 00 00 00 00]",
+        "605h [40 6C 60 00 00 00 00 00]",
+        "605h [40 6C 68 00 00 00 00 00]",
+        "605h [2B 40 60 00 02 00 00 00]",
+    ]
 
 
 def test_motors_that_share_one_have_it_written_once() -> None:
     stop = SdoStop(1, robot_with("zlac8015d").drives)
-    assert shown(stop, [QUICK_STOP, QUICK_STOP], 1.0) == ["601h [2B 40 60 00 02 00 00 00]"]
+    assert shown(stop, [QUICK_STOP, QUICK_STOP], 4) == [
+        "601h [2B 40 60 00 02 00 00 00]",
+        "601h [40 6C 60 01 00 00 00 00]",
+        "601h [40 6C 60 02 00 00 00 00]",
+        "601h [2B 40 60 00 02 00 00 00]",
+    ]
 
 
-def test_it_is_written_again_as_an_answer_may_be_lost_but_not_in_every_cycle() -> None:
+def test_a_drive_is_asked_one_thing_after_the_other() -> None:
     stop = SdoStop(1, robot_of((1, 0, "left"), (2, 0, "right")).drives[:1])
     sent = [bool(stop.frames([QUICK_STOP], 1.0 + i * PERIOD_S / 5)) for i in range(11)]
     assert sent == [True, *[False] * 4, True, *[False] * 4, True]
+
+
+@pytest.mark.parametrize(
+    ("frame", "speed"),
+    [
+        ("585#436C600000FFFFFF", (0, -256)),
+        ("585#436C680005000000", (1, 5)),
+        ("585#426C680005000000", (1, 5)),  # without its size
+        ("586#436C600005000000", None),
+        ("585#4364600005000000", None),
+        ("585#4364", None),
+        ("585#806C600000000206", None),  # an abort
+        ("585#606C600000000000", None),  # an answer to a write
+        ("585#416C600005000000", None),  # a segmented one
+    ],
+)
+def test_a_speed_is_known_by_its_address(frame: str, speed: tuple[int, int] | None) -> None:
+    stop = SdoStop(5, robot_of((5, 0, "left"), (5, 1, "right")).drives)
+    cob_id, data = frame.split("#")
+    assert stop.speed(Frame(int(cob_id, 16), bytes.fromhex(data))) == speed
+
+
+def test_a_narrow_speed_has_a_sign_too() -> None:
+    drives = robot_with("zlac8015d").drives
+    bits = drives[0].kind.layout.velocity_bits
+    stop = SdoStop(1, drives)
+    data = bytes.fromhex("4B6C6002") + (-3).to_bytes(bits // 8, "little", signed=True)
+    assert stop.speed(Frame(0x581, data.ljust(8, b"\0"))) == (1, -3)
 
 
 def written_by_the_driver(world: World, since: int) -> list[str]:

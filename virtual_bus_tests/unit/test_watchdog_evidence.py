@@ -265,6 +265,18 @@ def test_of_a_slow_order_the_time_is_one_at_rated_torque_or_longer_at_less(
     assert wheel.sample(creep, 0.0, torque=torque).unseen
 
 
+@pytest.mark.parametrize(("velocity", "samples"), [(2.0**-7, 16), (2.0**-6, 4), (-(2.0**-6), 4)])
+def test_a_velocity_without_travel_is_no_wheel_that_friction_holds(velocity: float, samples: int) -> None:
+    wheel = held_until_its_order_has_gone()
+    assert not wheel.samples(samples - 1, 0.0, velocity, rolls=0.0, torque=0.25).unseen
+    assert wheel.sample(0.0, velocity, rolls=0.0, torque=0.25).unseen
+
+
+def test_a_wheel_that_just_begins_to_roll_has_its_time() -> None:
+    wheel = held_until_its_order_has_gone()
+    assert wheel.samples(2, 0.0, 2.0**-6, rolls=2.0**-6, torque=0.25).unseen_s == 12.5 / HZ
+
+
 def test_of_a_faster_order_each_moment_counts_whatever_the_torque_is() -> None:
     """Faster than the tolerance of motion, 1/16 m/s; the lag is 8 samples."""
     wheel = held_until_its_order_has_gone()

@@ -320,9 +320,29 @@ def test_a_run_of_syncs_begins_just_when_the_gap_is_over() -> None:
 def test_frames_of_others_are_ignored_without_a_count() -> None:
     it = observer()
     before = look(it)
-    for cob_id in (0x081, 0x183, 0x501, 0x601, 0x77E, 0x1FE, 0x7E5):
+    for cob_id in (0x081, 0x183, 0x501, 0x77E, 0x1FE, 0x7E5):
         it.on_frame(cob_id, bytes(8), 1.0)
     assert (look(it), it.dropped) == (before, 0)
+
+
+@pytest.mark.parametrize(
+    ("data", "by_others"),
+    [
+        ("40 41 60 00 00 00 00 00", False),
+        ("40 64 60 00 00 00 00 00", False),
+        ("40 6c 68 00 00 00 00 00", False),
+        ("2b 40 60 00 00 00 00 00", False),
+        ("40 18 10 01 00 00 00 00", True),  # identity
+        ("22 00 14 01 01 02 00 00", True),  # 1400h
+        ("60 00 00 00 00 00 00 00", True),  # a segment
+        ("80 41 60 00 00 00 04 05", True),  # somebody gives up
+        ("40 41 60", True),
+    ],
+)
+def test_who_asks_a_drive_for_more_than_its_motion_configures_it(data: str, by_others: bool) -> None:
+    it = observer()
+    rx(it, 0x601, data)
+    assert [node.configured_at > NEVER for node in look(it).nodes] == [by_others, False]
 
 
 frames_on_the_bus = st.tuples(st.sampled_from(WATCHED) | st.integers(0, 0x7FF), st.binary(max_size=8))

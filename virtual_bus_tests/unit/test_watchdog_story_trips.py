@@ -120,13 +120,18 @@ def test_the_driver_dies_and_leases_go_on(bits: int) -> None:
     assert {frame.data[1:3] for _, frame in story.since(begin, 0x601)} == {b"\x41\x60", b"\x64\x60", b"\x6c\x60"}
 
 
-def test_after_standstill_it_is_quiet_except_for_heartbeat_state_and_counters() -> None:
+# the driver dies ── 0.3 s: stopped ── each 0.5 s one look at drives that nobody asks by SYNC
+def test_after_standstill_it_sends_heartbeat_state_and_counters_and_looks_now_and_then() -> None:
     story = driving()
     story.driver = False
     story.run(1.5)
     quiet = story.t
     story.run(1.0)
-    assert {frame.cob_id for at, frame in story.sent if at > quiet} == {HEARTBEAT, STATE, COUNTERS}
+    sent = [frame for at, frame in story.sent if at > quiet]
+    assert {frame.cob_id for frame in sent} == {HEARTBEAT, STATE, COUNTERS, 0x601, 0x602}
+    reads = [frame.data[:3].hex() for frame in sent if frame.cob_id == 0x601]
+    assert 3 <= len(reads) <= 6
+    assert set(reads) == {"404160", "406460", "406c60"}
 
 
 @pytest.mark.parametrize("lost", ["heartbeat", "sync"])

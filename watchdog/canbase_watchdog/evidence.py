@@ -11,8 +11,8 @@ that is being stopped can lose its sensor as well (docs/decisions/0020)
    But a wheel that was held, and comes free as its order goes through zero, has nothing to show until the new order
    asked for it: the loop's integral has to turn round, against its friction. So each direction counts apart, and
    orders of both directions have BOTH_WAYS times as much in all. And a slow order may need long until its drive has
-   got over the friction: where that reports no more torque than friction takes, the time counts as time at rated
-   torque, which bounds the speed that a dead encoder hides.
+   got over the friction: where that reports no motion, and no more torque than friction takes, the time counts as time
+   at rated torque, which bounds the speed that a dead encoder hides.
 2. Halted: the velocity of a wheel that rolled drops at once to standstill, as no wheel can, whatever is ordered, and
    the encoder does not move from then on.
 3. Jolts: velocities that change as no wheel can, again and again.
@@ -192,8 +192,9 @@ class EvidenceWatch:
         return one_way or (counted.both_s >= BOTH_WAYS * least_s and counted.both_m >= BOTH_WAYS * least_m)
 
     def _weight(self, torque: float | None) -> float:
-        fast = abs(self._least_mps) > self._slack_mps
-        if torque is None or fast or abs(torque) > STRAIN_SHARE:
+        """Of a moment: less for a wheel that is ordered to move slowly, and has not begun to or just begins."""
+        lags = not self._is_visible(self._velocity_mps) or self._rolled
+        if torque is None or abs(torque) > STRAIN_SHARE or abs(self._least_mps) > self._slack_mps or not lags:
             return 1.0
         return max(abs(torque), LEAST_WEIGHT)
 

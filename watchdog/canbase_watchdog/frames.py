@@ -154,11 +154,19 @@ def decode_sdo(data: bytes) -> tuple[tuple[int, int], int] | None:
     return (index, sub_index), int.from_bytes(data[4 : 4 + size], "little", signed=True)
 
 
+_OF_MOTION = frozenset(index % AXIS_OFFSET for index in (CONTROLWORD, STATUSWORD, POSITION, VELOCITY))
+
+
 def decode_sdo_download(data: bytes) -> int | None:
     """Index that an SDO request begins to write (CiA 301: initiate download, byte 0 = 001xxxxx), else None."""
     if len(data) != 8 or data[0] & 0xE0 != 0x20:
         return None
     return int(_SDO_HEAD.unpack_from(data)[1])
+
+
+def concerns_motion(data: bytes) -> bool:
+    """True for an SDO request as the watchdog sends them: it begins to read or write 6040h, 6041h, 6064h or 606Ch."""
+    return len(data) == 8 and data[0] >> 5 in (1, 2) and _SDO_HEAD.unpack_from(data)[1] % AXIS_OFFSET in _OF_MOTION
 
 
 def takes_power_away(data: bytes) -> bool:

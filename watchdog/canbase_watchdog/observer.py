@@ -117,6 +117,7 @@ class Observer:
         self._records = {(drive.node_id, drive.axis): _Record(drive, config, now) for drive in config.drives}
         self._heartbeat_at = {node_id: NEVER for node_id, _ in self._records}
         self._heard_at, self._boot_up_at = dict(self._heartbeat_at), dict(self._heartbeat_at)
+        self._configured_at = dict(self._heartbeat_at)
         self._foreign = Foreign(config)
         self._driver_at = self._sync_at = self._sync_since = NEVER
         self._routes: dict[int, Callable[[bytes, float], bool]] = {}
@@ -138,7 +139,7 @@ class Observer:
             tuple([record.axis() for record in self._records.values()]),
             tuple(
                 [
-                    Node(node_id, at, self._heard_at[node_id], self._boot_up_at[node_id])
+                    Node(node_id, at, self._heard_at[node_id], self._boot_up_at[node_id], self._configured_at[node_id])
                     for node_id, at in self._heartbeat_at.items()
                 ]
             ),
@@ -306,6 +307,8 @@ class Observer:
         stops = written is not None and written % frames.AXIS_OFFSET == _CONTROLWORD and frames.takes_power_away(data)
         if written is not None and written % frames.AXIS_OFFSET in _COMMANDS and not stops:
             self._note_foreign(node_id, f"an SDO that writes {written:04X}h", now)
+        if not frames.concerns_motion(data):
+            self._configured_at[node_id] = now
         return True
 
     def _note_foreign(self, node_id: int, detail: str, now: float) -> None:

@@ -24,6 +24,10 @@ STALE_S = 0.02
 """While it is stopped, feedback that is older is read: two cycles, or an SDO's way to and fro."""
 RESET_PERIOD_S = 1.0
 """A drive needs so long to start anew."""
+AGAIN_S = 0.5
+"""A stopped node that tells nothing is read again so often, while nobody configures it ..."""
+FRESH_S = 1.5
+"""... and a reset needs a look at it that is no older: two motors take 0.3 s."""
 SEEK_PERIOD_S = 0.5
 """A node of which nothing is known after the start is asked so seldom that tools find the SDO channel free."""
 
@@ -73,6 +77,11 @@ class Stopper:
         """True when the node stands and is off or held, as its feedback said, or when there is no such node."""
         return (self.climb.stopped and self._seen.seen_at > self.climb.since) or not self._seen.present
 
+    def is_fresh(self, now: float) -> bool:
+        """Whether what says so came in the last moments: a wheel that was stopped may roll again, or may have rolled
+        unseen. Of a node that nobody has ever heard nothing comes."""
+        return now < self._seen.seen_at + FRESH_S or not self._seen.present
+
     def tick(self, view: View, now: float) -> list[Frame]:
         """Look at the node, climb where the rules say so, and return the frames that are due."""
         self._follow(view)
@@ -110,7 +119,7 @@ class Stopper:
         return Look(
             enabled=any(axis.enabled for axis in axes),
             powered=any(axis.powered for axis in axes),
-            standing=self._is_untold(seen_at) or all(self._stands(axis) for axis in axes),
+            standing=self._is_untold(axes) or all(self._stands(axis) for axis in axes),
             speed_mps=max(abs(axis.velocity_mps) for axis in axes),
             begin_mps=max(self._begin_mps(axis) for axis in axes),
             seen_at=seen_at,
@@ -120,9 +129,13 @@ class Stopper:
             reading_s=self._axis_count * REQUESTS * SDO_PERIOD_S,
         )
 
-    def _is_untold(self, seen_at: float) -> bool:
-        """Nothing is known of it since the start: it is neither said to move, nor stopped."""
-        return seen_at <= self._resting_since < math.inf
+    def _is_untold(self, axes: Sequence[Axis]) -> bool:
+        """Since the start something is not known of it: it is neither said to move, nor stopped.
+
+        A statusword that says that it has power is enough to stop it, whoever asked for that.
+        """
+        seen_at, powered = min(axis.seen_at for axis in axes), any(axis.powered for axis in axes)
+        return seen_at <= self._resting_since < math.inf and not powered
 
     def _stands(self, axis: Axis) -> bool:
         """Standing takes several samples to prove. Until then a drive that was found off is not stopped in vain.
@@ -168,11 +181,12 @@ class Stopper:
         return [frames.pre_operational(self._node_id)]
 
     def _sdo(self, view: View, defied: bool, now: float) -> list[Frame]:
-        """The next request in turn. A stopped node that nobody commands is left alone: the driver may configure it."""
-        seeks = self.climb.stopped and not defied and self._is_unknown(view, now)
+        """The next request in turn. A stopped node that tells what it does, or is configured, is left alone."""
+        rests = self.climb.stopped and not defied
+        seeks = rests and self._is_unknown(view, now)
         stopped_s = SEEK_PERIOD_S if seeks else IDLE_SDO_PERIOD_S
         period_s = stopped_s if self.climb.stopped else SDO_PERIOD_S
-        if now < self._sdo_at + period_s or (self.climb.stopped and not defied and not seeks):
+        if now < self._sdo_at + period_s or (rests and not seeks and not self._is_old(view, now)):
             return []
         requests = self._requests(view, now)
         if not requests:
@@ -184,7 +198,12 @@ class Stopper:
     def _is_unknown(self, view: View, now: float) -> bool:
         """Since the start it has told nothing, and no driver makes it: it may turn as it did before the start."""
         heard_at = max(self._resting_since, view.bus.driver_at)
-        return self._is_untold(self._seen.seen_at) and now >= heard_at + self._config.drive_heartbeat_s
+        return self._is_untold(self._axes(view)) and now >= heard_at + self._config.drive_heartbeat_s
+
+    def _is_old(self, view: View, now: float) -> bool:
+        """It told something once, and has not of late; and nobody else needs its SDO channel."""
+        told_at, quiet_since = self._seen.seen_at, view.node(self._node_id).configured_at
+        return told_at > NEVER and now >= max(told_at, quiet_since) + AGAIN_S
 
     def _requests(self, view: View, now: float) -> Sequence[Frame]:
         """Writes of this rung, and readings of what TPDOs do not tell (no SYNC, or pre-operational)."""

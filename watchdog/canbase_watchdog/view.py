@@ -87,6 +87,8 @@ class Node:
     heard_at: float = NEVER
     boot_up_at: float = NEVER
     """When a boot-up came from it although it had just reported that it was enabled."""
+    configured_at: float = NEVER
+    """When somebody last asked it by SDO for anything but its motion: a boot or a tool."""
 
 
 @dataclass(frozen=True, slots=True)

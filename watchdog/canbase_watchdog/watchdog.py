@@ -292,7 +292,8 @@ class Watchdog:
         if self._state is not State.TRIPPED:
             return Answer.NOT_TRIPPED
         view = self._look(now)
-        if not self._settled or policy.stands(self._verdict, view, self._config, now):
+        fresh = all(stopper.is_fresh(now) for stopper in self._stoppers)
+        if not self._settled or not fresh or policy.stands(self._verdict, view, self._config, now):
             return Answer.CAUSE_STANDS
         if policy.velocity_ordered(view, self._config, now):
             return Answer.VELOCITY_ORDERED
