@@ -17,6 +17,8 @@ from canbase_driver.units import AxisUnits
 
 STEP_MARGIN = 3.0
 """An encoder step in one cycle is possible up to this many times the fastest wheel: cycles come early and late."""
+LETS_GO_SHARE = 0.5
+"""Of watchdog.stand_impulse_s: the watchdog counts from signs of life of its own, and must not be first."""
 GAP_MAX_S = 60.0
 """A gap in the feedback counts as this long at most: what a wheel can have done in it stays far from a wrap."""
 
@@ -37,7 +39,7 @@ class Axis:
         step_m = STEP_MARGIN * Limiter(robot.limits, robot.base.track_m).wheel_mps / robot.rates.control_hz
         self.travel = WheelTravel(metres_per_count, max(1.0, step_m / abs(metres_per_count)))
         self.stillness = Stillness(StillnessLimits.of(robot, drive), metres_per_count)
-        self.push = Push(robot.watchdog.stand_impulse_s, metres_per_count)
+        self.push = Push(LETS_GO_SHARE * robot.watchdog.stand_impulse_s, metres_per_count)
         self._feedback_s = robot.timeouts.feedback_s
         self._layout = layout.profile.layout
         self._setpoint_cob_id = layout.setpoint_cob_id(drive.axis)
@@ -45,6 +47,8 @@ class Axis:
         self._control_hz = robot.rates.control_hz
         self._restarts = 0
         self._status_is_new = False
+        self._known_mps, self._known_at = 0.0, -math.inf
+        """How fast it was when it was lost, and when."""
 
     @property
     def position_rad(self) -> float:
@@ -72,6 +76,8 @@ class Axis:
     def forget(self) -> None:
         """What was heard no longer counts: the drive restarted, or its bus did."""
         self._restarts += self.status_at > -math.inf
+        if self.velocity_at > -math.inf:
+            self._known_mps, self._known_at = self.velocity_mps, self.velocity_at
         self.status_at = self.velocity_at = -math.inf
         self.state = None
         self.velocity_mps = 0.0
@@ -112,8 +118,16 @@ class Axis:
         return True
 
     def on_speed(self, raw: int, now: float) -> None:
-        """Take 606Ch that was read by SDO, after `forget`: how fast it is, and no evidence that it stands."""
+        """Take 606Ch that was read by SDO, after `forget`: how fast it is, and no evidence that it stands.
+
+        Where nothing can have braked it so much since it was lost, its sensor is none either.
+        """
         self.velocity_mps, self.velocity_at = self.units.velocity_mps(raw), now
+        if self.stillness.is_sudden(abs(self._known_mps) - abs(self.velocity_mps), now - self._known_at):
+            after_s = now - self._known_at
+            self.stillness.distrust(
+                f"went from {self._known_mps:.2f} to {self.velocity_mps:.2f} m/s in {after_s:.2f} s"
+            )
 
     def sample_taken(self) -> None:
         """The core has taken the new sample into the odometry."""

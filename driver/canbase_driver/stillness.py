@@ -82,7 +82,11 @@ class Stillness:
         self._quiet = False
 
     def forget(self) -> None:
-        """What was measured no longer counts, after a restart. Doubts and the time without power stay."""
+        """What was measured no longer counts, after a restart. Doubts and the time without power stay.
+
+        Who judged a sudden stop until then may not see it any more.
+        """
+        self._follows = False
         if not self._sudden:
             self._stopping.forget()
         self.pause()
@@ -130,6 +134,12 @@ class Stillness:
             f"or its encoder is dead; turn it by hand by {stopping.missing_m + 0.001:.3f} m, or wait until its power "
             f"has been off for {self._limits.coasting_s:.0f} s"
         )
+
+    def is_sudden(self, lost_mps: float, elapsed_s: float) -> bool:
+        """Whether a wheel that lost so much speed was braked harder than it can be, noise apart."""
+        limits = self._limits
+        hardest_mps2 = max(limits.braking_mps2, limits.rolling_mps2)
+        return lost_mps > hardest_mps2 * elapsed_s + limits.noise_mps
 
     def distrust(self, why: str) -> None:
         """Somebody else has caught the sensors with a lie."""

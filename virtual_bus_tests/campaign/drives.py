@@ -16,6 +16,8 @@ from canbase_bench.world.bench import Bench, BenchParameters
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID
 
 HEARTBEATS = {0x700 + DRIVER_NODE_ID: "driver", 0x700 + WATCHDOG_NODE_ID: "watchdog"}
+ROLLS_SHARE = 0.02
+"""Of its greatest force: less neither brakes nor drives a wheel."""
 
 
 class Drives:
@@ -40,13 +42,20 @@ class Drives:
         self.heard = dict.fromkeys(self.bench.nodes, bus.clock.now)
         self.ordered = dict.fromkeys(self.bench.nodes, bus.clock.now)
         """When each node last heard a setpoint of its own."""
-        motors = [self.axis(wheel).motor for wheel in range(len(drawn.robot.drives))]
-        pairs = list(zip(drawn.robot.drives, motors, strict=True))
-        self.sides = tuple(tuple(motor for drive, motor in pairs if drive.side == side) for side in ("left", "right"))
-        """The motors of each side, whose wheels turn together."""
+        axes = [self.axis(wheel) for wheel in range(len(drawn.robot.drives))]
+        pairs = list(zip(drawn.robot.drives, axes, strict=True))
+        self.sides = tuple(tuple(axis for drive, axis in pairs if drive.side == side) for side in ("left", "right"))
+        """The axes of each side, whose wheels turn together."""
         self.moved_at = bus.clock.now
         self._answers = False
         self._poll()
+
+    @staticmethod
+    def rolls(axis: Axis) -> bool:
+        """Its wheel rolls: the motor has no power, or gives no force as its drive sees no motion of a dead encoder."""
+        motor = axis.motor
+        blind = not axis.encoder.closes_loop and abs(motor.force_n) <= ROLLS_SHARE * motor.peak_force_n
+        return blind or not motor.powered
 
     def place(self, wheel: int) -> tuple[int, int]:
         """Node id and axis of a wheel, counted in the order of robot.yaml, and round again."""

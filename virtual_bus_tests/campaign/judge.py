@@ -22,7 +22,7 @@ from campaign.motion_judge import MotionJudge
 from campaign.odometry_judge import OdometryJudge
 from campaign.outside import Outside, Surroundings
 from campaign.plan import Plan
-from campaign.reach import Reach
+from campaign.reach import BRAKES_S, Reach
 from campaign.shown import Shown
 from campaign.strangers import SENT_S, Strangers
 from campaign.wishes import Wishes
@@ -42,6 +42,12 @@ OBEY_S = RUNGS[Step.QUICK_STOP].obey_s
 """A base that starts just when something is latched goes on until the stop has reached its drives."""
 LONGEST_S = 20.0
 """No base needs longer to stop."""
+ROUNDING_S = 0.002
+"""Of τ, from one step to the next one."""
+TURNED_RAD = 0.35
+"""What was ahead of a base that has turned by so much is beside it."""
+SWING_SHARE, SWING_S = 0.1, 0.3
+"""Of the speed that it braked from: a loaded base swings back as its drives' velocity loops do, for so long."""
 HEARD_S = 0.3
 """The stop button says ten times a second that it is pressed: the filter has heard it then, if it runs."""
 FOUND_S = 0.6
@@ -124,6 +130,9 @@ class Judge:
         self._rests_since = math.inf
         """When the last reset was done, as long as nobody has had the base move since."""
         self._hold: Envelope | None = None
+        self._from_mps = self._acts_s = 0.0
+        """The fastest wheel since something is latched; and for how long whoever moved it last may."""
+        self._acted_at = -math.inf
         self._stood = False
         self._latched_at = self._again_since = now
         self._again_tau_s = 0.0
@@ -228,7 +237,8 @@ class Judge:
             self._touched = False
         elif not self._touched:
             self._touched = True
-            if not pushed and not self._motion.ran_away and not (blind and tau_s <= slowly_s):
+            excused = pushed or self._motion.ran_away or self._around.turned_rad > TURNED_RAD
+            if not excused and not (blind and tau_s <= slowly_s):
                 self._violate("obstacle", f"touched at {self._shown}")
 
     def _check_speed(self, tau_s: float, coasting: bool, now: float) -> None:
@@ -241,6 +251,10 @@ class Judge:
             self._violate("sources", f"{self._shown}: {tau_s:.3f} s to stop, the sources want {allowed_s:.3f} s")
         if self._hold is None:
             return
+        self._from_mps = max(self._from_mps, self._shown.fastest_mps)
+        acts_s = self._reach.acts_s(now, self._motion.runaway_s)
+        if acts_s > 0.0:
+            self._acts_s, self._acted_at = acts_s, now
         base = self._world.drives.bench.base
         stands = tau_s == 0.0 and moving_s(self._world.robot, base.v_mps, base.w_radps) == 0.0
         self._stood = self._stood or (stands and now >= self._latched_at + OBEY_S)
@@ -264,13 +278,16 @@ class Judge:
 
     def _moves_again(self, tau_s: float, now: float) -> bool:
         """After a stop: longer than what moves it may, or faster and faster when that has lost its power."""
-        acts_s = self._reach.acts_s(now, self._motion.runaway_s)
-        if acts_s > 0.0:
+        if now <= self._again_since + SWING_S and self._shown.fastest_mps <= SWING_SHARE * self._from_mps:
             self._again_tau_s = tau_s
-            return now > self._again_since + acts_s
-        rolls_out = tau_s <= self._again_tau_s and not any(self._reach.turning())
+            return False
+        if now <= self._acted_at + STEP_S:
+            self._again_tau_s = math.inf  # it may have got faster until the very moment when its power went
+            return now > self._again_since + self._acts_s
+        rolls_out = now <= self._acted_at + BRAKES_S or not any(self._reach.turning())
+        slows = tau_s <= self._again_tau_s + ROUNDING_S
         self._again_tau_s = min(tau_s, self._again_tau_s)
-        return not rolls_out
+        return not (slows and rolls_out)
 
     def _check_latches(self, now: float) -> None:
         watchdog = self._world.watchdog
@@ -317,6 +334,7 @@ class Judge:
             self._hold = None
         elif self._hold is None:
             self._hold, self._stood, self._latched_at = Envelope(self.react_s, now, self._coasting), False, now
+            self._from_mps = self._shown.fastest_mps
 
     def _check_drives(self, now: float) -> None:
         robot = self._world.robot
@@ -363,8 +381,9 @@ class Judge:
             self._violate("goal", f"goal {goal.number} succeeded {off_m:.3f} m beside its distance")
 
     def _coasts(self) -> bool:
-        """The wheels of one side have no power: they roll."""
-        return any(not any(motor.powered for motor in side) for side in self._world.drives.sides)
+        """The wheels of one side roll: no motor of it brakes."""
+        drives = self._world.drives
+        return any(all(drives.rolls(axis) for axis in side) for side in drives.sides)
 
     def _was_pushed(self) -> bool:
         """Strange hands moved the base after the wall came, or just before."""

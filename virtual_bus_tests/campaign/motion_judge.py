@@ -73,7 +73,7 @@ class MotionJudge:
         self._impulse_s = world.robot.watchdog.stand_impulse_s + JITTER_S
         self.ran_away = False
         """Since the base last stood, some wheel was faster than ordered, or the base turned otherwise: `runaway` and
-        `path` bound for how long."""
+        `path` bound for how long. Or a wheel with a dead encoder rolls, which no drive can brake."""
 
     @property
     def runaway_s(self) -> float:
@@ -94,7 +94,7 @@ class MotionJudge:
         while len(self._orders) > 1 and self._orders[1][0] < now - self._allowed.remembered_s:
             self._orders.popleft()
         found = self._runaway(now) or self._path(now) or self._standstill(now) or ("", "")
-        beyond = not math.isclose(now, min(self._fast_since, self._beside_since))
+        beyond = not math.isclose(now, min(self._fast_since, self._beside_since)) or self._shown.is_blind
         self.ran_away = beyond or (self.ran_away and self._shown.fastest_mps > self._allowed.stands_mps)
         return found
 
@@ -102,10 +102,21 @@ class MotionJudge:
         nodes = self._world.drives.bench.nodes.values()
         return any(axis.motor.powered for node in nodes for axis in node.axes)
 
+    def _driven_mps(self) -> float:
+        """The faster side with a motor that drives or brakes it."""
+        drives, speeds = self._world.drives, (self._shown.left_mps, self._shown.right_mps)
+        sides = zip(speeds, drives.sides, strict=True)
+        return max((abs(mps) for mps, side in sides if not all(map(drives.rolls, side))), default=0.0)
+
+    def _rolls_blindly(self) -> bool:
+        """The wheels of a side roll, with power, as their drives see nothing of it."""
+        drives = self._world.drives
+        return any(any(axis.motor.powered for axis in side) and all(map(drives.rolls, side)) for side in drives.sides)
+
     def _runaway(self, now: float) -> tuple[str, str] | None:
         ordered_mps = max(abs(t.linear_mps) + abs(t.angular_radps) * self._half_m for _, t in self._orders)
-        wheel_mps = self._shown.fastest_mps
-        if wheel_mps <= ordered_mps + self._allowed.runaway_mps or not self._powered():
+        wheel_mps = self._driven_mps()
+        if wheel_mps <= ordered_mps + self._allowed.runaway_mps:
             self._fast_since = now
         if now <= self._fast_since + self._allowed.runaway_s:
             return None
@@ -117,7 +128,7 @@ class MotionJudge:
         low, high = min(0.0, *turns, 0.0), max(0.0, *turns, 0.0)
         turn = self._shown.angular_radps
         slack = self._allowed.path_radps + PATH_SHARE * max(-low, high)
-        if low - slack <= turn <= high + slack or not self._powered():
+        if low - slack <= turn <= high + slack or not self._powered() or self._rolls_blindly():
             self._beside_since = now
         if now <= self._beside_since + self._allowed.path_s:
             return None

@@ -1,6 +1,7 @@
 """Is the driver's pose a pose that the base can have? Compared with the ground truth.
 
 From each standstill after the driver's start, or after the driver said that it missed some travel (`travel_losses`).
+A second drive with the same node id tells another position, while the first one is silent too: nobody can know.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from canbase_action_server.along_track import Pose, displacement
 from canbase_config.stopping import max_wheel_mps
 
 BRAKES_MPS = 0.2
-"""So much faster the base may have been when the newest sample was taken."""
+"""So much faster, or by what the drives brake since then, the base may have been when the newest sample was taken."""
 FLOOR_M, SHARE = 0.01, 0.03
 """What encoder steps, inner steps of the plant and cycles of different length may differ by."""
 
@@ -25,6 +26,10 @@ class OdometryJudge:
         self._fastest_mps = max_wheel_mps(world.robot)
         self._late_s = world.robot.timeouts.feedback_s + 2.0 / world.robot.rates.control_hz
         """So old the newest sample may be while the driver calls its odometry valid."""
+        limits = world.robot.limits
+        self._braked_mps = self._late_s * (
+            limits.deceleration_mps2 + limits.angular_deceleration_radps2 * world.robot.base.track_m / 2.0
+        )
         self._core: object = None
         self._seen_at = 0.0
         self._losses = 0
@@ -41,6 +46,8 @@ class OdometryJudge:
         self._seen_at = snapshot.time_s
         if driver.core is not self._core:
             self._core, self._last, self._origins = driver.core, None, None
+        if self._world.intruder.twin:
+            self._origins = None
         if snapshot.travel_losses != self._losses:
             self._losses, self._origins = snapshot.travel_losses, None
         if not snapshot.odometry_valid:
@@ -65,6 +72,6 @@ class OdometryJudge:
             self._origins, self._path_from_m = (pose, truth), base.path_m
         seen, true = displacement(self._origins[0], pose), displacement(self._origins[1], truth)
         off_m = math.hypot(seen.along_m - true.along_m, seen.lateral_m - true.lateral_m)
-        rim_mps = max(abs(base.v_left_mps), abs(base.v_right_mps)) + BRAKES_MPS
+        rim_mps = max(abs(base.v_left_mps), abs(base.v_right_mps)) + max(BRAKES_MPS, self._braked_mps)
         possible_m = FLOOR_M + SHARE * (base.path_m - self._path_from_m) + self._late_s * rim_mps
         return f"pose is {off_m:.3f} m beside the true one" if off_m > possible_m else ""

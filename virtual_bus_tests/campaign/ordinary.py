@@ -36,6 +36,9 @@ HARDEST_SHARE: Final = 0.85
 """... but brakes no wheel harder than this share of watchdog.jolt_mps2: whoever meets something harder is stopped."""
 CARPET: Final = (1.0, 1.0, 2.0, 4.0)
 """Dry friction, in multiples of the bare floor's."""
+STIFF_SHARE: Final = 0.8
+"""A drive that has to turn its torque round against the friction does so within this share of motion_missing_m: one
+that is softer needs a longer way there."""
 RAMP_SHARES: Final = (1.0, 1.0, 0.5, 0.3)
 """The drives' own ramps, as a share of the limits' acceleration; the watchdog counts on a quarter."""
 NOISE_MPS: Final = (0.0, 0.0, 0.002, 0.005)
@@ -173,7 +176,10 @@ class OrdinaryHour:
         body, base = self.drawn.body, self.world.drives.bench.base
         factor = self.random.choice(CARPET)
         room_n = max(0.0, body.peak_force_n - self._needs_n())
-        self._carpet_n = min((factor - 1.0) * body.coulomb_n, room_n / 2.0)
+        tuned_for_kg = body.mass_kg / len(self.drawn.robot.drives) + body.wheel_mass_kg
+        stiffness_npm = tuned_for_kg * (body.bandwidth_radps / 2.0) ** 2
+        most_n = STIFF_SHARE * self.drawn.robot.watchdog.motion_missing_m * stiffness_npm / 2.0 - body.coulomb_n
+        self._carpet_n = max(0.0, min((factor - 1.0) * body.coulomb_n, room_n / 2.0, most_n))
         for side in ("left", "right"):
             base.hold(side, self._carpet_n * len(self.drawn.robot.drives) / 2.0)
 

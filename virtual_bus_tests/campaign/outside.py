@@ -83,7 +83,7 @@ class Surroundings:
         self.wall_m: float | None = None
         self.wall_at = -math.inf
         """When it came."""
-        self._wall_from_m = 0.0
+        self._wall_from_m = self._wall_from_rad = 0.0
         self.reset: Callable[[], None] = lambda: None
         """The operator asks for a reset; set by who plays the operator."""
         self._scan()
@@ -106,11 +106,16 @@ class Surroundings:
         noticing_m = (abs(base.v_mps) + SPEEDING_UP_MPS) * sees_s
         self.wall_at = self._world.clock.now
         self.wall_m = safety.padding_m + safety.stop_distance_m + braking_m + noticing_m + margin_m
-        self._wall_from_m = base.travel_m
+        self._wall_from_m, self._wall_from_rad = base.travel_m, base.turned_rad
 
     def take_wall(self) -> None:
         """The wall is gone."""
         self.wall_m = None
+
+    @property
+    def turned_rad(self) -> float:
+        """How far the base is turned away from the wall that was put."""
+        return abs(self._world.drives.bench.base.turned_rad - self._wall_from_rad)
 
     @property
     def free_m(self) -> tuple[float, float]:

@@ -8,11 +8,12 @@ quick stop closes its loop on that sensor. STO, wired, stops both. A watchdog th
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from campaign.envelope import tolerance_mps
 from campaign.world import World
 from canbase_bench.cia301.dictionary import key
+from canbase_bench.cia402.axis import Axis
 from canbase_bench.cia402.states import State
 from canbase_bench.node import SimulatedNode
 from canbase_bench.personality import PERSONALITIES
@@ -35,7 +36,7 @@ class Reach:
         self.alone_s = self.personality.alone_s(world.robot.timeouts.drive_heartbeat_s)
         """After so long without a word a drive of this kind begins to stop by itself [s]; infinity: never."""
         self._wheels = [(*world.drives.place(wheel), drive.side) for wheel, drive in enumerate(world.robot.drives)]
-        self._moves_mps = tolerance_mps(world.robot)
+        self._moves_mps = tolerance_mps(world.robot) / 2.0
         self.lost = False
         self.was_lost = False
         """It was so since the base last stood."""
@@ -82,15 +83,19 @@ class Reach:
     def acts_s(self, now: float, lies_s: float) -> float:
         """So long a wheel may turn again after a stop, before somebody has to have acted [s]; 0: nobody has a reason.
 
-        `lies_s`: for a wheel with power whose encoder lies. A drive that nobody reaches ends its setpoint by itself.
+        `lies_s`: for a wheel with power whose encoder lies, or whose drive does not brake. Infinity: for one that
+        nobody reaches, until it has ended its setpoint by itself.
         """
         nodes = self._world.drives.bench.nodes
         longest_s = 0.0
         for node_id, _ in self.turning():
-            lies = any(axis.encoder.scale != 1.0 or not axis.encoder.closes_loop for axis in nodes[node_id].axes)
-            left_s = self.heard(node_id) + self.alone_s - now + BRAKES_S
-            alone = not self._reached(node_id) and self.stops_alone(node_id)
-            longest_s = max(longest_s, lies_s if lies else 0.0, left_s if alone else 0.0)
+            axes = nodes[node_id].axes
+            lies = any(axis.encoder.scale != 1.0 or not axis.encoder.closes_loop for axis in axes) or self._is_weak(
+                axes
+            )
+            waits = now < self.heard(node_id) + self.alone_s + BRAKES_S
+            alone = not self._reached(node_id) and self.stops_alone(node_id) and waits
+            longest_s = max(longest_s, lies_s if lies else 0.0, math.inf if alone else 0.0)
         return longest_s
 
     def _is_lost(self, node_id: int, now: float) -> bool:
@@ -128,9 +133,13 @@ class Reach:
         Or it does not brake in it.
         """
         node = self._world.drives.bench.nodes[node_id]
+        lies = self._lies(node) or self._is_weak(node.axes)
+        return lies and any(axis.state is State.FAULT_REACTION_ACTIVE for axis in node.axes)
+
+    def _is_weak(self, axes: Iterable[Axis]) -> bool:
+        """A quick stop, or a fault reaction, of one of them has hardly an effect."""
         least_mps2 = BRAKING_SHARE * self._world.robot.limits.deceleration_mps2
-        weak = any(axis.motor.stop_mps2 < least_mps2 for axis in node.axes)
-        return (self._lies(node) or weak) and any(axis.state is State.FAULT_REACTION_ACTIVE for axis in node.axes)
+        return any(axis.motor.stop_mps2 < least_mps2 for axis in axes)
 
     @staticmethod
     def _lies(node: SimulatedNode) -> bool:

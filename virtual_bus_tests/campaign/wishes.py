@@ -6,6 +6,8 @@ from campaign.envelope import braking_s
 from canbase_config.robot import Robot
 from canbase_velocity.twist import Twist
 
+RECENT_S = 0.05
+
 
 class Wishes:
     """Each source's last command holds for its timeout in robot.yaml.
@@ -20,6 +22,8 @@ class Wishes:
         self._neutral_after = {source.topic: source.neutral_after_s for source in robot.mux.sources.values()}
         self._held: set[str] = set()
         self._last: dict[str, tuple[float, float]] = dict.fromkeys(self._timeouts, (0.0, now))
+        self._before = dict(self._last)
+        """The greatest one of RECENT_S before it: who takes the newest of two hands on one stick may take the other."""
 
     def take(self, topic: str, twist: Twist, now: float) -> None:
         """A message on any topic; only sources count, and only finite commands."""
@@ -28,6 +32,8 @@ class Wishes:
         patience_s = self._neutral_after[topic]
         if twist.is_zero or (patience_s and now > self._last[topic][1] + patience_s):
             self._held.discard(topic)
+        before = self._last[topic], self._before[topic]
+        self._before[topic] = max((each for each in before if now <= each[1] + RECENT_S), default=(0.0, now))
         self._last[topic] = braking_s(self._robot, twist.linear_mps, twist.angular_radps), now
 
     def on_reset(self, now: float) -> None:
@@ -40,4 +46,6 @@ class Wishes:
 
     def _orders_s(self, topic: str, now: float) -> float:
         tau_s, at = self._last[topic]
-        return tau_s if now <= at + self._timeouts[topic] else 0.0
+        before_s, before_at = self._before[topic]
+        recent_s = before_s if now <= before_at + RECENT_S else 0.0
+        return max(tau_s if now <= at + self._timeouts[topic] else 0.0, recent_s)

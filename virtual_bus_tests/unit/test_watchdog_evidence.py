@@ -73,7 +73,7 @@ class Wheel:
 
 
 def test_at_the_start_nothing_speaks_against_a_wheel() -> None:
-    assert Wheel().last == Evidence(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False, 0, 0, 0.0, True)
+    assert Wheel().last == Evidence(trusted=True, unseen=False, ghost=False)
 
 
 def test_before_the_first_setpoint_nothing_is_ordered() -> None:
@@ -275,6 +275,8 @@ def test_a_velocity_without_travel_is_no_wheel_that_friction_holds(velocity: flo
 def test_a_wheel_that_just_begins_to_roll_has_its_time() -> None:
     wheel = held_until_its_order_has_gone()
     assert wheel.samples(2, 0.0, 2.0**-6, rolls=2.0**-6, torque=0.25).unseen_s == 12.5 / HZ
+    other = held_until_its_order_has_gone()
+    assert other.samples(2, 0.0, 2.0**-6, rolls=2.0**-6).unseen_s == 12.5 / HZ  # whether it tells a torque or not
 
 
 def test_of_a_faster_order_each_moment_counts_whatever_the_torque_is() -> None:
@@ -295,7 +297,7 @@ def test_an_order_to_the_other_side_counts_apart(sign: int) -> None:
     wheel = rolling(sign * 0.5)
     wheel.samples(12, sign * 0.5, 0.0)
     last = wheel.sample(-sign * 0.25, 0.0)
-    assert (last.unseen_s, last.unseen_m, last.both_s, last.both_m) == (0.0, 0.25 / HZ, 12 / HZ, 6.25 / HZ)
+    assert (last.unseen_s, last.unseen_m, last.both_s, last.both_m) == (0.0, 0.25 / HZ, 12 / HZ, 6 / HZ)
     last = wheel.samples(8 + 8, -sign * 0.25, 0.0)
     assert (last.unseen, last.unseen_s, last.both_s) == (False, 8 / HZ, 20 / HZ)
 
@@ -311,13 +313,17 @@ def test_orders_to_and_fro_have_half_as_much_again_in_all() -> None:
     assert (last.both_s, last.unseen_s, last.unseen) == (24 / HZ, 3 / HZ, True)
 
 
-def test_to_and_fro_needs_its_way_too() -> None:
-    """3/2 of 1/16 m, of 1/32 m/s: 3 s."""
+def test_orders_to_and_fro_that_ask_for_nothing_in_sum_have_eight_times_the_time() -> None:
+    """They wind up nothing: 1/32 m/s, 1/64 m to each side of where they began, until 2 s have counted."""
     wheel = rolling(2.0**-5)
-    last = wheel.samples(100, 2.0**-5, 0.0)
-    assert (last.both_s > 0.375, last.unseen) == (True, False)
-    assert not wheel.samples(90, -(2.0**-5), 0.0).unseen
-    assert wheel.samples(2, -(2.0**-5), 0.0).unseen
+    last = wheel.samples(32, 2.0**-5, 0.0)
+    for n in range(30):
+        last = wheel.samples(64, -(2.0**-5) * (-1) ** n, 0.0)
+        assert last.both_m <= 2.0**-5 + 2.0**-5 / HZ
+        if last.unseen:
+            break
+    assert (last.unseen, last.both_s >= 2.0, last.unseen_s < 2.0) == (True, True, True)
+    assert last.both_s < 2.0 + 64 / HZ
 
 
 def test_a_sign_of_life_begins_both_directions_anew() -> None:
@@ -489,7 +495,52 @@ def test_a_jolt_after_a_long_time_is_the_first_again() -> None:
     assert wheel.sample(0.5, 0.0).jolts == 1
 
 
-# --- 4: slower than the least that the setpoints ask for
+# --- 4: a velocity without travel
+
+
+@pytest.mark.parametrize("velocity", [0.25, -0.25, 2.0**-6, -(2.0**-9)])
+@pytest.mark.parametrize("enabled", [True, False])
+def test_a_velocity_one_way_that_the_encoder_does_not_show_is_a_ghost(velocity: float, enabled: bool) -> None:
+    """0.1 s after the last sign of life for 0.1 s at least, and two signs of life at least, whatever is ordered."""
+    wheel = Wheel()
+    wheel.sample(0.0, velocity, rolls=1.0)
+    n, last = 0, wheel.last
+    while not last.ghost and n < 10000:
+        n, last = n + 1, wheel.sample(0.0, velocity, rolls=0.0, enabled=enabled)
+    way_n = 2.0 * wheel.watch._life_m / abs(velocity) * HZ
+    assert (last.ghost, last.trusted) == (True, False)
+    assert max(7, way_n) + 5 <= n <= max(7, way_n) + 9
+
+
+def test_noise_to_both_sides_and_zeros_are_none() -> None:
+    wheel = Wheel()
+    for n in range(1000):
+        assert wheel.sample(0.0, (-1) ** n * 0.25 if n % 8 else 0.0, rolls=0.0).ghost_m <= 0.25 / HZ
+    assert not wheel.last.ghost
+
+
+def test_a_wheel_that_shows_signs_of_life_is_none_however_slow() -> None:
+    wheel = Wheel()
+    assert not wheel.samples(5000, 0.0, 2.0**-7).ghost
+
+
+def test_a_filtered_velocity_that_fades_after_a_hard_stop_is_none() -> None:
+    wheel = rolling(0.5)
+    for n in range(40):
+        assert not wheel.sample(0.0, 0.5 * 0.5**n, rolls=0.0, powered=n < 20).ghost
+
+
+def test_it_outlives_the_power_but_not_a_reset() -> None:
+    wheel = Wheel()
+    wheel.sample(0.0, 2.0**-9, rolls=1.0)
+    before = wheel.samples(32, 0.0, 2.0**-9, rolls=0.0)
+    assert before.ghost_m > 0.0
+    assert wheel.samples(4, 0.0, 2.0**-9, rolls=0.0, powered=False).ghost_m > before.ghost_m
+    wheel.watch.trust()
+    assert wheel.last.ghost_m == 0.0
+
+
+# --- 5: slower than the least that the setpoints ask for
 
 
 @pytest.mark.parametrize("sign", [1, -1])

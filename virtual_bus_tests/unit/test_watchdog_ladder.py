@@ -278,6 +278,18 @@ def test_a_stand_that_a_liar_showed_was_none(step: Step, then: Step) -> None:
     assert go(assumed, replace(STANDING, trusted=False), 99.0).stopped
 
 
+# standing, and held with power, from 10.0 on ── 0.2 s for the drive or the driver ── power off
+@pytest.mark.parametrize(("now", "step"), [(10.199, Step.QUICK_STOP), (10.2, Step.DISABLE_VOLTAGE)])
+def test_a_drive_that_goes_on_holding_loses_its_power(now: float, step: Step) -> None:
+    held = replace(STANDING, powered=True)
+    stood = go(FOOT, held, 10.0)
+    assert stood.stopped
+    assert go(stood, replace(held, seen_at=now), now).step is step
+    assert go(stood, replace(STANDING, seen_at=now), now).step is Step.QUICK_STOP
+    off = replace(stood, step=Step.DISABLE_VOLTAGE)
+    assert go(off, replace(held, seen_at=now), now).stopped
+
+
 def test_it_stays_stopped_while_it_stands() -> None:
     stood = replace(FOOT, stopped=True, judged_at=STANDING.seen_at)
     assert go(stood, STANDING, 99.0) == stood

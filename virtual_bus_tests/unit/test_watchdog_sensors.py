@@ -89,7 +89,7 @@ def course(world: World, within_s: float) -> Course:
         ("encoder_lost", 0.3, IMPLAUSIBLE, 0.07, 0.7),
         ("encoder_lost", 0.8, IMPLAUSIBLE, 0.07, 1.2),
         ("encoder_zero", 0.3, IMPLAUSIBLE, 0.07, 0.7),
-        ("encoder_frozen", 0.05, MISSING, 0.28, 1.5),
+        ("encoder_frozen", 0.05, IMPLAUSIBLE, 0.25, 1.5),
         ("encoder_frozen", 0.3, IMPLAUSIBLE, 0.25, 1.5),
         ("encoder_reversed", 0.3, Cause.MOTION_OUTSIDE, 0.12, 1.0),
         ("encoder_intermittent", 0.3, IMPLAUSIBLE, 0.07, 0.7),

@@ -122,6 +122,27 @@ def test_pushed_in_vain_is_time_at_rated_torque_or_longer_at_less(share: float, 
     assert bus.watch.in_vain
 
 
+@pytest.mark.parametrize(("setpoint", "samples"), [(0.005, 25), (0.004, 32), (0.0025, 50), (0.0001, 50)])
+def test_a_wheel_that_is_ordered_to_creep_takes_longer_to_show_it(setpoint: float, samples: int) -> None:
+    """Slower than 5 mm/s, base.standstill_mps; half of that at most."""
+    bus = Bus().moved()
+    bus.run(samples - 1, -1.2, setpoint)
+    assert not bus.watch.in_vain
+    bus.run(2, -1.2, setpoint)
+    assert bus.watch.in_vain
+
+
+@pytest.mark.parametrize(
+    ("share", "counts"), [(-0.64, False), (-0.66, True), (0.64, False), (1.09, False), (1.11, True)]
+)
+def test_friction_takes_as_much_one_way_as_the_other(share: float, counts: bool) -> None:
+    """0.6 of the rated torque at the last sign of life."""
+    bus = Bus()
+    bus.run(2, 0.6, 0.2, step=10)
+    bus.run(60, share, 0.1)
+    assert (bus.watch.last.vain_s > 0.0) == counts
+
+
 def test_pushed_in_vain_adds_up_over_orders_until_the_encoder_moves() -> None:
     bus = Bus().moved()
     for _ in range(4):

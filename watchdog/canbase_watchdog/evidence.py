@@ -1,6 +1,6 @@
 """Whether a wheel shows the motion that it is ordered: the lower bounds of motion. It measures; policy.py decides.
 
-Rules, 1 and 4 for an enabled drive and the setpoint that a SYNC made effective, 2 and 3 for one with power: a wheel
+Rules, 1 and 5 for an enabled drive and the setpoint that a SYNC made effective, the others for one with power: a wheel
 that is being stopped can lose its sensor as well (docs/decisions/0020)
 1. Unseen: ordered to move, and the encoder has not moved: net, from one place to another, for an encoder that jitters
    moves nothing. The ordered travel adds up until it moves, however slow the order is; a setpoint of zero adds nothing
@@ -9,16 +9,19 @@ that is being stopped can lose its sensor as well (docs/decisions/0020)
    that. Once enough travel was ordered it adds up without such an order too: a wheel runs away after its order; but
    not while nothing is ordered of any wheel and none moves: then its drive has to let go, which torque.py watches.
    But a wheel that was held, and comes free as its order goes through zero, has nothing to show until the new order
-   asked for it: the loop's integral has to turn round, against its friction. So each direction counts apart, and
-   orders of both directions have BOTH_WAYS times as much in all. And a slow order may need long until its drive has
+   asked for it: the loop's integral has to turn round, against its friction. So each direction counts apart. What
+   orders of both directions ask for in sum winds up the integral of a dead encoder: that may be BOTH_WAYS as much, and
+   the time LONGEST as much where it stays small. And a slow order may need long until its drive has
    got over the friction: where that reports no motion, and no more torque than friction takes, the time counts as time
    at rated torque, which bounds the speed that a dead encoder hides.
 2. Halted: the velocity of a wheel that rolled drops at once to standstill, as no wheel can, whatever is ordered, and
    the encoder does not move from then on.
 3. Jolts: velocities that change as no wheel can, again and again.
-4. Behind: slower than the least that the setpoints of the last `drive_lag_s` ask for, reached by `slowest_ramp_mps2`.
+4. Ghost: the velocity says that the wheel turns, one way, and the encoder does not move. Its drive pushes against a
+   motion that there is not, also with nothing ordered and after it has let go.
+5. Behind: slower than the least that the setpoints of the last `drive_lag_s` ask for, reached by `slowest_ramp_mps2`.
    It adds up while the wheel is too slow, and goes down as fast while it is not.
-A sensor that did 1 to 3, or contradicts itself, is not trusted until a reset.
+A sensor that did 1 to 4, or contradicts itself, is not trusted until a reset.
 """
 
 from __future__ import annotations
@@ -39,11 +42,15 @@ STRAIN_SHARE = 0.5
 """Of the rated torque: friction takes less, and from one direction to the other changes it by less."""
 LEAST_WEIGHT = 0.25
 """A wheel that cannot turn, and takes no torque for it, is found all the same."""
-BOTH_WAYS = 1.5
-"""Of what one direction may lack. What was ordered in both of them winds up the integral less than it adds up here."""
+BOTH_WAYS, LONGEST = 1.5, 8.0
+"""Of what one direction may lack."""
 ROLLING_SHARE = 0.5
 """An encoder that moved by more than this share of what the velocity says: the wheel really rolled."""
 JOLT_MEMORY_S = 1.0
+GHOST_LIVES = 2.0
+"""So many signs of life the velocity may tell of that the encoder does not show, ..."""
+GHOST_LAG_S = 0.1
+"""... apart from this time after the last one: 606Ch may be filtered, and a wheel may meet something hard."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,15 +64,19 @@ class Evidence:
     """Since the order last went through zero."""
     both_s: float = 0.0
     both_m: float = 0.0
-    """Of both directions."""
+    """Of both directions: the time, and how far the sum of the ordered travel, with its sign, has come about."""
     unseen: bool = False
     """Time and travel are beyond what is allowed, of one direction or of both: rule 1."""
     halted: int = 0
     """Samples in a row without any motion after a drop that no wheel can do: rule 2."""
     jolts: int = 0
     """Changes of the velocity that no wheel can do, none more than JOLT_MEMORY_S after the one before: rule 3."""
+    ghost_m: float = 0.0
+    """Travel by the velocity alone: rule 4."""
+    ghost: bool = False
+    """It is beyond what is allowed."""
     behind_s: float = 0.0
-    """Rule 4."""
+    """Rule 5."""
     trusted: bool = True
 
 
@@ -85,7 +96,10 @@ class EvidenceWatch:
         self._setpoint_mps = self._ordered_mps = 0.0
         self._least_mps = self._velocity_mps = self._direction = 0.0
         self._rolled = self._rests = False
+        self._sum_m = self._low_m = self._high_m = 0.0
+        """Of the ordered travel with its sign, since there was no power or the last sign of life."""
         self._jolted_at = -math.inf
+        self._lived_at, self._ghost_s = now, 0.0
         self.last = Evidence()
 
     def on_sync(self, rests: bool) -> None:
@@ -101,6 +115,8 @@ class EvidenceWatch:
     def trust(self) -> None:
         """A reset was accepted: everything begins anew."""
         self._life.begin()
+        self._wind(0.0, begin=True)
+        self._ghost_s = 0.0
         self.last = Evidence()
 
     def doubt(self) -> None:
@@ -126,8 +142,11 @@ class EvidenceWatch:
         self._velocity_mps = velocity_mps
         self._rolled = step_m is not None and abs(step_m) > ROLLING_SHARE * abs(velocity_mps) * elapsed_s
         self._ask(elapsed_s, now, enabled)
+        ghost_m = self._ghost_m(lives or step_m is None, velocity_mps, elapsed_s, now)
         kept_m = self._kept_m(lives)
-        before = Evidence(unseen_m=kept_m, both_m=kept_m, trusted=self.last.trusted)
+        before = Evidence(unseen_m=kept_m, both_m=kept_m, ghost_m=ghost_m, trusted=self.last.trusted)
+        if not enabled:
+            self._wind(0.0, begin=True)
         if not powered:
             self.last = before
             return
@@ -135,6 +154,7 @@ class EvidenceWatch:
             before = self._unseen(lives, step_m is not None, elapsed_s, torque)
         halted, jolts = self._halted(jolted and rolled, lives), self._jolts(jolted, now)
         samples, unseen = self._config.feedback_samples, self._is_unseen(before)
+        ghost = abs(ghost_m) >= GHOST_LIVES * self._life_m and self._ghost_s >= GHOST_LAG_S
         self.last = replace(
             before,
             ordered_mps=self._ordered_mps,
@@ -142,8 +162,10 @@ class EvidenceWatch:
             unseen=unseen,
             halted=halted,
             jolts=jolts,
+            ghost_m=ghost_m,
+            ghost=ghost,
             behind_s=self._behind_s(velocity_mps, elapsed_s) if enabled else 0.0,
-            trusted=self.last.trusted and not unseen and halted < samples and jolts < self._config.jolts,
+            trusted=self.last.trusted and not unseen and not ghost and halted < samples and jolts < self._config.jolts,
         )
 
     def _is_visible(self, ordered_mps: float) -> bool:
@@ -167,6 +189,7 @@ class EvidenceWatch:
         last, trusted = self.last, self.last.trusted
         if lives:
             self._direction = 0.0
+            self._wind(0.0, begin=True)
             return Evidence(trusted=trusted)
         if not known:
             return Evidence(
@@ -182,21 +205,34 @@ class EvidenceWatch:
             unseen_s=step_s + (0.0 if turned else last.unseen_s),
             unseen_m=unseen_m,
             both_s=last.both_s + step_s,
-            both_m=last.both_m + step_m,
+            both_m=last.both_m + self._wind(self._setpoint_mps * elapsed_s),
             trusted=trusted,
         )
+
+    def _wind(self, step_m: float, begin: bool = False) -> float:
+        """The sum goes on by so much; by how much more it has come about than before."""
+        if begin:
+            self._sum_m = self._low_m = self._high_m = 0.0
+        before_m = self._high_m - self._low_m
+        self._sum_m += step_m
+        self._low_m, self._high_m = min(self._low_m, self._sum_m), max(self._high_m, self._sum_m)
+        return self._high_m - self._low_m - before_m
 
     def _is_unseen(self, counted: Evidence) -> bool:
         least_s, least_m = self._config.motion_missing_s, self._unseen_m
         one_way = counted.unseen_s >= least_s and counted.unseen_m >= least_m
-        return one_way or (counted.both_s >= BOTH_WAYS * least_s and counted.both_m >= BOTH_WAYS * least_m)
+        both = counted.both_s >= BOTH_WAYS * least_s and counted.both_m >= BOTH_WAYS * least_m
+        turned = counted.both_s > counted.unseen_s
+        return one_way or both or (turned and counted.both_s >= LONGEST * least_s)
 
     def _weight(self, torque: float | None) -> float:
         """Of a moment: less for a wheel that is ordered to move slowly, and has not begun to or just begins."""
-        lags = not self._is_visible(self._velocity_mps) or self._rolled
-        if torque is None or abs(torque) > STRAIN_SHARE or abs(self._least_mps) > self._slack_mps or not lags:
+        begins = self._is_visible(self._velocity_mps) and self._rolled
+        if abs(self._least_mps) > self._slack_mps or (self._is_visible(self._velocity_mps) and not begins):
             return 1.0
-        return max(abs(torque), LEAST_WEIGHT)
+        if torque is None:
+            return LEAST_WEIGHT if begins else 1.0
+        return 1.0 if abs(torque) > STRAIN_SHARE else max(abs(torque), LEAST_WEIGHT)
 
     def _kept_m(self, lives: bool) -> float:
         return 0.0 if lives else min(self.last.both_m, KEPT_SHARE * self._unseen_m)
@@ -207,6 +243,16 @@ class EvidenceWatch:
         if halts:
             return 1
         return self.last.halted + 1 if self.last.halted and not lives else 0
+
+    def _ghost_m(self, lives: bool, velocity_mps: float, elapsed_s: float, now: float) -> float:
+        """Noise changes its sign, and one bad sample is over soon. It goes on without power: the sensor is the same."""
+        if lives:
+            self._lived_at = now
+        if now < self._lived_at + GHOST_LAG_S or velocity_mps * self.last.ghost_m < 0.0 or velocity_mps == 0.0:
+            self._ghost_s = 0.0
+            return 0.0
+        self._ghost_s += elapsed_s
+        return self.last.ghost_m + velocity_mps * elapsed_s
 
     def _jolts(self, jolted: bool, now: float) -> int:
         before = self.last.jolts if now < self._jolted_at + JOLT_MEMORY_S else 0

@@ -24,6 +24,8 @@ scale that is a little wrong have no memory. An error of more than travel_tolera
 JUMP_FACTOR = 3.0
 """A step of the encoder beyond so many times the fastest wheel's is a jump: it tells nothing about the motion."""
 JUMP_CYCLES = 2.0
+SWING_SHARE, SWING_S = 0.08, 0.3
+"""A loaded wheel swings beyond its setpoint as its velocity loop does: by this share of the fastest one of so long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +56,7 @@ class FeedbackWatch:
         self._fastest_mps = config.overspeed_factor * config.max_wheel_mps
         self._forward, self._backward = Peak(config.drive_lag_s), Peak(config.drive_lag_s)
         self._ahead, self._behind = Overshoot(), Overshoot()
+        self._fastest = Peak(SWING_S)
         self._target_mps = 0.0
         self._high = self._low = config.max_wheel_mps
         for peak in (self._forward, self._backward):
@@ -70,6 +73,7 @@ class FeedbackWatch:
         self._target_mps = target_mps
         self._forward.set(target_mps, now, math.inf)
         self._backward.set(-target_mps, now, math.inf)
+        self._fastest.set(abs(target_mps), now, math.inf)
 
     def on_position(self, counts: int) -> None:
         """6064h of a status TPDO; the velocity of the same SYNC follows."""
@@ -100,7 +104,8 @@ class FeedbackWatch:
             self.last = Feedback(-self._low, self._high)
             return
         config, last = self._config, self.last
-        slack = self._fixed_mps + config.motion_tolerance_share * max(self._low, self._high)
+        swing_mps = SWING_SHARE * self._fastest.greatest(now)
+        slack = self._fixed_mps + max(config.motion_tolerance_share * max(self._low, self._high), swing_mps)
         forward_mps, backward_mps = self._overshoots(velocity_mps, slack, elapsed_s, now)
         inside = -self._low - slack - backward_mps <= velocity_mps <= self._high + slack + forward_mps
         self.last = Feedback(

@@ -48,6 +48,8 @@ RUNGS = {
 
 READINGS = 2.0
 """One reading may be lost."""
+HELD_S = 0.2
+"""A drive that holds a wheel at standstill has so long to switch off, by itself (605Ah) or as the driver says."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +114,7 @@ class Climb:
     since: float
     begin_mps: float
     stopped: bool = False
+    stopped_at: float = math.inf
     assumed: bool = False
     """Stopped without evidence: its power is off for longer than a wheel rolls."""
     runaway: bool = False
@@ -133,7 +136,8 @@ def advance(before: Climb, look: Look, braking: Braking, now: float) -> Climb:
 
     1. stopped, and enabled again: next rung, somebody works against us; but no reset before the power was ordered off;
     2. stopped, and moving, or its sensor is caught with a lie after that: not stopped, same rung from the start, or the
-       one before the reset. How long its power is off goes on counting: a look that cannot tell drives no wheel;
+       one before the reset. How long its power is off goes on counting: a look that cannot tell drives no wheel. With
+       power for HELD_S: power off, for what holds a wheel by a sensor that stays where it is may drive it;
     3. not enabled and standing, by feedback that came on this rung: stopped. Where the sensor cannot be trusted, its
        power must be off as well, for as long as a wheel may roll: then a stand is assumed;
     4. never heard of, and not told to have power: stays, there is nothing to climb for;
@@ -146,15 +150,9 @@ def advance(before: Climb, look: Look, braking: Braking, now: float) -> Climb:
     """
     climb = _judged(before, look, braking, now)
     if climb.stopped:
-        if look.enabled:
-            return _to(min(climb.step + 1, Step.HEARTBEAT_WITHHELD), climb, look, now)
-        stands = look.standing and (look.trusted or climb.assumed)
-        step = min(climb.step, Step.HEARTBEAT_WITHHELD)
-        return (
-            climb if stands else replace(first(look, now), step=step, runaway=climb.runaway, off_since=climb.off_since)
-        )
+        return _stopped(climb, look, now)
     if look.standing and look.seen_at > climb.since and _holds(climb, look, braking, now):
-        return replace(climb, stopped=True, assumed=not look.trusted)
+        return replace(climb, stopped=True, stopped_at=now, assumed=not look.trusted)
     if not look.present:
         return climb
     if not look.trusted and climb.step < Step.DISABLE_VOLTAGE:
@@ -162,6 +160,16 @@ def advance(before: Climb, look: Look, braking: Braking, now: float) -> Climb:
     if climb.against >= braking.samples or look.unslowed:
         return replace(_to(max(climb.step + 1, Step.DISABLE_VOLTAGE), climb, look, now), runaway=True)
     return _up(climb, look, now) if _disobeys(climb, look, now) else climb
+
+
+def _stopped(climb: Climb, look: Look, now: float) -> Climb:
+    if look.enabled:
+        return _to(min(climb.step + 1, Step.HEARTBEAT_WITHHELD), climb, look, now)
+    if not look.standing or not (look.trusted or climb.assumed):
+        step = min(climb.step, Step.HEARTBEAT_WITHHELD)
+        return replace(first(look, now), step=step, runaway=climb.runaway, off_since=climb.off_since)
+    is_held = look.powered and climb.step < Step.DISABLE_VOLTAGE and now >= climb.stopped_at + HELD_S
+    return _to(Step.DISABLE_VOLTAGE, climb, look, now) if is_held else climb
 
 
 def _judged(climb: Climb, look: Look, braking: Braking, now: float) -> Climb:

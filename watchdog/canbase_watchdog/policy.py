@@ -259,6 +259,11 @@ def _implausible(axis: Axis, config: WatchdogConfig) -> str:
             f"reports {axis.velocity_mps:.3f} m/s, and {evidence.jolts} changes of speed that no wheel can do "
             f"(watchdog.jolt_mps2 {config.jolt_mps2:g} m/s²)"
         )
+    if evidence.ghost:
+        return (
+            f"reports {axis.velocity_mps:.3f} m/s, {evidence.ghost_m:.3f} m in all, and its encoder does not move: "
+            "its drive pushes against a motion that there is not; see encoder"
+        )
     if axis.feedback.implausible >= samples:
         return (
             f"reports {axis.velocity_mps:.3f} m/s, and its encoder tells otherwise: "

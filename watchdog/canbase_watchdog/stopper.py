@@ -68,7 +68,8 @@ class Stopper:
         self._slowing: list[SlowingWatch] = []
         self._begin_slowing(now)
         self._seen = self._look(view)
-        self.climb: Climb = replace(first(self._seen, now), stopped=resting, assumed=resting and not trusted)
+        foot = first(self._seen, now)
+        self.climb: Climb = replace(foot, stopped=resting, stopped_at=now, assumed=resting and not trusted)
         self._quick_stop_at = self._nmt_at = self._sdo_at = self._reset_at = NEVER
         self._sdo_turn = 0
 
