@@ -187,7 +187,8 @@ def test_the_sentences_about_evidence_have_the_values() -> None:
         "no wheel stops so fast (watchdog.jolt_mps2 20 m/s²)",
         "wheel_1_0 reports 0.100 m/s, and 5 changes of speed that no wheel can do (watchdog.jolt_mps2 20 m/s²)",
         "wheel_1_0 is ordered 0.300 m/s, and its encoder has not moved for 0.300 s and 0.090 m of its orders "
-        "(allowed 0.250 s and 0.010 m, to and fro 1.5 times that); it reports 0.100 m/s: see encoder, motor, wheel",
+        "(allowed 0.250 s and 0.010 m, to and fro 2 times that way: watchdog.motion_missing_m); it reports 0.100 m/s: "
+        "see encoder, motor, wheel",
         "wheel_1_0 turns at 0.100 m/s, its setpoints ask for 0.300 m/s for 0.500 s "
         "(allowed 0.500 s; slow ramps: watchdog.slowest_ramp_mps2)",
     ]

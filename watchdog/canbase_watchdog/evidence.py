@@ -9,9 +9,8 @@ that is being stopped can lose its sensor as well (docs/decisions/0020)
    that. Once enough travel was ordered it adds up without such an order too: a wheel runs away after its order; but
    not while nothing is ordered of any wheel and none moves: then its drive has to let go, which torque.py watches.
    But a wheel that was held, and comes free as its order goes through zero, has nothing to show until the new order
-   asked for it: the loop's integral has to turn round, against its friction. So each direction counts apart. What
-   orders of both directions ask for in sum winds up the integral of a dead encoder: that may be BOTH_WAYS as much, and
-   the time LONGEST as much where it stays small. And a slow order may need long until its drive has
+   asked for it: the loop's integral has to turn round, against its friction. So each direction counts apart, and
+   orders to and fro have BOTH_WAYS times the travel in all. And a slow order may need long until its drive has
    got over the friction: where that reports no motion, and no more torque than friction takes, the time counts as time
    at rated torque, which bounds the speed that a dead encoder hides.
 2. Halted: the velocity of a wheel that rolled drops at once to standstill, as no wheel can, whatever is ordered, and
@@ -42,7 +41,7 @@ STRAIN_SHARE = 0.5
 """Of the rated torque: friction takes less, and from one direction to the other changes it by less."""
 LEAST_WEIGHT = 0.25
 """A wheel that cannot turn, and takes no torque for it, is found all the same."""
-BOTH_WAYS, LONGEST = 1.5, 8.0
+BOTH_WAYS = 2.0
 """Of what one direction may lack."""
 ROLLING_SHARE = 0.5
 """An encoder that moved by more than this share of what the velocity says: the wheel really rolled."""
@@ -64,7 +63,7 @@ class Evidence:
     """Since the order last went through zero."""
     both_s: float = 0.0
     both_m: float = 0.0
-    """Of both directions: the time, and how far the sum of the ordered travel, with its sign, has come about."""
+    """Of both directions, the time since they asked for as much as one may lack."""
     unseen: bool = False
     """Time and travel are beyond what is allowed, of one direction or of both: rule 1."""
     halted: int = 0
@@ -96,8 +95,6 @@ class EvidenceWatch:
         self._setpoint_mps = self._ordered_mps = 0.0
         self._least_mps = self._velocity_mps = self._direction = 0.0
         self._rolled = self._rests = False
-        self._sum_m = self._low_m = self._high_m = 0.0
-        """Of the ordered travel with its sign, since there was no power or the last sign of life."""
         self._jolted_at = -math.inf
         self._lived_at, self._ghost_s = now, 0.0
         self.last = Evidence()
@@ -115,7 +112,6 @@ class EvidenceWatch:
     def trust(self) -> None:
         """A reset was accepted: everything begins anew."""
         self._life.begin()
-        self._wind(0.0, begin=True)
         self._ghost_s = 0.0
         self.last = Evidence()
 
@@ -145,8 +141,6 @@ class EvidenceWatch:
         ghost_m = self._ghost_m(lives or step_m is None, velocity_mps, elapsed_s, now)
         kept_m = self._kept_m(lives)
         before = Evidence(unseen_m=kept_m, both_m=kept_m, ghost_m=ghost_m, trusted=self.last.trusted)
-        if not enabled:
-            self._wind(0.0, begin=True)
         if not powered:
             self.last = before
             return
@@ -189,7 +183,6 @@ class EvidenceWatch:
         last, trusted = self.last, self.last.trusted
         if lives:
             self._direction = 0.0
-            self._wind(0.0, begin=True)
             return Evidence(trusted=trusted)
         if not known:
             return Evidence(
@@ -199,31 +192,21 @@ class EvidenceWatch:
         self._direction = self._setpoint_mps or self._direction
         step_m = abs(self._setpoint_mps) * elapsed_s
         unseen_m = step_m + (0.0 if turned else last.unseen_m)
+        both_m = step_m + last.both_m
+        step_s = 0.0 if self._rests else elapsed_s * self._weight(torque)
         asked = unseen_m >= self._unseen_m or (self._is_visible(self._least_mps) and unseen_m >= self._life_m)
-        step_s = elapsed_s * self._weight(torque) if asked and not self._rests else 0.0
         return Evidence(
-            unseen_s=step_s + (0.0 if turned else last.unseen_s),
+            unseen_s=(step_s if asked else 0.0) + (0.0 if turned else last.unseen_s),
             unseen_m=unseen_m,
-            both_s=last.both_s + step_s,
-            both_m=last.both_m + self._wind(self._setpoint_mps * elapsed_s),
+            both_s=last.both_s + (step_s if both_m >= self._unseen_m else 0.0),
+            both_m=both_m,
             trusted=trusted,
         )
-
-    def _wind(self, step_m: float, begin: bool = False) -> float:
-        """The sum goes on by so much; by how much more it has come about than before."""
-        if begin:
-            self._sum_m = self._low_m = self._high_m = 0.0
-        before_m = self._high_m - self._low_m
-        self._sum_m += step_m
-        self._low_m, self._high_m = min(self._low_m, self._sum_m), max(self._high_m, self._sum_m)
-        return self._high_m - self._low_m - before_m
 
     def _is_unseen(self, counted: Evidence) -> bool:
         least_s, least_m = self._config.motion_missing_s, self._unseen_m
         one_way = counted.unseen_s >= least_s and counted.unseen_m >= least_m
-        both = counted.both_s >= BOTH_WAYS * least_s and counted.both_m >= BOTH_WAYS * least_m
-        turned = counted.both_s > counted.unseen_s
-        return one_way or both or (turned and counted.both_s >= LONGEST * least_s)
+        return one_way or (counted.both_s >= least_s and counted.both_m >= BOTH_WAYS * least_m)
 
     def _weight(self, torque: float | None) -> float:
         """Of a moment: less for a wheel that is ordered to move slowly, and has not begun to or just begins."""

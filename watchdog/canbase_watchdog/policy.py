@@ -285,9 +285,10 @@ def _missing(axis: Axis, config: WatchdogConfig) -> str:
     evidence = axis.evidence
     if evidence.unseen:
         return (
-            f"is ordered {evidence.setpoint_mps:.3f} m/s, and its encoder has not moved for {evidence.both_s:.3f} s "
-            f"and {evidence.both_m:.3f} m of its orders (allowed {config.motion_missing_s:.3f} s and "
-            f"{config.motion_missing_m:.3f} m, to and fro {BOTH_WAYS:g} times that); it reports "
+            f"is ordered {evidence.setpoint_mps:.3f} m/s, and its encoder has not moved for "
+            f"{max(evidence.unseen_s, evidence.both_s):.3f} s and {evidence.both_m:.3f} m of its orders (allowed "
+            f"{config.motion_missing_s:.3f} s and {config.motion_missing_m:.3f} m, to and fro {BOTH_WAYS:g} times that "
+            f"way: watchdog.motion_missing_m); it reports "
             f"{axis.velocity_mps:.3f} m/s: see encoder, motor, wheel"
         )
     if axis.push.vain_s >= config.motion_missing_s:
