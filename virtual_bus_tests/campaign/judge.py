@@ -42,6 +42,8 @@ OBEY_S = RUNGS[Step.QUICK_STOP].obey_s
 """A base that starts just when something is latched goes on until the stop has reached its drives."""
 LONGEST_S = 20.0
 """No base needs longer to stop."""
+RAMP_LATE_S = 0.3
+"""One drive of several may still be on its own ramp, when the others that held it have let go."""
 ROUNDING_S = 0.002
 """Of τ, from one step to the next one."""
 TURNED_RAD = 0.35
@@ -130,7 +132,7 @@ class Judge:
         self._rests_since = math.inf
         """When the last reset was done, as long as nobody has had the base move since."""
         self._hold: Envelope | None = None
-        self._from_mps = self._acts_s = 0.0
+        self._from_mps = self._from_tau_s = self._acts_s = 0.0
         """The fastest wheel since something is latched; and for how long whoever moved it last may."""
         self._acted_at = -math.inf
         self._stood = False
@@ -256,10 +258,15 @@ class Judge:
         if acts_s > 0.0:
             self._acts_s, self._acted_at = acts_s, now
         base = self._world.drives.bench.base
-        stands = tau_s == 0.0 and moving_s(self._world.robot, base.v_mps, base.w_radps) == 0.0
+        rests = moving_s(self._world.robot, base.v_mps, base.w_radps) == 0.0
+        stands = tau_s == 0.0 and rests
         self._stood = self._stood or (stands and now >= self._latched_at + OBEY_S)
         excused = self._reach.was_lost or now < max(self._strangers.sent_at, self._strangers.deaf_at) + self.react_s
-        again = self._moves_again(tau_s, now) if self._stood and tau_s > 0.0 and not excused else self._rest_again(now)
+        again = (
+            self._moves_again(tau_s, now)
+            if self._stood and tau_s > 0.0 and not excused and not rests
+            else self._rest_again(now)
+        )
         if tau_s > self._hold.bound_s(tau_s, now, coasting, self._reach.lost) or again:
             self._violate("held", f"{self._shown} while {' and '.join(self._latches)} latched")
 
@@ -278,6 +285,10 @@ class Judge:
 
     def _moves_again(self, tau_s: float, now: float) -> bool:
         """After a stop: longer than what moves it may, or faster and faster when that has lost its power."""
+        on_its_ramp = tau_s <= self._from_tau_s + RAMP_LATE_S - (now - self._latched_at)
+        if on_its_ramp:
+            self._again_tau_s = tau_s
+            return False
         if now <= self._again_since + SWING_S and self._shown.fastest_mps <= SWING_SHARE * self._from_mps:
             self._again_tau_s = tau_s
             return False
@@ -334,7 +345,9 @@ class Judge:
             self._hold = None
         elif self._hold is None:
             self._hold, self._stood, self._latched_at = Envelope(self.react_s, now, self._coasting), False, now
-            self._from_mps = self._shown.fastest_mps
+            shown = self._shown
+            self._from_mps = shown.fastest_mps
+            self._from_tau_s = moving_s(self._world.robot, shown.linear_mps, shown.angular_radps)
 
     def _check_drives(self, now: float) -> None:
         robot = self._world.robot

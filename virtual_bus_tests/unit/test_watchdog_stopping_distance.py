@@ -189,3 +189,23 @@ def test_what_was_braked_with_power_is_not_braked_again_without_it() -> None:
     wheel.sample(0.02, 0.0, 0.04)
     wheel.powered = False
     assert wheel.lost(samples=30)
+
+
+# 0.5 m/s ── lost: unproven ── 0.1 s ── it shows 0.45 m/s again ── lost again, for good
+def test_a_wheel_that_moves_again_before_it_can_have_rolled_out_has_never_stood() -> None:
+    wheel = Wheel(powered=False).turns(30, 0.5)
+    assert wheel.lost()
+    wheel.turns(60, 0.45)
+    assert wheel.brakes(0.45, 5.0).lost()
+    assert wheel.watch.stands
+    wheel.watch.trust()
+    assert not wheel.watch.unproven
+
+
+@pytest.mark.parametrize(("mps", "wait_s"), [(0.04, 0.5), (0.45, 2.1)])
+def test_a_wheel_that_is_turned_slowly_or_later_has_stood(mps: float, wait_s: float) -> None:
+    wheel = Wheel(powered=False).turns(30, 0.5)
+    assert wheel.lost()
+    wheel.turns(round(wait_s / CYCLE_S), 0.0)
+    wheel.turns(100, mps)
+    assert not wheel.brakes(mps, 5.0).lost()

@@ -7,7 +7,8 @@ Rules, with `standstill_mps` s and `motion_tolerance_mps` n:
 Anything else is motion: so is a wheel of which position or velocity did not come. The driver has the same rules in code
 of its own. No frames here, no judgement of the sensor: that is evidence.py. But a standstill that came on less travel
 than a wheel needs to stop is unproven (stopping_distance.py), until the encoder has shown it, or the wheel has been
-without power for so long that it has rolled out and gets power again.
+without power for so long that it has rolled out and gets power again. One that moves again before that, without power,
+has never stood: its encoder comes and goes.
 """
 
 from __future__ import annotations
@@ -56,6 +57,8 @@ class StandWatch:
         self._stopping = StoppingDistance(config.motion_tolerance_mps, self._grain_m)
         self._encoder_mps, self._mean_s = 0.0, math.inf
         self._sudden, self._sudden_since = 0, -math.inf
+        self._never_stood = False
+        """It moved again sooner than it can have rolled out: what it showed as standstill was none."""
         self._off_since, self._was_powered = math.inf, False
 
     def on_position(self, counts: int, now: float) -> None:
@@ -83,6 +86,9 @@ class StandWatch:
             self._slow_m, self._slow_since, self._crept_at = 0.0, now, -math.inf
         self._speed_mps, self._velocity_at = abs(velocity_mps), now
         self._note_power(powered, now)
+        moves = min(self._speed_mps, self._encoder_mps) > self._noise_mps
+        if moves and not powered and self.unproven and now < self._sudden_since + self._rolls_s:
+            self._never_stood = True
         hardest_mps2 = self._hardest_mps2(powered)
         at_end_mps = self._encoder_mps - hardest_mps2 * self._mean_s / 2.0
         self._mean_s = math.inf
@@ -94,7 +100,7 @@ class StandWatch:
     def trust(self) -> None:
         """A reset was accepted: everything begins anew."""
         self._stopping.forget()
-        self._sudden = 0
+        self._sudden, self._never_stood = 0, False
 
     @property
     def sudden(self) -> bool:
@@ -104,6 +110,8 @@ class StandWatch:
     @property
     def unproven(self) -> bool:
         """The same, for as long as it takes to be no error of one sample. Answers to SDOs come seldom."""
+        if self._never_stood:
+            return True
         lasts = self._sudden >= 2 and self._velocity_at - self._sudden_since >= self._samples * self._period_s
         return lasts or self._sudden >= self._samples
 
