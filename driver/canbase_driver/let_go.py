@@ -35,8 +35,8 @@ class Push:
         """`limit_s`: time at rated torque, or longer at less."""
         self._limit_s = limit_s
         self._life_m = max(LIFE_M, LIFE_COUNTS * abs(m_per_count))
-        self._low_m = self._high_m = self.pushed_s = 0.0
-        """Between these places it has been since its last sign of life."""
+        self._seen_m = self._at_m = self._low_m = self._high_m = self.pushed_s = 0.0
+        """Where it is, and between which places it has been, from that of its last sign of life on."""
         self._at = math.inf
         self._owes = self._tells = False
         self.share: float | None = None
@@ -54,10 +54,10 @@ class Push:
         self.share = share if self._tells else None
         torque = 1.0 if self.share is None else abs(self.share)
         given_s = torque * elapsed_s if torque >= NOISE_SHARE else 0.0
-        self._low_m, self._high_m = min(self._low_m, travel_m), max(self._high_m, travel_m)
+        self._at_m, self._seen_m = self._at_m + travel_m - self._seen_m, travel_m
+        self._low_m, self._high_m = min(self._low_m, self._at_m), max(self._high_m, self._at_m)
         if self._high_m - self._low_m >= self._life_m or not has_torque:
-            self._low_m = self._high_m = travel_m
-            self.pushed_s = 0.0
+            self._at_m = self._low_m = self._high_m = self.pushed_s = 0.0
         else:
             self.pushed_s = min(self.pushed_s + given_s, self._limit_s)
         self._owes = has_torque and (self._owes or ordered_mps != 0.0)
