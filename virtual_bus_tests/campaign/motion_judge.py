@@ -10,6 +10,7 @@ from math import sqrt
 from campaign.envelope import notice_s
 from campaign.shown import Shown
 from campaign.world import World
+from canbase_bench.cia402.states import State
 from canbase_config.robot import Robot
 from canbase_config.stopping import longest_ramp_s, max_wheel_mps
 from canbase_velocity.twist import Twist
@@ -98,9 +99,10 @@ class MotionJudge:
         self.ran_away = beyond or (self.ran_away and self._shown.fastest_mps > self._allowed.stands_mps)
         return found
 
-    def _powered(self) -> bool:
+    def _follows(self) -> bool:
+        """A drive follows its setpoints. Where all brake by ramps of their own, a turn ends when the base stands."""
         nodes = self._world.drives.bench.nodes.values()
-        return any(axis.motor.powered for node in nodes for axis in node.axes)
+        return any(axis.state is State.OPERATION_ENABLED for node in nodes for axis in node.axes)
 
     def _driven_mps(self) -> float:
         """The faster side with a motor that drives or brakes it."""
@@ -128,7 +130,7 @@ class MotionJudge:
         low, high = min(0.0, *turns, 0.0), max(0.0, *turns, 0.0)
         turn = self._shown.angular_radps
         slack = self._allowed.path_radps + PATH_SHARE * max(-low, high)
-        if low - slack <= turn <= high + slack or not self._powered() or self._rolls_blindly():
+        if low - slack <= turn <= high + slack or not self._follows() or self._rolls_blindly():
             self._beside_since = now
         if now <= self._beside_since + self._allowed.path_s:
             return None
