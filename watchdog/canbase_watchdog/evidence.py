@@ -138,7 +138,7 @@ class EvidenceWatch:
         self._velocity_mps = velocity_mps
         self._rolled = step_m is not None and abs(step_m) > ROLLING_SHARE * abs(velocity_mps) * elapsed_s
         self._ask(elapsed_s, now, enabled)
-        ghost_m = self._ghost_m(lives or step_m is None, velocity_mps, elapsed_s, now)
+        ghost_m = self._ghost_m(lives or step_m is None, velocity_mps, elapsed_s if powered else 0.0, now)
         kept_m = self._kept_m(lives)
         before = Evidence(unseen_m=kept_m, both_m=kept_m, ghost_m=ghost_m, trusted=self.last.trusted)
         if not powered:
@@ -228,7 +228,7 @@ class EvidenceWatch:
         return self.last.halted + 1 if self.last.halted and not lives else 0
 
     def _ghost_m(self, lives: bool, velocity_mps: float, elapsed_s: float, now: float) -> float:
-        """Noise changes its sign, and one bad sample is over soon. It goes on without power: the sensor is the same."""
+        """Noise changes its sign, and one bad sample is over soon. What counted with power outlives a time without."""
         if lives:
             self._lived_at = now
         if now < self._lived_at + GHOST_LAG_S or velocity_mps * self.last.ghost_m < 0.0 or velocity_mps == 0.0:
