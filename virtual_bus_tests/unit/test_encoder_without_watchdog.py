@@ -9,6 +9,7 @@ import pytest
 
 from bus.crews import robot_with
 from canbase_bench import faults
+from canbase_bench.cia402.states import State
 from canbase_driver.kinematics import Twist2D
 from canbase_driver.snapshot import DriverState
 from unit.chain_world import STEP_S, World, world_of
@@ -128,3 +129,19 @@ def test_a_drive_that_is_being_configured_is_not_read() -> None:
     assert story.since(since, 0x602)
     story.run(0.7)
     assert story.since(since, 0x601)
+
+
+# 0.0 the watchdog dies ── 0.3 the drives brake, pre-operational; one encoder freezes ── 0.36 a new watchdog, latched of
+# before: the driver leaves the drives to it, and it must not leave them to the driver
+def test_a_watchdog_that_is_back_does_not_wait_for_a_driver_that_waits_for_it() -> None:
+    world = World(robot_with("elmo_gold"), keeps=True)
+    world.drive(Twist2D(0.3, 0.0), 1.0)
+    world.watchdog = None
+    world.run(0.3, lambda: not all(axis.state is State.OPERATION_ENABLED for axis in world.node.axes[:1]))
+    world.run(0.03)
+    suffer(world, "encoder_frozen")
+    world.run(0.05)
+    world.start_watchdog()
+    assert world.core.state is DriverState.STOPPING
+    assert world.powered[0]
+    assert world.run(0.5, lambda: not world.powered[0])

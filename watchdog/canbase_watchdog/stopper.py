@@ -54,7 +54,7 @@ class Stopper:
         """Begins at the foot of the ladder at the monotonic time `now` [s]; without `trusted`, a sensor lied.
 
         `resting`: for a trip of before the start. A drive that is off is left alone, so that it can be booted; one that
-        has power or moves is stopped. One that tells nothing is asked, unless a driver is there, which boots it.
+        has power or moves is stopped. One that tells nothing is asked, unless somebody boots it.
         """
         self._node_id = node_id
         self._config = config
@@ -133,10 +133,11 @@ class Stopper:
     def _is_untold(self, axes: Sequence[Axis]) -> bool:
         """Since the start something is not known of it: it is neither said to move, nor stopped.
 
-        A statusword that says that it has power is enough to stop it, whoever asked for that.
+        A statusword that says that it has power, or a velocity, is enough to stop it, whoever asked for that.
         """
-        seen_at, powered = min(axis.seen_at for axis in axes), any(axis.powered for axis in axes)
-        return seen_at <= self._resting_since < math.inf and not powered
+        seen_at, noise_mps = min(axis.seen_at for axis in axes), self._config.motion_tolerance_mps
+        told = any(axis.powered or abs(axis.velocity_mps) > noise_mps for axis in axes)
+        return seen_at <= self._resting_since < math.inf and not told
 
     def _stands(self, axis: Axis) -> bool:
         """Standing takes several samples to prove. Until then a drive that was found off is not stopped in vain.
@@ -197,9 +198,9 @@ class Stopper:
         return [requests[(self._sdo_turn - 1) % len(requests)]]
 
     def _is_unknown(self, view: View, now: float) -> bool:
-        """Since the start it has told nothing, and no driver makes it: it may turn as it did before the start."""
-        heard_at = max(self._resting_since, view.bus.driver_at)
-        return self._is_untold(self._axes(view)) and now >= heard_at + self._config.drive_heartbeat_s
+        """Since the start it has told nothing, and no driver boots it: it may turn as it did before the start."""
+        configured_at = max(self._resting_since, view.node(self._node_id).configured_at)
+        return self._is_untold(self._axes(view)) and now >= configured_at + self._config.drive_heartbeat_s
 
     def _is_old(self, view: View, now: float) -> bool:
         """It told something once, and has not of late; and nobody else needs its SDO channel."""
