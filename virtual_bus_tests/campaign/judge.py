@@ -88,6 +88,7 @@ EXCUSES = {
     "deaf watchdog": "it cannot keep a standing base from starting; driver and drives miss it within T_react (held)",
     "reset by a stranger": "a drive that another master has reset has forgotten 1016h (heartbeat)",
     "unheard button": "a filter that never heard the button knows of no emergency stop (zero)",
+    "unasked": "without a driver there is no SYNC, and no drive tells anything: it is missed first (runaway)",
     "ran away": "a wheel whose sensor lies is faster than ordered, or turns the base, for the times of runaway and "
     "path at most, and rolls out without power then; its way may be longer than the free one (obstacle)",
     "unproven stand": "a drive with a dead encoder may push for stand_impulse_s before it has to let go, and its wheel "

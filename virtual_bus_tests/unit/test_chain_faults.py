@@ -218,8 +218,9 @@ def test_a_velocity_of_16_mm_per_s_beside_an_encoder_that_is_still_is_noise_and_
     world.command = Twist2D.ZERO
     world.run(5.0)
     bit_mps = watchdog_config(world.robot).drives[0].velocity_mps_per_bit
-    world.node.axes[0].faults.stuck_velocity = round(0.016 / bit_mps)  # for a moment
-    world.run(0.5)
+    for n in range(10):  # to and fro: one way it is no noise, and its drive would push against it
+        world.node.axes[0].faults.stuck_velocity = round((-1) ** n * 0.016 / bit_mps)
+        world.run(0.05)
     assert world.core.state is DriverState.ENABLED
     assert world.snapshot.standstill
     world.node.axes[0].faults.stuck_velocity = None

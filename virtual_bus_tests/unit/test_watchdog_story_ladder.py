@@ -37,7 +37,7 @@ def test_a_drive_that_leaves_quick_stop_by_itself_stays_off() -> None:
 def test_a_drive_that_is_enabled_again_and_again_is_taken_out_of_operational() -> None:
     """605Ah = 6: each 0Fh of the driver enables it again, so the quick stop alone never wins.
 
-    trip ── quick stop each 10 ms against 0Fh each 10 ms ── 0.15 s ── NMT pre-operational, quick stop by SDO ── stands
+    trip ── quick stop each 10 ms against 0Fh each 10 ms ── 0.15 s ── pre-operational, quick stop by SDO ── stands ── off
     """
     story = mad(FakeDrive(1, option=6))
     trip = story.t
@@ -49,15 +49,16 @@ def test_a_drive_that_is_enabled_again_and_again_is_taken_out_of_operational() -
     assert frame == Frame(0x000, b"\x80\x01")
     assert Frame(0x601, bytes.fromhex("2b 40 60 00 02 00 00 00")) in [f for _, f in story.since(at, 0x601)]
     until_still(story)
-    story.run(3.0)
-    assert speeds(story) == [0]
-    assert step(story) is Step.PRE_OPERATIONAL
+    assert (speeds(story), step(story)) == ([0], Step.PRE_OPERATIONAL)
+    story.run(3.0)  # it goes on holding the wheel: its power goes too
+    assert (speeds(story), step(story)) == ([0], Step.DISABLE_VOLTAGE)
+    assert story.drives[0].words[0] == SOD
 
 
 def test_a_driver_that_starts_the_drives_again_is_answered_by_the_next_rung() -> None:
     story = mad(FakeDrive(1, option=6))
     until_still(story)
-    story.run(0.5)
+    story.run(0.1)
     story.put(Frame(0x000, b"\x01\x01"))
     story.run(0.1)
     assert step(story) is Step.DISABLE_VOLTAGE
