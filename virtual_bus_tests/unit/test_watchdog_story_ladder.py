@@ -37,7 +37,7 @@ def test_a_drive_that_leaves_quick_stop_by_itself_stays_off() -> None:
 def test_a_drive_that_is_enabled_again_and_again_is_taken_out_of_operational() -> None:
     """605Ah = 6: each 0Fh of the driver enables it again, so the quick stop alone never wins.
 
-    trip ── quick stop each 10 ms against 0Fh each 10 ms ── 0.15 s ── pre-operational, quick stop by SDO ── stands ── off
+    trip ── quick stop each 10 ms against 0Fh each 10 ms ── 0.15 s ── pre-operational, quick stop by SDO ── stands, off
     """
     story = mad(FakeDrive(1, option=6))
     trip = story.t
