@@ -6,6 +6,7 @@ import struct
 
 import pytest
 
+from canbase_bench.cia301.dictionary import key
 from canbase_bench.cia402.states import State
 from unit.sim_rig import MPS, Rig
 
@@ -246,3 +247,15 @@ def test_the_inhibit_time_limits_the_rate_and_the_event_timer_repeats() -> None:
     said = rig.wait(1.0)
     assert 45 <= sum(text.startswith("181") for text in said) <= 51
     assert 9 <= sum(text.startswith("281") for text in said) <= 11
+
+
+def test_a_node_that_is_started_in_the_middle_of_a_mapping_has_that_pdo_off() -> None:
+    """1600h and 1A00h count an entry that was never written; the drive says nothing with them, and goes on."""
+    rig = _quiet()
+    for comm, cob_id in ((0x1400, 0x201), (0x1800, 0x181)):
+        node = rig.node.dictionary.values
+        node[key(comm + 0x200, 0)], node[key(comm + 0x200, 1)], node[key(comm, 1)] = 1, 0, cob_id
+    rig.tx("000 01 01")
+    rig.wait(0.01)
+    assert rig.tx("201 0F 00 55 25 00 00") == []
+    assert rig.tx("080") == []

@@ -442,3 +442,29 @@ def test_without_a_position_there_is_no_drift() -> None:
     watch.on_position(123_456)
     watch.on_velocity(0.5, True, True, 0.2)
     assert (watch.last.drift_m, watch.last.implausible) == (0.0, 0)
+
+
+# 1.8 m/s ── this process waits 0.06 s ── six samples at once: the first one has all the time, the others none
+@pytest.mark.parametrize("wait_ms", [60, 110])
+@pytest.mark.parametrize("dead", [False, True])
+def test_samples_that_come_at_once_are_no_drift_until_one_comes_in_its_time(dead: bool, wait_ms: int) -> None:
+    """After 0.1 s, feedback_s, their travel counts as little as the time."""
+    wheel = Wheel()
+    wheel.samples(100, 1.8, 1.8)
+    for n in range(wait_ms // 10):
+        wheel.n += wait_ms if n == 0 else 0
+        wheel.way_m += 0.0 if dead else 0.018
+        wheel.watch.on_position(round(wheel.way_m * 10_000))
+        wheel.watch.on_velocity(1.8, True, True, wheel.n / 1000)
+        assert wheel.last.implausible <= 1
+    assert (wheel.samples(5, 1.8, 1.8, rolls=0.0 if dead else None).implausible >= 3) == dead
+
+
+# setpoints of 1 m/s until 0.0 ── zero ── 0.3 s for what swings back by 8 % of it
+@pytest.mark.parametrize(("after", "velocity", "outside"), [(25, -0.125, 0), (25, -0.135, 1), (35, -0.125, 1)])
+def test_after_a_fast_setpoint_a_wheel_may_swing_back(after: int, velocity: float, outside: int) -> None:
+    wheel = Wheel(deceleration_mps2=10.0)
+    wheel.samples(100, 1.0, 1.0)
+    for n in range(after - 1):
+        wheel.sample(max(0.0, 1.0 - n * 0.05), 0.0)
+    assert wheel.sample(velocity, 0.0).outside == outside

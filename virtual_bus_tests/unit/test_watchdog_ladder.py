@@ -14,7 +14,15 @@ from canbase_watchdog.ladder import RUNGS, Braking, Climb, Look, Step, advance, 
 
 RULES = Braking(lag_s=0.1, least_mps2=0.5, tolerance_mps=0.05, tolerance_share=0.1, coasting_s=2.0, samples=3)
 BRAKING = Look(
-    enabled=False, powered=True, standing=False, speed_mps=0.4, begin_mps=0.5, seen_at=10.0, present=True, trusted=True
+    enabled=False,
+    powered=True,
+    standing=False,
+    speed_mps=0.4,
+    begin_mps=0.5,
+    seen_at=10.0,
+    present=True,
+    trusted=True,
+    reading_s=0.04,
 )
 ENABLED = replace(BRAKING, enabled=True)
 STANDING = replace(BRAKING, powered=False, standing=True, speed_mps=0.0, begin_mps=0.0)

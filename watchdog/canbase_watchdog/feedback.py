@@ -24,6 +24,8 @@ scale that is a little wrong have no memory. An error of more than travel_tolera
 JUMP_FACTOR = 3.0
 """A step of the encoder beyond so many times the fastest wheel's is a jump: it tells nothing about the motion."""
 JUMP_CYCLES = 2.0
+BUNCHED = 0.5
+"""Samples that come after fewer periods waited while this process was late: their times say nothing, only their sum."""
 SWING_SHARE, SWING_S = 0.08, 0.3
 """A loaded wheel swings beyond its setpoint as its velocity loop does: by this share of the fastest one of so long."""
 
@@ -56,7 +58,8 @@ class FeedbackWatch:
         self._fastest_mps = config.overspeed_factor * config.max_wheel_mps
         self._forward, self._backward = Peak(config.drive_lag_s), Peak(config.drive_lag_s)
         self._ahead, self._behind = Overshoot(), Overshoot()
-        self._fastest = Peak(SWING_S)
+        self._fastest, self._bunched_s = Peak(SWING_S), BUNCHED / config.control_hz
+        self._gap = False
         self._target_mps = 0.0
         self._high = self._low = config.max_wheel_mps
         for peak in (self._forward, self._backward):
@@ -107,13 +110,14 @@ class FeedbackWatch:
         swing_mps = SWING_SHARE * self._fastest.greatest(now)
         slack = self._fixed_mps + max(config.motion_tolerance_share * max(self._low, self._high), swing_mps)
         forward_mps, backward_mps = self._overshoots(velocity_mps, slack, elapsed_s, now)
+        apart = jumped or abs(drift_m) > config.travel_tolerance_m
         inside = -self._low - slack - backward_mps <= velocity_mps <= self._high + slack + forward_mps
         self.last = Feedback(
             low_mps=-self._low,
             high_mps=self._high,
             outside=0 if inside else last.outside + 1,
             overspeed=last.overspeed + 1 if abs(velocity_mps) > self._fastest_mps else 0,
-            implausible=last.implausible + 1 if jumped or abs(drift_m) > config.travel_tolerance_m else 0,
+            implausible=last.implausible + (elapsed_s >= self._bunched_s) if apart else 0,
             drift_m=drift_m,
         )
 
@@ -139,9 +143,11 @@ class FeedbackWatch:
     def _step(self, elapsed_s: float) -> tuple[float | None, bool]:
         """Travel by the encoder since the last sample [m], and whether it jumped.
 
-        None after a gap: what the wheel did in it was not measured.
+        None after a gap: what the wheel did in it was not measured. So are the samples that waited in it.
         """
-        if self._counts is None or self._counts_before is None or elapsed_s >= self._config.feedback_timeout_s:
+        gap = elapsed_s >= self._config.feedback_timeout_s
+        self._gap = gap or (self._gap and elapsed_s < self._bunched_s)
+        if self._counts is None or self._counts_before is None or self._gap:
             return None, False
         step_m = difference(self._counts, self._counts_before) * self._m_per_count
         return step_m, abs(step_m) > self._jump_mps * max(elapsed_s, self._jump_s)

@@ -101,9 +101,9 @@ class Look:
     seen_at: float
     present: bool
     trusted: bool
+    reading_s: float
     unslowed: bool = False
     """A wheel with power has not lost speed for a window of time, on this rung: slowing.py."""
-    reading_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -48,7 +48,10 @@ class Rpdo:
         self.stop()
         if not self._rules.valid:
             return
-        mapped = self._rules.mapped()
+        try:
+            mapped = self._rules.mapped()
+        except SdoAbortedError:  # somebody starts the node in the middle of a mapping
+            return
         self._codec = struct.Struct("<" + "".join(m.code for m in mapped))
         self._writers = [_skip if m.address is None else self._dictionary.writer(m.address) for m in mapped]
         self._at_sync = self._rules.value(TYPE) <= MAX_SYNC_TYPE

@@ -5,6 +5,8 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 
+from canopen.sdo.exceptions import SdoAbortedError
+
 from canbase_bench.cia301.dictionary import Dictionary
 from canbase_bench.cia301.pdo_rules import COB_ID, EVENT, INHIBIT, MAX_SYNC_TYPE, TYPE, PdoRules
 from canbase_bench.frame import Frame
@@ -36,7 +38,10 @@ class Tpdo:
         self.stop()
         if not self._rules.valid:
             return
-        mapped = self._rules.mapped()
+        try:
+            mapped = self._rules.mapped()
+        except SdoAbortedError:  # somebody starts the node in the middle of a mapping
+            return
         self._pack = struct.Struct("<" + "".join(m.code for m in mapped)).pack
         self._places = [self._entries[m.address].place for m in mapped if m.address is not None]
         self._cob_id = self._rules.value(COB_ID) & 0x7FF
