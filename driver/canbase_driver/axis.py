@@ -17,7 +17,7 @@ from canbase_driver.units import AxisUnits
 
 STEP_MARGIN = 3.0
 """An encoder step in one cycle is possible up to this many times the fastest wheel: cycles come early and late."""
-LETS_GO_SHARE = 0.5
+LETS_GO_SHARE = 0.75
 """Of watchdog.stand_impulse_s: the watchdog counts from signs of life of its own, and must not be first."""
 GAP_MAX_S = 60.0
 """A gap in the feedback counts as this long at most: what a wheel can have done in it stays far from a wrap."""

@@ -183,7 +183,7 @@ class _Boot:
             if poll == 0:
                 braking.begin(speed_mps, 0.0, elapsed_s, quick=True)
             slow = slow + 1 if speed_mps < self._robot.base.standstill_mps else 0
-            if not slow and braking.fails(speed_mps, elapsed_s):
+            if braking.fails(speed_mps, elapsed_s) and not slow:
                 yield from self._give_up(drive, f"turns at {speed_mps:.3f} m/s {elapsed_s:.1f} s after a quick stop")
             yield Pause(POLL_S, f"{drive.joint} to stand after a quick stop")
         yield from self._give_up(drive, f"did not stand {standstill_s(self._robot):.1f} s after a quick stop")

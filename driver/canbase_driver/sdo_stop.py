@@ -17,8 +17,8 @@ from canbase_driver.cia301 import SDO_TO_CLIENT
 from canbase_driver.frame import Frame
 from canbase_driver.sdo import Read, SdoClient, Write
 
-PERIOD_S = 0.02
-"""Between two requests: a drive keeps one, and answers within this."""
+PERIOD_S, AGAIN_S = 0.02, 0.05
+"""Between two requests; and until the same one is sent again: a drive keeps one, and may be busy with another's."""
 _UPLOADED, _COMMAND, _EXPEDITED = 2 << 5, 7 << 5, 0x02
 """First byte of an answer to a Read (CiA 301, SDO upload)."""
 
@@ -33,24 +33,30 @@ class SdoStop:
         self._reads = [Read(at.index, at.sub) for at in speeds]
         self._sizes = [at.bits // 8 for at in speeds]
         self._sent_at = -math.inf
-        self._turn = 0
+        self._turn = -1
+        self._waits_for = b""
+        """Address of the request that is not answered yet."""
 
     def frames(self, controlwords: Sequence[int], now: float) -> list[Frame]:
-        """The next request, once each PERIOD_S: 6040h of each axis, once where motors share one, then 606Ch of each."""
-        if now - self._sent_at < PERIOD_S:
+        """The next request, PERIOD_S after the last one that was answered: 6040h of each axis, once where motors share
+        one, then 606Ch of each. One that is not answered is sent again."""
+        if now - self._sent_at < (AGAIN_S if self._waits_for else PERIOD_S):
             return []
         words = zip(self._drives, controlwords, strict=True)
         writes = dict.fromkeys(write_at(drive, CONTROLWORD, word) for drive, word in words)
         steps: list[Read | Write] = [*writes, *self._reads]
-        step = steps[self._turn % len(steps)]
-        self._sent_at, self._turn = now, self._turn + 1
-        return [SdoClient(self._node_id, PERIOD_S, attempts=1).start(step, now)]
+        self._turn += not self._waits_for
+        frame = SdoClient(self._node_id, AGAIN_S, attempts=1).start(steps[self._turn % len(steps)], now)
+        self._sent_at, self._waits_for = now, frame.data[1:4]
+        return [frame]
 
     def speed(self, frame: Frame) -> tuple[int, int] | None:
         """Which axis an answer is about, as its place in `drives`, and its 606Ch [raw]. None: it is no speed."""
         data = frame.data
         if frame.cob_id != SDO_TO_CLIENT + self._node_id or len(data) != 8:
             return None
+        if data[1:4] == self._waits_for:
+            self._waits_for = b""
         if data[0] & _COMMAND != _UPLOADED or not data[0] & _EXPEDITED:
             return None
         address = Read(int.from_bytes(data[1:3], "little"), data[3])

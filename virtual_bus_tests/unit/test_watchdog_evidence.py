@@ -276,7 +276,7 @@ def test_a_wheel_that_just_begins_to_roll_has_its_time() -> None:
     wheel = held_until_its_order_has_gone()
     assert wheel.samples(2, 0.0, 2.0**-6, rolls=2.0**-6, torque=0.25).unseen_s == 12.5 / HZ
     other = held_until_its_order_has_gone()
-    assert other.samples(2, 0.0, 2.0**-6, rolls=2.0**-6).unseen_s == 12.5 / HZ  # whether it tells a torque or not
+    assert other.samples(2, 0.0, 2.0**-6, rolls=2.0**-6).unseen_s == 14 / HZ  # without a torque nothing bounds it
 
 
 def test_of_a_faster_order_each_moment_counts_whatever_the_torque_is() -> None:
@@ -324,6 +324,17 @@ def test_slow_orders_to_and_fro_need_their_way() -> None:
         assert not wheel.samples(32, (-1) ** n * 2.0**-5, 0.0).unseen
     assert not wheel.samples(30, -(2.0**-5), 0.0).unseen
     assert wheel.samples(2, -(2.0**-5), 0.0).unseen
+
+
+def test_most_of_the_time_outlives_the_power_too() -> None:
+    """A drive that lets go after each order is found all the same: an eighth of 1/8 m and of 0.25 s is left."""
+    wheel = rolling(0.5)
+    wheel.samples(15, 0.5, 0.0)
+    wheel.samples(10, -0.5, 0.0)
+    last = wheel.sample(0.0, 0.0, powered=False)
+    assert (last.unseen_m, last.both_s, last.both_m) == (0.875 * 2.0**-4, 0.875 * 0.25, 0.875 * 2.0**-3)
+    assert not wheel.samples(1, 0.5, 0.0).unseen
+    assert wheel.samples(1, -0.5, 0.0).unseen
 
 
 def test_a_sign_of_life_begins_both_directions_anew() -> None:
@@ -522,6 +533,19 @@ def test_noise_to_both_sides_and_zeros_are_none() -> None:
 def test_a_wheel_that_shows_signs_of_life_is_none_however_slow() -> None:
     wheel = Wheel()
     assert not wheel.samples(5000, 0.0, 2.0**-7).ghost
+
+
+def test_a_few_bits_at_standstill_are_none() -> None:
+    wheel = Wheel(mps_per_bit=0.0)
+    wheel.watch._residue_mps = 2.0**-9
+    assert wheel.samples(5000, 0.0, 2.0**-9, rolls=0.0).ghost_m == 0.0
+    assert wheel.samples(5000, 0.0, 1.01 * 2.0**-9, rolls=0.0).ghost
+
+
+@pytest.mark.parametrize(("keeps", "ghost"), [(0.985, False), (0.995, True)])
+def test_the_tail_of_a_slow_filter_is_none(keeps: float, ghost: bool) -> None:
+    wheel = rolling(0.5)
+    assert any(wheel.sample(0.0, 0.3 * keeps**n, rolls=0.0).ghost for n in range(60)) == ghost
 
 
 def test_a_filtered_velocity_that_fades_after_a_hard_stop_is_none() -> None:

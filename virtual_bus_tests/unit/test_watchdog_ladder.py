@@ -295,7 +295,10 @@ def test_a_drive_that_goes_on_holding_loses_its_power(now: float, step: Step) ->
     assert go(stood, replace(held, seen_at=now), now).step is step
     assert go(stood, replace(STANDING, seen_at=now), now).step is Step.QUICK_STOP
     off = replace(stood, step=Step.DISABLE_VOLTAGE)
-    assert go(off, replace(held, seen_at=now), now).stopped
+    above = Step.HEARTBEAT_WITHHELD if step is Step.DISABLE_VOLTAGE else Step.DISABLE_VOLTAGE
+    assert go(off, replace(held, seen_at=now), now).step is above
+    end = replace(stood, step=Step.HEARTBEAT_WITHHELD)
+    assert go(end, replace(held, seen_at=now), now).step is Step.HEARTBEAT_WITHHELD
 
 
 def test_it_stays_stopped_while_it_stands() -> None:

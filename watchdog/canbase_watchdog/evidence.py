@@ -48,6 +48,8 @@ ROLLING_SHARE = 0.5
 JOLT_MEMORY_S = 1.0
 GHOST_LIVES = 2.0
 """So many signs of life the velocity may tell of that the encoder does not show, ..."""
+GHOST_BITS, GHOST_FALLS = 4.0, 0.99
+"""A register that shows a few bits at standstill is none, nor is a filter's tail: only a velocity that stays counts."""
 GHOST_LAG_S = 0.1
 """... apart from this time after the last one: 606Ch may be filtered, and a wheel may meet something hard."""
 
@@ -90,6 +92,7 @@ class EvidenceWatch:
         self._life_m = life_m(drive, config)
         self._life = Life(self._life_m)
         self._slack_mps = config.motion_tolerance_mps + abs(drive.velocity_mps_per_bit)
+        self._residue_mps = GHOST_BITS * abs(drive.velocity_mps_per_bit)
         self._period_s = 1.0 / config.control_hz
         self._backward, self._forward = Peak(config.drive_lag_s), Peak(config.drive_lag_s)
         self._setpoint_mps = self._ordered_mps = 0.0
@@ -135,12 +138,12 @@ class EvidenceWatch:
         """
         jolted, rolled = self._is_jolt(velocity_mps, elapsed_s), self._rolled
         lives = self._lives(step_m, jolted)
+        falls = abs(velocity_mps) < GHOST_FALLS * abs(self._velocity_mps)
         self._velocity_mps = velocity_mps
         self._rolled = step_m is not None and abs(step_m) > ROLLING_SHARE * abs(velocity_mps) * elapsed_s
         self._ask(elapsed_s, now, enabled)
-        ghost_m = self._ghost_m(lives or step_m is None, velocity_mps, elapsed_s if powered else 0.0, now)
-        kept_m = self._kept_m(lives)
-        before = Evidence(unseen_m=kept_m, both_m=kept_m, ghost_m=ghost_m, trusted=self.last.trusted)
+        ghost_m = self._ghost_m(lives or step_m is None, velocity_mps, elapsed_s if powered and not falls else 0.0, now)
+        before = self._kept(lives, ghost_m)
         if not powered:
             self.last = before
             return
@@ -213,12 +216,18 @@ class EvidenceWatch:
         begins = self._is_visible(self._velocity_mps) and self._rolled
         if abs(self._least_mps) > self._slack_mps or (self._is_visible(self._velocity_mps) and not begins):
             return 1.0
-        if torque is None:
-            return LEAST_WEIGHT if begins else 1.0
-        return 1.0 if abs(torque) > STRAIN_SHARE else max(abs(torque), LEAST_WEIGHT)
+        return 1.0 if torque is None or abs(torque) > STRAIN_SHARE else max(abs(torque), LEAST_WEIGHT)
 
-    def _kept_m(self, lives: bool) -> float:
-        return 0.0 if lives else min(self.last.both_m, KEPT_SHARE * self._unseen_m)
+    def _kept(self, lives: bool, ghost_m: float) -> Evidence:
+        """What outlives a time without power: most of it, or a drive that lets go after each order is never found."""
+        last = Evidence(trusted=self.last.trusted) if lives else self.last
+        return Evidence(
+            unseen_m=min(last.both_m, KEPT_SHARE * self._unseen_m),
+            both_s=min(last.both_s, KEPT_SHARE * self._config.motion_missing_s),
+            both_m=min(last.both_m, KEPT_SHARE * BOTH_WAYS * self._unseen_m),
+            ghost_m=ghost_m,
+            trusted=last.trusted,
+        )
 
     def _halted(self, halts: bool, lives: bool) -> int:
         if self._is_visible(self._velocity_mps):
@@ -231,7 +240,11 @@ class EvidenceWatch:
         """Noise changes its sign, and one bad sample is over soon. What counted with power outlives a time without."""
         if lives:
             self._lived_at = now
-        if now < self._lived_at + GHOST_LAG_S or velocity_mps * self.last.ghost_m < 0.0 or velocity_mps == 0.0:
+        if (
+            now < self._lived_at + GHOST_LAG_S
+            or velocity_mps * self.last.ghost_m < 0.0
+            or abs(velocity_mps) <= self._residue_mps
+        ):
             self._ghost_s = 0.0
             return 0.0
         self._ghost_s += elapsed_s

@@ -137,7 +137,7 @@ def advance(before: Climb, look: Look, braking: Braking, now: float) -> Climb:
     1. stopped, and enabled again: next rung, somebody works against us; but no reset before the power was ordered off;
     2. stopped, and moving, or its sensor is caught with a lie after that: not stopped, same rung from the start, or the
        one before the reset. How long its power is off goes on counting: a look that cannot tell drives no wheel. With
-       power for HELD_S: power off, for what holds a wheel by a sensor that stays where it is may drive it;
+       power for HELD_S: power off, or the next rung, for what holds a wheel by a sensor that stays may drive it;
     3. not enabled and standing, by feedback that came on this rung: stopped. Where the sensor cannot be trusted, its
        power must be off as well, for as long as a wheel may roll: then a stand is assumed;
     4. never heard of, and not told to have power: stays, there is nothing to climb for;
@@ -168,8 +168,9 @@ def _stopped(climb: Climb, look: Look, now: float) -> Climb:
     if not look.standing or not (look.trusted or climb.assumed):
         step = min(climb.step, Step.HEARTBEAT_WITHHELD)
         return replace(first(look, now), step=step, runaway=climb.runaway, off_since=climb.off_since)
-    is_held = look.powered and climb.step < Step.DISABLE_VOLTAGE and now >= climb.stopped_at + HELD_S
-    return _to(Step.DISABLE_VOLTAGE, climb, look, now) if is_held else climb
+    if not look.powered or now < climb.stopped_at + HELD_S:
+        return climb
+    return _to(min(max(climb.step + 1, Step.DISABLE_VOLTAGE), Step.HEARTBEAT_WITHHELD), climb, look, now)
 
 
 def _judged(climb: Climb, look: Look, braking: Braking, now: float) -> Climb:

@@ -8,8 +8,9 @@ Rules, for a drive with power
 1. Pushed: torque × time since the last sign of life, or since there was no power, bounds the speed that a dead encoder
    can hide. With nothing ordered of any wheel, a drive that was ordered motion before must let go once.
 2. In vain: the torque is more than friction takes, and by as much another one than at the last sign of life (a hill),
-   and more than there, whatever its direction; and nothing moves. Its time at rated torque, or longer at less, adds up
-   over orders until the encoder moves, and most of it outlives the power.
+   and more than there, whatever its direction; and nothing moves. Its time adds up over orders until the encoder moves,
+   and most of it outlives the power. Of the first millimetres that it is ordered in one go it is time at rated torque,
+   or longer at less: a wheel breaks loose slowly.
 A drive that does not tell its torque may give the rated one: rule 1 alone. So may one that has only ever told zero.
 """
 
@@ -26,8 +27,6 @@ ALIKE_SHARE = 0.05
 """Friction takes as much one way as the other."""
 NOISE_SHARE = 0.01
 """Of the rated torque: less moves no wheel."""
-CREEPING = 0.5
-"""Of base.standstill_mps: slower orders count as this one."""
 LONGEST_STEP_S = 0.1
 """Time between two samples counts for so long at most: a drive that is silent for longer is another cause."""
 
@@ -58,17 +57,16 @@ class PushWatch:
         self._counts_before: int | None = None
         self._at = math.inf
         self._tells = self._rests = False
-        self._pace = 1.0
-        """A wheel that is ordered to creep takes longer to show it."""
+        self._setpoint_mps = self._asked_m = 0.0
+        """What was ordered while it was strained, since its last sign of life; infinity: it has let go since."""
         self._usual = 0.0
         """Torque at the last sign of life, of the rated one."""
         self.last = Push()
 
     def on_sync(self, setpoint_mps: float, rests: bool) -> None:
         """The setpoint of this wheel; `rests`: those of all wheels are zero, and none moves by what it measures."""
-        self._rests, self._pace = rests, 1.0
+        self._rests, self._setpoint_mps = rests, setpoint_mps
         if setpoint_mps != 0.0:
-            self._pace = min(max(abs(setpoint_mps) / self._config.standstill_mps, CREEPING), 1.0)
             self.last = replace(self.last, owes=True)
 
     def on_position(self, counts: int) -> None:
@@ -101,8 +99,10 @@ class PushWatch:
         known = share if self._tells else None
         lives = self._lives()
         vain_s = 0.0 if lives else self.last.vain_s
+        if lives:
+            self._asked_m = 0.0
         if not powered:
-            self._usual = 0.0
+            self._usual, self._asked_m = 0.0, 0.0 if lives else math.inf
             self.last = Push(known, vain_s=min(vain_s, KEPT_SHARE * self._config.motion_missing_s))
             return
         if lives:
@@ -118,7 +118,9 @@ class PushWatch:
         overdue_s = min(self.last.overdue_s + elapsed_s, config.stand_answer_s) if overdue else 0.0
         strain = min(torque, abs(share - self._usual), 1.0) if owes and share is not None else 0.0
         if strain > STRAIN_SHARE and torque > abs(self._usual) + ALIKE_SHARE:
-            vain_s = min(vain_s + self._pace * strain * elapsed_s, config.motion_missing_s)
+            self._asked_m += abs(self._setpoint_mps) * elapsed_s
+            weight = strain if self._asked_m < config.motion_missing_m else 1.0
+            vain_s = min(vain_s + weight * elapsed_s, config.motion_missing_s)
         return Push(share, pushed_s, owes, overdue_s, vain_s)
 
     def _lives(self) -> bool:
