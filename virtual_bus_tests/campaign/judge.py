@@ -92,7 +92,7 @@ EXCUSES = {
     "ran away": "a wheel whose sensor lies is faster than ordered, or turns the base, for the times of runaway and "
     "path at most, and rolls out without power then; its way may be longer than the free one (obstacle)",
     "unproven stand": "a drive with a dead encoder may push for stand_impulse_s before it has to let go, and its wheel "
-    "rolls out after that: nothing shows it (standstill)",
+    "rolls out after that: nothing shows it (standstill, neutral)",
     "no watch": "a drive of a kind that watches neither heartbeats nor setpoints goes on turning (heartbeat)",
 }
 """What no software can do, each as a state of the world that is looked at, and never by a fault's name."""
@@ -276,7 +276,7 @@ class Judge:
         pushed = self._reach.was_lost or self._strangers.acted_at > self._rests_since
         if self._latches or pushed or self._wishes.greatest_s(now) > 0.0:
             self._rests_since = math.inf
-        lies = self._reach.acts_s(now, self._motion.runaway_s) > 0.0
+        lies = self._reach.acts_s(now, self._motion.runaway_s) > 0.0 or self._shown.is_blind
         if tau_s > 0.0 and now > self._rests_since and not lies:
             self._violate("neutral", f"{self._shown}, {now - self._rests_since:.2f} s after a reset")
 

@@ -43,6 +43,8 @@ class Reach:
         self.fastest_mps = 0.0
         """The fastest wheel since the base last stood."""
         self.lost_at = -math.inf
+        self._weak: set[int] = set()
+        """Drives whose own stop has had hardly an effect since they have power: a ramp that has begun goes on so."""
         self._reacts_since: dict[int, float] = {}
         """Drives in a fault reaction that their own sensor never ends; since when the watchdog reaches them."""
         watchdog = world.robot.watchdog
@@ -53,6 +55,8 @@ class Reach:
     def step(self, stands: bool) -> None:
         """Look at all drives now."""
         now, bench = self._world.clock.now, self._world.drives.bench
+        powered = [node for node in bench.nodes.values() if any(axis.motor.powered for axis in node.axes)]
+        self._weak = {node.node_id for node in powered if node.node_id in self._weak or self._is_weak(node.axes)}
         self.lost = not stands and any(self._is_lost(node_id, now) for node_id, _ in self.turning())
         self.was_lost = self.lost or (self.was_lost and not stands)
         self.lost_at = now if self.lost else self.lost_at
@@ -60,10 +64,11 @@ class Reach:
         self.fastest_mps = 0.0 if stands else max(self.fastest_mps, wheel_mps)
 
     def stops_alone(self, node_id: int) -> bool:
-        """The drive stops when it hears nobody: it watches its masters, and its sensors do not lie."""
+        """The drive stops when it hears nobody: it watches its masters, it brakes, and its sensors do not lie."""
         node = self._world.drives.bench.nodes[node_id]
         forgot = self.personality.heeds_heartbeats and not self._knows_masters(node)
-        return self.alone_s < math.inf and not self._lies(node) and not (forgot and self._world.intruder.bad_at > 0.0)
+        able = node_id not in self._weak and not self._lies(node)
+        return self.alone_s < math.inf and able and not (forgot and self._world.intruder.bad_at > 0.0)
 
     def turning(self) -> Iterator[tuple[int, int]]:
         """Node id and axis of each wheel that turns with power."""
