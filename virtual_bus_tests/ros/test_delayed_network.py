@@ -58,7 +58,7 @@ def delayed(chain: Chain, spawn: Spawn) -> Chain:
     chain.node.spin_for(LOOKS_S)
     chain.node.release(chain.joystick)
     chain.joystick.message = drive(0.2)
-    chain.wait_for_order(0.2)
+    chain.wait_for_order(0.2, START_S)
     return chain
 
 
