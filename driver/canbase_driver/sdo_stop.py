@@ -19,6 +19,8 @@ from canbase_driver.sdo import Read, SdoClient, Write
 
 PERIOD_S, AGAIN_S = 0.02, 0.05
 """Between two requests; and until the same one is sent again: a drive keeps one, and may be busy with another's."""
+TRIES = 3
+"""Of a controlword. A speed is asked for once: a drive that never tells it must not keep the next controlword away."""
 _UPLOADED, _COMMAND, _EXPEDITED = 2 << 5, 7 << 5, 0x02
 """First byte of an answer to a Read (CiA 301, SDO upload)."""
 
@@ -33,21 +35,23 @@ class SdoStop:
         self._reads = [Read(at.index, at.sub) for at in speeds]
         self._sizes = [at.bits // 8 for at in speeds]
         self._sent_at = -math.inf
-        self._turn = -1
+        self._turn, self._tries = -1, 0
         self._waits_for = b""
         """Address of the request that is not answered yet."""
 
     def frames(self, controlwords: Sequence[int], now: float) -> list[Frame]:
         """The next request, PERIOD_S after the last one that was answered: 6040h of each axis, once where motors share
-        one, then 606Ch of each. One that is not answered is sent again."""
+        one, then 606Ch of each. A controlword that is not answered is sent again."""
         if now - self._sent_at < (AGAIN_S if self._waits_for else PERIOD_S):
             return []
         words = zip(self._drives, controlwords, strict=True)
         writes = dict.fromkeys(write_at(drive, CONTROLWORD, word) for drive, word in words)
         steps: list[Read | Write] = [*writes, *self._reads]
-        self._turn += not self._waits_for
+        reads = isinstance(steps[self._turn % len(steps)], Read)
+        if not self._waits_for or reads or self._tries >= TRIES:
+            self._turn, self._tries = self._turn + 1, 0
         frame = SdoClient(self._node_id, AGAIN_S, attempts=1).start(steps[self._turn % len(steps)], now)
-        self._sent_at, self._waits_for = now, frame.data[1:4]
+        self._sent_at, self._waits_for, self._tries = now, frame.data[1:4], self._tries + 1
         return [frame]
 
     def speed(self, frame: Frame) -> tuple[int, int] | None:

@@ -56,6 +56,23 @@ def test_what_is_not_answered_is_asked_again() -> None:
     assert [str(f) for f in stop.frames([QUICK_STOP], 1.126)] == [speed]
 
 
+def test_a_drive_that_never_tells_its_speed_gets_its_controlwords_all_the_same() -> None:
+    stop = SdoStop(1, robot_of((1, 0, "left"), (2, 0, "right")).drives[:1])
+    written = 0
+    for ms in range(0, 1000, 5):
+        for frame in stop.frames([OFF], 1.0 + ms / 1000):
+            if frame.data[0] == 0x2B:
+                written += 1
+                stop.speed(Frame(0x581, b"\x60" + frame.data[1:4] + bytes(4)))
+    assert written >= 12
+
+
+def test_a_controlword_that_is_never_answered_does_not_keep_that_of_the_other_motor_away() -> None:
+    stop = SdoStop(5, robot_of((5, 0, "left"), (5, 1, "right")).drives)
+    sent = [frame.data[1:3] for ms in range(0, 400, 5) for frame in stop.frames([OFF, OFF], 1.0 + ms / 1000)]
+    assert sent[:6] == [b"\x40\x60"] * 3 + [b"\x40\x68"] * 3
+
+
 @pytest.mark.parametrize(
     ("frame", "speed"),
     [
