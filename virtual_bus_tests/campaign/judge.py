@@ -266,7 +266,7 @@ class Judge:
         again = (
             self._moves_again(tau_s, now)
             if self._stood and tau_s > 0.0 and not excused and not rests
-            else self._rest_again(now)
+            else self._rest_again(tau_s if excused else 0.0, now)
         )
         if tau_s > self._hold.bound_s(tau_s, now, coasting, self._reach.lost) or again:
             self._violate("held", f"{self._shown} while {' and '.join(self._latches)} latched")
@@ -280,8 +280,9 @@ class Judge:
         if tau_s > 0.0 and now > self._rests_since and not lies:
             self._violate("neutral", f"{self._shown}, {now - self._rests_since:.2f} s after a reset")
 
-    def _rest_again(self, now: float) -> bool:
-        self._again_since, self._again_tau_s = now, 0.0
+    def _rest_again(self, tau_s: float, now: float) -> bool:
+        """It stands, or moves by what is excused: it may roll out from that `tau_s`."""
+        self._again_since, self._again_tau_s = now, tau_s
         return False
 
     def _moves_again(self, tau_s: float, now: float) -> bool:

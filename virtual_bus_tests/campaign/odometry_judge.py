@@ -33,6 +33,8 @@ class OdometryJudge:
         self._core: object = None
         self._seen_at = 0.0
         self._losses = 0
+        self._twin_until = -math.inf
+        """So long the newest sample may be one of a second drive with the same node id."""
         self._last: tuple[float, Pose] | None = None
         self._origins: tuple[Pose, Pose] | None = None
         self._path_from_m = 0.0
@@ -47,13 +49,16 @@ class OdometryJudge:
         if driver.core is not self._core:
             self._core, self._last, self._origins = driver.core, None, None
         if self._world.intruder.twin:
+            self._twin_until = now + self._late_s
+        if now <= self._twin_until:
             self._origins = None
         if snapshot.travel_losses != self._losses:
             self._losses, self._origins = snapshot.travel_losses, None
         if not snapshot.odometry_valid:
             return ""
         pose = Pose(snapshot.x_m, snapshot.y_m, snapshot.yaw_rad)
-        return self._jump(pose, now) or (self._difference(pose) if self._exact else "")
+        knows = self._exact and now > self._twin_until
+        return self._jump(pose, now) or (self._difference(pose) if knows else "")
 
     def _jump(self, pose: Pose, now: float) -> str:
         last, self._last = self._last, (now, pose)

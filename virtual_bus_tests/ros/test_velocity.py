@@ -342,7 +342,6 @@ def test_two_scanners_on_one_topic_stop_the_base_with_their_names(chain: Chain) 
     chain.wait_for_order(0.3)
     with TestNode("rear_scanner") as other:
         other.node.create_publisher(LaserScan, "scan", qos_profile_sensor_data)
-        state = chain.wait_for_cause(SafetyState.CAUSE_SCAN_INVALID)
-        assert "2 publishers (/rear_scanner, /test_node)" in state.detail
+        chain.wait_for_cause(SafetyState.CAUSE_SCAN_INVALID, "2 publishers (/rear_scanner, /test_node)")
         chain.wait_for_order(0.0)
     chain.wait_for_cause(SafetyState.CAUSE_NONE)

@@ -87,12 +87,14 @@ class Chain:
         self.node.wait_for(lambda: self.ordered[0] == pytest.approx(linear_mps), timeout_s, what)
         return time.monotonic() - started_s
 
-    def wait_for_cause(self, cause: str) -> SafetyState:
+    def wait_for_cause(self, cause: str, detail: str = "") -> SafetyState:
+        """Until the state has that cause, and `detail` in its detail: DDS tells of a node before it tells its name."""
+
         def state() -> SafetyState | None:
             last = self.state.last
-            return last if last is not None and last.cause == cause else None
+            return last if last is not None and last.cause == cause and detail in last.detail else None
 
-        found = self.node.wait_for(state, CAUSE_S, f"cause {cause}, state is {self.state.last}")
+        found = self.node.wait_for(state, CAUSE_S, f"cause {cause} {detail}, state is {self.state.last}")
         assert found is not None
         return found
 

@@ -280,15 +280,23 @@ def test_a_wheel_that_just_begins_to_roll_has_its_time() -> None:
 
 
 def test_of_a_faster_order_each_moment_counts_whatever_the_torque_is() -> None:
-    """Faster than the tolerance of motion, 1/16 m/s; the lag is 8 samples."""
+    """Faster than twice the tolerance of motion, 1/16 m/s; the lag is 8 samples."""
     wheel = held_until_its_order_has_gone()
     wheel.sample(0.0, 0.0, torque=0.25)
-    assert wheel.samples(8, 2.0**-3, 0.0, torque=0.25).unseen_s == (12 + 9 * 0.25) / HZ
-    last = wheel.sample(2.0**-3, 0.0, torque=0.25)
+    assert wheel.samples(8, 2.0**-2, 0.0, torque=0.25).unseen_s == (12 + 9 * 0.25) / HZ
+    last = wheel.sample(2.0**-2, 0.0, torque=0.25)
     assert (last.unseen_s, last.unseen) == ((12 + 10 * 0.25) / HZ, False)
-    last = wheel.sample(2.0**-3, 0.0, torque=0.25)
+    last = wheel.sample(2.0**-2, 0.0, torque=0.25)
     assert (last.unseen_s, last.unseen) == ((12 + 10 * 0.25 + 1) / HZ, False)
-    assert wheel.sample(2.0**-3, 0.0, torque=0.25).unseen
+    assert wheel.sample(2.0**-2, 0.0, torque=0.25).unseen
+
+
+@pytest.mark.parametrize(("share", "weight"), [(1.0, 0.25), (1.001, 1.0)])
+def test_an_order_is_slow_up_to_twice_what_a_velocity_may_be_off(share: float, weight: float) -> None:
+    wheel = held_until_its_order_has_gone()
+    order_mps = share * 2.0 * 2.0**-4  # 606Ch of this drive has no bits to lose
+    before_s = wheel.samples(9, order_mps, 0.0, torque=0.25).unseen_s
+    assert wheel.sample(order_mps, 0.0, torque=0.25).unseen_s - before_s == pytest.approx(weight / HZ)
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -41,6 +41,8 @@ STRAIN_SHARE = 0.5
 """Of the rated torque: friction takes less, and from one direction to the other changes it by less."""
 LEAST_WEIGHT = 0.25
 """A wheel that cannot turn, and takes no torque for it, is found all the same."""
+SLOW_SLACKS = 2.0
+"""An order of less than so many times what a velocity may be off is a slow one: its drive winds up torque slowly."""
 BOTH_WAYS = 2.0
 """Of what one direction may lack."""
 ROLLING_SHARE = 0.5
@@ -213,8 +215,9 @@ class EvidenceWatch:
 
     def _weight(self, torque: float | None) -> float:
         """Of a moment: less for a wheel that is ordered to move slowly, and has not begun to or just begins."""
-        begins = self._is_visible(self._velocity_mps) and self._rolled
-        if abs(self._least_mps) > self._slack_mps or (self._is_visible(self._velocity_mps) and not begins):
+        fast = abs(self._least_mps) > SLOW_SLACKS * self._slack_mps
+        slips = self._is_visible(self._velocity_mps) and not self._rolled
+        if fast or slips:
             return 1.0
         return 1.0 if torque is None or abs(torque) > STRAIN_SHARE else max(abs(torque), LEAST_WEIGHT)
 
