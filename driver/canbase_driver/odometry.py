@@ -15,6 +15,10 @@ from canbase_driver.snapshot import Covariance
 RE_REFERENCE_SAMPLES = 3
 """So many samples in a row at a new place, each near the one before: the counter has moved for good."""
 
+DOUBTED_CYCLES = 10
+"""A place that a counter jumped to is not believed after so many cycles of silence: a second drive with the same node
+id may have told it."""
+
 POSE_FLOOR_M2 = 1e-6
 """Variance of x and of y before any motion [m²]: 1 mm."""
 POSE_FLOOR_RAD2 = 1e-6
@@ -55,13 +59,15 @@ class WheelTravel:
     Each sample is compared with the last one that was taken in. A step that the wheel cannot have made is a jump: it
     is dropped and counted. If the samples after it come back, nothing was lost. If `RE_REFERENCE_SAMPLES` in a row
     stay at the new place, the counter has moved for good: that place becomes the new reference, the travel goes on
-    from where it was, and `losses` counts it, as the travel of those samples is unknown.
+    from where it was, and `losses` counts it, as the travel of those samples is unknown. After such a jump no silence
+    of more than `DOUBTED_CYCLES` is bridged any more: the first sample after it is a new reference as well.
     """
 
     __slots__ = (
         "_accepted_cycles",
         "_accepted_raw",
         "_counts",
+        "_doubted",
         "_max_step_counts",
         "_metres_per_count",
         "_suspect_raw",
@@ -87,6 +93,7 @@ class WheelTravel:
         self._accepted_cycles = 0
         self._suspect_raw = 0
         self._suspects = 0
+        self._doubted = False
         self.jumps = 0
         """Samples that were dropped, since start."""
         self.losses = 0
@@ -106,6 +113,7 @@ class WheelTravel:
         """The next sample is a new offset: after a drive's power cycle or a gap in its feedback. The travel stays."""
         self._accepted_raw = None
         self._suspects = 0
+        self._doubted = False
 
     def update(self, raw: int, cycles: int = 1) -> float:
         """Take in a new sample; the travel after it [m]. `cycles`: control cycles since the sample before, from 1."""
@@ -115,6 +123,9 @@ class WheelTravel:
             self._accept(raw)
             return self.travel_m
         self._accepted_cycles += cycles
+        if self._doubted and cycles > DOUBTED_CYCLES:
+            self._lose(raw)
+            return self.travel_m
         stays = self._suspects > 0 and self._is_near(self._suspect_raw, raw, cycles)
         if not stays and self._is_near(self._accepted_raw, raw, self._accepted_cycles):
             self._counts += unwrap(self._accepted_raw, raw)
@@ -136,8 +147,12 @@ class WheelTravel:
         self._suspects = self._suspects + 1 if stays else 1
         self._suspect_raw = raw
         if self._suspects >= RE_REFERENCE_SAMPLES:
-            self.losses += 1
-            self._accept(raw)
+            self._doubted = True
+            self._lose(raw)
+
+    def _lose(self, raw: int) -> None:
+        self.losses += 1
+        self._accept(raw)
 
 
 @dataclass(frozen=True, slots=True)

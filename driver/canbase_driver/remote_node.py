@@ -323,6 +323,8 @@ class RemoteNode:
         self._lost_heartbeat = False
         self._boot = None
         self.nmt_state = None
+        for axis in self.axes:
+            axis.travel.reset_reference()  # to what came since it was lost: a second drive of this id may have told it
         self._go(Presence.STARTING, now)
         return nmt(NmtCommand.START, self.node_id)
 

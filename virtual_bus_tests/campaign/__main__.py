@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import signal
 from typing import Annotated
 
 import typer
@@ -20,6 +21,8 @@ from campaign.without import SAFEGUARDS, remove
 
 SHOWN = 50
 """Violations that are told one by one, as they are found."""
+BROKEN_OFF = 128 + signal.SIGINT
+"""Exit code after Ctrl-C, as of a shell."""
 app = typer.Typer(add_completion=False)
 out = Console()
 Fault = enum.Enum("Fault", {name: name for name in FAULTS}, type=str)  # type: ignore[misc]
@@ -36,18 +39,24 @@ def main(
     frames: Annotated[bool, typer.Option(help="with --seed: every frame on the bus too")] = False,
     without: Annotated[Safeguard | None, typer.Option(help="take this safeguard out before")] = None,
 ) -> None:
-    """Scenarios with 1 to 4 overlapping faults in virtual time. Exit code 1 when a property did not hold."""
+    """Scenarios with 1 to 4 overlapping faults in virtual time. Exit code 1 when a property did not hold.
+
+    Ctrl-C tells what was found until then, with exit code 130.
+    """
     only = [name.value for name in fault or ()]
     taken_out = without.value if without is not None else ""
     if seed is not None:
         remove(taken_out)
         result = replay(draw_plan(seed, only), frames, print)
         raise typer.Exit(1 if result.violations else 0)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     tally = _run(range(first, first + scenarios), workers, only, taken_out)
     _tell_faults(tally)
     _tell_sums(tally)
     _tell_violations(tally, only)
-    raise typer.Exit(1 if tally.violations else 0)
+    if tally.broken_off:
+        out.print(f"broken off after {tally.scenarios} of {scenarios} scenarios")
+    raise typer.Exit(1 if tally.violations else BROKEN_OFF if tally.broken_off else 0)
 
 
 def _run(seeds: range, workers: int, only: list[str], without: str) -> Tally:

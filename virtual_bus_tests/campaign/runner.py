@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import signal
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -34,6 +35,8 @@ class Tally:
     virtual_s: float = 0.0
     processor_s: float = 0.0
     moved_m: float = 0.0
+    broken_off: bool = False
+    """By Ctrl-C: the other numbers are of what was done until then."""
 
     def add(self, result: Result) -> None:
         """One more result."""
@@ -56,19 +59,32 @@ def run(
     without: str = "",
     on_result: Callable[[Result], None] | None = None,
 ) -> Tally:
-    """Run the scenarios of these seeds, with faults from `only` (empty: all), `without` one of `SAFEGUARDS`."""
+    """Run the scenarios of these seeds, with faults from `only` (empty: all), `without` one of `SAFEGUARDS`.
+
+    Ctrl-C ends it after the robots at hand, with what was done.
+    """
     refuse_compiled(without)
     tally = Tally()
     batches = [list(batch) for _, batch in groupby(seeds, lambda seed: seed // SCENARIOS)]
     # Not forked from here: who calls may have threads, and a forked scenario must have none.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, initializer=remove, initargs=(without,)) as pool:
-        for results in pool.map(partial(_run, only), batches):
-            for result in results:
-                tally.add(result)
-                if on_result is not None:
-                    on_result(result)
+    with ProcessPoolExecutor(workers, context, initializer=_begin, initargs=(without,)) as pool:
+        try:
+            for results in pool.map(partial(_run, only), batches):
+                for result in results:
+                    tally.add(result)
+                    if on_result is not None:
+                        on_result(result)
+        except KeyboardInterrupt:
+            tally.broken_off = True
+            pool.shutdown(cancel_futures=True)
     return tally
+
+
+def _begin(without: str) -> None:
+    """A worker: Ctrl-C of a terminal reaches it too, and is for the process that asked for the work."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    remove(without)
 
 
 def start_of(seed: int) -> Start:

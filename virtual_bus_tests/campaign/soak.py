@@ -1,6 +1,7 @@
 """`python -m campaign.soak --hours 20`: ordinary driving for simulated hours; whatever trips is a false trip.
 
 `--seed 7` drives one robot again and tells its story. Exit code 1: something tripped, latched or lost its power.
+Ctrl-C tells what was driven until then, with exit code 130.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import argparse
 import gc
 import math
 import multiprocessing
+import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -22,6 +24,8 @@ from campaign.ordinary import FalseTrip, OrdinaryHour
 
 RUN_S = 120.0
 """One seed: one robot, one load, one floor."""
+BROKEN_OFF = 128 + signal.SIGINT
+"""Exit code after Ctrl-C, as of a shell."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,11 +52,11 @@ def drive(seed: int, seconds: float = RUN_S) -> Driven:
 
 
 def drive_all(seeds: range, seconds: float, workers: int) -> Iterator[Driven]:
-    """As they end."""
+    """As they end. Ctrl-C of a terminal is not for the workers."""
     if workers == 1:
         yield from (drive(seed, seconds) for seed in seeds)
         return
-    with multiprocessing.get_context("spawn").Pool(workers) as pool:
+    with multiprocessing.get_context("spawn").Pool(workers, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
         yield from pool.imap_unordered(partial(drive, seconds=seconds), seeds)
 
 
@@ -75,23 +79,39 @@ def main() -> int:
     seeds = range(given.first, given.first + math.ceil(given.hours * 3600.0 / RUN_S))
     if given.seed is not None:
         seeds = range(given.seed, given.seed + 1)
-    time_s = moving_s = path_m = processor_s = 0.0
-    trips = 0
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    done, broken_off = [], False
     columns = TextColumn("{task.fields[told]}"), BarColumn(), TimeRemainingColumn()
     with Progress(*columns, console=out) as progress:
         task = progress.add_task("", total=len(seeds), told="")
-        for driven in drive_all(seeds, seconds, min(given.workers, len(seeds))):
-            time_s, moving_s, path_m = time_s + driven.time_s, moving_s + driven.moving_s, path_m + driven.path_m
-            processor_s += driven.processor_s
-            if driven.trip is not None:
-                trips += 1
-                out.print(told(driven.trip), highlight=False, soft_wrap=True, markup=False)
-            progress.update(task, advance=1, told=f"{time_s / 3600.0:.1f} h, {trips} false trips")
-    out.print(
-        f"{len(seeds)} robots, {time_s / 3600.0:.2f} h in virtual time, {moving_s / 3600.0:.2f} h of them in motion, "
-        f"{path_m / 1000.0:.2f} km, {time_s / processor_s:.0f} s for each second of processor time: {trips} false trips"
+        try:
+            for driven in drive_all(seeds, seconds, min(given.workers, len(seeds))):
+                done.append(driven)
+                if driven.trip is not None:
+                    out.print(told(driven.trip), highlight=False, soft_wrap=True, markup=False)
+                progress.update(task, advance=1, told=_in_short(done))
+        except KeyboardInterrupt:
+            broken_off = True
+    out.print(_sums(done) + (f"; broken off, {len(seeds)} robots were asked for" if broken_off else ""))
+    return 1 if _trips(done) else BROKEN_OFF if broken_off else 0
+
+
+def _trips(done: list[Driven]) -> int:
+    return sum(driven.trip is not None for driven in done)
+
+
+def _in_short(done: list[Driven]) -> str:
+    return f"{sum(driven.time_s for driven in done) / 3600.0:.1f} h, {_trips(done)} false trips"
+
+
+def _sums(done: list[Driven]) -> str:
+    time_s, processor_s = sum(driven.time_s for driven in done), sum(driven.processor_s for driven in done)
+    moving_s, path_m = sum(driven.moving_s for driven in done), sum(driven.path_m for driven in done)
+    speed = f"{time_s / processor_s:.0f} s for each second of processor time: " if done else ""
+    return (
+        f"{len(done)} robots, {time_s / 3600.0:.2f} h in virtual time, {moving_s / 3600.0:.2f} h of them in motion, "
+        f"{path_m / 1000.0:.2f} km, {speed}{_trips(done)} false trips"
     )
-    return 1 if trips else 0
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from campaign.faults import FAULTS
 from campaign.needs import NEEDS, Need
 from campaign.plan import MOST_FAULTS, draw_plan
 from campaign.runner import run
-from campaign.scenario import Start
+from campaign.scenario import Result, Start
 from campaign.teeth import look_at
 from campaign.without import SAFEGUARDS
 from hazards.catalogue import load
@@ -76,3 +76,12 @@ def test_one_scenario_is_told_from_begin_to_end() -> None:
     )
     assert listed.exit_code == 1, listed.output
     assert "latched in seed" in listed.output
+
+
+def test_ctrl_c_tells_what_was_found_until_then() -> None:
+    def ctrl_c(_result: Result) -> None:
+        raise KeyboardInterrupt
+
+    tally = run([0, 25, 50], 1, on_result=ctrl_c)
+    assert tally.broken_off
+    assert tally.scenarios == 1

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Iterator
 
 import pytest
 
+from campaign import soak
 from campaign.ordinary import OrdinaryHour
-from campaign.soak import drive_all, told
+from campaign.soak import Driven, drive_all, told
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(600)]
 
@@ -54,3 +56,18 @@ def test_the_command_says_what_it_drove() -> None:
     assert done.returncode == 0, done.stdout + done.stderr
     assert "1 robots, 0.00 h in virtual time" in done.stdout
     assert "0 false trips" in done.stdout
+
+
+def test_ctrl_c_tells_what_was_driven_until_then(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def until_ctrl_c(*_given: object) -> Iterator[Driven]:
+        yield Driven(7, time_s=3600.0, moving_s=1800.0, path_m=2000.0, trip=None, processor_s=60.0)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(soak, "drive_all", until_ctrl_c)
+    monkeypatch.setattr(sys, "argv", ["soak", "--hours", "20"])
+    assert soak.main() == 130
+    told = " ".join(capsys.readouterr().out.split())
+    assert "1 robots, 1.00 h in virtual time, 0.50 h of them in motion, 2.00 km" in told
+    assert "0 false trips; broken off, 600 robots were asked for" in told

@@ -292,6 +292,19 @@ def test_ready_ends_with_any_other_nmt_state(state: int, why: str) -> None:
     assert story.axis.status_at == -math.inf
 
 
+def test_a_place_that_was_heard_before_the_nmt_start_is_no_reference() -> None:
+    """Drives send no PDOs before it: a second drive with this node id told that place."""
+    story = Story().ready()
+    story.heartbeat(PRE_OPERATIONAL)
+    assert story.status()
+    assert story.axis.travel.referenced
+    story.wait(0.3)
+    story.started()
+    assert not story.axis.travel.referenced
+    story.status()
+    assert story.axis.travel.referenced
+
+
 def test_a_restart_while_it_is_starting_is_noticed_at_once() -> None:
     story = Story().started()
     story.heartbeat(BOOT_UP)

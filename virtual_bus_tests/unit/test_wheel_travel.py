@@ -128,6 +128,27 @@ def test_a_counter_that_has_moved_for_good_becomes_the_new_reference_at_the_thir
     assert travel.update(10 + jump + 10) == pytest.approx(0.015)
 
 
+@pytest.mark.parametrize(("cycles", "travel_m", "losses"), [(10, 0.020, 1), (11, 0.010, 2), (6000, 0.010, 2)])
+def test_a_place_that_a_counter_jumped_to_is_not_believed_over_a_silence(
+    cycles: int, travel_m: float, losses: int
+) -> None:
+    """Another drive with this node id may have told it, and was the only one that spoke."""
+    travel = wheel(0, 10, 500, 500, 500)
+    assert travel.update(510, cycles) == pytest.approx(travel_m)
+    assert (travel.losses, travel.referenced) == (losses, True)
+    assert travel.update(515) == pytest.approx(travel_m + 0.005)
+
+
+def test_a_place_that_it_rolled_to_is_believed_over_a_silence() -> None:
+    travel = wheel(0, 10)
+    assert travel.update(500, 60) == pytest.approx(0.500)
+    assert travel.losses == 0
+    doubted = wheel(0, 10, 500, 500, 500)
+    doubted.reset_reference()  # its drive was booted anew
+    doubted.update(0)
+    assert doubted.update(490, 60) == pytest.approx(0.500)
+
+
 def test_samples_that_are_all_over_the_place_never_become_a_reference() -> None:
     travel = wheel(0, *(sign * k * 1_000_000 for k in range(1, 40) for sign in (1, -1)))
     assert travel.travel_m == 0.0
