@@ -277,7 +277,8 @@ class Judge:
         if self._latches or pushed or self._wishes.greatest_s(now) > 0.0:
             self._rests_since = math.inf
         lies = self._reach.acts_s(now, self._motion.runaway_s) > 0.0 or self._shown.is_blind
-        if tau_s > 0.0 and now > self._rests_since and not lies:
+        driven = any(self._reach.turning())
+        if tau_s > 0.0 and now > self._rests_since and driven and not lies:
             self._violate("neutral", f"{self._shown}, {now - self._rests_since:.2f} s after a reset")
 
     def _rest_again(self, tau_s: float, now: float) -> bool:

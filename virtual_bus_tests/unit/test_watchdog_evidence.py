@@ -279,6 +279,30 @@ def test_a_wheel_that_just_begins_to_roll_has_its_time() -> None:
     assert other.samples(2, 0.0, 2.0**-6, rolls=2.0**-6).unseen_s == 14 / HZ  # without a torque nothing bounds it
 
 
+@pytest.mark.parametrize(
+    ("ordered", "velocity", "rolls", "weight"),
+    [
+        (60, 2.0**-6, 2.0**-6, 0.25),
+        (63, 2.0**-6, 2.0**-6, 0.25),
+        (64, 2.0**-6, 2.0**-6, 1.0),  # 1/16 m were ordered: it has had its time to begin
+        (60, 2.0**-6, 2.0**-7, 1.0),
+        (60, 2.0**-6, 0.0, 1.0),
+        (60, 2.0**-7, 2.0**-7, 1.0),
+        (60, -(2.0**-6), -(2.0**-6), 1.0),
+        (60, 0.0, 0.0, 1.0),
+    ],
+)
+def test_a_wheel_that_tells_no_torque_has_less_time_while_it_begins_to_roll_as_ordered(
+    ordered: int, velocity: float, rolls: float, weight: float
+) -> None:
+    """Ordered 1/1024 m a sample."""
+    wheel = Wheel(motion_missing_s=4.0)
+    before_s = wheel.samples(ordered - 1, 2.0**-4, 0.0).unseen_s
+    last = wheel.sample(2.0**-4, velocity, rolls=rolls)
+    assert last.unseen_m == ordered / 1024
+    assert last.unseen_s - before_s == weight / HZ
+
+
 def test_of_a_faster_order_each_moment_counts_whatever_the_torque_is() -> None:
     """Faster than twice the tolerance of motion, 1/16 m/s; the lag is 8 samples."""
     wheel = held_until_its_order_has_gone()

@@ -198,7 +198,7 @@ class EvidenceWatch:
         step_m = abs(self._setpoint_mps) * elapsed_s
         unseen_m = step_m + (0.0 if turned else last.unseen_m)
         both_m = step_m + last.both_m
-        step_s = 0.0 if self._rests else elapsed_s * self._weight(torque)
+        step_s = 0.0 if self._rests else elapsed_s * self._weight(torque, unseen_m)
         asked = unseen_m >= self._unseen_m or (self._is_visible(self._least_mps) and unseen_m >= self._life_m)
         return Evidence(
             unseen_s=(step_s if asked else 0.0) + (0.0 if turned else last.unseen_s),
@@ -213,13 +213,19 @@ class EvidenceWatch:
         one_way = counted.unseen_s >= least_s and counted.unseen_m >= least_m
         return one_way or (counted.both_s >= least_s and counted.both_m >= BOTH_WAYS * least_m)
 
-    def _weight(self, torque: float | None) -> float:
-        """Of a moment: less for a wheel that is ordered to move slowly, and has not begun to or just begins."""
+    def _weight(self, torque: float | None, unseen_m: float) -> float:
+        """Of a moment: less for a wheel that is ordered to move slowly, and has not begun to or just begins.
+
+        `unseen_m`: ordered this way. A drive that tells no torque has less time for the beginning alone.
+        """
         fast = abs(self._least_mps) > SLOW_SLACKS * self._slack_mps
-        slips = self._is_visible(self._velocity_mps) and not self._rolled
-        if fast or slips:
+        turns = self._is_visible(self._velocity_mps)
+        if fast or (turns and not self._rolled):
             return 1.0
-        return 1.0 if torque is None or abs(torque) > STRAIN_SHARE else max(abs(torque), LEAST_WEIGHT)
+        if torque is None:
+            begins = turns and self._setpoint_mps * self._velocity_mps > 0.0 and unseen_m < self._unseen_m
+            return LEAST_WEIGHT if begins else 1.0
+        return 1.0 if abs(torque) > STRAIN_SHARE else max(abs(torque), LEAST_WEIGHT)
 
     def _kept(self, lives: bool, ghost_m: float) -> Evidence:
         """What outlives a time without power: most of it, or a drive that lets go after each order is never found."""
