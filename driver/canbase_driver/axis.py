@@ -129,6 +129,10 @@ class Axis:
                 f"went from {self._known_mps:.2f} to {self.velocity_mps:.2f} m/s in {after_s:.2f} s"
             )
 
+    def has_fresh_sample(self, now: float) -> bool:
+        """A new sample, and none from before a silence: beside a fresh one of another wheel it would turn the pose."""
+        return self.has_new_sample and self.age_s(now) <= self._feedback_s
+
     def sample_taken(self) -> None:
         """The core has taken the new sample into the odometry."""
         self._status_is_new = self.has_new_sample = False

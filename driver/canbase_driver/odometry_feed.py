@@ -36,9 +36,9 @@ class OdometryFeed:
         self.odometry.reset(pose)
 
     def update(self, now: float) -> None:
-        """Take the sample in if every wheel has given one since the last; call it after each feedback."""
+        """Take the sample in if every wheel has given a fresh one since the last; call it after each feedback."""
         axes = self._drives.axes
-        if not all(axis.has_new_sample for axis in axes):
+        if not all(axis.has_fresh_sample(now) for axis in axes):
             return
         for axis in axes:
             axis.sample_taken()

@@ -79,6 +79,18 @@ def test_a_sample_is_new_when_both_frames_of_a_sync_have_come_and_until_it_is_ta
     assert not left.has_new_sample
 
 
+def test_a_sample_from_before_a_silence_is_not_fresh() -> None:
+    left = axis()
+    assert not left.has_fresh_sample(10.0)
+    left.on_status(status(READY, 0), 10.0)
+    left.on_velocity(velocity(0), 10.0)
+    feedback_s = bench_robot().timeouts.feedback_s
+    assert left.has_fresh_sample(10.0 + 0.999 * feedback_s)
+    assert not left.has_fresh_sample(10.0 + 1.001 * feedback_s)
+    left.on_velocity(velocity(0), 11.0)  # its status got lost
+    assert not left.has_fresh_sample(11.0)
+
+
 def test_a_gap_in_the_feedback_is_measured_in_time_so_nothing_of_the_way_is_lost() -> None:
     left = axis()
     left.on_status(status(ENABLED, 0), 10.0)

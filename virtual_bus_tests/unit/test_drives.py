@@ -159,6 +159,17 @@ def test_a_sample_enters_the_odometry_when_all_wheels_have_given_theirs(story: S
     assert story.feed.odometry.twist.linear_mps == pytest.approx(0.4, abs=0.01)
 
 
+def test_after_a_silence_a_wheel_that_speaks_first_turns_no_pose(story: Story) -> None:
+    """The right wheel's last sample before the silence found no partner; the left wheel's first one after it comes."""
+    story.now = 10.01
+    story.say(1, travel_m=0.004)
+    story.now = 11.0
+    story.say(0, travel_m=0.3)
+    assert story.pose == (0.0, 0.0, 0.0)
+    story.say(1, travel_m=0.3)
+    assert story.pose == pytest.approx((0.3, 0.0, 0.0), abs=1e-4)
+
+
 def test_two_samples_at_the_same_time_are_one(story: Story) -> None:
     story.say(0)
     story.say(1)
