@@ -41,8 +41,6 @@ class Kind:
     draw: Callable[[Random], Arguments]
     begin: Change
     end: Change
-    encoder_lies: bool = False
-    """A position is not that of the wheel: odometry cannot be compared with the truth."""
 
 
 def nothing(random: Random) -> Arguments:

@@ -11,6 +11,8 @@ from canbase_config.robot import Robot
 from canbase_velocity.twist import Twist
 
 ENABLE = 0x000F
+NMT_RESETS = (0x81, 0x82)
+"""Reset node, reset communication."""
 SETPOINT = struct.Struct("<Hi")
 TWIN_STATUS = struct.pack("<Hi", 0x0637, 0)
 """Operation enabled; position 0."""
@@ -34,26 +36,26 @@ class Intruder:
         """It publishes this to cmd_vel."""
         self.twin = 0
         """It answers as a second drive of this node id: switched on, at a stand."""
-        self.bad_at = -1.0
-        """When it last sent something to the bus."""
+        self.moves_at = self.resets_at = -1.0
+        """When it last sent setpoints or NMT commands, and when an NMT reset: both forget settings, 1016h too."""
         self._act()
 
     def _act(self) -> None:
+        now = self._clock.now
         if self.nmt:
-            self._send(0x000, self.nmt)
+            self._member.send(0x000, self.nmt)
+            self.moves_at = now
+            self.resets_at = now if self.nmt[0] in NMT_RESETS else self.resets_at
         if self.setpoints_mps:
             for drive in self._robot.drives:
                 bits = round(self.setpoints_mps / mps_per_bit(drive, self._robot.base.wheel_radius_m))
-                self._send(0x200 + 0x100 * drive.axis + drive.node_id, SETPOINT.pack(ENABLE, bits))
+                self._member.send(0x200 + 0x100 * drive.axis + drive.node_id, SETPOINT.pack(ENABLE, bits))
+            self.moves_at = now
         if self.setpoints_mps or self.syncs:
-            self._send(0x080, b"")
+            self._member.send(0x080, b"")
         if self.twin:
-            self._send(0x180 + self.twin, TWIN_STATUS)
-            self._send(0x280 + self.twin, bytes(4))
+            self._member.send(0x180 + self.twin, TWIN_STATUS)
+            self._member.send(0x280 + self.twin, bytes(4))
         if self.twist is not None:
             self._topics.publish("cmd_vel", self.twist)
         self._clock.after(self.PERIOD_S, self._act)
-
-    def _send(self, cob_id: int, data: bytes) -> None:
-        self.bad_at = self._clock.now
-        self._member.send(cob_id, data)

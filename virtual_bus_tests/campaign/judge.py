@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from campaign.action_process import Goal
 from campaign.envelope import (
+    ORDER_S,
     Envelope,
     braking_s,
     coasting_share,
@@ -17,7 +18,7 @@ from campaign.envelope import (
     notice_s,
     react_s,
 )
-from campaign.faults import FAULTS
+from campaign.goal_judge import GoalJudge
 from campaign.motion_judge import MotionJudge
 from campaign.odometry_judge import OdometryJudge
 from campaign.outside import Outside, Surroundings
@@ -27,12 +28,11 @@ from campaign.shown import Shown
 from campaign.strangers import SENT_S, Strangers
 from campaign.wishes import Wishes
 from campaign.world import World
-from canbase_action_server.outcome import ErrorCode
 from canbase_bench.cia402.states import State
 from canbase_config.robot import Robot
-from canbase_config.stopping import jerk_adds_s, lag_s, max_wheel_mps, standstill_s
+from canbase_config.stopping import jerk_adds_s, lag_s, max_wheel_mps
 from canbase_driver.snapshot import DriverState
-from canbase_velocity.twist import Twist
+from canbase_velocity.twist import ZERO, Twist
 from canbase_watchdog.ladder import RUNGS, Step
 from canbase_watchdog.watchdog import Answer
 from canbase_watchdog.watchdog import State as WatchdogState
@@ -76,23 +76,29 @@ PROPERTIES = {
 }
 EXCUSES = {
     "unreachable": "no process has a line to a drive that turns, and it cannot stop by itself: it watches nothing, or "
-    "its own quick stop closes its loop on a sensor that lies; only STO stops it. Times count from when it is reached",
+    "its own quick stop closes its loop on a sensor that lies; only STO stops it. Times count from when it is reached. "
+    "A process that hangs for less than watchdog_s is there",
     "scaled": "a wheel whose encoder counts a share of the motion is to every part a smaller wheel; orders are "
     "compared with the motion in the measure of its encoder",
-    "strange hands": "who sends to the drives past all layers asks no watchdog (enabling), and moves them again after "
-    "a stop, until that is stopped too (held: for T_react); its way may be longer than the free one (obstacle)",
-    "fault reaction": "a drive whose sensor lies, or that does not brake, takes no controlword in its fault reaction "
-    "(CiA 402-2): as unreachable, until the watchdog has found it, ordered its power off and reset its node; and while "
-    "no watchdog reaches it. A wheel that stood may turn again for the time that its lie takes to be found (held)",
+    "strange hands": "who sends setpoints or NMT commands to the drives past all layers asks no watchdog (enabling), "
+    "and moves them again after a stop, until that is stopped too (held, neutral: T_react from its begin on); its way "
+    "may be longer than the free one (obstacle: unless the filter orders motion into it)",
+    "fault reaction": "a drive whose sensor lies, or that does not brake as its settings say, takes no controlword in "
+    "its fault reaction (CiA 402-2): as unreachable, until the watchdog has found it, ordered its power off and reset "
+    "its node; and while no watchdog reaches it. A wheel that stood may turn again for the time that its lie takes to "
+    "be found, all such times of one stop together (held)",
     "cut off": "one drive of several is cut off and turns the base on until its own watch stops it (held)",
-    "deaf watchdog": "it cannot keep a standing base from starting; driver and drives miss it within T_react (held)",
-    "reset by a stranger": "a drive that another master has reset has forgotten 1016h (heartbeat)",
+    "deaf watchdog": "it cannot keep a standing base from starting; driver and drives miss it within T_react from the "
+    "begin on (held)",
+    "reset by a stranger": "a drive that another master has reset has forgotten 1016h, until its power is off "
+    "(heartbeat)",
     "unheard button": "a filter that never heard the button knows of no emergency stop (zero)",
     "unasked": "without a driver there is no SYNC, and no drive tells anything: it is missed first (runaway)",
     "ran away": "a wheel whose sensor lies is faster than ordered, or turns the base, for the times of runaway and "
-    "path at most, and rolls out without power then; its way may be longer than the free one (obstacle)",
+    "path at most, and rolls out without power then; its way may be longer than the free one (obstacle: unless the "
+    "filter orders motion into it)",
     "unproven stand": "a drive with a dead encoder may push for stand_impulse_s before it has to let go, and its wheel "
-    "rolls out after that: nothing shows it (standstill, neutral)",
+    "rolls out after that: nothing shows it (standstill; neutral: unless the filter orders motion)",
     "no watch": "a drive of a kind that watches neither heartbeats nor setpoints goes on turning (heartbeat)",
 }
 """What no software can do, each as a state of the world that is looked at, and never by a fault's name."""
@@ -118,7 +124,6 @@ class Judge:
     def __init__(self, world: World, around: Surroundings, outside: Outside, plan: Plan) -> None:
         self._world, self._around, self._outside = world, around, outside
         self._start = now = world.clock.now
-        self._faults = {fault.name for fault in plan.faults}
         self.violations: list[Violation] = []
         self.react_s = self._react_s(plan)
         self._coasting = coasting_share(world.drawn)
@@ -129,22 +134,22 @@ class Judge:
         sees_s = world.robot.safety.scan.timeout_s + 2.0 * around.SCAN_S + longest_lag_s(world.robot)
         self._blind = Envelope(sees_s + (self.react_s if len(plan.faults) > 1 else 0.0), now, self._coasting)
         self._touched = False
-        self._awaits_zero = False
+        self._leased, self._leased_at = ZERO, -math.inf
+        self._awaits_zero = self._pushed = False
         self._rests_since = math.inf
-        """When the last reset was done, as long as nobody has had the base move since."""
+        """When the last reset was done, as long as no source has had the base move since."""
         self._hold: Envelope | None = None
-        self._from_mps = self._from_tau_s = self._acts_s = 0.0
-        """The fastest wheel since something is latched; and for how long whoever moved it last may."""
+        self._from_mps = self._from_tau_s = self._acts_s = self._acted_s = 0.0
+        """The fastest wheel since something is latched; for how long whoever moved it last may, and so long it did."""
         self._acted_at = -math.inf
         self._stood = False
-        self._latched_at = self._again_since = now
+        self._latched_at = self._again_since = self._tripped_at = now
         self._again_tau_s = 0.0
         self._latches: dict[str, object] = {}
         self._resets_done = 0
         self._watching_at = now
         self._pressed_at, self._unheard_at, self._lock_from = math.inf, -math.inf, -math.inf
-        lies = any(FAULTS[name].encoder_lies for name in self._faults)
-        self._odometry = OdometryJudge(world, exact=not lies)
+        self._odometry, self._goals = OdometryJudge(world, self._shown), GoalJudge(world, self._shown)
         self._motion = MotionJudge(world, self._shown)
         self.trips: list[str] = []
         self.lives, self._fresh = 1, False
@@ -161,9 +166,9 @@ class Judge:
 
     def finish(self) -> None:
         """The scenario is over: no goal may be left."""
-        for goal in self._world.action.goals:
-            if not goal.ends and not goal.died:
-                self._violate("goal", f"goal {goal.number} never ended")
+        problem = self._goals.left()
+        if problem:
+            self._violate("goal", problem)
 
     def _react_s(self, plan: Plan) -> float:
         """Two layers with several faults. A second master is fought rung by rung; what comes late adds its delay."""
@@ -186,6 +191,7 @@ class Judge:
         locked_s = self._world.clock.now - max(self._world.locked_at, self._lock_from)
         if locked_s > HEARD_S and not twist.is_zero:
             self._violate("locked", f"{twist} is ordered, {locked_s:.2f} s after a lock was closed")
+        self._leased, self._leased_at = twist, self._world.clock.now
         tau_s = braking_s(self._world.robot, twist.linear_mps, twist.angular_radps)
         self._envelope.order(tau_s, self._world.clock.now)
         self._motion.order(twist)
@@ -216,6 +222,7 @@ class Judge:
         self._check_wall(tau_s, coasting, now)
         if self._fresh and tau_s > 0.0 and not self._latches:
             self.lives, self._fresh = self.lives + 1, False
+        self._goals.step()
         problem = self._odometry.step(now)
         if problem:
             self._violate("odometry", problem)
@@ -241,8 +248,14 @@ class Judge:
         elif not self._touched:
             self._touched = True
             excused = pushed or self._motion.ran_away or self._around.turned_rad > TURNED_RAD
-            if not excused and not (blind and tau_s <= slowly_s):
+            if (not excused or self._orders_into(blind, now)) and not (blind and tau_s <= slowly_s):
                 self._violate("obstacle", f"touched at {self._shown}")
+
+    def _orders_into(self, blind: bool, now: float) -> bool:
+        """Whatever moved the base there, the filter orders motion on against the wall."""
+        ahead_m, behind_m = self._around.free_m
+        towards_mps = self._leased.linear_mps * (1.0 if ahead_m < behind_m else -1.0)
+        return self._is_leased(now) and towards_mps > (self._world.robot.safety.blind_mps if blind else 0.0)
 
     def _check_speed(self, tau_s: float, coasting: bool, now: float) -> None:
         allowed_s = self._envelope.bound_s(tau_s, now, coasting, self._reach.lost)
@@ -262,7 +275,7 @@ class Judge:
         rests = moving_s(self._world.robot, base.v_mps, base.w_radps) == 0.0
         stands = tau_s == 0.0 and rests
         self._stood = self._stood or (stands and now >= self._latched_at + OBEY_S)
-        excused = self._reach.was_lost or now < max(self._strangers.sent_at, self._strangers.deaf_at) + self.react_s
+        excused = self._reach.was_lost or now < self._strangers.begins_at + self.react_s
         again = (
             self._moves_again(tau_s, now)
             if self._stood and tau_s > 0.0 and not excused and not rests
@@ -272,14 +285,19 @@ class Judge:
             self._violate("held", f"{self._shown} while {' and '.join(self._latches)} latched")
 
     def _check_neutral(self, tau_s: float, now: float) -> None:
-        """From a reset on, at which the base stands, until somebody orders motion who may, or moves it past all."""
-        pushed = self._reach.was_lost or self._strangers.acted_at > self._rests_since
-        if self._latches or pushed or self._wishes.greatest_s(now) > 0.0:
+        """From a reset on until somebody orders motion who may. What rolls without power moves for nobody."""
+        if self._latches or self._wishes.greatest_s(now) > 0.0:
             self._rests_since = math.inf
+        acted_at = self._strangers.acted_at
+        self._pushed = now < acted_at + self.react_s or (self._pushed and tau_s > 0.0)
         lies = self._reach.acts_s(now, self._motion.runaway_s) > 0.0 or self._shown.is_blind
-        driven = any(self._reach.turning())
-        if tau_s > 0.0 and now > self._rests_since and driven and not lies:
+        moved = (self._reach.was_lost or self._pushed or lies) and not self._is_leased(now)
+        if tau_s > 0.0 and now > self._rests_since and any(self._reach.turning()) and not moved:
             self._violate("neutral", f"{self._shown}, {now - self._rests_since:.2f} s after a reset")
+
+    def _is_leased(self, now: float) -> bool:
+        """The filter orders motion."""
+        return not self._leased.is_zero and now <= self._leased_at + ORDER_S
 
     def _rest_again(self, tau_s: float, now: float) -> bool:
         """It stands, or moves by what is excused: it may roll out from that `tau_s`."""
@@ -297,7 +315,8 @@ class Judge:
             return False
         if now <= self._acted_at + STEP_S:
             self._again_tau_s = math.inf  # it may have got faster until the very moment when its power went
-            return now > self._again_since + self._acts_s
+            self._acted_s += STEP_S
+            return self._acted_s > self._acts_s
         rolls_out = now <= self._acted_at + BRAKES_S or not any(self._reach.turning())
         slows = tau_s <= self._again_tau_s + ROUNDING_S
         self._again_tau_s = min(tau_s, self._again_tau_s)
@@ -311,10 +330,12 @@ class Judge:
             self._watching_at = now
         latched = self._latched_now()
         if "watchdog" in latched.keys() - self._latches.keys():
+            self._tripped_at = now
             self.trips.append(status.verdict.cause.name.lower())
         if self._gone("driver", latched) and done == self._resets_done:
             self._violate("latched", "the driver left LATCHED without a reset")
-        if self._gone("watchdog", latched) and status.reset[1] is not Answer.DONE:
+        asked = self._outside.asked_at >= self._tripped_at and status.reset[1] is Answer.DONE
+        if self._gone("watchdog", latched) and not asked:
             self._violate("latched", "the watchdog left TRIPPED without a reset")
         if done > self._resets_done:
             self._wishes.on_reset(now)
@@ -348,6 +369,7 @@ class Judge:
             self._hold = None
         elif self._hold is None:
             self._hold, self._stood, self._latched_at = Envelope(self.react_s, now, self._coasting), False, now
+            self._acted_s = 0.0
             shown = self._shown
             self._from_mps = shown.fastest_mps
             self._from_tau_s = moving_s(self._world.robot, shown.linear_mps, shown.angular_radps)
@@ -363,7 +385,7 @@ class Judge:
         fastest_mps = max(max_wheel_mps(robot), self._reach.fastest_mps)
         brakes_s = fastest_mps / robot.limits.emergency_deceleration_mps2
         for node_id, axis in self._reach.turning():
-            alone_s = now - max(self._reach.heard(node_id), self._reach.lost_at)
+            alone_s = now - max(self._reach.heard(node_id), self._reach.lost_at[node_id])
             if alone_s > self._reach.alone_s + brakes_s + 0.1 and self._reach.stops_alone(node_id):
                 self._violate("heartbeat", f"drive {node_id}.{axis} turns, {alone_s:.2f} s without its masters")
 
@@ -377,24 +399,20 @@ class Judge:
             self._unheard_at = now
         if now > max(self._pressed_at, self._unheard_at) + HEARD_S:
             self._awaits_zero = True
-        limits = self._world.robot.limits
-        longest_s = braking_s(self._world.robot, limits.linear_mps, limits.angular_radps)
-        if tau_s > 0.0 and not coasting and now > self._pressed_at + 0.1 + self.react_s + longest_s:
+        robot, fastest_mps = self._world.robot, self._reach.fastest_mps
+        longest_s = braking_s(robot, robot.limits.linear_mps, robot.limits.angular_radps)
+        if coasting:
+            rolls_s = braking_s(robot, fastest_mps, 2.0 * fastest_mps / robot.base.track_m) / self._coasting
+            longest_s = max(longest_s, rolls_s)
+        if tau_s > 0.0 and now > self._pressed_at + 0.1 + self.react_s + longest_s:
             self._violate("estop", f"{self._shown}, {now - self._pressed_at:.2f} s after it was pressed")
 
     def _on_goal_end(self, goal: Goal) -> None:
-        robot, outcome = self._world.robot, goal.ends[-1]
+        outcome = goal.ends[-1]
         self._world.note(f"goal {goal.number} ends: {outcome.code.name}: {outcome.message}")
-        ramps_s = goal.speed_mps * (1.0 / robot.limits.acceleration_mps2 + 1.0 / robot.limits.deceleration_mps2) + 0.5
-        ideal_s = abs(goal.distance_m) / goal.speed_mps + ramps_s
-        longest_s = robot.action.overall_factor * ideal_s + robot.action.overall_extra_s + standstill_s(robot)
-        if len(goal.ends) > 1:
-            self._violate("goal", f"goal {goal.number} ended {len(goal.ends)} times")
-        if goal.ended_at - goal.began > longest_s + goal.held_up_s + 1.0:
-            self._violate("goal", f"goal {goal.number} took {goal.ended_at - goal.began:.1f} s")
-        off_m = abs(outcome.traveled_m - goal.distance_m)
-        if outcome.code is ErrorCode.OK and off_m > 3.0 * robot.action.tolerance_m:
-            self._violate("goal", f"goal {goal.number} succeeded {off_m:.3f} m beside its distance")
+        problem = self._goals.ended(goal)
+        if problem:
+            self._violate("goal", problem)
 
     def _coasts(self) -> bool:
         """The wheels of one side roll: no motor of it brakes."""

@@ -147,9 +147,10 @@ class MotionJudge:
     def _unproven(self) -> bool:
         """A dead encoder shows a stand, and its drive has not given more torque yet than it may before it lets go, or
         the wheel rolls out after that."""
-        slower = self._shown.fastest_mps < self._before_mps
+        slower, drives = self._shown.fastest_mps < self._before_mps, self._world.drives
         self._before_mps = self._shown.fastest_mps
-        return self._shown.is_blind and (slower or self._shown.pushed_blindly_s <= self._impulse_s)
+        rolls_out = slower and any(all(map(drives.rolls, side)) for side in drives.sides)
+        return self._shown.is_blind and (rolls_out or self._shown.pushed_blindly_s <= self._impulse_s)
 
     def _standstill(self, now: float) -> tuple[str, str] | None:
         driver = self._world.driver

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from campaign.shown import Shown
 from campaign.world import World
 from canbase_action_server.along_track import Pose, displacement
 from canbase_config.stopping import max_wheel_mps
@@ -18,11 +19,17 @@ FLOOR_M, SHARE = 0.01, 0.03
 """What encoder steps, inner steps of the plant and cycles of different length may differ by."""
 
 
-class OdometryJudge:
-    """`exact`: no fault of this scenario makes an encoder tell something else than the travel."""
+def true_pose(world: World) -> Pose:
+    """Where the base is."""
+    base = world.drives.bench.base
+    return Pose(base.x_m, base.y_m, base.turned_rad)
 
-    def __init__(self, world: World, exact: bool) -> None:
-        self._world, self._exact = world, exact
+
+class OdometryJudge:
+    """To be asked every step."""
+
+    def __init__(self, world: World, shown: Shown) -> None:
+        self._world, self._shown = world, shown
         self._fastest_mps = max_wheel_mps(world.robot)
         self._late_s = world.robot.timeouts.feedback_s + 2.0 / world.robot.rates.control_hz
         """So old the newest sample may be while the driver calls its odometry valid."""
@@ -33,8 +40,8 @@ class OdometryJudge:
         self._core: object = None
         self._seen_at = 0.0
         self._losses = 0
-        self._twin_until = -math.inf
-        """So long the newest sample may be one of a second drive with the same node id."""
+        self._lies_until = -math.inf
+        """So long the newest sample may be one of an encoder that lies, or of a second drive with the same node id."""
         self._last: tuple[float, Pose] | None = None
         self._origins: tuple[Pose, Pose] | None = None
         self._path_from_m = 0.0
@@ -48,17 +55,16 @@ class OdometryJudge:
         self._seen_at = snapshot.time_s
         if driver.core is not self._core:
             self._core, self._last, self._origins = driver.core, None, None
-        if self._world.intruder.twin:
-            self._twin_until = now + self._late_s
-        if now <= self._twin_until:
+        if not self._shown.tells_truth:
+            self._lies_until = now + self._late_s
+        if now <= self._lies_until:
             self._origins = None
         if snapshot.travel_losses != self._losses:
             self._losses, self._origins = snapshot.travel_losses, None
         if not snapshot.odometry_valid:
             return ""
         pose = Pose(snapshot.x_m, snapshot.y_m, snapshot.yaw_rad)
-        knows = self._exact and now > self._twin_until
-        return self._jump(pose, now) or (self._difference(pose) if knows else "")
+        return self._jump(pose, now) or (self._difference(pose) if now > self._lies_until else "")
 
     def _jump(self, pose: Pose, now: float) -> str:
         last, self._last = self._last, (now, pose)
@@ -69,8 +75,7 @@ class OdometryJudge:
         return f"pose moved {way_m:.3f} m in {now - last[0]:.3f} s" if way_m > possible_m else ""
 
     def _difference(self, pose: Pose) -> str:
-        base = self._world.drives.bench.base
-        truth = Pose(base.x_m, base.y_m, base.turned_rad)
+        base, truth = self._world.drives.bench.base, true_pose(self._world)
         if self._origins is None:
             if abs(base.v_left_mps) + abs(base.v_right_mps) > 0.0:
                 return ""

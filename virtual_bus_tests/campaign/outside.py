@@ -28,6 +28,8 @@ class Outside:
         self._world, self._start = world, start
         self._topics = {name: source.topic for name, source in world.robot.mux.sources.items()}
         self.resets: list[Outcome] = []
+        self.asked_at = -math.inf
+        """When the operator last asked for one."""
         around.reset = self.reset
         clock = world.clock
         for segment in plan.segments:
@@ -40,6 +42,7 @@ class Outside:
     def reset(self) -> None:
         """The operator asks for a reset, whatever the state."""
         self._world.note("operator asks for a reset")
+        self.asked_at = self._world.clock.now
         self._world.velocity.reset()
         self._world.driver.reset(self.resets)
 

@@ -42,9 +42,13 @@ class Reach:
         """It was so since the base last stood."""
         self.fastest_mps = 0.0
         """The fastest wheel since the base last stood."""
-        self.lost_at = -math.inf
+        self.lost_at = dict.fromkeys(world.drives.bench.nodes, -math.inf)
         self._weak: set[int] = set()
         """Drives whose own stop has had hardly an effect since they have power: a ramp that has begun goes on so."""
+        self._ran_at = dict.fromkeys(("driver", "watchdog"), world.clock.now)
+        """When each of them ran last: nobody misses it before timeouts.watchdog_s, so it is there until then."""
+        self._power_from: dict[int, float] = {}
+        """Since when each drive has power: it gets none before its settings are written."""
         self._reacts_since: dict[int, float] = {}
         """Drives in a fault reaction that their own sensor never ends; since when the watchdog reaches them."""
         watchdog = world.robot.watchdog
@@ -55,20 +59,24 @@ class Reach:
     def step(self, stands: bool) -> None:
         """Look at all drives now."""
         now, bench = self._world.clock.now, self._world.drives.bench
+        self._ran_at |= {name: now for name in self._ran_at if self._world.processes[name].running}
         powered = [node for node in bench.nodes.values() if any(axis.motor.powered for axis in node.axes)]
+        self._power_from = {node.node_id: self._power_from.get(node.node_id, now) for node in powered}
         self._weak = {node.node_id for node in powered if node.node_id in self._weak or self._is_weak(node.axes)}
-        self.lost = not stands and any(self._is_lost(node_id, now) for node_id, _ in self.turning())
+        lost = {node_id for node_id, _ in self.turning() if not stands and self._is_lost(node_id, now)}
+        self.lost = bool(lost)
         self.was_lost = self.lost or (self.was_lost and not stands)
-        self.lost_at = now if self.lost else self.lost_at
+        self.lost_at |= dict.fromkeys(lost, now)
         wheel_mps = max(abs(bench.base.v_left_mps), abs(bench.base.v_right_mps))
         self.fastest_mps = 0.0 if stands else max(self.fastest_mps, wheel_mps)
 
     def stops_alone(self, node_id: int) -> bool:
         """The drive stops when it hears nobody: it watches its masters, it brakes, and its sensors do not lie."""
         node = self._world.drives.bench.nodes[node_id]
-        forgot = self.personality.heeds_heartbeats and not self._knows_masters(node)
+        was_reset = self._world.intruder.resets_at > self._power_from.get(node_id, math.inf)
+        forgot = self.personality.heeds_heartbeats and was_reset and not self._knows_masters(node)
         able = node_id not in self._weak and not self._lies(node)
-        return self.alone_s < math.inf and able and not (forgot and self._world.intruder.bad_at > 0.0)
+        return self.alone_s < math.inf and able and not forgot
 
     def turning(self) -> Iterator[tuple[int, int]]:
         """Node id and axis of each wheel that turns with power."""
@@ -94,10 +102,8 @@ class Reach:
         nodes = self._world.drives.bench.nodes
         longest_s = 0.0
         for node_id, _ in self.turning():
-            axes = nodes[node_id].axes
-            lies = any(axis.encoder.scale != 1.0 or not axis.encoder.closes_loop for axis in axes) or self._is_weak(
-                axes
-            )
+            node = nodes[node_id]
+            lies = self._lies(node) or self._is_weak(node.axes)
             waits = now < self.heard(node_id) + self.alone_s + BRAKES_S
             alone = not self._reached(node_id) and self.stops_alone(node_id) and waits
             longest_s = max(longest_s, lies_s if lies else 0.0, math.inf if alone else 0.0)
@@ -115,21 +121,29 @@ class Reach:
         return (waits or not self.stops_alone(node_id)) and not self._reached(node_id)
 
     def _reached(self, node_id: int) -> bool:
-        """A driver or a watchdog that runs, and that is not mad, has a line to it."""
+        """A driver or a watchdog that is there, and that is not mad, has a line to it."""
         world = self._world
-        driver, watchdog, blocked = world.driver, world.watchdog, world.bus.disturbance.blocked
-        sane = driver.running and not driver.bus_problem and not driver.repeats and not driver.ignores_zero
-        senders = {"driver": sane, "watchdog": watchdog.running and not watchdog.is_deaf}
+        driver, blocked = world.driver, world.bus.disturbance.blocked
+        sane = not driver.bus_problem and not driver.repeats and not driver.ignores_zero
+        senders = {
+            "driver": sane and self._is_there("driver"),
+            "watchdog": not world.watchdog.is_deaf and self._is_there("watchdog"),
+        }
         return world.drives.bench.nodes[node_id].line.hears and any(
             talks and (name, f"drive{node_id}") not in blocked for name, talks in senders.items()
         )
 
+    def _is_there(self, name: str) -> bool:
+        """It runs, or has hung for so short that nobody misses it."""
+        since_s = self._world.clock.now - self._ran_at[name]
+        return self._world.processes[name].alive and since_s <= self._world.robot.timeouts.watchdog_s
+
     def _watchdog_reaches(self, node_id: int) -> bool:
-        """It runs, and has a line to the drive and from it: it resets no drive that it does not hear."""
+        """It is there, and has a line to the drive and from it: it resets no drive that it does not hear."""
         world, drive = self._world, f"drive{node_id}"
         line, blocked = world.drives.bench.nodes[node_id].line, world.bus.disturbance.blocked
         ways = {("watchdog", drive), (drive, "watchdog")}
-        talks = world.watchdog.running and not world.watchdog.is_deaf
+        talks = self._is_there("watchdog") and not world.watchdog.is_deaf
         return talks and line.hears and not line.silent and not ways & blocked
 
     def _reacts(self, node_id: int) -> bool:
@@ -142,9 +156,9 @@ class Reach:
         return lies and any(axis.state is State.FAULT_REACTION_ACTIVE for axis in node.axes)
 
     def _is_weak(self, axes: Iterable[Axis]) -> bool:
-        """A quick stop, or a fault reaction, of one of them has hardly an effect."""
+        """A quick stop, or a fault reaction, of one of them has hardly an effect, though its settings ask for one."""
         least_mps2 = BRAKING_SHARE * self._world.robot.limits.deceleration_mps2
-        return any(axis.motor.stop_mps2 < least_mps2 for axis in axes)
+        return any(axis.motor.stop_mps2 < least_mps2 <= axis.stated_mps2 for axis in axes)
 
     @staticmethod
     def _lies(node: SimulatedNode) -> bool:

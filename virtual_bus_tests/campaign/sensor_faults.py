@@ -42,7 +42,6 @@ SENSOR_FAULTS: dict[str, Kind] = {
         LONG,
         wheel,
         *axis_fault("frozen_position", lambda axis: axis.position(), None),
-        encoder_lies=True,
     ),
     "stuck_velocity": Kind(
         "an actual velocity stands still",
@@ -55,36 +54,30 @@ SENSOR_FAULTS: dict[str, Kind] = {
         LONG,
         wheel,
         *bench.suffer("encoder_lost", bench.heal_encoder),
-        encoder_lies=True,
     ),
     "encoder_frozen": Kind(
         "an encoder counts nothing and shows its last speed",
         LONG,
         wheel,
         *bench.suffer("encoder_frozen", bench.heal_encoder),
-        encoder_lies=True,
     ),
     "encoder_reversed": Kind(
         "an encoder counts backward", LONG, wheel, *bench.suffer("encoder_reversed", bench.heal_encoder),
-        encoder_lies=True,
     ),
     "encoder_scaled": Kind(
         "an encoder counts a share of the motion",
         LONG,
         lambda r: {**wheel(r), "factor": r.choice((0.3, 0.5, 2.0))},
         *bench.suffer("encoder_scaled", bench.heal_encoder),
-        encoder_lies=True,
     ),
     "encoder_jumping": Kind(
         "an encoder jumps to and fro", LONG, wheel, *bench.suffer("encoder_jumping", bench.heal_encoder),
-        encoder_lies=True,
     ),
     "encoder_intermittent": Kind(
         "an encoder comes and goes",
         LONG,
         lambda r: {**wheel(r), "off_s": r.uniform(0.03, 0.2)},
         *bench.suffer("encoder_intermittent", bench.heal_encoder),
-        encoder_lies=True,
     ),
     **{name: _scanner_lies(name, lie) for name, lie in LIES.items()},
 }  # fmt: skip

@@ -16,6 +16,7 @@ class Shown:
     def __init__(self, world: World) -> None:
         self._base, self._track_m = world.drives.bench.base, world.robot.base.track_m
         drives = world.robot.drives
+        self._intruder = world.intruder
         self._clock, self._at = world.clock, world.clock.now
         self._axes = [world.drives.axis(wheel) for wheel in range(len(drives))]
         self._encoders = tuple(
@@ -39,6 +40,12 @@ class Shown:
         self.left_mps, self.right_mps = left * base.v_left_mps, right * base.v_right_mps
         self.linear_mps = (self.left_mps + self.right_mps) / 2.0
         self.angular_radps = (self.right_mps - self.left_mps) / self._track_m
+
+    @property
+    def tells_truth(self) -> bool:
+        """Each position on the bus is that of the wheel."""
+        lies = any(axis.encoder.is_faulty or axis.faults.frozen_position is not None for axis in self._axes)
+        return not lies and not self._intruder.twin
 
     @property
     def is_blind(self) -> bool:

@@ -193,6 +193,11 @@ class Axis:
         values[base + 0x6B00] = self.scale.raw(motor.demand_mps)
         values[base + 0x7700] = values[base + 0x7800] = int(1000.0 * motor.force_n / motor.peak_force_n)
 
+    @property
+    def stated_mps2(self) -> float:
+        """Of 6084h and 6085h, the gentler slope [m/s²]."""
+        return min(self.scale.slope(self._value(offset)) for offset in (0x84, 0x85))
+
     def position(self) -> int:
         """6064h as the encoder has it."""
         return self.scale.counts(self.encoder.travel_m, self.encoder_offset)

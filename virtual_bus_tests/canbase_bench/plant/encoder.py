@@ -44,6 +44,11 @@ class Encoder:
         return self._shown_m + self._factor * (self._true_m() - self._at_m)
 
     @property
+    def is_faulty(self) -> bool:
+        """Something is wrong with it."""
+        return self._fault is not None
+
+    @property
     def closes_loop(self) -> bool:
         """A velocity loop on it can brake: it counts motion, all the time and in the right direction."""
         return self._fault is None or (self._fault.factor > 0.0 and not self._fault.holds_speed)
