@@ -40,8 +40,6 @@ from canbase_watchdog.watchdog import State as WatchdogState
 STEP_S = 0.01
 OBEY_S = RUNGS[Step.QUICK_STOP].obey_s
 """A base that starts just when something is latched goes on until the stop has reached its drives."""
-LONGEST_S = 20.0
-"""No base needs longer to stop."""
 RAMP_LATE_S = 0.3
 """One drive of several may still be on its own ramp, when the others that held it have let go."""
 ROUNDING_S = 0.002
@@ -234,14 +232,14 @@ class Judge:
     def _check_wall(self, tau_s: float, coasting: bool, now: float) -> None:
         """Where the scanner reports that it sees nothing the base may creep, and so touch what is there."""
         blind = self._around.scanner is not None and self._around.scanner.hides and self._shown.linear_mps > 0.0
-        slowly_s = braking_s(self._world.robot, self._world.robot.safety.blind_mps, 0.0)
-        self._blind.order(slowly_s if blind else LONGEST_S, now)
-        allowed_s = self._blind.bound_s(tau_s, now, coasting, self._reach.lost)
+        robot, linear_mps = self._world.robot, self._shown.linear_mps
+        slowly_s, ahead_s = braking_s(robot, robot.safety.blind_mps, 0.0), moving_s(robot, linear_mps, 0.0)
+        self._blind.order(slowly_s if blind else max(slowly_s, ahead_s), now)
+        allowed_s = self._blind.bound_s(ahead_s, now, coasting, self._reach.lost)
         pushed = self._reach.was_lost or self._was_pushed()
-        turns = abs(self._shown.angular_radps) * self._world.robot.base.track_m > abs(self._shown.linear_mps)
-        if blind and tau_s > allowed_s and not turns and now > self._strangers.acted_at + self.react_s:
+        if blind and ahead_s > allowed_s and now > self._strangers.acted_at + self.react_s:
             self._violate(
-                "blind", f"{self._shown} where no scanner sees: {tau_s:.3f} s to stop, {allowed_s:.3f} allowed"
+                "blind", f"{self._shown} where no scanner sees: {ahead_s:.3f} s to stop, {allowed_s:.3f} allowed"
             )
         if min(self._around.free_m) >= 0.0:
             self._touched = False

@@ -123,6 +123,7 @@ SHORT, LONG = (stick(0.4, 0.0, 0.0, 0.5),), (stick(0.6, 0.0, 0.0, 9.0),)
 UNWATCHED = "watchdog:all+drives:heartbeat_consumer"
 UNMINDED = "mux:neutral_start+driver:waits_for_zero+driver:reset_needs_zero+driver:zero_before_motion"
 CUT, WALL = fault("cable_cut_to_drives", 0.8, 3.5), fault("obstacle", 0.6, 3.0, margin_m=0.1)
+BLIND = fault("scanner_blind_ahead", 0.8, 3.5, margin_m=None)
 SYNC = fault("second_master_sync", 0.75, 0.02, on=True)
 HELD = fault("stick_held", 1.5, 3.0, twist=Twist(0.3, 0.0))
 RESET = plan(STOPPED, HELD, segments=(stick(0.3, 0.0, 0.0, 0.5),))
@@ -167,6 +168,10 @@ STORIES = (
     Story("a wall and the SYNC of a stranger", plan(WALL, SYNC, segments=LONG), "obstacle", None, "filter:obstacle"),
     Story("a wall and a base that has turned", plan(fault("obstacle", 0.3, 4.0, margin_m=0.1), segments=TURNED),
           "obstacle", None, "filter:obstacle"),
+    Story("a scanner that hides what is ahead, after a time in which it told", plan(BLIND, segments=LONG), "blind",
+          None, "filter:blind"),
+    Story("the same in a tight curve", plan(BLIND, segments=(stick(0.6, 1.3, 0.0, 9.0),)), "blind", None,
+          "filter:blind"),
     Story("a second trip after a first one that was reset", replace(TWICE, resets_s=(2.2,)), "latched",
           forgets_the_second),
     Story("an encoder that was off for a moment, and odometry that is for ever",
