@@ -76,6 +76,7 @@ class Envelope:
     1. The last order holds for ORDER_S, then it is zero; what was ordered before it fades by one second a second.
     2. From the moment on that the base is beyond that, it has `react_s`: until then it may be as fast as it was since.
     3. Then that fades too, by one second a second.
+    4. All moments beyond it count together until there is an order again, and the base keeps to it.
     """
 
     def __init__(self, react_s: float, now: float, coasting: float = 0.2) -> None:
@@ -83,7 +84,7 @@ class Envelope:
         self._react_s, self._coasting = react_s, coasting
         self._order_s, self._ordered_at = 0.0, -math.inf
         self._ordered_bound_s = self._peak_s = 0.0
-        self._beyond_since = math.inf
+        self._beyond_s, self._was_beyond = 0.0, False
         self._at = now
 
     def order(self, tau_s: float, now: float) -> None:
@@ -96,15 +97,17 @@ class Envelope:
         `coasting`: some wheel has no power. `lost`: nobody reaches a drive that turns, so nothing brakes it; who
         reaches it again has `react_s` from there on.
         """
-        fades_s = (now - self._at) * (self._coasting if coasting else 1.0)
-        self._at = now
+        elapsed_s, self._at = now - self._at, now
+        fades_s = elapsed_s * (self._coasting if coasting else 1.0)
         ordered_s = self._order_s if now <= self._ordered_at + ORDER_S else 0.0
         self._ordered_bound_s = max(ordered_s, self._ordered_bound_s - fades_s)
         if tau_s <= self._ordered_bound_s + ROUNDING_S:
-            self._beyond_since, self._peak_s = math.inf, 0.0
+            self._was_beyond, self._peak_s = False, 0.0
+            self._beyond_s = 0.0 if ordered_s > 0.0 else self._beyond_s
             return self._ordered_bound_s + ROUNDING_S
-        self._beyond_since = now if lost else min(self._beyond_since, now)
-        if now <= self._beyond_since + self._react_s:
+        self._beyond_s = 0.0 if lost else self._beyond_s + (elapsed_s if self._was_beyond else 0.0)
+        self._was_beyond = True
+        if self._beyond_s <= self._react_s + ROUNDING_S:
             self._peak_s = max(self._peak_s, tau_s)
         else:
             self._peak_s -= fades_s

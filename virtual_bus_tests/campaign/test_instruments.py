@@ -140,6 +140,24 @@ def test_a_base_that_brakes_with_its_order_is_never_beyond_it() -> None:
         assert envelope.bound_s(braking_s, now) >= braking_s
 
 
+def test_pulses_that_nobody_orders_have_the_time_to_react_together() -> None:
+    """t 0 order of 0.5 s of braking; from 1.0 on 0.1 s of motion every 0.2 s, and nothing is ordered
+
+    beyond  1.0-1.1  1.2-1.3  1.4-1.5  1.6: the 0.3 s are over
+    """
+    envelope = Envelope(react_s=0.3, now=0.0)
+    envelope.order(0.5, 0.0)
+    found = [
+        now
+        for now in (step * 0.01 for step in range(300))
+        if (tau_s := 0.4 if now >= 1.0 and now * 5.0 % 1.0 < 0.5 else 0.0) > envelope.bound_s(tau_s, now)
+    ]
+    assert found[0] == pytest.approx(1.65, abs=0.06)
+    envelope.order(0.5, 3.0)
+    assert envelope.bound_s(0.4, 3.0) >= 0.4
+    assert envelope.bound_s(0.4, 3.3) >= 0.4, "an order that was kept gives it its time again"
+
+
 def test_several_layers_have_their_times_one_after_the_other() -> None:
     robot = campaign_robot()
     assert 0.4 < react_s(robot, layers=1) < 0.5
