@@ -358,6 +358,20 @@ def test_slow_orders_to_and_fro_need_their_way() -> None:
     assert wheel.samples(2, -(2.0**-5), 0.0).unseen
 
 
+def test_the_first_turn_has_no_time_until_a_millimetre_was_ordered_that_way() -> None:
+    """1/64 m/s are 1/4 mm a sample. Its drive has to turn its torque round; who turns again has had that time."""
+    wheel = rolling(0.5)
+    before_s = wheel.samples(12, 0.5, 0.0).both_s
+    assert before_s > 0.0
+    assert wheel.samples(4, -(2.0**-6), 0.0).both_s == before_s
+    assert wheel.samples(2, -(2.0**-6), 0.0).both_s == before_s + 2 / HZ
+    assert wheel.samples(2, 2.0**-6, 0.0).both_s == before_s + 4 / HZ
+    wheel.sample(0.0, 2.0**-2)
+    assert wheel.last.both_s == 0.0
+    before_s = wheel.samples(12, 0.5, 0.0).both_s
+    assert wheel.samples(4, -(2.0**-6), 0.0).both_s == before_s
+
+
 def test_most_of_the_time_outlives_the_power_too() -> None:
     """A drive that lets go after each order is found all the same: an eighth of 1/8 m and of 0.25 s is left."""
     wheel = rolling(0.5)

@@ -146,6 +146,15 @@ def test_friction_takes_as_much_one_way_as_the_other(share: float, counts: bool)
     assert (bus.watch.last.vain_s > 0.0) == counts
 
 
+@pytest.mark.parametrize(("share", "counts"), [(0.79, False), (0.81, True), (-0.49, False), (-0.51, True)])
+def test_what_held_a_wheel_before_it_was_ordered_to_move_is_a_hill(share: float, counts: bool) -> None:
+    """0.3 of the rated torque since it let go: 0.5 more is too much, and down the hill half of the rated one."""
+    bus = Bus().moved()
+    bus.run(1, 0.0, powered=False)
+    bus.run(20, 0.3)
+    assert (bus.run(20, share, 0.005).vain_s > 0.0) is counts
+
+
 def test_pushed_in_vain_adds_up_over_orders_until_the_encoder_moves() -> None:
     bus = Bus().moved()
     for _ in range(4):

@@ -10,9 +10,9 @@ that is being stopped can lose its sensor as well (docs/decisions/0020)
    not while nothing is ordered of any wheel and none moves: then its drive has to let go, which torque.py watches.
    But a wheel that was held, and comes free as its order goes through zero, has nothing to show until the new order
    asked for it: the loop's integral has to turn round, against its friction. So each direction counts apart, and
-   orders to and fro have BOTH_WAYS times the travel in all. And a slow order may need long until its drive has
-   got over the friction: where that reports no motion, and no more torque than friction takes, the time counts as time
-   at rated torque, which bounds the speed that a dead encoder hides.
+   orders to and fro have BOTH_WAYS times the travel in all; the first turn has no time until it asked for motion. And
+   a slow order may need long until its drive has got over the friction: where that reports no motion, and no more
+   torque than friction takes, the time counts as time at rated torque, which bounds the speed that a dead encoder hides.
 2. Halted: the velocity of a wheel that rolled drops at once to standstill, as no wheel can, whatever is ordered, and
    the encoder does not move from then on.
 3. Jolts: velocities that change as no wheel can, again and again.
@@ -100,6 +100,7 @@ class EvidenceWatch:
         self._setpoint_mps = self._ordered_mps = 0.0
         self._least_mps = self._velocity_mps = self._direction = 0.0
         self._rolled = self._rests = False
+        self._turns = 0
         self._jolted_at = -math.inf
         self._lived_at, self._ghost_s = now, 0.0
         self.last = Evidence()
@@ -187,7 +188,7 @@ class EvidenceWatch:
         """What rule 1 counts."""
         last, trusted = self.last, self.last.trusted
         if lives:
-            self._direction = 0.0
+            self._direction, self._turns = 0.0, 0
             return Evidence(trusted=trusted)
         if not known:
             return Evidence(
@@ -195,15 +196,17 @@ class EvidenceWatch:
             )
         turned = self._setpoint_mps * self._direction < 0.0
         self._direction = self._setpoint_mps or self._direction
+        self._turns = min(self._turns + turned, 2)
         step_m = abs(self._setpoint_mps) * elapsed_s
         unseen_m = step_m + (0.0 if turned else last.unseen_m)
         both_m = step_m + last.both_m
         step_s = 0.0 if self._rests else elapsed_s * self._weight(torque, unseen_m)
         asked = unseen_m >= self._unseen_m or (self._is_visible(self._least_mps) and unseen_m >= self._life_m)
+        turns_round = self._turns == 1 and unseen_m < self._life_m
         return Evidence(
             unseen_s=(step_s if asked else 0.0) + (0.0 if turned else last.unseen_s),
             unseen_m=unseen_m,
-            both_s=last.both_s + (step_s if both_m >= self._unseen_m else 0.0),
+            both_s=last.both_s + (step_s if both_m >= self._unseen_m and not turns_round else 0.0),
             both_m=both_m,
             trusted=trusted,
         )

@@ -7,10 +7,10 @@ lets go: the healthy wheel rolls, which its encoder shows, or its friction holds
 Rules, for a drive with power
 1. Pushed: torque × time since the last sign of life, or since there was no power, bounds the speed that a dead encoder
    can hide. With nothing ordered of any wheel, a drive that was ordered motion before must let go once.
-2. In vain: the torque is more than friction takes, and by as much another one than at the last sign of life (a hill),
-   and more than there, whatever its direction; and nothing moves. Its time adds up over orders until the encoder moves,
-   and most of it outlives the power. Of the first millimetres that it is ordered in one go it is time at rated torque,
-   or longer at less: a wheel breaks loose slowly.
+2. In vain: the torque is more than friction takes, and by as much another one than at the last sign of life, or than
+   what held the wheel before motion was ordered (a hill), and more than there, whatever its direction; and nothing
+   moves. Its time adds up over orders until the encoder moves, and most of it outlives the power. Of the first
+   millimetres that it is ordered in one go it is time at rated torque, or longer at less: a wheel breaks loose slowly.
 A drive that does not tell its torque may give the rated one: rule 1 alone. So may one that has only ever told zero.
 """
 
@@ -60,7 +60,8 @@ class PushWatch:
         self._setpoint_mps = self._asked_m = 0.0
         """What was ordered while it was strained, since its last sign of life; infinity: it has let go since."""
         self._usual = 0.0
-        """Torque at the last sign of life, of the rated one."""
+        """Torque at the last sign of life, of the rated one; or that which held the wheel when motion was ordered first
+        since it let go."""
         self.last = Push()
 
     def on_sync(self, setpoint_mps: float, rests: bool) -> None:
@@ -105,7 +106,7 @@ class PushWatch:
             self._usual, self._asked_m = 0.0, 0.0 if lives else math.inf
             self.last = Push(known, vain_s=min(vain_s, KEPT_SHARE * self._config.motion_missing_s))
             return
-        if lives:
+        if lives or not self.last.owes:
             self._usual = known or 0.0
         self.last = self._with_power(known, elapsed_s, lives, vain_s)
 
