@@ -133,12 +133,16 @@ class Axis:
         """A new sample, and none from before a silence: beside a fresh one of another wheel it would turn the pose."""
         return self.has_new_sample and self.age_s(now) <= self._feedback_s
 
+    def rests(self, rim_mps: float) -> bool:
+        """Its last setpoint was zero bits of 60FFh, and that of `rim_mps` is: nobody else sees less than one bit."""
+        return self.target_mps == 0.0 and self.units.velocity_raw(rim_mps) == 0
+
     def sample_taken(self) -> None:
         """The core has taken the new sample into the odometry."""
         self._status_is_new = self.has_new_sample = False
 
     def setpoint(self, goal: PowerGoal, rim_mps: float, controlword: int) -> Frame:
         """The frame with 6040h and 60FFh; the target is zero unless the goal is ON."""
-        self.target_mps = rim_mps if goal is PowerGoal.ON else 0.0
-        target_raw = self.units.velocity_raw(self.target_mps)
+        target_raw = self.units.velocity_raw(rim_mps) if goal is PowerGoal.ON else 0
+        self.target_mps = rim_mps if target_raw else 0.0
         return Frame(self._setpoint_cob_id, pack_setpoint(controlword, target_raw, self._layout))

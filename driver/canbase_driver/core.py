@@ -267,7 +267,7 @@ class DriverCore:
         if orders.drive is not Drive.FOLLOW:
             self._let_go.end()
             return
-        rests = self._motion.twist == Twist2D.ZERO == self._command.target(now)
+        rests = self._drives.rest(*wheel_speeds(self._command.target(now), self._robot.base.track_m))
         self._let_go.step(self._drives.axes, rests, now)
 
     def _stop_by_sdo(self, orders: Orders, situation: Situation, now: float) -> list[Frame]:

@@ -97,6 +97,11 @@ class Drives:
         """Measured, fresh, and evidence: no wheel turns."""
         return all(axis.stands(now) for axis in self.axes)
 
+    def rest(self, left_mps: float, right_mps: float) -> bool:
+        """Nothing is ordered of any wheel, and these speeds of the rims order nothing either."""
+        speeds = {"left": left_mps, "right": right_mps}
+        return all(axis.rests(speeds[axis.drive.side]) for axis in self.axes)
+
     def turning(self, now: float) -> str:
         """Which wheel does not stand, and why that is said; empty: all stand."""
         return _first(self._turning(axis, now) for axis in self.axes)

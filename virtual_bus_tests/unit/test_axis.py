@@ -166,3 +166,15 @@ def test_each_value_has_its_own_age_and_the_oldest_is_that_of_the_axis() -> None
     left.on_velocity(velocity(100), 10.2)
     left.on_velocity(velocity(100), 10.5)
     assert left.age_s(10.5) == pytest.approx(0.3)
+
+
+def test_a_speed_of_less_than_half_a_bit_is_no_order() -> None:
+    left, bit_mps = axis(), 1.0 / BITS_PER_MPS
+    assert left.rests(0.49 * bit_mps)
+    assert not left.rests(0.51 * bit_mps)
+    left.setpoint(PowerGoal.ON, 0.49 * bit_mps, 0x0F)
+    assert left.target_mps == 0.0
+    assert left.rests(-0.49 * bit_mps)
+    left.setpoint(PowerGoal.ON, 0.51 * bit_mps, 0x0F)
+    assert left.target_mps == 0.51 * bit_mps
+    assert not left.rests(0.0)

@@ -129,6 +129,23 @@ def test_a_drive_that_tells_no_torque_lets_go_at_each_stand(kind: str) -> None:
     assert seen.end_mps == 0.0
 
 
+@pytest.mark.parametrize("kind", ["zlac8015d", "kinco", "epos4"])
+def test_after_an_order_of_less_than_one_bit_a_healthy_drive_lets_go_once_and_is_not_stopped(kind: str) -> None:
+    """For the watchdog, which sees the setpoints alone, nothing is ordered."""
+    world = world_of(kind)
+    world.enable()
+    world.command = Twist2D(0.2, 0.0)
+    world.run(1.0)
+    world.command = Twist2D(1e-5, 0.0)
+    without = 0
+    for _ in range(round(3.0 / STEP_S)):
+        before = world.powered[0]
+        world.run(STEP_S)
+        without += before and not world.powered[0]
+    assert world.watchdog.status.verdict.cause is Cause.NONE
+    assert without <= 1
+
+
 def never_lets_go(monkeypatch: pytest.MonkeyPatch) -> None:
     """A driver with a defect."""
     monkeypatch.setattr(LetGo, "step", lambda self, wheels, rests, now: None)

@@ -10,9 +10,10 @@ that is being stopped can lose its sensor as well (docs/decisions/0020)
    not while nothing is ordered of any wheel and none moves: then its drive has to let go, which torque.py watches.
    But a wheel that was held, and comes free as its order goes through zero, has nothing to show until the new order
    asked for it: the loop's integral has to turn round, against its friction. So each direction counts apart, and
-   orders to and fro have BOTH_WAYS times the travel in all; the first turn has no time until it asked for motion. And
-   a slow order may need long until its drive has got over the friction: where that reports no motion, and no more
-   torque than friction takes, the time counts as time at rated torque, which bounds the speed that a dead encoder hides.
+   orders to and fro have BOTH_WAYS times the travel in all; the first turn has no time until it asked for motion.
+   And a slow order may need long until its drive has got over the friction: where that reports no motion, and no more
+   torque than friction takes, the time counts as time at rated torque, which bounds the speed that a dead encoder
+   hides.
 2. Halted: the velocity of a wheel that rolled drops at once to standstill, as no wheel can, whatever is ordered, and
    the encoder does not move from then on.
 3. Jolts: velocities that change as no wheel can, again and again.
