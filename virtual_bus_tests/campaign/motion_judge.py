@@ -72,7 +72,7 @@ class MotionJudge:
         self._fast_since = self._beside_since = self._lies_since = now
         self._before_mps = 0.0
         self._impulse_s = world.robot.watchdog.stand_impulse_s + JITTER_S
-        self._unasked_at = -math.inf
+        self._unasked_at = self._unwatched_at = -math.inf
         self.ran_away = False
         """Since the base last stood, some wheel was faster than ordered, or the base turned otherwise: `runaway` and
         `path` bound for how long. Or a wheel with a dead encoder rolls, which no drive can brake."""
@@ -116,19 +116,24 @@ class MotionJudge:
         drives = self._world.drives
         return any(any(axis.motor.powered for axis in side) and all(map(drives.rolls, side)) for side in drives.sides)
 
-    def _unasked_s(self, now: float) -> float:
-        """No drive tells anything without SYNC: a driver that hangs or is dead is missed first [s]."""
-        if not self._world.driver.running:
+    def _missed_s(self, now: float) -> float:
+        """No drive tells anything without SYNC: a driver that hangs or is dead is missed first [s]. And a driver alone
+        misses its watchdog before it stops what a stranger's setpoints move."""
+        world, timeouts = self._world, self._world.robot.timeouts
+        if not world.driver.running:
             self._unasked_at = now
-        missed_s = self._world.robot.timeouts.drive_heartbeat_s
-        return missed_s if self._fast_since - missed_s <= self._unasked_at else 0.0
+        if not world.watchdog.running and world.intruder.setpoints_mps:
+            self._unwatched_at = now
+        unasked = self._fast_since - timeouts.drive_heartbeat_s <= self._unasked_at
+        unwatched = self._fast_since - timeouts.watchdog_s <= self._unwatched_at
+        return max(unasked * timeouts.drive_heartbeat_s, unwatched * timeouts.watchdog_s)
 
     def _runaway(self, now: float) -> tuple[str, str] | None:
         ordered_mps = max(abs(t.linear_mps) + abs(t.angular_radps) * self._half_m for _, t in self._orders)
         wheel_mps = self._driven_mps()
         if wheel_mps <= ordered_mps + self._allowed.runaway_mps:
             self._fast_since = now
-        if now <= self._fast_since + self._allowed.runaway_s + self._unasked_s(now):
+        if now <= self._fast_since + self._allowed.runaway_s + self._missed_s(now):
             return None
         return "runaway", f"a wheel turns at {wheel_mps:.2f} m/s, {ordered_mps:.2f} m/s was the most ordered of it"
 

@@ -142,6 +142,7 @@ def test_after_an_order_of_less_than_one_bit_a_healthy_drive_lets_go_once_and_is
         before = world.powered[0]
         world.run(STEP_S)
         without += before and not world.powered[0]
+    assert world.watchdog is not None
     assert world.watchdog.status.verdict.cause is Cause.NONE
     assert without <= 1
 
