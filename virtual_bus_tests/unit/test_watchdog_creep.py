@@ -13,7 +13,7 @@ from canbase_watchdog.frames import DriveState
 from canbase_watchdog.policy import Cause, decide
 from canbase_watchdog.view import Axis, BusView
 from canbase_watchdog.watchdog import State
-from unit.chain_world import World
+from unit.chain_world import BITS_PER_MPS, World
 from unit.test_watchdog_lies import lies
 from unit.watchdog_story import config
 from unit.watchdog_views import AT_REST, CONFIG, NOW, well
@@ -56,6 +56,15 @@ def test_a_zero_and_a_drive_without_power_are_no_order(changes: dict[str, object
     assert look(watch, CREEPS, REST, 11.01) == ""
 
 
+def test_a_zero_now_and_then_ends_nothing_and_one_that_lasts_does() -> None:
+    watch = CreepWatch(config())
+    told = [look(watch, AT_REST if n % 5 == 0 else CREEPS, REST, 10.0 + n / 64) for n in range(45)]
+    assert told[0] == told[33] == ""
+    assert told[-1] != ""
+    assert look(watch, AT_REST, REST, 10.0 + 45 / 64 + HOLD_S) == ""
+    assert look(watch, CREEPS, REST, 10.8 + HOLD_S) == ""
+
+
 def test_it_is_a_setpoint_outside_of_the_leases() -> None:
     verdict = decide(well(creep="left is ordered 0.0280 m/s for 0.400 s"), CONFIG, NOW)
     assert verdict.cause is Cause.TARGET_OUTSIDE
@@ -74,6 +83,18 @@ def test_a_driver_that_repeats_a_slow_setpoint_for_ever_is_stopped(slow: Twist2D
     assert world.watchdog is not None
     assert world.watchdog.status.verdict.cause is Cause.TARGET_OUTSIDE
     assert world.run(0.2, lambda: not any(world.powered))
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+def test_a_driver_that_creeps_with_a_zero_now_and_then_is_stopped(turn: int) -> None:
+    """0.028 m/s for 0.3 s and two zeros, again and again: 0.26 m in 10 s, or a turn of 1 rad, with zero ordered."""
+    world = World()
+    world.enable()
+    start, slow = world.now, round(0.028 * BITS_PER_MPS)
+    both = {0x201: slow, 0x202: -turn * slow}  # the right one is mounted mirrored
+    lies(world, lambda cob_id, target: both[cob_id] if (world.now - start) % 0.32 < 0.3 else 0)
+    assert world.run(2.0, lambda: world.watchdog is not None and world.watchdog.status.state is State.TRIPPED)
+    assert abs(world.truth.x_m) < 0.05
 
 
 def test_an_honest_driver_that_creeps_to_its_stop_is_left_alone() -> None:

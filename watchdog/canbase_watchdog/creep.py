@@ -18,20 +18,30 @@ AT_REST = Bounds(0.0, 0.0, 0.0, 0.0)
 
 
 class CreepWatch:
-    """Remembers since when a wheel is ordered to turn and nothing allows it."""
+    """Remembers for how long a wheel was ordered to turn and nothing allowed it; a zero in between ends nothing."""
 
     def __init__(self, config: WatchdogConfig) -> None:
         """`order_hold_s` from `config`: the longest way of an order to the driver, and its ramp's rounding."""
         self._hold_s = config.order_hold_s
-        self._since = math.inf
+        self._ordered_s = 0.0
+        self._ordered_at = self._looked_at = -math.inf
+        self._ordered = False
+        """At the last look."""
 
     def look(self, bus: BusView, bounds: Bounds, now: float) -> str:
-        """What is ordered though nothing is allowed, for `order_hold_s`; empty: nothing is."""
+        """What is ordered though nothing is allowed, for `order_hold_s` in all; empty: nothing is.
+
+        It begins anew when anything is allowed, and when nothing was ordered for as long.
+        """
         wheel = next((axis for axis in bus.axes if axis.enabled and axis.target_mps != 0.0), None)
-        if wheel is None or bounds != AT_REST:
-            self._since = math.inf
+        elapsed_s, self._looked_at = now - self._looked_at, now
+        went_on, self._ordered = self._ordered, wheel is not None and bounds == AT_REST
+        if bounds != AT_REST or now >= self._ordered_at + self._hold_s:
+            self._ordered_s = 0.0
+        if wheel is None or not self._ordered:
             return ""
-        self._since = min(self._since, now)
-        if now < self._since + self._hold_s:
+        self._ordered_s += elapsed_s if went_on else 0.0
+        self._ordered_at = now
+        if self._ordered_s < self._hold_s:
             return ""
-        return f"{wheel.drive.joint} is ordered {wheel.target_mps:.4f} m/s for {now - self._since:.3f} s"
+        return f"{wheel.drive.joint} is ordered {wheel.target_mps:.4f} m/s for {self._ordered_s:.3f} s"
