@@ -199,13 +199,38 @@ def test_in_a_reversal_the_wheel_may_still_turn_the_old_way() -> None:
     assert wheel.samples(51, 0.0, -0.4).high_mps == 0.0
 
 
-def test_a_wheel_without_power_may_be_pushed_and_nothing_of_it_stays() -> None:
+def test_a_wheel_without_power_may_be_pushed_and_nothing_of_it_counts() -> None:
     wheel = Wheel()
-    wheel.samples(4, 2.0, 0.0, rolls=0.0)
+    wheel.samples(4, 2.0, 0.0)
     assert wheel.last.outside == 4
-    last = wheel.sample(2.0, 0.0, powered=False)
-    assert (last.outside, last.overspeed, last.implausible, last.drift_m) == (0, 0, 0, 0.0)
+    before_m = wheel.last.drift_m
+    last = wheel.sample(2.0, 0.0, powered=False, rolls=0.0)
+    assert (last.outside, last.overspeed, last.implausible) == (0, 0, 0)
+    assert last.drift_m == pytest.approx(before_m * 0.999)
     assert wheel.sample(2.0, 0.0).outside == 1
+
+
+def test_a_drift_outlives_the_power_and_is_forgotten_with_time() -> None:
+    """A wheel that turns faster than its broken encoder tells does so while its drive lets go, too."""
+    wheel = Wheel()
+    wheel.way_m += 0.04
+    wheel.sample(0.0, 0.0)
+    assert wheel.sample(0.0, 0.0, powered=False).drift_m == pytest.approx(-0.04 * 0.999)
+    assert wheel.last.implausible == 0
+    wheel.way_m += 0.012
+    wheel.sample(0.0, 0.0)
+    assert wheel.last.implausible == 1
+    assert wheel.sample(0.0, 0.0, powered=False, after_s=10.0).drift_m == 0.0
+    assert wheel.sample(0.0, 0.0, powered=False, after_s=11.0).drift_m == 0.0
+
+
+def test_a_reset_forgets_the_drift() -> None:
+    wheel = Wheel()
+    wheel.way_m += 0.055
+    assert wheel.sample(0.0, 0.0).implausible == 1
+    wheel.sample(0.0, 0.0, powered=False)
+    wheel.watch.trust()
+    assert (wheel.last.drift_m, wheel.sample(0.0, 0.0).implausible) == (0.0, 0)
 
 
 def test_before_the_start_the_wheel_may_have_had_any_setpoint() -> None:

@@ -10,7 +10,7 @@ speed (docs/decisions/0020).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 from canbase_watchdog.counts import difference
@@ -71,6 +71,11 @@ class FeedbackWatch:
         self.last = Feedback()
         self.evidence = EvidenceWatch(drive, config, now)
 
+    def trust(self) -> None:
+        """A reset was accepted: what encoder and velocity told against each other is over."""
+        self.last = replace(self.last, drift_m=0.0)
+        self.evidence.trust()
+
     def on_target(self, target_mps: float, now: float) -> None:
         """A setpoint, which stays until the next one."""
         self._target_mps = target_mps
@@ -85,7 +90,8 @@ class FeedbackWatch:
     def on_velocity(
         self, velocity_mps: float, powered: bool, enabled: bool, now: float, torque: float | None = None
     ) -> None:
-        """606Ch of a velocity TPDO. A wheel without power may be pushed: nothing of it is bad.
+        """606Ch of a velocity TPDO. A wheel without power may be pushed: nothing of it is bad. The drift of
+        before stays, or a drive that lets go after each order would never be found.
 
         `torque`: what it tells of 6077h, as a share of the rated one; None: nothing.
         """
@@ -104,7 +110,8 @@ class FeedbackWatch:
         self, velocity_mps: float, powered: bool, drift_m: float, jumped: bool, elapsed_s: float, now: float
     ) -> None:
         if not powered:
-            self.last = Feedback(-self._low, self._high)
+            kept_m = self.last.drift_m * max(1.0 - elapsed_s / DRIFT_S, 0.0)
+            self.last = Feedback(-self._low, self._high, drift_m=kept_m)
             return
         config, last = self._config, self.last
         swing_mps = SWING_SHARE * self._fastest.greatest(now)

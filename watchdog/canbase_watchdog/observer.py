@@ -152,7 +152,7 @@ class Observer:
     def trust(self) -> None:
         """A reset was accepted: what spoke against the sensors is over."""
         for record in self._records.values():
-            record.feedback.evidence.trust()
+            record.feedback.trust()
             record.push.trust()
             record.stand.trust()
 
