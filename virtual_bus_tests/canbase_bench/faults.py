@@ -150,7 +150,7 @@ KINDS: Mapping[str, tuple[Callable[..., None], frozenset[str]]] = {
     "encoder_jumping": (_encoder(factor=1.0, jump_m=0.01, every_s=0.02), frozenset({"axis", "jump_m", "every_s"})),
     "encoder_scaled": (_encoder(factor=0.5), frozenset({"axis", "factor"})),
     "encoder_reversed": (_encoder(factor=-1.0), frozenset({"axis"})),
-    "encoder_intermittent": (_encoder(off_s=0.1), frozenset({"axis", "off_s"})),
+    "encoder_intermittent": (_encoder(off_s=0.1), frozenset({"axis", "off_s", "on_s"})),
     "rpdo_lost": (_rpdo_lost, frozenset({"axis", "every"})),
     "tpdo_lost": (_tpdo_lost, frozenset({"axis"})),
     "mute_boot": (_mute_boot, frozenset()),
@@ -171,7 +171,7 @@ brakes with a share of their slopes, none by default.
 encoder_…: all that hangs on one encoder, 6064h, 606Ch and the drive's own loops. lost: it counts nothing and shows no
 speed. frozen: it counts nothing and shows its last speed. zero: lost, and 6064h is 0. jumping: `jump_m` ahead and back
 in turn, each `every_s`. scaled: it counts `factor` times the motion, 0.5 by default. reversed: it counts backward.
-intermittent: nothing for `off_s`, everything for `off_s`, in turn.
+intermittent: nothing for `off_s`, everything for `on_s` (0: as long), in turn.
 rpdo_lost: setpoints of one axis do not reach it, or every n-th does. tpdo_lost: the feedback PDOs of one axis are lost.
 mute_boot: its boot-up messages are lost. short_emcy: three bytes. aliases: 29-bit frames that look like its own.
 extra_boot_up: one boot-up message too many. bus_off: its controller leaves the bus for `off_s`. reset_node: as by NMT.
@@ -183,6 +183,7 @@ RANGES: Mapping[str, tuple[type, float, float]] = {
     "code": (int, 1, 0xFFFF),
     "holds": (bool, 0, 1),
     "off_s": (float, 0.0, 3600.0),
+    "on_s": (float, 0.0, 3600.0),
     "share": (float, 0.0, 1.0),
     "factor": (float, -10.0, 10.0),
     "force_n": (float, 0.0, 1e9),

@@ -147,6 +147,42 @@ def test_after_an_order_of_less_than_one_bit_a_healthy_drive_lets_go_once_and_is
     assert without <= 1
 
 
+def tapping(world: World, tap_s: float, each_s: float, seconds: float, *, until: Cause) -> Course:
+    """0.1 m/s for `tap_s`, again and again, until the watchdog trips."""
+    assert world.watchdog is not None
+    start, seen = world.now, Course()
+    while world.now < start + seconds and seen.cause is Cause.NONE:
+        world.command = Twist2D(0.1 if (world.now - start) % each_s < tap_s else 0.0, 0.0)
+        world.run(STEP_S)
+        seen.peak_mps = max(seen.peak_mps, abs(world.truth.v_left_mps))
+        seen.cause, seen.off_s = world.watchdog.status.verdict.cause, world.now - start
+    assert seen.cause is until
+    return seen
+
+
+@pytest.mark.parametrize(("tap_s", "each_s", "off_s"), [(0.06, 0.3, 2.6), (0.06, 0.6, 5.0), (0.04, 0.2, 6.0)])
+def test_taps_of_a_millimetre_and_less_are_found_without_torque_too(tap_s: float, each_s: float, off_s: float) -> None:
+    """Each asks for 1.1 mm or 0.4 mm, and the wheel, which has not rolled out meanwhile, gets another push."""
+    world = world_of("zlac8015d")
+    world.enable()
+    lose(world)
+    assert tapping(world, tap_s, each_s, 8.0, until=MISSING).off_s <= off_s
+
+
+@pytest.mark.parametrize("kind", ["zlac8015d", "epos4"])
+@pytest.mark.parametrize(("tap_s", "each_s"), [(0.1, 0.6), (0.2, 1.0), (0.06, 0.3)])
+def test_an_encoder_that_shows_itself_for_moments_is_found_between_taps(kind: str, tap_s: float, each_s: float) -> None:
+    """4 ms of 0.2 s: each time a sign of life, and a contradiction that letting go must not forget."""
+    world = world_of(kind)
+    world.enable()
+    drive = world.robot.drives[0]
+    given = {"axis": drive.axis, "off_s": 0.2, "on_s": 0.004}
+    faults.apply(world.bench.nodes, drive.node_id, "encoder_intermittent", world.now, given)
+    seen = tapping(world, tap_s, each_s, 5.0, until=Cause.FEEDBACK_IMPLAUSIBLE)
+    assert seen.off_s <= 2.5
+    assert seen.peak_mps <= 2.0
+
+
 def never_lets_go(monkeypatch: pytest.MonkeyPatch) -> None:
     """A driver with a defect."""
     monkeypatch.setattr(LetGo, "step", lambda self, wheels, rests, now: None)

@@ -373,14 +373,23 @@ def test_the_first_turn_has_no_time_until_a_millimetre_was_ordered_that_way() ->
 
 
 def test_most_of_the_time_outlives_the_power_too() -> None:
-    """A drive that lets go after each order is found all the same: an eighth of 1/8 m and of 0.25 s is left."""
+    """A drive that lets go after each order is found all the same: nothing of 1/8 m and an eighth of 0.25 s is left."""
     wheel = rolling(0.5)
     wheel.samples(15, 0.5, 0.0)
     wheel.samples(10, -0.5, 0.0)
     last = wheel.sample(0.0, 0.0, powered=False)
-    assert (last.unseen_m, last.both_s, last.both_m) == (0.875 * 2.0**-4, 0.875 * 0.25, 0.875 * 2.0**-3)
+    assert (last.unseen_m, last.both_s, last.both_m) == (0.875 * 2.0**-4, 0.875 * 0.25, 2.0**-3)
     assert not wheel.samples(1, 0.5, 0.0).unseen
     assert wheel.samples(1, -0.5, 0.0).unseen
+
+
+def test_short_orders_add_up_however_little_each_of_them_asks_for() -> None:
+    """Taps of 3/256 m, each with a let-go: eleven of them are 1/8 m."""
+    wheel = rolling(0.25)
+    for _ in range(10):
+        assert not wheel.samples(3, 0.25, 0.0).unseen
+        wheel.samples(2, 0.0, 0.0, powered=False)
+    assert wheel.samples(3, 0.25, 0.0).unseen
 
 
 def test_a_sign_of_life_begins_both_directions_anew() -> None:
@@ -542,6 +551,16 @@ def test_of_few_jolts_a_sensor_may_still_be_trusted() -> None:
     assert (last.jolts, last.trusted) == (4, True)
     last = wheel.sample(0.5, 0.5, rolls=0.5)
     assert (last.jolts, last.trusted) == (5, False)
+
+
+def test_jolts_add_up_over_a_moment_without_power() -> None:
+    """An encoder that comes and goes while its drive lets go after each order."""
+    wheel = Wheel()
+    for n in range(5):
+        wheel.sample(0.5, 0.5 * (n % 2), rolls=0.5)
+    assert wheel.samples(8, 0.0, 0.0, powered=False).jolts == 4
+    assert wheel.sample(0.5, 0.5, rolls=0.5).jolts == 5
+    assert not wheel.last.trusted
 
 
 def test_a_jolt_after_a_long_time_is_the_first_again() -> None:

@@ -36,8 +36,9 @@ from canbase_watchdog.envelope import Peak
 UNSEEN_COUNTS = 4
 """Of a coarse encoder nothing is missed before so many increments were ordered."""
 KEPT_SHARE = 0.875
-"""So much of the ordered travel that is allowed without a sign of life is remembered while there is no power. Not all:
-a wheel that gets power again needs an order before it can show anything."""
+"""So much of the time that is allowed without a sign of life, and of the travel of one direction, is remembered while
+there is no power. Not all: a wheel that gets power again needs an order before it can show anything. Of both directions
+all of the travel is: orders of less than what would be left were never found."""
 STRAIN_SHARE = 0.5
 """Of the rated torque: friction takes less, and from one direction to the other changes it by less."""
 LEAST_WEIGHT = 0.25
@@ -237,7 +238,8 @@ class EvidenceWatch:
         return Evidence(
             unseen_m=min(last.both_m, KEPT_SHARE * self._unseen_m),
             both_s=min(last.both_s, KEPT_SHARE * self._config.motion_missing_s),
-            both_m=min(last.both_m, KEPT_SHARE * BOTH_WAYS * self._unseen_m),
+            both_m=min(last.both_m, BOTH_WAYS * self._unseen_m),
+            jolts=self.last.jolts,
             ghost_m=ghost_m,
             trusted=last.trusted,
         )

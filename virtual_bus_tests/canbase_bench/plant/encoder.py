@@ -19,7 +19,9 @@ class EncoderFault:
     holds_speed: bool = False
     """The velocity keeps its last value, like a register that nobody refreshes."""
     off_s: float = 0.0
-    """Above 0: for so long the factor holds, then all of the motion counts for as long, and so on."""
+    """Above 0: for so long the factor holds, then all of the motion counts for `on_s`, and so on."""
+    on_s: float = 0.0
+    """0: as long as `off_s`."""
     jump_m: float = 0.0
     """So far it jumps ahead and back in turn, within one inner step ..."""
     every_s: float = 0.0
@@ -75,7 +77,8 @@ class Encoder:
             return speed_mps
         self._time_s += self._step_s
         if fault.off_s:
-            self._count(1.0 if self._time_s % (2.0 * fault.off_s) >= fault.off_s else fault.factor)
+            period_s = fault.off_s + (fault.on_s or fault.off_s)
+            self._count(1.0 if self._time_s % period_s >= fault.off_s else fault.factor)
         if fault.holds_speed:
             return self._held_mps
         return self._factor * speed_mps + self._jump(fault)
