@@ -91,8 +91,8 @@ EXCUSES = {
     "reset by a stranger": "a drive that another master has reset has forgotten 1016h, until its power is off "
     "(heartbeat)",
     "unheard button": "a filter that never heard the button knows of no emergency stop (zero)",
-    "unasked": "without a driver there is no SYNC, and no drive tells anything: it is missed first; so is the watchdog, "
-    "when a stranger's setpoints move the base (runaway)",
+    "unasked": "without a driver there is no SYNC, and no drive tells anything: it is missed first; so is the "
+    "watchdog, when a stranger's setpoints move the base (runaway)",
     "ran away": "a wheel whose sensor lies is faster than ordered, or turns the base, for the times of runaway and "
     "path at most, and rolls out without power then; its way may be longer than the free one (obstacle: unless the "
     "filter orders motion into it)",
