@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from canbase_bench import faults
+from canbase_bench.plant.encoder import EncoderFault
 from unit.sim_rig import MPS, Rig
 
 SLOW = round(0.3 * MPS)
@@ -94,6 +95,17 @@ def test_an_intermittent_encoder_misses_half_of_the_way() -> None:
     way = rig.bench.base.travel_left_m - way
     counted = (rig.read(0x6064) - start) / (4096 * 10 / (2 * 3.14159265 * 0.1))
     assert counted == pytest.approx(way / 2.0, rel=0.3)
+
+
+def test_an_encoder_that_loses_counts_above_a_speed_makes_its_wheel_faster_and_faster() -> None:
+    rig = _driving()
+    rig.bench.nodes[1].axes[0].lose_encoder(EncoderFault(factor=1.0, most_mps=0.4))
+    rig.wait(0.5)
+    assert _left(rig) == pytest.approx(0.3, rel=0.02)
+    rig.write(0x60FF, round(0.5 * MPS))
+    rig.wait(1.0)
+    assert rig.read(0x606C) == pytest.approx(0.4 * MPS, rel=0.02)
+    assert _left(rig) > 1.5
 
 
 def test_a_jumping_encoder_jumps_ahead_and_back() -> None:

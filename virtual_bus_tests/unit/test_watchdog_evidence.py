@@ -713,3 +713,48 @@ def test_nothing_is_asked_of_a_drive_that_is_not_enabled() -> None:
     last = wheel.sample(0.5, 0.25, enabled=False)
     assert (last.ordered_mps, last.behind_s, last.setpoint_mps) == (0.0, 0.0, 0.5)
     assert wheel.sample(0.5, 0.25).ordered_mps == 0.5 / 64
+
+
+# --- 6: all the torque, and no gain
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_wheel_that_gets_no_faster_with_all_the_torque_is_strained(sign: int) -> None:
+    """1/64 m/s slower than ordered; standstill is 1/128 m/s. The first 0.1 s are no time."""
+    wheel, slow = rolling(sign * 0.5), sign * (0.5 - 2.0**-6)
+    assert wheel.samples(7, sign * 0.5, slow, torque=0.9).strained_s == 0.0
+    last = wheel.samples(15, sign * 0.5, slow, torque=-0.9)
+    assert (last.strained_s, last.trusted, last.behind_s) == (15 / HZ, True, 0.0)
+    last = wheel.sample(sign * 0.5, slow, torque=0.9)
+    assert (last.strained_s, last.trusted) == (16 / HZ, False)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "how"),
+    [
+        (0.5 - 2.0**-6, {"torque": 0.89}),
+        (0.5 - 2.0**-6, {"torque": None}),
+        (0.5 - 2.0**-7, {"torque": 1.0}),
+        (0.75, {"torque": 1.0}),
+        (0.5 - 2.0**-6, {"torque": 1.0, "enabled": False}),
+    ],
+)
+def test_with_less_torque_or_at_its_order_it_is_not(velocity: float, how: dict[str, Any]) -> None:
+    wheel = rolling(0.5)
+    assert wheel.samples(40, 0.5, velocity, **how).strained_s == 0.0
+
+
+def test_a_wheel_that_gains_is_not_strained_however_far_from_its_order() -> None:
+    """5/4 mm/s a sample: more than 1/128 m/s in seven of them, and one in seven may count."""
+    wheel = rolling(0.125)
+    worst_s = max(wheel.sample(0.5, 0.125 + n * 0.00125, torque=1.0).strained_s for n in range(200))
+    assert worst_s <= 1 / HZ
+    assert wheel.samples(30, 0.5, wheel.watch._velocity_mps, torque=1.0).strained_s > 0.25
+
+
+def test_a_moment_without_all_the_torque_begins_it_anew() -> None:
+    wheel = rolling(0.5)
+    assert wheel.samples(20, 0.5, 0.25, torque=1.0).strained_s > 0.0
+    assert wheel.sample(0.5, 0.25, torque=0.5).strained_s == 0.0
+    assert wheel.samples(7, 0.5, 0.25, torque=1.0).strained_s == 0.0
+    assert wheel.sample(0.5, 0.25, torque=1.0).strained_s > 0.0

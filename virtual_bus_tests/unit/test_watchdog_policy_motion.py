@@ -155,6 +155,7 @@ EVIDENCE = [
     (Evidence(jolts=5), Cause.FEEDBACK_IMPLAUSIBLE),
     (Evidence(unseen=True, both_s=0.3, both_m=0.09, setpoint_mps=0.3), Cause.MOTION_MISSING),
     (Evidence(behind_s=0.5, ordered_mps=0.3), Cause.MOTION_MISSING),
+    (Evidence(strained_s=0.25, setpoint_mps=0.3), Cause.MOTION_MISSING),
 ]
 
 
@@ -173,7 +174,13 @@ def test_evidence_against_a_wheel_trips(evidence: Evidence, found: Cause) -> Non
 
 @pytest.mark.parametrize(
     "evidence",
-    [Evidence(halted=4), Evidence(jolts=4), Evidence(unseen_s=9.0, unseen_m=9.0), Evidence(behind_s=0.499)],
+    [
+        Evidence(halted=4),
+        Evidence(jolts=4),
+        Evidence(unseen_s=9.0, unseen_m=9.0),
+        Evidence(behind_s=0.499),
+        Evidence(strained_s=0.249),
+    ],
 )
 def test_a_little_less_does_not(evidence: Evidence) -> None:
     assert cause(of(replace(AT_REST, evidence=evidence))) == 0
@@ -191,6 +198,8 @@ def test_the_sentences_about_evidence_have_the_values() -> None:
         "see encoder, motor, wheel",
         "wheel_1_0 turns at 0.100 m/s, its setpoints ask for 0.300 m/s for 0.500 s "
         "(allowed 0.500 s; slow ramps: watchdog.slowest_ramp_mps2)",
+        "wheel_1_0 is pushed with a torque that the drive does not report and gets no faster than 0.100 m/s for "
+        "0.250 s (allowed 0.250 s), ordered 0.300 m/s: its encoder may lose counts, or its load is too heavy",
     ]
 
 

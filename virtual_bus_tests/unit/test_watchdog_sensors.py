@@ -16,6 +16,7 @@ import pytest
 
 from canbase_bench import faults
 from canbase_bench.frame import Frame as BenchFrame
+from canbase_bench.plant.encoder import EncoderFault
 from canbase_driver.core import DriverCore
 from canbase_driver.frame import Frame
 from canbase_driver.kinematics import Twist2D
@@ -79,6 +80,21 @@ def course(world: World, within_s: float) -> Course:
 
 
 # --- all that hangs on one encoder
+
+
+@pytest.mark.parametrize(("shown", "ordered"), [(0.1, 0.11), (0.1, 0.15), (0.5, 0.52), (0.5, 0.6)])
+def test_an_encoder_that_loses_counts_just_below_the_order_makes_no_wheel_run_away(
+    shown: float, ordered: float
+) -> None:
+    """Its wheel was 10 m/s fast and nothing tripped: what it shows is within every tolerance of the order."""
+    world = at_rest()
+    world.bench.nodes[1].axes[0].lose_encoder(EncoderFault(factor=1.0, most_mps=shown))
+    world.command = Twist2D(ordered, 0.0)
+    world.run(2.0, lambda: abs(world.truth.v_left_mps) > ordered)
+    seen = course(world, 1.0)
+    assert seen.cause is MISSING
+    assert seen.off_s <= 0.5
+    assert seen.peak_mps <= ordered + 2.3
 
 
 @pytest.mark.parametrize(

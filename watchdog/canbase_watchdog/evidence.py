@@ -21,7 +21,9 @@ that is being stopped can lose its sensor as well (docs/decisions/0020)
    motion that there is not, also with nothing ordered and after it has let go.
 5. Behind: slower than the least that the setpoints of the last `drive_lag_s` ask for, reached by `slowest_ramp_mps2`.
    It adds up while the wheel is too slow, and goes down as fast while it is not.
-A sensor that did 1 to 4, or contradicts itself, is not trusted until a reset.
+6. Strained: its drive gives all its torque, and the wheel is slower than ordered and gets no faster: an encoder that
+   cannot show the speed (it loses counts) makes its drive push without end, however near to the order it is.
+A sensor that did one of 1 to 4 or 6, or contradicts itself, is not trusted until a reset.
 """
 
 from __future__ import annotations
@@ -45,6 +47,8 @@ LEAST_WEIGHT = 0.25
 """A wheel that cannot turn, and takes no torque for it, is found all the same."""
 SLOW_SLACKS = 2.0
 """An order of less than so many times what a velocity may be off is a slow one: its drive winds up torque slowly."""
+STRAINED_SHARE, NEARER_S = 0.9, 0.1
+"""Of the rated torque: a drive gives all that it has for long; after so long without a gain it is strained."""
 BOTH_WAYS = 2.0
 """Of what one direction may lack."""
 ROLLING_SHARE = 0.5
@@ -82,6 +86,8 @@ class Evidence:
     """It is beyond what is allowed."""
     behind_s: float = 0.0
     """Rule 5."""
+    strained_s: float = 0.0
+    """Rule 6, without a gain since NEARER_S."""
     trusted: bool = True
 
 
@@ -101,6 +107,10 @@ class EvidenceWatch:
         self._backward, self._forward = Peak(config.drive_lag_s), Peak(config.drive_lag_s)
         self._setpoint_mps = self._ordered_mps = 0.0
         self._least_mps = self._velocity_mps = self._direction = 0.0
+        self._fine_mps = config.standstill_mps + abs(drive.velocity_mps_per_bit)
+        self._lacked_mps = math.inf
+        self._nearer_at = now
+        """So much slower than ordered a strained wheel was when it last came nearer to its order, and when that was."""
         self._rolled = self._rests = False
         self._turns = 0
         self._jolted_at = -math.inf
@@ -156,6 +166,8 @@ class EvidenceWatch:
             before = self._unseen(lives, step_m is not None, elapsed_s, torque)
         halted, jolts = self._halted(jolted and rolled, lives), self._jolts(jolted, now)
         samples, unseen = self._config.feedback_samples, self._is_unseen(before)
+        strained_s = self._strained_s(velocity_mps, torque, elapsed_s, now) if enabled else 0.0
+        strained = strained_s >= self._config.motion_missing_s
         ghost = abs(ghost_m) >= GHOST_LIVES * self._life_m and self._ghost_s >= GHOST_LAG_S
         self.last = replace(
             before,
@@ -167,7 +179,11 @@ class EvidenceWatch:
             ghost_m=ghost_m,
             ghost=ghost,
             behind_s=self._behind_s(velocity_mps, elapsed_s) if enabled else 0.0,
-            trusted=self.last.trusted and not unseen and not ghost and halted < samples and jolts < self._config.jolts,
+            strained_s=strained_s,
+            trusted=self.last.trusted
+            and not (unseen or ghost or strained)
+            and halted < samples
+            and jolts < self._config.jolts,
         )
 
     def _is_visible(self, ordered_mps: float) -> bool:
@@ -292,3 +308,11 @@ class EvidenceWatch:
         least_mps = abs(ordered_mps) * (1.0 - self._config.slow_wheel_share) - self._slack_mps
         behind = ordered_mps != 0.0 and math.copysign(1.0, ordered_mps) * velocity_mps < least_mps
         return max(0.0, self.last.behind_s + (elapsed_s if behind else -elapsed_s))
+
+    def _strained_s(self, velocity_mps: float, torque: float | None, elapsed_s: float, now: float) -> float:
+        lacks_mps = abs(self._least_mps) - math.copysign(1.0, self._least_mps) * velocity_mps
+        strained = torque is not None and abs(torque) >= STRAINED_SHARE and lacks_mps > self._fine_mps
+        if not strained or lacks_mps < self._lacked_mps - self._fine_mps:
+            self._lacked_mps, self._nearer_at = (lacks_mps if strained else math.inf), now
+        held = now > self._nearer_at + NEARER_S
+        return self.last.strained_s + elapsed_s if held else 0.0

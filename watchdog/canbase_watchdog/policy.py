@@ -296,6 +296,12 @@ def _missing(axis: Axis, config: WatchdogConfig) -> str:
             f"is pushed with {_torque(axis)} and shows no motion for {axis.push.vain_s:.3f} s (allowed "
             f"{config.motion_missing_s:.3f} s), ordered {evidence.setpoint_mps:.3f} m/s: see encoder, motor, wheel"
         )
+    if evidence.strained_s >= config.motion_missing_s:
+        return (
+            f"is pushed with {_torque(axis)} and gets no faster than {axis.velocity_mps:.3f} m/s for "
+            f"{evidence.strained_s:.3f} s (allowed {config.motion_missing_s:.3f} s), ordered "
+            f"{evidence.setpoint_mps:.3f} m/s: its encoder may lose counts, or its load is too heavy"
+        )
     if evidence.behind_s >= config.slow_wheel_s:
         return (
             f"turns at {axis.velocity_mps:.3f} m/s, its setpoints ask for {evidence.ordered_mps:.3f} m/s for "

@@ -6,6 +6,7 @@ quick-stop ramp of the drive then control what it shows, and the wheel does what
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -22,6 +23,8 @@ class EncoderFault:
     """Above 0: for so long the factor holds, then all of the motion counts for `on_s`, and so on."""
     on_s: float = 0.0
     """0: as long as `off_s`."""
+    most_mps: float = math.inf
+    """It loses counts of a faster motion, and shows this speed."""
     jump_m: float = 0.0
     """So far it jumps ahead and back in turn, within one inner step ..."""
     every_s: float = 0.0
@@ -79,6 +82,8 @@ class Encoder:
         if fault.off_s:
             period_s = fault.off_s + (fault.on_s or fault.off_s)
             self._count(1.0 if self._time_s % period_s >= fault.off_s else fault.factor)
+        if fault.most_mps < math.inf:
+            self._count(min(1.0, fault.most_mps / max(abs(speed_mps), fault.most_mps)))
         if fault.holds_speed:
             return self._held_mps
         return self._factor * speed_mps + self._jump(fault)
