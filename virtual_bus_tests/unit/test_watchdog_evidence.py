@@ -744,6 +744,14 @@ def test_with_less_torque_or_at_its_order_it_is_not(velocity: float, how: dict[s
     assert wheel.samples(40, 0.5, velocity, **how).strained_s == 0.0
 
 
+@pytest.mark.parametrize("velocity", [0.25, -0.25])
+def test_a_wheel_that_is_held_with_nothing_ordered_is_not_strained(velocity: float) -> None:
+    """A hill may be too steep for its drives; without power it would only roll faster."""
+    wheel = rolling(0.5)
+    wheel.samples(9, 0.0, velocity, torque=1.0)
+    assert wheel.samples(40, 0.0, velocity, torque=1.0).strained_s == 0.0
+
+
 def test_a_wheel_that_gains_is_not_strained_however_far_from_its_order() -> None:
     """5/4 mm/s a sample: more than 1/128 m/s in seven of them, and one in seven may count."""
     wheel = rolling(0.125)

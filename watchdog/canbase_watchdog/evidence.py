@@ -310,7 +310,8 @@ class EvidenceWatch:
         return max(0.0, self.last.behind_s + (elapsed_s if behind else -elapsed_s))
 
     def _strained_s(self, velocity_mps: float, torque: float | None, elapsed_s: float, now: float) -> float:
-        lacks_mps = abs(self._least_mps) - math.copysign(1.0, self._least_mps) * velocity_mps
+        least_mps = self._least_mps
+        lacks_mps = abs(least_mps) - math.copysign(1.0, least_mps) * velocity_mps if least_mps else 0.0
         strained = torque is not None and abs(torque) >= STRAINED_SHARE and lacks_mps > self._fine_mps
         if not strained or lacks_mps < self._lacked_mps - self._fine_mps:
             self._lacked_mps, self._nearer_at = (lacks_mps if strained else math.inf), now
