@@ -760,6 +760,19 @@ def test_a_wheel_that_gains_is_not_strained_however_far_from_its_order() -> None
     assert wheel.samples(30, 0.5, wheel.watch._velocity_mps, torque=1.0).strained_s > 0.25
 
 
+def test_a_wheel_that_recovers_from_a_threshold_gains() -> None:
+    """Held for 0.2 s, from 1/2 m/s to a stand; then it takes 0.4 s to get back: 1/50 m/s a sample. Noise is no gain."""
+    wheel = rolling(0.5)
+    held = [wheel.sample(0.5, 0.5 - n / 24, torque=1.0).strained_s for n in range(1, 13)]
+    assert 0.0 < max(held) < 0.1
+    assert max(wheel.sample(0.5, n / 50, torque=1.0).strained_s for n in range(1, 25)) < 0.25
+    assert wheel.last.strained_s == 0.0
+    noisy = rolling(0.5)
+    for n in range(30):
+        noisy.sample(0.5, 0.4 + (-1) ** n * 0.03, torque=1.0)
+    assert noisy.last.strained_s > 0.25
+
+
 def test_a_moment_without_all_the_torque_begins_it_anew() -> None:
     wheel = rolling(0.5)
     assert wheel.samples(20, 0.5, 0.25, torque=1.0).strained_s > 0.0

@@ -108,9 +108,9 @@ class EvidenceWatch:
         self._setpoint_mps = self._ordered_mps = 0.0
         self._least_mps = self._velocity_mps = self._direction = 0.0
         self._fine_mps = config.standstill_mps + abs(drive.velocity_mps_per_bit)
-        self._lacked_mps = math.inf
-        self._nearer_at = now
-        """So much slower than ordered a strained wheel was when it last came nearer to its order, and when that was."""
+        self._lacked_mps, self._worst_mps, self._nearer_at = math.inf, 0.0, now
+        """How much slower than ordered a strained wheel was when it last came nearer to its order, at most since then,
+        and when that was. Nearer is than ever, or clearly than after something had held it."""
         self._rolled = self._rests = False
         self._turns = 0
         self._jolted_at = -math.inf
@@ -313,7 +313,9 @@ class EvidenceWatch:
         least_mps = self._least_mps
         lacks_mps = abs(least_mps) - math.copysign(1.0, least_mps) * velocity_mps if least_mps else 0.0
         strained = torque is not None and abs(torque) >= STRAINED_SHARE and lacks_mps > self._fine_mps
-        if not strained or lacks_mps < self._lacked_mps - self._fine_mps:
-            self._lacked_mps, self._nearer_at = (lacks_mps if strained else math.inf), now
+        self._worst_mps = max(self._worst_mps, lacks_mps)
+        nearer = lacks_mps < self._lacked_mps - self._fine_mps or lacks_mps < self._worst_mps - self._slack_mps
+        if not strained or nearer:
+            self._lacked_mps, self._worst_mps, self._nearer_at = (lacks_mps if strained else math.inf), lacks_mps, now
         held = now > self._nearer_at + NEARER_S
         return self.last.strained_s + elapsed_s if held else 0.0
