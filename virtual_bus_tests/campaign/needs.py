@@ -42,7 +42,7 @@ class Need:
         return f"{self.safeguard}+{self.beside}" if self.beside else self.safeguard
 
 
-_SILENT = ("feedback_lost", "cable_cut_from_drives", "drive_silent")
+_SILENT = ("feedback_lost", "cable_cut_from_drives", "drive_silent", "encoder_lost")
 _MAD = ("straight_to_cmd_vel", "driver_repeats", "driver_ignores_zero")
 _DRIVER_GONE = ("driver_dies", "driver_hangs")
 _WATCHDOG_GONE = ("watchdog_dies", "watchdog_hangs")
