@@ -23,6 +23,8 @@ ORDER_S = 0.05
 OVERSHOOT_MPS = 0.006
 """Of a drive's velocity loop, on top of watchdog.target_tolerance."""
 ROUNDING_S = 1e-9
+ROLLS_S = 0.002
+"""Of τ: what a wheel that rolls out from one step to the next may differ by; 1 mm/s at 0.5 m/s²."""
 
 
 def tolerance_mps(robot: Robot) -> float:
@@ -111,4 +113,4 @@ class Envelope:
             self._peak_s = max(self._peak_s, tau_s)
         else:
             self._peak_s -= fades_s
-        return max(self._ordered_bound_s, self._peak_s)
+        return max(self._ordered_bound_s, self._peak_s) + (ROLLS_S if coasting else 0.0)

@@ -150,15 +150,16 @@ def test_it_may_for_two_tenths_of_a_second_after_the_last_sample_that_lacked() -
     assert counts[20:] in ([1, 2, 3, 4], [2, 3, 4, 5])
 
 
-@pytest.mark.parametrize(("held_mps", "outside"), [(0.3101, 1), (0.3099, 0)])
-def test_what_lacked_no_more_than_the_tolerance_was_not_held(held_mps: float, outside: int) -> None:
+@pytest.mark.parametrize(("held_mps", "outside"), [(0.3701, 1), (0.3699, 0)])
+def test_what_lacked_no_more_than_a_third_of_the_tolerance_was_not_held(held_mps: float, outside: int) -> None:
+    """Three times that it may be faster anyway: a wheel that lost 0.07 m/s to a bump comes free as much too fast."""
     assert held(at_mps=held_mps).sample(0.5, 0.4).outside == outside
 
 
-@pytest.mark.parametrize(("held_mps", "outside"), [(0.0201, 1), (0.0199, 0)])
-def test_below_twice_the_tolerance_half_of_the_setpoint_is_what_tells(held_mps: float, outside: int) -> None:
-    """A threshold holds a wheel at 0.04 m/s; its drive has a tenth of a second to wind up."""
-    assert held(at_mps=held_mps, target=0.04).sample(0.0941 + 0.01, 0.04).outside == outside
+@pytest.mark.parametrize(("held_mps", "outside"), [(0.0151, 1), (0.0149, 0)])
+def test_below_two_thirds_of_the_tolerance_half_of_the_setpoint_is_what_tells(held_mps: float, outside: int) -> None:
+    """A threshold holds a wheel at 0.03 m/s; its drive has a tenth of a second to wind up."""
+    assert held(at_mps=held_mps, target=0.03).sample(0.0831 + 0.01, 0.03).outside == outside
 
 
 def test_it_overshoots_by_what_it_lacked_and_the_other_way_not_at_all() -> None:

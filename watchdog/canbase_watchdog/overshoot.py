@@ -29,11 +29,14 @@ class Overshoot:
     def on_sample(
         self, *, target_mps: float, velocity_mps: float, slack_mps: float, elapsed_s: float, now_s: float
     ) -> float:
-        """By how much it may be faster than its setpoints now [m/s]. `slack_mps`: what is no lack."""
+        """By how much it may be faster than its setpoints now [m/s].
+
+        `slack_mps`: so much faster it may always be; what it lacked counts where FASTER times that is more.
+        """
         if now_s - self._lacked_at > AFTER_S:
             self._lack_mps = self._lost_m = 0.0
         lack_mps = min(target_mps - velocity_mps, target_mps)
-        if lack_mps > min(slack_mps, target_mps / 2.0):
+        if lack_mps > min(slack_mps / FASTER, target_mps / 2.0):
             self._lacked_at = now_s
             self._lack_mps = max(self._lack_mps, lack_mps)
             self._lost_m = min(self._lost_m + lack_mps * elapsed_s, self._lack_mps * HELD_S)
