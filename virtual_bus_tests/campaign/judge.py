@@ -85,7 +85,8 @@ EXCUSES = {
     "its fault reaction (CiA 402-2): as unreachable, until the watchdog has found it, ordered its power off and reset "
     "its node; and while no watchdog reaches it. A wheel that stood may turn again for the time that its lie takes to "
     "be found, all such times of one stop together (held)",
-    "cut off": "one drive of several is cut off and turns the base on until its own watch stops it (held)",
+    "cut off": "one drive of several is cut off and turns the base on until its own watch stops it, or, reached again, "
+    "a later rung does (held)",
     "deaf watchdog": "it cannot keep a standing base from starting; driver and drives miss it within T_react from the "
     "begin on (held)",
     "reset by a stranger": "a drive that another master has reset has forgotten 1016h, until its power is off "
@@ -280,7 +281,10 @@ class Judge:
             if self._stood and tau_s > 0.0 and not excused and not rests
             else self._rest_again(tau_s if excused else 0.0, now)
         )
-        if tau_s > self._hold.bound_s(tau_s, now, coasting, self._reach.lost) or again:
+        beyond = tau_s > self._hold.bound_s(tau_s, now, coasting, self._reach.lost) and not self._on_its_ramp(
+            tau_s, now
+        )
+        if beyond or again:
             self._violate("held", f"{self._shown} while {' and '.join(self._latches)} latched")
 
     def _check_neutral(self, tau_s: float, now: float) -> None:
@@ -303,10 +307,13 @@ class Judge:
         self._again_since, self._again_tau_s = now, tau_s
         return False
 
+    def _on_its_ramp(self, tau_s: float, now: float) -> bool:
+        """No faster than one ramp leaves it that began RAMP_LATE_S after the stop."""
+        return tau_s <= self._from_tau_s + RAMP_LATE_S - (now - self._latched_at)
+
     def _moves_again(self, tau_s: float, now: float) -> bool:
         """After a stop: longer than what moves it may, or faster and faster when that has lost its power."""
-        on_its_ramp = tau_s <= self._from_tau_s + RAMP_LATE_S - (now - self._latched_at)
-        if on_its_ramp:
+        if self._on_its_ramp(tau_s, now):
             self._again_tau_s = tau_s
             return False
         if now <= self._again_since + SWING_S and self._shown.fastest_mps <= SWING_SHARE * self._from_mps:
@@ -333,7 +340,7 @@ class Judge:
             self.trips.append(status.verdict.cause.name.lower())
         if self._gone("driver", latched) and done == self._resets_done:
             self._violate("latched", "the driver left LATCHED without a reset")
-        asked = self._outside.asked_at >= self._tripped_at and status.reset[1] is Answer.DONE
+        asked = self._outside.asked_at >= self._tripped_at - STEP_S and status.reset[1] is Answer.DONE
         if self._gone("watchdog", latched) and not asked:
             self._violate("latched", "the watchdog left TRIPPED without a reset")
         if done > self._resets_done:

@@ -43,6 +43,8 @@ class Reach:
         self.fastest_mps = 0.0
         """The fastest wheel since the base last stood."""
         self.lost_at = dict.fromkeys(world.drives.bench.nodes, -math.inf)
+        self._cut_at = dict.fromkeys(world.drives.bench.nodes, -math.inf)
+        """When nobody reached each drive last: who does again has its rungs before him."""
         self._weak: set[int] = set()
         """Drives whose own stop has had hardly an effect since they have power: a ramp that has begun goes on so."""
         self._ran_at = dict.fromkeys(("driver", "watchdog"), world.clock.now)
@@ -67,6 +69,7 @@ class Reach:
         self.lost = bool(lost)
         self.was_lost = self.lost or (self.was_lost and not stands)
         self.lost_at |= dict.fromkeys(lost, now)
+        self._cut_at |= {node.node_id: now for node in powered if not self._reached(node.node_id)}
         wheel_mps = max(abs(bench.base.v_left_mps), abs(bench.base.v_right_mps))
         self.fastest_mps = 0.0 if stands else max(self.fastest_mps, wheel_mps)
 
@@ -96,14 +99,14 @@ class Reach:
     def acts_s(self, now: float, lies_s: float) -> float:
         """So long a wheel may turn again after a stop, before somebody has to have acted [s]; 0: nobody has a reason.
 
-        `lies_s`: for a wheel with power whose encoder lies, or whose drive does not brake. Infinity: for one that
-        nobody reaches, until it has ended its setpoint by itself.
+        `lies_s`: for a wheel with power whose encoder lies, or whose drive does not brake, or is reached again since
+        then. Infinity: for one that nobody reaches, until it has ended its setpoint by itself.
         """
         nodes = self._world.drives.bench.nodes
         longest_s = 0.0
         for node_id, _ in self.turning():
             node = nodes[node_id]
-            lies = self._lies(node) or self._is_weak(node.axes)
+            lies = self._lies(node) or self._is_weak(node.axes) or now < self._cut_at[node_id] + lies_s
             waits = now < self.heard(node_id) + self.alone_s + BRAKES_S
             alone = not self._reached(node_id) and self.stops_alone(node_id) and waits
             longest_s = max(longest_s, lies_s if lies else 0.0, math.inf if alone else 0.0)
