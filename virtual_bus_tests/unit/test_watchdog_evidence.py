@@ -773,9 +773,10 @@ def test_a_wheel_that_recovers_from_a_threshold_gains() -> None:
     assert noisy.last.strained_s > 0.25
 
 
-def test_a_moment_without_all_the_torque_begins_it_anew() -> None:
+@pytest.mark.parametrize("how", [{"torque": 0.5}, {"torque": 1.0, "enabled": False}, {"torque": 1.0, "powered": False}])
+def test_a_moment_without_all_the_torque_begins_it_anew(how: dict[str, Any]) -> None:
     wheel = rolling(0.5)
     assert wheel.samples(20, 0.5, 0.25, torque=1.0).strained_s > 0.0
-    assert wheel.sample(0.5, 0.25, torque=0.5).strained_s == 0.0
+    assert wheel.sample(0.5, 0.25, **how).strained_s == 0.0
     assert wheel.samples(7, 0.5, 0.25, torque=1.0).strained_s == 0.0
     assert wheel.sample(0.5, 0.25, torque=1.0).strained_s > 0.0

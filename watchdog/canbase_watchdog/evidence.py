@@ -159,6 +159,7 @@ class EvidenceWatch:
         self._ask(elapsed_s, now, enabled)
         ghost_m = self._ghost_m(lives or step_m is None, velocity_mps, elapsed_s if powered and not falls else 0.0, now)
         before = self._kept(lives, ghost_m)
+        strained_s = self._strained_s(velocity_mps, torque if powered and enabled else None, elapsed_s, now)
         if not powered:
             self.last = before
             return
@@ -166,7 +167,6 @@ class EvidenceWatch:
             before = self._unseen(lives, step_m is not None, elapsed_s, torque)
         halted, jolts = self._halted(jolted and rolled, lives), self._jolts(jolted, now)
         samples, unseen = self._config.feedback_samples, self._is_unseen(before)
-        strained_s = self._strained_s(velocity_mps, torque, elapsed_s, now) if enabled else 0.0
         strained = strained_s >= self._config.motion_missing_s
         ghost = abs(ghost_m) >= GHOST_LIVES * self._life_m and self._ghost_s >= GHOST_LAG_S
         self.last = replace(
