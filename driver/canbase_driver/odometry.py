@@ -17,7 +17,7 @@ RE_REFERENCE_SAMPLES = 3
 
 DOUBTED_CYCLES = 10
 """A place that a counter jumped to is not believed after so many cycles of silence: a second drive with the same node
-id may have told it."""
+id may have reported it."""
 
 POSE_FLOOR_M2 = 1e-6
 """Variance of x and of y before any motion [m²]: 1 mm."""

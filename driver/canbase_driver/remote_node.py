@@ -324,7 +324,7 @@ class RemoteNode:
         self._boot = None
         self.nmt_state = None
         for axis in self.axes:
-            axis.travel.reset_reference()  # to what came since it was lost: a second drive of this id may have told it
+            axis.travel.reset_reference()  # to what came since it was lost: another drive of this id may have sent it
         self._go(Presence.STARTING, now)
         return nmt(NmtCommand.START, self.node_id)
 

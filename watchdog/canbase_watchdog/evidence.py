@@ -169,6 +169,7 @@ class EvidenceWatch:
         samples, unseen = self._config.feedback_samples, self._is_unseen(before)
         strained = strained_s >= self._config.motion_missing_s
         ghost = abs(ghost_m) >= GHOST_LIVES * self._life_m and self._ghost_s >= GHOST_LAG_S
+        lies = unseen or ghost or strained or halted >= samples or jolts >= self._config.jolts
         self.last = replace(
             before,
             ordered_mps=self._ordered_mps,
@@ -180,10 +181,7 @@ class EvidenceWatch:
             ghost=ghost,
             behind_s=self._behind_s(velocity_mps, elapsed_s) if enabled else 0.0,
             strained_s=strained_s,
-            trusted=self.last.trusted
-            and not (unseen or ghost or strained)
-            and halted < samples
-            and jolts < self._config.jolts,
+            trusted=self.last.trusted and not lies,
         )
 
     def _is_visible(self, ordered_mps: float) -> bool:
@@ -237,7 +235,7 @@ class EvidenceWatch:
     def _weight(self, torque: float | None, unseen_m: float) -> float:
         """Of a moment: less for a wheel that is ordered to move slowly, and has not begun to or just begins.
 
-        `unseen_m`: ordered this way. A drive that tells no torque has less time for the beginning alone.
+        `unseen_m`: ordered this way. Where the drive reports no torque, it is less only while the wheel begins to roll.
         """
         fast = abs(self._least_mps) > SLOW_SLACKS * self._slack_mps
         turns = self._is_visible(self._velocity_mps)
