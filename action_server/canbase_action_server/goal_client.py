@@ -15,6 +15,7 @@ from rclpy.action import ActionClient
 from rclpy.action.client import ClientGoalHandle
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from unique_identifier_msgs.msg import UUID
 
 from canbase_action_server.outcome import Status
@@ -25,6 +26,9 @@ SERVER_LOST_S = 2.0
 """A server that cannot be seen for this long is lost."""
 KEEPALIVE_S = 0.1
 """So often the server is told that the client lives; the shortest lease is three times as long."""
+SERVICE_QOS = QoSProfile(depth=100)
+"""With the usual depth of 10 a server loses the oldest of more requests at once, and their clients wait for ever.
+A client loses answers in the same way, as it hears those to all clients."""
 
 ResultT = TypeVar("ResultT")
 FeedbackT = TypeVar("FeedbackT")
@@ -73,7 +77,14 @@ class GoalClient(Generic[ResultT, FeedbackT]):
     ) -> None:
         # ROS 2 Jazzy remaps topics and services, and no action (ros2/ros2, 1312): the name is resolved here.
         name = node.resolve_topic_name(action)
-        self._client = ActionClient(node, kind, name)
+        self._client = ActionClient(
+            node,
+            kind,
+            name,
+            goal_service_qos_profile=SERVICE_QOS,
+            result_service_qos_profile=SERVICE_QOS,
+            cancel_service_qos_profile=SERVICE_QOS,
+        )
         self._executor = executor or SingleThreadedExecutor(context=node.context)
         if executor is None:
             self._executor.add_node(node)

@@ -29,6 +29,7 @@ from canbase_action_server import messages
 from canbase_action_server.admission import action_source
 from canbase_action_server.binding import Binding
 from canbase_action_server.goal import Phase
+from canbase_action_server.goal_client import SERVICE_QOS
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.open_goal import OpenGoal, numbers, uuid_of
@@ -45,9 +46,6 @@ STATUS_QOS = QoSProfile(depth=1)
 LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 KEEPALIVE_QOS = QoSProfile(depth=100)
 """Deep enough for all goals that may wait."""
-SERVICE_QOS = QoSProfile(depth=100)
-"""With the usual depth of 10, of more requests at once the oldest are lost, and their clients wait for ever."""
-
 OLD = "the action server stood still before it took the goal in: its client may be gone; send it again"
 
 T = TypeVar("T")

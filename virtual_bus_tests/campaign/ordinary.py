@@ -15,7 +15,7 @@ from typing import Final
 from campaign.clock import Pace
 from campaign.hands import HANDS, Source
 from campaign.outside import Surroundings
-from campaign.robots import GRAVITY_MPS2, DrawnRobot, draw_robot
+from campaign.robots import CREEP_SHARE, GRAVITY_MPS2, DrawnRobot, draw_robot
 from campaign.world import World
 from canbase_bench.cia402.axis import Axis
 from canbase_bench.cia402.states import State
@@ -175,11 +175,12 @@ class OrdinaryHour:
         """Thick carpet or bare floor, as far as the motors get over it."""
         body, base = self.drawn.body, self.world.drives.bench.base
         factor = self.random.choice(CARPET)
-        room_n = max(0.0, body.peak_force_n - self._needs_n())
+        room_n = min(body.peak_force_n - self._needs_n(), CREEP_SHARE * body.peak_force_n - body.coulomb_n)
         tuned_for_kg = body.mass_kg / len(self.drawn.robot.drives) + body.wheel_mass_kg
         stiffness_npm = tuned_for_kg * (body.bandwidth_radps / 2.0) ** 2
         most_n = STIFF_SHARE * self.drawn.robot.watchdog.motion_missing_m * stiffness_npm / 2.0 - body.coulomb_n
         self._carpet_n = max(0.0, min((factor - 1.0) * body.coulomb_n, room_n / 2.0, most_n))
+        self._slope_n = max(0.0, room_n - self._carpet_n)
         for side in ("left", "right"):
             base.hold(side, self._carpet_n * len(self.drawn.robot.drives) / 2.0)
 
@@ -197,7 +198,7 @@ class OrdinaryHour:
         """Up or down, no steeper than the motors climb while they accelerate."""
         body, base, wheels = self.drawn.body, self.world.drives.bench.base, len(self.drawn.robot.drives)
         weight_n = GRAVITY_MPS2 * body.mass_kg * body.payload_factor
-        most_n = min(STEEPEST * weight_n, wheels * max(0.0, body.peak_force_n - self._needs_n() - self._carpet_n))
+        most_n = min(STEEPEST * weight_n, wheels * self._slope_n)
         base.push_n = most_n * self.random.choice((0.0, 0.0, self.random.uniform(-1.0, 1.0)))
         self._note(f"slope {base.push_n / weight_n:+.1%}")
         self._slow_ramps()

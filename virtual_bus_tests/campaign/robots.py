@@ -27,6 +27,8 @@ GRAVITY_MPS2 = 9.81
 SLOPES = (0.0, 0.0, 0.03, 0.06, 0.1)
 FRICTION_LEFT = 0.6
 """A slope takes at most so much of the friction: a base that rolls downhill without power needs brakes."""
+CREEP_SHARE = 0.45
+"""Of the rated torque: friction and slope take no more of a wheel that just turns. docs/bus.md asks for half."""
 TRIES = 100
 BITRATES = (125_000, 250_000, 500_000, 1_000_000)
 STOP_THEMSELVES = ("generic", "epos4", "nanotec", "elmo_gold", "kinco")
@@ -219,6 +221,7 @@ def _with_body(number: int, robot: Robot, random: Random) -> DrawnRobot:
     inertia_kg = mass_kg * payload + wheels * wheel_kg
     hardest = max(limits.emergency_deceleration_mps2, limits.acceleration_mps2)
     needs_n = (inertia_kg * hardest + abs(push_n)) / wheels + coulomb_n
+    creeps_n = abs(push_n) / wheels + coulomb_n
     body = PlantParameters(
         mass_kg=mass_kg,
         payload_factor=payload,
@@ -226,7 +229,7 @@ def _with_body(number: int, robot: Robot, random: Random) -> DrawnRobot:
         wheel_mass_kg=round(wheel_kg, 2),
         coulomb_n=round(coulomb_n, 1),
         viscous_nspm=round(coulomb_n * random.uniform(0.3, 1.5), 1),
-        peak_force_n=float(ceil(needs_n * random.uniform(1.2, 2.0))),
+        peak_force_n=float(ceil(max(needs_n * random.uniform(1.2, 2.0), creeps_n / CREEP_SHARE))),
         bandwidth_radps=random.choice((60.0, 100.0, 200.0)),
     )
     return DrawnRobot(number, robot, body, round(push_n, 1))

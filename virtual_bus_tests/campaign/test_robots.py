@@ -27,6 +27,9 @@ def test_a_drawn_robot_passes_the_checks_and_can_do_what_its_file_states(number:
     inertia_kg = body.mass_kg * body.payload_factor + wheels * body.wheel_mass_kg
     friction_n = wheels * body.coulomb_n
     assert wheels * body.peak_force_n + friction_n > inertia_kg * limits.emergency_deceleration_mps2 + abs(drawn.push_n)
+    assert (body.coulomb_n + abs(drawn.push_n) / wheels) / body.peak_force_n <= 0.46, (
+        "a wheel that creeps takes so much"
+    )
     assert abs(drawn.push_n) < friction_n, "without power it stays on its slope"
     assert abs(drawn.push_n) <= body.mass_kg * body.payload_factor * GRAVITY_MPS2 * 0.1 + 0.1
     assert min(rolls_out(drawn)) > 0.0

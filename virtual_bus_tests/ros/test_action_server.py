@@ -14,6 +14,7 @@ from canbase.msg import DriverStatus, SafetyState
 from rclpy.action import ActionClient
 
 from canbase_action_server.client import Drive, DriveClient, DriveFeedback, DriveResult, RejectedError
+from canbase_action_server.goal_client import SERVICE_QOS
 from canbase_action_server.outcome import ErrorCode, Status
 from ros.conftest import MakeRobot, Spawn
 from ros.fake_base import FakeBase, server_code
@@ -280,7 +281,8 @@ def test_a_second_goal_is_rejected_while_one_runs_and_accepted_afterwards(stage:
 
 def test_many_goals_at_once_find_exactly_one_owner(stage: Stage) -> None:
     goal = DriveDistance.Goal(distance_m=0.2, max_speed_mps=0.3)
-    clients = [ActionClient(stage.node.node, DriveDistance, "drive_distance") for _ in range(4)]
+    deep = {"goal_service_qos_profile": SERVICE_QOS}
+    clients = [ActionClient(stage.node.node, DriveDistance, "drive_distance", **deep) for _ in range(4)]
     stage.node.wait_for(lambda: all(client.server_is_ready() for client in clients), 5.0, "all clients")
     answers = [client.send_goal_async(goal) for client in clients for _ in range(5)]
     stage.node.wait_for(lambda: all(answer.done() for answer in answers), 5.0, "all answers")
