@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import enum
-from typing import Annotated
+import signal
+from collections.abc import Sequence
+from typing import Annotated, Final
 
 import typer
 from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from campaign.without import SAFEGUARDS, remove
 from small_worlds.explore import Bounds, Search, search, shortest
@@ -16,6 +19,8 @@ from small_worlds.world import STARTS
 app = typer.Typer(add_completion=False)
 out = Console(highlight=False, soft_wrap=True)
 Safeguard = enum.Enum("Safeguard", {name: name for name in SAFEGUARDS}, type=str)  # type: ignore[misc]
+BROKEN_OFF: Final = 128 + signal.SIGINT
+"""Exit code after Ctrl-C, as of a shell."""
 Start = enum.Enum("Start", {name: name for name in STARTS}, type=str)  # type: ignore[misc]
 
 
@@ -28,12 +33,25 @@ def main(
     workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
     without: Annotated[Safeguard | None, typer.Option(help="take this safeguard out before")] = None,
 ) -> None:
-    """Exit code 1 when a property did not hold, or a world did not come to rest."""
+    """Exit code 1 when a property did not hold, or a world did not come to rest; 130 after Ctrl-C."""
     remove(without.value if without is not None else "")
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     bounds = Bounds(faults, operator, every)
-    found = search(bounds, [each.value for each in start or ()] or STARTS, workers)
+    found = _with_progress(bounds, [each.value for each in start or ()] or STARTS, workers)
     _tell(bounds, found)
-    raise typer.Exit(1 if found.stories else 0)
+    raise typer.Exit(1 if found.stories else BROKEN_OFF if found.broken_off else 0)
+
+
+def _with_progress(bounds: Bounds, starts: Sequence[str], workers: int) -> Search:
+    columns = TextColumn("first events"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[told]}")
+    with Progress(*columns, console=out) as progress:
+        task = progress.add_task("", total=None, told="")
+
+        def on_news(found: Search) -> None:
+            told = f"{found.states:,} states, {len(found.stories)} stories"
+            progress.update(task, total=found.tasks, completed=found.done, told=told)
+
+        return search(bounds, starts, workers, on_news)
 
 
 def _tell(bounds: Bounds, found: Search) -> None:
@@ -41,6 +59,8 @@ def _tell(bounds: Bounds, found: Search) -> None:
         f"{bounds}: {found.states:,} states, {found.steps:,} steps, "
         f"{found.real_s:.0f} s, {found.cpu_s:.0f} s of processor time"
     )
+    if found.broken_off:
+        out.print(f"broken off after {found.done} of {found.tasks} first events")
     for name, sentence in PROPERTIES.items():
         violated = [story for story in found.stories if story.found.name == name]
         out.print(f"{name:9} {len(violated):4} stories   {sentence}")

@@ -13,11 +13,13 @@ import json
 import mmap
 import os
 import resource
+import signal
 import struct
 import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from small_worlds import canonical
 from small_worlds.copying import Snapshot
@@ -70,6 +72,18 @@ class Search:
     cpu_s: float = 0.0
     real_s: float = 0.0
     stories: list[Story] = field(default_factory=list)
+    tasks: int = 0
+    done: int = 0
+    """Of the tasks: each is one first event, and all that may come after it."""
+
+    @property
+    def broken_off(self) -> bool:
+        """Ctrl-C came before the last task was done."""
+        return self.done < self.tasks
+
+
+def _nobody(found: Search) -> None:
+    """Nobody wants to know."""
 
 
 class _Shared:
@@ -101,6 +115,7 @@ class _Shared:
 
 
 STATES, STEPS = 0, 1
+DONE = "done"
 COLLECTED = (30_000, 5, 5)
 """Worlds refer to themselves: many are thrown away at once."""
 ALL = (*FAULT_EVENTS, *OPERATOR_EVENTS)
@@ -223,8 +238,11 @@ class _Worker:
         return not self._shared.seen(_hash(told, bytes((phase + 1,))), left.bit) & left.as_much
 
     def _tell(self, world: _World, found: Found) -> None:
-        told = [world.start, world.events, found.name, found.at_s - world.began, found.detail[:1500]]
-        os.write(self._writer, json.dumps(told).encode() + b"\n")
+        self.say([world.start, world.events, found.name, found.at_s - world.began, found.detail[:1500]])
+
+    def say(self, news: object) -> None:
+        """To the process that began the search: a story, or DONE."""
+        os.write(self._writer, json.dumps(news).encode() + b"\n")
 
 
 NOTHING = _Left(0, 0)
@@ -234,27 +252,51 @@ def _hash(told: bytes, salt: bytes) -> int:
     return int.from_bytes(hashlib.blake2b(told, digest_size=8, salt=salt).digest(), "little") or 1
 
 
-def search(bounds: Bounds, starts: Sequence[str], workers: int = 2) -> Search:
-    """Everything within `bounds` from each of `starts`."""
+def search(
+    bounds: Bounds, starts: Sequence[str], workers: int = 2, on_news: Callable[[Search], None] = _nobody
+) -> Search:
+    """Everything within `bounds` from each of `starts`. `on_news` hears of each story and of each task that is done.
+
+    Ctrl-C ends it, with what was found until then. Raises RuntimeError when a searching process died.
+    """
     began, used_s = time.perf_counter(), _cpu_s()
-    shared = _Shared()
+    shared, found = _Shared(), Search()
     reader, writer = os.pipe()
-    children = _fork(bounds, starts, shared, (reader, writer), workers)
+    children = _fork(bounds, starts, shared, (reader, writer), workers, found)
     os.close(writer)
-    with os.fdopen(reader, "rb") as pipe:
-        stories = [_story(line) for line in pipe]
-    failed = [child for child in children if os.waitpid(child, 0)[1]]
+    try:
+        with os.fdopen(reader, "rb") as pipe:
+            for line in pipe:
+                _take(line, found)
+                found.states, found.steps = shared.count(STATES), shared.count(STEPS)
+                on_news(found)
+    except KeyboardInterrupt:
+        for child in children:
+            os.kill(child, signal.SIGTERM)
+    failed = [child for child in children if os.waitpid(child, 0)[1] not in (0, signal.SIGTERM)]
     if failed:
         raise RuntimeError(f"{len(failed)} of {workers} searching processes died")
-    counts = (shared.count(STATES), shared.count(STEPS))
-    return Search(*counts, _cpu_s() - used_s, time.perf_counter() - began, stories)
+    found.states, found.steps = shared.count(STATES), shared.count(STEPS)
+    found.cpu_s, found.real_s = _cpu_s() - used_s, time.perf_counter() - began
+    return found
 
 
-def _fork(bounds: Bounds, starts: Sequence[str], shared: _Shared, pipe: tuple[int, int], workers: int) -> list[int]:
+def _take(line: bytes, found: Search) -> None:
+    told = json.loads(line)
+    if told == DONE:
+        found.done += 1
+    else:
+        found.stories.append(_story(told))
+
+
+def _fork(
+    bounds: Bounds, starts: Sequence[str], shared: _Shared, pipe: tuple[int, int], workers: int, found: Search
+) -> list[int]:
     """The processes of the search. Each takes the next task when it has done one: a first event at some point."""
     first = _Worker(bounds, shared, pipe[1])
     left = _Left(bounds.faults, bounds.operator)
     tasks = [(snapshot, row) for start in starts for snapshot, rows in first.begin(_World(start), left) for row in rows]
+    found.tasks = len(tasks)
     todo, give = os.pipe()
     os.write(give, b"".join(struct.pack("<H", number) for number in range(len(tasks))))
     os.close(give)
@@ -273,12 +315,15 @@ def _work(worker: _Worker, tasks: list[tuple[Snapshot, int]], left: _Left, todo:
     status = 1
     try:
         os.close(reader)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to all; who began the search ends it
         gc.collect()
         gc.freeze()
         gc.set_threshold(*COLLECTED)
         while number := os.read(todo, 2):
             snapshot, row = tasks[struct.unpack("<H", number)[0]]
             worker.branch(snapshot, row, left)
+            worker.say(DONE)
         status = 0
     except BaseException:  # noqa: BLE001 - told, and an exit code
         traceback.print_exc()
@@ -292,8 +337,8 @@ def _cpu_s() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def _story(line: bytes) -> Story:
-    start, events, name, at_s, detail = json.loads(line)
+def _story(told: list[Any]) -> Story:
+    start, events, name, at_s, detail = told
     return Story(start, tuple((at, event) for at, event in events), Found(name, at_s, detail))
 
 

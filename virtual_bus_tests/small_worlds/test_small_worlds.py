@@ -9,7 +9,7 @@ from canbase_driver.sdo import Read, SdoAborted
 from small_worlds import canonical
 from small_worlds.copying import Snapshot
 from small_worlds.events import EVENTS, FAULT_EVENTS, OPERATOR_EVENTS
-from small_worlds.explore import Bounds, Story, search, shortest
+from small_worlds.explore import Bounds, Search, Story, search, shortest
 from small_worlds.properties import PROPERTIES, Found, Properties
 from small_worlds.teeth import TEETH, Tooth, bite
 from small_worlds.world import POINT_S, STARTS, SmallWorld
@@ -19,6 +19,7 @@ pytestmark = [pytest.mark.campaign, pytest.mark.timeout(900)]
 
 def test_with_each_single_event_at_any_time_everything_holds() -> None:
     found = search(Bounds(1, 0, 4), STARTS)
+    assert not found.broken_off
     assert [story.lines() for story in shortest(found.stories).values()] == []
     assert found.states > 1000
 
@@ -27,6 +28,19 @@ def test_with_each_single_event_at_any_time_everything_holds() -> None:
 def test_without_a_safeguard_a_small_world_misses_it(tooth: Tooth) -> None:
     stories = bite(tooth)
     assert tooth.found in stories, [story.lines() for story in stories.values()]
+
+
+def test_ctrl_c_ends_a_search_with_what_was_found_until_then() -> None:
+    news: list[int] = []
+
+    def press(found: Search) -> None:
+        news.append(found.done)
+        if found.done == 2:
+            raise KeyboardInterrupt
+
+    found = search(Bounds(1, 0, 4), ["driving"], workers=1, on_news=press)
+    assert (news, found.done, found.broken_off) == ([1, 2], 2, True)
+    assert 0 < found.states < 300
 
 
 def test_a_world_at_rest_is_told_alike_at_any_time_and_another_one_differently() -> None:
