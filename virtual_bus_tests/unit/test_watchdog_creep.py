@@ -36,6 +36,14 @@ def test_a_setpoint_that_nothing_allows_is_told_after_the_hold_and_not_before(ta
     assert f"{target_mps:.4f} m/s for 0.35" in look(watch, axis, REST, 10.0 + HOLD_S + 0.001)
 
 
+def test_what_it_tells_does_not_grow_while_nobody_hears_the_drive_any_more() -> None:
+    """A driver that died and a cable that is cut leave the last setpoint standing: the trip stays one and the same."""
+    watch = CreepWatch(config())
+    look(watch, CREEPS, REST, 10.0)
+    told = {look(watch, CREEPS, REST, 10.0 + HOLD_S + 0.1 * step) for step in range(1, 600)}
+    assert told == {f"{CREEPS.drive.joint} is ordered 0.0010 m/s for {HOLD_S:.3f} s"}
+
+
 @pytest.mark.parametrize(
     "bounds", [Bounds(-0.01, 0, 0, 0), Bounds(0, 0.01, 0, 0), Bounds(0, 0, -0.1, 0), Bounds(0, 0, 0, 0.1)]
 )

@@ -40,7 +40,7 @@ class CreepWatch:
             self._ordered_s = 0.0
         if wheel is None or not self._ordered:
             return ""
-        self._ordered_s += elapsed_s if went_on else 0.0
+        self._ordered_s = min(self._ordered_s + (elapsed_s if went_on else 0.0), self._hold_s)
         self._ordered_at = now
         if self._ordered_s < self._hold_s:
             return ""
