@@ -37,8 +37,8 @@ else
 endif
 
 HOT_SOURCES := $(wildcard can_config/canbase_config/*.py driver/canbase_driver/*.py velocity_mux/canbase_velocity/*.py \
-  watchdog/canbase_watchdog/*.py action_server/canbase_action_server/*.py virtual_bus_tests/canbase_bench/*.py \
-  virtual_bus_tests/canbase_bench/*/*.py virtual_bus_tests/campaign/*.py virtual_bus_tests/compiled/*.py)
+  watchdog/canbase_watchdog/*.py action_server/canbase_action_server/*.py virtual_bus_tests/canbase_sim/*.py \
+  virtual_bus_tests/canbase_sim/*/*.py virtual_bus_tests/campaign/*.py virtual_bus_tests/compiled/*.py)
 
 build/compiled/ready: $(VENV)/ready $(HOT_SOURCES)
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m compiled
@@ -72,7 +72,8 @@ fuzz: $(VENV)/ready ## a million random and malformed frames and leases against 
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.fuzz
 
 UNIT := virtual_bus_tests/unit
-DECIDES := $(wildcard $(UNIT)/test_watchdog_*.py) $(patsubst %,$(UNIT)/test_%.py,cia402 axis supervisor reset layouts_agree latch_record stillness braking)
+DECIDES := $(UNIT)/watchdog $(patsubst %,$(UNIT)/driver/test_%.py,cia402 axis supervisor reset standstill braking) \
+  $(UNIT)/chain/test_layouts_agree.py $(UNIT)/runtime/test_latch_record.py
 
 .PHONY: coverage
 coverage: $(VENV)/ready ## branch coverage of watchdog policy and CiA 402 tables: all of it, or it fails
@@ -90,9 +91,9 @@ exit-matrix: $(VENV)/ready ## every way out of a driving robot, for real, measur
 .PHONY: bench
 bench: $(VENV)/ready ## every budget of this computer, measured beside a floor: docs/performance.md; NAME=reaction runs one
 ifdef NAME
-	canbase bench $(NAME)
+	canbase benchmark $(NAME)
 else
-	canbase bench --write docs/performance.md
+	canbase benchmark --write docs/performance.md
 endif
 
 .PHONY: hazards

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bus import real_bus
+from support import real_bus
 
 pytest_plugins = ["pytester"]
 

@@ -23,9 +23,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from canbase_action_server.inputs import Odometry
-from canbase_bench.plant.base import PlantParameters
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
+from canbase_sim.plant.base import PlantParameters
 from drive_rig import Case, Rig
 from drive_ways import WAYS, Controller
 

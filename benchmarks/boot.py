@@ -6,11 +6,11 @@ measures that). `python benchmarks/boot.py` prints the table of docs/drives.md.
 
 from __future__ import annotations
 
-from bus.crews import robot_with
-from canbase_bench.personality import PERSONALITIES
+from canbase_sim.personality import PERSONALITIES
 from figures import Figure
-from unit.chain_world import bench_robot, robot_of
-from unit.timed_bus import TimedBus, on_a_wire
+from support.chain_world import bench_robot, robot_of
+from support.crews import robot_with
+from support.timed_bus import TimedBus, on_a_wire
 
 BUDGET_S, BUDGET_RATIO = 1.0, 1.5
 LONGEST_S = 10.0

@@ -17,9 +17,9 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from canbase_cli.priority import PRIORITY
+from canbase_cli.raise_priority import PRIORITY
 from figures import Figure, quantile, spread
-from ros.running_robot import RunningRobot, own_domain, robot_on
+from support.running_robot import RunningRobot, own_domain, robot_on
 
 SECONDS = 20.0
 FILE = "CANBASE_PROBE"

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from canbase_action_server.along_track import Pose
 from canbase_action_server.inputs import Odometry
 from canbase_action_server.motion import STOP, Twist
-from canbase_bench.plant.base import Base, MountedWheel, PlantParameters
 from canbase_config.robot import Robot
-from canbase_driver.kinematics import Twist2D, wheel_speeds
-from canbase_driver.limits import Limiter, MotionState
+from canbase_driver.motion.kinematics import Twist2D, wheel_speeds
+from canbase_driver.motion.limiter import Limiter, MotionState
+from canbase_sim.plant.base import Base, MountedWheel, PlantParameters
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Protocol
 
+from canbase_action_server.goal_queue import Reception
+from canbase_action_server.goal_request import DriveRequest
 from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
 from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.outcome import ErrorCode
-from canbase_action_server.reception import Reception
-from canbase_action_server.request import DriveRequest
 from canbase_config.robot import Robot
 from drive_rig import Case
 

@@ -24,7 +24,7 @@ from canbase_config.derive import watchdog_config
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from figures import Figure, raise_priority
-from ros.harness import free_udp_port
+from support.ros_harness import free_udp_port
 
 RATE_HZ = 8000
 SECONDS = 5.0
@@ -72,10 +72,10 @@ def bare(robot: Robot, pipe: Connection) -> None:
 
 def driver(robot: Robot, pipe: Connection) -> None:
     """The driver's control thread with its core."""
-    from canbase_driver.black_box import Ring
-    from canbase_driver.bus_port import BusPort
     from canbase_driver.core import DriverCore
-    from canbase_driver.loop import ControlLoop
+    from canbase_driver.runtime.black_box import Ring
+    from canbase_driver.runtime.bus_port import BusPort
+    from canbase_driver.runtime.control_thread import ControlLoop
 
     raise_priority(35)
     core = DriverCore(robot)

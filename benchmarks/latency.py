@@ -26,8 +26,8 @@ from canbase_config.load import load_robot
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.twist import Twist
 from figures import Figure, quantile, raise_priority, spread
-from ros.harness import Process, TestNode, clear_records
-from ros.running_robot import CANBASE, own_domain, robot_file
+from support.ros_harness import Process, TestNode, clear_records
+from support.running_robot import CANBASE, own_domain, robot_file
 
 ORDERS = 200
 SPEED_MPS = 0.05

@@ -18,8 +18,8 @@ import can
 
 from canbase_config.load import load_robot
 from figures import Figure, quantile
-from ros.harness import Process, clear_records
-from ros.running_robot import CANBASE, own_domain, robot_file
+from support.ros_harness import Process, clear_records
+from support.running_robot import CANBASE, own_domain, robot_file
 
 RUNS = 5
 FEW, MANY = 2, 8

@@ -17,8 +17,8 @@ from lifecycle_msgs.srv import ChangeState
 from std_srvs.srv import Trigger
 
 from figures import Figure, quantile, spread
-from ros.harness import Process, TestNode
-from ros.running_robot import own_domain, robot_on
+from support.ros_harness import Process, TestNode
+from support.running_robot import own_domain, robot_on
 
 TRIALS = 200
 BUDGET_S = 0.1

@@ -30,7 +30,7 @@ from ruamel.yaml import YAML
 from sensor_msgs.msg import LaserScan
 
 from canbase_cli.middleware import prefer_udp
-from canbase_cli.priority import raise_priority
+from canbase_cli.raise_priority import raise_priority
 from canbase_config.load import sample
 
 SOURCES = 5

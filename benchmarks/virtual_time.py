@@ -9,11 +9,11 @@ import struct
 import time
 from collections.abc import Callable
 
-from canbase_bench.frame import Frame
-from canbase_bench.plant.base import Base, MountedWheel, PlantParameters
+from canbase_sim.frame import Frame
+from canbase_sim.plant.base import Base, MountedWheel, PlantParameters
 from figures import Figure
-from unit.chain_world import FORWARD, World, bench_robot
-from unit.sim_rig import MPS, Rig
+from support.chain_world import FORWARD, World, bench_robot
+from support.sim_rig import MPS, Rig
 
 SECONDS = 60.0
 BUDGET = 100.0

@@ -28,7 +28,7 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 def ordinary_priority() -> Iterator[None]:
     """Commands that a test calls inside its own process leave that one as it is: all it starts would inherit it."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("canbase_cli.process.raise_priority", lambda part: None)
+        patch.setattr("canbase_cli.services.raise_priority", lambda part: None)
         yield
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from canbase_action_server.goal import Feedback
+from canbase_action_server.goal_request import Request
 from canbase_action_server.outcome import Outcome
-from canbase_action_server.request import Request
 
 
 @dataclass(frozen=True, slots=True)

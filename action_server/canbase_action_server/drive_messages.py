@@ -6,8 +6,8 @@ from canbase.action import DriveDistance
 
 from canbase_action_server.binding import Binding
 from canbase_action_server.goal import Feedback
+from canbase_action_server.goal_request import DriveRequest
 from canbase_action_server.outcome import Outcome
-from canbase_action_server.request import DriveRequest
 
 
 def drive_binding() -> Binding:

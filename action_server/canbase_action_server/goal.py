@@ -9,12 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from canbase_action_server.admission import action_source
 from canbase_action_server.causes import Cause, Situation, cause_while_driving, cause_while_stopping
 from canbase_action_server.inputs import Inputs, Odometry
 from canbase_action_server.limits import standstill_limits
 from canbase_action_server.motion import STOP, Motion, Twist
 from canbase_action_server.outcome import ErrorCode, Outcome
+from canbase_action_server.preconditions import action_source
 from canbase_action_server.standstill import Standstill, Verdict
 from canbase_config.robot import Robot
 

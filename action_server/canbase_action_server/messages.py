@@ -9,7 +9,7 @@ from nav_msgs.msg import Odometry as OdometryMessage
 from canbase_action_server.along_track import Pose, yaw_of_quaternion
 from canbase_action_server.inputs import Driver, Mux, Odometry, Safety
 from canbase_action_server.motion import Twist
-from canbase_config.foreign_text import SENTENCE_LENGTH, printable
+from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
 
 DRIVER_STATES = {
     DriverStatus.OFFLINE: "offline",

@@ -26,20 +26,20 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from unique_identifier_msgs.msg import UUID
 
 from canbase_action_server import messages
-from canbase_action_server.admission import action_source
 from canbase_action_server.binding import Binding
 from canbase_action_server.goal import Phase
 from canbase_action_server.goal_client import SERVICE_QOS
+from canbase_action_server.goal_queue import Cycle, Reception
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.open_goal import OpenGoal, numbers, uuid_of
 from canbase_action_server.outcome import ErrorCode, Outcome
-from canbase_action_server.reception import Cycle, Reception
-from canbase_config.journal import Journal, Voice
-from canbase_config.priority import Priority
-from canbase_config.receive_time import REQUEST_GAP_S, RESENT_S, ReceiveTimes
+from canbase_action_server.preconditions import action_source
 from canbase_config.robot import Robot
-from canbase_config.sim_time import refuse_sim_time
+from canbase_runtime.journal import Journal, Voice
+from canbase_runtime.log_priority import Priority
+from canbase_runtime.receive_time import REQUEST_GAP_S, RESENT_S, ReceiveTimes
+from canbase_runtime.sim_time import refuse_sim_time
 
 SENSOR_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 STATUS_QOS = QoSProfile(depth=1)

@@ -13,8 +13,8 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from canbase_driver.cia301.frame import Frame
     from canbase_driver.core import DriverCore
-    from canbase_driver.frame import Frame
 
 FILE = "CANBASE_PROBE"
 _seen: list[float] = []

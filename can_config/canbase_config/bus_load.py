@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from canbase_config.places import (
+from canbase_config.object_map import (
     CONTROLWORD,
     POSITION_ACTUAL,
     STATUSWORD,

@@ -14,13 +14,13 @@ from pydantic import ValidationError
 from canbase_config import bus_load
 from canbase_config.commissioned import uncommissioned
 from canbase_config.errors import ConfigError, Loc, Problem
-from canbase_config.explain import explain
 from canbase_config.robot import Robot
 from canbase_config.ros_params import plain
 from canbase_config.runtime_folder import with_runtime_folder
 from canbase_config.schema import Schema
 from canbase_config.stop_checks import uncertain_stops
-from canbase_config.twist_mux import with_twist_mux
+from canbase_config.twist_mux_file import with_twist_mux
+from canbase_config.validation_errors import explain
 from canbase_config.yaml_file import YamlFile, read_yaml
 
 ROBOT_SCHEMA = Schema(Robot)

@@ -10,9 +10,9 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from canbase_config.errors import ConfigError
-from canbase_config.explain import explain
 from canbase_config.profile import Profile
 from canbase_config.schema import Schema
+from canbase_config.validation_errors import explain
 from canbase_config.yaml_file import read_yaml
 
 PROFILE_SCHEMA = Schema(Profile)

@@ -18,7 +18,7 @@ from canbase_config.drive import Drive
 from canbase_config.mux import Mux
 from canbase_config.safety import Safety
 from canbase_config.section import MisfitError, Name, Section
-from canbase_config.tolerances import Watchdog
+from canbase_config.watchdog_section import Watchdog
 
 DRIVER_NODE_ID = 127
 """CANopen node id of the motor driver: its heartbeat is COB-ID 77Fh."""

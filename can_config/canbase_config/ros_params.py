@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 from canbase_config.errors import ConfigError, Loc, Place, Problem
-from canbase_config.twist_mux import PARAMETERS
+from canbase_config.twist_mux_file import PARAMETERS
 from canbase_config.yaml_file import YamlFile
 from canbase_config.yaml_limits import MAX_DEPTH
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from canbase_cli.options import colour, load_config
+from canbase_runtime.terminal import colour, load_config
 
 app = typer.Typer(help="Look at a robot.yaml.", no_args_is_help=True)
 

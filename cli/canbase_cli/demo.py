@@ -21,12 +21,13 @@ from rich.console import Console
 from rich.table import Table
 
 from canbase_cli.goal import CANCELED, REJECTED
-from canbase_cli.options import FAILED, fail, ros_needed
-from canbase_cli.own_modules import module_command
+from canbase_cli.options import ros_needed
 from canbase_cli.stack import Stack
+from canbase_runtime.own_modules import module_command
+from canbase_runtime.terminal import FAILED, fail
 
 if TYPE_CHECKING:
-    from canbase_bench.control import SimControl
+    from canbase_sim.control import SimControl
 
 DISTANCE_M: Final = 1.0
 ENCODER_TOLERANCE_M: Final = 0.005
@@ -107,8 +108,8 @@ def demo(
 
 
 def _show(console: Console, stack: Stack, config: Path, report: Report, speed_mps: float) -> None:
-    from canbase_bench.control import ControlError, SimControl, control_path
     from canbase_config.load import load_robot
+    from canbase_sim.control import ControlError, SimControl, control_path
 
     with console.status("starting: simulated drives, watchdog, velocity, driver, action server"):
         observer = _Observer()

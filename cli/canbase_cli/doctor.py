@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from canbase_cli.checks import Check, commissioning, exit_code, first_failure, good_file, table
-from canbase_cli.options import ConfigOption, NamespaceOption, load_config, ros_arguments, ros_needed
-from canbase_cli.symptoms import SYMPTOMS
+from canbase_cli.options import ConfigOption, NamespaceOption, ros_arguments, ros_needed
+from canbase_doctor.checks import Check, commissioning, exit_code, first_failure, good_file, table
+from canbase_doctor.symptoms import SYMPTOMS
+from canbase_runtime.terminal import load_config
 
 if TYPE_CHECKING:
     from canbase_config.load import Loaded
@@ -69,8 +70,8 @@ def doctor(
 
 def _walk(symptom: str, loaded: Loaded, arguments: list[str], seconds: float) -> list[Check]:
     with ros_needed():
-        from canbase_cli.observe import observe
-        from canbase_cli.symptom_walk import walk
+        from canbase_doctor.observe import observe
+        from canbase_doctor.symptom_walk import walk
     return walk(symptom, observe(loaded, arguments, seconds))
 
 
@@ -82,8 +83,8 @@ def _all(loaded: Loaded, arguments: list[str], seconds: float, *, with_bus: bool
     if not with_bus:
         rows = _parts(loaded, arguments, seconds)
         return [rows[0], *files, *rows[1:]]
-    from canbase_cli.bus_checks import bus_checks
-    from canbase_cli.onbus.doctor import look
+    from canbase_doctor.bus_checks import bus_checks
+    from canbase_doctor.bus_probe import look
 
     seen = look(loaded.robot)
     rows = _parts(loaded, arguments, seconds) if seen.canbase_runs or seen.problem else [good_file(loaded)]
@@ -92,8 +93,8 @@ def _all(loaded: Loaded, arguments: list[str], seconds: float, *, with_bus: bool
 
 def _parts(loaded: Loaded, arguments: list[str], seconds: float) -> list[Check]:
     with ros_needed():
-        from canbase_cli.observe import observe
-        from canbase_cli.robot_checks import robot_checks
+        from canbase_doctor.observe import observe
+        from canbase_doctor.robot_checks import robot_checks
     return robot_checks(observe(loaded, arguments, seconds))
 
 

@@ -7,7 +7,8 @@ from typing import Annotated
 import typer
 
 from canbase_cli.goal import ABORTED, CANCELED, NO_SERVER, REJECTED, CancelAfterOption
-from canbase_cli.options import NamespaceOption, RosCommand, fail, ros_arguments, ros_needed
+from canbase_cli.options import NamespaceOption, RosCommand, ros_arguments, ros_needed
+from canbase_runtime.terminal import fail
 
 app = typer.Typer(help="An action to learn with: nothing moves.", no_args_is_help=True)
 PeriodOption = Annotated[float, typer.Option("--period", metavar="SECONDS", min=0.01, max=10.0, help="for one number")]

@@ -14,8 +14,9 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from canbase_cli.options import FAILED, RosCommand, colour, fail
-from canbase_config.foreign_text import SENTENCE_LENGTH, printable
+from canbase_cli.options import RosCommand
+from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
+from canbase_runtime.terminal import FAILED, colour, fail
 
 if TYPE_CHECKING:
     from canbase_action_server.goal_client import SentGoal

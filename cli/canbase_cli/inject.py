@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from canbase_cli.options import FAILED, WRONG_INPUT, ConfigOption, colour, fail, load_config
+from canbase_cli.options import ConfigOption
+from canbase_runtime.terminal import FAILED, WRONG_INPUT, colour, fail, load_config
 
 if TYPE_CHECKING:
     from canbase_config.robot import Robot
@@ -58,7 +59,7 @@ def inject(
 
 
 def _signal(robot: Robot, part: str, fault: str) -> None:
-    from canbase_config.sole import bus_name, holder
+    from canbase_runtime.single_instance import bus_name, holder
 
     if fault not in SIGNALS:
         fail(f"{part} takes {', '.join(SIGNALS)}, not {fault!r}", WRONG_INPUT)
@@ -74,8 +75,8 @@ def _signal(robot: Robot, part: str, fault: str) -> None:
 
 
 def _break(robot: Robot, target: str, fault: str, arguments: Mapping[str, Any]) -> None:
-    from canbase_bench.control import ControlError, SimControl, control_path
-    from canbase_bench.faults import KINDS
+    from canbase_sim.control import ControlError, SimControl, control_path
+    from canbase_sim.faults import KINDS
 
     if fault not in KINDS:
         fail(f"there is no fault {fault!r} of a drive, expected one of {', '.join(KINDS)}", WRONG_INPUT)

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from canbase_cli.options import FAILED, WRONG_INPUT, colour, fail, load_config
+from canbase_runtime.terminal import FAILED, WRONG_INPUT, colour, fail, load_config
 
 
 class Network(str, Enum):

@@ -7,8 +7,7 @@ from typing import Annotated, Final
 import typer
 
 from canbase_cli import (
-    bench,
-    bundle,
+    benchmark,
     commission,
     config,
     demo,
@@ -19,16 +18,17 @@ from canbase_cli import (
     install,
     jog,
     monitor,
-    process,
     rotate,
     sample,
     scan,
     sdo,
+    services,
     trigger,
     up,
 )
 from canbase_cli.goal import GoalCommand
 from canbase_cli.options import RosCommand
+from canbase_doctor import support_bundle
 
 app = typer.Typer(
     name="canbase",
@@ -40,7 +40,7 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from canbase_cli.version import installed_version
+        from canbase_runtime.version import installed_version
 
         typer.echo(f"canbase {installed_version()}")
         raise typer.Exit
@@ -74,14 +74,14 @@ app.command("commission", epilog=commission.EPILOG)(commission.commission)
 app.command("jog", epilog=jog.EPILOG)(jog.jog)
 app.command("inject", epilog=inject.EPILOG)(inject.inject)
 app.command("sample")(sample.sample)
-app.command("bench")(bench.bench)
+app.command("benchmark")(benchmark.benchmark)
 app.add_typer(config.app, name="config")
 app.add_typer(fibonacci.app, name="fibonacci")
 app.command("install")(install.install)
 app.command("uninstall")(install.uninstall)
-app.command("support-bundle")(bundle.support_bundle)
-app.command("driver", cls=RosCommand, options_metavar=_ROS_USAGE)(process.driver)
-app.command("velocity", cls=RosCommand, options_metavar=_ROS_USAGE)(process.velocity)
-app.command("action-server", cls=RosCommand, options_metavar=_ROS_USAGE)(process.action_server)
-app.command("watchdog", cls=RosCommand)(process.watchdog)
-app.command("sim", cls=RosCommand)(process.sim)
+app.command("support-bundle")(support_bundle.support_bundle)
+app.command("driver", cls=RosCommand, options_metavar=_ROS_USAGE)(services.driver)
+app.command("velocity", cls=RosCommand, options_metavar=_ROS_USAGE)(services.velocity)
+app.command("action-server", cls=RosCommand, options_metavar=_ROS_USAGE)(services.action_server)
+app.command("watchdog", cls=RosCommand)(services.watchdog)
+app.command("sim", cls=RosCommand)(services.sim)

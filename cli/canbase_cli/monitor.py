@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, Final
 import typer
 
 from canbase_cli.options import NamespaceOption, ros_arguments, ros_needed
-from canbase_config.foreign_text import clean
+from canbase_runtime.foreign_text import clean
 
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-    from canbase_cli.picture import Snapshot
+    from canbase_cli.monitor_picture import Snapshot
 
 REFRESH_S: Final = 0.2
 ALL_STOPS: Final = 50
@@ -49,7 +49,7 @@ def monitor(ctx: typer.Context, namespace: NamespaceOption = "") -> None:
 @contextmanager
 def _shown() -> Iterator[Callable[[Snapshot], None]]:
     """How a snapshot is shown: on a screen of its own, or as a line when something changed."""
-    from canbase_cli.picture import line, picture
+    from canbase_cli.monitor_picture import line, picture
 
     if sys.stdout.isatty():
         from rich.live import Live
@@ -104,7 +104,7 @@ def _listen(node: Node) -> dict[str, tuple[Any, float]]:
 
 
 def _snapshot(robot: str, kept: dict[str, tuple[Any, float]], now: float) -> Snapshot:
-    from canbase_cli.picture import Heard, Snapshot
+    from canbase_cli.monitor_picture import Heard, Snapshot
 
     return Snapshot(robot, **{name: Heard(message, now - at_s) for name, (message, at_s) in kept.items()})
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from canbase_cli.options import WRONG_INPUT, fail
+from canbase_runtime.terminal import WRONG_INPUT, fail
 
 
 def _names() -> list[str]:

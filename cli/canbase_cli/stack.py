@@ -16,7 +16,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final
 
-from canbase_cli.own_modules import module_command
+from canbase_runtime.own_modules import module_command
 
 START_ORDER: Final = ("sim", "watchdog", "velocity", "driver", "action-server")
 END_ORDER: Final = ("action-server", "velocity", "driver", "watchdog", "sim")
@@ -88,8 +88,8 @@ class Stack:
                 self._running[part] = self._spawn(part)
 
     def _clear_first_records(self) -> None:
-        from canbase_config.latch_file import create_first, latch_folder
         from canbase_config.load import load_robot
+        from canbase_runtime.latch_file import create_first, latch_folder
 
         robot = load_robot(self._config).robot
         if "sim" not in self._parts and not robot.bus.is_virtual:

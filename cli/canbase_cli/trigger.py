@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from canbase_cli.options import FAILED, NamespaceOption, colour, fail, ros_arguments, ros_needed
-from canbase_config.foreign_text import SENTENCE_LENGTH, printable
+from canbase_cli.options import NamespaceOption, ros_arguments, ros_needed
+from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
+from canbase_runtime.terminal import FAILED, colour, fail
 
 if TYPE_CHECKING:
     from rclpy.node import Node

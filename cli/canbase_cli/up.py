@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from canbase_cli.options import FAILED, ConfigOption, NamespaceOption, colour, fail, load_config, ros_arguments
+from canbase_cli.options import ConfigOption, NamespaceOption, ros_arguments
 from canbase_cli.stack import POLL_S, Death, Stack
+from canbase_runtime.terminal import FAILED, colour, fail, load_config
 
 if TYPE_CHECKING:
     from canbase_config.robot import Robot
@@ -50,8 +51,8 @@ def up(
 
 def _refuse_twice(robot: Robot) -> None:
     """Before any part starts: one that runs already is left alone."""
-    from canbase_config.latch_file import WRITER, latch_folder, record_name
-    from canbase_config.sole import TakenError, bus_name, check
+    from canbase_runtime.latch_file import WRITER, latch_folder, record_name
+    from canbase_runtime.single_instance import TakenError, bus_name, check
 
     bus = bus_name(robot.bus.arguments())
     record = record_name(latch_folder(os.environ, Path.home(), robot.name), "driver")

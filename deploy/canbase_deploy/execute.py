@@ -9,9 +9,9 @@ import subprocess
 from collections.abc import Callable, Sequence
 from pathlib import Path, PurePosixPath
 
-from canbase_config.latch_file import create_first
 from canbase_deploy.actions import Action, Existing, FirstRecords, Link, Remove, Run, WriteFile
 from canbase_deploy.owner import ETC, old
+from canbase_runtime.latch_file import create_first
 
 COMMAND_S = 60.0
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import sys
 
-from exit_matrix.marked import rewritten
 from site_builder import structure
 from site_builder.modules import ROOT
+from support.marked_page import rewritten
 
 PAGE = ROOT / "docs" / "architecture.md"
 

@@ -1,8 +1,8 @@
 """The motor driver without bus, clock and ROS: frames and commands in, frames and snapshots out.
 
 One cycle is `tick`: heartbeat, boots, the supervisor's judgement, a reset on its way, the setpoints of all axes,
-SYNC. Who stops what and why is in `supervisor.py`, how a node is booted in `boot.py`, how fast the base may go in
-`limits.py`.
+SYNC. Who stops what and why is in `supervisor.py`, how a node is booted in `sequence.py`, how fast the base may go in
+`limiter.py`.
 """
 
 from __future__ import annotations
@@ -13,12 +13,9 @@ from collections.abc import Callable
 from functools import partial
 
 from canbase_config import stopping
-from canbase_config.latch_record import Found, Record
 from canbase_config.robot import DRIVER_NODE_ID, Robot
-from canbase_driver.axis import Axis
-from canbase_driver.braking import Braking
-from canbase_driver.bus_health import BusReport
-from canbase_driver.cia301 import (
+from canbase_driver.cia301.frame import Frame
+from canbase_driver.cia301.nmt import (
     EMCY,
     HEARTBEAT,
     NMT,
@@ -30,24 +27,27 @@ from canbase_driver.cia301 import (
     nmt,
 )
 from canbase_driver.cia402 import PowerGoal
-from canbase_driver.command import Command
-from canbase_driver.cycle_stats import CycleStats
-from canbase_driver.drives import Drives
-from canbase_driver.frame import Frame
-from canbase_driver.kinematics import Twist2D, wheel_speeds
-from canbase_driver.let_go import LetGo
-from canbase_driver.limits import Limiter, MotionState
-from canbase_driver.odometry import Pose2D
-from canbase_driver.odometry_feed import OdometryFeed
-from canbase_driver.readiness import Aim, Readiness
-from canbase_driver.remote_node import RemoteNode
+from canbase_driver.drives.axis import Axis
+from canbase_driver.drives.canopen_node import RemoteNode
+from canbase_driver.drives.drive_group import Drives
+from canbase_driver.drives.let_go import LetGo
+from canbase_driver.drives.odometry_feed import OdometryFeed
+from canbase_driver.motion.braking import Braking
+from canbase_driver.motion.kinematics import Twist2D, wheel_speeds
+from canbase_driver.motion.limiter import Limiter, MotionState
+from canbase_driver.motion.odometry import Pose2D
+from canbase_driver.motion.velocity_command import Command
 from canbase_driver.report import Told, snapshot_of
-from canbase_driver.reset import Outcome
-from canbase_driver.reset_run import ResetRun
+from canbase_driver.runtime.bus_health import BusReport
+from canbase_driver.runtime.cycle_stats import CycleStats
 from canbase_driver.snapshot import DriverSnapshot, DriverState, StopRecord, WatchdogView
-from canbase_driver.stop_record import PowerRecord, cause_before_the_start
-from canbase_driver.supervisor import NO_POWER, Cause, Drive, Orders, Situation, Supervisor
-from canbase_driver.watchdog_link import COUNTERS_COB_ID, STATE_COB_ID, WatchdogLink
+from canbase_driver.supervision.latch import PowerRecord, cause_before_the_start
+from canbase_driver.supervision.lifecycle import Aim, Readiness
+from canbase_driver.supervision.reset import Outcome
+from canbase_driver.supervision.reset_run import ResetRun
+from canbase_driver.supervision.supervisor import NO_POWER, Cause, Drive, Orders, Situation, Supervisor
+from canbase_driver.supervision.watchdog_link import COUNTERS_COB_ID, STATE_COB_ID, WatchdogLink
+from canbase_runtime.latch_record import Found, Record
 
 HEARTBEATS_PER_TIMEOUT = 3
 """The heartbeat goes out this often in the time that the drives allow for it."""

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from canbase_config.robot import Base
-from canbase_driver.bus_health import BusReport
-from canbase_driver.command import Command
-from canbase_driver.cycle_stats import CycleStats
-from canbase_driver.drives import Drives, age_s
-from canbase_driver.kinematics import base_twist
-from canbase_driver.odometry_feed import OdometryFeed
+from canbase_driver.drives.drive_group import Drives, age_s
+from canbase_driver.drives.odometry_feed import OdometryFeed
+from canbase_driver.motion.kinematics import base_twist
+from canbase_driver.motion.velocity_command import Command
+from canbase_driver.runtime.bus_health import BusReport
+from canbase_driver.runtime.cycle_stats import CycleStats
 from canbase_driver.snapshot import DriverSnapshot
-from canbase_driver.supervisor import Supervisor
-from canbase_driver.watchdog_link import WatchdogLink
+from canbase_driver.supervision.supervisor import Supervisor
+from canbase_driver.supervision.watchdog_link import WatchdogLink
 
 
 @dataclass(frozen=True, slots=True)

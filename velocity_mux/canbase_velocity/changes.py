@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from canbase_config.priority import Priority
+from canbase_runtime.log_priority import Priority
 from canbase_velocity.decision import Action, Cause, Decision
 from canbase_velocity.mux import MuxDecision, Standing
 from canbase_velocity.safety_filter import ScanState

@@ -12,8 +12,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from canbase_config.foreign_text import printable
 from canbase_config.safety import Scan as ScanConfig
+from canbase_runtime.foreign_text import printable
 from canbase_velocity.placement import Placement
 from canbase_velocity.scan import Scan, ScanError, check
 from canbase_velocity.sweep import FULL_TURN_RAD, Bools, Box, Floats

@@ -19,28 +19,28 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
-from canbase_config.journal import Journal, Voice
-from canbase_config.latch_file import LatchKeeper
-from canbase_config.priority import Priority
-from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
 from canbase_config.safety import Scan as ScanConfig
-from canbase_config.sim_time import refuse_sim_time
 from canbase_config.stopping import ramp
+from canbase_runtime.journal import Journal, Voice
+from canbase_runtime.latch_file import LatchKeeper
+from canbase_runtime.log_priority import Priority
+from canbase_runtime.receive_time import ReceiveTimes
+from canbase_runtime.sim_time import refuse_sim_time
 from canbase_velocity import messages
 from canbase_velocity.changes import DropTeller, changed_order, is_told
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
-from canbase_velocity.foreign import UNKNOWN
 from canbase_velocity.graph import BUTTON_KIND, SCAN_KIND, publishers
-from canbase_velocity.io import LeaseSender
 from canbase_velocity.lease import lease_datagram
+from canbase_velocity.lease_sender import LeaseSender
 from canbase_velocity.placement import HeldPlacement, Placement, PlacementError, Transform, placed_by_tf
 from canbase_velocity.qos import COMMAND, SCAN, STATE, STATIC_TF, listen_closely
 from canbase_velocity.safety_filter import FilterConfig
 from canbase_velocity.steady import steady_timer
 from canbase_velocity.twist import Twist
+from canbase_velocity.unexpected_publishers import UNKNOWN
 
 STATE_PERIOD_S = 0.1
 GRAPH_PERIOD_S = 0.5

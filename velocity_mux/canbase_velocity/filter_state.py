@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from canbase_config.latch_record import Found, Record
 from canbase_config.safety import Scan as ScanConfig
+from canbase_runtime.latch_record import Found, Record
 from canbase_velocity.clearance import FREE, Clearances, Field, Points, ScanReader, clearances
 from canbase_velocity.decision import Action, Cause, Decision
 from canbase_velocity.delay import Delay, Sent

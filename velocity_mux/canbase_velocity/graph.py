@@ -1,4 +1,4 @@
-"""What the mux expects in the ROS graph and what is there, in the words of foreign.py. Asks a node, decides nothing."""
+"""What the mux expects in the ROS graph and what is there. Asks a node, decides nothing."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Final
 
 from rclpy.node import Node
 
-from canbase_config.foreign_text import printable
 from canbase_config.mux import MuxSource
 from canbase_config.robot import Robot
-from canbase_velocity.foreign import Expected, Publisher
+from canbase_runtime.foreign_text import printable
+from canbase_velocity.unexpected_publishers import Expected, Publisher
 
 STAMPED: Final = "geometry_msgs/msg/TwistStamped"
 PLAIN: Final = "geometry_msgs/msg/Twist"

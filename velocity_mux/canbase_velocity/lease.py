@@ -1,4 +1,4 @@
-"""The datagram that reports the safety filter's order to the watchdog: docs/bus.md, "The lease". Sending is io.py."""
+"""The datagram that reports the safety filter's order to the watchdog: docs/bus.md, "The lease"."""
 
 from __future__ import annotations
 

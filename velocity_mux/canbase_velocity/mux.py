@@ -4,7 +4,7 @@ Rules:
 1. A source is fresh while its last valid command is not older than its timeout: by local receive time, plus what it
    was late by (delay.py).
 2. A lock holds while its last word is true, and, where it is required, while it is silent. It holds back every source
-   whose priority is lower than its own. A foreign publisher may hold back too (foreign.py).
+   whose priority is lower than its own. A foreign publisher may hold back too (unexpected_publishers.py).
 3. The fresh source of the highest priority that is not held back has the base; its last command holds.
 4. None is left: the order is zero, said explicitly. A source that was taken over does not come back with an old
    command: it drives again only while it is fresh by itself.
@@ -28,10 +28,10 @@ from dataclasses import dataclass
 from canbase_config.mux import MuxLock, MuxSource
 from canbase_velocity.base_ready import STATUS_TIMEOUT_S, BaseReady
 from canbase_velocity.delay import Delay, Sent
-from canbase_velocity.foreign import Foreign
 from canbase_velocity.lock import Lock, LockView, crowd
 from canbase_velocity.neutral import BLIND_S, Arming
 from canbase_velocity.twist import ZERO, Twist
+from canbase_velocity.unexpected_publishers import Foreign
 
 
 class Standing(enum.Enum):

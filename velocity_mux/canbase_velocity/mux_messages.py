@@ -8,9 +8,9 @@ from builtin_interfaces.msg import Time
 from canbase.msg import ForeignPublisher, MuxLock, MuxSource, MuxState
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from canbase_velocity.foreign import Foreign
 from canbase_velocity.lock import LockView
 from canbase_velocity.mux import MuxDecision, SourceView
+from canbase_velocity.unexpected_publishers import Foreign
 
 
 def mux_state(decision: MuxDecision, stamp: Time) -> MuxState:

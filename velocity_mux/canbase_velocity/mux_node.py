@@ -19,14 +19,13 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from std_msgs.msg import Bool
 
-from canbase_config.journal import Journal, Voice
-from canbase_config.receive_time import ReceiveTimes
 from canbase_config.robot import Robot
-from canbase_config.sim_time import refuse_sim_time
+from canbase_runtime.journal import Journal, Voice
+from canbase_runtime.receive_time import ReceiveTimes
+from canbase_runtime.sim_time import refuse_sim_time
 from canbase_velocity.base_ready import status_timeout_s
 from canbase_velocity.changes import changes
 from canbase_velocity.delay import Sent
-from canbase_velocity.foreign import ForeignWatch
 from canbase_velocity.graph import expected, heard, publishers
 from canbase_velocity.messages import driver_state, sent_at, twist_message, twist_of
 from canbase_velocity.mux import Mux, MuxDecision
@@ -34,6 +33,7 @@ from canbase_velocity.mux_messages import diagnostics, mux_state
 from canbase_velocity.qos import ANY_COMMAND, COMMAND, DRIVER_STATUS, STATE, listen_closely, loud
 from canbase_velocity.steady import steady_timer
 from canbase_velocity.twist import Twist
+from canbase_velocity.unexpected_publishers import ForeignWatch
 
 STATE_PERIOD_S = 0.5
 GRAPH_PERIOD_S = 0.5

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from canbase_config.foreign_text import printable
 from canbase_config.safety import Scan as ScanConfig
+from canbase_runtime.foreign_text import printable
 from canbase_velocity.sweep import Floats
 
 MAX_TILT_RAD = math.radians(10.0)

@@ -10,10 +10,10 @@ import pytest
 from can.interfaces import BACKENDS
 from can.interfaces.virtual import VirtualBus
 
-from bus.crews import Crew
-from bus.drive_rig import Driver, Surroundings
-from bus.flaky_bus import FlakyBus
-from bus.real_bus import crews
+from support.crews import Crew
+from support.drive_rig import Driver, Surroundings
+from support.flaky_bus import FlakyBus
+from support.real_bus import crews
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -27,7 +27,7 @@ def arguments(crew: Crew, request: pytest.FixtureRequest, monkeypatch: pytest.Mo
     """Of `can.Bus`: a virtual bus that this test has for itself, and can break; or the real one."""
     if not crew.simulated:
         return crew.robot.bus.arguments()
-    monkeypatch.setitem(BACKENDS, "virtual", ("bus.flaky_bus", "FlakyBus"))
+    monkeypatch.setitem(BACKENDS, "virtual", ("support.flaky_bus", "FlakyBus"))
     FlakyBus.heal()
     return {"interface": "virtual", "channel": f"drives-{request.node.name}"}
 

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 import can
 import pytest
 
-from canbase_config.sole import TakenError
-from canbase_driver.bus_port import BusPort
-from canbase_driver.main import _listen_for_another
+from canbase_driver.runtime.bus_port import BusPort
+from canbase_driver.runtime.main import _listen_for_another
+from canbase_runtime.single_instance import TakenError
 
 pytestmark = pytest.mark.bus
 

@@ -11,15 +11,15 @@ import can
 import canopen
 import pytest
 
-from bus.crews import Crew
-from bus.drive_rig import Surroundings
-from canbase_bench.frame import Frame as BenchFrame
-from canbase_bench.world.bench import Bench
 from canbase_config.drive import Drive
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
-from canbase_driver.frame import Frame
-from canbase_driver.node_boot import NodeBoot
+from canbase_driver.boot.node_boot import NodeBoot
+from canbase_driver.cia301.frame import Frame
+from canbase_sim.frame import Frame as BenchFrame
+from canbase_sim.world.bench import Bench
+from support.crews import Crew
+from support.drive_rig import Surroundings
 
 pytestmark = pytest.mark.bus
 BOOTED_WITHIN_S = 5.0

@@ -10,10 +10,10 @@ import can
 import pytest
 from can.interfaces.virtual import VirtualBus
 
-from bus.drive_rig import Driver, Surroundings
-from bus.flaky_bus import FlakyBus
-from canbase_driver.bus_port import BUS_OFF
+from canbase_driver.runtime.bus_port import BUS_OFF
 from canbase_driver.snapshot import DriverState
+from support.drive_rig import Driver, Surroundings
+from support.flaky_bus import FlakyBus
 
 pytestmark = pytest.mark.bus
 

@@ -13,10 +13,10 @@ import pytest
 from can.interfaces import BACKENDS
 from can.interfaces.virtual import VirtualBus
 
-from bus.flaky_bus import FlakyBus
-from canbase_driver import bus_port
-from canbase_driver.bus_port import BUS_OFF, RECEIVE_FAILURES, SEND_FAILURES, SEND_TIMEOUT_S, BusError, BusPort
-from canbase_driver.frame import Frame
+from canbase_driver.cia301.frame import Frame
+from canbase_driver.runtime import bus_port
+from canbase_driver.runtime.bus_port import BUS_OFF, RECEIVE_FAILURES, SEND_FAILURES, SEND_TIMEOUT_S, BusError, BusPort
+from support.flaky_bus import FlakyBus
 
 pytestmark = pytest.mark.bus
 SYNC = Frame(0x080)
@@ -32,7 +32,7 @@ WAYS_TO_FAIL = [
 @pytest.fixture
 def arguments(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """Of a bus that this test has for itself, and can break; it is opened again soon."""
-    monkeypatch.setitem(BACKENDS, "virtual", ("bus.flaky_bus", "FlakyBus"))
+    monkeypatch.setitem(BACKENDS, "virtual", ("support.flaky_bus", "FlakyBus"))
     monkeypatch.setattr(bus_port, "RETRY_S", RETRY_S)
     FlakyBus.heal()
     return {"interface": "virtual", "channel": f"port-{request.node.name}"}

@@ -10,9 +10,9 @@ from pathlib import Path
 import can
 import pytest
 
-from bus.tool import ENVIRONMENT, argv, canbase, drives, free_port, write_robot
 from canbase_config.commissioned import mark
 from canbase_config.load import load_robot
+from support.bus_tool import ENVIRONMENT, argv, canbase, drives, free_port, write_robot
 
 pytestmark = [pytest.mark.bus, pytest.mark.timeout(180)]
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from bus.terminal import Terminal
-from bus.tool import drives, free_port, write_robot
-from canbase_bench.control import SimControl
+from canbase_sim.control import SimControl
+from support.bus_tool import drives, free_port, write_robot
+from support.terminal import Terminal
 
 pytestmark = [pytest.mark.bus, pytest.mark.timeout(120)]
 

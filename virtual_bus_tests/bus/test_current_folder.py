@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from bus.tool import free_port, write_robot
 from canbase_cli import forget_current_folder
-from canbase_cli.own_modules import module_command
 from canbase_cli.stack import Stack
 from canbase_config.load import sample
+from canbase_runtime.own_modules import module_command
+from support.bus_tool import free_port, write_robot
 
 pytestmark = pytest.mark.bus
 

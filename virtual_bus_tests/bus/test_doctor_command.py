@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bus.tool import canbase, drives, free_port, write_robot
+from support.bus_tool import canbase, drives, free_port, write_robot
 
 pytestmark = pytest.mark.bus
 

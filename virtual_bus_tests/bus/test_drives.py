@@ -10,11 +10,11 @@ import time
 
 import pytest
 
-from bus.crews import Crew
-from bus.drive_rig import Driver, Surroundings
-from canbase_driver.kinematics import Twist2D
-from canbase_driver.pdo import node_layout
+from canbase_driver.cia301.pdo import node_layout
+from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.snapshot import DriverSnapshot, DriverState
+from support.crews import Crew
+from support.drive_rig import Driver, Surroundings
 
 pytestmark = pytest.mark.bus
 ENABLED_WITHIN_S = 6.0

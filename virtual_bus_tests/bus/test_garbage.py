@@ -10,13 +10,13 @@ from typing import Any
 import can
 import pytest
 
-from bus import garbage
-from bus.tool import ENVIRONMENT, argv, canbase, drives, free_port, write_robot
-from canbase_bench.loop import Loop
 from canbase_config.load import load_robot, sample
-from canbase_driver import bus_port as of_the_driver
-from canbase_driver.frame import Frame
+from canbase_driver.cia301.frame import Frame
+from canbase_driver.runtime import bus_port as of_the_driver
+from canbase_sim.loop import Loop
 from canbase_watchdog import bus_port as of_the_watchdog
+from support import garbage
+from support.bus_tool import ENVIRONMENT, argv, canbase, drives, free_port, write_robot
 
 pytestmark = pytest.mark.bus
 MANY = 100

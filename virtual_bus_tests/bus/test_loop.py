@@ -11,11 +11,11 @@ from can.interfaces.virtual import VirtualBus
 
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
-from canbase_driver.black_box import Ring
-from canbase_driver.bus_port import BusPort
+from canbase_driver.cia301.frame import Frame
 from canbase_driver.core import DriverCore
-from canbase_driver.frame import Frame
-from canbase_driver.loop import FRAMES_WHEN_LATE, ControlLoop
+from canbase_driver.runtime.black_box import Ring
+from canbase_driver.runtime.bus_port import BusPort
+from canbase_driver.runtime.control_thread import FRAMES_WHEN_LATE, ControlLoop
 
 pytestmark = pytest.mark.bus
 

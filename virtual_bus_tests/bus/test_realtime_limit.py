@@ -14,7 +14,7 @@ pytestmark = pytest.mark.bus
 
 SPINS = "while True: pass"
 RAISE = {
-    "driver": "from canbase_cli.priority import raise_priority; raise_priority('driver')",
+    "driver": "from canbase_cli.raise_priority import raise_priority; raise_priority('driver')",
     "watchdog": "from canbase_watchdog.realtime import raise_priority; assert raise_priority() is None",
 }
 

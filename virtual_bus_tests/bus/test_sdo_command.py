@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from bus.tool import canbase, drives, free_port, write_robot
+from support.bus_tool import canbase, drives, free_port, write_robot
 
 pytestmark = pytest.mark.bus
 

@@ -16,12 +16,12 @@ import pytest
 from canopen import SdoAbortedError
 from canopen.emcy import EmcyError
 
-from canbase_bench.control import SimControl
-from canbase_bench.control_server import ControlServer
-from canbase_bench.loop import Loop
-from canbase_bench.world.bench import Bench
-from canbase_bench.world.trace import Trace
-from unit.sim_rig import MPS, robot
+from canbase_sim.control import SimControl
+from canbase_sim.control_server import ControlServer
+from canbase_sim.loop import Loop
+from canbase_sim.world.bench import Bench
+from canbase_sim.world.trace import Trace
+from support.sim_rig import MPS, robot
 
 pytestmark = pytest.mark.bus
 

@@ -17,9 +17,9 @@ from typing import Any
 import can
 import pytest
 
-from canbase_bench.control import ControlError, SimControl, control_path
 from canbase_config.robot import Robot
-from unit.sim_rig import robot
+from canbase_sim.control import ControlError, SimControl, control_path
+from support.sim_rig import robot
 
 pytestmark = pytest.mark.bus
 
@@ -36,7 +36,7 @@ def _robot(folder: Path, **bus: Any) -> Robot:
 def _start(folder: Path, of: Robot, name: str = "robot.yaml") -> subprocess.Popen[str]:
     file = folder / name
     file.write_text(json.dumps(of.model_dump(mode="json")), encoding="utf-8")
-    command = [sys.executable, "-m", "canbase_bench", str(file)]
+    command = [sys.executable, "-m", "canbase_sim", str(file)]
     environment = os.environ | {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"}
     return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
 
@@ -150,9 +150,7 @@ def test_a_bus_that_is_not_there_is_a_message_and_1(tmp_path: Path) -> None:
 def test_a_wrong_robot_file_is_2(tmp_path: Path) -> None:
     file = tmp_path / "robot.yaml"
     file.write_text("name: 7\n", encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "-m", "canbase_bench", str(file)], capture_output=True, text=True, timeout=20
-    )
+    done = subprocess.run([sys.executable, "-m", "canbase_sim", str(file)], capture_output=True, text=True, timeout=20)
     assert done.returncode == 2
     assert "robot.yaml" in done.stderr
 

@@ -14,7 +14,6 @@ from pathlib import Path
 import can
 import pytest
 
-from bus.watchdog_live import LiveRobot
 from canbase_watchdog import loop
 from canbase_watchdog.bus_port import BusError, BusPort
 from canbase_watchdog.frames import Frame
@@ -22,7 +21,8 @@ from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
 from canbase_watchdog.loop import BusDeadError, Loop
 from canbase_watchdog.policy import Cause
 from canbase_watchdog.watchdog import Watchdog
-from unit.watchdog_story import config
+from support.watchdog_live import LiveRobot
+from support.watchdog_story import config
 
 pytestmark = pytest.mark.bus
 

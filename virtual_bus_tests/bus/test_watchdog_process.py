@@ -14,11 +14,11 @@ from pathlib import Path
 
 import pytest
 
-from bus.watchdog_live import LiveRobot
 from canbase_watchdog.frames import Frame
-from ros.harness import clear_records
-from unit.test_output import full_pipe
-from unit.watchdog_story import config
+from support.ros_harness import clear_records
+from support.watchdog_live import LiveRobot
+from support.watchdog_story import config
+from unit.runtime.test_output import full_pipe
 
 pytestmark = pytest.mark.bus
 

@@ -1,4 +1,4 @@
-"""The process that sends stop frames after another one has died: `python -m canbase_watchdog.stop`, on a real bus."""
+"""Stop frames from a process of their own: `python -m canbase_watchdog.post_stop`, on a real bus."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ import pytest
 
 from bus.test_watchdog_process import free_port
 from canbase_config.watchdog import WatchdogConfig, WatchedLayout
-from canbase_watchdog.stop import LIMIT_S, main, plan
-from unit.watchdog_story import config
+from canbase_watchdog.post_stop import LIMIT_S, main, plan
+from support.watchdog_story import config
 
 pytestmark = pytest.mark.bus
 
@@ -43,7 +43,7 @@ def stop_file(folder: Path, told: WatchdogConfig) -> Path:
 
 def run(path: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "canbase_watchdog.stop", str(path)],
+        [sys.executable, "-m", "canbase_watchdog.post_stop", str(path)],
         env=os.environ | {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"},
         capture_output=True,
         text=True,

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 from campaign.clock import Clock
 from campaign.process import Process, Topics
-from canbase_action_server.admission import action_source
 from canbase_action_server.along_track import Pose
+from canbase_action_server.goal_queue import Reception
+from canbase_action_server.goal_request import DriveRequest
 from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
 from canbase_action_server.outcome import Outcome
-from canbase_action_server.reception import Reception
-from canbase_action_server.request import DriveRequest
+from canbase_action_server.preconditions import action_source
 from canbase_config.robot import Robot
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_velocity.decision import Action, Cause, Decision

@@ -1,13 +1,13 @@
-"""Faults of the simulated drives, as `canbase_bench.faults` has them, with how each one ends."""
+"""Faults of the simulated drives, as `canbase_sim.faults` has them, with how each one ends."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from canbase_bench.cia402.axis import Supply
-from canbase_bench.faults import KINDS, apply
-from canbase_bench.node import SimulatedNode
+from canbase_sim.cia402.axis import Supply
+from canbase_sim.faults import KINDS, apply
+from canbase_sim.node import SimulatedNode
 
 if TYPE_CHECKING:
     from campaign.fault import Arguments, Change

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from canbase_config import latch_record
-from canbase_config.latch_record import SLOT, Defect, Found, Record
+from canbase_runtime import latch_record
+from canbase_runtime.latch_record import SLOT, Defect, Found, Record
 from canbase_watchdog import latch
 from canbase_watchdog.latch import Entry, Past
 

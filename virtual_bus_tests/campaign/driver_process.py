@@ -7,12 +7,12 @@ from campaign.clock import FINE, Pace
 from campaign.disk import StopDisk
 from campaign.process import FRAMES_HELD, Process, Topics
 from canbase_config.robot import DRIVER_NODE_ID, Robot
+from canbase_driver.cia301.frame import Frame
 from canbase_driver.core import DriverCore
-from canbase_driver.frame import Frame
-from canbase_driver.kinematics import Twist2D
-from canbase_driver.readiness import Aim
-from canbase_driver.reset import Outcome
+from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.snapshot import DriverSnapshot
+from canbase_driver.supervision.lifecycle import Aim
+from canbase_driver.supervision.reset import Outcome
 from canbase_velocity.decision import Decision
 from canbase_velocity.twist import ZERO, Twist
 

@@ -9,11 +9,11 @@ from functools import partial
 from campaign.can_bus import CanBus
 from campaign.clock import FINE, Pace
 from campaign.robots import DrawnRobot
-from canbase_bench.axis_parts import StateChange
-from canbase_bench.cia402.axis import Axis
-from canbase_bench.node import SimulatedNode
-from canbase_bench.world.bench import Bench, BenchParameters
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID
+from canbase_sim.axis_parts import StateChange
+from canbase_sim.cia402.axis import Axis
+from canbase_sim.node import SimulatedNode
+from canbase_sim.world.bench import Bench, BenchParameters
 
 HEARTBEATS = {0x700 + DRIVER_NODE_ID: "driver", 0x700 + WATCHDOG_NODE_ID: "watchdog"}
 ROLLS_SHARE = 0.02

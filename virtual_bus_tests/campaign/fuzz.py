@@ -15,7 +15,7 @@ from pathlib import Path
 from random import Random
 
 from campaign.world import World
-from canbase_driver.frame import Frame
+from canbase_driver.cia301.frame import Frame
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.twist import Twist
 from canbase_watchdog.watchdog import State, Watchdog

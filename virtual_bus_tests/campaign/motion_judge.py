@@ -10,9 +10,9 @@ from math import sqrt
 from campaign.envelope import notice_s
 from campaign.shown import Shown
 from campaign.world import World
-from canbase_bench.cia402.states import State
 from canbase_config.robot import Robot
 from canbase_config.stopping import longest_ramp_s, max_wheel_mps
+from canbase_sim.cia402.states import State
 from canbase_velocity.twist import Twist
 
 OBEY_S = 0.15

@@ -17,9 +17,9 @@ from campaign.hands import HANDS, Source
 from campaign.outside import Surroundings
 from campaign.robots import CREEP_SHARE, GRAVITY_MPS2, DrawnRobot, draw_robot
 from campaign.world import World
-from canbase_bench.cia402.axis import Axis
-from canbase_bench.cia402.states import State
 from canbase_driver.snapshot import DriverState
+from canbase_sim.cia402.axis import Axis
+from canbase_sim.cia402.states import State
 from canbase_velocity.estop import EstopState
 from canbase_velocity.twist import ZERO
 from canbase_watchdog.watchdog import State as WatchdogState

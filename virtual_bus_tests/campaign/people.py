@@ -7,7 +7,7 @@ from random import Random
 from typing import TYPE_CHECKING
 
 from campaign.fault import LONG, SHORT, Arguments, Change, Kind, nothing, stays
-from canbase_driver.readiness import Aim
+from canbase_driver.supervision.lifecycle import Aim
 from canbase_velocity.twist import ZERO, Twist
 
 if TYPE_CHECKING:

@@ -12,12 +12,12 @@ from collections.abc import Iterable, Iterator
 
 from campaign.envelope import tolerance_mps
 from campaign.world import World
-from canbase_bench.cia301.dictionary import key
-from canbase_bench.cia402.axis import Axis
-from canbase_bench.cia402.states import State
-from canbase_bench.node import SimulatedNode
-from canbase_bench.personality import PERSONALITIES
 from canbase_config.stopping import BRAKING_SHARE
+from canbase_sim.cia301.dictionary import key
+from canbase_sim.cia402.axis import Axis
+from canbase_sim.cia402.states import State
+from canbase_sim.node import SimulatedNode
+from canbase_sim.personality import PERSONALITIES
 from canbase_watchdog.ladder import RUNGS, Step
 
 RESETS_S = 0.2

@@ -14,12 +14,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from canbase_bench.plant.base import PlantParameters
 from canbase_config import bus_load
 from canbase_config.commissioned import STEPS, Commissioned, mark
 from canbase_config.load import load_robot, sample
 from canbase_config.profile_file import load_profile
 from canbase_config.robot import Robot
+from canbase_sim.plant.base import PlantParameters
 
 SCENARIOS = 25
 """So many scenarios in a row have one robot: a worker boots it once."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from canbase_velocity.scan import Scan
-from unit.lidar import ByTurns, Fault, Frozen, Late, Lidar, blind, one_beam_left
+from support.lidar import ByTurns, Fault, Frozen, Late, Lidar, blind, one_beam_left
 
 NAN = math.nan
 HALF_WALL_M = 0.6

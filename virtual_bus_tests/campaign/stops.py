@@ -26,9 +26,9 @@ from campaign.twins import GOAL, JOYSTICK, TWINS, Twin
 from campaign.world import World
 from canbase_velocity.twist import ZERO, Twist
 from exit_matrix.layers import SPEED_MPS
-from exit_matrix.marked import rewritten, section
 from exit_matrix.page_table import Key, Row
 from exit_matrix.stop_table import COMMANDS, TABLE, VIRTUAL
+from support.marked_page import rewritten, section
 
 CRUISES_S, LONGEST_S, RESTS_S, LOOK_S = 1.5, 8.0, 0.6, 0.002
 """Until the base drives steadily; longer than any stop; a base that stood so long has stopped; how often is looked."""

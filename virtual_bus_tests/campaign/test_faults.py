@@ -11,8 +11,8 @@ import pytest
 from campaign.faults import FAULTS
 from campaign.scenario import Start
 from campaign.world import World
-from canbase_bench.cia402.states import State
-from canbase_bench.plant.encoder import EncoderFault
+from canbase_sim.cia402.states import State
+from canbase_sim.plant.encoder import EncoderFault
 from canbase_velocity.twist import ZERO, Twist
 
 pytestmark = pytest.mark.campaign

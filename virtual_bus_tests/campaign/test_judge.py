@@ -19,11 +19,11 @@ from campaign.robots import draw_robot
 from campaign.scenario import Start
 from campaign.without import SAFEGUARDS
 from campaign.world import World
-from canbase_bench.cia301.dictionary import key
-from canbase_bench.cia402.states import State as Drive
 from canbase_config.derive import mps_per_bit
-from canbase_driver.frame import Frame
+from canbase_driver.cia301.frame import Frame
 from canbase_driver.snapshot import DriverSnapshot
+from canbase_sim.cia301.dictionary import key
+from canbase_sim.cia402.states import State as Drive
 from canbase_velocity.twist import Twist
 from canbase_watchdog import policy
 from canbase_watchdog.watchdog import State, Watchdog

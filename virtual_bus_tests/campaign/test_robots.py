@@ -9,9 +9,9 @@ from campaign.reach import Reach
 from campaign.robots import BITRATES, GRAVITY_MPS2, bitrates, draw_robot, robot_of, rolls_out
 from campaign.shown import Shown
 from campaign.world import World
-from canbase_bench.faults import apply
 from canbase_config.commissioned import uncommissioned
 from canbase_config.robot import Robot
+from canbase_sim.faults import apply
 from canbase_velocity.twist import Twist
 
 pytestmark = pytest.mark.campaign

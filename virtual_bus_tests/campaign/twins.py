@@ -12,7 +12,7 @@ from campaign.fault import Arguments
 from campaign.faults import FAULTS
 from campaign.outside import Surroundings
 from campaign.world import World
-from canbase_bench.faults import KINDS, apply
+from canbase_sim.faults import KINDS, apply
 from canbase_velocity.twist import Twist
 from exit_matrix.layers import SPEED_MPS
 

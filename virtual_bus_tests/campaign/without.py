@@ -12,13 +12,14 @@ from typing import Any
 from campaign.disk import StopDisk, WatchdogDisk
 from canbase_action_server import causes
 from canbase_action_server.outcome import ErrorCode
-from canbase_bench.cia301.heartbeat import HeartbeatConsumer
-from canbase_config.latch_record import CLEAR, Defect, Found
-from canbase_driver import command, reset, supervisor, watchdog_link
-from canbase_driver.kinematics import Twist2D
-from canbase_driver.let_go import LetGo
-from canbase_driver.odometry import WheelTravel
+from canbase_driver.drives.let_go import LetGo
+from canbase_driver.motion import velocity_command as command
+from canbase_driver.motion.kinematics import Twist2D
+from canbase_driver.motion.odometry import WheelTravel
 from canbase_driver.snapshot import DriverState, WatchdogView
+from canbase_driver.supervision import reset, supervisor, watchdog_link
+from canbase_runtime.latch_record import CLEAR, Defect, Found
+from canbase_sim.cia301.heartbeat import HeartbeatConsumer
 from canbase_velocity import filter_state, lock, mux, neutral, obstacle, safety_filter
 from canbase_velocity.estop import FREE, HELD
 from canbase_velocity.frozen import FrozenWatch

@@ -16,10 +16,10 @@ from campaign.process import Process, Topics
 from campaign.robots import DrawnRobot, campaign_robot
 from campaign.velocity_process import VelocityProcess
 from campaign.watchdog_process import WatchdogProcess
-from canbase_bench.plant.base import PlantParameters
 from canbase_config.derive import watchdog_config
 from canbase_config.robot import Robot
 from canbase_driver.snapshot import DriverState
+from canbase_sim.plant.base import PlantParameters
 from canbase_velocity.twist import Twist
 
 LEASE_DELAY_S = 0.0002

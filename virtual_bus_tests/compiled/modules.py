@@ -12,25 +12,27 @@ SOURCES = {
     "canbase_velocity": "velocity_mux",
     "canbase_watchdog": "watchdog",
     "canbase_action_server": "action_server",
-    "canbase_bench": "virtual_bus_tests",
+    "canbase_sim": "virtual_bus_tests",
     "campaign": "virtual_bus_tests",
 }
 """Packages of which a compiled world has a copy, and where each of them lies."""
 HOT = {
     "canbase_watchdog": (
-        "bus_health creep envelope evidence feedback foreign frames ladder latch lease observer pair policy standing "
+        "bus_health creep envelope evidence frames ladder latch lease observer pair plausibility policy second_master "
+        "standing "
         "stopper tally torque twist view watchdog"
     ),
     "canbase_driver": (
-        "axis braking cia301 cia402 command core cycle_stats drives frame let_go measures "
-        "node_boot odometry odometry_feed pdo remote_node report snapshot stillness stop_record stops supervisor units "
-        "watchdog_link"
+        "cia402 core drive_units report snapshot boot.node_boot cia301.frame cia301.nmt cia301.pdo drives.axis "
+        "drives.canopen_node drives.drive_group drives.let_go drives.odometry_feed drives.standstill drives.telemetry "
+        "motion.braking motion.odometry motion.velocity_command runtime.cycle_stats supervision.latch "
+        "supervision.stop_history supervision.supervisor supervision.watchdog_link"
     ),
     "canbase_velocity": (
         "base_ready clearance decision estop filter_state frozen glitch lease motion mux neutral obstacle ramp "
         "safety_filter sweep twist"
     ),
-    "canbase_bench": (
+    "canbase_sim": (
         "axis_parts command_watch frame line node cia301.dictionary cia301.emcy cia301.heartbeat cia301.nmt "
         "cia301.pdo_rules cia301.rpdo cia301.tpdo cia402.axis cia402.states cia402.units plant.base plant.encoder "
         "plant.motor world.bench"

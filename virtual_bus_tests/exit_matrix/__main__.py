@@ -13,17 +13,17 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from exit_matrix.marked import rewritten, section
 from exit_matrix.report import merged, table
 from exit_matrix.rows import ROWS, Row
 from exit_matrix.runner import Result, Runner
 from exit_matrix.stop_table import COMMANDS
+from support.marked_page import rewritten, section
 
 WIDTH = 140
 """Of the table where nobody tells how wide the terminal is."""
 
 PRIORITY = 25
-"""Below the processes of the chain (`canbase_cli.priority`)."""
+"""Below the processes of the chain (`canbase_cli.raise_priority`)."""
 
 
 def main() -> int:

@@ -9,11 +9,11 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from canbase_bench.world.bench import DEFAULT_BODY
 from canbase_config.derive import order_hold_s
 from canbase_config.robot import Robot
-from canbase_watchdog.feedback import DRIFT_M, DRIFT_S
-from canbase_watchdog.foreign import DISORDER_COUNT
+from canbase_sim.world.bench import DEFAULT_BODY
+from canbase_watchdog.plausibility import DRIFT_M, DRIFT_S
+from canbase_watchdog.second_master import DISORDER_COUNT
 
 SPEED_MPS = 0.4
 """The base drives at it when something fails."""

@@ -21,14 +21,14 @@ from typing import Final
 from std_msgs.msg import Bool
 
 from canbase_action_server.goal_client import DriveError
-from canbase_bench.control import ControlError
+from canbase_sim.control import ControlError
 from exit_matrix.evidence import Evidence
 from exit_matrix.layers import SPEED_MPS, Layer
 from exit_matrix.rows import SERVER, Row
 from exit_matrix.said import Catch
 from exit_matrix.scene import CHANGES, Scene, sabotaged
-from ros.running_robot import RESTS_M, Standstill, own_domain, robot_on
-from ros.surroundings import scan
+from support.running_robot import RESTS_M, Standstill, own_domain, robot_on
+from support.surroundings import scan
 
 QUIET_S: Final = 1.0
 RESTART_S: Final = 2.0

@@ -18,9 +18,9 @@ from canbase_config.derive import mps_per_bit
 from canbase_config.robot import Robot
 from exit_matrix.layers import SPEED_MPS
 from exit_matrix.saboteur import sitecustomize as saboteur
-from ros.harness import Process, Repeater
-from ros.running_robot import READY_S, RunningRobot
-from ros.surroundings import World
+from support.ros_harness import Process, Repeater
+from support.running_robot import READY_S, RunningRobot
+from support.surroundings import World
 
 WAY_M: Final = 4.5
 """Of a goal: it takes longer than any row needs."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
-from exit_matrix.marked import rewritten
 from hazards import catalogue, page, proofs
+from support.marked_page import rewritten
 
 
 def main() -> int:

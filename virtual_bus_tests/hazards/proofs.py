@@ -10,11 +10,11 @@ from __future__ import annotations
 import ast
 from functools import cache
 
-from exit_matrix.marked import section
 from exit_matrix.page_table import NOTHING
 from exit_matrix.rows import ROWS
 from exit_matrix.stop_table import COMMANDS, REAL_RUN, TABLE
 from hazards.catalogue import ROOT, Catalogue
+from support.marked_page import section
 from vm.guest.main import ALL
 
 TESTS = ROOT / "virtual_bus_tests"

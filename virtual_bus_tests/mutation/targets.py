@@ -14,7 +14,7 @@ from mutation.mutants import behaviour
 
 ROOT = Path(__file__).resolve().parents[2]
 UNIT = Path("virtual_bus_tests/unit")
-STORIES = ("watchdog_story_trips", "watchdog_story_ladder", "watchdog_story_reset", "watchdog_trips")
+STORIES = ("watchdog/story_trips", "watchdog/story_ladder", "watchdog/story_reset", "watchdog/trips")
 """Tests of the watchdog as a whole."""
 LONG = "noise or minutes or minute"
 """Tests that are left out: long, and about exceptions and false trips, which the others notice as well."""
@@ -22,7 +22,7 @@ LONG = "noise or minutes or minute"
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """One mutated module. `path`: from the root of the project; `first`, `then`: names of test files."""
+    """One mutated module. `path`: from the root of the project; `first`, `then`: of the tests (watchdog/policy)."""
 
     path: str
     first: tuple[str, ...]
@@ -46,32 +46,32 @@ class Target:
 
 def files(names: tuple[str, ...]) -> list[str]:
     """Paths of test files, from the root of the project."""
-    return [str(UNIT / f"test_{name}.py") for name in names]
+    return [str(UNIT / folder / f"test_{name}.py") for folder, name in (name.split("/") for name in names)]
 
 
 def _watchdog(name: str, *first: str, then: tuple[str, ...] = STORIES) -> Target:
-    return Target(f"watchdog/canbase_watchdog/{name}.py", first or (f"watchdog_{name}",), then)
+    return Target(f"watchdog/canbase_watchdog/{name}.py", first or (f"watchdog/{name}",), then)
 
 
 def _driver(name: str, *then: str) -> Target:
-    return Target(f"driver/canbase_driver/{name}.py", (name,), then)
+    return Target(f"driver/canbase_driver/{name}.py", (f"driver/{name}",), then)
 
 
 TARGETS = (
-    _watchdog("policy", "watchdog_policy", "watchdog_policy_motion"),
-    _watchdog("envelope", then=("watchdog_trips", "watchdog_envelope_limiter")),
-    _watchdog("feedback"),
-    _watchdog("evidence", then=("watchdog_observer",)),
+    _watchdog("policy", "watchdog/policy", "watchdog/policy_motion"),
+    _watchdog("envelope", then=("watchdog/trips", "watchdog/envelope_limiter")),
+    _watchdog("plausibility"),
+    _watchdog("evidence", then=("watchdog/observer",)),
     _watchdog("torque"),
-    _watchdog("standing", "watchdog_standing", "watchdog_stopping_distance", then=("watchdog_observer",)),
+    _watchdog("standing", "watchdog/standing", "watchdog/stopping_distance", then=("watchdog/observer",)),
     _watchdog("stopping_distance"),
-    _watchdog("twist", then=("watchdog_observer",)),
-    _watchdog("tally", then=("watchdog_observer",)),
+    _watchdog("twist", then=("watchdog/observer",)),
+    _watchdog("tally", then=("watchdog/observer",)),
     _watchdog("pair"),
-    _watchdog("foreign"),
+    _watchdog("second_master"),
     _watchdog("lease"),
     _watchdog("ladder"),
-    _watchdog("view", "watchdog_policy", "watchdog_observer"),
+    _watchdog("view", "watchdog/policy", "watchdog/observer"),
     _watchdog("bus_health"),
-    _driver("cia402", "axis", "layouts_agree"),
+    _driver("cia402", "driver/axis", "chain/layouts_agree"),
 )

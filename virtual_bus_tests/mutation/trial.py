@@ -25,7 +25,7 @@ WALL_S = 600
 MEMORY_BYTES = 3 * 2**30
 UNUSED = [f"-pno:{plugin}" for plugin in ("cacheprovider", "faulthandler", "threadexception", "unraisableexception")]
 """Parts of pytest that take time and would kill no mutant."""
-PRELOADED = ("hypothesis", "can", "canbase_config.load", "canbase_config.derive", "canbase_bench.world.bench")
+PRELOADED = ("hypothesis", "can", "canbase_config.load", "canbase_config.derive", "canbase_sim.world.bench")
 """Imported once, before the forks; nothing that is mutated may be among it."""
 HOOK = "hazards.skipped"
 """Of conftest.py: it judges skipped tests, kills no mutant, and imports half of the project each time."""

@@ -15,8 +15,8 @@ from ruamel.yaml import YAML
 
 from canbase_config.load import load_robot
 from canbase_config.robot import Robot
-from ros.harness import Process, TestNode, clear_records, merged, python_argv, reserve_domain, robot_values
-from ros.velocity_chain import RUN, Chain
+from support.ros_harness import Process, TestNode, clear_records, merged, python_argv, reserve_domain, robot_values
+from support.velocity_chain import RUN, Chain
 
 Spawn = Callable[..., Process]
 MakeRobot = Callable[[Mapping[str, Any]], Path]

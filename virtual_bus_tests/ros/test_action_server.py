@@ -17,8 +17,8 @@ from canbase_action_server.client import Drive, DriveClient, DriveFeedback, Driv
 from canbase_action_server.goal_client import SERVICE_QOS
 from canbase_action_server.outcome import ErrorCode, Status
 from ros.conftest import MakeRobot, Spawn
-from ros.fake_base import FakeBase, server_code
-from ros.harness import Process, TestNode
+from support.fake_base import FakeBase, server_code
+from support.ros_harness import Process, TestNode
 
 pytestmark = pytest.mark.ros
 

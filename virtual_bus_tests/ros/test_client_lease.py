@@ -13,8 +13,8 @@ from rclpy.action import ActionClient
 from canbase_action_server.client import DriveClient
 from canbase_action_server.outcome import ErrorCode, Status
 from ros.conftest import MakeRobot, Spawn
-from ros.fake_base import FakeBase, server_code
-from ros.harness import TestNode
+from support.fake_base import FakeBase, server_code
+from support.ros_harness import TestNode
 
 pytestmark = pytest.mark.ros
 

@@ -14,8 +14,8 @@ from geometry_msgs.msg import TwistStamped
 from std_msgs.msg import Float64
 
 from ros.conftest import Spawn
-from ros.harness import Repeater
-from ros.velocity_chain import START_S, Chain, drive
+from support.ros_harness import Repeater
+from support.velocity_chain import START_S, Chain, drive
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 

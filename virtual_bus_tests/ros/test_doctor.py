@@ -13,9 +13,9 @@ from action_msgs.msg import GoalStatusArray
 from action_msgs.srv import CancelGoal
 from ruamel.yaml import YAML
 
-from ros.fake_base import FakeBase, server_code
-from ros.harness import Process, TestNode, merged, python_argv, robot_values
-from ros.running_robot import LATCHED, own_domain
+from support.fake_base import FakeBase, server_code
+from support.ros_harness import Process, TestNode, merged, python_argv, robot_values
+from support.running_robot import LATCHED, own_domain
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 

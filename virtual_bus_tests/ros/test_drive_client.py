@@ -14,8 +14,8 @@ from rclpy.action import ActionClient
 
 from canbase_action_server.client import DriveClient, NoResponseError, NoServerError, ServerLostError
 from ros.conftest import MakeRobot, Spawn
-from ros.fake_base import FakeBase, server_code
-from ros.harness import Process, TestNode
+from support.fake_base import FakeBase, server_code
+from support.ros_harness import Process, TestNode
 
 pytestmark = pytest.mark.ros
 

@@ -14,13 +14,13 @@ from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from std_srvs.srv import Trigger
 
-from ros.running_robot import READY_S, RunningRobot, own_domain, robot_on
+from support.running_robot import READY_S, RunningRobot, own_domain, robot_on
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 
 TRIALS = 20
 STOP_S = 0.25
-"""A loaded machine answers within this; `canbase bench stop` measures it."""
+"""A loaded machine answers within this; `canbase benchmark stop` measures it."""
 PAUSE_S = 3.0
 CUT_NODE = 1
 

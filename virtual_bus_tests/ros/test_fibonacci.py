@@ -11,7 +11,7 @@ from canbase_action_server.fibonacci_client import FibonacciClient
 from canbase_action_server.goal_client import RejectedError
 from canbase_action_server.outcome import Status
 from ros.conftest import Spawn
-from ros.harness import TestNode
+from support.ros_harness import TestNode
 
 pytestmark = pytest.mark.ros
 

@@ -10,8 +10,8 @@ from std_msgs.msg import Bool
 
 from canbase_action_server.client import RejectedError
 from canbase_action_server.outcome import ErrorCode
-from ros.harness import Repeater, merged
-from ros.running_robot import PATIENT, RESTS_M, RunningRobot, own_domain, robot_on
+from support.ros_harness import Repeater, merged
+from support.running_robot import PATIENT, RESTS_M, RunningRobot, own_domain, robot_on
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 

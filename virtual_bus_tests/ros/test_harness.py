@@ -11,7 +11,7 @@ import pytest
 from std_msgs.msg import Bool
 
 from canbase_config.robot import Robot
-from ros.harness import Process, TestNode, merged, reserve_domain
+from support.ros_harness import Process, TestNode, merged, reserve_domain
 
 pytestmark = pytest.mark.ros
 

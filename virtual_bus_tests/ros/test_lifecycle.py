@@ -12,8 +12,8 @@ from lifecycle_msgs.msg import State, Transition, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetState
 
 from exit_matrix.scene import forward
-from ros.harness import Repeater
-from ros.running_robot import READY_S, RESTS_M, RunningRobot, own_domain, robot_on
+from support.ros_harness import Repeater
+from support.running_robot import READY_S, RESTS_M, RunningRobot, own_domain, robot_on
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 

@@ -12,10 +12,10 @@ from lifecycle_msgs.srv import ChangeState
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from canbase_driver.managed_node import ManagedNode
-from canbase_driver.readiness import Aim
-from canbase_driver.reset import Outcome
-from ros.harness import TestNode
+from canbase_driver.ros.managed_node import ManagedNode
+from canbase_driver.supervision.lifecycle import Aim
+from canbase_driver.supervision.reset import Outcome
+from support.ros_harness import TestNode
 
 pytestmark = pytest.mark.ros
 

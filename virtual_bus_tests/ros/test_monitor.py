@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import pytest
 from geometry_msgs.msg import TwistStamped
 
-from ros.running_robot import CANBASE, RunningRobot, own_domain, robot_on
+from support.running_robot import CANBASE, RunningRobot, own_domain, robot_on
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 CTRL_C = b"\x03"

@@ -22,7 +22,7 @@ from std_msgs.msg import Bool
 from canbase_config.robot import Robot
 from canbase_velocity.filter_node import FilterNode
 from canbase_velocity.mux_node import MuxNode
-from ros.harness import Process, Recorder, TestNode
+from support.ros_harness import Process, Recorder, TestNode
 
 pytestmark = pytest.mark.ros
 

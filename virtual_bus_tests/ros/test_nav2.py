@@ -14,7 +14,7 @@ import pytest
 from canbase.msg import DriverStatus, MuxState
 from geometry_msgs.msg import Twist, TwistStamped
 
-from ros.harness import Process, TestNode
+from support.ros_harness import Process, TestNode
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(60)]
 START_S = 20.0

@@ -12,10 +12,10 @@ from canbase.msg import DriverStatus, MuxState, SafetyState
 from geometry_msgs.msg import TwistStamped
 from std_msgs.msg import Bool
 
-from ros.running_robot import LATCHED as STATE
-from ros.running_robot import RESTS_M, RunningRobot, own_domain, robot_on
 from ros.test_velocity import reset
-from ros.velocity_chain import Chain, drive
+from support.running_robot import LATCHED as STATE
+from support.running_robot import RESTS_M, RunningRobot, own_domain, robot_on
+from support.velocity_chain import Chain, drive
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(240)]
 ENABLED = DriverStatus(state=DriverStatus.ENABLED)

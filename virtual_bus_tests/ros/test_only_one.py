@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from canbase.msg import DriverStatus
 
-from ros.running_robot import own_domain, robot_on
+from support.running_robot import own_domain, robot_on
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(200)]
 

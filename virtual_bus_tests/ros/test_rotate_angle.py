@@ -12,8 +12,8 @@ from canbase_action_server.client import DriveClient, RejectedError
 from canbase_action_server.outcome import ErrorCode, Status
 from canbase_action_server.rotate_client import RotateClient, RotateFeedback
 from ros.conftest import MakeRobot, Spawn
-from ros.fake_base import FakeBase, server_code
-from ros.harness import TestNode
+from support.fake_base import FakeBase, server_code
+from support.ros_harness import TestNode
 
 pytestmark = pytest.mark.ros
 

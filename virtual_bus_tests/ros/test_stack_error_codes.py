@@ -22,9 +22,9 @@ from canbase_action_server.outcome import ErrorCode, Status
 from exit_matrix.injections import Inject, breaks, estop_pressed, fault, scan_dies, sends
 from exit_matrix.rows import DRIVER, SERVER
 from exit_matrix.scene import Scene, sabotaged
-from ros.running_robot import READY_S, RESTS_M, own_domain, robot_on
-from ros.scanner import BEAMS
-from ros.surroundings import BLOCKED_M, scan
+from support.running_robot import READY_S, RESTS_M, own_domain, robot_on
+from support.scanner import BEAMS
+from support.surroundings import BLOCKED_M, scan
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 

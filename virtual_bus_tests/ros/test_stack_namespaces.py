@@ -9,7 +9,7 @@ import pytest
 from canbase.msg import DriverStatus
 from geometry_msgs.msg import TwistStamped
 
-from ros.running_robot import RESTS_M, RunningRobot, own_domain, robot_on
+from support.running_robot import RESTS_M, RunningRobot, own_domain, robot_on
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 

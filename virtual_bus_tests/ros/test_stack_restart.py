@@ -8,7 +8,7 @@ import time
 import pytest
 from canbase.msg import DriverStatus
 
-from ros.running_robot import RESTS_M, own_domain, robot_on
+from support.running_robot import RESTS_M, own_domain, robot_on
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(150)]
 

@@ -17,10 +17,10 @@ from std_srvs.srv import Trigger
 
 from canbase_action_server.client import Drive, DriveResult
 from canbase_action_server.outcome import ErrorCode
-from ros.harness import merged
-from ros.running_robot import PATIENT, RESTS_M, own_domain, robot_on
-from ros.sros2_policy import allowed, present
-from ros.surroundings import BLOCKED_M, World, scan
+from support.ros_harness import merged
+from support.running_robot import PATIENT, RESTS_M, own_domain, robot_on
+from support.sros2_policy import allowed, present
+from support.surroundings import BLOCKED_M, World, scan
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 

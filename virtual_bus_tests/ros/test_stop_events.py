@@ -11,8 +11,8 @@ import can
 import pytest
 from canbase.msg import StopEvent
 
-from canbase_driver.black_box import MAX_FRAMES
-from ros.running_robot import RunningRobot, own_domain, robot_on
+from canbase_driver.runtime.black_box import MAX_FRAMES
+from support.running_robot import RunningRobot, own_domain, robot_on
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 

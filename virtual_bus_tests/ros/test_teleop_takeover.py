@@ -10,7 +10,7 @@ from canbase.msg import MuxState
 from geometry_msgs.msg import TwistStamped
 
 from canbase_action_server.outcome import ErrorCode, Status
-from ros.running_robot import LATCHED, RESTS_M, RunningRobot, own_domain, robot_on
+from support.running_robot import LATCHED, RESTS_M, RunningRobot, own_domain, robot_on
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 AT_ONCE_S = 0.3

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from canbase_bench.control import control_path
-from ros.harness import Process
-from ros.running_robot import RESTS_M, RunningRobot, own_domain, robot_on
+from canbase_sim.control import control_path
+from support.ros_harness import Process
+from support.running_robot import RESTS_M, RunningRobot, own_domain, robot_on
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 

@@ -18,9 +18,9 @@ from std_msgs.msg import Bool, Int8
 from std_srvs.srv import Trigger
 
 from ros.conftest import MakeRobot, Spawn
-from ros.harness import Process, TestNode
-from ros.scanner import BEAMS, all_around
-from ros.velocity_chain import LATCHED, RUN, START_S, Chain, drive, scan
+from support.ros_harness import Process, TestNode
+from support.scanner import BEAMS, all_around
+from support.velocity_chain import LATCHED, RUN, START_S, Chain, drive, scan
 
 pytestmark = pytest.mark.ros
 

@@ -7,7 +7,7 @@ from canbase.msg import SafetyState
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
-from ros.velocity_chain import Chain, drive
+from support.velocity_chain import Chain, drive
 
 pytestmark = pytest.mark.ros
 

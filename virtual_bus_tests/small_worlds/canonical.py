@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from campaign.clock import Clock
 from campaign.process import Process, Topics
 from campaign.world import World
-from canbase_bench.cia301.dictionary import Dictionary
+from canbase_sim.cia301.dictionary import Dictionary
 
 if TYPE_CHECKING:
     from small_worlds.properties import Properties

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from canbase_driver import node_boot
-from canbase_driver.boot import boot
-from canbase_driver.boot_steps import BootError, Step
+from canbase_driver.boot import node_boot
+from canbase_driver.boot.sequence import boot
+from canbase_driver.boot.steps import BootError, Step
 
 _SHARED = (Enum, Random, Struct, MappingProxyType, np.ndarray)
 """Kinds that nobody changes: of chance nothing is left in a small world."""
@@ -47,7 +47,7 @@ class Snapshot:
 
 
 class _Boot:
-    """The steps of one boot, as canbase_driver.boot has them, with every answer: they depend on nothing else."""
+    """The steps of one boot, as canbase_driver.boot.sequence has them, with every answer."""
 
     def __init__(self, *of: Any) -> None:
         self._begin(*of)

@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from campaign.faults import FAULTS
-from canbase_bench.faults import apply
+from canbase_sim.faults import apply
 
 if TYPE_CHECKING:
     from small_worlds.world import SmallWorld

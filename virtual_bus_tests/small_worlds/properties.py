@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from campaign.envelope import Envelope, braking_s, moving_s, notice_s, react_s
 from campaign.wishes import Wishes
-from canbase_bench.cia402.states import State
-from canbase_bench.node import SimulatedNode
 from canbase_config.stopping import max_wheel_mps
 from canbase_driver.snapshot import DriverState
+from canbase_sim.cia402.states import State
+from canbase_sim.node import SimulatedNode
 from canbase_velocity.twist import Twist
 from canbase_watchdog.ladder import RUNGS, Step
 from canbase_watchdog.watchdog import Answer

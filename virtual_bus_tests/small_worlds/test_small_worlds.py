@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from campaign.without import SAFEGUARDS
-from canbase_driver.sdo import Read, SdoAborted
+from canbase_driver.cia301.sdo_client import Read, SdoAborted
 from small_worlds import canonical
 from small_worlds.copying import Snapshot
 from small_worlds.events import EVENTS, FAULT_EVENTS, OPERATOR_EVENTS

@@ -12,9 +12,9 @@ from campaign.process import Process
 from campaign.robots import campaign_robot
 from campaign.world import World
 from canbase_config.robot import Robot
-from canbase_driver import supervisor
-from canbase_driver.readiness import Aim
-from canbase_driver.reset import Outcome
+from canbase_driver.supervision import supervisor
+from canbase_driver.supervision.lifecycle import Aim
+from canbase_driver.supervision.reset import Outcome
 from canbase_velocity.twist import ZERO, Twist
 from small_worlds.events import EVENTS, EVER_S, Event
 

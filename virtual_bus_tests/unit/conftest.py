@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from unit.chain_world import KINDS
+from support.chain_world import KINDS
 
 
 @pytest.fixture(params=KINDS)

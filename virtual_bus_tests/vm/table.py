@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from exit_matrix.marked import rewritten, section
 from exit_matrix.page_table import NOTHING, Key, PageTable, Row
+from support.marked_page import rewritten, section
 from vm.guest.main import BEGINS
 
 COMMAND = "make vm-test"

@@ -288,7 +288,7 @@ class EvidenceWatch:
     def _ask(self, elapsed_s: float, now: float, enabled: bool) -> None:
         """The least that the setpoints of the lag ask for, and how far the slowest ramp has got to it from a stand.
 
-        A wheel that still turns the other way has not begun: how fast that ends is the upper bound's, feedback.py.
+        A wheel that still turns the other way has not begun: how fast that ends is the upper bound's, plausibility.py.
         """
         backward_mps, forward_mps = -self._backward.greatest(now), self._forward.greatest(now)
         self._least_mps = max(backward_mps, 0.0) + min(forward_mps, 0.0)

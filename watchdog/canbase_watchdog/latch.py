@@ -1,7 +1,7 @@
 """The watchdog's record of its trip, over kills, restarts and reboots. Pure; the file is latch_file.py.
 
 Before a drive may have power the record on disk already says LIVE; CLEAR comes after power was seen to be off, without
-a trip. Found LIVE, or unreadable in any way, it is a trip. The layout is that of canbase_config.latch_record, written
+a trip. Found LIVE, or unreadable in any way, it is a trip. The layout is that of canbase_runtime.latch_record, written
 a second time on purpose: a test compares both.
 """
 

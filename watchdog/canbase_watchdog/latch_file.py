@@ -1,6 +1,6 @@
 """The file of the watchdog's record, and the thread that writes it: the loop never waits for a disk.
 
-A second copy, on purpose, of what canbase_config.latch_file does for driver and filter: the watchdog shares no code.
+A second copy, on purpose, of what canbase_runtime.latch_file does for driver and filter: the watchdog shares no code.
 """
 
 from __future__ import annotations

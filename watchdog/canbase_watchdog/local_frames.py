@@ -5,7 +5,7 @@ socket (SO_ATTACH_FILTER, socket(7), packet(7)) passes what came over the loopba
 itself turned round on its way out: multicast that this computer sent. Where `bus.extra.hop_limit` lets frames leave
 this computer, those of others are wanted, and there is no filter.
 
-A second copy, on purpose, of what canbase_config.local_frames does for the others; a test compares both.
+A second copy, on purpose, of what canbase_runtime.local_frames does for the others; a test compares both.
 """
 
 from __future__ import annotations

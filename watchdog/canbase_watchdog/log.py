@@ -54,7 +54,7 @@ class Lines(logging.Handler):
 
 
 def never_wait(environment: Mapping[str, str], descriptor: int = STDERR) -> None:
-    """A second copy, on purpose, of canbase_config.output: from now on a write that would wait raises BlockingIOError.
+    """A second copy, on purpose, of canbase_runtime.output: from now on a write that would wait raises BlockingIOError.
 
     A terminal and a pipe are opened anew, so that other processes that share them still wait. A socket cannot be: only
     the one to the journal, which is this process's own, is changed. Files stay as they are.

@@ -14,7 +14,8 @@ from pathlib import Path
 from types import FrameType
 
 from canbase_config.watchdog import WatchdogConfig
-from canbase_watchdog import frames, latch_file, realtime, sole
+from canbase_watchdog import frames, latch_file, realtime
+from canbase_watchdog import single_instance as sole
 from canbase_watchdog.bus_port import BusError, BusPort
 from canbase_watchdog.latch_file import Keeper
 from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError

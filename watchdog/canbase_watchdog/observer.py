@@ -10,9 +10,9 @@ from functools import partial
 
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 from canbase_watchdog import frames
-from canbase_watchdog.feedback import FeedbackWatch
-from canbase_watchdog.foreign import Foreign
 from canbase_watchdog.frames import DriveState
+from canbase_watchdog.plausibility import FeedbackWatch
+from canbase_watchdog.second_master import Foreign
 from canbase_watchdog.standing import StandWatch
 from canbase_watchdog.tally import Tally
 from canbase_watchdog.torque import PushWatch

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from canbase_config.watchdog import WatchedDrive
 from canbase_watchdog.envelope import Bounds
 from canbase_watchdog.evidence import Evidence
-from canbase_watchdog.feedback import Feedback
-from canbase_watchdog.foreign import Sign
 from canbase_watchdog.frames import POWERED, DriveState
 from canbase_watchdog.lease import Lease
+from canbase_watchdog.plausibility import Feedback
+from canbase_watchdog.second_master import Sign
 from canbase_watchdog.torque import Push
 
 NEVER = -math.inf

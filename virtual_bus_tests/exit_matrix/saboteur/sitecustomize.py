@@ -15,11 +15,11 @@ from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
 if TYPE_CHECKING:
-    from canbase_driver.command import Command
+    from canbase_driver.cia301.frame import Frame
     from canbase_driver.core import DriverCore
-    from canbase_driver.frame import Frame
-    from canbase_driver.kinematics import Twist2D
-    from canbase_driver.node import MotorDriverNode
+    from canbase_driver.motion.kinematics import Twist2D
+    from canbase_driver.motion.velocity_command import Command
+    from canbase_driver.ros.node import MotorDriverNode
     from canbase_driver.snapshot import DriverSnapshot, StopRecord
 
 BUSY_S = 4.0
@@ -83,8 +83,8 @@ def repeat_setpoints() -> None:
 
 def ignore_zero() -> None:
     """The driver follows each command but zero."""
-    from canbase_driver.command import Command
-    from canbase_driver.kinematics import Twist2D
+    from canbase_driver.motion.kinematics import Twist2D
+    from canbase_driver.motion.velocity_command import Command
 
     usual = Command.target
     last = [Twist2D.ZERO]
@@ -100,7 +100,7 @@ def ignore_zero() -> None:
 
 def withhold_odometry() -> None:
     """The driver works, and publishes no odometry any more."""
-    from canbase_driver.node import MotorDriverNode
+    from canbase_driver.ros.node import MotorDriverNode
 
     usual = MotorDriverNode.publish
 
@@ -112,7 +112,7 @@ def withhold_odometry() -> None:
 
 def freeze_odometry() -> None:
     """The driver works, and the pose of its odometry stays where it is; the velocities are true."""
-    from canbase_driver.node import MotorDriverNode
+    from canbase_driver.ros.node import MotorDriverNode
 
     usual = MotorDriverNode.publish
     frozen: list[DriverSnapshot] = []

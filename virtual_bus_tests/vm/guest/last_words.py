@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from canbase_bench.control import SimControl
+from canbase_sim.control import SimControl
 from vm.guest.standstill import standstill
 
 FOLDER = Path("/mnt")

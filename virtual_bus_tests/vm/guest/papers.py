@@ -12,13 +12,13 @@ from typing import Any, Final
 
 from canbase.msg import DriverStatus
 
-from canbase_cli.commissioning.link import parse_link
+from canbase_commissioning.can_interface import parse_link
 from vm.guest.robot import Robot
 from vm.guest.scenario import Row
 from vm.guest.system import PARTS, ROBOT_YAML, TARGET, BrokenPromiseError, run, show, unit
 
 CANBASE: Final = (sys.executable, "-m", "canbase_cli")
-STOP: Final = ("env", "_ROS_WHEELS_BOOTSTRAP_COMPLETE=1", sys.executable, "-m", "canbase_watchdog.stop")
+STOP: Final = ("env", "_ROS_WHEELS_BOOTSTRAP_COMPLETE=1", sys.executable, "-m", "canbase_watchdog.post_stop")
 STOP_FILE: Final = "/run/canbase/robot/stop.json"
 WARNING, NOTICE, INFO = "4", "5", "6"
 """Priorities of syslog, as the journal writes them."""

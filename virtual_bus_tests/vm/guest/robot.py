@@ -8,9 +8,9 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
-from canbase_bench.control import SimControl
-from canbase_bench.world.bench import Truth
 from canbase_cli.middleware import prefer_udp
+from canbase_sim.control import SimControl
+from canbase_sim.world.bench import Truth
 
 prefer_udp(os.environ)
 

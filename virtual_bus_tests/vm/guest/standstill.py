@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from canbase_bench.world.trace import Row
+from canbase_sim.world.trace import Row
 
 STANDS_MPS = 0.005
 

@@ -1,0 +1,93 @@
+"""The goal that has the base, if any: runs it, and ends it exactly once.
+
+Who may take it, and when, is decided in `goal_queue.py`. After `fail` the goal only stops, and ends with INTERNAL.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from canbase_action_server.goal import GoalRun, Order, Phase
+from canbase_action_server.goal_request import Request
+from canbase_action_server.inputs import Inputs
+from canbase_action_server.limits import standstill_limits
+from canbase_action_server.motion import STOP
+from canbase_action_server.outcome import ErrorCode, Outcome
+from canbase_action_server.standstill import Standstill, Verdict
+from canbase_config.robot import Robot
+
+FAREWELL_S = 0.2
+"""After the end of a goal zero is ordered for this long; then the source goes silent and others may drive."""
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A defect of the server during a goal, and the stop that follows, without `GoalRun`, which may be at fault."""
+
+    error: Exception
+    standstill: Standstill
+
+
+class Owner:
+    """The base and the goal that has it."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._goal: GoalRun | None = None
+        self._failure: Failure | None = None
+        self._silent_from = -1.0
+
+    @property
+    def busy(self) -> bool:
+        """A goal owns the base."""
+        return self._goal is not None
+
+    @property
+    def phase(self) -> Phase:
+        """Of the goal that owns the base; ENDED when there is none."""
+        return self._goal.phase if self._goal else Phase.ENDED
+
+    def take(self, request: Request, inputs: Inputs, now: float) -> None:
+        """The base now belongs to this goal. RuntimeError when it has an owner, or was never seen."""
+        if self.busy or inputs.odometry is None:
+            raise RuntimeError("a goal took a base that is not free, or of which no odometry was received")
+        start = inputs.odometry
+        self._goal = GoalRun(self._robot, request.motion(self._robot, start), start, now)
+
+    def tick(self, inputs: Inputs, now: float) -> Order | None:
+        """One control cycle. None: nothing is to be ordered, the source stays silent."""
+        if self._goal is None:
+            return Order(STOP) if now < self._silent_from else None
+        if self._failure is None:
+            order = self._goal.tick(inputs, now)
+        else:
+            order = self._end_failed(self._failure, self._goal.traveled_m, inputs, now)
+        if order.end is not None:
+            self._release(now)
+        return order
+
+    def fail(self, error: Exception, now: float) -> None:
+        """Something in the server broke: from now on the goal only stops. The first failure stays."""
+        if self._goal is not None and self._failure is None:
+            limits = self._robot.limits
+            stop = standstill_limits(self._robot, limits.deceleration_mps2)
+            self._failure = Failure(error, Standstill(stop, now, limits.linear_mps))
+
+    def give_up(self, code: ErrorCode, message: str, now: float) -> Order | None:
+        """Ends the goal at once, standing or not, because the process has no more time. None: there was no goal."""
+        if self._goal is None:
+            return None
+        traveled_m = self._goal.traveled_m
+        self._release(now)
+        return Order(STOP, end=Outcome(code, traveled_m, 0.0, message))
+
+    def _end_failed(self, failure: Failure, traveled_m: float, inputs: Inputs, now: float) -> Order:
+        verdict = failure.standstill.judge(inputs, now)
+        if verdict is Verdict.WAIT:
+            return Order(STOP)
+        message = f"defect in the action server ({failure.error!r}), see its log; the base {verdict.value}"
+        return Order(STOP, end=Outcome(ErrorCode.INTERNAL, traveled_m, 0.0, message))
+
+    def _release(self, now: float) -> None:
+        self._goal = None
+        self._silent_from = now + FAREWELL_S

@@ -1,0 +1,202 @@
+"""Which goals are accepted, which of them owns the base, and which wait: the goal policy, over goals of every action.
+
+Rules.
+1. `refusal` and `admit` are called one after the other, without another call in between: so no two goals can both find
+   the base free.
+2. A goal that is admitted waits. `tick` gives the base to the one that waits longest, as soon as nobody owns it.
+3. `reject`: nobody is admitted while a goal waits or runs. `queue`: up to `queue_length` wait. `preempt`: a new goal
+   ends all others with PREEMPTED: those that wait at once, the running one when the base stands. Then it has the base.
+4. A goal that waits starts only after an end that left the base standing where it was told to. Any other end, such as
+   an emergency stop, is theirs too: nothing starts to move by itself when the cause has gone, or from a wrong place.
+5. With `require_client_lease` a goal begins when its client has been heard since its acceptance, and ends with
+   CLIENT_LOST when it was not heard for `client_lease_s`.
+6. Each goal that was admitted ends exactly once.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, replace
+
+from canbase_action_server.active_goal import Owner
+from canbase_action_server.causes import CLIENT_SILENT, Cause
+from canbase_action_server.goal import Feedback, Order, Phase
+from canbase_action_server.goal_request import Request
+from canbase_action_server.inputs import Inputs
+from canbase_action_server.motion import STOP, Twist
+from canbase_action_server.outcome import ErrorCode, Outcome
+from canbase_action_server.preconditions import state_reason
+from canbase_config.robot import Robot
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """The end of the goal `key`."""
+
+    key: str
+    outcome: Outcome
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """The result of one control cycle."""
+
+    twist: Twist | None = None
+    """The order for the base; None: nothing is to be ordered, the source stays silent."""
+    began: str | None = None
+    """Key of the goal that owns the base from now on."""
+    feedback: tuple[str, Feedback] | None = None
+    ends: tuple[End, ...] = ()
+
+
+@dataclass(slots=True)
+class Admitted:
+    """A goal that waits or runs."""
+
+    key: str
+    request: Request
+    heard: float
+    """When its client gave the last sign of life; until the first one, when it was admitted."""
+    alive: bool = False
+    """Its client has given one since then: it knows that the goal was accepted."""
+    canceled: bool = False
+    preempted: bool = False
+
+
+class Reception:
+    """All goals of the server. `key` is any name that no other goal ever had, such as its UUID."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._owner = Owner(robot)
+        self._running: Admitted | None = None
+        self._waiting: deque[Admitted] = deque()
+        self._failed = False
+
+    @property
+    def busy(self) -> bool:
+        """A goal runs or waits."""
+        return self._running is not None or bool(self._waiting)
+
+    @property
+    def running(self) -> str | None:
+        """Key of the goal that owns the base."""
+        return self._running.key if self._running else None
+
+    @property
+    def phase(self) -> Phase:
+        """Of the goal that owns the base; ENDED when there is none."""
+        return self._owner.phase
+
+    def refusal(self, request: Request, inputs: Inputs, now: float) -> str | None:
+        """Why a goal with these numbers is rejected; None: it may be admitted."""
+        return request.range_reason(self._robot) or self._no_place() or state_reason(self._robot, inputs, now)
+
+    def admit(self, key: str, request: Request, inputs: Inputs, now: float) -> None:
+        """From now on the goal waits for the base. RuntimeError when `refusal` would have refused it."""
+        reason = self.refusal(request, inputs, now)
+        if reason is not None or key in (goal.key for goal in self._goals()):
+            raise RuntimeError(f"goal {key} was admitted, but it is known already, or refused: {reason}")
+        if self._robot.action.goal_policy == "preempt":
+            for goal in self._goals():
+                goal.preempted = True
+        self._waiting.append(Admitted(key, request, now))
+
+    def cancel(self, key: str) -> bool:
+        """A client wants the goal to end. False: no such goal runs or waits."""
+        found = [goal for goal in self._goals() if goal.key == key]
+        for goal in found:
+            goal.canceled = True
+        return bool(found)
+
+    def keepalive(self, key: str, now: float) -> None:
+        """The client of this goal lives. Nothing happens when no such goal runs or waits."""
+        for goal in self._goals():
+            if goal.key == key:
+                goal.heard, goal.alive = now, True
+
+    def tick(self, inputs: Inputs, now: float) -> Cycle:
+        """One control cycle."""
+        ends = self._drop(inputs, now)
+        began = self._begin(inputs, now)
+        running = self._running
+        if running is not None:
+            lost = self._client_lost(running, now)
+            inputs = replace(inputs, cancel_requested=running.canceled, preempted=running.preempted, client_lost=lost)
+        order = self._owner.tick(inputs, now)
+        if order is None:
+            return Cycle(began=began, ends=ends)
+        if running is None:
+            return Cycle(order.twist, began, ends=ends)
+        feedback = (running.key, order.feedback) if order.feedback else None
+        return Cycle(order.twist, began, feedback, ends + self._ended(order))
+
+    def fail(self, error: Exception, now: float) -> None:
+        """Something in the server broke: the running goal only stops, all end with INTERNAL."""
+        self._failed = True
+        self._owner.fail(error, now)
+
+    def give_up(self, code: ErrorCode, message: str, now: float) -> Cycle:
+        """Ends all goals at once, the base standing or not, because the process has no more time."""
+        order = self._owner.give_up(code, message, now)
+        return Cycle(STOP, ends=(self._ended(order) if order else ()) + self._flush(Cause(code, message)))
+
+    def _goals(self) -> tuple[Admitted, ...]:
+        return (*((self._running,) if self._running else ()), *self._waiting)
+
+    def _no_place(self) -> str | None:
+        action = self._robot.action
+        if action.goal_policy == "reject" and self.busy:
+            return "busy: another goal owns the base; wait for its result, or cancel it"
+        if action.goal_policy == "queue" and len(self._waiting) >= action.queue_length:
+            return f"busy: {len(self._waiting)} goals wait already (action.queue_length)"
+        return None
+
+    def _client_lost(self, goal: Admitted, now: float) -> bool:
+        action = self._robot.action
+        return action.require_client_lease and now - goal.heard > action.client_lease_s
+
+    def _drop(self, inputs: Inputs, now: float) -> tuple[End, ...]:
+        """The ends of those that shall not wait any longer."""
+        causes = [(goal, self._against_waiting(goal, inputs, now)) for goal in self._waiting]
+        self._waiting = deque(goal for goal, cause in causes if cause is None)
+        return tuple(End(goal.key, _not_started(cause)) for goal, cause in causes if cause is not None)
+
+    def _against_waiting(self, goal: Admitted, inputs: Inputs, now: float) -> Cause | None:
+        if self._failed:
+            return Cause(ErrorCode.INTERNAL, "defect in the action server, see its log")
+        if goal.canceled:
+            return Cause(ErrorCode.CANCELED, "canceled by request")
+        if goal.preempted:
+            return Cause(ErrorCode.PREEMPTED, "a newer goal takes its place")
+        if self._client_lost(goal, now):
+            return Cause(ErrorCode.CLIENT_LOST, CLIENT_SILENT)
+        return Cause(ErrorCode.SHUTDOWN, "the action server is shutting down") if inputs.shutdown else None
+
+    def _begin(self, inputs: Inputs, now: float) -> str | None:
+        if self._owner.busy or not self._waiting:
+            return None
+        goal = self._waiting[0]
+        if self._robot.action.require_client_lease and not goal.alive:
+            return None
+        self._owner.take(goal.request, inputs, now)
+        self._running = self._waiting.popleft()
+        return goal.key
+
+    def _ended(self, order: Order) -> tuple[End, ...]:
+        """The end of the running goal, if this is one, and of those that may not follow it."""
+        if self._running is None or order.end is None:
+            return ()
+        end, self._running = End(self._running.key, order.end), None
+        if order.end.code.leaves_the_base_standing:
+            return (end,)
+        return (end, *self._flush(Cause(order.end.code, f"the goal before it ended with {order.end.code.name}")))
+
+    def _flush(self, cause: Cause) -> tuple[End, ...]:
+        ends = tuple(End(goal.key, _not_started(cause)) for goal in self._waiting)
+        self._waiting.clear()
+        return ends
+
+
+def _not_started(cause: Cause) -> Outcome:
+    return Outcome(cause.code, 0.0, 0.0, f"{cause.message}; it never started")

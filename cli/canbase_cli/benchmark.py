@@ -1,0 +1,32 @@
+"""`canbase benchmark`: the benchmarks of the sources. An installation has none: they need the simulated robot."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import canbase_cli
+from canbase_runtime.terminal import FAILED, fail
+
+
+def benchmark(
+    names: Annotated[list[str] | None, typer.Argument(metavar="[NAME]…", help="Some of them; all without.")] = None,
+    write: Annotated[Path | None, typer.Option("--write", metavar="FILE", help="Write the table as Markdown.")] = None,
+) -> None:
+    """Measure this computer: reactions, latencies, processor, each beside a floor and against its budget.
+
+    Exit codes: 0 every budget is kept, 1 one is not or there are no sources here, 2 there is no such benchmark.
+    """
+    root = Path(canbase_cli.__file__).resolve().parents[2]
+    script = root / "benchmarks" / "run.py"
+    if not script.exists():
+        fail("the benchmarks come with the sources: clone the repository, and there `make bench`", FAILED)
+    options = ["--write", str(write.resolve())] if write else []
+    environment = os.environ | {"PYTHONPATH": str(root / "virtual_bus_tests")}
+    command = [sys.executable, str(script), *(names or []), *options]
+    raise typer.Exit(subprocess.call(command, env=environment, cwd=root))  # its children import from there at most

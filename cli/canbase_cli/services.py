@@ -1,0 +1,132 @@
+"""The commands that run one process of the stack each. Thin: read robot.yaml, hand it over, exit with its code."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from canbase_cli.options import ConfigOption, NamespaceOption, UnusedNamespaceOption, ros_arguments, ros_needed
+from canbase_cli.raise_priority import raise_priority
+from canbase_runtime.own_modules import module_command
+from canbase_runtime.sim_time import SimTimeError
+from canbase_runtime.terminal import FAILED, fail, load_config
+
+if TYPE_CHECKING:
+    from canbase_config.robot import Robot
+
+WRONG_COMMAND_LINE: Final = 2
+
+
+StopFileOption = Annotated[
+    Path | None,
+    typer.Option("--stop-file", metavar="PATH", help="Write here what `python -m canbase_watchdog.post_stop` needs."),
+]
+
+
+def driver(
+    ctx: typer.Context,
+    config: ConfigOption = None,
+    namespace: NamespaceOption = "",
+    stop_file: StopFileOption = None,
+    autostart: Annotated[
+        bool,
+        typer.Option("--autostart/--no-autostart", help="Without it the node waits for its lifecycle transitions."),
+    ] = True,
+) -> None:
+    """Run the motor driver: brings the drives up, turns cmd_vel into setpoints, publishes odom.
+
+    What stands behind --ros-args goes to rclpy.
+    """
+    robot = load_config(config).robot
+    with ros_needed():
+        from canbase_driver.runtime.main import run
+    leave_stop_file(robot, stop_file)
+    with _real_time():
+        raise typer.Exit(run(robot, ros_arguments(ctx, namespace), autostart, partial(raise_priority, "driver")))
+
+
+def velocity(ctx: typer.Context, config: ConfigOption = None, namespace: NamespaceOption = "") -> None:
+    """Run velocity mux and safety filter: who may drive, and how fast.
+
+    What stands behind --ros-args goes to rclpy.
+    """
+    robot = load_config(config).robot
+    with ros_needed():
+        from canbase_velocity.main import run
+    with _real_time():
+        raise typer.Exit(run(robot, ros_arguments(ctx, namespace), partial(raise_priority, "velocity")))
+
+
+def action_server(ctx: typer.Context, config: ConfigOption = None, namespace: NamespaceOption = "") -> None:
+    """Run the server of the action drive_distance.
+
+    What stands behind --ros-args goes to rclpy.
+    """
+    robot = load_config(config).robot
+    with ros_needed():
+        from canbase_action_server.main import run
+    with _real_time():
+        raise typer.Exit(run(robot, ros_arguments(ctx, namespace), partial(raise_priority, "action-server")))
+
+
+@contextmanager
+def _real_time() -> Iterator[None]:
+    """A wrong command line: use_sim_time."""
+    try:
+        yield
+    except SimTimeError as error:
+        fail(str(error), WRONG_COMMAND_LINE)
+
+
+def sim(
+    config: ConfigOption = None,
+    namespace: UnusedNamespaceOption = "",
+    control: Annotated[
+        Path | None, typer.Option("--control", metavar="PATH", help="Unix socket to steer the simulation by.")
+    ] = None,
+) -> None:
+    """Run simulated drives on the robot's bus, in place of the real ones."""
+    from canbase_sim.main import run
+
+    robot = load_config(config).robot
+    raise_priority("sim")
+    raise typer.Exit(run(robot, None if control is None else str(control)))
+
+
+def watchdog(
+    config: ConfigOption = None, namespace: UnusedNamespaceOption = "", stop_file: StopFileOption = None
+) -> None:
+    """Run the watchdog: stops the drives when lease, driver or a drive goes silent or wrong.
+
+    It replaces this process by one that has only Python's standard library and python-can in it.
+    """
+    from canbase_config.derive import watchdog_config
+
+    robot = load_config(config).robot
+    leave_stop_file(robot, stop_file)
+    told = watchdog_config(robot).to_json()
+    # The ROS wheels' start-up hook would start every Python of their environment a second time.
+    environment = os.environ | {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"}
+    os.execve(sys.executable, module_command("canbase_watchdog", "--config-json", told), environment)
+
+
+def leave_stop_file(robot: Robot, path: Path | None) -> None:
+    """What the stop frames need, for a process that is started when this one has died. Whole or not there at all."""
+    if path is None:
+        return
+    from canbase_config.derive import watchdog_config
+
+    new = path.with_name(f"{path.name}.new{os.getpid()}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        new.write_text(watchdog_config(robot).to_json(), encoding="utf-8")
+        new.replace(path)
+    except OSError as error:
+        fail(f"{path} cannot be written: {error}; without it nobody could stop the drives after a crash", FAILED)

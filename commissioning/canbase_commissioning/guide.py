@@ -1,0 +1,155 @@
+"""A guided procedure as a script to be read from top to bottom: it moves, waits, asks and reports. The runner is pure.
+
+A script is a generator: it yields `Until`, `Ask` or `Tell`, and is sent the answer. While it waits, the rig goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from canbase_commissioning.powered_drives import Rig
+from canbase_driver.cia301.frame import Frame
+
+T = TypeVar("T")
+
+
+class CommissionError(Exception):
+    """The procedure cannot go on. The text says why, and what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Until:
+    """Wait until `holds(now)`, or `timeout_s`. The answer: whether it held."""
+
+    holds: Callable[[float], bool]
+    timeout_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """A question to the person at the machine. `key` names it in an answers file. The answer: their words.
+
+    `check` raises ValueError for words that make no sense: then it is asked again. `confirms`: it wants a yes.
+    """
+
+    key: str
+    text: str
+    check: Callable[[str], object] = str
+    confirms: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Tell:
+    """A line for the person at the machine; `is_loud`: one that must not be overlooked. It brings no answer."""
+
+    text: str
+    is_loud: bool = False
+
+
+Script = Generator[Until | Ask | Tell, Any, T]
+
+
+def wait(seconds: float) -> Until:
+    """Wait for a time, whatever happens."""
+    return Until(lambda _now: False, seconds)
+
+
+def number(low: float, high: float) -> Callable[[str], float]:
+    """A check for a number in a range."""
+
+    def check(text: str) -> float:
+        try:
+            value = float(text.replace(",", "."))
+        except ValueError as error:
+            raise ValueError(f"{text!r} is no number") from error
+        if not low <= value <= high:
+            raise ValueError(f"{value:g} is outside {low:g} to {high:g}")
+        return value
+
+    return check
+
+
+def one_of(*words: str) -> Callable[[str], str]:
+    """A check for one of some words; their first letter is enough."""
+
+    def check(text: str) -> str:
+        found = next((word for word in words if text.strip().lower() in (word, word[0])), None)
+        if found is None:
+            raise ValueError(f"expected one of {', '.join(words)}")
+        return found
+
+    return check
+
+
+def _confirm(text: str) -> None:
+    """Raises CommissionError for a no or a bare Enter, ValueError for what is neither yes nor no."""
+    word = text.strip().lower()
+    if word in ("", "n", "no"):
+        raise CommissionError("not confirmed: nothing more is done")
+    if word not in ("y", "yes"):
+        raise ValueError(f"{text.strip()!r} is neither yes nor no")
+
+
+class Guide(Generic[T]):
+    """Runs one script on one rig. A session; when it waits for a person, `question` says for what.
+
+    Ends with `result`, or raises what the script or the rig raised: whoever runs it must then say farewell.
+    """
+
+    def __init__(self, rig: Rig, script: Script[T], tell: Callable[[Tell], None]) -> None:
+        self.rig = rig
+        self.result: T | None = None
+        self.done = False
+        self.question: Ask | None = None
+        self._script, self._tell = script, tell
+        self._until: Until | None = None
+        self._give_up_at = 0.0
+        self._has_begun = False
+
+    def on_frame(self, frame: Frame, now: float) -> None:
+        """Take a frame."""
+        self.rig.on_frame(frame, now)
+
+    def tick(self, now: float) -> list[Frame]:
+        """Let time pass. Raises RigError, CommissionError."""
+        frames = self.rig.tick(now)
+        if not self._has_begun:
+            self._has_begun = True
+            self._go_on(None, now)
+        elif self._until is not None:
+            held = self._until.holds(now)
+            if held or now >= self._give_up_at:
+                self._go_on(held, now)
+        return frames
+
+    def answer(self, text: str) -> None:
+        """The words of the person. Raises ValueError, and goes on asking, when they make no sense.
+
+        Raises CommissionError when they did not confirm.
+        """
+        if self.question is None:
+            raise RuntimeError("nothing was asked")
+        if self.question.confirms:
+            _confirm(text)
+        value = self.question.check(text)
+        self._go_on(value, self.rig.now)
+
+    def _go_on(self, answer: object, now: float) -> None:
+        self._until = self.question = None
+        while True:
+            try:
+                step = self._script.send(answer)
+            except StopIteration as end:
+                self.result, self.done = end.value, True
+                return
+            if isinstance(step, Tell):
+                self._tell(step)
+                answer = None
+                continue
+            if isinstance(step, Until):
+                self._until, self._give_up_at = step, now + step.timeout_s
+            else:
+                self.question = step
+            return

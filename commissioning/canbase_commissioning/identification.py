@@ -1,0 +1,121 @@
+"""The active part of `canbase scan`: queries the identity of every node id by SDO reads (CiA 301, 1000h, 1017h, 1018h).
+
+Names and firmware (1008h, 100Ah) take segmented transfers and are read only where nobody else uses the channel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from canbase_commissioning.bus_monitor import Listener
+from canbase_commissioning.session import NodeTask
+from canbase_driver.boot.steps import Steps, unsigned
+from canbase_driver.cia301.frame import Frame
+from canbase_driver.cia301.sdo_client import Read, SdoAborted, SdoClient, SdoTimeout
+
+STAGGER_S = 0.002
+"""Between the first questions to two node ids: 127 of them at once would fill every transmit buffer."""
+UNHEARD_ATTEMPTS, HEARD_ATTEMPTS = 1, 3
+
+
+@dataclass(frozen=True, slots=True)
+class NodeCard:
+    """What one node says of itself; None: it lacks the object. `profile_402`: 1000h says motor drive."""
+
+    node_id: int
+    device_type: int | None
+    vendor_id: int | None
+    product_code: int | None
+    revision: int | None
+    serial: int | None
+    heartbeat_ms: int | None
+    name: str
+    firmware: str
+
+    @property
+    def profile_402(self) -> bool:
+        """Whether 1000h says that it is a motor drive (CiA 402)."""
+        return self.device_type is not None and self.device_type & 0xFFFF == 402
+
+
+def identify(node_id: int, with_texts: bool) -> Steps[NodeCard | bool]:
+    """Asks one node who it is; False: nobody answers at this id."""
+    try:
+        device_type = yield from _number(0x1000, 0)
+    except SdoTimeout:
+        return False
+    vendor_id = yield from _number(0x1018, 1)
+    product_code = yield from _number(0x1018, 2)
+    revision = yield from _number(0x1018, 3)
+    serial = yield from _number(0x1018, 4)
+    heartbeat_ms = yield from _number(0x1017, 0)
+    name = (yield from _text(0x1008)) if with_texts else ""
+    firmware = (yield from _text(0x100A)) if with_texts else ""
+    return NodeCard(node_id, device_type, vendor_id, product_code, revision, serial, heartbeat_ms, name, firmware)
+
+
+def _number(index: int, sub: int) -> Steps[int | None]:
+    try:
+        return unsigned((yield Read(index, sub)))
+    except SdoAborted:
+        return None
+
+
+def _text(index: int) -> Steps[str]:
+    try:
+        data: bytes = yield Read(index)
+    except (SdoAborted, SdoTimeout):
+        return ""
+    return data.decode("latin-1").strip(" \0")
+
+
+class Roster:
+    """Asks `node_ids`, those that were heard more patiently. `cards` has who answered, by node id."""
+
+    def __init__(self, node_ids: Iterable[int], heard: Listener, timeout_s: float, *, with_texts: bool) -> None:
+        self._node_ids = tuple(node_ids)
+        self._heard = heard
+        self._timeout_s = timeout_s
+        self._with_texts = with_texts
+        self._tasks: list[NodeTask[NodeCard | bool]] = []
+        self._pending: list[Frame] = []
+        self.lost: dict[int, str] = {}
+        """Nodes that were there and then failed, with the reason."""
+
+    @property
+    def done(self) -> bool:
+        """Whether all have answered or not."""
+        return bool(self._tasks) and all(task.done for task in self._tasks)
+
+    @property
+    def cards(self) -> dict[int, NodeCard]:
+        """Who answered."""
+        return {task.node_id: task.result for task in self._tasks if isinstance(task.result, NodeCard)}
+
+    def on_frame(self, frame: Frame, now: float) -> None:
+        """Take a frame."""
+        self._heard.on_frame(frame, now)
+        for task in self._tasks:
+            self._pending += task.on_frame(frame, now)
+
+    def tick(self, now: float) -> list[Frame]:
+        """The questions that are due."""
+        if not self._tasks:
+            self._tasks = [self._task(node_id, now + i * STAGGER_S) for i, node_id in enumerate(self._node_ids)]
+        frames, self._pending = self._pending, []
+        for task in self._tasks:
+            frames += task.tick(now)
+            if task.error is not None:
+                self.lost[task.node_id] = str(task.error)
+        return frames
+
+    def _task(self, node_id: int, not_before: float) -> NodeTask[NodeCard | bool]:
+        attempts = HEARD_ATTEMPTS if node_id in self._heard.nodes else UNHEARD_ATTEMPTS
+        client = SdoClient(node_id, self._timeout_s, attempts)
+        return NodeTask(
+            identify(node_id, self._with_texts),
+            client,
+            not_before=not_before,
+            free=lambda now: self._heard.sdo_free(node_id, now),
+        )

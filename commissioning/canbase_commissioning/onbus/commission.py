@@ -1,0 +1,205 @@
+"""`canbase commission` on the bus: step by step, the report, robot.yaml. What is measured is in `commissioning`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import typer
+from pydantic import ValidationError
+
+from canbase_commissioning.calibration import JudgeError
+from canbase_commissioning.edits import (
+    Edit,
+    commissioned_edits,
+    edited,
+    floor_edits,
+    identity_edits,
+    wheel_edits,
+    with_edits,
+)
+from canbase_commissioning.floor import FloorFound, measure_floor
+from canbase_commissioning.guide import Ask, CommissionError, Script, Tell
+from canbase_commissioning.onbus.bus_session import BusLine, open_line
+from canbase_commissioning.onbus.moving import refuse_beside_masters, run_script
+from canbase_commissioning.onbus.operator import Person, Stopped, stopping_signals
+from canbase_commissioning.powered_drives import Rig, RigError
+from canbase_commissioning.report import Results, markdown, verdict
+from canbase_commissioning.self_stop_test import Outcome, get_ready, prove
+from canbase_commissioning.wheel_direction import AGAIN, WheelFound, find_direction, measure_scale
+from canbase_config.derive import mps_per_bit
+from canbase_config.errors import ConfigError
+from canbase_config.load import load_robot
+from canbase_config.robot import Robot
+from canbase_runtime.terminal import FAILED, fail, load_config
+from canbase_runtime.version import installed_version
+
+WHEELS_UP = (
+    "WHEELS UP: all wheels off the floor, nothing near them, the emergency stop (STO) at hand and tried. "
+    "Enter stops everything at any time. Is it so?"
+)
+WHEELS_DOWN = "Now on the floor: put the robot down, 3 m free all around, the emergency stop at hand. Is it so?"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What is to be done. `steps`: directions, scale, proof, floor."""
+
+    steps: frozenset[str]
+    speed_mps: float
+    revolutions: float
+    distance_m: float
+    turns: float
+    report: Path | None
+    """None: beside robot.yaml, with the robot's name and the date."""
+
+
+def run(config: Path, plan: Plan, answers: Path | None, *, yes: bool, dry_run: bool) -> None:
+    """All steps; exits with 1 when the self-stop is not proven, or not all was done."""
+    robot = load_config(config).robot
+    person = Person(answers, yes=yes)
+    results = Results(dry_run=dry_run)
+    with open_line(robot.bus) as line, stopping_signals():
+        refuse_beside_masters(line)
+        try:
+            _go(line, robot, plan, person, results)
+            results.edits += identity_edits(robot, results.boots)
+        except (CommissionError, RigError, JudgeError, ValidationError) as error:
+            results.ended_by = str(error)
+        except Stopped as stopped:
+            results.ended_by = str(stopped)
+    results.edits += commissioned_edits(robot, results.edits, sorted(results.done))
+    _write_report(robot, plan.report, config, results)
+    _change(config, results.edits, dry_run=dry_run)
+    person.tell(Tell(verdict(results), is_loud=not results.proven))
+    if results.ended_by:
+        fail(results.ended_by, FAILED)
+    if "proof" in plan.steps and not results.proven:
+        raise typer.Exit(FAILED)
+
+
+def _go(line: BusLine, robot: Robot, plan: Plan, person: Person, results: Results) -> None:
+    if plan.steps & {"directions", "scale"}:
+        robot = _measure_wheels(line, robot, plan, person, results)
+        results.done |= {step for step in ("directions", "scale") if step in plan.steps}
+    if "proof" in plan.steps:
+        results.outcomes = run_script(line, robot, lambda rig: _proof(rig, plan, results), person)
+        for outcome in results.outcomes:
+            person.tell(Tell(str(outcome), is_loud=not outcome.stopped))
+        results.done |= {"proof"} if results.proven else set()
+    if "floor" not in plan.steps:
+        return
+    if "proof" in plan.steps and not results.proven:
+        person.tell(Tell("the measured drive on the floor is left out: the self-stop is not proven", is_loud=True))
+        return
+    results.floor = run_script(line, robot, lambda rig: _floor(rig, plan, results), person)
+    results.edits += floor_edits(robot, results.floor)
+    results.done.add("floor")
+
+
+def _measure_wheels(line: BusLine, robot: Robot, plan: Plan, person: Person, results: Results) -> Robot:
+    """The robot with what was found. A correction is measured again before anything else relies on it.
+
+    Raises CommissionError when the second measurement contradicts the first: then nothing is changed.
+    """
+    results.wheels = run_script(line, robot, lambda rig: _wheels(rig, plan, results), person)
+    edits = wheel_edits(robot, results.wheels)
+    if not edits:
+        return robot
+    corrected = with_edits(robot, edits)
+    wrong = {robot.drives[int(edit.loc[1])].joint for edit in edits}
+    for edit in edits:
+        person.tell(Tell(f"robot.yaml is wrong: {edit}. It is measured again with the corrected value", is_loud=True))
+    found = run_script(
+        line, corrected, lambda rig: _wheels(rig, plan, results, wrong, _gentler(robot, rig.robot)), person
+    )
+    other = wheel_edits(corrected, found)
+    if other:
+        told = "; ".join(str(edit) for edit in other)
+        raise CommissionError(
+            f"the second measurement contradicts the first ({told}): measure again from the beginning"
+        )
+    results.edits += edits
+    return corrected
+
+
+def _gentler(before: Robot, after: Robot) -> dict[str, float]:
+    """By joint, the share of the speed at which the motor turns no faster with the corrected scale than before it."""
+    radius_m = before.base.wheel_radius_m
+    pairs = zip(before.drives, after.drives, strict=True)
+    return {new.joint: min(1.0, abs(mps_per_bit(new, radius_m) / mps_per_bit(old, radius_m))) for old, new in pairs}
+
+
+def _wheels(
+    rig: Rig, plan: Plan, results: Results, again: Collection[str] = (), shares: Mapping[str, float] | None = None
+) -> Script[list[WheelFound]]:
+    """All wheels, or those of `again`, at these shares of the speed."""
+    suffix = AGAIN if again else ""
+    yield Ask(f"wheels_up{suffix}", WHEELS_UP, confirms=True)
+    yield from get_ready(rig)
+    _note_boots(rig, results)
+    found = []
+    for drive in rig.robot.drives:
+        if again and drive.joint not in again:
+            continue
+        wheel = WheelFound(drive.joint, drive.direction)
+        if "directions" in plan.steps:
+            wheel = yield from find_direction(rig, drive, suffix)
+        if "scale" in plan.steps:
+            speed_mps = plan.speed_mps * (shares or {}).get(drive.joint, 1.0)
+            scale, turned = yield from measure_scale(rig, drive, plan.revolutions, speed_mps, suffix)
+            wheel = WheelFound(drive.joint, wheel.direction, scale, turned)
+        found.append(wheel)
+    return found
+
+
+def _proof(rig: Rig, plan: Plan, results: Results) -> Script[tuple[Outcome, ...]]:
+    yield Ask("proof", f"The proof, wheels still up: all wheels turn at {plan.speed_mps:g} m/s. Ready?", confirms=True)
+    yield from get_ready(rig)
+    _note_boots(rig, results)
+    return (yield from prove(rig, plan.speed_mps))
+
+
+def _floor(rig: Rig, plan: Plan, results: Results) -> Script[FloorFound]:
+    yield Ask("wheels_down", WHEELS_DOWN, confirms=True)
+    yield from get_ready(rig)
+    _note_boots(rig, results)
+    return (yield from measure_floor(rig, plan.distance_m, plan.turns, plan.speed_mps))
+
+
+def _note_boots(rig: Rig, results: Results) -> None:
+    results.boots = {node_id: node.report for node_id, node in rig.nodes.items() if node.report is not None}
+
+
+def _write_report(robot: Robot, wanted: Path | None, config: Path, results: Results) -> None:
+    """To a file of its own: a report of another day, or of another robot, is never overwritten."""
+    when = time.strftime("%Y-%m-%d %H:%M %z")
+    path = wanted or config.with_name(f"commissioning-{robot.name}-{time.strftime('%Y%m%d-%H%M%S')}.md")
+    text = markdown(robot, results, when, installed_version())
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        typer.echo(text)
+        fail(f"the report above cannot be written: {error}", FAILED)
+    typer.echo(f"report: {path}")
+
+
+def _change(config: Path, edits: list[Edit], *, dry_run: bool) -> None:
+    """The new file takes the old one's place only when it is good; the old one stays beside it."""
+    for edit in edits:
+        typer.echo(f"{'would change' if dry_run else 'changed'} {edit}")
+    if not edits or dry_run:
+        return
+    text = config.read_text(encoding="utf-8")
+    new = config.with_name(f".{config.name}.new.yaml")
+    try:
+        new.write_text(edited(text, edits), encoding="utf-8")
+        load_robot(new)
+        config.with_name(f"{config.name}.before").write_text(text, encoding="utf-8")
+        new.replace(config)
+    except (OSError, ConfigError, KeyError) as error:
+        new.unlink(missing_ok=True)
+        fail(f"{config} is left as it was; write the values above into it by hand: {error}", FAILED)

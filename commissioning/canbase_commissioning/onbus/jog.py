@@ -1,0 +1,111 @@
+"""`canbase jog` on the bus and on the terminal. What a held key means is in `commissioning/jog.py`."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+import termios
+import time
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+import typer
+
+from canbase_commissioning.guide import CommissionError, Guide, Script
+from canbase_commissioning.jog import JogSession
+from canbase_commissioning.onbus.bus_session import BusLine, open_line
+from canbase_commissioning.onbus.moving import refuse_beside_masters
+from canbase_commissioning.onbus.operator import Stopped, stopping_signals
+from canbase_commissioning.powered_drives import Rig, RigError
+from canbase_commissioning.safe_stop import Farewell
+from canbase_commissioning.self_stop_test import get_ready
+from canbase_config.robot import Robot
+from canbase_runtime.terminal import FAILED, WRONG_INPUT, colour, fail, load_config
+
+SHOW_S: Final = 0.2
+CANNOT_STOP: Final = (
+    "this drive does NOT stop by itself when this program is killed (SIGKILL) or the computer dies: "
+    "only STO stops it then. Hand on the emergency stop, wheels up"
+)
+STOPS: Final = "killed (SIGKILL), it leaves the wheel to the drive, which stops by itself: {}"
+
+
+def run(config: Path | None, joint: str, speed_mps: float, *, yes: bool) -> None:
+    """Until q; exits as `canbase jog --help` says."""
+    robot = load_config(config).robot
+    joints = [drive.joint for drive in robot.drives]
+    if joint not in joints:
+        fail(f"there is no wheel {joint!r} in robot.yaml, expected one of {', '.join(joints)}", WRONG_INPUT)
+    if not sys.stdin.isatty():
+        fail("a dead-man key needs a terminal: run it on one", WRONG_INPUT)
+    if not yes and not typer.confirm("WHEELS UP, nothing near them, the emergency stop (STO) at hand and tried?"):
+        fail("not confirmed", FAILED)
+    with open_line(robot.bus) as line, stopping_signals():
+        refuse_beside_masters(line)
+        try:
+            _jog(line, robot, joint, speed_mps)
+        except (RigError, CommissionError, OSError) as error:
+            fail(f"{error}. The wheel was stopped, its power is off", FAILED)
+        except Stopped as stopped:
+            typer.secho(f"canbase: {stopped}: the wheel was stopped, its power is off", err=True, color=colour())
+            raise typer.Exit(128 + stopped.number) from stopped
+
+
+def _jog(line: BusLine, robot: Robot, joint: str, speed_mps: float) -> None:
+    rig = Rig(robot)
+    try:
+        line.run(Guide(rig, _boot(rig), lambda told: typer.echo(told.text)))
+        _say_what_happens_after_a_kill(rig, joint)
+        session = JogSession(rig, joint, speed_mps)
+        with _single_keys():
+            _hold(line, session)
+    finally:
+        line.run(Farewell(rig))
+
+
+def _boot(rig: Rig) -> Script[bool]:
+    yield from get_ready(rig)
+    return True
+
+
+def _hold(line: BusLine, session: JogSession) -> None:
+    shown_at = 0.0
+    while not session.done:
+        line.turn(session)
+        now = time.monotonic()
+        if select.select([sys.stdin], [], [], 0.0)[0]:
+            text = os.read(sys.stdin.fileno(), 64).decode("latin-1")
+            if not text:
+                raise CommissionError("the terminal is gone")
+            session.press(text, now)
+        if now - shown_at >= SHOW_S:
+            shown_at = now
+            sys.stdout.write(f"\r{session.line:<78}")
+            sys.stdout.flush()
+    sys.stdout.write("\n")
+
+
+def _say_what_happens_after_a_kill(rig: Rig, joint: str) -> None:
+    report = rig.report(joint)
+    if report is None or not report.stops_by_itself:
+        typer.secho(CANNOT_STOP, fg=typer.colors.RED, bold=True, color=colour())
+    else:
+        typer.echo(STOPS.format(report.self_stop))
+    typer.echo("hold w (forward) or s (backward); release stops; q ends")
+
+
+@contextmanager
+def _single_keys() -> Iterator[None]:
+    """Keys come one by one and unseen; Ctrl-C stays a signal. What was pressed before does not count."""
+    number = sys.stdin.fileno()
+    before = termios.tcgetattr(number)
+    tty.setcbreak(number)
+    termios.tcflush(number, termios.TCIFLUSH)
+    try:
+        yield
+    finally:
+        termios.tcsetattr(number, termios.TCSADRAIN, before)

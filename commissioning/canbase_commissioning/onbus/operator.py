@@ -1,0 +1,103 @@
+"""The person at the machine: answers from the terminal while the bus goes on, or from a file."""
+
+from __future__ import annotations
+
+import select
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+
+import typer
+
+from canbase_commissioning.guide import Ask, CommissionError, Tell
+from canbase_config.errors import ConfigError
+from canbase_config.yaml_file import read_yaml
+from canbase_runtime.terminal import WRONG_INPUT, colour, fail
+
+
+class Stopped(BaseException):
+    """A signal asked for the end."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"stopped by {signal.Signals(number).name}")
+        self.number = number
+
+
+@contextmanager
+def stopping_signals() -> Iterator[None]:
+    """SIGINT, SIGTERM and SIGHUP raise `Stopped` inside, once: what runs on the way out is not broken off."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+    def stop(number: int, _frame: FrameType | None) -> None:
+        for each in numbers:
+            signal.signal(each, signal.SIG_IGN)
+        raise Stopped(number)
+
+    before = {number: signal.signal(number, stop) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+class Person:
+    """Asks on the terminal, or takes the answers of a file; `yes` confirms what wants a yes."""
+
+    def __init__(self, answers: Path | None, *, yes: bool) -> None:
+        """Exits with 2 when the file cannot be read."""
+        self._yes = yes
+        self._has_terminal = sys.stdin.isatty()  # asked once: one that has gone says that it is none
+        try:
+            values = read_yaml(answers).values if answers else {}
+        except ConfigError as error:
+            fail(str(error), WRONG_INPUT)
+        self._answers = {str(key): str(value) for key, value in values.items()}
+
+    def tell(self, line: Tell) -> None:
+        """A line of the procedure."""
+        typer.secho(line.text, bold=line.is_loud, fg=typer.colors.RED if line.is_loud else None, color=colour())
+
+    def ask(self, question: Ask, turn: Callable[[], None]) -> str:
+        """The words of the answer; `turn` keeps the bus going meanwhile. Raises CommissionError without a person."""
+        known = "yes" if question.confirms and self._yes else self._answers.get(question.key)
+        if known is not None:
+            typer.echo(f"{question.text} {known}")
+            return known
+        if not self._has_terminal:
+            raise CommissionError(f"no answer to {question.key}: run it on a terminal, or give it in --answers")
+        hint = " [yes/no]" if question.confirms else ""
+        typer.secho(f"{question.text}{hint} ", bold=True, nl=False, color=colour())
+        while not _has_line():
+            turn()
+        return _line()
+
+    def again(self, question: Ask, error: ValueError) -> None:
+        """The words made no sense. Raises CommissionError when they came from a file: they stay the same."""
+        if question.key in self._answers:
+            raise CommissionError(f"{question.key} in --answers: {error}") from error
+        typer.secho(f"{error}; please again", fg=typer.colors.YELLOW, color=colour())
+
+    def interrupts(self) -> bool:
+        """Whether Enter was pressed while nothing was asked. Raises CommissionError when the terminal is gone."""
+        if self._has_terminal and _has_line():
+            _line()
+            return True
+        return False
+
+
+def _has_line() -> bool:
+    return bool(select.select([sys.stdin], [], [], 0.0)[0])
+
+
+def _line() -> str:
+    try:
+        text = sys.stdin.readline()
+    except OSError as error:  # EIO, of a terminal that was hung up
+        raise CommissionError("the terminal is gone") from error
+    if not text:
+        raise CommissionError("the terminal is gone")
+    return text.strip()

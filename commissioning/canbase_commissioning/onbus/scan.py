@@ -1,0 +1,92 @@
+"""`canbase scan` on the bus, and its table. What is queried and concluded is in `commissioning`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import asdict
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from canbase_commissioning.bus_monitor import OURS, ListenSession
+from canbase_commissioning.identification import Roster
+from canbase_commissioning.onbus.bus_session import BusLine, open_line
+from canbase_commissioning.scan_rows import ScanRow, missing, scan_rows
+from canbase_config.robot import Bus, Robot
+from canbase_driver.cia301.nmt import MAX_NODE_ID
+from canbase_runtime.terminal import FAILED, colour, fail
+
+
+def run(
+    bus: Bus, robot: Robot | None, seconds: float, timeout_s: float, *, passive: bool, yes: bool, as_json: bool
+) -> None:
+    """Listens, asks, prints; exits with 1 when nobody or not everybody is there."""
+    with open_line(bus) as line:
+        listening = ListenSession(seconds)
+        line.run(listening)
+        heard = listening.heard
+        masters = heard.masters(listening.now)
+        asks = not passive and (not masters or _may_ask(masters, yes))
+        roster = Roster(
+            (n for n in range(1, MAX_NODE_ID + 1) if n not in OURS), heard, timeout_s, with_texts=not masters
+        )
+        if asks:
+            line.run(roster)
+        rows = scan_rows(heard.nodes, roster.cards, robot)
+        problem = _bus_problem(line, rows)
+    _print(rows, as_json)
+    for reason in roster.lost.values():
+        typer.echo(f"gone while it was asked: {reason}", err=True)
+    absent = missing(rows)
+    if problem or len(absent) == len(rows):
+        fail(problem or "no node is heard, and none answers: power, cable, termination, bit rate?", FAILED)
+    if absent:
+        fail(f"node {', '.join(map(str, absent))} of robot.yaml is not on the bus: power, cable, node id?", FAILED)
+
+
+def _may_ask(masters: list[str], yes: bool) -> bool:
+    """Somebody else commands this bus: our questions are harmless to it in most cases, not in all."""
+    signs = "\n".join(f"  {sign}" for sign in masters)
+    typer.secho(f"another master is on this bus:\n{signs}", err=True, fg=typer.colors.YELLOW, color=colour())
+    if yes:
+        return True
+    told = "scan would send SDO reads beside it; an answer to them may confuse a master that is asking the same node"
+    if not sys.stdin.isatty():
+        typer.echo(f"{told}. Only listened; with --yes it asks nevertheless", err=True)
+        return False
+    return typer.confirm(f"{told}. Ask nevertheless?", default=False, err=True)
+
+
+def _bus_problem(line: BusLine, rows: list[ScanRow]) -> str:
+    if line.problem:
+        return line.problem
+    if line.send_errors and not any(row.nmt_state for row in rows):
+        return f"the bus did not take {line.send_errors} frames: nobody acknowledges them (power, cable, bit rate?)"
+    return ""
+
+
+def _print(rows: list[ScanRow], as_json: bool) -> None:
+    if as_json:
+        typer.echo(json.dumps([asdict(row) for row in rows]))
+    elif rows:
+        Console().print(_table(rows))
+
+
+def _table(rows: list[ScanRow]) -> Table:
+    title = f"{len(rows)} nodes; identity: vendor:product:revision:serial (1018h, hexadecimal)"
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
+    for column in ("node", "what", "state", "heartbeat", "profile", "identity", "robot.yaml"):
+        table.add_column(column, overflow="fold")
+    for row in rows:
+        identity = ":".join("–" if n is None else f"{n:X}" for n in _identity(row))
+        cells = (str(row.node_id), row.what, row.nmt_state, row.heartbeat, row.profile or "–", identity, row.in_robot)
+        table.add_row(*(Text(cell) for cell in cells))
+    return table
+
+
+def _identity(row: ScanRow) -> tuple[int | None, ...]:
+    return row.vendor_id, row.product_code, row.revision, row.serial

@@ -1,0 +1,1 @@
+"""Finds out what is wrong with a robot: checks, symptoms, evidence, the support bundle."""

@@ -1,0 +1,84 @@
+"""What goes into a support bundle, and what never does. Pure: texts and names in, texts out.
+
+Files are named one by one, never taken by the folder: the keys of SROS2 lie beside robot.yaml.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from canbase_doctor.service_environment import arguments
+from canbase_runtime.own_modules import module_command
+
+ENVIRONMENT: Final = re.compile(r"(ROS|RMW|CANBASE|AMENT|COLCON|FASTDDS|FASTRTPS|CYCLONEDDS|PYTHON|_ROS)[A-Z0-9_]*")
+"""Variables whose values are taken; of all others not even the names."""
+FORBIDDEN: Final = re.compile(
+    r"(?i)(\.(pem|key|p12|pfx|p7s|crt|cer)$)|(^|/)(keys|keystore|enclaves|private|\.ssh)(/|$)"
+)
+"""No file of such a name or below such a folder is taken, whoever names it."""
+BOXES: Final = 5
+"""So many recordings of stops, the newest."""
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A program whose output is one file of the bundle."""
+
+    file: str
+    argv: tuple[str, ...]
+    timeout_s: float = 20.0
+    environment: Mapping[str, str] | None = None
+    """None: that of whoever asks."""
+
+
+def commands(config: Path, since: str, services: Mapping[str, str] | None = None) -> tuple[Command, ...]:
+    """All of them; `since` as journalctl takes it, `services`: their environment, by which the doctor finds them."""
+    check = module_command("canbase_cli", "config", "check", str(config))
+    doctor = module_command("canbase_cli", "doctor", "--config", str(config), *arguments(services or {}))
+    journal = ("journalctl", "--no-pager", "--since", since)
+    return (
+        Command("system/kernel.txt", ("uname", "-a")),
+        Command("system/release.txt", ("cat", "/etc/os-release")),
+        Command("system/load.txt", ("cat", "/proc/uptime", "/proc/loadavg", "/proc/meminfo")),
+        Command("system/disks.txt", ("df", "-h")),
+        Command("system/usb.txt", ("lsusb",)),
+        Command("can/interfaces.txt", ("ip", "-details", "-statistics", "link", "show", "type", "can")),
+        Command("can/interfaces.json", ("ip", "-details", "-statistics", "-json", "link", "show", "type", "can")),
+        Command("can/sockets.txt", ("sh", "-c", "head -n 50 /proc/net/can/*")),
+        Command("units/list.txt", ("systemctl", "list-units", "--all", "--no-pager", "canbase*")),
+        Command("units/status.txt", ("systemctl", "status", "--all", "--no-pager", "--lines=0", "canbase*")),
+        Command("units/show.txt", ("systemctl", "show", "--no-pager", "canbase*")),
+        Command("journal/canbase.txt", (*journal, "--output=short-precise", "--unit=canbase*"), 60.0),
+        Command("journal/canbase.json", (*journal, "--output=json", "--unit=canbase*"), 60.0),
+        Command("journal/kernel.txt", (*journal, "--output=short-precise", "--dmesg"), 60.0),
+        Command("config/check.txt", tuple(check)),
+        Command("doctor.txt", tuple(doctor), 40.0, services),
+    )
+
+
+def environment_text(environment: Mapping[str, str]) -> str:
+    """The variables that matter to canbase and ROS, one a line."""
+    return "".join(f"{name}={environment[name]}\n" for name in sorted(environment) if ENVIRONMENT.fullmatch(name))
+
+
+def allowed(path: Path) -> bool:
+    """Whether a file of this name may be taken."""
+    return FORBIDDEN.search(path.as_posix()) is None
+
+
+def newest_boxes(robot: str, found: Mapping[Path, float]) -> list[Path]:
+    """The last recordings of the robot of this name, of all robots if empty; `found`: files and modification times."""
+    begin = f"stop_{robot}_" if robot else "stop_"
+    mine = [path for path in found if path.suffix == ".asc" and path.name.startswith(begin)]
+    return sorted(mine, key=lambda path: found[path], reverse=True)[:BOXES]
+
+
+def manifest(taken: Mapping[str, str], missing: Mapping[str, str]) -> str:
+    """The table of contents; what could not be collected comes first, each with its reason."""
+    lines = ["NOT COLLECTED", *(f"  {name}: {why}" for name, why in sorted(missing.items())), ""]
+    lines += ["COLLECTED", *(f"  {name}: {what}" for name, what in sorted(taken.items())), ""]
+    return "\n".join(lines) + "Hidden: values that look like passwords, tokens or keys. Never taken: SROS2 keystores.\n"

@@ -1,0 +1,74 @@
+"""The part of `canbase doctor` that looks at the bus: listens, reads the nodes, asks the system about the interface."""
+
+from __future__ import annotations
+
+import copy
+import subprocess
+from typing import Final
+
+from canbase_commissioning.bus_monitor import Listener, ListenSession
+from canbase_commissioning.can_interface import Link, parse_link
+from canbase_commissioning.onbus.bus_session import BusLine
+from canbase_commissioning.sdo_session import Inquiry
+from canbase_config.robot import Robot
+from canbase_doctor.bus_checks import BusEvidence
+from canbase_doctor.inspection import Inspection, inspect
+from canbase_driver.boot.node_boot import sdo_client
+from canbase_driver.runtime.bus_port import BusError
+
+LISTEN_S: Final = 1.2
+"""Long enough for heartbeats of a second."""
+GAP_S: Final = 0.01
+"""Between two questions to a node beside a running driver: its own come first."""
+IP_S: Final = 5.0
+
+
+def look(robot: Robot) -> BusEvidence:
+    """What is to be seen on the bus of `robot`. Sends SDO reads alone."""
+    link = read_link(robot.bus.channel) if robot.bus.interface == "socketcan" else None
+    try:
+        line = BusLine(robot.bus)
+    except BusError as error:
+        return BusEvidence(robot, Listener(0.0), 0.0, str(error), link)
+    with line:
+        listening = ListenSession(LISTEN_S)
+        line.run(listening)
+        heard, now = copy.deepcopy(listening.heard), listening.now  # what our own questions bring is no news
+        inquiry = ask(robot, listening.heard)
+        line.run(inquiry)
+        problem = line.problem
+    return evidence(robot, heard, now, inquiry, problem, link)
+
+
+def ask(robot: Robot, heard: Listener) -> Inquiry[Inspection]:
+    """The reading of all nodes."""
+    by_node = {d.node_id: tuple(e for e in robot.drives if e.node_id == d.node_id) for d in robot.drives}
+    return Inquiry(
+        {node_id: inspect(node_id, drives, robot) for node_id, drives in by_node.items()},
+        heard,
+        lambda node_id: sdo_client(node_id, by_node[node_id][0].kind.sdo, robot.timeouts.sdo_s),
+        gap_s=GAP_S if heard.driver_lives else 0.0,
+    )
+
+
+def evidence(
+    robot: Robot, heard: Listener, now: float, inquiry: Inquiry[Inspection], problem: str, link: Link | None
+) -> BusEvidence:
+    """What came of it."""
+    unread = {
+        node_id: "its SDO channel is in use all the time: the driver boots it" if task.blocked else str(task.error)
+        for node_id, task in inquiry.tasks.items()
+        if task.result is None
+    }
+    found = {node_id: task.result for node_id, task in inquiry.tasks.items() if task.result is not None}
+    return BusEvidence(robot, heard, now, problem, link, found, unread)
+
+
+def read_link(channel: str) -> Link | None:
+    """What `ip` tells about an interface; None where it cannot."""
+    words = ["ip", "-details", "-statistics", "-json", "link", "show", channel]
+    try:
+        done = subprocess.run(words, capture_output=True, text=True, timeout=IP_S, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return parse_link(done.stdout)

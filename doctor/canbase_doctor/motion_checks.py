@@ -1,0 +1,144 @@
+"""Checks of `canbase doctor --symptom` about motion: its sources, mux and filter, and the topics that report it.
+
+Pure: from `Evidence` to one `Check` each. symptoms.py says which belong to which symptom.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from canbase_action_server.preconditions import action_source
+from canbase_doctor.checks import Check, fail, ok, too_slow, warn
+from canbase_doctor.evidence import Evidence
+
+CLOCKS_APART_S = 1.0
+"""A stamp that is farther from this computer's clock was made with another one."""
+BUSY_S = 10.0
+"""Older stamps than that no busy computer explains."""
+TWIST = {True: "geometry_msgs/msg/TwistStamped", False: "geometry_msgs/msg/Twist"}
+WATCHDOG_OK = "ok"
+
+
+def zeros_are_ordered(seen: Evidence) -> Check:
+    """Does the action's source order zero, or nothing, when no goal runs?"""
+    name, last = "zero on cmd_vel_action", seen.on("cmd_vel_action").last
+    nodes = [endpoint.node for endpoint in seen.publishers.get("cmd_vel_action", ())]
+    if len(nodes) > 1:
+        return fail(name, f"published by {', '.join(nodes)}", "end all but drive_distance_server")
+    if seen.running:
+        return warn(name, f"goal {seen.running[0].uuid} runs: the base moves by right", "cancel it, then call doctor")
+    if last is not None and _moves(last):
+        return fail(
+            name, f"no goal runs, yet {nodes or 'somebody'} orders motion", "a defect of the server: restart it"
+        )
+    return ok(name, "silent" if last is None else "zero")
+
+
+def mux_owner(seen: Evidence) -> Check:
+    """Does nobody else drive, past the mux or through it?"""
+    name, mux = "who owns the base", seen.inputs.mux
+    for topic in ("cmd_vel_mux", "cmd_vel"):
+        nodes = [endpoint.node for endpoint in seen.publishers.get(topic, ())]
+        if len(nodes) > 1:
+            return fail(
+                name, f"{topic} is published by {', '.join(nodes)}", "every source goes through a topic of mux.sources"
+            )
+    if mux is None:
+        return fail(name, "velocity_mux is silent", "start canbase velocity")
+    if mux.active not in ("", action_source(seen.robot)):
+        return fail(name, f"{mux.active} drives", "let go of it, or end its node")
+    return ok(name, mux.active or "nobody drives")
+
+
+def driver_watchdog(seen: Evidence) -> Check:
+    """Does the driver turn silence and zero into a standstill, and does the watchdog look after it?"""
+    name, status, order = "driver and watchdog", seen.on("motor_driver/status").last, seen.on("cmd_vel").last
+    if status is None:
+        return fail(name, "motor_driver is silent", "use the emergency stop; then look at its log")
+    if status.watchdog != WATCHDOG_OK:
+        return fail(name, f"the watchdog is {status.watchdog}", "use the emergency stop; start it, canbase reset")
+    if not status.standstill and (order is None or not _moves(order)):
+        return fail(
+            name, "zero is ordered, but a wheel turns", "use the emergency stop; then brake, slope, or drive settings"
+        )
+    return ok(name, "the base stands" if status.standstill else "the base moves as cmd_vel orders")
+
+
+def odometry(seen: Evidence) -> Check:
+    """Is it there, often enough, in the right frames, by this clock?"""
+    name, heard, base = "odometry", seen.on("odom"), seen.robot.base
+    if heard.last is None:
+        return fail(name, "nothing on odom", "is motor_driver running, and do the drives send feedback?")
+    frames = (heard.last.header.frame_id, heard.last.child_frame_id)
+    if frames != (base.odom_frame, base.base_frame):
+        return fail(
+            name,
+            f"from {frames[0]!r} to {frames[1]!r}",
+            f"expected {base.odom_frame} to {base.base_frame}: another publisher?",
+        )
+    apart_s = seen.wall_s - _stamp_s(heard.last)
+    if abs(apart_s) > CLOCKS_APART_S:
+        advice = "clocks differ: use_sim_time on a real robot, or no chrony"
+        return too_slow(_excuse(seen, apart_s), name, f"its stamps are {apart_s:.1f} s old", advice)
+    return ok(name, f"at {heard.rate_hz:.0f} Hz, by this clock")
+
+
+def transform(seen: Evidence) -> Check:
+    """Does tf carry odom → base_link?"""
+    name, base, heard = "tf", seen.robot.base, seen.on("tf")
+    if "tf" not in seen.heard:
+        return warn(name, "this ROS 2 has no tf2_msgs: not looked at", "install ros-<distro>-tf2-msgs")
+    pairs = {(each.header.frame_id, each.child_frame_id) for message in heard.messages for each in message.transforms}
+    if (base.odom_frame, base.base_frame) in pairs:
+        return ok(name, f"{base.odom_frame} → {base.base_frame}")
+    return fail(
+        name, f"{base.odom_frame} → {base.base_frame} is missing", "is motor_driver running, and nobody remaps tf?"
+    )
+
+
+def sensors(seen: Evidence) -> Check:
+    """Does the scan that the filter needs come, by this clock?"""
+    name, scan = "stamps of the sensors", seen.robot.safety.scan
+    last = seen.on(scan.topic).last
+    if last is None and not scan.required:
+        return ok(name, "no scan is required")
+    if last is None:
+        return fail(name, f"nothing on {scan.topic}, and it is required", "start the scanner; its QoS is sensor data")
+    apart_s = seen.wall_s - _stamp_s(last)
+    if abs(apart_s) > CLOCKS_APART_S:
+        found = f"{scan.topic} is stamped {apart_s:.1f} s ago"
+        advice = "clocks differ: use_sim_time on a real robot, or no chrony"
+        return too_slow(_excuse(seen, apart_s), name, found, advice)
+    return ok(name, f"{scan.topic} is stamped {apart_s:.2f} s ago")
+
+
+def command_interface(seen: Evidence) -> Check:
+    """Do all senders of velocities send what the mux reads, and does the driver hear its output?"""
+    name = "command interface"
+    for source, described in seen.robot.mux.sources.items():
+        for endpoint in seen.publishers.get(described.topic, ()):
+            if endpoint.type != TWIST[described.stamped]:
+                found = (
+                    f"{endpoint.node} sends {endpoint.type} on {described.topic}, expected {TWIST[described.stamped]}"
+                )
+                return fail(
+                    name,
+                    found,
+                    f"mux.sources.{source}.stamped: {str(not described.stamped).lower()}, or let it send stamped ones",
+                )
+    if not seen.subscribers.get("cmd_vel"):
+        return fail(name, "nobody listens on cmd_vel", "start canbase driver, in the same namespace")
+    return ok(name, f"{len(seen.robot.mux.sources)} sources with the right type; the driver listens")
+
+
+def _excuse(seen: Evidence, apart_s: float) -> str:
+    """Stamps from the future, or very old ones, are no matter of a busy computer."""
+    return seen.overload.sentence if 0.0 < apart_s < BUSY_S else ""
+
+
+def _moves(order: Any) -> bool:
+    return bool(order.twist.linear.x != 0.0 or order.twist.angular.z != 0.0)
+
+
+def _stamp_s(message: Any) -> float:
+    return float(message.header.stamp.sec) + float(message.header.stamp.nanosec) * 1e-9

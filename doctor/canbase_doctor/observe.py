@@ -1,0 +1,173 @@
+"""The shell of `canbase doctor`: listens to a running robot for a while, and returns what it saw. Orders nothing."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from dataclasses import replace
+from functools import partial
+from typing import Any, Final
+
+import rclpy
+from action_msgs.msg import GoalStatusArray
+from canbase.msg import DriverStatus, MuxState, SafetyState
+from geometry_msgs.msg import TwistStamped
+from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import Log
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import LaserScan
+
+from canbase_action_server import messages
+from canbase_action_server.inputs import Inputs
+from canbase_action_server.preconditions import action_source
+from canbase_config.load import Loaded
+from canbase_config.robot import Robot
+from canbase_doctor.evidence import ACTIONS, DOCTOR, Endpoint, Evidence, Goal, Heard
+from canbase_doctor.overload import Overload, load_per_core
+from canbase_doctor.probes import SERVER, TYPES, Prober
+from canbase_doctor.server_processes import server_processes, talks_by
+from canbase_runtime.foreign_text import clean
+
+try:
+    from tf2_msgs.msg import TFMessage as TFMessage
+except ModuleNotFoundError:  # not every ROS 2 has it, and canbase builds it along only where ROS 2 does not
+    TFMessage = None
+
+LATCHED: Final = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+BEST_EFFORT: Final = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Understands every publisher, reliable or not."""
+SLICE_S: Final = 0.1
+STATES: Final = ("motor_driver/status", "safety_filter/state", "velocity_mux/state", "odom")
+"""A robot that is well says all of them."""
+DISCOVERY_S: Final = 5.0
+"""So long their first words and the first answer of the action server may take: nobody is found at once."""
+STATUS: Final = "/_action/status"
+
+
+def topics(robot: Robot) -> dict[str, tuple[type, QoSProfile]]:
+    """What doctor listens to."""
+    found: dict[str, tuple[type, QoSProfile]] = {
+        "motor_driver/status": (DriverStatus, BEST_EFFORT),
+        "safety_filter/state": (SafetyState, LATCHED),
+        "velocity_mux/state": (MuxState, LATCHED),
+        "odom": (Odometry, BEST_EFFORT),
+        "cmd_vel_action": (TwistStamped, BEST_EFFORT),
+        "cmd_vel": (TwistStamped, BEST_EFFORT),
+        robot.safety.scan.topic: (LaserScan, BEST_EFFORT),
+        "/rosout": (Log, LATCHED),
+    }
+    for action, kind in TYPES.items():
+        found[f"{action}{STATUS}"] = (GoalStatusArray, LATCHED)
+        found[f"{action}/_action/feedback"] = (kind.Impl.FeedbackMessage, BEST_EFFORT)
+    return found if TFMessage is None else found | {"tf": (TFMessage, BEST_EFFORT)}
+
+
+class Listener:
+    """Keeps what comes on the topics."""
+
+    def __init__(self, node: Node, robot: Robot) -> None:
+        self._kept: dict[str, list[tuple[float, Any]]] = {}
+        for topic, (kind, qos) in topics(robot).items():
+            self._kept[topic] = []
+            node.create_subscription(kind, topic, self._keeper(self._kept[topic]), qos)
+
+    def heard(self) -> dict[str, Heard]:
+        """By topic."""
+        return {
+            topic: Heard(tuple(message for _, message in kept), tuple(at_s for at_s, _ in kept))
+            for topic, kept in self._kept.items()
+        }
+
+    @property
+    def found_s(self) -> float:
+        """When each of STATES had come once; infinite before."""
+        return max(self._kept[topic][0][0] if self._kept[topic] else math.inf for topic in STATES)
+
+    def goals(self) -> tuple[Goal, ...]:
+        """As each action told them last."""
+        last = {action: self._kept[f"{action}{STATUS}"][-1:] for action in ACTIONS}
+        return tuple(
+            Goal(action, bytes(each.goal_info.goal_id.uuid).hex(), each.status)
+            for action, kept in last.items()
+            for _, message in kept
+            for each in message.status_list
+        )
+
+    def _keeper(self, kept: list[tuple[float, Any]]) -> Any:
+        return lambda message: kept.append((time.monotonic(), clean(message)))
+
+
+def observe(loaded: Loaded, ros_args: list[str], seconds: float) -> Evidence:
+    """What a robot says of itself within `seconds` [s] after it was found, or was not."""
+    rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = rclpy.create_node(DOCTOR, enable_rosout=False)
+        listener, prober = Listener(node, loaded.robot), Prober(node)
+        until, late_s = time.monotonic() + DISCOVERY_S + seconds, 0.0
+        while (left_s := until - time.monotonic()) > 0.0:
+            began_s = time.monotonic()
+            rclpy.spin_once(node, timeout_sec=min(SLICE_S, left_s))
+            late_s = max(late_s, time.monotonic() - began_s - SLICE_S)
+            until = min(until, max(listener.found_s, prober.first_answer_s) + seconds)
+            prober.step(listener.goals())
+        return replace(_evidence(loaded, node, listener, prober), overload=Overload(late_s, load_per_core()))
+    finally:
+        rclpy.try_shutdown()
+
+
+def _evidence(loaded: Loaded, node: Node, listener: Listener, prober: Prober) -> Evidence:
+    heard = listener.heard()
+    names = {*topics(loaded.robot), *(source.topic for source in loaded.robot.mux.sources.values()), "cmd_vel_mux"}
+    return Evidence(
+        robot=loaded.robot,
+        source=str(loaded.path),
+        now=time.monotonic(),
+        namespace=node.get_namespace(),
+        wall_s=time.time(),
+        heard=heard,
+        inputs=_inputs(heard, action_source(loaded.robot)),
+        steps=_steps(heard["/rosout"], node.get_namespace()),
+        servers=_servers(node),
+        publishers={name: _endpoints(node.get_publishers_info_by_topic(name)) for name in names},
+        subscribers={name: _endpoints(node.get_subscriptions_info_by_topic(name)) for name in names},
+        goals=listener.goals(),
+        processes=server_processes(),
+        environment=talks_by("self"),
+        answers=prober.answers(),
+    )
+
+
+def _inputs(heard: dict[str, Heard], own_source: str) -> Inputs:
+    def last(topic: str, read: Any) -> Any:
+        return read(heard[topic].last, heard[topic].times_s[-1]) if heard[topic].messages else None
+
+    return Inputs(
+        odometry=last("odom", messages.odometry_in),
+        safety=last("safety_filter/state", messages.safety_in),
+        driver=last("motor_driver/status", messages.driver_in),
+        mux=last("velocity_mux/state", partial(messages.mux_in, own_source=own_source)),
+    )
+
+
+def _steps(log: Heard, namespace: str) -> tuple[dict[str, Any], ...]:
+    name = ".".join([*filter(None, namespace.split("/")), SERVER])
+    lines = [line for line in log.messages if line.name == name and line.msg.startswith('{"uuid"')]
+    return tuple(json.loads(line.msg) | {"at_s": _seconds(line.stamp)} for line in lines)
+
+
+def _seconds(stamp: Any) -> float:
+    return float(stamp.sec) + float(stamp.nanosec) * 1e-9
+
+
+def _servers(node: Node) -> dict[str, tuple[Endpoint, ...]]:
+    names = [name for name, _ in node.get_topic_names_and_types() if name.endswith(STATUS)]
+    found = {name.removesuffix(STATUS): _endpoints(node.get_publishers_info_by_topic(name)) for name in names}
+    return {name: endpoints for name, endpoints in found.items() if endpoints}
+
+
+def _endpoints(infos: Any) -> tuple[Endpoint, ...]:
+    found = (Endpoint(f"{info.node_namespace.rstrip('/')}/{info.node_name}", info.topic_type) for info in infos)
+    return tuple(endpoint for endpoint in found if not endpoint.node.endswith(f"/{DOCTOR}"))

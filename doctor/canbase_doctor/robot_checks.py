@@ -1,0 +1,220 @@
+"""The checks of `canbase doctor` without --symptom: whether every part is there and reports that all is well.
+
+Pure: from `Evidence` to rows. `CHECKS` is the order in which they are shown: from what explains most to the rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from canbase.msg import DriverStatus, SafetyState
+
+from canbase_doctor.checks import Check, fail, ok, warn
+from canbase_doctor.evidence import Evidence
+
+UNFOLLOWED = {
+    True: "release the joystick, or let that program order zero (docs/velocity.md, Neutral start)",
+    False: "look at the network between that sender and the robot, and at the clock of the sender",
+}
+"""What to do about a source that is not followed, by whether it waits for a zero."""
+SILENT_S = 1.5
+"""A state that was received longer ago says nothing: the slowest one comes every 0.5 s."""
+HANGS = "its process hangs, or its timers stand still: look at its log, and restart it"
+PARTS_RUN = "is it running (canbase up), in this namespace and ROS_DOMAIN_ID?"
+STATES = {
+    DriverStatus.OFFLINE: "offline",
+    DriverStatus.BOOTING: "booting",
+    DriverStatus.DISARMED: "disarmed",
+    DriverStatus.ENABLING: "enabling",
+    DriverStatus.ENABLED: "enabled",
+    DriverStatus.STOPPING: "stopping",
+    DriverStatus.LATCHED: "latched",
+}
+ON_ITS_WAY = (DriverStatus.BOOTING, DriverStatus.ENABLING, DriverStatus.STOPPING)
+RUNGS = ("no rung", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld", "NMT reset node")
+WATCHDOG_COUNTERS = ("leases_refused", "frames_dropped", "bus_errors", "trips")
+MOSTLY_USABLE = 0.5
+"""Share of beams: a scanner of which more says nothing is covered, dirty or defective."""
+PAUSE_S = 0.05
+"""A pause of the watchdog's loop that is worth a look: ten of its turns."""
+COUNTERS = ("commands_refused", "overruns", "frames_dropped", "send_errors")
+
+
+def configuration(evidence: Evidence) -> list[Check]:
+    """The file was read and is valid, otherwise nothing was observed at all."""
+    robot = evidence.robot
+    return [ok("robot.yaml", f"{evidence.source} is good: {robot.name}, {len(robot.drives)} drives")]
+
+
+def driver(evidence: Evidence) -> list[Check]:
+    """The state of motor_driver, and its counters."""
+    status = evidence.on("motor_driver/status").last
+    if silent := _silent(evidence, "motor_driver", "motor_driver/status"):
+        return [silent]
+    state = STATES.get(status.state, f"state {status.state}")
+    if status.state == DriverStatus.ENABLED:
+        stands = "stands" if status.standstill else "moves"
+        found = ok("motor_driver", f"enabled, {stands}; cmd_vel is {_age(status.command_age_s)} old")
+    elif status.state in ON_ITS_WAY:
+        found = warn("motor_driver", f"{state}, {status.cause}: {status.detail}", "look again in a second")
+    else:
+        found = fail("motor_driver", f"{state}, {status.cause}: {status.detail}", _until(status.clears_on))
+    return [found, _counters(evidence.on("motor_driver/status").first, status)]
+
+
+def _counters(before: Any, now: Any) -> Check:
+    told = ", ".join(f"{name} {getattr(now, name)}" for name in COUNTERS)
+    told += f"; cycles at most {now.cycle_lateness_max_s * 1e3:.1f} ms late"
+    grew = [name for name in COUNTERS if getattr(now, name) > getattr(before, name)]
+    if not grew:
+        return ok("its counters", told)
+    return warn("its counters", told, f"{', '.join(grew)} grew while doctor listened; docs/bus.md says what they count")
+
+
+def watchdog(evidence: Evidence) -> list[Check]:
+    """The watchdog as the driver hears it on the bus: its state, its ages, its counters."""
+    heard = evidence.on("motor_driver/status")
+    status = heard.last
+    if status is None:
+        return [fail("watchdog", "unknown: reported by motor_driver, which is not running", PARTS_RUN)]
+    age = _age(status.watchdog_age_s)
+    if status.watchdog == DriverStatus.WATCHDOG_MISSING:
+        return [fail("watchdog", f"missing, last heard {age} ago", "start canbase watchdog on the same robot.yaml")]
+    told = f"last heard {age} ago; last lease {_age(status.watchdog_lease_age_s)} old"
+    if status.watchdog == DriverStatus.WATCHDOG_OK:
+        found = ok("watchdog", f"ok, {told}")
+    else:
+        rung = RUNGS[min(status.watchdog_rung, len(RUNGS) - 1)]
+        tripped = f"tripped: {status.watchdog_cause}; went as far as {rung}; {told}"
+        found = fail("watchdog", tripped, "remove the cause (docs/bus.md), canbase reset")
+    return [found, _watchdog_counters(heard.first, status)]
+
+
+def _watchdog_counters(before: Any, now: Any) -> Check:
+    name = "watchdog's counters"
+    counts = {name: getattr(now, f"watchdog_{name}") for name in WATCHDOG_COUNTERS}
+    told = ", ".join(f"{name} {count}" for name, count in counts.items())
+    told += f"; longest pause of its loop {now.watchdog_pause_max_s * 1e3:.0f} ms"
+    grew = [name for name, count in counts.items() if count > getattr(before, f"watchdog_{name}")]
+    if grew:
+        return warn(name, told, f"{', '.join(grew)} grew while doctor listened; docs/bus.md, 2FEh")
+    if now.watchdog_pause_max_s > PAUSE_S:
+        return warn(name, told, "its loop is held up: is the computer overloaded, has it real-time priority?")
+    return ok(name, told)
+
+
+def drives(evidence: Evidence) -> list[Check]:
+    """One row per drive that motor_driver tells about."""
+    status = evidence.on("motor_driver/status").last
+    return [] if status is None else [_drive(drive) for drive in status.drives]
+
+
+def _drive(drive: Any) -> Check:
+    name = f"drive {drive.joint} (node {drive.node_id})"
+    ages = f"feedback {_age(drive.feedback_age_s)}, heartbeat {_age(drive.heartbeat_age_s)} old"
+    found = f"{drive.state}, {drive.nmt_state}; {ages}"
+    if drive.error_code:
+        return fail(name, f"{found}; 0x{drive.error_code:04X} {drive.error_text}", "remove the cause, canbase reset")
+    if math.isnan(drive.heartbeat_age_s) and math.isnan(drive.feedback_age_s):
+        return fail(name, "never heard", "power, cable, termination, bit rate, node id; canbase scan shows who answers")
+    if not drive.stops_by_itself:
+        return warn(
+            name, f"{found}; does not watch the watchdog's heartbeat", "it will not stop when the computer dies"
+        )
+    return ok(name, found)
+
+
+def safety_filter(evidence: Evidence) -> list[Check]:
+    """What the filter lets through, and whether its leases arrive."""
+    heard = evidence.on("safety_filter/state")
+    state = heard.last
+    if silent := _silent(evidence, "safety_filter", "safety_filter/state"):
+        return [silent]
+    found = f"{state.cause}: {state.detail}" if state.detail else state.cause
+    if state.lease_errors > heard.first.lease_errors:
+        lost = f"{state.lease_errors} leases could not be delivered to {evidence.robot.lease.socket}"
+        return [fail("safety_filter", lost, "is canbase watchdog running, with the same lease.socket?")]
+    if state.action == SafetyState.STOP:
+        return [fail("safety_filter", f"stops, {found}", _until(state.clears_on))]
+    if state.action == SafetyState.PASS:
+        return [ok("safety_filter", f"passes; {state.lease_sequence} leases sent")]
+    return [warn("safety_filter", f"slows down, {found}", _until(state.clears_on))]
+
+
+def scanners(evidence: Evidence) -> list[Check]:
+    """Each scanner as the safety filter sees it."""
+    heard = evidence.on("safety_filter/state")
+    if heard.last is None:
+        return []
+    before = {scanner.topic: scanner.dropped for scanner in heard.first.scanners}
+    return [_scanner(scanner, scanner.dropped - before.get(scanner.topic, 0)) for scanner in heard.last.scanners]
+
+
+def _scanner(scanner: Any, dropped: int) -> Check:
+    """`dropped`: scans within the observation."""
+    name, found = f"scanner {scanner.topic}", f"last usable scan {_age(scanner.age_s)} old"
+    if not math.isnan(scanner.usable_share):
+        found += f", {scanner.usable_share:.0%} of its beams say something"
+    if dropped or scanner.problem:
+        found += f"; {dropped} scans dropped: {scanner.problem or 'some could not be used'}"
+    cure = "look at the scanner and its ROS driver; docs/safety_filter.md, Scanners, has what a scan must be"
+    if scanner.required and not scanner.fresh:
+        return fail(name, found, cure)
+    if dropped or scanner.problem:
+        return warn(name, found, cure)
+    if scanner.usable_share < MOSTLY_USABLE:
+        return warn(name, found, "the base only creeps to where the others look: clean it, free its view")
+    return ok(name, found if scanner.fresh else f"{found}; it is not required")
+
+
+def velocity_mux(evidence: Evidence) -> list[Check]:
+    """Who drives, and who sends what is no number."""
+    state = evidence.on("velocity_mux/state").last
+    if silent := _silent(evidence, "velocity_mux", "velocity_mux/state"):
+        return [silent]
+    ignored = [source for source in state.sources if source.active and source.reason]
+    if ignored:
+        told = f"{ignored[0].name} is not followed: {ignored[0].reason}"
+        return [fail("velocity_mux", told, UNFOLLOWED[ignored[0].reason.startswith("waiting")])]
+    found = f"{state.active} drives" if state.active else "nobody drives"
+    bad = [source.name for source in state.sources if source.refused]
+    if bad:
+        return [warn("velocity_mux", f"{found}; refused NaN or infinity of {', '.join(bad)}", "correct that sender")]
+    return [ok("velocity_mux", found)]
+
+
+CHECKS: tuple[Callable[[Evidence], list[Check]], ...] = (
+    configuration,
+    watchdog,
+    driver,
+    drives,
+    safety_filter,
+    scanners,
+    velocity_mux,
+)
+
+
+def robot_checks(evidence: Evidence) -> list[Check]:
+    """All rows."""
+    return [check for checks in CHECKS for check in checks(evidence)]
+
+
+def _silent(evidence: Evidence, name: str, topic: str) -> Check | None:
+    """Nothing came, or nothing any more: a latched topic gives the last words of a node that hangs to everybody."""
+    heard = evidence.on(topic)
+    if heard.last is None:
+        return fail(name, f"nothing came on {topic}", PARTS_RUN)
+    age_s = evidence.now - heard.times_s[-1]
+    if age_s <= SILENT_S:
+        return None
+    return fail(name, f"nothing on {topic} for {age_s:.1f} s; what it said before is not looked at", HANGS)
+
+
+def _until(clears_on: str) -> str:
+    return f"it ends with: {clears_on}" if clears_on else "see its log"
+
+
+def _age(age_s: float) -> str:
+    return "never" if math.isnan(age_s) else f"{age_s:.2f} s"

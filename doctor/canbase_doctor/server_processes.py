@@ -1,0 +1,44 @@
+"""Finds the processes of the action server on this computer, and what decides whom they can talk to. Reads /proc."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from canbase_doctor.evidence import ServerProcess
+
+PROC = Path("/proc")
+DECIDES = ("ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "RMW_IMPLEMENTATION")
+
+
+def server_processes(proc: Path = PROC) -> tuple[ServerProcess, ...]:
+    """Those that this user may look at; doctor itself is none."""
+    return tuple(ServerProcess(pid, talks_by(pid, proc)) for pid in sorted(_pids(proc)))
+
+
+def talks_by(pid: int | str, proc: Path = PROC) -> dict[str, str]:
+    """The variables of DECIDES that the process was started with. Without the right to look: none."""
+    try:
+        lines = (proc / str(pid) / "environ").read_bytes().decode(errors="replace").split("\0")
+    except OSError:
+        return {}
+    pairs = (line.partition("=") for line in lines)
+    return {name: value for name, _, value in pairs if name in DECIDES}
+
+
+def _pids(proc: Path) -> Iterator[int]:
+    for folder in proc.glob("[0-9]*"):
+        try:
+            words = (folder / "cmdline").read_bytes().decode(errors="replace").split("\0")
+        except OSError:  # it ended meanwhile
+            continue
+        if int(folder.name) != os.getpid() and _is_server(words):
+            yield int(folder.name)
+
+
+def _is_server(words: list[str]) -> bool:
+    """By `canbase`, by Python, by `ros2 run` and launch files."""
+    by_ros = any(word.endswith("/lib/canbase/drive_distance_server") for word in words)
+    by_canbase = "action-server" in words and any("canbase" in word for word in words)
+    return by_ros or by_canbase or "canbase_action_server.main" in " ".join(words)

@@ -1,0 +1,282 @@
+"""`canbase support-bundle`: one file with all that remote help needs. What is collected: `bundle_contents.py`."""
+
+from __future__ import annotations
+
+import io
+import os
+import platform
+import subprocess
+import sys
+import tarfile
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+from importlib.metadata import distributions
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from canbase_doctor import bundle_contents as support
+from canbase_doctor.bounded_run import run
+from canbase_doctor.careful_read import RefusedError, modified, names, read_end
+from canbase_doctor.redact import cleaned
+from canbase_doctor.service_environment import service_environment
+from canbase_runtime.terminal import FAILED, colour, fail
+
+if TYPE_CHECKING:  # `canbase --help` loads no configuration
+    from canbase_config.robot import Robot
+
+LIMIT_BYTES: Final = 10_000_000
+"""Of one file: the end of a longer one is taken."""
+TOTAL_BYTES: Final = 80_000_000
+"""Of all: what comes later is missing."""
+MOST_FILES: Final = 200
+STATE: Final = Path("/var/lib/canbase")
+ETC: Final = Path("/etc/canbase")
+UNITS: Final = Path("/etc/systemd/system")
+PARTS: Final = ("driver", "watchdog", "velocity")
+"""Whose records of stops there are."""
+_KEY: Final = "it may be a key; such files are never taken"
+
+
+class Bundle:
+    """What was collected, in memory, and what was not and why."""
+
+    def __init__(self) -> None:
+        self.files: dict[str, bytes] = {}
+        self.taken: dict[str, str] = {}
+        self.missing: dict[str, str] = {}
+
+    def text(self, name: str, what: str, read: Callable[[], str]) -> None:
+        """One file, cleaned; an OSError of `read` is the reason why it is missing."""
+        if len(self.files) >= MOST_FILES or sum(map(len, self.files.values())) >= TOTAL_BYTES:
+            self.missing[name] = f"{what}: the bundle is full ({MOST_FILES} files, {TOTAL_BYTES // 1_000_000} MB)"
+            return
+        try:
+            content = read()
+        except OSError as error:
+            self.missing[name] = f"{what}: {error.strerror or error}"
+            return
+        self.files[name] = cleaned(content).encode()[-LIMIT_BYTES:]
+        self.taken[name] = what
+
+    def file(self, name: str, path: Path) -> None:
+        """A regular file of this computer, if its name is allowed, where it really is too. No link is followed."""
+        self.text(name, str(path), lambda: _regular(path))
+
+    def output(self, command: support.Command) -> None:
+        """What a program prints; one that cannot tell anything is missing with its last words."""
+        shown = " ".join(command.argv) + (", in the services' environment" if command.environment is not None else "")
+        try:
+            code, said, complaint = run(command.argv, command.environment, command.timeout_s, LIMIT_BYTES)
+        except OSError as error:
+            self.missing[command.file] = f"{shown}: {error.strerror}"
+        except subprocess.TimeoutExpired:
+            self.missing[command.file] = f"{shown}: not done within {command.timeout_s:.0f} s"
+        else:
+            if said.strip():
+                self.text(command.file, f"{shown} (exit code {code})", lambda: said + complaint)
+            else:
+                last = complaint.strip().splitlines()[-1:] or ["it says nothing"]
+                self.missing[command.file] = f"{shown}: exit code {code}, {cleaned(last[0])}"
+
+    def write(self, path: Path) -> None:
+        """As path, a .tar.gz that its owner alone may read, and that appears whole or not at all."""
+        new = path.with_name(f"{path.name}.new{os.getpid()}")
+        folder = path.name.removesuffix(".tar.gz")
+        manifest = support.manifest(self.taken, self.missing).encode()
+        handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with os.fdopen(handle, "wb") as file, tarfile.open(fileobj=file, mode="w:gz") as archive:
+            for name, content in [("MANIFEST.txt", manifest), *sorted(self.files.items())]:
+                entry = tarfile.TarInfo(f"{folder}/{name}")
+                entry.size, entry.mode, entry.mtime = len(content), 0o600, int(time.time())
+                archive.addfile(entry, io.BytesIO(content))
+        new.replace(path)
+
+
+def _regular(path: Path) -> str:
+    if not support.allowed(path):
+        raise RefusedError(_KEY)
+    place, content = read_end(path, LIMIT_BYTES)
+    if not support.allowed(Path(place)):
+        raise RefusedError(_KEY)
+    return content.decode(errors="replace")
+
+
+def collect(
+    robot: Robot | None,
+    config: Path,
+    since: str,
+    etc: Path = ETC,
+    state: Path = STATE,
+    named: Mapping[str, Path] = MappingProxyType({}),
+    problems: str = "",
+) -> Bundle:
+    """Everything. Nothing of it touches the bus or orders anything. `named`: the files that robot.yaml names.
+
+    `robot`: None where robot.yaml is of no use, for the reasons in `problems`; then the recordings of all robots count.
+    """
+    bundle = Bundle()
+    if problems:
+        bundle.text("config/problems.txt", f"what is wrong with {config}", lambda: problems)
+    bundle.text("versions/canbase.txt", "canbase, Python, computer", _versions)
+    bundle.text("versions/packages.txt", "Python packages", _packages)
+    bundle.text("environment.txt", "variables of ROS and canbase", lambda: support.environment_text(os.environ))
+    bundle.file("config/robot.yaml", config)
+    for name, path in named.items():
+        outside = ".." in Path(name).parts or Path(name).is_absolute()
+        bundle.file(f"config/elsewhere/{path.name}" if outside else f"config/{name}", path)
+    for path in _listed(bundle, "config/installed", etc, (".yaml", ".env")):
+        bundle.file(f"config/installed/{path.name}", path)
+    for path in _listed(bundle, "config/installed/installed", etc / "installed", (".txt",)):
+        bundle.file(f"config/installed/installed/{path.name}", path)
+    _black_boxes(bundle, robot, state)
+    _records(bundle, robot.name if robot else config.stem, state)
+    services = doctor_environment(config, robot.name if robot else config.stem, etc)
+    for command in support.commands(config, since, services):
+        bundle.output(command)
+    return bundle
+
+
+def installed_robot(etc: Path) -> Path | None:
+    """The robot.yaml of the first robot that is installed; other .yaml files may lie beside it. None: there is none."""
+    stems = sorted(path.stem for path in (etc / "installed").glob("*.txt")) or ["robot"]
+    return next((path for path in (etc / f"{stem}.yaml" for stem in stems) if os.path.isfile(path)), None)
+
+
+def doctor_environment(config: Path, name: str, etc: Path = ETC, units: Path = UNITS) -> dict[str, str] | None:
+    """What the services of this robot have, None where none are installed or their .env is not readable.
+
+    The .env is beside an installed `config` and has its name, else that of the robot.
+    """
+    installed = config.stem if config.resolve().parent == etc.resolve() else name
+    try:
+        env_file = _regular(etc / f"{installed}.env")
+        drop_ins = [_regular(path) for path in sorted(units.glob(f"canbase-driver@{installed}.service.d/*.conf"))]
+    except OSError:
+        return None
+    return service_environment(os.environ, drop_ins, env_file)
+
+
+def _listed(bundle: Bundle, name: str, folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
+    try:
+        return [folder / file for file in names(folder) if file.endswith(suffixes)]
+    except FileNotFoundError:
+        bundle.missing[name] = f"{folder}: nothing is installed"
+    except OSError as error:
+        bundle.missing[name] = f"{folder}: not readable: {error.strerror}; try sudo"
+    return []
+
+
+def _black_boxes(bundle: Bundle, robot: Robot | None, state: Path) -> None:
+    """The newest recordings. Services write to these folders: what is no ordinary file in them is not taken."""
+    folders = list(dict.fromkeys(_box_folders(robot, state)))
+    found: dict[Path, float] = {}
+    for folder in folders:
+        try:
+            found |= {
+                path: modified(path) for path in (folder / file for file in names(folder)) if path.suffix == ".asc"
+            }
+        except OSError:
+            continue  # said below where no folder has any
+    newest = support.newest_boxes(robot.name if robot else "", found)
+    if not newest:
+        whose = f"of {robot.name}" if robot else "of any robot"
+        bundle.missing["black_box"] = f"no recording of a stop {whose} in {', '.join(map(str, folders))}"
+    for path in newest:
+        bundle.file(f"black_box/{path.name}", path)
+
+
+def _records(bundle: Bundle, robot: str, state: Path) -> None:
+    """What the parts have on disk about their stops, in words: the files name the computer by a number of its own."""
+    from canbase_runtime.latch_file import SUFFIX, latch_folder
+
+    folders = {"installed": state / robot, "user": latch_folder(os.environ, Path.home(), robot)}
+    places = {
+        f"stops/{name}/{part}.txt": folder / f"{part}{SUFFIX}" for name, folder in folders.items() for part in PARTS
+    }
+    found = {name: path for name, path in places.items() if os.path.lexists(path)}
+    for name, path in found.items():
+        bundle.text(name, str(path), partial(_record_text, path, robot))
+    if not found:
+        bundle.missing["stops"] = f"no record of stops of {robot} in {', '.join(map(str, folders.values()))}"
+
+
+def _record_text(path: Path, robot: str) -> str:
+    from canbase_runtime import latch_record
+    from canbase_runtime.foreign_text import printable
+    from canbase_runtime.latch_file import machine
+
+    _, content = read_end(path, latch_record.SIZE + 1)
+    found = latch_record.read(content, latch_record.owner_of(path.stem, robot, machine()))
+    record = found.record
+    changed = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(modified(path)))
+    lines = (
+        f"needs a reset: {'yes' if found.latched else 'no'}",
+        f"mark: {record.mark.name}, code {record.code}, written {found.sequence} times, last at {changed}",
+        f"cause: {printable(record.cause)}",
+        f"detail: {printable(record.detail)}",
+        f"defect: {found.defect.value} {found.detail}",
+    )
+    return "".join(f"{line.rstrip()}\n" for line in lines)
+
+
+def _box_folders(robot: Robot | None, state: Path) -> list[Path]:
+    from canbase_driver.runtime.black_box_writer import state_folder
+
+    own = [Path(robot.black_box.folder)] if robot and robot.black_box.folder else []
+    return [*own, state_folder(os.environ, Path.home()), state, *([state / robot.name] if robot else [])]
+
+
+def _versions() -> str:
+    from canbase_runtime.version import installed_version
+
+    ros = os.environ.get("ROS_DISTRO", "not sourced (the wheels of PyPI, if any)")
+    collected = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+    python = f"Python {sys.version}\n{sys.executable}"
+    return f"canbase {installed_version()}\n{python}\n{platform.platform()}\nROS {ros}\ncollected {collected}\n"
+
+
+def _packages() -> str:
+    """As `pip list --format=freeze` has it, without a process that could be another pip."""
+    found = {(dist.metadata["Name"] or "?", dist.version) for dist in distributions()}
+    return "".join(f"{name}=={version}\n" for name, version in sorted(found))
+
+
+def support_bundle(
+    config: Annotated[
+        Path | None,
+        typer.Option("--config", "-c", metavar="FILE", help="The robot.yaml.", show_default="the installed"),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="A .tar.gz.", show_default="here, by date")
+    ] = None,
+    since: Annotated[str, typer.Option(metavar="TIME", help="Journal from then on, as journalctl takes it.")] = "-2h",
+) -> None:
+    """Collect what helps to find a fault: configuration, versions, units, journal, CAN statistics, black box.
+
+    It orders nothing, and touches no key: docs/logs.md. As root it sees more. A robot.yaml with mistakes is collected
+    with a list of them. Exit codes: 0 written, 1 not.
+    """
+    from canbase_config.errors import ConfigError
+    from canbase_config.load import load_robot, sample
+
+    file = config or installed_robot(ETC) or sample("bench")
+    try:
+        loaded = load_robot(file)
+    except ConfigError as error:  # the bundle is needed then above all
+        problems = str(error)
+        typer.secho(f"{file} cannot be used; collected all the same:\n{problems}", err=True, color=colour())
+        bundle, robot = collect(None, file, since, problems=problems), file.stem
+    else:
+        bundle, robot = collect(loaded.robot, loaded.path, since, named=loaded.files), loaded.robot.name
+    path = output or Path(f"canbase-support-{robot}-{time.strftime('%Y%m%dT%H%M%S')}.tar.gz")
+    try:
+        bundle.write(path)
+    except OSError as error:
+        fail(f"{path} cannot be written: {error.strerror or error}", FAILED)
+    for part, why in sorted(bundle.missing.items()):
+        typer.echo(f"not collected: {part}: {why}", err=True)
+    typer.echo(f"{path}: {len(bundle.files)} files. Look into it before you send it: its MANIFEST.txt lists them.")

@@ -1,0 +1,165 @@
+"""Runs the boot sequence of one node against the bus: frames and the time go in, frames and the result come out."""
+
+from __future__ import annotations
+
+import math
+
+from canbase_config.drive import Drive
+from canbase_config.profile import Sdo
+from canbase_config.robot import Robot
+from canbase_driver.boot.sequence import BootReport, boot
+from canbase_driver.boot.steps import BootError, Pause, Quiet, SendNmt, Step, WaitBootUp
+from canbase_driver.cia301.frame import Frame
+from canbase_driver.cia301.nmt import NmtState, nmt, parse_heartbeat
+from canbase_driver.cia301.sdo_client import Read, SdoClient, SdoError, Write
+
+DUPLICATES = 3
+"""So many requests that were sent once and answered twice: one may be an answer that somebody else asked for."""
+
+
+class NodeBoot:
+    """One boot of one node; for another try make a new one. `drives` are the axes of the node, one or two.
+
+    Give it every frame by `on_frame`, then, and at least every 10 ms, call `tick` and send what it returns. It has
+    ended when `report` or `error` is set. One boot takes 45 to 125 SDO transfers an axis: calling `tick` right after
+    `on_frame` makes them follow each other without waiting.
+    """
+
+    def __init__(self, node_id: int, drives: tuple[Drive, ...], robot: Robot, settle_s: float = 0.0) -> None:
+        """`settle_s`: see `boot`."""
+        self.node_id = node_id
+        self.boot_up_at = -math.inf
+        """When the boot-up message came that answered the NMT reset [s]; minus infinity: none did."""
+        self.report: BootReport | None = None
+        self.error: BootError | None = None
+        self._name = f"node {node_id} ({', '.join(drive.joint for drive in drives)})"
+        self._sequence = boot(node_id, drives, robot, settle_s)
+        self._client = sdo_client(node_id, drives[0].kind.sdo, robot.timeouts.sdo_s)
+        self._gap_s = drives[0].kind.sdo.gap_s
+        self._held: Read | Write | None = None
+        """The next transfer, when it has to keep its distance from the one before."""
+        self._step: Step | None = None
+        self._wake_at = 0.0
+        self._was_reset = False
+        self.heard = False
+        """Whether it has answered any request."""
+        self._outbox: list[Frame] = []
+
+    @property
+    def done(self) -> bool:
+        """Whether it has ended, well or not."""
+        return self.report is not None or self.error is not None
+
+    @property
+    def configuring(self) -> bool:
+        """Whether the drive has been heard, and its SDOs fill the bus."""
+        return not self.done and self.heard
+
+    @property
+    def waiting_for(self) -> str:
+        """What the node is to do next, for people; empty when the boot has ended."""
+        return "" if self.done else f"waiting for {self._name}: {_awaited(self._step)}"
+
+    @property
+    def dropped(self) -> int:
+        """SDO frames of this node that answered nothing."""
+        return self._client.dropped
+
+    def on_frame(self, frame: Frame, now: float) -> None:
+        """Take a frame from the bus, at `now` [s, monotonic]; those of other nodes do nothing."""
+        if self.done or self._step is None:
+            return
+        if parse_heartbeat(frame) == (self.node_id, NmtState.INITIALISING):
+            self._on_boot_up(now)
+        elif self._client.busy:
+            self._outbox += self._client.on_frame(frame, now)
+            self._take_answer(now)
+
+    def tick(self, now: float) -> list[Frame]:
+        """Let time pass until `now` [s, monotonic]. The frames to send, in order. The first call begins the boot."""
+        if self._step is None:
+            if not self.done:
+                self._advance(None, now)
+        elif self._client.busy:
+            self._outbox += self._client.tick(now)
+            self._take_answer(now)
+        elif now >= self._wake_at:
+            self._wake(now)
+        frames, self._outbox = self._outbox, []
+        return frames
+
+    def _wake(self, now: float) -> None:
+        held, self._held = self._held, None
+        if held is None:
+            self._advance(False, now)
+        else:
+            self._outbox.append(self._client.start(held, now))
+
+    def _on_boot_up(self, now: float) -> None:
+        if isinstance(self._step, WaitBootUp):
+            self.boot_up_at = now
+            self._advance(True, now)
+        elif isinstance(self._step, Quiet):
+            self._wake_at = now + self._step.duration_s
+        elif self._was_reset:
+            problem = f"it started anew while it was being configured ({_awaited(self._step)} was due)"
+            hint = "The boot begins again and waits for a second boot-up message (start.settle_s of its drive profile)"
+            self._end(error=BootError(self.node_id, problem, f"{hint}; if this goes on, check its supply voltage"))
+        elif self._client.busy:
+            self._outbox.append(self._client.again(now))
+
+    def _take_answer(self, now: float) -> None:
+        if self._client.duplicates >= DUPLICATES:
+            problem = "each request is answered twice: two devices on the bus have this node id"
+            self._end(error=BootError(self.node_id, problem, "Give each drive a node id of its own (canbase scan)"))
+        if self._client.busy or self.done:
+            return
+        try:
+            answer = self._client.answer()
+        except SdoError as error:
+            self._advance(error, now)
+        else:
+            self.heard = True
+            self._advance(answer, now)
+
+    def _advance(self, answer: bytes | bool | SdoError | None, now: float) -> None:
+        self._was_reset = self._was_reset or isinstance(self._step, WaitBootUp)
+        try:
+            step = self._sequence.throw(answer) if isinstance(answer, SdoError) else self._sequence.send(answer)
+        except StopIteration as end:
+            self._end(report=end.value)
+        except BootError as error:
+            self._end(error=error)
+        else:
+            self._begin(step, now)
+
+    def _begin(self, step: Step, now: float) -> None:
+        self._step = step
+        if isinstance(step, Read | Write) and self._gap_s > 0.0:
+            self._held, self._wake_at = step, now + self._gap_s
+        elif isinstance(step, Read | Write):
+            self._outbox.append(self._client.start(step, now))
+        elif isinstance(step, SendNmt):
+            self._outbox.append(nmt(step.command, self.node_id))
+            self._advance(None, now)
+        else:
+            self._wake_at = now + (step.timeout_s if isinstance(step, WaitBootUp) else step.duration_s)
+
+    def _end(self, report: BootReport | None = None, error: BootError | None = None) -> None:
+        self.report, self.error = report, error
+        self._step = None
+
+
+def sdo_client(node_id: int, sdo: Sdo, timeout_s: float) -> SdoClient:
+    """A client that asks as the profile wants; `timeout_s` [s] where the profile has none."""
+    return SdoClient(node_id, sdo.timeout_s or timeout_s, sdo.attempts)
+
+
+def _awaited(step: Step | None) -> str:
+    if isinstance(step, Read | Write):
+        return f"the answer to {step}"
+    if isinstance(step, WaitBootUp):
+        return "its boot-up message"
+    if isinstance(step, Quiet):
+        return "no further boot-up message"
+    return step.until if isinstance(step, Pause) else "the first step"

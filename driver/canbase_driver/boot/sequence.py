@@ -1,0 +1,242 @@
+"""How one node is made ready, as a sequence of steps to be read from top to bottom. No bus and no time in here.
+
+CiA 301 and CiA 402-2. It ends in NMT pre-operational and without torque: who starts the nodes, and when, is decided
+elsewhere. `node_boot.py` runs it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from canbase_config.drive import Drive, Identity
+from canbase_config.object_map import CONTROLWORD, STATUSWORD, VELOCITY_ACTUAL, place
+from canbase_config.robot import Robot
+from canbase_config.stopping import standstill_s
+from canbase_driver.boot.pdo_mapping import configure_pdos
+from canbase_driver.boot.settings import (
+    configure_motion,
+    configure_self_stop,
+    configure_sync,
+    harmless_on_loss,
+    write_all,
+    write_at,
+)
+from canbase_driver.boot.steps import (
+    BootError,
+    NodeAccess,
+    Pause,
+    Quiet,
+    SendNmt,
+    Steps,
+    WaitBootUp,
+    boot_error,
+    unsigned,
+)
+from canbase_driver.cia301.nmt import NmtCommand
+from canbase_driver.cia301.pdo import node_layout
+from canbase_driver.cia301.sdo_client import Read, SdoAborted, SdoError, SdoTimeout, Write
+from canbase_driver.cia402 import Command, DriveState, decode_statusword
+from canbase_driver.drive_units import AxisUnits
+from canbase_driver.motion.braking import Braking
+
+DEVICE_TYPE, SOFTWARE, IDENTITY = 0x1000, 0x100A, 0x1018
+NUMBERS = ("vendor_id", "product_code", "revision", "serial")
+"""1018h:1 to 1018h:4."""
+PROFILE_402 = 0x0192
+
+POLL_S = 0.02
+STANDING_POLLS = 5
+"""A drive that stays in quick stop active stands when it is slow for so many polls on end."""
+_RESETS = {"communication": NmtCommand.RESET_COMMUNICATION, "node": NmtCommand.RESET_NODE}
+_CAN_BE_DISABLED = frozenset(
+    (DriveState.READY_TO_SWITCH_ON, DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
+)
+
+
+@dataclass(frozen=True, slots=True)
+class BootReport:
+    """What was found and done. `notes` tell what the drive lacks, refused or changed without being unfit for it."""
+
+    node_id: int
+    identity: Identity
+    self_stop: str
+    """What makes the drive stop by itself when nobody commands it, set and confirmed; empty: nothing."""
+    notes: tuple[str, ...]
+    changes: tuple[str, ...] = ()
+    """Every object that had another value than wanted: the old one and the new one."""
+
+    @property
+    def stops_by_itself(self) -> bool:
+        """Whether something makes it stop by itself."""
+        return self.self_stop != ""
+
+
+def boot(node_id: int, drives: tuple[Drive, ...], robot: Robot, settle_s: float = 0.0) -> Steps[BootReport]:
+    """All steps for one node, its used axes being `drives`. Raises ValueError when they are not one or two axes.
+
+    `settle_s`: quiet after a boot-up message [s] where the profile has less (start.settle_s): learnt from a drive that
+    sent a second one. The steps end with the report, or raise BootError when the node cannot be made ready.
+    """
+    return _explained(_Boot(node_id, drives, robot, settle_s).run())
+
+
+def _explained(steps: Steps[BootReport]) -> Steps[BootReport]:
+    try:
+        return (yield from steps)
+    except SdoError as error:
+        raise boot_error(error) from error
+
+
+class _Boot:
+    def __init__(self, node_id: int, drives: tuple[Drive, ...], robot: Robot, settle_s: float) -> None:
+        self._settle_s = settle_s
+        self._drives = tuple(sorted(drives, key=lambda drive: drive.axis))
+        self._layout = node_layout(node_id, self._drives, robot)
+        self._kind = drives[0].kind
+        self._robot = robot
+        self._node = NodeAccess(node_id)
+
+    def run(self) -> Steps[BootReport]:
+        yield from self._wait_for_the_drive()
+        identity = yield from self._check_identity()
+        yield from self._bring_to_a_stand()
+        yield from self._forget_earlier_masters()
+        yield from write_all(self._node, self._kind.writes.before_mapping)
+        for drive in self._drives:
+            yield from configure_motion(self._node, drive, self._robot)
+        self_stop = yield from configure_self_stop(self._node, self._drives, self._robot)
+        yield from configure_sync(self._node, self._kind, self._robot.bus.sync_counter)
+        yield from configure_pdos(self._node, self._layout)
+        yield from write_all(self._node, self._kind.writes.after_mapping)
+        notes = tuple(dict.fromkeys(self._node.notes))
+        return BootReport(self._node.node_id, identity, self_stop, notes, tuple(self._node.changes))
+
+    # -- what is there
+
+    def _wait_for_the_drive(self) -> Steps[None]:
+        """For ever. A node in NMT stopped does not answer, so it is sent to pre-operational."""
+        while True:
+            try:
+                device_type = unsigned((yield Read(DEVICE_TYPE)))
+                break
+            except SdoTimeout:
+                yield SendNmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+        if device_type & 0xFFFF != PROFILE_402:
+            # Some real drives report another profile or none, so this alone is no reason to refuse.
+            self._node.notes.append(f"1000h:0 is {device_type:08X}h, not the profile 402 (0192h) of a motor drive")
+
+    def _check_identity(self) -> Steps[Identity]:
+        found: dict[str, int | None] = {}
+        for sub, name in enumerate(NUMBERS, start=1):
+            found[name] = yield from self._node.read_if_present(IDENTITY, sub)
+            for drive in self._drives:
+                shown = "missing" if found[name] is None else f"{found[name]:08X}h"
+                expected = getattr(drive.identity, name)
+                self._compare(f"1018h:{sub} ({name})", found[name], shown, expected, f"{expected or 0:08X}h")
+        return Identity(**found, software=(yield from self._check_software()))
+
+    def _check_software(self) -> Steps[str | None]:
+        """Only where robot.yaml asks for it: it takes a segmented transfer, and not every drive has it."""
+        expected = [drive.identity.software for drive in self._drives if drive.identity.software is not None]
+        if not expected:
+            return None
+        try:
+            data: bytes = yield Read(SOFTWARE)
+        except SdoAborted:
+            data = b""
+        found = data.decode("ascii", "replace").strip(" \0")
+        for text in expected:
+            self._compare("100Ah:0 (software)", found, f'"{found}"', text, f'"{text}"')
+        return found or None
+
+    def _compare(self, what: str, found: object, shown: str, expected: object, wanted: str) -> None:
+        if expected not in (None, found):
+            hint = "Another drive or firmware has this node id, or `identity` in robot.yaml is wrong"
+            raise BootError(self._node.node_id, f"{what} is {shown}, expected {wanted}", hint)
+
+    # -- nothing may move
+
+    def _bring_to_a_stand(self) -> Steps[None]:
+        """A drive may still be running from an earlier life of its master."""
+        states: dict[str, DriveState | None] = {}
+        for drive in self._drives:
+            states[drive.joint] = yield from _state(drive)
+            if _has_torque(states[drive.joint]):
+                yield _control(drive, Command.QUICK_STOP)
+        for drive in self._drives:
+            if _has_torque(states[drive.joint]):
+                yield from self._wait_for_standstill(drive)
+                states[drive.joint] = yield from _state(drive)
+            if states[drive.joint] in _CAN_BE_DISABLED:
+                yield _control(drive, Command.DISABLE_VOLTAGE)
+
+    def _wait_for_standstill(self, drive: Drive) -> Steps[None]:
+        """Polls take longer than they count here: it has at least the time that it needs."""
+        units, braking = AxisUnits(drive, self._robot.base), Braking(self._robot)
+        slow = 0
+        for poll in range(math.ceil(standstill_s(self._robot) / POLL_S)):
+            if not _has_torque((yield from _state(drive))) or slow == STANDING_POLLS:
+                return
+            raw = int.from_bytes((yield _read(drive, VELOCITY_ACTUAL)), "little", signed=True)
+            speed_mps, elapsed_s = abs(units.velocity_mps(raw)), poll * POLL_S
+            if poll == 0:
+                braking.begin(speed_mps, 0.0, elapsed_s, quick=True)
+            slow = slow + 1 if speed_mps < self._robot.base.standstill_mps else 0
+            if braking.fails(speed_mps, elapsed_s) and not slow:
+                yield from self._give_up(drive, f"turns at {speed_mps:.3f} m/s {elapsed_s:.1f} s after a quick stop")
+            yield Pause(POLL_S, f"{drive.joint} to stand after a quick stop")
+        yield from self._give_up(drive, f"did not stand {standstill_s(self._robot):.1f} s after a quick stop")
+
+    def _give_up(self, drive: Drive, what: str) -> Steps[None]:
+        """Setpoints of whoever keeps it moving count no more, then the power goes."""
+        yield SendNmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+        yield _control(drive, Command.DISABLE_VOLTAGE)
+        hint = "Its voltage is now disabled; look for another master, and at its encoder, 605Ah and 6085h"
+        raise BootError(self._node.node_id, f"{drive.joint} {what}", hint)
+
+    def _forget_earlier_masters(self) -> Steps[None]:
+        """What they set goes with an NMT reset. Some drives keep a fault for a lost heartbeat until then."""
+        start = self._kind.start
+        command = _RESETS.get(start.reset)
+        if command is not None:
+            yield from self._make_reset_harmless()
+            yield SendNmt(command)
+            if not (yield WaitBootUp(start.boot_up_s)):
+                name = command.name.lower().replace("_", " ")
+                self._node.notes.append(f"no boot-up message within {start.boot_up_s:g} s of NMT {name}")
+            if self._settle_s > start.settle_s:
+                self._node.notes.append(
+                    f"it sends two boot-up messages; the boot waits {self._settle_s:.1f} s for the second one: "
+                    f"set start.settle_s in its drive profile"
+                )
+            if settle_s := max(start.settle_s, self._settle_s):
+                yield Quiet(settle_s)
+        yield SendNmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+
+    def _make_reset_harmless(self) -> Steps[None]:
+        for drive in self._drives:
+            write = harmless_on_loss(drive)
+            if self._kind.self_stop.abort_connection == "no":
+                continue
+            found = yield from self._node.read_if_present(write.index, write.sub)
+            if found is not None:
+                yield from self._node.set_if_present(write, known=found)
+
+
+def _state(drive: Drive) -> Steps[DriveState | None]:
+    at = place(drive.kind.layout, STATUSWORD, drive.axis)
+    return decode_statusword(unsigned((yield _read(drive, STATUSWORD))) >> at.shift & 0xFFFF)
+
+
+def _has_torque(state: DriveState | None) -> bool:
+    return state is None or state.has_torque
+
+
+def _read(drive: Drive, index: int) -> Read:
+    at = place(drive.kind.layout, index, drive.axis)
+    return Read(at.index, at.sub)
+
+
+def _control(drive: Drive, command: Command) -> Write:
+    return write_at(drive, CONTROLWORD, command.value)

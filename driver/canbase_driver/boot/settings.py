@@ -1,0 +1,230 @@
+"""What the boot sets in a node without torque: how it moves, and when it stops by itself. CiA 301, CiA 402-2.
+
+Which of the objects exist, where and in which unit, is in the drive's profile. The sequence is `sequence.py`.
+"""
+
+from __future__ import annotations
+
+from canbase_config.drive import Drive
+from canbase_config.object_map import MODE, MODE_DISPLAY, TARGET_VELOCITY, place
+from canbase_config.profile import Profile, SdoWrite
+from canbase_config.robot import CYCLIC, DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
+from canbase_driver.boot.steps import BootError, NodeAccess, Steps
+from canbase_driver.cia301.sdo_client import VALUE_INVALID, VALUE_TOO_HIGH, VALUE_TOO_LOW, SdoAborted, Write
+from canbase_driver.drive_units import AxisUnits
+
+HEARTBEAT_CONSUMER, HEARTBEAT_PRODUCER, SYNC_COUNTER, ERROR_BEHAVIOUR = 0x1016, 0x1017, 0x1019, 0x1029
+ABORT_CONNECTION_OPTION, QUICK_STOP_OPTION, FAULT_REACTION_OPTION = 0x6007, 0x605A, 0x605E
+PROFILE_ACCELERATION, PROFILE_DECELERATION, QUICK_STOP_DECELERATION = 0x6083, 0x6084, 0x6085
+INTERPOLATION = 0x60C2
+STOPPING_LIMITS = {
+    PROFILE_DECELERATION: "deceleration_mps2",
+    QUICK_STOP_DECELERATION: "emergency_deceleration_mps2",
+}
+"""Which limit of robot.yaml a drive must brake with at least by its own ramps, whatever it refuses."""
+KEPT_SHARE = 0.95
+"""Of that limit: drives round."""
+COASTS = 0
+
+ENTER_PRE_OPERATIONAL_ON_LOSS = 0
+MILLISECONDS = -3
+"""60C2h:2, exponent of the period; some drives accept no other."""
+FAULT_SIGNAL = 1
+"""6007h: some drives take an NMT reset for the loss of their master then, and go into fault."""
+NO_ACTION = 0
+
+HEARTBEATS_WANTED, HEARTBEATS_NEEDED = 3, 2
+"""In the time after which a drive without a heartbeat counts as silent (timeouts.drive_heartbeat_s)."""
+HEARTBEAT_PERIODS_MS = (10, 20, 25, 40, 50, 64, 80, 100, 125, 128, 150, 160, 200, 250, 256, 320, 400, 500)
+"""Values of 1017h that are tried where a drive refuses the wanted one: those that steps and limits of drives allow."""
+VALUE_REFUSED = (VALUE_INVALID, VALUE_TOO_HIGH, VALUE_TOO_LOW)
+
+
+def configure_motion(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None]:
+    """Mode, ramps, and no target: one of an earlier life would move the drive as soon as it is enabled."""
+    kind, mode = drive.kind, drive.used_mode
+    yield from node.set(write_at(drive, MODE, mode))
+    if kind.options.mode_display in ("yes", "probe"):
+        yield from _check_mode(node, drive, mode)
+    if mode == CYCLIC:
+        cycle_ms = round(1000.0 / robot.rates.control_hz)
+        yield from node.set_if_present(Write(INTERPOLATION, 1, cycle_ms, 1), kind.options.interpolation)
+        yield from node.set_if_present(Write(INTERPOLATION, 2, MILLISECONDS, 1), kind.options.interpolation)
+    yield from node.set(write_at(drive, TARGET_VELOCITY, 0))
+    yield from _configure_ramps(node, drive, robot)
+
+
+def configure_self_stop(node: NodeAccess, drives: tuple[Drive, ...], robot: Robot) -> Steps[str]:
+    """What makes the drive stop by itself, in words; empty: nothing does that is confirmed."""
+    kind, timeout_ms = drives[0].kind, round(1000 * robot.timeouts.drive_heartbeat_s)
+    yield from _produce_heartbeat(node, timeout_ms)
+    stops = yield from _watch_heartbeats(node, kind, timeout_ms)
+    enters = Write(ERROR_BEHAVIOUR, 1, ENTER_PRE_OPERATIONAL_ON_LOSS, 1)
+    yield from node.set_if_present(enters, kind.self_stop.error_behaviour)
+    options = kind.options
+    for drive in drives:
+        took = yield from node.set_if_present(on_loss(drive), kind.self_stop.abort_connection)
+        stops = took and stops
+        quick_stop = write_at(drive, QUICK_STOP_OPTION, options.quick_stop_code)
+        if not (yield from node.set_if_present(quick_stop, options.quick_stop)):
+            yield from _refuse_coasting(node, drive)
+        reaction = write_at(drive, FAULT_REACTION_OPTION, options.fault_reaction_code)
+        yield from node.set_if_present(reaction, options.fault_reaction)
+    by_vendor = yield from _set_vendor_watchdog(node, kind, robot.timeouts.drive_heartbeat_s)
+    return "heartbeat of the watchdog (1016h, 6007h)" if stops else by_vendor
+
+
+def configure_sync(node: NodeAccess, kind: Profile, counter: int | None) -> Steps[None]:
+    """1019h as `bus.sync_counter` says; a SYNC of another length than a drive expects is an error to it."""
+    if counter is not None:
+        yield from node.set(Write(SYNC_COUNTER, 0, counter, 1))
+    elif kind.options.sync_counter != "no" and (yield from node.read_if_present(SYNC_COUNTER)):
+        yield from node.set_if_present(Write(SYNC_COUNTER, 0, 0, 1))
+
+
+def write_all(node: NodeAccess, writes: tuple[SdoWrite, ...]) -> Steps[None]:
+    """What the profile wants written besides."""
+    for entry in writes:
+        write = Write(entry.index, entry.sub, entry.value, entry.bits // 8)
+        if entry.optional:
+            yield from node.set_if_present(write)
+        else:
+            yield from node.set(write)
+
+
+def on_loss(drive: Drive) -> Write:
+    """6007h: what the drive does when its master is lost."""
+    return write_at(drive, ABORT_CONNECTION_OPTION, drive.kind.self_stop.abort_connection_code)
+
+
+def harmless_on_loss(drive: Drive) -> Write:
+    """6007h for the time of an NMT reset, in which nothing has torque: no fault for it."""
+    code = drive.kind.self_stop.abort_connection_code
+    return write_at(drive, ABORT_CONNECTION_OPTION, NO_ACTION if code == FAULT_SIGNAL else code)
+
+
+def write_at(drive: Drive, index: int, value: int) -> Write:
+    """A write to object `index` of the drive's axis."""
+    at = place(drive.kind.layout, index, drive.axis)
+    return Write(at.index, at.sub, value, at.bits // 8)
+
+
+def _check_mode(node: NodeAccess, drive: Drive, mode: int) -> Steps[None]:
+    at = place(drive.kind.layout, MODE_DISPLAY, drive.axis)
+    shown = yield from node.read_if_present(at.index, at.sub)
+    if shown is not None and shown != mode & 0xFF:
+        node.notes.append(f"{at.index:04X}h:{at.sub} shows mode {shown}, {mode} was set; it may take power to change")
+
+
+def _configure_ramps(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None]:
+    """Raises BootError when the drive keeps a softer stop: its way would be longer than all others count with."""
+    units, presence = AxisUnits(drive, robot.base), drive.kind.options.ramps
+    for index, mps2 in _ramps_mps2(robot).items():
+        write = write_at(drive, index, units.acceleration_raw(mps2))
+        took = yield from node.set_if_present(write, presence)
+        if took or presence == "no" or index not in STOPPING_LIMITS:
+            continue
+        raw = yield from node.read_if_present(write.index, write.sub)
+        key = STOPPING_LIMITS[index]
+        needed = getattr(robot.limits, key)
+        if raw is None or units.acceleration_mps2(raw) >= KEPT_SHARE * needed:
+            continue
+        kept = units.acceleration_mps2(raw)
+        problem = f"{write.index:04X}h:{write.sub} stays at {raw}: {drive.joint} brakes with {kept:.3g} m/s² by it"
+        hint = f"Lower limits.{key} ({needed:g}) to that in robot.yaml, or set the object with the maker's tool"
+        raise BootError(node.node_id, problem, hint)
+
+
+def _refuse_coasting(node: NodeAccess, drive: Drive) -> Steps[None]:
+    """605Ah of 0 that the drive keeps: a quick stop takes the power away, and the wheel rolls out."""
+    at = place(drive.kind.layout, QUICK_STOP_OPTION, drive.axis)
+    if drive.kind.options.quick_stop == "no" or (yield from node.read_if_present(at.index, at.sub)) != COASTS:
+        return
+    problem = f"{at.index:04X}h:{at.sub} stays at 0: a quick stop lets {drive.joint} coast"
+    hint = "Set it to 2 with the maker's tool; where rolling out is right, options.quick_stop: no in its drive profile"
+    raise BootError(node.node_id, problem, hint)
+
+
+def _ramps_mps2(robot: Robot) -> dict[int, float]:
+    """The driver shapes the speed; the drive's own ramps bound a step, and must never lag behind in a curve."""
+    limits, arm_m = robot.limits, robot.base.track_m / 2
+    faster = limits.acceleration_mps2 + limits.angular_acceleration_radps2 * arm_m
+    slower = limits.deceleration_mps2 + limits.angular_deceleration_radps2 * arm_m
+    hardest = limits.emergency_deceleration_mps2
+    return {
+        PROFILE_ACCELERATION: max(faster, hardest),
+        PROFILE_DECELERATION: max(slower, hardest),
+        QUICK_STOP_DECELERATION: hardest,
+    }
+
+
+def _produce_heartbeat(node: NodeAccess, timeout_ms: int) -> Steps[None]:
+    """1017h, or the nearest period that the drive takes. Raises BootError when it takes none that is short enough.
+
+    A drive that lacks the object, or refuses it for another reason, may produce a heartbeat all the same: a note.
+    """
+    wanted, longest = round(timeout_ms / HEARTBEATS_WANTED), timeout_ms // HEARTBEATS_NEEDED
+    others = sorted((ms for ms in HEARTBEAT_PERIODS_MS if ms <= longest), key=lambda ms: abs(ms - wanted))
+    refusal = ""
+    for period_ms in (wanted, *others):
+        try:
+            yield from node.set(Write(HEARTBEAT_PRODUCER, 0, period_ms, 2))
+        except SdoAborted as refused:
+            refusal = f"1017h:0: {refused.text}"
+            if refused.code not in VALUE_REFUSED:
+                node.notes.append(refusal)
+                return
+        except BootError as other:
+            refusal = other.problem
+            if 0 < ((yield from node.read_if_present(HEARTBEAT_PRODUCER)) or 0) <= longest:
+                node.notes.append(f"{refusal}: that is short enough")
+                return
+        else:
+            if period_ms != wanted:
+                node.notes.append(f"1017h:0: heartbeat every {period_ms} ms, {wanted} ms was refused")
+            return
+    problem = f"it takes no heartbeat period of at most {longest} ms ({refusal})"
+    hint = "Raise timeouts.drive_heartbeat_s in robot.yaml to twice the shortest period of the drive, 1017h"
+    raise BootError(node.node_id, problem, hint)
+
+
+def _watch_heartbeats(node: NodeAccess, kind: Profile, timeout_ms: int) -> Steps[bool]:
+    """With one entry the watchdog is watched, which is silent when the driver is. Whether it is watched.
+
+    No node may be in two entries, so those of an earlier life go first.
+    """
+    known = kind.self_stop.heartbeat_entries
+    entries = 0 if known == 0 else (yield from node.read_if_present(HEARTBEAT_CONSUMER)) or 0
+    if entries == 0:
+        node.notes.append("1016h: the drive watches no heartbeat, it will not stop by it")
+        return False
+    watchdog, driver = (node_id << 16 | timeout_ms for node_id in (WATCHDOG_NODE_ID, DRIVER_NODE_ID))
+    left: int | None = None
+    for sub in range(2, entries + 1):
+        found = yield from node.read_if_present(HEARTBEAT_CONSUMER, sub)
+        is_ours = sub == 2 and found == driver
+        if found and not is_ours:
+            yield from node.set_if_present(Write(HEARTBEAT_CONSUMER, sub, 0, 4), known=found)
+        elif sub == 2:
+            left = found
+    is_watched = yield from node.set_if_present(Write(HEARTBEAT_CONSUMER, 1, watchdog, 4))
+    if entries > 1:
+        yield from node.set_if_present(Write(HEARTBEAT_CONSUMER, 2, driver, 4), known=left)
+    return is_watched
+
+
+def _set_vendor_watchdog(node: NodeAccess, kind: Profile, timeout_s: float) -> Steps[str]:
+    """The maker's own command timeout; what is not proven to stop the motor is only noted."""
+    watchdog = kind.self_stop.vendor_watchdog
+    if watchdog is None:
+        return ""
+    if watchdog.index is None:
+        node.notes.append(f"the drive's own watchdog: {watchdog.text}")
+        return ""
+    write = Write(watchdog.index, watchdog.sub, round(watchdog.per_s * timeout_s), watchdog.bits // 8)
+    if not (yield from node.set_if_present(write)):
+        return ""
+    if kind.is_unproven("self_stop.vendor_watchdog"):
+        node.notes.append(f"{write}: {watchdog.text} is set, but not proven to stop the motor")
+        return ""
+    return f"{watchdog.text} ({write})"

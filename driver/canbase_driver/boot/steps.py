@@ -1,0 +1,233 @@
+"""What the boot of a node is made of: its steps, its errors, and the ways to write an object and be sure of it.
+
+The sequence itself is `sequence.py`, the PDOs `pdo_mapping.py`; `node_boot.py` puts the steps on the bus.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from canbase_config.profile import Presence
+from canbase_driver.cia301.nmt import NmtCommand
+from canbase_driver.cia301.sdo_client import (
+    ACCESS_UNSUPPORTED,
+    DEVICE_STATE,
+    LENGTH_WRONG,
+    NO_OBJECT,
+    NO_SUB_INDEX,
+    READ_ONLY,
+    TOO_LONG,
+    TOO_SHORT,
+    WRITE_ONLY,
+    Read,
+    SdoAborted,
+    SdoError,
+    SdoTimeout,
+    Write,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class SendNmt:
+    """An NMT command to the node. It brings no answer."""
+
+    command: NmtCommand
+
+
+@dataclass(frozen=True, slots=True)
+class WaitBootUp:
+    """Wait for the node's boot-up message. The answer tells whether it came within `timeout_s`."""
+
+    timeout_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Pause:
+    """Wait `duration_s`; `until` says what for. It brings no answer."""
+
+    duration_s: float
+    until: str
+
+
+@dataclass(frozen=True, slots=True)
+class Quiet:
+    """Wait until there was no boot-up message for `duration_s`. It brings no answer."""
+
+    duration_s: float
+
+
+Step = Read | Write | SendNmt | WaitBootUp | Pause | Quiet
+T = TypeVar("T")
+Steps = Generator[Step, Any, T]
+"""Yields steps; is sent the answer of each (bytes of a Read, b"" of a Write), or thrown SdoAborted or SdoTimeout."""
+
+
+class BootError(Exception):
+    """A node cannot be made ready. The text names the object, the reason and what to try."""
+
+    def __init__(self, node_id: int, problem: str, hint: str) -> None:
+        super().__init__(f"node {node_id}: {problem}. {hint}.")
+        self.node_id = node_id
+        self.problem = problem
+        self.hint = hint
+
+
+def boot_error(error: SdoError) -> BootError:
+    """What a transfer that failed for good means to the person at the machine."""
+    return BootError(error.node_id, f"{error.index:04X}h:{error.sub}: {error.text}", _hint(error))
+
+
+PROFILE_KEYS: tuple[tuple[range, str], ...] = (
+    (range(0x1016, 0x1017), "self_stop.heartbeat_entries"),
+    (range(0x1017, 0x1018), "timeouts.drive_heartbeat_s of robot.yaml: a third of it is the period"),
+    (range(0x1019, 0x101A), "options.sync_counter"),
+    (range(0x1029, 0x102A), "self_stop.error_behaviour"),
+    (range(0x1600, 0x1800), "layout"),
+    (range(0x1A00, 0x1C00), "layout"),
+    (range(0x6007, 0x6008), "self_stop.abort_connection"),
+    (range(0x605A, 0x605B), "options.quick_stop"),
+    (range(0x605E, 0x605F), "options.fault_reaction"),
+    (range(0x6060, 0x6061), "modes"),
+    (range(0x6061, 0x6062), "options.mode_display"),
+    (range(0x606C, 0x606D), "layout.velocity_bits"),
+    (range(0x6077, 0x6079), "options.torque"),
+    (range(0x6083, 0x6086), "options.ramps"),
+    (range(0x60C2, 0x60C3), "options.interpolation"),
+    (range(0x60FF, 0x6100), "layout.target_bits"),
+)
+"""Object → the key of a drive profile (docs/drives.md) that says whether, where or how wide the drive has it."""
+TRANSMISSION_TYPE = 2
+"""Sub-index of 1400h… and 1800h…."""
+WIDTHS = (LENGTH_WRONG, TOO_LONG, TOO_SHORT)
+
+
+def profile_key(index: int, sub: int = 0) -> str:
+    """The key of a drive profile that an object belongs to; empty: none. The second axis is at + 800h."""
+    if (0x1400 <= index < 0x1600 or 0x1800 <= index < 0x1A00) and sub == TRANSMISSION_TYPE:
+        return "pdo.synchronous"
+    first_axis = index - 0x800 if 0x6800 <= index < 0x7000 else index
+    return next((key for objects, key in PROFILE_KEYS if first_axis in objects), "")
+
+
+def _hint(error: SdoError) -> str:
+    if isinstance(error, SdoTimeout):
+        return "Check power, cable and bit rate, and that no other program uses the SDO channel of this node"
+    key = profile_key(error.index, error.sub)
+    if key == "pdo.synchronous":
+        return "The drive takes no PDO that waits for SYNC: set `pdo.synchronous: false` in its drive profile"
+    code = error.code if isinstance(error, SdoAborted) else None
+    if code == DEVICE_STATE:
+        return "Switch the drive off and on again, and let no other master control it"
+    if code in WIDTHS:
+        where = f": see `{key}` of its drive profile" if key.startswith("layout") else ""
+        return f"The drive has this object in another width than CiA 402 and its profile say{where}"
+    if error.index in (0x6060, 0x6860):
+        return "The drive must support `mode` of robot.yaml, see 6502h: bit 2 is mode 3, bit 8 is mode 9"
+    needed = "canbase needs this object as docs/bus.md has it; look it up in the manual of the drive"
+    return needed + (f", and see `{key}` of its drive profile" if key else "")
+
+
+class NodeAccess:
+    """Objects of one node. `notes`: what was lacking or refused; `changes`: what was written, with the old value."""
+
+    def __init__(self, node_id: int) -> None:
+        self.node_id = node_id
+        self.notes: list[str] = []
+        self.changes: list[str] = []
+
+    def read_if_present(self, index: int, sub: int = 0) -> Steps[int | None]:
+        """An unsigned number; None when the drive lacks the object, or refuses it with whatever abort code.
+
+        Many drives abort with 0800 0000h (general error) for what they do not have. Any code but "does not exist" is
+        noted.
+        """
+        try:
+            return unsigned((yield Read(index, sub)))
+        except SdoAborted as refused:
+            if refused.code not in (NO_OBJECT, NO_SUB_INDEX):
+                self.notes.append(f"{index:04X}h:{sub} cannot be read: {refused.text}{_see(index, sub)}")
+            return None
+
+    def set(self, step: Write, known: int | None = None) -> Steps[None]:
+        """Write where it differs, and read back. A read-only object may pass when it has the value.
+
+        `known`: the present value, unsigned, where it was read just now. Raises BootError when another value is read
+        back.
+        """
+        before = (yield from self._read(step)) if known is None else _as_bytes(known, step.size)
+        if before is None or not _same(before, step.data):
+            yield from self.overwrite(step, _hex(before) if before else "?")
+
+    def overwrite(self, step: Write, before: str) -> Steps[None]:
+        """Write what is known to differ from `before`, and read back. Raises BootError when another value is read."""
+        refusal = yield from self._write(step)
+        found = yield from self._read(step)
+        if found is not None and not _same(found, step.data):
+            problem = f"{step} is {_hex(found)}, expected {_hex(step.data)}{refusal}"
+            raise BootError(self.node_id, problem, "Set it with the maker's tool, or look for what sets it otherwise")
+        self.changes.append(f"{step}: {before} → {_hex(step.data)}")
+
+    def set_if_present(self, step: Write, presence: Presence = "probe", known: int | None = None) -> Steps[bool]:
+        """Like `set`, but a drive that lacks, refuses or changes the value only earns a note. Whether it took it.
+
+        `presence`: what the profile says; an object that it denies is not tried.
+        """
+        if presence == "no":
+            return False
+        try:
+            yield from self.set(step, known)
+        except SdoAborted as refused:
+            self.notes.append(f"{step}: {refused.text}")
+            return False
+        except BootError as other:
+            self.notes.append(other.problem)
+            return False
+        return True
+
+    def _write(self, step: Write) -> Steps[str]:
+        """Empty, or why a read-only object refused."""
+        try:
+            yield step
+        except SdoAborted as refused:
+            if refused.code not in (READ_ONLY, ACCESS_UNSUPPORTED):
+                raise
+            return f" ({refused.text})"
+        return ""
+
+    def _read(self, step: Write) -> Steps[bytes | None]:
+        """None: the object can only be written."""
+        try:
+            found: bytes = yield Read(step.index, step.sub)
+        except SdoAborted as refused:
+            if refused.code != WRITE_ONLY:
+                raise
+            return None
+        return found
+
+
+def _see(index: int, sub: int) -> str:
+    key = profile_key(index, sub)
+    return f" (drive profile: {key})" if key else ""
+
+
+def _same(found: bytes, wanted: bytes) -> bool:
+    """The same number, of whatever width the drive has it."""
+    width = min(len(found), len(wanted))
+    rest = found[width:] + wanted[width:]
+    return width > 0 and found[:width] == wanted[:width] and rest.strip(b"\0") in (b"", b"\xff" * len(rest))
+
+
+def unsigned(data: bytes) -> int:
+    """The number in an answer."""
+    return int.from_bytes(data, "little")
+
+
+def _as_bytes(number: int, size: int) -> bytes:
+    """In `size` bytes, or in more where a drive has sent more."""
+    return number.to_bytes(max(size, (number.bit_length() + 7) // 8), "little")
+
+
+def _hex(data: bytes) -> str:
+    return f"{unsigned(data):0{2 * len(data)}X}h"

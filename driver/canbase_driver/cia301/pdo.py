@@ -1,0 +1,206 @@
+"""The PDOs of docs/bus.md as data: which exist, with which identifiers and contents, and their packing.
+
+The profile of the drive says where its objects are and how wide. Writing the layout into a drive is `pdo_mapping.py`.
+The layout of the quick stop PDO is the watchdog's; its sender is too.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+from canbase_config.drive import Drive
+from canbase_config.object_map import (
+    CONTROLWORD,
+    POSITION_ACTUAL,
+    STATUSWORD,
+    TARGET_VELOCITY,
+    TORQUE_OBJECTS,
+    VELOCITY_ACTUAL,
+    place,
+)
+from canbase_config.profile import Layout, Profile
+from canbase_config.robot import Robot
+from canbase_driver.cia301.nmt import RPDO, TPDO
+
+EVERY_SYNC = 1
+"""Transmission type: a TPDO goes out after each SYNC, an RPDO takes effect at the next one (CiA 301)."""
+AT_ONCE = 255
+"""Transmission type: event driven, an RPDO takes effect when it arrives (CiA 301, profile event)."""
+QUICK_STOP_RPDO = 4
+"""The watchdog's PDO has this number, or the last one of a drive with fewer."""
+
+GENERIC_PROFILE = Profile(title="generic")
+GENERIC = GENERIC_PROFILE.layout
+_SETPOINT = {16: struct.Struct("<Hh"), 32: struct.Struct("<Hi")}
+_STATUS = {False: struct.Struct("<Hi"), True: struct.Struct("<Ii")}
+"""By whether the statuswords of two axes are packed into one object."""
+_VELOCITY = {16: struct.Struct("<h"), 32: struct.Struct("<i")}
+_TORQUE = struct.Struct("<h")
+RATED = 1000.0
+"""6077h and 6078h at rated torque (CiA 402-2)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pdo:
+    """One PDO as a drive is to be told: `mapping` holds the entries of 1600h/1A00h in order."""
+
+    kind: str
+    """"RPDO" (to the drive) or "TPDO" (from it)."""
+    number: int
+    """1…512."""
+    cob_id: int = 0
+    transmission_type: int = EVERY_SYNC
+    mapping: tuple[int, ...] = ()
+    optional: int = 0
+    """So many at the end of the mapping may stay away."""
+    inhibit_100us: int | None = None
+    """1800h:3, None: not written."""
+    event_timer_ms: int | None = None
+    """1400h:5 or 1800h:5, None: not written."""
+
+    @property
+    def name(self) -> str:
+        """RPDO1, TPDO2, …"""
+        return f"{self.kind}{self.number}"
+
+    @property
+    def communication(self) -> int:
+        """Index of its communication parameters, 1400h… or 1800h…"""
+        return (0x1400 if self.kind == "RPDO" else 0x1800) + self.number - 1
+
+    @property
+    def mapping_object(self) -> int:
+        """Index of its mapping parameters, 1600h… or 1A00h…"""
+        return self.communication + 0x200
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """What the times in PDOs follow from: the period of the control cycle, and how long setpoints may be missing."""
+
+    cycle_s: float = 0.01
+    deadline_s: float = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class NodeLayout:
+    """The PDOs of one node with one or two used axes. Raises ValueError for any other set of axes."""
+
+    node_id: int
+    axes: tuple[int, ...]
+    """Used axes in rising order; the first has RPDO1, TPDO1 and TPDO2, the second RPDO2, TPDO3 and TPDO4."""
+    profile: Profile = GENERIC_PROFILE
+    timing: Timing = Timing()
+    with_torque: bool = True
+    """False: the drive refuses to tell its torque in a PDO."""
+
+    def __post_init__(self) -> None:
+        if self.axes not in ((0,), (1,), (0, 1)):
+            raise ValueError(f"axes {self.axes} of node {self.node_id}: expected (0,), (1,) or (0, 1)")
+
+    def setpoint_cob_id(self, axis: int) -> int:
+        """Identifier of the RPDO that takes `pack_setpoint` for this axis. Raises ValueError for an unused axis."""
+        return RPDO[self.axes.index(axis)] + self.node_id
+
+    def status_cob_id(self, axis: int) -> int:
+        """Identifier of the TPDO for `unpack_status` of this axis. Raises ValueError for an unused axis."""
+        return TPDO[2 * self.axes.index(axis)] + self.node_id
+
+    def velocity_cob_id(self, axis: int) -> int:
+        """Identifier of the TPDO for `unpack_velocity` of this axis. Raises ValueError for an unused axis."""
+        return TPDO[2 * self.axes.index(axis) + 1] + self.node_id
+
+    @property
+    def torque_objects(self) -> tuple[int, ...]:
+        """6077h or 6078h where the velocity TPDO carries it behind 606Ch, else nothing."""
+        index = TORQUE_OBJECTS.get(self.profile.options.torque)
+        return () if index is None or not self.with_torque else (index,)
+
+    def torque_places(self) -> tuple[tuple[int, int], ...]:
+        """Index and sub-index of the torque of each axis."""
+        places = [place(self.profile.layout, index, axis) for index in self.torque_objects for axis in self.axes]
+        return tuple((at.index, at.sub) for at in places)
+
+    def pdos(self) -> tuple[Pdo, ...]:
+        """Every PDO in use, as docs/bus.md has them."""
+        return (*self._setpoints(), self._quick_stop(), *self._feedback())
+
+    def _setpoints(self) -> list[Pdo]:
+        has_deadline = self.profile.self_stop.rpdo_timer != "no"
+        deadline_ms = round(1000 * self.timing.deadline_s) if has_deadline else None
+        kind = EVERY_SYNC if self.profile.pdo.synchronous else AT_ONCE
+        return [
+            Pdo(
+                "RPDO",
+                1 + i,
+                self.setpoint_cob_id(axis),
+                kind,
+                self._entries(axis, CONTROLWORD, TARGET_VELOCITY),
+                event_timer_ms=deadline_ms,
+            )
+            for i, axis in enumerate(self.axes)
+        ]
+
+    def _quick_stop(self) -> Pdo:
+        entries = dict.fromkeys(entry for axis in self.axes for entry in self._entries(axis, CONTROLWORD))
+        number = min(QUICK_STOP_RPDO, self.profile.pdo.rpdos)
+        return Pdo("RPDO", number, RPDO[3] + self.node_id, AT_ONCE, tuple(entries))
+
+    def _feedback(self) -> list[Pdo]:
+        pdos = []
+        for i, axis in enumerate(self.axes):
+            status = self._entries(axis, STATUSWORD, POSITION_ACTUAL)
+            velocity = self._entries(axis, VELOCITY_ACTUAL, *self.torque_objects)
+            pdos.append(self._tpdo(2 * i + 1, self.status_cob_id(axis), status))
+            pdos.append(self._tpdo(2 * i + 2, self.velocity_cob_id(axis), velocity, len(self.torque_objects)))
+        return pdos
+
+    def _tpdo(self, number: int, cob_id: int, mapping: tuple[int, ...], optional: int = 0) -> Pdo:
+        """Without SYNC it goes by its timer, and never more often than once in a cycle."""
+        if self.profile.pdo.synchronous:
+            return Pdo("TPDO", number, cob_id, mapping=mapping, optional=optional)
+        ms = max(1, round(1000 * self.timing.cycle_s))
+        return Pdo("TPDO", number, cob_id, AT_ONCE, mapping, optional, inhibit_100us=10 * ms, event_timer_ms=ms)
+
+    def _entries(self, axis: int, *indexes: int) -> tuple[int, ...]:
+        return tuple(place(self.profile.layout, index, axis).mapping_entry for index in indexes)
+
+
+def node_layout(node_id: int, drives: tuple[Drive, ...], robot: Robot) -> NodeLayout:
+    """The PDOs of a node whose used axes are `drives`, all of one profile. Raises ValueError when there is none."""
+    if not drives:
+        raise ValueError(f"node {node_id} has no axes")
+    timing = Timing(1.0 / robot.rates.control_hz, robot.timeouts.drive_heartbeat_s)
+    return NodeLayout(node_id, tuple(sorted(drive.axis for drive in drives)), drives[0].kind, timing)
+
+
+def pack_setpoint(controlword: int, target_raw: int, layout: Layout = GENERIC) -> bytes:
+    """6040h and 60FFh for `setpoint_cob_id`. Raises struct.error when a value does not fit its object."""
+    return _SETPOINT[layout.target_bits].pack(controlword, target_raw)
+
+
+def unpack_status(data: bytes, layout: Layout = GENERIC, axis: int = 0) -> tuple[int, int] | None:
+    """Statusword 6041h of an axis and position 6064h [increments].
+
+    None when the length is wrong: to be dropped and counted.
+    """
+    is_packed = layout.statusword == "packed"
+    form = _STATUS[is_packed]
+    if len(data) != form.size:
+        return None
+    statusword, position = form.unpack(data)
+    return (statusword >> 16 * axis & 0xFFFF if is_packed else statusword), position
+
+
+def unpack_velocity(data: bytes, layout: Layout = GENERIC) -> int | None:
+    """Velocity 606Ch [raw], with or without a torque behind it; None when the length is wrong: to be dropped and
+    counted."""
+    form = _VELOCITY[layout.velocity_bits]
+    return int(form.unpack_from(data)[0]) if len(data) in (form.size, form.size + _TORQUE.size) else None
+
+
+def unpack_torque(data: bytes, layout: Layout = GENERIC) -> float | None:
+    """Torque behind the velocity, as a share of the rated one; None: the drive does not tell it."""
+    form = _VELOCITY[layout.velocity_bits]
+    return _TORQUE.unpack_from(data, form.size)[0] / RATED if len(data) == form.size + _TORQUE.size else None

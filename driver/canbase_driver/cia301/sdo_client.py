@@ -1,0 +1,306 @@
+"""CiA 301 SDO client for one node, without a bus: frames go in, frames and answers come out, time is an argument.
+
+Expedited and segmented transfers in both directions; no block transfers. One transfer at a time. What does not answer
+the transfer under way is dropped and counted: other clients use the same channel, and answers may come late.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+from canbase_driver.cia301.frame import Frame
+from canbase_driver.cia301.nmt import MAX_NODE_ID, SDO_TO_CLIENT, SDO_TO_SERVER
+
+_ABORT = 0x80
+
+MAX_UPLOAD_BYTES = 4096
+"""A drive that sends more than this for one object is not followed any further."""
+
+TOGGLE_BIT_WRONG, TIMED_OUT, COMMAND_UNKNOWN = 0x0503_0000, 0x0504_0000, 0x0504_0001
+OUT_OF_MEMORY, ACCESS_UNSUPPORTED, WRITE_ONLY, READ_ONLY = 0x0504_0005, 0x0601_0000, 0x0601_0001, 0x0601_0002
+NO_OBJECT, NO_SUB_INDEX, LENGTH_WRONG, DEVICE_STATE = 0x0602_0000, 0x0609_0011, 0x0607_0010, 0x0800_0022
+TOO_LONG, TOO_SHORT = 0x0607_0012, 0x0607_0013
+VALUE_INVALID, VALUE_TOO_HIGH, VALUE_TOO_LOW = 0x0609_0030, 0x0609_0031, 0x0609_0032
+
+ABORT_TEXTS = {
+    TOGGLE_BIT_WRONG: "toggle bit not alternated",
+    TIMED_OUT: "SDO protocol timed out",
+    COMMAND_UNKNOWN: "command specifier not valid or unknown",
+    0x0504_0002: "block size not valid",
+    0x0504_0003: "sequence number not valid",
+    0x0504_0004: "CRC error",
+    OUT_OF_MEMORY: "out of memory",
+    ACCESS_UNSUPPORTED: "unsupported access to the object",
+    WRITE_ONLY: "the object is write-only",
+    READ_ONLY: "the object is read-only",
+    NO_OBJECT: "the object does not exist",
+    0x0604_0041: "the object cannot be mapped to a PDO",
+    0x0604_0042: "the mapped objects exceed the length of the PDO",
+    0x0604_0043: "parameters are incompatible",
+    0x0604_0047: "internal incompatibility in the device",
+    0x0606_0000: "access failed because of a hardware error",
+    LENGTH_WRONG: "data type or length does not match",
+    TOO_LONG: "data too long",
+    TOO_SHORT: "data too short",
+    NO_SUB_INDEX: "the sub-index does not exist",
+    VALUE_INVALID: "value not valid",
+    VALUE_TOO_HIGH: "value too high",
+    VALUE_TOO_LOW: "value too low",
+    0x0609_0036: "maximum below minimum",
+    0x060A_0023: "resource not available",
+    0x0800_0000: "general error",
+    0x0800_0020: "data cannot be transferred or stored",
+    0x0800_0021: "data cannot be transferred or stored because of local control",
+    DEVICE_STATE: "data cannot be transferred or stored in the present state of the device",
+    0x0800_0023: "no object dictionary present",
+    0x0800_0024: "no data available",
+}
+"""SDO abort codes of CiA 301 in words."""
+
+
+def abort_text(code: int) -> str:
+    """An abort code, with its meaning, for people."""
+    return f"{code >> 16:04X} {code & 0xFFFF:04X}h {ABORT_TEXTS.get(code, 'unknown abort code')}"
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """Upload of one object. The answer is its bytes."""
+
+    index: int
+    sub: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.index:04X}h:{self.sub}"
+
+
+@dataclass(frozen=True, slots=True)
+class Write:
+    """Download of one object: `value` as a number of `size` bytes (negative: two's complement), or as bytes.
+
+    The answer is b"". Raises ValueError when a number does not fit, or when there is nothing to write.
+    """
+
+    index: int
+    sub: int
+    value: int | bytes
+    size: int = 0
+
+    def __post_init__(self) -> None:
+        if self.value == b"" or (isinstance(self.value, int) and self.size < 1):
+            raise ValueError(f"{self}: nothing to write; a number needs its size in bytes")
+        if isinstance(self.value, int) and not -(1 << 8 * self.size - 1) <= self.value < 1 << 8 * self.size:
+            raise ValueError(f"{self}: {self.value} does not fit {self.size} bytes")
+
+    @property
+    def data(self) -> bytes:
+        """The bytes that go to the drive."""
+        if isinstance(self.value, bytes):
+            return self.value
+        return (self.value & (1 << 8 * self.size) - 1).to_bytes(self.size, "little")
+
+    def __str__(self) -> str:
+        return f"{self.index:04X}h:{self.sub}"
+
+
+class SdoError(Exception):
+    """A transfer failed for good. Abstract: it is one of the two below."""
+
+    def __init__(self, node_id: int, step: Read | Write, text: str) -> None:
+        super().__init__(f"node {node_id}, {step}: {text}")
+        self.node_id = node_id
+        self.index = step.index
+        self.sub = step.sub
+        self.text = text
+
+
+class SdoAborted(SdoError):  # noqa: N818 - the standard's word
+    """The drive refused the transfer, or its answers broke the protocol: `code` is the abort code."""
+
+    def __init__(self, node_id: int, step: Read | Write, code: int) -> None:
+        super().__init__(node_id, step, abort_text(code))
+        self.code = code
+
+
+class SdoTimeout(SdoError):  # noqa: N818 - as TimeoutError, but of SDO
+    """The drive did not answer any of the attempts."""
+
+
+@dataclass(slots=True)
+class _Transfer:
+    """The transfer under way. `buffer`: what is still to be sent, or what has come so far."""
+
+    step: Read | Write
+    attempts_left: int
+    deadline: float
+    buffer: bytes
+    initiated: bool = False
+    toggle: int = 0
+    announced: int | None = None
+
+
+class SdoClient:
+    """One SDO transfer after the other with one node.
+
+    `start` gives the first frame, `on_frame` and `tick` give those that follow; when `busy` ends, `answer()` has it.
+    `dropped` counts the frames of this channel that did not belong to the transfer, `duplicates` those among them that
+    answer the request before it once more, though that one was sent once.
+    """
+
+    def __init__(self, node_id: int, timeout_s: float, attempts: int) -> None:
+        if not 1 <= node_id <= MAX_NODE_ID or timeout_s <= 0.0 or attempts < 1:
+            raise ValueError(f"node {node_id}, {timeout_s} s, {attempts} attempts: expected 1…127, more than 0 of each")
+        self.node_id = node_id
+        self.dropped = self.duplicates = 0
+        self._answered: bytes | None = None
+        """Address of the transfer that ended last, with the first answer to its only request."""
+        self._timeout_s = timeout_s
+        self._attempts = attempts
+        self._transfer: _Transfer | None = None
+        self._answer: bytes | SdoError | None = None
+
+    @property
+    def busy(self) -> bool:
+        """Whether a transfer is under way."""
+        return self._transfer is not None
+
+    def start(self, step: Read | Write, now: float) -> Frame:
+        """Begin a transfer. Raises RuntimeError while another is under way."""
+        if self._transfer is not None:
+            raise RuntimeError(f"node {self.node_id}: {self._transfer.step} is under way; wait for its answer")
+        self._answer = None
+        return self._begin(step, self._attempts, now)
+
+    def again(self, now: float) -> Frame:
+        """Begin the transfer under way anew: the drive has just started. Raises RuntimeError when there is none."""
+        if self._transfer is None:
+            raise RuntimeError(f"node {self.node_id}: no transfer is under way")
+        return self._begin(self._transfer.step, self._attempts, now)
+
+    def answer(self) -> bytes:
+        """What the last transfer brought: the object's bytes, or b"" after a write.
+
+        Raises SdoAborted or SdoTimeout when it failed, RuntimeError when there is none yet.
+        """
+        if self._answer is None:
+            raise RuntimeError(f"node {self.node_id}: no transfer has ended yet")
+        if isinstance(self._answer, SdoError):
+            raise self._answer
+        return self._answer
+
+    def tick(self, now: float) -> list[Frame]:
+        """Let time pass: a transfer without an answer is aborted, then tried again or given up."""
+        if self._transfer is None or now < self._transfer.deadline:
+            return []
+        return self._fail(self._transfer, TIMED_OUT, now)
+
+    def on_frame(self, frame: Frame, now: float) -> list[Frame]:
+        """Take a frame from the bus; frames of other nodes and services are none of our business."""
+        if frame.cob_id != SDO_TO_CLIENT + self.node_id:
+            return []
+        transfer = self._transfer
+        if len(frame.data) == 8 and frame.data[1:4] == self._answered and not _expects(transfer, frame.data):
+            self.duplicates += 1
+            return self._drop()
+        if transfer is None or len(frame.data) != 8:
+            return self._drop()
+        if frame.data[0] == _ABORT:
+            return self._on_abort(transfer.step, frame.data)
+        if transfer.initiated:
+            return self._on_segment(transfer, frame.data, now)
+        return self._on_initiated(transfer, frame.data, now)
+
+    def _begin(self, step: Read | Write, attempts: int, now: float) -> Frame:
+        buffer = b"" if isinstance(step, Read) else step.data
+        self._transfer = _Transfer(step, attempts - 1, now, buffer)
+        return self._request(self._transfer, _initiate(step), now)
+
+    def _request(self, transfer: _Transfer, data: bytes, now: float) -> Frame:
+        transfer.deadline = now + self._timeout_s
+        return Frame(SDO_TO_SERVER + self.node_id, data.ljust(8, b"\0"))
+
+    def _on_abort(self, step: Read | Write, data: bytes) -> list[Frame]:
+        if data[1:4] != _address(step):
+            return self._drop()
+        return self._finish(SdoAborted(self.node_id, step, int.from_bytes(data[4:], "little")))
+
+    def _on_initiated(self, transfer: _Transfer, data: bytes, now: float) -> list[Frame]:
+        step = transfer.step
+        if data[1:4] != _address(step) or data[0] >> 5 != (2 if isinstance(step, Read) else 3):
+            return self._drop()
+        transfer.initiated = True
+        if isinstance(step, Write):
+            return self._finish(b"") if len(step.data) <= 4 else [self._send_segment(transfer, now)]
+        expedited, sized = data[0] & 0x02, data[0] & 0x01
+        if expedited:
+            return self._finish(data[4 : 8 - (data[0] >> 2 & 0x03 if sized else 0)])
+        transfer.announced = int.from_bytes(data[4:], "little") if sized else None
+        return [self._request(transfer, b"\x60", now)]
+
+    def _on_segment(self, transfer: _Transfer, data: bytes, now: float) -> list[Frame]:
+        is_read = isinstance(transfer.step, Read)
+        if data[0] >> 5 != (0 if is_read else 1):
+            return self._drop()
+        if data[0] >> 4 & 1 != transfer.toggle:
+            return self._fail(transfer, TOGGLE_BIT_WRONG, now)
+        transfer.toggle ^= 1
+        if is_read:
+            return self._on_uploaded(transfer, data, now)
+        return [self._send_segment(transfer, now)] if transfer.buffer else self._finish(b"")
+
+    def _on_uploaded(self, transfer: _Transfer, data: bytes, now: float) -> list[Frame]:
+        transfer.buffer += data[1 : 8 - (data[0] >> 1 & 0x07)]
+        if len(transfer.buffer) > MAX_UPLOAD_BYTES:
+            return self._fail(transfer, OUT_OF_MEMORY, now)
+        if not data[0] & 0x01:
+            return [self._request(transfer, bytes((0x60 | transfer.toggle << 4,)), now)]
+        if transfer.announced not in (None, len(transfer.buffer)):
+            return self._fail(transfer, LENGTH_WRONG, now)
+        return self._finish(transfer.buffer)
+
+    def _send_segment(self, transfer: _Transfer, now: float) -> Frame:
+        part, transfer.buffer = transfer.buffer[:7], transfer.buffer[7:]
+        is_last = not transfer.buffer
+        command = transfer.toggle << 4 | (7 - len(part)) << 1 | is_last
+        return self._request(transfer, bytes((command,)) + part, now)
+
+    def _fail(self, transfer: _Transfer, code: int, now: float) -> list[Frame]:
+        step = transfer.step
+        abort = Frame(SDO_TO_SERVER + self.node_id, bytes((_ABORT,)) + _address(step) + code.to_bytes(4, "little"))
+        if transfer.attempts_left:
+            return [abort, self._begin(step, transfer.attempts_left, now)]
+        self._finish(self._timeout(step) if code == TIMED_OUT else SdoAborted(self.node_id, step, code))
+        return [abort]
+
+    def _timeout(self, step: Read | Write) -> SdoTimeout:
+        return SdoTimeout(self.node_id, step, f"no answer to {self._attempts} requests, {self._timeout_s:g} s each")
+
+    def _finish(self, answer: bytes | SdoError) -> list[Frame]:
+        transfer, self._transfer = self._transfer, None
+        asked_once = transfer is not None and transfer.attempts_left == self._attempts - 1
+        self._answered = _address(transfer.step) if transfer is not None and asked_once else None
+        self._answer = answer
+        return []
+
+    def _drop(self) -> list[Frame]:
+        self.dropped += 1
+        return []
+
+
+def _expects(transfer: _Transfer | None, data: bytes) -> bool:
+    """Whether the transfer under way may be what this frame answers."""
+    return transfer is not None and (transfer.initiated or _address(transfer.step) == data[1:4])
+
+
+def _address(step: Read | Write) -> bytes:
+    return struct.pack("<HB", step.index, step.sub)
+
+
+def _initiate(step: Read | Write) -> bytes:
+    if isinstance(step, Read):
+        return b"\x40" + _address(step)
+    data = step.data
+    if len(data) <= 4:
+        return bytes((0x23 | (4 - len(data)) << 2,)) + _address(step) + data
+    return b"\x21" + _address(step) + len(data).to_bytes(4, "little")

@@ -1,0 +1,355 @@
+"""One CANopen node of the base at run time: its NMT state and heartbeat, its emergency messages, its boot, its axes.
+
+GONE ──begin_boot──► BOOTING ──boot report──► STARTING ──operational, all axes heard──► READY
+  ▲                     │ error                  │ too late, or boot-up heard             │
+  └─────────────────────┴────────────────────────┴── boot-up or other NMT state heard ────┘
+
+Between boot report and NMT start it waits for the other nodes' boots: PDOs go before SDOs on the bus.
+
+What a node says before it is STARTING comes from an earlier life, with a layout of its own: none of it counts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from enum import Enum
+
+from canbase_config.profile import Profile
+from canbase_config.robot import Robot
+from canbase_driver.boot.node_boot import NodeBoot
+from canbase_driver.boot.sequence import BootReport
+from canbase_driver.cia301.emcy import Emcy, parse_emcy
+from canbase_driver.cia301.frame import Frame
+from canbase_driver.cia301.nmt import ALL_NODES, NmtCommand, NmtState, nmt, parse_heartbeat
+from canbase_driver.cia301.pdo import node_layout
+from canbase_driver.cia402 import DriveState, PowerGoal, common_controlword, next_controlword
+from canbase_driver.drives.axis import Axis
+from canbase_driver.drives.sdo_stop import SdoStop
+from canbase_driver.drives.telemetry import Measures, Values
+
+START_TIMEOUT_S = 1.0
+"""From NMT start to a heartbeat "operational" and a status of every axis."""
+HOLD_S = 0.2
+"""So long after the last NMT "enter pre-operational" it is left alone; the watchdog repeats it every 0.05 s."""
+RETRY_S = 1.0
+"""Between two boots of a node that failed."""
+UNHEARD_S = 1.0
+"""A node that has answered no request of its boot for so long may have no power or no cable."""
+SEEK_S = 1.0
+"""A node that is silent for so long while nothing has power is looked for by a new boot: its boot-up may be lost."""
+SECOND_BOOT_UP_S, ALIKE, SETTLE_FACTOR, SETTLE_EXTRA_S = 3.0, 0.3, 1.3, 0.2
+"""A boot-up message so soon after the one that answered the NMT reset may be a second one of the same start. When it
+comes again after the next boot, as late but for this share, the boots after that wait for it: that time, times the
+factor, and the extra. Once alone it is a drive that lost its supply."""
+BUS_LOST = (0x8120, 0x8130, 0x8140)
+"""Emergency codes for a lost bus or heartbeat (CiA 301): error passive, heartbeat or life guarding, bus-off."""
+
+
+class Presence(Enum):
+    """How far a node is; see the drawing at the head of this file."""
+
+    GONE = "gone"
+    BOOTING = "booting"
+    STARTING = "starting"
+    READY = "ready"
+
+
+class RemoteNode:
+    """A node and its one or two axes."""
+
+    def __init__(self, node_id: int, robot: Robot) -> None:
+        self.node_id = node_id
+        self._robot = robot
+        self._drives = tuple(drive for drive in robot.drives if drive.node_id == node_id)
+        self.layout = node_layout(node_id, self._drives, robot)
+        self.axes = tuple(Axis(drive, self.layout, robot) for drive in self._drives)
+        self.presence = Presence.GONE
+        self.nmt_state: NmtState | None = None
+        self.heartbeat_at = -math.inf
+        self.emcy: Emcy | None = None
+        self.report: BootReport | None = None
+        """Of the last boot, while the node is there."""
+        self.boot_error = ""
+        self.others_are_configured: Callable[[], bool] = lambda: True
+        """Whether no other node is in the middle of its boot; set by whoever has them all."""
+        self._measures = Measures(node_id, self._drives, robot.timeouts.sdo_s)
+        self._sdo_stop = SdoStop(node_id, self._drives)
+        self._lost_heartbeat = self._owed_stop = False
+        self._held_until = -math.inf
+        self._ready_at = math.inf
+        """When it was ready last; before that, when it was looked at first. Infinity until then."""
+        self._boot: NodeBoot | None = None
+        self._boot_up_at = -math.inf
+        self._second_s = math.inf
+        """From the boot-up message of the last boot to a second one [s]; infinity: there was none."""
+        self._settle_s = 0.0
+        self._since_s = -math.inf
+        self._why_gone = "not booted yet"
+
+    @property
+    def name(self) -> str:
+        """ "node 1 (left_wheel_joint)" """
+        return f"node {self.node_id} ({', '.join(drive.joint for drive in self._drives)})"
+
+    @property
+    def profile(self) -> Profile:
+        """What is known of its kind."""
+        return self.layout.profile
+
+    @property
+    def has_pdos(self) -> bool:
+        """It was configured and started: setpoints may be sent to it, and its feedback counts."""
+        return self.presence in (Presence.STARTING, Presence.READY)
+
+    @property
+    def takes_pdos(self) -> bool:
+        """`has_pdos`; or it had power when it was lost, and nothing has shown since that its motors have none: NMT
+        tells nothing about that, and it may obey its PDOs still. Until its boot begins, which stops it by SDO."""
+        return self.has_pdos or self._owed_stop
+
+    def is_off(self, now: float) -> bool:
+        """Every axis says, in a fresh statusword, that it has no torque."""
+        fresh_s = self._robot.timeouts.feedback_s
+        axes = self.axes
+        return all(now - axis.status_at <= fresh_s and axis.state and not axis.state.has_torque for axis in axes)
+
+    @property
+    def is_being_configured(self) -> bool:
+        """It was heard, and its boot fills the bus with SDOs."""
+        return self._boot is not None and self._boot.configuring
+
+    @property
+    def _is_configured(self) -> bool:
+        """Its boot has ended well, and it is not started yet."""
+        return self._boot is not None and self._boot.report is not None
+
+    def waiting_for(self, now: float) -> str:
+        """What keeps it from being ready; empty when it is, or when it is gone and not being booted."""
+        if self._is_configured:
+            return f"{self.name}: configured, waits for the boots of the others"
+        if self.presence is Presence.BOOTING and self._boot is not None:
+            unheard = not self._boot.heard and now - self._since_s > UNHEARD_S
+            cure = "; check its power and its cable" if unheard else ""
+            return self._boot.waiting_for + cure + (f" (last try: {self.boot_error})" if self.boot_error else "")
+        if self.presence is Presence.STARTING:
+            return f"{self.name}: waiting for its first feedback since {now - self._since_s:.1f} s"
+        return ""
+
+    def missing(self, now: float) -> str:
+        """Why it is not ready though it had timeouts.boot_s for it; empty when it is, or has time left."""
+        if self.presence is Presence.READY or now - self._ready_at <= self._robot.timeouts.boot_s:
+            return ""
+        why = self.boot_error or f"{self._why_gone}; check its power and its cable"
+        return f"{self.name} is missing since {now - self._ready_at:.0f} s: {why}"
+
+    def absent(self) -> str:
+        """Why it is gone; empty when it is not."""
+        return f"{self.name} {self._why_gone}" if self.presence is Presence.GONE else ""
+
+    def silent(self, now: float, sync_since: float) -> str:
+        """A sentence when its feedback or its heartbeat is too old; only a node that is ready can be silent.
+
+        It answers SYNCs: after a pause of ours it has timeouts.feedback_s from `sync_since` on [s], when the present
+        run of SYNCs began. However often we pause, it is silent when timeouts.drive_heartbeat_s are over as well.
+        """
+        if self.presence is not Presence.READY:
+            return ""
+        timeouts = self._robot.timeouts
+        for axis in self.axes:
+            unasked_s = min(max(0.0, sync_since - axis.fed_at), timeouts.drive_heartbeat_s)
+            if axis.age_s(now) - unasked_s > timeouts.feedback_s:
+                value = "status" if axis.status_at <= axis.velocity_at else "velocity"
+                return f"{self.name}: no {value} for {axis.age_s(now):.2f} s"
+        if now - self.heartbeat_at > timeouts.drive_heartbeat_s:
+            return f"{self.name}: no heartbeat for {now - self.heartbeat_at:.2f} s"
+        return ""
+
+    def begin_boot(self, now: float) -> None:
+        """Boot it (again). Does nothing while a boot runs, within RETRY_S after a failed one, and
+        while the watchdog's ladder holds it: a boot would work against that.
+        """
+        too_soon = self.boot_error and now - self._since_s < RETRY_S
+        if self.presence is not Presence.GONE or too_soon or now < self._held_until:
+            return
+        self._boot = NodeBoot(self.node_id, self._drives, self._robot, self._settle_s)
+        self._boot_up_at = -math.inf
+        self._owed_stop = False
+        self._go(Presence.BOOTING, now)
+
+    def seek(self, now: float, sync_since: float) -> None:
+        """Boot a node anew that was ready and is silent for SEEK_S: asked, it may answer. Only without power.
+
+        `sync_since`: start of the present run of SYNCs [s]; before it the node was not asked.
+        """
+        if self.presence is not Presence.READY:
+            return
+        heard_at = min(self.heartbeat_at, *(axis.status_at for axis in self.axes))
+        if now - max(heard_at, self._since_s, sync_since) > SEEK_S:
+            self.lose(f"gave no sign for {now - heard_at:.1f} s and is looked for", now)
+
+    def lose(self, why: str, now: float) -> None:
+        """It must be booted again before it counts: `why` completes the sentence that begins with its name."""
+        had_power = self.has_pdos and any(axis.state is None or axis.state.has_torque for axis in self.axes)
+        self._owed_stop = had_power or self._owed_stop
+        for axis in self.axes:
+            axis.forget()
+        self._why_gone = why
+        self._boot = self.report = None
+        self._go(Presence.GONE, now)
+
+    def release(self, now: float) -> None:
+        """It is not ours any more until it is booted again; what it failed in before is forgotten."""
+        self.lose("is not configured", now)
+        self.boot_error, self._ready_at = "", math.inf
+
+    def clear_lost_heartbeat(self, now: float) -> None:
+        """Some drives keep a fault for a lost heartbeat or bus until an NMT reset, which a boot brings."""
+        faulty = any(axis.state is DriveState.FAULT for axis in self.axes)
+        if self.profile.heartbeat_fault == "reset_communication" and self._lost_heartbeat and faulty:
+            self.lose("is reset: it is in fault for a lost heartbeat", now)
+
+    def forget_emcy(self) -> None:
+        """What it told before a reset is no news any more."""
+        self.emcy = None
+        self._lost_heartbeat = False
+
+    def measured(self, axis: Axis, now: float) -> Values:
+        """Voltage, current and temperature of one of its axes."""
+        return self._measures.values(axis.drive.axis, now)
+
+    def emcy_text(self) -> str:
+        """Its last emergency message in words; empty: none."""
+        return self.emcy.text_with(self.profile.emcy) if self.emcy else ""
+
+    def setpoints(self, goal: PowerGoal, left_mps: float, right_mps: float) -> list[Frame]:
+        """The setpoint of each axis, one step towards `goal`; speeds of the rims, forward positive [m/s]."""
+        speeds = {"left": left_mps, "right": right_mps}
+        words = self.controlwords(goal)
+        return [axis.setpoint(goal, speeds[axis.drive.side], word) for axis, word in zip(self.axes, words, strict=True)]
+
+    def stop_by_sdo(self, goal: PowerGoal, now: float) -> list[Frame]:
+        """Controlwords and speeds by SDO while it takes no PDOs; it may have left NMT operational, motors turning."""
+        return [] if self.has_pdos else self._sdo_stop.frames(self.controlwords(goal), now)
+
+    def controlwords(self, goal: PowerGoal) -> list[int]:
+        """6040h of each of its axes, one step towards `goal`; motors that share one get the same."""
+        if self.profile.layout.controlword == "own":
+            return [next_controlword(axis.state, goal) for axis in self.axes]
+        return [common_controlword([axis.state for axis in self.axes], goal)] * len(self.axes)
+
+    def on_heartbeat(self, frame: Frame, now: float) -> bool:
+        """Take a frame 700h + id. False: not a heartbeat."""
+        parsed = parse_heartbeat(frame)
+        if parsed is None or parsed[1] is None:
+            return False
+        self.nmt_state = parsed[1]
+        self.heartbeat_at = now
+        if (self.has_pdos or self._is_configured) and self.nmt_state is NmtState.INITIALISING:
+            self.emcy = None
+            self.lose(f"restarted (boot-up message){self._learn_to_settle(now)}", now)
+        elif self.presence is Presence.READY and self.nmt_state is not NmtState.OPERATIONAL:
+            self.lose(f"left NMT operational ({self.nmt_state.text})", now)
+        elif self._boot is not None:
+            self._boot.on_frame(frame, now)
+            if self._boot.error is not None and self.nmt_state is NmtState.INITIALISING:
+                self._boot_up_at = self._boot.boot_up_at
+                self._learn_to_settle(now)
+        return True
+
+    def _learn_to_settle(self, now: float) -> str:
+        """A second boot-up message of one start: the next boot waits for it. What to add to a sentence about it."""
+        gap_s = now - self._boot_up_at
+        before_s, self._second_s = self._second_s, gap_s if gap_s <= SECOND_BOOT_UP_S else math.inf
+        if self._second_s == math.inf:
+            return ""
+        told = f", {gap_s:.2f} s after that of its boot"
+        if abs(gap_s - before_s) > ALIKE * gap_s:
+            return f"{told}; if it does so after each boot, set start.settle_s in its drive profile"
+        self._settle_s = max(self._settle_s, SETTLE_FACTOR * gap_s + SETTLE_EXTRA_S)
+        return f"{told}, again; the next boot waits for it (drive profile: start.settle_s)"
+
+    def on_nmt(self, frame: Frame, now: float) -> None:
+        """Take an NMT command (000h) that is on the bus: somebody keeps it pre-operational."""
+        if frame.data in (bytes((NmtCommand.ENTER_PRE_OPERATIONAL, node)) for node in (ALL_NODES, self.node_id)):
+            self._held_until = now + HOLD_S
+
+    def on_status(self, axis: Axis, frame: Frame, now: float) -> bool:
+        """Take 6041h and 6064h of one of its axes. False: not understood."""
+        return not self.takes_pdos or axis.on_status(frame.data, now)
+
+    def on_velocity(self, axis: Axis, frame: Frame, now: float) -> bool:
+        """Take 606Ch of one of its axes. False: not understood."""
+        return not self.takes_pdos or axis.on_velocity(frame.data, now)
+
+    def on_emcy(self, frame: Frame, _now: float) -> bool:
+        """Take a frame 080h + id. False: not an emergency message. It tells; only the statusword stops anything."""
+        emcy = parse_emcy(frame)
+        if emcy is None:
+            return False
+        self.emcy = None if emcy.is_reset else emcy
+        self._lost_heartbeat |= emcy.code in BUS_LOST  # some take the message back, and stay in fault
+        return True
+
+    def on_sdo(self, frame: Frame, now: float) -> bool:
+        """Take an SDO answer; one that nobody here waits for is somebody else's (a tool's) and fine."""
+        if self._boot is not None:
+            self._boot.on_frame(frame, now)
+        elif self.presence is Presence.READY:
+            self._measures.on_frame(frame, now)
+        elif (speed := self._sdo_stop.speed(frame)) is not None:
+            self.axes[speed[0]].on_speed(speed[1], now)
+        return True
+
+    def tick(self, now: float) -> list[Frame]:
+        """Let the boot go on, or ask for the next measured value. The frames to send."""
+        if self.presence is Presence.READY or self._ready_at == math.inf:
+            self._ready_at = now
+        if self.presence is Presence.STARTING:
+            self._check_started(now)
+        if self._boot is None:
+            return self._measures.tick(now) if self.presence is Presence.READY else []
+        frames = self._boot.tick(now)
+        if self._boot.error is not None:
+            self.boot_error = str(self._boot.error)
+            self.lose(f"could not be booted: {self.boot_error}", now)
+        elif self._boot.report is not None and self.others_are_configured():
+            frames.append(self._start(self._boot.report, now))
+        return frames
+
+    def _start(self, report: BootReport, now: float) -> Frame:
+        self._boot_up_at = self._boot.boot_up_at if self._boot is not None else -math.inf
+        self.report = report
+        self._lost_heartbeat = False
+        self._boot = None
+        self.nmt_state = None
+        for axis in self.axes:
+            axis.travel.reset_reference()  # to what came since it was lost: another drive of this id may have sent it
+        self._go(Presence.STARTING, now)
+        return nmt(NmtCommand.START, self.node_id)
+
+    def _check_started(self, now: float) -> None:
+        heard = all(axis.age_s(now) <= self._robot.timeouts.feedback_s for axis in self.axes)
+        if heard and self.nmt_state is NmtState.OPERATIONAL:
+            self.boot_error = ""
+            self._go(Presence.READY, now)
+        elif now - self._since_s > START_TIMEOUT_S:
+            self.boot_error = f"within {START_TIMEOUT_S:.1f} s of NMT start it sent {self._not_started(now)}"
+            self.lose(f"could not be started: {self.boot_error}", now)
+
+    def _not_started(self, now: float) -> str:
+        """What a node that was started has not sent, and what that may come from. It has answered SDOs until then."""
+        lacking = [
+            f"no status of {axis.drive.joint} (its TPDOs: see pdo.synchronous of its drive profile)"
+            for axis in self.axes
+            if axis.age_s(now) > self._robot.timeouts.feedback_s
+        ]
+        if self.nmt_state is None:
+            lacking.append("no heartbeat (1017h; a drive that knows node guarding alone cannot be used)")
+        elif self.nmt_state is not NmtState.OPERATIONAL:
+            lacking.append(f"a heartbeat that says {self.nmt_state.text}, not operational")
+        notes = self.report.notes if self.report else ()
+        return " and ".join(lacking) + (f"; its boot noted: {'; '.join(notes)}" if notes else "")
+
+    def _go(self, presence: Presence, now: float) -> None:
+        self.presence, self._since_s = presence, now

@@ -1,0 +1,252 @@
+"""All drives of the base as one: what keeps them from being ready, whether they stand, how far each side has rolled.
+
+Sentences name joint, node and values and are empty when there is nothing to tell. No decisions: `supervisor.py`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from functools import partial
+
+from canbase_config.robot import Robot
+from canbase_driver.boot.sdo_budget import SdoBudget
+from canbase_driver.cia301.emcy import emcy_text
+from canbase_driver.cia301.frame import Frame
+from canbase_driver.cia402 import INTERNAL_LIMIT, PREPARED, REMOTE, WARNING, DriveState
+from canbase_driver.drives.axis import Axis
+from canbase_driver.drives.canopen_node import RemoteNode
+from canbase_driver.snapshot import DriveSnapshot
+
+
+class Drives:
+    """Nodes by node id, axes in the order of robot.yaml."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self.nodes = tuple(RemoteNode(node_id, robot) for node_id in sorted({drive.node_id for drive in robot.drives}))
+        self._budget = SdoBudget(robot.bus, 1.0 / robot.rates.control_hz)
+        self._first = 0
+        for node in self.nodes:
+            node.others_are_configured = partial(self._are_configured_without, node)
+        by_joint = {axis.drive.joint: axis for node in self.nodes for axis in node.axes}
+        self.axes = tuple(by_joint[drive.joint] for drive in robot.drives)
+        self.left = tuple(axis for axis in self.axes if axis.drive.side == "left")
+        self.right = tuple(axis for axis in self.axes if axis.drive.side == "right")
+        node_of = {node.node_id: node for node in self.nodes}
+        self._with_node = tuple((node_of[axis.drive.node_id], axis) for axis in self.axes)
+
+    def _are_configured_without(self, node: RemoteNode) -> bool:
+        return not any(other.is_being_configured for other in self.nodes if other is not node)
+
+    def tick(self, now: float, may_boot: bool, sync_since: float) -> list[Frame]:
+        """Once a cycle: every node goes on, another one first each time; those that are gone begin their boot, those
+        that are silent are looked for. `sync_since`: start of the present run of SYNCs [s].
+        """
+        self._budget.refill(sum(len(node.axes) for node in self.nodes if node.has_pdos))
+        self._first = (self._first + 1) % len(self.nodes)
+        frames: list[Frame] = []
+        for node in (*self.nodes[self._first :], *self.nodes[: self._first]):
+            frames += self.go_on(node, now)
+            if may_boot:
+                node.seek(now, sync_since)
+                node.begin_boot(now)
+        return frames
+
+    def go_on(self, node: RemoteNode, now: float) -> list[Frame]:
+        """What a node sends next; while it is being configured, only as far as the bus has room for it."""
+        if node.is_being_configured and self._budget.is_spent:
+            return []
+        frames = node.tick(now)
+        self._budget.spend(len(frames))
+        return frames
+
+    def booting(self, now: float) -> str:
+        """What a node that is being booted or started is waiting for."""
+        return _first(node.waiting_for(now) for node in self.nodes)
+
+    def missing(self, now: float) -> str:
+        """Which node could not be booted for timeouts.boot_s, and why."""
+        return _first(node.missing(now) for node in self.nodes)
+
+    def absent(self) -> str:
+        """Why a node must be booted again."""
+        return _first(node.absent() for node in self.nodes)
+
+    def silent(self, now: float, sync_since: float) -> str:
+        """Which node gives no fresh status or heartbeat. `sync_since`: start of the present run of SYNCs [s]."""
+        return _first(node.silent(now, sync_since) for node in self.nodes)
+
+    def fault(self) -> str:
+        """Which axis is in fault or in its reaction to one, and the code that the drive gave."""
+        return _first(_fault(node) for node in self.nodes)
+
+    def disabled(self) -> str:
+        """Which axis is not in operation enabled."""
+        return _first(_disabled(axis) for axis in self.axes)
+
+    def unprepared(self) -> str:
+        """Which axis has not got as far as switched on, and what that may come from."""
+        return _first(_unprepared(axis) for axis in self.axes)
+
+    def are_fresh(self, now: float) -> bool:
+        """Every axis has given all its values in time."""
+        return all(self._is_fresh(axis, now) for axis in self.axes)
+
+    def stand(self, now: float) -> bool:
+        """Measured, fresh, and evidence: no wheel turns."""
+        return all(axis.stands(now) for axis in self.axes)
+
+    def rest(self, left_mps: float, right_mps: float) -> bool:
+        """Nothing is ordered of any wheel, and these speeds of the rims order nothing either."""
+        speeds = {"left": left_mps, "right": right_mps}
+        return all(axis.rests(speeds[axis.drive.side]) for axis in self.axes)
+
+    def turning(self, now: float) -> str:
+        """Which wheel does not stand, and why that is said; empty: all stand."""
+        return _first(self._turning(axis, now) for axis in self.axes)
+
+    def doubt(self, node_id: int, why: str) -> None:
+        """What this node measures is no evidence: somebody has caught it with a lie."""
+        for axis in self.axes:
+            if axis.drive.node_id == node_id:
+                axis.stillness.distrust(why)
+
+    def doubted(self) -> str:
+        """Which wheel's sensors are no evidence, and why; empty: none."""
+        return _first(_of(axis, axis.stillness.doubt) for axis in self.axes)
+
+    def assumed(self, now: float) -> str:
+        """Which wheel's standstill is assumed and not measured, and why; empty: none."""
+        return _first(_of(axis, axis.stillness.assumed(now)) for axis in self.axes)
+
+    def may_have_power(self, now: float) -> bool:
+        """Some axis has torque, or does not tell."""
+        fresh_s = self._robot.timeouts.feedback_s
+        return any(now - axis.status_at > fresh_s or axis.state is None or axis.state.has_torque for axis in self.axes)
+
+    def have_references(self) -> bool:
+        """The travel of every wheel is known since its first sample."""
+        return all(axis.travel.referenced for axis in self.axes)
+
+    def forget_emcys(self) -> None:
+        """After a reset: what the drives told before it is no news any more; some never take it back."""
+        for node in self.nodes:
+            node.forget_emcy()
+
+    def losses(self) -> int:
+        """How often the travel of some wheel went on from a new reference, since the start."""
+        return sum(axis.losses for axis in self.axes)
+
+    def travel_m(self) -> tuple[float, float]:
+        """Travel of the rims, left and right, since the start [m]; several wheels on a side are averaged."""
+        return _mean(axis.travel.travel_m for axis in self.left), _mean(axis.travel.travel_m for axis in self.right)
+
+    def speeds_mps(self) -> tuple[float, float]:
+        """Measured speeds of the rims, left and right [m/s]; several wheels on a side are averaged."""
+        return _mean(axis.velocity_mps for axis in self.left), _mean(axis.velocity_mps for axis in self.right)
+
+    def fastest(self) -> Axis:
+        """The axis with the greatest measured speed."""
+        return max(self.axes, key=lambda axis: abs(axis.velocity_mps))
+
+    def braking_mps(self, now: float) -> float:
+        """The greatest speed of a wheel with power that was measured in the last moments; 0: there is none [m/s]."""
+        return max((abs(each.velocity_mps) for each in self.axes if self._is_driven(each, now)), default=0.0)
+
+    def _is_driven(self, axis: Axis, now: float) -> bool:
+        """With power, by fresh values; or it tells its speed alone, by SDO, and may have power."""
+        if axis.state is None:
+            return now - axis.velocity_at <= self._robot.timeouts.feedback_s
+        return self._is_fresh(axis, now) and axis.state.has_torque
+
+    def snapshots(self, now: float) -> tuple[DriveSnapshot, ...]:
+        """One per axis, in the order of robot.yaml."""
+        return tuple(_snapshot(node, axis, self._robot, now) for node, axis in self._with_node)
+
+    def _turning(self, axis: Axis, now: float) -> str:
+        if axis.stands(now):
+            return ""
+        joint, base = axis.drive.joint, self._robot.base
+        if not self._is_fresh(axis, now):
+            return f"{joint} has given no velocity for {axis.age_s(now):.2f} s"
+        if axis.stillness.doubt:
+            return f"{joint} {axis.stillness.doubt}: its sensors are no evidence of standstill"
+        return f"{joint} turns at {axis.velocity_mps:.3f} m/s (base.standstill_mps {base.standstill_mps:g})"
+
+    def _is_fresh(self, axis: Axis, now: float) -> bool:
+        return axis.age_s(now) <= self._robot.timeouts.feedback_s
+
+
+def age_s(now: float, then: float) -> float:
+    """Seconds since `then`; NaN when that never was (minus infinity)."""
+    return now - then if then > -math.inf else math.nan
+
+
+def _snapshot(node: RemoteNode, axis: Axis, robot: Robot, now: float) -> DriveSnapshot:
+    radius_m = robot.base.wheel_radius_m
+    code = node.emcy.code if node.emcy else 0
+    measured = node.measured(axis, now)
+    return DriveSnapshot(
+        joint=axis.drive.joint,
+        node_id=node.node_id,
+        axis=axis.drive.axis,
+        nmt_state=node.nmt_state.text if node.nmt_state is not None else "unknown",
+        state=axis.state.text if axis.state else "unknown",
+        statusword=axis.statusword,
+        error_code=code,
+        error_text=emcy_text(code, node.profile.emcy) if code else "",
+        target_radps=axis.target_mps / radius_m,
+        velocity_radps=axis.velocity_mps / radius_m,
+        position_rad=axis.position_rad,
+        feedback_age_s=age_s(now, axis.fed_at),
+        heartbeat_age_s=age_s(now, node.heartbeat_at),
+        stops_by_itself=node.report is not None and node.report.stops_by_itself,
+        self_stop=node.report.self_stop if node.report else "",
+        warning=bool(axis.statusword & WARNING),
+        internal_limit=bool(axis.statusword & INTERNAL_LIMIT),
+        remote=bool(axis.statusword & REMOTE),
+        voltage_v=measured.voltage_v,
+        torque_share=math.nan if axis.push.share is None else axis.push.share,
+        current_a=measured.current_a,
+        temperature_c=measured.temperature_c,
+        boot_notes=node.report.notes if node.report else (),
+        boot_problem=node.boot_error,
+        configured=node.report is not None,
+        boot_changes=node.report.changes if node.report else (),
+    )
+
+
+def _fault(node: RemoteNode) -> str:
+    for axis in node.axes:
+        if axis.state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
+            return f"{axis.drive.joint} (node {node.node_id}): {node.emcy_text() or 'no code given'}"
+    return ""
+
+
+def _of(axis: Axis, what: str) -> str:
+    return f"{axis.drive.joint} {what}" if what else ""
+
+
+def _unprepared(axis: Axis) -> str:
+    if axis.state in PREPARED:
+        return ""
+    place = f"{axis.drive.joint} (node {axis.drive.node_id})"
+    local = "" if axis.statusword & REMOTE else "; it is in local mode and ignores the controlword (statusword bit 9)"
+    return f"{place} stays in {axis.state.text if axis.state else 'no state known'}: STO, main voltage?{local}"
+
+
+def _disabled(axis: Axis) -> str:
+    if axis.state is DriveState.OPERATION_ENABLED:
+        return ""
+    text = axis.state.text if axis.state else "in no state known"
+    return f"{axis.drive.joint} (node {axis.drive.node_id}) is {text}"
+
+
+def _first(sentences: Iterable[str]) -> str:
+    return next((sentence for sentence in sentences if sentence), "")
+
+
+def _mean(values: Iterable[float]) -> float:
+    listed = list(values)
+    return sum(listed) / len(listed)

@@ -1,0 +1,249 @@
+"""From the drives' 32-bit positions to the pose of the base: unwrapping, travel of a wheel, exact arcs, covariance.
+
+A first sample is an offset and never motion. What a wheel cannot have done does not enter the pose. No ROS, no clock.
+Frames and axes are those of REP 103 and REP 105.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from canbase_driver.motion.kinematics import Twist2D, base_twist
+from canbase_driver.snapshot import Covariance
+
+RE_REFERENCE_SAMPLES = 3
+"""So many samples in a row at a new place, each near the one before: the counter has moved for good."""
+
+DOUBTED_CYCLES = 10
+"""A place that a counter jumped to is not believed after so many cycles of silence: a second drive with the same node
+id may have reported it."""
+
+POSE_FLOOR_M2 = 1e-6
+"""Variance of x and of y before any motion [m²]: 1 mm."""
+POSE_FLOOR_RAD2 = 1e-6
+"""Variance of yaw before any motion [rad²]: 1 mrad."""
+POSE_M2_PER_M = 1e-4
+"""Growth of the variance of x and y with the distance [m²/m]: 1 cm after 1 m, 10 cm after 100 m."""
+YAW_RAD2_PER_M = 1e-4
+"""Growth of the variance of yaw with the distance [rad²/m]."""
+YAW_RAD2_PER_RAD = 1e-4
+"""Growth of the variance of yaw with the rotation [rad²/rad]: 1.4° after one turn."""
+TWIST_FLOOR = 1e-6
+"""Variance of a velocity at standstill [m²/s², rad²/s²]: 1 mm/s, 1 mrad/s."""
+TWIST_SHARE = 0.02
+"""Standard deviation of a velocity as a share of it: slip and the radius of the wheels."""
+UNMEASURED = 1e6
+"""Variance of what wheels cannot measure: z, roll and pitch."""
+
+_STRAIGHT_RAD = 1e-4
+_COUNTS = 1 << 32
+
+
+def unwrap(previous_raw: int, raw: int) -> int:
+    """Signed way from one 32-bit position to the next [counts], the shorter way round: −2³¹ … 2³¹ − 1.
+
+    Both may be given as i32 (6064h) or as u32.
+    """
+    return (raw - previous_raw + _COUNTS // 2) % _COUNTS - _COUNTS // 2
+
+
+def wrap_angle(angle_rad: float) -> float:
+    """The same direction in −π … π, for publishing only: whoever counts turns needs the angle unwrapped [rad]."""
+    return math.remainder(angle_rad, math.tau)
+
+
+class WheelTravel:
+    """Travel of one wheel's rim since its first sample, from the raw position of its axis (6064h).
+
+    Each sample is compared with the last one that was taken in. A step that the wheel cannot have made is a jump: it
+    is dropped and counted. If the samples after it come back, nothing was lost. If `RE_REFERENCE_SAMPLES` in a row
+    stay at the new place, the counter has moved for good: that place becomes the new reference, the travel goes on
+    from where it was, and `losses` counts it, as the travel of those samples is unknown. After such a jump no silence
+    of more than `DOUBTED_CYCLES` is bridged any more: the first sample after it is a new reference as well.
+    """
+
+    __slots__ = (
+        "_accepted_cycles",
+        "_accepted_raw",
+        "_counts",
+        "_doubted",
+        "_max_step_counts",
+        "_metres_per_count",
+        "_suspect_raw",
+        "_suspects",
+        "jumps",
+        "losses",
+    )
+
+    def __init__(self, metres_per_count: float, max_step_counts: float) -> None:
+        """`metres_per_count`: rim travel, negative for a mirrored axis. `max_step_counts`: possible in one cycle.
+
+        Raises ValueError for a step that is not positive or not below half the 32-bit range: it could not be told from
+        a wrap.
+        """
+        if not 0.0 < max_step_counts < _COUNTS / 2:
+            raise ValueError(f"max_step_counts must be above 0 and below 2^31, not {max_step_counts}")
+        if not math.isfinite(metres_per_count) or metres_per_count == 0.0:
+            raise ValueError(f"metres_per_count must be finite and not 0, not {metres_per_count}")
+        self._metres_per_count = metres_per_count
+        self._max_step_counts = max_step_counts
+        self._counts = 0
+        self._accepted_raw: int | None = None
+        self._accepted_cycles = 0
+        self._suspect_raw = 0
+        self._suspects = 0
+        self._doubted = False
+        self.jumps = 0
+        """Samples that were dropped, since start."""
+        self.losses = 0
+        """References that were lost to a jump, since start: each time the travel misses what happened meanwhile."""
+
+    @property
+    def travel_m(self) -> float:
+        """Rim travel since the first sample, forward positive [m]."""
+        return self._counts * self._metres_per_count
+
+    @property
+    def referenced(self) -> bool:
+        """A sample was taken in since the start or the last `reset_reference`, and the newest one is no jump."""
+        return self._accepted_raw is not None and self._suspects == 0
+
+    def reset_reference(self) -> None:
+        """The next sample is a new offset: after a drive's power cycle or a gap in its feedback. The travel stays."""
+        self._accepted_raw = None
+        self._suspects = 0
+        self._doubted = False
+
+    def update(self, raw: int, cycles: int = 1) -> float:
+        """Take in a new sample; the travel after it [m]. `cycles`: control cycles since the sample before, from 1."""
+        if cycles < 1:
+            raise ValueError(f"a new sample is at least one cycle younger than the one before, not {cycles}")
+        if self._accepted_raw is None:
+            self._accept(raw)
+            return self.travel_m
+        self._accepted_cycles += cycles
+        if self._doubted and cycles > DOUBTED_CYCLES:
+            self._lose(raw)
+            return self.travel_m
+        stays = self._suspects > 0 and self._is_near(self._suspect_raw, raw, cycles)
+        if not stays and self._is_near(self._accepted_raw, raw, self._accepted_cycles):
+            self._counts += unwrap(self._accepted_raw, raw)
+            self._accept(raw)
+        else:
+            self._suspect(raw, stays)
+        return self.travel_m
+
+    def _is_near(self, from_raw: int, raw: int, cycles: int) -> bool:
+        return abs(unwrap(from_raw, raw)) <= self._max_step_counts * cycles
+
+    def _accept(self, raw: int) -> None:
+        self._accepted_raw = raw
+        self._accepted_cycles = 0
+        self._suspects = 0
+
+    def _suspect(self, raw: int, stays: bool) -> None:
+        self.jumps += 1
+        self._suspects = self._suspects + 1 if stays else 1
+        self._suspect_raw = raw
+        if self._suspects >= RE_REFERENCE_SAMPLES:
+            self._doubted = True
+            self._lose(raw)
+
+    def _lose(self, raw: int) -> None:
+        self.losses += 1
+        self._accept(raw)
+
+
+@dataclass(frozen=True, slots=True)
+class Pose2D:
+    """Pose in the odom frame; `yaw_rad` is counter-clockwise and counts the turns (not wrapped)."""
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    yaw_rad: float = 0.0
+
+
+class Odometry:
+    """Pose of the base by dead reckoning: between two updates each wheel keeps its speed, so the base runs an arc."""
+
+    __slots__ = ("_distance_m", "_last_m", "_pose", "_rotation_rad", "_track_m", "_twist")
+
+    def __init__(self, track_m: float) -> None:
+        self._track_m = track_m
+        self._last_m: tuple[float, float] | None = None
+        self.reset(Pose2D())
+
+    @property
+    def pose(self) -> Pose2D:
+        """Pose of the base since start or `reset`."""
+        return self._pose
+
+    @property
+    def twist(self) -> Twist2D:
+        """Mean velocity between the last two updates."""
+        return self._twist
+
+    def reset(self, pose: Pose2D) -> None:
+        """Continue from `pose`, with the covariance of a fresh start. The wheels' travel goes on."""
+        self._pose = pose
+        self._twist = Twist2D.ZERO
+        self._distance_m = 0.0
+        self._rotation_rad = 0.0
+
+    def lose_reference(self) -> None:
+        """The next update is a reference and no motion: what is rolled until then does not enter the pose."""
+        self._last_m = None
+
+    def update(self, left_m: float, right_m: float, dt_s: float) -> Twist2D:
+        """Take in the travel of both sides since their start [m]; the mean velocity since the update before.
+
+        The first call, and the first after `lose_reference`, is the reference and no motion. Raises ValueError, with
+        nothing changed, for a travel that is not finite and for a `dt_s` that is not positive.
+        """
+        if not (math.isfinite(left_m) and math.isfinite(right_m)):
+            raise ValueError(f"the travel must be finite, not {left_m} m and {right_m} m")
+        if not (math.isfinite(dt_s) and dt_s > 0.0):
+            raise ValueError(f"the time between two updates must be positive, not {dt_s} s")
+        last_left_m, last_right_m = self._last_m or (left_m, right_m)
+        self._last_m = left_m, right_m
+        step = base_twist(left_m - last_left_m, right_m - last_right_m, self._track_m)
+        self._pose = _along_arc(self._pose, step.linear_mps, step.angular_radps)
+        self._distance_m += abs(step.linear_mps)
+        self._rotation_rad += abs(step.angular_radps)
+        self._twist = Twist2D(step.linear_mps / dt_s, step.angular_radps / dt_s)
+        return self._twist
+
+    def pose_covariance(self) -> Covariance:
+        """Of `pose`, in the odom frame: x and y grow with the distance, yaw with distance and rotation.
+
+        REP 103 order: x, y, z [m²], rotation about x, y, z [rad²]. The base stays on the ground as far as it knows: z,
+        roll and pitch are published as 0 and `UNMEASURED`.
+        """
+        xy_m2 = POSE_FLOOR_M2 + POSE_M2_PER_M * self._distance_m
+        yaw_rad2 = POSE_FLOOR_RAD2 + YAW_RAD2_PER_M * self._distance_m + YAW_RAD2_PER_RAD * self._rotation_rad
+        return _diagonal(xy_m2, xy_m2, yaw_rad2)
+
+    def twist_covariance(self) -> Covariance:
+        """Of `twist`, in the base frame, in the same order [m²/s², rad²/s²]. Sideways no wheel rolls: the floor."""
+        linear = TWIST_FLOOR + (TWIST_SHARE * self._twist.linear_mps) ** 2
+        angular = TWIST_FLOOR + (TWIST_SHARE * self._twist.angular_radps) ** 2
+        return _diagonal(linear, TWIST_FLOOR, angular)
+
+
+def _along_arc(pose: Pose2D, distance_m: float, turn_rad: float) -> Pose2D:
+    """The end of an arc: its chord, distance × sin(turn/2) / (turn/2), points half the turn away from the start."""
+    half_rad = turn_rad / 2.0
+    # Next to 0 the quotient loses digits; the series 1 − x²/6 is exact to 1e-18 there.
+    shortening = math.sin(half_rad) / half_rad if abs(half_rad) > _STRAIGHT_RAD else 1.0 - half_rad * half_rad / 6.0
+    heading_rad = pose.yaw_rad + half_rad
+    return Pose2D(
+        pose.x_m + distance_m * shortening * math.cos(heading_rad),
+        pose.y_m + distance_m * shortening * math.sin(heading_rad),
+        pose.yaw_rad + turn_rad,
+    )
+
+
+def _diagonal(x: float, y: float, yaw: float) -> Covariance:
+    diagonal = (x, y, UNMEASURED, UNMEASURED, UNMEASURED, yaw)
+    return tuple(value if row == column else 0.0 for row, value in enumerate(diagonal) for column in range(6))

@@ -1,0 +1,56 @@
+"""The velocity command as the driver takes it: finite or refused, fresh or none, and never before a zero was seen."""
+
+from __future__ import annotations
+
+import math
+
+from canbase_driver.motion.kinematics import Twist2D
+
+
+class Command:
+    """The last velocity command, with its local receive time [s, monotonic]."""
+
+    def __init__(self, timeout_s: float) -> None:
+        """`timeout_s`: a command that is older is none (timeouts.command_s)."""
+        self._timeout_s = timeout_s
+        self._twist = Twist2D.ZERO
+        self._seen_zero = False
+        self._emergency_at = -math.inf
+        self.received_at = -math.inf
+        self.refused = 0
+        """Commands that were not finite."""
+
+    def take(self, twist: Twist2D, received_at: float) -> bool:
+        """Take a command. False, and counted: it was not finite."""
+        if not twist.is_finite:
+            self.refused += 1
+            return False
+        self._twist, self.received_at = twist, received_at
+        self._seen_zero = self._seen_zero or twist == Twist2D.ZERO
+        return True
+
+    def take_emergency(self, brakes_hard: bool, received_at: float) -> None:
+        """Whether the base has to brake with the emergency deceleration, until it is said otherwise or not any more."""
+        self._emergency_at = received_at if brakes_hard else -math.inf
+
+    def brakes_hard(self, now: float) -> bool:
+        """The emergency deceleration was asked for within the timeout. Whatever the command is, that means a stop."""
+        return now - self._emergency_at <= self._timeout_s
+
+    def await_zero(self) -> None:
+        """From now on nothing is followed until a zero has come: who holds the stick must let go of it once."""
+        self._seen_zero = False
+
+    def is_fresh(self, now: float) -> bool:
+        """It came within the timeout."""
+        return now - self.received_at <= self._timeout_s
+
+    def motion(self, now: float) -> str:
+        """A sentence when a fresh command asks for motion, followed or not."""
+        if not self.is_fresh(now) or self._twist == Twist2D.ZERO:
+            return ""
+        return f"cmd_vel orders {self._twist.linear_mps:.3f} m/s, {self._twist.angular_radps:.3f} rad/s"
+
+    def target(self, now: float) -> Twist2D:
+        """What to follow: the command, zero when it is too old or no zero was seen yet."""
+        return self._twist if self._seen_zero and self.is_fresh(now) else Twist2D.ZERO

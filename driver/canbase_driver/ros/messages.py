@@ -1,0 +1,159 @@
+"""From a `DriverSnapshot` to ROS messages: odom, tf, joint_states, motor_driver/status, stop_events. No node or clock.
+
+Frames and units are those of REP 103 and REP 105. A stamp is a builtin_interfaces/Time that the caller gives.
+"""
+
+from __future__ import annotations
+
+import math
+
+from builtin_interfaces.msg import Time
+from canbase.msg import DriverStatus, DriveStatus, StopEvent
+from geometry_msgs.msg import Pose, Quaternion, TransformStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
+
+from canbase_driver.motion.odometry import Pose2D, wrap_angle
+from canbase_driver.snapshot import DriverSnapshot, DriveSnapshot
+from canbase_driver.supervision.stop_history import StopReport
+
+try:
+    from tf2_msgs.msg import TFMessage as TFMessage
+except ModuleNotFoundError:  # The ROS wheels on PyPI do not have tf2_msgs; ROS 2 from apt does.
+    TFMessage = None
+
+
+def odometry_message(snapshot: DriverSnapshot, stamp: Time) -> Odometry:
+    """The pose in odom_frame and the velocity in base_frame, each with its covariance."""
+    message = Odometry()
+    message.header.stamp = stamp
+    message.header.frame_id = snapshot.odom_frame
+    message.child_frame_id = snapshot.base_frame
+    message.pose.pose.position.x = snapshot.x_m
+    message.pose.pose.position.y = snapshot.y_m
+    message.pose.pose.orientation = _quaternion(snapshot.yaw_rad)
+    message.pose.covariance = snapshot.pose_covariance
+    message.twist.twist.linear.x = snapshot.linear_mps
+    message.twist.twist.angular.z = snapshot.angular_radps
+    message.twist.covariance = snapshot.twist_covariance
+    return message
+
+
+def transform_message(snapshot: DriverSnapshot, stamp: Time) -> TransformStamped:
+    """The transform odom_frame → base_frame: the pose of `odometry_message`."""
+    message = TransformStamped()
+    message.header.stamp = stamp
+    message.header.frame_id = snapshot.odom_frame
+    message.child_frame_id = snapshot.base_frame
+    message.transform.translation.x = snapshot.x_m
+    message.transform.translation.y = snapshot.y_m
+    message.transform.rotation = _quaternion(snapshot.yaw_rad)
+    return message
+
+
+def tf_message(snapshot: DriverSnapshot, stamp: Time) -> TFMessage | None:
+    """For the topic tf. None where this machine's ROS has no tf2_msgs: there is no type to publish it with."""
+    return None if TFMessage is None else TFMessage(transforms=[transform_message(snapshot, stamp)])
+
+
+def joint_state_message(snapshot: DriverSnapshot, stamp: Time) -> JointState:
+    """Angle and speed of each wheel that has given feedback; one that has not is left out, as its angle is unknown."""
+    heard = [drive for drive in snapshot.drives if not math.isnan(drive.feedback_age_s)]
+    message = JointState()
+    message.header.stamp = stamp
+    message.name = [drive.joint for drive in heard]
+    message.position = [drive.position_rad for drive in heard]
+    message.velocity = [drive.velocity_radps for drive in heard]
+    return message
+
+
+def status_message(snapshot: DriverSnapshot, stamp: Time) -> DriverStatus:
+    """Everything that DriverStatus has a field for. Counters go round at 2³² as their type does."""
+    return DriverStatus(
+        stamp=stamp,
+        state=int(snapshot.state),
+        cause=snapshot.cause,
+        detail=snapshot.detail,
+        clears_on=snapshot.clears_on,
+        watchdog=snapshot.watchdog.value,
+        watchdog_cause=snapshot.watchdog_cause,
+        watchdog_age_s=snapshot.watchdog_age_s,
+        watchdog_rung=snapshot.watchdog_rung,
+        watchdog_lease_age_s=snapshot.watchdog_lease_age_s,
+        watchdog_trips=snapshot.watchdog_trips,
+        watchdog_leases_refused=snapshot.watchdog_leases_refused,
+        watchdog_frames_dropped=snapshot.watchdog_frames_dropped,
+        watchdog_bus_errors=snapshot.watchdog_bus_errors,
+        watchdog_pause_max_s=snapshot.watchdog_pause_max_s,
+        pose_resets=_u32(snapshot.pose_resets),
+        standstill=snapshot.standstill,
+        command_age_s=snapshot.command_age_s,
+        command_fresh=snapshot.command_fresh,
+        commands_refused=_u32(snapshot.commands_refused),
+        cycles=_u32(snapshot.cycles),
+        overruns=_u32(snapshot.overruns),
+        cycle_lateness_max_s=snapshot.cycle_lateness_max_s,
+        frames_dropped=_u32(snapshot.frames_dropped),
+        send_errors=_u32(snapshot.send_errors),
+        bus_problem=snapshot.bus_problem,
+        controller=snapshot.controller,
+        receive_errors=_u32(snapshot.receive_errors),
+        error_frames=_u32(snapshot.error_frames),
+        bus_failures=_u32(snapshot.bus_failures),
+        drives=[_drive_status(drive) for drive in snapshot.drives],
+    )
+
+
+def stop_event_message(stop: StopReport, stamp: Time, black_box: str) -> StopEvent:
+    """One stop for the topic stop_events. `stamp`: of its cause; `black_box`: path of its recording, empty: none."""
+    record = stop.record
+    return StopEvent(
+        stamp=stamp,
+        stopped_by=record.stopped_by,
+        cause=record.cause,
+        detail=record.detail,
+        latched=record.latched,
+        clears_on=record.clears_on,
+        standstill=stop.standstill,
+        standstill_s=stop.standstill_s,
+        distance_m=stop.distance_m,
+        turned_rad=stop.turned_rad,
+        black_box=black_box,
+    )
+
+
+def pose_of(message: Pose) -> Pose2D:
+    """The part of a pose that a base on the ground has. No rotation (all 0, or not finite) becomes NaN: refused."""
+    turn = message.orientation
+    is_rotation = math.isfinite(turn.z + turn.w) and math.hypot(turn.x, turn.y, turn.z, turn.w) > 0.5
+    yaw_rad = wrap_angle(2.0 * math.atan2(turn.z, turn.w)) if is_rotation else math.nan
+    return Pose2D(message.position.x, message.position.y, yaw_rad)
+
+
+def _quaternion(yaw_rad: float) -> Quaternion:
+    half_rad = wrap_angle(yaw_rad) / 2.0
+    return Quaternion(x=0.0, y=0.0, z=math.sin(half_rad), w=math.cos(half_rad))
+
+
+def _u32(counter: int) -> int:
+    return counter & 0xFFFF_FFFF
+
+
+def _drive_status(drive: DriveSnapshot) -> DriveStatus:
+    return DriveStatus(
+        joint=drive.joint,
+        node_id=drive.node_id,
+        axis=drive.axis,
+        nmt_state=drive.nmt_state,
+        state=drive.state,
+        statusword=drive.statusword,
+        error_code=drive.error_code,
+        error_text=drive.error_text,
+        target_radps=drive.target_radps,
+        velocity_radps=drive.velocity_radps,
+        position_rad=drive.position_rad,
+        feedback_age_s=drive.feedback_age_s,
+        heartbeat_age_s=drive.heartbeat_age_s,
+        stops_by_itself=drive.stops_by_itself,
+        boot_problem=drive.boot_problem,
+    )

@@ -1,0 +1,174 @@
+"""The ROS node motor_driver: cmd_vel in; odom, tf, joint_states, status, diagnostics and stop events out.
+
+Threads: the executor's (main) takes commands, requests and lifecycle transitions, and none of its callbacks waits;
+`publisher` waits for snapshots and publishes them. Neither of them touches the bus.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+
+from canbase.msg import DriverStatus, SafetyState
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+
+from canbase_config.robot import Robot
+from canbase_driver.motion.kinematics import Twist2D
+from canbase_driver.ros import messages
+from canbase_driver.ros.diagnostics import diagnostics_message, unguarded
+from canbase_driver.ros.managed_node import ManagedNode
+from canbase_driver.ros.services import DriverServices
+from canbase_driver.ros.stop_events import StopTeller
+from canbase_driver.runtime.black_box import Ring
+from canbase_driver.runtime.black_box_writer import BlackBoxWriter
+from canbase_driver.runtime.control_thread import ControlLoop
+from canbase_driver.snapshot import DriverSnapshot, StopRecord
+from canbase_driver.supervision.supervisor import INACTIVE, PREPARING_CAUSE, UNARMED
+from canbase_runtime.journal import Journal, Voice
+from canbase_runtime.log_priority import Priority
+from canbase_runtime.receive_time import ReceiveTimes
+
+COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
+STATE_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
+DIAGNOSTICS_PERIOD_S = 1.0
+_USUAL = ("none", "booting", PREPARING_CAUSE, "enabling", "shutdown", "not configured", INACTIVE, UNARMED)
+"""Causes that are no warning."""
+
+
+class MotorDriverNode(ManagedNode):
+    """Talks ROS for a `ControlLoop`."""
+
+    def __init__(self, robot: Robot, loop: ControlLoop, ring: Ring, writer: BlackBoxWriter, autostart: bool) -> None:
+        super().__init__("motor_driver", loop, autostart)
+        self._robot = robot
+        self._receive_times = ReceiveTimes()
+        self.voice = Voice(self.get_logger(), Journal("motor_driver"))
+        self._odom = self.create_publisher(Odometry, "odom", 10)
+        self._tf = self.create_publisher(messages.TFMessage, "tf", 100) if messages.TFMessage is not None else None
+        self._joints = self.create_publisher(JointState, "joint_states", 10)
+        self._status = self.create_publisher(DriverStatus, "motor_driver/status", STATE_QOS)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self.create_subscription(TwistStamped, "cmd_vel", self._on_command, COMMAND_QOS)
+        self.create_subscription(SafetyState, "safety_filter/state", self._on_safety, COMMAND_QOS)
+        self._stops = StopTeller(self, robot, ring, writer, self.voice)
+        self._offers = DriverServices(self, loop, robot.base.odom_frame, self.request_times)
+        self._previous: DriverSnapshot | None = None
+        self._diagnosed: DriverSnapshot | None = None
+        self._status_at = 0.0
+        self._unguarded: tuple[str, ...] = ()
+        self._boot_problems: dict[str, str] = {}
+        """By joint: why its last boot failed, as it went to the log."""
+        self.state_text = "starting"
+        """State, cause and what ends it, in words: the last line that went to the log."""
+        if self._tf is None:
+            self.get_logger().warning("tf2_msgs is not installed: no transform is published on tf")
+
+    def publish(self, snapshot: DriverSnapshot, stops: list[StopRecord]) -> None:
+        """Publish a snapshot; called by the publisher's thread alone."""
+        stamp = self.get_clock().now().to_msg()
+        self._stops.tell(snapshot, stops)
+        if snapshot.odometry_valid:
+            self._odom.publish(messages.odometry_message(snapshot, stamp))
+            self._joints.publish(messages.joint_state_message(snapshot, stamp))
+            if self._tf is not None:
+                self._tf.publish(messages.tf_message(snapshot, stamp))
+        self._publish_status(snapshot, stamp)
+        self._log_change(snapshot)
+        self._warn_of_unguarded(snapshot)
+        self._warn_of_boots(snapshot)
+        self._previous = snapshot
+
+    def look_at_the_clock(self, now: float) -> None:
+        """To be called in each turn of the executor's loop: a pause between two of them ages the commands that wait."""
+        self._receive_times.at(now)
+        self.request_times.at(now)
+
+    def end(self) -> None:
+        """The control thread has ended: tell the stops that are still open."""
+        self._stops.end()
+
+    def _on_command(self, message: TwistStamped) -> None:
+        received_at = self._receive_times.at(time.monotonic())
+        twist = Twist2D(message.twist.linear.x, message.twist.angular.z)
+        if not twist.is_finite:
+            self.get_logger().error(f"cmd_vel refused: {twist} is not finite", throttle_duration_sec=1.0)
+        self._loop.command(twist, received_at)
+        self._stops.on_command(twist, received_at)
+
+    def _on_safety(self, message: SafetyState) -> None:
+        now = time.monotonic()
+        self._loop.emergency(message.emergency, now)
+        self._stops.on_filter(message, now)
+
+    def _publish_status(self, snapshot: DriverSnapshot, stamp: object) -> None:
+        previous = self._previous
+        changed = previous is None or _essence(previous) != _essence(snapshot)
+        if changed or snapshot.time_s - self._status_at >= 1.0 / self._robot.rates.status_hz:
+            self._status_at = snapshot.time_s
+            self._status.publish(messages.status_message(snapshot, stamp))
+        if self._diagnosed is None or snapshot.time_s - self._diagnosed.time_s >= DIAGNOSTICS_PERIOD_S:
+            before, self._diagnosed = self._diagnosed or snapshot, snapshot
+            self._diagnostics.publish(diagnostics_message(snapshot, stamp, robot=self._robot.name, previous=before))
+
+    def _log_change(self, snapshot: DriverSnapshot) -> None:
+        previous = self._previous
+        if previous is not None and (previous.state, previous.cause) == (snapshot.state, snapshot.cause):
+            return
+        why = f": {snapshot.cause}" if snapshot.cause not in ("none", snapshot.state.name.lower()) else ""
+        detail = f" ({snapshot.detail})" if snapshot.detail else ""
+        clears = f"; ends on: {snapshot.clears_on}" if snapshot.clears_on else ""
+        text = self.state_text = f"{snapshot.state.name}{why}{detail}{clears}"
+        self._stops.note(text)
+        usual = snapshot.cause in _USUAL
+        priority = Priority.INFO if usual else Priority.WARNING
+        self.voice.tell(text, priority, state=snapshot.state.name, cause=snapshot.cause, robot=self._robot.name)
+
+    def _warn_of_boots(self, snapshot: DriverSnapshot) -> None:
+        """Once for each reason why a drive cannot be booted, whatever else keeps the robot stopped."""
+        for drive in snapshot.drives:
+            if drive.boot_problem and self._boot_problems.get(drive.joint) != drive.boot_problem:
+                sentence = f"boot of {drive.joint} failed: {drive.boot_problem}"
+                self._stops.note(sentence)
+                self.voice.tell(sentence, Priority.WARNING, robot=self._robot.name)
+            self._boot_problems[drive.joint] = drive.boot_problem
+
+    def _warn_of_unguarded(self, snapshot: DriverSnapshot) -> None:
+        """Once after each boot, loudly."""
+        before, self._unguarded = self._unguarded, unguarded(snapshot)
+        for sentence in self._unguarded:
+            if sentence not in before:
+                self._stops.note(sentence)
+                self.voice.tell(sentence, Priority.ERROR, robot=self._robot.name)
+
+
+def _essence(snapshot: DriverSnapshot) -> tuple[object, ...]:
+    """What is published at once when it changes. After odom: who knows of a new pose has seen it."""
+    return snapshot.state, snapshot.cause, snapshot.pose_resets
+
+
+class Publisher(threading.Thread):
+    """Publishes every snapshot as soon as the control thread hands it over."""
+
+    def __init__(self, node: MotorDriverNode, loop: ControlLoop) -> None:
+        super().__init__(name="publisher", daemon=True)
+        self._node = node
+        self._loop = loop
+        self.failure: BaseException | None = None
+
+    def run(self) -> None:
+        """The thread's body: until the control thread has ended and its last snapshot is out."""
+        try:
+            while True:
+                alive = self._loop.is_alive()
+                snapshot, stops = self._loop.next_snapshot(timeout_s=0.1)
+                if snapshot is not None:
+                    self._node.publish(snapshot, stops)
+                elif not alive:
+                    self._node.end()
+                    return
+        except BaseException as error:  # noqa: BLE001 - main sees it, stops the robot and ends the process
+            self.failure = error

@@ -1,0 +1,123 @@
+"""ROS around `stop_history.py` and the black box: what filter and mux say comes in, stop_events go out.
+
+Two threads meet here: the executor's brings in commands and states, the publisher's tells. What the first one brings
+waits in a queue until the second one takes it.
+"""
+
+from __future__ import annotations
+
+import math
+import queue
+import time
+from collections.abc import Callable
+
+from builtin_interfaces.msg import Time
+from canbase.msg import MuxState, SafetyState, StopEvent
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from canbase_config.robot import Robot
+from canbase_config.stopping import given_up_s
+from canbase_driver.motion.kinematics import Twist2D
+from canbase_driver.ros.messages import stop_event_message
+from canbase_driver.runtime.black_box import Ring
+from canbase_driver.runtime.black_box_writer import BlackBoxWriter
+from canbase_driver.snapshot import DriverSnapshot, StopRecord
+from canbase_driver.supervision.stop_history import FILTER, StopRecorder, StopReport, standstill_text
+from canbase_driver.supervision.supervisor import POWER_OFF_TIMEOUT_S
+from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
+from canbase_runtime.journal import Voice
+from canbase_runtime.log_priority import Priority
+
+EVENT_QOS = QoSProfile(depth=50, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class StopTeller:
+    """Publishes one StopEvent for each stop, and has its recording written when it is latched."""
+
+    def __init__(self, node: Node, robot: Robot, ring: Ring, writer: BlackBoxWriter, voice: Voice) -> None:
+        self._node = node
+        self._voice = voice
+        self._robot_name = robot.name
+        self._ring = ring
+        self._writer = writer
+        self._estop_latches = robot.safety.estop.latched
+        patience_s = given_up_s(robot) + POWER_OFF_TIMEOUT_S
+        self._recorder = StopRecorder(patience_s)
+        self._news: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._filter_said = self._mux_said = ""
+        self._publisher = node.create_publisher(StopEvent, "stop_events", EVENT_QOS)
+        node.create_subscription(MuxState, "velocity_mux/state", self._on_mux, STATE_QOS)
+
+    def on_command(self, twist: Twist2D, received_at: float) -> None:
+        """A command came; from the executor's thread."""
+        self._ring.note(received_at, f"cmd_vel {twist.linear_mps:.4f} m/s {twist.angular_radps:.4f} rad/s")
+        moves = twist.is_finite and twist != Twist2D.ZERO
+        self._news.put(lambda: self._recorder.on_command(moves, received_at))
+
+    def on_filter(self, message: SafetyState, now: float) -> None:
+        """The safety filter said what it does; from the executor's thread."""
+        stops = message.action == SafetyState.STOP
+        cause, detail = printable(message.cause), printable(message.detail, SENTENCE_LENGTH)
+        said = f"safety_filter {cause} {detail}".rstrip()
+        ordered = f"{message.ordered_linear_mps:.4f} m/s {message.ordered_angular_radps:.4f} rad/s"
+        self._ring.note(now, f"{said}; orders {ordered}, lease {message.lease_sequence}")
+        latched = self._estop_latches and message.cause in (SafetyState.CAUSE_ESTOP, SafetyState.CAUSE_ESTOP_STALE)
+        clears_on = printable(message.clears_on, SENTENCE_LENGTH)
+        record = StopRecord(FILTER, cause, detail, latched, clears_on, now)
+        self._news.put(lambda: self._recorder.on_filter(record if stops else None, now))
+
+    def note(self, text: str) -> None:
+        """A line for the black box."""
+        self._ring.note(time.monotonic(), f"motor_driver {text}")
+
+    def tell(self, snapshot: DriverSnapshot, stops: list[StopRecord]) -> None:
+        """Take a snapshot and the stops that the core began; publish what is over. From the publisher's thread."""
+        while True:
+            try:
+                news = self._news.get_nowait()
+            except queue.Empty:
+                break
+            news()
+        for report in self._recorder.on_snapshot(snapshot, stops):
+            self._publish(report)
+
+    def end(self) -> None:
+        """Publish what is not over."""
+        for report in self._recorder.end():
+            self._publish(report)
+
+    def _publish(self, report: StopReport) -> None:
+        record, now = report.record, time.monotonic()
+        stamp_ns = self._node.get_clock().now().nanoseconds - round((now - record.at_s) * 1e9)
+        path = self._write(report, now) if record.latched else ""
+        stamp = Time(sec=stamp_ns // 1_000_000_000, nanosec=stamp_ns % 1_000_000_000)
+        self._publisher.publish(stop_event_message(report, stamp, path))
+        end = standstill_text(report)
+        file = f"; black box: {path}" if path else ""
+        by = f"{record.stopped_by}: {record.cause} ({record.detail})"
+        self._voice.tell(
+            f"stop by {by}; standstill {end}{file}",
+            Priority.WARNING,
+            robot=self._robot_name,
+            stopped_by=record.stopped_by,
+            cause=record.cause,
+            latched=str(record.latched).lower(),
+            standstill_s=f"{report.standstill_s:.3f}" if report.standstill else "",
+            distance_m="" if math.isnan(report.distance_m) else f"{report.distance_m:.4f}",
+            black_box=path,
+        )
+
+    def _write(self, report: StopReport, now: float) -> str:
+        record, offset_s = report.record, time.time() - now
+        title = f"stop by {record.stopped_by}: {record.cause} ({record.detail})"
+        recording = self._ring.cut(now, offset_s)
+        return self._writer.submit(recording, record.cause, record.at_s + offset_s, title)
+
+    def _on_mux(self, message: MuxState) -> None:
+        now, active = time.monotonic(), printable(message.active)
+        reasons = (f"{source.name}: {source.reason}" for source in message.sources if source.reason)
+        detail = printable("; ".join(reasons), SENTENCE_LENGTH)
+        self._ring.note(now, f"velocity_mux {active or 'no source'}; {detail}")
+        self._news.put(lambda: self._recorder.on_mux(active, detail, now))

@@ -1,0 +1,1 @@
+"""The process: its threads, the bus, recordings to disk."""

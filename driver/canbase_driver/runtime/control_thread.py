@@ -1,0 +1,236 @@
+"""The control thread: owns the core and the bus, keeps the SYNC cycle, and hands snapshots to whoever publishes them.
+
+Cycles lie on a grid of absolute times; between two of them the thread does nothing but take in frames. Other threads
+only put requests into the inbox. However the thread ends, its last act on the bus is a quick stop.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import math
+import os
+import queue
+import threading
+import time
+from collections.abc import Callable
+
+from canbase_driver.cia301.frame import Frame
+from canbase_driver.core import DriverCore
+from canbase_driver.motion.kinematics import Twist2D
+from canbase_driver.motion.odometry import Pose2D
+from canbase_driver.runtime.black_box import Ring
+from canbase_driver.runtime.bus_port import BusPort
+from canbase_driver.snapshot import DriverSnapshot, StopRecord
+from canbase_driver.supervision.lifecycle import Aim
+from canbase_driver.supervision.reset import Outcome
+from canbase_runtime.latch_file import LatchKeeper
+
+OLD_S = 0.5
+"""A request that lay in the inbox for longer is refused: this process stood still, and its caller may be gone."""
+FRAMES_WHEN_LATE = 100
+"""So many waiting frames are taken in before a cycle that is already late: more than a bus brings in one cycle."""
+LAST_WORDS = 3
+"""How often the quick stop is sent on the way out."""
+
+OnOutcome = Callable[[Outcome], None]
+
+
+class ControlLoop(threading.Thread):
+    """Runs a core on a bus. `failure` is the exception that ended it, None for an orderly end."""
+
+    def __init__(
+        self,
+        core: DriverCore,
+        bus: BusPort,
+        control_hz: float,
+        odometry_hz: float,
+        ring: Ring,
+        keeper: LatchKeeper | None = None,
+    ) -> None:
+        """`keeper`: of the record that the core was made with; None where it was made without."""
+        super().__init__(name="control", daemon=True)
+        self._core = core
+        self._bus = bus
+        self._ring = ring
+        self._keeper = keeper
+        self._period_s = 1.0 / control_hz
+        self._samples_per_snapshot = max(1, round(control_hz / odometry_hz))
+        self._inbox: queue.SimpleQueue[Callable[[float], object]] = queue.SimpleQueue()
+        self._outcomes: queue.SimpleQueue[tuple[int, Outcome]] = queue.SimpleQueue()
+        self._numbers = itertools.count()
+        self._asked: dict[int, OnOutcome] = {}
+        self._condition = threading.Condition()
+        self._snapshot: DriverSnapshot | None = None
+        self._stops: list[StopRecord] = []
+        self._published = (0, core.state)
+        self._handed_over_at = 0.0
+        self.cycle_at = math.inf
+        """When the last cycle began [s, monotonic]: a thread that hangs is seen by it. Infinity before the first."""
+        self.failure: BaseException | None = None
+
+    def command(self, twist: Twist2D, received_at: float) -> None:
+        """Hand over a velocity command, from any thread."""
+        self._inbox.put(lambda _now: self._core.on_command(twist, received_at))
+
+    def emergency(self, brakes_hard: bool, received_at: float) -> None:
+        """Hand over whether the safety filter asks for the emergency deceleration, from any thread."""
+        self._inbox.put(lambda _now: self._core.on_emergency(brakes_hard, received_at))
+
+    def request_shutdown(self) -> None:
+        """Ramp to a stand, disable, end the thread."""
+        self._inbox.put(lambda _now: self._core.request_shutdown())
+
+    @property
+    def aimed_at(self) -> Aim:
+        """How far the driver goes now."""
+        return self._core.aim
+
+    def stop(self, on_outcome: OnOutcome) -> None:
+        """Stop, however late; like each of these four it returns at once, and `deliver` calls `on_outcome`, once.
+
+        No outcome comes while the control thread hangs: nothing obeys then, and the process is about to end.
+        """
+
+        def carry_out(_now: float, answer: OnOutcome) -> None:
+            self._core.request_stop()
+            answer(Outcome(True, "stopping; nothing moves until motor_driver/reset"))
+
+        self._ask(carry_out, on_outcome, however_late=True)
+
+    def reset(self, on_outcome: OnOutcome) -> None:
+        """Reset."""
+        self._ask(lambda now, answer: self._core.request_reset(now, answer), on_outcome)
+
+    def set_pose(self, pose: Pose2D, on_outcome: OnOutcome) -> None:
+        """Set the pose of the odometry."""
+        self._ask(lambda now, answer: answer(self._core.set_pose(pose, now)), on_outcome)
+
+    def aim(self, aim: Aim, on_outcome: OnOutcome) -> None:
+        """Go so far. What takes power away is obeyed however late."""
+        takes_power = aim <= self._core.aim
+        self._ask(lambda now, answer: self._core.request_aim(aim, now, answer), on_outcome, takes_power)
+
+    def deliver(self) -> None:
+        """Tell the outcomes that are there. By the thread that asks, and often: nothing here waits."""
+        ended = not self.is_alive()
+        while True:
+            try:
+                number, outcome = self._outcomes.get_nowait()
+            except queue.Empty:
+                break
+            self._asked.pop(number)(outcome)
+        for number in tuple(self._asked) if ended else ():
+            self._asked.pop(number)(Outcome(False, "refused: the control loop has ended"))
+
+    def _ask(
+        self,
+        request: Callable[[float, OnOutcome], None],
+        on_outcome: OnOutcome,
+        however_late: bool = False,
+    ) -> None:
+        number, asked_at = next(self._numbers), time.monotonic()
+        self._asked[number] = on_outcome
+
+        def answer(outcome: Outcome) -> None:
+            self._outcomes.put((number, outcome))
+
+        def carry_out(now: float) -> None:
+            if now - asked_at > OLD_S and not however_late:
+                answer(Outcome(False, f"refused: motor_driver stood still for {now - asked_at:.1f} s; send it again"))
+            else:
+                request(now, answer)
+
+        self._inbox.put(carry_out)
+
+    def next_snapshot(self, timeout_s: float) -> tuple[DriverSnapshot | None, list[StopRecord]]:
+        """Wait for a new snapshot; (None, []) when none came. Stops since the last call come with it."""
+        with self._condition:
+            self._condition.wait_for(lambda: self._snapshot is not None, timeout_s)
+            snapshot, self._snapshot = self._snapshot, None
+            stops, self._stops = self._stops, []
+            return snapshot, stops
+
+    def run(self) -> None:
+        """The thread's body."""
+        lead()
+        try:
+            self._cycle_until_finished()
+            self._hand_over(time.monotonic())
+        except BaseException as error:  # noqa: BLE001 - whatever it is, the drives are stopped and the process ends by it
+            self.failure = error
+            self._send(self._core.stop_frames() * LAST_WORDS)
+        finally:
+            self._bus.close()
+
+    def _cycle_until_finished(self) -> None:
+        cycle_at = self.cycle_at = time.monotonic()
+        while not self._core.finished:
+            cycle_at += self._period_s
+            self._take_in_until(cycle_at)
+            self._empty_inbox()
+            now = self.cycle_at = time.monotonic()
+            self._core.on_bus(self._bus.problem, now, self._bus.report)
+            if self._keeper is not None:
+                self._core.on_record(self._keeper.written, self._keeper.problem)
+            self._send(self._core.tick(now, now - cycle_at))
+            if self._keeper is not None:
+                self._keeper.want(self._core.record)
+            self._hand_over_if_due(now)
+            if now - cycle_at > self._period_s:
+                cycle_at = now  # cycles that were missed are not made up for
+
+    def _take_in_until(self, cycle_at: float) -> None:
+        """Until then; in a cycle that is late already, what waits: feedback must not starve."""
+        left = FRAMES_WHEN_LATE
+        while left > 0:
+            wait_s = cycle_at - time.monotonic()
+            frame = self._bus.receive(max(0.0, wait_s))
+            if frame is not None:
+                now = time.monotonic()
+                self._ring.frame(now, frame.cob_id, frame.data, True)
+                self._send(self._core.on_frame(frame, now))
+                self._hand_over_if_due(now)
+            elif wait_s <= 0.0:
+                return
+            left -= wait_s <= 0.0
+
+    def _empty_inbox(self) -> None:
+        while True:
+            try:
+                request = self._inbox.get_nowait()
+            except queue.Empty:
+                return
+            request(time.monotonic())
+
+    def _send(self, frames: list[Frame]) -> None:
+        now = time.monotonic()
+        for frame in frames:
+            self._bus.send(frame)
+            self._ring.frame(now, frame.cob_id, frame.data, False)
+
+    def _hand_over_if_due(self, now: float) -> None:
+        """With each sample of the odometry that is to be published, and at once when the state changes."""
+        serial, state = self._core.odometry_serial, self._core.state
+        published_serial, published_state = self._published
+        stale = self._snapshot is None and now - self._handed_over_at > self._samples_per_snapshot * self._period_s * 2
+        if serial - published_serial >= self._samples_per_snapshot or state is not published_state or stale:
+            self._hand_over(now)
+
+    def _hand_over(self, now: float) -> None:
+        self._published = (self._core.odometry_serial, self._core.state)
+        self._handed_over_at = now
+        with self._condition:
+            self._snapshot = self._core.snapshot(now)
+            self._stops += self._core.stops
+            self._core.stops.clear()
+            self._condition.notify_all()
+
+
+def lead() -> None:
+    """Where this process has real-time priority, this thread has one more than the others: a node that joins the ROS
+    network keeps them busy, and the cycle does not wait for that. Without the right to it everything stays as it is."""
+    if os.sched_getscheduler(0) == os.SCHED_FIFO:
+        mine = os.sched_getparam(0).sched_priority
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(mine + 1))

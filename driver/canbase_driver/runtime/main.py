@@ -1,0 +1,179 @@
+"""The process of motor_driver: opens the bus, starts the threads, ends them. Owns signals and exit codes.
+
+Every way out stops the robot: a signal ramps down and disables; a thread that fails sends quick stop and ends the
+process; a process that is killed or hangs is caught by the watchdog and by the drives' own heartbeat consumers.
+"""
+
+from __future__ import annotations
+
+import gc
+import math
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import FrameType
+
+import rclpy
+from rclpy.experimental import EventsExecutor
+from rclpy.logging import get_logger
+from rclpy.signals import SignalHandlerOptions
+
+from canbase_config.robot import DRIVER_NODE_ID, Robot
+from canbase_config.stopping import given_up_s
+from canbase_driver.cia301.nmt import HEARTBEAT, SYNC
+from canbase_driver.core import DriverCore
+from canbase_driver.ros.node import MotorDriverNode, Publisher
+from canbase_driver.runtime.black_box import Ring
+from canbase_driver.runtime.black_box_writer import BlackBoxWriter
+from canbase_driver.runtime.bus_port import BusError, BusPort
+from canbase_driver.runtime.control_thread import ControlLoop
+from canbase_driver.supervision.lifecycle import Aim
+from canbase_runtime.latch_file import LatchFile, LatchKeeper, hold, latch_folder
+from canbase_runtime.log_priority import Priority
+from canbase_runtime.output import never_wait
+from canbase_runtime.private_process import guard_keys
+from canbase_runtime.single_instance import TakenError, bus_name, take
+from canbase_runtime.systemd import Service
+
+WAKE_S = 0.02
+"""So long an outcome of the control thread may wait for the next message before it is answered."""
+LOOP_TIMEOUT_S = 0.5
+"""A control thread without a cycle for so long, while this one ran, hangs: the process ends; the watchdog has already
+stopped the drives."""
+END_MARGIN_S = 1.5
+"""Above the time of ramp and quick stop: power off."""
+WRITE_S = 5.0
+"""For the recording of a stop that is just over."""
+
+Worker = ControlLoop | Publisher | BlackBoxWriter | LatchKeeper
+"""Each of them has a `failure`, and none may end before the process does."""
+
+
+def run(
+    robot: Robot, ros_args: Sequence[str], autostart: bool = True, when_ready: Callable[[], None] = lambda: None
+) -> int:
+    """Runs the driver until SIGINT or SIGTERM. Returns 0 after an orderly end, 1 when the bus cannot be opened or a
+    thread failed. `ros_args`: arguments for rclpy. `autostart`: without it nothing is sent on the bus before the node
+    is configured. `when_ready`: called when all is made and nothing runs yet. Call from the main thread (signals)."""
+    guard_keys(os.environ)
+    never_wait(os.environ)
+    folder = latch_folder(os.environ, Path.home(), robot.name)
+    try:
+        held = take("driver", bus_name(robot.bus.arguments())), hold(folder, "driver")
+        bus = BusPort(robot.bus.arguments())
+        _listen_for_another(bus, robot.timeouts.drive_heartbeat_s)
+    except (BusError, TakenError) as error:
+        print(f"canbase driver: {error}", file=sys.stderr)
+        return 1
+    received: list[int] = []
+
+    def note(number: int, _frame: FrameType | None) -> None:
+        received.append(number)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, note)
+    rclpy.init(args=list(ros_args), signal_handler_options=SignalHandlerOptions.NO)
+    aim = Aim.ACTIVE if autostart else Aim.RELEASED
+    ring = Ring(robot.black_box.seconds)
+    keeper = LatchKeeper(LatchFile(folder, "driver", robot.name))
+    core = DriverCore(robot, aim, keeper.found)
+    loop = ControlLoop(core, bus, robot.rates.control_hz, robot.rates.odometry_hz, ring, keeper)
+    writer = BlackBoxWriter(robot.black_box, robot.name, get_logger("motor_driver").warning)
+    node = MotorDriverNode(robot, loop, ring, writer, autostart)
+    publisher = Publisher(node, loop)
+    threads = (loop, publisher, writer, keeper)
+    gc.collect()
+    gc.freeze()  # what is there now lives for ever: later collections need not look at it
+    when_ready()
+    for thread in threads:
+        thread.start()
+    try:
+        failure = _spin(node, loop, threads, received)
+        loop.request_shutdown()
+        loop.join(given_up_s(robot) + END_MARGIN_S)
+        loop.deliver()
+        publisher.join(1.0)
+        keeper.finish(WRITE_S)
+        writer.finish(WRITE_S)
+    finally:
+        rclpy.shutdown()
+        for each in held:
+            each.close()
+    failure = failure or loop.failure
+    if failure is not None:
+        node.voice.tell(f"ended by {type(failure).__name__}: {failure}", Priority.ERROR, robot=robot.name)
+        sys.excepthook(type(failure), failure, failure.__traceback__)
+    return 0 if failure is None else 1
+
+
+def _listen_for_another(bus: BusPort, listen_s: float) -> None:
+    """A driver on another computer: heard before the first frame of this one. Raises TakenError."""
+    end = time.monotonic() + listen_s
+    while (left_s := end - time.monotonic()) > 0.0:
+        frame = bus.receive(left_s)
+        if frame is not None and frame.cob_id in (SYNC.cob_id, HEARTBEAT + DRIVER_NODE_ID):
+            bus.close()
+            raise TakenError(
+                f"another driver is on the bus: SYNC or the heartbeat of node {DRIVER_NODE_ID} came ({frame}). "
+                "Only one may run; end it first, on the computer that it runs on"
+            )
+
+
+def _spin(
+    node: MotorDriverNode, loop: ControlLoop, threads: Sequence[Worker], received: list[int]
+) -> BaseException | None:
+    """Until a signal or a failure; the failure."""
+    executor = EventsExecutor()
+    executor.add_node(node)
+    watch, service = HangWatch(LOOP_TIMEOUT_S, WAKE_S), Service()
+    try:
+        while not received:
+            executor.spin_once(timeout_sec=WAKE_S)
+            now = time.monotonic()
+            node.look_at_the_clock(now)
+            loop.deliver()
+            failure = _failure(threads) or watch.look(loop.cycle_at, now)
+            if failure is not None:
+                return failure
+            if loop.cycle_at < math.inf:
+                service.alive(node.state_text, now)
+    except Exception as error:  # noqa: BLE001 - the base is ramped down, then the process ends by it
+        return error
+    finally:
+        service.stopping()
+        executor.shutdown()
+    return None
+
+
+def _failure(threads: Sequence[Worker]) -> BaseException | None:
+    """Why the process must end: a thread that failed or ended."""
+    for thread in threads:
+        if thread.failure is not None:
+            return thread.failure
+        if not thread.is_alive():
+            return RuntimeError(f"thread {thread.name} ended by itself")
+    return None
+
+
+class HangWatch:
+    """Tells a thread that hangs from a process that was stopped as a whole, and goes on."""
+
+    def __init__(self, timeout_s: float, look_s: float) -> None:
+        """`look_s`: the longest time between two looks while this thread runs."""
+        self._timeout_s = timeout_s
+        self._look_s = look_s
+        self._cycle_at = self._looked_at = math.inf
+        self._seen_s = 0.0
+
+    def look(self, cycle_at: float, now: float) -> TimeoutError | None:
+        """Call after each wait with the time of the last cycle. The failure, when there is one."""
+        self._seen_s += max(0.0, min(now - self._looked_at, self._look_s))
+        self._looked_at = now
+        if cycle_at != self._cycle_at:
+            self._cycle_at, self._seen_s = cycle_at, 0.0
+        if self._seen_s <= self._timeout_s:
+            return None
+        return TimeoutError(f"the control thread has made no cycle for {now - cycle_at:.1f} s")

@@ -1,0 +1,122 @@
+"""How far the driver may go: nothing on the bus, drives booted, drives with power. The lifecycle of the ROS node asks.
+
+RELEASED ──configure──► CONFIGURED ──activate──► ACTIVE      one change at a time; a change that fails is taken back,
+   ▲ └────cleanup───────────┘ └──────deactivate────┘         but none that takes power away: a stop goes on.
+
+What is aimed at is the state of the lifecycle: ROS shows it (`managed_node.py`), and owns none of its own.
+
+Rules. What is aimed at holds at once: less than ACTIVE is a reason to stop (`supervisor.py`), and RELEASED follows only
+when nothing has power. A latched stop outlives every change: `reset` alone ends it. Pure: time is an argument.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+
+from canbase_config.robot import Robot
+from canbase_config.stopping import given_up_s
+from canbase_driver.snapshot import DriverState
+from canbase_driver.supervision.reset import Outcome
+from canbase_driver.supervision.supervisor import (
+    ENABLE_TIMEOUT_S,
+    NO_POWER,
+    POWER_OFF_TIMEOUT_S,
+    Cause,
+    Situation,
+)
+
+MARGIN_S = 1.0
+"""On top of the times of what is waited for."""
+
+
+class Aim(IntEnum):
+    """How far the driver goes."""
+
+    RELEASED = 0
+    """It sends nothing."""
+    CONFIGURED = 1
+    """Drives are booted and heard, and have no power."""
+    ACTIVE = 2
+    """Drives get power as soon as nothing forbids it, and follow commands."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Change:
+    before: Aim
+    until: float
+    on_outcome: Callable[[Outcome], None]
+
+
+class Readiness:
+    """What is aimed at, and the change on its way there."""
+
+    def __init__(self, robot: Robot, aim: Aim) -> None:
+        timeouts = robot.timeouts
+        self.aim = aim
+        self.released = aim is Aim.RELEASED
+        """Nothing is sent: never configured, or let go again."""
+        self._change: _Change | None = None
+        stop_s = given_up_s(robot) + POWER_OFF_TIMEOUT_S
+        self._patience_s = {
+            Aim.RELEASED: stop_s + MARGIN_S,
+            Aim.CONFIGURED: max(timeouts.boot_s, stop_s) + MARGIN_S,
+            Aim.ACTIVE: ENABLE_TIMEOUT_S + MARGIN_S,
+        }
+
+    @property
+    def unconfigured(self) -> str:
+        """A sentence while drives must not be booted; else empty."""
+        return "lifecycle: unconfigured" if self.aim is Aim.RELEASED else ""
+
+    @property
+    def inactive(self) -> str:
+        """A sentence while drives must not have power; else empty."""
+        return "" if self.aim is Aim.ACTIVE else "lifecycle: not active"
+
+    def request(self, aim: Aim, now: float, on_outcome: Callable[[Outcome], None]) -> None:
+        """Aim at that; `on_outcome` is called once, when it is there or has failed."""
+        if self._change is not None:
+            on_outcome(Outcome(False, f"refused: a change to {self.aim.name} is under way"))
+            return
+        self._change = _Change(self.aim, now + self._patience_s[aim], on_outcome)
+        self.aim = aim
+        self.released = self.released and aim is Aim.RELEASED
+
+    def step(self, situation: Situation, state: DriverState, cause: Cause, now: float) -> bool:
+        """Once a cycle, after the supervisor. True: the drives are to be let go now."""
+        let_go = self.aim is Aim.RELEASED and not self.released and state in NO_POWER and not situation.powered
+        self.released = self.released or let_go
+        change = self._change
+        if change is not None:
+            outcome = self._outcome(change, situation, state, cause, now)
+            if outcome is not None:
+                self._end(change, outcome)
+        return let_go
+
+    def _outcome(
+        self, change: _Change, situation: Situation, state: DriverState, cause: Cause, now: float
+    ) -> Outcome | None:
+        if self._there(change, situation, state):
+            return Outcome(True, f"{self.aim.name.lower()} ({state.name.lower()}, {cause.name})")
+        hopeless = self.aim is Aim.ACTIVE and state is DriverState.LATCHED
+        if hopeless or now > change.until:
+            ends = f"; ends on: {cause.clears_on}" if cause.clears_on else ""
+            return Outcome(False, f"not {self.aim.name.lower()}: {cause.name} {cause.detail}".rstrip() + ends)
+        return None
+
+    def _there(self, change: _Change, situation: Situation, state: DriverState) -> bool:
+        if self.aim is Aim.RELEASED:
+            return self.released
+        if self.aim is Aim.ACTIVE:
+            return state is DriverState.ENABLED
+        if change.before is Aim.ACTIVE:
+            return state in NO_POWER and not situation.powered
+        return not (situation.unready or situation.missing or situation.bus)
+
+    def _end(self, change: _Change, outcome: Outcome) -> None:
+        self._change = None
+        if not outcome.done and self.aim > change.before:
+            self.aim = change.before
+        change.on_outcome(outcome)

@@ -1,0 +1,159 @@
+"""One reset on its way: the watchdog first, then the drives, then their faults. It never gives power to anything.
+
+Rules: refused or broken off while a velocity is commanded, while a wheel turns, or while the bus or the watchdog is
+dead. Each step has a deadline; the sentence of a failed reset says which step failed and what to do. Pure: time is an
+argument.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+from canbase_driver.cia402 import FAULT_RESET_CYCLES
+from canbase_driver.snapshot import WatchdogView
+from canbase_driver.supervision.supervisor import Situation
+from canbase_driver.supervision.watchdog_link import ACCEPTED, ANSWERS
+
+WATCHDOG_TIMEOUT_S = 0.5
+EDGE_S = 0.05
+"""How long bit 7 of the controlword stays 0, then 1: some drives sample it in a slow loop, after several PDOs."""
+FAULT_TIMEOUT_S = 1.0
+"""From the edge of bit 7 until the fault has gone."""
+FAULT_TRIES = 3
+"""So many edges, then the reset has failed; a cause that stands is not hammered at."""
+
+
+class Phase(Enum):
+    """Where the reset is, in this order; without a fault the edges are left out."""
+
+    WATCHDOG = "waiting for the watchdog"
+    DRIVES = "waiting for the drives to boot"
+    EDGE_LOW = "fault reset bit low"
+    EDGE_HIGH = "fault reset bit high"
+    FAULTS = "waiting for the faults to clear"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How it ended."""
+
+    done: bool
+    sentence: str
+
+
+_BUS_OR_COMMAND: tuple[Callable[[Situation], str], ...] = (
+    lambda s: f"{s.commanded}; let go of the joystick or cancel the goal first" if s.commanded else "",
+    lambda s: s.bus,
+)
+_WATCHDOG: tuple[Callable[[Situation], str], ...] = (
+    lambda s: f"watchdog: {s.watchdog_detail}" if s.watchdog is not WatchdogView.OK else "",
+)
+_DRIVES: tuple[Callable[[Situation], str], ...] = (lambda s: s.unready,)
+
+REFUSALS: tuple[Callable[[Situation], str], ...] = (
+    lambda s: "the driver is ending" if s.shutdown_requested else "",
+    lambda s: "a reset is under way" if s.resetting else "",
+    lambda s: f"{s.unconfigured}; configure it first" if s.unconfigured else "",
+    lambda s: s.turning or "a wheel turns" if not s.standstill and not s.unready else "",
+    *_BUS_OR_COMMAND,
+    lambda s: f"watchdog: {s.watchdog_detail}" if s.watchdog is WatchdogView.MISSING else "",
+)
+"""Why a reset may not even begin. A drive that is not heard cannot be seen to stand; it is waited for instead."""
+
+BREAKS: dict[Phase, tuple[Callable[[Situation], str], ...]] = {
+    Phase.WATCHDOG: _BUS_OR_COMMAND,
+    Phase.DRIVES: _BUS_OR_COMMAND + _WATCHDOG,
+    Phase.EDGE_LOW: _BUS_OR_COMMAND + _WATCHDOG + _DRIVES,
+    Phase.EDGE_HIGH: _BUS_OR_COMMAND + _WATCHDOG + _DRIVES,
+    Phase.FAULTS: _BUS_OR_COMMAND + _WATCHDOG + _DRIVES,
+}
+"""What ends a reset in each phase: what an earlier phase has found to be well must stay so."""
+
+
+def refusal(situation: Situation, stopped: bool) -> str | None:
+    """Why a reset may not even begin; None when it may. `stopped`: the supervisor has taken all power away."""
+    if not stopped:
+        return "refused: there is power on the drives; stop first (service motor_driver/stop)"
+    problem = _first(REFUSALS, situation)
+    return f"refused: {problem}" if problem else None
+
+
+class Reset:
+    """The sequence, stepped once a cycle until it has an outcome."""
+
+    def __init__(self, now: float, cycle_s: float, boot_s: float) -> None:
+        """`cycle_s`: period of the setpoints; each level of the fault reset bit lasts FAULT_RESET_CYCLES at least.
+
+        `boot_s`: how long it waits for drives that boot [s] (timeouts.boot_s).
+        """
+        self._boot_s = boot_s
+        self.phase = Phase.WATCHDOG
+        self._edge_s = max(EDGE_S, FAULT_RESET_CYCLES * cycle_s)
+        self._since_s = now
+        self._tries_left = FAULT_TRIES
+
+    @property
+    def fault_reset_bit(self) -> bool:
+        """Bit 7 of the controlword of the drives in fault, in this cycle."""
+        return self.phase is Phase.EDGE_HIGH
+
+    def step(self, situation: Situation, answer: int | None, now: float) -> Outcome | None:
+        """Judge the situation and move on; the outcome when it has ended.
+
+        `answer`: the watchdog's answer to our request, None while there is none.
+        """
+        problem = _first(BREAKS[self.phase], situation)
+        if problem:
+            return Outcome(False, f"broken off: {problem}")
+        return RULES[self.phase](self, situation, answer, now)
+
+    def _watchdog(self, situation: Situation, answer: int | None, now: float) -> Outcome | None:
+        if answer is not None and answer not in ACCEPTED:
+            return Outcome(False, f"the watchdog refused: {ANSWERS.get(answer, f'answer {answer}')}")
+        if answer is not None and situation.watchdog is WatchdogView.OK:
+            self._go(Phase.DRIVES, now)
+        elif now - self._since_s > WATCHDOG_TIMEOUT_S:
+            detail = situation.watchdog_detail or "no answer"
+            return Outcome(False, f"the watchdog is not ready after {WATCHDOG_TIMEOUT_S} s ({detail}); reset again")
+        return None
+
+    def _drives(self, situation: Situation, _answer: int | None, now: float) -> Outcome | None:
+        if not situation.unready:
+            self._go(Phase.EDGE_LOW if situation.fault else Phase.FAULTS, now)
+        elif now - self._since_s > self._boot_s:
+            return Outcome(False, f"{situation.unready}; reset again once that is cured")
+        return None
+
+    def _edge(self, _situation: Situation, _answer: int | None, now: float) -> Outcome | None:
+        if now - self._since_s >= self._edge_s:
+            self._go(Phase.EDGE_HIGH if self.phase is Phase.EDGE_LOW else Phase.FAULTS, now)
+        return None
+
+    def _faults(self, situation: Situation, _answer: int | None, now: float) -> Outcome | None:
+        if not situation.fault:
+            return Outcome(True, "reset done; the drives get power once the command is zero")
+        if now - self._since_s > FAULT_TIMEOUT_S:
+            self._tries_left -= 1
+            if not self._tries_left:
+                return Outcome(False, f"{situation.fault}: it does not clear; remove its cause, then reset again")
+            self._go(Phase.EDGE_LOW, now)
+        return None
+
+    def _go(self, phase: Phase, now: float) -> None:
+        self.phase, self._since_s = phase, now
+
+
+RULES: dict[Phase, Callable[[Reset, Situation, int | None, float], Outcome | None]] = {
+    Phase.WATCHDOG: Reset._watchdog,
+    Phase.DRIVES: Reset._drives,
+    Phase.EDGE_LOW: Reset._edge,
+    Phase.EDGE_HIGH: Reset._edge,
+    Phase.FAULTS: Reset._faults,
+}
+"""What is decided in each phase."""
+
+
+def _first(checks: tuple[Callable[[Situation], str], ...], situation: Situation) -> str:
+    return next((problem for check in checks if (problem := check(situation))), "")

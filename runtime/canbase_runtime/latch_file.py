@@ -1,0 +1,276 @@
+"""The file of a latch record: opened once, overwritten in place, and on disk when `write` returns (fsync).
+
+Preallocated, so that a full disk loses no latch. The layout and what counts as latched: latch_record.py.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import queue
+import shutil
+import socket
+import stat
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from canbase_runtime import latch_record
+from canbase_runtime import single_instance as sole
+from canbase_runtime.latch_record import Defect, Found, Record
+
+PARTS: Final = ("driver", "watchdog", "velocity")
+SUFFIX: Final = ".latch"
+WRITER: Final = "writer of records"
+"""What is held while a process writes one, beside `sole`'s other tasks."""
+RETRY_S: Final = 1.0
+_MACHINE: Final = (Path("/etc/machine-id"), Path("/sys/firmware/devicetree/base/serial-number"))
+_OPEN: Final = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+_OTHERS: Final = stat.S_IWGRP | stat.S_IWOTH
+
+
+def latch_folder(environment: Mapping[str, str], home: Path, robot: str) -> Path:
+    """Where the records of this robot are: the last of what systemd gives (StateDirectory=), else by the robot's name
+    in the user's state folder."""
+    given = environment.get("STATE_DIRECTORY", "").split(":")
+    if len(given) > 1:
+        return Path(given[-1])
+    state = Path(given[0]) if given[0] else _state_home(environment, home) / "canbase"
+    return state / robot
+
+
+def hold(folder: Path, part: str) -> socket.socket:
+    """Be the only one that writes the record of `part`, until it is closed or the process ends.
+
+    Raises sole.TakenError with the holder: two robots of one name would forget each other's latched stops.
+    """
+    try:
+        return sole.take(WRITER, record_name(folder, part))
+    except sole.TakenError as error:
+        raise sole.TakenError(f"{error}. Two robots on one computer need two names (`name` in robot.yaml)") from error
+
+
+def record_name(folder: Path, part: str) -> str:
+    """What `hold` holds."""
+    return str(folder.resolve() / f"{part}{SUFFIX}")
+
+
+def machine() -> str:
+    """What tells this computer from others: its machine-id, and the serial number of a board that has one."""
+    found = []
+    for path in _MACHINE:
+        with contextlib.suppress(OSError):
+            found.append(path.read_bytes().rstrip(b"\0\n").decode(errors="replace"))
+    return " ".join(found)
+
+
+def create_first(folder: Path, robot: str, chown: Callable[[Path], None] = lambda _path: None) -> bool:
+    """Clear records for a robot that has never had any; False, and nothing is touched: there is a folder already.
+
+    All of them or none. `chown`: gives a path to the user that the services run as. Raises OSError.
+    """
+    if folder.exists():
+        return False
+    folder.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    new = folder.with_name(f".{folder.name}.new{os.getpid()}")
+    new.mkdir(mode=0o700)
+    try:
+        for part in PARTS:
+            path = new / f"{part}{SUFFIX}"
+            owner = latch_record.owner_of(part, robot, machine())
+            os.close(_put(path, latch_record.whole(Record(), owner)))
+            chown(path)
+        _sync(new)
+        chown(new)
+        new.rename(folder)
+    except BaseException:
+        shutil.rmtree(new, ignore_errors=True)
+        raise
+    _sync(folder.parent)
+    return True
+
+
+class LatchFile:
+    """One part's record. One thread at a time."""
+
+    def __init__(self, folder: Path, part: str, robot: str) -> None:
+        self.path = folder / f"{part}{SUFFIX}"
+        self._owner = latch_record.owner_of(part, robot, machine())
+        self._descriptor: int | None = None
+        self._sequence = 0
+
+    def open(self) -> Found:
+        """What it says. Never raises: what cannot be read counts as latched."""
+        try:
+            found = self._read()
+        except FileNotFoundError:
+            found = Found(defect=Defect.MISSING, detail=str(self.path))
+        except OSError as error:
+            found = Found(defect=Defect.UNREADABLE, detail=f"{self.path}: {error.strerror or error}")
+        self._sequence = found.sequence
+        if found.defect is not Defect.NONE:
+            self.close()
+        return found
+
+    def write(self, record: Record) -> None:
+        """On disk when it returns. Raises OSError. A file that could not be used is replaced by a new one."""
+        if self._descriptor is None:
+            self._replace(record)
+            return
+        data = latch_record.slot(record, self._sequence + 1, self._owner)
+        if os.pwrite(self._descriptor, data, latch_record.place_of(self._sequence + 1)) != len(data):
+            raise OSError(f"{self.path}: written in part")
+        os.fsync(self._descriptor)
+        self._sequence += 1
+
+    def close(self) -> None:
+        """Nothing can be written in place afterwards."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
+
+    def _read(self) -> Found:
+        writable = True
+        try:
+            self._descriptor = os.open(self.path, os.O_RDWR | _OPEN)
+        except OSError as error:
+            if error.errno != errno.EROFS:
+                raise
+            writable = False
+            self._descriptor = os.open(self.path, os.O_RDONLY | _OPEN)
+        if wrong := _wrong_access(self._descriptor, self.path):
+            return Found(defect=Defect.ACCESS, detail=wrong)
+        found = latch_record.read(os.pread(self._descriptor, latch_record.SIZE + 1, 0), self._owner)
+        if not writable:
+            self.close()
+        if found.defect is Defect.NONE:
+            return found
+        return replace(found, detail=f"{self.path}: {found.detail}")
+
+    def _replace(self, record: Record) -> None:
+        self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        new = self.path.with_name(f".{self.path.name}.new")
+        new.unlink(missing_ok=True)
+        descriptor = _put(new, latch_record.whole(record, self._owner))
+        try:
+            new.replace(self.path)
+            _sync(self.path.parent)
+        except BaseException:
+            os.close(descriptor)
+            raise
+        self._descriptor, self._sequence = descriptor, 2
+
+
+class LatchKeeper(threading.Thread):
+    """Writes what a loop wants on disk, so that the loop never waits for one. `failure`: the defect that ended it."""
+
+    def __init__(self, file: LatchFile) -> None:
+        """Reads the file at once: `found`."""
+        super().__init__(name="latch", daemon=True)
+        self._file = file
+        self.found = file.open()
+        self._wanted: Record | None = None
+        self._pending: Record | None = None
+        self._inbox: queue.SimpleQueue[Record | None] = queue.SimpleQueue()
+        self.written: Record | None = None
+        """The newest that is on disk since the start."""
+        self.problem = ""
+        """Why the newest is not, and what to do; empty: nothing is in the way."""
+        self.failure: BaseException | None = None
+
+    def want(self, record: Record) -> None:
+        """This shall be on disk; for a loop, which calls it with the same one again and again. Never waits."""
+        if record is not self._wanted:
+            self._wanted = record
+            self._inbox.put(record)
+
+    def finish(self, timeout_s: float) -> None:
+        """Write what is wanted, at most for so long, and end."""
+        self._inbox.put(None)
+        if self.is_alive():
+            self.join(timeout_s)
+
+    def run(self) -> None:
+        """The thread's body."""
+        try:
+            while self._turn():
+                pass
+        except BaseException as error:  # noqa: BLE001 - the process sees it, stops the robot and ends by it
+            self.failure = error
+        finally:
+            self._file.close()
+
+    def _turn(self) -> bool:
+        """Wait, write the newest; False: it is to end."""
+        taken = self._take(None if self._pending is None else RETRY_S)
+        newest = [record for record in taken if record is not None]
+        if newest:
+            self._pending = newest[-1]
+        if self._pending is not None and self._attempt(self._pending):
+            self._pending = None
+        return None not in taken
+
+    def _take(self, timeout_s: float | None) -> list[Record | None]:
+        """All that waits; what comes first is waited for."""
+        taken: list[Record | None] = []
+        with contextlib.suppress(queue.Empty):
+            taken.append(self._inbox.get(timeout=timeout_s))
+            while True:
+                taken.append(self._inbox.get_nowait())
+        return taken
+
+    def _attempt(self, record: Record) -> bool:
+        """It is on disk."""
+        try:
+            self._file.write(record)
+        except OSError as error:
+            self.problem = (
+                f"the record of stops {self._file.path} cannot be written: {error.strerror or error}. "
+                "Make its folder writable for this user and its disk writable; no power until then"
+            )
+            return False
+        self.written, self.problem = record, ""
+        return True
+
+
+def _state_home(environment: Mapping[str, str], home: Path) -> Path:
+    return Path(environment.get("XDG_STATE_HOME") or home / ".local" / "state")
+
+
+def _wrong_access(descriptor: int, path: Path) -> str:
+    """Who else could change it; empty: nobody but root."""
+    file, folder, me = os.fstat(descriptor), path.parent.stat(), os.geteuid()
+    if not stat.S_ISREG(file.st_mode):
+        return f"{path} is no regular file"
+    if file.st_uid != me:
+        return f"{path} belongs to user {file.st_uid}, this is user {me}"
+    if folder.st_uid not in (0, me):
+        return f"{path.parent} belongs to user {folder.st_uid}, this is user {me}"
+    if (file.st_mode | folder.st_mode) & _OTHERS:
+        return f"others than user {me} may write {path} or its folder"
+    return ""
+
+
+def _put(path: Path, data: bytes) -> int:
+    """A new file with these bytes on disk; its descriptor."""
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | _OPEN, 0o600)
+    try:
+        if os.write(descriptor, data) != len(data):
+            raise OSError(f"{path}: written in part")
+        os.fsync(descriptor)
+    except BaseException:
+        os.close(descriptor)
+        path.unlink(missing_ok=True)
+        raise
+    return descriptor
+
+
+def _sync(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,351 @@
+"""A simulated motor controller: the CiA 301 services and one or two CiA 402 axes, wired together. Pure.
+
+`on_frame` takes what is on the bus, `tick` returns what the node says. The world moves the wheels in between.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+
+from canopen import SdoAbortedError
+
+from canbase_sim.axis_parts import AxisParts, StateChange
+from canbase_sim.cia301 import abort, emcy, heartbeat, nmt, sdo, store
+from canbase_sim.cia301.dictionary import AXIS_STRIDE, Dictionary, key
+from canbase_sim.cia301.nmt import NmtCommand, NmtState
+from canbase_sim.cia301.rpdo import Rpdo
+from canbase_sim.cia301.tpdo import Tpdo
+from canbase_sim.cia402.axis import Axis
+from canbase_sim.cia402.states import POWERED, State, Transition
+from canbase_sim.command_watch import CommandWatch
+from canbase_sim.frame import Frame
+from canbase_sim.line import Line
+from canbase_sim.personality import GENERIC, Personality
+from canbase_sim.plant.encoder import Encoder
+
+COMMUNICATION_FAULT = 0x7500
+"""603Fh when NMT stop or a reset meets an axis with 6007h = 1."""
+RESET_S = 0.01
+"""From NMT reset communication to the boot-up message [s]."""
+OFFSET_STEP = 1_000_003
+"""The encoder shows other counts after each power cycle: it has no battery."""
+
+
+class SimulatedNode:
+    """One node on the bus. `line` has the switches for what is wrong between it and the others."""
+
+    def __init__(
+        self,
+        node_id: int,
+        axes: Sequence[AxisParts],
+        now: float,
+        boot_delay_s: float = 0.1,
+        fixed: Mapping[int, int] | None = None,
+        personality: Personality = GENERIC,
+        sdo_delay_s: float = 0.0,
+    ) -> None:
+        self.node_id, self.personality = node_id, personality
+        self.boot_delay_s = boot_delay_s if personality.boot_delay_s is None else personality.boot_delay_s
+        self.line = Line(sdo_delay_s if personality.sdo_delay_s is None else personality.sdo_delay_s)
+        self.state = NmtState.INITIALISING
+        self.changes: deque[StateChange] = deque(maxlen=1000)
+        self.lost_producers: deque[int] = deque(maxlen=100)
+        """Node ids whose heartbeat this node has missed; whoever tells of them empties it."""
+        self._now = now
+        self._bus_on_at: float | None = None
+        d = self.dictionary = Dictionary(node_id, len(axes), fixed, personality)
+        d.before_read = self._refresh
+        self.emcy = emcy.EmcyService(d, self._send_emcy)
+        self.sdo = sdo.SdoService(node_id, d, lambda frame: self.line.answer(frame, self._now))
+        self._producer = heartbeat.HeartbeatProducer(d)
+        self._consumer = heartbeat.HeartbeatConsumer(d, self._on_lost, self._on_alive)
+        self.axes = tuple(self._axis(number, parts) for number, parts in enumerate(axes))
+        self._rpdos = [Rpdo(n, d, self.emcy, self._operational, self._on_deadline) for n in range(1, 5)]
+        self._tpdos = [Tpdo(n, d, self.line.say, self._operational) for n in range(1, 5)]
+        self._command_watch = CommandWatch(d, self._rpdos)
+        store.StoreService(d)
+        d.guard(0x1019, lambda subindex, value: _check_overflow(value))
+        d.on_write(0x1005, lambda subindex, value: self._route())
+        for n in range(4):
+            d.on_write(0x1400 + n, partial(self._pdo_written, self._rpdos[n]))
+            d.on_write(0x1800 + n, partial(self._pdo_written, self._tpdos[n]))
+        self._boot_at, self._loader_s = now, 0.0
+        self._power_up(now, 0.0)
+
+    @property
+    def refused_rpdo_values(self) -> int:
+        """Values that came by RPDO and that their objects did not take."""
+        return sum(rpdo.refused for rpdo in self._rpdos)
+
+    # The bus
+
+    def on_frame(self, cob_id: int, data: bytes, now: float) -> None:
+        """One frame from the bus, at `now`. What the node does not understand is ignored."""
+        if not self.line.hears:
+            return
+        self._now = now
+        take = self._routes.get(cob_id)
+        if take is not None:
+            take(data, now)
+        elif cob_id > heartbeat.COB_ID and self.state is not NmtState.INITIALISING:
+            self._consumer.receive(cob_id - heartbeat.COB_ID, data, now)
+
+    def tick(self, now: float) -> list[Frame]:
+        """Whatever is due by `now`, and every frame since the last call, in order."""
+        self._now = now
+        self.line.say_late_answers(now)
+        if self._bus_on_at is not None and now >= self._bus_on_at:
+            self._recover_from_bus_off()
+        if self.state is not NmtState.INITIALISING:
+            self._tick_watches(now)
+        elif now >= self._boot_at:
+            self._boot()
+        if self.state is NmtState.OPERATIONAL:
+            self._tick_pdos(now)
+        return self.line.take_out()
+
+    # Faults for tests
+
+    def power_cycle(self, now: float, off_s: float = 0.5) -> None:
+        """Supply off, and on again after `off_s`: motors coast, objects as saved, the encoder starts elsewhere."""
+        for axis in self.axes:
+            axis.encoder_offset = (axis.encoder_offset + OFFSET_STEP + 2**31) % 2**32 - 2**31
+        self._power_up(now, off_s)
+
+    def reset_node(self, now: float) -> None:
+        """As by NMT reset node: everything starts anew, the encoder goes on."""
+        self._power_up(now, 0.0)
+
+    def bus_off(self, now: float, off_s: float = 0.2) -> None:
+        """Too many errors: the CAN controller leaves the bus and comes back after `off_s`; a loss like any other."""
+        self.line.cut, self._bus_on_at = True, now + off_s
+        self._lose_connection(emcy.BUS_OFF_RECOVERED)
+
+    def say_boot_up(self) -> None:
+        """A boot-up message. Called by a test it is one too many: nothing was restarted."""
+        self.line.say_boot_up(Frame(heartbeat.COB_ID + self.node_id, bytes([NmtState.INITIALISING])))
+
+    def fail(self, axis: int, code: int, holds: bool = False) -> None:
+        """A fault of one axis with EMCY `code`; while it `holds`, fault resets are in vain (see `heal`)."""
+        if holds:
+            self.axes[axis].causes.add(code)
+        self.axes[axis].fail(code)
+
+    def heal(self, axis: int) -> None:
+        """The causes of the faults of one axis are gone; it still needs a fault reset."""
+        self.axes[axis].causes.clear()
+
+    def thin_out(self, axis: int, every: int) -> None:
+        """Of the setpoint PDOs of an axis it takes every n-th only, 0: none."""
+        self._rpdos[axis].takes_every = every
+
+    def lose_feedback(self, axis: int, lost: bool = True) -> None:
+        """The feedback PDOs of an axis, status and velocity, do not get onto the bus."""
+        for number in (0, 1):
+            self._tpdos[2 * axis + number].lost = lost
+
+    # NMT
+
+    def _on_nmt(self, data: bytes, now: float) -> None:
+        command = nmt.command_for(self.node_id, data)
+        if command is None:
+            return
+        if command is NmtCommand.RESET_NODE:
+            self.reset_node(now)
+        elif command is NmtCommand.RESET_COMMUNICATION:
+            self._leave_bus()
+            self._reset_communication(now + RESET_S)
+        else:
+            self._enter(nmt.ENTERS[command])
+
+    def _enter(self, state: NmtState) -> None:
+        if state is self.state:
+            return
+        self.state = state
+        pdos: list[Rpdo | Tpdo] = [*self._rpdos, *self._tpdos]
+        for pdo in pdos:
+            pdo.start() if state is NmtState.OPERATIONAL else pdo.stop()
+        self._list_pdos()
+        self._producer.restart()
+        if state is NmtState.STOPPED:
+            self._leave_bus()
+
+    def _pdo_written(self, pdo: Rpdo | Tpdo, subindex: int, value: int) -> None:
+        """In OPERATIONAL the only write that passes the guard switches the PDO off; elsewhere it is off anyway."""
+        pdo.stop()
+        self._list_pdos()
+
+    def _list_pdos(self) -> None:
+        self._on_sync_tpdos = [t for t in self._tpdos if t.on_sync_active]
+        self._on_event_tpdos = [t for t in self._tpdos if t.on_event_active]
+        self._active_rpdos = [r for r in self._rpdos if r.cob_id is not None]
+        self._route()
+
+    def _boot(self) -> None:
+        if self._loader_s:
+            self.say_boot_up()
+            self._boot_at, self._loader_s = self._boot_at + self._loader_s, 0.0
+            return
+        self._enter(NmtState.PRE_OPERATIONAL)
+        self.say_boot_up()
+        for axis in self.axes:
+            if axis.state is State.NOT_READY_TO_SWITCH_ON:
+                axis.boot()
+        if self.personality.starts_operational:
+            self._enter(NmtState.OPERATIONAL)
+
+    def _power_up(self, now: float, off_s: float) -> None:
+        self.dictionary.reset(0x2000, 0x9FFF)
+        for axis in self.axes:
+            axis.restart()
+        self._reset_communication(now + off_s + self.boot_delay_s, self.personality.second_boot_up_s or 0.0)
+
+    def _reset_communication(self, boot_at: float, loader_s: float = 0.0) -> None:
+        self._enter(NmtState.INITIALISING)
+        self.line.forget()
+        self.dictionary.reset(0x1000, 0x1FFF)
+        self.emcy.reset()
+        self.sdo.reset()
+        self._consumer.configure()
+        for axis in self.axes:
+            axis.causes.discard(emcy.HEARTBEAT_LOST)
+        self._boot_at, self._loader_s = boot_at, loader_s
+        self._route()
+
+    def _route(self) -> None:
+        """Who listens to which COB-ID in this NMT state."""
+        self._routes: dict[int, Callable[[bytes, float], None]] = {}
+        if self.state is NmtState.INITIALISING:
+            return
+        if self.state is NmtState.OPERATIONAL:
+            self._routes |= {r.cob_id: r.receive for r in self._active_rpdos if r.cob_id is not None}
+        if self.state in nmt.HAS_SDO:
+            self._routes[self.sdo.rx_cobid] = lambda data, now: self.sdo.receive(data)
+            if key(0x1005) in self.dictionary.entries:
+                self._routes[self.dictionary.values[key(0x1005)] & 0x7FF] = self._on_sync
+        self._routes[nmt.COB_ID] = self._on_nmt
+
+    # PDO
+
+    def _on_sync(self, data: bytes, now: float) -> None:
+        """Feedback is sampled at the SYNC, then what came before it takes effect. With 1019h it carries a counter."""
+        if len(data) != bool(self.dictionary.values[key(0x1019)]):
+            self.emcy.raise_error(emcy.SYNC_LENGTH)
+            return
+        self.emcy.clear_error(emcy.SYNC_LENGTH)
+        if self.state is not NmtState.OPERATIONAL:
+            return
+        self._refresh()
+        for tpdo in self._on_sync_tpdos:
+            tpdo.on_sync()
+        for rpdo in self._active_rpdos:
+            rpdo.on_sync()
+
+    def _tick_watches(self, now: float) -> None:
+        self._consumer.tick(now)
+        if self._command_watch.ran_out(now):
+            for axis in self.axes:
+                axis.starve()
+        if self._producer.due(now):
+            self.line.say(Frame(heartbeat.COB_ID + self.node_id, bytes([self.state])))
+
+    def _tick_pdos(self, now: float) -> None:
+        for rpdo in self._active_rpdos:
+            rpdo.tick(now)
+        if self._on_event_tpdos:
+            self._refresh()
+            for tpdo in self._on_event_tpdos:
+                tpdo.tick(now)
+
+    def _operational(self) -> bool:
+        return self.state is NmtState.OPERATIONAL
+
+    def _refresh(self) -> None:
+        for axis in self.axes:
+            axis.refresh()
+        self.dictionary.pack()
+
+    # Loss of the connection
+
+    def _on_lost(self, producer: int) -> None:
+        """A heartbeat is gone: EMCY 8130h."""
+        self.lost_producers.append(producer)
+        self.emcy.raise_error(emcy.HEARTBEAT_LOST, producer)
+        for axis in self.axes:
+            axis.causes.add(emcy.HEARTBEAT_LOST)
+        self._lose_connection(emcy.HEARTBEAT_LOST)
+
+    def _recover_from_bus_off(self) -> None:
+        self.line.cut, self._bus_on_at = False, None
+        self.emcy.raise_error(emcy.BUS_OFF_RECOVERED)
+
+    def _lose_connection(self, code: int) -> None:
+        """6007h for the motors, 1029h:1 for the NMT state."""
+        self._abort_connection(code)
+        behaviour = self.dictionary.values[key(0x1029, 1)]
+        if behaviour == 2:
+            self._enter(NmtState.STOPPED)
+        elif behaviour == 0 and self.state is NmtState.OPERATIONAL:
+            self._enter(NmtState.PRE_OPERATIONAL)
+
+    def _on_alive(self, producer: int) -> None:
+        self.emcy.clear_error(emcy.HEARTBEAT_LOST, producer)
+        needs_reset = self.personality.heartbeat_fault_needs_communication_reset
+        if not (self._consumer.any_lost or needs_reset):
+            for axis in self.axes:
+                axis.causes.discard(emcy.HEARTBEAT_LOST)
+
+    def _on_deadline(self) -> None:
+        """An RPDO's event timer ran out; the EMCY is sent, the motors act as on any lost connection."""
+        self._abort_connection(emcy.RPDO_TIMEOUT)
+
+    def _leave_bus(self) -> None:
+        """NMT stop or reset communication: 6007h, for the axes that move or could; the others have nothing to abort."""
+        for axis in self.axes:
+            if axis.state in POWERED:
+                axis.abort_connection(COMMUNICATION_FAULT)
+
+    def _abort_connection(self, code: int) -> None:
+        for axis in self.axes:
+            axis.abort_connection(code)
+
+    # Wiring
+
+    def _axis(self, number: int, parts: AxisParts) -> Axis:
+        def on_change(before: State, transition: Transition) -> None:
+            self.changes.append(StateChange(self.node_id, number, before, *transition))
+
+        return Axis(
+            self.dictionary,
+            number,
+            parts.motor,
+            parts.scale,
+            Encoder(parts.travel_m, parts.motor.step_s),
+            parts.encoder_offset,
+            tell_error=lambda code: self._tell_fault(code, number),
+            tell_clear=lambda code: self.emcy.clear_error(code, number),
+            on_change=on_change,
+            hold=parts.hold,
+            personality=self.personality,
+        )
+
+    def _tell_fault(self, code: int, axis: int) -> None:
+        """EMCY of an axis' fault; 81xxh and 82xxh were told by the service that found them."""
+        if code >> 8 not in (0x81, 0x82):
+            self.emcy.raise_error(code, axis)
+
+    def _send_emcy(self, frame: Frame) -> None:
+        if self.state in nmt.HAS_SDO:
+            self.line.say_emcy(frame)
+
+
+def _check_overflow(value: int) -> None:
+    if value == 1:
+        raise SdoAbortedError(abort.INVALID_VALUE)
+
+
+def axis_key(axis: int, index: int, subindex: int = 0) -> int:
+    """Address of an axis' object in the dictionary, for faults and tests: `index` as on the first axis."""
+    return key(index + AXIS_STRIDE * axis, subindex)

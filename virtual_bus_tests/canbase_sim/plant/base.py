@@ -1,0 +1,203 @@
+"""The robot under the drives: mass and yaw inertia couple two sides of wheels; friction, slip, true pose. SI, REP 103.
+
+Wheels of one side turn together. Each step applies the motors' forces and viscous friction, and then Coulomb friction
+as the impulse, within its bound, that leaves the least kinetic energy: so friction alone never moves anything, and an
+unpowered robot never gains speed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, pi, sin
+
+from canbase_sim.plant.motor import Motor
+
+SWEEPS = 8
+"""Passes over both sides until friction's impulses settle."""
+AT_REST_MPS = 1e-5
+"""A side that friction leaves slower than this sticks: static friction is a little more than sliding friction [m/s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlantParameters:
+    """The robot's body. Forces are per wheel and at the rim. Raises ValueError for a body that cannot be."""
+
+    mass_kg: float = 30.0
+    """Mass of the empty robot."""
+    payload_factor: float = 1.0
+    """Mass and yaw inertia with load, in multiples of the empty robot's; the drives are tuned for the empty one."""
+    yaw_gyration_m: float = 0.2
+    """Yaw inertia = mass × this²."""
+    wheel_mass_kg: float = 3.0
+    """Rotor, gear and wheel inertia of one wheel, as mass at its rim."""
+    coulomb_n: float = 6.0
+    """Dry friction of one wheel [N]."""
+    viscous_nspm: float = 8.0
+    """Friction of one wheel that grows with speed [N·s/m]."""
+    peak_force_n: float = 90.0
+    """Force of one wheel at its motor's torque limit [N]."""
+    bandwidth_radps: float = 200.0
+    """Velocity loop of the drives [rad/s]."""
+    slip_left: float = 0.0
+    """Share of the left rim's way that does not move the robot, below 1; negative: larger wheel than configured."""
+    slip_right: float = 0.0
+    """The same on the right."""
+    step_s: float = 0.002
+    """Fixed inner step [s]."""
+
+    def __post_init__(self) -> None:
+        positive = (self.mass_kg, self.payload_factor, self.yaw_gyration_m, self.wheel_mass_kg, self.peak_force_n)
+        if not all(0.0 < value < 1e6 for value in (*positive, self.bandwidth_radps, self.step_s)):
+            raise ValueError("masses, factor, gyration, force, bandwidth and step must be above 0 and finite")
+        if not all(0.0 <= value < 1e6 for value in (self.coulomb_n, self.viscous_nspm)):
+            raise ValueError("frictions must not be negative")
+        if not all(-1.0 < value < 1.0 for value in (self.slip_left, self.slip_right)):
+            raise ValueError("slip must be between -1 and 1")
+        if self.bandwidth_radps * self.step_s > 0.5:
+            raise ValueError("step_s is too long for bandwidth_radps: their product must not exceed 0.5")
+
+    def motor(self, wheels: int) -> Motor:
+        """The servo of one of `wheels` wheels, tuned for its share of the empty robot."""
+        mass = self.mass_kg / wheels + self.wheel_mass_kg
+        return Motor(mass, self.bandwidth_radps, self.peak_force_n, self.step_s)
+
+
+@dataclass(frozen=True, slots=True)
+class MountedWheel:
+    """A motor at its place: `direction` +1 where positive motor speed drives the base forward, else -1."""
+
+    motor: Motor
+    direction: int
+
+
+class Base:
+    """The moving robot. All fields are ground truth: pose in the frame where it started, rim speeds, ways."""
+
+    def __init__(
+        self,
+        parameters: PlantParameters,
+        track_m: float,
+        standstill_mps: float,
+        left: Sequence[MountedWheel],
+        right: Sequence[MountedWheel],
+        now: float,
+    ) -> None:
+        self._h = parameters.step_s
+        self._track, self._standstill = track_m, standstill_mps
+        self._left, self._right = ([(w.motor, float(w.direction)) for w in side] for side in (left, right))
+        self._viscous_left, self._viscous_right = (parameters.viscous_nspm * len(side) for side in (left, right))
+        self._bound_left, self._bound_right = (parameters.coulomb_n * self._h * len(side) for side in (left, right))
+        self._own_bounds = (self._bound_left, self._bound_right)
+        self._grip_left, self._grip_right = 1.0 - parameters.slip_left, 1.0 - parameters.slip_right
+        self._invert_mass_matrix(parameters)
+        self.x_m = self.y_m = self.turned_rad = 0.0
+        self.v_left_mps = self.v_right_mps = 0.0
+        self.push_n = 0.0
+        """Force on the body along its x axis: a slope [N]."""
+        self.travel_left_m = self.travel_right_m = 0.0
+        self.travel_m = self.path_m = 0.0
+        self.time_of_motion = now
+        self.resting = True
+
+    @property
+    def v_mps(self) -> float:
+        """True forward speed of the base."""
+        return (self.v_left_mps * self._grip_left + self.v_right_mps * self._grip_right) / 2.0
+
+    @property
+    def w_radps(self) -> float:
+        """True yaw rate, counter-clockwise positive."""
+        return (self.v_right_mps * self._grip_right - self.v_left_mps * self._grip_left) / self._track
+
+    @property
+    def yaw_rad(self) -> float:
+        """True heading, -π to π."""
+        return (self.turned_rad + pi) % (2.0 * pi) - pi
+
+    @property
+    def kinetic_energy_j(self) -> float:
+        """Of body and wheels together, without slip."""
+        a, b = self._inverse_left, self._inverse_right
+        c = self._cross
+        vl, vr = self.v_left_mps, self.v_right_mps
+        return (b * vl * vl - 2.0 * c * vl * vr + a * vr * vr) / (a * b - c * c) / 2.0
+
+    def hold(self, side: str, force_n: float) -> None:
+        """Something holds the wheels of a side with so much force beyond their friction: a threshold, a jammed gear."""
+        impulse = force_n * self._h
+        if side == "left":
+            self._bound_left = self._own_bounds[0] + impulse
+        else:
+            self._bound_right = self._own_bounds[1] + impulse
+
+    def step(self, now: float) -> None:
+        """Advance by one inner step that ends at `now`."""
+        vl, vr, h = self.v_left_mps, self.v_right_mps, self._h
+        push = self.push_n / 2.0
+        push_left, push_right = push - self._viscous_left * vl, push - self._viscous_right * vr
+        for motor, direction in self._left:
+            push_left += direction * motor.step(direction * vl)
+        for motor, direction in self._right:
+            push_right += direction * motor.step(direction * vr)
+        a, b, c = self._inverse_left, self._inverse_right, self._cross
+        new_left = vl + (a * push_left + c * push_right) * h
+        new_right = vr + (c * push_left + b * push_right) * h
+        self._move(*self._rub(new_left, new_right), now)
+
+    def _rub(self, vl: float, vr: float) -> tuple[float, float]:
+        """The speeds after Coulomb friction. While both sides slide on, both impulses are at their bounds."""
+        impulse_left = -self._bound_left if vl > 0.0 else self._bound_left
+        impulse_right = -self._bound_right if vr > 0.0 else self._bound_right
+        new_left = vl + self._inverse_left * impulse_left + self._cross * impulse_right
+        new_right = vr + self._cross * impulse_left + self._inverse_right * impulse_right
+        if new_left * vl > AT_REST_MPS**2 and new_right * vr > AT_REST_MPS**2:
+            return new_left, new_right
+        return self._stick(vl, vr)
+
+    def _stick(self, vl: float, vr: float) -> tuple[float, float]:
+        """The same where a side comes to rest: minimise the energy over one impulse after the other."""
+        a, b, c = self._inverse_left, self._inverse_right, self._cross
+        impulse_left = impulse_right = 0.0
+        for _ in range(SWEEPS):
+            wanted = _clamp(impulse_left - vl / a, self._bound_left)
+            change, impulse_left = wanted - impulse_left, wanted
+            vl, vr = vl + a * change, vr + c * change
+            wanted = _clamp(impulse_right - vr / b, self._bound_right)
+            change, impulse_right = wanted - impulse_right, wanted
+            vl, vr = vl + c * change, vr + b * change
+        return (0.0 if abs(vl) < AT_REST_MPS else vl), (0.0 if abs(vr) < AT_REST_MPS else vr)
+
+    def _move(self, vl: float, vr: float, now: float) -> None:
+        half = self._h / 2.0
+        left, right = (self.v_left_mps + vl) * half, (self.v_right_mps + vr) * half
+        self.travel_left_m += left
+        self.travel_right_m += right
+        left *= self._grip_left
+        right *= self._grip_right
+        way, turn = (left + right) / 2.0, (right - left) / self._track
+        heading = self.turned_rad + turn / 2.0
+        self.x_m += way * cos(heading)
+        self.y_m += way * sin(heading)
+        self.turned_rad += turn
+        self.travel_m += way
+        self.path_m += abs(way)
+        self.resting = vl == 0.0 == vr and left == 0.0 == right and not self.push_n
+        self.v_left_mps, self.v_right_mps = vl, vr
+        if abs(vl) > self._standstill or abs(vr) > self._standstill:
+            self.time_of_motion = now
+
+    def _invert_mass_matrix(self, p: PlantParameters) -> None:
+        """Kinetic energy = ½ (vl, vr) A (vl, vr)ᵀ; kept is the inverse of A."""
+        body = p.mass_kg * p.payload_factor
+        turning = body * p.yaw_gyration_m**2 / self._track**2
+        left = body / 4.0 + turning + p.wheel_mass_kg * len(self._left)
+        right = body / 4.0 + turning + p.wheel_mass_kg * len(self._right)
+        cross = body / 4.0 - turning
+        determinant = left * right - cross * cross
+        self._inverse_left, self._inverse_right = right / determinant, left / determinant
+        self._cross = -cross / determinant
+
+
+def _clamp(value: float, bound: float) -> float:
+    return bound if value > bound else -bound if value < -bound else value

@@ -1,0 +1,116 @@
+"""A reception before a simple base in virtual time; at every cycle it is seen that one goal at most orders motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal
+
+from canbase_action_server.along_track import Pose
+from canbase_action_server.goal_queue import Cycle, Reception
+from canbase_action_server.goal_request import DriveRequest, Request
+from canbase_action_server.inputs import Inputs, Odometry
+from canbase_action_server.motion import STOP
+from canbase_action_server.outcome import ErrorCode, Outcome
+from canbase_config.robot import Robot
+from support.action_plant import bench_robot, good_inputs
+
+PERIOD_S = 0.02
+Policy = Literal["reject", "queue", "preempt"]
+
+
+def robot_with(policy: Policy, queue_length: int = 8) -> Robot:
+    """The bench robot with another goal policy."""
+    robot = bench_robot()
+    action = robot.action.model_copy(update={"goal_policy": policy, "queue_length": queue_length})
+    return robot.model_copy(update={"action": action})
+
+
+@dataclass
+class Told:
+    """What became of one goal."""
+
+    request: Request
+    admitted: float
+    canceled: bool = False
+    began: float | None = None
+    ends: list[Outcome] = field(default_factory=list)
+    ended: float = 0.0
+
+
+class ReceptionWorld:
+    """Reception and base. `change` is laid over the inputs of each cycle."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.reception = Reception(robot)
+        self.now = 0.0
+        self.x_m = self.mps = 0.0
+        self.goals: dict[str, Told] = {}
+        self.refusals: list[str] = []
+        self.change: Callable[[Inputs], Inputs] = lambda inputs: inputs
+        self._owner: str | None = None
+
+    @property
+    def inputs(self) -> Inputs:
+        """Of this moment."""
+        return self.change(good_inputs(Odometry(self.now, Pose(self.x_m, 0.0, 0.0), self.mps, 0.0)))
+
+    def ask(self, request: Request) -> str | None:
+        """A client sends a goal: its key, None when it is refused."""
+        reason = self.reception.refusal(request, self.inputs, self.now)
+        if reason is not None:
+            self.refusals.append(reason)
+            return None
+        key = str(len(self.goals))
+        self.reception.admit(key, request, self.inputs, self.now)
+        self.goals[key] = Told(request, self.now)
+        return key
+
+    def ask_way(self, distance_m: float, speed_mps: float = 0.4) -> str:
+        """As `ask`, for a goal that must be accepted."""
+        key = self.ask(DriveRequest(distance_m, speed_mps))
+        assert key is not None, self.refusals
+        return key
+
+    def cancel(self, key: str) -> None:
+        """A client cancels."""
+        self.goals[key].canceled = self.reception.cancel(key) or self.goals[key].canceled
+
+    def run(self, duration_s: float, until: Callable[[], bool] = lambda: False) -> None:
+        """Let time pass, until `until` at most."""
+        for _ in range(round(duration_s / PERIOD_S)):
+            if until():
+                return
+            self.now += PERIOD_S
+            self._move(self.reception.tick(self.inputs, self.now))
+
+    def run_out(self, limit_s: float = 60.0) -> None:
+        """Until no goal is left."""
+        self.run(limit_s, lambda: not self.reception.busy)
+        assert not self.reception.busy
+
+    def code(self, key: str) -> ErrorCode:
+        """How it ended, once."""
+        (end,) = self.goals[key].ends
+        return end.code
+
+    def _move(self, cycle: Cycle) -> None:
+        if cycle.began is not None:
+            assert self._owner is None, "two goals own the base"
+            assert self.goals[cycle.began].began is None, "a goal began twice"
+            assert abs(self.mps) <= self.robot.base.standstill_mps, "a goal began on a base that moves"
+            self.goals[cycle.began].began = self.now
+            self._owner = cycle.began
+        if self._owner is None:
+            assert cycle.twist in (None, STOP), "nobody owns the base, and it was ordered to move"
+        assert cycle.feedback is None or cycle.feedback[0] == self._owner
+        for end in cycle.ends:
+            self.goals[end.key].ends.append(end.outcome)
+            self.goals[end.key].ended = self.now
+            if end.key == self._owner:
+                self._owner = None
+        wanted_mps = cycle.twist.linear_mps if cycle.twist else 0.0
+        most_mps = PERIOD_S * self.robot.limits.deceleration_mps2
+        self.mps += max(-most_mps, min(most_mps, wanted_mps - self.mps))
+        self.x_m += self.mps * PERIOD_S

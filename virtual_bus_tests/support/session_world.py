@@ -1,0 +1,52 @@
+"""A commissioning session before the simulated drives, in virtual time, and frames of others in between."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from canbase_commissioning.session import Session
+from canbase_config.robot import Robot
+from canbase_driver.cia301.frame import Frame
+from canbase_sim.frame import Frame as BenchFrame
+from canbase_sim.world.bench import Bench
+from support.sim_rig import robot as small_robot
+
+
+class SessionWorld:
+    """Drives that have just been switched on, and the clock. `said`: what the session sent, with its time."""
+
+    def __init__(self, robot: Robot | None = None, drives: Robot | None = None) -> None:
+        """`drives`: what is really there, where it is not what `robot` says."""
+        self.robot = robot or small_robot()
+        self.now = 100.0
+        self.bench = Bench(drives or self.robot, self.now)
+        self.said: list[tuple[float, Frame]] = []
+        self.others: list[Callable[[float], list[Frame]]] = []
+        """Other programs on the bus: each turn they are asked what they send."""
+        self.wait(0.5)
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass without a session."""
+        end = self.now + seconds
+        while self.now < end:
+            self.turn(None)
+
+    def run(self, session: Session, limit_s: float = 60.0) -> float:
+        """Until the session is done; how long it took [s]. Fails after `limit_s`."""
+        start = self.now
+        while not session.done:
+            assert self.now - start < limit_s, "the session does not end"
+            self.turn(session)
+        return self.now - start
+
+    def turn(self, session: Session | None) -> None:
+        """2 ms."""
+        self.now = round(self.now + 0.002, 6)
+        sent = session.tick(self.now) if session else []
+        self.said += [(self.now, frame) for frame in sent]
+        foreign = [frame for other in self.others for frame in other(self.now)]
+        for frame in [*sent, *foreign]:
+            self.bench.on_frame(BenchFrame(frame.cob_id, frame.data), self.now)
+        for heard in [*foreign, *(Frame(f.cob_id, f.data) for f in self.bench.tick(self.now))]:
+            if session is not None:
+                session.on_frame(heard, self.now)

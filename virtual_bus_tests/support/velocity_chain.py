@@ -1,0 +1,110 @@
+"""velocity_mux and safety_filter as a real process, all that it says, and the sources around it."""
+
+from __future__ import annotations
+
+import math
+import socket
+import struct
+import time
+import zlib
+from typing import Any
+
+import pytest
+from canbase.msg import DriverStatus, MuxState, SafetyState
+from geometry_msgs.msg import TwistStamped
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Bool
+
+from support.ros_harness import Process, Recorder, TestNode
+from support.scanner import BEAMS, all_around, scanner
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LEASE = struct.Struct("<4sQQddII")
+START_S = 15.0
+SILENT_S = 0.4
+"""After it no source of the sample robot is fresh that says nothing."""
+CAUSE_S = 10.0
+"""For a cause to be shown: some follow from the ROS graph, which DDS tells of late."""
+RUN = """
+import sys
+from canbase_config.load import load_robot
+from canbase_velocity.main import run
+sys.exit(run(load_robot({path!r}).robot, {ros_args!r}))
+"""
+
+
+def drive(linear_mps: float, angular_radps: float = 0.0) -> TwistStamped:
+    message = TwistStamped()
+    message.twist.linear.x, message.twist.angular.z = linear_mps, angular_radps
+    return message
+
+
+def scan(ahead_m: float = math.inf, behind_m: float = math.inf) -> LaserScan:
+    """Beams all around, all free but for one ahead and one behind, from base_link."""
+    ranges = [math.inf] * BEAMS
+    ranges[0], ranges[BEAMS // 2] = ahead_m, behind_m
+    return all_around(ranges)
+
+
+class Chain:
+    """The process, everything that it says, and the sources that a test can move."""
+
+    def __init__(self, node: TestNode, process: Process, watchdog: socket.socket, released: bool = True) -> None:
+        """`released`: joystick and action have commanded zero, and are silent now."""
+        self.node, self.process, self.watchdog = node, process, watchdog
+        self.leases: list[tuple[Any, ...]] = []
+        node.node.create_timer(0.02, self.drain)
+        self.orders: Recorder[TwistStamped] = node.record(TwistStamped, "cmd_vel")
+        self.mux: Recorder[MuxState] = node.record(MuxState, "velocity_mux/state", LATCHED)
+        self.state: Recorder[SafetyState] = node.record(SafetyState, "safety_filter/state", LATCHED)
+        self.joystick = node.repeat(TwistStamped, "cmd_vel_joy", 50.0)
+        self.action = node.repeat(TwistStamped, "cmd_vel_action", 50.0)
+        self.scan = scanner(node)
+        self.estop = node.repeat(Bool, "estop_state", 20.0)
+        self.driver = node.repeat(DriverStatus, "motor_driver/status", 20.0)
+        for repeater in (self.joystick, self.action, self.scan, self.estop, self.driver):
+            node.wait_for_subscriber(repeater.publisher, START_S)
+        node.wait_for(lambda: self.mux.last is not None and self.state.last is not None, START_S, "the first states")
+        self.scan.message = scan()
+        self.driver.message = DriverStatus(state=DriverStatus.ENABLED)
+        self.wait_for_cause(SafetyState.CAUSE_NONE)
+        if released:
+            node.release(self.joystick, self.action)
+            node.spin_for(SILENT_S)
+
+    @property
+    def ordered(self) -> tuple[float, float]:
+        """The newest order on cmd_vel [m/s, rad/s]."""
+        last = self.orders.last
+        assert last is not None
+        return last.twist.linear.x, last.twist.angular.z
+
+    def wait_for_order(self, linear_mps: float, timeout_s: float = 3.0) -> float:
+        """Until that is ordered; returns how long it took [s]."""
+        started_s = time.monotonic()
+        what = f"{linear_mps} m/s on cmd_vel"
+        self.node.wait_for(lambda: self.ordered[0] == pytest.approx(linear_mps), timeout_s, what)
+        return time.monotonic() - started_s
+
+    def wait_for_cause(self, cause: str, detail: str = "") -> SafetyState:
+        """Until the state has that cause, and `detail` in its detail: DDS tells of a node before it tells its name."""
+
+        def state() -> SafetyState | None:
+            last = self.state.last
+            return last if last is not None and last.cause == cause and detail in last.detail else None
+
+        found = self.node.wait_for(state, CAUSE_S, f"cause {cause} {detail}, state is {self.state.last}")
+        assert found is not None
+        return found
+
+    def drain(self) -> None:
+        """Takes all leases that wait at the socket: its queue is short, and a full one refuses the newest."""
+        while True:
+            try:
+                data = self.watchdog.recv(100)
+            except BlockingIOError:
+                return
+            lease = LEASE.unpack(data)
+            assert zlib.crc32(data[:40]) == lease[-1]
+            self.leases.append(lease)

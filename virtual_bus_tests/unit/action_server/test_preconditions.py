@@ -1,0 +1,89 @@
+"""Which goals may start: numbers dense at the limits, and each reason against a robot that is not ready."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from canbase_action_server.goal_request import DriveRequest
+from canbase_action_server.inputs import Inputs
+from canbase_action_server.preconditions import NO_SOURCE, STATE_TIMEOUT_S, action_source, state_reason
+from canbase_config.mux import Mux, MuxSource
+from support.action_plant import GOOD_DRIVER, GOOD_MUX, GOOD_SAFETY, Plant, bench_robot, replaced
+
+ROBOT = bench_robot()  # action.*: 0.01 to 5 m, 0.02 to 0.5 m/s
+READY = Inputs(Plant().odometry(0.0), GOOD_SAFETY, GOOD_DRIVER, GOOD_MUX)
+
+
+@pytest.mark.parametrize("distance_m", [0.01, -0.01, 0.011, 5.0, -5.0, 1.0])
+@pytest.mark.parametrize("speed_mps", [0.02, 0.5, 0.3])
+def test_numbers_within_the_limits_are_good(distance_m: float, speed_mps: float) -> None:
+    assert DriveRequest(distance_m, speed_mps).range_reason(ROBOT) is None
+
+
+def test_a_limit_that_float32_rounded_outward_is_still_the_limit() -> None:
+    smallest = DriveRequest(0.009999999776482582, 0.019999999552965164)  # float32(0.01), float32(0.02)
+    assert smallest.range_reason(ROBOT) is None
+
+
+@pytest.mark.parametrize("distance_m", [0.0, -0.0, 0.00999, -0.00999, 5.0001, -5.0001, math.inf, -math.inf, math.nan])
+def test_a_distance_outside_is_refused_with_its_range(distance_m: float) -> None:
+    reason = DriveRequest(distance_m, 0.2).range_reason(ROBOT)
+    assert reason is not None
+    assert "|distance_m|" in reason
+    assert "0.01 to 5.0" in reason
+
+
+@pytest.mark.parametrize("speed_mps", [0.0, -0.2, 0.0199, 0.5001, math.inf, -math.inf, math.nan])
+def test_a_speed_outside_is_refused_with_its_range(speed_mps: float) -> None:
+    reason = DriveRequest(1.0, speed_mps).range_reason(ROBOT)
+    assert reason is not None
+    assert "max_speed_mps" in reason
+    assert "0.02 to 0.5" in reason
+
+
+def test_a_robot_that_is_ready_has_no_reason_against_it() -> None:
+    assert state_reason(ROBOT, READY, 0.0) is None
+    assert state_reason(ROBOT, replaced(READY, mux=replace(GOOD_MUX, active="action")), 0.0) is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"shutdown": True}, "shutting down"),
+        ({"odometry": None}, "nothing received on odom"),
+        ({"safety": None}, "nothing received on safety_filter/state"),
+        ({"driver": None}, "nothing received on motor_driver/status"),
+        ({"mux": None}, "nothing received on velocity_mux/state"),
+        ({"safety": replace(GOOD_SAFETY, estop=True)}, "emergency stop"),
+        ({"safety": replace(GOOD_SAFETY, cause="estop_stale")}, "emergency stop"),
+        ({"driver": replace(GOOD_DRIVER, state="latched")}, "latched, not enabled"),
+        ({"driver": replace(GOOD_DRIVER, watchdog="missing")}, "watchdog is missing"),
+        ({"driver": replace(GOOD_DRIVER, hears_command=False)}, "hears no cmd_vel"),
+        ({"mux": replace(GOOD_MUX, active="joystick")}, "joystick drives"),
+        ({"mux": replace(GOOD_MUX, held_back="locked: pause holds")}, "holds action back: locked: pause holds"),
+    ],
+)
+def test_each_thing_that_is_missing_is_named(changes: dict[str, object], reason: str) -> None:
+    assert reason in str(state_reason(ROBOT, replaced(READY, **changes), 0.0))
+
+
+def test_old_messages_are_no_messages() -> None:
+    # odom may be 0.2 s old, the states 1.5 s.
+    assert state_reason(ROBOT, READY, 0.2) is None
+    assert "odom is silent for 0.21 s" in str(state_reason(ROBOT, READY, 0.21))
+    fresh = replaced(READY, odometry=Plant().odometry(1.6))
+    assert "motor_driver/status is silent" in str(state_reason(ROBOT, fresh, STATE_TIMEOUT_S + 0.1))
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        MuxSource(topic="cmd_vel_joy", priority=1, timeout_s=0.3),
+        MuxSource(topic="cmd_vel_action", priority=1, timeout_s=0.3, stamped=False),  # it would hear no TwistStamped
+    ],
+)
+def test_where_the_mux_does_not_hear_the_action_server_every_goal_is_refused(source: MuxSource) -> None:
+    assert action_source(ROBOT) == "action"
+    robot = ROBOT.model_copy(update={"mux": Mux(sources={"only": source})})
+    assert state_reason(robot, READY, 0.0) == NO_SOURCE

@@ -1,0 +1,144 @@
+"""The whole chain in virtual time: the pose over restarts, wraps and jumps, and robots with other drives."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import pytest
+
+from canbase_config.robot import Robot
+from canbase_driver.cia301.frame import Frame
+from canbase_driver.motion.kinematics import Twist2D
+from canbase_driver.motion.odometry import Pose2D
+from canbase_driver.snapshot import DriverState
+from canbase_sim.frame import Frame as BenchFrame
+from canbase_sim.world.bench import BenchParameters
+from support.chain_world import FORWARD, World, robot_of, world_of
+
+OVERCURRENT = 0x2310
+TPDOS = range(0x181, 0x500)
+
+
+@pytest.fixture
+def world(kind: str) -> World:
+    """At 0.3 m/s."""
+    world = world_of(kind)
+    world.drive()
+    return world
+
+
+def test_a_drive_that_was_switched_off_and_on_is_booted_again_and_waits_for_a_reset(world: World) -> None:
+    world.node.power_cycle(world.now, off_s=0.5)
+    world.run(0.7)
+    before = world.snapshot
+    assert not before.odometry_valid
+    world.run(12.0)  # nobody saw the wheel stop: the watchdog waits until it must have rolled out
+    after = world.snapshot
+    assert after.state is DriverState.LATCHED
+    assert after.odometry_valid
+    assert after.drives[0].nmt_state == "operational"
+    assert world.powered == [False, False]
+    # its encoder starts anew elsewhere: no jump of the pose, and the way that nobody could measure is reported
+    assert (after.x_m, after.y_m, after.yaw_rad) == pytest.approx((before.x_m, before.y_m, before.yaw_rad), abs=1e-3)
+    assert after.travel_losses >= 1
+    assert world.recovered()
+    assert world.snapshot.yaw_rad == pytest.approx(before.yaw_rad, abs=0.01)
+
+
+def test_the_pose_never_jumps_while_a_drive_is_switched_off_and_on(world: World) -> None:
+    world.node.power_cycle(world.now, off_s=0.3)
+    poses = []
+    for _ in range(300):
+        world.run(0.01)
+        poses.append(world.snapshot)
+    steps = [abs(b.x_m - a.x_m) + abs(b.yaw_rad - a.yaw_rad) for a, b in itertools.pairwise(poses)]
+    assert max(steps) < 0.3 * 0.01 * 1.5 + 0.01
+
+
+@pytest.mark.parametrize(("waited_s", "counts"), [(0.099, True), (0.101, False)])
+def test_feedback_that_waited_while_the_driver_stood_still_does_not_pass_for_fresh(
+    world: World, waited_s: float, counts: bool
+) -> None:
+    """t   0  cycle, SYNC, answers ── the process stands still ── waited_s: it goes on and reads the answers"""
+    went_on_at = world.now + waited_s
+    core, dropped = world.core, world.core.frames_dropped
+    core.tick(world.now)
+    world.bench.on_frame(BenchFrame(0x080, b""), world.now)
+    # those without SYNC say theirs in the next 10 ms
+    answers = [each for ms in range(11) for each in world.bench.tick(world.now + ms / 1000) if each.cob_id in TPDOS]
+    for answer in answers:
+        core.on_frame(Frame(answer.cob_id, answer.data), went_on_at)
+    assert core.snapshot(went_on_at).odometry_valid is counts
+    assert core.frames_dropped == dropped + (0 if counts else len(answers))
+
+
+@pytest.mark.parametrize(
+    "robot",
+    [
+        robot_of((1, 0, "left"), (1, 1, "right")),
+        robot_of((1, 0, "right"), (1, 1, "left")),
+        robot_of((1, 0, "left"), (2, 0, "right"), (3, 0, "left"), (4, 0, "right")),
+        robot_of((1, 0, "left"), (1, 1, "right"), (2, 0, "left"), (2, 1, "right")),
+    ],
+    ids=["two axes on a node", "the other way round", "four wheels", "four wheels on two nodes"],
+)
+def test_other_robots_drive_their_arc_and_stop_all_wheels_for_the_fault_of_one(robot: Robot) -> None:
+    world = World(robot)
+    world.drive(Twist2D(0.3, 0.5), seconds=1.0)
+    truth, snapshot = world.truth, world.snapshot
+    assert (truth.linear_mps, truth.angular_radps) == pytest.approx((0.3, 0.5), abs=0.01)
+    assert (snapshot.x_m, snapshot.y_m, snapshot.yaw_rad) == pytest.approx(
+        (truth.x_m, truth.y_m, truth.yaw_rad), abs=1e-3
+    )
+    world.node.fail(0, OVERCURRENT)
+    assert world.stands_after() < 0.25
+    assert world.core.state is DriverState.LATCHED
+    assert world.recovered()
+
+
+@pytest.mark.parametrize("offset", [2**31 - 2000, -(2**31) + 2000])
+def test_the_encoder_goes_round_at_32_bits_while_driving_and_nobody_sees_it(offset: int) -> None:
+    world = World(parameters=BenchParameters(encoder_offset=offset))
+    first = world.node.axes[0].position()
+    world.drive(Twist2D(0.3 if offset > 0 else -0.3, 0.0), seconds=1.0)
+    assert world.node.axes[0].position() * first < 0  # it went round
+    world.command = Twist2D.ZERO
+    world.run(1.0)
+    assert world.snapshot.x_m == pytest.approx(world.truth.x_m, abs=1e-4)
+    assert world.snapshot.travel_losses == 0
+
+
+def test_an_encoder_that_jumps_for_good_is_no_motion_of_the_base_and_is_reported(world: World) -> None:
+    before = world.snapshot
+    world.node.axes[0].encoder_offset += 1_000_000  # 7.7 m at the rim
+    world.run(0.5)
+    after = world.snapshot
+    assert after.x_m == pytest.approx(before.x_m + 0.15, abs=0.02)
+    assert after.yaw_rad == pytest.approx(before.yaw_rad, abs=0.01)
+    assert after.travel_losses == 1
+    assert after.odometry_valid
+
+
+def test_the_pose_is_set_at_a_standstill_only_and_the_way_goes_on_from_there() -> None:
+    world = World()
+    world.drive()
+    moving = world.core.set_pose(Pose2D(), world.now)
+    assert (moving.done, moving.sentence.split(":")[0]) == (False, "refused")
+    world.command = Twist2D.ZERO
+    world.run(1.0)
+    assert world.snapshot.x_m > 0.1
+    assert not world.core.set_pose(Pose2D(math.nan, 0.0, 0.0), world.now).done
+    assert world.snapshot.pose_resets == 0
+    assert world.core.set_pose(Pose2D(1.0, 2.0, math.pi / 2), world.now).done
+    fresh = world.snapshot
+    assert (fresh.x_m, fresh.y_m, fresh.yaw_rad) == (1.0, 2.0, math.pi / 2)
+    assert fresh.pose_resets == 1
+    assert world.core.set_pose(Pose2D(1.0, 2.0, math.pi / 2), world.now).done
+    assert world.snapshot.pose_resets == 2  # also where nothing jumps
+    world.command = FORWARD
+    world.run(1.0)
+    snapshot = world.snapshot
+    assert snapshot.x_m == pytest.approx(1.0, abs=0.01)
+    assert snapshot.y_m > 2.15
+    assert snapshot.pose_covariance[0] > fresh.pose_covariance[0]

@@ -1,0 +1,252 @@
+"""The `canbase` command: what the subcommands hand over, and how they end. The processes are stand-ins here."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from importlib.metadata import PackageNotFoundError
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from canbase_cli.main import app
+from canbase_cli.options import ros_needed
+from canbase_config.derive import watchdog_config
+from canbase_config.load import load_robot, sample
+from canbase_config.robot import Robot
+from canbase_config.watchdog import WatchdogConfig
+from canbase_runtime import version
+from canbase_runtime.own_modules import module_command
+from support.robot_files import write
+
+Call = tuple[Robot, Any]
+ROS_COMMANDS = [
+    ("driver", "canbase_driver.runtime.main"),
+    ("velocity", "canbase_velocity.main"),
+    ("action-server", "canbase_action_server.main"),
+]
+
+
+def stand_in(monkeypatch: pytest.MonkeyPatch, module_name: str, exit_code: int = 0) -> list[Call]:
+    """Replaces `run` of a process; returns the list that its calls go to."""
+    calls: list[Call] = []
+
+    def run(robot: Robot, argument: Any, *_options: Any) -> int:
+        calls.append((robot, argument))
+        return exit_code
+
+    module = ModuleType(module_name)
+    module.run = run  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, module_name, module)
+    return calls
+
+
+@pytest.mark.parametrize(("command", "module"), ROS_COMMANDS)
+def test_without_options_a_process_gets_the_bench_and_no_ros_arguments(
+    command: str, module: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = stand_in(monkeypatch, module)
+
+    result = CliRunner().invoke(app, [command])
+
+    assert (result.exit_code, result.output) == (0, "")
+    assert calls == [(load_robot(sample("bench")).robot, [])]
+
+
+@pytest.mark.parametrize(("command", "module"), ROS_COMMANDS)
+def test_namespace_and_ros_arguments_go_to_rclpy_together(
+    command: str, module: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = stand_in(monkeypatch, module)
+
+    CliRunner().invoke(
+        app, [command, "--namespace", "robot1", "--ros-args", "-r", "odom:=odometry", "--log-level", "debug"]
+    )
+
+    assert [arguments for _, arguments in calls] == [
+        ["--ros-args", "-r", "__ns:=/robot1", "-r", "odom:=odometry", "--log-level", "debug"]
+    ]
+
+
+@pytest.mark.parametrize(
+    ("given", "arguments"),
+    [
+        ("robot1", ["--ros-args", "-r", "__ns:=/robot1"]),
+        ("/robot1", ["--ros-args", "-r", "__ns:=/robot1"]),
+        ("fleet/robot1/", ["--ros-args", "-r", "__ns:=/fleet/robot1"]),
+        ("/", []),
+        ("", []),
+    ],
+)
+def test_a_namespace_is_written_with_or_without_its_slashes(
+    given: str, arguments: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = stand_in(monkeypatch, "canbase_driver.runtime.main")
+
+    CliRunner().invoke(app, ["driver", "-n", given])
+
+    assert [got for _, got in calls] == [arguments]
+
+
+@pytest.mark.parametrize("namespace", ["1st", "a b", "a//b", "a-b", "~", "a\n"])
+def test_a_namespace_that_ros_would_refuse_is_refused_here(namespace: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = stand_in(monkeypatch, "canbase_driver.runtime.main")
+
+    result = CliRunner().invoke(app, ["driver", "-n", namespace])
+
+    assert (result.exit_code, calls) == (2, [])
+    assert "is no ROS namespace" in result.stderr
+
+
+def test_a_mistyped_option_before_the_ros_arguments_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = stand_in(monkeypatch, "canbase_driver.runtime.main")
+
+    result = CliRunner().invoke(app, ["driver", "--confg", "x.yaml", "--ros-args", "-r", "a:=b"])
+
+    assert (result.exit_code, calls) == (2, [])
+    assert "No such option: --confg" in result.stderr
+
+
+@pytest.mark.parametrize(("command", "module"), [*ROS_COMMANDS, ("sim", "canbase_sim.main")])
+def test_the_exit_code_of_the_process_is_that_of_the_command(
+    command: str, module: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stand_in(monkeypatch, module, exit_code=7)
+
+    assert CliRunner().invoke(app, [command]).exit_code == 7
+
+
+@pytest.mark.parametrize("command", ["driver", "velocity", "action-server", "sim", "watchdog"])
+def test_a_broken_robot_yaml_starts_no_process(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = [stand_in(monkeypatch, module) for _, module in [*ROS_COMMANDS, ("sim", "canbase_sim.main")]]
+    monkeypatch.setattr(os, "execve", lambda *arguments: calls.append([arguments]))
+    file = write(tmp_path, {9: "    gear_ratio: 0"})
+
+    result = CliRunner().invoke(app, [command, "--config", str(file)])
+
+    assert (result.exit_code, calls) == (2, [[], [], [], []])
+    assert result.stderr.startswith(f"{file}:9: drives[0].gear_ratio: got 0, expected a number > 0 and <= 10000")
+    assert "Traceback" not in result.output
+
+
+def test_the_simulation_gets_its_control_socket(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = stand_in(monkeypatch, "canbase_sim.main")
+    file = write(tmp_path, {})
+
+    CliRunner().invoke(app, ["sim", "-c", str(file), "--control", "/tmp/control.sock", "--namespace", "robot1"])
+    CliRunner().invoke(app, ["sim", "-c", str(file), "--ros-args", "-r", "a:=b"])
+
+    assert calls == [(load_robot(file).robot, "/tmp/control.sock"), (load_robot(file).robot, None)]
+
+
+def test_the_watchdog_replaces_the_process_and_skips_the_start_up_hook(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[tuple[str, list[str], dict[str, str]]] = []
+    monkeypatch.setattr(os, "execve", lambda *arguments: calls.append(arguments))
+    monkeypatch.delenv("_ROS_WHEELS_BOOTSTRAP_COMPLETE", raising=False)
+    file = write(tmp_path, {})
+
+    CliRunner().invoke(app, ["watchdog", "--config", str(file)])
+
+    ((executable, arguments, environment),) = calls
+    assert executable == sys.executable
+    assert arguments[:-1] == module_command("canbase_watchdog", "--config-json")
+    assert WatchdogConfig.from_json(arguments[-1]) == watchdog_config(load_robot(file).robot)
+    assert environment["_ROS_WHEELS_BOOTSTRAP_COMPLETE"] == "1"
+    assert environment["PATH"] == os.environ["PATH"]
+
+
+def test_a_good_file_is_printed_and_praised(tmp_path: Path) -> None:
+    file = write(tmp_path, {})
+
+    result = CliRunner().invoke(app, ["config", "check", str(file)])
+
+    assert result.exit_code == 0
+    assert result.stdout.startswith(
+        "name: robot                                 # default\nbus:\n  interface: virtual\n"
+    )
+    given = 30  # lines of the file with a value, and one line with four
+    defaults = result.stdout.count("# default\n")
+    assert result.stderr == f"{file} is good: {given} values from the file, {defaults} defaults\n"
+
+
+def test_without_a_file_the_bench_sample_is_checked() -> None:
+    result = CliRunner().invoke(app, ["config", "check"])
+
+    assert (result.exit_code, result.stdout.splitlines()[0]) == (0, "name: bench")
+
+
+def test_colours_go_to_a_terminal_alone_and_not_where_the_user_wants_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    check = ["config", "check"]
+
+    assert "\x1b[" not in CliRunner().invoke(app, check).output
+    assert "\x1b[" in CliRunner().invoke(app, check, color=True).output
+    assert "\x1b[" not in CliRunner().invoke(app, check, color=True, env={"NO_COLOR": "1"}).output
+
+
+@pytest.mark.parametrize(
+    "command",
+    [[], ["config"], ["config", "check"], ["driver"], ["velocity"], ["action-server"], ["sim"], ["watchdog"]],
+    ids=" ".join,
+)
+def test_every_command_explains_itself(command: list[str]) -> None:
+    result = CliRunner().invoke(app, [*command, "--help"])
+
+    assert result.exit_code == 0
+    assert "Usage: " in result.stdout
+
+
+def test_help_loads_neither_ros_nor_can_nor_the_configuration() -> None:
+    code = (
+        "import sys; from canbase_cli.main import app; app(['--help'], standalone_mode=False);"
+        "print('loaded:', *sorted({'rclpy', 'can', 'canopen', 'pydantic', 'ruamel', 'numpy'} & set(sys.modules)))"
+    )
+
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=30, check=True)
+
+    assert result.stdout.splitlines()[-1] == "loaded:"
+
+
+@pytest.mark.parametrize("missing", ["rclpy", "rclpy.node", "canbase.msg"])
+def test_without_ros_there_is_advice_and_no_traceback(missing: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(typer.Exit) as caught, ros_needed():
+        raise ModuleNotFoundError(name=missing)
+
+    assert caught.value.exit_code == 1
+    assert "source its setup.bash, or install canbase[ros] from PyPI" in capsys.readouterr().err
+
+
+def test_a_bug_of_ours_is_not_taken_for_missing_ros() -> None:
+    with pytest.raises(ModuleNotFoundError), ros_needed():
+        raise ModuleNotFoundError(name="canbase_drive")
+
+
+def test_the_version_is_that_of_the_installed_package() -> None:
+    result = CliRunner().invoke(app, ["--version"])
+
+    assert (result.exit_code, result.stdout) == (0, f"canbase {version.installed_version()}\n")
+
+
+def test_in_a_colcon_workspace_the_version_comes_from_package_xml(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def not_by_pip(_: str) -> str:
+        raise PackageNotFoundError
+
+    share = tmp_path / "second" / "share" / "canbase"
+    share.mkdir(parents=True)
+    (share / "package.xml").write_text("<package><version>3.2.1</version></package>", encoding="utf-8")
+    monkeypatch.setattr(version, "version", not_by_pip)
+
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"{tmp_path / 'first'}:{tmp_path / 'second'}")
+    assert version.installed_version() == "3.2.1"
+
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "first"))
+    assert version.installed_version() == "unknown"

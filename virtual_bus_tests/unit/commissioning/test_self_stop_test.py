@@ -1,0 +1,116 @@
+"""The watchdog proof before every kind of drive, and before drives that do not stop by themselves."""
+
+from __future__ import annotations
+
+import pytest
+
+from canbase_commissioning.guide import CommissionError, Script
+from canbase_commissioning.powered_drives import Rig, RigError
+from canbase_commissioning.self_stop_test import HEARTBEAT, SILENCE, Outcome, get_ready, prove
+from canbase_driver.cia301.frame import Frame
+from canbase_sim.cia402.states import POWERED
+from canbase_sim.frame import Frame as BenchFrame
+from canbase_sim.personality import PERSONALITIES
+from support.crews import robot_with
+from support.guide_world import GuideWorld
+
+SPEED_MPS = 0.1
+
+
+def whole(rig: Rig) -> Script[tuple[Outcome, ...]]:
+    yield from get_ready(rig)
+    return (yield from prove(rig, SPEED_MPS))
+
+
+def assert_off(world: GuideWorld) -> None:
+    """Whatever happened: no motor has power, no wheel turns."""
+    world.wait(1.0)
+    assert not any(axis.state in POWERED for node in world.bench.nodes.values() for axis in node.axes)
+    assert world.speeds == (0.0, 0.0)
+
+
+BY_HEARTBEAT = ("elmo_gold", "epos4", "generic", "kinco", "nanotec")
+BY_THEIR_OWN_TIMEOUT = ("roboteq", "zlac8015d")
+NEVER = ("dryve_d1", "technosoft", "tmcm1636")
+
+
+def test_every_kind_of_drive_is_in_one_of_the_lists() -> None:
+    assert sorted((*BY_HEARTBEAT, *BY_THEIR_OWN_TIMEOUT, *NEVER)) == sorted(PERSONALITIES)
+
+
+@pytest.mark.parametrize("kind", BY_HEARTBEAT)
+def test_a_drive_that_watches_the_heartbeat_stops_in_both_trials_within_it_and_its_ramp(kind: str) -> None:
+    """0.3 s of 1016h, minus what passed since the last heartbeat (0.1 s), plus 0.05 s of ramp."""
+    world = GuideWorld(robot_with(kind))
+    outcomes = world.guide(whole)
+    assert [(o.trial, o.stopped, o.is_late) for o in outcomes] == [(SILENCE, True, False)] * 2 + [
+        (HEARTBEAT, True, False)
+    ] * 2
+    assert all(0.2 < outcome.time_s < 0.45 for outcome in outcomes)
+    assert all("EMCY 8130h" in outcome.sign for outcome in outcomes)
+    assert_off(world)
+
+
+@pytest.mark.parametrize(("kind", "late"), [("roboteq", True), ("zlac8015d", False)])
+def test_a_drive_with_a_timeout_of_its_own_stops_and_needs_no_heartbeat(kind: str, late: bool) -> None:
+    """Roboteq's RWD is a second: later than a heartbeat would be, and told so."""
+    world = GuideWorld(robot_with(kind))
+    outcomes = world.guide(whole)
+    assert [(o.trial, o.stopped, o.is_late) for o in outcomes] == [(SILENCE, True, late)] * 2
+    assert_off(world)
+
+
+@pytest.mark.parametrize("kind", NEVER)
+def test_a_drive_that_does_not_stop_by_itself_is_told_loudly_and_stopped_at_once(kind: str) -> None:
+    world = GuideWorld(robot_with(kind))
+    outcomes = world.guide(whole)
+    assert [(o.trial, o.stopped) for o in outcomes] == [(SILENCE, False)] * 2
+    assert "DID NOT STOP when this computer fell silent" in str(outcomes[0])
+    assert_off(world)
+
+
+def test_one_drive_of_two_that_lost_its_1016h_is_the_one_that_is_named() -> None:
+    """Somebody clears the entry between the boot and the trial: what was set is not what counts."""
+    world = GuideWorld()
+
+    def sabotaged(rig: Rig) -> Script[tuple[Outcome, ...]]:
+        yield from get_ready(rig)
+        request = "23 16 10 01 00 00 00 00"
+        world.bench.on_frame(BenchFrame(0x602, bytes.fromhex(request)), world.now)
+        request = "23 16 10 02 00 00 00 00"
+        world.bench.on_frame(BenchFrame(0x602, bytes.fromhex(request)), world.now)
+        return (yield from prove(rig, SPEED_MPS))
+
+    outcomes = world.guide(sabotaged)
+    assert [(outcome.joint, outcome.stopped) for outcome in outcomes] == [("left", True), ("right", False)]
+    assert_off(world)
+
+
+def test_a_drive_that_does_not_get_power_ends_it_with_its_state() -> None:
+    world = GuideWorld()
+
+    def held(rig: Rig) -> Script[tuple[Outcome, ...]]:
+        yield from get_ready(rig)
+        world.bench.nodes[2].fail(0, 0x2310, holds=True)
+        return (yield from prove(rig, SPEED_MPS))
+
+    with pytest.raises(RigError, match="right: fault 2310h over-current"):
+        world.guide(held)
+    assert_off(world)
+
+
+def test_a_drive_that_is_not_there_ends_it_before_anything_moves() -> None:
+    world = GuideWorld()
+    world.bench.nodes[2].line.cut = True
+    with pytest.raises(CommissionError, match=r"did not get ready within 15 s: .*node 2 \(right\)"):
+        world.guide(whole)
+    assert world.bench.base.path_m == 0.0
+
+
+def test_the_heartbeat_of_a_driver_ends_it_at_once() -> None:
+    world = GuideWorld()
+    spins_at = world.now + 3.0
+    world.others.append(lambda now: [Frame(0x77F, b"\x05")] if now > spins_at else [])
+    with pytest.raises(RigError, match="comes from another master"):
+        world.guide(whole)
+    assert_off(world)

@@ -1,0 +1,184 @@
+"""Parameter files of twist_mux, read as they are; what is wrong in them names file, line and key."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from canbase_config.effective import effective
+from canbase_config.errors import ConfigError
+from canbase_config.load import load_robot
+from canbase_config.mux import NEUTRAL_AFTER_S, Mux, MuxLock, MuxSource
+from support.robot_files import LAST_LINE, write
+
+END = LAST_LINE + 1
+
+TOPICS = """\
+# as it comes with twist_mux, but for the tablet
+twist_mux:
+  ros__parameters:
+    use_stamped: false
+    topics:
+      navigation:
+        topic   : nav_vel
+        timeout : 0.5
+        priority: 10
+      joystick:
+        topic   : joy_vel
+        timeout : 0.5
+        priority: 100
+"""
+LOCKS = """\
+twist_mux:
+  ros__parameters:
+    locks:
+      pause:
+        topic   : pause_navigation
+        timeout : 0.0
+        priority: 100
+      e_stop:
+        topic   : platform/emergency_stop
+        timeout : 0.6
+        priority: 255
+"""
+DOTTED = """\
+teleop:
+  ros__parameters: {scale: 0.4}
+a200_0000:
+  twist_mux:
+    ros__parameters:
+      use_sim_time: False
+      topics.joy.topic: joy_teleop/cmd_vel
+      topics.joy.timeout: 0.5
+      topics.joy.priority: 10
+      topics.external.topic: cmd_vel_external
+      topics.external.timeout: 1
+      topics.external.priority: 0
+      locks.e_stop.topic: /platform/emergency_stop
+      locks.e_stop.timeout: 0.0
+      locks.e_stop.priority: 255
+"""
+
+
+def mux_of(folder: Path, *files: str, also: str = "") -> Mux:
+    """The mux of a robot.yaml that names these files; `also`: further keys below mux."""
+    names = []
+    for number, text in enumerate(files):
+        (folder / f"mux{number}.yaml").write_text(text, encoding="utf-8")
+        names.append(f"mux{number}.yaml")
+    robot = write(folder, {END: f"mux:\n  twist_mux: [{', '.join(names)}]\n{also}"})
+    return load_robot(robot).robot.mux
+
+
+def refusal(folder: Path, *files: str, also: str = "") -> str:
+    with pytest.raises(ConfigError) as caught:
+        mux_of(folder, *files, also=also)
+    return str(caught.value).replace(f"{folder}/", "")
+
+
+def test_the_two_files_of_twist_mux_become_sources_and_locks(tmp_path: Path) -> None:
+    mux = mux_of(tmp_path, TOPICS, LOCKS)
+    assert mux.sources == {
+        "navigation": MuxSource(
+            topic="nav_vel", priority=10, timeout_s=0.5, stamped=False, neutral_after_s=NEUTRAL_AFTER_S
+        ),
+        "joystick": MuxSource(topic="joy_vel", priority=100, timeout_s=0.5, stamped=False),
+    }
+    assert mux.locks == {
+        "pause": MuxLock(topic="pause_navigation", priority=100, required=False),
+        "e_stop": MuxLock(topic="platform/emergency_stop", priority=255, required=True, timeout_s=0.6),
+    }
+
+
+def test_dotted_keys_a_namespace_and_the_parameters_of_other_nodes(tmp_path: Path) -> None:
+    mux = mux_of(tmp_path, DOTTED)
+    assert mux.sources == {
+        "joy": MuxSource(topic="joy_teleop/cmd_vel", priority=10, timeout_s=0.5),
+        "external": MuxSource(topic="cmd_vel_external", priority=0, timeout_s=1.0),
+    }
+    assert mux.locks == {"e_stop": MuxLock(topic="/platform/emergency_stop", priority=255, required=False)}
+
+
+def test_a_later_file_has_the_last_word_on_single_values_as_ros_has_it(tmp_path: Path) -> None:
+    override = "/**:\n  ros__parameters:\n    topics: {joystick: {priority: 7}}\n    use_stamped: true\n"
+    mux = mux_of(tmp_path, TOPICS, override)
+    assert (mux.sources["joystick"].priority, mux.sources["joystick"].topic) == (7, "joy_vel")
+    assert mux.sources["navigation"].stamped is True
+
+
+def test_sources_of_robot_yaml_come_to_those_of_the_files(tmp_path: Path) -> None:
+    own = "  sources:\n    action: {topic: cmd_vel_action, priority: 40, timeout_s: 0.3}\n"
+    assert list(mux_of(tmp_path, TOPICS, also=own).sources) == ["action", "navigation", "joystick"]
+
+
+def test_the_effective_configuration_spells_them_out_and_loads_without_the_files(tmp_path: Path) -> None:
+    mux = mux_of(tmp_path, TOPICS, LOCKS)
+    (tmp_path / "effective.yaml").write_text(effective(load_robot(tmp_path / "robot.yaml")), encoding="utf-8")
+    (tmp_path / "mux0.yaml").unlink()
+    assert load_robot(tmp_path / "effective.yaml").robot.mux == mux
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        ("priority: 100", "priority: 10", "mux0.yaml:13: topics.joystick.priority: sources navigation and joystick have"
+         " the same priority; each needs its own"),
+        ("priority: 100", "priority: 256", "mux0.yaml:13: topics.joystick.priority: got 256, expected a whole number"
+         " >= 0 and <= 255 (the higher wins; no two alike)"),
+        ("priority: 100", "priorty: 100", "mux0.yaml:11: topics.joystick.priority: missing, expected a whole number"),
+        ("timeout : 0.5\n        priority: 10\n", "timeout : 0.0\n        priority: 10\n", "mux0.yaml:8:"
+         " topics.navigation.timeout: got 0.0, expected a number >= 0.05 and <= 2 (silent"),
+        ("timeout : 0.5\n        priority: 100", "timeout : fast\n        priority: 100", 'mux0.yaml:12:'
+         ' topics.joystick.timeout: got "fast", expected a number'),
+        ("joy_vel", "cmd_vel", "mux0.yaml:11: topics.joystick.topic: cmd_vel is what this robot orders itself"),
+        ("joy_vel", "/cmd_vel_mux", "mux0.yaml:11: topics.joystick.topic: /cmd_vel_mux is what this robot orders"),
+        ("use_stamped: false", "use_stamped: 1", "mux0.yaml:4: use_stamped: got 1, expected true or false"),
+        ("topics:", "topic:", "mux0.yaml: has no topics and no locks of twist_mux"),
+        ("ros__parameters:", "parameters:", "mux0.yaml: has no topics and no locks of twist_mux"),
+        ("    topics:\n", "    topics: 3\n    other:\n", "mux0.yaml:5: topics: topics must hold entries with topic,"),
+        ("      joystick:\n", "      joy-stick:\n", 'mux0.yaml:11: topics.joy-stick: got the name "joy-stick"'),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_told_with_the_files_own_line_and_key(tmp_path: Path, old: str, new: str, text: str) -> None:
+    assert old in TOPICS
+    assert text in refusal(tmp_path, TOPICS.replace(old, new))
+
+
+def test_a_lock_that_can_hold_nobody_back_is_refused(tmp_path: Path) -> None:
+    text = refusal(tmp_path, TOPICS, LOCKS.replace("priority: 100", "priority: 10"))
+    assert "mux1.yaml:7: locks.pause.priority: 10 holds nobody back: the lowest source has 10" in text
+
+
+def test_a_lock_on_the_topic_of_a_source_is_refused(tmp_path: Path) -> None:
+    text = refusal(tmp_path, TOPICS, LOCKS.replace("pause_navigation", "nav_vel"))
+    assert "mux1.yaml:5: locks.pause.topic: nav_vel is the topic of a source too" in text
+
+
+def test_a_lock_without_timeout_is_refused(tmp_path: Path) -> None:
+    assert "mux1.yaml:9: locks.e_stop.timeout: got nothing" in refusal(
+        tmp_path, TOPICS, LOCKS.replace("timeout : 0.6", "")
+    )
+
+
+def test_two_nodes_with_topics_in_one_file_are_refused(tmp_path: Path) -> None:
+    text = refusal(tmp_path, TOPICS + TOPICS.replace("twist_mux:", "other_mux:"))
+    assert "mux0.yaml: has topics or locks of twist_mux and other_mux; keep those of one node" in text
+
+
+def test_a_name_in_both_files_is_refused(tmp_path: Path) -> None:
+    own = "  sources:\n    joystick: {topic: cmd_vel_joy, priority: 90, timeout_s: 0.3}\n"
+    text = refusal(tmp_path, TOPICS, also=own)
+    assert "mux0.yaml:11: topics.joystick.topic: mux.sources.joystick is given in robot.yaml too" in text
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    robot = write(tmp_path, {END: "mux: {twist_mux: [twist_mux_topics.yaml]}"})
+    with pytest.raises(ConfigError, match=r"twist_mux_topics\.yaml: no such file"):
+        load_robot(robot)
+
+
+def test_what_is_no_list_of_files_is_told_by_the_model(tmp_path: Path) -> None:
+    robot = write(tmp_path, {END: "mux: {twist_mux: topics.yaml}"})
+    with pytest.raises(ConfigError, match=r"robot\.yaml:36: mux\.twist_mux: got \"topics\.yaml\", expected a list"):
+        load_robot(robot)

@@ -1,0 +1,121 @@
+"""Doctor reads what the boot of the driver would change, and changes nothing itself: before every kind of drive."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from canbase_commissioning.bus_monitor import Listener
+from canbase_commissioning.sdo_session import Inquiry
+from canbase_config.robot import Robot
+from canbase_doctor.inspection import Inspection, inspect
+from canbase_driver.boot.node_boot import NodeBoot, sdo_client
+from canbase_driver.boot.settings import HEARTBEAT_CONSUMER
+from canbase_driver.cia301.frame import Frame
+from canbase_driver.cia402 import DriveState
+from canbase_sim.personality import PERSONALITIES
+from support.crews import robot_with
+from support.session_world import SessionWorld
+from support.sim_rig import robot
+
+KINDS = sorted(PERSONALITIES)
+
+
+class BootSession:
+    """The driver's boot of all nodes."""
+
+    def __init__(self, of: Robot) -> None:
+        nodes = {drive.node_id: tuple(d for d in of.drives if d.node_id == drive.node_id) for drive in of.drives}
+        self.boots = [NodeBoot(node_id, drives, of) for node_id, drives in nodes.items()]
+
+    @property
+    def done(self) -> bool:
+        return all(boot.done for boot in self.boots)
+
+    def on_frame(self, frame: Frame, now: float) -> None:
+        for boot in self.boots:
+            boot.on_frame(frame, now)
+
+    def tick(self, now: float) -> list[Frame]:
+        return [frame for boot in self.boots for frame in boot.tick(now)]
+
+
+def inspected(world: SessionWorld, of: Robot | None = None) -> dict[int, Inspection]:
+    looked = of or world.robot
+    nodes = {drive.node_id: tuple(d for d in looked.drives if d.node_id == drive.node_id) for drive in looked.drives}
+    inquiry = Inquiry(
+        {node_id: inspect(node_id, drives, looked) for node_id, drives in nodes.items()},
+        Listener(world.now),
+        lambda node_id: sdo_client(node_id, nodes[node_id][0].kind.sdo, 0.3),
+    )
+    world.run(inquiry)
+    errors = [str(task.error) for task in inquiry.tasks.values() if task.error]
+    assert errors == []
+    return {node_id: task.result for node_id, task in inquiry.tasks.items() if task.result}
+
+
+def writes(world: SessionWorld) -> list[Frame]:
+    """Frames that order something: SDO downloads and everything that is no SDO."""
+    return [frame for _, frame in world.said if frame.cob_id < 0x600 or frame.data[0] >> 5 == 1]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_drive_out_of_its_box_differs_and_nothing_is_written(kind: str) -> None:
+    world = SessionWorld(robot_with(kind))
+    world.wait(1.0)
+    found = inspected(world)
+    assert writes(world) == []
+    assert all(each.pdos.changes for each in found.values())
+    assert [each.settings.problem + each.pdos.problem + each.self_stop_part.problem for each in found.values()] == [
+        ""
+    ] * len(found)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_after_the_boot_nothing_differs_and_both_say_the_same_about_the_self_stop(kind: str) -> None:
+    world = SessionWorld(robot_with(kind))
+    session = BootSession(world.robot)
+    world.run(session)
+    for node_id, found in inspected(world).items():
+        assert (found.settings.changes, found.pdos.changes, found.self_stop_part.changes) == ((), (), ())
+        report = next(boot.report for boot in session.boots if boot.node_id == node_id)
+        assert report is not None
+        assert found.self_stop == report.self_stop
+
+
+def test_what_somebody_changed_afterwards_is_named_with_both_values() -> None:
+    world = SessionWorld()
+    world.run(BootSession(world.robot))
+    world.bench.nodes[2].dictionary.values[HEARTBEAT_CONSUMER << 8 | 1] = 0
+    world.bench.nodes[2].dictionary.values[0x6085 << 8] = 1
+    found = inspected(world)
+    assert found[1].self_stop_part.changes == ()
+    assert found[2].self_stop_part.changes == ("1016h:1: 00000000h → 007E012Ch",)
+    assert [change[:8] for change in found[2].settings.changes] == ["6085h:0:"]
+
+
+def test_a_target_that_the_driver_has_ordered_is_no_difference() -> None:
+    world = SessionWorld()
+    world.run(BootSession(world.robot))
+    world.bench.nodes[1].dictionary.values[0x60FF << 8] = 4711
+    assert inspected(world)[1].settings.changes == ()
+
+
+def test_state_error_code_and_a_wrong_identity() -> None:
+    left = {"joint": "left", "node_id": 1, "side": "left", "identity": {"vendor_id": 0xAA}}
+    right = {"joint": "right", "node_id": 2, "side": "right"}
+    expected = robot(left, right)
+    world = SessionWorld(expected, drives=robot())
+    world.bench.nodes[2].fail(0, 0x2310)
+    found = inspected(world)
+    assert found[1].wrong_identity == "vendor_id is 0h, robot.yaml expects AAh"
+    assert found[2].states == {"right": DriveState.FAULT}
+    assert found[2].error_codes == {"right": 0x2310}
+
+
+def test_a_drive_with_too_few_pdos_is_a_problem_in_words() -> None:
+    world = SessionWorld()
+    dictionary: Any = world.bench.nodes[1].dictionary
+    dictionary.entries = {key: entry for key, entry in dictionary.entries.items() if key >> 8 != 0x1403}
+    assert "it has no RPDO4 (1403h)" in inspected(world)[1].pdos.problem

@@ -1,0 +1,180 @@
+"""One axis at run time: feedback in bytes to SI, gaps and restarts, and the setpoint frame."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from canbase_driver.cia301.pdo import NodeLayout, pack_setpoint
+from canbase_driver.cia402 import DriveState, PowerGoal, next_controlword
+from canbase_driver.drives.axis import Axis
+from support.chain_world import BITS_PER_MPS, bench_robot
+
+ENABLED, READY, UNKNOWN = 0x0637, 0x0631, 0x0000
+COUNTS_PER_M = 4096 * 20 / (2.0 * math.pi * 0.1)
+
+
+def axis(number: int = 0) -> Axis:
+    """The left axis of the sample robot, or (1) the right one, mounted mirrored. 100 cycles a second."""
+    robot = bench_robot()
+    return Axis(robot.drives[number], NodeLayout(number + 1, (0,)), robot)
+
+
+def status(word: int, counts: int) -> bytes:
+    return word.to_bytes(2, "little") + counts.to_bytes(4, "little", signed=True)
+
+
+def velocity(raw: int) -> bytes:
+    return raw.to_bytes(4, "little", signed=True)
+
+
+def test_before_anything_was_heard() -> None:
+    left = axis()
+    assert (left.state, left.statusword, left.velocity_mps, left.position_rad) == (None, 0, 0.0, 0.0)
+    assert left.age_s(10.0) == math.inf
+    assert not left.has_new_sample
+
+
+@pytest.mark.parametrize(("number", "sign"), [(0, 1), (1, -1)])
+def test_feedback_in_si_forward_positive(number: int, sign: int) -> None:
+    wheel = axis(number)
+    assert wheel.on_status(status(ENABLED, 1000), 10.0)
+    assert wheel.on_status(status(ENABLED, 1000 + sign * round(0.003 * COUNTS_PER_M)), 10.01)
+    assert wheel.on_velocity(velocity(sign * round(0.3 * BITS_PER_MPS)), 10.01)
+    assert wheel.state is DriveState.OPERATION_ENABLED
+    assert wheel.velocity_mps == pytest.approx(0.3, abs=1e-4)
+    assert wheel.travel.travel_m == pytest.approx(0.003, abs=1e-5)
+    assert wheel.position_rad == pytest.approx(0.03, abs=1e-4)
+    assert wheel.age_s(10.05) == pytest.approx(0.04)
+
+
+@pytest.mark.parametrize("length", [0, 1, 5, 7, 8])
+def test_a_status_of_wrong_length_is_refused_and_changes_nothing(length: int) -> None:
+    left = axis()
+    left.on_status(status(ENABLED, 5), 10.0)
+    left.on_velocity(velocity(0), 10.0)
+    assert not left.on_status(bytes(length), 10.1)
+    assert left.statusword == ENABLED
+    assert left.age_s(10.1) == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("length", [0, 3, 5, 8])
+def test_a_velocity_of_wrong_length_is_refused_and_is_no_sample(length: int) -> None:
+    left = axis()
+    left.on_status(status(ENABLED, 5), 10.0)
+    assert not left.on_velocity(bytes(length), 10.0)
+    assert not left.has_new_sample
+
+
+def test_a_sample_is_new_when_both_frames_of_a_sync_have_come_and_until_it_is_taken() -> None:
+    left = axis()
+    left.on_velocity(velocity(0), 10.0)
+    assert not left.has_new_sample
+    left.on_status(status(READY, 0), 10.0)
+    left.on_velocity(velocity(0), 10.0)
+    assert left.has_new_sample
+    left.sample_taken()
+    left.on_velocity(velocity(0), 10.0)
+    assert not left.has_new_sample
+
+
+def test_a_sample_from_before_a_silence_is_not_fresh() -> None:
+    left = axis()
+    assert not left.has_fresh_sample(10.0)
+    left.on_status(status(READY, 0), 10.0)
+    left.on_velocity(velocity(0), 10.0)
+    feedback_s = bench_robot().timeouts.feedback_s
+    assert left.has_fresh_sample(10.0 + 0.999 * feedback_s)
+    assert not left.has_fresh_sample(10.0 + 1.001 * feedback_s)
+    left.on_velocity(velocity(0), 11.0)  # its status got lost
+    assert not left.has_fresh_sample(11.0)
+
+
+def test_a_gap_in_the_feedback_is_measured_in_time_so_nothing_of_the_way_is_lost() -> None:
+    left = axis()
+    left.on_status(status(ENABLED, 0), 10.0)
+    left.on_status(status(ENABLED, round(0.4 * COUNTS_PER_M)), 11.0)  # one frame later, but one second
+    assert left.travel.travel_m == pytest.approx(0.4, abs=1e-4)
+    assert (left.travel.jumps, left.losses) == (0, 0)
+
+
+def test_the_same_way_within_one_cycle_is_a_jump() -> None:
+    left = axis()
+    left.on_status(status(ENABLED, 0), 10.0)
+    left.on_status(status(ENABLED, round(0.4 * COUNTS_PER_M)), 10.01)
+    assert left.travel.travel_m == 0.0
+    assert left.travel.jumps == 1
+
+
+def test_a_gap_of_days_makes_no_step_possible_that_could_be_a_wrap() -> None:
+    left = axis()
+    left.on_status(status(ENABLED, 0), 10.0)
+    left.on_status(status(ENABLED, -(2**31)), 1e6)
+    assert left.travel.jumps == 1
+
+
+def test_after_a_restart_what_was_heard_no_longer_counts_and_the_travel_goes_on() -> None:
+    left = axis()
+    left.on_status(status(ENABLED, 0), 10.0)
+    left.on_status(status(ENABLED, 1000), 10.01)
+    left.on_velocity(velocity(500), 10.01)
+    way_m = left.travel.travel_m
+    left.forget()
+    assert (left.state, left.velocity_mps, left.age_s(10.02), left.has_new_sample) == (None, 0.0, math.inf, False)
+    left.on_status(status(READY, 999_999), 10.5)
+    assert left.travel.travel_m == way_m
+    assert left.losses == 1
+
+
+def test_to_forget_what_was_never_heard_loses_nothing() -> None:
+    left = axis()
+    left.forget()
+    left.forget()
+    assert left.losses == 0
+
+
+@pytest.mark.parametrize(
+    ("word", "goal", "controlword", "target"),
+    [
+        (ENABLED, PowerGoal.ON, 0x0F, 0.3),
+        (READY, PowerGoal.ON, 0x07, 0.3),
+        (ENABLED, PowerGoal.QUICK_STOP, 0x02, 0.0),
+        (ENABLED, PowerGoal.OFF, 0x00, 0.0),
+        (ENABLED, PowerGoal.RESET, 0x00, 0.0),
+    ],
+)
+@pytest.mark.parametrize(("number", "sign"), [(0, 1), (1, -1)])
+def test_the_setpoint_is_one_step_to_the_goal_and_has_a_target_only_on_the_way_on(
+    word: int, goal: PowerGoal, controlword: int, target: float, number: int, sign: int
+) -> None:
+    wheel = axis(number)
+    wheel.on_status(status(word, 0), 10.0)
+    frame = wheel.setpoint(goal, 0.3, next_controlword(wheel.state, goal))
+    assert frame.cob_id == 0x201 + number
+    assert frame.data == pack_setpoint(controlword, sign * round(target * BITS_PER_MPS))
+    assert wheel.target_mps == target
+
+
+def test_each_value_has_its_own_age_and_the_oldest_is_that_of_the_axis() -> None:
+    left = axis()
+    left.on_status(status(ENABLED, 0), 10.0)
+    assert left.age_s(10.0) == math.inf  # no velocity yet
+    left.on_velocity(velocity(100), 10.0)
+    left.on_status(status(ENABLED, 5), 10.2)
+    assert left.age_s(10.2) == pytest.approx(0.2)
+    left.on_velocity(velocity(100), 10.2)
+    left.on_velocity(velocity(100), 10.5)
+    assert left.age_s(10.5) == pytest.approx(0.3)
+
+
+def test_a_speed_of_less_than_half_a_bit_is_no_order() -> None:
+    left, bit_mps = axis(), 1.0 / BITS_PER_MPS
+    assert left.rests(0.49 * bit_mps)
+    assert not left.rests(0.51 * bit_mps)
+    left.setpoint(PowerGoal.ON, 0.49 * bit_mps, 0x0F)
+    assert left.target_mps == 0.0
+    assert left.rests(-0.49 * bit_mps)
+    left.setpoint(PowerGoal.ON, 0.51 * bit_mps, 0x0F)
+    assert left.target_mps == 0.51 * bit_mps
+    assert not left.rests(0.0)

@@ -1,0 +1,187 @@
+"""The black box: what is kept, how it is written, and that nothing about a disk is ever raised."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import can
+import pytest
+
+from canbase_config.black_box import BlackBox
+from canbase_driver.runtime.black_box import MAX_FRAMES, Recording, Ring, asc_lines
+from canbase_driver.runtime.black_box_writer import WAITING, BlackBoxWriter, state_folder
+
+WALL_S = 1_700_000_000.0
+SETPOINT = bytes.fromhex("0f 00 10 27 00 00")
+
+
+def recording(frames: int = 3) -> Recording:
+    """Setpoints every 10 ms with a command after each."""
+    ring = Ring(seconds=10.0)
+    for k in range(frames):
+        ring.frame(100.0 + 0.01 * k, 0x201, SETPOINT, received=False)
+        ring.note(100.0 + 0.01 * k + 0.001, f"cmd_vel 0.{k} m/s")
+    return ring.cut(now=105.0, wall_offset_s=WALL_S)
+
+
+def text(of: Recording) -> str:
+    return "".join(asc_lines(of, "stop by watchdog: lease lost"))
+
+
+def test_the_ring_gives_back_the_last_seconds_alone() -> None:
+    ring = Ring(seconds=2.0)
+    for k in range(50):
+        ring.frame(100.0 + 0.1 * k, k, b"", received=True)
+        ring.note(100.0 + 0.1 * k, str(k))
+    cut = ring.cut(now=105.0, wall_offset_s=0.0)
+    assert [entry[1] for entry in cut.frames] == list(range(30, 50))
+    assert [entry[1] for entry in cut.notes] == [str(k) for k in range(30, 50)]
+
+
+def test_memory_is_bounded_however_full_the_bus_is() -> None:
+    ring = Ring(seconds=60.0)
+    for k in range(MAX_FRAMES + 10):
+        ring.frame(100.0 + k * 1e-5, 0x181, b"", received=True)
+    frames = ring.cut(now=101.0, wall_offset_s=0.0).frames
+    assert len(frames) == MAX_FRAMES
+    assert frames[0][0] == pytest.approx(100.0001)
+
+
+def test_python_can_reads_the_frames_and_people_read_the_commands_between_them(tmp_path: Path) -> None:
+    file = tmp_path / "stop.asc"
+    file.write_text(text(recording()), encoding="utf-8")
+    with can.LogReader(file) as reader:
+        messages = list(reader)
+    assert [(round(m.timestamp, 3), m.arbitration_id, bytes(m.data), m.is_rx) for m in messages] == [
+        (0.0, 0x201, SETPOINT, False),
+        (0.01, 0x201, SETPOINT, False),
+        (0.02, 0x201, SETPOINT, False),
+    ]
+    lines = file.read_text(encoding="utf-8").splitlines()
+    assert " 0.000000 // stop by watchdog: lease lost" in lines
+    commands = [line for line in lines if "cmd_vel" in line]
+    assert commands == [f"// {0.01 * k + 0.001:.6f} cmd_vel 0.{k} m/s" for k in range(3)]
+    assert [lines.index(command) - lines.index(commands[0]) for command in commands] == [0, 2, 4]
+
+
+def test_a_bus_on_which_nothing_was_said_gives_a_file_with_the_commands(tmp_path: Path) -> None:
+    only = Recording(frames=(), notes=((100.0, "cmd_vel 0.1"),), wall_offset_s=WALL_S)
+    assert "// 0.000000 cmd_vel 0.1\n" in text(only)
+    file = tmp_path / "stop.asc"
+    file.write_text(text(Recording((), (), 0.0)), encoding="utf-8")
+    with can.LogReader(file) as reader:
+        assert list(reader) == []
+
+
+class Box:
+    """A writer with what it said."""
+
+    def __init__(self, folder: Path, files: int = 3) -> None:
+        self.said: list[str] = []
+        self.folder = folder
+        self.writer = BlackBoxWriter(BlackBox(folder=str(folder), files=files), "r1", self.said.append)
+
+    def stop(self, wall_s: float = WALL_S, cause: str = "drive fault") -> str:
+        return self.writer.submit(recording(), cause, wall_s, "a stop")
+
+    def finish(self) -> None:
+        """Let it do all its work; start it first where a test has not."""
+        if not self.writer.is_alive():
+            self.writer.start()
+        self.writer.finish(20.0)
+        assert not self.writer.is_alive()
+        assert self.writer.failure is None
+
+    @property
+    def files(self) -> list[str]:
+        return sorted(path.name for path in self.folder.iterdir())
+
+
+@pytest.fixture
+def box(tmp_path: Path) -> Box:
+    return Box(tmp_path / "box")
+
+
+def test_each_stop_has_a_file_with_its_time_robot_and_cause(box: Box) -> None:
+    path = box.stop(WALL_S + 0.25)
+    box.finish()
+    assert path == str(box.folder / "stop_r1_20231114T221320.250Z_drive_fault.asc")
+    assert box.files == [Path(path).name]
+    assert "// a stop" in Path(path).read_text(encoding="utf-8")
+    assert box.said == []
+
+
+def test_the_newest_files_are_kept_and_others_are_left_alone(box: Box) -> None:
+    box.folder.mkdir()
+    (box.folder / "stop_other_20200101T000000.000Z_x.asc").touch()
+    for hour in range(3):
+        (box.folder / f"stop_r1_20230101T0{hour}0000.000Z_x.asc").touch()
+    box.stop()
+    box.finish()
+    assert box.files == [
+        "stop_other_20200101T000000.000Z_x.asc",
+        "stop_r1_20230101T010000.000Z_x.asc",
+        "stop_r1_20230101T020000.000Z_x.asc",
+        "stop_r1_20231114T221320.000Z_drive_fault.asc",
+    ]
+
+
+def test_a_folder_that_cannot_be_made_is_said_once_and_no_path_is_told(tmp_path: Path) -> None:
+    (tmp_path / "box").write_text("a file", encoding="ascii")
+    box = Box(tmp_path / "box")
+    box.stop()
+    box.stop()
+    box.finish()
+    assert len(box.said) == 1
+    assert box.said[0].startswith(f"the black box cannot write to {tmp_path}/box: ")
+    assert box.stop() == ""
+
+
+def test_a_full_disk_is_said_once_leaves_nothing_behind_and_is_over_when_there_is_room(
+    box: Box, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    failures = iter([True, True, False])
+
+    def lines(_recording: Recording, _title: str) -> Iterator[str]:
+        yield "first\n"
+        if next(failures):
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("canbase_driver.runtime.black_box_writer.asc_lines", lines)
+    for _ in range(3):
+        box.stop()
+    box.finish()
+    assert box.files == ["stop_r1_20231114T221320.000Z_drive_fault.asc"]
+    assert [sentence.partition(": ")[2][:23] for sentence in box.said] == ["No space left on device", ""]
+    assert box.said[1] == f"the black box writes to {box.folder} again"
+
+
+def test_more_stops_than_can_wait_are_dropped_and_have_no_path(box: Box) -> None:
+    paths = [box.stop(WALL_S + k) for k in range(WAITING + 2)]
+    assert [bool(path) for path in paths] == [True] * WAITING + [False] * 2
+
+
+def test_a_defect_in_it_is_kept_for_the_main_thread(box: Box, monkeypatch: pytest.MonkeyPatch) -> None:
+    def defect(_recording: Recording, _title: str) -> Iterator[str]:
+        raise ZeroDivisionError("a defect")
+
+    monkeypatch.setattr("canbase_driver.runtime.black_box_writer.asc_lines", defect)
+    box.stop()
+    box.writer.start()
+    box.writer.join(20.0)
+    assert isinstance(box.writer.failure, ZeroDivisionError)
+
+
+@pytest.mark.parametrize(
+    ("environment", "folder"),
+    [
+        ({}, "/home/u/.local/state/canbase"),
+        ({"XDG_STATE_HOME": "/state"}, "/state/canbase"),
+        ({"XDG_STATE_HOME": ""}, "/home/u/.local/state/canbase"),
+        ({"STATE_DIRECTORY": "/var/lib/canbase", "XDG_STATE_HOME": "/state"}, "/var/lib/canbase"),
+        ({"STATE_DIRECTORY": "/var/lib/canbase:/var/lib/other"}, "/var/lib/canbase"),
+    ],
+)
+def test_where_files_go_by_default(environment: dict[str, str], folder: str) -> None:
+    assert state_folder(environment, Path("/home/u")) == Path(folder)

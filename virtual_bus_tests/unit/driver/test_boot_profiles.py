@@ -1,0 +1,194 @@
+"""What the profile of a drive changes in its boot: where things are, what is not tried, what is written besides."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from canbase_config.drive import Drive
+from canbase_config.profile_file import load_profile
+from canbase_config.robot import Robot
+from canbase_driver.boot.node_boot import NodeBoot
+from canbase_driver.cia301.frame import Frame
+from support.fake_drive import Bench, FakeDrive, Key, error_of, factory_objects, notes_of, robot, u8, u16, u32
+
+
+def of_kind(profile: str, **keys: Any) -> Robot:
+    """The robot of the boot tests with other drives."""
+    values = robot().model_dump()
+    apart = {"node_id": 2, "axis": 0} if load_profile(profile).layout.axes == 1 else {}
+    values["drives"] = [drive | {"profile": profile} | keys for drive in values["drives"]]
+    values["drives"][1] |= apart
+    return Robot.model_validate(values)
+
+
+def booted(drive: FakeDrive, base: Robot, seconds: float = 30.0) -> tuple[NodeBoot, Bench]:
+    drives = tuple(drive for drive in base.drives if drive.node_id == 1)
+    bench = Bench(drive, base, drives)
+    return bench.run(seconds), bench
+
+
+def hub_motors() -> dict[Key, bytes]:
+    """A ZLAC8015D: arrays, one controlword, a statusword of 32 bits, its own watchdog, nothing optional."""
+    objects = factory_objects()
+    gone = (0x1016, 0x1029, 0x6007, 0x605A, 0x605E, 0x606C, 0x6083, 0x6084, 0x6085, 0x60FF)
+    objects = {key: value for key, value in objects.items() if key[0] not in gone}
+    arrays = (0x606C, 0x6083, 0x6084, 0x6085, 0x60FF)
+    objects |= {(index, sub): u32(5) for index in arrays for sub in (1, 2)}
+    objects |= {(0x606C, sub): u32(0) for sub in (1, 2)}
+    return objects | {(0x6041, 0): u32(0x0240_0240), (0x6061, 0): u8(3), (0x2000, 0): u16(0), (0x200F, 0): u16(1)}
+
+
+def test_two_hub_motors_on_one_controlword() -> None:
+    drive = FakeDrive(objects=hub_motors())
+    boot, _ = booted(drive, of_kind("zlac8015d"))
+    assert notes_of(boot) == (
+        "1016h: the drive watches no heartbeat, it will not stop by it",
+        "2000h:0: communication offline time is set, but not proven to stop the motor",
+    )
+    assert boot.report is not None
+    assert not boot.report.stops_by_itself
+    assert [drive.number(0x1600, sub) for sub in range(3)] == [2, 0x6040_0010, 0x60FF_0120]
+    assert [drive.number(0x1601, sub) for sub in range(3)] == [2, 0x6040_0010, 0x60FF_0220]
+    assert [drive.number(0x1603, sub) for sub in range(2)] == [1, 0x6040_0010]
+    assert [drive.number(0x1A02, sub) for sub in range(3)] == [2, 0x6041_0020, 0x6064_0220]
+    assert [drive.number(0x1A03, sub) for sub in range(2)] == [1, 0x606C_0220]
+    assert (drive.number(0x2000), drive.number(0x200F)) == (300, 0)
+    # 1.5 m/s² at the rim are 47.7 rev/s² of the motor: 1000 rpm in 349 ms
+    assert (drive.number(0x6083, 1), drive.number(0x6085, 2)) == (349, 349)
+    assert (drive.number(0x60FF, 1), drive.number(0x60FF, 2)) == (0, 0)
+
+
+def test_the_right_hub_motor_that_runs_is_seen_in_the_upper_half() -> None:
+    drive = FakeDrive(objects=hub_motors() | {(0x6041, 0): u32(0x0237_0240)})
+    quick_stops: list[int] = []
+    drive.on_write[0x6040, 0] = lambda drive, data: quick_stops.append(data[0])
+    _, bench = booted(drive, of_kind("zlac8015d"), seconds=0.05)
+    assert quick_stops == [0x02]
+    assert "to stand after a quick stop" in bench.boot.waiting_for
+
+
+def test_what_the_profile_denies_is_not_asked_for() -> None:
+    drive = FakeDrive(objects=factory_objects(axes=(0, 1)))
+    asked: list[int] = []
+    serve = drive.on_frame
+
+    def listening(frame: Frame) -> list[Frame]:
+        asked.append(int.from_bytes(frame.data[1:3], "little"))
+        return serve(frame)
+
+    drive.on_frame = listening  # type: ignore[method-assign]
+    boot, _ = booted(drive, of_kind("roboteq"))
+    assert boot.report is not None
+    assert {0x6007, 0x6807, 0x1029, 0x605A, 0x605E}.isdisjoint(asked)
+    assert 0x6083 in asked
+
+
+def test_drives_without_sync_send_by_their_timer_and_act_at_once() -> None:
+    objects = factory_objects(axes=(0, 1))
+    objects |= {(0x1800 + i, sub): u16(0) for i in range(4) for sub in (3, 5)}
+    drive = FakeDrive(objects=objects)
+    boot, _ = booted(drive, of_kind("roboteq"))
+    assert boot.report is not None
+    assert [drive.number(index, 2) for index in (0x1400, 0x1401, 0x1800, 0x1803)] == [255] * 4
+    assert (drive.number(0x1800, 3), drive.number(0x1800, 5)) == (100, 10)  # 10 ms in 0.1 ms and in ms
+    assert (drive.number(0x6083), drive.number(0x6883)) == (28648, 28648)  # 1.5 m/s² in 0.1 rpm/s
+
+
+def test_an_rpdo_timer_is_set_where_it_exists() -> None:
+    objects = factory_objects() | {(0x1400 + i, 5): u16(0) for i in range(4)}
+    drive = FakeDrive(objects=objects)
+    boot, _ = booted(drive, of_kind("dryve_d1", velocity_unit="0.001rev/s"))
+    assert boot.report is not None
+    assert (drive.number(0x1400, 5), drive.number(0x1403, 5)) == (300, 0)
+    assert not boot.report.stops_by_itself  # without 6007h nothing says what it does then
+
+
+def test_another_value_of_6007h_and_none_while_the_reset_lasts() -> None:
+    drive = FakeDrive()
+    boot, _ = booted(drive, of_kind("kinco"))
+    assert boot.report is not None
+    assert [value for index, _, value in drive.writes if index == 0x6007] == [1]  # it was 0
+    drive.writes = []
+    booted(drive, of_kind("kinco"))
+    assert [value for index, _, value in drive.writes if index == 0x6007] == [0, 1]
+
+
+def test_mode_9_has_its_period_in_60c2h() -> None:
+    drive = FakeDrive(objects=factory_objects() | {(0x60C2, 1): u8(1), (0x60C2, 2): u8(0xFE), (0x6061, 0): u8(9)})
+    boot, _ = booted(drive, of_kind("epos4", mode=9))
+    assert notes_of(boot) == ()
+    assert (drive.number(0x6060), drive.number(0x60C2, 1), drive.number(0x60C2, 2)) == (9, 10, 0xFD)
+
+
+def test_a_mode_that_is_not_taken_is_told() -> None:
+    drive = FakeDrive(objects=factory_objects() | {(0x6061, 0): u8(0)})
+    boot, _ = booted(drive, of_kind("epos4"))
+    assert "6061h:0 shows mode 0, 3 was set; it may take power to change" in notes_of(boot)
+
+
+def test_a_drive_that_shows_its_mode_with_power_alone_is_not_asked() -> None:
+    drive = FakeDrive(objects=factory_objects() | {(0x6061, 0): u8(0)})
+    assert "6061h" not in str(notes_of(booted(drive, of_kind("kinco"))[0]))
+
+
+def test_a_second_boot_up_message_is_waited_for() -> None:
+    """Boot loader, then firmware 0.4 s later."""
+    drive = FakeDrive()
+    base = of_kind("nanotec", velocity_unit="rpm")
+    bench = Bench(drive, base, base.drives[:1])
+    bench.run(seconds=0.4)
+    assert bench.boot.waiting_for.endswith("no further boot-up message")
+    bench.boot.on_frame(Frame(0x701, b"\0"), bench.now)
+    bench.run(seconds=0.4)
+    assert bench.boot.waiting_for.endswith("no further boot-up message")
+    assert bench.run(seconds=0.2).report is not None
+
+
+def test_a_drive_that_is_switched_on_late_is_asked_again_at_once() -> None:
+    drive = FakeDrive(powered=False)
+    bench = Bench(drive, robot())
+    bench.run(seconds=0.05)
+    drive.powered = True
+    bench.boot.on_frame(Frame(0x701, b"\0"), bench.now)
+    assert bench.run(seconds=0.02).report is not None
+
+
+def test_sdo_timeouts_are_those_of_the_profile(monkeypatch: pytest.MonkeyPatch) -> None:
+    slow = load_profile("epos4").model_copy(
+        update={"sdo": load_profile("epos4").sdo.model_copy(update={"timeout_s": 2.0, "attempts": 1})}
+    )
+    base = of_kind("epos4")
+    monkeypatch.setattr(Drive, "kind", slow)
+    drive = FakeDrive(on_write={(0x6060, 0): lambda drive, _: setattr(drive, "powered", False)})
+    boot, bench = booted(drive, base)
+    assert "6060h:0: no answer to 1 requests, 2 s each" in error_of(boot)
+    assert bench.now == pytest.approx(102.0, abs=0.03)
+
+
+def test_requests_keep_the_distance_that_the_profile_wants(monkeypatch: pytest.MonkeyPatch) -> None:
+    generic = load_profile("generic")
+    slow = generic.model_copy(update={"sdo": generic.sdo.model_copy(update={"gap_s": 0.009})})
+    monkeypatch.setattr(Drive, "kind", slow)
+    drive = FakeDrive(objects=factory_objects(axes=(0, 1)))
+    boot, bench = booted(drive, robot())
+    assert boot.report is not None
+    assert bench.now - 100.0 == pytest.approx(0.01 * drive.transfers, rel=0.05)
+
+
+def test_another_firmware_is_refused() -> None:
+    drive = FakeDrive(objects=factory_objects(axes=(0, 1)) | {(0x100A, 0): b"2.1a"})
+    base = of_kind("generic", identity={"software": "2.0"})
+    assert '100Ah:0 (software) is "2.1a", expected "2.0"' in error_of(booted(drive, base)[0])
+    right, _ = booted(drive, of_kind("generic", identity={"software": "2.1a"}))
+    assert right.report is not None
+    assert right.report.identity.software == "2.1a"
+
+
+def test_a_sync_counter_is_set_or_refused() -> None:
+    values = robot().model_dump()
+    values["bus"]["sync_counter"] = 200
+    values["drives"] = [drive | {"profile": "roboteq"} for drive in values["drives"]]
+    with pytest.raises(ValueError, match="knows no counter in SYNC"):
+        Robot.model_validate(values)

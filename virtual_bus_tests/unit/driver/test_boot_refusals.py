@@ -1,0 +1,362 @@
+"""Boots of drives that lack, refuse or change something: what is a note, and what is an error."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import pytest
+
+from canbase_driver.boot.node_boot import NodeBoot
+from canbase_driver.cia301.frame import Frame
+from support.fake_drive import (
+    DEVICE_STATE,
+    INVALID,
+    READ_ONLY,
+    WRITE_ONLY,
+    Bench,
+    FakeDrive,
+    Key,
+    boot_one_axis,
+    error_of,
+    factory_objects,
+    notes_of,
+    u8,
+    u16,
+    u32,
+)
+from support.fake_drive import robot as fake_robot
+
+
+@pytest.mark.parametrize(
+    ("index", "sub", "note"),
+    [
+        (0x1017, 0, "1017h:0: 0602 0000h the object does not exist"),  # it may send one all the same
+        (0x1029, 1, "1029h:1: 0602 0000h the object does not exist"),
+        (0x605A, 0, "605Ah:0: 0602 0000h the object does not exist"),
+        (0x605E, 0, "605Eh:0: 0602 0000h the object does not exist"),
+        (0x6084, 0, "6084h:0: 0602 0000h the object does not exist"),
+    ],
+)
+def test_a_missing_option_is_a_note(index: int, sub: int, note: str) -> None:
+    drive = FakeDrive()
+    del drive.objects[index, sub]
+    boot = boot_one_axis(drive)
+    assert notes_of(boot) == (note,)
+    assert boot.report is not None
+    assert boot.report.stops_by_itself
+
+
+def test_a_drive_without_6007h_does_not_stop_by_itself() -> None:
+    drive = FakeDrive()
+    del drive.objects[0x6007, 0]
+    boot = boot_one_axis(drive)
+    assert notes_of(boot) == ("6007h:0: 0602 0000h the object does not exist",)
+    assert boot.report is not None
+    assert not boot.report.stops_by_itself
+
+
+def test_a_drive_without_1016h_does_not_stop_by_itself() -> None:
+    drive = FakeDrive()
+    for sub in range(3):
+        del drive.objects[0x1016, sub]
+    boot = boot_one_axis(drive)
+    assert notes_of(boot) == ("1016h: the drive watches no heartbeat, it will not stop by it",)
+    assert boot.report is not None
+    assert not boot.report.stops_by_itself
+
+
+def test_with_one_entry_the_watchdog_is_watched() -> None:
+    drive = FakeDrive(objects=factory_objects(consumers=1))
+    boot = boot_one_axis(drive)
+    assert drive.number(0x1016, 1) == 0x007E_012C
+    assert boot.report is not None
+    assert boot.report.stops_by_itself
+
+
+def test_stored_entries_of_an_earlier_life_go_first() -> None:
+    drive = FakeDrive(objects=factory_objects(consumers=4))
+    drive.objects |= {(0x1016, 1): u32(0x007F_0064), (0x1016, 2): u32(0x007E_0064), (0x1016, 4): u32(0x0001_0064)}
+    boot_one_axis(drive)
+    consumers = [(sub, value) for index, sub, value in drive.writes if index == 0x1016]
+    assert consumers == [(2, 0), (4, 0), (1, 0x007E_012C), (2, 0x007F_012C)]
+
+
+def test_an_option_that_the_drive_changes_is_a_note() -> None:
+    def clamp(drive: FakeDrive, _: bytes) -> None:
+        drive.objects[0x6083, 0] = u32(1000)
+
+    assert notes_of(boot_one_axis(FakeDrive(on_write={(0x6083, 0): clamp}))) == (
+        "6083h:0 is 000003E8h, expected 00000B31h",
+    )
+
+
+def test_a_read_only_option_passes_when_it_is_right_and_is_a_note_when_not() -> None:
+    drive = FakeDrive(refuse={(0x605A, 0): READ_ONLY, (0x605E, 0): READ_ONLY})
+    drive.objects[0x605A, 0] = u16(2)
+    assert notes_of(boot_one_axis(drive)) == ("605Eh:0 is 0000h, expected 0002h (0601 0002h the object is read-only)",)
+
+
+def test_a_mode_that_can_only_be_written_is_believed() -> None:
+    assert notes_of(boot_one_axis(FakeDrive(refuse_read={(0x6060, 0): WRITE_ONLY}))) == ()
+
+
+def test_a_fixed_mapping_that_is_right_is_left_alone() -> None:
+    fixed = {(0x1A01, sub): READ_ONLY for sub in range(5)}
+    drive = FakeDrive(refuse=fixed)
+    drive.objects |= {(0x1A01, 0): u8(2), (0x1A01, 1): u32(0x606C_0020), (0x1A01, 2): u32(0x6077_0010)}
+    assert notes_of(boot_one_axis(drive)) == ()
+
+
+NO_TORQUE = "see options.torque of its drive profile, watchdog.stand_proof"
+
+
+def test_a_drive_without_torque_does_without() -> None:
+    drive = FakeDrive()
+    del drive.objects[0x6077, 0]
+    notes = ("torque unknown: the drive has no 6077h:0; " + NO_TORQUE,)
+    assert notes_of(boot_one_axis(drive)) == notes
+    assert [drive.number(0x1A01, sub) for sub in range(2)] == [1, 0x606C_0020]
+
+
+@pytest.mark.parametrize("refused", [{(0x1A01, 2): 0x06040041}, {(0x1A01, 0): READ_ONLY, (0x1A01, 1): READ_ONLY}])
+def test_a_drive_whose_pdo_does_not_take_the_torque_does_without(refused: dict[Key, int]) -> None:
+    drive = FakeDrive(refuse=refused)
+    drive.objects |= {(0x1A01, 0): u8(1), (0x1A01, 1): u32(0x606C_0020)}
+    (note,) = notes_of(boot_one_axis(drive))
+    assert note.startswith("torque unknown: TPDO2 does not take it (")
+    assert note.endswith(NO_TORQUE)
+    assert [drive.number(0x1A01, sub) for sub in range(2)] == [1, 0x606C_0020]
+    assert drive.number(0x1801, 1) == 0x4000_0281
+
+
+def test_a_velocity_that_no_pdo_takes_is_an_error_with_a_torque_too() -> None:
+    drive = FakeDrive(refuse={(0x1A01, 1): 0x06040041})
+    assert "1A01h:1" in error_of(boot_one_axis(drive))
+
+
+GENERAL_ERROR, LOCAL_CONTROL, TOO_HIGH, TOO_LOW = 0x08000000, 0x08000021, 0x06090031, 0x06090032
+
+
+@pytest.mark.parametrize("abort", [GENERAL_ERROR, LOCAL_CONTROL, 0x06060000, 0x12345678])
+@pytest.mark.parametrize(
+    ("key", "named"),
+    [
+        ((0x1016, 0), "self_stop.heartbeat_entries"),
+        ((0x1018, 3), ""),
+        ((0x1019, 0), "options.sync_counter"),
+        ((0x6007, 0), "self_stop.abort_connection"),
+        ((0x6061, 0), "options.mode_display"),
+    ],
+)
+def test_whatever_the_abort_code_an_optional_object_that_cannot_be_read_is_a_note(
+    key: Key, named: str, abort: int
+) -> None:
+    drive = FakeDrive(refuse_read={key: abort}, refuse={key: abort})
+    drive.objects.setdefault(key, u8(0))
+    assert any(f"{key[0]:04X}h:{key[1]}" in note and named in note for note in notes_of(boot_one_axis(drive)))
+
+
+def test_a_drive_whose_1016h_cannot_be_read_does_not_stop_by_itself() -> None:
+    boot = boot_one_axis(FakeDrive(refuse_read={(0x1016, 0): GENERAL_ERROR}))
+    assert boot.report is not None
+    assert not boot.report.stops_by_itself
+
+
+def heartbeat_of(accepted: Callable[[int], bool], abort: int = INVALID) -> tuple[FakeDrive, NodeBoot]:
+    """A drive that takes only some periods of 1017h, and its boot."""
+
+    @dataclass
+    class Choosy(FakeDrive):
+        def _write(self, key: Key, data: bytes) -> int:
+            wrong = key == (0x1017, 0) and not accepted(int.from_bytes(data, "little"))
+            return abort if wrong else super()._write(key, data)
+
+    drive = Choosy()
+    return drive, boot_one_axis(drive)
+
+
+@pytest.mark.parametrize(
+    ("accepted", "period_ms"),
+    [
+        (lambda ms: ms % 64 == 0, 128),
+        (lambda ms: ms <= 50, 50),
+        (lambda ms: ms >= 125, 125),
+        (lambda ms: ms % 50 == 0, 100),
+    ],
+)
+@pytest.mark.parametrize("abort", [INVALID, TOO_HIGH, TOO_LOW])
+def test_where_the_wanted_heartbeat_period_is_refused_the_nearest_allowed_one_is_set(
+    accepted: Callable[[int], bool], period_ms: int, abort: int
+) -> None:
+    drive, boot = heartbeat_of(accepted, abort)
+    assert drive.number(0x1017) == period_ms
+    said = (f"1017h:0: heartbeat every {period_ms} ms, 100 ms was refused",)
+    assert notes_of(boot) == (said if period_ms != 100 else ())
+
+
+def test_a_drive_that_takes_no_heartbeat_period_that_is_short_enough_cannot_be_used() -> None:
+    _, boot = heartbeat_of(lambda ms: ms >= 1000)
+    text = error_of(boot)
+    assert "it takes no heartbeat period of at most 150 ms (1017h:0: 0609 0030h value not valid)" in text
+    assert "Raise timeouts.drive_heartbeat_s in robot.yaml" in text
+
+
+@pytest.mark.parametrize(("found", "fits"), [(128, True), (150, True), (151, False), (0, False)])
+def test_a_period_that_the_drive_rounds_is_taken_when_it_is_short_enough(found: int, fits: bool) -> None:
+    def rounded(drive: FakeDrive, _: bytes) -> None:
+        drive.objects[0x1017, 0] = u16(found)
+
+    boot = boot_one_axis(FakeDrive(on_write={(0x1017, 0): rounded}))
+    assert (boot.error is None) is fits
+
+
+def test_a_drive_that_takes_no_synchronous_pdo_is_told_the_key_that_cures_it() -> None:
+    text = error_of(boot_one_axis(FakeDrive(refuse={(0x1400, 2): INVALID})))
+    assert "1400h:2: 0609 0030h value not valid" in text
+    assert "set `pdo.synchronous: false` in its drive profile" in text
+
+
+@pytest.mark.parametrize("abort", [0x06070010, 0x06070012, 0x06070013])
+@pytest.mark.parametrize(
+    ("key", "where"), [((0x60FF, 0), "see `layout.target_bits`"), ((0x6060, 0), ""), ((0x1A00, 1), "`layout`")]
+)
+def test_an_object_of_another_width_is_said_to_be_one(key: Key, where: str, abort: int) -> None:
+    text = error_of(boot_one_axis(FakeDrive(refuse={key: abort})))
+    assert "another width than CiA 402" in text
+    assert where in text
+
+
+def test_two_drives_with_one_node_id_are_named() -> None:
+    class Twins(FakeDrive):
+        def on_frame(self, frame: Frame) -> list[Frame]:
+            return super().on_frame(frame) * 2
+
+    text = error_of(boot_one_axis(Twins()))
+    assert text.startswith("node 1: each request is answered twice: two devices on the bus have this node id.")
+
+
+def test_an_answer_that_comes_late_and_then_again_names_no_second_drive() -> None:
+    """The first request of each transfer is lost, so that two were sent, and both are answered in the end."""
+
+    class Slow(FakeDrive):
+        asked = 0
+
+        def on_frame(self, frame: Frame) -> list[Frame]:
+            if frame.cob_id != 0x601 or frame.data[0] == 0x80:
+                return super().on_frame(frame)
+            self.asked += 1
+            return super().on_frame(frame) * 2 if self.asked % 2 == 0 else []
+
+    boot = Bench(Slow(), fake_robot()).run(200.0)
+    assert boot.error is None
+
+
+# -- what no drive may lack
+
+
+@pytest.mark.parametrize(
+    ("key", "abort", "problem", "hint"),
+    [
+        ((0x6060, 0), INVALID, "6060h:0: 0609 0030h value not valid", "must support `mode`"),
+        ((0x60FF, 0), DEVICE_STATE, "60FFh:0: 0800 0022h", "Switch the drive off and on again"),
+        ((0x1600, 2), 0x06040041, "1600h:2: 0604 0041h the object cannot be mapped", "the manual of the drive"),
+        ((0x1A00, 0), READ_ONLY, "1A00h:0: 0601 0002h the object is read-only", "the manual of the drive"),
+    ],
+)
+def test_a_refused_necessity_is_an_error(key: Key, abort: int, problem: str, hint: str) -> None:
+    text = error_of(boot_one_axis(FakeDrive(refuse={key: abort})))
+    assert problem in text
+    assert hint in text
+
+
+def test_a_target_that_does_not_become_0_is_an_error() -> None:
+    def stuck(drive: FakeDrive, _: bytes) -> None:
+        drive.objects[0x60FF, 0] = u32(777)
+
+    text = error_of(boot_one_axis(FakeDrive(on_write={(0x60FF, 0): stuck})))
+    assert "60FFh:0 is 00000309h, expected 00000000h" in text
+
+
+def test_a_mapping_that_reads_back_differently_is_an_error() -> None:
+    def other(drive: FakeDrive, _: bytes) -> None:
+        drive.objects[0x1A00, 2] = u32(0x6063_0020)
+
+    text = error_of(boot_one_axis(FakeDrive(on_write={(0x1A00, 2): other})))
+    assert "TPDO1 reads back another mapping than was written to 1A00h" in text
+
+
+def test_a_missing_pdo_is_an_error() -> None:
+    text = error_of(boot_one_axis(FakeDrive(objects=factory_objects(pdos=3))))
+    assert "it has no RPDO4 (1403h)" in text
+
+
+def test_an_unused_pdo_that_stays_on_is_a_note() -> None:
+    boot = boot_one_axis(FakeDrive(refuse={(0x1402, 1): READ_ONLY}))
+    assert notes_of(boot) == ("1402h:1 is 40000401h, expected C0000401h (0601 0002h the object is read-only)",)
+
+
+def test_a_pdo_that_cannot_be_switched_off_is_a_note_where_its_fixed_identifier_and_mapping_are_right() -> None:
+    drive = FakeDrive(refuse={(0x1801, 1): READ_ONLY})
+    mapping = {(0x1A01, 0): u8(2), (0x1A01, 1): u32(0x606C_0020), (0x1A01, 2): u32(0x6077_0010)}
+    drive.objects |= {(0x1801, 1): u32(0x4000_0281)} | mapping
+    assert notes_of(boot_one_axis(drive)) == ("1801h:1: 0601 0002h the object is read-only",)
+    assert drive.number(0x1801, 2) == 1
+
+
+def test_a_mapping_that_is_empty_is_not_emptied() -> None:
+    drive = FakeDrive()
+    drive.objects[0x1A00, 0] = u8(0)
+    boot_one_axis(drive)
+    mapping = [(sub, value) for index, sub, value in drive.writes if index == 0x1A00]
+    assert mapping == [(1, 0x6041_0010), (2, 0x6064_0020), (0, 2)]
+
+
+def test_an_answer_that_is_wider_than_the_object_is_another_value() -> None:
+    drive = FakeDrive()
+    drive.objects[0x6007, 0] = u32(0x0001_0003)
+    assert notes_of(boot_one_axis(drive)) == ()
+    assert drive.objects[0x6007, 0] == u16(3)
+
+
+def test_a_drive_that_keeps_a_softer_quick_stop_is_refused_with_what_it_can_do() -> None:
+    """The safety filter and the watchdog count with limits.emergency_deceleration_mps2."""
+    drive = FakeDrive()
+    drive.objects[0x6085, 0] = u32(286)
+    drive.refuse[0x6085, 0] = 0x06090031
+    problem = str(error_of(boot_one_axis(drive)))
+    assert "6085h:0 stays at 286: left brakes with 0.15 m/s² by it" in problem
+    assert "Lower limits.emergency_deceleration_mps2 (1.5) to that in robot.yaml" in problem
+
+
+@pytest.mark.parametrize("kept", [2723, 2865, 9999])
+def test_a_drive_that_keeps_a_quick_stop_as_hard_or_harder_is_noted(kept: int) -> None:
+    drive = FakeDrive()
+    drive.objects[0x6085, 0] = u32(kept)
+    drive.refuse[0x6085, 0] = 0x06090031
+    boot = boot_one_axis(drive)
+    assert boot.report is not None
+    assert [note for note in notes_of(boot) if "6085h" in note] == (
+        [] if kept == 2865 else ["6085h:0: 0609 0031h value too high"]
+    )
+
+
+def test_an_ordinary_ramp_that_is_softer_than_the_driver_brakes_is_refused_too() -> None:
+    drive = FakeDrive()
+    drive.objects[0x6084, 0] = u32(500)
+    drive.refuse[0x6084, 0] = 0x06090031
+    assert "Lower limits.deceleration_mps2 (0.5)" in str(error_of(boot_one_axis(drive)))
+
+
+def test_a_drive_whose_quick_stop_coasts_and_cannot_be_told_otherwise_is_refused() -> None:
+    drive = FakeDrive()
+    drive.objects[0x605A, 0] = u16(0)
+    drive.refuse[0x605A, 0] = READ_ONLY
+    problem = str(error_of(boot_one_axis(drive)))
+    assert "605Ah:0 stays at 0: a quick stop lets left coast" in problem
+    assert "options.quick_stop: no in its drive profile" in problem
+
+
+def test_a_drive_that_keeps_another_way_to_brake_in_a_quick_stop_is_noted() -> None:
+    drive = FakeDrive()
+    drive.objects[0x605A, 0] = u16(6)
+    drive.refuse[0x605A, 0] = READ_ONLY
+    assert boot_one_axis(drive).report is not None

@@ -1,0 +1,408 @@
+"""One node at run time: gone, booting, starting, ready, told step by step with the frames that lead there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import pytest
+
+from canbase_config.robot import Robot
+from canbase_driver.cia301.frame import Frame
+from canbase_driver.cia301.nmt import NmtState
+from canbase_driver.drives.axis import Axis
+from canbase_driver.drives.canopen_node import Presence, RemoteNode
+from support.chain_world import bench_robot
+from support.fake_drive import FakeDrive
+
+NEVER = -math.inf
+
+GONE, BOOTING, STARTING, READY = Presence
+BOOT_UP, OPERATIONAL, PRE_OPERATIONAL, STOPPED = 0x00, 0x05, 0x7F, 0x04
+START = Frame(0x000, b"\x01\x01")
+
+
+@dataclass
+class Story:
+    """Node 1 of the sample robot and a drive of a few lines; the clock moves by 10 ms."""
+
+    robot: Robot = field(default_factory=bench_robot)
+    drive: FakeDrive = field(default_factory=FakeDrive)
+    now: float = 10.0
+    sent: list[Frame] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.node = RemoteNode(1, self.robot)
+
+    @property
+    def axis(self) -> Axis:
+        return self.node.axes[0]
+
+    def wait(self, seconds: float) -> None:
+        """Time passes, nobody says anything but the drive's SDO server."""
+        for _ in range(round(seconds / 0.01)):
+            self.now += 0.01
+            waiting = self.node.tick(self.now)
+            while waiting:
+                self.sent += waiting
+                answers = [answer for frame in waiting for answer in self.drive.on_frame(frame)]
+                waiting = [frame for answer in answers for frame in self._hear(answer)]
+
+    def heartbeat(self, state: int) -> bool:
+        return self.node.on_heartbeat(Frame(0x701, bytes([state])), self.now)
+
+    def status(self) -> bool:
+        """Status and velocity, as they answer one SYNC."""
+        status = self.node.on_status(self.axis, Frame(0x181, bytes.fromhex("37 06 10 00 00 00")), self.now)
+        return self.node.on_velocity(self.axis, Frame(0x281, bytes(4)), self.now) and status
+
+    def booted(self) -> Story:
+        self.node.begin_boot(self.now)
+        self.wait(1.0)
+        return self
+
+    def started(self) -> Story:
+        """Booted, and an answer of the drive to the NMT start has come."""
+        self.node.begin_boot(self.now)
+        while self.node.presence is not STARTING:
+            self.wait(0.01)
+        return self
+
+    def ready(self) -> Story:
+        self.started()
+        self.heartbeat(OPERATIONAL)
+        self.status()
+        self.wait(0.01)
+        assert self.node.presence is READY
+        return self
+
+    def _hear(self, frame: Frame) -> list[Frame]:
+        if frame.cob_id == 0x701:
+            self.node.on_heartbeat(frame, self.now)
+        else:
+            self.node.on_sdo(frame, self.now)
+        return self.node.tick(self.now)
+
+
+def test_at_first_it_is_gone_and_sends_nothing() -> None:
+    story = Story()
+    story.wait(0.1)
+    assert story.node.presence is GONE
+    assert story.sent == []
+    assert story.node.absent() == "node 1 (left_wheel) not booted yet"
+    assert (story.node.waiting_for(10.0), story.node.silent(10.0, NEVER)) == ("", "")
+
+
+def test_a_boot_that_ends_well_starts_the_node_and_waits_for_its_first_feedback() -> None:
+    story = Story().started()
+    assert story.sent[-1] == START
+    assert story.sent.count(START) == 1
+    assert story.node.has_pdos
+    assert story.node.report is not None
+    assert story.node.report.stops_by_itself
+    assert story.node.waiting_for(story.now).startswith("node 1 (left_wheel): waiting for its first feedback since 0.")
+    assert (story.node.absent(), story.node.silent(story.now, NEVER)) == ("", "")
+
+
+def test_when_it_is_configured_it_waits_for_the_boots_of_the_others() -> None:
+    story = Story()
+    story.node.others_are_configured = lambda: False
+    story.booted()
+    assert story.node.presence is BOOTING
+    assert not story.node.is_being_configured
+    assert START not in story.sent
+    assert story.node.waiting_for(story.now) == "node 1 (left_wheel): configured, waits for the boots of the others"
+    story.node.others_are_configured = lambda: True
+    story.wait(0.01)
+    assert story.node.presence is STARTING
+    assert story.sent[-1] == START
+
+
+def test_a_restart_while_it_waits_for_the_others_is_noticed_at_once() -> None:
+    story = Story()
+    story.node.others_are_configured = lambda: False
+    story.booted()
+    story.heartbeat(BOOT_UP)
+    assert story.node.presence is GONE
+    assert story.node.absent() == "node 1 (left_wheel) restarted (boot-up message)"
+
+
+def test_a_drive_that_is_not_there_keeps_nobody_waiting() -> None:
+    story = Story(drive=FakeDrive(powered=False))
+    story.node.begin_boot(story.now)
+    story.wait(2.0)
+    assert story.node.presence is BOOTING
+    assert not story.node.is_being_configured
+
+
+@pytest.mark.parametrize(("beats", "speaks"), [(False, False), (True, False), (False, True)])
+def test_without_heartbeat_or_status_it_is_lost_after_a_second(beats: bool, speaks: bool) -> None:
+    story = Story().started()
+    for _ in range(99):
+        story.wait(0.01)
+        story.heartbeat(OPERATIONAL if beats else PRE_OPERATIONAL)
+        if speaks:
+            story.status()
+    assert story.node.presence is STARTING  # a pre-operational heartbeat may still be on its way
+    story.wait(0.03)
+    assert story.node.presence is GONE
+    absent = story.node.absent()
+    assert absent.startswith("node 1 (left_wheel) could not be started: within 1.0 s of NMT start it sent ")
+    assert ("a heartbeat that says pre-operational, not operational" in absent) is not beats
+    assert ("no status of left_wheel (its TPDOs: see pdo.synchronous of its drive profile)" in absent) is not speaks
+    assert "cable" not in story.node.missing(story.now + 60.0)  # it has answered every SDO
+
+
+def test_a_drive_without_a_heartbeat_is_said_to_have_none() -> None:
+    story = Story().started()
+    for _ in range(103):
+        story.wait(0.01)
+        story.status()
+    said = "sent no heartbeat (1017h; a drive that knows node guarding alone cannot be used)"
+    assert story.node.absent().endswith(said)
+    assert said in story.node.boot_error
+
+
+def test_a_node_that_is_silent_without_power_is_asked_again_after_a_second() -> None:
+    story = Story().ready()
+    ready_at = story.now
+    while story.node.presence is READY:
+        story.wait(0.01)
+        story.node.seek(story.now, NEVER)
+    assert story.now - ready_at == pytest.approx(1.0, abs=0.03)
+    assert story.node.absent().endswith("s and is looked for")
+    story.sent.clear()
+    story.booted()
+    assert story.sent[0] == Frame(0x601, bytes.fromhex("40 00 10 00 00 00 00 00"))  # 1000h
+    assert story.node.presence is STARTING
+
+
+def test_a_node_that_was_not_asked_for_a_second_is_not_looked_for() -> None:
+    story = Story().ready()
+    story.wait(3.0)
+    story.node.seek(story.now, story.now - 0.9)  # the driver itself paused: its SYNCs began 0.9 s ago
+    assert story.node.presence is READY
+    story.node.seek(story.now, story.now - 1.1)
+    assert story.node.presence is GONE
+
+
+def test_a_second_boot_up_message_of_one_start_is_waited_for_in_the_next_boot() -> None:
+    story = Story().ready()
+    for said in ("if it does so after each boot, set start.settle_s", "again; the next boot waits for it"):
+        while story.now - story.node._boot_up_at < 0.8:
+            story.wait(0.01)
+        story.heartbeat(BOOT_UP)
+        assert said in story.node.absent()
+        began = story.now
+        story.started()
+    assert story.now - began > 1.3 * 0.8
+    assert story.node.report is not None
+    assert any("set start.settle_s in its drive profile" in note for note in story.node.report.notes)
+
+
+def test_a_boot_up_message_long_after_the_boot_is_a_restart_and_changes_nothing_about_the_next_boot() -> None:
+    story = Story().ready()
+    story.wait(6.0)
+    story.heartbeat(BOOT_UP)
+    assert story.node.absent() == "node 1 (left_wheel) restarted (boot-up message)"
+    began = story.now
+    story.started()
+    assert story.now - began < 0.5
+
+
+def test_a_drive_that_loses_its_supply_soon_after_its_boot_is_booted_at_once() -> None:
+    """Twice, but not as late after its boot each time: that is no second boot-up message of one start."""
+    story = Story().ready()
+    for lives_s in (2.0, 1.0):
+        story.wait(lives_s)
+        story.heartbeat(BOOT_UP)
+        began = story.now
+        story.ready()
+        assert story.now - began < 0.5
+
+
+def test_why_a_boot_failed_is_known_until_the_node_is_ready() -> None:
+    story = Story(drive=FakeDrive(refuse={(0x60FF, 0): 0x08000022}))
+    story.node.begin_boot(story.now)
+    story.wait(0.5)
+    assert "60FFh:0: 0800 0022h" in story.node.boot_error
+    story.drive.refuse.clear()
+    story.wait(1.0)
+    story.ready()
+    assert story.node.boot_error == ""
+
+
+def test_with_both_it_is_ready() -> None:
+    story = Story().ready()
+    assert (story.node.waiting_for(story.now), story.node.absent(), story.node.silent(story.now, NEVER)) == ("", "", "")
+    assert story.node.nmt_state is NmtState.OPERATIONAL
+
+
+@pytest.mark.parametrize(("age_s", "silent"), [(0.09, False), (0.11, True)])
+def test_a_status_that_is_too_old_is_silence(age_s: float, silent: bool) -> None:
+    story = Story().ready()
+    since = story.axis.status_at
+    sentence = f"node 1 (left_wheel): no status for {age_s:.2f} s"
+    assert story.node.silent(since + age_s, NEVER) == (sentence if silent else "")
+
+
+@pytest.mark.parametrize(
+    ("run_s", "age_s", "silent"),
+    [
+        (0.0, 0.15, False),
+        (0.09, 0.24, False),
+        (0.11, 0.26, True),
+        (0.0, 0.39, False),  # however often we pause: no longer than 0.3 s + 0.1 s
+        (0.0, 0.41, True),
+    ],
+)
+def test_a_drive_that_was_not_asked_is_not_silent(run_s: float, age_s: float, silent: bool) -> None:
+    """status ──── our pause ──── SYNCs again ── `run_s` ── now: the drive has 0.1 s from there on."""
+    story = Story().ready()
+    now = story.axis.status_at + age_s
+    story.node.heartbeat_at = now
+    sentence = f"node 1 (left_wheel): no status for {age_s:.2f} s"
+    assert story.node.silent(now, now - run_s) == (sentence if silent else "")
+
+
+def test_a_heartbeat_that_is_too_old_is_silence_though_the_status_is_fresh() -> None:
+    story = Story().ready()
+    beat_at = story.node.heartbeat_at
+    story.now = beat_at + 0.31
+    story.status()
+    assert story.node.silent(beat_at + 0.31, NEVER) == "node 1 (left_wheel): no heartbeat for 0.31 s"
+    story.heartbeat(OPERATIONAL)
+    assert story.node.silent(story.now, NEVER) == ""  # it is ready again by itself; what is latched is the supervisor's
+
+
+@pytest.mark.parametrize(
+    ("state", "why"),
+    [
+        (BOOT_UP, "restarted (boot-up message)"),
+        (PRE_OPERATIONAL, "left NMT operational (pre-operational)"),
+        (STOPPED, "left NMT operational (stopped)"),
+    ],
+)
+def test_ready_ends_with_any_other_nmt_state(state: int, why: str) -> None:
+    story = Story().ready()
+    assert story.heartbeat(state)
+    assert story.node.presence is GONE
+    assert story.node.absent().startswith(f"node 1 (left_wheel) {why}")
+    assert story.node.report is None
+    assert story.axis.status_at == -math.inf
+
+
+def test_a_place_that_was_heard_before_the_nmt_start_is_no_reference() -> None:
+    """Drives send no PDOs before it: a second drive with this node id told that place."""
+    story = Story().ready()
+    story.heartbeat(PRE_OPERATIONAL)
+    assert story.status()
+    assert story.axis.travel.referenced
+    story.wait(0.3)
+    story.started()
+    assert not story.axis.travel.referenced
+    story.status()
+    assert story.axis.travel.referenced
+
+
+def test_a_restart_while_it_is_starting_is_noticed_at_once() -> None:
+    story = Story().started()
+    story.heartbeat(BOOT_UP)
+    assert story.node.absent().startswith("node 1 (left_wheel) restarted (boot-up message)")
+
+
+def test_a_restart_forgets_the_emergency_message_of_the_life_before() -> None:
+    story = Story().ready()
+    assert story.node.on_emcy(Frame(0x081, bytes.fromhex("10 23 02 00 00 00 00 00")), story.now)
+    assert story.node.emcy is not None
+    story.heartbeat(BOOT_UP)
+    assert story.node.emcy is None
+
+
+@pytest.mark.parametrize("data", ["", "05 00", "63"])
+def test_what_is_no_heartbeat_is_refused_and_changes_nothing(data: str) -> None:
+    story = Story().ready()
+    beat_at = story.node.heartbeat_at
+    story.now += 0.05
+    assert not story.node.on_heartbeat(Frame(0x701, bytes.fromhex(data)), story.now)
+    assert (story.node.presence, story.node.heartbeat_at) == (READY, beat_at)
+
+
+def test_emergency_messages_come_and_go_and_half_a_code_is_none() -> None:
+    story = Story()
+    assert story.node.on_emcy(Frame(0x081, bytes.fromhex("10 23 02")), 10.0)
+    assert not story.node.on_emcy(Frame(0x081, b"\x10"), 10.0)
+    assert story.node.emcy is not None
+    assert story.node.emcy.code == 0x2310
+    assert story.node.on_emcy(Frame(0x081, bytes(8)), 10.0)
+    assert story.node.emcy is None
+
+
+def test_feedback_counts_only_from_the_nmt_start_on_and_its_length_matters_only_then() -> None:
+    story = Story()
+    velocity = Frame(0x281, bytes.fromhex("10 00 00 00"))
+    assert story.status()
+    assert story.node.on_velocity(story.axis, velocity, story.now)
+    assert story.node.on_status(story.axis, Frame(0x181), 10.0)
+    assert (story.axis.state, story.axis.velocity_mps) == (None, 0.0)
+    story.started()
+    assert story.status()
+    assert story.node.on_velocity(story.axis, velocity, story.now)
+    assert story.axis.velocity_mps > 0.0
+    assert not story.node.on_status(story.axis, Frame(0x181), story.now)
+    assert not story.node.on_velocity(story.axis, Frame(0x281), story.now)
+
+
+def test_a_second_begin_does_nothing_while_it_boots_or_is_there() -> None:
+    story = Story()
+    story.node.begin_boot(story.now)
+    story.wait(0.01)
+    story.node.begin_boot(story.now)
+    story.wait(0.01)
+    assert [str(frame) for frame in story.sent].count("601h [40 00 10 00 00 00 00 00]") == 1
+    ready = Story().ready()
+    ready.node.begin_boot(ready.now)
+    assert ready.node.presence is READY
+
+
+def test_a_boot_that_fails_is_tried_again_after_a_second_and_its_error_is_told_meanwhile() -> None:
+    story = Story()
+    story.drive.refuse[0x6060, 0] = 0x06090030
+    story.booted()
+    assert story.node.presence is GONE
+    assert "could not be booted: node 1" in story.node.absent()
+    failed_at = story.now
+    story.node.begin_boot(failed_at)
+    assert story.node.presence is GONE
+    story.now += 1.1
+    story.drive.powered = False
+    story.node.begin_boot(story.now)
+    story.wait(0.05)
+    assert story.node.presence is BOOTING
+    assert story.node.waiting_for(story.now).startswith("waiting for node 1 (left_wheel): the answer to 1000h:0 (last")
+
+
+def test_sdo_answers_without_a_boot_are_somebody_elses_and_fine() -> None:
+    assert Story().node.on_sdo(Frame(0x581, bytes(8)), 10.0)
+
+
+def test_a_boot_up_before_the_boot_is_no_loss() -> None:
+    story = Story()
+    story.heartbeat(BOOT_UP)
+    assert story.node.absent() == "node 1 (left_wheel) not booted yet"
+
+
+def test_a_heartbeat_from_before_the_nmt_start_is_no_answer_to_it() -> None:
+    story = Story()
+
+    def beat(_drive: FakeDrive, _data: bytes) -> None:
+        story.heartbeat(OPERATIONAL)  # a drive that starts by itself
+
+    story.drive.on_write[0x60FF, 0] = beat
+    story.started()
+    story.status()
+    story.wait(0.01)
+    assert story.node.presence is STARTING
+    story.heartbeat(OPERATIONAL)
+    story.wait(0.01)
+    assert story.node.presence is READY

@@ -1,0 +1,179 @@
+"""When the drives let go of wheels that stand: how hard they pushed, and the way there and back. Pure, times in s."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import pytest
+
+from canbase_config.robot import Robot
+from canbase_driver.cia402 import Command, DriveState, PowerGoal, next_controlword
+from canbase_driver.drives.let_go import RETURN_S, LetGo, Push
+from support.chain_world import bench_robot
+
+ENABLED, ON, OFF = DriveState.OPERATION_ENABLED, DriveState.SWITCHED_ON, DriveState.SWITCH_ON_DISABLED
+CYCLE_S, LIMIT_S = 0.01, 0.05
+COUNT_M = 1e-5
+
+
+def push() -> Push:
+    return Push(LIMIT_S, COUNT_M)
+
+
+def samples_until_due(each: Push, share: float | None, ordered_mps: float = 0.1, most: int = 200) -> int:
+    """Samples, a cycle apart, until it must let go; the first one begins the time. `most`: never."""
+    for n in range(most):
+        each.on_sample(0.0, share, ordered_mps, True, n * CYCLE_S)
+        if each.must_let_go:
+            return n
+    return most
+
+
+@pytest.mark.parametrize(
+    ("share", "cycles"), [(1.0, 5), (-1.0, 5), (0.5, 10), (0.051, 99), (0.0099, 200), (0.0, 5), (None, 5)]
+)
+def test_torque_and_time_make_the_limit_together(share: float | None, cycles: int) -> None:
+    """A drive that tells no torque, or has told nothing but zero, may give the rated one."""
+    assert samples_until_due(push(), share) in (cycles, cycles + 1)
+
+
+def test_a_torque_that_was_told_once_may_be_zero_then() -> None:
+    each = push()
+    each.on_sample(0.0, 0.2, 0.1, True, 0.0)
+    each.on_sample(0.002, 0.2, 0.1, True, CYCLE_S)
+    for n in range(2, 500):
+        each.on_sample(0.002, 0.0, 0.0, True, n * CYCLE_S)
+    assert not each.must_let_go
+
+
+def test_without_an_order_nothing_is_owed() -> None:
+    assert samples_until_due(push(), 1.0, ordered_mps=0.0) == 200
+
+
+@pytest.mark.parametrize(("step_m", "due"), [(0.00099, True), (0.00101, False), (-0.00101, False)])
+def test_an_encoder_that_moves_begins_anew(step_m: float, due: bool) -> None:
+    each, travel_m = push(), 0.0
+    for n in range(20):
+        travel_m += step_m * (n % 2 if due else 1)
+        travel_m -= step_m * (n % 2 == 0 and due)
+        each.on_sample(travel_m, 1.0, 0.1, True, n * CYCLE_S)
+    assert each.must_let_go is due
+
+
+def test_without_torque_it_owes_nothing_until_the_next_order() -> None:
+    each = push()
+    assert samples_until_due(each, 1.0) == 5
+    each.on_sample(0.0, 0.0, 0.0, False, 0.06)
+    for n in range(7, 60):
+        each.on_sample(0.0, 1.0, 0.0, True, n * CYCLE_S)
+    assert not each.must_let_go
+    each.on_sample(0.0, 1.0, -0.001, True, 0.6)
+    assert each.must_let_go
+
+
+def test_a_gap_counts_as_a_tenth_of_a_second_and_a_time_that_went_back_as_nothing() -> None:
+    each = push()
+    each.on_sample(0.0, 0.4, 0.1, True, 0.0)
+    each.on_sample(0.0, 0.4, 0.1, True, 60.0)
+    assert each.pushed_s == pytest.approx(0.04)
+    each.on_sample(0.0, 0.4, 0.1, True, 59.0)
+    assert each.pushed_s == pytest.approx(0.04)
+
+
+@dataclass
+class Wheel:
+    state: DriveState | None = ENABLED
+    velocity_mps: float = 0.0
+    push: Push = field(default_factory=push)
+
+
+def due() -> Wheel:
+    wheel = Wheel()
+    samples_until_due(wheel.push, 1.0)
+    return wheel
+
+
+def robot(proof: str = "let_go") -> Robot:
+    whole = bench_robot()
+    return whole.model_copy(update={"watchdog": whole.watchdog.model_copy(update={"stand_proof": proof})})
+
+
+def test_the_way_there_and_back() -> None:
+    left, right, each = due(), Wheel(), LetGo(robot())
+    told = []
+    for now, states in enumerate(((ENABLED, ENABLED), (ENABLED, ENABLED), (ON, ENABLED), (ON, ON), (ENABLED, ON))):
+        left.state, right.state = states
+        each.step((left, right), True, float(now))
+        told.append(each.goal(0.0))
+        assert each.active
+    assert told == [PowerGoal.LET_GO, PowerGoal.LET_GO, PowerGoal.LET_GO, PowerGoal.ON, PowerGoal.ON]
+    right.state = ENABLED
+    each.step((left, right), True, 5.0)
+    assert (each.active, each.goal(5.0)) == (False, PowerGoal.ON)
+
+
+@pytest.mark.parametrize(
+    ("rests", "other_mps", "proof", "goes"),
+    [
+        (True, 0.0, "let_go", True),
+        (True, 0.05, "let_go", True),
+        (True, -0.051, "let_go", False),
+        (False, 0.0, "let_go", False),
+        (True, 0.0, "none", False),
+    ],
+)
+def test_all_wheels_rest_and_the_robot_wants_it(rests: bool, other_mps: float, proof: str, goes: bool) -> None:
+    each = LetGo(robot(proof))
+    each.step((due(), Wheel(velocity_mps=other_mps)), rests, 1.0)
+    assert each.active is goes
+
+
+def test_no_wheel_that_is_due_no_letting_go() -> None:
+    each = LetGo(robot())
+    each.step((Wheel(), Wheel()), True, 1.0)
+    assert not each.active
+
+
+def test_an_order_does_not_end_it_and_another_stop_does() -> None:
+    wheels, each = (due(), Wheel()), LetGo(robot())
+    each.step(wheels, True, 1.0)
+    each.step(wheels, False, 1.01)
+    assert each.active
+    each.end()
+    assert (each.active, each.excuses(1.02)) == (False, False)
+
+
+@pytest.mark.parametrize(("answer_s", "feedback_s", "until_s"), [(0.2, 0.1, 0.05), (0.2, 0.5, 0.1), (0.06, 0.1, 0.03)])
+def test_a_drive_that_ignores_disable_operation_is_told_disable_voltage(
+    answer_s: float, feedback_s: float, until_s: float
+) -> None:
+    """Before the watchdog trips: nobody answered, or one drive has no power while another turns."""
+    mine = robot()
+    watchdog = mine.watchdog.model_copy(update={"stand_answer_s": answer_s})
+    timeouts = mine.timeouts.model_copy(update={"feedback_s": feedback_s})
+    wheels, each = (due(), Wheel()), LetGo(mine.model_copy(update={"watchdog": watchdog, "timeouts": timeouts}))
+    each.step(wheels, True, 1.0)
+    words = [next_controlword(ENABLED, each.goal(at)) for at in (1.0, 0.999 + until_s, 1.001 + until_s)]
+    assert words == [0x07, 0x07, Command.DISABLE_VOLTAGE.value]
+
+
+def test_the_way_up_from_any_state_without_torque() -> None:
+    for first, then in pairwise((OFF, DriveState.READY_TO_SWITCH_ON, ON)):
+        assert next_controlword(first, PowerGoal.LET_GO) == next_controlword(first, PowerGoal.READY)
+        assert next_controlword(then, PowerGoal.LET_GO) == next_controlword(then, PowerGoal.READY)
+
+
+def test_a_drive_that_does_not_come_back_is_no_excuse_for_ever() -> None:
+    each = LetGo(robot())
+    each.step((due(), Wheel()), True, 1.0)
+    assert each.excuses(1.0 + RETURN_S)
+    assert not each.excuses(1.01 + RETURN_S)
+
+
+def test_a_drive_of_unknown_state_may_have_torque() -> None:
+    wheels, each = (due(), Wheel()), LetGo(robot())
+    each.step(wheels, True, 1.0)
+    wheels[0].state, wheels[1].state = None, ON
+    each.step(wheels, True, 1.01)
+    assert each.goal(1.01) is PowerGoal.LET_GO

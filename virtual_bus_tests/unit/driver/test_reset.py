@@ -1,0 +1,202 @@
+"""A reset on its way: what refuses it, what breaks it off, and how long each level of the fault reset bit lasts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from canbase_driver.snapshot import WatchdogView
+from canbase_driver.supervision.reset import FAULT_TRIES, Outcome, Phase, Reset, refusal
+from canbase_driver.supervision.supervisor import Situation
+
+WELL = Situation()
+TRIPPED = Situation(watchdog=WatchdogView.TRIPPED, watchdog_detail="lease lost")
+MISSING = Situation(watchdog=WatchdogView.MISSING, watchdog_detail="silent for 0.40 s")
+FAULT = Situation(fault="left: over-current")
+DONE, CAUSE_STANDS, VELOCITY_ORDERED, NOT_TRIPPED = 1, 2, 3, 4
+
+
+class Story:
+    """One reset from second 10 on, stepped every `cycle_s`."""
+
+    def __init__(self, cycle_s: float = 0.01) -> None:
+        self.cycle_s = cycle_s
+        self.now = 10.0
+        self.reset = Reset(self.now, cycle_s, boot_s=10.0)
+        self.phases: list[tuple[float, Phase]] = []
+
+    def run(self, situation: Situation, seconds: float, answer: int | None = NOT_TRIPPED) -> Outcome | None:
+        """Step until it ends, or for so long."""
+        for _ in range(round(seconds / self.cycle_s)):
+            self.now += self.cycle_s
+            outcome = self.reset.step(situation, answer, self.now)
+            self.phases.append((round(self.now - 10.0, 3), self.reset.phase))
+            if outcome is not None:
+                return outcome
+        return None
+
+    def lasted(self, phase: Phase) -> float:
+        """How long it stayed in a phase [s]."""
+        return round(self.cycle_s * sum(each is phase for _, each in self.phases), 3)
+
+
+def in_phase(phase: Phase) -> Story:
+    """A reset that has got so far."""
+    story = Story()
+    for situation, seconds, answer in (
+        (WELL, 0.02, None),
+        (FAULT, 0.01, DONE),
+        (FAULT, 0.01, DONE),
+        (FAULT, 1.0, DONE),
+    ):
+        for _ in range(round(seconds / 0.01)):
+            if story.reset.phase is phase:
+                return story
+            assert story.run(situation, 0.01, answer) is None
+    raise AssertionError(story.reset.phase)
+
+
+def sentence(outcome: Outcome | None) -> str:
+    """The sentence of a reset that has failed."""
+    assert outcome is not None
+    assert not outcome.done
+    return outcome.sentence
+
+
+@pytest.mark.parametrize(
+    ("situation", "why"),
+    [
+        (Situation(commanded="cmd_vel orders 0.3 m/s"), "cmd_vel orders 0.3 m/s; let go of the joystick"),
+        (Situation(standstill=False), "a wheel turns"),
+        (Situation(bus="bus-off"), "bus-off"),
+        (MISSING, "watchdog: silent for 0.40 s"),
+        (Situation(resetting=True), "a reset is under way"),
+        (Situation(shutdown_requested=True), "the driver is ending"),
+    ],
+)
+def test_it_may_not_even_begin_while(situation: Situation, why: str) -> None:
+    refused = refusal(situation, stopped=True)
+    assert refused is not None
+    assert refused.startswith(f"refused: {why}")
+
+
+@pytest.mark.parametrize(
+    "situation",
+    [
+        WELL,
+        TRIPPED,
+        FAULT,
+        Situation(stop_requested=True),
+        # whether these wheels turn is not known: they are waited for
+        Situation(standstill=False, silent="node 1: no status"),
+        Situation(standstill=False, absent="node 1 restarted"),
+        Situation(standstill=False, booting="waiting for node 1"),
+    ],
+)
+def test_it_may_begin_with(situation: Situation) -> None:
+    assert refusal(situation, stopped=True) is None
+
+
+def test_it_may_not_begin_while_there_is_power() -> None:
+    assert refusal(WELL, stopped=False) == (
+        "refused: there is power on the drives; stop first (service motor_driver/stop)"
+    )
+
+
+@pytest.mark.parametrize("answer", [DONE, NOT_TRIPPED])
+def test_with_nothing_else_wrong_it_is_done_two_cycles_after_the_watchdogs_answer(answer: int) -> None:
+    story = Story()
+    assert story.run(WELL, 0.1, answer=None) is None
+    assert story.run(WELL, 0.02, answer) is None
+    outcome = story.run(WELL, 0.01, answer)
+    assert outcome == Outcome(True, "reset done; the drives get power once the command is zero")
+
+
+@pytest.mark.parametrize(
+    ("answer", "why"),
+    [
+        (CAUSE_STANDS, "the cause stands, or a wheel is not proven to be at standstill (its log says which)"),
+        (VELOCITY_ORDERED, "a velocity is ordered"),
+        (9, "answer 9"),
+    ],
+)
+def test_what_the_watchdog_refuses_is_refused(answer: int, why: str) -> None:
+    assert sentence(Story().run(TRIPPED, 0.01, answer)) == f"the watchdog refused: {why}"
+
+
+@pytest.mark.parametrize(
+    ("situation", "answer", "detail"),
+    [
+        (WELL, None, "no answer"),
+        (TRIPPED, None, "lease lost"),
+        (TRIPPED, DONE, "lease lost"),
+        (MISSING, None, "silent"),
+    ],
+)
+def test_it_waits_half_a_second_for_the_watchdog(situation: Situation, answer: int | None, detail: str) -> None:
+    story = Story()
+    assert story.run(situation, 0.49, answer) is None
+    assert sentence(story.run(situation, 0.03, answer)).startswith(f"the watchdog is not ready after 0.5 s ({detail}")
+
+
+NOT_THERE = "node 1 is not there"
+
+
+@pytest.mark.parametrize(
+    "waiting", [Situation(booting=NOT_THERE), Situation(absent=NOT_THERE), Situation(silent=NOT_THERE)]
+)
+def test_it_waits_ten_seconds_for_a_drive_and_goes_on_when_it_is_there(waiting: Situation) -> None:
+    late = Story()
+    assert late.run(waiting, 9.9) is None
+    assert sentence(late.run(waiting, 0.2)) == "node 1 is not there; reset again once that is cured"
+    in_time = Story()
+    assert in_time.run(waiting, 9.9) is None
+    outcome = in_time.run(WELL, 0.1)
+    assert outcome is not None
+    assert outcome.done
+
+
+@pytest.mark.parametrize(("cycle_s", "edge_s"), [(0.005, 0.05), (0.01, 0.05), (0.02, 0.06), (0.05, 0.15)])
+def test_each_level_of_the_fault_reset_bit_lasts_50_ms_and_three_cycles(cycle_s: float, edge_s: float) -> None:
+    story = Story(cycle_s)
+    outcome = story.run(FAULT, 6.0)
+    assert story.lasted(Phase.EDGE_LOW) == pytest.approx(FAULT_TRIES * edge_s, abs=FAULT_TRIES * 1.01 * cycle_s)
+    assert story.lasted(Phase.EDGE_HIGH) == pytest.approx(FAULT_TRIES * edge_s, abs=FAULT_TRIES * 1.01 * cycle_s)
+    assert story.lasted(Phase.EDGE_HIGH) > FAULT_TRIES * edge_s - 1e-6
+    order = [phase for i, (_, phase) in enumerate(story.phases) if i == 0 or story.phases[i - 1][1] is not phase]
+    assert order == list(Phase)[1:] + (FAULT_TRIES - 1) * list(Phase)[2:]
+    assert sentence(outcome) == "left: over-current: it does not clear; remove its cause, then reset again"
+    assert story.lasted(Phase.FAULTS) == pytest.approx(FAULT_TRIES * 1.0, abs=FAULT_TRIES * 2.01 * cycle_s)
+
+
+@pytest.mark.parametrize("phase", list(Phase))
+def test_the_bit_is_set_on_the_high_level_only(phase: Phase) -> None:
+    assert in_phase(phase).reset.fault_reset_bit is (phase is Phase.EDGE_HIGH)
+
+
+def test_a_fault_that_clears_ends_the_reset_well() -> None:
+    story = in_phase(Phase.FAULTS)
+    outcome = story.run(WELL, 0.01)
+    assert outcome is not None
+    assert outcome.done
+
+
+BREAKS = {
+    "commanded": (Situation(commanded="cmd_vel orders 0.3 m/s"), set(Phase)),
+    "bus": (Situation(bus="bus-off"), set(Phase)),
+    "tripped": (TRIPPED, set(Phase) - {Phase.WATCHDOG}),
+    "missing": (MISSING, set(Phase) - {Phase.WATCHDOG}),
+    "booting": (Situation(booting="waiting for node 1"), {Phase.EDGE_LOW, Phase.EDGE_HIGH, Phase.FAULTS}),
+    "absent": (Situation(absent="node 1 restarted"), {Phase.EDGE_LOW, Phase.EDGE_HIGH, Phase.FAULTS}),
+    "silent": (Situation(silent="node 1: no status"), {Phase.EDGE_LOW, Phase.EDGE_HIGH, Phase.FAULTS}),
+}
+"""What breaks it off, in which phases."""
+
+
+@pytest.mark.parametrize("what", BREAKS)
+@pytest.mark.parametrize("phase", list(Phase))
+def test_what_was_well_must_stay_so(phase: Phase, what: str) -> None:
+    situation, phases = BREAKS[what]
+    outcome = in_phase(phase).run(replace(situation, fault="left: over-current"), 0.01, answer=None)
+    assert (outcome is not None and outcome.sentence.startswith("broken off: ")) is (phase in phases)

@@ -1,0 +1,456 @@
+"""Who has power, and what takes it away: every state with every hazard, and the way down step by step."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from canbase_config.load import load_robot, sample
+from canbase_driver.cia402 import PowerGoal
+from canbase_driver.motion.braking import Braking
+from canbase_driver.snapshot import DriverState, WatchdogView
+from canbase_driver.supervision.supervisor import (
+    BLOCKERS,
+    HAZARDS,
+    NO_POWER,
+    ORDERS,
+    PREPARING,
+    UNARMED,
+    Cause,
+    Drive,
+    Orders,
+    Situation,
+    Step,
+    Supervisor,
+)
+
+OFFLINE, BOOTING, DISARMED, ENABLING, ENABLED, STOPPING, LATCHED = DriverState
+OFF, ON = Orders(PowerGoal.OFF, Drive.ZERO), Orders(PowerGoal.ON, Drive.ZERO)
+FOLLOW, RAMP = Orders(PowerGoal.ON, Drive.FOLLOW), Orders(PowerGoal.ON, Drive.RAMP)
+QUICK = Orders(PowerGoal.QUICK_STOP, Drive.ZERO)
+
+READY = Situation(disabled="left is switch on disabled")
+"""Without power, and nothing in the way of it."""
+RUNNING = Situation(powered=True, standstill=False, turning="left turns", speed_mps=0.5, begin_mps=0.5)
+"""Enabled, and turning at a speed that does not fall, whatever is ordered."""
+STANDING = Situation(powered=True)
+
+WRONG: dict[str, Situation] = {
+    "bus failed": Situation(bus="bus-off"),
+    "drive fault": Situation(fault="left: over-current"),
+    "drive restarted": Situation(absent="node 1 restarted"),
+    "booting": Situation(booting="waiting for node 1"),
+    "drive silent": Situation(silent="node 1: no status"),
+    "drive missing": Situation(missing="node 1 is missing"),
+    "watchdog tripped": Situation(watchdog=WatchdogView.TRIPPED, watchdog_detail="lease lost"),
+    "watchdog missing": Situation(watchdog=WatchdogView.MISSING, watchdog_detail="not heard yet"),
+    "resetting": Situation(resetting=True),
+    "drive disabled": Situation(disabled="left is switched on"),
+    "did not stop": Situation(overdue="left turns"),
+    "command not zero": Situation(commanded="0.3 m/s"),
+    "not standing": Situation(standstill=False, turning="left turns"),
+    "stop requested": Situation(stop_requested=True),
+    "not configured": Situation(unconfigured="lifecycle: unconfigured"),
+    "inactive": Situation(inactive="lifecycle: not active"),
+    "shutdown": Situation(shutdown_requested=True),
+}
+
+
+def also(base: Situation, wrong: Situation) -> Situation:
+    """`base`, and what is not as usual in `wrong`."""
+    usual = Situation()
+    fields = {name: getattr(wrong, name) for name in Situation.__dataclass_fields__}
+    return replace(base, **{name: value for name, value in fields.items() if value != getattr(usual, name)})
+
+
+class Story:
+    """A supervisor with a ramp of at most 3 s, stepped every 10 ms: 1 m/s², 0.12 s of lag."""
+
+    def __init__(self) -> None:
+        self.supervisor = Supervisor(Braking(load_robot(sample("bench")).robot), ramp_timeout_s=3.0)
+        self.now = 10.0
+
+    def step(self, situation: Situation, cycles: int = 1) -> Orders:
+        for _ in range(cycles):
+            self.now += 0.01
+            orders = self.supervisor.step(situation, self.now)
+        return orders
+
+    def lasts(self, situation: Situation, orders: Orders, longest_s: float = 10.0) -> float:
+        """How long it gives these orders [s]."""
+        start = self.now
+        while self.step(situation) == orders:
+            assert self.now - start < longest_s
+        return round(self.now - start, 3)
+
+    @property
+    def told(self) -> tuple[DriverState, str, bool]:
+        """State, cause, and whether it needs a reset."""
+        return self.supervisor.state, self.supervisor.cause.name, self.supervisor.latches
+
+
+def at(state: DriverState, wheels: Situation = STANDING) -> Story:
+    """A supervisor that has got into this state in the ordinary way."""
+    story = Story()
+    ways: dict[DriverState, tuple[Situation, ...]] = {
+        OFFLINE: (WRONG["bus failed"],),
+        BOOTING: (WRONG["booting"],),
+        DISARMED: (WRONG["command not zero"],),
+        ENABLING: (READY,),
+        ENABLED: (READY, wheels),
+        STOPPING: (READY, wheels, also(wheels, WRONG["stop requested"])),
+        LATCHED: (WRONG["drive fault"],),
+    }
+    for situation in ways[state]:
+        story.step(situation)
+    assert story.supervisor.state is state
+    return story
+
+
+NOT_YET = {
+    "bus failed": OFFLINE,
+    "booting": BOOTING,
+    "drive missing": BOOTING,
+    "drive restarted": BOOTING,
+    "not configured": OFFLINE,
+} | dict.fromkeys(
+    ("drive silent", "watchdog missing", "inactive", "resetting", "command not zero", "not standing"), DISARMED
+)
+BEFORE_POWER = [(wrong, state, False) for wrong, state in NOT_YET.items()] + [
+    ("drive fault", LATCHED, True),
+    ("watchdog tripped", LATCHED, True),
+    ("stop requested", LATCHED, True),
+]
+
+
+@pytest.mark.parametrize("state", [OFFLINE, BOOTING, DISARMED])
+@pytest.mark.parametrize(("wrong", "shown", "latched"), BEFORE_POWER)
+def test_without_power_whatever_is_wrong_keeps_it_off(
+    state: DriverState, wrong: str, shown: DriverState, latched: bool
+) -> None:
+    story = at(state)
+    situation = also(READY, WRONG[wrong])
+    for _ in range(3):
+        assert story.step(situation) == OFF
+    name = "booting" if wrong == "drive restarted" else wrong
+    assert story.told == (shown, name, latched)
+    assert story.supervisor.cause.clears_on
+
+
+@pytest.mark.parametrize("state", [OFFLINE, BOOTING, DISARMED])
+def test_when_nothing_is_wrong_the_drives_are_enabled_at_once(state: DriverState) -> None:
+    story = at(state)
+    assert story.step(READY) == ON
+    assert story.told == (ENABLING, "enabling", False)
+    assert story.step(STANDING) == FOLLOW
+    assert story.told == (ENABLED, "none", False)
+
+
+def test_while_nothing_is_wrong_it_follows() -> None:
+    story = at(ENABLED, RUNNING)
+    for _ in range(3):
+        assert story.step(RUNNING) == FOLLOW
+    assert story.told == (ENABLED, "none", False)
+
+
+STOPS = [
+    ("bus failed", QUICK, True),
+    ("watchdog tripped", QUICK, True),
+    ("drive fault", QUICK, True),
+    ("drive restarted", QUICK, True),
+    ("drive silent", QUICK, True),
+    ("watchdog tripped", QUICK, True),
+    ("watchdog missing", RAMP, True),
+    ("drive disabled", QUICK, True),
+    ("did not stop", QUICK, True),
+    ("stop requested", RAMP, True),
+    ("inactive", RAMP, False),
+    ("shutdown", RAMP, False),
+]
+"""Hazard, first step from ENABLED, latched."""
+
+
+def test_the_tables_of_this_test_name_every_hazard_and_every_blocker() -> None:
+    assert [name for name, _, _ in STOPS] == [hazard.name for hazard in HAZARDS]
+    assert {name for name, _, _ in BEFORE_POWER} - {"drive restarted"} == {blocker.name for blocker in BLOCKERS}
+    assert set(ORDERS) == (set(DriverState) - {STOPPING}) | set(Step) | {PREPARING}
+
+
+@pytest.mark.parametrize(("wrong", "first", "latched"), STOPS)
+def test_from_enabled_each_hazard_stops_the_base_by_its_first_step(wrong: str, first: Orders, latched: bool) -> None:
+    story = at(ENABLED, RUNNING)
+    assert story.step(also(RUNNING, WRONG[wrong])) == first
+    assert story.told == (STOPPING, wrong, latched)
+
+
+@pytest.mark.parametrize(("wrong", "first", "latched"), [row for row in STOPS if row[0] != "drive disabled"])
+def test_while_enabling_each_hazard_is_a_quick_stop_since_there_is_no_ramp_to_go_down(
+    wrong: str, first: Orders, latched: bool
+) -> None:
+    story = at(ENABLING)
+    assert story.step(also(READY, WRONG[wrong])) == QUICK
+    assert story.told == (STOPPING, wrong, latched)
+
+
+@pytest.mark.parametrize(("wrong", "first", "latched"), STOPS)
+def test_on_the_ramp_only_what_needs_a_quick_stop_changes_the_step_and_the_cause_stays(
+    wrong: str, first: Orders, latched: bool
+) -> None:
+    story = at(STOPPING, RUNNING)
+    assert story.step(also(RUNNING, WRONG[wrong])) == (QUICK if first == QUICK else RAMP)
+    assert story.told == (STOPPING, "stop requested", True)
+
+
+@pytest.mark.parametrize("wrong", [name for name in WRONG if name != "shutdown"])
+def test_latched_stays_latched_without_power_whatever_else_goes_wrong_or_well(wrong: str) -> None:
+    story = at(LATCHED)
+    assert story.step(also(READY, WRONG[wrong]), cycles=3) == OFF
+    assert story.step(READY, cycles=3) == OFF
+    assert story.told == (LATCHED, "drive fault", True)
+
+
+@pytest.mark.parametrize("wrong", ["", *WRONG])
+@pytest.mark.parametrize("state", list(DriverState))
+def test_a_shutdown_ends_from_every_state_with_everything_wrong_in_bounded_time(state: DriverState, wrong: str) -> None:
+    story = at(state, RUNNING)
+    hopeless = also(RUNNING, WRONG.get(wrong, Situation()))  # still turning, still powered: no feedback helps
+    situation = also(hopeless, WRONG["shutdown"])
+    last = Orders(PowerGoal.ON, Drive.FOLLOW)
+    start = story.now
+    while not story.supervisor.finished:
+        last = story.step(situation)
+        assert story.now - start < 0.6 + 0.4 + 0.5 + 0.1
+    assert last == OFF
+    assert story.supervisor.state in NO_POWER
+    assert story.supervisor.cause.name == "shutdown"
+
+
+@pytest.mark.parametrize("state", [OFFLINE, BOOTING, DISARMED, LATCHED])
+def test_a_shutdown_without_power_ends_in_the_same_cycle(state: DriverState) -> None:
+    story = at(state)
+    story.step(also(READY, WRONG["shutdown"]))
+    assert story.supervisor.finished
+
+
+def test_the_way_down_goes_on_at_standstill() -> None:
+    story = at(ENABLED, RUNNING)
+    stop = WRONG["stop requested"]
+    assert story.step(also(RUNNING, stop), cycles=30) == RAMP
+    assert story.step(also(STANDING, stop)) == OFF
+    assert story.supervisor.state is STOPPING  # the drives have not said yet that they are off
+    assert story.step(also(READY, stop)) == OFF
+    assert story.told == (LATCHED, "stop requested", True)
+
+
+def wheels(speed_mps: float, base: Situation = RUNNING) -> Situation:
+    """The same, with the fastest wheel at another speed."""
+    return replace(base, speed_mps=speed_mps, begin_mps=speed_mps, standstill=speed_mps == 0.0)
+
+
+STOP = also(RUNNING, WRONG["stop requested"])
+
+
+def test_a_base_that_does_not_lose_speed_has_its_power_taken_step_by_step_in_less_than_a_second() -> None:
+    """0.5 m/s: allowed 0.6 m/s for 0.12 s, then 0.415 m/s² less on the ramp, 0.5 m/s² less in the quick stop."""
+    story = at(ENABLED, RUNNING)
+    story.step(STOP)
+    assert story.lasts(STOP, RAMP) == pytest.approx(0.12 + 0.1 / 0.415 + 0.03, abs=0.021)
+    assert story.lasts(STOP, QUICK) == pytest.approx(0.12 + 0.1 / 0.5 + 0.03, abs=0.021)
+    while story.supervisor.state is STOPPING:
+        assert story.step(STOP) == OFF
+    assert story.told == (LATCHED, "stop requested", True)
+
+
+def test_a_base_that_brakes_with_half_of_its_deceleration_is_waited_for() -> None:
+    story = at(ENABLED, RUNNING)
+    story.step(STOP)
+    cycles = round(0.5 / 0.4 / 0.01)
+    for cycle in range(cycles):
+        assert story.step(wheels(0.5 - 0.4 * 0.01 * cycle, STOP)) == RAMP
+    assert story.step(wheels(0.0, STOP)) == OFF
+
+
+def test_a_quick_stop_from_3_mps_at_0_9_mps2_is_waited_for_until_it_stands() -> None:
+    story = Story()
+    fast = load_robot(sample("bench")).robot
+    limits = {"linear_mps": 3.0, "deceleration_mps2": 0.9, "emergency_deceleration_mps2": 0.9}
+    fast = fast.model_copy(update={"limits": fast.limits.model_copy(update=limits)})
+    story.supervisor = Supervisor(Braking(fast), ramp_timeout_s=8.0)
+    fault = also(wheels(3.0), WRONG["drive fault"])
+    story.step(READY)
+    story.step(wheels(3.0))
+    assert story.step(fault) == QUICK
+    for cycle in range(round(3.0 / 0.9 / 0.01)):
+        assert story.step(wheels(3.0 - 0.9 * 0.01 * cycle, fault)) == QUICK
+    assert story.step(wheels(0.0, fault)) == OFF
+
+
+def test_a_wheel_that_gets_faster_in_a_quick_stop_has_its_power_taken_in_the_third_cycle() -> None:
+    story = at(ENABLED, RUNNING)
+    story.step(also(RUNNING, WRONG["drive fault"]))
+    runaway = also(wheels(0.7), WRONG["drive fault"])
+    assert [story.step(runaway) for _ in range(3)] == [QUICK, QUICK, OFF]
+
+
+def test_a_ramp_that_is_given_up_latches_with_its_own_cause() -> None:
+    story = at(ENABLED, RUNNING)
+    hopeless = also(RUNNING, WRONG["inactive"])
+    story.step(hopeless)
+    assert story.told == (STOPPING, "inactive", False)
+    story.lasts(hopeless, RAMP)
+    assert story.told == (STOPPING, "did not stop", True)
+    assert story.supervisor.cause.detail.startswith("left turns on its ramp, 0.")
+
+
+def test_the_ramp_takes_no_longer_than_timeouts_standstill_s() -> None:
+    story = at(ENABLED, RUNNING)
+    story.step(STOP)
+    trembles = replace(STOP, speed_mps=0.0)
+    assert story.lasts(trembles, RAMP) < 3.1  # it never stands: the allowed speed falls below zero
+
+
+@pytest.mark.parametrize(
+    ("wrong", "name"), [("stop requested", "stop requested"), ("inactive", "feedback implausible")]
+)
+def test_a_sensor_that_is_no_evidence_has_the_power_taken_at_once(wrong: str, name: str) -> None:
+    story = at(ENABLED, RUNNING)
+    story.step(also(RUNNING, WRONG[wrong]))
+    assert story.step(also(replace(RUNNING, doubted="left showed no motion"), WRONG[wrong])) == OFF
+    assert story.told == (STOPPING, name, True)
+
+
+def test_in_a_quick_stop_too() -> None:
+    story = at(ENABLED, RUNNING)
+    assert story.step(also(RUNNING, WRONG["drive fault"])) == QUICK
+    assert story.step(also(replace(RUNNING, doubted="left showed no motion"), WRONG["drive fault"])) == OFF
+
+
+def test_a_quick_stop_ends_at_standstill_but_lasts_one_cycle_at_least() -> None:
+    story = at(ENABLED)
+    assert story.step(also(STANDING, WRONG["drive fault"])) == QUICK
+    assert story.step(also(STANDING, WRONG["drive fault"])) == OFF
+
+
+def test_enabling_gives_up_after_two_seconds_and_needs_a_reset() -> None:
+    story = at(ENABLING)
+    assert story.lasts(READY, ON) == pytest.approx(2.0, abs=0.021)
+    assert story.told == (STOPPING, "enable timeout", True)
+    assert story.supervisor.cause.detail == "left is switch on disabled after 2.0 s"
+    story.step(READY, cycles=3)
+    assert story.told == (LATCHED, "enable timeout", True)
+
+
+def test_when_several_things_are_seen_at_once_the_first_cause_is_told() -> None:
+    """This process was stopped; the watchdog stopped the drives, which left OPERATIONAL or failed by that."""
+    story = at(ENABLED, RUNNING)
+    several = also(also(RUNNING, WRONG["watchdog tripped"]), WRONG["drive disabled"])
+    story.step(also(also(several, WRONG["drive fault"]), WRONG["drive restarted"]))
+    assert story.supervisor.cause.name == "watchdog tripped"
+
+
+@pytest.mark.parametrize("wrong", ["drive fault", "drive silent", "drive restarted"])
+def test_of_a_drive_that_the_watchdog_tripped_about_the_driver_tells_more(wrong: str) -> None:
+    story = at(ENABLED, RUNNING)
+    tripped = replace(also(RUNNING, WRONG["watchdog tripped"]), watchdog_about_drive=True)
+    story.step(also(tripped, WRONG[wrong]))
+    assert story.supervisor.cause.name == wrong
+    alone = at(ENABLED, RUNNING)
+    alone.step(tripped)
+    assert alone.supervisor.cause.name == "watchdog tripped"
+
+
+@pytest.mark.parametrize("wrong", [name for name, _, latched in STOPS if latched])
+def test_a_stop_that_needs_no_reset_is_taken_over_by_the_first_cause_that_does(wrong: str) -> None:
+    story = at(ENABLED, RUNNING)
+    inactive = also(RUNNING, WRONG["inactive"])
+    story.step(inactive)
+    story.step(also(inactive, WRONG[wrong]))
+    assert story.told == (STOPPING, wrong, True)
+    story.step(also(inactive, WRONG["bus failed"]))
+    assert story.told == (STOPPING, wrong, True)  # the first that latched stays
+
+
+@pytest.mark.parametrize(("wrong", "taken_over"), [("watchdog missing", True), ("drive disabled", False)])
+def test_while_the_power_goes_off_drives_that_are_disabled_are_no_news(wrong: str, taken_over: bool) -> None:
+    story = at(ENABLED, RUNNING)
+    inactive = also(STANDING, WRONG["inactive"])
+    assert story.step(inactive) == RAMP
+    assert story.step(inactive) == OFF
+    story.step(also(inactive, WRONG[wrong]))
+    assert story.told == (STOPPING, wrong if taken_over else "inactive", taken_over)
+
+
+@pytest.mark.parametrize("state", [LATCHED, DISARMED])
+def test_a_reset_leads_to_disarmed_and_no_further(state: DriverState) -> None:
+    story = at(state)
+    story.supervisor.reset()
+    assert story.supervisor.state is DISARMED
+    assert not story.supervisor.latches
+    assert story.step(also(READY, WRONG["command not zero"])) == OFF
+    assert story.step(READY) == ON
+
+
+@pytest.mark.parametrize("state", [OFFLINE, BOOTING, ENABLING, ENABLED, STOPPING])
+def test_a_reset_in_any_other_state_is_our_own_mistake_and_changes_nothing(state: DriverState) -> None:
+    story = at(state)
+    before = story.told
+    with pytest.raises(RuntimeError, match=f"reset in state {state.name}"):
+        story.supervisor.reset()
+    assert story.told == before
+
+
+STO_OPEN = Situation(disabled="left is switch on disabled", unprepared="left stays in switch on disabled: STO?")
+
+
+def test_the_way_to_switched_on_is_no_warning_while_it_takes_less_than_a_second() -> None:
+    story = at(DISARMED, STO_OPEN)
+    assert story.step(STO_OPEN, cycles=4) == Orders(PowerGoal.READY, Drive.ZERO)
+    assert story.told == (DISARMED, "preparing", False)
+    story.step(WRONG["command not zero"])
+    story.step(STO_OPEN, cycles=99)
+    assert story.supervisor.cause.name == "preparing"
+    story.step(STO_OPEN, cycles=3)
+    assert story.supervisor.cause.name == "drive not ready"
+
+
+def test_drives_that_are_not_ready_are_waited_for_without_power_and_without_a_latch() -> None:
+    story = at(DISARMED, STO_OPEN)
+    for _ in range(1000):
+        assert story.step(STO_OPEN) == Orders(PowerGoal.READY, Drive.ZERO)
+    assert story.told == (DISARMED, "drive not ready", False)
+    assert story.step(replace(STO_OPEN, unprepared="")) == ON
+    assert story.supervisor.state is ENABLING
+
+
+def test_while_they_are_waited_for_every_blocker_takes_the_power_off() -> None:
+    story = at(DISARMED, STO_OPEN)
+    story.step(STO_OPEN)
+    for name in ("watchdog missing", "command not zero"):
+        assert story.step(also(STO_OPEN, WRONG[name])) == OFF
+        assert story.told == (DISARMED, name, False)
+
+
+# drives prepared ── the records say so on disk ── power
+def test_no_power_before_the_record_is_on_disk() -> None:
+    story = Story()
+    waits = Situation(unarmed="not on disk yet")
+    orders = story.step(waits, 500)
+    assert (story.supervisor.state, story.supervisor.cause.name) == (DISARMED, UNARMED)
+    assert orders == ORDERS[PREPARING]
+    story.step(replace(waits, unprepared="no main voltage"), 102)
+    assert story.supervisor.cause.name == "drive not ready"
+    story.step(READY)
+    assert story.supervisor.state is ENABLING
+
+
+def test_a_stop_of_before_the_start_is_latched_until_a_reset() -> None:
+    before = Cause("drive fault", "latched since before the start: left_wheel", "reset")
+    supervisor = Supervisor(Braking(load_robot(sample("bench")).robot), 3.0, before)
+    for step in range(100):
+        orders = supervisor.step(READY, 10.0 + step)
+    assert orders == ORDERS[LATCHED]
+    assert (supervisor.state, supervisor.cause, supervisor.latches) == (LATCHED, before, True)
+    supervisor.reset()
+    supervisor.step(READY, 200.0)
+    assert supervisor.state is ENABLING

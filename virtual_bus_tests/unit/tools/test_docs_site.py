@@ -1,0 +1,134 @@
+"""The generated parts of the documentation: files and their purposes, docstrings, commands, messages, decisions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from canbase_cli.main import app
+from site_builder import api_pages, command_page, decision_page, message_page, offline, source_pages, structure
+from site_builder.docstrings import converted
+from site_builder.modules import ROOT, Module, modules, purpose, shipped_packages
+from support.marked_page import section
+
+ARCHITECTURE = ROOT / "docs" / "architecture.md"
+ALL = [module for package in shipped_packages() for module in modules(package)]
+
+
+def test_the_tree_in_architecture_md_is_that_of_the_sources() -> None:
+    written = section(ARCHITECTURE.read_text(encoding="utf-8"), structure.COMMAND)
+
+    assert written.strip() == structure.section(ROOT).strip(), "out of date: run `make structure`"
+
+
+def test_a_new_file_and_a_changed_first_line_change_the_tree(tmp_path: Path) -> None:
+    (tmp_path / "pyproject.toml").write_text('[tool.scikit-build]\nwheel.packages = ["arm/canbase_arm"]\n')
+    folder = tmp_path / "arm" / "canbase_arm"
+    folder.mkdir(parents=True)
+    (folder / "__init__.py").write_text('"""The arm."""\n')
+    (folder / "joint.py").write_text('"""One joint.\n\nMore of it.\n"""\n')
+
+    assert structure.section(tmp_path) == (
+        "### `arm/canbase_arm/`\n\nThe arm.\n\n| file | purpose |\n|---|---|\n| `joint.py` | One joint. |"
+    )
+
+
+def test_a_file_without_a_docstring_is_an_error_that_names_it(tmp_path: Path) -> None:
+    file = tmp_path / "mute.py"
+    file.write_text("x = 1\n")
+
+    with pytest.raises(ValueError, match=r"mute\.py has no docstring"):
+        purpose(file)
+
+
+@pytest.mark.parametrize("module", ALL, ids=lambda module: module.name)
+def test_the_first_line_of_a_docstring_is_a_whole_sentence(module: Module) -> None:
+    assert module.purpose.endswith("."), f"{module.path}: {module.purpose}"
+
+
+def test_the_api_pages_have_every_shipped_module_that_can_be_imported() -> None:
+    pages = api_pages.pages(ROOT)
+    documented = {line.split(":: ")[1] for page in pages.values() for line in page.splitlines() if "automodule" in line}
+
+    assert documented == {module.name for module in ALL if module.path.name != "__main__.py"}
+    assert all(f"api/{Path(name).stem}\n" in pages["api.rst"] for name in pages if name != "api.rst")
+
+
+def test_the_page_of_commands_has_every_command() -> None:
+    page = command_page.page()
+
+    for command in app.registered_commands:
+        assert f"\n## `canbase {command.name}`\n" in page
+    for group in app.registered_groups:
+        assert f"\n## `canbase {group.name}`\n" in page
+
+
+def test_the_page_of_messages_has_every_definition_and_its_comments() -> None:
+    page = message_page.page(ROOT)
+
+    assert "## canbase/action/DriveDistance\n" in page
+    assert "# Distance to drive [m]. Positive: forward (+x of base_link, REP 103). Negative: backward.\n" in page
+    assert page.count("\n## canbase/") == len(list((ROOT / "interfaces" / "msg").iterdir())) + len(
+        list((ROOT / "interfaces" / "action").iterdir())
+    )
+
+
+def test_the_page_of_decisions_has_every_record() -> None:
+    page = decision_page.page(ROOT)
+
+    assert all(f"/decisions/{record.stem}\n" in page for record in (ROOT / "docs" / "decisions").glob("*.md"))
+
+
+@pytest.mark.parametrize(
+    ("docstring", "restructured"),
+    [
+        ("A `name` and 2 * 3.", r"A ``name`` and 2 \* 3."),
+        ("Makes `Check`s.", r"Makes ``Check``\ s."),
+        ("Ends in an underscore_ here.", r"Ends in an underscore\_ here."),
+        ("Rules:\n1. One,\n   still one.\n2. Two.\nAfter.", "Rules:\n\n1. One,\n   still one.\n2. Two.\n\nAfter."),
+        ("- One.\n- Two.\nAfter.", "- One.\n- Two.\n\nAfter."),
+        ("Text:\n    indented\nText.", "Text:\n\n    indented\n\nText."),
+    ],
+)
+def test_a_docstring_becomes_restructured_text(docstring: str, restructured: str) -> None:
+    assert "\n".join(converted(docstring.splitlines())) == restructured
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<script defer src="https://cdn.example/a.js"></script>',
+        '<link rel="stylesheet" href="//fonts.example/b.css">',
+        "<img alt='' src=http://pictures.example/c.png>",
+        "@font-face { src: local('F'), url('https://fonts.example/d.woff2') }",
+        '@import "https://styles.example/e.css";',
+    ],
+)
+def test_what_a_page_would_load_from_the_network_is_found_and_named(tmp_path: Path, text: str) -> None:
+    page = tmp_path / "page.html"
+    page.write_text(text, encoding="utf-8")
+
+    with pytest.raises(ValueError, match=r"page\.html: (http:|https:)?//\w+\.example/"):
+        offline.check(tmp_path)
+
+
+def test_links_to_read_and_own_files_are_no_loads(tmp_path: Path) -> None:
+    text = '<a href="https://example.org">x</a><img src="_images/a.png"><link href="_static/b.css"><svg xmlns="http://w3"/>'
+    (tmp_path / "page.html").write_text(text, encoding="utf-8")
+
+    offline.check(tmp_path)
+
+
+def test_no_picture_of_the_docs_loads_from_the_network() -> None:
+    offline.check(ROOT / "docs")
+
+
+def test_a_documented_name_links_to_the_line_of_its_definition() -> None:
+    link = source_pages.link("py", {"module": "canbase_config.errors", "fullname": "Problem"})
+
+    assert link is not None
+    page, _, line = link.removeprefix("../../source/").partition(".html#L-")
+    assert (ROOT / page).read_text(encoding="utf-8").splitlines()[int(line) - 1] == "class Problem:"
+    assert source_pages.link("py", {"module": "canbase_config.errors", "fullname": "no_such_name"}) is None
+    assert source_pages.link("py", {"module": "typing", "fullname": "Any"}) is None

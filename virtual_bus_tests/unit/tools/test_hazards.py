@@ -1,0 +1,116 @@
+"""docs/hazards.yaml: tests that exist, formulas that robot.yaml can answer, and a page that is up to date."""
+
+from __future__ import annotations
+
+import pytest
+from pydantic import ValidationError
+
+from campaign.without import SAFEGUARDS
+from hazards import page, proofs
+from hazards.catalogue import Braking, Catalogue, Row, load
+from hazards.formula import FormulaError, evaluate
+from support.marked_page import rewritten
+
+CATALOGUE = load()
+ROBOT = page.sample_robot()
+
+
+@pytest.mark.parametrize("row", CATALOGUE.rows, ids=lambda row: row.id)
+def test_each_row_names_tests_that_exist(row: Row) -> None:
+    assert [why for name in row.tests if (why := proofs.problem(name))] == []
+
+
+@pytest.mark.parametrize("row", CATALOGUE.rows, ids=lambda row: row.id)
+def test_each_time_and_distance_follows_from_robot_yaml(row: Row) -> None:
+    for formula in (row.within_s, row.distance_m):
+        assert not formula or 0.0 < evaluate(formula, ROBOT) < 20.0
+    assert row.braking in (Braking.NONE, Braking.COAST) or row.layer
+
+
+@pytest.mark.parametrize("row", [row for row in CATALOGUE.rows if row.safeguard], ids=lambda row: row.id)
+def test_each_safeguard_can_be_taken_out(row: Row) -> None:
+    assert [name for name in row.safeguard.split("+") if name not in SAFEGUARDS] == []
+
+
+def test_the_page_is_up_to_date() -> None:
+    text = page.PAGE.read_text(encoding="utf-8")
+    assert rewritten(text, page.COMMAND, page.tables(CATALOGUE, ROBOT)) == text, "run `make hazards`"
+
+
+def test_the_distance_is_the_way_until_it_acts_and_braking() -> None:
+    row = CATALOGUE.rows[1].model_copy(update={"within_s": "0.3", "braking": Braking.QUICK_STOP, "distance_m": ""})
+    speed, rate = ROBOT.limits.linear_mps, ROBOT.limits.emergency_deceleration_mps2
+    assert page.worst_distance_m(row, ROBOT) == pytest.approx(speed * 0.3 + speed**2 / (2.0 * rate))
+    assert page.worst_distance_m(row.model_copy(update={"braking": Braking.COAST}), ROBOT) is None
+    assert page.worst_distance_m(row.model_copy(update={"distance_m": "0.25 * 2"}), ROBOT) == 0.5
+
+
+@pytest.mark.parametrize(
+    ("formula", "value"),
+    [
+        ("1 + 2 * 3", 7.0),
+        ("max(0.1, 3 / 10) - min(0.1, 1)", 0.2),
+        ("timeouts.lease_s", ROBOT.timeouts.lease_s),
+        ("mux.sources.joystick.timeout_s", ROBOT.mux.sources["joystick"].timeout_s),
+    ],
+)
+def test_a_formula(formula: str, value: float) -> None:
+    assert evaluate(formula, ROBOT) == pytest.approx(value)
+
+
+@pytest.mark.parametrize(
+    ("formula", "said"),
+    [
+        ("timeouts.lease", "no key timeouts.lease"),
+        ("timeouts.__class__", "no key"),
+        ("limits", "not a number"),
+        ("__import__('os')", "only numbers"),
+        ("bus.interface", "not a number"),
+        ("1 +", "not a formula"),
+        ("True", "not a number"),
+        ("2 ** 9", "only numbers"),
+        ("(lambda: 1)()", "only numbers"),
+    ],
+)
+def test_what_is_no_formula_is_refused(formula: str, said: str) -> None:
+    with pytest.raises(FormulaError, match=said):
+        evaluate(formula, ROBOT)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("unit/test_nothing.py", "there is no"),
+        ("unit/tools/test_hazards.py::test_nothing", "has no test_nothing"),
+        ("support/snapshots.py", "has no test"),
+        ("matrix: motor_driver: SIGNOTHING", "no such row"),
+        ("virtual robot: nothing", "no such scenario"),
+    ],
+)
+def test_a_proof_that_does_not_exist_is_named(name: str, said: str) -> None:
+    assert said in proofs.problem(name)
+
+
+def test_a_proof_is_a_file_a_test_or_a_test_with_parameters() -> None:
+    names = frozenset(("unit/test_a.py", "ros/test_b.py::test_stops"))
+    assert proofs.is_proof("virtual_bus_tests/unit/test_a.py::test_any[1]", names)
+    assert proofs.is_proof("virtual_bus_tests/ros/test_b.py::test_stops[driver: SIGKILL]", names)
+    assert not proofs.is_proof("virtual_bus_tests/ros/test_b.py::test_goes", names)
+
+
+def test_two_rows_with_one_id_are_refused() -> None:
+    with pytest.raises(ValidationError, match="two rows have the id"):
+        Catalogue(rows=(CATALOGUE.rows[0], CATALOGUE.rows[0]))
+
+
+def test_a_skipped_proof_fails(pytester: pytest.Pytester) -> None:
+    pytester.makeconftest("from hazards.skipped import pytest_runtest_makereport as pytest_runtest_makereport")
+    name = next(
+        name for name in sorted(proofs.pytest_names(CATALOGUE)) if name.startswith("unit/") and "::" not in name
+    )
+    folder = pytester.mkdir("unit")
+    (folder / name.removeprefix("unit/")).write_text(
+        "import pytest\n\n@pytest.mark.skip(reason='no time')\ndef test_it() -> None: ...\n"
+    )
+    (folder / "test_other.py").write_text("import pytest\n\n@pytest.mark.skip\ndef test_it() -> None: ...\n")
+    pytester.runpytest_inprocess("-p", "no:cacheprovider").assert_outcomes(errors=1, skipped=1)

@@ -1,0 +1,144 @@
+"""What mux and filter tell: who drives and why not, locks, and how grave a stop is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from canbase_config.mux import MuxLock, MuxSource
+from canbase_runtime.log_priority import Priority
+from canbase_velocity.changes import DropTeller, changed_order, changes, is_told
+from canbase_velocity.decision import Action, Cause, Decision
+from canbase_velocity.safety_filter import ScanState
+from canbase_velocity.twist import ZERO, Twist
+from support.mux_world import rested
+
+SOURCES = {
+    "joy": MuxSource(topic="cmd_vel_joy", priority=100, timeout_s=0.3),
+    "nav": MuxSource(topic="cmd_vel_nav", priority=10, timeout_s=0.5),
+}
+LOCKS = {"gate": MuxLock(topic="gate", priority=50, required=False)}
+FORWARD = Twist(0.5, 0.0)
+
+
+def test_from_first_command_to_silence() -> None:
+    mux = rested(SOURCES, LOCKS)
+    nobody = mux.decide(0.0)
+    mux.on_command("nav", FORWARD, 1.0)
+    nav = mux.decide(1.0)
+    silent = mux.decide(1.6)
+
+    assert list(changes(nobody, nav)) == [
+        ("nav drives, before nobody", Priority.INFO, {"active": "nav", "before": ""}),
+    ]
+    assert list(changes(nav, mux.decide(1.4))) == []
+    ((sentence, priority, fields),) = changes(nav, silent)
+    assert sentence == "nobody drives, before nav (silent for 0.60 s (timeout 0.50 s))"
+    assert (priority, fields) == (Priority.INFO, {"active": "", "before": "nav"})
+
+
+def test_a_lock_is_a_notice_and_so_is_what_it_takes_away() -> None:
+    mux = rested(SOURCES, LOCKS)
+    mux.on_command("nav", FORWARD, 1.0)
+    nav = mux.decide(1.0)
+    mux.on_lock("gate", True, 1.1)
+    locked = mux.decide(1.1)
+    mux.on_lock("gate", False, 1.2)
+    free = mux.decide(1.2)
+
+    (lock, lost) = changes(nav, locked)
+    assert lock == ("lock gate holds", Priority.NOTICE, {"lock": "gate", "lock_holds": "true"})
+    assert (lost[0].startswith("nobody drives, before nav ("), lost[1]) == (True, Priority.NOTICE)
+    assert "gate" in lost[0]
+    assert list(changes(locked, free)) == [
+        ("lock gate is free", Priority.NOTICE, {"lock": "gate", "lock_holds": "false"}),
+        ("nav drives, before nobody", Priority.INFO, {"active": "nav", "before": ""}),
+    ]
+
+
+def test_a_source_that_is_not_followed_is_a_notice_with_what_it_waits_for() -> None:
+    mux = rested(SOURCES, LOCKS)
+    nobody = mux.decide(0.9)
+    mux.on_estop(False)
+    mux.on_command("joy", FORWARD, 1.0)
+    held = mux.decide(1.0)
+    mux.on_estop(True)
+    mux.on_command("joy", ZERO, 1.2)
+    released = mux.decide(1.2)
+
+    ((sentence, priority, fields),) = changes(nobody, held)
+    assert sentence.startswith("joy is not followed: waiting for zero")
+    assert (priority, fields) == (Priority.NOTICE, {"active": "joy", "before": ""})
+    assert [sentence for sentence, _, _ in changes(held, released)] == ["joy drives, before joy"]
+
+
+@pytest.mark.parametrize("cause", Cause)
+@pytest.mark.parametrize("action", Action)
+def test_only_a_stop_that_is_not_the_filters_daily_work_is_a_warning(action: Action, cause: Cause) -> None:
+    daily = {Cause.OBSTACLE: Priority.NOTICE, Cause.OBSTACLE_NEAR: Priority.NOTICE, Cause.SHUTDOWN: Priority.INFO}
+    expected = {Action.STOP: daily.get(cause, Priority.WARNING)}.get(action, Priority.INFO)
+
+    sentence, priority, fields = changed_order(Decision(action, cause, "at 0.31 m", "it being gone", ZERO))
+
+    assert sentence == f"{action.name} {cause.value} at 0.31 m"
+    assert priority is expected
+    assert fields == {
+        "action": action.name,
+        "cause": cause.value,
+        "clears_on": "it being gone",
+        "emergency": "false",
+    }
+
+
+def decision(action: Action, cause: Cause, *, emergency: bool = False) -> Decision:
+    return Decision(action, cause, "", "", ZERO, emergency)
+
+
+LIMITED = decision(Action.LIMIT, Cause.SPEED)
+FREE = decision(Action.PASS, Cause.NONE)
+PRESSED = decision(Action.STOP, Cause.ESTOP, emergency=True)
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "told"),
+    [
+        (LIMITED, PRESSED, True),  # an emergency stop while the speed was limited
+        (PRESSED, LIMITED, True),
+        (FREE, PRESSED, True),
+        (decision(Action.STOP, Cause.SCAN_STALE), PRESSED, True),
+        (FREE, decision(Action.SLOW, Cause.OBSTACLE_NEAR), True),
+        (FREE, LIMITED, False),  # comes and goes with each command
+        (LIMITED, decision(Action.LIMIT, Cause.ZONE), False),
+        (LIMITED, decision(Action.SLOW, Cause.OBSTACLE_NEAR), False),
+        (FREE, decision(Action.PASS, Cause.NONE, emergency=True), True),  # brakes hard under a zero command
+        (decision(Action.PASS, Cause.NONE, emergency=True), FREE, False),
+        (PRESSED, PRESSED, False),
+    ],
+)
+def test_each_stop_is_told_also_one_that_ends_or_follows_a_speed_limit(
+    before: Decision, now: Decision, told: bool
+) -> None:
+    assert is_told(before, now) is told
+
+
+def test_hard_braking_is_in_the_sentence_and_in_the_fields() -> None:
+    sentence, priority, fields = changed_order(decision(Action.PASS, Cause.NONE, emergency=True))
+    assert (sentence, priority, fields["emergency"]) == ("PASS none brakes hard", Priority.NOTICE, "true")
+
+
+def test_scans_that_are_dropped_are_told_once_for_each_reason_and_again_after_ten_seconds() -> None:
+    sound = ScanState("scan", True, 0.3, 0.1)
+    invalid = replace(sound, cause=Cause.SCAN_INVALID, dropped=3, why_dropped="it has no readings")
+    frozen = replace(sound, cause=Cause.SCAN_FROZEN, dropped=9, problem="the same 360 readings for 0.5 s, 6 scans")
+    drops = DropTeller()
+    assert list(drops.news([sound], 0.0)) == []
+    ((sentence, priority, fields),) = drops.news([invalid], 0.1)
+    assert sentence == "scans of scan are dropped, 3 so far: it has no readings"
+    assert (priority, fields) == (Priority.WARNING, {"topic": "scan", "cause": "scan_invalid"})
+    assert list(drops.news([invalid], 0.2)) == []
+    assert list(drops.news([sound], 0.3)) == []  # one that comes and goes does not fill the log
+    assert list(drops.news([invalid], 0.4)) == []
+    assert [told[2]["cause"] for told in drops.news([frozen], 0.5)] == ["scan_frozen"]
+    assert list(drops.news([frozen], 10.4)) == []
+    assert len(list(drops.news([frozen], 10.5))) == 1

@@ -1,0 +1,92 @@
+"""Two publishers on the topic of one scanner: whose scans count, and from when on none does. Times in s."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from canbase_velocity.decision import Action, Cause
+from canbase_velocity.filter_state import SafetyFilter
+from canbase_velocity.placement import Placement
+from canbase_velocity.sole_publisher import LATCHED_S, SolePublisher
+from canbase_velocity.twist import Twist
+from support.filter_inputs import config
+from support.lidar import Lidar
+
+ONE, TWO = ("/front",), ("/rear", "/front")
+FAR = np.array([(5.0, 0.0), (-4.0, 1.0)])
+PLACE = Placement(0.0, 0.0, (1.0, 0.0), (0.0, 1.0))
+
+
+@pytest.mark.parametrize(("together_s", "latched"), [(0.0, False), (LATCHED_S - 0.5, False), (LATCHED_S, True)])
+def test_two_that_were_together_for_long_are_two_scanners(together_s: float, latched: bool) -> None:
+    sole = SolePublisher()
+    sole.look(ONE, 9.5)
+    assert sole.problem == ""
+    for step in range(round(together_s / 0.5) + 1):
+        sole.look(TWO, 10.0 + 0.5 * step)
+        assert sole.problem.startswith("2 publishers (/front, /rear): give each scanner a topic")
+    assert ("until the next start" in sole.problem) is latched
+    sole.look(ONE, 10.5 + together_s)
+    assert bool(sole.problem) is latched
+    sole.look((), 11.0 + together_s)
+    assert bool(sole.problem) is latched
+
+
+def test_a_driver_that_is_started_again_and_again_is_one_scanner() -> None:
+    sole = SolePublisher()
+    for start in range(10):
+        for step in range(40):
+            sole.look(TWO, 30.0 * start + 0.5 * step)
+        sole.look(ONE, 30.0 * start + 20.0)
+        assert sole.problem == ""
+
+
+class Base:
+    """Two scanners on one topic, of one frame_id and one geometry: nothing in their scans tells them apart."""
+
+    def __init__(self) -> None:
+        self.filter = SafetyFilter(config(estop=False))
+        self.cycle = 0
+        self.scanners = (Lidar(), Lidar(seed=2))
+        self.topic = "scan"
+
+    def run(self, seconds: float, alive: tuple[int, ...], in_graph: tuple[str, ...]) -> set[tuple[Action, Cause]]:
+        """The decisions of that time."""
+        found = set()
+        for _ in range(round(seconds / 0.05)):
+            self.cycle += 1
+            now = 10.0 + 0.05 * self.cycle
+            if self.cycle % 10 == 0:
+                self.filter.on_scan_publishers(self.topic, in_graph, now)
+            number = self.cycle % 2
+            if number in alive:
+                scan = dataclasses.replace(self.scanners[number].scan(FAR), stamp_ns=round(now * 1e9))
+                self.filter.on_laser_scan(self.topic, scan, PLACE, now)
+            self.filter.on_command(Twist(0.3, 0.0), now)
+            decision = self.filter.decide(now)
+            found.add((decision.action, decision.cause))
+        return found
+
+
+# one scanner ── 2.0: a second one on its topic ── 40: the first one dies, and its half of the world with it
+def test_the_scans_of_two_do_not_count_and_neither_do_those_of_the_one_that_is_left() -> None:
+    base = Base()
+    base.run(1.0, (0,), ONE)
+    assert base.run(1.0, (0,), ONE) == {(Action.PASS, Cause.NONE)}
+    base.run(0.6, (0, 1), TWO)
+    assert base.run(38.0, (0, 1), TWO) == {(Action.STOP, Cause.SCAN_INVALID)}
+    assert base.run(30.0, (1,), TWO) == {(Action.STOP, Cause.SCAN_INVALID)}
+    assert base.run(30.0, (1,), ONE) == {(Action.STOP, Cause.SCAN_INVALID)}
+
+
+def test_a_driver_that_was_killed_is_replaced_when_the_graph_has_forgotten_it() -> None:
+    base = Base()
+    base.run(2.0, (0,), ONE)
+    base.run(0.6, (), ONE)
+    base.run(0.6, (0,), TWO)
+    assert base.run(19.0, (0,), TWO) == {(Action.STOP, Cause.SCAN_INVALID)}
+    base.run(0.6, (0,), ONE)
+    assert base.run(1.0, (0,), ONE) == {(Action.PASS, Cause.NONE)}

@@ -1,0 +1,175 @@
+"""What the watchdog writes down, and how it starts with what it finds."""
+
+from __future__ import annotations
+
+import pytest
+
+from canbase_watchdog import frames, policy
+from canbase_watchdog.latch import Entry, Mark, Past
+from canbase_watchdog.policy import Cause
+from canbase_watchdog.watchdog import Answer, State, Watchdog
+from support.watchdog_story import FakeDrive, Story
+from support.watchdog_story_looks import driving, until_tripped
+
+STATE = 0x1FE
+
+
+def resumed(past: Past, *drives: FakeDrive) -> Story:
+    """A watchdog that starts with this record, among drives that are off."""
+    story = Story(*drives)
+    story.watchdog = Watchdog(story.config, 0.0, past)
+    return story
+
+
+def mark_of(story: Story) -> Mark:
+    return story.watchdog.record.mark
+
+
+def keep(story: Story) -> None:
+    story.watchdog.on_record(story.watchdog.record, "")
+
+
+@pytest.mark.parametrize(
+    ("past", "cause", "detail"),
+    [
+        (Past(Entry(Mark.LIVE)), Cause.POWER_AT_END, "it ended while a drive had power"),
+        (Past(Entry(Mark.LATCHED, 6, 2, "too fast")), Cause.OVERSPEED, "since before the start: too fast"),
+        (
+            Past(Entry(Mark.LATCHED, 6, 2, "since before the start: too fast")),
+            Cause.OVERSPEED,
+            "since before the start: too fast",
+        ),
+        (Past(Entry(Mark.LATCHED, 99, 0, "?")), Cause.RECORD_UNUSABLE, "since before the start: ?"),
+        (Past(Entry(Mark.LATCHED, 0)), Cause.RECORD_UNUSABLE, "since before the start: "),
+        (Past(problem="/x: damaged"), Cause.RECORD_UNUSABLE, "cannot be used: /x: damaged"),
+    ],
+)
+def test_it_starts_tripped(past: Past, cause: Cause, detail: str) -> None:
+    story = resumed(past)
+    status = story.watchdog.status
+    assert (status.state, status.verdict.cause) == (State.TRIPPED, cause)
+    assert detail in status.verdict.detail
+    assert story.watchdog.trips == 0
+    assert mark_of(story) is Mark.LATCHED
+    story.run(1.0)
+    assert story.watchdog.status.state is State.TRIPPED
+    assert story.reset(1) == Answer.DONE
+    story.run(0.1)
+    assert mark_of(story) is Mark.CLEAR
+
+
+def test_it_starts_watching_with_a_clear_record() -> None:
+    story = resumed(Past())
+    story.run(0.5)
+    assert story.watchdog.status.state is State.WATCHING
+    assert mark_of(story) is Mark.CLEAR
+
+
+# start, tripped ── drives booted and off ── no frame to them
+def test_drives_that_are_off_are_left_alone() -> None:
+    story = resumed(Past(Entry(Mark.LIVE)))
+    story.run(2.0)
+    assert {frame.cob_id for _, frame in story.sent} <= {0x1FE, 0x2FE, 0x77E}
+
+
+def test_a_drive_that_has_power_is_stopped() -> None:
+    drive = FakeDrive(1)
+    story = resumed(Past(Entry(Mark.LIVE)), drive, FakeDrive(2))
+    story.obedient = False
+    story.drive_at(300, 0.3)
+    story.word, story.speed = 0x06, 0
+    story.run(2.0)
+    assert story.since(0.0, 0x501) or story.since(0.0, 0x601)
+    assert drive.speed[0] == 0
+
+
+def test_no_reset_before_the_drives_were_seen_to_stand() -> None:
+    drive = FakeDrive(1)
+    story = resumed(Past(Entry(Mark.LIVE)), drive, FakeDrive(2))
+    story.sync = False  # heartbeats, and no feedback
+    story.run(0.2)
+    assert story.reset(1) == Answer.CAUSE_STANDS
+    story.sync = True
+    story.run(1.0)
+    assert story.reset(2) == Answer.DONE
+
+
+def test_a_reset_needs_no_drive_that_was_never_there() -> None:
+    story = resumed(Past(Entry(Mark.LIVE)))
+    for drive in story.drives:
+        drive.mute = True
+    story.word = 0x00
+    story.run(1.0)
+    assert story.reset(1) == Answer.DONE
+    story.run(0.1)
+    assert mark_of(story) is Mark.CLEAR
+
+
+# switched on ── LIVE wanted ── on disk ── bit 7 ── enabled
+def test_the_bit_is_set_when_live_is_on_disk() -> None:
+    story = resumed(Past())
+    story.run(0.4)
+    for drive in story.drives:
+        drive.words[0] = 0x0233
+    story.run(0.1)
+    assert mark_of(story) is Mark.LIVE
+    assert not story.watchdog.status.armed
+    assert story.since(0.0, STATE)[-1][1].data[2] == 0
+    story.watchdog.on_record(None, "read-only file system")
+    story.run(0.1)
+    assert not story.watchdog.status.armed
+    keep(story)
+    story.run(0.1)
+    assert story.watchdog.status.armed
+    assert story.since(0.0, STATE)[-1][1].data[2] == frames.ARMED
+
+
+def test_it_stays_live_until_the_power_was_seen_to_be_off() -> None:
+    story = resumed(Past())
+    for drive in story.drives:
+        drive.words[0] = 0x0233
+    story.run(0.4)
+    assert mark_of(story) is Mark.LIVE
+    story.drives[0].mute = True
+    story.word = 0x00
+    story.run(0.5)
+    assert mark_of(story) is Mark.LIVE
+    story.drives[0].mute = False
+    story.run(0.5)
+    assert story.watchdog.status.state is State.WATCHING
+    assert mark_of(story) is Mark.CLEAR
+
+
+def test_clear_again_when_all_drives_are_off() -> None:
+    story = driving()
+    story.speed = 0
+    story.run(1.0)
+    story.word = 0x00
+    story.run(0.2)
+    assert story.watchdog.status.state is State.WATCHING
+    assert mark_of(story) is Mark.CLEAR
+
+
+def test_a_trip_is_written_with_its_cause_and_cleared_by_the_reset_alone() -> None:
+    story = driving()
+    story.filter = False
+    until_tripped(story)
+    record = story.watchdog.record
+    assert (record.mark, record.cause) == (Mark.LATCHED, Cause.LEASE_LOST)
+    story.run(2.0)
+    assert story.watchdog.record == record
+    story.filter = True
+    story.run(0.3)
+    assert story.reset(7) == Answer.DONE
+    story.run(0.1)
+    assert mark_of(story) is Mark.CLEAR
+
+
+def test_a_trip_at_the_end_is_written() -> None:
+    story = driving()
+    story.watchdog.end(story.t)
+    assert (story.watchdog.record.mark, story.watchdog.record.cause) == (Mark.LATCHED, Cause.ENDED)
+
+
+def test_a_readable_clear_record_is_no_cause() -> None:
+    assert policy.before_the_start(Past()) is policy.FINE
