@@ -14,6 +14,7 @@ from functools import partial
 
 from canbase_config import stopping
 from canbase_config.robot import DRIVER_NODE_ID, Robot
+from canbase_driver.causes import Cause, Finding
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import (
     EMCY,
@@ -41,11 +42,13 @@ from canbase_driver.report import Told, snapshot_of
 from canbase_driver.runtime.bus_health import BusReport
 from canbase_driver.runtime.cycle_stats import CycleStats
 from canbase_driver.snapshot import DriverSnapshot, DriverState, StopRecord, WatchdogView
-from canbase_driver.supervision.latch import PowerRecord, cause_before_the_start
+from canbase_driver.supervision.latch import PowerRecord, found_before_the_start
 from canbase_driver.supervision.lifecycle import Aim, Readiness
+from canbase_driver.supervision.phases import NO_POWER, Drive, Orders
 from canbase_driver.supervision.reset import Outcome
 from canbase_driver.supervision.reset_run import ResetRun
-from canbase_driver.supervision.supervisor import NO_POWER, Cause, Drive, Orders, Situation, Supervisor
+from canbase_driver.supervision.situation import Situation
+from canbase_driver.supervision.supervisor import Supervisor
 from canbase_driver.supervision.watchdog_link import COUNTERS_COB_ID, STATE_COB_ID, WatchdogLink
 from canbase_runtime.latch_record import Found, Record
 
@@ -74,7 +77,7 @@ class DriverCore:
         self._sync = SyncProducer(robot.bus.sync_counter)
         self._watchdog = WatchdogLink(robot.timeouts.watchdog_s)
         self._standstill_s = stopping.standstill_s(robot)
-        self._supervisor = Supervisor(Braking(robot), self._standstill_s, cause_before_the_start(found))
+        self._supervisor = Supervisor(Braking(robot), self._standstill_s, found_before_the_start(found))
         self._record = PowerRecord(found)
         self._let_go = LetGo(robot)
         self._limiter = Limiter(robot.limits, robot.base.track_m)
@@ -112,9 +115,9 @@ class DriverCore:
         return self._supervisor.state
 
     @property
-    def cause(self) -> Cause:
+    def finding(self) -> Finding:
         """Why it is not enabled."""
-        return self._supervisor.cause
+        return self._supervisor.finding
 
     @property
     def lets_go(self) -> bool:
@@ -218,7 +221,7 @@ class DriverCore:
         # Reset communication forgets 1016h: a drive must not report a lost heartbeat after an orderly end. One that may
         # have power keeps it, and stops by the missing heartbeat.
         off = [node.node_id for node in self._drives.nodes if node.is_off(now)]
-        let_go = self._readiness.step(situation, self.state, self.cause, now)
+        let_go = self._readiness.step(situation, self.state, self.finding, now)
         for node in self._drives.nodes if let_go else ():
             node.release(now)
         if let_go or (self.finished and not self._readiness.released):
@@ -234,13 +237,13 @@ class DriverCore:
         before, latched_before = self._supervisor.state, self._supervisor.latches
         orders = self._supervisor.step(situation, now)
         self._record.note(self._supervisor, situation)
-        state, cause = self._supervisor.state, self._supervisor.cause
+        state, finding = self._supervisor.state, self._supervisor.finding
         began = state is not before and state in (DriverState.STOPPING, DriverState.LATCHED)
         continued = before is DriverState.STOPPING and state in (DriverState.STOPPING, DriverState.LATCHED)
         if (began and not continued) or (continued and self._supervisor.latches and not latched_before):
-            by = "watchdog" if cause.name == "watchdog tripped" else "motor_driver"
+            by = "watchdog" if finding.cause is Cause.WATCHDOG_TRIPPED else "motor_driver"
             latches = self._supervisor.latches
-            self.stops.append(StopRecord(by, cause.name, cause.detail, latches, cause.clears_on, now))
+            self.stops.append(StopRecord(by, finding.cause.value, finding.detail, latches, finding.clears_on, now))
         if state is not before and state is DriverState.ENABLED:
             self._command.await_zero()
         return orders

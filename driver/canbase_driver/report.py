@@ -36,13 +36,13 @@ def snapshot_of(told: Told, base: Base, now: float) -> DriverSnapshot:
     supervisor, watchdog, drives, odometry = told.supervisor, told.watchdog, told.drives, told.feed.odometry
     view, _detail = watchdog.view(now)
     measured = base_twist(*drives.speeds_mps(), base.track_m)
-    counters, cause = watchdog.counters, supervisor.cause
+    counters, finding = watchdog.counters, supervisor.finding
     return DriverSnapshot(
         time_s=now,
         state=supervisor.state,
-        cause=cause.name,
-        detail=cause.detail,
-        clears_on=cause.clears_on,
+        cause=finding.cause,
+        detail=finding.detail,
+        clears_on=finding.clears_on,
         watchdog=view,
         watchdog_cause=watchdog.cause,
         watchdog_age_s=watchdog.age_s(now),

@@ -9,6 +9,8 @@ import math
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
+from canbase_driver.causes import Cause
+
 Covariance = tuple[float, ...]
 """36 numbers: 6 × 6, row by row, in the order x, y, z, rotation about x, y, z (geometry_msgs, REP 103)."""
 
@@ -98,8 +100,8 @@ class DriverSnapshot:
     time_s: float
     """Local monotonic time of the snapshot [s]."""
     state: DriverState
-    cause: str
-    """Why it is not ENABLED; "none" when it is."""
+    cause: Cause
+    """Why it is not ENABLED; NONE when it is."""
     detail: str
     """One sentence with the values."""
     clears_on: str

@@ -53,7 +53,7 @@ def test_every_drive_is_enabled_and_turns_its_wheel_forward_backward_and_against
     assert driver.loop.failure is None
     final, stops = driver.loop.next_snapshot(timeout_s=0.1)
     assert final is not None
-    assert (final.cause, [stop.cause for stop in driver.stops + stops]) == ("shutdown", ["shutdown"])
+    assert (final.cause.value, [stop.cause for stop in driver.stops + stops]) == ("shutdown", ["shutdown"])
 
 
 @pytest.mark.real_bus
@@ -70,7 +70,7 @@ def test_the_stop_request_and_the_reset_from_another_thread(driver: Driver) -> N
     driver.loop.join(6.0)
     last, _ = driver.loop.next_snapshot(timeout_s=0.1)  # handed over though the state is the same
     assert last is not None
-    assert (last.state, last.cause) == (DriverState.LATCHED, "shutdown")
+    assert (last.state, last.cause.value) == (DriverState.LATCHED, "shutdown")
 
 
 @pytest.mark.real_bus
@@ -92,7 +92,7 @@ def test_the_fault_of_one_drive_and_the_battery_of_all_stop_the_base_until_a_res
     last = crew.robot.drives[-1]
     around.suffer(last.node_id, "fault", axis=last.axis, code=OVERCURRENT)
     faulty = driver.latched()
-    assert faulty.cause == "drive fault"
+    assert faulty.cause.value == "drive fault"
     assert f"{last.joint} (node {last.node_id}): 2310h over-current" in faulty.detail
     driver.reset()
     driver.driving()

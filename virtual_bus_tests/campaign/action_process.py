@@ -115,7 +115,7 @@ class ActionProcess(Process):
         driver = Driver(
             received=self.clock.now,
             state=snapshot.state.name.lower(),
-            cause=snapshot.cause,
+            cause=snapshot.cause.value,
             detail=snapshot.detail,
             watchdog=snapshot.watchdog.value,
             watchdog_cause=snapshot.watchdog_cause,

@@ -153,7 +153,7 @@ class DriverProcess(Process):
 
     def _publish(self, now: float) -> None:
         """odom at 50 Hz while it is valid, the status at its rate and on every change."""
-        status = (self.core.state, self.core.cause.name)
+        status = (self.core.state, self.core.finding.cause)
         due = status != self._told or now - self._status_at >= 1.0 / self._robot.rates.status_hz
         samples = round(self._robot.rates.control_hz / self._robot.rates.odometry_hz)
         if not due and self._cycle % samples:

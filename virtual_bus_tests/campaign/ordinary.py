@@ -116,7 +116,7 @@ class OrdinaryHour:
         if watchdog.state is WatchdogState.TRIPPED:
             return f"watchdog: {watchdog.verdict.cause.name.lower()}: {watchdog.verdict.detail}"
         if driver.state is not DriverState.ENABLED:
-            return f"driver: {driver.state.name.lower()}: {driver.cause.name}: {driver.cause.detail}"
+            return f"driver: {driver.state.name.lower()}: {driver.finding.cause.value}: {driver.finding.detail}"
         for change in self.world.drives.changes():
             lets_go = change.after in LET_GO and self._stands
             if change.before is State.OPERATION_ENABLED and not lets_go:

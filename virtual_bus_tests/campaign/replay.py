@@ -25,7 +25,9 @@ class _Teller:
     def _look(self) -> None:
         world = self._world
         driver, watchdog = world.driver.core, world.watchdog.core.status
-        self._tell("driver", f"{driver.state.name}: {driver.cause.name} {driver.cause.detail}", driver.state.name)
+        self._tell(
+            "driver", f"{driver.state.name}: {driver.finding.cause.value} {driver.finding.detail}", driver.state.name
+        )
         verdict = f"{watchdog.state.name}: {watchdog.verdict.cause.name} {watchdog.verdict.detail}"
         self._tell("watchdog", verdict, f"{watchdog.state.name} {watchdog.verdict.cause.name}")
         self._tell("watchdog's ladder", watchdog.step.name, watchdog.step.name)

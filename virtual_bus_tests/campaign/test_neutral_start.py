@@ -53,7 +53,7 @@ class Hand:
             if self.world.driver.core.state is DriverState.LATCHED:
                 self.world.velocity.reset()
                 self.world.driver.reset(outcomes)
-        raise AssertionError(f"{self.world.driver.core.state}: {self.world.driver.core.cause} {outcomes}")
+        raise AssertionError(f"{self.world.driver.core.state}: {self.world.driver.core.finding} {outcomes}")
 
     def stays(self, seconds: float = 3.0) -> bool:
         """The base does not move."""

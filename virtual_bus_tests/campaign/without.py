@@ -12,12 +12,15 @@ from typing import Any
 from campaign.disk import StopDisk, WatchdogDisk
 from canbase_action_server import causes
 from canbase_action_server.outcome import ErrorCode
+from canbase_driver.causes import Cause
 from canbase_driver.drives.let_go import LetGo
 from canbase_driver.motion import velocity_command as command
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.motion.odometry import WheelTravel
-from canbase_driver.snapshot import DriverState, WatchdogView
+from canbase_driver.snapshot import WatchdogView
 from canbase_driver.supervision import reset, supervisor, watchdog_link
+from canbase_driver.supervision.phases import Phase
+from canbase_driver.supervision.reasons import HAZARDS, Blocker, Hazard
 from canbase_runtime.latch_record import CLEAR, Defect, Found
 from canbase_sim.cia301.heartbeat import HeartbeatConsumer
 from canbase_velocity import filter_state, lock, mux, neutral, obstacle, safety_filter
@@ -37,6 +40,8 @@ def _drop(module: ModuleType, wanted: Callable[[Any], bool]) -> Callable[[], Non
         for name, table in list(vars(module).items()):
             if isinstance(table, tuple) and any(not wanted(row) for row in table):
                 setattr(module, name, tuple(row for row in table if wanted(row)))
+            if name == "BY_PHASE":
+                table |= {phase: tuple(row for row in rows if wanted(row)) for phase, rows in table.items()}
 
     return take_out
 
@@ -49,8 +54,12 @@ def _trip(cause: policy.Cause) -> Callable[[], None]:
     return _drop(policy, lambda row: getattr(row, "cause", None) is not cause)
 
 
-def _hazard(name: str) -> Callable[[], None]:
-    return _drop(supervisor, lambda row: not (isinstance(row, supervisor.Hazard) and row.name == name))
+def _reason(kind: type[Blocker | Hazard], cause: Cause) -> Callable[[], None]:
+    def stays(row: Any) -> bool:
+        reason = getattr(row, "reason", row)
+        return not (isinstance(reason, kind) and reason.cause is cause)
+
+    return _drop(supervisor, stays)
 
 
 def _all_trips() -> None:
@@ -72,7 +81,7 @@ def _no_latch() -> None:
 
 def _driver_forgets() -> None:
     """A latched stop of the driver ends by itself."""
-    supervisor.RULES[DriverState.LATCHED] = supervisor.Supervisor._without_power
+    supervisor.BY_PHASE[Phase.LATCHED] = supervisor.BY_PHASE[Phase.DISARMED]
 
 
 def _forget_estop(self: filter_state.SafetyFilter, now: float) -> None:
@@ -116,10 +125,6 @@ def _resets_while_commanded() -> None:
         reset.BREAKS[phase] = tuple(check for check in checks if check is not commanded)
 
 
-def _blocker(name: str) -> Callable[[], None]:
-    return _drop(supervisor, lambda row: not (isinstance(row, supervisor.Blocker) and row.name == name))
-
-
 def _never_frozen(self: FrozenWatch, scan: Scan, now: float, *, moves: bool) -> str:
     self.since = now
     return ""
@@ -129,7 +134,7 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     **{f"watchdog:{check.cause.name.lower()}": _trip(check.cause) for check in policy.CHECKS},
     "watchdog:all": _all_trips,
     "watchdog:latch": _no_latch,
-    **{f"driver:{hazard.name.replace(' ', '_')}": _hazard(hazard.name) for hazard in supervisor.HAZARDS},
+    **{f"driver:{row.cause.value.replace(' ', '_')}": _reason(Hazard, row.cause) for row in HAZARDS},
     "driver:latch": _driver_forgets,
     "driver:asks_for_watchdog": _put(
         watchdog_link.WatchdogLink, "view", lambda self, now: (WatchdogView.OK, "")
@@ -139,7 +144,7 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "driver:command_is_finite": _put(Twist2D, "is_finite", property(lambda self: True)),
     "driver:odometry_jump_guard": _put(WheelTravel, "_is_near", lambda self, from_raw, raw, cycles: True),
     "driver:stop_record": _no_records,
-    "driver:waits_for_zero": _blocker("command not zero"),
+    "driver:waits_for_zero": _reason(Blocker, Cause.COMMAND_NOT_ZERO),
     "driver:reset_needs_zero": _resets_while_commanded,
     "watchdog:stop_record": _watchdog_forgets,
     "records:unreadable": _unreadable_is_clear,

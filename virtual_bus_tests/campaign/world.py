@@ -63,7 +63,7 @@ class World:
         while self.driver.core.state is not DriverState.ENABLED:
             if self.clock.now >= end:
                 raise RuntimeError(
-                    f"not enabled after {BOOT_S} s: {self.driver.core.state.name} {self.driver.core.cause}"
+                    f"not enabled after {BOOT_S} s: {self.driver.core.state.name} {self.driver.core.finding}"
                 )
             self.clock.run_until(self.clock.now + 0.01)
         self.release()

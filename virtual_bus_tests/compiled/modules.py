@@ -23,10 +23,11 @@ HOT = {
         "stopper tally torque twist view watchdog"
     ),
     "canbase_driver": (
-        "cia402 core drive_units report snapshot boot.node_boot cia301.frame cia301.nmt cia301.pdo drives.axis "
+        "causes cia402 core drive_units report snapshot boot.node_boot cia301.frame cia301.nmt cia301.pdo drives.axis "
         "drives.canopen_node drives.drive_group drives.let_go drives.odometry_feed drives.standstill drives.telemetry "
         "motion.braking motion.odometry motion.velocity_command runtime.cycle_stats supervision.latch "
-        "supervision.stop_history supervision.supervisor supervision.watchdog_link"
+        "supervision.phases supervision.reasons supervision.situation supervision.stop_history supervision.supervisor "
+        "supervision.watchdog_link"
     ),
     "canbase_velocity": (
         "base_ready clearance decision estop filter_state frozen glitch lease motion mux neutral obstacle ramp "

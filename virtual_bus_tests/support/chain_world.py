@@ -135,7 +135,7 @@ class World:
         """Let time pass until the driver is in `state`; it must get there in time. How long it took [s]."""
         start = self.now
         reached = self.run(within_s, lambda: self.core.state is state)
-        assert reached, f"driver is {self.core.state.name}, not {state.name}: {self.core.cause}"
+        assert reached, f"driver is {self.core.state.name}, not {state.name}: {self.core.finding}"
         return self.now - start
 
     def enable(self) -> None:

@@ -4,6 +4,7 @@ import dataclasses
 import math
 from typing import Any
 
+from canbase_driver.causes import Cause
 from canbase_driver.snapshot import DriverSnapshot, DriverState, DriveSnapshot, WatchdogView
 
 LEFT = DriveSnapshot(
@@ -26,7 +27,7 @@ RIGHT = dataclasses.replace(LEFT, joint="right_wheel_joint", node_id=2, axis=1, 
 SNAPSHOT = DriverSnapshot(
     time_s=1000.0,
     state=DriverState.ENABLED,
-    cause="none",
+    cause=Cause.NONE,
     detail="",
     clears_on="",
     watchdog=WatchdogView.OK,

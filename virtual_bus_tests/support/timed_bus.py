@@ -45,7 +45,7 @@ class TimedBus:
     def enabled_after(self, within_s: float) -> float:
         """From power on to operation enabled on all drives [s]. Fails when that takes longer than `within_s`."""
         while self._driver.state is not DriverState.ENABLED:
-            assert self.now < within_s, self._driver.cause
+            assert self.now < within_s, self._driver.finding
             self._step()
         return self.now
 

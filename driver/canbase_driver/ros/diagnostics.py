@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from canbase_driver.causes import Cause
 from canbase_driver.snapshot import DriverSnapshot, DriverState, DriveSnapshot, WatchdogView
 
 _LOOP_COUNTERS = ("commands_refused", "overruns", "travel_losses")
@@ -57,7 +58,7 @@ def _loop_entry(snapshot: DriverSnapshot, previous: DriverSnapshot, robot: str) 
     level, sentence = _with_news(level, sentence, _grown(snapshot, previous, _LOOP_COUNTERS))
     values = {
         "state": snapshot.state.name,
-        "cause": snapshot.cause,
+        "cause": snapshot.cause.value,
         "clears on": snapshot.clears_on,
         "standstill": snapshot.standstill,
         "odometry valid": snapshot.odometry_valid,
@@ -73,11 +74,11 @@ def _loop_entry(snapshot: DriverSnapshot, previous: DriverSnapshot, robot: str) 
 def _driver_state(snapshot: DriverSnapshot) -> tuple[bytes, str]:
     if snapshot.state is DriverState.ENABLED:
         return DiagnosticStatus.OK, "All drives are enabled."
-    passing = snapshot.state in _TRANSIENT and snapshot.cause != "drive missing"
+    passing = snapshot.state in _TRANSIENT and snapshot.cause is not Cause.DRIVE_MISSING
     level = DiagnosticStatus.WARN if passing else DiagnosticStatus.ERROR
     detail = f": {snapshot.detail.rstrip('.')}" if snapshot.detail else ""
     clears = f" It ends with: {snapshot.clears_on}." if snapshot.clears_on else ""
-    return level, f"{snapshot.state.name.capitalize()} ({snapshot.cause}){detail}.{clears}"
+    return level, f"{snapshot.state.name.capitalize()} ({snapshot.cause.value}){detail}.{clears}"
 
 
 def _bus_entry(snapshot: DriverSnapshot, previous: DriverSnapshot, robot: str) -> DiagnosticStatus:

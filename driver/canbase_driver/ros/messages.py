@@ -72,7 +72,7 @@ def status_message(snapshot: DriverSnapshot, stamp: Time) -> DriverStatus:
     return DriverStatus(
         stamp=stamp,
         state=int(snapshot.state),
-        cause=snapshot.cause,
+        cause=snapshot.cause.value,
         detail=snapshot.detail,
         clears_on=snapshot.clears_on,
         watchdog=snapshot.watchdog.value,

@@ -17,6 +17,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from canbase_config.robot import Robot
+from canbase_driver.causes import Cause
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.ros import messages
 from canbase_driver.ros.diagnostics import diagnostics_message, unguarded
@@ -27,7 +28,6 @@ from canbase_driver.runtime.black_box import Ring
 from canbase_driver.runtime.black_box_writer import BlackBoxWriter
 from canbase_driver.runtime.control_thread import ControlLoop
 from canbase_driver.snapshot import DriverSnapshot, StopRecord
-from canbase_driver.supervision.supervisor import INACTIVE, PREPARING_CAUSE, UNARMED
 from canbase_runtime.journal import Journal, Voice
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.receive_time import ReceiveTimes
@@ -35,8 +35,7 @@ from canbase_runtime.receive_time import ReceiveTimes
 COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 STATE_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 DIAGNOSTICS_PERIOD_S = 1.0
-_USUAL = ("none", "booting", PREPARING_CAUSE, "enabling", "shutdown", "not configured", INACTIVE, UNARMED)
-"""Causes that are no warning."""
+_SAID_BY_THE_STATE = (Cause.NONE, Cause.BOOTING, Cause.ENABLING)
 
 
 class MotorDriverNode(ManagedNode):
@@ -118,14 +117,13 @@ class MotorDriverNode(ManagedNode):
         previous = self._previous
         if previous is not None and (previous.state, previous.cause) == (snapshot.state, snapshot.cause):
             return
-        why = f": {snapshot.cause}" if snapshot.cause not in ("none", snapshot.state.name.lower()) else ""
+        why = f": {snapshot.cause.value}" if snapshot.cause not in _SAID_BY_THE_STATE else ""
         detail = f" ({snapshot.detail})" if snapshot.detail else ""
         clears = f"; ends on: {snapshot.clears_on}" if snapshot.clears_on else ""
         text = self.state_text = f"{snapshot.state.name}{why}{detail}{clears}"
         self._stops.note(text)
-        usual = snapshot.cause in _USUAL
-        priority = Priority.INFO if usual else Priority.WARNING
-        self.voice.tell(text, priority, state=snapshot.state.name, cause=snapshot.cause, robot=self._robot.name)
+        priority = Priority.INFO if snapshot.cause.is_usual else Priority.WARNING
+        self.voice.tell(text, priority, state=snapshot.state.name, cause=snapshot.cause.value, robot=self._robot.name)
 
     def _warn_of_boots(self, snapshot: DriverSnapshot) -> None:
         """Once for each reason why a drive cannot be booted, whatever else keeps the robot stopped."""

@@ -1,28 +1,34 @@
 """What the driver writes to disk about its stops, and what it makes of what it finds there. Pure.
 
-Rules: LIVE before there is power (`supervisor.UNARMED` waits for it), and until all of it was measured to be off;
+Rules: LIVE before there is power (the phase ARMING waits for it), and until all of it was measured to be off;
 LATCHED as soon as a stop latches; CLEAR else. So a kill, a crash, a hang and a power cut find LIVE or LATCHED on disk.
 """
 
 from __future__ import annotations
 
+from canbase_driver.causes import Cause, Finding
 from canbase_driver.snapshot import DriverState
-from canbase_driver.supervision.supervisor import UNARMED, Cause, Situation, Supervisor
+from canbase_driver.supervision.phases import Phase
+from canbase_driver.supervision.situation import Situation
+from canbase_driver.supervision.supervisor import Supervisor
 from canbase_runtime.latch_record import Defect, Found, Mark, Record, WriteAhead
 
-POWER_AT_END = "ended with power"
-UNUSABLE = "stop record unusable"
 _WITH_POWER = (DriverState.ENABLING, DriverState.ENABLED, DriverState.STOPPING)
 
 
-def cause_before_the_start(found: Found | None) -> Cause | None:
+def found_before_the_start(found: Found | None) -> Finding | None:
     """Why the driver is latched from its first moment; None: it is not."""
     if found is None or not found.latched:
         return None
     if found.defect is not Defect.NONE:
-        return Cause(UNUSABLE, found.sentence, "reset")
-    name = found.record.cause if found.record.mark is Mark.LATCHED else POWER_AT_END
-    return Cause(name, found.sentence, "reset")
+        return Finding(Cause.RECORD_UNUSABLE, found.sentence, "reset")
+    cause = _recorded(found.record) if found.record.mark is Mark.LATCHED else Cause.ENDED_WITH_POWER
+    return Finding(cause, found.sentence, "reset")
+
+
+def _recorded(record: Record) -> Cause:
+    """What latched then; a word that this version does not know counts as an unusable record."""
+    return next((cause for cause in Cause if cause.value == record.cause), Cause.RECORD_UNUSABLE)
 
 
 class PowerRecord:
@@ -50,16 +56,16 @@ class PowerRecord:
 
     def note(self, supervisor: Supervisor, situation: Situation) -> None:
         """After the supervisor's step."""
-        state, cause = supervisor.state, supervisor.cause
+        state, finding = supervisor.state, supervisor.finding
         if state is DriverState.LATCHED or (state is DriverState.STOPPING and supervisor.latches):
             if not supervisor.finished:  # the shutdown is no cause
-                self._ahead.want(Mark.LATCHED, cause=cause.name, detail=cause.detail)
-        elif self._is_live(state, cause, situation):
+                self._ahead.want(Mark.LATCHED, cause=finding.cause.value, detail=finding.detail)
+        elif self._is_live(supervisor, situation):
             self._ahead.want(Mark.LIVE)
         else:
             self._ahead.want(Mark.CLEAR)
 
-    def _is_live(self, state: DriverState, cause: Cause, situation: Situation) -> bool:
+    def _is_live(self, supervisor: Supervisor, situation: Situation) -> bool:
         """Power is about to come, is there, or was there and was not measured to be off."""
         may_be_left = situation.powered and self._ahead.wanted.mark is not Mark.CLEAR
-        return state in _WITH_POWER or cause.name == UNARMED or may_be_left
+        return supervisor.state in _WITH_POWER or supervisor.phase is Phase.ARMING or may_be_left

@@ -17,15 +17,12 @@ from enum import IntEnum
 
 from canbase_config.robot import Robot
 from canbase_config.stopping import given_up_s
+from canbase_driver.causes import Finding
 from canbase_driver.snapshot import DriverState
+from canbase_driver.supervision.phases import NO_POWER
 from canbase_driver.supervision.reset import Outcome
-from canbase_driver.supervision.supervisor import (
-    ENABLE_TIMEOUT_S,
-    NO_POWER,
-    POWER_OFF_TIMEOUT_S,
-    Cause,
-    Situation,
-)
+from canbase_driver.supervision.situation import Situation
+from canbase_driver.supervision.supervisor import ENABLE_TIMEOUT_S, POWER_OFF_TIMEOUT_S
 
 MARGIN_S = 1.0
 """On top of the times of what is waited for."""
@@ -84,26 +81,28 @@ class Readiness:
         self.aim = aim
         self.released = self.released and aim is Aim.RELEASED
 
-    def step(self, situation: Situation, state: DriverState, cause: Cause, now: float) -> bool:
+    def step(self, situation: Situation, state: DriverState, finding: Finding, now: float) -> bool:
         """Once a cycle, after the supervisor. True: the drives are to be let go now."""
         let_go = self.aim is Aim.RELEASED and not self.released and state in NO_POWER and not situation.powered
         self.released = self.released or let_go
         change = self._change
         if change is not None:
-            outcome = self._outcome(change, situation, state, cause, now)
+            outcome = self._outcome(change, situation, state, finding, now)
             if outcome is not None:
                 self._end(change, outcome)
         return let_go
 
     def _outcome(
-        self, change: _Change, situation: Situation, state: DriverState, cause: Cause, now: float
+        self, change: _Change, situation: Situation, state: DriverState, finding: Finding, now: float
     ) -> Outcome | None:
         if self._there(change, situation, state):
-            return Outcome(True, f"{self.aim.name.lower()} ({state.name.lower()}, {cause.name})")
+            return Outcome(True, f"{self.aim.name.lower()} ({state.name.lower()}, {finding.cause.value})")
         hopeless = self.aim is Aim.ACTIVE and state is DriverState.LATCHED
         if hopeless or now > change.until:
-            ends = f"; ends on: {cause.clears_on}" if cause.clears_on else ""
-            return Outcome(False, f"not {self.aim.name.lower()}: {cause.name} {cause.detail}".rstrip() + ends)
+            ends = f"; ends on: {finding.clears_on}" if finding.clears_on else ""
+            return Outcome(
+                False, f"not {self.aim.name.lower()}: {finding.cause.value} {finding.detail}".rstrip() + ends
+            )
         return None
 
     def _there(self, change: _Change, situation: Situation, state: DriverState) -> bool:

@@ -13,7 +13,7 @@ from enum import Enum
 
 from canbase_driver.cia402 import FAULT_RESET_CYCLES
 from canbase_driver.snapshot import WatchdogView
-from canbase_driver.supervision.supervisor import Situation
+from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.watchdog_link import ACCEPTED, ANSWERS
 
 WATCHDOG_TIMEOUT_S = 0.5

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.supervision.reset import Outcome, Phase, Reset, refusal
-from canbase_driver.supervision.supervisor import Situation
+from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.watchdog_link import WatchdogLink
 
 OnOutcome = Callable[[Outcome], None]

@@ -76,7 +76,7 @@ def test_a_drive_without_sto_or_main_voltage_is_waited_for_and_enabled_later(sup
     world = without(supply)
     world.run(10.0)
     assert world.core.state is DriverState.DISARMED
-    assert (world.core.cause.name, world.core.cause.detail) == ("drive not ready", sentence)
+    assert (world.core.finding.cause.value, world.core.finding.detail) == ("drive not ready", sentence)
     assert not any(world.powered)
     assert not world.core.stops
     apply(world.bench.nodes, 2, "heal", world.now, {})
@@ -92,7 +92,7 @@ def test_while_it_is_waited_for_a_command_keeps_the_power_off(supply: str) -> No
     apply(world.bench.nodes, 2, "heal", world.now, {})
     world.run(1.0)
     assert world.core.state is DriverState.DISARMED
-    assert world.core.cause.name == "command not zero"
+    assert world.core.finding.cause.value == "command not zero"
 
 
 @pytest.mark.parametrize("supply", WAITED_FOR)
@@ -101,7 +101,7 @@ def test_a_supply_that_is_lost_in_motion_stops_the_base_and_needs_a_reset(supply
     world.drive()
     apply(world.bench.nodes, 2, supply, world.now, {})
     world.run_until(DriverState.LATCHED, within_s=2.0)
-    assert world.core.cause.name == "drive disabled"
+    assert world.core.finding.cause.value == "drive disabled"
     assert world.stands_after() < 2.0
     apply(world.bench.nodes, 2, "heal", world.now, {})
     world.command = Twist2D.ZERO

@@ -35,7 +35,7 @@ def test_without_a_watchdog_nothing_gets_power_and_the_status_says_why(world: Wo
     watchdog, world.watchdog = world.watchdog, None
     world.run_until(DriverState.DISARMED, BOOTED_S)
     world.run(1.0)
-    assert (world.core.cause.name, world.core.cause.clears_on) == ("watchdog missing", "the watchdog alive")
+    assert (world.core.finding.cause.value, world.core.finding.clears_on) == ("watchdog missing", "the watchdog alive")
     assert ENABLE_OPERATION not in words(world)
     world.watchdog = watchdog  # nothing had moved: it goes on by itself
     world.run_until(DriverState.ENABLED, within_s=1.0)
@@ -50,7 +50,10 @@ def test_a_watchdog_that_has_tripped_before_the_start_needs_a_reset_and_power_co
     world.command = Twist2D.ZERO
     world.run_until(DriverState.LATCHED, within_s=1.5)
     world.run(0.5)
-    assert (world.core.cause.name, world.core.cause.detail) == ("watchdog tripped", "watchdog: driver silent")
+    assert (world.core.finding.cause.value, world.core.finding.detail) == (
+        "watchdog tripped",
+        "watchdog: driver silent",
+    )
     assert ENABLE_OPERATION not in words(world)
     outcome = world.reset()
     assert outcome.done, outcome.sentence
@@ -62,8 +65,8 @@ def test_a_velocity_that_is_commanded_keeps_the_power_off(world: World) -> None:
     world.command = FORWARD
     world.run_until(DriverState.DISARMED, BOOTED_S)
     world.run(1.0)
-    assert world.core.cause.name == "command not zero"
-    assert world.core.cause.detail == "cmd_vel orders 0.300 m/s, 0.000 rad/s"
+    assert world.core.finding.cause.value == "command not zero"
+    assert world.core.finding.detail == "cmd_vel orders 0.300 m/s, 0.000 rad/s"
     assert ENABLE_OPERATION not in words(world)
     world.command = Twist2D.ZERO
     world.run_until(DriverState.ENABLED, within_s=0.5)

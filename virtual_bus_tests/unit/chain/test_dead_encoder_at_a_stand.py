@@ -249,7 +249,7 @@ def count_of(world: World, seconds: float) -> int:
 def well(world: World) -> None:
     assert world.watchdog is not None
     assert world.watchdog.status.state is State.WATCHING, world.watchdog.status.verdict
-    assert world.core.state is DriverState.ENABLED, world.core.cause
+    assert world.core.state is DriverState.ENABLED, world.core.finding
 
 
 SLOPE_N = 30.0 * 9.81
@@ -321,7 +321,7 @@ def test_a_drive_that_does_not_come_back_is_a_latched_stop() -> None:
     lets_go_on_a_slope(world)
     faults.apply(world.bench.nodes, 1, "sto", world.now, {})
     world.run_until(DriverState.LATCHED, 2.0)
-    assert world.core.cause.name == "drive disabled"
+    assert world.core.finding.cause.value == "drive disabled"
 
 
 def test_a_robot_that_wants_no_proof_is_never_let_go_of() -> None:

@@ -86,7 +86,7 @@ def test_at_03_mps_the_base_stands_within_half_a_second_and_is_latched(
 ) -> None:
     act(world)
     assert world.stands_after() < within_s
-    assert (world.core.state, world.core.cause.name) == (DriverState.LATCHED, cause)
+    assert (world.core.state, world.core.finding.cause.value) == (DriverState.LATCHED, cause)
     assert [(stop.cause, stop.latched) for stop in world.core.stops] == [(cause, True)]
     way_m = world.truth.path_m
     world.command = FORWARD
@@ -112,7 +112,7 @@ def test_driver_and_watchdog_both_killed_the_drives_stop_by_themselves(world: Wo
 def test_a_drive_that_is_cut_off_stops_by_itself_and_the_base_is_latched(world: World, kind: str) -> None:
     world.node.line.cut = True
     assert world.stands_after() < ALONE_S[kind] + BRAKING_S
-    assert (world.core.state, world.core.cause.name) == (DriverState.LATCHED, "drive silent")
+    assert (world.core.state, world.core.finding.cause.value) == (DriverState.LATCHED, "drive silent")
 
 
 @pytest.mark.parametrize("kind", sorted(set(KINDS) - set(STOPS_ALONE)))
@@ -121,7 +121,7 @@ def test_a_drive_that_is_cut_off_and_has_nothing_to_stop_it_goes_on_alone(world:
     world.node.line.cut = True
     world.run(3.0)
     assert (world.truth.v_left_mps, world.truth.v_right_mps) == pytest.approx((0.3, 0.0), abs=0.01)
-    assert (world.core.state, world.core.cause.name) == (DriverState.LATCHED, "drive silent")
+    assert (world.core.state, world.core.finding.cause.value) == (DriverState.LATCHED, "drive silent")
     assert not world.snapshot.drives[0].stops_by_itself
 
 
@@ -152,7 +152,7 @@ def test_a_drive_that_fell_silent_in_a_pause_of_the_driver_is_noticed(world: Wor
     world.pause_driver(0.15)
     assert world.stands_after() < 0.35
     assert world.core.state is DriverState.LATCHED
-    assert world.core.cause.name in ("drive silent", "watchdog tripped")  # whoever looks first
+    assert world.core.finding.cause.value in ("drive silent", "watchdog tripped")  # whoever looks first
 
 
 def test_a_new_driver_takes_over_after_a_kill_and_needs_a_reset(world: World) -> None:
@@ -173,13 +173,13 @@ def test_a_fault_of_one_wheel_stops_both_within_one_cycle_of_knowing(world: Worl
     world.run(0.022)
     assert [word for word, _ in setpoints(world.ticks[-1])] == [QUICK_STOP, QUICK_STOP]
     assert world.now - failed_at < 0.025
-    assert world.core.cause.detail == "left_wheel (node 1): 2310h over-current"
+    assert world.core.finding.detail == "left_wheel (node 1): 2310h over-current"
 
 
 def test_a_watchdog_that_restarts_unnoticed_stops_the_base_while_it_is_starting(world: World) -> None:
     world.watchdog = Watchdog(watchdog_config(world.robot), world.now)
     world.run(0.05)
-    assert (world.core.state, world.core.cause.name) == (DriverState.STOPPING, "watchdog missing")
+    assert (world.core.state, world.core.finding.cause.value) == (DriverState.STOPPING, "watchdog missing")
 
 
 def run_beside_a_blind_watchdog(world: World, seconds: float) -> None:
@@ -200,8 +200,8 @@ def test_a_wheel_that_does_not_stop_is_quick_stopped_and_latched_by_the_driver_a
     assert not world.core.stops
     assert world.truth.v_left_mps > 0.1
     run_beside_a_blind_watchdog(world, 0.7)  # since its ramp was at zero
-    assert world.core.cause.name == "did not stop"
-    assert world.core.cause.detail.startswith("left_wheel turns at 0.3")
+    assert world.core.finding.cause.value == "did not stop"
+    assert world.core.finding.detail.startswith("left_wheel turns at 0.3")
     run_beside_a_blind_watchdog(world, 2.0)
     assert world.core.state is DriverState.LATCHED
     assert world.truth.standing_s > 1.0

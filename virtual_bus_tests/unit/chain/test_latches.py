@@ -9,8 +9,6 @@ import pytest
 from canbase_driver.core import DriverCore
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.snapshot import DriverState
-from canbase_driver.supervision.latch import POWER_AT_END, UNUSABLE
-from canbase_driver.supervision.supervisor import UNARMED
 from canbase_runtime.latch_record import Mark
 from canbase_watchdog import latch
 from canbase_watchdog.policy import Cause
@@ -45,7 +43,7 @@ def stays_stopped(world: World) -> None:
     """With a zero command, booted, and then one to move: nothing gets power or moves."""
     begin_m = world.truth.travel_m
     for world.command in (Twist2D.ZERO, Twist2D(0.3, 0.0)):
-        assert not world.run(LONG_S, lambda: any(world.powered)), world.core.cause
+        assert not world.run(LONG_S, lambda: any(world.powered)), world.core.finding
     assert world.truth.travel_m == pytest.approx(begin_m, abs=1e-4)
 
 
@@ -57,11 +55,11 @@ def test_a_requested_stop_outlives_the_driver() -> None:
     world.run_until(DriverState.LATCHED, 1.0)
     world.run(0.1)
     restart_driver(world)
-    assert (world.core.state, world.core.cause.name) == (DriverState.LATCHED, "stop requested")
-    assert world.core.cause.detail == "latched since before the start: service motor_driver/stop"
+    assert (world.core.state, world.core.finding.cause.value) == (DriverState.LATCHED, "stop requested")
+    assert world.core.finding.detail == "latched since before the start: service motor_driver/stop"
     stays_stopped(world)
     restart_driver(world)
-    assert world.core.cause.detail == "latched since before the start: service motor_driver/stop"
+    assert world.core.finding.detail == "latched since before the start: service motor_driver/stop"
     assert world.recovered()
 
 
@@ -87,8 +85,8 @@ def test_who_dies_with_power_comes_back_latched(moving: bool, restart: Callable[
     world.command = Twist2D.ZERO
     world.run(0.5)
     if restart is not restart_watchdog:
-        assert (world.core.state, world.core.cause.name) == (DriverState.LATCHED, POWER_AT_END)
-        assert "killed, crashed" in world.core.cause.detail
+        assert (world.core.state, world.core.finding.cause.value) == (DriverState.LATCHED, "ended with power")
+        assert "killed, crashed" in world.core.finding.detail
     if restart is not restart_driver:
         assert guard(world).status.state is State.TRIPPED
         assert guard(world).status.verdict.cause is Cause.POWER_AT_END
@@ -161,8 +159,8 @@ def test_a_disk_that_cannot_be_written_gives_no_power_and_says_why(disk: str) ->
     file = world.disk.file if disk == "driver" else world.watchdog_disk.file
     file.writable = False
     assert not world.run(LONG_S, lambda: any(world.powered))
-    assert (world.core.state, world.core.cause.name) == (DriverState.DISARMED, UNARMED)
-    assert "no space left" in world.core.cause.detail or "watchdog's log" in world.core.cause.detail
+    assert (world.core.state, world.core.finding.cause.value) == (DriverState.DISARMED, "stop record")
+    assert "no space left" in world.core.finding.detail or "watchdog's log" in world.core.finding.detail
     file.writable = True
     world.run_until(DriverState.ENABLED, 1.0)
 
@@ -192,7 +190,7 @@ def test_a_record_that_cannot_be_read_is_latched_until_a_reset() -> None:
     world.disk.file.data, world.watchdog_disk.file.data = stolen
     world.reboot()
     world.run(2.0)
-    assert (world.core.state, world.core.cause.name) == (DriverState.LATCHED, UNUSABLE)
+    assert (world.core.state, world.core.finding.cause.value) == (DriverState.LATCHED, "stop record unusable")
     assert guard(world).status.verdict.cause is Cause.RECORD_UNUSABLE
     stays_stopped(world)
     assert world.recovered()
@@ -236,6 +234,6 @@ def test_a_stop_in_the_last_cycle_before_the_end_is_not_forgotten(before_s: floa
     world.run(1.0)
     assert world.core.finished
     restart_driver(world)
-    assert (world.core.state, world.core.cause.name) == (DriverState.LATCHED, "stop requested")
+    assert (world.core.state, world.core.finding.cause.value) == (DriverState.LATCHED, "stop requested")
     stays_stopped(world)
     assert world.recovered()

@@ -73,7 +73,7 @@ def test_a_drive_that_sends_two_boot_up_messages_needs_no_key_for_it(second_s: f
         world.run(6.0)
         if world.core.state is not DriverState.ENABLED:
             assert world.core.state is DriverState.LATCHED
-            assert "start.settle_s" in world.core.cause.detail
+            assert "start.settle_s" in world.core.finding.detail
             world.reset()
     world.run(8.0)
     assert world.core.state is DriverState.ENABLED

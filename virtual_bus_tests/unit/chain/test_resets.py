@@ -214,7 +214,7 @@ def test_a_bus_that_fails_without_power_is_offline_and_goes_on_by_itself() -> No
     world.run_until(DriverState.DISARMED, within_s=1.0)
     world.cable = False
     world.run_until(DriverState.OFFLINE, within_s=0.02)
-    assert (world.core.cause.name, world.core.cause.detail) == ("bus failed", "the cable is cut")
+    assert (world.core.finding.cause.value, world.core.finding.detail) == ("bus failed", "the cable is cut")
     world.cable = True
     world.run_until(DriverState.BOOTING, within_s=0.02)
     world.command = Twist2D.ZERO
@@ -258,7 +258,7 @@ def test_a_watchdog_that_forgets_its_trip_in_a_restart_leaves_the_latch_to_the_d
     world.watchdog = Watchdog(watchdog_config(world.robot), world.now)
     world.run(2.0)
     assert world.watchdog.status.state is WatchdogState.WATCHING
-    assert (world.core.state, world.core.cause.name) == (DriverState.LATCHED, "watchdog tripped")
+    assert (world.core.state, world.core.finding.cause.value) == (DriverState.LATCHED, "watchdog tripped")
     assert world.recovered()
 
 
@@ -302,9 +302,9 @@ def test_a_drive_that_is_missing_at_the_start_is_an_error_after_boot_s_and_welco
     world = World()
     world.bench.nodes[2].line.cut = True
     world.run(9.9)
-    assert (world.core.state, world.core.cause.name) == (DriverState.BOOTING, "booting")
+    assert (world.core.state, world.core.finding.cause.value) == (DriverState.BOOTING, "booting")
     world.run(0.2)
-    assert (world.core.state, world.core.cause.name) == (DriverState.BOOTING, "drive missing")
-    assert world.core.cause.detail.startswith("node 2 (right_wheel) is missing since 10 s: ")
+    assert (world.core.state, world.core.finding.cause.value) == (DriverState.BOOTING, "drive missing")
+    assert world.core.finding.detail.startswith("node 2 (right_wheel) is missing since 10 s: ")
     world.bench.nodes[2].line.cut = False
     world.run_until(DriverState.ENABLED, within_s=5.0)

@@ -81,5 +81,5 @@ def test_a_watchdog_that_hears_nothing_is_no_watchdog() -> None:
     apply(world.bench.nodes, 2, "heal", world.now, {})
     world.run(1.0)
     assert world.core.state is DriverState.DISARMED
-    assert world.core.cause.name == "stop record"
+    assert world.core.finding.cause.value == "stop record"
     assert not any(world.powered)

@@ -47,7 +47,7 @@ def test_a_boot_up_message_in_motion_stops_the_drive_that_sent_it_too(nodes: tup
 
     assert world.run(1.0, lambda: blind_watchdog(world) or world.truth.standing_s > 0.05)
     assert world.truth.path_m - path_m < 0.06
-    assert (world.core.cause.name, world.core.stops[0].latched) == ("drive restarted", True)
+    assert (world.core.finding.cause.value, world.core.stops[0].latched) == ("drive restarted", True)
     stopped = [
         data for at, frame in world.log for data in [frame.data] if at >= begin and frame.cob_id == 0x200 + nodes[0]
     ]
@@ -73,8 +73,8 @@ def test_a_velocity_that_no_longer_comes_stops_the_base_and_is_not_published_as_
     assert world.snapshot.odometry_valid
     world.run(0.03)
     assert not world.snapshot.odometry_valid
-    assert (world.core.state, world.core.cause.name) == (DriverState.STOPPING, "drive silent")
-    assert world.core.cause.detail.startswith("node 1 (left_wheel): no velocity for 0.1")
+    assert (world.core.state, world.core.finding.cause.value) == (DriverState.STOPPING, "drive silent")
+    assert world.core.finding.detail.startswith("node 1 (left_wheel): no velocity for 0.1")
     assert math.isfinite(world.snapshot.drives[0].feedback_age_s)
     assert not world.snapshot.standstill
 
@@ -105,7 +105,7 @@ def test_after_the_driver_hung_it_says_that_the_watchdog_tripped() -> None:
     assert world.watchdog.status.state is State.TRIPPED
     assert [stop.cause for stop in world.core.stops] == ["watchdog tripped"]
     assert world.core.stops[0].stopped_by == "watchdog"
-    assert world.core.cause.detail in ("watchdog: driver silent", "watchdog: lease lost")
+    assert world.core.finding.detail in ("watchdog: driver silent", "watchdog: lease lost")
 
 
 def test_a_hazard_that_latches_during_a_ramp_that_does_not_is_shown_and_recorded() -> None:
@@ -115,7 +115,7 @@ def test_a_hazard_that_latches_during_a_ramp_that_does_not_is_shown_and_recorded
     assert [(stop.cause, stop.latched) for stop in world.core.stops] == [("shutdown", False)]
     world.core.request_stop()
     world.run(0.02)
-    assert world.core.cause.name == "stop requested"
+    assert world.core.finding.cause.value == "stop requested"
     assert [(stop.cause, stop.latched) for stop in world.core.stops] == [("shutdown", False), ("stop requested", True)]
 
 
@@ -124,7 +124,7 @@ def test_the_way_to_enabled_warns_of_nothing() -> None:
     causes: list[str] = []
 
     def note() -> bool:
-        causes.append(world.core.cause.name)
+        causes.append(world.core.finding.cause.value)
         return world.core.state is DriverState.ENABLED
 
     assert world.run(3.0, note)

@@ -24,7 +24,11 @@ def core() -> DriverCore:
 
 def test_before_the_first_cycle_the_snapshot_says_that_nothing_is_known(core: DriverCore) -> None:
     snapshot = core.snapshot(10.0)
-    assert (snapshot.state, snapshot.cause, snapshot.watchdog) == (DriverState.BOOTING, "booting", WatchdogView.MISSING)
+    assert (snapshot.state, snapshot.cause.value, snapshot.watchdog) == (
+        DriverState.BOOTING,
+        "booting",
+        WatchdogView.MISSING,
+    )
     assert (snapshot.standstill, snapshot.odometry_valid, snapshot.command_fresh) == (False, False, False)
     assert math.isnan(snapshot.command_age_s)
     assert math.isnan(snapshot.watchdog_age_s)
@@ -36,7 +40,7 @@ def test_the_first_cycles_beat_and_ask_the_drives_who_they_are(core: DriverCore)
     second = core.tick(10.01)
     assert [str(frame) for frame in first] == ["77Fh [05]"]
     assert [str(frame) for frame in second] == ["601h [40 00 10 00 00 00 00 00]", "602h [40 00 10 00 00 00 00 00]"]
-    assert core.cause.detail == "waiting for node 1 (left_wheel): the answer to 1000h:0"
+    assert core.finding.detail == "waiting for node 1 (left_wheel): the answer to 1000h:0"
 
 
 def test_frames_of_others_are_none_of_its_business(core: DriverCore) -> None:

@@ -8,6 +8,7 @@ import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
+from canbase_driver.causes import Cause
 from canbase_driver.ros.diagnostics import diagnostics_message, unguarded
 from canbase_driver.snapshot import DriverState, WatchdogView
 from support.snapshots import SNAPSHOT, with_driver, with_left
@@ -91,12 +92,12 @@ def test_the_values_are_short_and_have_their_units() -> None:
     ],
 )
 def test_the_level_of_the_driver_follows_its_state(state: DriverState, level: bytes) -> None:
-    message = diagnostics_message(with_driver(state=state, cause="x"), STAMP)
+    message = diagnostics_message(with_driver(state=state, cause=Cause.BOOTING), STAMP)
     assert entry(message, "robot: motor_driver").level == level
 
 
 def test_a_drive_that_is_missing_is_an_error() -> None:
-    message = diagnostics_message(with_driver(state=DriverState.BOOTING, cause="drive missing"), STAMP)
+    message = diagnostics_message(with_driver(state=DriverState.BOOTING, cause=Cause.DRIVE_MISSING), STAMP)
     assert entry(message, "robot: motor_driver").level == ERROR
 
 
@@ -109,7 +110,7 @@ def test_a_drive_that_is_missing_is_an_error() -> None:
     ],
 )
 def test_a_stopped_driver_says_why_and_what_ends_it(detail: str, clears_on: str, sentence: str) -> None:
-    snapshot = with_driver(state=DriverState.LATCHED, cause="drive fault", detail=detail, clears_on=clears_on)
+    snapshot = with_driver(state=DriverState.LATCHED, cause=Cause.DRIVE_FAULT, detail=detail, clears_on=clears_on)
     assert entry(diagnostics_message(snapshot, STAMP), "robot: motor_driver").message == sentence
 
 

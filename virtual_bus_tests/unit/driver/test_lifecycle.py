@@ -27,7 +27,7 @@ def test_unconfigured_nothing_at_all_is_sent(released: World) -> None:
     released.run(15.0)
     assert [frames for frames in released.ticks if frames] == []
     assert released.core.state is DriverState.OFFLINE
-    assert released.core.cause.name == "not configured"
+    assert released.core.finding.cause.value == "not configured"
 
 
 def test_configured_drives_are_booted_and_heard_and_get_no_power(released: World) -> None:
@@ -37,7 +37,7 @@ def test_configured_drives_are_booted_and_heard_and_get_no_power(released: World
     released.command = None
     released.run(2.0)
     assert released.core.state is DriverState.DISARMED
-    assert released.core.cause.name == "inactive"
+    assert released.core.finding.cause.value == "inactive"
     assert released.powered == [False, False]
     assert released.snapshot.odometry_valid
     assert released.truth.path_m == 0.0
@@ -64,7 +64,7 @@ def test_deactivated_at_speed_the_wheels_stand_before_the_power_goes_and_before_
     assert outcomes == []
     world.run(0.1)
     assert outcomes[0].done
-    assert world.core.cause.name == "inactive"
+    assert world.core.finding.cause.value == "inactive"
     world.run(3.0)  # the command still orders 0.3 m/s
     assert world.truth.linear_mps == 0.0
     assert world.watchdog is not None
@@ -84,7 +84,7 @@ def test_cleaned_up_the_drives_are_let_go_and_do_not_miss_the_driver() -> None:
     assert world.sent(SYNC, let_go + 0.002) == []
     assert world.sent(0x081) == world.sent(0x082) == []  # no emergency message
     assert world.go(Aim.CONFIGURED).done
-    assert world.core.cause.name == "inactive"
+    assert world.core.finding.cause.value == "inactive"
 
 
 def test_a_latched_stop_outlives_the_whole_way_round() -> None:
@@ -103,7 +103,7 @@ def test_a_latched_stop_outlives_the_whole_way_round() -> None:
     assert world.powered == [False, False]
     assert world.reset().done
     world.run(0.1)
-    assert world.core.cause.name == "inactive"  # the activation that failed was taken back
+    assert world.core.finding.cause.value == "inactive"  # the activation that failed was taken back
     assert world.go(Aim.ACTIVE).done
 
 
@@ -113,7 +113,7 @@ def test_a_configuration_that_fails_is_taken_back_and_says_what_is_missing(relea
     assert not outcome.done
     assert "node 1" in outcome.sentence
     released.run(0.1)
-    assert released.core.cause.name == "not configured"
+    assert released.core.finding.cause.value == "not configured"
     released.node.line.silent = False
     assert released.go(Aim.CONFIGURED).done
 
@@ -131,7 +131,7 @@ def test_a_deactivation_that_is_not_confirmed_in_time_is_not_taken_back() -> Non
     assert world.powered == [False, False]
     assert world.reset().done
     world.run(0.02)
-    assert world.core.cause.name == "inactive"
+    assert world.core.finding.cause.value == "inactive"
     assert world.go(Aim.ACTIVE).done
 
 

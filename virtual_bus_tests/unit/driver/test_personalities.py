@@ -154,7 +154,7 @@ def test_a_fault_is_told_in_the_makers_words_where_the_profile_has_them(kind: st
     world.drive(seconds=0.3)
     world.node.fail(0, code)
     world.run_until(DriverState.LATCHED, 3.0)
-    assert world.core.cause.detail == f"left_wheel (node 1): {text}"
+    assert world.core.finding.detail == f"left_wheel (node 1): {text}"
 
 
 @pytest.mark.parametrize(

@@ -53,7 +53,7 @@ def test_an_adapter_that_is_unplugged_for_a_while(kind: str) -> None:
     world.cable = False
     steps = run_with_poses(world, 3.0)
     assert world.truth.standing_s > 0.5
-    assert world.core.cause.name == "bus failed"
+    assert world.core.finding.cause.value == "bus failed"
     world.cable = True
     steps += run_with_poses(world, 3.0)
     assert max(steps) < FORWARD.linear_mps * 0.01 * 1.5 + 0.01

@@ -8,7 +8,7 @@ import pytest
 
 from canbase_driver.snapshot import WatchdogView
 from canbase_driver.supervision.reset import FAULT_TRIES, Outcome, Phase, Reset, refusal
-from canbase_driver.supervision.supervisor import Situation
+from canbase_driver.supervision.situation import Situation
 
 WELL = Situation()
 TRIPPED = Situation(watchdog=WatchdogView.TRIPPED, watchdog_detail="lease lost")

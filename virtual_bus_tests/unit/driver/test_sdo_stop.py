@@ -115,5 +115,5 @@ def test_beside_a_live_watchdog_it_is_left_to_its_ladder(kind: str) -> None:
     world.inject(0x701, "7f")
     assert world.core.state is DriverState.ENABLED
     world.run(0.3)
-    assert world.core.cause.name == "drive restarted"
+    assert world.core.finding.cause.value == "drive restarted"
     assert written_by_the_driver(world, cycles) == []

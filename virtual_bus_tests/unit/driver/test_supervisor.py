@@ -7,23 +7,14 @@ from dataclasses import replace
 import pytest
 
 from canbase_config.load import load_robot, sample
+from canbase_driver.causes import Cause, Finding
 from canbase_driver.cia402 import PowerGoal
 from canbase_driver.motion.braking import Braking
 from canbase_driver.snapshot import DriverState, WatchdogView
-from canbase_driver.supervision.supervisor import (
-    BLOCKERS,
-    HAZARDS,
-    NO_POWER,
-    ORDERS,
-    PREPARING,
-    UNARMED,
-    Cause,
-    Drive,
-    Orders,
-    Situation,
-    Step,
-    Supervisor,
-)
+from canbase_driver.supervision.phases import NO_POWER, ORDERS, SHOWN, Drive, Orders, Phase
+from canbase_driver.supervision.reasons import BLOCKERS, HAZARDS
+from canbase_driver.supervision.situation import Situation
+from canbase_driver.supervision.supervisor import Supervisor
 
 OFFLINE, BOOTING, DISARMED, ENABLING, ENABLED, STOPPING, LATCHED = DriverState
 OFF, ON = Orders(PowerGoal.OFF, Drive.ZERO), Orders(PowerGoal.ON, Drive.ZERO)
@@ -87,7 +78,7 @@ class Story:
     @property
     def told(self) -> tuple[DriverState, str, bool]:
         """State, cause, and whether it needs a reset."""
-        return self.supervisor.state, self.supervisor.cause.name, self.supervisor.latches
+        return self.supervisor.state, self.supervisor.finding.cause.value, self.supervisor.latches
 
 
 def at(state: DriverState, wheels: Situation = STANDING) -> Story:
@@ -135,7 +126,7 @@ def test_without_power_whatever_is_wrong_keeps_it_off(
         assert story.step(situation) == OFF
     name = "booting" if wrong == "drive restarted" else wrong
     assert story.told == (shown, name, latched)
-    assert story.supervisor.cause.clears_on
+    assert story.supervisor.finding.clears_on
 
 
 @pytest.mark.parametrize("state", [OFFLINE, BOOTING, DISARMED])
@@ -172,9 +163,10 @@ STOPS = [
 
 
 def test_the_tables_of_this_test_name_every_hazard_and_every_blocker() -> None:
-    assert [name for name, _, _ in STOPS] == [hazard.name for hazard in HAZARDS]
-    assert {name for name, _, _ in BEFORE_POWER} - {"drive restarted"} == {blocker.name for blocker in BLOCKERS}
-    assert set(ORDERS) == (set(DriverState) - {STOPPING}) | set(Step) | {PREPARING}
+    assert [name for name, _, _ in STOPS] == [hazard.cause.value for hazard in HAZARDS]
+    assert {name for name, _, _ in BEFORE_POWER} - {"drive restarted"} == {blocker.cause.value for blocker in BLOCKERS}
+    assert set(ORDERS) == set(SHOWN) == set(Phase)
+    assert set(SHOWN.values()) == set(DriverState)
 
 
 @pytest.mark.parametrize(("wrong", "first", "latched"), STOPS)
@@ -223,7 +215,7 @@ def test_a_shutdown_ends_from_every_state_with_everything_wrong_in_bounded_time(
         assert story.now - start < 0.6 + 0.4 + 0.5 + 0.1
     assert last == OFF
     assert story.supervisor.state in NO_POWER
-    assert story.supervisor.cause.name == "shutdown"
+    assert story.supervisor.finding.cause.value == "shutdown"
 
 
 @pytest.mark.parametrize("state", [OFFLINE, BOOTING, DISARMED, LATCHED])
@@ -300,7 +292,7 @@ def test_a_ramp_that_is_given_up_latches_with_its_own_cause() -> None:
     assert story.told == (STOPPING, "inactive", False)
     story.lasts(hopeless, RAMP)
     assert story.told == (STOPPING, "did not stop", True)
-    assert story.supervisor.cause.detail.startswith("left turns on its ramp, 0.")
+    assert story.supervisor.finding.detail.startswith("left turns on its ramp, 0.")
 
 
 def test_the_ramp_takes_no_longer_than_timeouts_standstill_s() -> None:
@@ -336,7 +328,7 @@ def test_enabling_gives_up_after_two_seconds_and_needs_a_reset() -> None:
     story = at(ENABLING)
     assert story.lasts(READY, ON) == pytest.approx(2.0, abs=0.021)
     assert story.told == (STOPPING, "enable timeout", True)
-    assert story.supervisor.cause.detail == "left is switch on disabled after 2.0 s"
+    assert story.supervisor.finding.detail == "left is switch on disabled after 2.0 s"
     story.step(READY, cycles=3)
     assert story.told == (LATCHED, "enable timeout", True)
 
@@ -346,7 +338,7 @@ def test_when_several_things_are_seen_at_once_the_first_cause_is_told() -> None:
     story = at(ENABLED, RUNNING)
     several = also(also(RUNNING, WRONG["watchdog tripped"]), WRONG["drive disabled"])
     story.step(also(also(several, WRONG["drive fault"]), WRONG["drive restarted"]))
-    assert story.supervisor.cause.name == "watchdog tripped"
+    assert story.supervisor.finding.cause.value == "watchdog tripped"
 
 
 @pytest.mark.parametrize("wrong", ["drive fault", "drive silent", "drive restarted"])
@@ -354,10 +346,10 @@ def test_of_a_drive_that_the_watchdog_tripped_about_the_driver_tells_more(wrong:
     story = at(ENABLED, RUNNING)
     tripped = replace(also(RUNNING, WRONG["watchdog tripped"]), watchdog_about_drive=True)
     story.step(also(tripped, WRONG[wrong]))
-    assert story.supervisor.cause.name == wrong
+    assert story.supervisor.finding.cause.value == wrong
     alone = at(ENABLED, RUNNING)
     alone.step(tripped)
-    assert alone.supervisor.cause.name == "watchdog tripped"
+    assert alone.supervisor.finding.cause.value == "watchdog tripped"
 
 
 @pytest.mark.parametrize("wrong", [name for name, _, latched in STOPS if latched])
@@ -409,9 +401,9 @@ def test_the_way_to_switched_on_is_no_warning_while_it_takes_less_than_a_second(
     assert story.told == (DISARMED, "preparing", False)
     story.step(WRONG["command not zero"])
     story.step(STO_OPEN, cycles=99)
-    assert story.supervisor.cause.name == "preparing"
+    assert story.supervisor.finding.cause.value == "preparing"
     story.step(STO_OPEN, cycles=3)
-    assert story.supervisor.cause.name == "drive not ready"
+    assert story.supervisor.finding.cause.value == "drive not ready"
 
 
 def test_drives_that_are_not_ready_are_waited_for_without_power_and_without_a_latch() -> None:
@@ -436,21 +428,21 @@ def test_no_power_before_the_record_is_on_disk() -> None:
     story = Story()
     waits = Situation(unarmed="not on disk yet")
     orders = story.step(waits, 500)
-    assert (story.supervisor.state, story.supervisor.cause.name) == (DISARMED, UNARMED)
-    assert orders == ORDERS[PREPARING]
+    assert (story.supervisor.state, story.supervisor.finding.cause.value) == (DISARMED, "stop record")
+    assert orders == ORDERS[Phase.PREPARING]
     story.step(replace(waits, unprepared="no main voltage"), 102)
-    assert story.supervisor.cause.name == "drive not ready"
+    assert story.supervisor.finding.cause.value == "drive not ready"
     story.step(READY)
     assert story.supervisor.state is ENABLING
 
 
 def test_a_stop_of_before_the_start_is_latched_until_a_reset() -> None:
-    before = Cause("drive fault", "latched since before the start: left_wheel", "reset")
+    before = Finding(Cause.DRIVE_FAULT, "latched since before the start: left_wheel", "reset")
     supervisor = Supervisor(Braking(load_robot(sample("bench")).robot), 3.0, before)
     for step in range(100):
         orders = supervisor.step(READY, 10.0 + step)
-    assert orders == ORDERS[LATCHED]
-    assert (supervisor.state, supervisor.cause, supervisor.latches) == (LATCHED, before, True)
+    assert orders == ORDERS[Phase.LATCHED]
+    assert (supervisor.state, supervisor.finding, supervisor.latches) == (LATCHED, before, True)
     supervisor.reset()
     supervisor.step(READY, 200.0)
     assert supervisor.state is ENABLING

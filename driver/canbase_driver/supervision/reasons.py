@@ -1,0 +1,94 @@
+"""Why nothing gets power, and what stops it: two tables, the most telling row first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from canbase_driver.causes import Cause
+from canbase_driver.snapshot import WatchdogView
+from canbase_driver.supervision.phases import Phase
+from canbase_driver.supervision.situation import Situation
+
+Seen = Callable[[Situation], str]
+"""A sentence when it is so, else empty."""
+
+
+@dataclass(frozen=True, slots=True)
+class Blocker:
+    """One reason why nothing gets power, and where the driver is meanwhile."""
+
+    cause: Cause
+    seen: Seen
+    phase: Phase
+    clears_on: str
+
+
+@dataclass(frozen=True, slots=True)
+class Hazard:
+    """One reason to stop what has power. `quick`: the drives' quick stop at once; otherwise the driver's ramp first."""
+
+    cause: Cause
+    seen: Seen
+    quick: bool
+    latched: bool
+    clears_on: str
+
+
+Reason = TypeVar("Reason", Blocker, Hazard)
+
+
+def first(reasons: tuple[Reason, ...], situation: Situation) -> Reason | None:
+    """The first row that holds."""
+    return next((reason for reason in reasons if reason.seen(situation)), None)
+
+
+def _watchdog(view: WatchdogView) -> Seen:
+    return lambda s: f"watchdog: {s.watchdog_detail}" if s.watchdog is view else ""
+
+
+def _stop_requested(s: Situation) -> str:
+    return "service motor_driver/stop" if s.stop_requested else ""
+
+
+_MISSING, _TRIPPED = _watchdog(WatchdogView.MISSING), _watchdog(WatchdogView.TRIPPED)
+
+BLOCKERS: tuple[Blocker, ...] = (
+    Blocker(Cause.STOP_REQUESTED, _stop_requested, Phase.LATCHED, "reset"),
+    Blocker(Cause.BUS_FAILED, lambda s: s.bus, Phase.OFFLINE, "the bus working"),
+    Blocker(Cause.WATCHDOG_TRIPPED, _TRIPPED, Phase.LATCHED, "reset"),
+    Blocker(Cause.NOT_CONFIGURED, lambda s: s.unconfigured, Phase.OFFLINE, "lifecycle transition configure"),
+    Blocker(Cause.DRIVE_MISSING, lambda s: s.missing, Phase.BOOTING, "the drive answering"),
+    Blocker(Cause.BOOTING, lambda s: s.booting or s.absent, Phase.BOOTING, "drives booted"),
+    Blocker(Cause.DRIVE_FAULT, lambda s: s.fault, Phase.LATCHED, "reset, with the drive's cause gone"),
+    Blocker(Cause.DRIVE_SILENT, lambda s: s.silent, Phase.DISARMED, "the drive answering"),
+    Blocker(Cause.WATCHDOG_MISSING, _MISSING, Phase.DISARMED, "the watchdog alive"),
+    Blocker(Cause.INACTIVE, lambda s: s.inactive, Phase.DISARMED, "lifecycle transition activate"),
+    Blocker(Cause.RESETTING, lambda s: "a reset is under way" if s.resetting else "", Phase.DISARMED, "its end"),
+    Blocker(Cause.COMMAND_NOT_ZERO, lambda s: s.commanded, Phase.DISARMED, "a zero command"),
+    Blocker(Cause.NOT_STANDING, lambda s: "" if s.standstill else s.turning, Phase.DISARMED, "standstill"),
+)
+"""What keeps the power off while nothing is latched, the most telling first. Nothing moved: most go by themselves."""
+
+HAZARDS: tuple[Hazard, ...] = (
+    Hazard(Cause.BUS_FAILED, lambda s: s.bus, True, True, "reset, with the bus working"),
+    Hazard(Cause.WATCHDOG_TRIPPED, lambda s: "" if s.watchdog_about_drive else _TRIPPED(s), True, True, "reset"),
+    Hazard(Cause.DRIVE_FAULT, lambda s: s.fault, True, True, "reset, with the drive's cause gone"),
+    Hazard(Cause.DRIVE_RESTARTED, lambda s: s.absent, True, True, "reset"),
+    Hazard(Cause.DRIVE_SILENT, lambda s: s.silent, True, True, "reset, with the drive answering"),
+    Hazard(Cause.WATCHDOG_TRIPPED, _TRIPPED, True, True, "reset"),
+    Hazard(Cause.WATCHDOG_MISSING, _MISSING, False, True, "reset, with the watchdog alive"),
+    Hazard(Cause.DRIVE_DISABLED, lambda s: s.disabled, True, True, "reset"),
+    Hazard(Cause.DID_NOT_STOP, lambda s: s.overdue, True, True, "reset"),
+    Hazard(Cause.STOP_REQUESTED, _stop_requested, False, True, "reset"),
+    Hazard(Cause.INACTIVE, lambda s: s.inactive, False, False, "lifecycle transition activate"),
+    Hazard(
+        Cause.SHUTDOWN, lambda s: "the driver is ending" if s.shutdown_requested else "", False, False, "a new start"
+    ),
+)
+"""All reasons to stop, the most telling first: when several hold, the first one is the cause that is reported.
+
+A tripped watchdog stops the drives itself. Where both are seen in the same cycle (this process was stopped for a
+while), drives that left NMT operational, are in fault or silent are what came of it, unless it tripped about a drive.
+"""
