@@ -46,7 +46,6 @@ class HeardNode:
     node_id: int
     nmt_state: NmtState | None = None
     heartbeats_at: list[float] = field(default_factory=list)
-    boot_ups: int = 0
     pdo_at: dict[int, float] = field(default_factory=dict)
     """Last time of each TPDO, by its COB-ID without node id."""
     sdo_answers: int = 0
@@ -142,7 +141,6 @@ class Listener:
     def _on_heartbeat(self, node: HeardNode, state: NmtState | None, now: float) -> None:
         node.nmt_state = state
         if state is NmtState.INITIALISING:
-            node.boot_ups += 1
             node.nmt_state = NmtState.PRE_OPERATIONAL
         else:
             node.heartbeats_at.append(now)

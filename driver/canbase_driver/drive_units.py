@@ -28,7 +28,6 @@ class AxisUnits:
         self._target_mps_per_bit = target_rev_per_s * rim_m_per_motor_rev
         self._actual_mps_per_bit = motor_rev_per_s(drive.actual_unit, counts) * rim_m_per_motor_rev
         self._m_per_count = rim_m_per_motor_rev / counts
-        self._wheel_radius_m = base.wheel_radius_m
 
     def velocity_raw(self, rim_mps: float) -> int:
         """Target for 60FFh: nearest value to `rim_mps` [m/s], saturated to its width.
@@ -47,10 +46,6 @@ class AxisUnits:
     def position_m(self, counts: int) -> float:
         """Distance of the rim [m] for a number of increments of 6064h, which may be wider than 32 bits."""
         return self._direction * counts * self._m_per_count
-
-    def wheel_rad(self, counts: int) -> float:
-        """Angle of the wheel [rad] for a number of increments of 6064h, forward positive."""
-        return self.position_m(counts) / self._wheel_radius_m
 
     def acceleration_raw(self, mps2: float) -> int:
         """Value for 6083h, 6084h, 6085h in the unit of the profile. A magnitude, 1…2³²-1, never 0.

@@ -73,8 +73,6 @@ class DriveSnapshot:
     """Statusword bit 7."""
     internal_limit: bool = False
     """Statusword bit 11; some drives set it from the start."""
-    remote: bool = True
-    """Statusword bit 9; false: it ignores the controlword."""
     voltage_v: float = math.nan
     """Of its supply [V]; NaN: not measured."""
     torque_share: float = math.nan

@@ -9,18 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from campaign.robots import RELY_ON_OTHERS
 from canbase_config.robot import Robot
 
 
 def any_robot(robot: Robot) -> bool:
     """Every robot can show it."""
     return True
-
-
-def relies_on_others(robot: Robot) -> bool:
-    """Its drives do not watch the heartbeats of their masters."""
-    return robot.drives[0].profile in RELY_ON_OTHERS
 
 
 @dataclass(frozen=True, slots=True)

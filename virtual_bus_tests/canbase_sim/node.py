@@ -13,7 +13,7 @@ from canopen import SdoAbortedError
 
 from canbase_sim.axis_parts import AxisParts, StateChange
 from canbase_sim.cia301 import abort, emcy, heartbeat, nmt, sdo, store
-from canbase_sim.cia301.dictionary import AXIS_STRIDE, Dictionary, key
+from canbase_sim.cia301.dictionary import Dictionary, key
 from canbase_sim.cia301.nmt import NmtCommand, NmtState
 from canbase_sim.cia301.rpdo import Rpdo
 from canbase_sim.cia301.tpdo import Tpdo
@@ -73,11 +73,6 @@ class SimulatedNode:
             d.on_write(0x1800 + n, partial(self._pdo_written, self._tpdos[n]))
         self._boot_at, self._loader_s = now, 0.0
         self._power_up(now, 0.0)
-
-    @property
-    def refused_rpdo_values(self) -> int:
-        """Values that came by RPDO and that their objects did not take."""
-        return sum(rpdo.refused for rpdo in self._rpdos)
 
     # The bus
 
@@ -344,8 +339,3 @@ class SimulatedNode:
 def _check_overflow(value: int) -> None:
     if value == 1:
         raise SdoAbortedError(abort.INVALID_VALUE)
-
-
-def axis_key(axis: int, index: int, subindex: int = 0) -> int:
-    """Address of an axis' object in the dictionary, for faults and tests: `index` as on the first axis."""
-    return key(index + AXIS_STRIDE * axis, subindex)

@@ -23,7 +23,6 @@ from mutation.targets import TARGETS, Target
 
 app = typer.Typer(add_completion=False)
 out = Console()
-Job = tuple[Target, Mutant]
 
 
 @app.command()

@@ -13,7 +13,6 @@ from canbase_sim.cia402.states import State
 from canbase_sim.node import SimulatedNode
 from canbase_velocity.twist import Twist
 from canbase_watchdog.ladder import RUNGS, Step
-from canbase_watchdog.watchdog import Answer
 from canbase_watchdog.watchdog import State as WatchdogState
 from small_worlds.world import SPEED_MPS, STEP_S, SmallWorld
 
@@ -73,7 +72,7 @@ class Properties:
         self._with_power = {part.name: False for part in small.parts}
         """Whether there was power when the part was seen alive last."""
         self._born: set[str] = set()
-        self._resets, self._freed, self._watchdog_answer = len(small.resets), small.freed, (0, Answer.NONE)
+        self._resets, self._freed = len(small.resets), small.freed
         self._watching_at = self._fast_since = self._pressed_at = now
         self._alive_at = {part.name: now for part in small.parts}
         self.found: Found | None = None

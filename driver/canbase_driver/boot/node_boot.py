@@ -60,11 +60,6 @@ class NodeBoot:
         """What the node is to do next, for people; empty when the boot has ended."""
         return "" if self.done else f"waiting for {self._name}: {_awaited(self._step)}"
 
-    @property
-    def dropped(self) -> int:
-        """SDO frames of this node that answered nothing."""
-        return self._client.dropped
-
     def on_frame(self, frame: Frame, now: float) -> None:
         """Take a frame from the bus, at `now` [s, monotonic]; those of other nodes do nothing."""
         if self.done or self._step is None:

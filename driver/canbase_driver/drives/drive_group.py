@@ -205,7 +205,6 @@ def _snapshot(node: RemoteNode, axis: Axis, robot: Robot, now: float) -> DriveSn
         self_stop=node.report.self_stop if node.report else "",
         warning=bool(axis.statusword & WARNING),
         internal_limit=bool(axis.statusword & INTERNAL_LIMIT),
-        remote=bool(axis.statusword & REMOTE),
         voltage_v=measured.voltage_v,
         torque_share=math.nan if axis.push.share is None else axis.push.share,
         current_a=measured.current_a,

@@ -46,7 +46,6 @@ class StopTeller:
         patience_s = given_up_s(robot) + POWER_OFF_TIMEOUT_S
         self._recorder = StopRecorder(patience_s)
         self._news: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
-        self._filter_said = self._mux_said = ""
         self._publisher = node.create_publisher(StopEvent, "stop_events", EVENT_QOS)
         node.create_subscription(MuxState, "velocity_mux/state", self._on_mux, STATE_QOS)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
+from contextlib import suppress
 from math import inf
 
 from canopen import SdoAbortedError
@@ -28,7 +29,6 @@ class Rpdo:
         on_deadline: Callable[[], None],
     ) -> None:
         self.number = number
-        self.refused = 0
         self.takes_every = 1
         """A fault of the receiver: it takes every n-th frame only, 0: none."""
         self._came = 0
@@ -97,10 +97,8 @@ class Rpdo:
 
     def _apply(self, data: bytes) -> None:
         for write, value in zip(self._writers, self._codec.unpack_from(data), strict=True):
-            try:
+            with suppress(SdoAbortedError):  # the object does not take it, and nobody is told
                 write(value)
-            except SdoAbortedError:
-                self.refused += 1
 
 
 def _skip(value: int) -> None:

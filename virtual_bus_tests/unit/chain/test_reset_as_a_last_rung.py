@@ -9,8 +9,8 @@ import pytest
 
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.snapshot import DriverState
+from canbase_sim.cia301.dictionary import key
 from canbase_sim.faults import KINDS
-from canbase_sim.node import axis_key
 from canbase_watchdog.ladder import RUNGS, Step
 from canbase_watchdog.watchdog import State
 from support.chain_world import World
@@ -69,14 +69,14 @@ def test_it_has_forgotten_1016h_and_is_configured_by_the_next_boot_before_it_get
     world = in_its_fault_reaction("encoder_reversed")
     world.run(1.0, lambda: bool(resets(world)))
     world.run(0.05)
-    assert world.node.dictionary.values[axis_key(0, 0x1016, 1)] == 0
+    assert world.node.dictionary.values[key(0x1016, 1)] == 0
     KINDS["heal"][0](world.node, world.now)
     world.command = Twist2D.ZERO
     assert world.run(4.0, lambda: world.truth.standing_s > 0.5)
     assert world.reset().done
     world.run(4.0, lambda: world.core.state is DriverState.ENABLED)
     assert world.core.state is DriverState.ENABLED
-    assert world.node.dictionary.values[axis_key(0, 0x1016, 1)] != 0
+    assert world.node.dictionary.values[key(0x1016, 1)] != 0
 
 
 @pytest.mark.parametrize("kind", ["encoder_lost", "silent"])

@@ -55,13 +55,11 @@ def test_a_mirrored_motor_turns_the_other_way_and_nothing_above_knows() -> None:
     assert mirrored.velocity_raw(0.5) == -955
     assert mirrored.velocity_mps(-955) == pytest.approx(0.5, rel=0.001)
     assert mirrored.position_m(-4096) == pytest.approx(0.0314159, rel=1e-5)
-    assert mirrored.wheel_rad(-4096 * 20) == pytest.approx(2.0 * math.pi)
 
 
 def test_one_turn_of_the_wheel() -> None:
     units = AxisUnits(drive(), BASE)
     assert units.position_m(20 * 4096) == pytest.approx(2.0 * math.pi * 0.1)
-    assert units.wheel_rad(20 * 4096) == pytest.approx(2.0 * math.pi)
 
 
 def test_a_position_beyond_32_bits_is_not_cut() -> None:
