@@ -7,7 +7,17 @@ from pathlib import Path
 import pytest
 
 from canbase_cli.main import app
-from site_builder import api_pages, command_page, decision_page, message_page, offline, source_pages, structure
+from canbase_driver.supervision.phases import Phase
+from site_builder import (
+    api_pages,
+    command_page,
+    decision_page,
+    message_page,
+    offline,
+    source_pages,
+    state_picture,
+    structure,
+)
 from site_builder.docstrings import converted
 from site_builder.modules import ROOT, Module, modules, purpose, shipped_packages
 from support.marked_page import section
@@ -20,6 +30,14 @@ def test_the_tree_in_architecture_md_is_that_of_the_sources() -> None:
     written = section(ARCHITECTURE.read_text(encoding="utf-8"), structure.COMMAND)
 
     assert written.strip() == structure.section(ROOT).strip(), "out of date: run `make structure`"
+
+
+def test_the_picture_of_the_states_is_the_one_of_the_table() -> None:
+    drawn = (ROOT / "docs" / "states.svg").read_text(encoding="utf-8")
+    assert drawn == state_picture.picture(), "out of date: run `make structure`"
+    assert set(state_picture.AT) == set(Phase)
+    ends = {after for _, after in state_picture.edges()} | set(state_picture.waits())
+    assert ends == set(Phase), "each state can be reached"
 
 
 def test_a_new_file_and_a_changed_first_line_change_the_tree(tmp_path: Path) -> None:
