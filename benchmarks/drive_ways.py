@@ -13,6 +13,7 @@ from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
 from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.outcome import ErrorCode
 from canbase_config.robot import Robot
+from canbase_runtime.driver_state import DriverState
 from drive_rig import Case
 
 SLOW_HZ = 10.0
@@ -90,7 +91,7 @@ def _inputs(odometry: Odometry) -> Inputs:
     """A healthy robot."""
     at = odometry.received
     safety = Safety(at, stops=False, cause="none", detail="", estop=False)
-    driver = Driver(at, "enabled", "none", "", "ok", "none", standstill=False, hears_command=True)
+    driver = Driver(at, DriverState.ENABLED, "none", "", "ok", "none", standstill=False, hears_command=True)
     return Inputs(odometry, safety, driver, Mux(at, ""))
 
 

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from canbase_action_server.inputs import (
-    ENABLED,
     ESTOP_CAUSES,
     OBSTACLE_CAUSE,
     SCAN_LOST_CAUSES,
@@ -21,6 +20,7 @@ from canbase_action_server.inputs import (
     age_s,
 )
 from canbase_action_server.outcome import ErrorCode
+from canbase_runtime.driver_state import DriverState
 
 CLIENT_SILENT = "no keepalive from the client (action.require_client_lease): it died, hangs, or does not send any"
 
@@ -72,9 +72,9 @@ def _watchdog(s: Situation) -> str | None:
 
 def _drive_fault(s: Situation) -> str | None:
     driver = s.inputs.driver
-    if driver is None or driver.state == ENABLED:
+    if driver is None or driver.state is DriverState.ENABLED:
         return None
-    return f"motor_driver is {driver.state}, cause {driver.cause}: {driver.detail}"
+    return f"motor_driver is {driver.state.word}, cause {driver.cause}: {driver.detail}"
 
 
 def _odometry_lost(s: Situation) -> str | None:

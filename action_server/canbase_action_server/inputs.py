@@ -9,9 +9,8 @@ import math
 from dataclasses import dataclass
 
 from canbase_action_server.along_track import Pose
+from canbase_runtime.driver_state import DriverState
 
-ENABLED = "enabled"
-"""State of motor_driver in which commands move the wheels (DriverStatus.ENABLED)."""
 WATCHDOG_OK = "ok"
 ESTOP_CAUSES = ("estop", "estop_stale")
 SCAN_LOST_CAUSES = ("scan_stale", "scan_unplaced", "scan_invalid", "scan_frozen")
@@ -46,10 +45,10 @@ class Safety:
 
 @dataclass(frozen=True, slots=True)
 class Driver:
-    """One message of motor_driver/status; `state` in lower case as in DriverStatus."""
+    """One message of motor_driver/status."""
 
     received: float
-    state: str
+    state: DriverState
     cause: str
     detail: str
     watchdog: str

@@ -9,17 +9,8 @@ from nav_msgs.msg import Odometry as OdometryMessage
 from canbase_action_server.along_track import Pose, yaw_of_quaternion
 from canbase_action_server.inputs import Driver, Mux, Odometry, Safety
 from canbase_action_server.motion import Twist
+from canbase_runtime.driver_state import driver_state
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
-
-DRIVER_STATES = {
-    DriverStatus.OFFLINE: "offline",
-    DriverStatus.BOOTING: "booting",
-    DriverStatus.DISARMED: "disarmed",
-    DriverStatus.ENABLING: "enabling",
-    DriverStatus.ENABLED: "enabled",
-    DriverStatus.STOPPING: "stopping",
-    DriverStatus.LATCHED: "latched",
-}
 
 
 def odometry_in(message: OdometryMessage, received: float) -> Odometry | None:
@@ -41,7 +32,7 @@ def driver_in(message: DriverStatus, received: float) -> Driver:
     """From motor_driver/status; a state that is not in the interface counts as offline."""
     return Driver(
         received=received,
-        state=DRIVER_STATES.get(message.state, "offline"),
+        state=driver_state(message.state),
         cause=printable(message.cause),
         detail=printable(message.detail, SENTENCE_LENGTH),
         watchdog=printable(message.watchdog),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from canbase_action_server.inputs import ENABLED, ESTOP_CAUSES, WATCHDOG_OK, Inputs, age_s
+from canbase_action_server.inputs import ESTOP_CAUSES, WATCHDOG_OK, Inputs, age_s
 from canbase_config.robot import Robot
+from canbase_runtime.driver_state import DriverState
 
 STATE_TIMEOUT_S = 1.5
 """A state that is older says nothing: three periods of the slowest one (velocity_mux/state, 2 Hz)."""
@@ -50,8 +51,8 @@ def _condition(robot: Robot, inputs: Inputs) -> str | None:
         return f"emergency stop holds: {safety.detail}; release it and reset"
     if driver and driver.watchdog != WATCHDOG_OK:
         return f"watchdog is {driver.watchdog} (cause {driver.watchdog_cause}); start or reset it"
-    if driver and driver.state != ENABLED:
-        return f"motor_driver is {driver.state}, not enabled: {driver.detail}"
+    if driver and driver.state is not DriverState.ENABLED:
+        return f"motor_driver is {driver.state.word}, not enabled: {driver.detail}"
     if driver and not driver.hears_command:
         return "motor_driver hears no cmd_vel; is safety_filter running? After a start try again in a second"
     if mux and mux.active not in ("", action_source(robot)):

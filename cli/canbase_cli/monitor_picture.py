@@ -1,4 +1,5 @@
-"""What `canbase monitor` shows, drawn from a snapshot: no ROS, no terminal, no clock. The shell is monitor.py."""
+"""What `canbase monitor` shows, drawn from canbase_runtime.driver_state import DriverState, driver_state
+from a snapshot: no ROS, no terminal, no clock. The shell is monitor.py."""
 
 from __future__ import annotations
 
@@ -12,11 +13,12 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from canbase_runtime.driver_state import DriverState, driver_state
+
 SILENT_S: Final = 1.5
 """A node that has said nothing for longer is shown as silent: its slowest state comes every 0.5 s."""
 ACTIONS: Final = ("passes", "limits", "slows", "STOPS")
 """SafetyState.action in words."""
-DRIVER_STATES: Final = ("OFFLINE", "BOOTING", "DISARMED", "ENABLING", "ENABLED", "STOPPING", "LATCHED")
 """DriverStatus.state in words."""
 GOOD: Final = "green"
 WARN: Final = "yellow"
@@ -104,11 +106,11 @@ def _driver_words(heard: Heard) -> list[Text]:
     if not heard.fresh:
         return [_silence("motor_driver", heard)]
     status = heard.message
-    state = DRIVER_STATES[status.state]
-    style = {"ENABLED": GOOD, "LATCHED": BAD, "OFFLINE": BAD}.get(state, WARN)
+    state = driver_state(status.state)
+    style = {DriverState.ENABLED: GOOD, DriverState.LATCHED: BAD, DriverState.OFFLINE: BAD}.get(state, WARN)
     cause = "" if status.cause in ("", "none") else f": {status.cause}"
     watchdog = Text(f"watchdog {status.watchdog}", GOOD if status.watchdog == "ok" else BAD)
-    return [Text(f"driver {state}{cause}", style), watchdog]
+    return [Text(f"driver {state.name}{cause}", style), watchdog]
 
 
 def _part(title: str, heard: Heard, draw: Callable[[Any], RenderableType]) -> Panel:

@@ -13,6 +13,7 @@ from canbase.msg import DriverStatus, SafetyState
 
 from canbase_doctor.checks import Check, fail, ok, warn
 from canbase_doctor.evidence import Evidence
+from canbase_runtime.driver_state import driver_state
 
 UNFOLLOWED = {
     True: "release the joystick, or let that program order zero (docs/velocity.md, Neutral start)",
@@ -23,15 +24,6 @@ SILENT_S = 1.5
 """A state that was received longer ago says nothing: the slowest one comes every 0.5 s."""
 HANGS = "its process hangs, or its timers stand still: look at its log, and restart it"
 PARTS_RUN = "is it running (canbase up), in this namespace and ROS_DOMAIN_ID?"
-STATES = {
-    DriverStatus.OFFLINE: "offline",
-    DriverStatus.BOOTING: "booting",
-    DriverStatus.DISARMED: "disarmed",
-    DriverStatus.ENABLING: "enabling",
-    DriverStatus.ENABLED: "enabled",
-    DriverStatus.STOPPING: "stopping",
-    DriverStatus.LATCHED: "latched",
-}
 ON_ITS_WAY = (DriverStatus.BOOTING, DriverStatus.ENABLING, DriverStatus.STOPPING)
 RUNGS = ("no rung", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld", "NMT reset node")
 WATCHDOG_COUNTERS = ("leases_refused", "frames_dropped", "bus_errors", "trips")
@@ -53,7 +45,7 @@ def driver(evidence: Evidence) -> list[Check]:
     status = evidence.on("motor_driver/status").last
     if silent := _silent(evidence, "motor_driver", "motor_driver/status"):
         return [silent]
-    state = STATES.get(status.state, f"state {status.state}")
+    state = driver_state(status.state).word
     if status.state == DriverStatus.ENABLED:
         stands = "stands" if status.standstill else "moves"
         found = ok("motor_driver", f"enabled, {stands}; cmd_vel is {_age(status.command_age_s)} old")

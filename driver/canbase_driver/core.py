@@ -41,7 +41,7 @@ from canbase_driver.motion.velocity_command import Command
 from canbase_driver.report import Told, snapshot_of
 from canbase_driver.runtime.bus_health import BusReport
 from canbase_driver.runtime.cycle_stats import CycleStats
-from canbase_driver.snapshot import DriverSnapshot, DriverState, StopRecord, WatchdogView
+from canbase_driver.snapshot import DriverSnapshot, StopRecord, WatchdogView
 from canbase_driver.supervision.latch import PowerRecord, found_before_the_start
 from canbase_driver.supervision.lifecycle import Aim, Readiness
 from canbase_driver.supervision.phases import NO_POWER, Drive, Orders
@@ -50,6 +50,7 @@ from canbase_driver.supervision.reset_run import ResetRun
 from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.supervisor import Supervisor
 from canbase_driver.supervision.watchdog_link import COUNTERS_COB_ID, STATE_COB_ID, WatchdogLink
+from canbase_runtime.driver_state import DriverState
 from canbase_runtime.latch_record import Found, Record
 
 HEARTBEATS_PER_TIMEOUT = 3

@@ -7,24 +7,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import Enum, IntEnum
+from enum import Enum
 
 from canbase_driver.causes import Cause
+from canbase_runtime.driver_state import DriverState
 
 Covariance = tuple[float, ...]
 """36 numbers: 6 × 6, row by row, in the order x, y, z, rotation about x, y, z (geometry_msgs, REP 103)."""
-
-
-class DriverState(IntEnum):
-    """State of the whole driver; the numbers are those of canbase/msg/DriverStatus."""
-
-    OFFLINE = 0
-    BOOTING = 1
-    DISARMED = 2
-    ENABLING = 3
-    ENABLED = 4
-    STOPPING = 5
-    LATCHED = 6
 
 
 class WatchdogView(Enum):

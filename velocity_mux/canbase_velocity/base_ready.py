@@ -6,6 +6,8 @@ its cycles from the start again was restarted: that is not ready either, also wh
 
 from __future__ import annotations
 
+from canbase_runtime.driver_state import DriverState
+
 STATUS_TIMEOUT_S = 0.5
 STATUS_PERIODS = 2.5
 """A status counts for STATUS_TIMEOUT_S, or for so many of its periods where rates.status_hz is low."""
@@ -22,13 +24,13 @@ class BaseReady:
 
     def __init__(self, timeout_s: float = STATUS_TIMEOUT_S) -> None:
         self._timeout_s = timeout_s
-        self._state = ""
+        self._state = DriverState.OFFLINE
         self._at_s: float | None = None
         self._cycles = 0
         self._estop_free = False
 
-    def on_driver(self, state: str, cycles: int, received: float) -> bool:
-        """Takes a motor_driver/status: its state ("ENABLED", …) and cycle counter. True: the driver was restarted."""
+    def on_driver(self, state: DriverState, cycles: int, received: float) -> bool:
+        """Takes a motor_driver/status: its state and cycle counter. True: the driver was restarted."""
         restarted = self._at_s is not None and cycles < self._cycles
         self._state, self._cycles, self._at_s = state, cycles, received
         return restarted
@@ -43,6 +45,6 @@ class BaseReady:
             return "nothing received on motor_driver/status yet"
         if now - self._at_s > self._timeout_s:
             return "motor_driver/status is silent"
-        if self._state != "ENABLED":
-            return f"motor_driver is {self._state}"
+        if self._state is not DriverState.ENABLED:
+            return f"motor_driver is {self._state.name}"
         return "" if self._estop_free else ESTOP_HOLDS

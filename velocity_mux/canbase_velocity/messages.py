@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from builtin_interfaces.msg import Time
-from canbase.msg import DriverStatus, SafetyState, ScannerState
+from canbase.msg import SafetyState, ScannerState
 from geometry_msgs.msg import Twist as TwistMessage
 from geometry_msgs.msg import TwistStamped
 from sensor_msgs.msg import LaserScan
@@ -24,10 +24,6 @@ except ModuleNotFoundError:  # a ROS 2 without it: its scanners have their pose 
     TFMessage = None
 
 NAN = math.nan
-DRIVER_STATES = {
-    getattr(DriverStatus, name): name
-    for name in ("OFFLINE", "BOOTING", "DISARMED", "ENABLING", "ENABLED", "STOPPING", "LATCHED")
-}
 
 
 def twist_of(message: TwistMessage) -> Twist:
@@ -54,11 +50,6 @@ def sent_at(stamp: Time, wall_s: float, now: float) -> Sent | None:
     """
     stamp_s = stamp.sec + stamp.nanosec * 1e-9
     return Sent(stamp_s, wall_s, now) if stamp_s > 0.0 else None
-
-
-def driver_state(message: DriverStatus) -> str:
-    """The state of a motor_driver/status by its name; one that is not known is none in which the base can move."""
-    return DRIVER_STATES.get(message.state, f"in state {message.state}")
 
 
 def scan_of(message: LaserScan) -> Scan:

@@ -26,6 +26,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from canbase_config.mux import MuxLock, MuxSource
+from canbase_runtime.driver_state import DriverState
 from canbase_velocity.base_ready import STATUS_TIMEOUT_S, BaseReady
 from canbase_velocity.delay import Delay, Sent
 from canbase_velocity.lock import Lock, LockView, crowd
@@ -224,8 +225,8 @@ class Mux:
         self._look(now)
         return True
 
-    def on_driver(self, state: str, cycles: int, received: float) -> None:
-        """Takes a motor_driver/status: the name of its state ("ENABLED", …) and its counter of cycles."""
+    def on_driver(self, state: DriverState, cycles: int, received: float) -> None:
+        """Takes a motor_driver/status: its state and its counter of cycles."""
         if self._base.on_driver(state, cycles, received):
             self._arm("motor_driver was restarted", received)
 

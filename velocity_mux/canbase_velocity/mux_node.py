@@ -20,6 +20,7 @@ from rclpy.node import Node
 from std_msgs.msg import Bool
 
 from canbase_config.robot import Robot
+from canbase_runtime.driver_state import driver_state
 from canbase_runtime.journal import Journal, Voice
 from canbase_runtime.receive_time import ReceiveTimes
 from canbase_runtime.sim_time import refuse_sim_time
@@ -27,7 +28,7 @@ from canbase_velocity.base_ready import status_timeout_s
 from canbase_velocity.changes import changes
 from canbase_velocity.delay import Sent
 from canbase_velocity.graph import expected, heard, publishers
-from canbase_velocity.messages import driver_state, sent_at, twist_message, twist_of
+from canbase_velocity.messages import sent_at, twist_message, twist_of
 from canbase_velocity.mux import Mux, MuxDecision
 from canbase_velocity.mux_messages import diagnostics, mux_state
 from canbase_velocity.qos import ANY_COMMAND, COMMAND, DRIVER_STATUS, STATE, listen_closely, loud
@@ -131,7 +132,7 @@ class MuxNode(Node):
 
     def _on_driver(self, message: DriverStatus) -> None:
         now = time.monotonic()
-        self._mux.on_driver(driver_state(message), message.cycles, self._receive_times.at(now))
+        self._mux.on_driver(driver_state(message.state), message.cycles, self._receive_times.at(now))
         self._send_if_changed(now)
 
     def _on_lock(self, name: str, message: Bool) -> None:

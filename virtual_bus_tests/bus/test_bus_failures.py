@@ -11,7 +11,7 @@ import pytest
 from can.interfaces.virtual import VirtualBus
 
 from canbase_driver.runtime.bus_port import BUS_OFF
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from support.drive_rig import Driver, Surroundings
 from support.flaky_bus import FlakyBus
 

@@ -12,7 +12,8 @@ import pytest
 
 from canbase_driver.cia301.pdo import node_layout
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverSnapshot, DriverState
+from canbase_driver.snapshot import DriverSnapshot
+from canbase_runtime.driver_state import DriverState
 from support.crews import Crew
 from support.drive_rig import Driver, Surroundings
 

@@ -114,7 +114,7 @@ class ActionProcess(Process):
     def _on_driver(self, snapshot: DriverSnapshot) -> None:
         driver = Driver(
             received=self.clock.now,
-            state=snapshot.state.name.lower(),
+            state=snapshot.state,
             cause=snapshot.cause.value,
             detail=snapshot.detail,
             watchdog=snapshot.watchdog.value,

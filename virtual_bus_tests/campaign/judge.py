@@ -30,7 +30,7 @@ from campaign.wishes import Wishes
 from campaign.world import World
 from canbase_config.robot import Robot
 from canbase_config.stopping import jerk_adds_s, lag_s, max_wheel_mps
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_sim.cia402.states import State
 from canbase_velocity.twist import ZERO, Twist
 from canbase_watchdog.ladder import RUNGS, Step

@@ -17,7 +17,7 @@ from campaign.hands import HANDS, Source
 from campaign.outside import Surroundings
 from campaign.robots import CREEP_SHARE, GRAVITY_MPS2, DrawnRobot, draw_robot
 from campaign.world import World
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_sim.cia402.axis import Axis
 from canbase_sim.cia402.states import State
 from canbase_velocity.estop import EstopState

@@ -10,8 +10,8 @@ import pytest
 
 from campaign.outside import Surroundings
 from campaign.world import World
-from canbase_driver.snapshot import DriverState
 from canbase_driver.supervision.reset import Outcome
+from canbase_runtime.driver_state import DriverState
 from canbase_velocity.neutral import Arming
 from canbase_velocity.twist import ZERO, Twist
 

@@ -92,7 +92,7 @@ class VelocityProcess(Process):
             self._send(decision)
 
     def _on_driver(self, snapshot: DriverSnapshot) -> None:
-        self.mux.on_driver(snapshot.state.name, snapshot.cycles, self.clock.now)
+        self.mux.on_driver(snapshot.state, snapshot.cycles, self.clock.now)
 
     def _decide(self) -> MuxDecision:
         self.mux.on_estop(self.filter.estop is EstopState.FREE)

@@ -18,7 +18,7 @@ from campaign.velocity_process import VelocityProcess
 from campaign.watchdog_process import WatchdogProcess
 from canbase_config.derive import watchdog_config
 from canbase_config.robot import Robot
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_sim.plant.base import PlantParameters
 from canbase_velocity.twist import Twist
 

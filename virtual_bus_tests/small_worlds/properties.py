@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from campaign.envelope import Envelope, braking_s, moving_s, notice_s, react_s
 from campaign.wishes import Wishes
 from canbase_config.stopping import max_wheel_mps
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_sim.cia402.states import State
 from canbase_sim.node import SimulatedNode
 from canbase_velocity.twist import Twist

@@ -17,6 +17,7 @@ from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.outcome import Outcome
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
+from canbase_runtime.driver_state import DriverState
 
 STEP_S = 0.001
 COUNT_M = 2 * math.pi * 0.1 / (20 * 4096)
@@ -83,7 +84,7 @@ class Plant:
 GOOD_SAFETY = Safety(received=0.0, stops=False, cause="none", detail="", estop=False)
 GOOD_DRIVER = Driver(
     received=0.0,
-    state="enabled",
+    state=DriverState.ENABLED,
     cause="none",
     detail="",
     watchdog="ok",

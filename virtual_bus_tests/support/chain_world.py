@@ -13,9 +13,10 @@ from canbase_config.robot import Robot
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.core import DriverCore
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverSnapshot, DriverState
+from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_driver.supervision.reset import Outcome
+from canbase_runtime.driver_state import DriverState
 from canbase_sim.cia402.states import State
 from canbase_sim.frame import Frame as BenchFrame
 from canbase_sim.node import SimulatedNode

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 
 from canbase_config.mux import DEFAULT_SOURCES, MuxLock, MuxSource
+from canbase_runtime.driver_state import DriverState
 from canbase_velocity.mux import Mux
 
 
@@ -19,7 +20,7 @@ def rested(
     patient = {name: source.model_copy(update={"neutral_after_s": 1.0}) for name, source in sources.items()}
     mux = Mux(patient, locks, foreign_lock=foreign_lock, status_timeout_s=math.inf)
     mux.on_estop(True)
-    mux.on_driver("ENABLED", 1, -10.0)
+    mux.on_driver(DriverState.ENABLED, 1, -10.0)
     for step in range(12):
         mux.decide(-10.0 + 0.1 * step)
     return mux

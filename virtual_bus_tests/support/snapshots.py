@@ -5,7 +5,8 @@ import math
 from typing import Any
 
 from canbase_driver.causes import Cause
-from canbase_driver.snapshot import DriverSnapshot, DriverState, DriveSnapshot, WatchdogView
+from canbase_driver.snapshot import DriverSnapshot, DriveSnapshot, WatchdogView
+from canbase_runtime.driver_state import DriverState
 
 LEFT = DriveSnapshot(
     joint="left_wheel_joint",

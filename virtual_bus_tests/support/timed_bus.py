@@ -11,7 +11,7 @@ from canbase_config.robot import Robot
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.core import DriverCore
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_sim.frame import Frame as BenchFrame
 from canbase_sim.world.bench import Bench
 from canbase_watchdog.watchdog import Watchdog

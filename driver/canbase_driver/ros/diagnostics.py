@@ -12,7 +12,8 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from canbase_driver.causes import Cause
-from canbase_driver.snapshot import DriverSnapshot, DriverState, DriveSnapshot, WatchdogView
+from canbase_driver.snapshot import DriverSnapshot, DriveSnapshot, WatchdogView
+from canbase_runtime.driver_state import DriverState
 
 _LOOP_COUNTERS = ("commands_refused", "overruns", "travel_losses")
 _BUS_COUNTERS = ("frames_dropped", "send_errors", "receive_errors", "error_frames", "bus_failures")

@@ -7,10 +7,10 @@ LATCHED as soon as a stop latches; CLEAR else. So a kill, a crash, a hang and a 
 from __future__ import annotations
 
 from canbase_driver.causes import Cause, Finding
-from canbase_driver.snapshot import DriverState
 from canbase_driver.supervision.phases import Phase
 from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.supervisor import Supervisor
+from canbase_runtime.driver_state import DriverState
 from canbase_runtime.latch_record import Defect, Found, Mark, Record, WriteAhead
 
 _WITH_POWER = (DriverState.ENABLING, DriverState.ENABLED, DriverState.STOPPING)

@@ -18,11 +18,11 @@ from enum import IntEnum
 from canbase_config.robot import Robot
 from canbase_config.stopping import given_up_s
 from canbase_driver.causes import Finding
-from canbase_driver.snapshot import DriverState
 from canbase_driver.supervision.phases import NO_POWER
 from canbase_driver.supervision.reset import Outcome
 from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.supervisor import ENABLE_TIMEOUT_S, POWER_OFF_TIMEOUT_S
+from canbase_runtime.driver_state import DriverState
 
 MARGIN_S = 1.0
 """On top of the times of what is waited for."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from canbase_driver.cia402 import PowerGoal
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 
 
 class Phase(Enum):

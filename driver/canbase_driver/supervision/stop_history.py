@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from canbase_driver.snapshot import DriverSnapshot, DriverState, StopRecord
+from canbase_driver.snapshot import DriverSnapshot, StopRecord
+from canbase_runtime.driver_state import DriverState
 
 ORDER_AGE_S = 0.1
 """A source that ordered motion so short before its end was lost; one that ordered zero had ended by itself."""

@@ -23,10 +23,10 @@ from dataclasses import dataclass
 
 from canbase_driver.causes import Cause, Finding
 from canbase_driver.motion.braking import Braking
-from canbase_driver.snapshot import DriverState
 from canbase_driver.supervision.phases import ORDERS, SHOWN, STOPPING, WAITING, Orders, Phase
 from canbase_driver.supervision.reasons import BLOCKERS, HAZARDS, Blocker, Hazard, Seen, first
 from canbase_driver.supervision.situation import Situation
+from canbase_runtime.driver_state import DriverState
 
 ENABLE_TIMEOUT_S = 2.0
 """From the first controlword to operation enabled on all drives; real ones need up to 1 s (brake, bus charge)."""

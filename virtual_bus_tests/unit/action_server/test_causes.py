@@ -9,6 +9,7 @@ from canbase.action import DriveDistance
 from canbase_action_server.causes import TABLE, Situation, cause_while_driving, cause_while_stopping
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.outcome import ErrorCode, Status
+from canbase_runtime.driver_state import DriverState
 from support.action_plant import GOOD_DRIVER, GOOD_MUX, GOOD_SAFETY, Plant, replaced
 
 GOOD = Situation(
@@ -37,7 +38,9 @@ Provoke = Callable[[Situation], Situation]
 PROVOKED: dict[ErrorCode, Provoke] = {
     ErrorCode.ESTOP: lambda s: with_inputs(s, safety=replace(GOOD_SAFETY, estop=True)),
     ErrorCode.WATCHDOG: lambda s: with_inputs(s, driver=replace(s.inputs.driver or GOOD_DRIVER, watchdog="tripped")),
-    ErrorCode.DRIVE_FAULT: lambda s: with_inputs(s, driver=replace(s.inputs.driver or GOOD_DRIVER, state="latched")),
+    ErrorCode.DRIVE_FAULT: lambda s: with_inputs(
+        s, driver=replace(s.inputs.driver or GOOD_DRIVER, state=DriverState.LATCHED)
+    ),
     ErrorCode.ODOMETRY_LOST: lambda s: replace(s, now=10.21),
     ErrorCode.TAKEN_OVER: lambda s: with_inputs(s, mux=replace(GOOD_MUX, active="joystick")),
     ErrorCode.SCAN_LOST: lambda s: with_inputs(s, safety=replace(GOOD_SAFETY, cause="scan_stale")),

@@ -14,6 +14,7 @@ from canbase_action_server.motion import Twist
 from canbase_action_server.outcome import ErrorCode, Status
 from canbase_action_server.standstill import Standstill, StandstillLimits, Verdict
 from canbase_config.stopping import standstill_s
+from canbase_runtime.driver_state import DriverState
 from support.action_plant import GOOD_SAFETY, Plant, Story, bench_robot, drive, goal_run, replaced
 
 OBSTACLE = replace(GOOD_SAFETY, stops=True, cause="obstacle", detail="0.12 m ahead")
@@ -114,7 +115,7 @@ def test_a_server_that_stood_still_does_not_drive_on_with_what_arrives_then() ->
 
 
 def test_a_fault_during_the_stop_of_a_cancel_is_the_cause() -> None:
-    at = {2.0: cancel, 2.1: lambda s: driver(s, state="latched", cause="drive_fault", detail="left 2310h")}
+    at = {2.0: cancel, 2.1: lambda s: driver(s, state=DriverState.LATCHED, cause="drive_fault", detail="left 2310h")}
     end = drive(Plant(), 3.0, 0.5, at=at).run()
     assert (end.status, end.code) == (Status.ABORTED, ErrorCode.DRIVE_FAULT)
     assert "left 2310h" in end.message
@@ -299,7 +300,7 @@ def test_turning_is_not_standing() -> None:
 
 
 def test_an_old_word_of_the_driver_is_no_word() -> None:
-    told = Driver(0.1, "enabled", "none", "", "ok", "none", standstill=True, hears_command=True)
+    told = Driver(0.1, DriverState.ENABLED, "none", "", "ok", "none", standstill=True, hears_command=True)
     watch = Standstill(STILL, began=0.0, speed_mps=0.1)
     assert watch.judge(Inputs(driver=told), 0.5) is Verdict.WAIT  # received before the order could act
     assert watch.judge(Inputs(driver=replace(told, received=0.4)), 0.5) is Verdict.STANDS

@@ -9,6 +9,7 @@ from canbase_action_server.goal_request import DriveRequest
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.preconditions import NO_SOURCE, STATE_TIMEOUT_S, action_source, state_reason
 from canbase_config.mux import Mux, MuxSource
+from canbase_runtime.driver_state import DriverState
 from support.action_plant import GOOD_DRIVER, GOOD_MUX, GOOD_SAFETY, Plant, bench_robot, replaced
 
 ROBOT = bench_robot()  # action.*: 0.01 to 5 m, 0.02 to 0.5 m/s
@@ -57,7 +58,7 @@ def test_a_robot_that_is_ready_has_no_reason_against_it() -> None:
         ({"mux": None}, "nothing received on velocity_mux/state"),
         ({"safety": replace(GOOD_SAFETY, estop=True)}, "emergency stop"),
         ({"safety": replace(GOOD_SAFETY, cause="estop_stale")}, "emergency stop"),
-        ({"driver": replace(GOOD_DRIVER, state="latched")}, "latched, not enabled"),
+        ({"driver": replace(GOOD_DRIVER, state=DriverState.LATCHED)}, "latched, not enabled"),
         ({"driver": replace(GOOD_DRIVER, watchdog="missing")}, "watchdog is missing"),
         ({"driver": replace(GOOD_DRIVER, hears_command=False)}, "hears no cmd_vel"),
         ({"mux": replace(GOOD_MUX, active="joystick")}, "joystick drives"),

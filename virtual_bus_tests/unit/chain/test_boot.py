@@ -10,7 +10,7 @@ from canbase_config.robot import Robot
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import NmtCommand
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_sim.faults import apply
 from support.chain_world import FORWARD, World, bench_robot, robot_of
 from support.timed_bus import TimedBus, on_a_wire

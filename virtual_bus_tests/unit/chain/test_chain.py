@@ -7,7 +7,7 @@ import math
 import pytest
 
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from support.chain_world import BOOTED_S, FORWARD, World, setpoints, world_of
 
 ENABLE_OPERATION = 0x0F

@@ -16,7 +16,7 @@ from canbase_config.robot import Robot
 from canbase_driver.cia402 import PowerGoal
 from canbase_driver.drives.let_go import LetGo
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_sim import faults
 from canbase_watchdog.policy import Cause
 from canbase_watchdog.watchdog import State

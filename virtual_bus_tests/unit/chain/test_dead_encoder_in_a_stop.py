@@ -13,7 +13,7 @@ import pytest
 from canbase_config.stopping import coasting_s, max_wheel_mps
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_sim import faults
 from canbase_watchdog.watchdog import Watchdog
 from support.chain_world import World

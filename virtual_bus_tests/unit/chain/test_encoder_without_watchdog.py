@@ -8,7 +8,7 @@ from __future__ import annotations
 import pytest
 
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_sim import faults
 from canbase_sim.cia402.states import State
 from support.chain_world import STEP_S, World, world_of

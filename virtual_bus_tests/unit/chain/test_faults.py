@@ -14,7 +14,7 @@ import pytest
 from canbase_config.derive import watchdog_config
 from canbase_config.stopping import standstill_s
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_sim.personality import PERSONALITIES
 from canbase_watchdog.watchdog import Watchdog
 from support.chain_world import FORWARD, KINDS, World, bench_robot, setpoints, world_of

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from canbase_driver.cia301.frame import Frame
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from support.chain_world import World, robot_of, setpoints
 
 OURS = {0x000, 0x080, 0x77F, 0x27E, 0x201, 0x202, 0x601, 0x602}

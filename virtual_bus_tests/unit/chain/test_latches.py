@@ -8,7 +8,7 @@ import pytest
 
 from canbase_driver.core import DriverCore
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_runtime.latch_record import Mark
 from canbase_watchdog import latch
 from canbase_watchdog.policy import Cause

@@ -8,7 +8,7 @@ import pytest
 
 from canbase_config.derive import watchdog_config
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_watchdog.watchdog import State, Watchdog
 from support.chain_world import World
 

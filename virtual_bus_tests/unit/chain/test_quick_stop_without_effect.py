@@ -13,7 +13,7 @@ from canbase_config.robot import Robot
 from canbase_config.stopping import lag_s
 from canbase_driver.motion.braking import Braking
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_sim.faults import apply
 from canbase_watchdog import policy
 from canbase_watchdog.slowing import LASTS_S

@@ -8,7 +8,7 @@ from __future__ import annotations
 import pytest
 
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_sim.cia301.dictionary import key
 from canbase_sim.faults import KINDS
 from canbase_watchdog.ladder import RUNGS, Step

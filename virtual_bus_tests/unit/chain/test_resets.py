@@ -10,7 +10,7 @@ import pytest
 from canbase_config.derive import watchdog_config
 from canbase_config.robot import Robot
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_watchdog.watchdog import State as WatchdogState
 from canbase_watchdog.watchdog import Watchdog
 from support.chain_world import BOOTED_S, FORWARD, World, bench_robot, setpoints, world_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_sim.faults import apply
 from canbase_watchdog.frames import Frame
 from canbase_watchdog.policy import Cause

@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverState
 from canbase_driver.supervision.stop_history import StopReport, standstill_text
+from canbase_runtime.driver_state import DriverState
 from canbase_sim.faults import KINDS
 from canbase_watchdog.watchdog import State
 from support.chain_world import World

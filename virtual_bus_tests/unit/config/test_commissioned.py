@@ -15,7 +15,7 @@ from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_doctor.checks import Verdict, commissioning
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_sim.world.bench import Bench
 from canbase_velocity.decision import Cause
 from canbase_velocity.safety_filter import FilterConfig, decide

@@ -27,6 +27,7 @@ from canbase_doctor.overload import Overload
 from canbase_doctor.server_processes import server_processes, talks_by
 from canbase_doctor.symptom_walk import CHECKS, walk
 from canbase_doctor.symptoms import SYMPTOMS
+from canbase_runtime.driver_state import DriverState
 
 WALL_S = 1_700_000_000
 NOW = Time(sec=WALL_S)
@@ -78,7 +79,7 @@ def step(name: str, at_s: float = WALL_S - 2.0, uuid: str | None = "cd", **value
 INPUTS = Inputs(
     odometry=OdometryInput(9.9, Pose(0.0, 0.0, 0.0), 0.0, 0.0),
     safety=Safety(9.9, False, "none", "", False),
-    driver=Driver(9.9, "enabled", "none", "", "ok", "none", standstill=True, hears_command=True),
+    driver=Driver(9.9, DriverState.ENABLED, "none", "", "ok", "none", standstill=True, hears_command=True),
     mux=Mux(9.9, ""),
 )
 HEALTHY = Evidence(

@@ -10,7 +10,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from canbase_driver.causes import Cause
 from canbase_driver.ros.diagnostics import diagnostics_message, unguarded
-from canbase_driver.snapshot import DriverState, WatchdogView
+from canbase_driver.snapshot import WatchdogView
+from canbase_runtime.driver_state import DriverState
 from support.snapshots import SNAPSHOT, with_driver, with_left
 
 STAMP = Time(sec=1_700_000_000, nanosec=250_000_000)

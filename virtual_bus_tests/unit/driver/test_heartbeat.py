@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import pytest
 
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_sim.personality import PERSONALITIES
 from support.chain_world import KINDS, World, world_of
 

@@ -9,11 +9,13 @@ from canbase.msg import DriverStatus, DriveStatus
 from geometry_msgs.msg import Point, Pose, Quaternion
 from rclpy.serialization import deserialize_message, serialize_message
 
+from canbase_driver.causes import Cause
 from canbase_driver.motion.odometry import Odometry
 from canbase_driver.ros import messages
 from canbase_driver.ros.diagnostics import diagnostics_message
-from canbase_driver.snapshot import DriverState, StopRecord, WatchdogView
+from canbase_driver.snapshot import StopRecord, WatchdogView
 from canbase_driver.supervision.stop_history import StopReport
+from canbase_runtime.driver_state import DriverState
 from support.snapshots import LEFT, RIGHT, SNAPSHOT, with_driver, with_left
 
 STAMP = Time(sec=1_700_000_000, nanosec=250_000_000)
@@ -111,7 +113,7 @@ def test_states_and_words_are_those_of_the_interface() -> None:
 def test_the_status_carries_every_field_of_the_snapshot_that_the_interface_has() -> None:
     latched = with_driver(
         state=DriverState.LATCHED,
-        cause="drive fault",
+        cause=Cause.DRIVE_FAULT,
         detail="left_wheel_joint is in fault",
         clears_on="reset",
         watchdog=WatchdogView.TRIPPED,
@@ -122,12 +124,13 @@ def test_the_status_carries_every_field_of_the_snapshot_that_the_interface_has()
     assert message.stamp == STAMP
     assert message.state == DriverStatus.LATCHED
     assert message.watchdog == DriverStatus.WATCHDOG_TRIPPED
-    plain = set(message.get_fields_and_field_types()) - {"stamp", "state", "watchdog", "drives"}
+    assert message.cause == "drive fault"
+    plain = set(message.get_fields_and_field_types()) - {"stamp", "state", "cause", "watchdog", "drives"}
     assert {name: getattr(message, name) for name in plain} == {name: getattr(latched, name) for name in plain}
 
 
 DIAGNOSTICS_ALONE = {
-    *("self_stop", "warning", "internal_limit", "remote", "voltage_v", "current_a", "temperature_c"),
+    *("self_stop", "warning", "internal_limit", "voltage_v", "current_a", "temperature_c"),
     *("boot_notes", "boot_changes", "configured", "torque_share"),
 }
 """What is in /diagnostics and not in the status."""

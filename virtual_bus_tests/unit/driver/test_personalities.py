@@ -11,7 +11,7 @@ from canbase_config.profile_file import load_profile, profile_names
 from canbase_config.robot import Robot
 from canbase_config.stopping import standstill_s
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_sim.personality import PERSONALITIES
 from canbase_watchdog.post_stop import plan
 from support.chain_world import FORWARD, KINDS, World, world_of

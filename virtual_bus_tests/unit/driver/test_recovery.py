@@ -7,7 +7,7 @@ import itertools
 import pytest
 
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from canbase_sim.faults import apply
 from support.chain_world import FORWARD, World, world_of
 

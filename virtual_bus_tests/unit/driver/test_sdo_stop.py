@@ -6,7 +6,7 @@ import pytest
 
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.drives.sdo_stop import PERIOD_S, SdoStop
-from canbase_driver.snapshot import DriverState
+from canbase_runtime.driver_state import DriverState
 from support.chain_world import World, robot_of, world_of
 from support.crews import robot_with
 

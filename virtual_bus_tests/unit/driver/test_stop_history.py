@@ -8,8 +8,9 @@ import math
 import pytest
 
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import DriverSnapshot, DriverState, StopRecord
+from canbase_driver.snapshot import DriverSnapshot, StopRecord
 from canbase_driver.supervision.stop_history import StopRecorder, StopReport
+from canbase_runtime.driver_state import DriverState
 from support.chain_world import FORWARD, World
 from support.snapshots import SNAPSHOT
 

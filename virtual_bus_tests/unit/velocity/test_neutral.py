@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canbase_config.mux import DEFAULT_SOURCES, MuxLock, MuxSource
+from canbase_runtime.driver_state import DriverState, driver_state
 from canbase_velocity.base_ready import STATUS_TIMEOUT_S, BaseReady, status_timeout_s
 from canbase_velocity.delay import Sent
 from canbase_velocity.mux import Mux, MuxDecision, Standing
@@ -27,7 +28,7 @@ class Story:
     def __init__(self) -> None:
         self.mux = Mux(DEFAULT_SOURCES)
         self.now = 100.0
-        self.driver: str | None = "ENABLED"
+        self.driver: DriverState | None = DriverState.ENABLED
         self.estop_free = True
         self.cycles = 0
         self.sends: dict[str, Twist] = {}
@@ -79,7 +80,7 @@ def test_a_stick_that_is_held_while_the_mux_starts_moves_nothing_until_it_was_re
 
 
 def driver_latches(story: Story) -> None:
-    story.driver = "LATCHED"
+    story.driver = DriverState.LATCHED
 
 
 def driver_is_silent(story: Story) -> None:
@@ -97,7 +98,7 @@ def test_a_stick_held_over_a_stop_is_not_followed_after_it(story: Story, event: 
     event(story)
     story.run(1.0)
     assert story.decide().twist == ZERO
-    story.driver, story.estop_free = "ENABLED", True
+    story.driver, story.estop_free = DriverState.ENABLED, True
     story.ordered.clear()
     assert story.run(20.0).twist == ZERO
     assert set(story.ordered) == {ZERO}
@@ -106,15 +107,15 @@ def test_a_stick_held_over_a_stop_is_not_followed_after_it(story: Story, event: 
     assert story.followed("joystick")
 
 
-@pytest.mark.parametrize("state", ["OFFLINE", "BOOTING", "DISARMED", "ENABLING", "STOPPING", "LATCHED", "in state 9"])
-def test_no_state_but_enabled_is_ready(story: Story, state: str) -> None:
+@pytest.mark.parametrize("state", [*(each for each in DriverState if each is not DriverState.ENABLED), driver_state(9)])
+def test_no_state_but_enabled_is_ready(story: Story, state: DriverState) -> None:
     story.release()
     story.driver = state
     story.sends = {"joystick": FORWARD}
     story.run(0.3)
-    story.driver = "ENABLED"
+    story.driver = DriverState.ENABLED
     assert not story.followed("joystick")
-    assert story.decide().sources[0].reason == f"waiting for zero (motor_driver is {state})"
+    assert story.decide().sources[0].reason == f"waiting for zero (motor_driver is {state.name})"
 
 
 def test_a_driver_that_restarted_within_one_period_of_its_status_disarms(story: Story) -> None:
@@ -130,9 +131,9 @@ def test_a_radio_gap_over_a_reset_arms_no_joystick(story: Story, gap_s: float) -
     story.release()
     assert story.followed("joystick")
     story.sends = {}  # the radio is gone
-    story.driver = "LATCHED"
+    story.driver = DriverState.LATCHED
     story.run(gap_s / 2)
-    story.driver = "ENABLED"  # the operator resets
+    story.driver = DriverState.ENABLED  # the operator resets
     story.run(gap_s / 2 + STATUS_S)
     assert not story.followed("joystick", 5.0)  # the stick was held all the time
     story.release()
@@ -154,9 +155,9 @@ def test_navigation_is_not_armed_by_a_gap_that_is_shorter_than_its_key(story: St
 def test_a_program_that_was_idle_begins_with_a_velocity(story: Story, name: str) -> None:
     story.run(2.1)
     assert story.followed(name)
-    story.driver = "LATCHED"  # and after a stop it needs zero, or to be idle again
+    story.driver = DriverState.LATCHED  # and after a stop it needs zero, or to be idle again
     story.run(0.5)
-    story.driver = "ENABLED"
+    story.driver = DriverState.ENABLED
     assert not story.followed(name, 5.0)
     assert story.decide().holder is not None
     assert "waiting for zero or 2.0 s of silence (motor_driver is LATCHED)" in story.decide().sentence
@@ -183,11 +184,11 @@ def test_a_held_stick_that_is_not_followed_lets_no_lower_source_drive_either(sto
 
 
 def test_zeros_while_the_base_is_not_ready_arm(story: Story) -> None:
-    story.driver = "BOOTING"
+    story.driver = DriverState.BOOTING
     story.release()
     assert story.decide().sources[0].armed
     assert story.decide().not_ready == "motor_driver is BOOTING"
-    story.driver = "ENABLED"
+    story.driver = DriverState.ENABLED
     story.run(0.2)
     assert story.followed("joystick")
 
@@ -197,7 +198,7 @@ def test_nan_neither_arms_nor_disarms(story: Story) -> None:
     story.mux.on_command("joystick", Twist(float("nan"), 0.0), story.now)
     assert not story.decide().sources[0].armed
     story.release()
-    story.driver = "LATCHED"
+    story.driver = DriverState.LATCHED
     story.run(0.2)
     story.mux.on_command("joystick", Twist(float("nan"), 0.0), story.now)
     assert story.decide().sources[0].armed
@@ -216,7 +217,7 @@ def test_a_zero_that_waited_while_this_process_stood_still_does_not_arm() -> Non
 def test_a_status_counts_until_exactly_its_timeout(age_s: float, problem: str) -> None:
     base = BaseReady()
     assert base.problem(0.0) == "nothing received on motor_driver/status yet"
-    base.on_driver("ENABLED", 1, 0.0)
+    base.on_driver(DriverState.ENABLED, 1, 0.0)
     assert base.problem(0.0) == "the emergency stop holds or waits for its reset"
     base.on_estop(True)
     assert base.problem(age_s) == problem
@@ -240,8 +241,8 @@ EVENTS: dict[str, dict[str, object]] = {
     "move": {"sends": {"joystick": FORWARD}},
     "zero": {"sends": {"joystick": ZERO}},
     "quiet": {"sends": {}},
-    "latch": {"driver": "LATCHED"},
-    "enable": {"driver": "ENABLED"},
+    "latch": {"driver": DriverState.LATCHED},
+    "enable": {"driver": DriverState.ENABLED},
     "mute": {"driver": None},
     "press": {"estop_free": False},
     "free": {"estop_free": True},
@@ -285,7 +286,7 @@ def test_a_stick_that_is_pushed_in_a_radio_gap_across_a_stop_is_not_followed_by_
     story.run(0.4)
     event(story)
     story.run(1.0)
-    story.driver, story.estop_free = "ENABLED", True
+    story.driver, story.estop_free = DriverState.ENABLED, True
     story.run(gap_s)
     assert not story.followed("joystick", 20.0)
     assert story.decide().sources[0].reason.startswith("waiting for zero (")
@@ -307,7 +308,7 @@ def test_what_waited_in_the_radio_comes_at_once_after_a_stop_and_is_not_followed
     story.run(0.2)
     driver_latches(story)
     story.run(1.0)
-    story.driver = "ENABLED"
+    story.driver = DriverState.ENABLED
     story.run(0.2)
     for number in range(70):
         say(FORWARD, pushed_s + STEP_S * number)
@@ -326,7 +327,7 @@ def test_a_stick_at_rest_that_goes_on_to_say_so_and_a_program_that_was_just_at_z
     story.sends = {"joystick": ZERO}
     driver_latches(story)
     story.run(1.0)
-    story.driver = "ENABLED"
+    story.driver = DriverState.ENABLED
     story.run(0.2)
     story.sends = {}
     story.run(0.4)
