@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Protocol
 
-from canbase_action_server.goal_queue import Reception
+from canbase_action_server.goal_queue import GoalQueue
 from canbase_action_server.goal_request import DriveRequest
 from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
 from canbase_action_server.motion import STOP, Twist
@@ -36,13 +36,13 @@ class Ours:
 
     def __init__(self, robot: Robot, case: Case, start: Odometry) -> None:
         self.period_s = 1.0 / robot.action.control_hz
-        self._reception = Reception(robot)
+        self._goal_queue = GoalQueue(robot)
         request = DriveRequest(case.distance_m, case.speed_mps)
-        self._reception.admit("goal", request, _inputs(start), start.received)
+        self._goal_queue.admit("goal", request, _inputs(start), start.received)
 
     def cycle(self, odometry: Odometry, now: float) -> tuple[Twist, bool]:
         """One control cycle."""
-        cycle = self._reception.tick(replace(_inputs(odometry), odometry=odometry), now)
+        cycle = self._goal_queue.tick(replace(_inputs(odometry), odometry=odometry), now)
         for end in cycle.ends:
             if end.outcome.code is not ErrorCode.OK:
                 raise RuntimeError(f"the goal failed: {end.outcome.message}")

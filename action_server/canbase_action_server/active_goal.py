@@ -28,7 +28,7 @@ class Failure:
     standstill: Standstill
 
 
-class Owner:
+class ActiveGoal:
     """The base and the goal that has it."""
 
     def __init__(self, robot: Robot) -> None:

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, replace
 
-from canbase_action_server.active_goal import Owner
+from canbase_action_server.active_goal import ActiveGoal
 from canbase_action_server.causes import CLIENT_SILENT, Cause
 from canbase_action_server.goal import Feedback, Order, Phase
 from canbase_action_server.goal_request import Request
@@ -63,12 +63,12 @@ class Admitted:
     preempted: bool = False
 
 
-class Reception:
+class GoalQueue:
     """All goals of the server. `key` is any name that no other goal ever had, such as its UUID."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._owner = Owner(robot)
+        self._owner = ActiveGoal(robot)
         self._running: Admitted | None = None
         self._waiting: deque[Admitted] = deque()
         self._failed = False

@@ -29,7 +29,7 @@ from canbase_action_server import messages
 from canbase_action_server.binding import Binding
 from canbase_action_server.goal import Phase
 from canbase_action_server.goal_client import SERVICE_QOS
-from canbase_action_server.goal_queue import Cycle, Reception
+from canbase_action_server.goal_queue import Cycle, GoalQueue
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.open_goal import OpenGoal, numbers, uuid_of
@@ -59,7 +59,7 @@ class DriveDistanceServer(Node):
         refuse_sim_time(self, SetParametersResult)
         self._robot = robot
         self._own_source = action_source(robot)
-        self._reception = Reception(robot)
+        self._goal_queue = GoalQueue(robot)
         self._voice = Voice(self.get_logger(), Journal("drive_distance_server"))
         self._inputs = Inputs()
         self._request_times = ReceiveTimes(REQUEST_GAP_S, RESENT_S)
@@ -81,7 +81,7 @@ class DriveDistanceServer(Node):
     @property
     def busy(self) -> bool:
         """A goal waits or runs, or its result is not out yet."""
-        return self._reception.busy or bool(self._open)
+        return self._goal_queue.busy or bool(self._open)
 
     def shut_down(self) -> None:
         """From now on no goal is accepted, and all that wait or run end with SHUTDOWN."""
@@ -90,7 +90,7 @@ class DriveDistanceServer(Node):
     def give_up(self, message: str) -> None:
         """Ends all goals now, whether the base stands or not. For the end of the process."""
         code = ErrorCode.SHUTDOWN if self.failure is None else ErrorCode.INTERNAL
-        self._carry_out(self._reception.give_up(code, message, time.monotonic()))
+        self._carry_out(self._goal_queue.give_up(code, message, time.monotonic()))
 
     def order_stop(self) -> None:
         """Zero on cmd_vel_action. Needs no goal and no state."""
@@ -100,7 +100,7 @@ class DriveDistanceServer(Node):
         """A callback raised: stop, end all goals with INTERNAL, and let the process end."""
         self.order_stop()
         self.failure = self.failure or error
-        self._reception.fail(error, time.monotonic())
+        self._goal_queue.fail(error, time.monotonic())
         self.shut_down()
         for line in "".join(traceback.format_exception(error)).splitlines():
             self._voice.tell(line, Priority.ERROR, robot=self._robot.name)
@@ -152,12 +152,12 @@ class DriveDistanceServer(Node):
     def _on_keepalive(self, goal_id: UUID) -> None:
         now = time.monotonic()
         if not self._keepalive_times.waited(now):
-            self._reception.keepalive(bytes(goal_id.uuid).hex(), now)
+            self._goal_queue.keepalive(bytes(goal_id.uuid).hex(), now)
 
     def _on_goal(self, binding: Binding, goal: Any) -> GoalResponse:
         now = time.monotonic()
         old = OLD if self._request_times.waited(now) else None
-        reason = old or self._reception.refusal(binding.request(goal), self._inputs, now)
+        reason = old or self._goal_queue.refusal(binding.request(goal), self._inputs, now)
         if reason is None:
             return GoalResponse.ACCEPT
         # rclpy does not tell the UUID of a goal that is not accepted yet.
@@ -166,7 +166,7 @@ class DriveDistanceServer(Node):
 
     def _on_accepted(self, binding: Binding, handle: ServerGoalHandle) -> None:
         goal, now, uuid = handle.request, time.monotonic(), uuid_of(handle)
-        self._reception.admit(uuid, binding.request(goal), self._inputs, now)
+        self._goal_queue.admit(uuid, binding.request(goal), self._inputs, now)
         self._open[uuid] = OpenGoal(handle, binding, now)
         self._log("accepted", uuid, action=binding.name, **numbers(goal))
 
@@ -194,10 +194,10 @@ class DriveDistanceServer(Node):
             times.at(time.monotonic())
         for uuid, goal in self._open.items():
             if goal.handle.is_cancel_requested:
-                self._reception.cancel(uuid)
-        running, before = self._reception.running, self._reception.phase
-        cycle = self._reception.tick(self._inputs, time.monotonic())
-        if self._reception.phase is not before:
+                self._goal_queue.cancel(uuid)
+        running, before = self._goal_queue.running, self._goal_queue.phase
+        cycle = self._goal_queue.tick(self._inputs, time.monotonic())
+        if self._goal_queue.phase is not before:
             self._log_phase(running, before, cycle)
         self._carry_out(cycle)
 
@@ -226,8 +226,8 @@ class DriveDistanceServer(Node):
         self._voice.tell(text, priority, robot=self._robot.name, goal=uuid, step=step, **told)
 
     def _log_phase(self, uuid: str | None, before: Phase, cycle: Cycle) -> None:
-        if self._reception.phase is Phase.STOPPING:
-            self._log("stopping", self._reception.running)
+        if self._goal_queue.phase is Phase.STOPPING:
+            self._log("stopping", self._goal_queue.running)
         elif before is Phase.STOPPING and any(end.key == uuid and end.outcome.stands for end in cycle.ends):
             self._log("standstill", uuid)
 

@@ -18,7 +18,7 @@ BOTH_EDGES: Final = (0.25, 4.0)
 """Lines of an encoder taken for its increments, or the other way round."""
 
 
-class JudgeError(ValueError):
+class CalibrationError(ValueError):
     """The measurements contradict each other. The text says what to look at."""
 
 
@@ -48,10 +48,10 @@ def agree(a: float, b: float) -> bool:
 
 
 def scale(drive: Drive, turned: Turned) -> Scale:
-    """The one key of robot.yaml that explains the three counts. Raises JudgeError when no single one does."""
+    """The one key of robot.yaml that explains the three counts. Raises CalibrationError when no single one does."""
     pos, vel, seen = abs(turned.by_position), abs(turned.by_velocity), abs(turned.seen)
     if min(pos, vel, seen) <= 0.0:
-        raise JudgeError(f"{drive.joint}: a count is zero (encoder {pos:.2f}, 606Ch {vel:.2f}, seen {seen:g})")
+        raise CalibrationError(f"{drive.joint}: a count is zero (encoder {pos:.2f}, 606Ch {vel:.2f}, seen {seen:g})")
     if agree(pos, seen) and agree(vel, seen):
         return Scale(drive.gear_ratio, drive.counts_per_motor_rev, drive.velocity_unit, "")
     if agree(pos, vel):
@@ -62,7 +62,7 @@ def scale(drive: Drive, turned: Turned) -> Scale:
         return Scale(drive.gear_ratio, counts, drive.velocity_unit, why)
     if agree(pos, seen):
         return _by_unit(drive, seen / vel)
-    raise JudgeError(
+    raise CalibrationError(
         f"{drive.joint}: the wheel made {seen:g} revolutions, its encoder counted {pos:.2f}, 606Ch tells of {vel:.2f}: "
         "more than one of gear_ratio, counts_per_motor_rev and velocity_unit is wrong; take them from the data sheets"
     )
@@ -83,7 +83,7 @@ def _by_unit(drive: Drive, factor: float) -> Scale:
     units: tuple[VelocityUnit, ...] = get_args(VelocityUnit)
     found = next((unit for unit in units if agree(motor_rev_per_s(unit, counts), wanted)), None)
     if found is None:
-        raise JudgeError(
+        raise CalibrationError(
             f"{drive.joint}: one bit of 606Ch is {factor:.3g} times {drive.actual_unit}, which is no unit that canbase "
             "knows: set the unit of velocities in the drive itself (60A9h, or the maker's tool)"
         )
@@ -92,19 +92,19 @@ def _by_unit(drive: Drive, factor: float) -> Scale:
 
 
 def radius(before_m: float, odometry_m: float, measured_m: float) -> float:
-    """Wheel radius [m] from a straight drive. Raises JudgeError for a result that cannot be."""
+    """Wheel radius [m] from a straight drive. Raises CalibrationError for a result that cannot be."""
     return _plausible("wheel_radius_m", before_m, before_m * measured_m / odometry_m)
 
 
 def track(before_m: float, odometry_rad: float, measured_rad: float, radius_factor: float) -> float:
-    """Track [m] from a turn in place; `radius_factor`: new radius / old radius. Raises JudgeError."""
+    """Track [m] from a turn in place; `radius_factor`: new radius / old radius. Raises CalibrationError."""
     return _plausible("track_m", before_m, before_m * odometry_rad / measured_rad * radius_factor)
 
 
 def _plausible(key: str, before: float, after: float) -> float:
     low, high = PLAUSIBLE
     if not math.isfinite(after) or not low <= after / before <= high:
-        raise JudgeError(f"{key} would change from {before:g} to {after:g}: measure again, or edit robot.yaml")
+        raise CalibrationError(f"{key} would change from {before:g} to {after:g}: measure again, or edit robot.yaml")
     return after
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from canbase_commissioning.calibration import radius, track
 from canbase_commissioning.guide import Ask, CommissionError, Script, Until, number
-from canbase_commissioning.powered_drives import Rig
+from canbase_commissioning.powered_drives import PoweredDrives
 from canbase_commissioning.wheel_direction import braking_way_m, rest
 
 LIMIT_FACTOR = 3.0
@@ -27,8 +27,8 @@ class FloorFound:
     measured_deg: float
 
 
-def measure_floor(rig: Rig, distance_m: float, turns: float, speed_mps: float) -> Script[FloorFound]:
-    """Drives `distance_m` forward, then turns counter-clockwise by `turns`. Raises CommissionError, JudgeError."""
+def measure_floor(rig: PoweredDrives, distance_m: float, turns: float, speed_mps: float) -> Script[FloorFound]:
+    """Drives `distance_m` forward, then turns left by `turns`. Raises CommissionError, CalibrationError."""
     base = rig.robot.base
     clear = f"It will drive {distance_m:g} m forward at {speed_mps:g} m/s. Mark its place. Is the way free?"
     yield Ask("floor.straight", clear, confirms=True)
@@ -51,7 +51,7 @@ def measure_floor(rig: Rig, distance_m: float, turns: float, speed_mps: float) -
 
 
 def _drive(
-    rig: Rig, left_mps: float, right_mps: float, progress_m: Callable[[float, float], float], goal_m: float
+    rig: PoweredDrives, left_mps: float, right_mps: float, progress_m: Callable[[float, float], float], goal_m: float
 ) -> Script[tuple[float, float]]:
     """Until the progress is `goal_m`, and to a stand; the ways of both sides [m]."""
     start = _ways(rig)
@@ -71,7 +71,7 @@ def _drive(
     return _since(rig, start)
 
 
-def _ways(rig: Rig) -> tuple[float, float]:
+def _ways(rig: PoweredDrives) -> tuple[float, float]:
     """Mean way of the wheels of each side [m]."""
     sides = {"left": [0.0, 0], "right": [0.0, 0]}
     for axis in rig.axes.values():
@@ -81,6 +81,6 @@ def _ways(rig: Rig) -> tuple[float, float]:
     return left, right
 
 
-def _since(rig: Rig, start: tuple[float, float]) -> tuple[float, float]:
+def _since(rig: PoweredDrives, start: tuple[float, float]) -> tuple[float, float]:
     left_m, right_m = _ways(rig)
     return left_m - start[0], right_m - start[1]

@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from canbase_commissioning.powered_drives import Rig
+from canbase_commissioning.powered_drives import PoweredDrives
 from canbase_driver.cia301.frame import Frame
 
 T = TypeVar("T")
@@ -98,7 +98,7 @@ class Guide(Generic[T]):
     Ends with `result`, or raises what the script or the rig raised: whoever runs it must then say farewell.
     """
 
-    def __init__(self, rig: Rig, script: Script[T], tell: Callable[[Tell], None]) -> None:
+    def __init__(self, rig: PoweredDrives, script: Script[T], tell: Callable[[Tell], None]) -> None:
         self.rig = rig
         self.result: T | None = None
         self.done = False

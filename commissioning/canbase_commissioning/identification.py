@@ -70,7 +70,7 @@ def _text(index: int) -> Steps[str]:
     return data.decode("latin-1").strip(" \0")
 
 
-class Roster:
+class Identification:
     """Asks `node_ids`, those that were heard more patiently. `cards` has who answered, by node id."""
 
     def __init__(self, node_ids: Iterable[int], heard: Listener, timeout_s: float, *, with_texts: bool) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from canbase_commissioning.powered_drives import Rig
+from canbase_commissioning.powered_drives import PoweredDrives
 from canbase_driver.cia301.frame import Frame
 
 FIRST_S = 0.8
@@ -57,7 +57,7 @@ def split_keys(text: str) -> list[str]:
 class JogSession:
     """One wheel under a dead-man key. `quit` ends it; whoever runs it must then say farewell. Ticks raise RigError."""
 
-    def __init__(self, rig: Rig, joint: str, speed_mps: float) -> None:
+    def __init__(self, rig: PoweredDrives, joint: str, speed_mps: float) -> None:
         """`speed_mps`: of the rim [m/s]. Raises KeyError for an unknown joint."""
         self._axis = rig.axes[joint]
         self._rig, self._joint, self._speed_mps = rig, joint, speed_mps

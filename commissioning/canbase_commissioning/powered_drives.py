@@ -28,7 +28,7 @@ from canbase_driver.cia301.nmt import (
 )
 from canbase_driver.cia402 import DriveState, PowerGoal
 from canbase_driver.drives.axis import Axis
-from canbase_driver.drives.canopen_node import Presence, RemoteNode
+from canbase_driver.drives.canopen_node import CanopenNode, Presence
 
 BEATS_PER_TIMEOUT = 3
 RAMP_MPS2 = 0.2
@@ -47,12 +47,12 @@ class RigError(Exception):
     """The drives do not do what they are told, or somebody else commands them. Everything stops."""
 
 
-class Rig:
+class PoweredDrives:
     """All drives of a robot. Give it every frame, and call `tick` at least every 10 ms: it is due when it sends."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self.nodes = {drive.node_id: RemoteNode(drive.node_id, robot) for drive in robot.drives}
+        self.nodes = {drive.node_id: CanopenNode(drive.node_id, robot) for drive in robot.drives}
         self.axes: dict[str, Axis] = {a.drive.joint: a for node in self.nodes.values() for a in node.axes}
         self.speeds_mps: dict[str, float] = {}
         """What is wanted of each wheel's rim, forward positive; those that are not in here have no power."""
@@ -168,13 +168,13 @@ class Rig:
         if not self.is_mute:
             self._pending += node.tick(now)
 
-    def _note_sign(self, node: RemoteNode, now: float) -> None:
+    def _note_sign(self, node: CanopenNode, now: float) -> None:
         if node.emcy is not None:
             self.signs.setdefault(node.node_id, (now, f"EMCY {node.emcy_text()}"))
         elif node.nmt_state not in (None, NmtState.OPERATIONAL):
             self.signs.setdefault(node.node_id, (now, f"left NMT operational ({node.nmt_state.text})"))
 
-    def _on_pdo(self, node: RemoteNode, frame: Frame, now: float) -> None:
+    def _on_pdo(self, node: CanopenNode, frame: Frame, now: float) -> None:
         for axis in node.axes:
             if frame.cob_id == node.layout.status_cob_id(axis.drive.axis):
                 node.on_status(axis, frame, now)
@@ -226,7 +226,7 @@ class Rig:
             self._wants_reset = False
         self._resets_left = max(0, self._resets_left - 1)
 
-    def _goal(self, node: RemoteNode) -> PowerGoal:
+    def _goal(self, node: CanopenNode) -> PowerGoal:
         if self.override is not None:
             return self.override
         if self._resets_left >= RESET_CYCLES:

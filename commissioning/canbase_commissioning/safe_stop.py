@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from canbase_commissioning.powered_drives import Rig
+from canbase_commissioning.powered_drives import PoweredDrives
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import NmtState, heartbeat
@@ -12,7 +12,7 @@ from canbase_driver.cia301.nmt import NmtState, heartbeat
 PERIOD_S = 0.01
 
 
-class Farewell:
+class SafeStop:
     """Quick stop until all stand, voltage off, pre-operational. Needs nothing from the drives to get to its end.
 
     A session; done after STOP_S and OFF_S at most. Heartbeats go on meanwhile: the drives keep to their ramps.
@@ -21,7 +21,7 @@ class Farewell:
     STOP_S = 2.0
     OFF_S = 0.1
 
-    def __init__(self, rig: Rig) -> None:
+    def __init__(self, rig: PoweredDrives) -> None:
         self._rig = rig
         self._since = self._off_since = self._cycle_at = math.nan
         self.done = False

@@ -14,7 +14,7 @@ from canbase_driver.cia301.sdo_client import SdoClient
 T = TypeVar("T")
 
 
-class Inquiry(Generic[T]):
+class SdoSession(Generic[T]):
     """Runs one sequence of transfers on each of some nodes at once. `tasks` has what came of them, by node id."""
 
     def __init__(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from canbase_commissioning.calibration import stop_time_s
 from canbase_commissioning.guide import CommissionError, Script, Tell, Until, wait
-from canbase_commissioning.powered_drives import Rig
+from canbase_commissioning.powered_drives import PoweredDrives
 from canbase_commissioning.session import NodeTask
 from canbase_commissioning.wheel_probe import Sample, look, way_m
 from canbase_config.drive import Drive
@@ -59,13 +59,13 @@ class Outcome:
         return f"{self.joint} stood {self.time_s:.2f} s after {self.trial}: {abs(self.way_m) * 1000:.0f} mm{said}"
 
 
-def watches_heartbeat(rig: Rig, joint: str) -> bool:
+def watches_heartbeat(rig: PoweredDrives, joint: str) -> bool:
     """Whether the boot could set that the drive watches the watchdog's heartbeat (1016h)."""
     report = rig.report(joint)
     return report is not None and report.self_stop.startswith("heartbeat")
 
 
-def prove(rig: Rig, speed_mps: float) -> Script[tuple[Outcome, ...]]:
+def prove(rig: PoweredDrives, speed_mps: float) -> Script[tuple[Outcome, ...]]:
     """Both trials; the second one with the drives that watch a heartbeat. Raises CommissionError, RigError."""
     outcomes = yield from _silence(rig, speed_mps)
     yield from recover(rig)
@@ -76,7 +76,7 @@ def prove(rig: Rig, speed_mps: float) -> Script[tuple[Outcome, ...]]:
     return tuple(outcomes)
 
 
-def get_ready(rig: Rig) -> Script[None]:
+def get_ready(rig: PoweredDrives) -> Script[None]:
     """Boots the drives. Raises CommissionError when they do not get ready."""
     rig.begin()
     held = yield Until(lambda _now: _begun(rig) and not rig.faults, READY_S)
@@ -85,7 +85,7 @@ def get_ready(rig: Rig) -> Script[None]:
         raise CommissionError(f"the drives did not get ready within {READY_S:g} s: {why}. canbase doctor tells more")
 
 
-def recover(rig: Rig) -> Script[None]:
+def recover(rig: PoweredDrives) -> Script[None]:
     """After a trial: quick stop, then everything from the start."""
     rig.is_mute, rig.override = False, PowerGoal.QUICK_STOP
     yield Until(lambda _now: rig.standing, 1.0)
@@ -94,7 +94,7 @@ def recover(rig: Rig) -> Script[None]:
     yield from get_ready(rig)
 
 
-def spin(rig: Rig, speeds_mps: Mapping[str, float]) -> Script[None]:
+def spin(rig: PoweredDrives, speeds_mps: Mapping[str, float]) -> Script[None]:
     """Brings wheels up to speed. Raises CommissionError when they do not get there."""
     rig.speeds_mps = dict(speeds_mps)
     fast = yield Until(lambda _now: all(_at_speed(rig, joint, v) for joint, v in speeds_mps.items()), SPIN_S)
@@ -105,22 +105,22 @@ def spin(rig: Rig, speeds_mps: Mapping[str, float]) -> Script[None]:
     yield wait(0.3)
 
 
-def _begun(rig: Rig) -> bool:
+def _begun(rig: PoweredDrives) -> bool:
     rig.begin()
     return rig.ready
 
 
-def _state(rig: Rig, joint: str) -> str:
+def _state(rig: PoweredDrives, joint: str) -> str:
     state = rig.axes[joint].state
     return "unknown state" if state is None else state.text
 
 
-def _at_speed(rig: Rig, joint: str, speed_mps: float) -> bool:
+def _at_speed(rig: PoweredDrives, joint: str, speed_mps: float) -> bool:
     axis = rig.axes[joint]
     return rig.enabled(joint) and axis.velocity_mps * speed_mps > 0.0 and abs(axis.velocity_mps) > 0.8 * abs(speed_mps)
 
 
-def _silence(rig: Rig, speed_mps: float) -> Script[list[Outcome]]:
+def _silence(rig: PoweredDrives, speed_mps: float) -> Script[list[Outcome]]:
     yield Tell(f"trial 1: {SILENCE}")
     yield from spin(rig, dict.fromkeys(rig.axes, speed_mps))
     before = yield from _looks(rig)
@@ -139,7 +139,7 @@ def _silence(rig: Rig, speed_mps: float) -> Script[list[Outcome]]:
     return outcomes
 
 
-def _without_heartbeat(rig: Rig, joints: list[str], speed_mps: float) -> Script[list[Outcome]]:
+def _without_heartbeat(rig: PoweredDrives, joints: list[str], speed_mps: float) -> Script[list[Outcome]]:
     yield Tell(f"trial 2: {HEARTBEAT}")
     yield from spin(rig, dict.fromkeys(joints, speed_mps))
     before = yield from _looks(rig)
@@ -162,7 +162,7 @@ def _without_heartbeat(rig: Rig, joints: list[str], speed_mps: float) -> Script[
     return outcomes
 
 
-def _begin(rig: Rig) -> float:
+def _begin(rig: PoweredDrives) -> float:
     """When the trial begins."""
     rig.on_trial = True
     rig.signs.clear()
@@ -170,7 +170,14 @@ def _begin(rig: Rig) -> float:
 
 
 def _outcome(
-    rig: Rig, joint: str, trial: str, speed_mps: float, began: float, stopped: bool, time_s: float, rolled_m: float
+    rig: PoweredDrives,
+    joint: str,
+    trial: str,
+    speed_mps: float,
+    began: float,
+    stopped: bool,
+    time_s: float,
+    rolled_m: float,
 ) -> Outcome:
     robot = rig.robot
     ramp_s = speed_mps / robot.limits.emergency_deceleration_mps2
@@ -180,7 +187,7 @@ def _outcome(
     return Outcome(joint, trial, speed_mps, stopped, time_s, rolled_m, limit_s, said)
 
 
-def _looks(rig: Rig) -> Script[dict[str, Sample]]:
+def _looks(rig: PoweredDrives) -> Script[dict[str, Sample]]:
     """One look at each wheel, node by node at once, axis by axis of a node."""
     found: dict[str, Sample] = {}
     for number in range(2):
@@ -189,13 +196,13 @@ def _looks(rig: Rig) -> Script[dict[str, Sample]]:
     return found
 
 
-def _turn(rig: Rig, drive: Drive) -> int:
+def _turn(rig: PoweredDrives, drive: Drive) -> int:
     """A node has one SDO channel: its axes are read one after the other."""
     first = min(axis.drive.axis for axis in rig.nodes[drive.node_id].axes)
     return int(drive.axis != first)
 
 
-def _looks_at(rig: Rig, drives: list[Drive]) -> Script[dict[str, Sample]]:
+def _looks_at(rig: PoweredDrives, drives: list[Drive]) -> Script[dict[str, Sample]]:
     if not drives:
         return {}
     tasks = {

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from canbase_commissioning.calibration import Scale, Turned, scale
 from canbase_commissioning.guide import Ask, CommissionError, Script, Tell, Until, number, one_of, wait
-from canbase_commissioning.powered_drives import RAMP_MPS2, Rig
+from canbase_commissioning.powered_drives import RAMP_MPS2, PoweredDrives
 from canbase_commissioning.self_stop_test import spin
 from canbase_config.drive import Drive
 
@@ -34,7 +34,7 @@ AGAIN = ".again"
 """Ends the key of a question that is asked a second time, after a correction."""
 
 
-def find_direction(rig: Rig, drive: Drive, again: str = "") -> Script[WheelFound]:
+def find_direction(rig: PoweredDrives, drive: Drive, again: str = "") -> Script[WheelFound]:
     """Turns one wheel forward, as robot.yaml has it, and asks. Raises CommissionError when something else happens.
 
     `again`: AGAIN after a correction.
@@ -66,9 +66,9 @@ def find_direction(rig: Rig, drive: Drive, again: str = "") -> Script[WheelFound
 
 
 def measure_scale(
-    rig: Rig, drive: Drive, revolutions: float, speed_mps: float, again: str = ""
+    rig: PoweredDrives, drive: Drive, revolutions: float, speed_mps: float, again: str = ""
 ) -> Script[tuple[Scale, Turned]]:
-    """Turns one wheel by `revolutions` as robot.yaml counts them, and asks. Raises CommissionError, JudgeError.
+    """Turns one wheel by `revolutions` as robot.yaml counts them, and asks. Raises CommissionError, CalibrationError.
 
     `again`: AGAIN after a correction.
     """
@@ -92,7 +92,7 @@ def measure_scale(
     return scale(drive, turned), turned
 
 
-def rest(rig: Rig) -> Script[None]:
+def rest(rig: PoweredDrives) -> Script[None]:
     """Brings all wheels to rest, then takes the power away."""
     rig.speeds_mps = dict.fromkeys(rig.speeds_mps, 0.0)
     yield Until(lambda _now: rig.standing, 5.0)
@@ -101,7 +101,7 @@ def rest(rig: Rig) -> Script[None]:
     yield Until(lambda _now: not rig.powered, 1.0)
 
 
-def braking_way_m(rig: Rig, speed_mps: float) -> float:
+def braking_way_m(rig: PoweredDrives, speed_mps: float) -> float:
     """Way of a rim from `speed_mps` to rest down the rig's ramp [m]."""
     return speed_mps**2 / (2.0 * min(RAMP_MPS2, rig.robot.limits.acceleration_mps2))
 
@@ -109,7 +109,7 @@ def braking_way_m(rig: Rig, speed_mps: float) -> float:
 class _Integral:
     """The way of a wheel by its 606Ch [m]."""
 
-    def __init__(self, rig: Rig, joint: str) -> None:
+    def __init__(self, rig: PoweredDrives, joint: str) -> None:
         self.way_m = 0.0
         self._axis = rig.axes[joint]
         self._at = rig.now

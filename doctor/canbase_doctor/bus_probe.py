@@ -8,8 +8,8 @@ from typing import Final
 
 from canbase_commissioning.bus_monitor import Listener, ListenSession
 from canbase_commissioning.can_interface import Link, parse_link
-from canbase_commissioning.onbus.bus_session import BusLine
-from canbase_commissioning.sdo_session import Inquiry
+from canbase_commissioning.onbus.bus_session import BusSession
+from canbase_commissioning.sdo_session import SdoSession
 from canbase_config.robot import Robot
 from canbase_doctor.bus_checks import BusEvidence
 from canbase_doctor.inspection import Inspection, inspect
@@ -27,7 +27,7 @@ def look(robot: Robot) -> BusEvidence:
     """What is to be seen on the bus of `robot`. Sends SDO reads alone."""
     link = read_link(robot.bus.channel) if robot.bus.interface == "socketcan" else None
     try:
-        line = BusLine(robot.bus)
+        line = BusSession(robot.bus)
     except BusError as error:
         return BusEvidence(robot, Listener(0.0), 0.0, str(error), link)
     with line:
@@ -40,10 +40,10 @@ def look(robot: Robot) -> BusEvidence:
     return evidence(robot, heard, now, inquiry, problem, link)
 
 
-def ask(robot: Robot, heard: Listener) -> Inquiry[Inspection]:
+def ask(robot: Robot, heard: Listener) -> SdoSession[Inspection]:
     """The reading of all nodes."""
     by_node = {d.node_id: tuple(e for e in robot.drives if e.node_id == d.node_id) for d in robot.drives}
-    return Inquiry(
+    return SdoSession(
         {node_id: inspect(node_id, drives, robot) for node_id, drives in by_node.items()},
         heard,
         lambda node_id: sdo_client(node_id, by_node[node_id][0].kind.sdo, robot.timeouts.sdo_s),
@@ -52,7 +52,7 @@ def ask(robot: Robot, heard: Listener) -> Inquiry[Inspection]:
 
 
 def evidence(
-    robot: Robot, heard: Listener, now: float, inquiry: Inquiry[Inspection], problem: str, link: Link | None
+    robot: Robot, heard: Listener, now: float, inquiry: SdoSession[Inspection], problem: str, link: Link | None
 ) -> BusEvidence:
     """What came of it."""
     unread = {

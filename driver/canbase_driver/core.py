@@ -29,7 +29,7 @@ from canbase_driver.cia301.nmt import (
 )
 from canbase_driver.cia402 import PowerGoal
 from canbase_driver.drives.axis import Axis
-from canbase_driver.drives.canopen_node import RemoteNode
+from canbase_driver.drives.canopen_node import CanopenNode
 from canbase_driver.drives.drive_group import Drives
 from canbase_driver.drives.let_go import LetGo
 from canbase_driver.drives.odometry_feed import OdometryFeed
@@ -43,7 +43,7 @@ from canbase_driver.runtime.bus_health import BusReport
 from canbase_driver.runtime.cycle_stats import CycleStats
 from canbase_driver.snapshot import DriverSnapshot, StopRecord, WatchdogView
 from canbase_driver.supervision.latch import PowerRecord, found_before_the_start
-from canbase_driver.supervision.lifecycle import Aim, Readiness
+from canbase_driver.supervision.lifecycle import Aim, Lifecycle
 from canbase_driver.supervision.phases import NO_POWER, Drive, Orders
 from canbase_driver.supervision.reset import Outcome
 from canbase_driver.supervision.reset_run import ResetRun
@@ -72,7 +72,7 @@ class DriverCore:
         """`aim`: how far it goes by itself. `found`: the record of its stops at the start; None: nobody keeps one,
         which is for virtual time alone."""
         self._robot = robot
-        self._readiness = Readiness(robot, aim)
+        self._readiness = Lifecycle(robot, aim)
         self._period_s = 1.0 / robot.rates.control_hz
         self._drives = Drives(robot)
         self._sync = SyncProducer(robot.bus.sync_counter)
@@ -344,10 +344,10 @@ class DriverCore:
             f"{fastest.drive.joint} turns at {fastest.velocity_mps:.3f} m/s, {elapsed_s:.1f} s after zero was ordered"
         )
 
-    def _on_status(self, node: RemoteNode, axis: Axis, frame: Frame, now: float) -> bool:
+    def _on_status(self, node: CanopenNode, axis: Axis, frame: Frame, now: float) -> bool:
         return self._answers_last_sync(now) and node.on_status(axis, frame, now)
 
-    def _on_velocity(self, node: RemoteNode, axis: Axis, frame: Frame, now: float) -> bool:
+    def _on_velocity(self, node: CanopenNode, axis: Axis, frame: Frame, now: float) -> bool:
         understood = self._answers_last_sync(now) and node.on_velocity(axis, frame, now)
         self._feed.update(now)
         return understood
@@ -361,9 +361,9 @@ class DriverCore:
         """False for a TPDO that waited while this process stood still: it tells of then, and would pass for fresh."""
         return now - self._ticked_at <= self._robot.timeouts.feedback_s
 
-    def _dispatch_table(self) -> dict[int, tuple[Handler, RemoteNode | None]]:
+    def _dispatch_table(self) -> dict[int, tuple[Handler, CanopenNode | None]]:
         """Who takes a frame, and the node that may go on with its boot after it."""
-        table: dict[int, tuple[Handler, RemoteNode | None]] = {
+        table: dict[int, tuple[Handler, CanopenNode | None]] = {
             STATE_COB_ID: (self._watchdog.on_frame, None),
             COUNTERS_COB_ID: (self._watchdog.on_counters, None),
             NMT: (self._on_nmt, None),

@@ -1,4 +1,4 @@
-"""drive_distance_server in virtual time: its `Reception` with the inputs, the timer and the callbacks of node.py."""
+"""drive_distance_server in virtual time: its `GoalQueue` with the inputs, the timer and the callbacks of node.py."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from campaign.clock import Clock
 from campaign.process import Process, Topics
 from canbase_action_server.along_track import Pose
-from canbase_action_server.goal_queue import Reception
+from canbase_action_server.goal_queue import GoalQueue
 from canbase_action_server.goal_request import DriveRequest
 from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
 from canbase_action_server.outcome import Outcome
@@ -56,7 +56,7 @@ class ActionProcess(Process):
 
     def begin(self) -> None:
         """A new owner without a goal; it has heard nothing."""
-        self.reception = Reception(self._robot)
+        self.goal_queue = GoalQueue(self._robot)
         self._inputs = Inputs()
         self._turned_at = self.clock.now
         self.every(1.0 / self._robot.action.control_hz, self._on_timer, phase_s=0.002)
@@ -82,22 +82,22 @@ class ActionProcess(Process):
     def _on_goal(self, distance_m: float, speed_mps: float) -> None:
         now = self.clock.now
         request = DriveRequest(distance_m, speed_mps)
-        if self.reception.refusal(request, self._inputs, now) is not None:
+        if self.goal_queue.refusal(request, self._inputs, now) is not None:
             self.refused += 1
             return
-        self.reception.admit(str(len(self.goals)), request, self._inputs, now)
+        self.goal_queue.admit(str(len(self.goals)), request, self._inputs, now)
         self.goals.append(Goal(len(self.goals), distance_m, speed_mps, now, []))
 
     def _on_cancel(self) -> None:
-        if self.reception.running is not None:
-            self.reception.cancel(self.reception.running)
+        if self.goal_queue.running is not None:
+            self.goal_queue.cancel(self.goal_queue.running)
 
     def _on_timer(self) -> None:
         now = self.clock.now
         if self.goals and not self.goals[-1].ends:
             self.goals[-1].held_up_s += max(0.0, now - self._turned_at - 1.0 / self._robot.action.control_hz)
         self._turned_at = now
-        cycle = self.reception.tick(self._inputs, now)
+        cycle = self.goal_queue.tick(self._inputs, now)
         if cycle.twist is not None:
             self._topics.publish("cmd_vel_action", Twist(cycle.twist.linear_mps, cycle.twist.angular_radps))
         for end in cycle.ends:

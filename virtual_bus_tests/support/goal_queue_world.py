@@ -1,4 +1,4 @@
-"""A reception before a simple base in virtual time; at every cycle it is seen that one goal at most orders motion."""
+"""A goal queue before a simple base in virtual time; at every cycle it is seen that one goal at most orders motion."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from canbase_action_server.along_track import Pose
-from canbase_action_server.goal_queue import Cycle, Reception
+from canbase_action_server.goal_queue import Cycle, GoalQueue
 from canbase_action_server.goal_request import DriveRequest, Request
 from canbase_action_server.inputs import Inputs, Odometry
 from canbase_action_server.motion import STOP
@@ -38,12 +38,12 @@ class Told:
     ended: float = 0.0
 
 
-class ReceptionWorld:
-    """Reception and base. `change` is laid over the inputs of each cycle."""
+class GoalQueueWorld:
+    """GoalQueue and base. `change` is laid over the inputs of each cycle."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self.reception = Reception(robot)
+        self.goal_queue = GoalQueue(robot)
         self.now = 0.0
         self.x_m = self.mps = 0.0
         self.goals: dict[str, Told] = {}
@@ -58,12 +58,12 @@ class ReceptionWorld:
 
     def ask(self, request: Request) -> str | None:
         """A client sends a goal: its key, None when it is refused."""
-        reason = self.reception.refusal(request, self.inputs, self.now)
+        reason = self.goal_queue.refusal(request, self.inputs, self.now)
         if reason is not None:
             self.refusals.append(reason)
             return None
         key = str(len(self.goals))
-        self.reception.admit(key, request, self.inputs, self.now)
+        self.goal_queue.admit(key, request, self.inputs, self.now)
         self.goals[key] = Told(request, self.now)
         return key
 
@@ -75,7 +75,7 @@ class ReceptionWorld:
 
     def cancel(self, key: str) -> None:
         """A client cancels."""
-        self.goals[key].canceled = self.reception.cancel(key) or self.goals[key].canceled
+        self.goals[key].canceled = self.goal_queue.cancel(key) or self.goals[key].canceled
 
     def run(self, duration_s: float, until: Callable[[], bool] = lambda: False) -> None:
         """Let time pass, until `until` at most."""
@@ -83,12 +83,12 @@ class ReceptionWorld:
             if until():
                 return
             self.now += PERIOD_S
-            self._move(self.reception.tick(self.inputs, self.now))
+            self._move(self.goal_queue.tick(self.inputs, self.now))
 
     def run_out(self, limit_s: float = 60.0) -> None:
         """Until no goal is left."""
-        self.run(limit_s, lambda: not self.reception.busy)
-        assert not self.reception.busy
+        self.run(limit_s, lambda: not self.goal_queue.busy)
+        assert not self.goal_queue.busy
 
     def code(self, key: str) -> ErrorCode:
         """How it ended, once."""

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import TypeVar
 
 from canbase_commissioning.guide import Guide, Script, Tell
-from canbase_commissioning.powered_drives import Rig
-from canbase_commissioning.safe_stop import Farewell
+from canbase_commissioning.powered_drives import PoweredDrives
+from canbase_commissioning.safe_stop import SafeStop
 from canbase_config.robot import Robot
 from support.session_world import SessionWorld
 
@@ -27,10 +27,10 @@ class GuideWorld(SessionWorld):
         self.told: list[Tell] = []
         self.asked: list[str] = []
         self.answers = dict(answers or {})
-        self.rig = Rig(self.robot)
+        self.rig = PoweredDrives(self.robot)
         self.wait(1.0)
 
-    def guide(self, script: Callable[[Rig], Script[T]], limit_s: float = 300.0) -> T:
+    def guide(self, script: Callable[[PoweredDrives], Script[T]], limit_s: float = 300.0) -> T:
         """The whole script, then the farewell; what it returned. Raises what it raised, after the farewell too."""
         guide = Guide(self.rig, script(self.rig), self.told.append)
         start = self.now
@@ -43,7 +43,7 @@ class GuideWorld(SessionWorld):
                     answer = self.answers[guide.question.key]
                     guide.answer(answer if isinstance(answer, str) else answer())
         finally:
-            self.run(Farewell(self.rig))
+            self.run(SafeStop(self.rig))
         assert guide.result is not None
         return guide.result
 

@@ -11,7 +11,7 @@ from functools import partial
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 from canbase_watchdog import frames
 from canbase_watchdog.frames import DriveState
-from canbase_watchdog.plausibility import FeedbackWatch
+from canbase_watchdog.plausibility import Plausibility
 from canbase_watchdog.second_master import Foreign
 from canbase_watchdog.standing import StandWatch
 from canbase_watchdog.tally import Tally
@@ -52,7 +52,7 @@ class _Record:
 
     def __init__(self, drive: WatchedDrive, config: WatchdogConfig, now: float) -> None:
         self.drive = drive
-        self.feedback = FeedbackWatch(drive, config, now)
+        self.feedback = Plausibility(drive, config, now)
         self.push, self.stand = PushWatch(drive, config), StandWatch(drive, config)
         self.state: DriveState | None = None
         self.status_at = self.enabled_since = self.disabled_since = NEVER

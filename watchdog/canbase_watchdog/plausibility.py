@@ -46,7 +46,7 @@ class Feedback:
     """Travel by velocity minus travel by encoder."""
 
 
-class FeedbackWatch:
+class Plausibility:
     """Follows the setpoints and samples of one axis. Speeds at the rim, forward positive [m/s]."""
 
     def __init__(self, drive: WatchedDrive, config: WatchdogConfig, now: float) -> None:

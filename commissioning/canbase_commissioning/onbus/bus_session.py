@@ -38,15 +38,15 @@ def robot_if_given(config: Path | None) -> Robot | None:
     return None if config is None else load_config(config).robot
 
 
-def open_line(bus: Bus) -> BusLine:
+def open_line(bus: Bus) -> BusSession:
     """The bus, for a `with`. Exits with 1 and advice when it cannot be opened."""
     try:
-        return BusLine(bus)
+        return BusSession(bus)
     except BusError as error:
         fail(str(error), FAILED)
 
 
-class BusLine:
+class BusSession:
     """One bus, and the clock. Use with `with`."""
 
     def __init__(self, bus: Bus) -> None:
@@ -54,7 +54,7 @@ class BusLine:
         self._echo = Echo() if bus.interface == "udp_multicast" else None
         self._port = BusPort(bus.arguments())
 
-    def __enter__(self) -> BusLine:
+    def __enter__(self) -> BusSession:
         return self
 
     def __exit__(self, *error: object) -> None:

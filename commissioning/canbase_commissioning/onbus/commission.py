@@ -10,7 +10,7 @@ from pathlib import Path
 import typer
 from pydantic import ValidationError
 
-from canbase_commissioning.calibration import JudgeError
+from canbase_commissioning.calibration import CalibrationError
 from canbase_commissioning.edits import (
     Edit,
     commissioned_edits,
@@ -22,10 +22,10 @@ from canbase_commissioning.edits import (
 )
 from canbase_commissioning.floor import FloorFound, measure_floor
 from canbase_commissioning.guide import Ask, CommissionError, Script, Tell
-from canbase_commissioning.onbus.bus_session import BusLine, open_line
+from canbase_commissioning.onbus.bus_session import BusSession, open_line
 from canbase_commissioning.onbus.moving import refuse_beside_masters, run_script
-from canbase_commissioning.onbus.operator import Person, Stopped, stopping_signals
-from canbase_commissioning.powered_drives import Rig, RigError
+from canbase_commissioning.onbus.operator import Operator, Stopped, stopping_signals
+from canbase_commissioning.powered_drives import PoweredDrives, RigError
 from canbase_commissioning.report import Results, markdown, verdict
 from canbase_commissioning.self_stop_test import Outcome, get_ready, prove
 from canbase_commissioning.wheel_direction import AGAIN, WheelFound, find_direction, measure_scale
@@ -59,14 +59,14 @@ class Plan:
 def run(config: Path, plan: Plan, answers: Path | None, *, yes: bool, dry_run: bool) -> None:
     """All steps; exits with 1 when the self-stop is not proven, or not all was done."""
     robot = load_config(config).robot
-    person = Person(answers, yes=yes)
+    person = Operator(answers, yes=yes)
     results = Results(dry_run=dry_run)
     with open_line(robot.bus) as line, stopping_signals():
         refuse_beside_masters(line)
         try:
             _go(line, robot, plan, person, results)
             results.edits += identity_edits(robot, results.boots)
-        except (CommissionError, RigError, JudgeError, ValidationError) as error:
+        except (CommissionError, RigError, CalibrationError, ValidationError) as error:
             results.ended_by = str(error)
         except Stopped as stopped:
             results.ended_by = str(stopped)
@@ -80,7 +80,7 @@ def run(config: Path, plan: Plan, answers: Path | None, *, yes: bool, dry_run: b
         raise typer.Exit(FAILED)
 
 
-def _go(line: BusLine, robot: Robot, plan: Plan, person: Person, results: Results) -> None:
+def _go(line: BusSession, robot: Robot, plan: Plan, person: Operator, results: Results) -> None:
     if plan.steps & {"directions", "scale"}:
         robot = _measure_wheels(line, robot, plan, person, results)
         results.done |= {step for step in ("directions", "scale") if step in plan.steps}
@@ -99,7 +99,7 @@ def _go(line: BusLine, robot: Robot, plan: Plan, person: Person, results: Result
     results.done.add("floor")
 
 
-def _measure_wheels(line: BusLine, robot: Robot, plan: Plan, person: Person, results: Results) -> Robot:
+def _measure_wheels(line: BusSession, robot: Robot, plan: Plan, person: Operator, results: Results) -> Robot:
     """The robot with what was found. A correction is measured again before anything else relies on it.
 
     Raises CommissionError when the second measurement contradicts the first: then nothing is changed.
@@ -133,7 +133,11 @@ def _gentler(before: Robot, after: Robot) -> dict[str, float]:
 
 
 def _wheels(
-    rig: Rig, plan: Plan, results: Results, again: Collection[str] = (), shares: Mapping[str, float] | None = None
+    rig: PoweredDrives,
+    plan: Plan,
+    results: Results,
+    again: Collection[str] = (),
+    shares: Mapping[str, float] | None = None,
 ) -> Script[list[WheelFound]]:
     """All wheels, or those of `again`, at these shares of the speed."""
     suffix = AGAIN if again else ""
@@ -155,21 +159,21 @@ def _wheels(
     return found
 
 
-def _proof(rig: Rig, plan: Plan, results: Results) -> Script[tuple[Outcome, ...]]:
+def _proof(rig: PoweredDrives, plan: Plan, results: Results) -> Script[tuple[Outcome, ...]]:
     yield Ask("proof", f"The proof, wheels still up: all wheels turn at {plan.speed_mps:g} m/s. Ready?", confirms=True)
     yield from get_ready(rig)
     _note_boots(rig, results)
     return (yield from prove(rig, plan.speed_mps))
 
 
-def _floor(rig: Rig, plan: Plan, results: Results) -> Script[FloorFound]:
+def _floor(rig: PoweredDrives, plan: Plan, results: Results) -> Script[FloorFound]:
     yield Ask("wheels_down", WHEELS_DOWN, confirms=True)
     yield from get_ready(rig)
     _note_boots(rig, results)
     return (yield from measure_floor(rig, plan.distance_m, plan.turns, plan.speed_mps))
 
 
-def _note_boots(rig: Rig, results: Results) -> None:
+def _note_boots(rig: PoweredDrives, results: Results) -> None:
     results.boots = {node_id: node.report for node_id, node in rig.nodes.items() if node.report is not None}
 
 

@@ -17,11 +17,11 @@ import typer
 
 from canbase_commissioning.guide import CommissionError, Guide, Script
 from canbase_commissioning.jog import JogSession
-from canbase_commissioning.onbus.bus_session import BusLine, open_line
+from canbase_commissioning.onbus.bus_session import BusSession, open_line
 from canbase_commissioning.onbus.moving import refuse_beside_masters
 from canbase_commissioning.onbus.operator import Stopped, stopping_signals
-from canbase_commissioning.powered_drives import Rig, RigError
-from canbase_commissioning.safe_stop import Farewell
+from canbase_commissioning.powered_drives import PoweredDrives, RigError
+from canbase_commissioning.safe_stop import SafeStop
 from canbase_commissioning.self_stop_test import get_ready
 from canbase_config.robot import Robot
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, colour, fail, load_config
@@ -55,8 +55,8 @@ def run(config: Path | None, joint: str, speed_mps: float, *, yes: bool) -> None
             raise typer.Exit(128 + stopped.number) from stopped
 
 
-def _jog(line: BusLine, robot: Robot, joint: str, speed_mps: float) -> None:
-    rig = Rig(robot)
+def _jog(line: BusSession, robot: Robot, joint: str, speed_mps: float) -> None:
+    rig = PoweredDrives(robot)
     try:
         line.run(Guide(rig, _boot(rig), lambda told: typer.echo(told.text)))
         _say_what_happens_after_a_kill(rig, joint)
@@ -64,15 +64,15 @@ def _jog(line: BusLine, robot: Robot, joint: str, speed_mps: float) -> None:
         with _single_keys():
             _hold(line, session)
     finally:
-        line.run(Farewell(rig))
+        line.run(SafeStop(rig))
 
 
-def _boot(rig: Rig) -> Script[bool]:
+def _boot(rig: PoweredDrives) -> Script[bool]:
     yield from get_ready(rig)
     return True
 
 
-def _hold(line: BusLine, session: JogSession) -> None:
+def _hold(line: BusSession, session: JogSession) -> None:
     shown_at = 0.0
     while not session.done:
         line.turn(session)
@@ -89,7 +89,7 @@ def _hold(line: BusLine, session: JogSession) -> None:
     sys.stdout.write("\n")
 
 
-def _say_what_happens_after_a_kill(rig: Rig, joint: str) -> None:
+def _say_what_happens_after_a_kill(rig: PoweredDrives, joint: str) -> None:
     report = rig.report(joint)
     if report is None or not report.stops_by_itself:
         typer.secho(CANNOT_STOP, fg=typer.colors.RED, bold=True, color=colour())

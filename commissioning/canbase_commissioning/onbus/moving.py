@@ -7,10 +7,10 @@ from typing import TypeVar
 
 from canbase_commissioning.bus_monitor import ListenSession
 from canbase_commissioning.guide import CommissionError, Guide, Script
-from canbase_commissioning.onbus.bus_session import BusLine
-from canbase_commissioning.onbus.operator import Person
-from canbase_commissioning.powered_drives import Rig
-from canbase_commissioning.safe_stop import Farewell
+from canbase_commissioning.onbus.bus_session import BusSession
+from canbase_commissioning.onbus.operator import Operator
+from canbase_commissioning.powered_drives import PoweredDrives
+from canbase_commissioning.safe_stop import SafeStop
 from canbase_config.robot import Robot
 from canbase_runtime.terminal import FAILED, fail
 
@@ -18,7 +18,7 @@ T = TypeVar("T")
 LISTEN_S = 1.0
 
 
-def refuse_beside_masters(line: BusLine) -> None:
+def refuse_beside_masters(line: BusSession) -> None:
     """Exits with 1 when anybody else commands this bus: two masters are none."""
     listening = ListenSession(LISTEN_S)
     line.run(listening)
@@ -28,9 +28,9 @@ def refuse_beside_masters(line: BusLine) -> None:
         fail(f"somebody else commands this bus ({signs}). End canbase up, or sudo systemctl stop 'canbase-*'", FAILED)
 
 
-def run_script(line: BusLine, robot: Robot, script: Callable[[Rig], Script[T]], person: Person) -> T:
+def run_script(line: BusSession, robot: Robot, script: Callable[[PoweredDrives], Script[T]], person: Operator) -> T:
     """The script to its end, then the farewell. What it raises comes after the farewell."""
-    rig = Rig(robot)
+    rig = PoweredDrives(robot)
     guide = Guide(rig, script(rig), person.tell)
     try:
         while not guide.done:
@@ -40,13 +40,13 @@ def run_script(line: BusLine, robot: Robot, script: Callable[[Rig], Script[T]], 
             elif person.interrupts():
                 raise CommissionError("stopped by Enter")
     finally:
-        line.run(Farewell(rig))
+        line.run(SafeStop(rig))
     if guide.result is None:
         raise RuntimeError("the script ended without a result")
     return guide.result
 
 
-def _answer(line: BusLine, guide: Guide[T], person: Person) -> None:
+def _answer(line: BusSession, guide: Guide[T], person: Operator) -> None:
     question = guide.question
     while question is not None and question is guide.question:
         try:

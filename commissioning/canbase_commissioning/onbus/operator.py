@@ -44,7 +44,7 @@ def stopping_signals() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-class Person:
+class Operator:
     """Asks on the terminal, or takes the answers of a file; `yes` confirms what wants a yes."""
 
     def __init__(self, answers: Path | None, *, yes: bool) -> None:

@@ -13,8 +13,8 @@ from rich.table import Table
 from rich.text import Text
 
 from canbase_commissioning.bus_monitor import OURS, ListenSession
-from canbase_commissioning.identification import Roster
-from canbase_commissioning.onbus.bus_session import BusLine, open_line
+from canbase_commissioning.identification import Identification
+from canbase_commissioning.onbus.bus_session import BusSession, open_line
 from canbase_commissioning.scan_rows import ScanRow, missing, scan_rows
 from canbase_config.robot import Bus, Robot
 from canbase_driver.cia301.nmt import MAX_NODE_ID
@@ -31,7 +31,7 @@ def run(
         heard = listening.heard
         masters = heard.masters(listening.now)
         asks = not passive and (not masters or _may_ask(masters, yes))
-        roster = Roster(
+        roster = Identification(
             (n for n in range(1, MAX_NODE_ID + 1) if n not in OURS), heard, timeout_s, with_texts=not masters
         )
         if asks:
@@ -61,7 +61,7 @@ def _may_ask(masters: list[str], yes: bool) -> bool:
     return typer.confirm(f"{told}. Ask nevertheless?", default=False, err=True)
 
 
-def _bus_problem(line: BusLine, rows: list[ScanRow]) -> str:
+def _bus_problem(line: BusSession, rows: list[ScanRow]) -> str:
     if line.problem:
         return line.problem
     if line.send_errors and not any(row.nmt_state for row in rows):

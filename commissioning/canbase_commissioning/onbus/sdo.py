@@ -22,9 +22,9 @@ from canbase_commissioning.object_dictionary import (
     parse_address,
     show,
 )
-from canbase_commissioning.onbus.bus_session import BusLine, open_line
+from canbase_commissioning.onbus.bus_session import BusSession, open_line
 from canbase_commissioning.sdo_access import Refused, Written, read_object, status_places, write_object
-from canbase_commissioning.sdo_session import Inquiry
+from canbase_commissioning.sdo_session import SdoSession
 from canbase_config.eds_file import EdsError, read_eds
 from canbase_config.robot import Bus, Robot
 from canbase_driver.boot.steps import Steps
@@ -105,14 +105,14 @@ def _tell(target: Target, done: Written, value: str) -> None:
         typer.secho(text, err=True, fg=typer.colors.YELLOW, color=colour())
 
 
-def _listen(line: BusLine) -> Listener:
+def _listen(line: BusSession) -> Listener:
     listening = ListenSession(LISTEN_S)
     line.run(listening)
     return listening.heard
 
 
-def _transfer(line: BusLine, node: int, steps: Steps[T], heard: Listener, timeout_s: float) -> T:
-    inquiry = Inquiry({node: steps}, heard, lambda node_id: SdoClient(node_id, timeout_s, ATTEMPTS))
+def _transfer(line: BusSession, node: int, steps: Steps[T], heard: Listener, timeout_s: float) -> T:
+    inquiry = SdoSession({node: steps}, heard, lambda node_id: SdoClient(node_id, timeout_s, ATTEMPTS))
     _or_wrong_value(lambda: line.run(inquiry))
     task = inquiry.tasks[node]
     if isinstance(task.error, SdoAborted):

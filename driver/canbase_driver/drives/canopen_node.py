@@ -55,7 +55,7 @@ class Presence(Enum):
     READY = "ready"
 
 
-class RemoteNode:
+class CanopenNode:
     """A node and its one or two axes."""
 
     def __init__(self, node_id: int, robot: Robot) -> None:

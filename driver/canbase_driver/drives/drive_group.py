@@ -15,7 +15,7 @@ from canbase_driver.cia301.emcy import emcy_text
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia402 import INTERNAL_LIMIT, PREPARED, REMOTE, WARNING, DriveState
 from canbase_driver.drives.axis import Axis
-from canbase_driver.drives.canopen_node import RemoteNode
+from canbase_driver.drives.canopen_node import CanopenNode
 from canbase_driver.snapshot import DriveSnapshot
 
 
@@ -24,7 +24,7 @@ class Drives:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self.nodes = tuple(RemoteNode(node_id, robot) for node_id in sorted({drive.node_id for drive in robot.drives}))
+        self.nodes = tuple(CanopenNode(node_id, robot) for node_id in sorted({drive.node_id for drive in robot.drives}))
         self._budget = SdoBudget(robot.bus, 1.0 / robot.rates.control_hz)
         self._first = 0
         for node in self.nodes:
@@ -36,7 +36,7 @@ class Drives:
         node_of = {node.node_id: node for node in self.nodes}
         self._with_node = tuple((node_of[axis.drive.node_id], axis) for axis in self.axes)
 
-    def _are_configured_without(self, node: RemoteNode) -> bool:
+    def _are_configured_without(self, node: CanopenNode) -> bool:
         return not any(other.is_being_configured for other in self.nodes if other is not node)
 
     def tick(self, now: float, may_boot: bool, sync_since: float) -> list[Frame]:
@@ -53,7 +53,7 @@ class Drives:
                 node.begin_boot(now)
         return frames
 
-    def go_on(self, node: RemoteNode, now: float) -> list[Frame]:
+    def go_on(self, node: CanopenNode, now: float) -> list[Frame]:
         """What a node sends next; while it is being configured, only as far as the bus has room for it."""
         if node.is_being_configured and self._budget.is_spent:
             return []
@@ -183,7 +183,7 @@ def age_s(now: float, then: float) -> float:
     return now - then if then > -math.inf else math.nan
 
 
-def _snapshot(node: RemoteNode, axis: Axis, robot: Robot, now: float) -> DriveSnapshot:
+def _snapshot(node: CanopenNode, axis: Axis, robot: Robot, now: float) -> DriveSnapshot:
     radius_m = robot.base.wheel_radius_m
     code = node.emcy.code if node.emcy else 0
     measured = node.measured(axis, now)
@@ -216,7 +216,7 @@ def _snapshot(node: RemoteNode, axis: Axis, robot: Robot, now: float) -> DriveSn
     )
 
 
-def _fault(node: RemoteNode) -> str:
+def _fault(node: CanopenNode) -> str:
     for axis in node.axes:
         if axis.state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
             return f"{axis.drive.joint} (node {node.node_id}): {node.emcy_text() or 'no code given'}"

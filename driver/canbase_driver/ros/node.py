@@ -23,7 +23,7 @@ from canbase_driver.ros import messages
 from canbase_driver.ros.diagnostics import diagnostics_message, unguarded
 from canbase_driver.ros.managed_node import ManagedNode
 from canbase_driver.ros.services import DriverServices
-from canbase_driver.ros.stop_events import StopTeller
+from canbase_driver.ros.stop_events import StopEvents
 from canbase_driver.runtime.black_box import Ring
 from canbase_driver.runtime.black_box_writer import BlackBoxWriter
 from canbase_driver.runtime.control_thread import ControlLoop
@@ -53,7 +53,7 @@ class MotorDriverNode(ManagedNode):
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.create_subscription(TwistStamped, "cmd_vel", self._on_command, COMMAND_QOS)
         self.create_subscription(SafetyState, "safety_filter/state", self._on_safety, COMMAND_QOS)
-        self._stops = StopTeller(self, robot, ring, writer, self.voice)
+        self._stops = StopEvents(self, robot, ring, writer, self.voice)
         self._offers = DriverServices(self, loop, robot.base.odom_frame, self.request_times)
         self._previous: DriverSnapshot | None = None
         self._diagnosed: DriverSnapshot | None = None

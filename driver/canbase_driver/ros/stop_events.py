@@ -23,7 +23,7 @@ from canbase_driver.ros.messages import stop_event_message
 from canbase_driver.runtime.black_box import Ring
 from canbase_driver.runtime.black_box_writer import BlackBoxWriter
 from canbase_driver.snapshot import DriverSnapshot, StopRecord
-from canbase_driver.supervision.stop_history import FILTER, StopRecorder, StopReport, standstill_text
+from canbase_driver.supervision.stop_history import FILTER, StopHistory, StopReport, standstill_text
 from canbase_driver.supervision.supervisor import POWER_OFF_TIMEOUT_S
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
 from canbase_runtime.journal import Voice
@@ -33,7 +33,7 @@ EVENT_QOS = QoSProfile(depth=50, reliability=ReliabilityPolicy.RELIABLE, durabil
 STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-class StopTeller:
+class StopEvents:
     """Publishes one StopEvent for each stop, and has its recording written when it is latched."""
 
     def __init__(self, node: Node, robot: Robot, ring: Ring, writer: BlackBoxWriter, voice: Voice) -> None:
@@ -44,7 +44,7 @@ class StopTeller:
         self._writer = writer
         self._estop_latches = robot.safety.estop.latched
         patience_s = given_up_s(robot) + POWER_OFF_TIMEOUT_S
-        self._recorder = StopRecorder(patience_s)
+        self._recorder = StopHistory(patience_s)
         self._news: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._publisher = node.create_publisher(StopEvent, "stop_events", EVENT_QOS)
         node.create_subscription(MuxState, "velocity_mux/state", self._on_mux, STATE_QOS)

@@ -46,7 +46,7 @@ class _Change:
     on_outcome: Callable[[Outcome], None]
 
 
-class Readiness:
+class Lifecycle:
     """What is aimed at, and the change on its way there."""
 
     def __init__(self, robot: Robot, aim: Aim) -> None:

@@ -64,7 +64,7 @@ class _OpenStop:
         return StopReport(self.record, stands, took_s if stands else math.nan, distance_m, turned_rad)
 
 
-class StopRecorder:
+class StopHistory:
     """All stops that are not told yet."""
 
     def __init__(self, patience_s: float) -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from canbase_action_server.active_goal import FAREWELL_S, Owner
+from canbase_action_server.active_goal import FAREWELL_S, ActiveGoal
 from canbase_action_server.goal_request import DriveRequest
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.motion import Twist
@@ -22,7 +22,7 @@ def good(now: float) -> Inputs:
 
 
 def test_the_base_has_one_owner_and_is_free_again_after_it() -> None:
-    owner = Owner(bench_robot())
+    owner = ActiveGoal(bench_robot())
     assert owner.tick(good(0.0), 0.0) is None  # nobody drives: silence
     owner.take(REQUEST, good(0.0), 0.0)
     with pytest.raises(RuntimeError, match="not free"):
@@ -42,11 +42,11 @@ def test_the_base_has_one_owner_and_is_free_again_after_it() -> None:
 
 def test_a_base_that_was_never_seen_is_not_taken() -> None:
     with pytest.raises(RuntimeError, match="odometry"):
-        Owner(bench_robot()).take(REQUEST, Inputs(), 0.0)
+        ActiveGoal(bench_robot()).take(REQUEST, Inputs(), 0.0)
 
 
 def test_after_a_defect_the_goal_only_stops_and_ends_as_internal() -> None:
-    owner = Owner(bench_robot())
+    owner = ActiveGoal(bench_robot())
     owner.take(REQUEST, good(0.0), 0.0)
     owner.fail(ZeroDivisionError("a defect"), 0.0)
     owner.fail(ValueError("a second one, which changes nothing"), 0.1)
@@ -63,7 +63,7 @@ def test_after_a_defect_the_goal_only_stops_and_ends_as_internal() -> None:
 
 
 def test_a_process_out_of_time_ends_its_goal_at_once() -> None:
-    owner = Owner(bench_robot())
+    owner = ActiveGoal(bench_robot())
     assert owner.give_up(ErrorCode.SHUTDOWN, "no time", 0.0) is None
     owner.take(REQUEST, good(0.0), 0.0)
     order = owner.give_up(ErrorCode.SHUTDOWN, "no time", 0.1)

@@ -12,7 +12,7 @@ from canbase_action_server.inputs import Inputs
 from canbase_action_server.motion import STOP
 from canbase_action_server.outcome import ErrorCode
 from support.action_plant import GOOD_SAFETY, replaced
-from support.goal_queue_world import Policy, ReceptionWorld, Told, robot_with
+from support.goal_queue_world import GoalQueueWorld, Policy, Told, robot_with
 
 
 def estop(inputs: Inputs) -> Inputs:
@@ -20,7 +20,7 @@ def estop(inputs: Inputs) -> Inputs:
 
 
 def test_reject_refuses_whatever_comes_while_a_goal_waits_or_runs() -> None:
-    world = ReceptionWorld(robot_with("reject"))
+    world = GoalQueueWorld(robot_with("reject"))
     first = world.ask_way(0.3)
     assert world.ask(DriveRequest(0.1, 0.2)) is None  # not begun yet
     world.run(0.5)
@@ -32,23 +32,23 @@ def test_reject_refuses_whatever_comes_while_a_goal_waits_or_runs() -> None:
 
 
 def test_a_wrong_number_is_told_before_busy() -> None:
-    world = ReceptionWorld(robot_with("reject"))
+    world = GoalQueueWorld(robot_with("reject"))
     world.ask_way(0.3)
     world.ask(DriveRequest(100.0, 0.2))
     assert "outside" in world.refusals[-1]
 
 
 def test_a_goal_that_was_refused_or_is_known_cannot_be_admitted() -> None:
-    world = ReceptionWorld(robot_with("queue"))
+    world = GoalQueueWorld(robot_with("queue"))
     key = world.ask_way(0.3)
     with pytest.raises(RuntimeError, match="known already"):
-        world.reception.admit(key, DriveRequest(0.1, 0.2), world.inputs, world.now)
+        world.goal_queue.admit(key, DriveRequest(0.1, 0.2), world.inputs, world.now)
     with pytest.raises(RuntimeError, match="outside"):
-        world.reception.admit("new", DriveRequest(100.0, 0.2), world.inputs, world.now)
+        world.goal_queue.admit("new", DriveRequest(100.0, 0.2), world.inputs, world.now)
 
 
 def test_a_queue_runs_in_order_and_the_base_stands_in_between() -> None:
-    world = ReceptionWorld(robot_with("queue"))
+    world = GoalQueueWorld(robot_with("queue"))
     keys = [world.ask_way(distance_m) for distance_m in (0.3, -0.2, 0.1)]
     world.run_out()
     assert [world.code(key) for key in keys] == [ErrorCode.OK] * 3
@@ -58,7 +58,7 @@ def test_a_queue_runs_in_order_and_the_base_stands_in_between() -> None:
 
 
 def test_a_queue_has_its_length() -> None:
-    world = ReceptionWorld(robot_with("queue", queue_length=2))
+    world = GoalQueueWorld(robot_with("queue", queue_length=2))
     world.ask_way(0.3)
     world.run(0.1)  # it runs now: the queue is empty
     world.ask_way(0.1)
@@ -68,7 +68,7 @@ def test_a_queue_has_its_length() -> None:
 
 
 def test_a_goal_that_waits_is_canceled_at_once_and_the_others_go_on() -> None:
-    world = ReceptionWorld(robot_with("queue"))
+    world = GoalQueueWorld(robot_with("queue"))
     first, second, third = (world.ask_way(0.3) for _ in range(3))
     world.run(0.5)
     world.cancel(second)
@@ -81,7 +81,7 @@ def test_a_goal_that_waits_is_canceled_at_once_and_the_others_go_on() -> None:
 
 
 def test_after_a_cancel_of_the_running_goal_the_next_one_begins_when_the_base_stands() -> None:
-    world = ReceptionWorld(robot_with("queue"))
+    world = GoalQueueWorld(robot_with("queue"))
     first, second = world.ask_way(2.0), world.ask_way(0.1)
     world.run(1.0)
     world.cancel(first)
@@ -90,7 +90,7 @@ def test_after_a_cancel_of_the_running_goal_the_next_one_begins_when_the_base_st
 
 
 def test_after_an_emergency_stop_nothing_of_the_queue_starts_by_itself() -> None:
-    world = ReceptionWorld(robot_with("queue"))
+    world = GoalQueueWorld(robot_with("queue"))
     keys = [world.ask_way(1.0) for _ in range(3)]
     world.run(1.0)
     world.change = estop
@@ -102,7 +102,7 @@ def test_after_an_emergency_stop_nothing_of_the_queue_starts_by_itself() -> None
 
 
 def test_preempt_stops_the_old_goal_before_the_new_one_owns_the_base() -> None:
-    world = ReceptionWorld(robot_with("preempt"))
+    world = GoalQueueWorld(robot_with("preempt"))
     old = world.ask_way(2.0)
     world.run(1.0)
     new = world.ask_way(-0.2)
@@ -116,7 +116,7 @@ def test_preempt_stops_the_old_goal_before_the_new_one_owns_the_base() -> None:
 
 
 def test_of_several_newer_goals_the_newest_gets_the_base() -> None:
-    world = ReceptionWorld(robot_with("preempt"))
+    world = GoalQueueWorld(robot_with("preempt"))
     keys = [world.ask_way(2.0)]
     world.run(1.0)
     keys += [world.ask_way(0.1), world.ask_way(0.2), world.ask_way(0.3)]
@@ -127,7 +127,7 @@ def test_of_several_newer_goals_the_newest_gets_the_base() -> None:
 
 
 def test_a_new_goal_that_is_wrong_preempts_nobody() -> None:
-    world = ReceptionWorld(robot_with("preempt"))
+    world = GoalQueueWorld(robot_with("preempt"))
     old = world.ask_way(0.3)
     world.run(0.5)
     assert world.ask(DriveRequest(100.0, 0.2)) is None
@@ -136,16 +136,16 @@ def test_a_new_goal_that_is_wrong_preempts_nobody() -> None:
 
 
 def test_a_goal_that_has_arrived_is_not_preempted_any_more() -> None:
-    world = ReceptionWorld(robot_with("preempt"))
+    world = GoalQueueWorld(robot_with("preempt"))
     old = world.ask_way(0.3)
-    world.run(20.0, lambda: world.reception.phase.value == "stopping")
+    world.run(20.0, lambda: world.goal_queue.phase.value == "stopping")
     new = world.ask_way(0.1)
     world.run_out()
     assert [world.code(old), world.code(new)] == [ErrorCode.OK, ErrorCode.OK]
 
 
 def test_a_cancel_of_a_goal_that_is_preempted_is_still_a_cancel() -> None:
-    world = ReceptionWorld(robot_with("preempt"))
+    world = GoalQueueWorld(robot_with("preempt"))
     old = world.ask_way(2.0)
     world.run(1.0)
     new = world.ask_way(0.1)
@@ -156,7 +156,7 @@ def test_a_cancel_of_a_goal_that_is_preempted_is_still_a_cancel() -> None:
 
 
 def test_the_new_goal_does_not_get_a_base_whose_stop_went_wrong() -> None:
-    world = ReceptionWorld(robot_with("preempt"))
+    world = GoalQueueWorld(robot_with("preempt"))
     old = world.ask_way(2.0)
     world.run(1.0)
     new = world.ask_way(-0.2)
@@ -168,7 +168,7 @@ def test_the_new_goal_does_not_get_a_base_whose_stop_went_wrong() -> None:
 
 
 def test_a_shutdown_ends_all() -> None:
-    world = ReceptionWorld(robot_with("queue"))
+    world = GoalQueueWorld(robot_with("queue"))
     keys = [world.ask_way(1.0) for _ in range(3)]
     world.run(1.0)
     world.change = lambda inputs: replaced(inputs, shutdown=True)
@@ -177,34 +177,34 @@ def test_a_shutdown_ends_all() -> None:
 
 
 def test_a_defect_ends_all_as_internal() -> None:
-    world = ReceptionWorld(robot_with("queue"))
+    world = GoalQueueWorld(robot_with("queue"))
     keys = [world.ask_way(1.0) for _ in range(3)]
     world.run(1.0)
-    world.reception.fail(ZeroDivisionError("a defect"), world.now)
+    world.goal_queue.fail(ZeroDivisionError("a defect"), world.now)
     world.run_out()
     assert {world.code(key) for key in keys} == {ErrorCode.INTERNAL}
 
 
 def test_a_process_out_of_time_ends_all_at_once() -> None:
-    world = ReceptionWorld(robot_with("queue"))
+    world = GoalQueueWorld(robot_with("queue"))
     keys = [world.ask_way(1.0) for _ in range(3)]
     world.run(1.0)
-    cycle = world.reception.give_up(ErrorCode.SHUTDOWN, "no time", world.now)
+    cycle = world.goal_queue.give_up(ErrorCode.SHUTDOWN, "no time", world.now)
     assert [end.key for end in cycle.ends] == keys
     assert {end.outcome.code for end in cycle.ends} == {ErrorCode.SHUTDOWN}
     assert cycle.twist == STOP
-    assert not world.reception.busy
+    assert not world.goal_queue.busy
 
 
 def test_a_cancel_of_an_unknown_goal_changes_nothing() -> None:
-    world = ReceptionWorld(robot_with("queue"))
-    assert not world.reception.cancel("who?")
+    world = GoalQueueWorld(robot_with("queue"))
+    assert not world.goal_queue.cancel("who?")
 
 
-def storm(policy: Policy, seed: int) -> ReceptionWorld:
+def storm(policy: Policy, seed: int) -> GoalQueueWorld:
     """1500 goals are sent, some of them are canceled, and sometimes the emergency stop is pressed."""
     chance = random.Random(seed)
-    world = ReceptionWorld(robot_with(policy, queue_length=3))
+    world = GoalQueueWorld(robot_with(policy, queue_length=3))
     for _ in range(1500):
         way_m = chance.choice((-1, 1)) * chance.uniform(0.01, 0.15)
         world.ask(DriveRequest(way_m, chance.uniform(0.1, 0.5)))

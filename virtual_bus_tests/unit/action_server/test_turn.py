@@ -17,7 +17,7 @@ from canbase_action_server.limits import lever_m, turn_limits
 from canbase_action_server.outcome import ErrorCode
 from canbase_action_server.turn import TurnMotion
 from support.action_plant import Plant, Story, bench_robot, rotate
-from support.goal_queue_world import ReceptionWorld, robot_with
+from support.goal_queue_world import GoalQueueWorld, robot_with
 
 ROBOT = bench_robot()  # action.*: 0.02 to 63 rad, 0.1 to 1.5 rad/s; the wheels are 0.25 m from the middle
 LEVER_M = 0.25
@@ -105,7 +105,7 @@ def test_a_base_that_is_stuck_makes_no_progress() -> None:
 
 
 def test_a_drive_and_a_turn_share_the_one_base() -> None:
-    world = ReceptionWorld(robot_with("reject"))
+    world = GoalQueueWorld(robot_with("reject"))
     world.ask_way(0.3)
     assert world.ask(RotateRequest(1.0, 0.5)) is None
     assert "busy" in world.refusals[0]

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canbase_commissioning.calibration import JudgeError, Turned, radius, scale, stop_time_s, track
+from canbase_commissioning.calibration import CalibrationError, Turned, radius, scale, stop_time_s, track
 from canbase_config.drive import Drive
 from support.sim_rig import robot
 
@@ -57,17 +57,17 @@ def test_where_the_unit_counts_increments_a_factor_of_four_is_the_encoders() -> 
 
 
 def test_a_factor_that_no_unit_explains_is_told() -> None:
-    with pytest.raises(JudgeError, match="60A9h"):
+    with pytest.raises(CalibrationError, match="60A9h"):
         found(3.0, 3.0 / 7.7, 3.0)
 
 
 def test_three_different_counts_are_more_than_one_mistake() -> None:
-    with pytest.raises(JudgeError, match="more than one of gear_ratio, counts_per_motor_rev and velocity_unit"):
+    with pytest.raises(CalibrationError, match="more than one of gear_ratio, counts_per_motor_rev and velocity_unit"):
         found(12.0, 3.0, 1.5)
 
 
 def test_nothing_counted_is_told() -> None:
-    with pytest.raises(JudgeError, match="a count is zero"):
+    with pytest.raises(CalibrationError, match="a count is zero"):
         found(0.0, 3.0, 3.0)
 
 
@@ -83,7 +83,7 @@ def test_radius_and_track_come_back_from_what_odometry_would_say_of_wrong_ones(r
 
 @pytest.mark.parametrize("measured_m", [0.9, 4.1])
 def test_a_radius_of_less_than_half_or_more_than_twice_is_no_result(measured_m: float) -> None:
-    with pytest.raises(JudgeError, match="measure again"):
+    with pytest.raises(CalibrationError, match="measure again"):
         radius(0.1, 2.0, measured_m)
 
 

@@ -6,8 +6,8 @@ import pytest
 
 from canbase_commissioning.guide import Guide, Script
 from canbase_commissioning.jog import DeadMan, JogSession, split_keys
-from canbase_commissioning.powered_drives import Rig, RigError
-from canbase_commissioning.safe_stop import Farewell
+from canbase_commissioning.powered_drives import PoweredDrives, RigError
+from canbase_commissioning.safe_stop import SafeStop
 from canbase_commissioning.self_stop_test import get_ready
 from canbase_sim.cia402.states import POWERED
 from support.guide_world import GuideWorld
@@ -61,7 +61,7 @@ class Holding(GuideWorld):
     def __init__(self) -> None:
         super().__init__()
 
-        def boot(rig: Rig) -> Script[bool]:
+        def boot(rig: PoweredDrives) -> Script[bool]:
             yield from get_ready(rig)
             return True
 
@@ -105,7 +105,7 @@ def test_q_ends_it_and_the_farewell_stops_a_wheel_that_turns() -> None:
     world.hold("w", 1.5)
     world.jog.press("q", world.now)
     assert world.jog.done
-    took_s = world.run(Farewell(world.rig))
+    took_s = world.run(SafeStop(world.rig))
     assert took_s < 0.5
     world.wait(0.2)
     assert world.speeds == (0.0, 0.0)

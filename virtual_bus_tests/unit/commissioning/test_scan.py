@@ -7,7 +7,7 @@ import math
 import pytest
 
 from canbase_commissioning.bus_monitor import Listener, ListenSession
-from canbase_commissioning.identification import Roster
+from canbase_commissioning.identification import Identification
 from canbase_commissioning.scan_rows import NOT_HERE, missing, scan_rows
 from canbase_commissioning.session import Echo
 from canbase_config.profile_file import load_profile, profile_names
@@ -99,10 +99,10 @@ def test_listening_sends_nothing_and_ends_in_time() -> None:
     assert world.said == []
 
 
-def scanned(world: SessionWorld, seconds: float = 1.0) -> Roster:
+def scanned(world: SessionWorld, seconds: float = 1.0) -> Identification:
     listening = ListenSession(seconds)
     world.run(listening)
-    roster = Roster(range(1, 126), listening.heard, 0.1, with_texts=True)
+    roster = Identification(range(1, 126), listening.heard, 0.1, with_texts=True)
     world.run(roster)
     return roster
 
@@ -157,7 +157,7 @@ def test_a_request_waits_until_the_other_master_is_quiet_on_that_channel() -> No
     world.run(listening)
     until = world.now + 1.0
     world.others.append(lambda now: [frame("601 40 64 60 00 00 00 00 00")] if now < until else [])
-    roster = Roster((1,), listening.heard, 0.1, with_texts=False)
+    roster = Identification((1,), listening.heard, 0.1, with_texts=False)
     world.turn(roster)
     world.run(roster)
     assert 1 in roster.cards

@@ -9,7 +9,7 @@ import pytest
 from canbase_commissioning.bus_monitor import Listener
 from canbase_commissioning.object_dictionary import Address
 from canbase_commissioning.sdo_access import Refused, Written, read_object, status_places, write_object
-from canbase_commissioning.sdo_session import Inquiry
+from canbase_commissioning.sdo_session import SdoSession
 from canbase_commissioning.session import NodeTask
 from canbase_driver.boot.steps import Steps
 from canbase_driver.cia301.frame import Frame
@@ -22,7 +22,7 @@ STATUS = (Address(0x6041), Address(0x6841))
 
 
 def ask(world: SessionWorld, steps: Steps[T], node: int = 1) -> NodeTask[T]:
-    inquiry = Inquiry({node: steps}, Listener(world.now), lambda node_id: SdoClient(node_id, 0.1, 2))
+    inquiry = SdoSession({node: steps}, Listener(world.now), lambda node_id: SdoClient(node_id, 0.1, 2))
     world.run(inquiry)
     return inquiry.tasks[node]
 
@@ -88,7 +88,7 @@ def test_a_channel_that_others_use_all_the_time_is_left_to_them_for_five_seconds
     question, heard = Frame(0x601, bytes.fromhex("4064600000000000")), Listener(world.now)
     heard.on_frame(question, world.now)
     world.others.append(lambda now: [question])
-    inquiry = Inquiry({1: read_object(Address(0x1000))}, heard, lambda node_id: SdoClient(node_id, 0.1, 2))
+    inquiry = SdoSession({1: read_object(Address(0x1000))}, heard, lambda node_id: SdoClient(node_id, 0.1, 2))
     assert world.run(inquiry) == pytest.approx(5.0, abs=0.1)
     assert inquiry.tasks[1].blocked
     assert world.said == []

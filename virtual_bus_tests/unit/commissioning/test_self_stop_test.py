@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from canbase_commissioning.guide import CommissionError, Script
-from canbase_commissioning.powered_drives import Rig, RigError
+from canbase_commissioning.powered_drives import PoweredDrives, RigError
 from canbase_commissioning.self_stop_test import HEARTBEAT, SILENCE, Outcome, get_ready, prove
 from canbase_driver.cia301.frame import Frame
 from canbase_sim.cia402.states import POWERED
@@ -17,7 +17,7 @@ from support.guide_world import GuideWorld
 SPEED_MPS = 0.1
 
 
-def whole(rig: Rig) -> Script[tuple[Outcome, ...]]:
+def whole(rig: PoweredDrives) -> Script[tuple[Outcome, ...]]:
     yield from get_ready(rig)
     return (yield from prove(rig, SPEED_MPS))
 
@@ -73,7 +73,7 @@ def test_one_drive_of_two_that_lost_its_1016h_is_the_one_that_is_named() -> None
     """Somebody clears the entry between the boot and the trial: what was set is not what counts."""
     world = GuideWorld()
 
-    def sabotaged(rig: Rig) -> Script[tuple[Outcome, ...]]:
+    def sabotaged(rig: PoweredDrives) -> Script[tuple[Outcome, ...]]:
         yield from get_ready(rig)
         request = "23 16 10 01 00 00 00 00"
         world.bench.on_frame(BenchFrame(0x602, bytes.fromhex(request)), world.now)
@@ -89,7 +89,7 @@ def test_one_drive_of_two_that_lost_its_1016h_is_the_one_that_is_named() -> None
 def test_a_drive_that_does_not_get_power_ends_it_with_its_state() -> None:
     world = GuideWorld()
 
-    def held(rig: Rig) -> Script[tuple[Outcome, ...]]:
+    def held(rig: PoweredDrives) -> Script[tuple[Outcome, ...]]:
         yield from get_ready(rig)
         world.bench.nodes[2].fail(0, 0x2310, holds=True)
         return (yield from prove(rig, SPEED_MPS))

@@ -11,7 +11,7 @@ import pytest
 from canbase_commissioning.edits import Edit, edited, floor_edits, identity_edits, wheel_edits, with_edits
 from canbase_commissioning.floor import FloorFound, measure_floor
 from canbase_commissioning.guide import CommissionError, Script
-from canbase_commissioning.powered_drives import Rig, RigError
+from canbase_commissioning.powered_drives import PoweredDrives, RigError
 from canbase_commissioning.report import Results, markdown, verdict
 from canbase_commissioning.self_stop_test import get_ready
 from canbase_commissioning.wheel_direction import WheelFound, find_direction, measure_scale
@@ -32,12 +32,12 @@ def with_left(**keys: Any) -> Robot:
     return robot(LEFT | keys, RIGHT)
 
 
-def direction_of_left(rig: Rig) -> Script[WheelFound]:
+def direction_of_left(rig: PoweredDrives) -> Script[WheelFound]:
     yield from get_ready(rig)
     return (yield from find_direction(rig, rig.robot.drives[0]))
 
 
-def scale_of_left(rig: Rig) -> Script[WheelFound]:
+def scale_of_left(rig: PoweredDrives) -> Script[WheelFound]:
     yield from get_ready(rig)
     scale, turned = yield from measure_scale(rig, rig.robot.drives[0], 0.6, 0.1)
     return WheelFound("left", 1, scale, turned)
@@ -124,7 +124,7 @@ def test_who_does_not_confirm_moves_nothing() -> None:
     assert world.bench.base.path_m == 0.0
 
 
-def floor(rig: Rig) -> Script[FloorFound]:
+def floor(rig: PoweredDrives) -> Script[FloorFound]:
     yield from get_ready(rig)
     return (yield from measure_floor(rig, 0.4, 0.25, 0.1))
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from canbase_commissioning.bus_monitor import Listener
-from canbase_commissioning.sdo_session import Inquiry
+from canbase_commissioning.sdo_session import SdoSession
 from canbase_config.robot import Robot
 from canbase_doctor.inspection import Inspection, inspect
 from canbase_driver.boot.node_boot import NodeBoot, sdo_client
@@ -44,7 +44,7 @@ class BootSession:
 def inspected(world: SessionWorld, of: Robot | None = None) -> dict[int, Inspection]:
     looked = of or world.robot
     nodes = {drive.node_id: tuple(d for d in looked.drives if d.node_id == drive.node_id) for drive in looked.drives}
-    inquiry = Inquiry(
+    inquiry = SdoSession(
         {node_id: inspect(node_id, drives, looked) for node_id, drives in nodes.items()},
         Listener(world.now),
         lambda node_id: sdo_client(node_id, nodes[node_id][0].kind.sdo, 0.3),

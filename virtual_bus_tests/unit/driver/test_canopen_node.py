@@ -11,7 +11,7 @@ from canbase_config.robot import Robot
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.drives.axis import Axis
-from canbase_driver.drives.canopen_node import Presence, RemoteNode
+from canbase_driver.drives.canopen_node import CanopenNode, Presence
 from support.chain_world import bench_robot
 from support.fake_drive import FakeDrive
 
@@ -32,7 +32,7 @@ class Story:
     sent: list[Frame] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.node = RemoteNode(1, self.robot)
+        self.node = CanopenNode(1, self.robot)
 
     @property
     def axis(self) -> Axis:

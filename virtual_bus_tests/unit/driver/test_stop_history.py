@@ -9,7 +9,7 @@ import pytest
 
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.snapshot import DriverSnapshot, StopRecord
-from canbase_driver.supervision.stop_history import StopRecorder, StopReport
+from canbase_driver.supervision.stop_history import StopHistory, StopReport
 from canbase_runtime.driver_state import DriverState
 from support.chain_world import FORWARD, World
 from support.snapshots import SNAPSHOT
@@ -29,9 +29,9 @@ def held(cause: str, at_s: float) -> StopRecord:
     return StopRecord("safety_filter", cause, "", False, "free way", at_s)
 
 
-def driving() -> StopRecorder:
+def driving() -> StopHistory:
     """A recorder that has seen the base drive at 0.5 m/s until 999.99 s."""
-    recorder = StopRecorder(PATIENCE_S)
+    recorder = StopHistory(PATIENCE_S)
     recorder.on_command(True, 999.98)
     assert recorder.on_snapshot(seen(999.99), []) == []
     return recorder
@@ -57,7 +57,7 @@ def test_a_way_forth_and_back_is_as_long_as_it_was() -> None:
 
 
 def test_a_base_that_stood_when_the_cause_came_stands_after_nothing() -> None:
-    recorder = StopRecorder(PATIENCE_S)
+    recorder = StopHistory(PATIENCE_S)
     recorder.on_snapshot(seen(999.99, standstill=True), [])
     (report,) = recorder.on_snapshot(seen(1000.01, standstill=True), [TRIP])
     assert (report.standstill, report.standstill_s, report.distance_m) == (True, 0.0, 0.0)
@@ -102,7 +102,7 @@ def test_the_filter_holds_a_base_that_moves_and_is_told_once() -> None:
 
 
 def test_a_filter_that_holds_a_base_at_rest_without_a_command_is_no_stop() -> None:
-    recorder = StopRecorder(PATIENCE_S)
+    recorder = StopHistory(PATIENCE_S)
     recorder.on_snapshot(seen(1000.0, standstill=True), [])
     recorder.on_filter(held("command_stale", 1000.1), 1000.1)
     assert recorder.on_snapshot(seen(1000.2, standstill=True), []) == []
@@ -121,7 +121,7 @@ def test_a_base_that_the_filter_lets_go_before_it_stands_was_not_stopped_to_the_
 def test_a_source_that_is_lost_while_it_orders_motion_is_a_stop_and_one_that_ended_with_zeros_is_none(
     ordered_at: float, told: int
 ) -> None:
-    recorder = StopRecorder(PATIENCE_S)
+    recorder = StopHistory(PATIENCE_S)
     recorder.on_command(True, ordered_at)
     recorder.on_command(False, ordered_at + 0.02)
     recorder.on_snapshot(seen(999.99), [])
@@ -146,7 +146,7 @@ def test_a_source_that_takes_over_ends_the_stop() -> None:
 def test_commands_that_end_while_the_base_moves_are_a_stop_of_the_driver(
     state: DriverState, moved_at: float, told: int
 ) -> None:
-    recorder = StopRecorder(PATIENCE_S)
+    recorder = StopHistory(PATIENCE_S)
     recorder.on_command(True, moved_at)
     recorder.on_snapshot(seen(999.99), [])
     recorder.on_snapshot(seen(1000.1, state=state, command_fresh=False, command_age_s=0.21), [])
@@ -170,12 +170,12 @@ def test_the_end_of_the_driver_tells_what_is_open() -> None:
     assert not report.standstill
     assert report.distance_m == pytest.approx(0.02)
     assert recorder.end() == []
-    assert StopRecorder(PATIENCE_S).end() == []
+    assert StopHistory(PATIENCE_S).end() == []
 
 
 def told_by_the_chain(world: World, seconds: float) -> list[StopReport]:
     """The recorder beside the driver, with a snapshot every 20 ms as in the process."""
-    recorder = StopRecorder(PATIENCE_S)
+    recorder = StopHistory(PATIENCE_S)
     reports: list[StopReport] = []
     for _ in range(round(seconds / 0.02)):
         if world.command is not None:
@@ -212,7 +212,7 @@ def test_in_the_chain_commands_that_end_are_one_stop_and_those_that_go_to_zero_a
     assert told_by_the_chain(world, 1.5) == []
     world.command = FORWARD
     assert told_by_the_chain(world, 1.0) == []
-    recorder = StopRecorder(PATIENCE_S)
+    recorder = StopHistory(PATIENCE_S)
     recorder.on_command(True, world.now)
     recorder.on_snapshot(world.snapshot, [])
     world.command = None

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from canbase_watchdog.plausibility import Feedback, FeedbackWatch
+from canbase_watchdog.plausibility import Feedback, Plausibility
 from support.watchdog_story import config
 
 CONFIG = replace(config(), motion_tolerance_mps=0.05 - 0.001)
@@ -26,7 +26,7 @@ class Wheel:
     def __init__(self, mirrored: bool = False, **changes: Any) -> None:
         self.sign = -1 if mirrored else 1
         drive = replace(CONFIG.drives[0], mps_per_bit=self.sign * 0.001, m_per_count=self.sign * 0.0001)
-        self.watch = FeedbackWatch(drive, replace(CONFIG, **changes), -10.0)
+        self.watch = Plausibility(drive, replace(CONFIG, **changes), -10.0)
         self.n = 0
         self.way_m = 0.0
         self.sample(0.0, 0.0)
@@ -235,7 +235,7 @@ def test_a_reset_forgets_the_drift() -> None:
 
 
 def test_before_the_start_the_wheel_may_have_had_any_setpoint() -> None:
-    watch = FeedbackWatch(CONFIG.drives[0], CONFIG, 0.0)
+    watch = Plausibility(CONFIG.drives[0], CONFIG, 0.0)
     watch.on_target(0.0, 0.05)
     watch.on_velocity(-1.0, True, True, 0.1)
     assert (watch.last.low_mps, watch.last.high_mps, watch.last.outside) == (-1.0, 1.0, 0)
@@ -244,7 +244,7 @@ def test_before_the_start_the_wheel_may_have_had_any_setpoint() -> None:
 
 
 def test_before_the_first_sample_nothing_is_allowed_and_nothing_is_wrong() -> None:
-    last = FeedbackWatch(CONFIG.drives[0], CONFIG, 0.0).last
+    last = Plausibility(CONFIG.drives[0], CONFIG, 0.0).last
     assert (last.low_mps, last.high_mps, last.outside, last.overspeed, last.implausible) == (0.0, 0.0, 0, 0, 0)
 
 
@@ -315,7 +315,7 @@ def test_the_tolerance_of_the_drift(drift_per_sample: float, implausible: int) -
 
 
 def test_before_the_first_sample_the_wheel_is_taken_for_standing() -> None:
-    watch = FeedbackWatch(CONFIG.drives[0], CONFIG, 0.0)
+    watch = Plausibility(CONFIG.drives[0], CONFIG, 0.0)
     watch.on_position(0)
     watch.on_velocity(0.0, True, True, 0.0)
     watch.on_velocity(0.4, True, True, 0.01)
@@ -400,7 +400,7 @@ def test_what_three_times_the_fastest_wheel_cannot_do_in_two_cycles_is_a_jump(st
 
 def test_a_step_as_long_as_it_may_be_is_no_jump() -> None:
     """3 × 1 m/s × 2/64 s = 1536/2^14 m."""
-    watch = FeedbackWatch(replace(CONFIG.drives[0], m_per_count=2.0**-14), replace(CONFIG, control_hz=64.0), 0.0)
+    watch = Plausibility(replace(CONFIG.drives[0], m_per_count=2.0**-14), replace(CONFIG, control_hz=64.0), 0.0)
     for counts, now in ((0, 1.0), (1536, 1.01)):
         watch.on_position(counts)
         watch.on_velocity(0.0, True, True, now)
@@ -461,7 +461,7 @@ def test_a_longer_way_forgets_all_that_was_before_it() -> None:
 
 
 def test_without_a_position_there_is_no_drift() -> None:
-    watch = FeedbackWatch(CONFIG.drives[0], CONFIG, 0.0)
+    watch = Plausibility(CONFIG.drives[0], CONFIG, 0.0)
     for n in range(20):
         watch.on_target(0.5, n / 100)
         watch.on_velocity(0.5, True, True, n / 100)
