@@ -75,7 +75,7 @@ def commission(
 
     Exit codes: 0 done and proven, 1 not proven or not finished, 2 wrong command line, robot.yaml or answers.
     """
-    from canbase_commissioning.onbus.commission import Plan, run
+    from canbase_commissioning.onbus.commission_command import Plan, run
 
     if report is not None and report.exists():
         fail(f"{report} exists; a report is never overwritten: give --report another name", WRONG_INPUT)

@@ -35,6 +35,6 @@ def jog(
 
     Exit codes: 0 ended by q, 1 refused or a fault, 2 wrong command line, robot.yaml, or no terminal; 128 + a signal.
     """
-    from canbase_commissioning.onbus.jog import run
+    from canbase_commissioning.onbus.jog_command import run
 
     run(config, joint, speed_mps, yes=yes)

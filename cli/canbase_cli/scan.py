@@ -40,7 +40,7 @@ def scan(
     Exit codes: 0 nodes were found, and all of --config, 1 none or not all, 2 wrong command line or robot.yaml.
     """
     from canbase_commissioning.onbus.bus_session import choose_bus, robot_if_given
-    from canbase_commissioning.onbus.scan import run
+    from canbase_commissioning.onbus.scan_command import run
 
     bus = choose_bus(config, interface, channel, bitrate)
     run(bus, robot_if_given(config), seconds, timeout_s, passive=passive, yes=yes, as_json=as_json)

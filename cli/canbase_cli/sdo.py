@@ -64,7 +64,7 @@ def read(
     Exit codes: 0 read, 1 refused by the drive or no answer, 2 wrong command line or robot.yaml.
     """
     from canbase_commissioning.onbus.bus_session import choose_bus, robot_if_given
-    from canbase_commissioning.onbus.sdo import Target, run_read
+    from canbase_commissioning.onbus.sdo_command import Target, run_read
 
     target = Target.of(node, at, kind, eds, robot_if_given(config))
     run_read(choose_bus(config, interface, channel, bitrate), target, timeout_s, raw=raw)
@@ -94,7 +94,7 @@ def write(
     Exit codes: 0 written and read back, 1 refused or no answer, 2 wrong command line, value or robot.yaml.
     """
     from canbase_commissioning.onbus.bus_session import choose_bus, robot_if_given
-    from canbase_commissioning.onbus.sdo import Target, run_write
+    from canbase_commissioning.onbus.sdo_command import Target, run_write
 
     target = Target.of(node, at, kind, eds, robot_if_given(config))
     run_write(choose_bus(config, interface, channel, bitrate), target, value, timeout_s, force=force)

@@ -14,10 +14,10 @@ from rich.table import Table
 from campaign.faults import FAULTS
 from campaign.judge import PROPERTIES, Violation
 from campaign.plan import draw_plan
+from campaign.removed_safeguards import SAFEGUARDS, remove
 from campaign.replay import replay
 from campaign.runner import Tally, run
 from campaign.scenario import Result
-from campaign.without import SAFEGUARDS, remove
 
 SHOWN = 50
 """Violations that are told one by one, as they are found."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from campaign.bus_faults import BUS_FAULTS
 from campaign.drive_faults import DRIVE_FAULTS
 from campaign.fault import Kind
-from campaign.people import PEOPLE
+from campaign.operator_faults import PEOPLE
 from campaign.process_faults import PROCESS_FAULTS
 from campaign.sensor_faults import SENSOR_FAULTS
 from campaign.topic_faults import TOPIC_FAULTS

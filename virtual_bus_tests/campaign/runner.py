@@ -13,9 +13,9 @@ from itertools import groupby
 
 from campaign.judge import Violation
 from campaign.plan import draw_plan
+from campaign.removed_safeguards import refuse_compiled, remove
 from campaign.robots import SCENARIOS, robot_of
 from campaign.scenario import Result, Start
-from campaign.without import refuse_compiled, remove
 
 _start: tuple[int, Start] | None = None
 """The robot that this worker has booted, by its number."""

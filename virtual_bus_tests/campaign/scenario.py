@@ -15,9 +15,9 @@ from campaign.faults import FAULTS
 from campaign.judge import Judge, Violation
 from campaign.outside import Outside, Surroundings
 from campaign.plan import Plan
+from campaign.removed_safeguards import remove
 from campaign.robots import DrawnRobot
 from campaign.scanner import LIES
-from campaign.without import remove
 from campaign.world import World
 
 LOOK_S = 0.1

@@ -25,8 +25,8 @@ from campaign.scenario import Start
 from campaign.twins import GOAL, JOYSTICK, TWINS, Twin
 from campaign.world import World
 from canbase_velocity.twist import ZERO, Twist
-from exit_matrix.layers import SPEED_MPS
 from exit_matrix.page_table import Key, Row
+from exit_matrix.stop_limits import SPEED_MPS
 from exit_matrix.stop_table import COMMANDS, TABLE, VIRTUAL
 from support.marked_page import rewritten, section
 

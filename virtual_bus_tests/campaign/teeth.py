@@ -19,10 +19,10 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress
 from rich.table import Table
 
-from campaign.needs import NEEDS, Need
 from campaign.plan import draw_plan
 from campaign.robots import SCENARIOS as SEEDS_A_ROBOT
 from campaign.robots import draw_robot
+from campaign.safeguard_needs import NEEDS, Need
 from campaign.scenario import Result, Start
 
 MOST = 200
@@ -103,7 +103,9 @@ def table(bites: Sequence[Bite]) -> Table:
 
 @app.command()
 def main(
-    safeguards: Annotated[list[str] | None, typer.Argument(help="names in campaign/without.py; default: all")] = None,
+    safeguards: Annotated[
+        list[str] | None, typer.Argument(help="names in campaign/removed_safeguards.py; default: all")
+    ] = None,
     scenarios: Annotated[int, typer.Option(min=1, help="tried for each row at most")] = MOST,
     workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
 ) -> None:

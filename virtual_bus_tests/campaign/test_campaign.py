@@ -8,12 +8,12 @@ from typer.testing import CliRunner
 from campaign import teeth
 from campaign.__main__ import app
 from campaign.faults import FAULTS
-from campaign.needs import NEEDS, Need
 from campaign.plan import MOST_FAULTS, draw_plan
+from campaign.removed_safeguards import SAFEGUARDS
 from campaign.runner import run
+from campaign.safeguard_needs import NEEDS, Need
 from campaign.scenario import Result, Start
 from campaign.teeth import look_at
-from campaign.without import SAFEGUARDS
 from hazards.catalogue import load
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(1800)]

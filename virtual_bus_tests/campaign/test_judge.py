@@ -15,9 +15,9 @@ import pytest
 
 from campaign.fault import PlannedFault
 from campaign.plan import GoalRequest, Plan, Segment
+from campaign.removed_safeguards import SAFEGUARDS
 from campaign.robots import draw_robot
 from campaign.scenario import Start
-from campaign.without import SAFEGUARDS
 from campaign.world import World
 from canbase_config.derive import mps_per_bit
 from canbase_driver.cia301.frame import Frame

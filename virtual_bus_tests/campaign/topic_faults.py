@@ -7,7 +7,7 @@ from random import Random
 from typing import TYPE_CHECKING
 
 from campaign.fault import LONG, SHORT, Arguments, Change, Kind, intruder, nothing, share, speed
-from campaign.people import goes_on
+from campaign.operator_faults import goes_on
 from canbase_velocity.twist import Twist
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from campaign.outside import Surroundings
 from campaign.world import World
 from canbase_sim.faults import KINDS, apply
 from canbase_velocity.twist import Twist
-from exit_matrix.layers import SPEED_MPS
+from exit_matrix.stop_limits import SPEED_MPS
 
 Begin = Callable[[World, Surroundings, Random], None]
 JOYSTICK, GOAL = "joystick", "goal"

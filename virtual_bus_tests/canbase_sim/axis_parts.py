@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from canbase_sim.cia402.raw_units import Scale
 from canbase_sim.cia402.states import State
-from canbase_sim.cia402.units import Scale
 from canbase_sim.plant.motor import Motor
 
 

@@ -12,7 +12,7 @@ from functools import partial
 from canopen import SdoAbortedError
 
 from canbase_sim.axis_parts import AxisParts, StateChange
-from canbase_sim.cia301 import abort, emcy, heartbeat, nmt, sdo, store
+from canbase_sim.cia301 import abort, emcy, heartbeat, nmt, sdo_server, store
 from canbase_sim.cia301.dictionary import Dictionary, key
 from canbase_sim.cia301.nmt import NmtCommand, NmtState
 from canbase_sim.cia301.rpdo import Rpdo
@@ -58,7 +58,7 @@ class SimulatedNode:
         d = self.dictionary = Dictionary(node_id, len(axes), fixed, personality)
         d.before_read = self._refresh
         self.emcy = emcy.EmcyService(d, self._send_emcy)
-        self.sdo = sdo.SdoService(node_id, d, lambda frame: self.line.answer(frame, self._now))
+        self.sdo = sdo_server.SdoService(node_id, d, lambda frame: self.line.answer(frame, self._now))
         self._producer = heartbeat.HeartbeatProducer(d)
         self._consumer = heartbeat.HeartbeatConsumer(d, self._on_lost, self._on_alive)
         self.axes = tuple(self._axis(number, parts) for number, parts in enumerate(axes))

@@ -13,8 +13,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
+from exit_matrix.failures import ROWS, Row
 from exit_matrix.report import merged, table
-from exit_matrix.rows import ROWS, Row
 from exit_matrix.runner import Result, Runner
 from exit_matrix.stop_table import COMMANDS
 from support.marked_page import rewritten, section

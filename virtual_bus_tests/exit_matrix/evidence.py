@@ -8,8 +8,8 @@ from typing import Final
 
 from canbase.msg import DriverStatus
 
-from exit_matrix.said import NAMES, Catch, logged
-from exit_matrix.scene import Scene
+from exit_matrix.driven_robot import Scene
+from exit_matrix.log_evidence import NAMES, Catch, logged
 
 SILENT: Final = "silent"
 STOPPED: Final = (DriverStatus.STOPPING, DriverStatus.LATCHED)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
+from exit_matrix.failures import ROWS
 from exit_matrix.page_table import NOTHING, Rows
-from exit_matrix.rows import ROWS
 from exit_matrix.runner import Result
 from exit_matrix.stop_table import REAL, TABLE
 

@@ -22,11 +22,11 @@ from std_msgs.msg import Bool
 
 from canbase_action_server.goal_client import DriveError
 from canbase_sim.control import ControlError
+from exit_matrix.driven_robot import CHANGES, Scene, sabotaged
 from exit_matrix.evidence import Evidence
-from exit_matrix.layers import SPEED_MPS, Layer
-from exit_matrix.rows import SERVER, Row
-from exit_matrix.said import Catch
-from exit_matrix.scene import CHANGES, Scene, sabotaged
+from exit_matrix.failures import SERVER, Row
+from exit_matrix.log_evidence import Catch
+from exit_matrix.stop_limits import SPEED_MPS, Layer
 from support.running_robot import RESTS_M, Standstill, own_domain, robot_on
 from support.surroundings import scan
 

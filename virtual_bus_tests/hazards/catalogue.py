@@ -72,7 +72,7 @@ class Row(BaseModel):
     """The stop category of IEC 60204-1 that the reaction resembles. Described, never claimed."""
     tests: Annotated[tuple[str, ...], Field(min_length=1)]
     safeguard: str = ""
-    """Name in campaign/without.py: `make teeth` takes it out and must find it missing."""
+    """Name in campaign/removed_safeguards.py: `make teeth` takes it out and must find it missing."""
     not_covered: str = ""
 
 

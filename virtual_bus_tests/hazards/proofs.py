@@ -10,8 +10,8 @@ from __future__ import annotations
 import ast
 from functools import cache
 
+from exit_matrix.failures import ROWS
 from exit_matrix.page_table import NOTHING
-from exit_matrix.rows import ROWS
 from exit_matrix.stop_table import COMMANDS, REAL_RUN, TABLE
 from hazards.catalogue import ROOT, Catalogue
 from support.marked_page import section
@@ -46,7 +46,7 @@ def is_proof(node_id: str, names: frozenset[str]) -> bool:
 
 def _matrix_problem(name: str) -> str:
     if name not in {row.name for row in ROWS}:
-        return f"{MATRIX}{name}: no such row in exit_matrix/rows.py"
+        return f"{MATRIX}{name}: no such row in exit_matrix/failures.py"
     what, how = name.split(": ", 1)
     measured = TABLE.rows(section(STOP_TIMES.read_text(encoding="utf-8"), COMMANDS)).get((what, how), {})
     if measured.get(REAL_RUN, NOTHING) == NOTHING:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from exit_matrix.rows import ROWS, Row
+from exit_matrix.failures import ROWS, Row
 from exit_matrix.runner import Runner
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(150)]

@@ -11,7 +11,7 @@ from geometry_msgs.msg import TwistStamped
 from lifecycle_msgs.msg import State, Transition, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetState
 
-from exit_matrix.scene import forward
+from exit_matrix.driven_robot import forward
 from support.ros_harness import Repeater
 from support.running_robot import READY_S, RESTS_M, RunningRobot, own_domain, robot_on
 

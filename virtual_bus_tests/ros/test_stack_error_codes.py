@@ -19,9 +19,9 @@ from unique_identifier_msgs.msg import UUID
 
 from canbase_action_server.client import Drive
 from canbase_action_server.outcome import ErrorCode, Status
+from exit_matrix.driven_robot import Scene, sabotaged
+from exit_matrix.failures import DRIVER, SERVER
 from exit_matrix.injections import Inject, breaks, estop_pressed, fault, scan_dies, sends
-from exit_matrix.rows import DRIVER, SERVER
-from exit_matrix.scene import Scene, sabotaged
 from support.running_robot import READY_S, RESTS_M, own_domain, robot_on
 from support.scanner import BEAMS
 from support.surroundings import BLOCKED_M, scan

@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-from campaign.without import SAFEGUARDS, remove
+from campaign.removed_safeguards import SAFEGUARDS, remove
 from small_worlds.explore import Bounds, Search, search, shortest
 from small_worlds.properties import PROPERTIES
 from small_worlds.world import STARTS

@@ -6,7 +6,7 @@ import multiprocessing
 import time
 from dataclasses import dataclass
 
-from campaign.without import remove
+from campaign.removed_safeguards import remove
 from small_worlds.explore import Bounds, Story, search, shortest
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from campaign.without import SAFEGUARDS
+from campaign.removed_safeguards import SAFEGUARDS
 from canbase_driver.cia301.sdo_client import Read, SdoAborted
 from small_worlds import canonical
 from small_worlds.copying import Snapshot

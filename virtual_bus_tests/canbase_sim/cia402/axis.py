@@ -10,6 +10,7 @@ from canopen import SdoAbortedError
 
 from canbase_sim.cia301 import abort
 from canbase_sim.cia301.dictionary import AXIS_STRIDE, Dictionary
+from canbase_sim.cia402.raw_units import Scale
 from canbase_sim.cia402.states import (
     POWERED,
     TRANSITIONS,
@@ -21,7 +22,6 @@ from canbase_sim.cia402.states import (
     after,
     decode,
 )
-from canbase_sim.cia402.units import Scale
 from canbase_sim.personality import GENERIC, Personality
 from canbase_sim.plant.encoder import Encoder, EncoderFault
 from canbase_sim.plant.motor import AT_ONCE, Motor

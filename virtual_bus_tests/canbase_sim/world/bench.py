@@ -13,7 +13,7 @@ from canbase_config.drive import Drive
 from canbase_config.robot import Robot
 from canbase_sim.axis_parts import AxisParts, StateChange
 from canbase_sim.cia301.dictionary import AXIS_STRIDE, key
-from canbase_sim.cia402.units import Scale
+from canbase_sim.cia402.raw_units import Scale
 from canbase_sim.frame import Frame
 from canbase_sim.node import SimulatedNode
 from canbase_sim.personality import GENERIC, PERSONALITIES, Personality

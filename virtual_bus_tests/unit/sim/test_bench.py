@@ -8,8 +8,8 @@ from math import pi
 import pytest
 
 from canbase_sim import faults
+from canbase_sim.cia402.raw_units import Scale
 from canbase_sim.cia402.states import State
-from canbase_sim.cia402.units import Scale
 from canbase_sim.frame import Frame
 from canbase_sim.world.bench import Bench, BenchParameters, Truth
 from canbase_sim.world.trace import Trace

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from canbase_sim.cia301.nmt import NmtState
+from canbase_sim.cia402.raw_units import Scale
 from canbase_sim.cia402.states import State
-from canbase_sim.cia402.units import Scale
 from canbase_sim.faults import apply
 from canbase_sim.personality import PERSONALITIES
 from support.sim_rig import Rig, robot

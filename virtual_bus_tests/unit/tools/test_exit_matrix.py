@@ -9,11 +9,11 @@ import pytest
 from campaign.twins import TWINS
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
-from exit_matrix import layers
-from exit_matrix.layers import Layer
+from exit_matrix import stop_limits
+from exit_matrix.failures import ROWS
 from exit_matrix.report import merged
-from exit_matrix.rows import ROWS
 from exit_matrix.runner import Result, judge
+from exit_matrix.stop_limits import Layer
 from exit_matrix.stop_table import COMMANDS, TABLE
 from support.marked_page import rewritten
 from support.running_robot import Standstill
@@ -43,13 +43,13 @@ def test_orders_on_cmd_vel_meet_the_latches_of_driver_watchdog_and_drives_and_no
 @pytest.mark.parametrize(
     ("layer", "limit_s"),
     [
-        (layers.DRIVES, 0.25 + 0.3 + 0.2),  # 0.4 m/s at 2 m/s²
-        (layers.WATCHDOG_LEASE, 0.25 + 0.25 + 0.2),
-        (layers.DRIVER_STALE, 0.25 + 0.2 + 0.4 + 0.1),  # 0.4 m/s at 1 m/s², 10 m/s³
-        (layers.MUX_JOYSTICK, 0.25 + 0.3 + 0.5),
-        (layers.FILTER_ESTOP, 0.25 + 0.5),
-        (layers.WATCHDOG_KEPT, 0.25 + 0.37 + 0.042 + 0.2),
-        (layers.WATCHDOG_FOREIGN, 0.25 + 0.03 + 0.2),
+        (stop_limits.DRIVES, 0.25 + 0.3 + 0.2),  # 0.4 m/s at 2 m/s²
+        (stop_limits.WATCHDOG_LEASE, 0.25 + 0.25 + 0.2),
+        (stop_limits.DRIVER_STALE, 0.25 + 0.2 + 0.4 + 0.1),  # 0.4 m/s at 1 m/s², 10 m/s³
+        (stop_limits.MUX_JOYSTICK, 0.25 + 0.3 + 0.5),
+        (stop_limits.FILTER_ESTOP, 0.25 + 0.5),
+        (stop_limits.WATCHDOG_KEPT, 0.25 + 0.37 + 0.042 + 0.2),
+        (stop_limits.WATCHDOG_FOREIGN, 0.25 + 0.03 + 0.2),
     ],
     ids=lambda value: value.cause if isinstance(value, Layer) else "",
 )
@@ -59,15 +59,15 @@ def test_a_limit_is_allowance_and_timeout_and_braking(robot: Robot, layer: Layer
 
 def test_a_shorter_timeout_makes_a_shorter_limit(robot: Robot) -> None:
     shorter = robot.model_copy(update={"timeouts": robot.timeouts.model_copy(update={"drive_heartbeat_s": 0.1})})
-    assert layers.DRIVES.limit_s(shorter, 0.4) == pytest.approx(layers.DRIVES.limit_s(robot, 0.4) - 0.2)
+    assert stop_limits.DRIVES.limit_s(shorter, 0.4) == pytest.approx(stop_limits.DRIVES.limit_s(robot, 0.4) - 0.2)
 
 
 def test_a_row_passes_that_stood_in_time_and_was_caught() -> None:
-    assert judge(ROW, Standstill(0.75, 0.2), [layers.DRIVES], set(), 0.75) == ""
+    assert judge(ROW, Standstill(0.75, 0.2), [stop_limits.DRIVES], set(), 0.75) == ""
 
 
 def test_a_row_fails_that_stood_too_late() -> None:
-    assert judge(ROW, Standstill(0.751, 0.2), [layers.DRIVES], set(), 0.75) == "stood after 0.751 s, limit 0.750 s"
+    assert judge(ROW, Standstill(0.751, 0.2), [stop_limits.DRIVES], set(), 0.75) == "stood after 0.751 s, limit 0.750 s"
 
 
 def test_a_row_fails_that_somebody_else_has_caught() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pydantic import ValidationError
 
-from campaign.without import SAFEGUARDS
+from campaign.removed_safeguards import SAFEGUARDS
 from hazards import page, proofs
 from hazards.catalogue import Braking, Catalogue, Row, load
 from hazards.formula import FormulaError, evaluate

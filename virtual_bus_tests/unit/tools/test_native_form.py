@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from campaign import without
+from campaign import removed_safeguards
 from compiled.modules import BUILD, ROOT, SOURCES, hot_modules
 from compiled.native_form import native_form
 
@@ -94,7 +94,7 @@ def test_every_hot_module_exists() -> None:
 
 def test_no_safeguard_is_taken_out_of_compiled_modules(monkeypatch: pytest.MonkeyPatch) -> None:
     """It would have no effect, and the campaign would find nothing: a check that cannot fail."""
-    monkeypatch.setattr(without, "policy", SimpleNamespace(__file__="policy.cpython-311-x86_64-linux-gnu.so"))
+    monkeypatch.setattr(removed_safeguards, "policy", SimpleNamespace(__file__="policy.cpython-311-x86_64-linux-gnu.so"))
     with pytest.raises(RuntimeError, match="without COMPILED=1"):
-        without.remove("watchdog:latch")
-    without.remove("")
+        removed_safeguards.remove("watchdog:latch")
+    removed_safeguards.remove("")

@@ -11,7 +11,7 @@ from canbase.msg import DriverStatus, MuxState, StopEvent
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from exit_matrix.said import NAMES, Catch, logged
+from exit_matrix.log_evidence import NAMES, Catch, logged
 from vm.guest.system import run, unit
 
 UNITS: Final = {"canbase-sim.service": "sim", **{unit(part): part for part in NAMES}}

@@ -14,10 +14,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from types import FrameType
 
-from vm.guest import machine, papers, units, wires
-from vm.guest.last_words import FOLDER
+from vm.guest import bus_failures, computer_failures, integrator, unit_failures
 from vm.guest.robot import Robot
 from vm.guest.scenario import Row, Scenario
+from vm.guest.shutdown_trace import FOLDER
 from vm.guest.system import BrokenPromiseError
 
 LIMIT_S = 90.0
@@ -31,27 +31,27 @@ ROWS = FOLDER / "rows.jsonl"
 PLAN = FOLDER / "plan.json"
 
 FIRST: dict[str, Scenario] = {
-    "cold boot": machine.cold_boot,
-    "goal": machine.goal,
-    "support bundle": papers.support_bundle,
-    **units.KILLS,
-    "power cut": wires.power_cut,
-    "link down": wires.link_down,
-    "unplugged": wires.unplugged,
-    "masked": units.masked,
-    "journal": papers.journal,
-    "full disk": machine.full_disk,
-    "installed again": papers.installed_again,
+    "cold boot": computer_failures.cold_boot,
+    "goal": computer_failures.goal,
+    "support bundle": integrator.support_bundle,
+    **unit_failures.KILLS,
+    "power cut": bus_failures.power_cut,
+    "link down": bus_failures.link_down,
+    "unplugged": bus_failures.unplugged,
+    "masked": unit_failures.masked,
+    "journal": integrator.journal,
+    "full disk": computer_failures.full_disk,
+    "installed again": integrator.installed_again,
 }
 SECOND: dict[str, Scenario] = {
-    **units.ORDERLY,
-    "error passive": wires.error_passive,
-    "bus-off": wires.bus_off,
-    "reboot": machine.reboot,
-    "freeze": machine.freeze,
+    **unit_failures.ORDERLY,
+    "error passive": bus_failures.error_passive,
+    "bus-off": bus_failures.bus_off,
+    "reboot": computer_failures.reboot,
+    "freeze": computer_failures.freeze,
 }
 """For two guests that run side by side. The serial adapter stays until the reboot; that and the freeze come last."""
-AFTER_BOOT: dict[str, Scenario] = {"reboot": machine.after_reboot, "freeze": machine.after_freeze}
+AFTER_BOOT: dict[str, Scenario] = {"reboot": computer_failures.after_reboot, "freeze": computer_failures.after_freeze}
 ALL = {**FIRST, **SECOND}
 SHORT = (
     "cold boot",

@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
-from exit_matrix.layers import Layer
-from exit_matrix.said import Catch
+from exit_matrix.log_evidence import Catch
+from exit_matrix.stop_limits import Layer
 from vm.guest.robot import SPEED_MPS, Robot
 from vm.guest.standstill import Standstill
 from vm.guest.system import BrokenPromiseError

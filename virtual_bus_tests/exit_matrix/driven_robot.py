@@ -16,8 +16,8 @@ from geometry_msgs.msg import TwistStamped
 
 from canbase_config.derive import mps_per_bit
 from canbase_config.robot import Robot
-from exit_matrix.layers import SPEED_MPS
 from exit_matrix.saboteur import sitecustomize as saboteur
+from exit_matrix.stop_limits import SPEED_MPS
 from support.ros_harness import Process, Repeater
 from support.running_robot import READY_S, RunningRobot
 from support.surroundings import World

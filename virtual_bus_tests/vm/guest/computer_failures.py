@@ -13,10 +13,10 @@ from typing import Final, NoReturn
 
 from canbase.msg import DriverStatus
 
-from exit_matrix import layers as by
-from vm.guest.last_words import FOLDER, MOMENT, WORDS
+from exit_matrix import stop_limits as by
 from vm.guest.robot import Robot
 from vm.guest.scenario import Row, limit_s, timed
+from vm.guest.shutdown_trace import FOLDER, MOMENT, WORDS
 from vm.guest.standstill import Standstill, standstill
 from vm.guest.system import PARTS, TARGET, BrokenPromiseError, run, set_priority, show, unit
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from signal import SIGINT, SIGKILL, SIGSTOP, SIGTERM
 
-from exit_matrix import layers as by
+from exit_matrix import stop_limits as by
+from exit_matrix.driven_robot import CLIENT, By
 from exit_matrix.injections import (
     Inject,
     Undo,
@@ -26,8 +27,7 @@ from exit_matrix.injections import (
     sends,
     then_zero,
 )
-from exit_matrix.layers import Layer
-from exit_matrix.scene import CLIENT, By
+from exit_matrix.stop_limits import Layer
 
 DRIVER, VELOCITY, WATCHDOG, SERVER = "driver", "velocity", "watchdog", "action-server"
 """Parts of `canbase_cli.stack`."""

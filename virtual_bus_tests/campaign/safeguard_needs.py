@@ -1,6 +1,6 @@
 """What each safeguard is needed for: the faults in which a property does not hold without it.
 
-Each name of campaign/without.py has a row. Where several layers hold the same, each of them has a row with the others
+Each name of removed_safeguards.py has a row. Where several layers hold the same, each of them has a row with the others
 `beside` it: without all of them the property does not hold, with this one alone it does.
 """
 

@@ -6,8 +6,8 @@ import json
 import time
 from signal import SIGKILL, SIGSTOP, Signals
 
-from exit_matrix import layers as by
-from exit_matrix.layers import Layer
+from exit_matrix import stop_limits as by
+from exit_matrix.stop_limits import Layer
 from vm.guest.robot import SPEED_MPS, Robot
 from vm.guest.scenario import LATCHED, STANDS, Row, Scenario, elapsed, judged
 from vm.guest.system import PARTS, TARGET, BrokenPromiseError, run, send_signal, show, unit

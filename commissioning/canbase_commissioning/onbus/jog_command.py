@@ -16,7 +16,7 @@ from typing import Final
 import typer
 
 from canbase_commissioning.guide import CommissionError, Guide, Script
-from canbase_commissioning.jog import JogSession
+from canbase_commissioning.jog_session import JogSession
 from canbase_commissioning.onbus.bus_session import BusSession, open_line
 from canbase_commissioning.onbus.moving import refuse_beside_masters
 from canbase_commissioning.onbus.operator import Stopped, stopping_signals

@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from exit_matrix import layers as by
+from exit_matrix import stop_limits as by
 from vm.guest.robot import Robot
 from vm.guest.scenario import LATCHED, Row, elapsed, judged
 from vm.guest.system import PARTS, ROBOT_YAML, TARGET, BrokenPromiseError, run, unit

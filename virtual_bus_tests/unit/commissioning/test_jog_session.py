@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from canbase_commissioning.guide import Guide, Script
-from canbase_commissioning.jog import DeadMan, JogSession, split_keys
+from canbase_commissioning.jog_session import DeadMan, JogSession, split_keys
 from canbase_commissioning.powered_drives import PoweredDrives, RigError
 from canbase_commissioning.safe_stop import SafeStop
 from canbase_commissioning.self_stop_test import get_ready
