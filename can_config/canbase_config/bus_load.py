@@ -18,6 +18,7 @@ from canbase_config.object_map import (
     VELOCITY_ACTUAL,
     place,
 )
+from canbase_config.watchdog import HEARTBEATS_PER_TIMEOUT
 
 if TYPE_CHECKING:
     from canbase_config.drive import Drive
@@ -31,7 +32,6 @@ BITRATES: Final = (125_000, 250_000, 500_000, 800_000, 1_000_000)
 """Of CiA 301, those that are worth proposing [bit/s]."""
 LEAST_CONTROL_HZ: Final = 20
 
-HEARTBEATS_PER_TIMEOUT: Final = 3
 STATE_HZ, COUNTERS_HZ = 20.0, 2.0
 """Of the watchdog: 1FEh and 2FEh, eight bytes each."""
 OVERHEAD_BITS, STUFFED_BITS = 47, 34

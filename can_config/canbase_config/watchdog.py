@@ -7,6 +7,9 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
+HEARTBEATS_PER_TIMEOUT = 3
+"""Driver and watchdog send their heartbeats this often in the time that the drives allow for one."""
+
 
 @dataclass(frozen=True)
 class WatchedLayout:
@@ -147,6 +150,11 @@ class WatchdogConfig:
     """None: there is no such relay."""
     robot: str = "robot"
     """`name` in robot.yaml: whose record of a trip it keeps."""
+
+    @property
+    def heartbeat_period_s(self) -> float:
+        """From one heartbeat of driver or watchdog to the next [s]."""
+        return self.drive_heartbeat_s / HEARTBEATS_PER_TIMEOUT
 
     def to_json(self) -> str:
         """One line of JSON that `from_json` reads back."""

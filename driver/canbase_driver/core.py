@@ -14,6 +14,7 @@ from functools import partial
 
 from canbase_config import stopping
 from canbase_config.robot import DRIVER_NODE_ID, Robot
+from canbase_config.watchdog import HEARTBEATS_PER_TIMEOUT
 from canbase_driver.causes import Cause, Finding
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import (
@@ -53,8 +54,6 @@ from canbase_driver.supervision.watchdog_link import COUNTERS_COB_ID, STATE_COB_
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.latch_record import Found, Record
 
-HEARTBEATS_PER_TIMEOUT = 3
-"""The heartbeat goes out this often in the time that the drives allow for it."""
 PAUSE = 0.5
 """A cycle that begins so late, in parts of timeouts.feedback_s, begins a new run of SYNCs."""
 LONGEST_STEP_S = 1.0

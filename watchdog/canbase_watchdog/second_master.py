@@ -23,7 +23,6 @@ SYNC_LOST, OFF_BEAT = 1.5, 0.75
 """Periods since the last SYNC: after more, one was lost; a SYNC after less is another one than the driver's."""
 EXCESS = 1.5
 SYNC_WINDOW_S = 0.5
-HEARTBEATS_PER_TIMEOUT = 3
 HEARTBEAT_PERIODS = 10
 
 
@@ -56,9 +55,11 @@ class Foreign:
 
     def __init__(self, config: WatchdogConfig) -> None:
         """Knows from `config` how often the driver sends what."""
-        period_s = config.drive_heartbeat_s / HEARTBEATS_PER_TIMEOUT
+        period_s = config.heartbeat_period_s
         self._syncs = Pace(math.ceil(EXCESS * SYNC_WINDOW_S * config.control_hz) + 1, SYNC_WINDOW_S)
-        self._heartbeats = Pace(math.ceil(EXCESS * HEARTBEAT_PERIODS) + 1, HEARTBEAT_PERIODS * period_s)
+        self._heartbeats = Pace(
+            math.ceil(EXCESS * HEARTBEAT_PERIODS) + 1, HEARTBEAT_PERIODS * config.heartbeat_period_s
+        )
         self._disorder = Pace(DISORDER_COUNT, DISORDER_S)
         self._control_hz, self._period_s = config.control_hz, period_s
         self._lost_s, self._off_beat_s = SYNC_LOST / config.control_hz, OFF_BEAT / config.control_hz

@@ -254,7 +254,7 @@ class Watchdog:
 
     def _tell(self, now: float) -> list[Frame]:
         out: list[Frame] = []
-        period_s = self._config.drive_heartbeat_s / 3.0
+        period_s = self._config.heartbeat_period_s
         if now >= self._heartbeat_due and self._beats:
             self._heartbeat_due = max(self._heartbeat_due, now - period_s) + period_s
             out.append(frames.heartbeat())

@@ -94,7 +94,8 @@ def test_every_hot_module_exists() -> None:
 
 def test_no_safeguard_is_taken_out_of_compiled_modules(monkeypatch: pytest.MonkeyPatch) -> None:
     """It would have no effect, and the campaign would find nothing: a check that cannot fail."""
-    monkeypatch.setattr(removed_safeguards, "policy", SimpleNamespace(__file__="policy.cpython-311-x86_64-linux-gnu.so"))
+    compiled = SimpleNamespace(__file__="policy.cpython-311-x86_64-linux-gnu.so")
+    monkeypatch.setattr(removed_safeguards, "policy", compiled)
     with pytest.raises(RuntimeError, match="without COMPILED=1"):
         removed_safeguards.remove("watchdog:latch")
     removed_safeguards.remove("")
