@@ -49,7 +49,7 @@ class Situation:
 
 
 @dataclass(frozen=True, slots=True)
-class Cause:
+class EndCause:
     """A row that holds."""
 
     code: ErrorCode
@@ -178,20 +178,20 @@ PRECEDENCE = {row.code: place for place, row in reversed(tuple(enumerate(TABLE))
 """Of a code with two rows, the upper one."""
 
 
-def cause_while_driving(situation: Situation) -> Cause | None:
+def cause_while_driving(situation: Situation) -> EndCause | None:
     """The first row that holds."""
     return _first(TABLE, situation)
 
 
-def cause_while_stopping(situation: Situation, so_far: ErrorCode) -> Cause | None:
+def cause_while_stopping(situation: Situation, so_far: ErrorCode) -> EndCause | None:
     """The first row that holds, counts while stopping, and stands above `so_far`."""
     above = TABLE[: PRECEDENCE[so_far]]
     return _first(tuple(row for row in above if row.while_stopping), situation)
 
 
-def _first(rows: tuple[Row, ...], situation: Situation) -> Cause | None:
+def _first(rows: tuple[Row, ...], situation: Situation) -> EndCause | None:
     for row in rows:
         message = row.test(situation)
         if message is not None:
-            return Cause(row.code, message)
+            return EndCause(row.code, message)
     return None

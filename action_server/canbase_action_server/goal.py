@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from canbase_action_server.causes import Cause, Situation, cause_while_driving, cause_while_stopping
+from canbase_action_server.causes import EndCause, Situation, cause_while_driving, cause_while_stopping
 from canbase_action_server.inputs import Inputs, Odometry
 from canbase_action_server.limits import standstill_limits
 from canbase_action_server.motion import STOP, Motion, Twist
@@ -68,7 +68,7 @@ class GoalRun:
         self._started = self._ticked_at = now
         self._gap_s = 0.0
         self._phase = Phase.DRIVING
-        self._cause = Cause(ErrorCode.OK, "")
+        self._cause = EndCause(ErrorCode.OK, "")
         self._standstill: Standstill | None = None
         self._last_odometry = start
         self._jumped = False
@@ -135,11 +135,11 @@ class GoalRun:
     def _drive(self, inputs: Inputs, now: float) -> Order:
         cause = cause_while_driving(self._situation(inputs, now))
         if cause and cause.code is ErrorCode.NO_PROGRESS and self._near_enough():
-            cause = Cause(ErrorCode.OK, "")
+            cause = EndCause(ErrorCode.OK, "")
         twist = None if cause else self._motion.order(now)
         if twist is not None:
             return Order(twist)
-        self._cause = cause or Cause(ErrorCode.OK, "")
+        self._cause = cause or EndCause(ErrorCode.OK, "")
         self._go(Phase.STOPPING)
         limits = standstill_limits(self._robot, self._motion.deceleration_mps2)
         self._standstill = Standstill(limits, now, self._motion.speed_mps(self._last_odometry))
@@ -170,11 +170,13 @@ class GoalRun:
     def _outcome(self, verdict: Verdict) -> Outcome:
         motion, cause = self._motion, self._cause
         if verdict is Verdict.STILL_MOVES and cause.code.leaves_the_base_standing:
-            cause = Cause(ErrorCode.DRIVE_FAULT, "ordered to stand, but the base still moves; use the emergency stop")
+            cause = EndCause(
+                ErrorCode.DRIVE_FAULT, "ordered to stand, but the base still moves; use the emergency stop"
+            )
         elif cause.code is ErrorCode.OK and motion.overshoot_m > self._robot.action.tolerance_m:
-            cause = Cause(ErrorCode.OVERSHOOT, "the base rolled over the goal: too fast for its load or the slope")
+            cause = EndCause(ErrorCode.OVERSHOOT, "the base rolled over the goal: too fast for its load or the slope")
         elif verdict is not Verdict.STANDS:
-            cause = Cause(cause.code, f"{cause.message}; the base {verdict.value}")
+            cause = EndCause(cause.code, f"{cause.message}; the base {verdict.value}")
         went = motion.report()
         text = f"{cause.message}; {went}" if cause.message else f"{went}, and stands"
         return Outcome(cause.code, motion.traveled_m, max(0.0, motion.overshoot_m), text, verdict is Verdict.STANDS)

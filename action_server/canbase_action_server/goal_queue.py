@@ -19,7 +19,7 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 from canbase_action_server.active_goal import ActiveGoal
-from canbase_action_server.causes import CLIENT_SILENT, Cause
+from canbase_action_server.causes import CLIENT_SILENT, EndCause
 from canbase_action_server.goal import Feedback, Order, Phase
 from canbase_action_server.goal_request import Request
 from canbase_action_server.inputs import Inputs
@@ -139,7 +139,7 @@ class GoalQueue:
     def give_up(self, code: ErrorCode, message: str, now: float) -> Cycle:
         """Ends all goals at once, the base standing or not, because the process has no more time."""
         order = self._owner.give_up(code, message, now)
-        return Cycle(STOP, ends=(self._ended(order) if order else ()) + self._flush(Cause(code, message)))
+        return Cycle(STOP, ends=(self._ended(order) if order else ()) + self._flush(EndCause(code, message)))
 
     def _goals(self) -> tuple[Admitted, ...]:
         return (*((self._running,) if self._running else ()), *self._waiting)
@@ -162,16 +162,16 @@ class GoalQueue:
         self._waiting = deque(goal for goal, cause in causes if cause is None)
         return tuple(End(goal.key, _not_started(cause)) for goal, cause in causes if cause is not None)
 
-    def _against_waiting(self, goal: Admitted, inputs: Inputs, now: float) -> Cause | None:
+    def _against_waiting(self, goal: Admitted, inputs: Inputs, now: float) -> EndCause | None:
         if self._failed:
-            return Cause(ErrorCode.INTERNAL, "defect in the action server, see its log")
+            return EndCause(ErrorCode.INTERNAL, "defect in the action server, see its log")
         if goal.canceled:
-            return Cause(ErrorCode.CANCELED, "canceled by request")
+            return EndCause(ErrorCode.CANCELED, "canceled by request")
         if goal.preempted:
-            return Cause(ErrorCode.PREEMPTED, "a newer goal takes its place")
+            return EndCause(ErrorCode.PREEMPTED, "a newer goal takes its place")
         if self._client_lost(goal, now):
-            return Cause(ErrorCode.CLIENT_LOST, CLIENT_SILENT)
-        return Cause(ErrorCode.SHUTDOWN, "the action server is shutting down") if inputs.shutdown else None
+            return EndCause(ErrorCode.CLIENT_LOST, CLIENT_SILENT)
+        return EndCause(ErrorCode.SHUTDOWN, "the action server is shutting down") if inputs.shutdown else None
 
     def _begin(self, inputs: Inputs, now: float) -> str | None:
         if self._owner.busy or not self._waiting:
@@ -190,13 +190,13 @@ class GoalQueue:
         end, self._running = End(self._running.key, order.end), None
         if order.end.code.leaves_the_base_standing:
             return (end,)
-        return (end, *self._flush(Cause(order.end.code, f"the goal before it ended with {order.end.code.name}")))
+        return (end, *self._flush(EndCause(order.end.code, f"the goal before it ended with {order.end.code.name}")))
 
-    def _flush(self, cause: Cause) -> tuple[End, ...]:
+    def _flush(self, cause: EndCause) -> tuple[End, ...]:
         ends = tuple(End(goal.key, _not_started(cause)) for goal in self._waiting)
         self._waiting.clear()
         return ends
 
 
-def _not_started(cause: Cause) -> Outcome:
+def _not_started(cause: EndCause) -> Outcome:
     return Outcome(cause.code, 0.0, 0.0, f"{cause.message}; it never started")

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from canbase_runtime.log_priority import Priority
-from canbase_velocity.decision import Action, Cause, Decision
+from canbase_velocity.decision import Action, Decision, StopCause
 from canbase_velocity.mux import MuxDecision, Standing
 from canbase_velocity.safety_filter import ScanState
 
@@ -16,9 +16,9 @@ Told = tuple[str, Priority, dict[str, str]]
 AGAIN_S: Final = 10.0
 """Scans that are dropped all the time are told again after so long [s]."""
 STOP_PRIORITY: Final = {
-    Cause.OBSTACLE: Priority.NOTICE,
-    Cause.OBSTACLE_NEAR: Priority.NOTICE,
-    Cause.SHUTDOWN: Priority.INFO,
+    StopCause.OBSTACLE: Priority.NOTICE,
+    StopCause.OBSTACLE_NEAR: Priority.NOTICE,
+    StopCause.SHUTDOWN: Priority.INFO,
 }
 """Of a stop. An obstacle is what the filter is for; each other cause is one that somebody should look at."""
 
@@ -52,13 +52,13 @@ class DropTeller:
     """Tells that scans are dropped and why: at the first one, for another reason, and AGAIN_S later if it goes on."""
 
     def __init__(self) -> None:
-        self._told: dict[str, tuple[Cause, float]] = {}
+        self._told: dict[str, tuple[StopCause, float]] = {}
 
     def news(self, scans: Sequence[ScanState], now: float) -> Iterator[Told]:
         """What is to be told at the time `now` [s, monotonic]."""
         for scan in scans:
             why = scan.problem or scan.why_dropped
-            cause, told_at = self._told.get(scan.topic, (Cause.NONE, -math.inf))
+            cause, told_at = self._told.get(scan.topic, (StopCause.NONE, -math.inf))
             if why and (scan.cause is not cause or now - told_at >= AGAIN_S):
                 self._told[scan.topic] = scan.cause, now
                 sentence = f"scans of {scan.topic} are dropped, {scan.dropped} so far: {why}"

@@ -17,7 +17,7 @@ class Action(enum.IntEnum):
     STOP = 3
 
 
-class Cause(str, enum.Enum):
+class StopCause(str, enum.Enum):
     """Why. The values are the CAUSE_ constants of SafetyState.msg."""
 
     NONE = "none"
@@ -44,7 +44,7 @@ class Finding:
     """One reason to do something. `factor`: the share of the commanded speed that it leaves, 0 to 1."""
 
     action: Action
-    cause: Cause
+    cause: StopCause
     detail: str
     clears_on: str
     factor: float
@@ -58,21 +58,21 @@ class Decision:
     """
 
     action: Action
-    cause: Cause
+    cause: StopCause
     detail: str
     clears_on: str
     twist: Twist
     emergency: bool = False
 
     @property
-    def essence(self) -> tuple[Action, Cause, bool]:
+    def essence(self) -> tuple[Action, StopCause, bool]:
         """What makes two decisions differ for a reader: not their numbers."""
         return self.action, self.cause, self.emergency
 
 
-PASSED = Finding(Action.PASS, Cause.NONE, "", "", 1.0)
+PASSED = Finding(Action.PASS, StopCause.NONE, "", "", 1.0)
 
 
-def stop(cause: Cause, detail: str, clears_on: str) -> Finding:
+def stop(cause: StopCause, detail: str, clears_on: str) -> Finding:
     """A reason to stand still."""
     return Finding(Action.STOP, cause, detail, clears_on, 0.0)

@@ -11,7 +11,7 @@ import numpy as np
 from canbase_config.safety import Scan as ScanConfig
 from canbase_runtime.latch_record import Found, Record
 from canbase_velocity.clearance import FREE, Clearances, Field, Points, ScanReader, clearances
-from canbase_velocity.decision import Action, Cause, Decision
+from canbase_velocity.decision import Action, Decision, StopCause
 from canbase_velocity.delay import Delay, Sent
 from canbase_velocity.estop import Estop, EstopEvent, EstopState
 from canbase_velocity.frozen import FrozenWatch
@@ -28,7 +28,13 @@ from canbase_velocity.twist import ZERO, Twist
 NOTHING_TO_RESET = "nothing to reset: the emergency stop waits for no reset"
 WITHOUT_SCANS_S = 1.0
 """After so long without usable scans nobody who ordered motion meanwhile is followed by himself (neutral.py) [s]."""
-NO_SCAN = (Cause.SCAN_STALE, Cause.SCAN_UNPLACED, Cause.SCAN_INVALID, Cause.SCAN_FROZEN, Cause.SCAN_BLIND)
+NO_SCAN = (
+    StopCause.SCAN_STALE,
+    StopCause.SCAN_UNPLACED,
+    StopCause.SCAN_INVALID,
+    StopCause.SCAN_FROZEN,
+    StopCause.SCAN_BLIND,
+)
 LONGEST_SINCE_S = 0.1
 """Orders after a longer gap may grow as far as after this one [s]."""
 
@@ -51,33 +57,33 @@ class _Scanner:
         self.clearances = FREE
         self.measured_from_s = -math.inf
         self._problem = self._why_dropped = ""
-        self._cause = Cause.SCAN_STALE
+        self._cause = StopCause.SCAN_STALE
         self._dropped = 0
         self._share: float | None = None
 
     def receive(self, scan: Scan, placement: Placement, now: float, *, moves: bool) -> None:
         """A scan as it came. One that cannot be used is dropped and counted."""
         if self.sole.problem:
-            self.drop(Cause.SCAN_INVALID, self.sole.problem, at_once=True)
+            self.drop(StopCause.SCAN_INVALID, self.sole.problem, at_once=True)
             return
         if self._frozen.is_repeated(scan):
-            self.drop(Cause.SCAN_FROZEN, "the stamp of its scans does not change")
+            self.drop(StopCause.SCAN_FROZEN, "the stamp of its scans does not change")
             return
         try:
             view = self._reader.read(scan, placement)
         except ScanError as error:
-            self.drop(Cause.SCAN_INVALID, str(error))
+            self.drop(StopCause.SCAN_INVALID, str(error))
             return
         frozen = self._frozen.look(scan, now, moves=moves)
         if frozen:
-            self.drop(Cause.SCAN_FROZEN, frozen, at_once=True)
+            self.drop(StopCause.SCAN_FROZEN, frozen, at_once=True)
             return
         late_s = self._late_s(scan, now)
         if self._delay.set_back:
-            self.drop(Cause.SCAN_INVALID, "its stamp is below that of the scan before")
+            self.drop(StopCause.SCAN_INVALID, "its stamp is below that of the scan before")
             return
         if late_s > self.config.timeout_s:
-            self.drop(Cause.SCAN_STALE, f"delayed by {late_s:.2f} s (limit {self.config.timeout_s:.2f} s)")
+            self.drop(StopCause.SCAN_STALE, f"delayed by {late_s:.2f} s (limit {self.config.timeout_s:.2f} s)")
             return
         self._share = view.share
         self.take(view.points, view.field, now - self._frozen.since + scan.scan_time_s + late_s, now)
@@ -88,7 +94,7 @@ class _Scanner:
             return 0.0
         return self._delay.take(Sent(scan.stamp_ns * 1e-9, math.nan, now))
 
-    def drop(self, cause: Cause, why: str, *, at_once: bool = False) -> None:
+    def drop(self, cause: StopCause, why: str, *, at_once: bool = False) -> None:
         """A scan that does not count. `at_once`: neither does the one before; otherwise that counts until it is old."""
         self._dropped += 1
         self._cause, self._why_dropped = cause, why
@@ -187,7 +193,7 @@ class SafetyFilter:
 
     def on_unplaced_scan(self, topic: str, problem: str) -> None:
         """A scan came whose scanner cannot be placed. Raises KeyError for another topic."""
-        self._scanners[topic].drop(Cause.SCAN_UNPLACED, problem, at_once=True)
+        self._scanners[topic].drop(StopCause.SCAN_UNPLACED, problem, at_once=True)
 
     def on_estop(self, pressed: bool, now: float) -> None:
         """Takes a message of the emergency stop: true = stop."""

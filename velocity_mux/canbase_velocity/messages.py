@@ -11,7 +11,7 @@ from geometry_msgs.msg import TwistStamped
 from sensor_msgs.msg import LaserScan
 
 from canbase_velocity.clearance import Clearances
-from canbase_velocity.decision import Cause, Decision
+from canbase_velocity.decision import Decision, StopCause
 from canbase_velocity.delay import Sent
 from canbase_velocity.placement import Transform
 from canbase_velocity.safety_filter import Inputs, ScanState
@@ -119,7 +119,7 @@ def oldest_scan_s(scans: tuple[ScanState, ...]) -> float | None:
 
 def stopped_by_estop(decision: Decision) -> bool:
     """Whether the emergency stop, or its silence, holds the base."""
-    return decision.cause in (Cause.ESTOP, Cause.ESTOP_STALE)
+    return decision.cause in (StopCause.ESTOP, StopCause.ESTOP_STALE)
 
 
 def _or_nan(value: float | None) -> float:

@@ -27,21 +27,21 @@ from canbase_config.commissioned import uncommissioned
 from canbase_config.robot import Limits, Robot
 from canbase_config.safety import Ceiling, Safety
 from canbase_velocity import obstacle
-from canbase_velocity.decision import PASSED, Action, Cause, Decision, Finding, stop
+from canbase_velocity.decision import PASSED, Action, Decision, Finding, StopCause, stop
 from canbase_velocity.estop import EstopState
 from canbase_velocity.obstacle import Geometry, Sight
 from canbase_velocity.ramp import Moving
 from canbase_velocity.sweep import fastest_mps, first_touch
 from canbase_velocity.twist import ZERO, Twist
 
-SHUTDOWN = Decision(Action.STOP, Cause.SHUTDOWN, "the safety filter is being shut down", "its next start", ZERO)
+SHUTDOWN = Decision(Action.STOP, StopCause.SHUTDOWN, "the safety filter is being shut down", "its next start", ZERO)
 
 
 CURES: Final = {
-    Cause.SCAN_STALE: "scans that can be used",
-    Cause.SCAN_UNPLACED: "a static transform of the scanner",
-    Cause.SCAN_INVALID: "scans that can be used; see the scanner and its ROS driver",
-    Cause.SCAN_FROZEN: "scans that change; start the scanner or its ROS driver again",
+    StopCause.SCAN_STALE: "scans that can be used",
+    StopCause.SCAN_UNPLACED: "a static transform of the scanner",
+    StopCause.SCAN_INVALID: "scans that can be used; see the scanner and its ROS driver",
+    StopCause.SCAN_FROZEN: "scans that change; start the scanner or its ROS driver again",
 }
 """What ends a stop for a scanner whose scans come, and cannot be used."""
 
@@ -75,7 +75,7 @@ class ScanState:
     age_s: float | None
     problem: str = ""
     """Why its scans cannot be used, such as a frame that tf_static does not know; empty: they can."""
-    cause: Cause = Cause.SCAN_STALE
+    cause: StopCause = StopCause.SCAN_STALE
     """What `problem` is, or what its last dropped scan was."""
     dropped: int = 0
     """Scans that could not be used."""
@@ -126,7 +126,7 @@ def decide(inputs: Inputs, config: FilterConfig) -> Decision:
     if stopped is not None:
         return Decision(stopped.action, stopped.cause, stopped.detail, stopped.clears_on, ZERO, emergency)
     if inputs.command.is_zero:
-        return Decision(Action.PASS, Cause.NONE, "", "", ZERO, emergency)
+        return Decision(Action.PASS, StopCause.NONE, "", "", ZERO, emergency)
     slowest = min(_slower(inputs, config), key=lambda finding: finding.factor)
     limited = _within(inputs.command.scaled(slowest.factor), config.limits)
     grown, growth = _growth(limited, inputs, config.safety.ceiling)
@@ -149,31 +149,31 @@ def _estop(inputs: Inputs, config: FilterConfig) -> Finding | None:
     estop = config.safety.estop
     if inputs.estop is EstopState.AWAITS_RESET:
         before = f" ({inputs.estop_before})" if inputs.estop_before else ""
-        return stop(Cause.ESTOP, f"the emergency stop is released and waits for a reset{before}", "reset")
+        return stop(StopCause.ESTOP, f"the emergency stop is released and waits for a reset{before}", "reset")
     if inputs.estop is EstopState.AWAITS_ZERO:
         detail = "the emergency stop is released, the command has not been zero since"
-        return stop(Cause.ESTOP, detail, "a zero command")
+        return stop(StopCause.ESTOP, detail, "a zero command")
     if inputs.estop is EstopState.FREE:
-        return stop(Cause.ESTOP, inputs.estop_unarmed, "the record on disk") if inputs.estop_unarmed else None
+        return stop(StopCause.ESTOP, inputs.estop_unarmed, "the record on disk") if inputs.estop_unarmed else None
     then = "a reset" if estop.latched else "a zero command"
     if not inputs.pressed and inputs.estop_crowd:
-        return stop(Cause.ESTOP, f"the emergency stop holds: {inputs.estop_crowd}", f"one publisher, then {then}")
+        return stop(StopCause.ESTOP, f"the emergency stop holds: {inputs.estop_crowd}", f"one publisher, then {then}")
     if not inputs.pressed:
         detail = _silence(estop.topic, inputs.estop_age_s, estop.timeout_s)
-        return stop(Cause.ESTOP_STALE, detail, f"false on {estop.topic}, then {then}")
+        return stop(StopCause.ESTOP_STALE, detail, f"false on {estop.topic}, then {then}")
     if inputs.estop_before and inputs.estop_age_s is None:
         detail = f"the emergency stop was not seen released yet: {inputs.estop_before}"
-        return stop(Cause.ESTOP, detail, f"false on {estop.topic}, then {then}")
-    return stop(Cause.ESTOP, "the emergency stop is pressed", f"its release, then {then}")
+        return stop(StopCause.ESTOP, detail, f"false on {estop.topic}, then {then}")
+    return stop(StopCause.ESTOP, "the emergency stop is pressed", f"its release, then {then}")
 
 
 def _command(inputs: Inputs, config: FilterConfig) -> Finding | None:
     timeout_s = config.safety.command_timeout_s
     if not _is_fresh(inputs.command_age_s, timeout_s):
         detail = _silence("cmd_vel_mux", inputs.command_age_s, timeout_s)
-        return stop(Cause.COMMAND_STALE, detail, "commands on cmd_vel_mux")
+        return stop(StopCause.COMMAND_STALE, detail, "commands on cmd_vel_mux")
     if not inputs.command.is_finite:
-        return stop(Cause.COMMAND_INVALID, f"cmd_vel_mux carries {inputs.command}", "a finite command")
+        return stop(StopCause.COMMAND_INVALID, f"cmd_vel_mux carries {inputs.command}", "a finite command")
     return None
 
 
@@ -186,7 +186,7 @@ def _scan(inputs: Inputs) -> Finding | None:
     if bad.why_dropped:
         detail = f"{bad.topic}: {bad.why_dropped} ({bad.dropped} scans dropped)"
         return stop(bad.cause, detail, CURES[bad.cause])
-    return stop(Cause.SCAN_STALE, _silence(bad.topic, bad.age_s, bad.timeout_s), f"scans on {bad.topic}")
+    return stop(StopCause.SCAN_STALE, _silence(bad.topic, bad.age_s, bad.timeout_s), f"scans on {bad.topic}")
 
 
 def _slower(inputs: Inputs, config: FilterConfig) -> list[Finding]:
@@ -195,13 +195,13 @@ def _slower(inputs: Inputs, config: FilterConfig) -> list[Finding]:
     linear_mps = min(limits.linear_mps, ceiling.linear_mps) if ceiling else limits.linear_mps
     angular_radps = min(limits.angular_radps, ceiling.angular_radps) if ceiling else limits.angular_radps
     found = [
-        _limit(command, obstacle.speed_factor(command, linear_mps, angular_radps), Cause.SPEED, "a slower command")
+        _limit(command, obstacle.speed_factor(command, linear_mps, angular_radps), StopCause.SPEED, "a slower command")
     ]
     if config.uncommissioned:
-        found.append(_corners(command, config.safety.uncommissioned_mps, config, Cause.SPEED, *_commission(config)))
+        found.append(_corners(command, config.safety.uncommissioned_mps, config, StopCause.SPEED, *_commission(config)))
     for zone in config.safety.limit_zones:
         factor = obstacle.zone_factor(command, zone, inputs.sight)
-        found.append(_limit(command, factor, Cause.ZONE, "nothing in the limit zone"))
+        found.append(_limit(command, factor, StopCause.ZONE, "nothing in the limit zone"))
     return found + _unseen(inputs, config)
 
 
@@ -209,17 +209,19 @@ def _unseen(inputs: Inputs, config: FilterConfig) -> list[Finding]:
     """Of rule 4: where no scanner looks, or where one looks and says nothing. Before any scan nothing is asked."""
     command, sight, geometry, safety = inputs.command, inputs.sight, config.geometry, config.safety
     if _lost_all(inputs.scans):
-        return [_blind(command, Cause.BLIND, "the scans of every scanner have ended", "scans that can be used", config)]
+        return [
+            _blind(command, StopCause.BLIND, "the scans of every scanner have ended", "scans that can be used", config)
+        ]
     if not sight.fields:
         return []
     found = []
     if obstacle.is_blind(command, sight, geometry):
         why = "no scanner looks where the command leads"
-        found.append(_blind(command, Cause.BLIND, why, "a command to where a scanner looks", config))
+        found.append(_blind(command, StopCause.BLIND, why, "a command to where a scanner looks", config))
     share = obstacle.told_share(command, sight, geometry)
     if share < safety.usable_share:
         why = f"{share:.0%} of the places ahead have usable readings, at least {safety.usable_share:.0%} are needed"
-        found.append(_blind(command, Cause.SCAN_BLIND, why, "more usable readings, or another direction", config))
+        found.append(_blind(command, StopCause.SCAN_BLIND, why, "more usable readings, or another direction", config))
     return found
 
 
@@ -228,7 +230,7 @@ def _lost_all(scans: tuple[ScanState, ...]) -> bool:
     return any(scan.age_s is not None for scan in scans) and not any(scan.is_fresh for scan in scans)
 
 
-def _limit(command: Twist, factor: float, cause: Cause, clears_on: str) -> Finding:
+def _limit(command: Twist, factor: float, cause: StopCause, clears_on: str) -> Finding:
     if factor >= 1.0:
         return PASSED
     allowed = command.scaled(factor)
@@ -239,7 +241,7 @@ def _limit(command: Twist, factor: float, cause: Cause, clears_on: str) -> Findi
     return Finding(Action.LIMIT, cause, detail, clears_on, factor)
 
 
-def _blind(command: Twist, cause: Cause, why: str, clears_on: str, config: FilterConfig) -> Finding:
+def _blind(command: Twist, cause: StopCause, why: str, clears_on: str, config: FilterConfig) -> Finding:
     blind_mps = config.safety.blind_mps
     if blind_mps < config.standstill_mps:
         return stop(cause, f"{why}, safety.blind_mps is {blind_mps:g}", clears_on)
@@ -250,7 +252,7 @@ def _commission(config: FilterConfig) -> tuple[str, str]:
     return f"{config.uncommissioned}, see safety.uncommissioned_mps", "canbase commission"
 
 
-def _corners(command: Twist, mps: float, config: FilterConfig, cause: Cause, why: str, clears_on: str) -> Finding:
+def _corners(command: Twist, mps: float, config: FilterConfig, cause: StopCause, why: str, clears_on: str) -> Finding:
     """No corner of the base faster than `mps`."""
     fastest = max(fastest_mps(config.geometry.box, command), sys.float_info.min)  # rounding makes 0 of the smallest
     limited = _limit(command, min(1.0, mps / fastest), cause, clears_on)
@@ -280,7 +282,7 @@ def _growth(twist: Twist, inputs: Inputs, ceiling: Ceiling | None) -> tuple[Twis
     if share >= 1.0:
         return twist, PASSED
     grown = Twist(kept_mps + linear_mps * share, kept_radps + angular_radps * share)
-    return grown, Finding(Action.LIMIT, Cause.ACCELERATION, "speeding up", "the speed asked for", share)
+    return grown, Finding(Action.LIMIT, StopCause.ACCELERATION, "speeding up", "the speed asked for", share)
 
 
 def _kept(previous: float, asked: float) -> float:
@@ -293,7 +295,7 @@ def _too_late(inputs: Inputs, config: FilterConfig) -> Finding:
     geometry, where = config.geometry, _where(inputs.moving.twist)
     touch = first_touch(inputs.sight.points, geometry.box, inputs.moving.twist, geometry.stop_m / 2.0)
     seen = f": {touch.way_m:.2f} m free {where}" if math.isfinite(touch.way_m) else " to standstill"
-    return stop(Cause.OBSTACLE, f"brakes hard{seen}", "standstill, and more free way")
+    return stop(StopCause.OBSTACLE, f"brakes hard{seen}", "standstill, and more free way")
 
 
 def _obstacle(twist: Twist, inputs: Inputs, config: FilterConfig) -> Finding:
@@ -307,9 +309,9 @@ def _obstacle(twist: Twist, inputs: Inputs, config: FilterConfig) -> Finding:
         return PASSED
     if judgement.share * speed_mps < config.standstill_mps:
         detail = f"{free_m:.2f} m free {where}, stop distance {geometry.stop_m:.2f} m"
-        return stop(Cause.OBSTACLE, detail, f"more free way {where}, or a command away from the obstacle")
+        return stop(StopCause.OBSTACLE, detail, f"more free way {where}, or a command away from the obstacle")
     detail = f"{free_m:.2f} m free {where}: at most {judgement.share * speed_mps:.2f} m/s"
-    return Finding(Action.SLOW, Cause.OBSTACLE_NEAR, detail, f"more free way {where}", judgement.share)
+    return Finding(Action.SLOW, StopCause.OBSTACLE_NEAR, detail, f"more free way {where}", judgement.share)
 
 
 def _where(twist: Twist) -> str:

@@ -19,7 +19,7 @@ from canbase_watchdog.bus_port import BusError, BusPort
 from canbase_watchdog.frames import Frame
 from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
 from canbase_watchdog.loop import BusDeadError, Loop
-from canbase_watchdog.policy import Cause
+from canbase_watchdog.policy import TripCause
 from canbase_watchdog.watchdog import Watchdog
 from support.watchdog_live import LiveRobot
 from support.watchdog_story import config
@@ -58,14 +58,14 @@ def rig(tmp_path: Path) -> Iterator[Rig]:
     assert not it.thread.is_alive()
 
 
-def cause(rig: Rig) -> Cause:
+def cause(rig: Rig) -> TripCause:
     return rig.watchdog.status.verdict.cause
 
 
 def test_driving_with_leases_goes_on(rig: Rig) -> None:
     rig.robot.drive_at(300)
     time.sleep(1.0)
-    assert cause(rig) is Cause.NONE
+    assert cause(rig) is TripCause.NONE
 
 
 # driving ── CLOCK_BOOTTIME is 60 s ahead of CLOCK_MONOTONIC at once: the computer was suspended ── quick stop
@@ -76,7 +76,7 @@ def test_a_suspend_at_speed_stops_the_base(rig: Rig, monkeypatch: pytest.MonkeyP
     at, frame = rig.robot.first(0x501, begin)
     assert frame == QUICK_STOP
     assert at - begin < 0.1
-    assert cause(rig) is Cause.LOOP_LATE
+    assert cause(rig) is TripCause.LOOP_LATE
 
 
 # last lease ── 0.25 s ── quick stop on the bus, and the wheels brake for 0.3 s
@@ -88,7 +88,7 @@ def test_leases_end_at_speed(rig: Rig) -> None:
     assert frame == QUICK_STOP
     assert 0.249 <= at - rig.robot.last_lease < 0.4
     assert rig.robot.wait_until_still() - begin < 1.0
-    assert cause(rig) is Cause.LEASE_LOST
+    assert cause(rig) is TripCause.LEASE_LOST
 
 
 def test_the_driver_stops_beating_at_speed(rig: Rig) -> None:
@@ -99,7 +99,7 @@ def test_the_driver_stops_beating_at_speed(rig: Rig) -> None:
     assert frame == QUICK_STOP
     assert 0.28 <= at - rig.robot.last_heartbeat < 0.45
     assert rig.robot.wait_until_still() - begin < 1.0
-    assert cause(rig) is Cause.DRIVER_SILENT
+    assert cause(rig) is TripCause.DRIVER_SILENT
     rig.robot.wait_for(lambda: rig.watchdog.status.settled, 1.0)
 
 

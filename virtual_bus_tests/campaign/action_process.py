@@ -15,11 +15,11 @@ from canbase_action_server.outcome import Outcome
 from canbase_action_server.preconditions import action_source
 from canbase_config.robot import Robot
 from canbase_driver.snapshot import DriverSnapshot
-from canbase_velocity.decision import Action, Cause, Decision
+from canbase_velocity.decision import Action, Decision, StopCause
 from canbase_velocity.mux import MuxDecision
 from canbase_velocity.twist import Twist
 
-ESTOP_CAUSES = (Cause.ESTOP, Cause.ESTOP_STALE)
+ESTOP_CAUSES = (StopCause.ESTOP, StopCause.ESTOP_STALE)
 
 
 @dataclass(slots=True)

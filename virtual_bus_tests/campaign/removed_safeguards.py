@@ -50,7 +50,7 @@ def _put(owner: Any, name: str, value: Any) -> Callable[[], None]:
     return lambda: setattr(owner, name, value)
 
 
-def _trip(cause: policy.Cause) -> Callable[[], None]:
+def _trip(cause: policy.TripCause) -> Callable[[], None]:
     return _drop(policy, lambda row: getattr(row, "cause", None) is not cause)
 
 

@@ -12,7 +12,7 @@ from canbase_config.robot import Limits
 from canbase_config.safety import Ceiling, Estop, Footprint, LimitZone, Safety
 from canbase_config.safety import Scan as ScanConfig
 from canbase_velocity.clearance import Points
-from canbase_velocity.decision import Cause
+from canbase_velocity.decision import StopCause
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.obstacle import NOTHING_IN_SIGHT, Geometry, Sight
@@ -53,7 +53,9 @@ def config(*, scan: bool = True, estop: bool = True, latched: bool = False, **sa
 
 
 def scanned(age_s: float | None, *, required: bool = True, problem: str = "") -> tuple[ScanState, ...]:
-    return (ScanState("scan", required, 0.3, age_s, problem, Cause.SCAN_UNPLACED if problem else Cause.SCAN_STALE),)
+    return (
+        ScanState("scan", required, 0.3, age_s, problem, StopCause.SCAN_UNPLACED if problem else StopCause.SCAN_STALE),
+    )
 
 
 def places(*at_m: tuple[float, float]) -> Sight:

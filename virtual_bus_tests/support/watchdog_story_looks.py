@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from canbase_watchdog.ladder import Step
-from canbase_watchdog.policy import Cause
+from canbase_watchdog.policy import TripCause
 from canbase_watchdog.watchdog import State
 from support.watchdog_story import FakeDrive, Story
 
 
-def cause(story: Story) -> Cause:
+def cause(story: Story) -> TripCause:
     return story.watchdog.status.verdict.cause
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from canbase_watchdog.envelope import Bounds
 from canbase_watchdog.frames import DriveState
 from canbase_watchdog.lease import Lease
-from canbase_watchdog.policy import Cause, decide
+from canbase_watchdog.policy import TripCause, decide
 from canbase_watchdog.view import Axis, BusView, Node, View
 from support.watchdog_story import config
 
@@ -62,5 +62,5 @@ def of(left: Axis, right: Axis | None = None, **changes: Any) -> View:
     return replace(view, bus=replace(view.bus, axes=(left, right or like_left)))
 
 
-def cause(view: View) -> Cause:
+def cause(view: View) -> TripCause:
     return decide(view, CONFIG, NOW).cause

@@ -16,7 +16,7 @@ from canbase_watchdog.latch import Mark, Past
 from canbase_watchdog.view import NEVER, Axis, Node, View
 
 
-class Cause(enum.IntEnum):
+class TripCause(enum.IntEnum):
     """Byte 1 of the state frame, see docs/bus.md."""
 
     NONE = 0
@@ -42,7 +42,7 @@ class Cause(enum.IntEnum):
     RECORD_UNUSABLE = 21
 
 
-SENSOR_CAUSES = (Cause.FEEDBACK_IMPLAUSIBLE, Cause.MOTION_MISSING, Cause.POWER_AT_STAND)
+SENSOR_CAUSES = (TripCause.FEEDBACK_IMPLAUSIBLE, TripCause.MOTION_MISSING, TripCause.POWER_AT_STAND)
 """After a trip of before the start with one of these, what the drive reports about its motion is no evidence."""
 SIGN_S = 1.0
 """A sign of another master, or of a drive that started anew, counts for so long."""
@@ -52,7 +52,7 @@ SIGN_S = 1.0
 class Verdict:
     """Why to trip: the cause, the node that it is about (0: none), and one sentence with the values."""
 
-    cause: Cause = Cause.NONE
+    cause: TripCause = TripCause.NONE
     node_id: int = 0
     detail: str = ""
 
@@ -66,12 +66,12 @@ def before_the_start(past: Past) -> Verdict:
         return FINE
     if past.problem:
         detail = f"the record of its last trip cannot be used: {past.problem}"
-        return Verdict(Cause.RECORD_UNUSABLE, 0, detail)
+        return Verdict(TripCause.RECORD_UNUSABLE, 0, detail)
     entry = past.entry
     if entry.mark is Mark.LIVE:
-        return Verdict(Cause.POWER_AT_END, 0, "it ended while a drive had power, or the computer lost its supply")
-    known = entry.cause in tuple(Cause) and entry.cause != Cause.NONE
-    cause = Cause(entry.cause) if known else Cause.RECORD_UNUSABLE
+        return Verdict(TripCause.POWER_AT_END, 0, "it ended while a drive had power, or the computer lost its supply")
+    known = entry.cause in tuple(TripCause) and entry.cause != TripCause.NONE
+    cause = TripCause(entry.cause) if known else TripCause.RECORD_UNUSABLE
     return Verdict(cause, entry.node_id, f"{BEFORE}{entry.detail.removeprefix(BEFORE)}")
 
 
@@ -125,7 +125,7 @@ def _lease_lost(view: View, config: WatchdogConfig, now: float) -> Verdict:
         f"no valid lease for {now - view.lease_at:.3f} s (allowed {config.lease_timeout_s:.3f} s) while "
         f"{axis.drive.joint} turns at {axis.velocity_mps:.3f} m/s, ordered {axis.target_mps:.3f} m/s"
     )
-    return Verdict(Cause.LEASE_LOST, 0, detail)
+    return Verdict(TripCause.LEASE_LOST, 0, detail)
 
 
 def _driver_is_silent(view: View, since: float, config: WatchdogConfig, now: float) -> bool:
@@ -142,7 +142,7 @@ def _driver_silent(view: View, config: WatchdogConfig, now: float) -> Verdict:
                 f"driver's heartbeat is {now - bus.driver_at:.3f} s old, its SYNC {now - bus.sync_at:.3f} s "
                 f"(allowed {config.drive_heartbeat_s:.3f} s) while {axis.drive.joint} has power"
             )
-            return Verdict(Cause.DRIVER_SILENT, 0, detail)
+            return Verdict(TripCause.DRIVER_SILENT, 0, detail)
     return FINE
 
 
@@ -173,7 +173,7 @@ def _drive_restarted(view: View, config: WatchdogConfig, now: float) -> Verdict:
                 f"node {node_id} ({axis.drive.joint}) sends a boot-up while it is enabled: it has restarted (supply?), "
                 "or two drives have this node id"
             )
-            return Verdict(Cause.DRIVE_RESTARTED, node_id, detail)
+            return Verdict(TripCause.DRIVE_RESTARTED, node_id, detail)
     return FINE
 
 
@@ -186,7 +186,7 @@ def _drive_silent(view: View, config: WatchdogConfig, now: float) -> Verdict:
                 f"{config.feedback_timeout_s:.3f} s), its heartbeat {now - node.heartbeat_at:.3f} s "
                 f"(allowed {config.drive_heartbeat_s:.3f} s)"
             )
-            return Verdict(Cause.DRIVE_SILENT, node.node_id, detail)
+            return Verdict(TripCause.DRIVE_SILENT, node.node_id, detail)
     return FINE
 
 
@@ -207,13 +207,13 @@ def _target_outside(view: View, config: WatchdogConfig, now: float) -> Verdict:
                 f"{axis.drive.joint} is ordered {axis.target_mps:.3f} m/s, "
                 f"the leases allow {low:.3f} to {high:.3f} m/s (tolerance {slack:.3f} m/s)"
             )
-            return Verdict(Cause.TARGET_OUTSIDE, axis.drive.node_id, detail)
+            return Verdict(TripCause.TARGET_OUTSIDE, axis.drive.node_id, detail)
     if view.halt:
-        return Verdict(Cause.TARGET_OUTSIDE, 0, view.halt)
+        return Verdict(TripCause.TARGET_OUTSIDE, 0, view.halt)
     if view.creep:
-        return Verdict(Cause.TARGET_OUTSIDE, 0, f"{view.creep}, while the leases allow no motion")
+        return Verdict(TripCause.TARGET_OUTSIDE, 0, f"{view.creep}, while the leases allow no motion")
     if view.skew:
-        return Verdict(Cause.TARGET_OUTSIDE, 0, f"left and right wheels are ordered {view.skew}")
+        return Verdict(TripCause.TARGET_OUTSIDE, 0, f"left and right wheels are ordered {view.skew}")
     return FINE
 
 
@@ -225,7 +225,7 @@ def _motion_outside(view: View, config: WatchdogConfig, now: float) -> Verdict:
                 f"{axis.drive.joint} turns at {axis.velocity_mps:.3f} m/s, "
                 f"its setpoints allow {feedback.low_mps:.3f} to {feedback.high_mps:.3f} m/s"
             )
-            return Verdict(Cause.MOTION_OUTSIDE, axis.drive.node_id, detail)
+            return Verdict(TripCause.MOTION_OUTSIDE, axis.drive.node_id, detail)
     return FINE
 
 
@@ -234,7 +234,7 @@ def _overspeed(view: View, config: WatchdogConfig, now: float) -> Verdict:
         if axis.powered and axis.feedback.overspeed >= config.feedback_samples:
             limit_mps = config.overspeed_factor * config.max_wheel_mps
             detail = f"{axis.drive.joint} turns at {axis.velocity_mps:.3f} m/s (allowed {limit_mps:.3f} m/s)"
-            return Verdict(Cause.OVERSPEED, axis.drive.node_id, detail)
+            return Verdict(TripCause.OVERSPEED, axis.drive.node_id, detail)
     return FINE
 
 
@@ -242,7 +242,7 @@ def _feedback_implausible(view: View, config: WatchdogConfig, now: float) -> Ver
     for axis in view.axes:
         detail = _implausible(axis, config) if axis.powered else ""
         if detail:
-            return Verdict(Cause.FEEDBACK_IMPLAUSIBLE, axis.drive.node_id, f"{axis.drive.joint} {detail}")
+            return Verdict(TripCause.FEEDBACK_IMPLAUSIBLE, axis.drive.node_id, f"{axis.drive.joint} {detail}")
     return FINE
 
 
@@ -276,7 +276,7 @@ def _motion_missing(view: View, config: WatchdogConfig, now: float) -> Verdict:
     for axis in view.axes:
         detail = _missing(axis, config) if axis.enabled else ""
         if detail:
-            return Verdict(Cause.MOTION_MISSING, axis.drive.node_id, f"{axis.drive.joint} {detail}")
+            return Verdict(TripCause.MOTION_MISSING, axis.drive.node_id, f"{axis.drive.joint} {detail}")
     return FINE
 
 
@@ -324,14 +324,14 @@ def _power_at_stand(view: View, config: WatchdogConfig, now: float) -> Verdict:
                 f"{config.stand_answer_s:.3f} s) without letting go: that may be a dead encoder and not a stand "
                 "(watchdog.stand_proof, watchdog.stand_answer_s)"
             )
-            return Verdict(Cause.POWER_AT_STAND, axis.drive.node_id, detail)
+            return Verdict(TripCause.POWER_AT_STAND, axis.drive.node_id, detail)
     return FINE
 
 
 def _twist_outside(view: View, config: WatchdogConfig, now: float) -> Verdict:
     if not view.twist:
         return FINE
-    return Verdict(Cause.TWIST_OUTSIDE, 0, f"the base moves otherwise than ordered: {view.twist}")
+    return Verdict(TripCause.TWIST_OUTSIDE, 0, f"the base moves otherwise than ordered: {view.twist}")
 
 
 def _cycles(config: WatchdogConfig) -> float:
@@ -346,7 +346,7 @@ def _setpoint_missing(view: View, config: WatchdogConfig, now: float) -> Verdict
                 f"{axis.drive.joint} is enabled, and SYNCs come without setpoints for it: "
                 f"the last one is {now - axis.setpoint_at:.3f} s old (allowed {config.feedback_timeout_s:.3f} s)"
             )
-            return Verdict(Cause.SETPOINT_MISSING, axis.drive.node_id, detail)
+            return Verdict(TripCause.SETPOINT_MISSING, axis.drive.node_id, detail)
     return FINE
 
 
@@ -354,7 +354,7 @@ def _answered_twice(view: View, config: WatchdogConfig, now: float) -> Verdict:
     for axis in view.axes:
         if axis.enabled and axis.double_answers >= _cycles(config):
             detail = f"two drives answer as node {axis.drive.node_id}, that of {axis.drive.joint}: give each its own id"
-            return Verdict(Cause.ANSWERED_TWICE, axis.drive.node_id, detail)
+            return Verdict(TripCause.ANSWERED_TWICE, axis.drive.node_id, detail)
     return FINE
 
 
@@ -370,7 +370,7 @@ def _drive_down(view: View, config: WatchdogConfig, now: float) -> Verdict:
                     f"{axis.drive.joint} is not enabled (state: {state}) while {other.drive.joint} turns at "
                     f"{other.velocity_mps:.3f} m/s, ordered {other.target_mps:.3f} m/s"
                 )
-                return Verdict(Cause.DRIVE_DOWN, axis.drive.node_id, detail)
+                return Verdict(TripCause.DRIVE_DOWN, axis.drive.node_id, detail)
     return FINE
 
 
@@ -382,7 +382,7 @@ def _foreign_master(view: View, config: WatchdogConfig, now: float) -> Verdict:
     sign = view.bus.foreign
     if sign is None or now >= sign.at + SIGN_S or not view.enabled:
         return FINE
-    return Verdict(Cause.FOREIGN_MASTER, sign.node_id, f"another master is on the bus: {sign.detail}")
+    return Verdict(TripCause.FOREIGN_MASTER, sign.node_id, f"another master is on the bus: {sign.detail}")
 
 
 def _bus_is_failed(view: View, node_id: int, config: WatchdogConfig, now: float) -> bool:
@@ -393,14 +393,14 @@ def _bus_failed(view: View, config: WatchdogConfig, now: float) -> Verdict:
     if not view.enabled or not _bus_is_failed(view, 0, config, now):
         return FINE
     detail = f"the bus takes no frames for {now - view.bus_failed_since:.3f} s (allowed {config.bus_failed_s:.3f} s)"
-    return Verdict(Cause.BUS_FAILED, 0, detail)
+    return Verdict(TripCause.BUS_FAILED, 0, detail)
 
 
 def _loop_late(view: View, config: WatchdogConfig, now: float) -> Verdict:
     if view.tick_gap_s <= config.loop_late_s or not view.enabled:
         return FINE
     detail = f"own loop stood still for {view.tick_gap_s:.3f} s (allowed {config.loop_late_s:.3f} s)"
-    return Verdict(Cause.LOOP_LATE, 0, detail)
+    return Verdict(TripCause.LOOP_LATE, 0, detail)
 
 
 def _over(view: View, node_id: int, config: WatchdogConfig, now: float) -> bool:
@@ -415,42 +415,45 @@ class Check:
     `clears_on`: what a reset needs besides standing wheels and no ordered velocity, in words.
     """
 
-    cause: Cause
+    cause: TripCause
     trips: Callable[[View, WatchdogConfig, float], Verdict]
     stands: Callable[[View, int, WatchdogConfig, float], bool]
     clears_on: str
 
 
 CHECKS = (
-    Check(Cause.BUS_FAILED, _bus_failed, _bus_is_failed, "the bus takes frames again"),
-    Check(Cause.LOOP_LATE, _loop_late, _over, "nothing else"),
-    Check(Cause.FOREIGN_MASTER, _foreign_master, _foreign_is_near, "the other master is silent for 1 s"),
+    Check(TripCause.BUS_FAILED, _bus_failed, _bus_is_failed, "the bus takes frames again"),
+    Check(TripCause.LOOP_LATE, _loop_late, _over, "nothing else"),
+    Check(TripCause.FOREIGN_MASTER, _foreign_master, _foreign_is_near, "the other master is silent for 1 s"),
     Check(
-        Cause.LEASE_LOST,
+        TripCause.LEASE_LOST,
         _lease_lost,
         lambda view, node_id, config, now: _lease_is_lost(view, config, now),
         "leases arrive",
     ),
-    Check(Cause.DRIVER_SILENT, _driver_silent, _driver_still_silent, "the driver's heartbeat is back"),
+    Check(TripCause.DRIVER_SILENT, _driver_silent, _driver_still_silent, "the driver's heartbeat is back"),
     Check(
-        Cause.DRIVE_RESTARTED, _drive_restarted, _has_restarted, "its last boot-up is 1 s ago; see supply and node ids"
+        TripCause.DRIVE_RESTARTED,
+        _drive_restarted,
+        _has_restarted,
+        "its last boot-up is 1 s ago; see supply and node ids",
     ),
     Check(
-        Cause.DRIVE_SILENT,
+        TripCause.DRIVE_SILENT,
         _drive_silent,
         lambda view, node_id, config, now: now >= view.node(node_id).heard_at + config.drive_heartbeat_s,
         "the drive answers again",
     ),
-    Check(Cause.ANSWERED_TWICE, _answered_twice, _over, "nothing else; give each drive a node id of its own first"),
-    Check(Cause.SETPOINT_MISSING, _setpoint_missing, _over, "nothing else"),
-    Check(Cause.DRIVE_DOWN, _drive_down, _over, "nothing else; the driver resets the drive's fault after it"),
-    Check(Cause.FEEDBACK_IMPLAUSIBLE, _feedback_implausible, _over, "nothing else; look at the encoder first"),
-    Check(Cause.MOTION_MISSING, _motion_missing, _over, "nothing else; look at encoder, motor and wheel first"),
-    Check(Cause.POWER_AT_STAND, _power_at_stand, _over, "nothing else; look at the encoder and the driver first"),
-    Check(Cause.TARGET_OUTSIDE, _target_outside, _over, "nothing else"),
-    Check(Cause.OVERSPEED, _overspeed, _over, "nothing else"),
-    Check(Cause.MOTION_OUTSIDE, _motion_outside, _over, "nothing else"),
-    Check(Cause.TWIST_OUTSIDE, _twist_outside, _over, "nothing else"),
+    Check(TripCause.ANSWERED_TWICE, _answered_twice, _over, "nothing else; give each drive a node id of its own first"),
+    Check(TripCause.SETPOINT_MISSING, _setpoint_missing, _over, "nothing else"),
+    Check(TripCause.DRIVE_DOWN, _drive_down, _over, "nothing else; the driver resets the drive's fault after it"),
+    Check(TripCause.FEEDBACK_IMPLAUSIBLE, _feedback_implausible, _over, "nothing else; look at the encoder first"),
+    Check(TripCause.MOTION_MISSING, _motion_missing, _over, "nothing else; look at encoder, motor and wheel first"),
+    Check(TripCause.POWER_AT_STAND, _power_at_stand, _over, "nothing else; look at the encoder and the driver first"),
+    Check(TripCause.TARGET_OUTSIDE, _target_outside, _over, "nothing else"),
+    Check(TripCause.OVERSPEED, _overspeed, _over, "nothing else"),
+    Check(TripCause.MOTION_OUTSIDE, _motion_outside, _over, "nothing else"),
+    Check(TripCause.TWIST_OUTSIDE, _twist_outside, _over, "nothing else"),
 )
 """The first row that trips is the cause: where one failure shows in several rows, the one that explains it most comes
 first. A cause without a row does not stand: nothing of it is left to see."""
@@ -460,7 +463,7 @@ def decide(view: View, config: WatchdogConfig, now: float) -> Verdict:
     """The first cause to trip in what is seen at the monotonic time `now` [s], or FINE."""
     for check in CHECKS:
         verdict = check.trips(view, config, now)
-        if verdict.cause is not Cause.NONE:
+        if verdict.cause is not TripCause.NONE:
             return verdict
     return FINE
 

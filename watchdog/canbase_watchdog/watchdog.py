@@ -17,7 +17,7 @@ from canbase_watchdog.latch import Entry, Ledger, Mark, Past
 from canbase_watchdog.lease import LeaseBook, Refusal
 from canbase_watchdog.observer import Observer
 from canbase_watchdog.pair import PairWatch
-from canbase_watchdog.policy import Cause, Verdict
+from canbase_watchdog.policy import TripCause, Verdict
 from canbase_watchdog.stopper import Stopper
 from canbase_watchdog.twist import TwistWatch
 from canbase_watchdog.view import View
@@ -97,7 +97,7 @@ class Watchdog:
         self.trips = 0
         """Since the start."""
         before = policy.before_the_start(past) if past is not None else policy.FINE
-        if before.cause is not Cause.NONE:
+        if before.cause is not TripCause.NONE:
             self._latch(before, now, resting=True)
         self._note_record(now)
 
@@ -181,7 +181,7 @@ class Watchdog:
         if self._state is State.STARTING and now >= self._started_at + self._config.drive_heartbeat_s:
             self._state = State.WATCHING
         verdict = policy.decide(self._view, self._config, now)
-        if verdict.cause is Cause.NONE:
+        if verdict.cause is TripCause.NONE:
             return []
         self._trip(verdict, now)
         return self._stop(now)
@@ -197,7 +197,7 @@ class Watchdog:
         if self._state is State.TRIPPED or axis is None:
             return
         detail = f"asked to end while {axis.drive.joint} turns at {axis.velocity_mps:.3f} m/s"
-        self._trip(Verdict(Cause.ENDED, 0, detail), now)
+        self._trip(Verdict(TripCause.ENDED, 0, detail), now)
         self._note_record(now)
 
     def quick_stops(self) -> list[Frame]:

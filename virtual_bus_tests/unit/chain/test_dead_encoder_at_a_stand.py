@@ -18,11 +18,11 @@ from canbase_driver.drives.let_go import LetGo
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
 from canbase_sim import faults
-from canbase_watchdog.policy import Cause
+from canbase_watchdog.policy import TripCause
 from canbase_watchdog.watchdog import State
 from support.chain_world import STEP_S, World, bench_robot, world_of
 
-MISSING, AT_STAND = Cause.MOTION_MISSING, Cause.POWER_AT_STAND
+MISSING, AT_STAND = TripCause.MOTION_MISSING, TripCause.POWER_AT_STAND
 
 
 @dataclass
@@ -33,7 +33,7 @@ class Course:
     peak_mps: float = 0.0
     way_m: float = 0.0
     end_mps: float = 0.0
-    cause: Cause = Cause.NONE
+    cause: TripCause = TripCause.NONE
 
 
 def robot_with_watchdog(**keys: object) -> Robot:
@@ -113,7 +113,7 @@ def test_an_encoder_that_is_lost_at_the_end_of_a_stop_is_no_stand(speed: float, 
 def test_taps_add_up_until_the_watchdog_trips() -> None:
     world = World()
     causes = [tap(world, 0.06, 0.1, 1.0).cause]
-    while causes[-1] is Cause.NONE and len(causes) < 10:
+    while causes[-1] is TripCause.NONE and len(causes) < 10:
         world.command = Twist2D(0.1, 0.0)
         causes.append(course(world, 1.0, 0.06).cause)
     assert causes[-1] is MISSING
@@ -143,15 +143,15 @@ def test_after_an_order_of_less_than_one_bit_a_healthy_drive_lets_go_once_and_is
         world.run(STEP_S)
         without += before and not world.powered[0]
     assert world.watchdog is not None
-    assert world.watchdog.status.verdict.cause is Cause.NONE
+    assert world.watchdog.status.verdict.cause is TripCause.NONE
     assert without <= 1
 
 
-def tapping(world: World, tap_s: float, each_s: float, seconds: float, *, until: Cause) -> Course:
+def tapping(world: World, tap_s: float, each_s: float, seconds: float, *, until: TripCause) -> Course:
     """0.1 m/s for `tap_s`, again and again, until the watchdog trips."""
     assert world.watchdog is not None
     start, seen = world.now, Course()
-    while world.now < start + seconds and seen.cause is Cause.NONE:
+    while world.now < start + seconds and seen.cause is TripCause.NONE:
         world.command = Twist2D(0.1 if (world.now - start) % each_s < tap_s else 0.0, 0.0)
         world.run(STEP_S)
         seen.peak_mps = max(seen.peak_mps, abs(world.truth.v_left_mps))
@@ -178,7 +178,7 @@ def test_an_encoder_that_shows_itself_for_moments_is_found_between_taps(kind: st
     drive = world.robot.drives[0]
     given = {"axis": drive.axis, "off_s": 0.2, "on_s": 0.004}
     faults.apply(world.bench.nodes, drive.node_id, "encoder_intermittent", world.now, given)
-    seen = tapping(world, tap_s, each_s, 5.0, until=Cause.FEEDBACK_IMPLAUSIBLE)
+    seen = tapping(world, tap_s, each_s, 5.0, until=TripCause.FEEDBACK_IMPLAUSIBLE)
     assert seen.off_s <= 2.5
     assert seen.peak_mps <= 2.0
 
@@ -190,7 +190,7 @@ def never_lets_go(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize(("kind", "cause"), [("generic", MISSING), ("kinco", AT_STAND)])
 def test_after_a_tap_the_watchdog_does_not_rely_on_the_driver(
-    kind: str, cause: Cause, monkeypatch: pytest.MonkeyPatch
+    kind: str, cause: TripCause, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     never_lets_go(monkeypatch)
     seen = tap(world_of(kind), 0.06, 0.1)
@@ -224,7 +224,7 @@ def test_a_drive_that_does_not_obey_disable_operation_loses_its_power_by_disable
         LetGo, "goal", lambda self, now: PowerGoal.ON if goal(self, now) is PowerGoal.LET_GO else goal(self, now)
     )
     seen = tap(World(), 0.06, 0.1)
-    assert seen.cause is Cause.NONE
+    assert seen.cause is TripCause.NONE
     assert seen.off_s <= 0.3
     assert seen.peak_mps <= 1.2
 

@@ -11,7 +11,7 @@ from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.latch_record import Mark
 from canbase_watchdog import latch
-from canbase_watchdog.policy import Cause
+from canbase_watchdog.policy import TripCause
 from canbase_watchdog.watchdog import State, Watchdog
 from support.chain_world import World
 
@@ -89,7 +89,7 @@ def test_who_dies_with_power_comes_back_latched(moving: bool, restart: Callable[
         assert "killed, crashed" in world.core.finding.detail
     if restart is not restart_driver:
         assert guard(world).status.state is State.TRIPPED
-        assert guard(world).status.verdict.cause is Cause.POWER_AT_END
+        assert guard(world).status.verdict.cause is TripCause.POWER_AT_END
     stays_stopped(world)
     assert world.recovered()
 
@@ -191,7 +191,7 @@ def test_a_record_that_cannot_be_read_is_latched_until_a_reset() -> None:
     world.reboot()
     world.run(2.0)
     assert (world.core.state, world.core.finding.cause.value) == (DriverState.LATCHED, "stop record unusable")
-    assert guard(world).status.verdict.cause is Cause.RECORD_UNUSABLE
+    assert guard(world).status.verdict.cause is TripCause.RECORD_UNUSABLE
     stays_stopped(world)
     assert world.recovered()
 

@@ -23,7 +23,7 @@ from canbase_velocity.lease import lease_datagram
 from canbase_velocity.twist import Twist
 from canbase_watchdog import frames, lease
 from canbase_watchdog.ladder import Step
-from canbase_watchdog.policy import Cause
+from canbase_watchdog.policy import TripCause
 from canbase_watchdog.watchdog import Answer, State
 
 BENCH = load_robot(sample("bench")).robot
@@ -45,7 +45,7 @@ def test_the_watchdog_reads_the_lease_that_the_filter_writes(
 
 @pytest.mark.parametrize("state", list(State))
 def test_the_driver_reads_the_state_frame_that_the_watchdog_writes(state: State) -> None:
-    ours = frames.state(state, Cause.DRIVE_SILENT, Step.PRE_OPERATIONAL, 7, 0.251, (9, Answer.CAUSE_STANDS))
+    ours = frames.state(state, TripCause.DRIVE_SILENT, Step.PRE_OPERATIONAL, 7, 0.251, (9, Answer.CAUSE_STANDS))
     read = watchdog_link.parse_state(DriverFrame(ours.cob_id, ours.data))
     assert read == watchdog_link.WatchdogState(int(state), 3, 2, 7, 251, 9, 2)
 
@@ -64,13 +64,20 @@ def test_the_driver_reads_the_counters_that_the_watchdog_writes() -> None:
 
 
 def test_every_cause_of_the_watchdog_has_words_at_the_driver() -> None:
-    assert set(watchdog_link.CAUSES) == set(Cause)
+    assert set(watchdog_link.CAUSES) == set(TripCause)
 
 
 @pytest.mark.parametrize(
-    "cause", [Cause.NONE, Cause.LEASE_LOST, Cause.DRIVER_SILENT, Cause.DRIVE_SILENT, Cause.FEEDBACK_IMPLAUSIBLE]
+    "cause",
+    [
+        TripCause.NONE,
+        TripCause.LEASE_LOST,
+        TripCause.DRIVER_SILENT,
+        TripCause.DRIVE_SILENT,
+        TripCause.FEEDBACK_IMPLAUSIBLE,
+    ],
 )
-def test_causes_have_the_same_names(cause: Cause) -> None:
+def test_causes_have_the_same_names(cause: TripCause) -> None:
     assert watchdog_link.CAUSES[cause] == cause.name.lower().replace("_", " ")
 
 

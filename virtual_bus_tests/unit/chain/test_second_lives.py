@@ -7,7 +7,7 @@ import pytest
 from canbase_runtime.driver_state import DriverState
 from canbase_sim.faults import apply
 from canbase_watchdog.frames import Frame
-from canbase_watchdog.policy import Cause
+from canbase_watchdog.policy import TripCause
 from canbase_watchdog.watchdog import State, Watchdog
 from support.chain_world import FORWARD, World
 from support.crews import robot_with
@@ -36,7 +36,7 @@ def test_a_watchdog_alone_stops_drives_that_went_on_without_their_masters(kind: 
     assert world.run(3.0, lambda: world.truth.standing_s > 0.1 and watchdog_of(world).status.settled)
     assert not any(world.powered)
     status = watchdog_of(world).status
-    assert (status.state, status.verdict.cause) == (State.TRIPPED, Cause.POWER_AT_END)
+    assert (status.state, status.verdict.cause) == (State.TRIPPED, TripCause.POWER_AT_END)
 
 
 def test_it_leaves_the_sdo_channel_to_a_driver_that_is_there() -> None:

@@ -17,7 +17,7 @@ from canbase_doctor.checks import Verdict, commissioning
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
 from canbase_sim.world.bench import Bench
-from canbase_velocity.decision import Cause
+from canbase_velocity.decision import StopCause
 from canbase_velocity.safety_filter import FilterConfig, decide
 from canbase_velocity.twist import Twist
 from support.chain_world import World, bench_robot
@@ -137,7 +137,7 @@ def test_until_then_no_corner_of_the_base_is_faster_than_safety_uncommissioned_m
     assert decide(replace(GOOD, command=ahead), known).twist == ahead
     slower = decide(replace(GOOD, command=ahead), unknown)
     assert slower.twist.linear_mps == pytest.approx(0.3)
-    assert slower.cause is Cause.SPEED
+    assert slower.cause is StopCause.SPEED
     assert "this robot is not commissioned (not done: directions, scale, proof, floor)" in slower.detail
     assert slower.clears_on == "canbase commission"
     assert decide(replace(GOOD, command=turning), unknown).twist.angular_radps == pytest.approx(0.3 / (0.31 * 2**0.5))

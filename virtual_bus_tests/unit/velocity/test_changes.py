@@ -9,7 +9,7 @@ import pytest
 from canbase_config.mux import MuxLock, MuxSource
 from canbase_runtime.log_priority import Priority
 from canbase_velocity.changes import DropTeller, changed_order, changes, is_told
-from canbase_velocity.decision import Action, Cause, Decision
+from canbase_velocity.decision import Action, Decision, StopCause
 from canbase_velocity.safety_filter import ScanState
 from canbase_velocity.twist import ZERO, Twist
 from support.mux_world import rested
@@ -73,10 +73,14 @@ def test_a_source_that_is_not_followed_is_a_notice_with_what_it_waits_for() -> N
     assert [sentence for sentence, _, _ in changes(held, released)] == ["joy drives, before joy"]
 
 
-@pytest.mark.parametrize("cause", Cause)
+@pytest.mark.parametrize("cause", StopCause)
 @pytest.mark.parametrize("action", Action)
-def test_only_a_stop_that_is_not_the_filters_daily_work_is_a_warning(action: Action, cause: Cause) -> None:
-    daily = {Cause.OBSTACLE: Priority.NOTICE, Cause.OBSTACLE_NEAR: Priority.NOTICE, Cause.SHUTDOWN: Priority.INFO}
+def test_only_a_stop_that_is_not_the_filters_daily_work_is_a_warning(action: Action, cause: StopCause) -> None:
+    daily = {
+        StopCause.OBSTACLE: Priority.NOTICE,
+        StopCause.OBSTACLE_NEAR: Priority.NOTICE,
+        StopCause.SHUTDOWN: Priority.INFO,
+    }
     expected = {Action.STOP: daily.get(cause, Priority.WARNING)}.get(action, Priority.INFO)
 
     sentence, priority, fields = changed_order(Decision(action, cause, "at 0.31 m", "it being gone", ZERO))
@@ -91,13 +95,13 @@ def test_only_a_stop_that_is_not_the_filters_daily_work_is_a_warning(action: Act
     }
 
 
-def decision(action: Action, cause: Cause, *, emergency: bool = False) -> Decision:
+def decision(action: Action, cause: StopCause, *, emergency: bool = False) -> Decision:
     return Decision(action, cause, "", "", ZERO, emergency)
 
 
-LIMITED = decision(Action.LIMIT, Cause.SPEED)
-FREE = decision(Action.PASS, Cause.NONE)
-PRESSED = decision(Action.STOP, Cause.ESTOP, emergency=True)
+LIMITED = decision(Action.LIMIT, StopCause.SPEED)
+FREE = decision(Action.PASS, StopCause.NONE)
+PRESSED = decision(Action.STOP, StopCause.ESTOP, emergency=True)
 
 
 @pytest.mark.parametrize(
@@ -106,13 +110,13 @@ PRESSED = decision(Action.STOP, Cause.ESTOP, emergency=True)
         (LIMITED, PRESSED, True),  # an emergency stop while the speed was limited
         (PRESSED, LIMITED, True),
         (FREE, PRESSED, True),
-        (decision(Action.STOP, Cause.SCAN_STALE), PRESSED, True),
-        (FREE, decision(Action.SLOW, Cause.OBSTACLE_NEAR), True),
+        (decision(Action.STOP, StopCause.SCAN_STALE), PRESSED, True),
+        (FREE, decision(Action.SLOW, StopCause.OBSTACLE_NEAR), True),
         (FREE, LIMITED, False),  # comes and goes with each command
-        (LIMITED, decision(Action.LIMIT, Cause.ZONE), False),
-        (LIMITED, decision(Action.SLOW, Cause.OBSTACLE_NEAR), False),
-        (FREE, decision(Action.PASS, Cause.NONE, emergency=True), True),  # brakes hard under a zero command
-        (decision(Action.PASS, Cause.NONE, emergency=True), FREE, False),
+        (LIMITED, decision(Action.LIMIT, StopCause.ZONE), False),
+        (LIMITED, decision(Action.SLOW, StopCause.OBSTACLE_NEAR), False),
+        (FREE, decision(Action.PASS, StopCause.NONE, emergency=True), True),  # brakes hard under a zero command
+        (decision(Action.PASS, StopCause.NONE, emergency=True), FREE, False),
         (PRESSED, PRESSED, False),
     ],
 )
@@ -123,14 +127,14 @@ def test_each_stop_is_told_also_one_that_ends_or_follows_a_speed_limit(
 
 
 def test_hard_braking_is_in_the_sentence_and_in_the_fields() -> None:
-    sentence, priority, fields = changed_order(decision(Action.PASS, Cause.NONE, emergency=True))
+    sentence, priority, fields = changed_order(decision(Action.PASS, StopCause.NONE, emergency=True))
     assert (sentence, priority, fields["emergency"]) == ("PASS none brakes hard", Priority.NOTICE, "true")
 
 
 def test_scans_that_are_dropped_are_told_once_for_each_reason_and_again_after_ten_seconds() -> None:
     sound = ScanState("scan", True, 0.3, 0.1)
-    invalid = replace(sound, cause=Cause.SCAN_INVALID, dropped=3, why_dropped="it has no readings")
-    frozen = replace(sound, cause=Cause.SCAN_FROZEN, dropped=9, problem="the same 360 readings for 0.5 s, 6 scans")
+    invalid = replace(sound, cause=StopCause.SCAN_INVALID, dropped=3, why_dropped="it has no readings")
+    frozen = replace(sound, cause=StopCause.SCAN_FROZEN, dropped=9, problem="the same 360 readings for 0.5 s, 6 scans")
     drops = DropTeller()
     assert list(drops.news([sound], 0.0)) == []
     ((sentence, priority, fields),) = drops.news([invalid], 0.1)

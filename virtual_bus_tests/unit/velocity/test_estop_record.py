@@ -6,7 +6,7 @@ import pytest
 
 from campaign.disk import FULL, StopDisk
 from canbase_runtime.latch_record import Defect, Found, Mark
-from canbase_velocity.decision import Action, Cause, Decision
+from canbase_velocity.decision import Action, Decision, StopCause
 from canbase_velocity.estop import Estop, EstopEvent, EstopState
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.twist import ZERO, Twist
@@ -73,7 +73,7 @@ def test_a_pressed_button_that_speaks_on_change_stays_pressed(restarts: int) -> 
         assert not robot.reset()
         assert robot.filter.estop is EstopState.HELD
     decision = robot.order(FORWARD)
-    assert (decision.action, decision.cause) == (Action.STOP, Cause.ESTOP)
+    assert (decision.action, decision.cause) == (Action.STOP, StopCause.ESTOP)
     assert "not seen released" in decision.detail
     robot.button(False)
     assert not robot.drives
@@ -188,7 +188,7 @@ def test_a_full_disk_moves_nothing_from_the_first_word_of_the_button_on() -> Non
     robot.disk.file.writable = False
     robot.button(False)
     decision = robot.order(FORWARD)
-    assert (decision.action, decision.cause, decision.detail) == (Action.STOP, Cause.ESTOP, FULL)
+    assert (decision.action, decision.cause, decision.detail) == (Action.STOP, StopCause.ESTOP, FULL)
     robot.disk.file.writable = True
     assert robot.drives
 
@@ -217,7 +217,7 @@ def test_a_press_during_an_orderly_end_is_recorded(late: bool) -> None:
     robot.button(False)
     assert robot.drives
     assert robot.filter.shut_down(robot.now).twist == ZERO
-    assert robot.order(FORWARD).cause is Cause.SHUTDOWN  # whatever still arrives
+    assert robot.order(FORWARD).cause is StopCause.SHUTDOWN  # whatever still arrives
     assert robot.disk.found().record.mark is Mark.LIVE
     if late:
         robot.filter.end()

@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from canbase_config.robot import Robot
-from canbase_velocity.decision import Action, Cause
+from canbase_velocity.decision import Action, StopCause
 from canbase_velocity.twist import ZERO, Twist
 from support.filter_world import FilterWorld, robot_with
 
@@ -56,7 +56,7 @@ def test_a_base_that_drives_at_a_wall_stands_at_the_stop_distance(sign: float) -
     assert 0.14 < least_m <= 0.165  # with 0.01 m of padding
     assert world.emergencies == 0
     assert world.decision is not None
-    assert (world.decision.action, world.decision.cause) == (Action.STOP, Cause.OBSTACLE)
+    assert (world.decision.action, world.decision.cause) == (Action.STOP, StopCause.OBSTACLE)
     assert world.run(Twist(-0.8 * sign, 0.0), 1.0) == pytest.approx(least_m)  # away from it at once
     assert world.gap_m > 0.3
 
@@ -110,7 +110,7 @@ def test_hard_braking_lasts_until_standstill_though_the_scanner_is_silent_then()
     assert world.decision.emergency
     world.scans = False
     assert world.run(Twist(0.8, 0.0), 0.4) > 0.0
-    assert world.decision.emergency or world.decision.cause is Cause.SCAN_STALE
+    assert world.decision.emergency or world.decision.cause is StopCause.SCAN_STALE
     before_m = world.path_m
     world.run(Twist(0.8, 0.0), 1.0)
     assert world.path_m == pytest.approx(before_m, abs=0.02)

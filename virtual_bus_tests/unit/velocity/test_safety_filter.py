@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from canbase.msg import SafetyState
 
-from canbase_velocity.decision import Action, Cause
+from canbase_velocity.decision import Action, StopCause
 from canbase_velocity.estop import EstopState
 from canbase_velocity.safety_filter import decide
 from canbase_velocity.twist import ZERO, Twist
@@ -18,7 +18,12 @@ from support.filter_inputs import GOOD, HELD, INF, NAN, config, free, given_that
 def test_with_all_well_a_command_goes_through_as_it_came() -> None:
     decision = decide(GOOD, config())
     assert decision.twist == GOOD.command
-    assert (decision.action, decision.cause, decision.detail, decision.clears_on) == (Action.PASS, Cause.NONE, "", "")
+    assert (decision.action, decision.cause, decision.detail, decision.clears_on) == (
+        Action.PASS,
+        StopCause.NONE,
+        "",
+        "",
+    )
 
 
 def test_actions_and_causes_are_those_of_the_message() -> None:
@@ -29,29 +34,29 @@ def test_actions_and_causes_are_those_of_the_message() -> None:
         SafetyState.STOP,
     ]
     constants = {getattr(SafetyState, name) for name in dir(SafetyState) if name.startswith("CAUSE_")}
-    assert {cause.value for cause in Cause} == constants
+    assert {cause.value for cause in StopCause} == constants
 
 
 @pytest.mark.parametrize(
     ("changes", "cause", "words"),
     [
-        ({"command_age_s": None}, Cause.COMMAND_STALE, "nothing received on cmd_vel_mux yet"),
-        ({"command_age_s": 0.25}, Cause.COMMAND_STALE, "cmd_vel_mux silent for 0.25 s (timeout 0.20 s)"),
-        ({"command": Twist(NAN, 0.0)}, Cause.COMMAND_INVALID, "cmd_vel_mux carries"),
-        ({"command": Twist(0.0, INF)}, Cause.COMMAND_INVALID, "cmd_vel_mux carries"),
-        ({"scans": scanned(None)}, Cause.SCAN_STALE, "nothing received on scan yet"),
-        ({"scans": scanned(0.35)}, Cause.SCAN_STALE, "scan silent for 0.35 s (timeout 0.30 s)"),
-        ({"scans": scanned(0.0, problem="tf_static is empty")}, Cause.SCAN_UNPLACED, "scan: tf_static is empty"),
-        (HELD | {"pressed": True}, Cause.ESTOP, "the emergency stop is pressed"),
-        (HELD | {"estop_age_s": None}, Cause.ESTOP_STALE, "nothing received on estop_state yet"),
-        (HELD | {"estop_age_s": 0.6}, Cause.ESTOP_STALE, "estop_state silent for 0.60 s (timeout 0.50 s)"),
-        ({"estop": EstopState.AWAITS_ZERO}, Cause.ESTOP, "has not been zero since"),
-        ({"estop": EstopState.AWAITS_RESET}, Cause.ESTOP, "waits for a reset"),
-        ({"sight": free(ahead_m=0.05)}, Cause.OBSTACLE, "0.05 m free ahead, stop distance 0.10 m"),
+        ({"command_age_s": None}, StopCause.COMMAND_STALE, "nothing received on cmd_vel_mux yet"),
+        ({"command_age_s": 0.25}, StopCause.COMMAND_STALE, "cmd_vel_mux silent for 0.25 s (timeout 0.20 s)"),
+        ({"command": Twist(NAN, 0.0)}, StopCause.COMMAND_INVALID, "cmd_vel_mux carries"),
+        ({"command": Twist(0.0, INF)}, StopCause.COMMAND_INVALID, "cmd_vel_mux carries"),
+        ({"scans": scanned(None)}, StopCause.SCAN_STALE, "nothing received on scan yet"),
+        ({"scans": scanned(0.35)}, StopCause.SCAN_STALE, "scan silent for 0.35 s (timeout 0.30 s)"),
+        ({"scans": scanned(0.0, problem="tf_static is empty")}, StopCause.SCAN_UNPLACED, "scan: tf_static is empty"),
+        (HELD | {"pressed": True}, StopCause.ESTOP, "the emergency stop is pressed"),
+        (HELD | {"estop_age_s": None}, StopCause.ESTOP_STALE, "nothing received on estop_state yet"),
+        (HELD | {"estop_age_s": 0.6}, StopCause.ESTOP_STALE, "estop_state silent for 0.60 s (timeout 0.50 s)"),
+        ({"estop": EstopState.AWAITS_ZERO}, StopCause.ESTOP, "has not been zero since"),
+        ({"estop": EstopState.AWAITS_RESET}, StopCause.ESTOP, "waits for a reset"),
+        ({"sight": free(ahead_m=0.05)}, StopCause.OBSTACLE, "0.05 m free ahead, stop distance 0.10 m"),
     ],
 )
 def test_each_reason_to_stop_has_its_cause_and_says_what_ends_it(
-    changes: dict[str, Any], cause: Cause, words: str
+    changes: dict[str, Any], cause: StopCause, words: str
 ) -> None:
     decision = decide(given_that(**changes), config())
     assert (decision.action, decision.cause, decision.twist) == (Action.STOP, cause, ZERO)
@@ -62,12 +67,12 @@ def test_each_reason_to_stop_has_its_cause_and_says_what_ends_it(
 @pytest.mark.parametrize(
     ("changes", "timeout_s", "cause"),
     [
-        (lambda age_s: {"command_age_s": age_s}, 0.2, Cause.COMMAND_STALE),
-        (lambda age_s: {"scans": scanned(age_s)}, 0.3, Cause.SCAN_STALE),
+        (lambda age_s: {"command_age_s": age_s}, 0.2, StopCause.COMMAND_STALE),
+        (lambda age_s: {"scans": scanned(age_s)}, 0.3, StopCause.SCAN_STALE),
     ],
 )
-def test_an_input_is_fresh_until_exactly_its_timeout(changes: Any, timeout_s: float, cause: Cause) -> None:
-    assert decide(given_that(**changes(timeout_s)), config()).cause is Cause.NONE
+def test_an_input_is_fresh_until_exactly_its_timeout(changes: Any, timeout_s: float, cause: StopCause) -> None:
+    assert decide(given_that(**changes(timeout_s)), config()).cause is StopCause.NONE
     assert decide(given_that(**changes(math.nextafter(timeout_s, INF))), config()).cause is cause
 
 
@@ -89,9 +94,13 @@ def test_of_several_reasons_to_stop_the_earlier_rule_is_told() -> None:
         causes.append(decide(given_that(**everything), config()).cause)
         everything[key] = good
     assert causes == [
-        Cause.ESTOP, Cause.ESTOP_STALE, Cause.COMMAND_STALE, Cause.COMMAND_INVALID, Cause.SCAN_STALE,
-    ]  # fmt: skip
-    assert decide(given_that(**everything), config()).cause is Cause.SPEED
+        StopCause.ESTOP,
+        StopCause.ESTOP_STALE,
+        StopCause.COMMAND_STALE,
+        StopCause.COMMAND_INVALID,
+        StopCause.SCAN_STALE,
+    ]
+    assert decide(given_that(**everything), config()).cause is StopCause.SPEED
 
 
 def test_only_a_held_emergency_stop_brakes_hard_of_the_reasons_to_stop() -> None:

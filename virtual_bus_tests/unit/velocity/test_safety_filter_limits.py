@@ -7,7 +7,7 @@ import math
 import pytest
 
 from canbase_velocity.clearance import NOWHERE, Field
-from canbase_velocity.decision import Action, Cause
+from canbase_velocity.decision import Action, StopCause
 from canbase_velocity.obstacle import Sight
 from canbase_velocity.placement import Placement
 from canbase_velocity.safety_filter import decide
@@ -34,7 +34,7 @@ def test_the_speed_ceiling_keeps_the_curve(asked: Twist, ordered: Twist) -> None
         (ordered.linear_mps, ordered.angular_radps)
     )
     assert (decision.action is Action.LIMIT) is (asked != ordered)
-    assert (decision.cause is Cause.SPEED) is (asked != ordered)
+    assert (decision.cause is StopCause.SPEED) is (asked != ordered)
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_the_speed_ceiling_keeps_the_curve(asked: Twist, ordered: Twist) -> None
 def test_something_in_a_limit_zone_limits_the_speed(at_m: tuple[float, float], asked: Twist, ordered: Twist) -> None:
     decision = decide(given_that(command=asked, sight=places(at_m)), config(limit_zones=(ZONE,)))
     assert decision.twist == ordered
-    assert decision.cause is (Cause.NONE if asked == ordered else Cause.ZONE)
+    assert decision.cause is (StopCause.NONE if asked == ordered else StopCause.ZONE)
 
 
 AHEAD_ONLY = Field(Placement(0.4, 0.0, (1.0, 0.0), (0.0, 1.0)), -math.pi / 2, math.pi, 0.05, 10.0)
@@ -75,12 +75,12 @@ def looking(*fields: Field) -> Sight:
 def test_where_no_scanner_looks_the_base_creeps(command: Twist, fields: tuple[Field, ...], speed_mps: float) -> None:
     decision = decide(given_that(command=command, sight=looking(*fields)), config())
     assert fastest_mps(BOX, decision.twist) == pytest.approx(speed_mps)
-    assert (decision.cause is Cause.BLIND) == (decision.twist != command)
+    assert (decision.cause is StopCause.BLIND) == (decision.twist != command)
 
 
 def test_with_a_blind_speed_of_0_the_base_does_not_go_where_no_scanner_looks() -> None:
     decision = decide(given_that(command=Twist(-0.5, 0.0), sight=looking(AHEAD_ONLY)), config(blind_mps=0.0))
-    assert (decision.action, decision.cause, decision.twist) == (Action.STOP, Cause.BLIND, ZERO)
+    assert (decision.action, decision.cause, decision.twist) == (Action.STOP, StopCause.BLIND, ZERO)
 
 
 @pytest.mark.parametrize(
@@ -106,12 +106,12 @@ def test_orders_grow_no_faster_than_the_ceiling_and_keep_the_curve(
 def test_without_time_nothing_grows() -> None:
     decision = decide(given_that(previous=Twist(0.1, 0.0), since_s=0.0), config(ceiling=CEILING))
     assert decision.twist.linear_mps == pytest.approx(0.1)
-    assert (decision.action, decision.cause) == (Action.LIMIT, Cause.ACCELERATION)
+    assert (decision.action, decision.cause) == (Action.LIMIT, StopCause.ACCELERATION)
 
 
 def test_ceiling_and_obstacle_together_tell_the_more_severe_and_order_the_slower() -> None:
     decision = decide(given_that(command=Twist(4.0, 0.0), sight=free(ahead_m=0.35)), config())
-    assert (decision.action, decision.cause) == (Action.SLOW, Cause.OBSTACLE_NEAR)
+    assert (decision.action, decision.cause) == (Action.SLOW, StopCause.OBSTACLE_NEAR)
     assert decision.twist.linear_mps == pytest.approx(0.6874, abs=1e-4)
     far = decide(given_that(command=Twist(4.0, 0.0), sight=free(ahead_m=0.621)), config())
     assert (far.action, far.twist.linear_mps) == (Action.LIMIT, 1.0)

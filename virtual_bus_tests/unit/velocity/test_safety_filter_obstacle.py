@@ -10,7 +10,7 @@ import pytest
 
 from canbase_config.safety import Scan as ScanConfig
 from canbase_velocity.clearance import Field, Points
-from canbase_velocity.decision import Action, Cause
+from canbase_velocity.decision import Action, StopCause
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.obstacle import Geometry, Sight
@@ -56,10 +56,10 @@ def test_towards_an_obstacle_the_speed_falls_so_that_the_base_stands_at_the_stop
     for free_m in (0.7, 0.621, 0.6, 0.35, 0.12, 0.1001, 0.1, 0.05, 0.0):
         decision = decide(given_that(command=full, sight=free(ahead_m=free_m, behind_m=free_m)), config())
         speeds[free_m] = (round(decision.twist.linear_mps * sign, 4), decision.action, decision.cause)
-    slow, stop = (Action.SLOW, Cause.OBSTACLE_NEAR), (Action.STOP, Cause.OBSTACLE)
+    slow, stop = (Action.SLOW, StopCause.OBSTACLE_NEAR), (Action.STOP, StopCause.OBSTACLE)
     assert speeds == {
-        0.7: (1.0, Action.PASS, Cause.NONE),
-        0.621: (1.0, Action.PASS, Cause.NONE),
+        0.7: (1.0, Action.PASS, StopCause.NONE),
+        0.621: (1.0, Action.PASS, StopCause.NONE),
         0.6: (0.9802, *slow),
         0.35: (0.6874, *slow),
         0.12: (0.181, *slow),
@@ -106,7 +106,7 @@ def test_a_base_in_motion_that_can_no_longer_stop_gently_brakes_hard() -> None:
     fast = Twist(1.0, 0.0)
     late = decide(given_that(command=fast, motion=fast, sight=free(ahead_m=0.29)), config())
     in_time = decide(given_that(command=fast, motion=fast, sight=free(ahead_m=0.31)), config())
-    assert (late.action, late.cause, late.twist, late.emergency) == (Action.STOP, Cause.OBSTACLE, ZERO, True)
+    assert (late.action, late.cause, late.twist, late.emergency) == (Action.STOP, StopCause.OBSTACLE, ZERO, True)
     assert (in_time.action, in_time.emergency) == (Action.SLOW, False)
 
 
@@ -122,17 +122,17 @@ BACK_ONLY = Field(Placement(-0.4, 0.0, (-1.0, 0.0), (0.0, -1.0)), -math.pi / 2, 
 @pytest.mark.parametrize(
     ("changes", "settings", "cause"),
     [
-        ({"scans": (*scanned(0.0), ScanState("scan_rear", True, 0.3, 0.31))}, {}, Cause.SCAN_STALE),
-        ({"command_age_s": 0.21}, {}, Cause.COMMAND_STALE),
-        ({"estop": EstopState.AWAITS_RESET}, {}, Cause.ESTOP),
-        ({"sight": Sight(free(ahead_m=0.29).points, (BACK_ONLY,))}, {"blind_mps": 0.0}, Cause.BLIND),
-        ({"command": Twist(0.02, 0.0)}, {}, Cause.OBSTACLE),  # the stick is pulled back to a creep
-        ({"command": Twist(-0.5, 0.0)}, {}, Cause.OBSTACLE),
-        ({"command": ZERO}, {}, Cause.NONE),
+        ({"scans": (*scanned(0.0), ScanState("scan_rear", True, 0.3, 0.31))}, {}, StopCause.SCAN_STALE),
+        ({"command_age_s": 0.21}, {}, StopCause.COMMAND_STALE),
+        ({"estop": EstopState.AWAITS_RESET}, {}, StopCause.ESTOP),
+        ({"sight": Sight(free(ahead_m=0.29).points, (BACK_ONLY,))}, {"blind_mps": 0.0}, StopCause.BLIND),
+        ({"command": Twist(0.02, 0.0)}, {}, StopCause.OBSTACLE),  # the stick is pulled back to a creep
+        ({"command": Twist(-0.5, 0.0)}, {}, StopCause.OBSTACLE),
+        ({"command": ZERO}, {}, StopCause.NONE),
     ],
 )
 def test_whatever_stops_it_a_base_for_which_the_ordinary_ramp_is_too_late_brakes_hard(
-    changes: dict[str, Any], settings: dict[str, Any], cause: Cause
+    changes: dict[str, Any], settings: dict[str, Any], cause: StopCause
 ) -> None:
     """At 1 m/s with 0.29 m free, the ordinary ramp of 2 m/s² needs 0.25 m; with 0.31 m it would do."""
     moving = {"motion": Twist(1.0, 0.0), "sight": free(ahead_m=0.29), **changes}
@@ -157,7 +157,7 @@ def test_hard_braking_that_began_lasts_until_standstill() -> None:
     see(safety, 2.03)
     assert safety.decide(2.03).emergency
     end = safety.shut_down(2.05)
-    assert (end.cause, end.twist, end.emergency) == (Cause.SHUTDOWN, ZERO, True)
+    assert (end.cause, end.twist, end.emergency) == (StopCause.SHUTDOWN, ZERO, True)
     assert not safety.shut_down(3.0).emergency
 
 
@@ -176,18 +176,18 @@ def test_of_several_scanners_each_required_one_must_be_fresh_and_all_are_looked_
     wall = Points(np.array([(-0.42, 0.0), (-0.42, 0.05)]), np.array([0, 1]), 360)
     safety.on_scan("scan_rear", wall, None, 0.0)
     fed(0.1, Twist(-0.3, 0.0), the_filter=safety)
-    assert safety.decide(0.1).cause is Cause.OBSTACLE
+    assert safety.decide(0.1).cause is StopCause.OBSTACLE
     free_way = safety.clearances(0.1)
     assert free_way is not None
     assert free_way.ahead_m == INF
     assert free_way.behind_m == pytest.approx(0.02)
     fed(0.31, Twist(-0.3, 0.0), the_filter=safety)
-    assert safety.decide(0.31).cause is Cause.NONE  # the rear scan is stale and is not required
+    assert safety.decide(0.31).cause is StopCause.NONE  # the rear scan is stale and is not required
     assert safety.clearances(0.7) is None
     safety.on_unplaced_scan("scan", "tf_static does not say where laser is in base_link")
-    assert safety.decide(0.32).cause is Cause.SCAN_UNPLACED
+    assert safety.decide(0.32).cause is StopCause.SCAN_UNPLACED
     fed(0.33, ZERO, the_filter=safety)
-    assert safety.decide(0.33).cause is Cause.NONE
+    assert safety.decide(0.33).cause is StopCause.NONE
 
 
 def test_the_way_ordered_since_the_scan_is_counted() -> None:

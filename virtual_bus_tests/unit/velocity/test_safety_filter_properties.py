@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canbase_velocity.clearance import Field
-from canbase_velocity.decision import Action, Cause, Decision
+from canbase_velocity.decision import Action, Decision, StopCause
 from canbase_velocity.estop import EstopState
 from canbase_velocity.obstacle import Sight, allowed_share
 from canbase_velocity.placement import Placement
@@ -98,7 +98,7 @@ def test_it_stops_whenever_a_required_input_is_stale_or_the_emergency_stop_is_no
     decision = decide(inputs, settings)
     assert decision.action is Action.STOP or not any(stale)
     assert decision.twist == ZERO or decision.action is not Action.STOP
-    assert (decision.cause is Cause.NONE) == (decision.action is Action.PASS)
+    assert (decision.cause is StopCause.NONE) == (decision.action is Action.PASS)
 
 
 def stands_in_time(decision: Decision, inputs: Inputs) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from canbase_velocity.clearance import ScanReader
-from canbase_velocity.decision import Cause
+from canbase_velocity.decision import StopCause
 from canbase_velocity.frozen import FrozenWatch
 from canbase_velocity.placement import Placement
 from canbase_velocity.scan import MAX_READINGS, Scan, ScanError, check
@@ -33,7 +33,7 @@ def world(blind_mps: float = 0.15, **scan: object) -> FilterWorld:
     return made
 
 
-def lies(made: FilterWorld, fault: Fault, duration_s: float = 6.0) -> tuple[float, set[Cause], float]:
+def lies(made: FilterWorld, fault: Fault, duration_s: float = 6.0) -> tuple[float, set[StopCause], float]:
     """The smallest gap, the causes, and the fastest order in the second half of the time."""
     made.run(AHEAD, 0.5)
     made.fault = fault
@@ -50,7 +50,7 @@ def lies(made: FilterWorld, fault: Fault, duration_s: float = 6.0) -> tuple[floa
 def test_a_sound_scanner_lets_the_base_come_to_the_stop_distance_and_no_further() -> None:
     least_m, causes, _ = lies(world(), lambda scan: scan)
     assert 0.12 < least_m < 0.2
-    assert causes == {Cause.NONE, Cause.OBSTACLE_NEAR, Cause.OBSTACLE}
+    assert causes == {StopCause.NONE, StopCause.OBSTACLE_NEAR, StopCause.OBSTACLE}
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ def test_a_sound_scanner_lets_the_base_come_to_the_stop_distance_and_no_further(
 def test_where_the_beams_say_nothing_the_base_creeps_or_does_not_go_at_all(fault: Fault) -> None:
     """Blind for the wall 1.5 m ahead it goes no faster than blind_mps; with 0 it is not touched."""
     least_m, causes, fastest = lies(world(), fault)
-    assert Cause.SCAN_BLIND in causes
+    assert StopCause.SCAN_BLIND in causes
     assert fastest <= 0.15 + 1e-9
     least_m, causes, fastest = lies(world(blind_mps=0.0), fault)
     assert least_m > 0.5
@@ -78,14 +78,14 @@ def test_where_the_beams_say_nothing_the_base_creeps_or_does_not_go_at_all(fault
 @pytest.mark.parametrize(
     ("fault", "cause"),
     [
-        (blind(NAN), Cause.SCAN_INVALID),
-        (blind(0.0), Cause.SCAN_INVALID),
-        (Frozen(new_stamps=True), Cause.SCAN_FROZEN),
-        (Frozen(new_stamps=False), Cause.SCAN_FROZEN),
-        (ByTurns(2, new_stamps=True), Cause.SCAN_FROZEN),
-        (ByTurns(2, new_stamps=False), Cause.SCAN_FROZEN),
-        (ByTurns(5, new_stamps=True), Cause.SCAN_FROZEN),
-        (lambda scan: dataclasses.replace(scan, angle_increment_rad=-scan.angle_increment_rad), Cause.SCAN_INVALID),
+        (blind(NAN), StopCause.SCAN_INVALID),
+        (blind(0.0), StopCause.SCAN_INVALID),
+        (Frozen(new_stamps=True), StopCause.SCAN_FROZEN),
+        (Frozen(new_stamps=False), StopCause.SCAN_FROZEN),
+        (ByTurns(2, new_stamps=True), StopCause.SCAN_FROZEN),
+        (ByTurns(2, new_stamps=False), StopCause.SCAN_FROZEN),
+        (ByTurns(5, new_stamps=True), StopCause.SCAN_FROZEN),
+        (lambda scan: dataclasses.replace(scan, angle_increment_rad=-scan.angle_increment_rad), StopCause.SCAN_INVALID),
         (
             lambda scan: dataclasses.replace(
                 scan,
@@ -93,17 +93,19 @@ def test_where_the_beams_say_nothing_the_base_creeps_or_does_not_go_at_all(fault
                 angle_max_rad=scan.angle_min_rad,
                 angle_increment_rad=-scan.angle_increment_rad,
             ),
-            Cause.SCAN_INVALID,  # counts the other way round all of a sudden: its readings are mirrored
+            StopCause.SCAN_INVALID,  # counts the other way round all of a sudden: its readings are mirrored
         ),
-        (lambda scan: dataclasses.replace(scan, angle_min_rad=3.0, angle_max_rad=-3.0), Cause.SCAN_INVALID),
-        (lambda scan: dataclasses.replace(scan, ranges_m=np.full(180, INF)), Cause.SCAN_INVALID),
-        (lambda scan: dataclasses.replace(scan, angle_min_rad=NAN), Cause.SCAN_INVALID),
-        (lambda scan: dataclasses.replace(scan, angle_max_rad=INF), Cause.SCAN_INVALID),
-        (lambda scan: dataclasses.replace(scan, ranges_m=np.full(MAX_READINGS + 1, INF)), Cause.SCAN_INVALID),
-        (lambda scan: dataclasses.replace(scan, ranges_m=[]), Cause.SCAN_INVALID),
+        (lambda scan: dataclasses.replace(scan, angle_min_rad=3.0, angle_max_rad=-3.0), StopCause.SCAN_INVALID),
+        (lambda scan: dataclasses.replace(scan, ranges_m=np.full(180, INF)), StopCause.SCAN_INVALID),
+        (lambda scan: dataclasses.replace(scan, angle_min_rad=NAN), StopCause.SCAN_INVALID),
+        (lambda scan: dataclasses.replace(scan, angle_max_rad=INF), StopCause.SCAN_INVALID),
+        (lambda scan: dataclasses.replace(scan, ranges_m=np.full(MAX_READINGS + 1, INF)), StopCause.SCAN_INVALID),
+        (lambda scan: dataclasses.replace(scan, ranges_m=[]), StopCause.SCAN_INVALID),
     ],
 )
-def test_a_scan_that_says_nothing_or_cannot_be_right_stops_the_base_before_the_wall(fault: Fault, cause: Cause) -> None:
+def test_a_scan_that_says_nothing_or_cannot_be_right_stops_the_base_before_the_wall(
+    fault: Fault, cause: StopCause
+) -> None:
     made = world()
     least_m, causes, fastest = lies(made, fault)
     assert least_m > 0.14
@@ -120,14 +122,14 @@ def test_a_frozen_scanner_is_noticed_after_frozen_s_and_the_base_drives_on_when_
     made.fault = Frozen(new_stamps=True)
     made.run(AHEAD, 0.7)
     assert made.decision is not None
-    assert (made.decision.cause, made.decision.twist) == (Cause.SCAN_FROZEN, ZERO)
+    assert (made.decision.cause, made.decision.twist) == (StopCause.SCAN_FROZEN, ZERO)
     assert "the same 360 readings for" in made.decision.detail
     made.fault = lambda scan: scan
     made.run(AHEAD, 0.2)
-    assert made.decision.cause in (Cause.NONE, Cause.OBSTACLE_NEAR)
+    assert made.decision.cause in (StopCause.NONE, StopCause.OBSTACLE_NEAR)
 
 
-def cause_of(made: FilterWorld) -> Cause:
+def cause_of(made: FilterWorld) -> StopCause:
     assert made.decision is not None
     return made.decision.cause
 
@@ -137,16 +139,16 @@ def test_a_simulator_without_noise_starts_from_standstill_and_is_frozen_only_whi
     made.lidar = Lidar(noise_m=0.0)
     made.run(ZERO, 3.0)
     made.run(AHEAD, 0.5)
-    assert cause_of(made) is Cause.NONE
+    assert cause_of(made) is StopCause.NONE
     made.fault = Frozen(new_stamps=True)
     assert made.run(AHEAD, 6.0) > 0.14
-    assert cause_of(made) is Cause.SCAN_FROZEN
+    assert cause_of(made) is StopCause.SCAN_FROZEN
     strict = world()
     strict.lidar = Lidar(noise_m=0.0)
     strict.run(ZERO, 3.0)
     assert strict.decision is not None
     strict.run(AHEAD, 0.5)
-    assert strict.decision.cause is Cause.SCAN_FROZEN
+    assert strict.decision.cause is StopCause.SCAN_FROZEN
 
 
 def test_in_an_empty_hall_equal_scans_are_no_sign_of_a_frozen_scanner_unless_it_may_not_be_empty() -> None:
@@ -155,18 +157,18 @@ def test_in_an_empty_hall_equal_scans_are_no_sign_of_a_frozen_scanner_unless_it_
     made.obstacles = np.empty((0, 2))
     made.run(AHEAD, 5.0)
     assert made.decision is not None
-    assert made.decision.cause is Cause.NONE
+    assert made.decision.cause is StopCause.NONE
     strict = world(allow_empty=False)
     strict.obstacles = np.empty((0, 2))
     strict.run(AHEAD, 1.0)
     assert strict.decision is not None
-    assert strict.decision.cause is Cause.SCAN_INVALID
+    assert strict.decision.cause is StopCause.SCAN_INVALID
     assert "allow_empty" in strict.decision.detail
 
 
 def test_readings_below_range_min_are_obstacles_where_the_scanner_means_them_so() -> None:
     """Something is put right before the scanner: 0 ahead. By default such beams say nothing."""
-    for meant, cause in (("invalid", Cause.SCAN_BLIND), ("too_near", Cause.OBSTACLE)):
+    for meant, cause in (("invalid", StopCause.SCAN_BLIND), ("too_near", StopCause.OBSTACLE)):
         made = world(below_range_min=meant, blind_mps=0.15)
         _, causes, _ = lies(made, blind(0.0, 0.2), 1.0)
         assert cause in causes, meant
@@ -181,7 +183,7 @@ def test_single_beams_that_say_nothing_do_not_hold_up_the_base() -> None:
         return dataclasses.replace(scan, ranges_m=ranges_m)
 
     least_m, causes, _ = lies(world(), fault)
-    assert causes == {Cause.NONE, Cause.OBSTACLE_NEAR, Cause.OBSTACLE}
+    assert causes == {StopCause.NONE, StopCause.OBSTACLE_NEAR, StopCause.OBSTACLE}
     assert 0.12 < least_m < 0.2
 
 
@@ -192,7 +194,7 @@ def test_a_scanner_whose_reach_is_shorter_than_the_way_to_stop_lets_the_base_cre
         return dataclasses.replace(scan, range_max_m=0.5)
 
     _, causes, fastest = lies(world(), fault, 2.0)
-    assert Cause.SCAN_BLIND in causes
+    assert StopCause.SCAN_BLIND in causes
     assert fastest <= 0.15 + 1e-9
 
 
@@ -211,13 +213,13 @@ def test_a_huge_scan_is_thinned_out_to_the_nearest_of_neighbours() -> None:
 
     made.fault = fine
     least_m, causes, _ = lies(made, fine)
-    assert causes == {Cause.NONE, Cause.OBSTACLE_NEAR, Cause.OBSTACLE}
+    assert causes == {StopCause.NONE, StopCause.OBSTACLE_NEAR, StopCause.OBSTACLE}
     assert 0.12 < least_m < 0.2
 
 
 def test_a_scanner_that_keeps_its_stamp_is_frozen_though_its_readings_change() -> None:
     least_m, causes, fastest = lies(world(), lambda scan: dataclasses.replace(scan, stamp_ns=7))
-    assert Cause.SCAN_FROZEN in causes
+    assert StopCause.SCAN_FROZEN in causes
     assert least_m > 0.14
     assert fastest == 0.0
 
@@ -225,7 +227,7 @@ def test_a_scanner_that_keeps_its_stamp_is_frozen_though_its_readings_change() -
 def test_until_frozen_s_is_over_equal_readings_are_taken_for_as_old_as_they_are() -> None:
     """With 10 s of patience: the base counts its own way since the readings were new, and does not touch the wall."""
     least_m, causes, _ = lies(world(frozen_s=10.0), Frozen(new_stamps=True))
-    assert Cause.SCAN_FROZEN not in causes
+    assert StopCause.SCAN_FROZEN not in causes
     assert least_m > 0.1
 
 
@@ -293,13 +295,13 @@ def test_two_scanners_on_one_topic_stop_the_base_until_the_next_start() -> None:
     made.lidar = Framed()
     least_m, causes, fastest = lies(made, TwoOnOneTopic(), 20.0)
     assert least_m > 0.9
-    assert Cause.SCAN_INVALID in causes
+    assert StopCause.SCAN_INVALID in causes
     assert fastest == 0.0
     assert made.decision is not None
     assert "scans of laser_front and of laser_rear come on one topic" in made.decision.detail
     made.fault = lambda scan: scan
     assert made.run(AHEAD, 3.0) > 0.9
-    assert made.decision.cause is Cause.SCAN_INVALID
+    assert made.decision.cause is StopCause.SCAN_INVALID
 
 
 # sound for 0.5 s ── each scan is handed out later, with the stamp of its measurement: a queue in the scanner's driver
@@ -312,7 +314,7 @@ def test_scans_that_come_late_do_not_lead_into_the_wall(most_s: float, per_s: fl
     least_m, causes, _ = lies(made, Late(most_s, per_s), 12.0)
     assert least_m > 0.1
     if most_s == 3.0 and per_s >= 0.3:
-        assert Cause.SCAN_STALE in causes
+        assert StopCause.SCAN_STALE in causes
         assert made.decision is not None
         assert "delayed by" in made.decision.detail
 
@@ -325,11 +327,11 @@ def test_when_the_last_scanner_ends_that_is_not_required_the_base_creeps() -> No
     made.scans = False
     assert made.run(AHEAD, 6.0) > 0.1
     assert made.decision is not None
-    assert cause_of(made) is Cause.BLIND
+    assert cause_of(made) is StopCause.BLIND
     assert fastest_mps(made.box, made.decision.twist) <= 0.15 + 1e-9
     made.scans = True
     made.run(Twist(-0.3, 0.0), 0.5)
-    assert cause_of(made) is Cause.NONE
+    assert cause_of(made) is StopCause.NONE
 
 
 def test_scans_that_are_always_as_late_are_the_scanner_s_own() -> None:
@@ -343,7 +345,7 @@ def test_scans_that_are_always_as_late_are_the_scanner_s_own() -> None:
     made.fault = fault
     made.run(AHEAD, 1.2)
     assert made.decision is not None
-    assert made.decision.cause is Cause.NONE
+    assert made.decision.cause is StopCause.NONE
     assert made.path_m > 0.3
 
 
@@ -355,7 +357,7 @@ def test_a_scanner_whose_clock_is_set_back_loses_one_scan() -> None:
     (scanner,) = made.filter.inputs(made.now).scans
     assert scanner.dropped == 1
     assert made.decision is not None
-    assert made.decision.cause is Cause.NONE
+    assert made.decision.cause is StopCause.NONE
 
 
 class Framed(Lidar):

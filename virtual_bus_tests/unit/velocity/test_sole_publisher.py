@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from canbase_velocity.decision import Action, Cause
+from canbase_velocity.decision import Action, StopCause
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.placement import Placement
 from canbase_velocity.sole_publisher import LATCHED_S, SolePublisher
@@ -53,7 +53,7 @@ class Base:
         self.scanners = (Lidar(), Lidar(seed=2))
         self.topic = "scan"
 
-    def run(self, seconds: float, alive: tuple[int, ...], in_graph: tuple[str, ...]) -> set[tuple[Action, Cause]]:
+    def run(self, seconds: float, alive: tuple[int, ...], in_graph: tuple[str, ...]) -> set[tuple[Action, StopCause]]:
         """The decisions of that time."""
         found = set()
         for _ in range(round(seconds / 0.05)):
@@ -75,11 +75,11 @@ class Base:
 def test_the_scans_of_two_do_not_count_and_neither_do_those_of_the_one_that_is_left() -> None:
     base = Base()
     base.run(1.0, (0,), ONE)
-    assert base.run(1.0, (0,), ONE) == {(Action.PASS, Cause.NONE)}
+    assert base.run(1.0, (0,), ONE) == {(Action.PASS, StopCause.NONE)}
     base.run(0.6, (0, 1), TWO)
-    assert base.run(38.0, (0, 1), TWO) == {(Action.STOP, Cause.SCAN_INVALID)}
-    assert base.run(30.0, (1,), TWO) == {(Action.STOP, Cause.SCAN_INVALID)}
-    assert base.run(30.0, (1,), ONE) == {(Action.STOP, Cause.SCAN_INVALID)}
+    assert base.run(38.0, (0, 1), TWO) == {(Action.STOP, StopCause.SCAN_INVALID)}
+    assert base.run(30.0, (1,), TWO) == {(Action.STOP, StopCause.SCAN_INVALID)}
+    assert base.run(30.0, (1,), ONE) == {(Action.STOP, StopCause.SCAN_INVALID)}
 
 
 def test_a_driver_that_was_killed_is_replaced_when_the_graph_has_forgotten_it() -> None:
@@ -87,6 +87,6 @@ def test_a_driver_that_was_killed_is_replaced_when_the_graph_has_forgotten_it() 
     base.run(2.0, (0,), ONE)
     base.run(0.6, (), ONE)
     base.run(0.6, (0,), TWO)
-    assert base.run(19.0, (0,), TWO) == {(Action.STOP, Cause.SCAN_INVALID)}
+    assert base.run(19.0, (0,), TWO) == {(Action.STOP, StopCause.SCAN_INVALID)}
     base.run(0.6, (0,), ONE)
-    assert base.run(1.0, (0,), ONE) == {(Action.PASS, Cause.NONE)}
+    assert base.run(1.0, (0,), ONE) == {(Action.PASS, StopCause.NONE)}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from canbase_velocity.decision import Cause, Decision
+from canbase_velocity.decision import Decision, StopCause
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.twist import ZERO, Twist
@@ -45,7 +45,7 @@ def test_what_one_button_says_releases_no_other(latched: bool) -> None:
     base = Base(latched=latched)
     base.press()
     decision = base.run(ZERO, 2.0)
-    assert decision.cause is Cause.ESTOP
+    assert decision.cause is StopCause.ESTOP
     assert "has 2 publishers" in decision.detail
     done, sentence = base.filter.reset((), base.now)
     assert not done
@@ -81,7 +81,7 @@ def test_a_button_of_another_type_holds_the_base_as_long_as_it_is_there() -> Non
     base = Base(publishers=1)
     base.filter.on_estop_publishers(0, "/button publishes it as std_msgs/msg/Int8, which is not heard")
     decision = base.run(FORWARD, 0.5)
-    assert (decision.cause, decision.twist) == (Cause.ESTOP, ZERO)
+    assert (decision.cause, decision.twist) == (StopCause.ESTOP, ZERO)
     assert "std_msgs/msg/Int8, which is not heard" in decision.detail
     assert not base.filter.reset((), base.now)[0]
     base.filter.on_estop_publishers(1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from canbase_velocity.decision import Cause
+from canbase_velocity.decision import StopCause
 from canbase_velocity.filter_state import NO_SCAN, WITHOUT_SCANS_S, SafetyFilter
 from canbase_velocity.twist import Twist
 from support.filter_inputs import config, see
@@ -21,7 +21,7 @@ class Base:
     def __init__(self, *, required: bool = True) -> None:
         self.filter = SafetyFilter(config(scan=required, estop=False))
         self.cycle, self.scans = 0, True
-        self.causes: set[Cause] = set()
+        self.causes: set[StopCause] = set()
 
     @property
     def now(self) -> float:
@@ -69,11 +69,11 @@ def test_gaps_that_are_each_shorter_do_not_add_up() -> None:
 def test_an_obstacle_or_a_scanner_that_is_not_required_is_no_want_of_scans() -> None:
     base = Base()
     assert base.run(3.0, (0.45, 0.0)) == ""
-    assert Cause.OBSTACLE in base.causes
+    assert StopCause.OBSTACLE in base.causes
     base = Base(required=False)
     base.scans = False
     assert base.run(5.0) == ""
 
 
 def test_every_cause_of_a_scanner_counts() -> None:
-    assert {cause for cause in Cause if cause.value.startswith("scan_")} == set(NO_SCAN)
+    assert {cause for cause in StopCause if cause.value.startswith("scan_")} == set(NO_SCAN)

@@ -10,7 +10,7 @@ from canbase_driver.motion.kinematics import Twist2D
 from canbase_watchdog.creep import CreepWatch
 from canbase_watchdog.envelope import Bounds
 from canbase_watchdog.frames import DriveState
-from canbase_watchdog.policy import Cause, decide
+from canbase_watchdog.policy import TripCause, decide
 from canbase_watchdog.view import Axis, BusView
 from canbase_watchdog.watchdog import State
 from support.chain_world import BITS_PER_MPS, World
@@ -75,7 +75,7 @@ def test_a_zero_now_and_then_ends_nothing_and_one_that_lasts_does() -> None:
 
 def test_it_is_a_setpoint_outside_of_the_leases() -> None:
     verdict = decide(well(creep="left is ordered 0.0280 m/s for 0.400 s"), CONFIG, NOW)
-    assert verdict.cause is Cause.TARGET_OUTSIDE
+    assert verdict.cause is TripCause.TARGET_OUTSIDE
     assert verdict.detail == "left is ordered 0.0280 m/s for 0.400 s, while the leases allow no motion"
 
 
@@ -89,7 +89,7 @@ def test_a_driver_that_repeats_a_slow_setpoint_for_ever_is_stopped(slow: Twist2D
     world.command = Twist2D.ZERO
     assert world.run(1.0, lambda: world.watchdog is not None and world.watchdog.status.state is State.TRIPPED)
     assert world.watchdog is not None
-    assert world.watchdog.status.verdict.cause is Cause.TARGET_OUTSIDE
+    assert world.watchdog.status.verdict.cause is TripCause.TARGET_OUTSIDE
     assert world.run(0.2, lambda: not any(world.powered))
 
 

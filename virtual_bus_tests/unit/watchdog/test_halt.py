@@ -18,7 +18,7 @@ from canbase_driver.motion.kinematics import Twist2D, wheel_speeds
 from canbase_driver.motion.limiter import Limiter, MotionState
 from canbase_watchdog.halt import RECEIVED_S, HaltWatch
 from canbase_watchdog.lease import Lease
-from canbase_watchdog.policy import Cause, decide
+from canbase_watchdog.policy import TripCause, decide
 from canbase_watchdog.view import BusView
 from canbase_watchdog.watchdog import State
 from support.chain_world import World, bench_robot
@@ -145,7 +145,7 @@ def test_the_drivers_own_limiter_is_never_found(seed: int) -> None:
 def test_the_policy_trips_with_it() -> None:
     view = replace(well(), halt="left is ordered 0.8 m/s")
     verdict = decide(view, CONFIG, NOW)
-    assert (verdict.cause, verdict.detail) == (Cause.TARGET_OUTSIDE, "left is ordered 0.8 m/s")
+    assert (verdict.cause, verdict.detail) == (TripCause.TARGET_OUTSIDE, "left is ordered 0.8 m/s")
 
 
 # The whole chain
@@ -170,7 +170,7 @@ def test_a_stuck_driver_with_a_low_jerk_is_stopped_after_a_second_or_two(jerk: f
     world.command = Twist2D.ZERO
     begin = world.now
     assert world.run(8.0, lambda: watchdog.status.state is State.TRIPPED)
-    assert watchdog.status.verdict.cause is Cause.TARGET_OUTSIDE
+    assert watchdog.status.verdict.cause is TripCause.TARGET_OUTSIDE
     assert world.now - begin < 0.37 + RECEIVED_S + sqrt(2.0 * 0.031 / jerk) + 0.05
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from canbase_watchdog import frames, policy
 from canbase_watchdog.latch import Entry, Mark, Past
-from canbase_watchdog.policy import Cause
+from canbase_watchdog.policy import TripCause
 from canbase_watchdog.watchdog import Answer, State, Watchdog
 from support.watchdog_story import FakeDrive, Story
 from support.watchdog_story_looks import driving, until_tripped
@@ -32,19 +32,19 @@ def keep(story: Story) -> None:
 @pytest.mark.parametrize(
     ("past", "cause", "detail"),
     [
-        (Past(Entry(Mark.LIVE)), Cause.POWER_AT_END, "it ended while a drive had power"),
-        (Past(Entry(Mark.LATCHED, 6, 2, "too fast")), Cause.OVERSPEED, "since before the start: too fast"),
+        (Past(Entry(Mark.LIVE)), TripCause.POWER_AT_END, "it ended while a drive had power"),
+        (Past(Entry(Mark.LATCHED, 6, 2, "too fast")), TripCause.OVERSPEED, "since before the start: too fast"),
         (
             Past(Entry(Mark.LATCHED, 6, 2, "since before the start: too fast")),
-            Cause.OVERSPEED,
+            TripCause.OVERSPEED,
             "since before the start: too fast",
         ),
-        (Past(Entry(Mark.LATCHED, 99, 0, "?")), Cause.RECORD_UNUSABLE, "since before the start: ?"),
-        (Past(Entry(Mark.LATCHED, 0)), Cause.RECORD_UNUSABLE, "since before the start: "),
-        (Past(problem="/x: damaged"), Cause.RECORD_UNUSABLE, "cannot be used: /x: damaged"),
+        (Past(Entry(Mark.LATCHED, 99, 0, "?")), TripCause.RECORD_UNUSABLE, "since before the start: ?"),
+        (Past(Entry(Mark.LATCHED, 0)), TripCause.RECORD_UNUSABLE, "since before the start: "),
+        (Past(problem="/x: damaged"), TripCause.RECORD_UNUSABLE, "cannot be used: /x: damaged"),
     ],
 )
-def test_it_starts_tripped(past: Past, cause: Cause, detail: str) -> None:
+def test_it_starts_tripped(past: Past, cause: TripCause, detail: str) -> None:
     story = resumed(past)
     status = story.watchdog.status
     assert (status.state, status.verdict.cause) == (State.TRIPPED, cause)
@@ -155,7 +155,7 @@ def test_a_trip_is_written_with_its_cause_and_cleared_by_the_reset_alone() -> No
     story.filter = False
     until_tripped(story)
     record = story.watchdog.record
-    assert (record.mark, record.cause) == (Mark.LATCHED, Cause.LEASE_LOST)
+    assert (record.mark, record.cause) == (Mark.LATCHED, TripCause.LEASE_LOST)
     story.run(2.0)
     assert story.watchdog.record == record
     story.filter = True
@@ -168,7 +168,7 @@ def test_a_trip_is_written_with_its_cause_and_cleared_by_the_reset_alone() -> No
 def test_a_trip_at_the_end_is_written() -> None:
     story = driving()
     story.watchdog.end(story.t)
-    assert (story.watchdog.record.mark, story.watchdog.record.cause) == (Mark.LATCHED, Cause.ENDED)
+    assert (story.watchdog.record.mark, story.watchdog.record.cause) == (Mark.LATCHED, TripCause.ENDED)
 
 
 def test_a_readable_clear_record_is_no_cause() -> None:

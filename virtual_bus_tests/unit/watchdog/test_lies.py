@@ -19,7 +19,7 @@ from canbase_driver.motion.kinematics import Twist2D
 from canbase_sim.frame import Frame as BenchFrame
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.twist import Twist
-from canbase_watchdog.policy import Cause
+from canbase_watchdog.policy import TripCause
 from canbase_watchdog.watchdog import State
 from support.chain_world import BITS_PER_MPS, STEP_S, World
 
@@ -231,43 +231,43 @@ def one_drive_is_disabled_and_the_driver_does_not_mind(world: World) -> EachStep
     return truthful
 
 
-CASES: list[tuple[Callable[[World], EachStep], Cause, float]] = [
-    (driver_repeats_its_last_setpoint, Cause.TARGET_OUTSIDE, 0.45),
-    (driver_doubles_its_targets, Cause.TARGET_OUTSIDE, 0.012),
-    (driver_turns_one_wheel_around, Cause.TARGET_OUTSIDE, 0.012),
-    (driver_gives_one_wheel_nothing, Cause.TARGET_OUTSIDE, 0.022),
-    (driver_follows_half_of_a_stop, Cause.TARGET_OUTSIDE, 0.75),
-    (somebody_publishes_straight_to_cmd_vel, Cause.TARGET_OUTSIDE, 0.45),
-    (drive_turns_30_percent_faster, Cause.MOTION_OUTSIDE, 0.15),
-    (drive_turns_the_wrong_way, Cause.MOTION_OUTSIDE, 0.35),
-    (drive_runs_at_three_times_the_speed, Cause.MOTION_OUTSIDE, 0.12),
-    (drive_ignores_zero, Cause.MOTION_OUTSIDE, 0.4),
-    (drive_reports_a_stuck_velocity, Cause.MOTION_OUTSIDE, 0.4),
-    (drive_reports_that_it_stands, Cause.FEEDBACK_IMPLAUSIBLE, 0.2),
-    (drive_has_a_frozen_encoder, Cause.FEEDBACK_IMPLAUSIBLE, 0.2),
-    (master_sends_setpoints, Cause.FOREIGN_MASTER, 0.05),
-    (master_sends_setpoints_and_syncs, Cause.SETPOINT_MISSING, 0.25),
-    (master_sends_syncs, Cause.FOREIGN_MASTER, 0.05),
-    (master_resets_a_node, Cause.FOREIGN_MASTER, 0.002),
-    (master_writes_the_target_by_sdo, Cause.FOREIGN_MASTER, 0.002),
-    (master_uses_the_quick_stop_pdo_to_enable, Cause.FOREIGN_MASTER, 0.002),
-    (second_driver_beats, Cause.FOREIGN_MASTER, 1.1),
-    (one_drive_is_disabled_and_the_driver_does_not_mind, Cause.DRIVE_DOWN, 0.13),
+CASES: list[tuple[Callable[[World], EachStep], TripCause, float]] = [
+    (driver_repeats_its_last_setpoint, TripCause.TARGET_OUTSIDE, 0.45),
+    (driver_doubles_its_targets, TripCause.TARGET_OUTSIDE, 0.012),
+    (driver_turns_one_wheel_around, TripCause.TARGET_OUTSIDE, 0.012),
+    (driver_gives_one_wheel_nothing, TripCause.TARGET_OUTSIDE, 0.022),
+    (driver_follows_half_of_a_stop, TripCause.TARGET_OUTSIDE, 0.75),
+    (somebody_publishes_straight_to_cmd_vel, TripCause.TARGET_OUTSIDE, 0.45),
+    (drive_turns_30_percent_faster, TripCause.MOTION_OUTSIDE, 0.15),
+    (drive_turns_the_wrong_way, TripCause.MOTION_OUTSIDE, 0.35),
+    (drive_runs_at_three_times_the_speed, TripCause.MOTION_OUTSIDE, 0.12),
+    (drive_ignores_zero, TripCause.MOTION_OUTSIDE, 0.4),
+    (drive_reports_a_stuck_velocity, TripCause.MOTION_OUTSIDE, 0.4),
+    (drive_reports_that_it_stands, TripCause.FEEDBACK_IMPLAUSIBLE, 0.2),
+    (drive_has_a_frozen_encoder, TripCause.FEEDBACK_IMPLAUSIBLE, 0.2),
+    (master_sends_setpoints, TripCause.FOREIGN_MASTER, 0.05),
+    (master_sends_setpoints_and_syncs, TripCause.SETPOINT_MISSING, 0.25),
+    (master_sends_syncs, TripCause.FOREIGN_MASTER, 0.05),
+    (master_resets_a_node, TripCause.FOREIGN_MASTER, 0.002),
+    (master_writes_the_target_by_sdo, TripCause.FOREIGN_MASTER, 0.002),
+    (master_uses_the_quick_stop_pdo_to_enable, TripCause.FOREIGN_MASTER, 0.002),
+    (second_driver_beats, TripCause.FOREIGN_MASTER, 1.1),
+    (one_drive_is_disabled_and_the_driver_does_not_mind, TripCause.DRIVE_DOWN, 0.13),
 ]
 """Who lies, what the watchdog calls it, and until when it must have tripped [s]."""
 
 
-def watched(world: World) -> tuple[bool, Cause]:
+def watched(world: World) -> tuple[bool, TripCause]:
     assert world.watchdog is not None
     status = world.watchdog.status
     return status.state is State.TRIPPED, status.verdict.cause
 
 
-def caught(begin: Callable[[World], EachStep], twist: Twist2D) -> tuple[Cause, float, float, float]:
-    """Cause, seconds from the lie to the trip, from there to standstill, and the fastest wheel at the trip."""
+def caught(begin: Callable[[World], EachStep], twist: Twist2D) -> tuple[TripCause, float, float, float]:
+    """TripCause, seconds from the lie to the trip, from there to standstill, and the fastest wheel at the trip."""
     world = World()
     world.drive(twist, seconds=1.2)
-    assert watched(world) == (False, Cause.NONE)
+    assert watched(world) == (False, TripCause.NONE)
     start, each_step = world.now, begin(world)
 
     def tripped() -> bool:
@@ -289,19 +289,19 @@ def caught(begin: Callable[[World], EachStep], twist: Twist2D) -> tuple[Cause, f
 
 @pytest.mark.parametrize(("begin", "cause", "within_s"), CASES, ids=[case[0].__name__ for case in CASES])
 def test_each_lie_is_caught_in_time_and_ends_in_standstill(
-    begin: Callable[[World], EachStep], cause: Cause, within_s: float
+    begin: Callable[[World], EachStep], cause: TripCause, within_s: float
 ) -> None:
     found, trip_s, stand_s, fastest_mps = caught(begin, SPEED)
     assert found is cause
     assert trip_s <= within_s + 1e-9
-    brakes_mps2 = COASTING_MPS2 if cause is Cause.FEEDBACK_IMPLAUSIBLE else EMERGENCY_MPS2
+    brakes_mps2 = COASTING_MPS2 if cause is TripCause.FEEDBACK_IMPLAUSIBLE else EMERGENCY_MPS2
     assert stand_s <= fastest_mps / brakes_mps2 + 0.06
 
 
 @pytest.mark.parametrize("begin", [driver_repeats_its_last_setpoint, driver_turns_one_wheel_around, drive_ignores_zero])
 def test_in_a_curve_too(begin: Callable[[World], EachStep]) -> None:
     cause, trip_s, stand_s, fastest_mps = caught(begin, ARC)
-    assert cause in (Cause.TARGET_OUTSIDE, Cause.MOTION_OUTSIDE)
+    assert cause in (TripCause.TARGET_OUTSIDE, TripCause.MOTION_OUTSIDE)
     assert trip_s <= 0.5
     assert stand_s <= fastest_mps / EMERGENCY_MPS2 + 0.06
 
@@ -310,7 +310,7 @@ def test_from_standstill_somebody_straight_on_cmd_vel_does_not_get_far() -> None
     world = World()
     world.enable()
     world.run(1.0)
-    assert watched(world) == (False, Cause.NONE)
+    assert watched(world) == (False, TripCause.NONE)
     each_step, start, fastest_mps = somebody_publishes_straight_to_cmd_vel(world), world.truth, 0.0
     world.command = SPEED
 
@@ -321,7 +321,7 @@ def test_from_standstill_somebody_straight_on_cmd_vel_does_not_get_far() -> None
         return False
 
     world.run(2.0, note)
-    assert watched(world) == (True, Cause.TARGET_OUTSIDE)
+    assert watched(world) == (True, TripCause.TARGET_OUTSIDE)
     assert world.truth.standing_s > 1.5
     assert 0.01 < fastest_mps < 0.06
     assert world.truth.path_m - start.path_m < 0.006

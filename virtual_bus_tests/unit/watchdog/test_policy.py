@@ -15,7 +15,7 @@ from canbase_watchdog.policy import (
     CHECKS,
     FINE,
     SENSOR_CAUSES,
-    Cause,
+    TripCause,
     Verdict,
     before_the_start,
     commanded,
@@ -42,7 +42,7 @@ def test_one_row_for_each_cause_that_the_bus_can_show() -> None:
 
 def test_causes_have_the_numbers_of_the_state_frame() -> None:
     """docs/bus.md, byte 1 of 1FEh. What is not in CHECKS: none, and a watchdog that ended."""
-    others = {cause.name: cause.value for cause in Cause if cause not in {check.cause for check in CHECKS}}
+    others = {cause.name: cause.value for cause in TripCause if cause not in {check.cause for check in CHECKS}}
     assert others == {"NONE": 0, "ENDED": 11, "POWER_AT_END": 20, "RECORD_UNUSABLE": 21}
 
 
@@ -217,15 +217,15 @@ def test_an_enabled_drive_beats(age_s: float, trips: int) -> None:
     assert cause(of(replace(AT_REST, enabled_since=99.701), nodes=nodes)) == 0
 
 
-@pytest.mark.parametrize(("standing", "trips"), [(False, Cause.DRIVER_SILENT), (True, Cause.NONE)])
+@pytest.mark.parametrize(("standing", "trips"), [(False, TripCause.DRIVER_SILENT), (True, TripCause.NONE)])
 @pytest.mark.parametrize("state", [DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE])
 def test_a_drive_that_brakes_by_itself_needs_the_driver_as_long_as_its_wheel_turns(
-    state: DriveState, standing: bool, trips: Cause
+    state: DriveState, standing: bool, trips: TripCause
 ) -> None:
     """The driver dies in its own quick stop: nobody else would see whether the wheel brakes."""
     axis = replace(LEFT, state=state, standing=standing, target_mps=0.0)
     assert cause(of(axis, driver_at=NOW - 0.301)) == trips
-    assert cause(of(axis, driver_at=NOW - 0.299)) == Cause.NONE
+    assert cause(of(axis, driver_at=NOW - 0.299)) == TripCause.NONE
 
 
 def test_a_silent_drive_is_named() -> None:
@@ -286,21 +286,21 @@ def test_a_drive_that_was_never_heard_of_is_not_there_unless_it_is_told_to_have_
         (Past(Entry(Mark.CLEAR, 6, 2, "too fast")), FINE),
         (
             Past(Entry(Mark.LIVE, 6, 2, "too fast")),
-            Verdict(Cause.POWER_AT_END, 0, "it ended while a drive had power, or the computer lost its supply"),
+            Verdict(TripCause.POWER_AT_END, 0, "it ended while a drive had power, or the computer lost its supply"),
         ),
         (
             Past(Entry(Mark.LATCHED, 6, 2, "too fast")),
-            Verdict(Cause.OVERSPEED, 2, "since before the start: too fast"),
+            Verdict(TripCause.OVERSPEED, 2, "since before the start: too fast"),
         ),
         (
             Past(Entry(Mark.LATCHED, 6, 2, "since before the start: too fast")),
-            Verdict(Cause.OVERSPEED, 2, "since before the start: too fast"),
+            Verdict(TripCause.OVERSPEED, 2, "since before the start: too fast"),
         ),
-        (Past(Entry(Mark.LATCHED, 0, 2, "?")), Verdict(Cause.RECORD_UNUSABLE, 2, "since before the start: ?")),
-        (Past(Entry(Mark.LATCHED, 19, 2, "?")), Verdict(Cause.RECORD_UNUSABLE, 2, "since before the start: ?")),
+        (Past(Entry(Mark.LATCHED, 0, 2, "?")), Verdict(TripCause.RECORD_UNUSABLE, 2, "since before the start: ?")),
+        (Past(Entry(Mark.LATCHED, 19, 2, "?")), Verdict(TripCause.RECORD_UNUSABLE, 2, "since before the start: ?")),
         (
             Past(Entry(Mark.LIVE, 6, 2, "too fast"), "damaged"),
-            Verdict(Cause.RECORD_UNUSABLE, 0, "the record of its last trip cannot be used: damaged"),
+            Verdict(TripCause.RECORD_UNUSABLE, 0, "the record of its last trip cannot be used: damaged"),
         ),
     ],
 )
@@ -309,7 +309,7 @@ def test_it_starts_with_what_the_record_says_and_with_a_trip_when_it_says_nothin
 
 
 def test_each_cause_that_can_be_written_is_the_same_after_the_start() -> None:
-    for each in set(Cause) - {Cause.NONE}:
+    for each in set(TripCause) - {TripCause.NONE}:
         assert before_the_start(Past(Entry(Mark.LATCHED, int(each)))).cause is each
 
 
@@ -332,18 +332,18 @@ def test_the_own_loop_may_not_stand_still_while_a_drive_is_enabled(gap_s: float,
 @pytest.mark.parametrize(
     ("tripped_by", "changes", "still"),
     [
-        (Cause.LEASE_LOST, {"lease_at": NOW - 0.249}, False),
-        (Cause.LEASE_LOST, {"lease_at": NOW - 0.251}, True),
-        (Cause.DRIVER_SILENT, {"driver_at": NOW - 0.299}, False),
-        (Cause.DRIVER_SILENT, {"driver_at": NOW - 0.301}, True),
-        (Cause.DRIVER_SILENT, {"sync_at": NEVER}, False),  # it boots the drives first
-        (Cause.DRIVE_SILENT, {"nodes": (Node(1, NEVER, NOW - 0.299),)}, False),
-        (Cause.DRIVE_SILENT, {"nodes": (Node(1, NEVER, NOW - 0.301),)}, True),
-        (Cause.LOOP_LATE, {"tick_gap_s": 5.0}, False),
-        (Cause.ENDED, {}, False),
+        (TripCause.LEASE_LOST, {"lease_at": NOW - 0.249}, False),
+        (TripCause.LEASE_LOST, {"lease_at": NOW - 0.251}, True),
+        (TripCause.DRIVER_SILENT, {"driver_at": NOW - 0.299}, False),
+        (TripCause.DRIVER_SILENT, {"driver_at": NOW - 0.301}, True),
+        (TripCause.DRIVER_SILENT, {"sync_at": NEVER}, False),  # it boots the drives first
+        (TripCause.DRIVE_SILENT, {"nodes": (Node(1, NEVER, NOW - 0.299),)}, False),
+        (TripCause.DRIVE_SILENT, {"nodes": (Node(1, NEVER, NOW - 0.301),)}, True),
+        (TripCause.LOOP_LATE, {"tick_gap_s": 5.0}, False),
+        (TripCause.ENDED, {}, False),
     ],
 )
-def test_a_cause_stands_even_while_nothing_moves(tripped_by: Cause, changes: dict[str, Any], still: bool) -> None:
+def test_a_cause_stands_even_while_nothing_moves(tripped_by: TripCause, changes: dict[str, Any], still: bool) -> None:
     assert stands(Verdict(tripped_by, 1), of(OFF, **changes), CONFIG, NOW) is still
 
 
@@ -381,19 +381,19 @@ def test_the_loop_wakes_when_the_first_timeout_runs_out() -> None:
 EXACT = replace(CONFIG, lease_timeout_s=0.25, drive_heartbeat_s=0.5, feedback_timeout_s=0.125, standstill_mps=0.0078125)
 
 
-def exactly(view: View) -> Cause:
+def exactly(view: View) -> TripCause:
     return decide(view, EXACT, NOW).cause
 
 
 def test_at_the_very_moment_it_trips() -> None:
-    assert exactly(well(lease_at=99.75)) is Cause.LEASE_LOST
-    assert exactly(of(AT_REST, driver_at=99.5)) is Cause.DRIVER_SILENT
-    assert exactly(of(replace(AT_REST, fed_at=99.875))) is Cause.DRIVE_SILENT
-    assert exactly(of(AT_REST, nodes=(Node(1, 99.5, 99.99), Node(2, 99.95, 99.99)))) is Cause.DRIVE_SILENT
+    assert exactly(well(lease_at=99.75)) is TripCause.LEASE_LOST
+    assert exactly(of(AT_REST, driver_at=99.5)) is TripCause.DRIVER_SILENT
+    assert exactly(of(replace(AT_REST, fed_at=99.875))) is TripCause.DRIVE_SILENT
+    assert exactly(of(AT_REST, nodes=(Node(1, 99.5, 99.99), Node(2, 99.95, 99.99)))) is TripCause.DRIVE_SILENT
 
 
 def test_at_the_very_moment_syncs_have_stopped() -> None:
-    assert exactly(of(replace(AT_REST, fed_at=99.0), sync_at=99.875)) is Cause.NONE
+    assert exactly(of(replace(AT_REST, fed_at=99.0), sync_at=99.875)) is TripCause.NONE
 
 
 def test_at_the_very_moment_feedback_is_too_old_to_say_that_the_power_is_off() -> None:
@@ -412,9 +412,9 @@ def test_at_the_very_moment_a_drive_that_says_nothing_may_be_on() -> None:
 
 
 def test_at_the_very_moment_a_cause_stands_and_an_order_is_over() -> None:
-    assert stands(Verdict(Cause.LEASE_LOST), of(OFF, lease_at=99.75), EXACT, NOW)
-    assert stands(Verdict(Cause.DRIVER_SILENT), of(OFF, driver_at=99.5), EXACT, NOW)
-    assert stands(Verdict(Cause.DRIVE_SILENT, 1), of(OFF, nodes=(Node(1, NEVER, 99.5),)), EXACT, NOW)
+    assert stands(Verdict(TripCause.LEASE_LOST), of(OFF, lease_at=99.75), EXACT, NOW)
+    assert stands(Verdict(TripCause.DRIVER_SILENT), of(OFF, driver_at=99.5), EXACT, NOW)
+    assert stands(Verdict(TripCause.DRIVE_SILENT, 1), of(OFF, nodes=(Node(1, NEVER, 99.5),)), EXACT, NOW)
     old_target = of(replace(OFF, target_mps=0.1, command_at=99.75), lease=None)
     assert not velocity_ordered(old_target, EXACT, NOW)
     old_lease = of(OFF, lease=Lease(1, 1, 0.3, 0.0, 0), lease_at=99.75)

@@ -13,7 +13,7 @@ from canbase_watchdog.envelope import Bounds
 from canbase_watchdog.evidence import Evidence
 from canbase_watchdog.frames import DriveState
 from canbase_watchdog.plausibility import Feedback
-from canbase_watchdog.policy import CHECKS, FINE, Cause, Verdict, clears_on, decide, stands
+from canbase_watchdog.policy import CHECKS, FINE, TripCause, Verdict, clears_on, decide, stands
 from canbase_watchdog.second_master import Sign
 from canbase_watchdog.torque import Push
 from canbase_watchdog.view import Axis
@@ -98,26 +98,28 @@ def test_the_sentence_about_a_target_has_the_values() -> None:
         "wheel_1_0 is ordered 0.800 m/s, the leases allow -0.100 to 0.400 m/s (tolerance 0.043 m/s)"
     )
     verdict = decide(of(AT_REST, replace(STANDING, target_mps=0.8), bounds=STRAIGHT), CONFIG, NOW)
-    assert (verdict.cause, verdict.node_id) == (Cause.TARGET_OUTSIDE, 2)
+    assert (verdict.cause, verdict.node_id) == (TripCause.TARGET_OUTSIDE, 2)
 
 
 def test_setpoints_that_do_not_go_together_are_about_no_single_node() -> None:
     verdict = decide(of(AT_REST, skew="2.000 rad/s together"), CONFIG, NOW)
-    assert verdict == Verdict(Cause.TARGET_OUTSIDE, 0, "left and right wheels are ordered 2.000 rad/s together")
+    assert verdict == Verdict(TripCause.TARGET_OUTSIDE, 0, "left and right wheels are ordered 2.000 rad/s together")
 
 
 # --- feedback: so many samples in a row
 
 COUNTS = [
-    ("outside", Cause.MOTION_OUTSIDE),
-    ("overspeed", Cause.OVERSPEED),
-    ("implausible", Cause.FEEDBACK_IMPLAUSIBLE),
+    ("outside", TripCause.MOTION_OUTSIDE),
+    ("overspeed", TripCause.OVERSPEED),
+    ("implausible", TripCause.FEEDBACK_IMPLAUSIBLE),
 ]
 
 
 @pytest.mark.parametrize(("count", "found"), COUNTS)
 @pytest.mark.parametrize(("samples", "trips"), [(0, False), (4, False), (5, True), (6, True)])
-def test_feedback_counts_after_five_bad_samples_in_a_row(count: str, found: Cause, samples: int, trips: bool) -> None:
+def test_feedback_counts_after_five_bad_samples_in_a_row(
+    count: str, found: TripCause, samples: int, trips: bool
+) -> None:
     bad = Feedback(**{count: samples})
     assert (cause(of(replace(AT_REST, feedback=bad))) is found) is trips
     assert (cause(of(AT_REST, replace(STANDING, feedback=bad))) is found) is trips
@@ -151,16 +153,16 @@ def test_the_sentences_about_feedback_have_the_values() -> None:
 # --- sensors that show what no wheel can do, and wheels that do not show their orders
 
 EVIDENCE = [
-    (Evidence(halted=5, setpoint_mps=0.3), Cause.FEEDBACK_IMPLAUSIBLE),
-    (Evidence(jolts=5), Cause.FEEDBACK_IMPLAUSIBLE),
-    (Evidence(unseen=True, both_s=0.3, both_m=0.09, setpoint_mps=0.3), Cause.MOTION_MISSING),
-    (Evidence(behind_s=0.5, ordered_mps=0.3), Cause.MOTION_MISSING),
-    (Evidence(strained_s=0.25, setpoint_mps=0.3), Cause.MOTION_MISSING),
+    (Evidence(halted=5, setpoint_mps=0.3), TripCause.FEEDBACK_IMPLAUSIBLE),
+    (Evidence(jolts=5), TripCause.FEEDBACK_IMPLAUSIBLE),
+    (Evidence(unseen=True, both_s=0.3, both_m=0.09, setpoint_mps=0.3), TripCause.MOTION_MISSING),
+    (Evidence(behind_s=0.5, ordered_mps=0.3), TripCause.MOTION_MISSING),
+    (Evidence(strained_s=0.25, setpoint_mps=0.3), TripCause.MOTION_MISSING),
 ]
 
 
 @pytest.mark.parametrize(("evidence", "found"), EVIDENCE)
-def test_evidence_against_a_wheel_trips(evidence: Evidence, found: Cause) -> None:
+def test_evidence_against_a_wheel_trips(evidence: Evidence, found: TripCause) -> None:
     verdict = decide(of(AT_REST, replace(STANDING, evidence=evidence)), CONFIG, NOW)
     assert (verdict.cause, verdict.node_id) == (found, 2)
     assert verdict.detail.startswith("wheel_2_0 ")
@@ -168,7 +170,7 @@ def test_evidence_against_a_wheel_trips(evidence: Evidence, found: Cause) -> Non
     unpowered = replace(OFF, drive=RIGHT.drive)
     assert cause(of(replace(OFF, evidence=evidence), unpowered)) == 0
     stopping = of(replace(AT_REST, state=DriveState.QUICK_STOP_ACTIVE, evidence=evidence), unpowered)
-    assert cause(stopping) is (found if found is Cause.FEEDBACK_IMPLAUSIBLE else Cause.NONE)
+    assert cause(stopping) is (found if found is TripCause.FEEDBACK_IMPLAUSIBLE else TripCause.NONE)
     assert not stands(verdict, of(replace(OFF, evidence=evidence)), CONFIG, NOW)
 
 
@@ -215,7 +217,7 @@ def test_a_drive_that_pushes_at_a_stand_and_does_not_let_go_trips(overdue_s: flo
 
 def test_the_sentence_about_power_at_a_stand_has_the_values() -> None:
     verdict = decide(of(AT_REST, replace(STANDING, push=Push(0.4, overdue_s=0.3))), CONFIG, NOW)
-    assert (verdict.cause, verdict.node_id) == (Cause.POWER_AT_STAND, 2)
+    assert (verdict.cause, verdict.node_id) == (TripCause.POWER_AT_STAND, 2)
     assert verdict.detail == (
         "wheel_2_0 is ordered 0.000 m/s, reports 0.000 m/s and has been held with 40% of the rated torque for "
         "0.300 s (allowed 0.200 s) without letting go: that may be a dead encoder and not a stand "
@@ -234,7 +236,7 @@ def test_the_sentence_about_a_push_in_vain_has_the_torque() -> None:
 
 def test_a_base_that_moves_otherwise_trips_without_a_node() -> None:
     verdict = decide(of(AT_REST, twist="1.000 rad/s together"), CONFIG, NOW)
-    assert verdict == Verdict(Cause.TWIST_OUTSIDE, 0, "the base moves otherwise than ordered: 1.000 rad/s together")
+    assert verdict == Verdict(TripCause.TWIST_OUTSIDE, 0, "the base moves otherwise than ordered: 1.000 rad/s together")
 
 
 # --- frames of one axis: 0.1 s at 100 Hz are 10 SYNCs
@@ -242,10 +244,10 @@ def test_a_base_that_moves_otherwise_trips_without_a_node() -> None:
 
 @pytest.mark.parametrize(
     ("count", "found"),
-    [("missed_setpoints", Cause.SETPOINT_MISSING), ("double_answers", Cause.ANSWERED_TWICE)],
+    [("missed_setpoints", TripCause.SETPOINT_MISSING), ("double_answers", TripCause.ANSWERED_TWICE)],
 )
 @pytest.mark.parametrize(("syncs", "trips"), [(0.0, False), (9.5, False), (10.0, True), (10.5, True)])
-def test_ten_bad_syncs_are_enough(count: str, found: Cause, syncs: float, trips: bool) -> None:
+def test_ten_bad_syncs_are_enough(count: str, found: TripCause, syncs: float, trips: bool) -> None:
     bad: dict[str, Any] = {count: syncs}
     verdict = decide(of(AT_REST, replace(STANDING, **bad)), CONFIG, NOW)
     assert ((verdict.cause, verdict.node_id) == (found, 2)) is trips
@@ -287,7 +289,7 @@ def test_a_drive_that_comes_last_has_as_long() -> None:
 
 def test_the_drive_that_is_down_is_named() -> None:
     verdict = decide(of(replace(OFF, state=DriveState.FAULT), RIGHT), CONFIG, NOW)
-    assert (verdict.cause, verdict.node_id) == (Cause.DRIVE_DOWN, 1)
+    assert (verdict.cause, verdict.node_id) == (TripCause.DRIVE_DOWN, 1)
     assert verdict.detail == (
         "wheel_1_0 is not enabled (state: fault) while wheel_2_0 turns at 0.300 m/s, ordered 0.300 m/s"
     )
@@ -303,12 +305,12 @@ def test_a_sign_of_another_master_counts_for_a_second_while_a_drive_is_enabled(a
     sign = Sign(NOW - age_s, 2, "NMT command 1")
     assert cause(of(AT_REST, foreign=sign)) == trips
     assert cause(of(OFF, replace(OFF, drive=RIGHT.drive), foreign=sign)) == 0
-    assert stands(Verdict(Cause.FOREIGN_MASTER, 2), of(OFF, foreign=sign), CONFIG, NOW) is (trips == 8)
+    assert stands(Verdict(TripCause.FOREIGN_MASTER, 2), of(OFF, foreign=sign), CONFIG, NOW) is (trips == 8)
 
 
 def test_the_sign_is_told() -> None:
     verdict = decide(of(AT_REST, foreign=Sign(NOW, 2, "NMT command 1")), CONFIG, NOW)
-    assert verdict == Verdict(Cause.FOREIGN_MASTER, 2, "another master is on the bus: NMT command 1")
+    assert verdict == Verdict(TripCause.FOREIGN_MASTER, 2, "another master is on the bus: NMT command 1")
     assert not stands(verdict, of(OFF), CONFIG, NOW)
 
 
@@ -320,7 +322,7 @@ def test_a_bus_that_takes_no_frames_for_a_moment_while_a_drive_is_enabled(failed
     since = NOW - failed_s
     assert cause(of(AT_REST, bus_failed_since=since)) == trips
     assert cause(of(OFF, replace(OFF, drive=RIGHT.drive), bus_failed_since=since)) == 0
-    assert stands(Verdict(Cause.BUS_FAILED), of(OFF, bus_failed_since=since), CONFIG, NOW) is (trips == 9)
+    assert stands(Verdict(TripCause.BUS_FAILED), of(OFF, bus_failed_since=since), CONFIG, NOW) is (trips == 9)
 
 
 def test_the_sentence_about_the_bus_has_the_values() -> None:
@@ -340,10 +342,10 @@ def exact_drive(drive: WatchedDrive) -> WatchedDrive:
 
 def test_at_the_very_moment_it_trips() -> None:
     down = replace(OFF, disabled_since=99.875)
-    assert decide(of(down, RIGHT), EXACT, NOW).cause is Cause.DRIVE_DOWN
-    assert decide(of(AT_REST, bus_failed_since=99.875), EXACT, NOW).cause is Cause.BUS_FAILED
+    assert decide(of(down, RIGHT), EXACT, NOW).cause is TripCause.DRIVE_DOWN
+    assert decide(of(AT_REST, bus_failed_since=99.875), EXACT, NOW).cause is TripCause.BUS_FAILED
     assert decide(of(AT_REST, foreign=Sign(99.0, 0, "")), EXACT, NOW) == FINE
-    assert not stands(Verdict(Cause.FOREIGN_MASTER), of(OFF, foreign=Sign(99.0, 0, "")), EXACT, NOW)
+    assert not stands(Verdict(TripCause.FOREIGN_MASTER), of(OFF, foreign=Sign(99.0, 0, "")), EXACT, NOW)
 
 
 @pytest.mark.parametrize("target_mps", [0.625, -0.375])
@@ -359,23 +361,23 @@ def test_at_the_very_tolerance_it_does_not_trip(target_mps: float) -> None:
 def test_each_cause_says_what_a_reset_needs() -> None:
     words = {check.cause: check.clears_on for check in CHECKS}
     assert {cause: clears_on(Verdict(cause)) for cause in words} == words
-    assert clears_on(Verdict(Cause.ENDED)) == "nothing else"
-    assert words[Cause.FOREIGN_MASTER] == "the other master is silent for 1 s"
-    assert words[Cause.BUS_FAILED] == "the bus takes frames again"
+    assert clears_on(Verdict(TripCause.ENDED)) == "nothing else"
+    assert words[TripCause.FOREIGN_MASTER] == "the other master is silent for 1 s"
+    assert words[TripCause.BUS_FAILED] == "the bus takes frames again"
 
 
 @pytest.mark.parametrize(
     "tripped_by",
     [
-        Cause.TARGET_OUTSIDE,
-        Cause.MOTION_OUTSIDE,
-        Cause.OVERSPEED,
-        Cause.DRIVE_DOWN,
-        Cause.FEEDBACK_IMPLAUSIBLE,
-        Cause.TWIST_OUTSIDE,
+        TripCause.TARGET_OUTSIDE,
+        TripCause.MOTION_OUTSIDE,
+        TripCause.OVERSPEED,
+        TripCause.DRIVE_DOWN,
+        TripCause.FEEDBACK_IMPLAUSIBLE,
+        TripCause.TWIST_OUTSIDE,
     ],
 )
-def test_of_motion_nothing_is_left_when_the_wheels_stand(tripped_by: Cause) -> None:
+def test_of_motion_nothing_is_left_when_the_wheels_stand(tripped_by: TripCause) -> None:
     """A drive in fault must not keep the reset away: the driver resets the fault only after it."""
     fault = replace(OFF, state=DriveState.FAULT, feedback=Feedback(outside=9, overspeed=9, implausible=9))
     assert not stands(Verdict(tripped_by, 1), of(fault), CONFIG, NOW)
@@ -402,6 +404,6 @@ def test_what_is_about_the_whole_robot_names_no_node() -> None:
 
 def test_a_bus_that_failed_explains_the_silence() -> None:
     everything = well(bus_failed_since=99.0, tick_gap_s=1.0, driver_at=90.0, lease_at=90.0, foreign=Sign(NOW, 1, ""))
-    assert cause(everything) is Cause.BUS_FAILED
-    assert cause(replace(everything, bus_failed_since=math.inf)) is Cause.LOOP_LATE
-    assert cause(replace(everything, bus_failed_since=math.inf, tick_gap_s=0.0)) is Cause.FOREIGN_MASTER
+    assert cause(everything) is TripCause.BUS_FAILED
+    assert cause(replace(everything, bus_failed_since=math.inf)) is TripCause.LOOP_LATE
+    assert cause(replace(everything, bus_failed_since=math.inf, tick_gap_s=0.0)) is TripCause.FOREIGN_MASTER

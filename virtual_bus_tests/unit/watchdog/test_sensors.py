@@ -21,18 +21,18 @@ from canbase_driver.supervision.lifecycle import Aim
 from canbase_sim import faults
 from canbase_sim.frame import Frame as BenchFrame
 from canbase_sim.plant.encoder import EncoderFault
-from canbase_watchdog.policy import Cause
+from canbase_watchdog.policy import TripCause
 from canbase_watchdog.watchdog import State, Watchdog
 from support.chain_world import STEP_S, World
 
-IMPLAUSIBLE, MISSING, TWIST = Cause.FEEDBACK_IMPLAUSIBLE, Cause.MOTION_MISSING, Cause.TWIST_OUTSIDE
+IMPLAUSIBLE, MISSING, TWIST = TripCause.FEEDBACK_IMPLAUSIBLE, TripCause.MOTION_MISSING, TripCause.TWIST_OUTSIDE
 
 
 @dataclass(frozen=True)
 class Course:
     """What came of a fault. Times since it began [s]."""
 
-    cause: Cause
+    cause: TripCause
     detail: str
     trip_s: float
     off_s: float
@@ -107,13 +107,13 @@ def test_an_encoder_that_loses_counts_just_below_the_order_makes_no_wheel_run_aw
         ("encoder_zero", 0.3, IMPLAUSIBLE, 0.07, 0.7),
         ("encoder_frozen", 0.05, IMPLAUSIBLE, 0.25, 1.5),
         ("encoder_frozen", 0.3, IMPLAUSIBLE, 0.25, 1.5),
-        ("encoder_reversed", 0.3, Cause.MOTION_OUTSIDE, 0.12, 1.0),
+        ("encoder_reversed", 0.3, TripCause.MOTION_OUTSIDE, 0.12, 1.0),
         ("encoder_intermittent", 0.3, IMPLAUSIBLE, 0.07, 0.7),
         ("encoder_jumping", 0.3, IMPLAUSIBLE, 0.1, 0.5),
     ],
 )
 def test_an_encoder_that_fails_at_speed_takes_the_power(
-    kind: str, speed: float, cause: Cause, off_s: float, peak_mps: float
+    kind: str, speed: float, cause: TripCause, off_s: float, peak_mps: float
 ) -> None:
     world = driving(speed)
     suffer(world, kind)
@@ -363,7 +363,7 @@ def test_setpoints_of_one_axis_that_do_not_come_trip(speed: float, every: int, w
     start = world.now
     assert world.run(1.0, lambda: tripped(world))
     verdict = watchdog(world).status.verdict
-    assert (verdict.cause, verdict.node_id) == (Cause.SETPOINT_MISSING, 1)
+    assert (verdict.cause, verdict.node_id) == (TripCause.SETPOINT_MISSING, 1)
     assert world.now - start <= within_s
 
 
@@ -376,7 +376,7 @@ def test_a_setpoint_that_is_lost_now_and_then_does_not() -> None:
 def test_feedback_of_one_axis_that_does_not_come_trips() -> None:
     world = driving(0.3)
     suffer(world, "tpdo_lost")
-    assert course(world, 1.0).cause is Cause.DRIVE_SILENT
+    assert course(world, 1.0).cause is TripCause.DRIVE_SILENT
 
 
 @pytest.mark.parametrize("speed", [0.3])
@@ -392,7 +392,7 @@ def test_two_drives_with_one_node_id_trip(speed: float) -> None:
     start = world.now
     assert world.run(1.0, lambda: tripped(world))
     verdict = watchdog(world).status.verdict
-    assert (verdict.cause, verdict.node_id) == (Cause.ANSWERED_TWICE, 1)
+    assert (verdict.cause, verdict.node_id) == (TripCause.ANSWERED_TWICE, 1)
     assert world.now - start <= 0.12
 
 
@@ -404,7 +404,7 @@ def test_a_boot_up_of_an_enabled_drive_trips_at_once_whatever_the_driver_does() 
     world.inject(0x701, "00")
     assert world.run(0.1, lambda: tripped(world))
     verdict = watchdog(world).status.verdict
-    assert (verdict.cause, verdict.node_id) == (Cause.DRIVE_RESTARTED, 1)
+    assert (verdict.cause, verdict.node_id) == (TripCause.DRIVE_RESTARTED, 1)
     assert world.now - start <= 0.006
     assert world.run(1.0, lambda: world.truth.standing_s > 0.1)
 
@@ -429,7 +429,7 @@ def test_values_that_somebody_polls_do_not_stand_in_for_a_tpdo_that_is_lost() ->
         world.run(0.01)
         world.inject(0x601, "40 6C 60 00 00 00 00 00")
         world.run(0.01)
-    assert watchdog(world).status.verdict.cause is Cause.DRIVE_SILENT
+    assert watchdog(world).status.verdict.cause is TripCause.DRIVE_SILENT
     assert world.now - start <= 0.13
 
 

@@ -12,7 +12,7 @@ import pytest
 from canbase_watchdog.frames import Frame
 from canbase_watchdog.ladder import Step
 from canbase_watchdog.lease import Refusal
-from canbase_watchdog.policy import Cause
+from canbase_watchdog.policy import TripCause
 from canbase_watchdog.watchdog import State
 from support.watchdog_story import FakeDrive, Story, lease
 from support.watchdog_story_looks import cause, driving, state, step, tripped, until_still, until_tripped
@@ -70,7 +70,7 @@ def test_leases_end_while_the_driver_goes_on() -> None:
     first = story.since(begin, 0x501)[0]
     assert first == (story.t, QUICK_STOP)
     assert story.since(begin, 0x502)[0][0] == story.t
-    assert (cause(story), story.watchdog.status.step) == (Cause.LEASE_LOST, Step.QUICK_STOP)
+    assert (cause(story), story.watchdog.status.step) == (TripCause.LEASE_LOST, Step.QUICK_STOP)
     assert until_still(story) == pytest.approx(0.3, abs=0.01)
 
 
@@ -89,7 +89,7 @@ def test_leases_of_somebody_else_do_not_keep_it_driving() -> None:
     story = Story(uid=1001)
     story.drive_at(300, 0.2)
     story.run(0.3)
-    assert cause(story) is Cause.LEASE_LOST
+    assert cause(story) is TripCause.LEASE_LOST
 
 
 def test_the_state_frame_tells_the_trip_in_the_tick_of_the_trip() -> None:
@@ -112,7 +112,7 @@ def test_the_driver_dies_and_leases_go_on(bits: int) -> None:
     begin = story.t
     story.driver = False
     assert 0.2 <= until_tripped(story) <= 0.31
-    assert cause(story) is Cause.DRIVER_SILENT
+    assert cause(story) is TripCause.DRIVER_SILENT
     assert until_still(story) <= abs(bits) / 1000 + 0.01
     story.run(0.2)
     status = story.watchdog.status
@@ -139,7 +139,7 @@ def test_half_a_driver_is_none(lost: str) -> None:
     story = driving()
     setattr(story, lost, False)
     assert until_tripped(story) <= 0.31
-    assert cause(story) is Cause.DRIVER_SILENT
+    assert cause(story) is TripCause.DRIVER_SILENT
 
 
 # --- a drive falls silent: last TPDO ── 0.1 s ── trip; it never answers, so its ladder is climbed to the end
@@ -152,7 +152,7 @@ def test_a_silent_drive_stops_the_other_one_without_making_it_coast() -> None:
     left.mute, left.hears_pdo = True, False
     assert until_tripped(story) <= 0.11
     status = story.watchdog.status
-    assert (status.verdict.cause, status.verdict.node_id) == (Cause.DRIVE_SILENT, 1)
+    assert (status.verdict.cause, status.verdict.node_id) == (TripCause.DRIVE_SILENT, 1)
     story.run(0.6)
     assert step(story) is Step.HEARTBEAT_WITHHELD
     assert right.speed[0] == 0
@@ -165,7 +165,7 @@ def test_a_drive_without_heartbeat_is_silent_too() -> None:
     story = driving()
     story.drives[1].beat_at = 1e9
     assert until_tripped(story) <= 0.31
-    assert (cause(story), story.watchdog.status.verdict.node_id) == (Cause.DRIVE_SILENT, 2)
+    assert (cause(story), story.watchdog.status.verdict.node_id) == (TripCause.DRIVE_SILENT, 2)
 
 
 # --- the watchdog itself
@@ -179,14 +179,14 @@ def test_it_trips_when_it_stood_still_itself(pause_s: float, trips: bool) -> Non
     story.ticking = True
     story.run(0.01)
     assert tripped(story) is trips
-    assert cause(story) is (Cause.LOOP_LATE if trips else Cause.NONE)
+    assert cause(story) is (TripCause.LOOP_LATE if trips else TripCause.NONE)
 
 
 def test_asked_to_end_while_driving_it_stops_first() -> None:
     story = driving()
     story.watchdog.end(story.t)
     story.run(0.005)
-    assert cause(story) is Cause.ENDED
+    assert cause(story) is TripCause.ENDED
     assert story.since(story.t - 0.004, 0x501)[0][1] == QUICK_STOP
     until_still(story)
     story.run(0.15)
@@ -205,7 +205,7 @@ def test_asked_to_end_after_a_trip_it_keeps_the_cause() -> None:
     story.filter = False
     until_tripped(story)
     story.watchdog.end(story.t)
-    assert cause(story) is Cause.LEASE_LOST
+    assert cause(story) is TripCause.LEASE_LOST
 
 
 def test_quick_stops_for_the_way_out_need_no_state() -> None:
@@ -241,7 +241,7 @@ def test_a_computer_that_was_suspended_at_speed_stops_as_soon_as_it_wakes_up() -
     begin = story.t
     story.run(0.006)
     assert [frame for _, frame in story.since(0.006, 0x501)] == [QUICK_STOP]
-    assert cause(story) is Cause.LOOP_LATE
+    assert cause(story) is TripCause.LOOP_LATE
     assert story.t - begin < 0.01
 
 

@@ -13,21 +13,21 @@ from random import Random
 import pytest
 
 from canbase_watchdog.frames import Frame
-from canbase_watchdog.policy import Cause
+from canbase_watchdog.policy import TripCause
 from canbase_watchdog.watchdog import Answer, State, Watchdog
 from support.watchdog_story import FAULT, SOD, FakeDrive, Story, lease
 
 COUNTERS = 0x2FE
 
 
-def cause(story: Story) -> Cause:
+def cause(story: Story) -> TripCause:
     return story.watchdog.status.verdict.cause
 
 
 def driving(*drives: FakeDrive, bits: int = 300) -> Story:
     story = Story(*drives)
     story.drive_at(bits, 1.2)
-    assert cause(story) is Cause.NONE
+    assert cause(story) is TripCause.NONE
     return story
 
 
@@ -52,9 +52,9 @@ def test_a_driver_that_goes_on_after_the_filter_ordered_zero() -> None:
     story = driving()
     story.ordered_mps, begin = 0.0, story.t
     story.run(0.36)
-    assert cause(story) is Cause.NONE
+    assert cause(story) is TripCause.NONE
     story.run(0.08)
-    assert cause(story) is Cause.TARGET_OUTSIDE
+    assert cause(story) is TripCause.TARGET_OUTSIDE
     assert story.since(begin, 0x501)[0][1].data == b"\x02\x00"
 
 
@@ -63,7 +63,7 @@ def test_a_wheel_that_does_not_brake() -> None:
     story = driving(left, right)
     left.brakes, story.speed = False, 0
     story.run(0.4)
-    assert (cause(story), story.watchdog.status.verdict.node_id) == (Cause.MOTION_OUTSIDE, 1)
+    assert (cause(story), story.watchdog.status.verdict.node_id) == (TripCause.MOTION_OUTSIDE, 1)
 
 
 @pytest.mark.parametrize(("lie", "order", "found"), [("frozen", 300, 12), ("stuck_velocity", 0, 5)])
@@ -81,9 +81,9 @@ def test_one_drive_in_fault_and_a_driver_that_does_not_mind() -> None:
     story = driving(left, right)
     left.words[0], fault_at = FAULT, story.t
     story.run(0.1)
-    assert cause(story) is Cause.NONE
+    assert cause(story) is TripCause.NONE
     story.run(0.03)
-    assert (cause(story), story.watchdog.status.verdict.node_id) == (Cause.DRIVE_DOWN, 1)
+    assert (cause(story), story.watchdog.status.verdict.node_id) == (TripCause.DRIVE_DOWN, 1)
     story.run(0.4)
     assert story.t < fault_at + 0.6
     assert right.speed[0] == 0
@@ -105,9 +105,9 @@ def test_a_bus_that_fails_for_a_moment_trips_and_keeps_the_reset_away_until_it_w
     failed_at = story.t
     story.watchdog.on_bus(failed_at, 3)
     story.run(0.095)
-    assert cause(story) is Cause.NONE
+    assert cause(story) is TripCause.NONE
     story.run(0.015)
-    assert cause(story) is Cause.BUS_FAILED
+    assert cause(story) is TripCause.BUS_FAILED
     story.run(1.0)
     assert story.reset(1) == Answer.CAUSE_STANDS
     story.watchdog.on_bus(math.inf, 4)
@@ -121,7 +121,7 @@ def test_a_bus_that_comes_back_in_time_is_no_reason() -> None:
         story.run(0.09)
         story.watchdog.on_bus(math.inf, 1)
         story.run(0.05)
-    assert cause(story) is Cause.NONE
+    assert cause(story) is TripCause.NONE
 
 
 # --- other masters
@@ -132,7 +132,7 @@ def test_after_a_trip_our_own_frames_are_no_sign_of_another_master() -> None:
     story = driving(FakeDrive(1, option=6), FakeDrive(2, option=6))
     story.obedient = story.filter = False
     story.run(1.0)
-    assert cause(story) is Cause.LEASE_LOST
+    assert cause(story) is TripCause.LEASE_LOST
     assert len(story.since(0.0, 0x000)) > 2
     story.obedient = story.filter = True
     for drive in story.drives:
@@ -140,14 +140,14 @@ def test_after_a_trip_our_own_frames_are_no_sign_of_another_master() -> None:
     story.run(0.5)
     assert story.reset(1) == Answer.DONE
     story.drive_at(100, 0.3)
-    assert cause(story) is Cause.NONE
+    assert cause(story) is TripCause.NONE
 
 
 def test_another_master_must_be_silent_for_a_second_before_the_reset() -> None:
     story = driving()
     story.put(Frame(0x000, b"\x01\x01"))
     story.run(0.01)
-    assert (cause(story), story.watchdog.status.verdict.node_id) == (Cause.FOREIGN_MASTER, 1)
+    assert (cause(story), story.watchdog.status.verdict.node_id) == (TripCause.FOREIGN_MASTER, 1)
     story.run(0.9)
     assert story.reset(1) == Answer.CAUSE_STANDS
     story.run(0.1)
@@ -173,7 +173,7 @@ def test_pauses_of_its_own_loop_that_are_allowed_make_no_trip() -> None:
             story.run(0.085)
             story.ticking = True
             story.run(0.015)
-    assert cause(story) is Cause.NONE
+    assert cause(story) is TripCause.NONE
 
 
 def test_the_next_tick_is_due_when_the_first_timeout_runs_out() -> None:
@@ -272,4 +272,4 @@ def test_a_drive_that_was_off_says_nothing_bad_afterwards() -> None:
     story.run(0.5)
     story.drives[0].speed[0], story.drives[0].brakes, story.drives[0].words[0] = 900, False, SOD
     story.run(1.0)  # pushed by hand
-    assert cause(story) is Cause.NONE
+    assert cause(story) is TripCause.NONE
