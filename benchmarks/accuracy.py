@@ -56,17 +56,17 @@ def drive(robot: Robot, case: Case, way: Callable[[Robot, Case, Odometry], Contr
     step_s, next_cycle, ended, ended_at_m, farthest_m = case.body.step_s, 0.0, math.inf, 0.0, 0.0
     fastest_mps = 0.0
     for step in range(1, round(LIMIT_S / step_s)):
-        now = step * step_s
-        rig.step(now)
+        now_s = step * step_s
+        rig.step(now_s)
         farthest_m = max(farthest_m, sign * rig.way_m)
         fastest_mps = max(fastest_mps, abs(rig.odometry.linear_mps))
-        if now >= next_cycle and ended == math.inf:
+        if now_s >= next_cycle and ended == math.inf:
             next_cycle += controller.period_s
-            twist, is_result = controller.cycle(rig.odometry, now)
-            rig.order(twist, now)
+            twist, is_result = controller.cycle(rig.odometry, now_s)
+            rig.order(twist, now_s)
             if is_result:
-                ended, ended_at_m = now, rig.way_m
-        if now >= ended + AFTER_S:
+                ended, ended_at_m = now_s, rig.way_m
+        if now_s >= ended + AFTER_S:
             error_m = sign * rig.way_m - abs(case.distance_m)
             overshoot_m = max(0.0, farthest_m - abs(case.distance_m))
             too_fast_mps = max(0.0, fastest_mps - case.speed_mps)

@@ -59,22 +59,22 @@ class Rig:
         """By encoder, signed."""
         return (self.base.travel_left_m + self.base.travel_right_m) / 2.0
 
-    def order(self, twist: Twist, now: float) -> None:
+    def order(self, twist: Twist, now_s: float) -> None:
         """A velocity order enters the chain."""
-        self._pipe.append((now + self._case.chain_s * self._chance.uniform(0.3, 1.0), twist))
+        self._pipe.append((now_s + self._case.chain_s * self._chance.uniform(0.3, 1.0), twist))
 
-    def step(self, now: float) -> None:
-        """One inner step that ends at `now`."""
-        self.base.step(now)
-        while self._pipe and self._pipe[0][0] <= now:
+    def step(self, now_s: float) -> None:
+        """One inner step that ends at `now_s`."""
+        self.base.step(now_s)
+        while self._pipe and self._pipe[0][0] <= now_s:
             self._order = self._pipe.popleft()[1]
-        if now >= self._next_drive:
+        if now_s >= self._next_drive:
             self._next_drive += 1.0 / self._case.control_hz
             self._drive()
-        if now >= self._next_odometry:
+        if now_s >= self._next_odometry:
             self._next_odometry += 1.0 / self._case.odometry_hz
-            self._publish(now)
-        while self._transit and self._transit[0].received <= now:
+            self._publish(now_s)
+        while self._transit and self._transit[0].received <= now_s:
             self.odometry = self._transit.popleft()
 
     def _drive(self) -> None:
@@ -98,9 +98,9 @@ class Rig:
         x_m, y_m = self._pose.x_m + way_m * math.cos(heading), self._pose.y_m + way_m * math.sin(heading)
         self._pose = Pose(x_m, y_m, self._pose.yaw_rad + turned_rad)
 
-    def _publish(self, now: float) -> None:
+    def _publish(self, now_s: float) -> None:
         """What the driver's last cycle saw; it arrives late and unevenly."""
-        arrives = now + self._chance.uniform(0.0005, 0.4 / self._case.odometry_hz)
+        arrives = now_s + self._chance.uniform(0.0005, 0.4 / self._case.odometry_hz)
         left_mps, right_mps = self.base.v_left_mps, self.base.v_right_mps
         turn_radps = (right_mps - left_mps) / self._robot.base.track_m
         self._transit.append(Odometry(arrives, self._pose, (left_mps + right_mps) / 2.0, turn_radps))

@@ -27,7 +27,7 @@ class Controller(Protocol):
 
     period_s: float
 
-    def cycle(self, odometry: Odometry, now: float) -> tuple[Twist, bool]:
+    def cycle(self, odometry: Odometry, now_s: float) -> tuple[Twist, bool]:
         """The order, and whether this is the result."""
 
 
@@ -40,9 +40,9 @@ class Ours:
         request = DriveRequest(case.distance_m, case.speed_mps)
         self._goal_queue.admit("goal", request, _inputs(start), start.received)
 
-    def cycle(self, odometry: Odometry, now: float) -> tuple[Twist, bool]:
+    def cycle(self, odometry: Odometry, now_s: float) -> tuple[Twist, bool]:
         """One control cycle."""
-        cycle = self._goal_queue.tick(replace(_inputs(odometry), odometry=odometry), now)
+        cycle = self._goal_queue.tick(replace(_inputs(odometry), odometry=odometry), now_s)
         for end in cycle.ends:
             if end.outcome.code is not ErrorCode.OK:
                 raise RuntimeError(f"the goal failed: {end.outcome.message}")
@@ -57,7 +57,7 @@ class Lecture:
     def __init__(self, robot: Robot, case: Case, start: Odometry) -> None:
         self._case, self._start = case, start.pose
 
-    def cycle(self, odometry: Odometry, now: float) -> tuple[Twist, bool]:
+    def cycle(self, odometry: Odometry, now_s: float) -> tuple[Twist, bool]:
         """One turn of the loop."""
         pose = odometry.pose
         if math.hypot(pose.x_m - self._start.x_m, pose.y_m - self._start.y_m) >= abs(self._case.distance_m):
@@ -74,7 +74,7 @@ class StopProfile:
         self._case, self._start, self._limits = case, start.pose, robot.limits
         self._last_mps = 0.0
 
-    def cycle(self, odometry: Odometry, now: float) -> tuple[Twist, bool]:
+    def cycle(self, odometry: Odometry, now_s: float) -> tuple[Twist, bool]:
         """One cycle."""
         pose, limits = odometry.pose, self._limits
         driven_m = math.hypot(pose.x_m - self._start.x_m, pose.y_m - self._start.y_m)

@@ -85,14 +85,14 @@ class FakeRobot:
         end_s = time.monotonic() + 3.0
         while True:
             message = self._bus.recv(max(0.0, self._cycle_at - time.monotonic()))
-            now = time.monotonic()
+            now_s = time.monotonic()
             self._note(message)
             if done(message):
-                return now
-            if now >= end_s:
+                return now_s
+            if now_s >= end_s:
                 raise TimeoutError(f"nothing came for 3 s; the watchdog is in state {self.state}")
-            if now >= self._cycle_at:
-                self._cycle_at = max(self._cycle_at + CYCLE_S, now)
+            if now_s >= self._cycle_at:
+                self._cycle_at = max(self._cycle_at + CYCLE_S, now_s)
                 self._drive()
                 if leases and self._cycle % 2 == 0:
                     self.lease()

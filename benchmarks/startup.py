@@ -97,17 +97,17 @@ def _listen(bus: can.BusABC, count: int) -> tuple[float, float]:
     first_s, end_s = 0.0, time.monotonic() + 20.0
     while len(enabled) < count:
         message = bus.recv(0.1)
-        now = time.monotonic()
-        if now > end_s:
+        now_s = time.monotonic()
+        if now_s > end_s:
             raise TimeoutError(f"only {sorted(enabled)} of {count} drives are enabled after 20 s")
         if message is None:
             continue
         cob_id = message.arbitration_id
         if not first_s and (cob_id == 0x77F or cob_id == 0x000 or 0x600 < cob_id < 0x680):
-            first_s = now
+            first_s = now_s
         if 0x180 < cob_id <= 0x180 + count and message.data[0] & ENABLED_MASK == ENABLED:
             enabled.add(cob_id)
-    return first_s, now
+    return first_s, now_s
 
 
 def _bare() -> float:

@@ -64,10 +64,10 @@ def _bench() -> Callable[[], object]:
 
     def run() -> None:
         for _ in range(round(SECONDS * 100.0)):
-            rig.now += 0.01
+            rig.now_s += 0.01
             for frame in cycle:
-                rig.bench.on_frame(frame, rig.now)
-            rig.bench.tick(rig.now)
+                rig.bench.on_frame(frame, rig.now_s)
+            rig.bench.tick(rig.now_s)
 
     return run
 

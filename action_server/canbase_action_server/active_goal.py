@@ -47,47 +47,47 @@ class ActiveGoal:
         """Of the goal that owns the base; ENDED when there is none."""
         return self._goal.phase if self._goal else Phase.ENDED
 
-    def take(self, request: Request, inputs: Inputs, now: float) -> None:
+    def take(self, request: Request, inputs: Inputs, now_s: float) -> None:
         """The base now belongs to this goal. RuntimeError when it has an owner, or was never seen."""
         if self.busy or inputs.odometry is None:
             raise RuntimeError("a goal took a base that is not free, or of which no odometry was received")
         start = inputs.odometry
-        self._goal = GoalRun(self._robot, request.motion(self._robot, start), start, now)
+        self._goal = GoalRun(self._robot, request.motion(self._robot, start), start, now_s)
 
-    def tick(self, inputs: Inputs, now: float) -> Order | None:
+    def tick(self, inputs: Inputs, now_s: float) -> Order | None:
         """One control cycle. None: nothing is to be ordered, the source stays silent."""
         if self._goal is None:
-            return Order(STOP) if now < self._silent_from else None
+            return Order(STOP) if now_s < self._silent_from else None
         if self._failure is None:
-            order = self._goal.tick(inputs, now)
+            order = self._goal.tick(inputs, now_s)
         else:
-            order = self._end_failed(self._failure, self._goal.traveled_m, inputs, now)
+            order = self._end_failed(self._failure, self._goal.traveled_m, inputs, now_s)
         if order.end is not None:
-            self._release(now)
+            self._release(now_s)
         return order
 
-    def fail(self, error: Exception, now: float) -> None:
+    def fail(self, error: Exception, now_s: float) -> None:
         """Something in the server broke: from now on the goal only stops. The first failure stays."""
         if self._goal is not None and self._failure is None:
             limits = self._robot.limits
             stop = standstill_limits(self._robot, limits.deceleration_mps2)
-            self._failure = Failure(error, Standstill(stop, now, limits.linear_mps))
+            self._failure = Failure(error, Standstill(stop, now_s, limits.linear_mps))
 
-    def give_up(self, code: ErrorCode, message: str, now: float) -> Order | None:
+    def give_up(self, code: ErrorCode, message: str, now_s: float) -> Order | None:
         """Ends the goal at once, standing or not, because the process has no more time. None: there was no goal."""
         if self._goal is None:
             return None
         traveled_m = self._goal.traveled_m
-        self._release(now)
+        self._release(now_s)
         return Order(STOP, end=Outcome(code, traveled_m, 0.0, message))
 
-    def _end_failed(self, failure: Failure, traveled_m: float, inputs: Inputs, now: float) -> Order:
-        verdict = failure.standstill.judge(inputs, now)
+    def _end_failed(self, failure: Failure, traveled_m: float, inputs: Inputs, now_s: float) -> Order:
+        verdict = failure.standstill.judge(inputs, now_s)
         if verdict is Verdict.WAIT:
             return Order(STOP)
         message = f"defect in the action server ({failure.error!r}), see its log; the base {verdict.value}"
         return Order(STOP, end=Outcome(ErrorCode.INTERNAL, traveled_m, 0.0, message))
 
-    def _release(self, now: float) -> None:
+    def _release(self, now_s: float) -> None:
         self._goal = None
-        self._silent_from = now + FAREWELL_S
+        self._silent_from = now_s + FAREWELL_S

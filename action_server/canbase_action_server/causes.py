@@ -30,7 +30,7 @@ class Situation:
     """What the rows look at: the inputs, the limits of time, and what the goal itself has measured."""
 
     inputs: Inputs
-    now: float
+    now_s: float
     own_source: str
     odometry_timeout_s: float
     gap_s: float
@@ -79,7 +79,7 @@ def _drive_fault(s: Situation) -> str | None:
 
 def _odometry_lost(s: Situation) -> str | None:
     odometry = s.inputs.odometry
-    age = age_s(odometry.received if odometry else None, s.now)
+    age = age_s(odometry.received if odometry else None, s.now_s)
     if s.pose_was_reset:
         return "the pose of the odometry was set anew during the goal, or missed some travel: send a new goal"
     if s.odometry_jumped:

@@ -59,13 +59,13 @@ class Order:
 class GoalRun:
     """A goal that owns the base. `tick` once per control cycle until it gives an end."""
 
-    def __init__(self, robot: Robot, motion: Motion, start: Odometry, now: float) -> None:
+    def __init__(self, robot: Robot, motion: Motion, start: Odometry, now_s: float) -> None:
         """`motion` begins at `start`."""
         self._robot = robot
         self._motion = motion
         self._own_source = action_source(robot)
         self._overall_s = robot.action.overall_factor * self._motion.ideal_s + robot.action.overall_extra_s
-        self._started = self._ticked_at = now
+        self._started = self._ticked_at = now_s
         self._gap_s = 0.0
         self._phase = Phase.DRIVING
         self._cause = EndCause(ErrorCode.OK, "")
@@ -77,8 +77,8 @@ class GoalRun:
         self._pose_was_reset = False
         self._stopped_since: float | None = None
         self._best_remaining_m = self._motion.remaining_m
-        self._progress_time = now
-        self._next_feedback = now
+        self._progress_time = now_s
+        self._next_feedback = now_s
 
     @property
     def phase(self) -> Phase:
@@ -90,16 +90,16 @@ class GoalRun:
         """Along the way, signed [m]."""
         return self._motion.traveled_m
 
-    def tick(self, inputs: Inputs, now: float) -> Order:
+    def tick(self, inputs: Inputs, now_s: float) -> Order:
         """What to order now, what to tell the client, and whether this was the end. RuntimeError after the end."""
         if self._phase is Phase.ENDED:
             raise RuntimeError("the goal has ended: it orders nothing any more")
-        self._gap_s, self._ticked_at = now - self._ticked_at, now
-        self._observe(inputs, now)
-        order = self._drive(inputs, now) if self._phase is Phase.DRIVING else self._stop(inputs, now)
-        return replace(order, feedback=self._feedback(now))
+        self._gap_s, self._ticked_at = now_s - self._ticked_at, now_s
+        self._observe(inputs, now_s)
+        order = self._drive(inputs, now_s) if self._phase is Phase.DRIVING else self._stop(inputs, now_s)
+        return replace(order, feedback=self._feedback(now_s))
 
-    def _observe(self, inputs: Inputs, now: float) -> None:
+    def _observe(self, inputs: Inputs, now_s: float) -> None:
         odometry, safety = inputs.odometry, inputs.safety
         if inputs.driver is not None:
             at_start = self._pose_resets = inputs.driver.pose_resets if self._pose_resets is None else self._pose_resets
@@ -109,53 +109,53 @@ class GoalRun:
             self._jumped = self._jumped or (known and not self._motion.observe(odometry))
             self._last_odometry = odometry
         if self._best_remaining_m - self._motion.remaining_m >= PROGRESS_M:
-            self._best_remaining_m, self._progress_time = self._motion.remaining_m, now
-        since = now if self._stopped_since is None else self._stopped_since
+            self._best_remaining_m, self._progress_time = self._motion.remaining_m, now_s
+        since = now_s if self._stopped_since is None else self._stopped_since
         self._stopped_since = since if safety is not None and safety.stops else None
 
-    def _situation(self, inputs: Inputs, now: float) -> Situation:
+    def _situation(self, inputs: Inputs, now_s: float) -> Situation:
         action = self._robot.action
         return Situation(
             inputs=inputs,
-            now=now,
+            now_s=now_s,
             own_source=self._own_source,
             odometry_timeout_s=self._robot.timeouts.odometry_s,
             gap_s=self._gap_s,
             odometry_jumped=self._jumped,
             pose_was_reset=self._pose_was_reset,
             off_course=self._motion.strayed(action.lateral_tolerance_m, action.heading_tolerance_rad),
-            stopped_s=0.0 if self._stopped_since is None else now - self._stopped_since,
+            stopped_s=0.0 if self._stopped_since is None else now_s - self._stopped_since,
             stopped_patience_s=STOPPED_PATIENCE_S,
-            no_progress_s=now - self._progress_time,
+            no_progress_s=now_s - self._progress_time,
             progress_timeout_s=action.progress_timeout_s,
-            running_s=now - self._started,
+            running_s=now_s - self._started,
             overall_timeout_s=self._overall_s,
         )
 
-    def _drive(self, inputs: Inputs, now: float) -> Order:
-        cause = cause_while_driving(self._situation(inputs, now))
+    def _drive(self, inputs: Inputs, now_s: float) -> Order:
+        cause = cause_while_driving(self._situation(inputs, now_s))
         if cause and cause.code is ErrorCode.NO_PROGRESS and self._near_enough():
             cause = EndCause(ErrorCode.OK, "")
-        twist = None if cause else self._motion.order(now)
+        twist = None if cause else self._motion.order(now_s)
         if twist is not None:
             return Order(twist)
         self._cause = cause or EndCause(ErrorCode.OK, "")
         self._go(Phase.STOPPING)
         limits = standstill_limits(self._robot, self._motion.deceleration_mps2)
-        self._standstill = Standstill(limits, now, self._motion.speed_mps(self._last_odometry))
-        return Order(self._motion.stop(now))
+        self._standstill = Standstill(limits, now_s, self._motion.speed_mps(self._last_odometry))
+        return Order(self._motion.stop(now_s))
 
-    def _stop(self, inputs: Inputs, now: float) -> Order:
-        self._motion.stop(now)
-        self._cause = cause_while_stopping(self._situation(inputs, now), self._cause.code) or self._cause
-        verdict = self._standstill.judge(inputs, now) if self._standstill else Verdict.WAIT
+    def _stop(self, inputs: Inputs, now_s: float) -> Order:
+        self._motion.stop(now_s)
+        self._cause = cause_while_stopping(self._situation(inputs, now_s), self._cause.code) or self._cause
+        verdict = self._standstill.judge(inputs, now_s) if self._standstill else Verdict.WAIT
         if self._cause.code is ErrorCode.TAKEN_OVER:
             verdict = Verdict.HANDED_OVER
         if verdict is Verdict.WAIT:
             return Order(STOP)
         if self._stands_short(verdict):
             self._go(Phase.DRIVING)
-            self._progress_time = now
+            self._progress_time = now_s
             return Order(STOP)
         self._go(Phase.ENDED)
         return Order(STOP, end=self._outcome(verdict))
@@ -181,10 +181,10 @@ class GoalRun:
         text = f"{cause.message}; {went}" if cause.message else f"{went}, and stands"
         return Outcome(cause.code, motion.traveled_m, max(0.0, motion.overshoot_m), text, verdict is Verdict.STANDS)
 
-    def _feedback(self, now: float) -> Feedback | None:
-        if now < self._next_feedback:
+    def _feedback(self, now_s: float) -> Feedback | None:
+        if now_s < self._next_feedback:
             return None
-        self._next_feedback = now + 1.0 / self._robot.action.feedback_hz
+        self._next_feedback = now_s + 1.0 / self._robot.action.feedback_hz
         return Feedback(self._motion.traveled_m, self._motion.remaining_m)
 
     def _go(self, phase: Phase) -> None:

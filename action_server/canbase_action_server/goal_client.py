@@ -233,7 +233,7 @@ class SentGoal(Generic[ResultT]):
         return bool(response.result().goals_canceling)
 
     def _server_lost(self) -> bool:
-        now = time.monotonic()
+        now_s = time.monotonic()
         if self._client.server_ready:
-            self._seen = now
-        return now - self._seen > SERVER_LOST_S
+            self._seen = now_s
+        return now_s - self._seen > SERVER_LOST_S

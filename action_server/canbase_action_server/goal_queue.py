@@ -88,19 +88,19 @@ class GoalQueue:
         """Of the goal that owns the base; ENDED when there is none."""
         return self._owner.phase
 
-    def refusal(self, request: Request, inputs: Inputs, now: float) -> str | None:
+    def refusal(self, request: Request, inputs: Inputs, now_s: float) -> str | None:
         """Why a goal with these numbers is rejected; None: it may be admitted."""
-        return request.range_reason(self._robot) or self._no_place() or state_reason(self._robot, inputs, now)
+        return request.range_reason(self._robot) or self._no_place() or state_reason(self._robot, inputs, now_s)
 
-    def admit(self, key: str, request: Request, inputs: Inputs, now: float) -> None:
+    def admit(self, key: str, request: Request, inputs: Inputs, now_s: float) -> None:
         """From now on the goal waits for the base. RuntimeError when `refusal` would have refused it."""
-        reason = self.refusal(request, inputs, now)
+        reason = self.refusal(request, inputs, now_s)
         if reason is not None or key in (goal.key for goal in self._goals()):
             raise RuntimeError(f"goal {key} was admitted, but it is known already, or refused: {reason}")
         if self._robot.action.goal_policy == "preempt":
             for goal in self._goals():
                 goal.preempted = True
-        self._waiting.append(Admitted(key, request, now))
+        self._waiting.append(Admitted(key, request, now_s))
 
     def cancel(self, key: str) -> bool:
         """A client wants the goal to end. False: no such goal runs or waits."""
@@ -109,21 +109,21 @@ class GoalQueue:
             goal.canceled = True
         return bool(found)
 
-    def keepalive(self, key: str, now: float) -> None:
+    def keepalive(self, key: str, now_s: float) -> None:
         """The client of this goal lives. Nothing happens when no such goal runs or waits."""
         for goal in self._goals():
             if goal.key == key:
-                goal.heard, goal.alive = now, True
+                goal.heard, goal.alive = now_s, True
 
-    def tick(self, inputs: Inputs, now: float) -> Cycle:
+    def tick(self, inputs: Inputs, now_s: float) -> Cycle:
         """One control cycle."""
-        ends = self._drop(inputs, now)
-        began = self._begin(inputs, now)
+        ends = self._drop(inputs, now_s)
+        began = self._begin(inputs, now_s)
         running = self._running
         if running is not None:
-            lost = self._client_lost(running, now)
+            lost = self._client_lost(running, now_s)
             inputs = replace(inputs, cancel_requested=running.canceled, preempted=running.preempted, client_lost=lost)
-        order = self._owner.tick(inputs, now)
+        order = self._owner.tick(inputs, now_s)
         if order is None:
             return Cycle(began=began, ends=ends)
         if running is None:
@@ -131,14 +131,14 @@ class GoalQueue:
         feedback = (running.key, order.feedback) if order.feedback else None
         return Cycle(order.twist, began, feedback, ends + self._ended(order))
 
-    def fail(self, error: Exception, now: float) -> None:
+    def fail(self, error: Exception, now_s: float) -> None:
         """Something in the server broke: the running goal only stops, all end with INTERNAL."""
         self._failed = True
-        self._owner.fail(error, now)
+        self._owner.fail(error, now_s)
 
-    def give_up(self, code: ErrorCode, message: str, now: float) -> Cycle:
+    def give_up(self, code: ErrorCode, message: str, now_s: float) -> Cycle:
         """Ends all goals at once, the base standing or not, because the process has no more time."""
-        order = self._owner.give_up(code, message, now)
+        order = self._owner.give_up(code, message, now_s)
         return Cycle(STOP, ends=(self._ended(order) if order else ()) + self._flush(EndCause(code, message)))
 
     def _goals(self) -> tuple[Admitted, ...]:
@@ -152,34 +152,34 @@ class GoalQueue:
             return f"busy: {len(self._waiting)} goals wait already (action.queue_length)"
         return None
 
-    def _client_lost(self, goal: Admitted, now: float) -> bool:
+    def _client_lost(self, goal: Admitted, now_s: float) -> bool:
         action = self._robot.action
-        return action.require_client_lease and now - goal.heard > action.client_lease_s
+        return action.require_client_lease and now_s - goal.heard > action.client_lease_s
 
-    def _drop(self, inputs: Inputs, now: float) -> tuple[End, ...]:
+    def _drop(self, inputs: Inputs, now_s: float) -> tuple[End, ...]:
         """The ends of those that shall not wait any longer."""
-        causes = [(goal, self._against_waiting(goal, inputs, now)) for goal in self._waiting]
+        causes = [(goal, self._against_waiting(goal, inputs, now_s)) for goal in self._waiting]
         self._waiting = deque(goal for goal, cause in causes if cause is None)
         return tuple(End(goal.key, _not_started(cause)) for goal, cause in causes if cause is not None)
 
-    def _against_waiting(self, goal: Admitted, inputs: Inputs, now: float) -> EndCause | None:
+    def _against_waiting(self, goal: Admitted, inputs: Inputs, now_s: float) -> EndCause | None:
         if self._failed:
             return EndCause(ErrorCode.INTERNAL, "defect in the action server, see its log")
         if goal.canceled:
             return EndCause(ErrorCode.CANCELED, "canceled by request")
         if goal.preempted:
             return EndCause(ErrorCode.PREEMPTED, "a newer goal takes its place")
-        if self._client_lost(goal, now):
+        if self._client_lost(goal, now_s):
             return EndCause(ErrorCode.CLIENT_LOST, CLIENT_SILENT)
         return EndCause(ErrorCode.SHUTDOWN, "the action server is shutting down") if inputs.shutdown else None
 
-    def _begin(self, inputs: Inputs, now: float) -> str | None:
+    def _begin(self, inputs: Inputs, now_s: float) -> str | None:
         if self._owner.busy or not self._waiting:
             return None
         goal = self._waiting[0]
         if self._robot.action.require_client_lease and not goal.alive:
             return None
-        self._owner.take(goal.request, inputs, now)
+        self._owner.take(goal.request, inputs, now_s)
         self._running = self._waiting.popleft()
         return goal.key
 

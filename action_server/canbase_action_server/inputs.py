@@ -86,6 +86,6 @@ class Inputs:
     shutdown: bool = False
 
 
-def age_s(received: float | None, now: float) -> float:
+def age_s(received: float | None, now_s: float) -> float:
     """Time since `received`; infinite when nothing was received."""
-    return math.inf if received is None else now - received
+    return math.inf if received is None else now_s - received

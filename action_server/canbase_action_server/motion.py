@@ -69,14 +69,14 @@ class Motion(ABC):
         self.overshoot_m = max(self.overshoot_m, -self.remaining_m)
         return True
 
-    def order(self, now: float) -> Twist | None:
+    def order(self, now_s: float) -> Twist | None:
         """The velocity to order now. None: order to stand, the way is gone."""
-        speed_mps = self._profile.order(self.remaining_m, self._last.received, now)
+        speed_mps = self._profile.order(self.remaining_m, self._last.received, now_s)
         return None if speed_mps is None else self._twist(speed_mps)
 
-    def stop(self, now: float) -> Twist:
+    def stop(self, now_s: float) -> Twist:
         """The order to stand, remembered by the profile."""
-        self._profile.stop(now)
+        self._profile.stop(now_s)
         return STOP
 
     @property

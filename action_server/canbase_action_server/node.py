@@ -150,14 +150,14 @@ class DriveDistanceServer(Node):
         )
 
     def _on_keepalive(self, goal_id: UUID) -> None:
-        now = time.monotonic()
-        if not self._keepalive_times.waited(now):
-            self._goal_queue.keepalive(bytes(goal_id.uuid).hex(), now)
+        now_s = time.monotonic()
+        if not self._keepalive_times.waited(now_s):
+            self._goal_queue.keepalive(bytes(goal_id.uuid).hex(), now_s)
 
     def _on_goal(self, binding: Binding, goal: Any) -> GoalResponse:
-        now = time.monotonic()
-        old = OLD if self._request_times.waited(now) else None
-        reason = old or self._goal_queue.refusal(binding.request(goal), self._inputs, now)
+        now_s = time.monotonic()
+        old = OLD if self._request_times.waited(now_s) else None
+        reason = old or self._goal_queue.refusal(binding.request(goal), self._inputs, now_s)
         if reason is None:
             return GoalResponse.ACCEPT
         # rclpy does not tell the UUID of a goal that is not accepted yet.
@@ -165,9 +165,9 @@ class DriveDistanceServer(Node):
         return GoalResponse.REJECT
 
     def _on_accepted(self, binding: Binding, handle: ServerGoalHandle) -> None:
-        goal, now, uuid = handle.request, time.monotonic(), uuid_of(handle)
-        self._goal_queue.admit(uuid, binding.request(goal), self._inputs, now)
-        self._open[uuid] = OpenGoal(handle, binding, now)
+        goal, now_s, uuid = handle.request, time.monotonic(), uuid_of(handle)
+        self._goal_queue.admit(uuid, binding.request(goal), self._inputs, now_s)
+        self._open[uuid] = OpenGoal(handle, binding, now_s)
         self._log("accepted", uuid, action=binding.name, **numbers(goal))
 
     def _on_cancel(self, handle: ServerGoalHandle) -> CancelResponse:

@@ -21,16 +21,16 @@ def action_source(robot: Robot) -> str:
     return next((name for name, source in sources if source.topic == "cmd_vel_action" and source.stamped), "")
 
 
-def state_reason(robot: Robot, inputs: Inputs, now: float) -> str | None:
+def state_reason(robot: Robot, inputs: Inputs, now_s: float) -> str | None:
     """Why the robot cannot start a goal now; None: it can."""
     if inputs.shutdown:
         return "the action server is shutting down"
     if not action_source(robot):
         return NO_SOURCE
-    return _silence(robot, inputs, now) or _condition(robot, inputs)
+    return _silence(robot, inputs, now_s) or _condition(robot, inputs)
 
 
-def _silence(robot: Robot, inputs: Inputs, now: float) -> str | None:
+def _silence(robot: Robot, inputs: Inputs, now_s: float) -> str | None:
     odometry, safety, driver, mux = inputs.odometry, inputs.safety, inputs.driver, inputs.mux
     for topic, node, received, timeout_s in (
         ("odom", "motor_driver", odometry.received if odometry else None, robot.timeouts.odometry_s),
@@ -40,8 +40,8 @@ def _silence(robot: Robot, inputs: Inputs, now: float) -> str | None:
     ):
         if received is None:
             return f"nothing received on {topic} yet; is {node} running?"
-        if age_s(received, now) > timeout_s:
-            return f"{topic} is silent for {age_s(received, now):.2f} s (timeout {timeout_s} s); is {node} running?"
+        if age_s(received, now_s) > timeout_s:
+            return f"{topic} is silent for {age_s(received, now_s):.2f} s (timeout {timeout_s} s); is {node} running?"
     return None
 
 

@@ -66,39 +66,39 @@ class Profile:
         self._orders: deque[tuple[float, float]] = deque()
         self._acceleration_mps2 = 0.0
 
-    def pending_m(self, odometry_time: float, now: float) -> float:
+    def pending_m(self, odometry_time: float, now_s: float) -> float:
         """Distance [m] that was ordered, but cannot be part of odometry received at `odometry_time` yet."""
         since = odometry_time - self._limits.chain_latency_s
         while len(self._orders) > 1 and self._orders[1][0] <= since:
             self._orders.popleft()
-        steps = pairwise([*self._orders, (now, 0.0)])
+        steps = pairwise([*self._orders, (now_s, 0.0)])
         return sum(speed * max(0.0, end - max(start, since)) for (start, speed), (end, _) in steps)
 
-    def order(self, remaining_m: float, odometry_time: float, now: float) -> float | None:
+    def order(self, remaining_m: float, odometry_time: float, now_s: float) -> float | None:
         """Speed to order now, >= 0 [m/s]. None: order to stand, then the drives end at the distance.
 
         `remaining_m` is what odometry received at `odometry_time` leaves to drive. Call once per control cycle.
         """
-        left_m = remaining_m - self.pending_m(odometry_time, now)
+        left_m = remaining_m - self.pending_m(odometry_time, now_s)
         if left_m <= 0.0:
-            self.stop(now)
+            self.stop(now_s)
             return None
-        speed_mps = self._speed(left_m, now)
-        self._orders.append((now, speed_mps))
+        speed_mps = self._speed(left_m, now_s)
+        self._orders.append((now_s, speed_mps))
         return speed_mps
 
-    def stop(self, now: float) -> None:
-        """Zero is ordered from `now` on."""
-        self._orders.append((now, 0.0))
+    def stop(self, now_s: float) -> None:
+        """Zero is ordered from `now_s` on."""
+        self._orders.append((now_s, 0.0))
         self._acceleration_mps2 = 0.0
 
-    def _speed(self, left_m: float, now: float) -> float:
+    def _speed(self, left_m: float, now_s: float) -> float:
         limits = self._limits
-        last_time, last_mps = self._orders[-1] if self._orders else (now, 0.0)
+        last_time, last_mps = self._orders[-1] if self._orders else (now_s, 0.0)
         curve_mps = braking_speed_mps(left_m, BRAKING_SHARE * limits.deceleration_mps2, limits.jerk_mps3)
         end_mps = max(END_GAIN_PER_S * left_m, limits.crawl_mps)
         wanted_mps = min(limits.speed_mps, max(curve_mps, limits.crawl_mps), end_mps)
-        return min(wanted_mps, self._ramped(last_mps, now - last_time))
+        return min(wanted_mps, self._ramped(last_mps, now_s - last_time))
 
     def _ramped(self, last_mps: float, elapsed_s: float) -> float:
         """Highest speed that acceleration and jerk allow after `last_mps`, rounding off towards the goal's speed."""

@@ -52,16 +52,16 @@ class Standstill:
         self._braked = self._counts_from + abs(speed_mps) / limits.deceleration_mps2 + BRAKING_RESERVE_S
         self._standing_since: float | None = None
 
-    def judge(self, inputs: Inputs, now: float) -> Verdict:
+    def judge(self, inputs: Inputs, now_s: float) -> Verdict:
         """Call once per control cycle."""
         odometry, driver = inputs.odometry, inputs.driver
-        if odometry and age_s(odometry.received, now) <= self._limits.odometry_timeout_s:
+        if odometry and age_s(odometry.received, now_s) <= self._limits.odometry_timeout_s:
             stands = self._seen_standing(odometry)
-            return self._or_give_up(stands, now)
+            return self._or_give_up(stands, now_s)
         self._standing_since = None
-        if driver and age_s(driver.received, now) <= DRIVER_AGE_S:
-            return self._or_give_up(self._driver_says_so(driver), now)
-        return Verdict.NOT_MEASURED if now >= self._braked else Verdict.WAIT
+        if driver and age_s(driver.received, now_s) <= DRIVER_AGE_S:
+            return self._or_give_up(self._driver_says_so(driver), now_s)
+        return Verdict.NOT_MEASURED if now_s >= self._braked else Verdict.WAIT
 
     def _seen_standing(self, odometry: Odometry) -> bool:
         limits = self._limits
@@ -77,7 +77,7 @@ class Standstill:
     def _driver_says_so(self, driver: Driver) -> bool:
         return driver.standstill and driver.received >= self._counts_from
 
-    def _or_give_up(self, stands: bool, now: float) -> Verdict:
+    def _or_give_up(self, stands: bool, now_s: float) -> Verdict:
         if stands:
             return Verdict.STANDS
-        return Verdict.STILL_MOVES if now >= self._give_up else Verdict.WAIT
+        return Verdict.STILL_MOVES if now_s >= self._give_up else Verdict.WAIT

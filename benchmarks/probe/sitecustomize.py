@@ -25,9 +25,9 @@ def _begin(_number: int, _frame: FrameType | None) -> None:
 
     usual = DriverCore.tick
 
-    def tick(self: DriverCore, now: float, lateness_s: float = 0.0) -> list[Frame]:
+    def tick(self: DriverCore, now_s: float, lateness_s: float = 0.0) -> list[Frame]:
         _seen.append(lateness_s)
-        return usual(self, now, lateness_s)
+        return usual(self, now_s, lateness_s)
 
     DriverCore.tick = tick  # type: ignore[method-assign]
 

@@ -103,10 +103,10 @@ def _listen(node: Node) -> dict[str, tuple[Any, float]]:
     return kept
 
 
-def _snapshot(robot: str, kept: dict[str, tuple[Any, float]], now: float) -> Snapshot:
+def _snapshot(robot: str, kept: dict[str, tuple[Any, float]], now_s: float) -> Snapshot:
     from canbase_cli.monitor_picture import Heard, Snapshot
 
-    return Snapshot(robot, **{name: Heard(message, now - at_s) for name, (message, at_s) in kept.items()})
+    return Snapshot(robot, **{name: Heard(message, now_s - at_s) for name, (message, at_s) in kept.items()})
 
 
 def _end_signals() -> list[int]:

@@ -57,13 +57,13 @@ class HeardNode:
         gaps = [b - a for a, b in zip(self.heartbeats_at, self.heartbeats_at[1:], strict=False)]
         return statistics.median(gaps) if gaps else math.nan
 
-    def heartbeat_age_s(self, now: float) -> float:
+    def heartbeat_age_s(self, now_s: float) -> float:
         """Seconds since the last one; NaN: none."""
-        return now - self.heartbeats_at[-1] if self.heartbeats_at else math.nan
+        return now_s - self.heartbeats_at[-1] if self.heartbeats_at else math.nan
 
-    def pdo_age_s(self, now: float) -> float:
+    def pdo_age_s(self, now_s: float) -> float:
         """Seconds since the last TPDO of any kind; NaN: none."""
-        return now - max(self.pdo_at.values()) if self.pdo_at else math.nan
+        return now_s - max(self.pdo_at.values()) if self.pdo_at else math.nan
 
     @property
     def state_text(self) -> str:
@@ -78,8 +78,8 @@ class HeardNode:
 class Listener:
     """Takes every frame of others, and says what it tells."""
 
-    def __init__(self, now: float) -> None:
-        self.since = now
+    def __init__(self, now_s: float) -> None:
+        self.since = now_s
         self.nodes: dict[int, HeardNode] = {}
         self.frames = 0
         self.bits = 0
@@ -92,22 +92,22 @@ class Listener:
         self._sdo_asked_at: dict[int, float] = {}
         self._syncs = 0
 
-    def on_frame(self, frame: Frame, now: float) -> None:
+    def on_frame(self, frame: Frame, now_s: float) -> None:
         """Take one frame."""
         self.frames += 1
         self.bits += frame_bits(len(frame.data))
-        if not self._on_watchdog(frame, now) and not self._on_master(frame, now):
-            self._on_node(frame, now)
+        if not self._on_watchdog(frame, now_s) and not self._on_master(frame, now_s):
+            self._on_node(frame, now_s)
 
-    def _on_watchdog(self, frame: Frame, now: float) -> bool:
+    def _on_watchdog(self, frame: Frame, now_s: float) -> bool:
         state, counters = parse_state(frame), parse_counters(frame)
         if state is not None:
-            self.watchdog, self.watchdog_at = state, now
+            self.watchdog, self.watchdog_at = state, now_s
         if counters is not None:
             self.counters = counters
         return state is not None or counters is not None
 
-    def _on_master(self, frame: Frame, now: float) -> bool:
+    def _on_master(self, frame: Frame, now_s: float) -> bool:
         function, node_id = frame.cob_id & 0x780, frame.cob_id & 0x7F
         if frame.cob_id == SYNC:
             self._syncs += 1
@@ -117,46 +117,46 @@ class Listener:
             self._setpoints[node_id] += 1
         elif function == SDO_TO_SERVER and node_id:
             self._sdo_requests[node_id] += 1
-            self._sdo_asked_at[node_id] = now
+            self._sdo_asked_at[node_id] = now_s
         else:
             return False
         return True
 
-    def _on_node(self, frame: Frame, now: float) -> None:
+    def _on_node(self, frame: Frame, now_s: float) -> None:
         function, node_id = frame.cob_id & 0x780, frame.cob_id & 0x7F
         parsed = parse_heartbeat(frame)
         if not 1 <= node_id <= MAX_NODE_ID or (function not in (*TPDO, EMCY, SDO_TO_CLIENT) and parsed is None):
             return
         node = self.nodes.setdefault(node_id, HeardNode(node_id))
         if parsed is not None:
-            self._on_heartbeat(node, parsed[1], now)
+            self._on_heartbeat(node, parsed[1], now_s)
         elif function in TPDO:
-            node.pdo_at[function] = now
+            node.pdo_at[function] = now_s
         elif function == SDO_TO_CLIENT:
             node.sdo_answers += 1
         else:
             emcy = parse_emcy(frame)
             node.emcy = None if emcy is None or emcy.is_reset else emcy
 
-    def _on_heartbeat(self, node: HeardNode, state: NmtState | None, now: float) -> None:
+    def _on_heartbeat(self, node: HeardNode, state: NmtState | None, now_s: float) -> None:
         node.nmt_state = state
         if state is NmtState.INITIALISING:
             node.nmt_state = NmtState.PRE_OPERATIONAL
         else:
-            node.heartbeats_at.append(now)
+            node.heartbeats_at.append(now_s)
 
-    def sdo_free(self, node_id: int, now: float) -> bool:
+    def sdo_free(self, node_id: int, now_s: float) -> bool:
         """Whether nobody else has asked this node by SDO for a while."""
-        return now - self._sdo_asked_at.get(node_id, -math.inf) > SDO_QUIET_S
+        return now_s - self._sdo_asked_at.get(node_id, -math.inf) > SDO_QUIET_S
 
     @property
     def driver_lives(self) -> bool:
         """Whether canbase's own driver is on this bus."""
         return DRIVER_NODE_ID in self.nodes
 
-    def masters(self, now: float) -> list[str]:
+    def masters(self, now_s: float) -> list[str]:
         """A sentence for each sign that somebody else commands this bus."""
-        seconds = max(now - self.since, 1e-3)
+        seconds = max(now_s - self.since, 1e-3)
         signs = [f"heartbeat of node {node_id}, {OURS[node_id]}" for node_id in sorted(OURS) if node_id in self.nodes]
         if self._syncs:
             signs.append(f"SYNC, {self._syncs / seconds:.0f} a second")
@@ -169,9 +169,9 @@ class Listener:
             signs.append(f"SDO requests to {_nodes(self._sdo_requests)}")
         return signs
 
-    def load(self, bitrate: int, now: float) -> float:
+    def load(self, bitrate: int, now_s: float) -> float:
         """Share of the bus's time that the frames took, at most; 0 to 1 and a little more where `bitrate` is wrong."""
-        return self.bits / bitrate / max(now - self.since, 1e-3)
+        return self.bits / bitrate / max(now_s - self.since, 1e-3)
 
 
 def _nodes(counter: Counter[int]) -> str:
@@ -183,26 +183,26 @@ class ListenSession:
 
     def __init__(self, duration_s: float) -> None:
         self.heard = Listener(0.0)
-        self.now = 0.0
+        self.now_s = 0.0
         self._duration_s = duration_s
         self._started = False
 
     @property
     def done(self) -> bool:
         """Whether the time is over."""
-        return self._started and self.now - self.heard.since >= self._duration_s
+        return self._started and self.now_s - self.heard.since >= self._duration_s
 
-    def on_frame(self, frame: Frame, now: float) -> None:
+    def on_frame(self, frame: Frame, now_s: float) -> None:
         """Take a frame."""
-        self._begin(now)
-        self.heard.on_frame(frame, now)
+        self._begin(now_s)
+        self.heard.on_frame(frame, now_s)
 
-    def tick(self, now: float) -> list[Frame]:
+    def tick(self, now_s: float) -> list[Frame]:
         """Sends nothing, ever."""
-        self._begin(now)
-        self.now = now
+        self._begin(now_s)
+        self.now_s = now_s
         return []
 
-    def _begin(self, now: float) -> None:
+    def _begin(self, now_s: float) -> None:
         if not self._started:
-            self._started, self.heard = True, Listener(now)
+            self._started, self.heard = True, Listener(now_s)

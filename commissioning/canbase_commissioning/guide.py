@@ -108,20 +108,20 @@ class Guide(Generic[T]):
         self._give_up_at = 0.0
         self._has_begun = False
 
-    def on_frame(self, frame: Frame, now: float) -> None:
+    def on_frame(self, frame: Frame, now_s: float) -> None:
         """Take a frame."""
-        self.rig.on_frame(frame, now)
+        self.rig.on_frame(frame, now_s)
 
-    def tick(self, now: float) -> list[Frame]:
+    def tick(self, now_s: float) -> list[Frame]:
         """Let time pass. Raises RigError, CommissionError."""
-        frames = self.rig.tick(now)
+        frames = self.rig.tick(now_s)
         if not self._has_begun:
             self._has_begun = True
-            self._go_on(None, now)
+            self._go_on(None, now_s)
         elif self._until is not None:
-            held = self._until.holds(now)
-            if held or now >= self._give_up_at:
-                self._go_on(held, now)
+            held = self._until.holds(now_s)
+            if held or now_s >= self._give_up_at:
+                self._go_on(held, now_s)
         return frames
 
     def answer(self, text: str) -> None:
@@ -134,9 +134,9 @@ class Guide(Generic[T]):
         if self.question.confirms:
             _confirm(text)
         value = self.question.check(text)
-        self._go_on(value, self.rig.now)
+        self._go_on(value, self.rig.now_s)
 
-    def _go_on(self, answer: object, now: float) -> None:
+    def _go_on(self, answer: object, now_s: float) -> None:
         self._until = self.question = None
         while True:
             try:
@@ -149,7 +149,7 @@ class Guide(Generic[T]):
                 answer = None
                 continue
             if isinstance(step, Until):
-                self._until, self._give_up_at = step, now + step.timeout_s
+                self._until, self._give_up_at = step, now_s + step.timeout_s
             else:
                 self.question = step
             return

@@ -93,19 +93,19 @@ class Identification:
         """Who answered."""
         return {task.node_id: task.result for task in self._tasks if isinstance(task.result, NodeCard)}
 
-    def on_frame(self, frame: Frame, now: float) -> None:
+    def on_frame(self, frame: Frame, now_s: float) -> None:
         """Take a frame."""
-        self._heard.on_frame(frame, now)
+        self._heard.on_frame(frame, now_s)
         for task in self._tasks:
-            self._pending += task.on_frame(frame, now)
+            self._pending += task.on_frame(frame, now_s)
 
-    def tick(self, now: float) -> list[Frame]:
+    def tick(self, now_s: float) -> list[Frame]:
         """The questions that are due."""
         if not self._tasks:
-            self._tasks = [self._task(node_id, now + i * STAGGER_S) for i, node_id in enumerate(self._node_ids)]
+            self._tasks = [self._task(node_id, now_s + i * STAGGER_S) for i, node_id in enumerate(self._node_ids)]
         frames, self._pending = self._pending, []
         for task in self._tasks:
-            frames += task.tick(now)
+            frames += task.tick(now_s)
             if task.error is not None:
                 self.lost[task.node_id] = str(task.error)
         return frames
@@ -117,5 +117,5 @@ class Identification:
             identify(node_id, self._with_texts),
             client,
             not_before=not_before,
-            free=lambda now: self._heard.sdo_free(node_id, now),
+            free=lambda now_s: self._heard.sdo_free(node_id, now_s),
         )

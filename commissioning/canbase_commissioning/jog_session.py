@@ -31,15 +31,15 @@ class DeadMan:
         self._pressed_at = -math.inf
         self._is_held = False
 
-    def press(self, key: str, now: float) -> None:
+    def press(self, key: str, now_s: float) -> None:
         """A key arrived. Another one than the last begins anew."""
-        in_time = now - self._pressed_at <= (HELD_S if self._is_held else FIRST_S)
+        in_time = now_s - self._pressed_at <= (HELD_S if self._is_held else FIRST_S)
         self._is_held = key in KEYS and key == self._key and in_time
-        self._key, self._pressed_at = key, now
+        self._key, self._pressed_at = key, now_s
 
-    def direction(self, now: float) -> int:
+    def direction(self, now_s: float) -> int:
         """+1 forward, -1 backward, 0 stand."""
-        if self._is_held and now - self._pressed_at > HELD_S:
+        if self._is_held and now_s - self._pressed_at > HELD_S:
             self._is_held, self._key = False, ""
         return KEYS[self._key] if self._is_held else 0
 
@@ -72,24 +72,24 @@ class JogSession:
         way = f"{self._axis.position_rad / (2.0 * math.pi):+.3f} rev"
         return f"{self._joint}: {state}, {self._axis.velocity_mps:+.3f} m/s, {way}"
 
-    def press(self, keys: str, now: float) -> None:
+    def press(self, keys: str, now_s: float) -> None:
         """Characters from the terminal."""
         for key in split_keys(keys):
-            self._dead_man.press(key, now)
+            self._dead_man.press(key, now_s)
             self.done = self.done or key in QUIT
 
-    def on_frame(self, frame: Frame, now: float) -> None:
+    def on_frame(self, frame: Frame, now_s: float) -> None:
         """Take a frame."""
-        self._rig.on_frame(frame, now)
+        self._rig.on_frame(frame, now_s)
 
-    def tick(self, now: float) -> list[Frame]:
+    def tick(self, now_s: float) -> list[Frame]:
         """Power comes with the first wish, goes a while after the last one."""
-        direction = self._dead_man.direction(now) if self._rig.ready else 0
+        direction = self._dead_man.direction(now_s) if self._rig.ready else 0
         if direction:
-            self._moved_at = now
+            self._moved_at = now_s
             self._rig.speeds_mps = {self._joint: direction * self._speed_mps}
-        elif now - self._moved_at <= IDLE_S:
+        elif now_s - self._moved_at <= IDLE_S:
             self._rig.speeds_mps = {self._joint: 0.0}
         else:
             self._rig.speeds_mps = {}
-        return self._rig.tick(now)
+        return self._rig.tick(now_s)

@@ -69,7 +69,7 @@ class PoweredDrives:
         """By node: when it first said that it missed us, and how. Cleared by whoever starts a trial."""
         self.probes: list[NodeTask[Sample]] = []
         """SDO readings that are under way, even while nothing else is sent."""
-        self.now = -math.inf
+        self.now_s = -math.inf
         self.foreign = ""
         """The first sign of another master."""
         self._sync = SyncProducer(robot.bus.sync_counter)
@@ -92,7 +92,7 @@ class PoweredDrives:
 
     def waiting_for(self) -> str:
         """What keeps it from being ready, for people."""
-        return "; ".join(filter(None, (n.waiting_for(self.now) or n.absent() for n in self.nodes.values())))
+        return "; ".join(filter(None, (n.waiting_for(self.now_s) or n.absent() for n in self.nodes.values())))
 
     def report(self, joint: str) -> BootReport | None:
         """What the boot of a wheel's drive found; None: it is not booted."""
@@ -125,7 +125,7 @@ class PoweredDrives:
     def begin(self) -> None:
         """Boot what is not booted."""
         for node in self.nodes.values():
-            node.begin_boot(self.now)
+            node.begin_boot(self.now_s)
 
     def reboot(self) -> None:
         """After a self-stop: everything from the start, faults and lost heartbeats forgotten."""
@@ -138,16 +138,16 @@ class PoweredDrives:
         self._targets_mps = dict.fromkeys(self.axes, 0.0)
         self._marks = {}
         for node in self.nodes.values():
-            node.lose("is booted anew", self.now)
+            node.lose("is booted anew", self.now_s)
             node.forget_emcy()
         self._wants_reset = True
         self.begin()
 
     # The bus
 
-    def on_frame(self, frame: Frame, now: float) -> None:
+    def on_frame(self, frame: Frame, now_s: float) -> None:
         """Take a frame of somebody else."""
-        self.now = now
+        self.now_s = now_s
         function, node_id = frame.cob_id & 0x780, frame.cob_id & 0x7F
         if frame.cob_id in (NMT, HEARTBEAT + DRIVER_NODE_ID, HEARTBEAT + WATCHDOG_NODE_ID):
             self.foreign = self.foreign or f"frame {frame} comes from another master"
@@ -155,56 +155,56 @@ class PoweredDrives:
         if node is None:
             return
         if function == HEARTBEAT:
-            node.on_heartbeat(frame, now)
+            node.on_heartbeat(frame, now_s)
         elif function == EMCY:
-            node.on_emcy(frame, now)
+            node.on_emcy(frame, now_s)
         elif function == SDO_TO_CLIENT:
-            node.on_sdo(frame, now)
+            node.on_sdo(frame, now_s)
             for probe in self.probes:
-                self._pending += probe.on_frame(frame, now)
+                self._pending += probe.on_frame(frame, now_s)
         else:
-            self._on_pdo(node, frame, now)
-        self._note_sign(node, now)
+            self._on_pdo(node, frame, now_s)
+        self._note_sign(node, now_s)
         if not self.is_mute:
-            self._pending += node.tick(now)
+            self._pending += node.tick(now_s)
 
-    def _note_sign(self, node: CanopenNode, now: float) -> None:
+    def _note_sign(self, node: CanopenNode, now_s: float) -> None:
         if node.emcy is not None:
-            self.signs.setdefault(node.node_id, (now, f"EMCY {node.emcy_text()}"))
+            self.signs.setdefault(node.node_id, (now_s, f"EMCY {node.emcy_text()}"))
         elif node.nmt_state not in (None, NmtState.OPERATIONAL):
-            self.signs.setdefault(node.node_id, (now, f"left NMT operational ({node.nmt_state.text})"))
+            self.signs.setdefault(node.node_id, (now_s, f"left NMT operational ({node.nmt_state.text})"))
 
-    def _on_pdo(self, node: CanopenNode, frame: Frame, now: float) -> None:
+    def _on_pdo(self, node: CanopenNode, frame: Frame, now_s: float) -> None:
         for axis in node.axes:
             if frame.cob_id == node.layout.status_cob_id(axis.drive.axis):
-                node.on_status(axis, frame, now)
+                node.on_status(axis, frame, now_s)
                 self._unanswered[axis.drive.joint] = 0
             elif frame.cob_id == node.layout.velocity_cob_id(axis.drive.axis):
-                node.on_velocity(axis, frame, now)
+                node.on_velocity(axis, frame, now_s)
 
-    def tick(self, now: float) -> list[Frame]:
+    def tick(self, now_s: float) -> list[Frame]:
         """What is due. Raises RigError when a wheel runs away, or another master speaks."""
-        self.now = now
+        self.now_s = now_s
         frames, self._pending = self._pending, []
         if self.has_ended:
             return []
-        frames += [frame for probe in self.probes for frame in probe.tick(now)]
+        frames += [frame for probe in self.probes for frame in probe.tick(now_s)]
         if self.is_mute:
             return frames
-        frames += self._heartbeats(now)
+        frames += self._heartbeats(now_s)
         for node in self.nodes.values():
-            frames += node.tick(now)
-        if now - self._cycle_at >= self._period_s:
-            dt_s = min(now - self._cycle_at, STEP_MAX_S)
-            self._cycle_at = now
+            frames += node.tick(now_s)
+        if now_s - self._cycle_at >= self._period_s:
+            dt_s = min(now_s - self._cycle_at, STEP_MAX_S)
+            self._cycle_at = now_s
             frames += self._cycle(dt_s)
         self._check()
         return frames
 
-    def _heartbeats(self, now: float) -> list[Frame]:
-        if now - self._beat_at < self.robot.timeouts.drive_heartbeat_s / BEATS_PER_TIMEOUT - self._period_s / 2.0:
+    def _heartbeats(self, now_s: float) -> list[Frame]:
+        if now_s - self._beat_at < self.robot.timeouts.drive_heartbeat_s / BEATS_PER_TIMEOUT - self._period_s / 2.0:
             return []
-        self._beat_at = now
+        self._beat_at = now_s
         return [heartbeat(node_id, NmtState.OPERATIONAL) for node_id in sorted(self.beats)]
 
     def _cycle(self, dt_s: float) -> list[Frame]:
@@ -263,11 +263,11 @@ class PoweredDrives:
 
     def _encoder_mps(self, joint: str, axis: Axis) -> float:
         """606Ch has the unit of 60FFh: where that is wrong, only the encoder shows it."""
-        since, travel_m = self._marks.setdefault(joint, (self.now, axis.travel.travel_m))
-        if self.now - since < WINDOW_S:
+        since, travel_m = self._marks.setdefault(joint, (self.now_s, axis.travel.travel_m))
+        if self.now_s - since < WINDOW_S:
             return 0.0
-        self._marks[joint] = (self.now, axis.travel.travel_m)
-        return (axis.travel.travel_m - travel_m) / (self.now - since)
+        self._marks[joint] = (self.now_s, axis.travel.travel_m)
+        return (axis.travel.travel_m - travel_m) / (self.now_s - since)
 
     # The ways out
 

@@ -26,29 +26,29 @@ class SafeStop:
         self._since = self._off_since = self._cycle_at = math.nan
         self.done = False
 
-    def on_frame(self, frame: Frame, now: float) -> None:
+    def on_frame(self, frame: Frame, now_s: float) -> None:
         """Take a frame."""
-        self._rig.on_frame(frame, now)
+        self._rig.on_frame(frame, now_s)
 
-    def tick(self, now: float) -> list[Frame]:
+    def tick(self, now_s: float) -> list[Frame]:
         """The next frames of the stop."""
         rig = self._rig
-        rig.now = now
+        rig.now_s = now_s
         if math.isnan(self._since):
-            self._since, rig.is_mute = now, False
-        if now - self._cycle_at < PERIOD_S or self.done:
+            self._since, rig.is_mute = now_s, False
+        if now_s - self._cycle_at < PERIOD_S or self.done:
             return []
-        self._cycle_at = now
+        self._cycle_at = now_s
         beats = [heartbeat(node_id, NmtState.OPERATIONAL) for node_id in (DRIVER_NODE_ID, WATCHDOG_NODE_ID)]
-        if math.isnan(self._off_since) and not self._stands(now):
+        if math.isnan(self._off_since) and not self._stands(now_s):
             return [*beats, *rig.stop_frames()]
         if math.isnan(self._off_since):
-            self._off_since = now
-        if now - self._off_since < self.OFF_S:
+            self._off_since = now_s
+        if now_s - self._off_since < self.OFF_S:
             return [*beats, *rig.off_frames()]
         self.done = True
         return rig.end_frames()
 
-    def _stands(self, now: float) -> bool:
+    def _stands(self, now_s: float) -> bool:
         """Three quick stops at least, whatever was heard."""
-        return now - self._since > self.STOP_S or (now - self._since > 0.05 and self._rig.standing)
+        return now_s - self._since > self.STOP_S or (now_s - self._since > 0.05 and self._rig.standing)

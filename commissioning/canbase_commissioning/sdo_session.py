@@ -34,18 +34,18 @@ class SdoSession(Generic[T]):
         """Whether all have ended."""
         return all(task.done for task in self.tasks.values())
 
-    def on_frame(self, frame: Frame, now: float) -> None:
+    def on_frame(self, frame: Frame, now_s: float) -> None:
         """Take a frame."""
-        self._heard.on_frame(frame, now)
+        self._heard.on_frame(frame, now_s)
         for task in self.tasks.values():
-            self._pending += task.on_frame(frame, now)
+            self._pending += task.on_frame(frame, now_s)
 
-    def tick(self, now: float) -> list[Frame]:
+    def tick(self, now_s: float) -> list[Frame]:
         """What is to be sent."""
         frames, self._pending = self._pending, []
         for task in self.tasks.values():
-            frames += task.tick(now)
+            frames += task.tick(now_s)
         return frames
 
     def _task(self, steps: Steps[T], client: SdoClient, gap_s: float) -> NodeTask[T]:
-        return NodeTask(steps, client, gap_s=gap_s, free=lambda now: self._heard.sdo_free(client.node_id, now))
+        return NodeTask(steps, client, gap_s=gap_s, free=lambda now_s: self._heard.sdo_free(client.node_id, now_s))

@@ -147,16 +147,16 @@ def _without_heartbeat(rig: PoweredDrives, joints: list[str], speed_mps: float) 
     rig.beats = rig.beats - {WATCHDOG_NODE_ID}
     stood: dict[str, tuple[float, Sample]] = {}
     last = before
-    while len(stood) < len(joints) and rig.now < began + SILENCE_S:
+    while len(stood) < len(joints) and rig.now_s < began + SILENCE_S:
         last = yield from _looks(rig)
         for joint in joints:
             if abs(last[joint].velocity_mps) < rig.robot.base.standstill_mps:
-                stood.setdefault(joint, (rig.now - began, last[joint]))
+                stood.setdefault(joint, (rig.now_s - began, last[joint]))
             else:
                 stood.pop(joint, None)
     outcomes = []
     for joint in joints:
-        at_s, sample = stood.get(joint, (rig.now - began, last[joint]))
+        at_s, sample = stood.get(joint, (rig.now_s - began, last[joint]))
         rolled_m = way_m(rig.axes[joint].drive, rig.robot, before[joint], sample)
         outcomes.append(_outcome(rig, joint, HEARTBEAT, speed_mps, began, joint in stood, at_s, rolled_m))
     return outcomes
@@ -166,7 +166,7 @@ def _begin(rig: PoweredDrives) -> float:
     """When the trial begins."""
     rig.on_trial = True
     rig.signs.clear()
-    return rig.now
+    return rig.now_s
 
 
 def _outcome(

@@ -19,16 +19,16 @@ ECHO_S = 0.1
 
 
 class Session(Protocol):
-    """One conversation with the bus. `now` is monotonic [s]."""
+    """One conversation with the bus. `now_s` is monotonic [s]."""
 
     @property
     def done(self) -> bool:
         """Whether it has ended."""
 
-    def on_frame(self, frame: Frame, now: float) -> None:
+    def on_frame(self, frame: Frame, now_s: float) -> None:
         """Take a frame that somebody else has sent."""
 
-    def tick(self, now: float) -> list[Frame]:
+    def tick(self, now_s: float) -> list[Frame]:
         """Let time pass, at least every 10 ms; what to send, in order."""
 
 
@@ -38,13 +38,13 @@ class Echo:
     def __init__(self) -> None:
         self._sent: deque[tuple[float, Frame]] = deque()
 
-    def sent(self, frame: Frame, now: float) -> None:
+    def sent(self, frame: Frame, now_s: float) -> None:
         """This frame went out."""
-        self._sent.append((now, frame))
+        self._sent.append((now_s, frame))
 
-    def is_own(self, frame: Frame, now: float) -> bool:
+    def is_own(self, frame: Frame, now_s: float) -> bool:
         """Whether a received frame is ours. Each one sent comes back once, so a second one is somebody else's."""
-        while self._sent and now - self._sent[0][0] > ECHO_S:
+        while self._sent and now_s - self._sent[0][0] > ECHO_S:
             self._sent.popleft()
         for i, (_, own) in enumerate(self._sent):
             if own == frame:
@@ -90,49 +90,49 @@ class NodeTask(Generic[T]):
         """Whether it has ended, well or not."""
         return self.result is not None or self.error is not None or self.blocked
 
-    def on_frame(self, frame: Frame, now: float) -> list[Frame]:
+    def on_frame(self, frame: Frame, now_s: float) -> list[Frame]:
         """Take a frame from the bus; what to send at once."""
         if self.done or not self._client.busy:
             return []
-        frames = self._client.on_frame(frame, now)
-        self._take_answer(now)
+        frames = self._client.on_frame(frame, now_s)
+        self._take_answer(now_s)
         return frames
 
-    def tick(self, now: float) -> list[Frame]:
+    def tick(self, now_s: float) -> list[Frame]:
         """Let time pass; what to send."""
         if self.done:
             return []
         if self._client.busy:
-            frames = self._client.tick(now)
-            self._take_answer(now)
+            frames = self._client.tick(now_s)
+            self._take_answer(now_s)
             return frames
-        if now < self._wake_at:
+        if now_s < self._wake_at:
             return []
         if not self._has_begun or self._next is None:
             self._has_begun = True
-            self._advance(None, now)
-        return self._ask(now)
+            self._advance(None, now_s)
+        return self._ask(now_s)
 
-    def _ask(self, now: float) -> list[Frame]:
-        if self._next is None or self.done or now < self._wake_at:
+    def _ask(self, now_s: float) -> list[Frame]:
+        if self._next is None or self.done or now_s < self._wake_at:
             return []
-        if not self._free(now):
-            self.blocked = now - self._waits_since > self._patience_s
+        if not self._free(now_s):
+            self.blocked = now_s - self._waits_since > self._patience_s
             return []
         step, self._next = self._next, None
-        return [self._client.start(step, now)]
+        return [self._client.start(step, now_s)]
 
-    def _take_answer(self, now: float) -> None:
+    def _take_answer(self, now_s: float) -> None:
         if self._client.busy:
             return
         try:
             answer = self._client.answer()
         except SdoError as error:
-            self._advance(error, now)
+            self._advance(error, now_s)
         else:
-            self._advance(answer, now)
+            self._advance(answer, now_s)
 
-    def _advance(self, answer: bytes | SdoError | None, now: float) -> None:
+    def _advance(self, answer: bytes | SdoError | None, now_s: float) -> None:
         try:
             step = self._steps.throw(answer) if isinstance(answer, SdoError) else self._steps.send(answer)
         except StopIteration as end:
@@ -141,11 +141,11 @@ class NodeTask(Generic[T]):
         except (SdoError, BootError) as error:
             self.error = error
             return
-        self._waits_since = now
-        self._wake_at = now + self._gap_s
+        self._waits_since = now_s
+        self._wake_at = now_s + self._gap_s
         if isinstance(step, Read | Write):
             self._next = step
         elif isinstance(step, Pause):
-            self._wake_at = now + step.duration_s
+            self._wake_at = now_s + step.duration_s
         else:
             raise TypeError(f"{step} has no place in a task of SDO transfers")

@@ -80,10 +80,10 @@ def measure_scale(
     goal_m = revolutions * rim_m - braking_way_m(rig, speed_mps)
     rig.speeds_mps = {joint: speed_mps}
     needed_s = TIMEOUT_FACTOR * revolutions * rim_m / speed_mps + 3.0
-    yield Until(lambda now: integral.add(now) and axis.travel.travel_m - start_m >= goal_m, needed_s)
+    yield Until(lambda now_s: integral.add(now_s) and axis.travel.travel_m - start_m >= goal_m, needed_s)
     rig.speeds_mps = {joint: 0.0}
-    yield Until(lambda now: integral.add(now) and abs(axis.velocity_mps) < rig.robot.base.standstill_mps, 5.0)
-    yield Until(lambda now: not integral.add(now), 0.3)
+    yield Until(lambda now_s: integral.add(now_s) and abs(axis.velocity_mps) < rig.robot.base.standstill_mps, 5.0)
+    yield Until(lambda now_s: not integral.add(now_s), 0.3)
     rig.speeds_mps = {}
     by_position = (axis.travel.travel_m - start_m) / rim_m
     text = f"How many revolutions did {joint} make, to a twentieth?"
@@ -112,10 +112,10 @@ class _Integral:
     def __init__(self, rig: PoweredDrives, joint: str) -> None:
         self.way_m = 0.0
         self._axis = rig.axes[joint]
-        self._at = rig.now
+        self._at = rig.now_s
 
-    def add(self, now: float) -> bool:
+    def add(self, now_s: float) -> bool:
         """To be called each turn."""
-        self.way_m += self._axis.velocity_mps * (now - self._at)
-        self._at = now
+        self.way_m += self._axis.velocity_mps * (now_s - self._at)
+        self._at = now_s
         return True

@@ -105,7 +105,7 @@ def busy_or_unsafe(seen: Evidence) -> Check:
         )
     if policy == "queue" and len(waiting) > seen.robot.action.queue_length:
         return fail(name, f"busy: {len(waiting) - 1} goals wait", "wait, or set action.queue_length")
-    reason = state_reason(seen.robot, seen.inputs, seen.now)
+    reason = state_reason(seen.robot, seen.inputs, seen.now_s)
     if reason is not None:
         return fail(name, reason, "canbase doctor without --symptom shows every part")
     return ok(name, "a good goal would be accepted now")

@@ -28,11 +28,11 @@ _SHOWN: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class BusEvidence:
-    """What doctor has seen of the bus until `now` [s, monotonic]."""
+    """What doctor has seen of the bus until `now_s` [s, monotonic]."""
 
     robot: Robot
     heard: Listener
-    now: float
+    now_s: float
     problem: str = ""
     """Why the bus cannot be used; empty: it can."""
     link: Link | None = None
@@ -103,8 +103,8 @@ def _settings_of(link: Link) -> Check:
 
 
 def _load(seen: BusEvidence) -> Check:
-    heard, seconds = seen.heard, max(seen.now - seen.heard.since, 1e-3)
-    load = heard.load(seen.robot.bus.bitrate, seen.now)
+    heard, seconds = seen.heard, max(seen.now_s - seen.heard.since, 1e-3)
+    load = heard.load(seen.robot.bus.bitrate, seen.now_s)
     found = f"{heard.frames / seconds:.0f} frames a second, at most {load:.0%} of {seen.robot.bus.bitrate} bit/s"
     if load > FULL_LOAD:
         return fail("bus load", found, "a higher bit rate, a lower rates.control_hz, or fewer PDOs of other nodes")
@@ -115,7 +115,7 @@ def _load(seen: BusEvidence) -> Check:
 
 def _masters(seen: BusEvidence) -> Check:
     """Beside canbase's own driver nobody else may command; without it nobody at all."""
-    signs = seen.heard.masters(seen.now)
+    signs = seen.heard.masters(seen.now_s)
     if not seen.canbase_runs and signs:
         return fail("masters", "; ".join(signs), "another program commands this bus: end it before canbase drives")
     if not seen.canbase_runs:
@@ -130,7 +130,7 @@ def _watchdog(seen: BusEvidence) -> list[Check]:
         if not seen.canbase_runs:
             return []
         return [fail("watchdog's state (1FEh)", "never heard", "start canbase watchdog on the same robot.yaml")]
-    age_s = seen.now - seen.heard.watchdog_at
+    age_s = seen.now_s - seen.heard.watchdog_at
     lease = "none yet" if state.lease_age_ms == LEASE_AGE_UNKNOWN else f"{state.lease_age_ms} ms old"
     found = f"{('starting', 'watching', 'tripped')[state.state]}, heard {age_s * 1000:.0f} ms ago; lease {lease}"
     rows = [_watchdog_state(seen, found, age_s)]
@@ -226,7 +226,7 @@ def _ages(seen: BusEvidence, node_id: int) -> str:
     node = seen.heard.nodes.get(node_id)
     if node is None:
         return "NMT state unknown, no heartbeat, no TPDO"
-    beat, pdo = node.heartbeat_age_s(seen.now), node.pdo_age_s(seen.now)
+    beat, pdo = node.heartbeat_age_s(seen.now_s), node.pdo_age_s(seen.now_s)
     period = "" if math.isnan(node.period_s) else f" every {node.period_s * 1000:.0f} ms"
     heartbeat = "no heartbeat" if math.isnan(beat) else f"heartbeat{period}, {beat * 1000:.0f} ms old"
     tpdo = "no TPDO" if math.isnan(pdo) else f"TPDO {pdo * 1000:.0f} ms old"

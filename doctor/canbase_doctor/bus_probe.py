@@ -33,11 +33,11 @@ def look(robot: Robot) -> BusEvidence:
     with line:
         listening = ListenSession(LISTEN_S)
         line.run(listening)
-        heard, now = copy.deepcopy(listening.heard), listening.now  # what our own questions bring is no news
+        heard, now_s = copy.deepcopy(listening.heard), listening.now_s  # what our own questions bring is no news
         inquiry = ask(robot, listening.heard)
         line.run(inquiry)
         problem = line.problem
-    return evidence(robot, heard, now, inquiry, problem, link)
+    return evidence(robot, heard, now_s, inquiry, problem, link)
 
 
 def ask(robot: Robot, heard: Listener) -> SdoSession[Inspection]:
@@ -52,7 +52,7 @@ def ask(robot: Robot, heard: Listener) -> SdoSession[Inspection]:
 
 
 def evidence(
-    robot: Robot, heard: Listener, now: float, inquiry: SdoSession[Inspection], problem: str, link: Link | None
+    robot: Robot, heard: Listener, now_s: float, inquiry: SdoSession[Inspection], problem: str, link: Link | None
 ) -> BusEvidence:
     """What came of it."""
     unread = {
@@ -61,7 +61,7 @@ def evidence(
         if task.result is None
     }
     found = {node_id: task.result for node_id, task in inquiry.tasks.items() if task.result is not None}
-    return BusEvidence(robot, heard, now, problem, link, found, unread)
+    return BusEvidence(robot, heard, now_s, problem, link, found, unread)
 
 
 def read_link(channel: str) -> Link | None:

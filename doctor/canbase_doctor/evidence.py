@@ -99,15 +99,15 @@ class Answers:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """Everything that was seen, until `now`."""
+    """Everything that was seen, until `now_s`."""
 
     robot: Robot
     source: str
     """Where `robot` comes from: the path of its file."""
-    now: float
+    now_s: float
     namespace: str = "/"
     wall_s: float = 0.0
-    """`now` by the computer's clock."""
+    """`now_s` by the computer's clock."""
     heard: Mapping[str, Heard] = field(default_factory=dict)
     """By topic, relative to the robot's namespace."""
     inputs: Inputs = field(default_factory=Inputs)

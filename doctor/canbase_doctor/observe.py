@@ -124,7 +124,7 @@ def _evidence(loaded: Loaded, node: Node, listener: Listener, prober: Prober) ->
     return Evidence(
         robot=loaded.robot,
         source=str(loaded.path),
-        now=time.monotonic(),
+        now_s=time.monotonic(),
         namespace=node.get_namespace(),
         wall_s=time.time(),
         heard=heard,

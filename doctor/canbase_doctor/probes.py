@@ -38,18 +38,18 @@ class Series:
         self.first_answer_s = math.inf
         """When the first answer came; infinite before."""
 
-    def step(self, now: float) -> bool:
+    def step(self, now_s: float) -> bool:
         """Asks, or looks for the answer; whether no question is on its way any more."""
         if self._answer is None:
             if not self._client.service_is_ready():
                 return True
-            self._asked_s, self._answer = now, self._client.call_async(self._request)
+            self._asked_s, self._answer = now_s, self._client.call_async(self._request)
             return False
-        if not self._answer.done() and now - self._asked_s < LOST_S:
+        if not self._answer.done() and now_s - self._asked_s < LOST_S:
             return False
         if self._answer.done():
-            self.first_answer_s = min(self.first_answer_s, now)
-        self._times_s.append(now - self._asked_s if self._answer.done() else math.inf)
+            self.first_answer_s = min(self.first_answer_s, now_s)
+        self._times_s.append(now_s - self._asked_s if self._answer.done() else math.inf)
         self._answer = None
         return True
 

@@ -198,7 +198,7 @@ def _silent(evidence: Evidence, name: str, topic: str) -> Check | None:
     heard = evidence.on(topic)
     if heard.last is None:
         return fail(name, f"nothing came on {topic}", PARTS_RUN)
-    age_s = evidence.now - heard.times_s[-1]
+    age_s = evidence.now_s - heard.times_s[-1]
     if age_s <= SILENT_S:
         return None
     return fail(name, f"nothing on {topic} for {age_s:.1f} s; what it said before is not looked at", HANGS)

@@ -138,14 +138,14 @@ class DriverCore:
         """Grows by one with each sample that entered the odometry."""
         return self._feed.serial
 
-    def on_frame(self, frame: Frame, now: float) -> list[Frame]:
+    def on_frame(self, frame: Frame, now_s: float) -> list[Frame]:
         """Take a frame from the bus; the frames to send at once (the boot's next request). Never raises."""
         handler = self._handlers.get(frame.cob_id)
         if handler is None:
             return []
         take, node = handler
-        self.frames_dropped += not take(frame, now)
-        return self._drives.go_on(node, now) if node is not None else []
+        self.frames_dropped += not take(frame, now_s)
+        return self._drives.go_on(node, now_s) if node is not None else []
 
     def on_command(self, twist: Twist2D, received_at: float) -> bool:
         """Take a velocity command with its receive time. False, and counted: it was not finite."""
@@ -155,12 +155,12 @@ class DriverCore:
         """Whether the safety filter asks for the emergency deceleration, with the receive time of that."""
         self._command.take_emergency(brakes_hard, received_at)
 
-    def on_bus(self, problem: str, now: float, report: BusReport = HEALTHY) -> None:
+    def on_bus(self, problem: str, now_s: float, report: BusReport = HEALTHY) -> None:
         """The bus failed (a sentence), or works (empty); after a failure every node is booted anew."""
         self._bus_report = report
         if self._bus_problem and not problem:
             for node in self._drives.nodes:
-                node.lose("was cut off from the bus", now)
+                node.lose("was cut off from the bus", now_s)
         self._bus_problem = problem
 
     def request_stop(self) -> None:
@@ -173,57 +173,57 @@ class DriverCore:
         self._shutdown_requested = True
         self._reset.end(Outcome(False, "broken off: the driver is ending"))
 
-    def request_reset(self, now: float, on_outcome: Callable[[Outcome], None]) -> None:
+    def request_reset(self, now_s: float, on_outcome: Callable[[Outcome], None]) -> None:
         """Begin a reset; `on_outcome` is called once, at once when it is refused."""
-        if self._reset.begin(self._situation(now), self._supervisor.state in NO_POWER, now, on_outcome):
+        if self._reset.begin(self._situation(now_s), self._supervisor.state in NO_POWER, now_s, on_outcome):
             for node in self._drives.nodes:
-                node.clear_lost_heartbeat(now)
+                node.clear_lost_heartbeat(now_s)
 
-    def request_aim(self, aim: Aim, now: float, on_outcome: Callable[[Outcome], None]) -> None:
+    def request_aim(self, aim: Aim, now_s: float, on_outcome: Callable[[Outcome], None]) -> None:
         """Go so far; `on_outcome` is called once, when it is there or has failed."""
         if self._shutdown_requested:
             on_outcome(Outcome(False, "refused: the driver is ending"))
         else:
-            self._readiness.request(aim, now, on_outcome)
+            self._readiness.request(aim, now_s, on_outcome)
 
-    def set_pose(self, pose: Pose2D, now: float) -> Outcome:
+    def set_pose(self, pose: Pose2D, now_s: float) -> Outcome:
         """The odometry goes on from `pose`, with the covariance of a fresh start. Refused in motion."""
-        commanded = self._command.motion(now)
+        commanded = self._command.motion(now_s)
         if not (math.isfinite(pose.x_m) and math.isfinite(pose.y_m) and math.isfinite(pose.yaw_rad)):
             return Outcome(False, f"refused: {pose} is not finite")
-        if commanded or not self._drives.stand(now):
-            return Outcome(False, f"refused: {commanded or self._drives.turning(now)}; a pose is set at a standstill")
+        if commanded or not self._drives.stand(now_s):
+            return Outcome(False, f"refused: {commanded or self._drives.turning(now_s)}; a pose is set at a standstill")
         self._feed.set_pose(pose)
         return Outcome(
             True, f"odometry goes on from x {pose.x_m:.3f} m, y {pose.y_m:.3f} m, yaw {pose.yaw_rad:.3f} rad"
         )
 
-    def tick(self, now: float, lateness_s: float = 0.0) -> list[Frame]:
+    def tick(self, now_s: float, lateness_s: float = 0.0) -> list[Frame]:
         """One cycle; the frames to send, in this order. `lateness_s`: how late it began."""
-        if now - self._ticked_at > PAUSE * self._robot.timeouts.feedback_s:
-            self._sync_since = now
-        dt_s = min(now - self._ticked_at, LONGEST_STEP_S)
-        self._ticked_at = now
-        self._stats.note(now, lateness_s)
-        frames = self._heartbeat(now)
+        if now_s - self._ticked_at > PAUSE * self._robot.timeouts.feedback_s:
+            self._sync_since = now_s
+        dt_s = min(now_s - self._ticked_at, LONGEST_STEP_S)
+        self._ticked_at = now_s
+        self._stats.note(now_s, lateness_s)
+        frames = self._heartbeat(now_s)
         if not self._readiness.released:
             ends = self._shutdown_requested or self._readiness.unconfigured
             may_boot = self._supervisor.state in NO_POWER and not ends
-            asked_since = now if self._bus_problem else self._sync_since
-            frames += self._drives.tick(now, may_boot, asked_since)
-        situation = self._situation(now)
-        orders = self._judge(situation, now)
-        frames += self._go_on_with_reset(situation, now)
-        frames += self._setpoints(orders, now, dt_s)
-        frames += self._stop_by_sdo(orders, situation, now)
+            asked_since = now_s if self._bus_problem else self._sync_since
+            frames += self._drives.tick(now_s, may_boot, asked_since)
+        situation = self._situation(now_s)
+        orders = self._judge(situation, now_s)
+        frames += self._go_on_with_reset(situation, now_s)
+        frames += self._setpoints(orders, now_s, dt_s)
+        frames += self._stop_by_sdo(orders, situation, now_s)
         if self._motion.twist != Twist2D.ZERO or situation.standstill:
-            self._eased_at = now
+            self._eased_at = now_s
         # Reset communication forgets 1016h: a drive must not report a lost heartbeat after an orderly end. One that may
         # have power keeps it, and stops by the missing heartbeat.
-        off = [node.node_id for node in self._drives.nodes if node.is_off(now)]
-        let_go = self._readiness.step(situation, self.state, self.finding, now)
+        off = [node.node_id for node in self._drives.nodes if node.is_off(now_s)]
+        let_go = self._readiness.step(situation, self.state, self.finding, now_s)
         for node in self._drives.nodes if let_go else ():
-            node.release(now)
+            node.release(now_s)
         if let_go or (self.finished and not self._readiness.released):
             frames += [nmt(NmtCommand.RESET_COMMUNICATION, node_id) for node_id in off]
         return frames
@@ -233,9 +233,9 @@ class DriverCore:
         goal = PowerGoal.QUICK_STOP
         return [frame for node in self._drives.nodes for frame in node.setpoints(goal, 0.0, 0.0)] + [self._sync.next()]
 
-    def _judge(self, situation: Situation, now: float) -> Orders:
+    def _judge(self, situation: Situation, now_s: float) -> Orders:
         before, latched_before = self._supervisor.state, self._supervisor.latches
-        orders = self._supervisor.step(situation, now)
+        orders = self._supervisor.step(situation, now_s)
         self._record.note(self._supervisor, situation)
         state, finding = self._supervisor.state, self._supervisor.finding
         began = state is not before and state in (DriverState.STOPPING, DriverState.LATCHED)
@@ -243,45 +243,45 @@ class DriverCore:
         if (began and not continued) or (continued and self._supervisor.latches and not latched_before):
             by = "watchdog" if finding.cause is Cause.WATCHDOG_TRIPPED else "motor_driver"
             latches = self._supervisor.latches
-            self.stops.append(StopRecord(by, finding.cause.value, finding.detail, latches, finding.clears_on, now))
+            self.stops.append(StopRecord(by, finding.cause.value, finding.detail, latches, finding.clears_on, now_s))
         if state is not before and state is DriverState.ENABLED:
             self._command.await_zero()
         return orders
 
-    def _setpoints(self, orders: Orders, now: float, dt_s: float) -> list[Frame]:
+    def _setpoints(self, orders: Orders, now_s: float, dt_s: float) -> list[Frame]:
         started = [node for node in self._drives.nodes if node.takes_pdos]
-        self._hold_or_let_go(orders, now)
+        self._hold_or_let_go(orders, now_s)
         if orders.drive is Drive.ZERO or self._let_go.active:
             self._motion = MotionState.AT_REST
         else:
-            target = self._command.target(now) if orders.drive is Drive.FOLLOW else Twist2D.ZERO
-            hard = self._command.brakes_hard(now)
+            target = self._command.target(now_s) if orders.drive is Drive.FOLLOW else Twist2D.ZERO
+            hard = self._command.brakes_hard(now_s)
             self._motion = self._limiter.step(self._motion, target, dt_s, emergency=hard)
         if self._bus_problem or not started:
             return []
-        goal = self._let_go.goal(now) if self._let_go.active else orders.goal
+        goal = self._let_go.goal(now_s) if self._let_go.active else orders.goal
         if self._reset.fault_reset_bit:  # to an axis without a fault RESET is OFF
             goal = PowerGoal.RESET
         left_mps, right_mps = wheel_speeds(self._motion.twist, self._robot.base.track_m)
         frames = [frame for node in started for frame in node.setpoints(goal, left_mps, right_mps)]
         return [*frames, self._sync.next()]
 
-    def _hold_or_let_go(self, orders: Orders, now: float) -> None:
+    def _hold_or_let_go(self, orders: Orders, now_s: float) -> None:
         if orders.drive is not Drive.FOLLOW:
             self._let_go.end()
             return
-        rests = self._drives.rest(*wheel_speeds(self._command.target(now), self._robot.base.track_m))
-        self._let_go.step(self._drives.axes, rests, now)
+        rests = self._drives.rest(*wheel_speeds(self._command.target(now_s), self._robot.base.track_m))
+        self._let_go.step(self._drives.axes, rests, now_s)
 
-    def _stop_by_sdo(self, orders: Orders, situation: Situation, now: float) -> list[Frame]:
+    def _stop_by_sdo(self, orders: Orders, situation: Situation, now_s: float) -> list[Frame]:
         """While a watchdog lives its ladder does this, and takes an SDO of ours for another master's."""
         alone = situation.watchdog is WatchdogView.MISSING and not self._bus_problem
         if not alone or self._supervisor.state is not DriverState.STOPPING:
             return []
-        return [frame for node in self._drives.nodes for frame in node.stop_by_sdo(orders.goal, now)]
+        return [frame for node in self._drives.nodes for frame in node.stop_by_sdo(orders.goal, now_s)]
 
-    def _go_on_with_reset(self, situation: Situation, now: float) -> list[Frame]:
-        frames, outcome = self._reset.step(situation, now)
+    def _go_on_with_reset(self, situation: Situation, now_s: float) -> list[Frame]:
+        frames, outcome = self._reset.step(situation, now_s)
         if outcome is not None and outcome.done:
             self._stop_requested = False
             self._supervisor.reset()
@@ -290,43 +290,43 @@ class DriverCore:
             self._reset.end(outcome)
         return frames
 
-    def _heartbeat(self, now: float) -> list[Frame]:
+    def _heartbeat(self, now_s: float) -> list[Frame]:
         period_s = self._robot.timeouts.drive_heartbeat_s / HEARTBEATS_PER_TIMEOUT
-        if self._readiness.released or now - self._heartbeat_at < period_s - self._period_s / 2.0:
+        if self._readiness.released or now_s - self._heartbeat_at < period_s - self._period_s / 2.0:
             return []
-        self._heartbeat_at = now
+        self._heartbeat_at = now_s
         return [heartbeat(DRIVER_NODE_ID, NmtState.OPERATIONAL)]
 
-    def _situation(self, now: float) -> Situation:
-        watchdog, watchdog_detail = self._watchdog.view(now)
-        liar = self._watchdog.lying_node(now)
+    def _situation(self, now_s: float) -> Situation:
+        watchdog, watchdog_detail = self._watchdog.view(now_s)
+        liar = self._watchdog.lying_node(now_s)
         if liar:
             self._drives.doubt(liar, f"reports what cannot be ({watchdog_detail})")
         measured_mps = abs(self._drives.fastest().velocity_mps)
         ordered_mps = max(abs(speed) for speed in wheel_speeds(self._motion.twist, self._robot.base.track_m))
         return Situation(
             bus=self._bus_problem,
-            booting=self._drives.booting(now),
-            missing=self._drives.missing(now),
+            booting=self._drives.booting(now_s),
+            missing=self._drives.missing(now_s),
             fault=self._drives.fault(),
             absent=self._drives.absent(),
-            silent=self._drives.silent(now, self._sync_since),
-            disabled="" if self._let_go.excuses(now) else self._drives.disabled(),
+            silent=self._drives.silent(now_s, self._sync_since),
+            disabled="" if self._let_go.excuses(now_s) else self._drives.disabled(),
             unprepared=self._drives.unprepared(),
             unarmed=self._record.unarmed or self._watchdog.unarmed,
             watchdog=watchdog,
             watchdog_detail=watchdog_detail,
             watchdog_about_drive=self._watchdog.about_drive,
-            commanded=self._command.motion(now),
-            overdue=self._overdue(now),
-            standstill=self._drives.stand(now),
-            turning=self._drives.turning(now),
+            commanded=self._command.motion(now_s),
+            overdue=self._overdue(now_s),
+            standstill=self._drives.stand(now_s),
+            turning=self._drives.turning(now_s),
             speed_mps=measured_mps,
-            braking_mps=self._drives.braking_mps(now),
+            braking_mps=self._drives.braking_mps(now_s),
             begin_mps=max(measured_mps, ordered_mps),
             turn_radps=self._motion.twist.angular_radps,
             doubted=self._drives.doubted(),
-            powered=self._drives.may_have_power(now),
+            powered=self._drives.may_have_power(now_s),
             unconfigured=self._readiness.unconfigured,
             inactive=self._readiness.inactive,
             resetting=self._reset.runs,
@@ -334,8 +334,8 @@ class DriverCore:
             shutdown_requested=self._shutdown_requested,
         )
 
-    def _overdue(self, now: float) -> str:
-        elapsed_s = now - self._eased_at
+    def _overdue(self, now_s: float) -> str:
+        elapsed_s = now_s - self._eased_at
         if elapsed_s <= self._standstill_s:
             return ""
         fastest = self._drives.fastest()
@@ -343,22 +343,22 @@ class DriverCore:
             f"{fastest.drive.joint} turns at {fastest.velocity_mps:.3f} m/s, {elapsed_s:.1f} s after zero was ordered"
         )
 
-    def _on_status(self, node: CanopenNode, axis: Axis, frame: Frame, now: float) -> bool:
-        return self._answers_last_sync(now) and node.on_status(axis, frame, now)
+    def _on_status(self, node: CanopenNode, axis: Axis, frame: Frame, now_s: float) -> bool:
+        return self._answers_last_sync(now_s) and node.on_status(axis, frame, now_s)
 
-    def _on_velocity(self, node: CanopenNode, axis: Axis, frame: Frame, now: float) -> bool:
-        understood = self._answers_last_sync(now) and node.on_velocity(axis, frame, now)
-        self._feed.update(now)
+    def _on_velocity(self, node: CanopenNode, axis: Axis, frame: Frame, now_s: float) -> bool:
+        understood = self._answers_last_sync(now_s) and node.on_velocity(axis, frame, now_s)
+        self._feed.update(now_s)
         return understood
 
-    def _on_nmt(self, frame: Frame, now: float) -> bool:
+    def _on_nmt(self, frame: Frame, now_s: float) -> bool:
         for node in self._drives.nodes:
-            node.on_nmt(frame, now)
+            node.on_nmt(frame, now_s)
         return True
 
-    def _answers_last_sync(self, now: float) -> bool:
+    def _answers_last_sync(self, now_s: float) -> bool:
         """False for a TPDO that waited while this process stood still: it tells of then, and would pass for fresh."""
-        return now - self._ticked_at <= self._robot.timeouts.feedback_s
+        return now_s - self._ticked_at <= self._robot.timeouts.feedback_s
 
     def _dispatch_table(self) -> dict[int, tuple[Handler, CanopenNode | None]]:
         """Who takes a frame, and the node that may go on with its boot after it."""
@@ -376,7 +376,7 @@ class DriverCore:
                 table[node.layout.velocity_cob_id(axis.drive.axis)] = (partial(self._on_velocity, node, axis), None)
         return table
 
-    def snapshot(self, now: float) -> DriverSnapshot:
+    def snapshot(self, now_s: float) -> DriverSnapshot:
         """What the driver knows now."""
         told = Told(
             self._supervisor,
@@ -389,4 +389,4 @@ class DriverCore:
             self._bus_problem,
             self.frames_dropped,
         )
-        return snapshot_of(told, self._robot.base, now)
+        return snapshot_of(told, self._robot.base, now_s)

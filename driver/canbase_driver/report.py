@@ -31,21 +31,21 @@ class Told:
     frames_dropped: int
 
 
-def snapshot_of(told: Told, base: Base, now: float) -> DriverSnapshot:
-    """The snapshot at the monotonic time `now` [s]."""
+def snapshot_of(told: Told, base: Base, now_s: float) -> DriverSnapshot:
+    """The snapshot at the monotonic time `now_s` [s]."""
     supervisor, watchdog, drives, odometry = told.supervisor, told.watchdog, told.drives, told.feed.odometry
-    view, _detail = watchdog.view(now)
+    view, _detail = watchdog.view(now_s)
     measured = base_twist(*drives.speeds_mps(), base.track_m)
     counters, finding = watchdog.counters, supervisor.finding
     return DriverSnapshot(
-        time_s=now,
+        time_s=now_s,
         state=supervisor.state,
         cause=finding.cause,
         detail=finding.detail,
         clears_on=finding.clears_on,
         watchdog=view,
         watchdog_cause=watchdog.cause,
-        watchdog_age_s=watchdog.age_s(now),
+        watchdog_age_s=watchdog.age_s(now_s),
         watchdog_rung=watchdog.rung,
         watchdog_lease_age_s=watchdog.lease_age_s,
         watchdog_trips=counters.trips,
@@ -53,10 +53,10 @@ def snapshot_of(told: Told, base: Base, now: float) -> DriverSnapshot:
         watchdog_frames_dropped=counters.frames_dropped,
         watchdog_bus_errors=counters.bus_errors,
         watchdog_pause_max_s=counters.pause_max_ms / 1000.0,
-        standstill=drives.stand(now),
-        standstill_assumed=drives.assumed(now),
-        command_age_s=age_s(now, told.command.received_at),
-        command_fresh=told.command.is_fresh(now),
+        standstill=drives.stand(now_s),
+        standstill_assumed=drives.assumed(now_s),
+        command_age_s=age_s(now_s, told.command.received_at),
+        command_fresh=told.command.is_fresh(now_s),
         commands_refused=told.command.refused,
         cycles=told.stats.cycles,
         overruns=told.stats.overruns,
@@ -68,7 +68,7 @@ def snapshot_of(told: Told, base: Base, now: float) -> DriverSnapshot:
         receive_errors=told.bus.receive_errors,
         error_frames=told.bus.error_frames,
         bus_failures=told.bus.failures,
-        drives=drives.snapshots(now),
+        drives=drives.snapshots(now_s),
         x_m=odometry.pose.x_m,
         y_m=odometry.pose.y_m,
         yaw_rad=odometry.pose.yaw_rad,
@@ -76,7 +76,7 @@ def snapshot_of(told: Told, base: Base, now: float) -> DriverSnapshot:
         angular_radps=measured.angular_radps,
         pose_covariance=odometry.pose_covariance(),
         twist_covariance=odometry.twist_covariance(),
-        odometry_valid=drives.are_fresh(now) and drives.have_references(),
+        odometry_valid=drives.are_fresh(now_s) and drives.have_references(),
         travel_losses=drives.losses(),
         pose_resets=told.feed.pose_resets,
         odom_frame=base.odom_frame,

@@ -29,20 +29,20 @@ class ReceiveTimes:
         self._looked_at = math.inf
         self._before_pause = self._settled_at = -math.inf
 
-    def at(self, now: float) -> float:
-        """The receive time of what is taken in at `now` (both monotonic, s): `now`, or before the last pause."""
-        if now - self._looked_at > self._gap_s:
+    def at(self, now_s: float) -> float:
+        """The receive time of what is taken in at `now_s` (both monotonic, s): `now_s`, or before the last pause."""
+        if now_s - self._looked_at > self._gap_s:
             if self._looked_at >= self._settled_at:  # else the queues are not empty yet since the pause before
                 self._before_pause = self._looked_at
-            self._settled_at = now + self._settle_s
-        self._looked_at = now
-        return now if now >= self._settled_at else self._before_pause
+            self._settled_at = now_s + self._settle_s
+        self._looked_at = now_s
+        return now_s if now_s >= self._settled_at else self._before_pause
 
     @classmethod
     def of_requests(cls) -> ReceiveTimes:
         """For requests."""
         return cls(REQUEST_GAP_S, REQUEST_SETTLE_S)
 
-    def waited(self, now: float) -> bool:
-        """What is taken in at `now` may have waited while this process stood still."""
-        return self.at(now) != now
+    def waited(self, now_s: float) -> bool:
+        """What is taken in at `now_s` may have waited while this process stood still."""
+        return self.at(now_s) != now_s

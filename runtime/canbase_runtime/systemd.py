@@ -25,8 +25,8 @@ class Service:
         self._status = ""
         self._alive_at = -ALIVE_PERIOD_S
 
-    def alive(self, status: str, now: float) -> None:
-        """To be called by the loop that this process stands for, in each of its turns, at the monotonic time `now` [s].
+    def alive(self, status: str, now_s: float) -> None:
+        """To be called by the loop that this process stands for, in each of its turns, at `now_s` [s, monotonic].
 
         The first call says READY; later ones at most every ALIVE_PERIOD_S that it lives, and `status` when it changed.
         """
@@ -37,8 +37,8 @@ class Service:
         if status != self._status:
             self._status = status
             lines.append(f"STATUS={status}")
-        if now - self._alive_at >= ALIVE_PERIOD_S:
-            self._alive_at = now
+        if now_s - self._alive_at >= ALIVE_PERIOD_S:
+            self._alive_at = now_s
             lines.append("WATCHDOG=1")
         self._send(lines)
 

@@ -39,11 +39,11 @@ class BaseReady:
         """Takes what the safety filter knows of the emergency stop. False: it holds, or waits for a reset or a zero."""
         self._estop_free = free
 
-    def problem(self, now: float) -> str:
-        """Why the base cannot move at `now` [s, monotonic]; empty: it can."""
+    def problem(self, now_s: float) -> str:
+        """Why the base cannot move at `now_s` [s, monotonic]; empty: it can."""
         if self._at_s is None:
             return "nothing received on motor_driver/status yet"
-        if now - self._at_s > self._timeout_s:
+        if now_s - self._at_s > self._timeout_s:
             return "motor_driver/status is silent"
         if self._state is not DriverState.ENABLED:
             return f"motor_driver is {self._state.name}"

@@ -33,7 +33,7 @@ class Sent:
 
     stamp_s: float
     wall_s: float
-    now: float
+    now_s: float
 
 
 class Delay:
@@ -55,17 +55,17 @@ class Delay:
         self.set_back = sent.stamp_s < self._stamp_s - SET_BACK_S
         if self.set_back:
             self._least_s = self._least_since_s = math.inf
-        offset_s = sent.now - sent.stamp_s
-        self._least_s = min(self._least_s + DRIFT * max(0.0, sent.now - self._at_s), offset_s)
-        self._look_back(offset_s, sent.now)
-        self._stamp_s, self._at_s = sent.stamp_s, sent.now
+        offset_s = sent.now_s - sent.stamp_s
+        self._least_s = min(self._least_s + DRIFT * max(0.0, sent.now_s - self._at_s), offset_s)
+        self._look_back(offset_s, sent.now_s)
+        self._stamp_s, self._at_s = sent.stamp_s, sent.now_s
         return offset_s - self._least_s
 
-    def _look_back(self, offset_s: float, now: float) -> None:
+    def _look_back(self, offset_s: float, now_s: float) -> None:
         """Rule 3."""
-        if now - self._at_s > SILENCE_S:
-            self._silence_until, self._least_since_s = now, math.inf
+        if now_s - self._at_s > SILENCE_S:
+            self._silence_until, self._least_since_s = now_s, math.inf
         self._least_since_s = min(self._least_since_s, offset_s)
-        if now - self._silence_until >= FORGET_S:
+        if now_s - self._silence_until >= FORGET_S:
             self._least_s = max(self._least_s, self._least_since_s)
             self._silence_until = math.inf

@@ -84,8 +84,8 @@ class FilterNode(Node):
         """Orders zero, with its lease, and says so in the state; from here on nothing else is ordered. Called several
         times: one message may be lost.
         """
-        now = time.monotonic()
-        self._issue(self._filter.shut_down(now), now)
+        now_s = time.monotonic()
+        self._issue(self._filter.shut_down(now_s), now_s)
 
     def end(self) -> bool:
         """The base is at standstill in an orderly end: a free emergency stop leaves nothing behind for the next start.
@@ -131,17 +131,17 @@ class FilterNode(Node):
                 raise ModuleNotFoundError("a scanner with `pose: tf` needs tf2_msgs; install ros-jazzy-tf2-msgs")
             self.create_subscription(messages.TFMessage, "tf_static", self._on_tf_static, STATIC_TF)
 
-    def obey(self, twist: Twist, now: float) -> None:
-        """Takes the order of the mux at `now` [s, time.monotonic], and issues it as far as it may."""
-        self._filter.on_command(twist, self._receive_times.at(now))
+    def obey(self, twist: Twist, now_s: float) -> None:
+        """Takes the order of the mux at `now_s` [s, time.monotonic], and issues it as far as it may."""
+        self._filter.on_command(twist, self._receive_times.at(now_s))
         self._timer.reset()  # a mux faster than the timer is not doubled by it
-        self._issue(self._filter.decide(now), now)
+        self._issue(self._filter.decide(now_s), now_s)
 
     def _on_estop(self, message: Bool) -> None:
-        now = time.monotonic()
-        self._filter.on_estop(message.data, self._receive_times.at(now))
+        now_s = time.monotonic()
+        self._filter.on_estop(message.data, self._receive_times.at(now_s))
         if message.data:
-            self._issue(self._filter.decide(now), now)
+            self._issue(self._filter.decide(now_s), now_s)
 
     def _count_buttons(self) -> None:
         before, topic = self._filter.estop_crowd, self.resolve_topic_name(self._robot.safety.estop.topic)
@@ -154,8 +154,8 @@ class FilterNode(Node):
             self._voice.tell(crowd, Priority.ERROR, robot=self._robot.name)
 
     def _on_scan(self, config: ScanConfig, held: HeldPlacement, message: LaserScan) -> None:
-        now = time.monotonic()
-        if self._receive_times.waited(now):
+        now_s = time.monotonic()
+        if self._receive_times.waited(now_s):
             return
         try:
             if config.pose == "tf":
@@ -166,44 +166,44 @@ class FilterNode(Node):
         except PlacementError as error:
             self._filter.on_unplaced_scan(config.topic, str(error))
             return
-        self._filter.on_laser_scan(config.topic, messages.scan_of(message), placement, now)
+        self._filter.on_laser_scan(config.topic, messages.scan_of(message), placement, now_s)
 
     def _look_for_scanners(self) -> None:
         """Into the ROS graph: a message does not tell who sent it."""
-        now = time.monotonic()
+        now_s = time.monotonic()
         for scan in self._robot.safety.scans:
             found = publishers(self, self.resolve_topic_name(scan.topic))
             nodes = [each.node or "a node without a name" for each in found if each.kind == SCAN_KIND]
-            self._filter.on_scan_publishers(scan.topic, nodes, now)
+            self._filter.on_scan_publishers(scan.topic, nodes, now_s)
 
     def _on_tf_static(self, message: messages.TFMessage) -> None:
         self._transforms.update(messages.transforms_of(message))
 
     def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        now = time.monotonic()
-        if self._request_times.waited(now):  # whoever asked may have given up, and be near the base
+        now_s = time.monotonic()
+        if self._request_times.waited(now_s):  # whoever asked may have given up, and be near the base
             response.success, response.message = False, OLD
         else:
-            response.success, response.message = self._filter.reset(self._moving_sources(), now)
+            response.success, response.message = self._filter.reset(self._moving_sources(), now_s)
         self._voice.tell(f"reset: {response.message}", Priority.NOTICE, robot=self._robot.name)
         return response
 
     def _tick(self) -> None:
         """Nothing was issued for a period: decides again, for ages have grown and scans have come."""
-        now = time.monotonic()
-        self._receive_times.at(now)
-        self._issue(self._filter.decide(now), now)
+        now_s = time.monotonic()
+        self._receive_times.at(now_s)
+        self._issue(self._filter.decide(now_s), now_s)
 
-    def _issue(self, decision: Decision, now: float) -> None:
+    def _issue(self, decision: Decision, now_s: float) -> None:
         """The lease goes first: the watchdog knows what is allowed before a wheel can move."""
-        self._request_times.at(now)
+        self._request_times.at(now_s)
         self._send_lease(decision)
         stamp = self.get_clock().now().to_msg()
         self._commands.publish(messages.twist_message(decision.twist, stamp, self._robot.base.base_frame))
         if not decision.twist.is_zero:
             order = decision.twist
-            self._stands_from_s = now + ramp(self._robot.limits, order.linear_mps, order.angular_radps).time_s
-        self._tell(decision, now)
+            self._stands_from_s = now_s + ramp(self._robot.limits, order.linear_mps, order.angular_radps).time_s
+        self._tell(decision, now_s)
         self._decision = decision
         self._keep_record()
 
@@ -230,18 +230,20 @@ class FilterNode(Node):
         if report is not None:
             self._voice.tell(report, Priority.WARNING, robot=self._robot.name)
 
-    def _tell(self, decision: Decision, now: float) -> None:
+    def _tell(self, decision: Decision, now_s: float) -> None:
         before = self._decision
         if is_told(before, decision):
             sentence, priority, fields = changed_order(decision)
             self._voice.tell(sentence, priority, robot=self._robot.name, **fields)
         changed = decision.essence != before.essence
-        if not changed and now - self._state_at_s < STATE_PERIOD_S:
+        if not changed and now_s - self._state_at_s < STATE_PERIOD_S:
             return
-        inputs = self._filter.inputs(now)
-        for sentence, priority, fields in self._drops.news(inputs.scans, now):
+        inputs = self._filter.inputs(now_s)
+        for sentence, priority, fields in self._drops.news(inputs.scans, now_s):
             self._voice.tell(sentence, priority, robot=self._robot.name, **fields)
-        message = messages.safety_state(decision, inputs, self._filter.clearances(now), self.get_clock().now().to_msg())
+        message = messages.safety_state(
+            decision, inputs, self._filter.clearances(now_s), self.get_clock().now().to_msg()
+        )
         message.lease_sequence, message.lease_errors = self._lease_sequence, self._leases.errors
         self._states.publish(message)
-        self._state_at_s = now
+        self._state_at_s = now_s

@@ -61,7 +61,7 @@ class _Scanner:
         self._dropped = 0
         self._share: float | None = None
 
-    def receive(self, scan: Scan, placement: Placement, now: float, *, moves: bool) -> None:
+    def receive(self, scan: Scan, placement: Placement, now_s: float, *, moves: bool) -> None:
         """A scan as it came. One that cannot be used is dropped and counted."""
         if self.sole.problem:
             self.drop(StopCause.SCAN_INVALID, self.sole.problem, at_once=True)
@@ -74,11 +74,11 @@ class _Scanner:
         except ScanError as error:
             self.drop(StopCause.SCAN_INVALID, str(error))
             return
-        frozen = self._frozen.look(scan, now, moves=moves)
+        frozen = self._frozen.look(scan, now_s, moves=moves)
         if frozen:
             self.drop(StopCause.SCAN_FROZEN, frozen, at_once=True)
             return
-        late_s = self._late_s(scan, now)
+        late_s = self._late_s(scan, now_s)
         if self._delay.set_back:
             self.drop(StopCause.SCAN_INVALID, "its stamp is below that of the scan before")
             return
@@ -86,13 +86,13 @@ class _Scanner:
             self.drop(StopCause.SCAN_STALE, f"delayed by {late_s:.2f} s (limit {self.config.timeout_s:.2f} s)")
             return
         self._share = view.share
-        self.take(view.points, view.field, now - self._frozen.since + scan.scan_time_s + late_s, now)
+        self.take(view.points, view.field, now_s - self._frozen.since + scan.scan_time_s + late_s, now_s)
 
-    def _late_s(self, scan: Scan, now: float) -> float:
+    def _late_s(self, scan: Scan, now_s: float) -> float:
         """Above the fastest scan [s]. The stamps of a simulator are of its own time, which may be slower."""
         if not (scan.stamp_ns and self.config.noisy):
             return 0.0
-        return self._delay.take(Sent(scan.stamp_ns * 1e-9, math.nan, now))
+        return self._delay.take(Sent(scan.stamp_ns * 1e-9, math.nan, now_s))
 
     def drop(self, cause: StopCause, why: str, *, at_once: bool = False) -> None:
         """A scan that does not count. `at_once`: neither does the one before; otherwise that counts until it is old."""
@@ -100,23 +100,23 @@ class _Scanner:
         self._cause, self._why_dropped = cause, why
         self._problem = why if at_once else self._problem
 
-    def take(self, points: Points, field: Field | None, scan_time_s: float, now: float) -> None:
+    def take(self, points: Points, field: Field | None, scan_time_s: float, now_s: float) -> None:
         """A scan that says something; its first reading was taken `scan_time_s` before."""
         limits = self._geometry.limits
-        since_s = self.config.timeout_s if self.at_s is None else min(now - self.at_s, self.config.timeout_s)
+        since_s = self.config.timeout_s if self.at_s is None else min(now_s - self.at_s, self.config.timeout_s)
         genuine = self._glitches.genuine(points, limits.linear_mps * since_s, limits.angular_radps * since_s)
         self.clearances = clearances(genuine, self._geometry.box)
         self.points = genuine[self._geometry.box.distances_m(genuine) <= self._reach_m]
-        self.field, self.at_s, self._problem, self._why_dropped = field, now, "", ""
-        self.measured_from_s = now - min(max(scan_time_s, 0.0), self.config.timeout_s + self.config.frozen_s)
+        self.field, self.at_s, self._problem, self._why_dropped = field, now_s, "", ""
+        self.measured_from_s = now_s - min(max(scan_time_s, 0.0), self.config.timeout_s + self.config.frozen_s)
 
-    def state(self, now: float) -> ScanState:
+    def state(self, now_s: float) -> ScanState:
         config = self.config
         return ScanState(
             config.topic,
             config.required,
             config.timeout_s,
-            _age_s(self.at_s, now),
+            _age_s(self.at_s, now_s),
             self._problem,
             self._cause,
             self._dropped,
@@ -172,32 +172,32 @@ class SafetyFilter:
         """An orderly end is complete, but for messages of the emergency stop that still come."""
         self._estop.end()
 
-    def on_command(self, twist: Twist, now: float) -> None:
+    def on_command(self, twist: Twist, now_s: float) -> None:
         """Takes a command of cmd_vel_mux, also one with NaN: that stops."""
-        self._command, self._command_at_s = twist, now
+        self._command, self._command_at_s = twist, now_s
 
-    def on_scan(self, topic: str, points: Points, field: Field | None, now: float, scan_time_s: float = 0.0) -> None:
+    def on_scan(self, topic: str, points: Points, field: Field | None, now_s: float, scan_time_s: float = 0.0) -> None:
         """Takes what a scan shows. `field` None: it looks everywhere. Raises KeyError for another topic."""
-        self._scanners[topic].take(points, field, scan_time_s, now)
+        self._scanners[topic].take(points, field, scan_time_s, now_s)
 
-    def on_laser_scan(self, topic: str, scan: Scan, placement: Placement, now: float) -> None:
+    def on_laser_scan(self, topic: str, scan: Scan, placement: Placement, now_s: float) -> None:
         """Takes a scan as it came; drops and counts one that cannot be used. Raises KeyError for another topic."""
-        self._motion.advance(now)
-        self._scanners[topic].receive(scan, placement, now, moves=not self._motion.moving.twist.is_zero)
+        self._motion.advance(now_s)
+        self._scanners[topic].receive(scan, placement, now_s, moves=not self._motion.moving.twist.is_zero)
 
-    def on_scan_publishers(self, topic: str, nodes: Sequence[str], now: float) -> None:
+    def on_scan_publishers(self, topic: str, nodes: Sequence[str], now_s: float) -> None:
         """Takes who publishes on the topic of a scanner: a node's name for each publisher. Raises KeyError for another
         topic.
         """
-        self._scanners[topic].sole.look(nodes, now)
+        self._scanners[topic].sole.look(nodes, now_s)
 
     def on_unplaced_scan(self, topic: str, problem: str) -> None:
         """A scan came whose scanner cannot be placed. Raises KeyError for another topic."""
         self._scanners[topic].drop(StopCause.SCAN_UNPLACED, problem, at_once=True)
 
-    def on_estop(self, pressed: bool, now: float) -> None:
+    def on_estop(self, pressed: bool, now_s: float) -> None:
         """Takes a message of the emergency stop: true = stop."""
-        self._pressed, self._estop_at_s = pressed, now
+        self._pressed, self._estop_at_s = pressed, now_s
         if pressed:
             self._estop.happens(EstopEvent.PRESS)
 
@@ -211,10 +211,10 @@ class SafetyFilter:
         advice = "no release counts; give each button a lock of its own (mux.locks), or join them in one node"
         self.estop_crowd = f"{topic} has {count} publishers: {advice}" if count > 1 else ""
 
-    def reset(self, moving: Sequence[str], now: float) -> tuple[bool, str]:
+    def reset(self, moving: Sequence[str], now_s: float) -> tuple[bool, str]:
         """Whether the emergency stop is free now, and a sentence. `moving`: sources that do not order zero."""
-        self._advance_estop(now)
-        inputs = self.inputs(now)
+        self._advance_estop(now_s)
+        inputs = self.inputs(now_s)
         if self._estop.state is EstopState.HELD:
             held = "pressed" if self._pressed else self._estop_unheard or self.estop_crowd or "silent"
             if self._pressed and self._estop_at_s is None:
@@ -230,67 +230,67 @@ class SafetyFilter:
         self._estop.happens(EstopEvent.RESET)
         return True, "emergency stop reset; the next command is followed"
 
-    def inputs(self, now: float) -> Inputs:
-        """What is known at time `now` [s, monotonic]."""
-        scans = tuple(scanner.state(now) for scanner in self._scanners.values())
-        pose = self._motion.advance(now)
+    def inputs(self, now_s: float) -> Inputs:
+        """What is known at time `now_s` [s, monotonic]."""
+        scans = tuple(scanner.state(now_s) for scanner in self._scanners.values())
+        pose = self._motion.advance(now_s)
         return Inputs(
             command=self._command,
-            command_age_s=_age_s(self._command_at_s, now),
+            command_age_s=_age_s(self._command_at_s, now_s),
             scans=scans,
-            sight=self._sight(pose, now),
+            sight=self._sight(pose, now_s),
             moving=self._motion.moving,
             previous=self._previous,
-            since_s=min(max(now - self._previous_at_s, 0.0), LONGEST_SINCE_S),
+            since_s=min(max(now_s - self._previous_at_s, 0.0), LONGEST_SINCE_S),
             estop=self._estop.state,
             pressed=self._pressed,
-            estop_age_s=_age_s(self._estop_at_s, now),
+            estop_age_s=_age_s(self._estop_at_s, now_s),
             estop_before=self._estop.before_the_start,
             estop_crowd=self._estop_unheard or self.estop_crowd,
             estop_unarmed=self._estop.unarmed,
             braking_hard=self._braking_hard,
         )
 
-    def clearances(self, now: float) -> Clearances | None:
+    def clearances(self, now_s: float) -> Clearances | None:
         """The free way straight ahead and behind, by all fresh scans; None without any."""
-        fresh = [scanner.clearances for scanner in self._fresh(now)]
+        fresh = [scanner.clearances for scanner in self._fresh(now_s)]
         if not fresh:
             return None
         return Clearances(min(each.ahead_m for each in fresh), min(each.behind_m for each in fresh))
 
-    def decide(self, now: float) -> Decision:
-        """The order at time `now` [s, monotonic]; it counts as given."""
+    def decide(self, now_s: float) -> Decision:
+        """The order at time `now_s` [s, monotonic]; it counts as given."""
         if self._ending:
-            return self.shut_down(now)
-        self._advance_estop(now)
-        decision = decide(self.inputs(now), self._config)
-        self._watch_scans(decision, now)
-        return self._ordered(decision, now)
+            return self.shut_down(now_s)
+        self._advance_estop(now_s)
+        decision = decide(self.inputs(now_s), self._config)
+        self._watch_scans(decision, now_s)
+        return self._ordered(decision, now_s)
 
-    def shut_down(self, now: float) -> Decision:
+    def shut_down(self, now_s: float) -> Decision:
         """The zero of a filter that ends, now and from here on; where the base brakes hard, it goes on to do so."""
         self._ending = True
-        emergency = brakes_hard(self.inputs(now), self._config)
-        return self._ordered(replace(SHUTDOWN, emergency=emergency), now)
+        emergency = brakes_hard(self.inputs(now_s), self._config)
+        return self._ordered(replace(SHUTDOWN, emergency=emergency), now_s)
 
-    def _watch_scans(self, decision: Decision, now: float) -> None:
+    def _watch_scans(self, decision: Decision, now_s: float) -> None:
         missing = decision.action is Action.STOP and decision.cause in NO_SCAN
-        self._no_scan_from = min(self._no_scan_from, now) if missing else math.inf
-        long = now - self._no_scan_from >= WITHOUT_SCANS_S
+        self._no_scan_from = min(self._no_scan_from, now_s) if missing else math.inf
+        long = now_s - self._no_scan_from >= WITHOUT_SCANS_S
         self.without_scans = f"no usable scan for {WITHOUT_SCANS_S:.1f} s: {decision.cause.value}" if long else ""
 
-    def _ordered(self, decision: Decision, now: float) -> Decision:
-        self._motion.order(decision.twist, now)
-        self._previous, self._previous_at_s = decision.twist, now
+    def _ordered(self, decision: Decision, now_s: float) -> Decision:
+        self._motion.order(decision.twist, now_s)
+        self._previous, self._previous_at_s = decision.twist, now_s
         self._braking_hard = decision.emergency
         return decision
 
-    def _fresh(self, now: float) -> list[_Scanner]:
-        return [scanner for scanner in self._scanners.values() if scanner.state(now).is_fresh]
+    def _fresh(self, now_s: float) -> list[_Scanner]:
+        return [scanner for scanner in self._scanners.values() if scanner.state(now_s).is_fresh]
 
-    def _sight(self, pose: Pose, now: float) -> Sight:
+    def _sight(self, pose: Pose, now_s: float) -> Sight:
         """Each place as it was scanned and as the base must see it by now, where that differs."""
-        fresh = self._fresh(now)
+        fresh = self._fresh(now_s)
         parts = [np.empty((0, 2))]
         for scanner in fresh:
             there = self._motion.pose_at(scanner.measured_from_s - self._config.safety.reaction_s)
@@ -301,10 +301,10 @@ class SafetyFilter:
         sees_all = any(scanner.field is None for scanner in fresh)
         return Sight(np.concatenate(parts), () if sees_all else fields)
 
-    def _advance_estop(self, now: float) -> None:
+    def _advance_estop(self, now_s: float) -> None:
         """A fresh zero command counts only while the emergency stop is free. In a crowd neither does a release."""
         settings = self._config.safety
-        age_s, command_age_s = _age_s(self._estop_at_s, now), _age_s(self._command_at_s, now)
+        age_s, command_age_s = _age_s(self._estop_at_s, now_s), _age_s(self._command_at_s, now_s)
         silent = age_s is None or age_s > settings.estop.timeout_s
         if self._estop_unheard or (settings.estop.required and silent):
             self._estop.happens(EstopEvent.SILENCE)
@@ -317,5 +317,5 @@ class SafetyFilter:
             self._estop.happens(EstopEvent.ZERO)
 
 
-def _age_s(at_s: float | None, now: float) -> float | None:
-    return None if at_s is None else now - at_s
+def _age_s(at_s: float | None, now_s: float) -> float | None:
+    return None if at_s is None else now_s - at_s

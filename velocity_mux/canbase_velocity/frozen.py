@@ -47,12 +47,12 @@ class FrozenWatch:
         before, self._stamp_ns = self._stamp_ns, scan.stamp_ns
         return scan.stamp_ns is not None and scan.stamp_ns == before
 
-    def look(self, scan: Scan, now: float, *, moves: bool) -> str:
+    def look(self, scan: Scan, now_s: float, *, moves: bool) -> str:
         """Why the scanner counts as frozen, empty: it does not. `moves`: the base may have moved since the last one."""
         ranges = np.asarray(scan.ranges_m, dtype=np.float64)
         in_range = int(np.count_nonzero((ranges >= scan.range_min_m) & (ranges <= scan.range_max_m)))
-        step_s = now - self._looked_at if moves or self._noisy else 0.0
-        readings, self._looked_at, self.since = ranges.tobytes(), now, now
+        step_s = now_s - self._looked_at if moves or self._noisy else 0.0
+        readings, self._looked_at, self.since = ranges.tobytes(), now_s, now_s
         compared = len(self._before) if in_range >= MANY else min(len(self._before), 1 if in_range else 0)
         for place in range(PERIODS):
             if place < compared and self._before[place][0] == readings:

@@ -45,12 +45,12 @@ class Lock:
         """Takes who publishes on its topic. It holds while there is more than one: which of them spoke is not known."""
         self._crowd = crowd(self.config.topic, nodes)
 
-    def hear(self, locked: bool, now: float) -> None:
+    def hear(self, locked: bool, now_s: float) -> None:
         """Takes its word: true = locked."""
-        self._locked, self._at_s = locked, now
+        self._locked, self._at_s = locked, now_s
 
-    def cause(self, now: float) -> str:
-        """Why it holds at time `now` [s, monotonic]; empty: it does not."""
+    def cause(self, now_s: float) -> str:
+        """Why it holds at time `now_s` [s, monotonic]; empty: it does not."""
         if self._locked:
             return "holds"
         if self._crowd:
@@ -59,15 +59,15 @@ class Lock:
             return ""
         if self._at_s is None:
             return f"has published nothing yet on {self.config.topic}"
-        age_s = now - self._at_s
+        age_s = now_s - self._at_s
         if age_s <= self.config.timeout_s:
             return ""
         return f"is silent for {age_s:.2f} s (timeout {self.config.timeout_s:.2f} s)"
 
-    def view(self, now: float) -> LockView:
+    def view(self, now_s: float) -> LockView:
         """What is told of it."""
-        config, cause = self.config, self.cause(now)
-        age_s = None if self._at_s is None else now - self._at_s
+        config, cause = self.config, self.cause(now_s)
+        age_s = None if self._at_s is None else now_s - self._at_s
         return LockView(
             self.name, config.topic, config.priority, bool(cause), config.required, age_s, config.timeout_s, cause
         )

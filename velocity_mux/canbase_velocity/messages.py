@@ -44,12 +44,12 @@ def twist_message(twist: Twist, stamp: Time, frame_id: str) -> TwistStamped:
     return message
 
 
-def sent_at(stamp: Time, wall_s: float, now: float) -> Sent | None:
-    """The times of a command that was taken in at `wall_s` by this computer's clock and at `now`, monotonic [s]. None:
-    its stamp is zero, which says nothing.
+def sent_at(stamp: Time, wall_s: float, now_s: float) -> Sent | None:
+    """The times of a command that was taken in at `wall_s` by this computer's clock and at `now_s`, monotonic [s].
+    None: its stamp is zero, which says nothing.
     """
     stamp_s = stamp.sec + stamp.nanosec * 1e-9
-    return Sent(stamp_s, wall_s, now) if stamp_s > 0.0 else None
+    return Sent(stamp_s, wall_s, now_s) if stamp_s > 0.0 else None
 
 
 def scan_of(message: LaserScan) -> Scan:

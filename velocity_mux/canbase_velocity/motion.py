@@ -79,16 +79,16 @@ class ExpectedMotion:
         """The velocity expected now, and how it changes."""
         self._poses: deque[tuple[float, Pose]] = deque([(-math.inf, Pose())])
 
-    def advance(self, now: float) -> Pose:
-        """Lets the time pass until `now` [s, monotonic]; the pose there."""
+    def advance(self, now_s: float) -> Pose:
+        """Lets the time pass until `now_s` [s, monotonic]; the pose there."""
         at_s, pose = self._poses[-1]
-        left_s = min(max(now - at_s, 0.0), LONGEST_TIME_S)
+        left_s = min(max(now_s - at_s, 0.0), LONGEST_TIME_S)
         while left_s > 0.0:
             dt_s = min(left_s, STEP_S)
             left_s -= dt_s
             pose = self._step(pose, dt_s)
-        self._poses.append((now, pose))
-        while len(self._poses) > 2 and self._poses[1][0] < now - self._memory_s:
+        self._poses.append((now_s, pose))
+        while len(self._poses) > 2 and self._poses[1][0] < now_s - self._memory_s:
             self._poses.popleft()
         return pose
 
@@ -98,9 +98,9 @@ class ExpectedMotion:
         mean = Twist((before.linear_mps + after.linear_mps) / 2.0, (before.angular_radps + after.angular_radps) / 2.0)
         return pose.moved(mean, dt_s)
 
-    def order(self, twist: Twist, now: float) -> None:
-        """From `now` on this is ordered."""
-        self.advance(now)
+    def order(self, twist: Twist, now_s: float) -> None:
+        """From `now_s` on this is ordered."""
+        self.advance(now_s)
         self._order = twist
 
     def pose_at(self, at_s: float) -> Pose:

@@ -127,17 +127,17 @@ class _Source:
         self._delay = Delay(config.same_clock)
         self._late_from = math.inf
 
-    def take(self, twist: Twist, received: float, sent: Sent | None, now: float) -> None:
+    def take(self, twist: Twist, received: float, sent: Sent | None, now_s: float) -> None:
         """A finite command."""
         self.received += 1
         self.twist, self.at_s = twist, received
         self.delay_s = None if sent is None else self._delay.take(sent)
         if sent is not None and self._delay.set_back:
             self.arming.disarm("the clock of its sender was set back")
-        self._late_from = min(self._late_from, now) if self.is_late else math.inf
-        if now - self._late_from > LATE_S:
+        self._late_from = min(self._late_from, now_s) if self.is_late else math.inf
+        if now_s - self._late_from > LATE_S:
             self.arming.disarm("its commands arrived late")
-        self.arming.command(twist, now, on_time=not self.is_late and received == now and not self.crowd)
+        self.arming.command(twist, now_s, on_time=not self.is_late and received == now_s and not self.crowd)
 
     def published_by(self, nodes: Sequence[str], keys: Sequence[str]) -> None:
         """Takes who publishes on its topic."""
@@ -155,12 +155,12 @@ class _Source:
         """Its last command was on the way for longer than it may hold, or is stamped that far in the future."""
         return self.delay_s is not None and abs(self.delay_s) > self.config.timeout_s
 
-    def age_s(self, now: float) -> float | None:
-        return None if self.at_s is None else now - self.at_s
+    def age_s(self, now_s: float) -> float | None:
+        return None if self.at_s is None else now_s - self.at_s
 
-    def is_fresh(self, now: float) -> bool:
+    def is_fresh(self, now_s: float) -> bool:
         """Also of commands that were late: somebody publishes there."""
-        age_s = self.age_s(now)
+        age_s = self.age_s(now_s)
         late_s = 0.0 if self.is_late else max(0.0, self.delay_s or 0.0)
         return age_s is not None and age_s + late_s <= self.config.timeout_s
 
@@ -172,10 +172,10 @@ class _Source:
             return Standing.DELAYED, f"{what} {abs(self.delay_s or 0.0):.2f} s {limit}"
         return (Standing.ACTIVE, "") if self.arming.armed else (Standing.UNARMED, self.crowd or self.arming.reason)
 
-    def view(self, now: float, standing: Standing, reason: str, locked: bool = False) -> SourceView:
+    def view(self, now_s: float, standing: Standing, reason: str, locked: bool = False) -> SourceView:
         config = self.config
         return SourceView(
-            self.name, config.topic, config.priority, standing, self.age_s(now), config.timeout_s,
+            self.name, config.topic, config.priority, standing, self.age_s(now_s), config.timeout_s,
             self.received, self.refused, reason, self.arming.armed, locked, self.delay_s,
         )  # fmt: skip
 
@@ -208,21 +208,21 @@ class Mux:
         self._looked_at = -math.inf
 
     def on_command(
-        self, name: str, twist: Twist, received: float, now: float | None = None, sent: Sent | None = None
+        self, name: str, twist: Twist, received: float, now_s: float | None = None, sent: Sent | None = None
     ) -> bool:
         """Takes the command of source `name`; False: refused, for NaN or infinity. Raises KeyError for another name.
 
-        `received`: when it counts as received, before `now` where this process stood still in between
-        (receive_time.py); `now` None: the same. `sent`: its times; None: it has no stamp.
+        `received`: when it counts as received, before `now_s` where this process stood still in between
+        (receive_time.py); `now_s` None: the same. `sent`: its times; None: it has no stamp.
         """
-        now = received if now is None else now
+        now_s = received if now_s is None else now_s
         source = self._sources[name]
-        self._look(now)
+        self._look(now_s)
         if not twist.is_finite:
             source.refused += 1
             return False
-        source.take(twist, received, sent, now)
-        self._look(now)
+        source.take(twist, received, sent, now_s)
+        self._look(now_s)
         return True
 
     def on_driver(self, state: DriverState, cycles: int, received: float) -> None:
@@ -238,10 +238,10 @@ class Mux:
         """Takes what the safety filter says of its scans: why it has been without them for long; empty: it has not."""
         self._without_scans = missing
 
-    def on_lock(self, name: str, locked: bool, now: float) -> None:
+    def on_lock(self, name: str, locked: bool, now_s: float) -> None:
         """Takes the word of lock `name`. Raises KeyError for another name."""
-        self._locks[name].hear(locked, now)
-        self._look(now)
+        self._locks[name].hear(locked, now_s)
+        self._look(now_s)
 
     def on_publishers(self, topic: str, nodes: Sequence[str], keys: Sequence[str] = ()) -> None:
         """Takes who publishes on this topic of robot.yaml: a node's name for each publisher of the type heard there,
@@ -257,63 +257,63 @@ class Mux:
         """Takes all foreign publishers that are there now."""
         self._foreign = tuple(foreign)
 
-    def decide(self, now: float) -> MuxDecision:
-        """The order at time `now` [s, monotonic]."""
-        self._look(now)
-        held = {name: self._held_back(source, now) for name, source in self._sources.items()}
-        active = next((s for s in self._sources.values() if s.is_fresh(now) and not held[s.name]), None)
-        views = tuple(self._view(source, active, held[source.name], now) for source in self._sources.values())
+    def decide(self, now_s: float) -> MuxDecision:
+        """The order at time `now_s` [s, monotonic]."""
+        self._look(now_s)
+        held = {name: self._held_back(source, now_s) for name, source in self._sources.items()}
+        active = next((s for s in self._sources.values() if s.is_fresh(now_s) and not held[s.name]), None)
+        views = tuple(self._view(source, active, held[source.name], now_s) for source in self._sources.values())
         if active is None:
-            return MuxDecision(None, ZERO, views, *self._others(now))
+            return MuxDecision(None, ZERO, views, *self._others(now_s))
         followed = active.standing()[0] is Standing.ACTIVE
-        return MuxDecision(active.name, active.twist if followed else ZERO, views, *self._others(now))
+        return MuxDecision(active.name, active.twist if followed else ZERO, views, *self._others(now_s))
 
-    def moving(self, now: float) -> tuple[str, ...]:
+    def moving(self, now_s: float) -> tuple[str, ...]:
         """Fresh sources that do not order zero, whoever drives: a reset is refused while there are any."""
-        moving = (source for source in self._sources.values() if source.is_fresh(now) and not source.twist.is_zero)
+        moving = (source for source in self._sources.values() if source.is_fresh(now_s) and not source.twist.is_zero)
         return tuple(source.name for source in moving)
 
-    def shutdown(self, now: float) -> MuxDecision:
+    def shutdown(self, now_s: float) -> MuxDecision:
         """The order while the process ends: zero, whoever wants to drive."""
-        views = tuple(source.view(now, Standing.SHUTDOWN, "shutdown") for source in self._sources.values())
-        return MuxDecision(None, ZERO, views, *self._others(now))
+        views = tuple(source.view(now_s, Standing.SHUTDOWN, "shutdown") for source in self._sources.values())
+        return MuxDecision(None, ZERO, views, *self._others(now_s))
 
-    def _look(self, now: float) -> None:
+    def _look(self, now_s: float) -> None:
         """Time has passed: whom that arms or disarms."""
-        if now - self._looked_at > BLIND_S:
+        if now_s - self._looked_at > BLIND_S:
             for source in self._sources.values():
-                source.arming.missed(now)
-        self._looked_at = now
-        self._arm(self._base.problem(now), now)
+                source.arming.missed(now_s)
+        self._looked_at = now_s
+        self._arm(self._base.problem(now_s), now_s)
 
-    def _arm(self, not_ready: str, now: float) -> None:
+    def _arm(self, not_ready: str, now_s: float) -> None:
         for source in self._sources.values():
-            paused = self._held_back(source, now) or self._without_scans
-            source.arming.look(not_ready, now, silent=not source.is_fresh(now), paused=paused)
+            paused = self._held_back(source, now_s) or self._without_scans
+            source.arming.look(not_ready, now_s, silent=not source.is_fresh(now_s), paused=paused)
 
-    def _others(self, now: float) -> tuple[tuple[LockView, ...], tuple[Foreign, ...], bool, str]:
-        locks = tuple(lock.view(now) for lock in self._locks.values())
-        return locks, self._foreign, self._foreign_lock, self._base.problem(now)
+    def _others(self, now_s: float) -> tuple[tuple[LockView, ...], tuple[Foreign, ...], bool, str]:
+        locks = tuple(lock.view(now_s) for lock in self._locks.values())
+        return locks, self._foreign, self._foreign_lock, self._base.problem(now_s)
 
-    def _held_back(self, source: _Source, now: float) -> str:
+    def _held_back(self, source: _Source, now_s: float) -> str:
         """By what; empty: by nothing."""
         for lock in self._locks.values():
-            if lock.config.priority > source.config.priority and (cause := lock.cause(now)):
+            if lock.config.priority > source.config.priority and (cause := lock.cause(now_s)):
                 return f"locked: {lock.name} {cause}"
         for foreign in self._foreign if self._foreign_lock else ():
             if foreign.disturbs(source.name):
                 return f"locked: {foreign.sentence}"
         return ""
 
-    def _view(self, source: _Source, active: _Source | None, held: str, now: float) -> SourceView:
-        age_s = source.age_s(now)
+    def _view(self, source: _Source, active: _Source | None, held: str, now_s: float) -> SourceView:
+        age_s = source.age_s(now_s)
         if source is active:
-            return source.view(now, *source.standing())
+            return source.view(now_s, *source.standing())
         if held:
-            return source.view(now, Standing.LOCKED, held, locked=True)
+            return source.view(now_s, Standing.LOCKED, held, locked=True)
         if age_s is None:
-            return source.view(now, Standing.NEVER_RECEIVED, "never received")
-        if active is None or not source.is_fresh(now):
+            return source.view(now_s, Standing.NEVER_RECEIVED, "never received")
+        if active is None or not source.is_fresh(now_s):
             reason = f"silent for {age_s:.2f} s (timeout {source.config.timeout_s:.2f} s)"
-            return source.view(now, Standing.SILENT, reason)
-        return source.view(now, Standing.LOWER_PRIORITY, f"{active.name} has priority")
+            return source.view(now_s, Standing.SILENT, reason)
+        return source.view(now_s, Standing.LOWER_PRIORITY, f"{active.name} has priority")

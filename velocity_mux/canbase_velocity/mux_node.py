@@ -52,8 +52,8 @@ class Follower(Protocol):
     def without_scans(self) -> str:
         """Why it has been without usable scans for long; empty: it has not."""
 
-    def obey(self, twist: Twist, now: float) -> None:
-        """Takes the order of the mux at `now` [s, monotonic]."""
+    def obey(self, twist: Twist, now_s: float) -> None:
+        """Takes the order of the mux at `now_s` [s, monotonic]."""
 
 
 class MuxNode(Node):
@@ -97,8 +97,8 @@ class MuxNode(Node):
         lost. The filter orders its own zeros.
         """
         self._follower, self._ending = None, True
-        now = time.monotonic()
-        self._send(self._decide(now), now)
+        now_s = time.monotonic()
+        self._send(self._decide(now_s), now_s)
 
     def moving_sources(self) -> tuple[str, ...]:
         """Names of the sources that order a velocity now, whoever drives."""
@@ -116,36 +116,36 @@ class MuxNode(Node):
                 self.get_logger().warning(f"the silence of lock {name} is not noticed: it is not required (timeout 0)")
 
     def _on_stamped(self, name: str, message: TwistStamped) -> None:
-        now = time.monotonic()
-        self._on_twist(name, message.twist, now, sent_at(message.header.stamp, time.time(), now))
+        now_s = time.monotonic()
+        self._on_twist(name, message.twist, now_s, sent_at(message.header.stamp, time.time(), now_s))
 
     def _on_plain(self, name: str, message: TwistMessage) -> None:
         self._on_twist(name, message, time.monotonic(), None)
 
-    def _on_twist(self, name: str, message: TwistMessage, now: float, sent: Sent | None) -> None:
-        if not self._mux.on_command(name, twist_of(message), self._receive_times.at(now), now, sent):
+    def _on_twist(self, name: str, message: TwistMessage, now_s: float, sent: Sent | None) -> None:
+        if not self._mux.on_command(name, twist_of(message), self._receive_times.at(now_s), now_s, sent):
             self.get_logger().warning(f"{name} refused: NaN or infinity", throttle_duration_sec=5.0)
-        decision = self._decide(now)
+        decision = self._decide(now_s)
         if decision.active == name or decision.active != self._decision.active:
             self._timer.reset()  # a source faster than the timer is not doubled by it
-            self._send(decision, now)
+            self._send(decision, now_s)
 
     def _on_driver(self, message: DriverStatus) -> None:
-        now = time.monotonic()
-        self._mux.on_driver(driver_state(message.state), message.cycles, self._receive_times.at(now))
-        self._send_if_changed(now)
+        now_s = time.monotonic()
+        self._mux.on_driver(driver_state(message.state), message.cycles, self._receive_times.at(now_s))
+        self._send_if_changed(now_s)
 
     def _on_lock(self, name: str, message: Bool) -> None:
-        now = time.monotonic()
-        self._mux.on_lock(name, message.data, self._receive_times.at(now))
-        self._send_if_changed(now)
+        now_s = time.monotonic()
+        self._mux.on_lock(name, message.data, self._receive_times.at(now_s))
+        self._send_if_changed(now_s)
 
     def _look(self) -> None:
         """Into the ROS graph. What is found there is logged when it comes."""
-        now = time.monotonic()
+        now_s = time.monotonic()
         before = self._decision.foreign
         graph = {topic.topic: publishers(self, topic.topic) for topic in self._watch.expected}
-        foreign = self._watch.look(graph, now)
+        foreign = self._watch.look(graph, now_s)
         for found in foreign:
             if found not in before:
                 told = {"topic": found.topic, "node": found.node}
@@ -154,34 +154,34 @@ class MuxNode(Node):
         for topic, kind in self._heard.items():
             there = [found for found in publishers(self, self.resolve_topic_name(topic)) if found.kind == kind]
             self._mux.on_publishers(topic, [found.node for found in there], [found.key for found in there])
-        self._send_if_changed(now)
+        self._send_if_changed(now_s)
 
-    def _send_if_changed(self, now: float) -> None:
-        decision = self._decide(now)
+    def _send_if_changed(self, now_s: float) -> None:
+        decision = self._decide(now_s)
         if decision.essence != self._decision.essence:
-            self._send(decision, now)
+            self._send(decision, now_s)
 
     def _tick(self) -> None:
         """Nothing was sent for a period: repeats what holds, or zero."""
-        now = time.monotonic()
-        self._receive_times.at(now)
-        self._send(self._decide(now), now)
+        now_s = time.monotonic()
+        self._receive_times.at(now_s)
+        self._send(self._decide(now_s), now_s)
 
-    def _decide(self, now: float) -> MuxDecision:
+    def _decide(self, now_s: float) -> MuxDecision:
         if self._follower is not None:
             self._mux.on_estop(self._follower.estop_free)
             self._mux.on_scans(self._follower.without_scans)
-        return self._mux.shutdown(now) if self._ending else self._mux.decide(now)
+        return self._mux.shutdown(now_s) if self._ending else self._mux.decide(now_s)
 
-    def _send(self, decision: MuxDecision, now: float) -> None:
+    def _send(self, decision: MuxDecision, now_s: float) -> None:
         """The filter first: what is published afterwards is for people."""
         if self._follower is not None:
-            self._follower.obey(decision.twist, now)
+            self._follower.obey(decision.twist, now_s)
         stamp = self.get_clock().now().to_msg()
         self._commands.publish(twist_message(decision.twist, stamp, self._robot.base.base_frame))
-        if decision.essence != self._decision.essence or now - self._state_at_s >= STATE_PERIOD_S:
+        if decision.essence != self._decision.essence or now_s - self._state_at_s >= STATE_PERIOD_S:
             self._states.publish(mux_state(decision, stamp))
-            self._state_at_s = now
+            self._state_at_s = now_s
         for sentence, priority, fields in changes(self._decision, decision):
             self._voice.tell(sentence, priority, robot=self._robot.name, **fields)
         self._decision = decision

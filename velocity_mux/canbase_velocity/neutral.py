@@ -40,9 +40,9 @@ class Arming:
         """It may be followed."""
         return not self.waits_since
 
-    def command(self, twist: Twist, now: float, *, on_time: bool) -> None:
-        """A command arrived at `now` [s, monotonic]."""
-        self._absent_from = now
+    def command(self, twist: Twist, now_s: float, *, on_time: bool) -> None:
+        """A command arrived at `now_s` [s, monotonic]."""
+        self._absent_from = now_s
         self._moves = not twist.is_zero
         if twist.is_zero and on_time:
             self.waits_since = ""
@@ -51,7 +51,7 @@ class Arming:
         """It needs a zero again. The first reason is kept."""
         self.waits_since = self.waits_since or why
 
-    def look(self, not_ready: str, now: float, *, silent: bool, paused: str = "") -> None:
+    def look(self, not_ready: str, now_s: float, *, silent: bool, paused: str = "") -> None:
         """Time has passed. `not_ready`: why the base cannot move; empty: it can. `silent`: it is not fresh.
 
         `paused`: why this source is not followed although the base is ready; empty: it is.
@@ -60,12 +60,12 @@ class Arming:
         stopped = not_ready or (paused if needs_zero else "")
         if stopped and (self._moves or (silent and needs_zero)):
             self.disarm(stopped)
-        if self._absent_s is not None and now - self._absent_from >= self._absent_s:
+        if self._absent_s is not None and now_s - self._absent_from >= self._absent_s:
             self.waits_since, self._moves = "", False
 
-    def missed(self, now: float) -> None:
-        """Until `now` nobody watched: absence counts from here."""
-        self._absent_from = now
+    def missed(self, now_s: float) -> None:
+        """Until `now_s` nobody watched: absence counts from here."""
+        self._absent_from = now_s
 
     @property
     def reason(self) -> str:

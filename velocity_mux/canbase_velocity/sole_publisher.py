@@ -29,15 +29,15 @@ class SolePublisher:
         self.problem = ""
         """Why no scan counts; empty: there is no reason."""
 
-    def look(self, nodes: Sequence[str], now: float) -> None:
-        """Takes the names of the nodes that publish there at `now` [s, monotonic], one for each publisher."""
+    def look(self, nodes: Sequence[str], now_s: float) -> None:
+        """Takes the names of the nodes that publish there at `now_s` [s, monotonic], one for each publisher."""
         if self._latched:
             return
         if len(nodes) < 2:
             self._several_from, self.problem = math.inf, ""
             return
-        self._several_from = min(self._several_from, now)
-        self._latched = now - self._several_from >= LATCHED_S
+        self._several_from = min(self._several_from, now_s)
+        self._latched = now_s - self._several_from >= LATCHED_S
         until = "until the next start of canbase velocity" if self._latched else "until one is left"
         named = ", ".join(sorted(nodes)[:3])
         self.problem = f"{len(nodes)} publishers ({named}): give each scanner a topic and a key of its own; {until}"

@@ -82,16 +82,16 @@ class ForeignWatch:
         self.expected = tuple(expected)
         self._unknown_since: dict[str, float] = {}
 
-    def look(self, graph: Mapping[str, Sequence[Publisher]], now: float) -> tuple[Foreign, ...]:
-        """All foreign publishers among those in the graph, by topic, at time `now` [s, monotonic]."""
+    def look(self, graph: Mapping[str, Sequence[Publisher]], now_s: float) -> tuple[Foreign, ...]:
+        """All foreign publishers among those in the graph, by topic, at time `now_s` [s, monotonic]."""
         unknown = {topic for topic, publishers in graph.items() if any(not p.node for p in publishers)}
-        self._unknown_since = {topic: self._unknown_since.get(topic, now) for topic in sorted(unknown)}
+        self._unknown_since = {topic: self._unknown_since.get(topic, now_s) for topic in sorted(unknown)}
         return tuple(
-            found for expected in self.expected for found in self._on(expected, graph.get(expected.topic, ()), now)
+            found for expected in self.expected for found in self._on(expected, graph.get(expected.topic, ()), now_s)
         )
 
-    def _on(self, expected: Expected, publishers: Sequence[Publisher], now: float) -> list[Foreign]:
-        patient = now - self._unknown_since.get(expected.topic, now) < PATIENCE_S
+    def _on(self, expected: Expected, publishers: Sequence[Publisher], now_s: float) -> list[Foreign]:
+        patient = now_s - self._unknown_since.get(expected.topic, now_s) < PATIENCE_S
         counts = Counter(publisher.node for publisher in publishers if publisher.kind == expected.kind)
         found = []
         for publisher in sorted(set(publishers), key=lambda p: (p.node, p.kind)):

@@ -55,11 +55,11 @@ def run_on(bus: can.BusABC, boots: list[NodeBoot], limit_s: float) -> float:
     start = time.monotonic()
     while not all(boot.done for boot in boots) and time.monotonic() < start + limit_s:
         received = bus.recv(0.005)
-        now = time.monotonic()
+        now_s = time.monotonic()
         for boot in boots:
             if received is not None:
-                boot.on_frame(Frame(received.arbitration_id, bytes(received.data)), now)
-            for frame in boot.tick(now):
+                boot.on_frame(Frame(received.arbitration_id, bytes(received.data)), now_s)
+            for frame in boot.tick(now_s):
                 bus.send(message(frame.cob_id, frame.data))
     return time.monotonic() - start
 
@@ -106,10 +106,10 @@ def simulate(channel: str, robot: Robot, end: threading.Event) -> None:
         bench = Bench(robot, time.monotonic())
         while not end.is_set():
             received = bus.recv(0.002)
-            now = time.monotonic()
+            now_s = time.monotonic()
             if received is not None:
-                bench.on_frame(BenchFrame(received.arbitration_id, bytes(received.data)), now)
-            for frame in bench.tick(now):
+                bench.on_frame(BenchFrame(received.arbitration_id, bytes(received.data)), now_s)
+            for frame in bench.tick(now_s):
                 bus.send(message(frame.cob_id, frame.data))
 
 

@@ -40,14 +40,14 @@ class SlowCore(DriverCore):
         self.ticked_at: list[float] = []
         self.taken = 0
 
-    def on_frame(self, frame: Frame, now: float) -> list[Frame]:
+    def on_frame(self, frame: Frame, now_s: float) -> list[Frame]:
         self.taken += 1
         return []
 
-    def tick(self, now: float, lateness_s: float = 0.0) -> list[Frame]:
-        self.ticked_at.append(now)
+    def tick(self, now_s: float, lateness_s: float = 0.0) -> list[Frame]:
+        self.ticked_at.append(now_s)
         time.sleep(self._naps_s.pop(0) if len(self._naps_s) > 1 else self._naps_s[0])
-        return super().tick(now, lateness_s)
+        return super().tick(now_s, lateness_s)
 
 
 def run_for(core: DriverCore, robot: Robot, arguments: dict[str, Any], seconds: float, frames: int = 0) -> None:

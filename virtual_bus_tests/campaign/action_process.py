@@ -58,7 +58,7 @@ class ActionProcess(Process):
         """A new owner without a goal; it has heard nothing."""
         self.goal_queue = GoalQueue(self._robot)
         self._inputs = Inputs()
-        self._turned_at = self.clock.now
+        self._turned_at = self.clock.now_s
         self.every(1.0 / self._robot.action.control_hz, self._on_timer, phase_s=0.002)
 
     def die(self) -> None:
@@ -80,40 +80,40 @@ class ActionProcess(Process):
         self.receive("cancels", 10, self._on_cancel)
 
     def _on_goal(self, distance_m: float, speed_mps: float) -> None:
-        now = self.clock.now
+        now_s = self.clock.now_s
         request = DriveRequest(distance_m, speed_mps)
-        if self.goal_queue.refusal(request, self._inputs, now) is not None:
+        if self.goal_queue.refusal(request, self._inputs, now_s) is not None:
             self.refused += 1
             return
-        self.goal_queue.admit(str(len(self.goals)), request, self._inputs, now)
-        self.goals.append(Goal(len(self.goals), distance_m, speed_mps, now, []))
+        self.goal_queue.admit(str(len(self.goals)), request, self._inputs, now_s)
+        self.goals.append(Goal(len(self.goals), distance_m, speed_mps, now_s, []))
 
     def _on_cancel(self) -> None:
         if self.goal_queue.running is not None:
             self.goal_queue.cancel(self.goal_queue.running)
 
     def _on_timer(self) -> None:
-        now = self.clock.now
+        now_s = self.clock.now_s
         if self.goals and not self.goals[-1].ends:
-            self.goals[-1].held_up_s += max(0.0, now - self._turned_at - 1.0 / self._robot.action.control_hz)
-        self._turned_at = now
-        cycle = self.goal_queue.tick(self._inputs, now)
+            self.goals[-1].held_up_s += max(0.0, now_s - self._turned_at - 1.0 / self._robot.action.control_hz)
+        self._turned_at = now_s
+        cycle = self.goal_queue.tick(self._inputs, now_s)
         if cycle.twist is not None:
             self._topics.publish("cmd_vel_action", Twist(cycle.twist.linear_mps, cycle.twist.angular_radps))
         for end in cycle.ends:
             goal = self.goals[int(end.key)]
             goal.ends.append(end.outcome)
-            goal.ended_at = now
+            goal.ended_at = now_s
             self._on_end(goal)
 
     def _on_odometry(self, snapshot: DriverSnapshot) -> None:
         pose = Pose(snapshot.x_m, snapshot.y_m, snapshot.yaw_rad)
-        odometry = Odometry(self.clock.now, pose, snapshot.linear_mps, snapshot.angular_radps)
+        odometry = Odometry(self.clock.now_s, pose, snapshot.linear_mps, snapshot.angular_radps)
         self._inputs = replace(self._inputs, odometry=odometry)
 
     def _on_driver(self, snapshot: DriverSnapshot) -> None:
         driver = Driver(
-            received=self.clock.now,
+            received=self.clock.now_s,
             state=snapshot.state,
             cause=snapshot.cause.value,
             detail=snapshot.detail,
@@ -127,10 +127,10 @@ class ActionProcess(Process):
 
     def _on_safety(self, decision: Decision) -> None:
         stops, estop = decision.action is Action.STOP, decision.cause in ESTOP_CAUSES
-        safety = Safety(self.clock.now, stops, decision.cause.value, decision.detail, estop)
+        safety = Safety(self.clock.now_s, stops, decision.cause.value, decision.detail, estop)
         self._inputs = replace(self._inputs, safety=safety)
 
     def _on_mux(self, decision: MuxDecision) -> None:
         own = action_source(self._robot)
         locked = (source.reason for source in decision.sources if source.name == own and source.locked)
-        self._inputs = replace(self._inputs, mux=Mux(self.clock.now, decision.active or "", next(locked, "")))
+        self._inputs = replace(self._inputs, mux=Mux(self.clock.now_s, decision.active or "", next(locked, "")))

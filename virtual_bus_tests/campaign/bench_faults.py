@@ -24,7 +24,7 @@ def suffer(kind: str, heal: Callable[[SimulatedNode, int], None], **fixed: Any) 
         takes = KINDS[kind][1]
         if "axis" in takes:
             arguments["axis"] = axis
-        apply(world.drives.bench.nodes, node_id, kind, world.clock.now, arguments)
+        apply(world.drives.bench.nodes, node_id, kind, world.clock.now_s, arguments)
 
     def end(world: World, around: Surroundings, given: Arguments) -> None:
         node_id, axis = world.drives.place(given["wheel"])

@@ -119,7 +119,7 @@ class CanBus:
         if (sender.name, member.name) in trouble.blocked or draw() < trouble.loss:
             return
         if trouble.delay_s > 0.0:
-            arrival = max(self.clock.now + draw() * trouble.delay_s, member.late_until.get(sender.name, 0.0))
+            arrival = max(self.clock.now_s + draw() * trouble.delay_s, member.late_until.get(sender.name, 0.0))
             member.late_until[sender.name] = arrival
             self.clock.at(arrival, member.receive, cob_id, data)
         else:

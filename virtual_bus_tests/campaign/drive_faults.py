@@ -21,7 +21,7 @@ def _heals(world: World, around: Surroundings, given: Arguments) -> None:
 
 
 def _power_cycle(world: World, around: Surroundings, given: Arguments) -> None:
-    world.drives.node(given["wheel"]).power_cycle(world.clock.now, given["off_s"])
+    world.drives.node(given["wheel"]).power_cycle(world.clock.now_s, given["off_s"])
 
 
 DRIVE_FAULTS: dict[str, Kind] = {

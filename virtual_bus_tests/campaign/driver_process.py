@@ -70,7 +70,7 @@ class DriverProcess(Process):
     def reset(self, on_outcome: list[Outcome]) -> None:
         """Service motor_driver/reset; nobody answers while the process does not run."""
         if self.running:
-            self.core.request_reset(self.clock.now, lambda outcome: self._on_reset(outcome, on_outcome))
+            self.core.request_reset(self.clock.now_s, lambda outcome: self._on_reset(outcome, on_outcome))
 
     def _on_reset(self, outcome: Outcome, on_outcome: list[Outcome]) -> None:
         self.asked = "" if outcome.done and self.asked == "stop" else self.asked
@@ -85,7 +85,7 @@ class DriverProcess(Process):
     def aim(self, aim: Aim) -> None:
         """Lifecycle transitions activate and deactivate."""
         if self.running:
-            self.core.request_aim(aim, self.clock.now, lambda outcome: None)
+            self.core.request_aim(aim, self.clock.now_s, lambda outcome: None)
             self.asked = "" if aim is Aim.ACTIVE else "deactivate"
 
     def end(self) -> None:
@@ -99,25 +99,25 @@ class DriverProcess(Process):
 
     def _on_frame(self, cob_id: int, data: bytes) -> None:
         if not self.bus_problem:
-            self._send(self.core.on_frame(Frame(cob_id, data), self.clock.now))
+            self._send(self.core.on_frame(Frame(cob_id, data), self.clock.now_s))
 
     def _on_command(self, twist: Twist) -> None:
         if self.keeps_motion and twist.is_zero:
             twist = self._moves
         self._moves = twist
-        self.core.on_command(Twist2D(twist.linear_mps, twist.angular_radps), self.clock.now)
+        self.core.on_command(Twist2D(twist.linear_mps, twist.angular_radps), self.clock.now_s)
 
     def _on_safety(self, decision: Decision) -> None:
-        self.core.on_emergency(decision.emergency, self.clock.now)
+        self.core.on_emergency(decision.emergency, self.clock.now_s)
 
     def _on_cycle(self) -> None:
-        now = self.clock.now
-        self.core.on_bus(self.bus_problem, now)
-        frames = self.core.tick(now, self._random.random() * self._jitter_s)
+        now_s = self.clock.now_s
+        self.core.on_bus(self.bus_problem, now_s)
+        frames = self.core.tick(now_s, self._random.random() * self._jitter_s)
         self.core.on_record(*self.disk.write(self.core.record))
         self._send(self._changed(frames))
         self._cycle += 1
-        self._publish(now)
+        self._publish(now_s)
         if self.core.finished:  # as loop.py does
             self.die()
 
@@ -151,16 +151,16 @@ class DriverProcess(Process):
         stands = frame.cob_id & 0x780 in SETPOINTS and not any(frame.data[2:])
         return Frame(frame.cob_id, self._last_moving.get(frame.cob_id, frame.data)) if stands else frame
 
-    def _publish(self, now: float) -> None:
+    def _publish(self, now_s: float) -> None:
         """odom at 50 Hz while it is valid, the status at its rate and on every change."""
         status = (self.core.state, self.core.finding.cause)
-        due = status != self._told or now - self._status_at >= 1.0 / self._robot.rates.status_hz
+        due = status != self._told or now_s - self._status_at >= 1.0 / self._robot.rates.status_hz
         samples = round(self._robot.rates.control_hz / self._robot.rates.odometry_hz)
         if not due and self._cycle % samples:
             return
-        snapshot = self.snapshot = self.core.snapshot(now)
+        snapshot = self.snapshot = self.core.snapshot(now_s)
         if snapshot.odometry_valid:
             self._topics.publish("odom", snapshot)
         if due:
-            self._told, self._status_at = status, now
+            self._told, self._status_at = status, now_s
             self._topics.publish("motor_driver/status", snapshot)

@@ -28,7 +28,7 @@ class Drives:
         self._robot = drawn.robot
         bandwidth_radps = min(drawn.body.bandwidth_radps, pace.bandwidth_radps)
         body = replace(drawn.body, step_s=pace.plant_step_s, bandwidth_radps=bandwidth_radps)
-        self.bench = Bench(drawn.robot, bus.clock.now, body, BenchParameters(sdo_delay_s=pace.sdo_delay_s))
+        self.bench = Bench(drawn.robot, bus.clock.now_s, body, BenchParameters(sdo_delay_s=pace.sdo_delay_s))
         self.bench.base.push_n = drawn.push_n
         self.measured: Callable[[int, bytes], bytes] = lambda cob_id, data: data
         """What becomes of a drive's frame before it is sent: sensors with noise."""
@@ -39,14 +39,14 @@ class Drives:
         self._urgent = {0x000, 0x080}
         for node_id in self.bench.nodes:
             self._urgent |= {0x500 + node_id, 0x600 + node_id}
-        self.heard = dict.fromkeys(self.bench.nodes, bus.clock.now)
-        self.ordered = dict.fromkeys(self.bench.nodes, bus.clock.now)
+        self.heard = dict.fromkeys(self.bench.nodes, bus.clock.now_s)
+        self.ordered = dict.fromkeys(self.bench.nodes, bus.clock.now_s)
         """When each node last heard a setpoint of its own."""
         axes = [self.axis(wheel) for wheel in range(len(drawn.robot.drives))]
         pairs = list(zip(drawn.robot.drives, axes, strict=True))
         self.sides = tuple(tuple(axis for drive, axis in pairs if drive.side == side) for side in ("left", "right"))
         """The axes of each side, whose wheels turn together."""
-        self.moved_at = bus.clock.now
+        self.moved_at = bus.clock.now_s
         self._answers = False
         self._poll()
 
@@ -78,18 +78,18 @@ class Drives:
     def _hear(self, node_id: int, node: SimulatedNode, cob_id: int, data: bytes) -> None:
         """What acts at once, or samples, needs the world as it is now; all else may be some milliseconds early."""
         if cob_id in self._urgent:
-            if self.moved_at < self._clock.now:
+            if self.moved_at < self._clock.now_s:
                 self._say()
-            node.on_frame(cob_id, data, self._clock.now)
+            node.on_frame(cob_id, data, self._clock.now_s)
             if not self._answers:
                 self._answers = True
                 self._clock.after(0.0, self._answer)
             return
-        node.on_frame(cob_id, data, self._clock.now)
+        node.on_frame(cob_id, data, self._clock.now_s)
         if cob_id in HEARTBEATS and node.line.hears:
-            self.heard[node_id] = self._clock.now
+            self.heard[node_id] = self._clock.now_s
         elif cob_id & 0x7F == node_id and 0x200 <= cob_id < 0x500 and not cob_id & 0x80:
-            self.ordered[node_id] = self._clock.now
+            self.ordered[node_id] = self._clock.now_s
 
     def _answer(self) -> None:
         """All nodes have heard the frame."""
@@ -97,12 +97,12 @@ class Drives:
         self._say()
 
     def _say(self) -> None:
-        self.moved_at = self._clock.now
-        for frame in self.bench.tick(self._clock.now):
+        self.moved_at = self._clock.now_s
+        for frame in self.bench.tick(self._clock.now_s):
             self._members[frame.cob_id & 0x7F].send(frame.cob_id, self.measured(frame.cob_id, frame.data))
 
     def _poll(self) -> None:
         """While SYNCs come they move the world often enough."""
-        if self.moved_at < self._clock.now - self._poll_s:
+        if self.moved_at < self._clock.now_s - self._poll_s:
             self._say()
         self._clock.after(self._poll_s, self._poll)

@@ -81,27 +81,27 @@ class Envelope:
     4. All moments beyond it count together until there is an order again, and the base keeps to it.
     """
 
-    def __init__(self, react_s: float, now: float, coasting: float = 0.2) -> None:
+    def __init__(self, react_s: float, now_s: float, coasting: float = 0.2) -> None:
         """`coasting`: of `coasting_share`; 0.2: of the sample robot."""
         self._react_s, self._coasting = react_s, coasting
         self._order_s, self._ordered_at = 0.0, -math.inf
         self._ordered_bound_s = self._peak_s = 0.0
         self._beyond_s, self._was_beyond = 0.0, False
-        self._at = now
+        self._at = now_s
 
-    def order(self, tau_s: float, now: float) -> None:
+    def order(self, tau_s: float, now_s: float) -> None:
         """An order with this τ is given."""
-        self._order_s, self._ordered_at = tau_s, now
+        self._order_s, self._ordered_at = tau_s, now_s
 
-    def bound_s(self, tau_s: float, now: float, coasting: bool = False, lost: bool = False) -> float:
+    def bound_s(self, tau_s: float, now_s: float, coasting: bool = False, lost: bool = False) -> float:
         """The greatest τ allowed now, when the base has `tau_s`. To be asked again and again.
 
         `coasting`: some wheel has no power. `lost`: nobody reaches a drive that turns, so nothing brakes it; who
         reaches it again has `react_s` from there on.
         """
-        elapsed_s, self._at = now - self._at, now
+        elapsed_s, self._at = now_s - self._at, now_s
         fades_s = elapsed_s * (self._coasting if coasting else 1.0)
-        ordered_s = self._order_s if now <= self._ordered_at + ORDER_S else 0.0
+        ordered_s = self._order_s if now_s <= self._ordered_at + ORDER_S else 0.0
         self._ordered_bound_s = max(ordered_s, self._ordered_bound_s - fades_s)
         if tau_s <= self._ordered_bound_s + ROUNDING_S:
             self._was_beyond, self._peak_s = False, 0.0

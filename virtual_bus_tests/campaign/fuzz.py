@@ -56,16 +56,16 @@ def random_frame(random: Random) -> tuple[int, bytes]:
 def fuzz_driver(frames: int, seed: int = 0) -> int:
     """Frames from anybody into an enabled driver that has no command: it never orders motion. Returns what it sent."""
     world, random = _enabled(), Random(seed)
-    core, now, sent = world.driver.core, world.clock.now, 0
+    core, now_s, sent = world.driver.core, world.clock.now_s, 0
 
     def step(number: int) -> None:
-        nonlocal now, sent
+        nonlocal now_s, sent
         cob_id, data = random_frame(random)
-        out = core.on_frame(Frame(cob_id, data), now)
+        out = core.on_frame(Frame(cob_id, data), now_s)
         if number % FRAMES_A_CYCLE == 0:
-            now += CYCLE_S
-            out += core.tick(now)
-            core.snapshot(now)
+            now_s += CYCLE_S
+            out += core.tick(now_s)
+            core.snapshot(now_s)
         for frame in out:
             if frame.cob_id & 0x780 in SETPOINTS and frame.cob_id & 0x7F < 0x7E and any(frame.data[2:]):
                 raise FuzzError(f"after frame {number}, {cob_id:03X} {data.hex(' ')}, the driver ordered {frame}")
@@ -80,18 +80,18 @@ def fuzz_watchdog(frames: int, seed: int = 0) -> int:
     stops. Returns how many of its frames were stops.
     """
     world, random = _enabled(), Random(seed)
-    watchdog, now, stops = world.watchdog.core, world.clock.now, 0
+    watchdog, now_s, stops = world.watchdog.core, world.clock.now_s, 0
     tripped = False
 
     def step(number: int) -> None:
-        nonlocal now, stops, tripped
+        nonlocal now_s, stops, tripped
         cob_id, data = random_frame(random)
-        watchdog.on_frame(cob_id, b"" if data[1:] == b"RST" else data, now)
+        watchdog.on_frame(cob_id, b"" if data[1:] == b"RST" else data, now_s)
         if number % LEASES == 0:
-            watchdog.on_lease(random_lease(random, number + 1, now), None, now)
+            watchdog.on_lease(random_lease(random, number + 1, now_s), None, now_s)
         if number % FRAMES_A_CYCLE == 0:
-            now += CYCLE_S / 2.0
-            stops += _count_stops(watchdog, now)
+            now_s += CYCLE_S / 2.0
+            stops += _count_stops(watchdog, now_s)
             if tripped and watchdog.status.state is not State.TRIPPED:
                 raise FuzzError(f"after frame {number}, {cob_id:03X} {data.hex(' ')}, the watchdog forgot its trip")
             tripped = watchdog.status.state is State.TRIPPED
@@ -102,10 +102,10 @@ def fuzz_watchdog(frames: int, seed: int = 0) -> int:
     return stops
 
 
-def random_lease(random: Random, sequence: int, now: float) -> bytes:
+def random_lease(random: Random, sequence: int, now_s: float) -> bytes:
     """A good lease, one with a byte changed, one cut short, or noise."""
     twist = Twist(random.uniform(-9.0, 9.0), random.choice((0.0, 1e300, -1e300)))
-    stamp_ns = round((now + random.choice((0.0, 0.0, -1.0, 1.0))) * 1e9)
+    stamp_ns = round((now_s + random.choice((0.0, 0.0, -1.0, 1.0))) * 1e9)
     datagram = lease_datagram(sequence, stamp_ns, twist, stops=False, estop=False)
     kind = random.randrange(4)
     if kind == 0:
@@ -132,8 +132,8 @@ def is_stop(cob_id: int, data: bytes) -> bool:
     return cob_id == 0x000 or function in (0x500, SDO_REQUEST)
 
 
-def _count_stops(watchdog: Watchdog, now: float) -> int:
-    return sum(is_stop(frame.cob_id, frame.data) for frame in watchdog.tick(now))
+def _count_stops(watchdog: Watchdog, now_s: float) -> int:
+    return sum(is_stop(frame.cob_id, frame.data) for frame in watchdog.tick(now_s))
 
 
 def fuzz_drives(frames: int, seed: int = 0) -> float:
@@ -155,18 +155,18 @@ def orders(cob_id: int, data: bytes) -> bool:
 
 def _fuzz_bench(frames: int, seed: int, everything: bool) -> float:
     world, random = _enabled(), Random(seed)
-    bench, now = world.drives.bench, world.clock.now
+    bench, now_s = world.drives.bench, world.clock.now_s
 
     def step(number: int) -> None:
-        nonlocal now
+        nonlocal now_s
         cob_id, data = random_frame(random)
         if not everything and orders(cob_id, data):
             return
         for node in bench.nodes.values():
-            node.on_frame(cob_id, data, now)
+            node.on_frame(cob_id, data, now_s)
         if number % FRAMES_A_CYCLE == 0:
-            now += CYCLE_S
-            bench.tick(now)
+            now_s += CYCLE_S
+            bench.tick(now_s)
             bench.state_changes()
         if not everything and (bench.base.v_left_mps or bench.base.v_right_mps):
             raise FuzzError(f"after frame {number}, {cob_id:03X} {data.hex(' ')}, the wheels turn")

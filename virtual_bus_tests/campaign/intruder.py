@@ -41,16 +41,16 @@ class Intruder:
         self._act()
 
     def _act(self) -> None:
-        now = self._clock.now
+        now_s = self._clock.now_s
         if self.nmt:
             self._member.send(0x000, self.nmt)
-            self.moves_at = now
-            self.resets_at = now if self.nmt[0] in NMT_RESETS else self.resets_at
+            self.moves_at = now_s
+            self.resets_at = now_s if self.nmt[0] in NMT_RESETS else self.resets_at
         if self.setpoints_mps:
             for drive in self._robot.drives:
                 bits = round(self.setpoints_mps / mps_per_bit(drive, self._robot.base.wheel_radius_m))
                 self._member.send(0x200 + 0x100 * drive.axis + drive.node_id, SETPOINT.pack(ENABLE, bits))
-            self.moves_at = now
+            self.moves_at = now_s
         if self.setpoints_mps or self.syncs:
             self._member.send(0x080, b"")
         if self.twin:

@@ -123,16 +123,16 @@ class Judge:
 
     def __init__(self, world: World, around: Surroundings, outside: Outside, plan: Plan) -> None:
         self._world, self._around, self._outside = world, around, outside
-        self._start = now = world.clock.now
+        self._start = now_s = world.clock.now_s
         self.violations: list[Violation] = []
         self.react_s = self._react_s(plan)
         self._coasting = coasting_share(world.drawn)
         self._reach, self._strangers, self._shown = Reach(world), Strangers(world), Shown(world)
-        self._envelope = Envelope(self.react_s, now, self._coasting)
-        self._wishes = Wishes(world.robot, now)
-        self._wish = Envelope(self.react_s + world.robot.safety.command_timeout_s, now, self._coasting)
+        self._envelope = Envelope(self.react_s, now_s, self._coasting)
+        self._wishes = Wishes(world.robot, now_s)
+        self._wish = Envelope(self.react_s + world.robot.safety.command_timeout_s, now_s, self._coasting)
         sees_s = world.robot.safety.scan.timeout_s + 2.0 * around.SCAN_S + longest_lag_s(world.robot)
-        self._blind = Envelope(sees_s + (self.react_s if len(plan.faults) > 1 else 0.0), now, self._coasting)
+        self._blind = Envelope(sees_s + (self.react_s if len(plan.faults) > 1 else 0.0), now_s, self._coasting)
         self._touched = False
         self._leased, self._leased_at = ZERO, -math.inf
         self._awaits_zero = self._pushed = False
@@ -143,11 +143,11 @@ class Judge:
         """The fastest wheel since something is latched; for how long whoever moved it last may, and so long it did."""
         self._acted_at = -math.inf
         self._stood = False
-        self._latched_at = self._again_since = self._tripped_at = now
+        self._latched_at = self._again_since = self._tripped_at = now_s
         self._again_tau_s = 0.0
         self._latches: dict[str, object] = {}
         self._resets_done = 0
-        self._watching_at = now
+        self._watching_at = now_s
         self._pressed_at, self._unheard_at, self._lock_from = math.inf, -math.inf, -math.inf
         self._odometry, self._goals = OdometryJudge(world, self._shown), GoalJudge(world, self._shown)
         self._motion = MotionJudge(world, self._shown)
@@ -182,64 +182,64 @@ class Judge:
 
     def _violate(self, name: str, detail: str) -> None:
         if all(violation.name != name for violation in self.violations):
-            self.violations.append(Violation(name, self._world.clock.now - self._start, detail))
+            self.violations.append(Violation(name, self._world.clock.now_s - self._start, detail))
             self._world.note(f"VIOLATION of {name}: {detail}")
 
     def _on_lease(self, twist: Twist) -> None:
         if self._awaits_zero and not twist.is_zero:
             self._violate("zero", f"{twist} is ordered, and the command was not zero since the emergency stop")
-        locked_s = self._world.clock.now - max(self._world.locked_at, self._lock_from)
+        locked_s = self._world.clock.now_s - max(self._world.locked_at, self._lock_from)
         if locked_s > HEARD_S and not twist.is_zero:
             self._violate("locked", f"{twist} is ordered, {locked_s:.2f} s after a lock was closed")
-        self._leased, self._leased_at = twist, self._world.clock.now
+        self._leased, self._leased_at = twist, self._world.clock.now_s
         tau_s = braking_s(self._world.robot, twist.linear_mps, twist.angular_radps)
-        self._envelope.order(tau_s, self._world.clock.now)
+        self._envelope.order(tau_s, self._world.clock.now_s)
         self._motion.order(twist)
 
     def _on_message(self, topic: str, message: object) -> None:
         """What the sources want; and a command of zero after an emergency stop, before anything else is ordered."""
         if not isinstance(message, Twist):
             return
-        now = self._world.clock.now
-        self._wishes.take(topic, message, now)
+        now_s = self._world.clock.now_s
+        self._wishes.take(topic, message, now_s)
         if topic == "cmd_vel_mux" and message.is_zero and not self._around.pressed:
             self._awaits_zero = False
 
     def _step(self) -> None:
-        now = self._world.clock.now
+        now_s = self._world.clock.now_s
         self._shown.look()
         tau_s = moving_s(self._world.robot, self._shown.linear_mps, self._shown.angular_radps)
         coasting = tau_s > 0.0 and self._coasts()
         self._reach.step(tau_s == 0.0)
-        self._strangers.step(now)
-        self._check_latches(now)
-        self._check_speed(tau_s, coasting, now)
-        self._check_neutral(tau_s, now)
-        self._check_drives(now)
-        self._check_stop_button(tau_s, coasting, now)
+        self._strangers.step(now_s)
+        self._check_latches(now_s)
+        self._check_speed(tau_s, coasting, now_s)
+        self._check_neutral(tau_s, now_s)
+        self._check_drives(now_s)
+        self._check_stop_button(tau_s, coasting, now_s)
         if not self._world.velocity.running:
-            self._lock_from = now + FOUND_S
-        self._check_wall(tau_s, coasting, now)
+            self._lock_from = now_s + FOUND_S
+        self._check_wall(tau_s, coasting, now_s)
         if self._fresh and tau_s > 0.0 and not self._latches:
             self.lives, self._fresh = self.lives + 1, False
         self._goals.step()
-        problem = self._odometry.step(now)
+        problem = self._odometry.step(now_s)
         if problem:
             self._violate("odometry", problem)
-        name, detail = self._motion.step(now, self._reach.lost)
+        name, detail = self._motion.step(now_s, self._reach.lost)
         if name:
             self._violate(name, detail)
         self._world.clock.after(STEP_S, self._step)
 
-    def _check_wall(self, tau_s: float, coasting: bool, now: float) -> None:
+    def _check_wall(self, tau_s: float, coasting: bool, now_s: float) -> None:
         """Where the scanner reports that it sees nothing the base may creep, and so touch what is there."""
         blind = self._around.scanner is not None and self._around.scanner.hides and self._shown.linear_mps > 0.0
         robot, linear_mps = self._world.robot, self._shown.linear_mps
         slowly_s, ahead_s = braking_s(robot, robot.safety.blind_mps, 0.0), moving_s(robot, linear_mps, 0.0)
-        self._blind.order(slowly_s if blind else max(slowly_s, ahead_s), now)
-        allowed_s = self._blind.bound_s(ahead_s, now, coasting, self._reach.lost)
+        self._blind.order(slowly_s if blind else max(slowly_s, ahead_s), now_s)
+        allowed_s = self._blind.bound_s(ahead_s, now_s, coasting, self._reach.lost)
         pushed = self._reach.was_lost or self._was_pushed()
-        if blind and ahead_s > allowed_s and now > self._strangers.acted_at + self.react_s:
+        if blind and ahead_s > allowed_s and now_s > self._strangers.acted_at + self.react_s:
             self._violate(
                 "blind", f"{self._shown} where no scanner sees: {ahead_s:.3f} s to stop, {allowed_s:.3f} allowed"
             )
@@ -248,95 +248,95 @@ class Judge:
         elif not self._touched:
             self._touched = True
             excused = pushed or self._motion.ran_away or self._around.turned_rad > TURNED_RAD
-            if (not excused or self._orders_into(blind, now)) and not (blind and tau_s <= slowly_s):
+            if (not excused or self._orders_into(blind, now_s)) and not (blind and tau_s <= slowly_s):
                 self._violate("obstacle", f"touched at {self._shown}")
 
-    def _orders_into(self, blind: bool, now: float) -> bool:
+    def _orders_into(self, blind: bool, now_s: float) -> bool:
         """Whatever moved the base there, the filter orders motion on against the wall."""
         ahead_m, behind_m = self._around.free_m
         towards_mps = self._leased.linear_mps * (1.0 if ahead_m < behind_m else -1.0)
-        return self._is_leased(now) and towards_mps > (self._world.robot.safety.blind_mps if blind else 0.0)
+        return self._is_leased(now_s) and towards_mps > (self._world.robot.safety.blind_mps if blind else 0.0)
 
-    def _check_speed(self, tau_s: float, coasting: bool, now: float) -> None:
-        allowed_s = self._envelope.bound_s(tau_s, now, coasting, self._reach.lost)
+    def _check_speed(self, tau_s: float, coasting: bool, now_s: float) -> None:
+        allowed_s = self._envelope.bound_s(tau_s, now_s, coasting, self._reach.lost)
         if tau_s > allowed_s:
             self._violate("envelope", f"{self._shown}: {tau_s:.3f} s to stop, the leases allow {allowed_s:.3f} s")
-        self._wish.order(self._wishes.greatest_s(now), now)
-        allowed_s = self._wish.bound_s(tau_s, now, coasting, self._reach.lost)
+        self._wish.order(self._wishes.greatest_s(now_s), now_s)
+        allowed_s = self._wish.bound_s(tau_s, now_s, coasting, self._reach.lost)
         if tau_s > allowed_s:
             self._violate("sources", f"{self._shown}: {tau_s:.3f} s to stop, the sources want {allowed_s:.3f} s")
         if self._hold is None:
             return
         self._from_mps = max(self._from_mps, self._shown.fastest_mps)
-        acts_s = self._reach.acts_s(now, self._motion.runaway_s)
+        acts_s = self._reach.acts_s(now_s, self._motion.runaway_s)
         if acts_s > 0.0:
-            self._acts_s, self._acted_at = acts_s, now
+            self._acts_s, self._acted_at = acts_s, now_s
         base = self._world.drives.bench.base
         rests = moving_s(self._world.robot, base.v_mps, base.w_radps) == 0.0
         stands = tau_s == 0.0 and rests
-        self._stood = self._stood or (stands and now >= self._latched_at + OBEY_S)
-        excused = self._reach.was_lost or now < self._strangers.begins_at + self.react_s
+        self._stood = self._stood or (stands and now_s >= self._latched_at + OBEY_S)
+        excused = self._reach.was_lost or now_s < self._strangers.begins_at + self.react_s
         again = (
-            self._moves_again(tau_s, now)
+            self._moves_again(tau_s, now_s)
             if self._stood and tau_s > 0.0 and not excused and not rests
-            else self._rest_again(tau_s if excused else 0.0, now)
+            else self._rest_again(tau_s if excused else 0.0, now_s)
         )
-        beyond = tau_s > self._hold.bound_s(tau_s, now, coasting, self._reach.lost) and not self._on_its_ramp(
-            tau_s, now
+        beyond = tau_s > self._hold.bound_s(tau_s, now_s, coasting, self._reach.lost) and not self._on_its_ramp(
+            tau_s, now_s
         )
         if beyond or again:
             self._violate("held", f"{self._shown} while {' and '.join(self._latches)} latched")
 
-    def _check_neutral(self, tau_s: float, now: float) -> None:
+    def _check_neutral(self, tau_s: float, now_s: float) -> None:
         """From a reset on until somebody orders motion who may. What rolls without power moves for nobody."""
-        if self._latches or self._wishes.greatest_s(now) > 0.0:
+        if self._latches or self._wishes.greatest_s(now_s) > 0.0:
             self._rests_since = math.inf
         acted_at = self._strangers.acted_at
-        self._pushed = now < acted_at + self.react_s or (self._pushed and tau_s > 0.0)
-        lies = self._reach.acts_s(now, self._motion.runaway_s) > 0.0 or self._shown.is_blind
-        moved = (self._reach.was_lost or self._pushed or lies) and not self._is_leased(now)
-        if tau_s > 0.0 and now > self._rests_since and any(self._reach.turning()) and not moved:
-            self._violate("neutral", f"{self._shown}, {now - self._rests_since:.2f} s after a reset")
+        self._pushed = now_s < acted_at + self.react_s or (self._pushed and tau_s > 0.0)
+        lies = self._reach.acts_s(now_s, self._motion.runaway_s) > 0.0 or self._shown.is_blind
+        moved = (self._reach.was_lost or self._pushed or lies) and not self._is_leased(now_s)
+        if tau_s > 0.0 and now_s > self._rests_since and any(self._reach.turning()) and not moved:
+            self._violate("neutral", f"{self._shown}, {now_s - self._rests_since:.2f} s after a reset")
 
-    def _is_leased(self, now: float) -> bool:
+    def _is_leased(self, now_s: float) -> bool:
         """The filter orders motion."""
-        return not self._leased.is_zero and now <= self._leased_at + ORDER_S
+        return not self._leased.is_zero and now_s <= self._leased_at + ORDER_S
 
-    def _rest_again(self, tau_s: float, now: float) -> bool:
+    def _rest_again(self, tau_s: float, now_s: float) -> bool:
         """It stands, or moves by what is excused: it may roll out from that `tau_s`."""
-        self._again_since, self._again_tau_s = now, tau_s
+        self._again_since, self._again_tau_s = now_s, tau_s
         return False
 
-    def _on_its_ramp(self, tau_s: float, now: float) -> bool:
+    def _on_its_ramp(self, tau_s: float, now_s: float) -> bool:
         """No faster than one ramp leaves it that began RAMP_LATE_S after the stop."""
-        return tau_s <= self._from_tau_s + RAMP_LATE_S - (now - self._latched_at)
+        return tau_s <= self._from_tau_s + RAMP_LATE_S - (now_s - self._latched_at)
 
-    def _moves_again(self, tau_s: float, now: float) -> bool:
+    def _moves_again(self, tau_s: float, now_s: float) -> bool:
         """After a stop: longer than what moves it may, or faster and faster when that has lost its power."""
-        if self._on_its_ramp(tau_s, now):
+        if self._on_its_ramp(tau_s, now_s):
             self._again_tau_s = tau_s
             return False
-        if now <= self._again_since + SWING_S and self._shown.fastest_mps <= SWING_SHARE * self._from_mps:
+        if now_s <= self._again_since + SWING_S and self._shown.fastest_mps <= SWING_SHARE * self._from_mps:
             self._again_tau_s = tau_s
             return False
-        if now <= self._acted_at + STEP_S:
+        if now_s <= self._acted_at + STEP_S:
             self._again_tau_s = math.inf  # it may have got faster until the very moment when its power went
             self._acted_s += STEP_S
             return self._acted_s > self._acts_s
-        rolls_out = now <= self._acted_at + BRAKES_S or not any(self._reach.turning())
+        rolls_out = now_s <= self._acted_at + BRAKES_S or not any(self._reach.turning())
         slows = tau_s <= self._again_tau_s + ROUNDING_S
         self._again_tau_s = min(tau_s, self._again_tau_s)
         return not (slows and rolls_out)
 
-    def _check_latches(self, now: float) -> None:
+    def _check_latches(self, now_s: float) -> None:
         watchdog = self._world.watchdog
         status = watchdog.core.status
         done = sum(outcome.done for outcome in self._outside.resets)
         if watchdog.running and status.state is WatchdogState.WATCHING:
-            self._watching_at = now
+            self._watching_at = now_s
         latched = self._latched_now()
         if "watchdog" in latched.keys() - self._latches.keys():
-            self._tripped_at = now
+            self._tripped_at = now_s
             self.trips.append(status.verdict.cause.name.lower())
         if self._gone("driver", latched) and done == self._resets_done:
             self._violate("latched", "the driver left LATCHED without a reset")
@@ -344,11 +344,11 @@ class Judge:
         if self._gone("watchdog", latched) and not asked:
             self._violate("latched", "the watchdog left TRIPPED without a reset")
         if done > self._resets_done:
-            self._wishes.on_reset(now)
-            self._rests_since = now
+            self._wishes.on_reset(now_s)
+            self._rests_since = now_s
         self._fresh, self._resets_done = self._fresh or done > self._resets_done, done
         if latched.keys() != self._latches.keys():
-            self._note_latches(latched, now)
+            self._note_latches(latched, now_s)
         self._latches = latched
 
     def _latched_now(self) -> dict[str, object]:
@@ -369,49 +369,49 @@ class Judge:
         """It was latched and is not any more, in this life or after a start: what is dead stays as it was."""
         return name in self._latches and name not in latched
 
-    def _note_latches(self, latched: dict[str, object], now: float) -> None:
+    def _note_latches(self, latched: dict[str, object], now_s: float) -> None:
         self._world.note(f"latched: {', '.join(latched) or 'nothing'}")
         if not latched:
             self._hold = None
         elif self._hold is None:
-            self._hold, self._stood, self._latched_at = Envelope(self.react_s, now, self._coasting), False, now
+            self._hold, self._stood, self._latched_at = Envelope(self.react_s, now_s, self._coasting), False, now_s
             self._acted_s = 0.0
             shown = self._shown
             self._from_mps = shown.fastest_mps
             self._from_tau_s = moving_s(self._world.robot, shown.linear_mps, shown.angular_radps)
 
-    def _check_drives(self, now: float) -> None:
+    def _check_drives(self, now_s: float) -> None:
         robot = self._world.robot
         grace_s = robot.timeouts.watchdog_s + notice_s(robot)
         for change in self._world.drives.changes():
             self._world.note(f"drive {change.node_id}: {change.before.name} → {change.after.name}")
-            by_stranger = now < self._strangers.sent_at + SENT_S
-            if change.after is State.OPERATION_ENABLED and now > self._watching_at + grace_s and not by_stranger:
-                self._violate("enabling", f"drive {change.node_id}, {now - self._watching_at:.2f} s without watchdog")
+            by_stranger = now_s < self._strangers.sent_at + SENT_S
+            if change.after is State.OPERATION_ENABLED and now_s > self._watching_at + grace_s and not by_stranger:
+                self._violate("enabling", f"drive {change.node_id}, {now_s - self._watching_at:.2f} s without watchdog")
         fastest_mps = max(max_wheel_mps(robot), self._reach.fastest_mps)
         brakes_s = fastest_mps / robot.limits.emergency_deceleration_mps2
         for node_id, axis in self._reach.turning():
-            alone_s = now - max(self._reach.heard(node_id), self._reach.lost_at[node_id])
+            alone_s = now_s - max(self._reach.heard(node_id), self._reach.lost_at[node_id])
             if alone_s > self._reach.alone_s + brakes_s + 0.1 and self._reach.stops_alone(node_id):
                 self._violate("heartbeat", f"drive {node_id}.{axis} turns, {alone_s:.2f} s without its masters")
 
-    def _check_stop_button(self, tau_s: float, coasting: bool, now: float) -> None:
+    def _check_stop_button(self, tau_s: float, coasting: bool, now_s: float) -> None:
         if not self._around.pressed:
             self._pressed_at = math.inf
             return
-        self._pressed_at = now if self._reach.lost else min(self._pressed_at, now)
+        self._pressed_at = now_s if self._reach.lost else min(self._pressed_at, now_s)
         topics, topic = self._world.topics, self._world.robot.safety.estop.topic
         if topics.loss.get(topic) or not self._world.velocity.running:
-            self._unheard_at = now
-        if now > max(self._pressed_at, self._unheard_at) + HEARD_S:
+            self._unheard_at = now_s
+        if now_s > max(self._pressed_at, self._unheard_at) + HEARD_S:
             self._awaits_zero = True
         robot, fastest_mps = self._world.robot, self._reach.fastest_mps
         longest_s = braking_s(robot, robot.limits.linear_mps, robot.limits.angular_radps)
         if coasting:
             rolls_s = braking_s(robot, fastest_mps, 2.0 * fastest_mps / robot.base.track_m) / self._coasting
             longest_s = max(longest_s, rolls_s)
-        if tau_s > 0.0 and now > self._pressed_at + 0.1 + self.react_s + longest_s:
-            self._violate("estop", f"{self._shown}, {now - self._pressed_at:.2f} s after it was pressed")
+        if tau_s > 0.0 and now_s > self._pressed_at + 0.1 + self.react_s + longest_s:
+            self._violate("estop", f"{self._shown}, {now_s - self._pressed_at:.2f} s after it was pressed")
 
     def _on_goal_end(self, goal: Goal) -> None:
         outcome = goal.ends[-1]

@@ -67,9 +67,9 @@ class MotionJudge:
         self._world, self._half_m = world, world.robot.base.track_m / 2.0
         self._shown = shown
         self._allowed = Allowed.of(world.robot)
-        now = world.clock.now
-        self._orders: deque[tuple[float, Twist]] = deque([(now, Twist(0.0, 0.0))])
-        self._fast_since = self._beside_since = self._lies_since = now
+        now_s = world.clock.now_s
+        self._orders: deque[tuple[float, Twist]] = deque([(now_s, Twist(0.0, 0.0))])
+        self._fast_since = self._beside_since = self._lies_since = now_s
         self._before_mps = 0.0
         self._impulse_s = world.robot.watchdog.stand_impulse_s + JITTER_S
         self._unasked_at = self._unwatched_at = -math.inf
@@ -84,19 +84,19 @@ class MotionJudge:
 
     def order(self, twist: Twist) -> None:
         """The filter ordered this, with a lease."""
-        self._orders.append((self._world.clock.now, twist))
+        self._orders.append((self._world.clock.now_s, twist))
 
-    def step(self, now: float, lost: bool) -> tuple[str, str]:
+    def step(self, now_s: float, lost: bool) -> tuple[str, str]:
         """Name of the property that does not hold now and what is seen; two empty texts: everything holds.
 
         `lost`: nobody reaches a drive that turns; whoever does again has his time from there on.
         """
         if lost:
-            self._fast_since = self._beside_since = self._lies_since = now
-        while len(self._orders) > 1 and self._orders[1][0] < now - self._allowed.remembered_s:
+            self._fast_since = self._beside_since = self._lies_since = now_s
+        while len(self._orders) > 1 and self._orders[1][0] < now_s - self._allowed.remembered_s:
             self._orders.popleft()
-        found = self._runaway(now) or self._path(now) or self._standstill(now) or ("", "")
-        beyond = not math.isclose(now, min(self._fast_since, self._beside_since)) or self._shown.is_blind
+        found = self._runaway(now_s) or self._path(now_s) or self._standstill(now_s) or ("", "")
+        beyond = not math.isclose(now_s, min(self._fast_since, self._beside_since)) or self._shown.is_blind
         self.ran_away = beyond or (self.ran_away and self._shown.fastest_mps > self._allowed.stands_mps)
         return found
 
@@ -116,36 +116,36 @@ class MotionJudge:
         drives = self._world.drives
         return any(any(axis.motor.powered for axis in side) and all(map(drives.rolls, side)) for side in drives.sides)
 
-    def _missed_s(self, now: float) -> float:
+    def _missed_s(self, now_s: float) -> float:
         """No drive tells anything without SYNC: a driver that hangs or is dead is missed first [s]. And a driver alone
         misses its watchdog before it stops what a stranger's setpoints move."""
         world, timeouts = self._world, self._world.robot.timeouts
         if not world.driver.running:
-            self._unasked_at = now
+            self._unasked_at = now_s
         if not world.watchdog.running and world.intruder.setpoints_mps:
-            self._unwatched_at = now
+            self._unwatched_at = now_s
         unasked = self._fast_since - timeouts.drive_heartbeat_s <= self._unasked_at
         unwatched = self._fast_since - timeouts.watchdog_s <= self._unwatched_at
         return max(unasked * timeouts.drive_heartbeat_s, unwatched * timeouts.watchdog_s)
 
-    def _runaway(self, now: float) -> tuple[str, str] | None:
+    def _runaway(self, now_s: float) -> tuple[str, str] | None:
         ordered_mps = max(abs(t.linear_mps) + abs(t.angular_radps) * self._half_m for _, t in self._orders)
         wheel_mps = self._driven_mps()
         if wheel_mps <= ordered_mps + self._allowed.runaway_mps:
-            self._fast_since = now
-        if now <= self._fast_since + self._allowed.runaway_s + self._missed_s(now):
+            self._fast_since = now_s
+        if now_s <= self._fast_since + self._allowed.runaway_s + self._missed_s(now_s):
             return None
         return "runaway", f"a wheel turns at {wheel_mps:.2f} m/s, {ordered_mps:.2f} m/s was the most ordered of it"
 
-    def _path(self, now: float) -> tuple[str, str] | None:
+    def _path(self, now_s: float) -> tuple[str, str] | None:
         """Between the slowest and the fastest turn that was ordered, zero among them, as a stop may come any time."""
         turns = [twist.angular_radps for _, twist in self._orders]
         low, high = min(0.0, *turns, 0.0), max(0.0, *turns, 0.0)
         turn = self._shown.angular_radps
         slack = self._allowed.path_radps + PATH_SHARE * max(-low, high)
         if low - slack <= turn <= high + slack or not self._follows() or self._rolls_blindly():
-            self._beside_since = now
-        if now <= self._beside_since + self._allowed.path_s:
+            self._beside_since = now_s
+        if now_s <= self._beside_since + self._allowed.path_s:
             return None
         return "path", f"the base turns at {turn:+.2f} rad/s, between {low:+.2f} and {high:+.2f} rad/s were ordered"
 
@@ -157,11 +157,11 @@ class MotionJudge:
         rolls_out = slower and any(all(map(drives.rolls, side)) for side in drives.sides)
         return self._shown.is_blind and (rolls_out or self._shown.pushed_blindly_s <= self._impulse_s)
 
-    def _standstill(self, now: float) -> tuple[str, str] | None:
+    def _standstill(self, now_s: float) -> tuple[str, str] | None:
         driver = self._world.driver
         says = not self._unproven() and driver.running and driver.snapshot is not None and driver.snapshot.standstill
-        if not says or self._shown.fastest_mps <= self._allowed.stands_mps or math.isclose(now, self._lies_since):
-            self._lies_since = now
-        if now <= self._lies_since + STANDS_S:
+        if not says or self._shown.fastest_mps <= self._allowed.stands_mps or math.isclose(now_s, self._lies_since):
+            self._lies_since = now_s
+        if now_s <= self._lies_since + STANDS_S:
             return None
         return "standstill", f"the driver says standstill, a wheel turns at {self._shown.fastest_mps:.2f} m/s"

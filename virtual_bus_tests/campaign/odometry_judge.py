@@ -46,7 +46,7 @@ class OdometryJudge:
         self._origins: tuple[Pose, Pose] | None = None
         self._path_from_m = 0.0
 
-    def step(self, now: float) -> str:
+    def step(self, now_s: float) -> str:
         """What is wrong now, or an empty text."""
         driver = self._world.driver
         snapshot = driver.snapshot
@@ -56,23 +56,23 @@ class OdometryJudge:
         if driver.core is not self._core:
             self._core, self._last, self._origins = driver.core, None, None
         if not self._shown.tells_truth:
-            self._lies_until = now + self._late_s
-        if now <= self._lies_until:
+            self._lies_until = now_s + self._late_s
+        if now_s <= self._lies_until:
             self._origins = None
         if snapshot.travel_losses != self._losses:
             self._losses, self._origins = snapshot.travel_losses, None
         if not snapshot.odometry_valid:
             return ""
         pose = Pose(snapshot.x_m, snapshot.y_m, snapshot.yaw_rad)
-        return self._jump(pose, now) or (self._difference(pose) if now > self._lies_until else "")
+        return self._jump(pose, now_s) or (self._difference(pose) if now_s > self._lies_until else "")
 
-    def _jump(self, pose: Pose, now: float) -> str:
-        last, self._last = self._last, (now, pose)
+    def _jump(self, pose: Pose, now_s: float) -> str:
+        last, self._last = self._last, (now_s, pose)
         if last is None:
             return ""
         way_m = math.hypot(pose.x_m - last[1].x_m, pose.y_m - last[1].y_m)
-        possible_m = 1.1 * self._fastest_mps * (now - last[0] + self._late_s) + FLOOR_M
-        return f"pose moved {way_m:.3f} m in {now - last[0]:.3f} s" if way_m > possible_m else ""
+        possible_m = 1.1 * self._fastest_mps * (now_s - last[0] + self._late_s) + FLOOR_M
+        return f"pose moved {way_m:.3f} m in {now_s - last[0]:.3f} s" if way_m > possible_m else ""
 
     def _difference(self, pose: Pose) -> str:
         base, truth = self._world.drives.bench.base, true_pose(self._world)

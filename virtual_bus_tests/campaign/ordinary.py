@@ -71,7 +71,7 @@ class OrdinaryHour:
         self.drawn: DrawnRobot = draw_robot(seed)
         self.world = World(seed=seed, pace=pace, drawn=self.drawn)
         self.around = Surroundings(self.world)
-        self._start = self.world.clock.now
+        self._start = self.world.clock.now_s
         self.moving_s = 0.0
         """So long the base has been moving."""
         self._story: deque[str] = deque(maxlen=STORY)
@@ -87,7 +87,7 @@ class OrdinaryHour:
     @property
     def now_s(self) -> float:
         """Since power on [s]."""
-        return self.world.clock.now - self._start
+        return self.world.clock.now_s - self._start
 
     def run(self, seconds: float) -> FalseTrip | None:
         """From power on; the first false trip, at which it ends."""
@@ -101,9 +101,9 @@ class OrdinaryHour:
 
     def go_on(self, seconds: float) -> FalseTrip | None:
         """So much longer."""
-        end = self.world.clock.now + seconds
-        while self.world.clock.now < end:
-            self.world.clock.run_until(self.world.clock.now + LOOK_S)
+        end = self.world.clock.now_s + seconds
+        while self.world.clock.now_s < end:
+            self.world.clock.run_until(self.world.clock.now_s + LOOK_S)
             self.moving_s += 0.0 if self.world.drives.bench.base.resting else LOOK_S
             what = self._wrong()
             if what:
@@ -155,14 +155,14 @@ class OrdinaryHour:
         self._note(f"{name} drives")
         topic = self.drawn.robot.mux.sources[source].topic
         lasts_s = self.random.uniform(2.0, 15.0)
-        until = self.world.clock.now + lasts_s
+        until = self.world.clock.now_s + lasts_s
         self._publish(topic, hands(self.random, self.drawn.robot.limits), until)
         self._later(lasts_s + self.random.choice((0.0, 0.0, 0.1, 1.0)), self._change_hands)
 
     def _publish(self, topic: str, source: Source, until: float) -> None:
         """At its end it releases the stick, or says nothing any more."""
         wait_s, twist = next(source)
-        if self.world.clock.now >= until:
+        if self.world.clock.now_s >= until:
             if self.random.random() < 0.7:
                 self.world.topics.publish(topic, ZERO)
             return

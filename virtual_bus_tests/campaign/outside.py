@@ -42,7 +42,7 @@ class Outside:
     def reset(self) -> None:
         """The operator asks for a reset, whatever the state."""
         self._world.note("operator asks for a reset")
-        self.asked_at = self._world.clock.now
+        self.asked_at = self._world.clock.now_s
         self._world.velocity.reset()
         self._world.driver.reset(self.resets)
 
@@ -53,7 +53,7 @@ class Outside:
             self._world.clock.after(goal.cancel_after_s, self._world.action.cancel)
 
     def _send(self, segment: Segment) -> None:
-        elapsed_s = self._world.clock.now - self._start - segment.start_s
+        elapsed_s = self._world.clock.now_s - self._start - segment.start_s
         if elapsed_s >= segment.duration_s:
             return
         self._world.topics.publish(self._topics[segment.source], self._twist(segment, elapsed_s))
@@ -107,7 +107,7 @@ class Surroundings:
         if self.scanner is not None and self.scanner.lies:
             sees_s = max(sees_s, react_s(robot, layers=1) + safety.scan.frozen_s + safety.scan.timeout_s)
         noticing_m = (abs(base.v_mps) + SPEEDING_UP_MPS) * sees_s
-        self.wall_at = self._world.clock.now
+        self.wall_at = self._world.clock.now_s
         self.wall_m = safety.padding_m + safety.stop_distance_m + braking_m + noticing_m + margin_m
         self._wall_from_m, self._wall_from_rad = base.travel_m, base.turned_rad
 
@@ -149,7 +149,8 @@ class Surroundings:
     def _scan(self) -> None:
         if self.scans:
             self._world.topics.publish(
-                "scan", self._seen() if self.scanner is None else self.scanner.scan(*self.free_m, self._world.clock.now)
+                "scan",
+                self._seen() if self.scanner is None else self.scanner.scan(*self.free_m, self._world.clock.now_s),
             )
         self._world.clock.after(self.SCAN_S, self._scan)
 

@@ -46,7 +46,7 @@ class Process:
 
     def every(self, period_s: float, do: Callable[[], None], phase_s: float = 0.0) -> None:
         """Call `do` on a grid of absolute times as long as this life lasts."""
-        self._enter(self._life, self.clock.now + phase_s, period_s, do)
+        self._enter(self._life, self.clock.now_s + phase_s, period_s, do)
 
     def die(self) -> None:
         """SIGKILL: everything that it knew is gone."""
@@ -99,8 +99,8 @@ class Process:
             do()
             nonlocal due
             due += period_s
-            if due <= self.clock.now:  # turns that were missed are not made up for
-                due = self.clock.now + period_s
+            if due <= self.clock.now_s:  # turns that were missed are not made up for
+                due = self.clock.now_s + period_s
             self.clock.at(due, turn)
 
         self.clock.at(due, turn)
@@ -149,7 +149,7 @@ class Topics:
                 self._clock.at(arrival + self.AGAIN_S, process.receive, topic, 1, do, message)
 
     def _arrival(self, topic: str) -> float:
-        arrival = self._clock.now + self.FASTEST_S + self._random.random() * self._jitter_s
+        arrival = self._clock.now_s + self.FASTEST_S + self._random.random() * self._jitter_s
         if topic in self.shuffles_s:
             return arrival + self._random.random() * self.shuffles_s[topic]
         arrival += self.delay_s.get(topic, 0.0)

@@ -141,7 +141,7 @@ def _all_restart(world: World, around: Surroundings, given: Arguments) -> None:
 def _supply_lost(world: World, around: Surroundings, given: Arguments) -> None:
     _all_die(world, around, given)
     for node in world.drives.bench.nodes.values():
-        node.power_cycle(world.clock.now, given["off_s"])
+        node.power_cycle(world.clock.now_s, given["off_s"])
 
 
 def _leases(field: str, off: object) -> tuple[Change, Change]:

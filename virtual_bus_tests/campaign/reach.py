@@ -47,7 +47,7 @@ class Reach:
         """When nobody reached each drive last: who does again has its rungs before him."""
         self._weak: set[int] = set()
         """Drives whose own stop has had hardly an effect since they have power: a ramp that has begun goes on so."""
-        self._ran_at = dict.fromkeys(("driver", "watchdog"), world.clock.now)
+        self._ran_at = dict.fromkeys(("driver", "watchdog"), world.clock.now_s)
         """When each of them ran last: nobody misses it before timeouts.watchdog_s, so it is there until then."""
         self._power_from: dict[int, float] = {}
         """Since when each drive has power: it gets none before its settings are written."""
@@ -60,16 +60,16 @@ class Reach:
 
     def step(self, stands: bool) -> None:
         """Look at all drives now."""
-        now, bench = self._world.clock.now, self._world.drives.bench
-        self._ran_at |= {name: now for name in self._ran_at if self._world.processes[name].running}
+        now_s, bench = self._world.clock.now_s, self._world.drives.bench
+        self._ran_at |= {name: now_s for name in self._ran_at if self._world.processes[name].running}
         powered = [node for node in bench.nodes.values() if any(axis.motor.powered for axis in node.axes)]
-        self._power_from = {node.node_id: self._power_from.get(node.node_id, now) for node in powered}
+        self._power_from = {node.node_id: self._power_from.get(node.node_id, now_s) for node in powered}
         self._weak = {node.node_id for node in powered if node.node_id in self._weak or self._is_weak(node.axes)}
-        lost = {node_id for node_id, _ in self.turning() if not stands and self._is_lost(node_id, now)}
+        lost = {node_id for node_id, _ in self.turning() if not stands and self._is_lost(node_id, now_s)}
         self.lost = bool(lost)
         self.was_lost = self.lost or (self.was_lost and not stands)
-        self.lost_at |= dict.fromkeys(lost, now)
-        self._cut_at |= {node.node_id: now for node in powered if not self._reached(node.node_id)}
+        self.lost_at |= dict.fromkeys(lost, now_s)
+        self._cut_at |= {node.node_id: now_s for node in powered if not self._reached(node.node_id)}
         wheel_mps = max(abs(bench.base.v_left_mps), abs(bench.base.v_right_mps))
         self.fastest_mps = 0.0 if stands else max(self.fastest_mps, wheel_mps)
 
@@ -96,7 +96,7 @@ class Reach:
         heard = drives.heard if self.personality.heeds_heartbeats else drives.ordered
         return heard[node_id]
 
-    def acts_s(self, now: float, lies_s: float) -> float:
+    def acts_s(self, now_s: float, lies_s: float) -> float:
         """So long a wheel may turn again after a stop, before somebody has to have acted [s]; 0: nobody has a reason.
 
         `lies_s`: for a wheel with power whose encoder lies, or whose drive does not brake, or is reached again since
@@ -106,21 +106,21 @@ class Reach:
         longest_s = 0.0
         for node_id, _ in self.turning():
             node = nodes[node_id]
-            lies = self._lies(node) or self._is_weak(node.axes) or now < self._cut_at[node_id] + lies_s
-            waits = now < self.heard(node_id) + self.alone_s + BRAKES_S
+            lies = self._lies(node) or self._is_weak(node.axes) or now_s < self._cut_at[node_id] + lies_s
+            waits = now_s < self.heard(node_id) + self.alone_s + BRAKES_S
             alone = not self._reached(node_id) and self.stops_alone(node_id) and waits
             longest_s = max(longest_s, lies_s if lies else 0.0, math.inf if alone else 0.0)
         return longest_s
 
-    def _is_lost(self, node_id: int, now: float) -> bool:
+    def _is_lost(self, node_id: int, now_s: float) -> bool:
         """Nobody reaches it, and it does not stop by itself, or not yet: a maker's own watch has a time of its own."""
         if self._reacts(node_id):
-            since = self._reacts_since.setdefault(node_id, now)
+            since = self._reacts_since.setdefault(node_id, now_s)
             if not self._watchdog_reaches(node_id):
-                self._reacts_since[node_id] = now
-            return now <= since + self._reset_s
+                self._reacts_since[node_id] = now_s
+            return now_s <= since + self._reset_s
         self._reacts_since.pop(node_id, None)
-        waits = not self.personality.heeds_heartbeats and now <= self.heard(node_id) + self.alone_s
+        waits = not self.personality.heeds_heartbeats and now_s <= self.heard(node_id) + self.alone_s
         return (waits or not self.stops_alone(node_id)) and not self._reached(node_id)
 
     def _reached(self, node_id: int) -> bool:
@@ -138,7 +138,7 @@ class Reach:
 
     def _is_there(self, name: str) -> bool:
         """It runs, or has hung for so short that nobody misses it."""
-        since_s = self._world.clock.now - self._ran_at[name]
+        since_s = self._world.clock.now_s - self._ran_at[name]
         return self._world.processes[name].alive and since_s <= self._world.robot.timeouts.watchdog_s
 
     def _watchdog_reaches(self, node_id: int) -> bool:

@@ -70,8 +70,8 @@ def _no_latch() -> None:
     """A trip ends by itself when everything stands."""
     tick = Watchdog.tick
 
-    def forgetful(self: Watchdog, now: float) -> Any:
-        frames = tick(self, now)
+    def forgetful(self: Watchdog, now_s: float) -> Any:
+        frames = tick(self, now_s)
         if self._state is State.TRIPPED and self._settled:
             self._state, self._verdict, self._stoppers = State.WATCHING, policy.FINE, []
         return frames
@@ -84,12 +84,12 @@ def _driver_forgets() -> None:
     supervisor.BY_PHASE[Phase.LATCHED] = supervisor.BY_PHASE[Phase.DISARMED]
 
 
-def _forget_estop(self: filter_state.SafetyFilter, now: float) -> None:
+def _forget_estop(self: filter_state.SafetyFilter, now_s: float) -> None:
     """Released, the emergency stop is free at once."""
     self._estop.state = HELD if self._pressed else FREE
 
 
-def _no_estop(self: filter_state.SafetyFilter, now: float) -> None:
+def _no_estop(self: filter_state.SafetyFilter, now_s: float) -> None:
     """Whatever was pressed, nothing of it is left when an order is decided."""
     self._estop.state = FREE
 
@@ -125,8 +125,8 @@ def _resets_while_commanded() -> None:
         reset.BREAKS[phase] = tuple(check for check in checks if check is not commanded)
 
 
-def _never_frozen(self: FrozenWatch, scan: Scan, now: float, *, moves: bool) -> str:
-    self.since = now
+def _never_frozen(self: FrozenWatch, scan: Scan, now_s: float, *, moves: bool) -> str:
+    self.since = now_s
     return ""
 
 
@@ -137,9 +137,9 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     **{f"driver:{row.cause.value.replace(' ', '_')}": _reason(Hazard, row.cause) for row in HAZARDS},
     "driver:latch": _driver_forgets,
     "driver:asks_for_watchdog": _put(
-        watchdog_link.WatchdogLink, "view", lambda self, now: (WatchdogView.OK, "")
+        watchdog_link.WatchdogLink, "view", lambda self, now_s: (WatchdogView.OK, "")
     ),
-    "driver:command_timeout": _put(command.Command, "is_fresh", lambda self, now: self.received_at > 0.0),
+    "driver:command_timeout": _put(command.Command, "is_fresh", lambda self, now_s: self.received_at > 0.0),
     "driver:zero_before_motion": _put(command.Command, "await_zero", lambda self: None),
     "driver:command_is_finite": _put(Twist2D, "is_finite", property(lambda self: True)),
     "driver:odometry_jump_guard": _put(WheelTravel, "_is_near", lambda self, from_raw, raw, cycles: True),
@@ -148,17 +148,17 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "driver:reset_needs_zero": _resets_while_commanded,
     "watchdog:stop_record": _watchdog_forgets,
     "records:unreadable": _unreadable_is_clear,
-    "drives:heartbeat_consumer": _put(HeartbeatConsumer, "tick", lambda self, now: None),
+    "drives:heartbeat_consumer": _put(HeartbeatConsumer, "tick", lambda self, now_s: None),
     "mux:neutral_start": _put(neutral.Arming, "armed", property(lambda self: True)),
     "mux:lock_publishers": _put(lock.Lock, "published_by", lambda self, nodes: None),
     "driver:lets_go": _put(LetGo, "_is_due", lambda self, wheels: False),
-    "mux:timeout": _put(mux._Source, "is_fresh", lambda self, now: self.at_s is not None),
+    "mux:timeout": _put(mux._Source, "is_fresh", lambda self, now_s: self.at_s is not None),
     "filter:estop": _put(filter_state.SafetyFilter, "_advance_estop", _no_estop),
     "filter:obstacle": _put(obstacle, "first_touch", lambda points, box, twist, stop_m: NO_TOUCH),
     "filter:blind": _put(obstacle, "told_share", lambda order, sight, geometry: 1.0),
     "filter:frozen": _put(FrozenWatch, "look", _never_frozen),
     "filter:repeated_stamp": _put(FrozenWatch, "is_repeated", lambda self, scan: False),
-    "filter:late_scans": _put(filter_state._Scanner, "_late_s", lambda self, scan, now: 0.0),
+    "filter:late_scans": _put(filter_state._Scanner, "_late_s", lambda self, scan, now_s: 0.0),
     "filter:command": _put(safety_filter, "_command", lambda inputs, config: None),
     "filter:zero_after_estop": _put(filter_state.SafetyFilter, "_advance_estop", _forget_estop),
     "action:timeout_and_progress": _drop(

@@ -31,8 +31,8 @@ class _Teller:
         verdict = f"{watchdog.state.name}: {watchdog.verdict.cause.name} {watchdog.verdict.detail}"
         self._tell("watchdog", verdict, f"{watchdog.state.name} {watchdog.verdict.cause.name}")
         self._tell("watchdog's ladder", watchdog.step.name, watchdog.step.name)
-        if world.clock.now >= self._speed_at:
-            self._speed_at = world.clock.now + SPEED_S
+        if world.clock.now_s >= self._speed_at:
+            self._speed_at = world.clock.now_s + SPEED_S
             base = world.drives.bench.base
             world.note(f"    truth {base.v_mps:+.3f} m/s {base.w_radps:+.3f} rad/s")
         world.clock.after(LOOK_S, self._look)

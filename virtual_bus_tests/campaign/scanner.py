@@ -78,7 +78,7 @@ class Scanner:
         """What is ahead is not seen, and the scanner says so."""
         return any(LIES[name].hides for name in self.lies)
 
-    def scan(self, ahead_m: float, behind_m: float, now: float) -> Scan:
+    def scan(self, ahead_m: float, behind_m: float, now_s: float) -> Scan:
         """What it sends, with walls so far from the footprint [m]; infinity: none."""
         places = list(ROOM)
         across = np.linspace(-HALF_WALL_M, HALF_WALL_M, 25)
@@ -86,7 +86,7 @@ class Scanner:
             places += [(self._front_m + max(0.0, ahead_m), y_m) for y_m in across]
         if behind_m < math.inf:
             places += [(-self._rear_m - max(0.0, behind_m), y_m) for y_m in across]
-        sent = dataclasses.replace(self._lidar.scan(np.array(places)), stamp_ns=round(now * 1e9))
+        sent = dataclasses.replace(self._lidar.scan(np.array(places)), stamp_ns=round(now_s * 1e9))
         for lie in self.lies.values():
             sent = lie(sent)
         return sent

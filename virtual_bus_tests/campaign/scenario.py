@@ -99,11 +99,11 @@ class _Run:
         self, world: World, around: Surroundings, plan: Plan, note: Callable[[float, str], None] | None
     ) -> None:
         self._world, self._around, self._plan = world, around, plan
-        self._start = world.clock.now
+        self._start = world.clock.now_s
         world.random.seed(plan.seed)
         world.bus.bitrate = plan.bitrate
         if note is not None:
-            world.note = lambda text: note(world.clock.now - self._start, text)
+            world.note = lambda text: note(world.clock.now_s - self._start, text)
         self._moved_from_m = world.drives.bench.base.path_m
         if any(fault.name in LIES for fault in plan.faults):
             around.look_closely()
@@ -132,17 +132,17 @@ class _Run:
     def _play(self) -> tuple[Violation, ...]:
         clock, end = self._world.clock, self._start + self._plan.duration_s
         try:
-            while clock.now < end and not self._is_over():
-                clock.run_until(clock.now + LOOK_S)
-            while self._goals_run() and clock.now < end + GOALS_END_S:
-                clock.run_until(clock.now + LOOK_S)
+            while clock.now_s < end and not self._is_over():
+                clock.run_until(clock.now_s + LOOK_S)
+            while self._goals_run() and clock.now_s < end + GOALS_END_S:
+                clock.run_until(clock.now_s + LOOK_S)
             self._judge.finish()
         except Exception:  # noqa: BLE001 - whatever it is: that nothing raises is one of the properties
-            return (Violation("exception", clock.now - self._start, traceback.format_exc(limit=-4)),)
+            return (Violation("exception", clock.now_s - self._start, traceback.format_exc(limit=-4)),)
         return ()
 
     def _is_over(self) -> bool:
-        return self._world.clock.now > self._quiet_at and self._judge.at_rest
+        return self._world.clock.now_s > self._quiet_at and self._judge.at_rest
 
     def _goals_run(self) -> bool:
         return any(not goal.ends and not goal.died for goal in self._world.action.goals)
@@ -158,6 +158,6 @@ class _Run:
             self._judge.lives,
             tuple(ends),
             self._world.drives.bench.base.path_m - self._moved_from_m,
-            self._world.clock.now - self._start,
+            self._world.clock.now_s - self._start,
             processor_s,
         )

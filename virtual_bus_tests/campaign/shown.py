@@ -17,7 +17,7 @@ class Shown:
         self._base, self._track_m = world.drives.bench.base, world.robot.base.track_m
         drives = world.robot.drives
         self._intruder = world.intruder
-        self._clock, self._at = world.clock, world.clock.now
+        self._clock, self._at = world.clock, world.clock.now_s
         self._axes = [world.drives.axis(wheel) for wheel in range(len(drives))]
         self._encoders = tuple(
             [axis.encoder for axis, drive in zip(self._axes, drives, strict=True) if drive.side == side]
@@ -28,7 +28,7 @@ class Shown:
 
     def look(self) -> None:
         """Now."""
-        base, elapsed_s, self._at = self._base, self._clock.now - self._at, self._clock.now
+        base, elapsed_s, self._at = self._base, self._clock.now_s - self._at, self._clock.now_s
         for wheel, axis in enumerate(self._axes):
             motor = axis.motor
             given_s = elapsed_s * abs(motor.force_n) / motor.peak_force_n

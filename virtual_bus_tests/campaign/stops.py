@@ -62,7 +62,7 @@ class Cruise:
         if by == GOAL:
             self.world.action.send_goal(GOAL_M, speed_mps)
         self._push()
-        self.world.clock.run_until(self.world.clock.now + CRUISES_S)
+        self.world.clock.run_until(self.world.clock.now_s + CRUISES_S)
 
     def _push(self) -> None:
         if self.ordered is not None:
@@ -90,7 +90,7 @@ class Cruise:
         """One run in this very world, which is spent then."""
         world, clock, random = self.world, self.world.clock, Random(f"{twin.key} {seed}")
         world.random.seed(seed)
-        clock.run_until(clock.now + random.uniform(0.0, PHASE_S))
+        clock.run_until(clock.now_s + random.uniform(0.0, PHASE_S))
         watch = _Watch(self.world)
         twin.begin(world, self.around, random)
         if twin.then_zero_s:
@@ -111,37 +111,37 @@ class _Watch:
     def begin(self) -> None:
         """What is measured begins now; the fastest wheel and the power are watched since this was made."""
         base = self._world.drives.bench.base
-        self._began = self._moved_at = self._world.clock.now
+        self._began = self._moved_at = self._world.clock.now_s
         self._from_m = (base.x_m, base.y_m)
 
     def look_for(self, seconds: float) -> None:
         """Let time pass."""
-        end = self._world.clock.now + seconds
-        while self._world.clock.now < end - LOOK_S / 2.0:
+        end = self._world.clock.now_s + seconds
+        while self._world.clock.now_s < end - LOOK_S / 2.0:
             self._look()
 
     def until_it_rests(self) -> None:
         """Until it has been standing for a while, or LONGEST_S."""
-        while self._world.clock.now < min(self._moved_at + RESTS_S, self._began + LONGEST_S):
+        while self._world.clock.now_s < min(self._moved_at + RESTS_S, self._began + LONGEST_S):
             self._look()
 
     def _look(self) -> None:
         clock, drives = self._world.clock, self._world.drives.bench
-        clock.run_until(clock.now + LOOK_S)
+        clock.run_until(clock.now_s + LOOK_S)
         rim_mps = max(abs(drives.base.v_left_mps), abs(drives.base.v_right_mps))
         self._peak_mps = max(self._peak_mps, rim_mps)
         if rim_mps > self._world.robot.base.standstill_mps:
-            self._moved_at = clock.now
+            self._moved_at = clock.now_s
         if any(axis.motor.powered for node in drives.nodes.values() for axis in node.axes):
             self._power_off_at = math.inf
         else:
-            self._power_off_at = min(self._power_off_at, clock.now)
+            self._power_off_at = min(self._power_off_at, clock.now_s)
 
     @property
     def run(self) -> Run:
         """What was seen."""
         base = self._world.drives.bench.base
-        stood = self._world.clock.now >= self._moved_at + RESTS_S - LOOK_S
+        stood = self._world.clock.now_s >= self._moved_at + RESTS_S - LOOK_S
         distance_m = math.dist(self._from_m, (base.x_m, base.y_m))
         time_s = self._moved_at - self._began if stood else math.inf
         return Run(time_s, distance_m, self._power_off_at - self._began, self._peak_mps)

@@ -14,7 +14,7 @@ class Strangers:
     """Times [s]; minus infinity: never."""
 
     def __init__(self, world: World) -> None:
-        self._world, self._from = world, world.clock.now
+        self._world, self._from = world, world.clock.now_s
         self.sent_at = -math.inf
         """Somebody sent controlwords, setpoints or NMT commands past the driver's decisions ..."""
         self.sends_from = -math.inf
@@ -25,19 +25,19 @@ class Strangers:
         """Since when the watchdog could not send, this time or the last one."""
         self._deaf = False
 
-    def step(self, now: float) -> None:
+    def step(self, now_s: float) -> None:
         """Now."""
         driver, intruder, deaf = self._world.driver, self._world.intruder, self._world.watchdog.is_deaf
         before = self.sent_at
         if driver.alive and (driver.repeats or driver.ignores_zero):
-            self.sent_at = now
+            self.sent_at = now_s
         if intruder.moves_at > max(self._from, self.sent_at):
             self.sent_at = intruder.moves_at
         if self.sent_at > before + SENT_S:
             self.sends_from = self.sent_at
         if intruder.twist is not None:
-            self.ordered_at = now
-        self.deaf_from = now if deaf and not self._deaf else self.deaf_from
+            self.ordered_at = now_s
+        self.deaf_from = now_s if deaf and not self._deaf else self.deaf_from
         self._deaf = deaf
 
     @property

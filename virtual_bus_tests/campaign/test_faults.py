@@ -55,8 +55,8 @@ def test_a_driver_that_never_lets_go_leaves_the_power_on_after_a_touch(holds: bo
     world.drives.changes()
     for step in range(8):
         twist = Twist(0.05, 0.0) if step < 4 else ZERO
-        world.clock.at(world.clock.now + 0.1 + 0.02 * step, world.topics.publish, "cmd_vel_joy", twist)
-    world.clock.run_until(world.clock.now + 0.4)
+        world.clock.at(world.clock.now_s + 0.1 + 0.02 * step, world.topics.publish, "cmd_vel_joy", twist)
+    world.clock.run_until(world.clock.now_s + 0.4)
     without_power = [change for change in world.drives.changes() if change.after is State.SWITCHED_ON]
     assert bool(without_power) is not holds
 
@@ -94,14 +94,14 @@ def _drive(start: Start, by: str, *faults: str) -> int:
     if by == "goal":
         world.action.send_goal(2.0, 0.4)
     else:
-        _push(world, world.clock.now + DRIVES_S + HOLDS_S)
-    world.clock.run_until(world.clock.now + DRIVES_S)
+        _push(world, world.clock.now_s + DRIVES_S + HOLDS_S)
+    world.clock.run_until(world.clock.now_s + DRIVES_S)
     for fault in faults:
         FAULTS[fault].begin(world, start.around, FAULTS[fault].draw(Random(1)))
-    world.clock.run_until(world.clock.now + LASTS_S)
+    world.clock.run_until(world.clock.now_s + LASTS_S)
     return sums[0]
 
 
 def _push(world: World, until: float) -> None:
-    world.topics.publish("cmd_vel_joy", Twist(0.4 if world.clock.now < until else 0.0, 0.0))
+    world.topics.publish("cmd_vel_joy", Twist(0.4 if world.clock.now_s < until else 0.0, 0.0))
     world.clock.after(0.05, _push, world, until)

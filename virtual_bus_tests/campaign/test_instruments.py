@@ -29,7 +29,7 @@ class Listener(Process):
         self.begin()
 
     def begin(self) -> None:
-        self.every(0.01, lambda: self.ticks.append(round(self.clock.now, 4)))
+        self.every(0.01, lambda: self.ticks.append(round(self.clock.now_s, 4)))
 
 
 def bus_of(bitrate: int) -> tuple[Clock, CanBus]:
@@ -54,7 +54,7 @@ def test_the_lower_identifier_wins_and_each_sender_keeps_its_order() -> None:
 def test_eight_bytes_take_a_quarter_of_a_millisecond_at_500_kbit_per_s() -> None:
     clock, bus = bus_of(500_000)
     times: list[float] = []
-    bus.join("ear", lambda cob_id, data: times.append(clock.now))
+    bus.join("ear", lambda cob_id, data: times.append(clock.now_s))
     bus.join("mouth", lambda cob_id, data: None).send(0x100, bytes(8))
     clock.run_until(1.0)
     assert times == pytest.approx([0.00025], rel=0.02)
@@ -120,24 +120,24 @@ def test_an_order_holds_then_the_base_has_its_time_to_react_and_then_it_must_bra
     t      0 ──── 0.05 ──────────── 0.35 ─────────► the allowance falls
     order  0.5    gone; beyond since 0.05, T_react = 0.3
     """
-    envelope = Envelope(react_s=0.3, now=0.0)
+    envelope = Envelope(react_s=0.3, now_s=0.0)
     envelope.order(0.5, 0.0)
     for step in range(1, 72):
-        now = step * 0.005
-        assert envelope.bound_s(0.5, now) >= 0.5, now
+        now_s = step * 0.005
+        assert envelope.bound_s(0.5, now_s) >= 0.5, now_s
     assert envelope.bound_s(0.5, 0.40) == pytest.approx(0.46, abs=0.011)
     assert envelope.bound_s(0.0, 0.41) <= 0.5
 
 
 def test_a_base_that_brakes_with_its_order_is_never_beyond_it() -> None:
-    envelope = Envelope(react_s=0.0, now=0.0)
+    envelope = Envelope(react_s=0.0, now_s=0.0)
     envelope.order(0.4, 0.0)
     assert envelope.bound_s(0.4, 0.0) == pytest.approx(0.4)
     for step in range(1, 40):
-        now = step * 0.01
-        envelope.order(0.0, now)
-        braking_s = max(0.0, 0.4 - now)
-        assert envelope.bound_s(braking_s, now) >= braking_s
+        now_s = step * 0.01
+        envelope.order(0.0, now_s)
+        braking_s = max(0.0, 0.4 - now_s)
+        assert envelope.bound_s(braking_s, now_s) >= braking_s
 
 
 def test_pulses_that_nobody_orders_have_the_time_to_react_together() -> None:
@@ -145,12 +145,12 @@ def test_pulses_that_nobody_orders_have_the_time_to_react_together() -> None:
 
     beyond  1.0-1.1  1.2-1.3  1.4-1.5  1.6: the 0.3 s are over
     """
-    envelope = Envelope(react_s=0.3, now=0.0)
+    envelope = Envelope(react_s=0.3, now_s=0.0)
     envelope.order(0.5, 0.0)
     found = [
-        now
-        for now in (step * 0.01 for step in range(300))
-        if (tau_s := 0.4 if now >= 1.0 and now * 5.0 % 1.0 < 0.5 else 0.0) > envelope.bound_s(tau_s, now)
+        now_s
+        for now_s in (step * 0.01 for step in range(300))
+        if (tau_s := 0.4 if now_s >= 1.0 and now_s * 5.0 % 1.0 < 0.5 else 0.0) > envelope.bound_s(tau_s, now_s)
     ]
     assert found[0] == pytest.approx(1.65, abs=0.06)
     envelope.order(0.5, 3.0)

@@ -53,10 +53,10 @@ def plan(*faults: PlannedFault, segments: tuple[Segment, ...] = (), lasts_s: flo
 
 def goes_on(world: World, pulse_s: float = 9.0) -> None:
     """The driver enables its drives and moves them, in pulses, from STARTS_S on, whatever is latched."""
-    begins, driver, changed = world.clock.now + STARTS_S, world.driver, world.driver._changed
+    begins, driver, changed = world.clock.now_s + STARTS_S, world.driver, world.driver._changed
 
     def moving() -> list[Frame]:
-        moves = (world.clock.now - begins) % (pulse_s + 0.4) < pulse_s
+        moves = (world.clock.now_s - begins) % (pulse_s + 0.4) < pulse_s
         sent = []
         for drive in world.robot.drives:
             state = world.drives.bench.nodes[drive.node_id].axes[drive.axis].state
@@ -66,7 +66,7 @@ def goes_on(world: World, pulse_s: float = 9.0) -> None:
         return [*sent, Frame(0x080, b"")]
 
     def mad(frames: list[Frame]) -> list[Frame]:
-        is_mad = begins <= world.clock.now < begins + ENDS_S - STARTS_S
+        is_mad = begins <= world.clock.now_s < begins + ENDS_S - STARTS_S
         beats = [frame for frame in frames if frame.cob_id >= 0x700]
         return [*beats, *moving()] if is_mad else changed(frames)
 
@@ -102,15 +102,15 @@ def counts_more(world: World) -> None:
     """The driver takes each metre for one and a half."""
     core = world.driver.core
     told = core.snapshot
-    core.snapshot = lambda now: replace(told(now), x_m=1.5 * told(now).x_m)  # type: ignore[method-assign]
+    core.snapshot = lambda now_s: replace(told(now_s), x_m=1.5 * told(now_s).x_m)  # type: ignore[method-assign]
 
 
 def forgets_the_second(world: World) -> None:
     """The watchdog's second trip ends by itself."""
     tick = Watchdog.tick
 
-    def forgetful(self: Watchdog, now: float) -> object:
-        frames = tick(self, now)
+    def forgetful(self: Watchdog, now_s: float) -> object:
+        frames = tick(self, now_s)
         if self._state is State.TRIPPED and self._settled and self.trips >= 2:
             self._state, self._verdict, self._stoppers = State.WATCHING, policy.FINE, []
         return frames

@@ -40,7 +40,7 @@ class Hand:
         """Let time pass; how far the base went meanwhile [m]."""
         base = self.world.drives.bench.base
         before_m = base.path_m
-        self.world.clock.run_until(self.world.clock.now + seconds)
+        self.world.clock.run_until(self.world.clock.now_s + seconds)
         return base.path_m - before_m
 
     def wait_enabled(self) -> None:

@@ -51,7 +51,7 @@ def driving() -> World:
     world.enable()
     for _ in range(16):
         world.topics.publish("cmd_vel_joy", Twist(0.3, 0.0))
-        world.clock.run_until(world.clock.now + 0.05)
+        world.clock.run_until(world.clock.now_s + 0.05)
     return world
 
 
@@ -66,7 +66,7 @@ def test_a_drive_is_out_of_reach_when_nobody_has_a_line_to_it_and_its_sensor_lie
     driving.driver.die()
     driving.watchdog.die()
     assert not lost(), "it watches its masters, and stops by itself"
-    apply(nodes, 1, "encoder_lost", driving.clock.now, {})
+    apply(nodes, 1, "encoder_lost", driving.clock.now_s, {})
     assert lost()
     driving.watchdog.restart()
     assert not lost()
@@ -81,9 +81,9 @@ def test_a_wheel_counts_in_the_measure_of_its_encoder(driving: World) -> None:
     shown = Shown(driving)
     shown.look()
     assert shown.left_mps == pytest.approx(0.3, abs=0.02)
-    apply(driving.drives.bench.nodes, 1, "encoder_scaled", driving.clock.now, {"factor": 0.5})
+    apply(driving.drives.bench.nodes, 1, "encoder_scaled", driving.clock.now_s, {"factor": 0.5})
     shown.look()
     assert (shown.left_mps, shown.right_mps) == pytest.approx((0.15, 0.3), abs=0.02)
-    apply(driving.drives.bench.nodes, 1, "encoder_reversed", driving.clock.now, {})
+    apply(driving.drives.bench.nodes, 1, "encoder_reversed", driving.clock.now_s, {})
     shown.look()
     assert shown.left_mps == pytest.approx(0.3, abs=0.02), "one that lies otherwise excuses nothing"

@@ -69,7 +69,7 @@ def two_on_a_lock(world: World, around: Surroundings, given: Arguments, number: 
     """The graph has both of them; each publishes ten times a second."""
     if number % LOOK == 0:
         world.topics.publish("publishers", ("lock", ("button", "panel")))
-    world.locked_at = min(world.locked_at, world.clock.now)
+    world.locked_at = min(world.locked_at, world.clock.now_s)
     world.topics.publish("lock", number % 2 == 0)
 
 

@@ -58,7 +58,7 @@ def drive(kind: str, **given: object) -> Begin:
     def begin(world: World, around: Surroundings, random: Random) -> None:
         node, axis = world.drives.place(random.randrange(len(world.robot.drives)))
         placed = {"axis": axis} if "axis" in KINDS[kind][1] else {}
-        apply(world.drives.bench.nodes, node, kind, world.clock.now, given | placed)
+        apply(world.drives.bench.nodes, node, kind, world.clock.now_s, given | placed)
 
     return begin
 

@@ -59,7 +59,7 @@ class VelocityProcess(Process):
 
     def begin(self) -> None:
         """A new mux and a new filter; the sequence of the leases starts again."""
-        now = self.clock.now
+        now_s = self.clock.now_s
         self.mux = Mux(self._robot.mux.sources, LOCKS, status_timeout_s=status_timeout_s(self._robot.rates.status_hz))
         self.filter = SafetyFilter(FilterConfig.of(self._robot), self.disk.found())
         self._sequence, self._ending = 0, False
@@ -67,7 +67,7 @@ class VelocityProcess(Process):
         self._told: tuple[object, ...] = ()
         self._mux_state_at = self._state_at = -math.inf
         self._active: str | None = None
-        self._mux_due = self._filter_due = now
+        self._mux_due = self._filter_due = now_s
         self._period_s = 1.0 / self._robot.rates.command_hz
         self.every(self._period_s / self._parts, self._on_timer, phase_s=0.003)
 
@@ -75,79 +75,79 @@ class VelocityProcess(Process):
         """It orders zero until the base stands."""
         self._ending = True
         self.filter.end()
-        self._issue(self.filter.shut_down(self.clock.now))
+        self._issue(self.filter.shut_down(self.clock.now_s))
 
     def _on_timer(self) -> None:
         """Two timers that each message sets anew, at a quarter of their period's resolution."""
-        now = self.clock.now
-        if now >= self._mux_due:
+        now_s = self.clock.now_s
+        if now_s >= self._mux_due:
             self._send(self._decide())
-        if now >= self._filter_due:
-            self._issue(self.filter.decide(now))
+        if now_s >= self._filter_due:
+            self._issue(self.filter.decide(now_s))
 
     def _on_source(self, name: str, twist: Twist) -> None:
-        self.mux.on_command(name, twist, self.clock.now)
+        self.mux.on_command(name, twist, self.clock.now_s)
         decision = self._decide()
         if decision.active == name or decision.active != self._active:
             self._send(decision)
 
     def _on_driver(self, snapshot: DriverSnapshot) -> None:
-        self.mux.on_driver(snapshot.state, snapshot.cycles, self.clock.now)
+        self.mux.on_driver(snapshot.state, snapshot.cycles, self.clock.now_s)
 
     def _decide(self) -> MuxDecision:
         self.mux.on_estop(self.filter.estop is EstopState.FREE)
         self.mux.on_scans(self.filter.without_scans)
-        return self.mux.decide(self.clock.now)
+        return self.mux.decide(self.clock.now_s)
 
     def _send(self, decision: MuxDecision) -> None:
         """As mux_node.py: the filter first; the topic is for people."""
-        now = self.clock.now
-        self._mux_due, self._active = now + self._period_s, decision.active
+        now_s = self.clock.now_s
+        self._mux_due, self._active = now_s + self._period_s, decision.active
         self._topics.publish("cmd_vel_mux", decision.twist)
         if not self._topics.loses("cmd_vel_mux"):
-            self.filter.on_command(decision.twist, now)
-            self._issue(self.filter.decide(now))
+            self.filter.on_command(decision.twist, now_s)
+            self._issue(self.filter.decide(now_s))
         told = decision.essence
-        if told != self._mux_told or now - self._mux_state_at >= MUX_STATE_PERIOD_S:
-            self._mux_told, self._mux_state_at = told, now
+        if told != self._mux_told or now_s - self._mux_state_at >= MUX_STATE_PERIOD_S:
+            self._mux_told, self._mux_state_at = told, now_s
             self._topics.publish("velocity_mux/state", decision)
 
     def reset(self) -> None:
         """The operator resets the emergency stop; a process that is dead or hangs does not hear it."""
         if self.alive:
-            self.filter.reset(self.mux.moving(self.clock.now), self.clock.now)
+            self.filter.reset(self.mux.moving(self.clock.now_s), self.clock.now_s)
 
     def _on_scan(self, seen: Points | Scan) -> None:
         scan = self._robot.safety.scan
         if isinstance(seen, Scan):
-            self.filter.on_laser_scan(scan.topic, seen, Placement.of(scan), self.clock.now)
+            self.filter.on_laser_scan(scan.topic, seen, Placement.of(scan), self.clock.now_s)
         else:
-            self.filter.on_scan(scan.topic, seen, None, self.clock.now)
+            self.filter.on_scan(scan.topic, seen, None, self.clock.now_s)
 
     def _on_lock(self, locked: bool) -> None:
-        self.mux.on_lock("lock", locked, self.clock.now)
+        self.mux.on_lock("lock", locked, self.clock.now_s)
 
     def _on_publishers(self, found: tuple[str, tuple[str, ...]]) -> None:
         """A look into the ROS graph: a topic, and the nodes that publish on it."""
         self.mux.on_publishers(*found)
 
     def _on_estop(self, pressed: bool) -> None:
-        self.filter.on_estop(pressed, self.clock.now)
+        self.filter.on_estop(pressed, self.clock.now_s)
         if pressed:
-            self._issue(self.filter.decide(self.clock.now))
+            self._issue(self.filter.decide(self.clock.now_s))
 
     def _issue(self, decision: Decision) -> None:
-        now = self.clock.now
+        now_s = self.clock.now_s
         if self._ending:
-            decision = self.filter.shut_down(now)
-        self._filter_due = now + self._period_s
+            decision = self.filter.shut_down(now_s)
+        self._filter_due = now_s + self._period_s
         self._sequence += 1
         stops = decision.action is Action.STOP
-        datagram = lease_datagram(self._sequence, round(now * 1e9), decision.twist, stops=stops, estop=False)
+        datagram = lease_datagram(self._sequence, round(now_s * 1e9), decision.twist, stops=stops, estop=False)
         self._send_lease(datagram, decision.twist)
         self._topics.publish("cmd_vel", decision.twist)
         told = (decision.action, decision.cause, decision.emergency)
-        if told != self._told or now - self._state_at >= STATE_PERIOD_S:
-            self._told, self._state_at = told, now
+        if told != self._told or now_s - self._state_at >= STATE_PERIOD_S:
+            self._told, self._state_at = told, now_s
             self._topics.publish("safety_filter/state", decision)
         self.filter.on_record(*self.disk.write(self.filter.record))

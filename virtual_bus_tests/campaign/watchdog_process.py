@@ -28,7 +28,7 @@ class WatchdogProcess(Process):
 
     def fail_bus(self, fails: bool) -> None:
         """Its adapter takes and gives no frames from now on; or does again."""
-        self._failed_since = self.clock.now if fails else math.inf
+        self._failed_since = self.clock.now_s if fails else math.inf
 
     @property
     def is_deaf(self) -> bool:
@@ -37,30 +37,30 @@ class WatchdogProcess(Process):
 
     def begin(self) -> None:
         """A new core, which knows of a trip before by its record."""
-        self.core = Watchdog(self._config, self.clock.now, self.disk.past())
+        self.core = Watchdog(self._config, self.clock.now_s, self.disk.past())
         self.every(self._tick_s, self._on_tick, phase_s=0.001)
 
     def end(self) -> None:
         """With a wheel in motion it stops it first."""
-        self.core.end(self.clock.now)
+        self.core.end(self.clock.now_s)
 
     def on_lease(self, datagram: bytes) -> None:
         """A datagram arrives at the socket."""
         self.receive("leases", FRAMES_HELD, self._on_lease, datagram)
 
     def _on_lease(self, datagram: bytes) -> None:
-        self.core.on_lease(datagram, None, self.clock.now)
+        self.core.on_lease(datagram, None, self.clock.now_s)
 
     def _hear(self, cob_id: int, data: bytes) -> None:
         self.receive("frames", FRAMES_HELD, self._on_frame, cob_id, data)
 
     def _on_frame(self, cob_id: int, data: bytes) -> None:
         if self._failed_since == math.inf:
-            self.core.on_frame(cob_id, data, self.clock.now)
+            self.core.on_frame(cob_id, data, self.clock.now_s)
 
     def _on_tick(self) -> None:
         self.core.on_bus(self._failed_since, 0)
-        for frame in self.core.tick(self.clock.now):
+        for frame in self.core.tick(self.clock.now_s):
             if self._failed_since == math.inf:
                 self._member.send(frame.cob_id, frame.data)
         self.core.on_record(*self.disk.write(self.core.record))

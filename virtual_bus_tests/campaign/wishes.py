@@ -16,36 +16,36 @@ class Wishes:
     neutral_after_s.
     """
 
-    def __init__(self, robot: Robot, now: float) -> None:
+    def __init__(self, robot: Robot, now_s: float) -> None:
         self._robot = robot
         self._timeouts = {source.topic: source.timeout_s for source in robot.mux.sources.values()}
         self._neutral_after = {source.topic: source.neutral_after_s for source in robot.mux.sources.values()}
         self._held: set[str] = set()
-        self._last: dict[str, tuple[float, float]] = dict.fromkeys(self._timeouts, (0.0, now))
+        self._last: dict[str, tuple[float, float]] = dict.fromkeys(self._timeouts, (0.0, now_s))
         self._before = dict(self._last)
         """The greatest one of RECENT_S before it: who takes the newest of two hands on one stick may take the other."""
 
-    def take(self, topic: str, twist: Twist, now: float) -> None:
+    def take(self, topic: str, twist: Twist, now_s: float) -> None:
         """A message on any topic; only sources count, and only finite commands."""
         if topic not in self._timeouts or not twist.is_finite:
             return
         patience_s = self._neutral_after[topic]
-        if twist.is_zero or (patience_s and now > self._last[topic][1] + patience_s):
+        if twist.is_zero or (patience_s and now_s > self._last[topic][1] + patience_s):
             self._held.discard(topic)
         before = self._last[topic], self._before[topic]
-        self._before[topic] = max((each for each in before if now <= each[1] + RECENT_S), default=(0.0, now))
-        self._last[topic] = braking_s(self._robot, twist.linear_mps, twist.angular_radps), now
+        self._before[topic] = max((each for each in before if now_s <= each[1] + RECENT_S), default=(0.0, now_s))
+        self._last[topic] = braking_s(self._robot, twist.linear_mps, twist.angular_radps), now_s
 
-    def on_reset(self, now: float) -> None:
+    def on_reset(self, now_s: float) -> None:
         """A reset is done: who orders motion now has held the stick over it."""
-        self._held = {topic for topic in self._last if self._orders_s(topic, now) > 0.0}
+        self._held = {topic for topic in self._last if self._orders_s(topic, now_s) > 0.0}
 
-    def greatest_s(self, now: float) -> float:
+    def greatest_s(self, now_s: float) -> float:
         """τ of the greatest command that holds [s]."""
-        return max(0.0 if topic in self._held else self._orders_s(topic, now) for topic in self._last)
+        return max(0.0 if topic in self._held else self._orders_s(topic, now_s) for topic in self._last)
 
-    def _orders_s(self, topic: str, now: float) -> float:
+    def _orders_s(self, topic: str, now_s: float) -> float:
         tau_s, at = self._last[topic]
         before_s, before_at = self._before[topic]
-        recent_s = before_s if now <= before_at + RECENT_S else 0.0
-        return max(tau_s if now <= at + self._timeouts[topic] else 0.0, recent_s)
+        recent_s = before_s if now_s <= before_at + RECENT_S else 0.0
+        return max(tau_s if now_s <= at + self._timeouts[topic] else 0.0, recent_s)

@@ -59,15 +59,15 @@ class World:
 
     def enable(self) -> None:
         """From power on until the driver is enabled and has seen a zero. RuntimeError: it does not happen."""
-        end = self.clock.now + BOOT_S
+        end = self.clock.now_s + BOOT_S
         while self.driver.core.state is not DriverState.ENABLED:
-            if self.clock.now >= end:
+            if self.clock.now_s >= end:
                 raise RuntimeError(
                     f"not enabled after {BOOT_S} s: {self.driver.core.state.name} {self.driver.core.finding}"
                 )
-            self.clock.run_until(self.clock.now + 0.01)
+            self.clock.run_until(self.clock.now_s + 0.01)
         self.release()
-        self.clock.run_until(self.clock.now + 0.7)
+        self.clock.run_until(self.clock.now_s + 0.7)
 
     def release(self) -> None:
         """Every source commands zero once: from now on it is followed (neutral start)."""

@@ -18,13 +18,13 @@ class CommandWatch:
         self._object = dictionary.personality.command_timeout_object
         self._told = -inf
 
-    def ran_out(self, now: float) -> bool:
+    def ran_out(self, now_s: float) -> bool:
         """True once for each last command that is older than the time; without one there is nothing to stop."""
         timeout_s = self._fixed_s if self._object is None else self._values[self._object] / 1000.0
         if not timeout_s:
             return False
         last = max(rpdo.received_at for rpdo in self._rpdos)
-        if last == self._told or now - last <= timeout_s:
+        if last == self._told or now_s - last <= timeout_s:
             return False
         self._told = last
         return last != -inf

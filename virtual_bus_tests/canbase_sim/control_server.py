@@ -45,12 +45,12 @@ class ControlServer:
         self._selector.close()
         self._path.unlink(missing_ok=True)
 
-    def poll(self, now: float) -> None:
+    def poll(self, now_s: float) -> None:
         """Answer the requests that have come."""
         for ready, events in self._selector.select(0):
             if ready.data is None:
                 self._accept()
-            elif not self._serve(ready.data, events, now):
+            elif not self._serve(ready.data, events, now_s):
                 self._selector.unregister(ready.fileobj)
                 ready.data.connection.close()
 
@@ -59,10 +59,10 @@ class ControlServer:
         connection.setblocking(False)
         self._selector.register(connection, selectors.EVENT_READ, _Client(connection))
 
-    def _serve(self, client: _Client, events: int, now: float) -> bool:
+    def _serve(self, client: _Client, events: int, now_s: float) -> bool:
         """False when the client has gone or talks nonsense without end."""
         try:
-            if events & selectors.EVENT_READ and not self._read(client, now):
+            if events & selectors.EVENT_READ and not self._read(client, now_s):
                 return False
             if client.to_send:
                 del client.to_send[: client.connection.send(client.to_send)]
@@ -74,32 +74,32 @@ class ControlServer:
         self._selector.modify(client.connection, wanted, client)
         return True
 
-    def _read(self, client: _Client, now: float) -> bool:
+    def _read(self, client: _Client, now_s: float) -> bool:
         data = client.connection.recv(LONGEST_REQUEST)
         client.received += data
         while b"\n" in client.received:
             line, _, rest = client.received.partition(b"\n")
             client.received = rest
-            client.to_send += json.dumps(self._answer(bytes(line), now)).encode() + b"\n"
+            client.to_send += json.dumps(self._answer(bytes(line), now_s)).encode() + b"\n"
         return bool(data) and len(client.received) <= LONGEST_REQUEST
 
-    def _answer(self, line: bytes, now: float) -> dict[str, Any]:
+    def _answer(self, line: bytes, now_s: float) -> dict[str, Any]:
         try:
             request = json.loads(line)
         except ValueError as error:
             return {"error": f"one JSON object a line was expected: {error}"}
         match request:
             case {"get": "truth"}:
-                return {"truth": asdict(self._bench.truth(now))}
+                return {"truth": asdict(self._bench.truth(now_s))}
             case {"get": "trace", "since": int() | float() as since}:
                 return {"trace": self._trace.since(since)}
             case {"fault": {"node": int() as node, "kind": str() as kind, **arguments}}:
-                return self._break(node, kind, now, {str(k): v for k, v in arguments.items()})
+                return self._break(node, kind, now_s, {str(k): v for k, v in arguments.items()})
         return {"error": 'expected {"get": "truth"}, {"get": "trace", "since": t} or {"fault": {"node": n, "kind": k}}'}
 
-    def _break(self, node: int, kind: str, now: float, arguments: dict[str, Any]) -> dict[str, Any]:
+    def _break(self, node: int, kind: str, now_s: float, arguments: dict[str, Any]) -> dict[str, Any]:
         try:
-            faults.apply(self._bench.nodes, node, kind, now, arguments)
+            faults.apply(self._bench.nodes, node, kind, now_s, arguments)
         except faults.FaultError as error:
             return {"error": str(error)}
         return {"done": kind}

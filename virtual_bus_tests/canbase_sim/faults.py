@@ -19,109 +19,111 @@ class FaultError(ValueError):
     """The order names no known fault, no node or axis of this robot, or an argument that the fault does not take."""
 
 
-def _silent(node: SimulatedNode, now: float) -> None:
+def _silent(node: SimulatedNode, now_s: float) -> None:
     node.line.silent = True
 
 
-def _deaf(node: SimulatedNode, now: float) -> None:
+def _deaf(node: SimulatedNode, now_s: float) -> None:
     node.line.deaf = True
 
 
-def _cut(node: SimulatedNode, now: float) -> None:
+def _cut(node: SimulatedNode, now_s: float) -> None:
     node.line.cut = True
 
 
-def _drive_fault(node: SimulatedNode, now: float, axis: int = 0, code: int = DEFAULT_CODE, holds: bool = False) -> None:
+def _drive_fault(
+    node: SimulatedNode, now_s: float, axis: int = 0, code: int = DEFAULT_CODE, holds: bool = False
+) -> None:
     node.fail(axis, code, holds)
 
 
-def _power_cycle(node: SimulatedNode, now: float, off_s: float = 0.5) -> None:
-    node.power_cycle(now, off_s)
+def _power_cycle(node: SimulatedNode, now_s: float, off_s: float = 0.5) -> None:
+    node.power_cycle(now_s, off_s)
 
 
-def _frozen_encoder(node: SimulatedNode, now: float, axis: int = 0) -> None:
+def _frozen_encoder(node: SimulatedNode, now_s: float, axis: int = 0) -> None:
     node.axes[axis].faults.frozen_position = node.axes[axis].position()
 
 
-def _stuck_velocity(node: SimulatedNode, now: float, axis: int = 0, raw: int | None = None) -> None:
+def _stuck_velocity(node: SimulatedNode, now_s: float, axis: int = 0, raw: int | None = None) -> None:
     node.axes[axis].faults.stuck_velocity = node.axes[axis].velocity() if raw is None else raw
 
 
-def _ignores_setpoints(node: SimulatedNode, now: float, axis: int = 0) -> None:
+def _ignores_setpoints(node: SimulatedNode, now_s: float, axis: int = 0) -> None:
     node.axes[axis].faults.ignores_setpoints = True
 
 
-def _weak(node: SimulatedNode, now: float, axis: int = 0, share: float = 0.0) -> None:
+def _weak(node: SimulatedNode, now_s: float, axis: int = 0, share: float = 0.0) -> None:
     node.axes[axis].weaken(share)
 
 
-def _blocked(node: SimulatedNode, now: float, axis: int = 0, force_n: float = BLOCKED_N) -> None:
+def _blocked(node: SimulatedNode, now_s: float, axis: int = 0, force_n: float = BLOCKED_N) -> None:
     node.axes[axis].hold(force_n)
 
 
-def _limited(node: SimulatedNode, now: float, axis: int = 0, share: float = 0.5) -> None:
+def _limited(node: SimulatedNode, now_s: float, axis: int = 0, share: float = 0.5) -> None:
     node.axes[axis].faults.setpoint_share = share
 
 
-def _unbraked(node: SimulatedNode, now: float, axis: int = 0, share: float = 0.0) -> None:
+def _unbraked(node: SimulatedNode, now_s: float, axis: int = 0, share: float = 0.0) -> None:
     node.axes[axis].faults.stop_share = share
 
 
 def _encoder(**fixed: float | bool) -> Callable[..., None]:
     """A fault of all that hangs on one encoder; what is not `fixed` is an argument of EncoderFault."""
 
-    def begin(node: SimulatedNode, now: float, axis: int = 0, **given: float) -> None:
+    def begin(node: SimulatedNode, now_s: float, axis: int = 0, **given: float) -> None:
         node.axes[axis].lose_encoder(EncoderFault(**(fixed | given)))  # type: ignore[arg-type]
 
     return begin
 
 
-def _encoder_zero(node: SimulatedNode, now: float, axis: int = 0) -> None:
+def _encoder_zero(node: SimulatedNode, now_s: float, axis: int = 0) -> None:
     node.axes[axis].faults.frozen_position = 0
     node.axes[axis].lose_encoder(EncoderFault())
 
 
-def _rpdo_lost(node: SimulatedNode, now: float, axis: int = 0, every: int = 0) -> None:
+def _rpdo_lost(node: SimulatedNode, now_s: float, axis: int = 0, every: int = 0) -> None:
     node.thin_out(axis, every)
 
 
-def _tpdo_lost(node: SimulatedNode, now: float, axis: int = 0) -> None:
+def _tpdo_lost(node: SimulatedNode, now_s: float, axis: int = 0) -> None:
     node.lose_feedback(axis)
 
 
-def _mute_boot(node: SimulatedNode, now: float) -> None:
+def _mute_boot(node: SimulatedNode, now_s: float) -> None:
     node.line.mute_boot = True
 
 
-def _short_emcy(node: SimulatedNode, now: float) -> None:
+def _short_emcy(node: SimulatedNode, now_s: float) -> None:
     node.line.short_emcy = True
 
 
-def _aliases(node: SimulatedNode, now: float) -> None:
+def _aliases(node: SimulatedNode, now_s: float) -> None:
     node.line.aliases = True
 
 
-def _extra_boot_up(node: SimulatedNode, now: float) -> None:
+def _extra_boot_up(node: SimulatedNode, now_s: float) -> None:
     node.say_boot_up()
 
 
-def _bus_off(node: SimulatedNode, now: float, off_s: float = 0.2) -> None:
-    node.bus_off(now, off_s)
+def _bus_off(node: SimulatedNode, now_s: float, off_s: float = 0.2) -> None:
+    node.bus_off(now_s, off_s)
 
 
-def _reset_node(node: SimulatedNode, now: float) -> None:
-    node.reset_node(now)
+def _reset_node(node: SimulatedNode, now_s: float) -> None:
+    node.reset_node(now_s)
 
 
-def _sto(node: SimulatedNode, now: float, axis: int = 0) -> None:
+def _sto(node: SimulatedNode, now_s: float, axis: int = 0) -> None:
     node.axes[axis].lose(Supply.NO_TORQUE)
 
 
-def _no_mains(node: SimulatedNode, now: float, axis: int = 0) -> None:
+def _no_mains(node: SimulatedNode, now_s: float, axis: int = 0) -> None:
     node.axes[axis].lose(Supply.NO_MAINS)
 
 
-def _heal(node: SimulatedNode, now: float) -> None:
+def _heal(node: SimulatedNode, now_s: float) -> None:
     node.line.heal()
     for number, axis in enumerate(node.axes):
         axis.heal()
@@ -195,7 +197,7 @@ RANGES: Mapping[str, tuple[type, float, float]] = {
 """Type, least and greatest value of each argument."""
 
 
-def apply(nodes: Mapping[int, SimulatedNode], node: int, kind: str, now: float, arguments: Mapping[str, Any]) -> None:
+def apply(nodes: Mapping[int, SimulatedNode], node: int, kind: str, now_s: float, arguments: Mapping[str, Any]) -> None:
     """Make `nodes[node]` suffer `kind`. Raises FaultError and changes nothing when the order makes no sense."""
     if node not in nodes:
         raise FaultError(f"there is no node {node!r}, expected one of {sorted(nodes)}")
@@ -208,7 +210,7 @@ def apply(nodes: Mapping[int, SimulatedNode], node: int, kind: str, now: float, 
         _check(name, value)
     if arguments.get("axis", 0) >= len(nodes[node].axes):
         raise FaultError(f"node {node} has no axis {arguments['axis']}, expected below {len(nodes[node].axes)}")
-    do(nodes[node], now, **arguments)
+    do(nodes[node], now_s, **arguments)
 
 
 def _check(name: str, value: object) -> None:

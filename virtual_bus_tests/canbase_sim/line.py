@@ -56,16 +56,16 @@ class Line:
         if not self.mute_boot:
             self.say(frame)
 
-    def answer(self, frame: Frame, now: float) -> None:
+    def answer(self, frame: Frame, now_s: float) -> None:
         """An SDO answer, after the time that the drive takes for it."""
         if self._answer_delay_s:
-            self._answers.append((now + self._answer_delay_s, frame))
+            self._answers.append((now_s + self._answer_delay_s, frame))
         else:
             self.say(frame)
 
-    def say_late_answers(self, now: float) -> None:
+    def say_late_answers(self, now_s: float) -> None:
         """Those whose time has come."""
-        while self._answers and now >= self._answers[0][0]:
+        while self._answers and now_s >= self._answers[0][0]:
             self.say(self._answers.popleft()[1])
 
     def take_out(self) -> list[Frame]:

@@ -35,15 +35,15 @@ class Loop:
         """Until `stopped()` is true. Raises can.CanError when the bus fails."""
         while not stopped():
             message = self._receive()
-            now = time.monotonic()
-            self._trace.tick(now)
+            now_s = time.monotonic()
+            self._trace.tick(now_s)
             if message is not None and _is_ours(message):
-                self._bench.on_frame(Frame(message.arbitration_id, bytes(message.data)), now)
-            for frame in self._bench.tick(now):
+                self._bench.on_frame(Frame(message.arbitration_id, bytes(message.data)), now_s)
+            for frame in self._bench.tick(now_s):
                 self._send(frame)
-            if now >= self._next_step:
-                self._next_step = now + STEP_S
-                self._control.poll(now)
+            if now_s >= self._next_step:
+                self._next_step = now_s + STEP_S
+                self._control.poll(now_s)
                 self._tell_changes()
 
     def _receive(self) -> can.Message | None:

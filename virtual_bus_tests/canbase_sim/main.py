@@ -48,9 +48,9 @@ def run(robot: Robot, control: str | None = None) -> int:
 def _simulate(robot: Robot, path: Path, stop: Event) -> None:
     with can.Bus(**robot.bus.arguments()) as bus:
         keep_to_this_computer(robot.bus.arguments(), bus)
-        now = time.monotonic()
-        bench = Bench(robot, now)
-        trace = Trace(bench, now)
+        now_s = time.monotonic()
+        bench = Bench(robot, now_s)
+        trace = Trace(bench, now_s)
         with closing(ControlServer(path, bench, trace)) as server:
             log.info("drives %s on %s %s", sorted(bench.nodes), robot.bus.interface, robot.bus.channel)
             Loop(bus, bench, trace, server).run(stop.is_set)

@@ -40,7 +40,7 @@ class SimulatedNode:
         self,
         node_id: int,
         axes: Sequence[AxisParts],
-        now: float,
+        now_s: float,
         boot_delay_s: float = 0.1,
         fixed: Mapping[int, int] | None = None,
         personality: Personality = GENERIC,
@@ -53,7 +53,7 @@ class SimulatedNode:
         self.changes: deque[StateChange] = deque(maxlen=1000)
         self.lost_producers: deque[int] = deque(maxlen=100)
         """Node ids whose heartbeat this node has missed; whoever tells of them empties it."""
-        self._now = now
+        self._now = now_s
         self._bus_on_at: float | None = None
         d = self.dictionary = Dictionary(node_id, len(axes), fixed, personality)
         d.before_read = self._refresh
@@ -71,51 +71,51 @@ class SimulatedNode:
         for n in range(4):
             d.on_write(0x1400 + n, partial(self._pdo_written, self._rpdos[n]))
             d.on_write(0x1800 + n, partial(self._pdo_written, self._tpdos[n]))
-        self._boot_at, self._loader_s = now, 0.0
-        self._power_up(now, 0.0)
+        self._boot_at, self._loader_s = now_s, 0.0
+        self._power_up(now_s, 0.0)
 
     # The bus
 
-    def on_frame(self, cob_id: int, data: bytes, now: float) -> None:
-        """One frame from the bus, at `now`. What the node does not understand is ignored."""
+    def on_frame(self, cob_id: int, data: bytes, now_s: float) -> None:
+        """One frame from the bus, at `now_s`. What the node does not understand is ignored."""
         if not self.line.hears:
             return
-        self._now = now
+        self._now = now_s
         take = self._routes.get(cob_id)
         if take is not None:
-            take(data, now)
+            take(data, now_s)
         elif cob_id > heartbeat.COB_ID and self.state is not NmtState.INITIALISING:
-            self._consumer.receive(cob_id - heartbeat.COB_ID, data, now)
+            self._consumer.receive(cob_id - heartbeat.COB_ID, data, now_s)
 
-    def tick(self, now: float) -> list[Frame]:
-        """Whatever is due by `now`, and every frame since the last call, in order."""
-        self._now = now
-        self.line.say_late_answers(now)
-        if self._bus_on_at is not None and now >= self._bus_on_at:
+    def tick(self, now_s: float) -> list[Frame]:
+        """Whatever is due by `now_s`, and every frame since the last call, in order."""
+        self._now = now_s
+        self.line.say_late_answers(now_s)
+        if self._bus_on_at is not None and now_s >= self._bus_on_at:
             self._recover_from_bus_off()
         if self.state is not NmtState.INITIALISING:
-            self._tick_watches(now)
-        elif now >= self._boot_at:
+            self._tick_watches(now_s)
+        elif now_s >= self._boot_at:
             self._boot()
         if self.state is NmtState.OPERATIONAL:
-            self._tick_pdos(now)
+            self._tick_pdos(now_s)
         return self.line.take_out()
 
     # Faults for tests
 
-    def power_cycle(self, now: float, off_s: float = 0.5) -> None:
+    def power_cycle(self, now_s: float, off_s: float = 0.5) -> None:
         """Supply off, and on again after `off_s`: motors coast, objects as saved, the encoder starts elsewhere."""
         for axis in self.axes:
             axis.encoder_offset = (axis.encoder_offset + OFFSET_STEP + 2**31) % 2**32 - 2**31
-        self._power_up(now, off_s)
+        self._power_up(now_s, off_s)
 
-    def reset_node(self, now: float) -> None:
+    def reset_node(self, now_s: float) -> None:
         """As by NMT reset node: everything starts anew, the encoder goes on."""
-        self._power_up(now, 0.0)
+        self._power_up(now_s, 0.0)
 
-    def bus_off(self, now: float, off_s: float = 0.2) -> None:
+    def bus_off(self, now_s: float, off_s: float = 0.2) -> None:
         """Too many errors: the CAN controller leaves the bus and comes back after `off_s`; a loss like any other."""
-        self.line.cut, self._bus_on_at = True, now + off_s
+        self.line.cut, self._bus_on_at = True, now_s + off_s
         self._lose_connection(emcy.BUS_OFF_RECOVERED)
 
     def say_boot_up(self) -> None:
@@ -143,15 +143,15 @@ class SimulatedNode:
 
     # NMT
 
-    def _on_nmt(self, data: bytes, now: float) -> None:
+    def _on_nmt(self, data: bytes, now_s: float) -> None:
         command = nmt.command_for(self.node_id, data)
         if command is None:
             return
         if command is NmtCommand.RESET_NODE:
-            self.reset_node(now)
+            self.reset_node(now_s)
         elif command is NmtCommand.RESET_COMMUNICATION:
             self._leave_bus()
-            self._reset_communication(now + RESET_S)
+            self._reset_communication(now_s + RESET_S)
         else:
             self._enter(nmt.ENTERS[command])
 
@@ -191,11 +191,11 @@ class SimulatedNode:
         if self.personality.starts_operational:
             self._enter(NmtState.OPERATIONAL)
 
-    def _power_up(self, now: float, off_s: float) -> None:
+    def _power_up(self, now_s: float, off_s: float) -> None:
         self.dictionary.reset(0x2000, 0x9FFF)
         for axis in self.axes:
             axis.restart()
-        self._reset_communication(now + off_s + self.boot_delay_s, self.personality.second_boot_up_s or 0.0)
+        self._reset_communication(now_s + off_s + self.boot_delay_s, self.personality.second_boot_up_s or 0.0)
 
     def _reset_communication(self, boot_at: float, loader_s: float = 0.0) -> None:
         self._enter(NmtState.INITIALISING)
@@ -217,14 +217,14 @@ class SimulatedNode:
         if self.state is NmtState.OPERATIONAL:
             self._routes |= {r.cob_id: r.receive for r in self._active_rpdos if r.cob_id is not None}
         if self.state in nmt.HAS_SDO:
-            self._routes[self.sdo.rx_cobid] = lambda data, now: self.sdo.receive(data)
+            self._routes[self.sdo.rx_cobid] = lambda data, now_s: self.sdo.receive(data)
             if key(0x1005) in self.dictionary.entries:
                 self._routes[self.dictionary.values[key(0x1005)] & 0x7FF] = self._on_sync
         self._routes[nmt.COB_ID] = self._on_nmt
 
     # PDO
 
-    def _on_sync(self, data: bytes, now: float) -> None:
+    def _on_sync(self, data: bytes, now_s: float) -> None:
         """Feedback is sampled at the SYNC, then what came before it takes effect. With 1019h it carries a counter."""
         if len(data) != bool(self.dictionary.values[key(0x1019)]):
             self.emcy.raise_error(emcy.SYNC_LENGTH)
@@ -238,21 +238,21 @@ class SimulatedNode:
         for rpdo in self._active_rpdos:
             rpdo.on_sync()
 
-    def _tick_watches(self, now: float) -> None:
-        self._consumer.tick(now)
-        if self._command_watch.ran_out(now):
+    def _tick_watches(self, now_s: float) -> None:
+        self._consumer.tick(now_s)
+        if self._command_watch.ran_out(now_s):
             for axis in self.axes:
                 axis.starve()
-        if self._producer.due(now):
+        if self._producer.due(now_s):
             self.line.say(Frame(heartbeat.COB_ID + self.node_id, bytes([self.state])))
 
-    def _tick_pdos(self, now: float) -> None:
+    def _tick_pdos(self, now_s: float) -> None:
         for rpdo in self._active_rpdos:
-            rpdo.tick(now)
+            rpdo.tick(now_s)
         if self._on_event_tpdos:
             self._refresh()
             for tpdo in self._on_event_tpdos:
-                tpdo.tick(now)
+                tpdo.tick(now_s)
 
     def _operational(self) -> bool:
         return self.state is NmtState.OPERATIONAL

@@ -32,7 +32,7 @@ class Digest:
 
     def _take(self, sender: str, cob_id: int, data: bytes) -> None:
         self._frames += 1
-        self._hash.update(f"{self._world.clock.now.hex()} {sender} {cob_id:X} {data.hex()}\n".encode())
+        self._hash.update(f"{self._world.clock.now_s.hex()} {sender} {cob_id:X} {data.hex()}\n".encode())
 
     def line(self, name: str, result: object) -> str:
         """`name`, how many frames there were, and what they and `result` come to."""

@@ -53,8 +53,8 @@ class Managed:
         """From wherever it is, by ordinary transitions."""
         self.joystick.message = None
         ways = {State.PRIMARY_STATE_ACTIVE: DEACTIVATE, State.PRIMARY_STATE_UNCONFIGURED: CONFIGURE}
-        while (now := self.state) != State.PRIMARY_STATE_INACTIVE:
-            assert self.change(ways[now]), self.robot.logs()
+        while (now_s := self.state) != State.PRIMARY_STATE_INACTIVE:
+            assert self.change(ways[now_s]), self.robot.logs()
         last = {State.PRIMARY_STATE_ACTIVE: (ACTIVATE,), State.PRIMARY_STATE_UNCONFIGURED: (CLEANUP,)}
         for transition in last.get(state, ()):
             assert self.change(transition), self.robot.logs()

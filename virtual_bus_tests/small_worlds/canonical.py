@@ -71,8 +71,8 @@ _FIXED = (
 class Canon:
     """Walks through objects; `form` gives nested tuples of plain values."""
 
-    def __init__(self, now: float) -> None:
-        self._now = now
+    def __init__(self, now_s: float) -> None:
+        self._now = now_s
         self._known: dict[int, object] = {}
 
     def form(self, thing: Any) -> Any:
@@ -146,9 +146,9 @@ def _is_fixed(kind: type) -> bool:
 
 def told(small: SmallWorld, properties: Properties) -> bytes:
     """All that decides, as bytes."""
-    now = small.world.clock.now
+    now_s = small.world.clock.now_s
     more = {
-        "ends": sorted((round(at_s - now, DIGITS), name) for at_s, name in small.ends),
+        "ends": sorted((round(at_s - now_s, DIGITS), name) for at_s, name in small.ends),
         "stick": (small.held, small.has_radio),
         "button": small.around.pressed,
         "disks": [(disk.file.writable, disk.readable) for disk in small.disks.values()],
@@ -161,7 +161,7 @@ def told(small: SmallWorld, properties: Properties) -> bytes:
 
 def form(world: World, more: Mapping[str, object]) -> tuple[object, ...]:
     """All that decides: the cores, who lives, the drives, the wheels, the cables, what is on its way, and `more`."""
-    canon = Canon(world.clock.now)
+    canon = Canon(world.clock.now_s)
     processes = (world.driver, world.watchdog, world.velocity)
     bench = world.drives.bench
     return (
@@ -187,8 +187,8 @@ def _values(canon: Canon, values: Mapping[int, int]) -> object:
 
 def _waiting(world: World) -> object:
     """What is on its way, and when: each timer and message by the name of what it calls."""
-    now = world.clock.now
-    return tuple(sorted((round(when - now, DIGITS), _name(do)) for when, _, do, _ in world.clock._events))
+    now_s = world.clock.now_s
+    return tuple(sorted((round(when - now_s, DIGITS), _name(do)) for when, _, do, _ in world.clock._events))
 
 
 def _name(do: Callable[..., object]) -> str:

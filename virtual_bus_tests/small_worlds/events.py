@@ -85,7 +85,7 @@ def _drive(node: int, after: str = "") -> list[Event]:
 
 
 def _kill_encoder(node: int, small: SmallWorld) -> None:
-    apply(small.world.drives.bench.nodes, node, "encoder_lost", small.world.clock.now, {})
+    apply(small.world.drives.bench.nodes, node, "encoder_lost", small.world.clock.now_s, {})
 
 
 def _processes_die(small: SmallWorld) -> None:
@@ -101,7 +101,7 @@ def _processes_restart(small: SmallWorld) -> None:
 def _supply_fails(small: SmallWorld) -> None:
     _processes_die(small)
     for node in small.world.drives.bench.nodes.values():
-        node.power_cycle(small.world.clock.now, SHORT_S)
+        node.power_cycle(small.world.clock.now_s, SHORT_S)
 
 
 def _no_radio(small: SmallWorld) -> None:

@@ -156,11 +156,11 @@ class _World:
         self.small = SmallWorld(start)
         self.properties = Properties(self.small)
         self.small.pass_to_point(canonical.OLD_S)
-        self.began = self.small.world.clock.now
+        self.began = self.small.world.clock.now_s
         self.events: list[tuple[float, str]] = []
 
     def happens(self, event: Event) -> None:
-        self.events.append((self.small.world.clock.now - self.began, event.name))
+        self.events.append((self.small.world.clock.now_s - self.began, event.name))
         self.small.happens(event)
 
 
@@ -196,7 +196,7 @@ class _Worker:
                 points.append((Snapshot(world), rows))
             if not self._pass(world, left, (point + 1) % self._bounds.every):
                 return points
-        self._tell(world, Found("rest", world.small.world.clock.now, f"still new {LONGEST_S} s after the last event"))
+        self._tell(world, Found("rest", world.small.world.clock.now_s, f"still new {LONGEST_S} s after the last event"))
         return points
 
     def _rows(self, world: _World, left: _Left, least: int) -> list[int]:
@@ -224,8 +224,8 @@ class _Worker:
         try:
             do()
         except Exception:  # noqa: BLE001 - whatever a core raises is what this search is for
-            now = world.small.world.clock.now
-            self._tell(world, Found("exception", now, traceback.format_exc(limit=-3)))
+            now_s = world.small.world.clock.now_s
+            self._tell(world, Found("exception", now_s, traceback.format_exc(limit=-3)))
             return False
         return True
 

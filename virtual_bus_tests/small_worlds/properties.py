@@ -45,13 +45,13 @@ class Found:
 class _Hold:
     """From its beginning on the base has to brake, to stand, and to stay there."""
 
-    def __init__(self, react_s: float, now: float) -> None:
-        self._envelope = Envelope(react_s, now)
-        self._since, self._stood = now, False
+    def __init__(self, react_s: float, now_s: float) -> None:
+        self._envelope = Envelope(react_s, now_s)
+        self._since, self._stood = now_s, False
 
-    def is_broken(self, tau_s: float, now: float, coasting: bool) -> bool:
-        self._stood = self._stood or (tau_s == 0.0 and now >= self._since + OBEY_S)
-        return tau_s > self._envelope.bound_s(tau_s, now, coasting) or (self._stood and tau_s > 0.0)
+    def is_broken(self, tau_s: float, now_s: float, coasting: bool) -> bool:
+        self._stood = self._stood or (tau_s == 0.0 and now_s >= self._since + OBEY_S)
+        return tau_s > self._envelope.bound_s(tau_s, now_s, coasting) or (self._stood and tau_s > 0.0)
 
 
 class Properties:
@@ -59,11 +59,11 @@ class Properties:
 
     def __init__(self, small: SmallWorld) -> None:
         self._small, self._world = small, small.world
-        robot, now = small.world.robot, small.world.clock.now
+        robot, now_s = small.world.robot, small.world.clock.now_s
         self._react_s = react_s(robot, layers=2)
         self._brakes_s = max(braking_s(robot, SPEED_MPS, 0.0), max_wheel_mps(robot) / robot.limits.deceleration_mps2)
-        self._wishes = Wishes(robot, now - 10.0)
-        self._fresh = Envelope(self._react_s + robot.safety.command_timeout_s, now)
+        self._wishes = Wishes(robot, now_s - 10.0)
+        self._fresh = Envelope(self._react_s + robot.safety.command_timeout_s, now_s)
         self._latches: set[str] = set()
         self._latched: _Hold | None = None
         self._neutral: _Hold | None = None
@@ -73,8 +73,8 @@ class Properties:
         """Whether there was power when the part was seen alive last."""
         self._born: set[str] = set()
         self._resets, self._freed = len(small.resets), small.freed
-        self._watching_at = self._fast_since = self._pressed_at = now
-        self._alive_at = {part.name: now for part in small.parts}
+        self._watching_at = self._fast_since = self._pressed_at = now_s
+        self._alive_at = {part.name: now_s for part in small.parts}
         self.found: Found | None = None
         small.world.topics.watch = self._on_message
         small.world.drives.changes()
@@ -87,34 +87,34 @@ class Properties:
 
     def _violate(self, name: str, detail: str) -> None:
         if self.found is None:
-            self.found = Found(name, self._world.clock.now, detail)
+            self.found = Found(name, self._world.clock.now_s, detail)
 
     def _on_message(self, topic: str, message: object) -> None:
         if isinstance(message, Twist):
-            self._wishes.take(topic, message, self._world.clock.now)
+            self._wishes.take(topic, message, self._world.clock.now_s)
             if topic == "cmd_vel_joy" and message.is_zero:
                 self._neutral = None
 
     def _step(self) -> None:
-        world, now = self._world, self._world.clock.now
+        world, now_s = self._world, self._world.clock.now_s
         base = world.drives.bench.base
         tau_s = moving_s(world.robot, base.v_mps, base.w_radps)
         coasting = tau_s > 0.0 and self._coasts()
-        self._note_new_lives(now)
-        self._note_latches(now)
-        self._note_starts(now)
-        self._check_motion(tau_s, coasting, now)
-        self._check_power(now)
-        self._check_alive(tau_s, now)
-        self._check_cut_off(tau_s, now)
-        self._check_runaway(now)
+        self._note_new_lives(now_s)
+        self._note_latches(now_s)
+        self._note_starts(now_s)
+        self._check_motion(tau_s, coasting, now_s)
+        self._check_power(now_s)
+        self._check_alive(tau_s, now_s)
+        self._check_cut_off(tau_s, now_s)
+        self._check_runaway(now_s)
         world.clock.after(STEP_S, self._step)
 
     def _cores(self) -> dict[str, object]:
         world = self._world
         return {"driver": world.driver.core, "watchdog": world.watchdog.core, "velocity": world.velocity.filter}
 
-    def _note_new_lives(self, now: float) -> None:
+    def _note_new_lives(self, now_s: float) -> None:
         """Who died while there was power, or whose record of stops cannot be read, comes back latched."""
         before, self._lives = self._lives, self._cores()
         self._born = {name for name, core in self._lives.items() if core is not before[name]}
@@ -126,80 +126,84 @@ class Properties:
             if part.alive:
                 self._with_power[part.name] = self._powered()
 
-    def _note_latches(self, now: float) -> None:
+    def _note_latches(self, now_s: float) -> None:
         """A latch is noted where it is seen, and forgotten by an accepted reset of its own part alone."""
         if any(outcome.done for outcome in self._small.resets[self._resets :]):
             self._latches -= {"driver", "watchdog"}
         if self._small.freed != self._freed:
             self._latches.discard("emergency stop")
         self._resets, self._freed = len(self._small.resets), self._small.freed
-        self._latches |= self._seen_latched(now)
+        self._latches |= self._seen_latched(now_s)
         if not self._latches:
             self._latched = None
         elif self._latched is None:
-            self._latched = _Hold(self._react_s, now)
+            self._latched = _Hold(self._react_s, now_s)
 
-    def _seen_latched(self, now: float) -> set[str]:
+    def _seen_latched(self, now_s: float) -> set[str]:
         """A filter that ran while the button was pressed has been told."""
         driver, watchdog, velocity = self._small.parts
         if not (self._small.around.pressed and velocity.running):
-            self._pressed_at = now
+            self._pressed_at = now_s
         seen = {
             "driver": driver.alive and self._world.driver.core.state is DriverState.LATCHED,
             "watchdog": watchdog.alive and self._world.watchdog.core.status.state is WatchdogState.TRIPPED,
-            "emergency stop": now > self._pressed_at + HEARD_S,
+            "emergency stop": now_s > self._pressed_at + HEARD_S,
         }
         return {name for name, is_latched in seen.items() if is_latched}
 
-    def _note_starts(self, now: float) -> None:
+    def _note_starts(self, now_s: float) -> None:
         """Enabled, or a filter that is new: who holds the stick then has to show zero first."""
         world = self._world
         is_enabled = world.driver.alive and world.driver.core.state is DriverState.ENABLED
         starts = is_enabled and not self._was_enabled
         self._was_enabled = is_enabled
         if (starts or "velocity" in self._born) and self._small.held:
-            self._neutral = _Hold(self._react_s, now)
+            self._neutral = _Hold(self._react_s, now_s)
 
-    def _check_motion(self, tau_s: float, coasting: bool, now: float) -> None:
-        self._fresh.order(self._wishes.greatest_s(now), now)
-        if tau_s > self._fresh.bound_s(tau_s, now, coasting):
+    def _check_motion(self, tau_s: float, coasting: bool, now_s: float) -> None:
+        self._fresh.order(self._wishes.greatest_s(now_s), now_s)
+        if tau_s > self._fresh.bound_s(tau_s, now_s, coasting):
             self._violate("fresh", f"{self._speed()}, which is more than anybody orders")
-        if self._latched is not None and self._latched.is_broken(tau_s, now, coasting):
+        if self._latched is not None and self._latched.is_broken(tau_s, now_s, coasting):
             self._violate("latched", f"{self._speed()} while {' and '.join(sorted(self._latches))} latched")
-        if self._neutral is not None and self._neutral.is_broken(tau_s, now, coasting):
+        if self._neutral is not None and self._neutral.is_broken(tau_s, now_s, coasting):
             self._violate("neutral", f"{self._speed()}: the stick was held when it began, and never showed zero")
 
-    def _check_power(self, now: float) -> None:
+    def _check_power(self, now_s: float) -> None:
         world = self._world
         if world.watchdog.running and world.watchdog.core.status.state is WatchdogState.WATCHING:
-            self._watching_at = now
+            self._watching_at = now_s
         grace_s = world.robot.timeouts.watchdog_s + notice_s(world.robot) + 2.0 * STEP_S
         for change in world.drives.changes():
             if change.after is not State.OPERATION_ENABLED:
                 continue
-            if now > self._watching_at + grace_s:
-                self._violate("watched", f"drive {change.node_id} on, {now - self._watching_at:.2f} s without watchdog")
+            if now_s > self._watching_at + grace_s:
+                self._violate(
+                    "watched", f"drive {change.node_id} on, {now_s - self._watching_at:.2f} s without watchdog"
+                )
             if self._latches & {"driver", "watchdog"}:
                 self._violate("latched", f"drive {change.node_id} gets power while {sorted(self._latches)} latched")
 
-    def _check_alive(self, tau_s: float, now: float) -> None:
+    def _check_alive(self, tau_s: float, now_s: float) -> None:
         for part in self._small.parts:
             if part.running:
-                self._alive_at[part.name] = now
-            elif now > self._alive_at[part.name] + self._react_s + self._brakes_s and self._powered() and tau_s > 0.0:
-                self._violate("alive", f"{self._speed()}, {now - self._alive_at[part.name]:.2f} s without {part.name}")
+                self._alive_at[part.name] = now_s
+            elif now_s > self._alive_at[part.name] + self._react_s + self._brakes_s and self._powered() and tau_s > 0.0:
+                self._violate(
+                    "alive", f"{self._speed()}, {now_s - self._alive_at[part.name]:.2f} s without {part.name}"
+                )
 
-    def _check_cut_off(self, tau_s: float, now: float) -> None:
+    def _check_cut_off(self, tau_s: float, now_s: float) -> None:
         allowed_s = self._world.robot.timeouts.drive_heartbeat_s + self._brakes_s + 2.0 * STEP_S
         heard = max(self._world.drives.heard.values())
-        if now > heard + allowed_s and tau_s > 0.0 and self._powered():
-            self._violate("cut off", f"{self._speed()}, {now - heard:.2f} s after the last heartbeat")
+        if now_s > heard + allowed_s and tau_s > 0.0 and self._powered():
+            self._violate("cut off", f"{self._speed()}, {now_s - heard:.2f} s after the last heartbeat")
 
-    def _check_runaway(self, now: float) -> None:
+    def _check_runaway(self, now_s: float) -> None:
         wheel_mps = max(abs(axis.motor.speed_mps) for node in self._nodes() for axis in node.axes)
         if wheel_mps <= SPEED_MPS + RUNAWAY_MPS or not self._powered():
-            self._fast_since = now
-        elif now > self._fast_since + RUNAWAY_S:
+            self._fast_since = now_s
+        elif now_s > self._fast_since + RUNAWAY_S:
             self._violate("runaway", f"a wheel turns at {wheel_mps:.2f} m/s, {SPEED_MPS} m/s was the most ordered")
 
     def _nodes(self) -> list[SimulatedNode]:

@@ -66,7 +66,7 @@ def test_a_copy_goes_on_as_its_original_does(event: str) -> None:
         snapshot = Snapshot((small, properties))
         small.pass_to_point()
         copied, its = snapshot.restore()
-        assert copied.world.clock.now < small.world.clock.now
+        assert copied.world.clock.now_s < small.world.clock.now_s
         copied.pass_to_point()
         assert canonical.told(copied, its) == canonical.told(small, properties)
         copied.happens(EVENTS["driver dies"])

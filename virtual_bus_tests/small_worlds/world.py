@@ -90,14 +90,14 @@ class SmallWorld:
     def pass_to_point(self, least_s: float = POINT_S) -> None:
         """At least so much time passes, up to a moment at which something may happen: just after all timers."""
         clock = self.world.clock
-        clock.run_until(math.ceil((clock.now - AFTER_S + least_s) / POINT_S - 1e-6) * POINT_S + AFTER_S)
+        clock.run_until(math.ceil((clock.now_s - AFTER_S + least_s) / POINT_S - 1e-6) * POINT_S + AFTER_S)
 
     def happens(self, event: Event) -> None:
         """It begins now, and ends by itself when its time is over."""
         event.begin(self)
         if event.lasts_s < EVER_S:
             clock = self.world.clock
-            end = clock.now - AFTER_S + event.lasts_s
+            end = clock.now_s - AFTER_S + event.lasts_s
             self.ends.append((end, event.name))
             clock.at(end, self._over, event.name)
         elif event.once:
@@ -112,7 +112,7 @@ class SmallWorld:
 
     def reset(self) -> None:
         """Both resets, as `canbase reset` asks for them."""
-        self.asked_s.append(self.world.clock.now)
+        self.asked_s.append(self.world.clock.now_s)
         velocity = self.world.velocity
         before = velocity.filter.estop if velocity.running else None
         velocity.reset()
@@ -123,7 +123,7 @@ class SmallWorld:
     def turn_lifecycle(self) -> None:
         """Deactivate the driver if it is active, activate it if it is not."""
         core = self.world.driver.core
-        core.request_aim(Aim.CONFIGURED if core.aim is Aim.ACTIVE else Aim.ACTIVE, self.world.clock.now, _nobody)
+        core.request_aim(Aim.CONFIGURED if core.aim is Aim.ACTIVE else Aim.ACTIVE, self.world.clock.now_s, _nobody)
 
     def kill_and_tear(self, name: str) -> None:
         """A process dies while it writes its record of stops: one of the two pages is not whole."""

@@ -50,13 +50,13 @@ class Plant:
     _ramped_radps: float = 0.0
     _pipe: deque[tuple[float, Twist]] = field(default_factory=lambda: deque([(-1.0, STOP)]))
 
-    def order(self, twist: Twist, now: float) -> None:
+    def order(self, twist: Twist, now_s: float) -> None:
         """A velocity order enters the chain."""
-        self._pipe.append((now + self.dead_time_s, twist))
+        self._pipe.append((now_s + self.dead_time_s, twist))
 
-    def step(self, now: float) -> None:
+    def step(self, now_s: float) -> None:
         """One step of STEP_S."""
-        while len(self._pipe) > 1 and self._pipe[1][0] <= now:
+        while len(self._pipe) > 1 and self._pipe[1][0] <= now_s:
             self._pipe.popleft()
         wanted = self._pipe[0][1]
         speeding_up = abs(wanted.linear_mps) > abs(self._ramped_mps)
@@ -128,24 +128,24 @@ class Story:
         next_control = next_odometry = 0.0
         transit: deque[tuple[float, Odometry]] = deque()
         for tick in range(round(limit_s / STEP_S)):
-            now = tick * STEP_S
-            while pending and pending[0] <= now:
+            now_s = tick * STEP_S
+            while pending and pending[0] <= now_s:
                 self.at[pending.pop(0)](self)
-            if now >= next_odometry and self.odometry_alive:
+            if now_s >= next_odometry and self.odometry_alive:
                 next_odometry += 1.0 / self.odometry_hz
-                arrives = now + self.jitter.uniform(0.0, 0.4) / self.odometry_hz
+                arrives = now_s + self.jitter.uniform(0.0, 0.4) / self.odometry_hz
                 transit.append((arrives, self.plant.odometry(arrives)))
-            while transit and transit[0][0] <= now:
+            while transit and transit[0][0] <= now_s:
                 self.inputs = replaced(self.inputs, odometry=transit.popleft()[1])
-            if now >= next_control:
+            if now_s >= next_control:
                 next_control += control_s
-                order = goal.tick(self.inputs, now)
-                self.orders.append((now, order.twist))
-                self.plant.order(order.twist, now)
+                order = goal.tick(self.inputs, now_s)
+                self.orders.append((now_s, order.twist))
+                self.plant.order(order.twist, now_s)
                 if order.end:
-                    self.ended_at = now
+                    self.ended_at = now_s
                     return order.end
-            self.plant.step(now)
+            self.plant.step(now_s)
             self.fastest_mps = max(self.fastest_mps, abs(self.plant.speed_mps))
             self.fastest_radps = max(self.fastest_radps, abs(self.plant.turn_radps))
         raise AssertionError(f"no end after {limit_s} s of virtual time")

@@ -74,7 +74,7 @@ class World:
         """`keeps`: driver and watchdog keep records of their stops, on `disk` and `watchdog_disk`."""
         self.robot = robot or bench_robot()
         self._start, self._steps = 100.0, 0
-        self.bench = Bench(self.robot, self.now, parameters=parameters)
+        self.bench = Bench(self.robot, self.now_s, parameters=parameters)
         self._keeps = keeps
         self.disk, self.watchdog_disk = StopDisk("driver"), WatchdogDisk()
         self.driver: DriverCore | None = DriverCore(self.robot, aim, self.disk.found() if keeps else None)
@@ -89,10 +89,10 @@ class World:
         """What the driver sent in each of its cycles."""
         self._ordered = Twist2D.ZERO
         self._sequence = 0
-        self._next_cycle = self._next_command = self.now
+        self._next_cycle = self._next_command = self.now_s
 
     @property
-    def now(self) -> float:
+    def now_s(self) -> float:
         """The time [s]."""
         return self._start + self._steps * STEP_S
 
@@ -105,12 +105,12 @@ class World:
     @property
     def truth(self) -> Truth:
         """What the robot really does."""
-        return self.bench.truth(self.now)
+        return self.bench.truth(self.now_s)
 
     @property
     def snapshot(self) -> DriverSnapshot:
         """What the driver knows."""
-        return self.core.snapshot(self.now)
+        return self.core.snapshot(self.now_s)
 
     @property
     def node(self) -> SimulatedNode:
@@ -134,10 +134,10 @@ class World:
 
     def run_until(self, state: DriverState, within_s: float) -> float:
         """Let time pass until the driver is in `state`; it must get there in time. How long it took [s]."""
-        start = self.now
+        start = self.now_s
         reached = self.run(within_s, lambda: self.core.state is state)
         assert reached, f"driver is {self.core.state.name}, not {state.name}: {self.core.finding}"
-        return self.now - start
+        return self.now_s - start
 
     def enable(self) -> None:
         """From power on to operation enabled, with a zero command seen."""
@@ -162,7 +162,7 @@ class World:
     def start_watchdog(self) -> None:
         """A new watchdog process."""
         past = self.watchdog_disk.past() if self._keeps else None
-        self.watchdog = Watchdog(watchdog_config(self.robot), self.now, past)
+        self.watchdog = Watchdog(watchdog_config(self.robot), self.now_s, past)
 
     def reboot(self, seconds: float = 0.5) -> None:
         """The computer loses its supply for so long; the drives keep theirs."""
@@ -177,31 +177,31 @@ class World:
         self.run(seconds)
         self.driver = driver
         for _, frame in self.log[taken_in:]:
-            driver.on_frame(frame, self.now)
+            driver.on_frame(frame, self.now_s)
         self.resume_cycles()
 
     def resume_cycles(self) -> None:
         """The driver's next cycle is now: those in which it was not there are not made up for."""
-        self._next_cycle = self.now
+        self._next_cycle = self.now_s
 
     def stands_after(self, within_s: float = 3.0) -> float:
         """Let time pass and see the base come to a stand, for good. Until then, from now [s]."""
-        start = self.now
+        start = self.now_s
         self.run(within_s)
         assert self.truth.standing_s > 0.5, self.truth
-        return self.now - self.truth.standing_s - start
+        return self.now_s - self.truth.standing_s - start
 
     def reset(self) -> Outcome:
         """Ask the driver for a reset and let it run to its end."""
         outcomes: list[Outcome] = []
-        self.core.request_reset(self.now, outcomes.append)
+        self.core.request_reset(self.now_s, outcomes.append)
         assert self.run(12.0, lambda: bool(outcomes)), "the reset never ended"
         return outcomes[0]
 
     def go(self, aim: Aim) -> Outcome:
         """Ask the driver to go so far and let it get there, or fail."""
         outcomes: list[Outcome] = []
-        self.core.request_aim(aim, self.now, outcomes.append)
+        self.core.request_aim(aim, self.now_s, outcomes.append)
         assert self.run(20.0, lambda: bool(outcomes)), "the change never ended"
         return outcomes[0]
 
@@ -232,21 +232,21 @@ class World:
         self._send([Frame(cob_id, bytes.fromhex(data))])
 
     def _step(self) -> None:
-        if self.now >= self._next_command - STEP_S / 2:
+        if self.now_s >= self._next_command - STEP_S / 2:
             self._next_command += COMMAND_PERIOD_S
             self._order()
-        if self.driver is not None and self.now >= self._next_cycle - STEP_S / 2:
+        if self.driver is not None and self.now_s >= self._next_cycle - STEP_S / 2:
             self._next_cycle += 1.0 / self.robot.rates.control_hz
             self._cycle(self.driver)
         if self.watchdog is not None:
-            self._send([Frame(frame.cob_id, frame.data) for frame in self.watchdog.tick(self.now)])
+            self._send([Frame(frame.cob_id, frame.data) for frame in self.watchdog.tick(self.now_s)])
             if self._keeps:
                 self.watchdog.on_record(*self.watchdog_disk.write(self.watchdog.record))
-        self._send([Frame(frame.cob_id, frame.data) for frame in self.bench.tick(self.now)])
+        self._send([Frame(frame.cob_id, frame.data) for frame in self.bench.tick(self.now_s)])
 
     def _cycle(self, driver: DriverCore) -> None:
-        driver.on_bus("" if self.cable else "the cable is cut", self.now)
-        frames = driver.tick(self.now)
+        driver.on_bus("" if self.cable else "the cable is cut", self.now_s)
+        frames = driver.tick(self.now_s)
         if self._keeps:
             driver.on_record(*self.disk.write(driver.record))
         self.ticks.append(frames)
@@ -256,24 +256,24 @@ class World:
         if self.command is not None and self.command.is_finite:
             self._ordered = self.command
         if self.driver is not None and self.command is not None:
-            self.driver.on_command(self.command, self.now)
+            self.driver.on_command(self.command, self.now_s)
         if self.leases and self.watchdog is not None:
             self._sequence += 1
             ordered = Twist(self._ordered.linear_mps, self._ordered.angular_radps)
-            datagram = lease_datagram(self._sequence, round(self.now * 1e9), ordered, stops=False, estop=False)
-            self.watchdog.on_lease(datagram, None, self.now)
+            datagram = lease_datagram(self._sequence, round(self.now_s * 1e9), ordered, stops=False, estop=False)
+            self.watchdog.on_lease(datagram, None, self.now_s)
 
     def _send(self, frames: list[Frame]) -> None:
         waiting = list(frames)
         while waiting:
             frame = waiting.pop(0)
-            self.log.append((self.now, frame))
+            self.log.append((self.now_s, frame))
             if self.driver is not None and self.cable:
-                waiting += self.driver.on_frame(frame, self.now)
+                waiting += self.driver.on_frame(frame, self.now_s)
             if self.watchdog is not None:
-                self.watchdog.on_frame(frame.cob_id, frame.data, self.now)
-            self.bench.on_frame(BenchFrame(frame.cob_id, frame.data), self.now)
-            waiting += [Frame(each.cob_id, each.data) for each in self.bench.tick(self.now)]
+                self.watchdog.on_frame(frame.cob_id, frame.data, self.now_s)
+            self.bench.on_frame(BenchFrame(frame.cob_id, frame.data), self.now_s)
+            waiting += [Frame(each.cob_id, each.data) for each in self.bench.tick(self.now_s)]
 
 
 def world_of(kind: str, **changes: object) -> World:

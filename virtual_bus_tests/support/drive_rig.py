@@ -32,9 +32,9 @@ class Surroundings(threading.Thread):
 
     def __init__(self, crew: Crew, bus: can.BusABC) -> None:
         super().__init__(name="surroundings", daemon=True)
-        self._bus, now = bus, time.monotonic()
-        self._bench = Bench(crew.robot, now) if crew.simulated else None
-        self._watchdog = Watchdog(watchdog_config(crew.robot), now)
+        self._bus, now_s = bus, time.monotonic()
+        self._bench = Bench(crew.robot, now_s) if crew.simulated else None
+        self._watchdog = Watchdog(watchdog_config(crew.robot), now_s)
         self._ended = threading.Event()
         self._lock = threading.Lock()
         self._leases = 0
@@ -70,30 +70,30 @@ class Surroundings(threading.Thread):
             with self._lock:
                 self._turn(received, time.monotonic())
 
-    def _turn(self, received: can.Message | None, now: float) -> None:
+    def _turn(self, received: can.Message | None, now_s: float) -> None:
         if received is not None and not received.is_extended_id:
             data = bytes(received.data)
-            self.heard.append((now, received.arbitration_id, data))
-            self._to_drives(received.arbitration_id, data, now)
-            self._watchdog.on_frame(received.arbitration_id, data, now)
-        self._lease(now)
-        for frame in self._watchdog.tick(now):
+            self.heard.append((now_s, received.arbitration_id, data))
+            self._to_drives(received.arbitration_id, data, now_s)
+            self._watchdog.on_frame(received.arbitration_id, data, now_s)
+        self._lease(now_s)
+        for frame in self._watchdog.tick(now_s):
             self._say(frame.cob_id, frame.data)
-            self._to_drives(frame.cob_id, frame.data, now)
-        for answer in self._bench.tick(now) if self._bench else ():
+            self._to_drives(frame.cob_id, frame.data, now_s)
+        for answer in self._bench.tick(now_s) if self._bench else ():
             self._say(answer.cob_id, answer.data, answer.extended)
             if not answer.extended:
-                self._watchdog.on_frame(answer.cob_id, answer.data, now)
+                self._watchdog.on_frame(answer.cob_id, answer.data, now_s)
 
-    def _to_drives(self, cob_id: int, data: bytes, now: float) -> None:
+    def _to_drives(self, cob_id: int, data: bytes, now_s: float) -> None:
         if self._bench is not None:
-            self._bench.on_frame(BenchFrame(cob_id, data), now)
+            self._bench.on_frame(BenchFrame(cob_id, data), now_s)
 
-    def _lease(self, now: float) -> None:
+    def _lease(self, now_s: float) -> None:
         self._leases += 1
         ordered = Twist(self.ordered.linear_mps, self.ordered.angular_radps)
-        datagram = lease_datagram(self._leases, round(now * 1e9), ordered, stops=False, estop=False)
-        self._watchdog.on_lease(datagram, None, now)
+        datagram = lease_datagram(self._leases, round(now_s * 1e9), ordered, stops=False, estop=False)
+        self._watchdog.on_lease(datagram, None, now_s)
 
     def _say(self, cob_id: int, data: bytes, extended: bool = False) -> None:
         self._bus.send(can.Message(arbitration_id=cob_id, data=data, is_extended_id=extended))

@@ -71,9 +71,9 @@ class FakeBase:
         self.orders.append((time.monotonic(), message.twist.linear.x))
 
     def _step(self) -> None:
-        now = time.monotonic()
-        elapsed_s, self._last = now - self._last, now
-        fresh = bool(self.orders) and now - self.orders[-1][0] < COMMAND_TIMEOUT_S
+        now_s = time.monotonic()
+        elapsed_s, self._last = now_s - self._last, now_s
+        fresh = bool(self.orders) and now_s - self.orders[-1][0] < COMMAND_TIMEOUT_S
         held = self.safety.action == SafetyState.STOP or self.driver.state != DriverStatus.ENABLED or not fresh
         wanted_mps = 0.0 if held else self._wanted.twist.linear.x
         self._turn_radps = 0.0 if held else self._wanted.twist.angular.z

@@ -129,21 +129,21 @@ class Bench:
     def __init__(self, drive: FakeDrive, robot: Robot, drives: tuple[Drive, ...] | None = None) -> None:
         self.boot = NodeBoot(drive.node_id, drives or robot.drives[:1], robot)
         self.drive = drive
-        self.now = 100.0
+        self.now_s = 100.0
 
     def run(self, seconds: float = 30.0) -> NodeBoot:
         for _ in range(round(seconds / 0.01)):
             self._exchange()
             if self.boot.done:
                 break
-            self.now += 0.01
+            self.now_s += 0.01
         return self.boot
 
     def _exchange(self) -> None:
-        while sent := self.boot.tick(self.now):
+        while sent := self.boot.tick(self.now_s):
             for frame in sent:
                 for answer in self.drive.on_frame(frame):
-                    self.boot.on_frame(answer, self.now)
+                    self.boot.on_frame(answer, self.now_s)
 
 
 def robot(**identity: int) -> Robot:

@@ -95,16 +95,16 @@ CEILING = Ceiling(linear_mps=0.6, angular_radps=1.0, acceleration_mps2=0.5, angu
 """In 0.02 s an order may grow by 0.01 m/s and 0.02 rad/s."""
 
 
-def fed(now: float, twist: Twist, *, pressed: bool = False, the_filter: SafetyFilter | None = None) -> SafetyFilter:
+def fed(now_s: float, twist: Twist, *, pressed: bool = False, the_filter: SafetyFilter | None = None) -> SafetyFilter:
     """A filter that has just received everything it needs."""
     made = the_filter or SafetyFilter(config())
-    made.on_command(twist, now)
-    see(made, now)
-    made.on_estop(pressed, now)
+    made.on_command(twist, now_s)
+    see(made, now_s)
+    made.on_estop(pressed, now_s)
     return made
 
 
-def see(safety: SafetyFilter, now: float, *at_m: tuple[float, float]) -> None:
+def see(safety: SafetyFilter, now_s: float, *at_m: tuple[float, float]) -> None:
     """A scan with these places, each seen by two beams."""
     rows = np.repeat(np.array(at_m).reshape(-1, 2), 2, axis=0)
-    safety.on_scan("scan", Points(rows, np.arange(len(rows)), 360), None, now)
+    safety.on_scan("scan", Points(rows, np.arange(len(rows)), 360), None, now_s)

@@ -62,7 +62,7 @@ class FilterWorld:
         self._step = 0
 
     @property
-    def now(self) -> float:
+    def now_s(self) -> float:
         """Time [s]."""
         return 100.0 + self._step * STEP_S
 
@@ -85,26 +85,26 @@ class FilterWorld:
             least_m = min(least_m, self.gap_m)
         return least_m
 
-    def _scan(self, now: float) -> None:
+    def _scan(self, now_s: float) -> None:
         scanner = self.robot.safety.scan
         if self.lidar is not None:
             scan = self.fault(self.lidar.scan(self.seen))  # its stamps go on while nothing is published
             if self.scans:
-                self.filter.on_laser_scan(scanner.topic, scan, Placement.of(scanner), now)
+                self.filter.on_laser_scan(scanner.topic, scan, Placement.of(scanner), now_s)
             return
         if not self.scans:
             return
         count = self.obstacles.shape[0]
         points = Points(self.seen, np.arange(count), max(count, 1) + 1)
-        self.filter.on_scan(scanner.topic, points, None, now)
+        self.filter.on_scan(scanner.topic, points, None, now_s)
 
     def _turn(self) -> None:
-        now = self.now
+        now_s = self.now_s
         if self._step % self._scan_steps == 0:
-            self._scan(now)
+            self._scan(now_s)
         if self._step % self._command_steps == 0:
-            self.filter.on_command(self.command, now)
-            self.decision = self.filter.decide(now)
+            self.filter.on_command(self.command, now_s)
+            self.decision = self.filter.decide(now_s)
             self.emergencies += self.decision.emergency
         assert self.decision is not None
         order = Twist2D(self.decision.twist.linear_mps, self.decision.twist.angular_radps)

@@ -44,7 +44,7 @@ class GoalQueueWorld:
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self.goal_queue = GoalQueue(robot)
-        self.now = 0.0
+        self.now_s = 0.0
         self.x_m = self.mps = 0.0
         self.goals: dict[str, Told] = {}
         self.refusals: list[str] = []
@@ -54,17 +54,17 @@ class GoalQueueWorld:
     @property
     def inputs(self) -> Inputs:
         """Of this moment."""
-        return self.change(good_inputs(Odometry(self.now, Pose(self.x_m, 0.0, 0.0), self.mps, 0.0)))
+        return self.change(good_inputs(Odometry(self.now_s, Pose(self.x_m, 0.0, 0.0), self.mps, 0.0)))
 
     def ask(self, request: Request) -> str | None:
         """A client sends a goal: its key, None when it is refused."""
-        reason = self.goal_queue.refusal(request, self.inputs, self.now)
+        reason = self.goal_queue.refusal(request, self.inputs, self.now_s)
         if reason is not None:
             self.refusals.append(reason)
             return None
         key = str(len(self.goals))
-        self.goal_queue.admit(key, request, self.inputs, self.now)
-        self.goals[key] = Told(request, self.now)
+        self.goal_queue.admit(key, request, self.inputs, self.now_s)
+        self.goals[key] = Told(request, self.now_s)
         return key
 
     def ask_way(self, distance_m: float, speed_mps: float = 0.4) -> str:
@@ -82,8 +82,8 @@ class GoalQueueWorld:
         for _ in range(round(duration_s / PERIOD_S)):
             if until():
                 return
-            self.now += PERIOD_S
-            self._move(self.goal_queue.tick(self.inputs, self.now))
+            self.now_s += PERIOD_S
+            self._move(self.goal_queue.tick(self.inputs, self.now_s))
 
     def run_out(self, limit_s: float = 60.0) -> None:
         """Until no goal is left."""
@@ -100,14 +100,14 @@ class GoalQueueWorld:
             assert self._owner is None, "two goals own the base"
             assert self.goals[cycle.began].began is None, "a goal began twice"
             assert abs(self.mps) <= self.robot.base.standstill_mps, "a goal began on a base that moves"
-            self.goals[cycle.began].began = self.now
+            self.goals[cycle.began].began = self.now_s
             self._owner = cycle.began
         if self._owner is None:
             assert cycle.twist in (None, STOP), "nobody owns the base, and it was ordered to move"
         assert cycle.feedback is None or cycle.feedback[0] == self._owner
         for end in cycle.ends:
             self.goals[end.key].ends.append(end.outcome)
-            self.goals[end.key].ended = self.now
+            self.goals[end.key].ended = self.now_s
             if end.key == self._owner:
                 self._owner = None
         wanted_mps = cycle.twist.linear_mps if cycle.twist else 0.0

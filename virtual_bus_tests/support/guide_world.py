@@ -33,10 +33,10 @@ class GuideWorld(SessionWorld):
     def guide(self, script: Callable[[PoweredDrives], Script[T]], limit_s: float = 300.0) -> T:
         """The whole script, then the farewell; what it returned. Raises what it raised, after the farewell too."""
         guide = Guide(self.rig, script(self.rig), self.told.append)
-        start = self.now
+        start = self.now_s
         try:
             while not guide.done:
-                assert self.now - start < limit_s, f"the procedure does not end: {self.told[-1:]}"
+                assert self.now_s - start < limit_s, f"the procedure does not end: {self.told[-1:]}"
                 self.turn(guide)
                 if guide.question is not None:
                     self.asked.append(guide.question.key)
@@ -50,5 +50,5 @@ class GuideWorld(SessionWorld):
     @property
     def speeds(self) -> tuple[float, float]:
         """What the rims really do [m/s]."""
-        truth = self.bench.truth(self.now)
+        truth = self.bench.truth(self.now_s)
         return truth.v_left_mps, truth.v_right_mps

@@ -18,8 +18,8 @@ class SessionWorld:
     def __init__(self, robot: Robot | None = None, drives: Robot | None = None) -> None:
         """`drives`: what is really there, where it is not what `robot` says."""
         self.robot = robot or small_robot()
-        self.now = 100.0
-        self.bench = Bench(drives or self.robot, self.now)
+        self.now_s = 100.0
+        self.bench = Bench(drives or self.robot, self.now_s)
         self.said: list[tuple[float, Frame]] = []
         self.others: list[Callable[[float], list[Frame]]] = []
         """Other programs on the bus: each turn they are asked what they send."""
@@ -27,26 +27,26 @@ class SessionWorld:
 
     def wait(self, seconds: float) -> None:
         """Let time pass without a session."""
-        end = self.now + seconds
-        while self.now < end:
+        end = self.now_s + seconds
+        while self.now_s < end:
             self.turn(None)
 
     def run(self, session: Session, limit_s: float = 60.0) -> float:
         """Until the session is done; how long it took [s]. Fails after `limit_s`."""
-        start = self.now
+        start = self.now_s
         while not session.done:
-            assert self.now - start < limit_s, "the session does not end"
+            assert self.now_s - start < limit_s, "the session does not end"
             self.turn(session)
-        return self.now - start
+        return self.now_s - start
 
     def turn(self, session: Session | None) -> None:
         """2 ms."""
-        self.now = round(self.now + 0.002, 6)
-        sent = session.tick(self.now) if session else []
-        self.said += [(self.now, frame) for frame in sent]
-        foreign = [frame for other in self.others for frame in other(self.now)]
+        self.now_s = round(self.now_s + 0.002, 6)
+        sent = session.tick(self.now_s) if session else []
+        self.said += [(self.now_s, frame) for frame in sent]
+        foreign = [frame for other in self.others for frame in other(self.now_s)]
         for frame in [*sent, *foreign]:
-            self.bench.on_frame(BenchFrame(frame.cob_id, frame.data), self.now)
-        for heard in [*foreign, *(Frame(f.cob_id, f.data) for f in self.bench.tick(self.now))]:
+            self.bench.on_frame(BenchFrame(frame.cob_id, frame.data), self.now_s)
+        for heard in [*foreign, *(Frame(f.cob_id, f.data) for f in self.bench.tick(self.now_s))]:
             if session is not None:
-                session.on_frame(heard, self.now)
+                session.on_frame(heard, self.now_s)

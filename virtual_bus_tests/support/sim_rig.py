@@ -57,7 +57,7 @@ class Rig:
 
     def __init__(self, of: Robot | None = None, body: PlantParameters | None = None) -> None:
         self.bench = Bench(of or robot(), 0.0, body or PlantParameters(), AT_ONCE)
-        self.now = 0.0
+        self.now_s = 0.0
         self.heard: list[tuple[float, str]] = []
         self.wait(0.2)
 
@@ -79,14 +79,14 @@ class Rig:
         """Let time pass; the frames said meanwhile, as "581 60 40 60 00 00 00 00 00"."""
         said: list[str] = []
         for _ in range(round(seconds / step_s)):
-            self.now = round(self.now + step_s, 6)
+            self.now_s = round(self.now_s + step_s, 6)
             said += self._take()
         return said
 
     def tx(self, text: str) -> list[str]:
         """Send one frame, written as its COB-ID and bytes in hex; the frames that are said at once."""
         cob_id, _, data = text.partition(" ")
-        self.bench.on_frame(Frame(int(cob_id, 16), bytes.fromhex(data)), self.now)
+        self.bench.on_frame(Frame(int(cob_id, 16), bytes.fromhex(data)), self.now_s)
         return self._take()
 
     def write(self, index: int, value: int, sub: int = 0, node: int = 1) -> str:
@@ -122,6 +122,6 @@ class Rig:
         return bytes.fromhex(answer[4:])
 
     def _take(self) -> list[str]:
-        said = [f"{frame.cob_id:03X} {frame.data.hex(' ').upper()}".strip() for frame in self.bench.tick(self.now)]
-        self.heard += [(self.now, text) for text in said]
+        said = [f"{frame.cob_id:03X} {frame.data.hex(' ').upper()}".strip() for frame in self.bench.tick(self.now_s)]
+        self.heard += [(self.now_s, text) for text in said]
         return said

@@ -33,7 +33,7 @@ class TimedBus:
     """Driver, watchdog and drives, all switched on at the same moment."""
 
     def __init__(self, robot: Robot) -> None:
-        self._robot, self.now = robot, 0.0
+        self._robot, self.now_s = robot, 0.0
         self._bench, self._driver = Bench(robot, 0.0), DriverCore(robot)
         self._watchdog = Watchdog(watchdog_config(robot), 0.0)
         self._queue: list[tuple[int, int, Frame]] = []
@@ -45,31 +45,31 @@ class TimedBus:
     def enabled_after(self, within_s: float) -> float:
         """From power on to operation enabled on all drives [s]. Fails when that takes longer than `within_s`."""
         while self._driver.state is not DriverState.ENABLED:
-            assert self.now < within_s, self._driver.finding
+            assert self.now_s < within_s, self._driver.finding
             self._step()
-        return self.now
+        return self.now_s
 
     def _step(self) -> None:
         """The time of one frame, or a little when there is none."""
         self._queue_up_what_is_due()
         if not self._queue:
-            self.now += IDLE_S
+            self.now_s += IDLE_S
             return
         frame = heapq.heappop(self._queue)[2]
-        self.now += frame_bits(len(frame.data)) / self._robot.bus.bitrate
+        self.now_s += frame_bits(len(frame.data)) / self._robot.bus.bitrate
         self._deliver(frame)
 
     def _queue_up_what_is_due(self) -> None:
         if self._is_due("command", COMMAND_PERIOD_S):
-            self._driver.on_command(Twist2D.ZERO, self.now)
+            self._driver.on_command(Twist2D.ZERO, self.now_s)
         if self._is_due("cycle", 1.0 / self._robot.rates.control_hz):
-            self._queue_up(self._driver.tick(self.now))
+            self._queue_up(self._driver.tick(self.now_s))
         if self._is_due("watchdog", WATCHDOG_PERIOD_S):
-            self._queue_up([Frame(frame.cob_id, frame.data) for frame in self._watchdog.tick(self.now)])
-        self._queue_up([Frame(frame.cob_id, frame.data) for frame in self._bench.tick(self.now)])
+            self._queue_up([Frame(frame.cob_id, frame.data) for frame in self._watchdog.tick(self.now_s)])
+        self._queue_up([Frame(frame.cob_id, frame.data) for frame in self._bench.tick(self.now_s)])
 
     def _is_due(self, what: str, period_s: float) -> bool:
-        due = self.now >= self._due[what]
+        due = self.now_s >= self._due[what]
         self._due[what] += period_s * due
         return due
 
@@ -78,7 +78,7 @@ class TimedBus:
             heapq.heappush(self._queue, (frame.cob_id, next(self._numbers), frame))
 
     def _deliver(self, frame: Frame) -> None:
-        self.heard.append((self.now, frame))
-        self._queue_up(self._driver.on_frame(frame, self.now))
-        self._watchdog.on_frame(frame.cob_id, frame.data, self.now)
-        self._bench.on_frame(BenchFrame(frame.cob_id, frame.data), self.now)
+        self.heard.append((self.now_s, frame))
+        self._queue_up(self._driver.on_frame(frame, self.now_s))
+        self._watchdog.on_frame(frame.cob_id, frame.data, self.now_s)
+        self._bench.on_frame(BenchFrame(frame.cob_id, frame.data), self.now_s)

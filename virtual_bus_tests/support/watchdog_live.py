@@ -76,15 +76,15 @@ class LiveRobot:
         turn, before, sequence = 0, time.monotonic(), 0
         while self._going:
             self._listen(before + TURN_S)
-            now = time.monotonic()
+            now_s = time.monotonic()
             for drive in self.drives:
-                self._send(drive.step(now - before, now))
+                self._send(drive.step(now_s - before, now_s))
             if self.driver and turn % 5 == 0:
-                self._drive(turn, now)
+                self._drive(turn, now_s)
             if self.filter and turn % 10 == 0:
                 sequence += 1
-                self._lease(sequence, now)
-            turn, before = turn + 1, now
+                self._lease(sequence, now_s)
+            turn, before = turn + 1, now_s
 
     def _listen(self, until: float) -> None:
         while (left := until - time.monotonic()) > 0:
@@ -103,22 +103,22 @@ class LiveRobot:
         for drive in self.drives:
             self._send(drive.on_frame(frame))
 
-    def _drive(self, turn: int, now: float) -> None:
+    def _drive(self, turn: int, now_s: float) -> None:
         out = [Frame(0x200 + drive.node_id, struct.pack("<Hi", self.word, self.speed)) for drive in self.drives]
         out.append(Frame(0x080, b""))
         if turn % 50 == 0:
-            self.last_heartbeat = now
+            self.last_heartbeat = now_s
             out.insert(0, Frame(0x77F, b"\x05"))
         self._send(out)
         for frame in out:
             self._tell_drives(frame)
 
-    def _lease(self, sequence: int, now: float) -> None:
+    def _lease(self, sequence: int, now_s: float) -> None:
         try:
-            self._socket.sendto(lease(sequence, now, self.speed / 1000), self._path)
+            self._socket.sendto(lease(sequence, now_s, self.speed / 1000), self._path)
         except (FileNotFoundError, ConnectionRefusedError, BlockingIOError):
             return
-        self.last_lease = now
+        self.last_lease = now_s
 
     def _send(self, frames: list[Frame]) -> None:
         for frame in frames:

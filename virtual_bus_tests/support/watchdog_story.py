@@ -170,7 +170,7 @@ class FakeDrive:
             out = b"\x43" + out + struct.pack("<i", self.velocity(axis))
         return [] if self.mute else [Frame(0x580 + self.node_id, out)]
 
-    def step(self, dt: float, now: float) -> list[Frame]:
+    def step(self, dt: float, now_s: float) -> list[Frame]:
         """Let the motors turn for `dt` s: 1000 bits/s² up and down."""
         for axis in self.axes:
             goal = self.target[axis] if self.words[axis] == ENABLED else 0
@@ -181,9 +181,9 @@ class FakeDrive:
             self.travel[axis] += self.speed[axis] * dt
             if self.words[axis] == QUICK_STOP and self.speed[axis] == 0 and self.option < 5:
                 self.words[axis] = SOD
-        if now < self.beat_at or self.mute:
+        if now_s < self.beat_at or self.mute:
             return []
-        self.beat_at = now + 0.1
+        self.beat_at = now_s + 0.1
         return [Frame(0x700 + self.node_id, bytes([self.nmt]))]
 
 

@@ -74,8 +74,10 @@ def write(page: Path, found: Sequence[Result], names: Sequence[str], today: str)
     text = page.read_text(encoding="utf-8")
     old = TABLE.rows(section(text, COMMAND))
     known: dict[Key, Row] = {(name,): old[name,] for name in names if (name,) in old}
-    now: dict[Key, Row] = {(result["name"],): _row(result, known, today) for result in found if result["name"] in names}
-    merged = TABLE.merged(TABLE.merged("", known), now, [(name,) for name in names])
+    now_s: dict[Key, Row] = {
+        (result["name"],): _row(result, known, today) for result in found if result["name"] in names
+    }
+    merged = TABLE.merged(TABLE.merged("", known), now_s, [(name,) for name in names])
     page.write_text(rewritten(text, COMMAND, merged), encoding="utf-8")
 
 

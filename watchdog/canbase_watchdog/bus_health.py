@@ -47,25 +47,25 @@ class BusHealth:
         """A frame was taken by the bus."""
         self._unsent_since = math.inf
 
-    def on_send_error(self, now: float) -> None:
+    def on_send_error(self, now_s: float) -> None:
         """A frame was not taken."""
         self.send_errors += 1
-        self._unsent_since = min(self._unsent_since, now)
+        self._unsent_since = min(self._unsent_since, now_s)
 
-    def on_receive_error(self, now: float) -> None:
+    def on_receive_error(self, now_s: float) -> None:
         """Reading failed: the interface is down or gone."""
         self.receive_errors += 1
-        self._broken_since = min(self._broken_since, now)
+        self._broken_since = min(self._broken_since, now_s)
 
     def on_data(self) -> None:
         """A frame of somebody else came: controller and cable work."""
         self._broken_since = math.inf
 
-    def on_error_frame(self, error_class: int, data: bytes, now: float) -> None:
+    def on_error_frame(self, error_class: int, data: bytes, now_s: float) -> None:
         """What the controller says. Bus errors and lost arbitrations are counted alone: each may be the last one."""
         self.error_frames += 1
         detail = data[1] if error_class & CONTROLLER and len(data) > 1 else 0
         if error_class & (BUS_OFF | TX_TIMEOUT) or detail & PASSIVE:
-            self._broken_since = min(self._broken_since, now)
+            self._broken_since = min(self._broken_since, now_s)
         elif error_class & RESTARTED or detail & ACTIVE:
             self._broken_since = math.inf

@@ -28,20 +28,20 @@ class CreepWatch:
         self._ordered = False
         """At the last look."""
 
-    def look(self, bus: BusView, bounds: Bounds, now: float) -> str:
+    def look(self, bus: BusView, bounds: Bounds, now_s: float) -> str:
         """What is ordered though nothing is allowed, for `order_hold_s` in all; empty: nothing is.
 
         It begins anew when anything is allowed, and when nothing was ordered for as long.
         """
         wheel = next((axis for axis in bus.axes if axis.enabled and axis.target_mps != 0.0), None)
-        elapsed_s, self._looked_at = now - self._looked_at, now
+        elapsed_s, self._looked_at = now_s - self._looked_at, now_s
         went_on, self._ordered = self._ordered, wheel is not None and bounds == AT_REST
-        if bounds != AT_REST or now >= self._ordered_at + self._hold_s:
+        if bounds != AT_REST or now_s >= self._ordered_at + self._hold_s:
             self._ordered_s = 0.0
         if wheel is None or not self._ordered:
             return ""
         self._ordered_s = min(self._ordered_s + (elapsed_s if went_on else 0.0), self._hold_s)
-        self._ordered_at = now
+        self._ordered_at = now_s
         if self._ordered_s < self._hold_s:
             return ""
         return f"{wheel.drive.joint} is ordered {wheel.target_mps:.4f} m/s for {self._ordered_s:.3f} s"

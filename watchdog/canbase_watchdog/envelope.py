@@ -31,22 +31,22 @@ class Peak:
         """Value and when it ended, only those that may still be the greatest: the values fall, their ends rise."""
         self._value, self._end = 0.0, -math.inf
 
-    def set(self, value: float, now: float, until: float) -> None:
-        """From `now` on `value` is in force, until the next one or until the time `until`, whichever is earlier."""
-        self._keep(self._value, min(self._end, now))
-        if self._end < now:
-            self._keep(0.0, now)
+    def set(self, value: float, now_s: float, until: float) -> None:
+        """From `now_s` on `value` is in force, until the next one or until the time `until`, whichever is earlier."""
+        self._keep(self._value, min(self._end, now_s))
+        if self._end < now_s:
+            self._keep(0.0, now_s)
         self._value, self._end = value, until
 
-    def greatest(self, now: float) -> float:
-        """The greatest value at the time `now`, which may not be before that of the last call."""
-        past, since = self._past, now - self._hold_s
+    def greatest(self, now_s: float) -> float:
+        """The greatest value at the time `now_s`, which may not be before that of the last call."""
+        past, since = self._past, now_s - self._hold_s
         while past and past[0][1] < since:
             past.popleft()
         before = past[0][0] if past else -math.inf
         if self._end >= since:
             before = max(before, self._value)
-        return before if self._end >= now else max(before, 0.0)
+        return before if self._end >= now_s else max(before, 0.0)
 
     def _keep(self, value: float, end: float) -> None:
         past = self._past
@@ -58,23 +58,23 @@ class Peak:
 class Way:
     """One way to go (forward, backward, to the left, to the right): what is ordered that way, and what is allowed."""
 
-    def __init__(self, ceiling: float, hold_s: float, now: float) -> None:
-        """Up to `ceiling` may have been ordered before the time `now`."""
+    def __init__(self, ceiling: float, hold_s: float, now_s: float) -> None:
+        """Up to `ceiling` may have been ordered before the time `now_s`."""
         self._ceiling = ceiling
         self._high, self._low = Peak(hold_s), Peak(hold_s)
-        self._high.set(ceiling, now, now)
+        self._high.set(ceiling, now_s, now_s)
         self.level = self.most = ceiling
         self.least = 0.0
 
-    def order(self, value: float, now: float, until: float) -> None:
+    def order(self, value: float, now_s: float, until: float) -> None:
         """An order, negative for the opposite way; above the ceiling it allows no more than the ceiling."""
         value = min(max(value, 0.0), self._ceiling)
-        self._high.set(value, now, until)
-        self._low.set(-value, now, until)
+        self._high.set(value, now_s, until)
+        self._low.set(-value, now_s, until)
 
-    def look(self, now: float) -> None:
+    def look(self, now_s: float) -> None:
         """Bring the most and the least of what was ordered up to date."""
-        self.most, self.least = self._high.greatest(now), -self._low.greatest(now)
+        self.most, self.least = self._high.greatest(now_s), -self._low.greatest(now_s)
         self.level = max(self.level, self.most)
 
     def fall(self, kept: float) -> None:
@@ -120,25 +120,25 @@ class Bounds:
 class Envelope:
     """The bounds as they rise with each order and fall with time."""
 
-    def __init__(self, config: WatchdogConfig, now: float) -> None:
-        """Rule 4: open at the monotonic time `now` [s]."""
+    def __init__(self, config: WatchdogConfig, now_s: float) -> None:
+        """Rule 4: open at the monotonic time `now_s` [s]."""
         self._config = config
         ceilings = (config.linear_mps, config.linear_mps, config.angular_radps, config.angular_radps)
-        self._ways = tuple(Way(ceiling, config.order_hold_s, now) for ceiling in ceilings)
-        self._at = now
+        self._ways = tuple(Way(ceiling, config.order_hold_s, now_s) for ceiling in ceilings)
+        self._at = now_s
 
-    def order(self, linear_mps: float, angular_radps: float, now: float) -> None:
+    def order(self, linear_mps: float, angular_radps: float, now_s: float) -> None:
         """A lease that counts. What it orders above the configured limits allows no more than they do."""
-        until = now + self._config.lease_timeout_s
+        until = now_s + self._config.lease_timeout_s
         values = (linear_mps, -linear_mps, angular_radps, -angular_radps)
         for way, value in zip(self._ways, values, strict=True):
-            way.order(value, now, until)
+            way.order(value, now_s, until)
 
-    def advance(self, now: float) -> Bounds:
-        """The bounds at the monotonic time `now` [s], which may not be before that of the last call."""
-        elapsed_s, self._at = now - self._at, now
+    def advance(self, now_s: float) -> Bounds:
+        """The bounds at the monotonic time `now_s` [s], which may not be before that of the last call."""
+        elapsed_s, self._at = now_s - self._at, now_s
         for way in self._ways:
-            way.look(now)
+            way.look(now_s)
         forward, backward, left, right = self._ways
         linear_s, angular_s = self._falling_s()
         forward.fall(_kept(elapsed_s, linear_s))

@@ -94,8 +94,8 @@ class Evidence:
 class EvidenceWatch:
     """Follows one axis. Speeds at the rim, forward positive [m/s]."""
 
-    def __init__(self, drive: WatchedDrive, config: WatchdogConfig, now: float) -> None:
-        """Before the monotonic time `now` [s] nothing was ordered."""
+    def __init__(self, drive: WatchedDrive, config: WatchdogConfig, now_s: float) -> None:
+        """Before the monotonic time `now_s` [s] nothing was ordered."""
         self._config = config
         count_m = abs(drive.m_per_count)
         self._unseen_m = max(config.motion_missing_m, UNSEEN_COUNTS * count_m)
@@ -108,24 +108,24 @@ class EvidenceWatch:
         self._setpoint_mps = self._ordered_mps = 0.0
         self._least_mps = self._velocity_mps = self._direction = 0.0
         self._fine_mps = config.standstill_mps + abs(drive.velocity_mps_per_bit)
-        self._lacked_mps, self._worst_mps, self._nearer_at = math.inf, 0.0, now
+        self._lacked_mps, self._worst_mps, self._nearer_at = math.inf, 0.0, now_s
         """How much slower than ordered a strained wheel was when it last came nearer to its order, at most since then,
         and when that was. Nearer is than ever, or clearly than after something had held it."""
         self._rolled = self._rests = False
         self._turns = 0
         self._jolted_at = -math.inf
-        self._lived_at, self._ghost_s = now, 0.0
+        self._lived_at, self._ghost_s = now_s, 0.0
         self.last = Evidence()
 
     def on_sync(self, rests: bool) -> None:
         """After the setpoints: `rests`: those of all wheels are zero, and none moves by what it measures."""
         self._rests = rests and self._config.stand_proof
 
-    def on_setpoint(self, setpoint_mps: float, now: float) -> None:
+    def on_setpoint(self, setpoint_mps: float, now_s: float) -> None:
         """A SYNC made it effective."""
         self._setpoint_mps = setpoint_mps
-        self._forward.set(setpoint_mps, now, math.inf)
-        self._backward.set(-setpoint_mps, now, math.inf)
+        self._forward.set(setpoint_mps, now_s, math.inf)
+        self._backward.set(-setpoint_mps, now_s, math.inf)
 
     def trust(self) -> None:
         """A reset was accepted: everything begins anew."""
@@ -144,7 +144,7 @@ class EvidenceWatch:
         powered: bool,
         enabled: bool,
         elapsed_s: float,
-        now: float,
+        now_s: float,
         torque: float | None = None,
     ) -> None:
         """606Ch, and the travel of the encoder since the last sample; None: it is not known, or a jump.
@@ -156,16 +156,18 @@ class EvidenceWatch:
         falls = abs(velocity_mps) < GHOST_FALLS * abs(self._velocity_mps)
         self._velocity_mps = velocity_mps
         self._rolled = step_m is not None and abs(step_m) > ROLLING_SHARE * abs(velocity_mps) * elapsed_s
-        self._ask(elapsed_s, now, enabled)
-        ghost_m = self._ghost_m(lives or step_m is None, velocity_mps, elapsed_s if powered and not falls else 0.0, now)
+        self._ask(elapsed_s, now_s, enabled)
+        ghost_m = self._ghost_m(
+            lives or step_m is None, velocity_mps, elapsed_s if powered and not falls else 0.0, now_s
+        )
         before = self._kept(lives, ghost_m)
-        strained_s = self._strained_s(velocity_mps, torque if powered and enabled else None, elapsed_s, now)
+        strained_s = self._strained_s(velocity_mps, torque if powered and enabled else None, elapsed_s, now_s)
         if not powered:
             self.last = before
             return
         if enabled:
             before = self._unseen(lives, step_m is not None, elapsed_s, torque)
-        halted, jolts = self._halted(jolted and rolled, lives), self._jolts(jolted, now)
+        halted, jolts = self._halted(jolted and rolled, lives), self._jolts(jolted, now_s)
         samples, unseen = self._config.feedback_samples, self._is_unseen(before)
         strained = strained_s >= self._config.motion_missing_s
         ghost = abs(ghost_m) >= GHOST_LIVES * self._life_m and self._ghost_s >= GHOST_LAG_S
@@ -265,12 +267,12 @@ class EvidenceWatch:
             return 1
         return self.last.halted + 1 if self.last.halted and not lives else 0
 
-    def _ghost_m(self, lives: bool, velocity_mps: float, elapsed_s: float, now: float) -> float:
+    def _ghost_m(self, lives: bool, velocity_mps: float, elapsed_s: float, now_s: float) -> float:
         """Noise changes its sign, and one bad sample is over soon. What counted with power outlives a time without."""
         if lives:
-            self._lived_at = now
+            self._lived_at = now_s
         if (
-            now < self._lived_at + GHOST_LAG_S
+            now_s < self._lived_at + GHOST_LAG_S
             or velocity_mps * self.last.ghost_m < 0.0
             or abs(velocity_mps) <= self._residue_mps
         ):
@@ -279,18 +281,18 @@ class EvidenceWatch:
         self._ghost_s += elapsed_s
         return self.last.ghost_m + velocity_mps * elapsed_s
 
-    def _jolts(self, jolted: bool, now: float) -> int:
-        before = self.last.jolts if now < self._jolted_at + JOLT_MEMORY_S else 0
+    def _jolts(self, jolted: bool, now_s: float) -> int:
+        before = self.last.jolts if now_s < self._jolted_at + JOLT_MEMORY_S else 0
         if jolted:
-            self._jolted_at = now
+            self._jolted_at = now_s
         return before + jolted
 
-    def _ask(self, elapsed_s: float, now: float, enabled: bool) -> None:
+    def _ask(self, elapsed_s: float, now_s: float, enabled: bool) -> None:
         """The least that the setpoints of the lag ask for, and how far the slowest ramp has got to it from a stand.
 
         A wheel that still turns the other way has not begun: how fast that ends is the upper bound's, plausibility.py.
         """
-        backward_mps, forward_mps = -self._backward.greatest(now), self._forward.greatest(now)
+        backward_mps, forward_mps = -self._backward.greatest(now_s), self._forward.greatest(now_s)
         self._least_mps = max(backward_mps, 0.0) + min(forward_mps, 0.0)
         other_way = self._velocity_mps * self._least_mps < 0.0 and abs(self._velocity_mps) > self._slack_mps
         gain_mps = self._config.slowest_ramp_mps2 * elapsed_s
@@ -307,13 +309,13 @@ class EvidenceWatch:
         behind = ordered_mps != 0.0 and math.copysign(1.0, ordered_mps) * velocity_mps < least_mps
         return max(0.0, self.last.behind_s + (elapsed_s if behind else -elapsed_s))
 
-    def _strained_s(self, velocity_mps: float, torque: float | None, elapsed_s: float, now: float) -> float:
+    def _strained_s(self, velocity_mps: float, torque: float | None, elapsed_s: float, now_s: float) -> float:
         least_mps = self._least_mps
         lacks_mps = abs(least_mps) - math.copysign(1.0, least_mps) * velocity_mps if least_mps else 0.0
         strained = torque is not None and abs(torque) >= STRAINED_SHARE and lacks_mps > self._fine_mps
         self._worst_mps = max(self._worst_mps, lacks_mps)
         nearer = lacks_mps < self._lacked_mps - self._fine_mps or lacks_mps < self._worst_mps - self._slack_mps
         if not strained or nearer:
-            self._lacked_mps, self._worst_mps, self._nearer_at = (lacks_mps if strained else math.inf), lacks_mps, now
-        held = now > self._nearer_at + NEARER_S
+            self._lacked_mps, self._worst_mps, self._nearer_at = (lacks_mps if strained else math.inf), lacks_mps, now_s
+        held = now_s > self._nearer_at + NEARER_S
         return self.last.strained_s + elapsed_s if held else 0.0

@@ -54,15 +54,15 @@ class HaltWatch:
         self._after_s = 0.0
         self._bad = 0
 
-    def look(self, bus: BusView, lease: Lease | None, now: float) -> str:
+    def look(self, bus: BusView, lease: Lease | None, now_s: float) -> str:
         """Which wheel's setpoint does not fall, for two SYNCs in a row, in words; empty: they do."""
         elapsed_s, is_new = bus.sync_at - self._sync_at, bus.sync_at != self._sync_at
         self._sync_at = bus.sync_at
         if lease is None or lease.orders_motion:
             self._since, self._ramp, self._bad = math.inf, None, 0
             return ""
-        self._since = min(self._since, now)
-        if not is_new or now < self._since + self._config.order_wait_s or not all(axis.enabled for axis in bus.axes):
+        self._since = min(self._since, now_s)
+        if not is_new or now_s < self._since + self._config.order_wait_s or not all(axis.enabled for axis in bus.axes):
             return ""
         if self._ramp is None or self._left(self._ramp) > 0.0:  # at its end time is of no matter any more
             self._after_s += min(elapsed_s, LONGEST_STEP_S)

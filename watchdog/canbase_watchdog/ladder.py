@@ -126,12 +126,12 @@ class Climb:
     """Since when its feedback says that it has no power; infinity: it does not."""
 
 
-def first(look: Look, now: float) -> Climb:
+def first(look: Look, now_s: float) -> Climb:
     """The foot of the ladder."""
-    return Climb(Step.QUICK_STOP, now, look.begin_mps)
+    return Climb(Step.QUICK_STOP, now_s, look.begin_mps)
 
 
-def advance(before: Climb, look: Look, braking: Braking, now: float) -> Climb:
+def advance(before: Climb, look: Look, braking: Braking, now_s: float) -> Climb:
     """The place of a node after this look at it. Rules, the first that fits:
 
     1. stopped, and enabled again: next rung, somebody works against us; but no reset before the power was ordered off;
@@ -148,63 +148,63 @@ def advance(before: Climb, look: Look, braking: Braking, now: float) -> Climb:
        seen to have power on the rung before: one that is not heard may be off, and a reset makes it forget 1016h;
     8. stays. A wheel that rolls without power is waited for: no rung can brake it.
     """
-    climb = _judged(before, look, braking, now)
+    climb = _judged(before, look, braking, now_s)
     if climb.stopped:
-        return _stopped(climb, look, now)
-    if look.standing and look.seen_at > climb.since and _holds(climb, look, braking, now):
-        return replace(climb, stopped=True, stopped_at=now, assumed=not look.trusted)
+        return _stopped(climb, look, now_s)
+    if look.standing and look.seen_at > climb.since and _holds(climb, look, braking, now_s):
+        return replace(climb, stopped=True, stopped_at=now_s, assumed=not look.trusted)
     if not look.present:
         return climb
     if not look.trusted and climb.step < Step.DISABLE_VOLTAGE:
-        return _to(Step.DISABLE_VOLTAGE, climb, look, now)
+        return _to(Step.DISABLE_VOLTAGE, climb, look, now_s)
     if climb.against >= braking.samples or look.unslowed:
-        return replace(_to(max(climb.step + 1, Step.DISABLE_VOLTAGE), climb, look, now), runaway=True)
-    return _up(climb, look, now) if _disobeys(climb, look, now) else climb
+        return replace(_to(max(climb.step + 1, Step.DISABLE_VOLTAGE), climb, look, now_s), runaway=True)
+    return _up(climb, look, now_s) if _disobeys(climb, look, now_s) else climb
 
 
-def _stopped(climb: Climb, look: Look, now: float) -> Climb:
+def _stopped(climb: Climb, look: Look, now_s: float) -> Climb:
     if look.enabled:
-        return _to(min(climb.step + 1, Step.HEARTBEAT_WITHHELD), climb, look, now)
+        return _to(min(climb.step + 1, Step.HEARTBEAT_WITHHELD), climb, look, now_s)
     if not look.standing or not (look.trusted or climb.assumed):
         step = min(climb.step, Step.HEARTBEAT_WITHHELD)
-        return replace(first(look, now), step=step, runaway=climb.runaway, off_since=climb.off_since)
-    if not look.powered or now < climb.stopped_at + HELD_S:
+        return replace(first(look, now_s), step=step, runaway=climb.runaway, off_since=climb.off_since)
+    if not look.powered or now_s < climb.stopped_at + HELD_S:
         return climb
-    return _to(min(max(climb.step + 1, Step.DISABLE_VOLTAGE), Step.HEARTBEAT_WITHHELD), climb, look, now)
+    return _to(min(max(climb.step + 1, Step.DISABLE_VOLTAGE), Step.HEARTBEAT_WITHHELD), climb, look, now_s)
 
 
-def _judged(climb: Climb, look: Look, braking: Braking, now: float) -> Climb:
+def _judged(climb: Climb, look: Look, braking: Braking, now_s: float) -> Climb:
     """Count this look's sample, if it is a new one that came on this rung, and note since when the power is off."""
     if look.seen_at <= max(climb.since, climb.judged_at):
         return climb
     too_fast = look.speed_mps > max(0.0, braking.allowed_mps(climb.begin_mps, look.seen_at - climb.since))
     against = climb.against + 1 if look.powered and too_fast and not look.standing else 0
-    off_since = math.inf if look.powered else min(climb.off_since, now)
+    off_since = math.inf if look.powered else min(climb.off_since, now_s)
     return replace(climb, against=against, judged_at=look.seen_at, off_since=off_since)
 
 
-def _holds(climb: Climb, look: Look, braking: Braking, now: float) -> bool:
+def _holds(climb: Climb, look: Look, braking: Braking, now_s: float) -> bool:
     """Nothing drives it, and what says that it stands is evidence, or needs none any more."""
-    return not look.enabled if look.trusted else now >= climb.off_since + braking.coasting_s
+    return not look.enabled if look.trusted else now_s >= climb.off_since + braking.coasting_s
 
 
-def _disobeys(climb: Climb, look: Look, now: float) -> bool:
+def _disobeys(climb: Climb, look: Look, now_s: float) -> bool:
     obey_s = max(RUNGS[climb.step].obey_s, READINGS * look.reading_s)
     if climb.step is Step.HEARTBEAT_WITHHELD:
-        return look.powered and look.seen_at > climb.since and now >= climb.since + obey_s
-    if now >= max(climb.since, look.seen_at) + obey_s:
+        return look.powered and look.seen_at > climb.since and now_s >= climb.since + obey_s
+    if now_s >= max(climb.since, look.seen_at) + obey_s:
         return True
     asked = look.powered if climb.step >= Step.DISABLE_VOLTAGE else look.enabled
-    return asked and now >= climb.since + obey_s
+    return asked and now_s >= climb.since + obey_s
 
 
-def _up(climb: Climb, look: Look, now: float) -> Climb:
-    return _to(climb.step + 1, climb, look, now)
+def _up(climb: Climb, look: Look, now_s: float) -> Climb:
+    return _to(climb.step + 1, climb, look, now_s)
 
 
-def _to(step: int, climb: Climb, look: Look, now: float) -> Climb:
+def _to(step: int, climb: Climb, look: Look, now_s: float) -> Climb:
     """The last rung is the end: there it stays as it is. No rung gives power to a wheel that has none."""
     if climb.step is Step.RESET_NODE and not climb.stopped:
         return climb
     off_since = math.inf if look.powered else climb.off_since
-    return Climb(Step(min(step, Step.RESET_NODE)), now, look.begin_mps, runaway=climb.runaway, off_since=off_since)
+    return Climb(Step(min(step, Step.RESET_NODE)), now_s, look.begin_mps, runaway=climb.runaway, off_since=off_since)

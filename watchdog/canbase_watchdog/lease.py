@@ -65,16 +65,16 @@ def parse(datagram: bytes) -> Lease | Refusal:
     return Lease(sequence, stamp_ns, linear, angular, flags)
 
 
-def judge(lease: Lease, last: Lease | None, timeout_s: float, now: float) -> Refusal | None:
-    """Why this lease does not count after `last` at the monotonic time `now` [s], or None when it does.
+def judge(lease: Lease, last: Lease | None, timeout_s: float, now_s: float) -> Refusal | None:
+    """Why this lease does not count after `last` at the monotonic time `now_s` [s], or None when it does.
 
     Within one run of the filter both sequence and stamp rise. A sequence that falls back while the stamp goes on is a
     filter that was started again; its first datagrams may be lost, so it need not begin at 1.
     """
     stamp_s = lease.stamp_ns * 1e-9
-    if stamp_s > now + FUTURE_TOLERANCE_S:
+    if stamp_s > now_s + FUTURE_TOLERANCE_S:
         return Refusal.FUTURE
-    if now >= stamp_s + timeout_s:
+    if now_s >= stamp_s + timeout_s:
         return Refusal.OLD
     if last is None:
         return None
@@ -99,30 +99,30 @@ class LeaseBook:
         """Monotonic time [s] that the last lease's age counts from: its stamp or its arrival, whichever is earlier."""
         self.refused: dict[Refusal, int] = dict.fromkeys(Refusal, 0)
 
-    def take(self, datagram: bytes, uid: int | None, now: float, pid: int | None = None) -> Refusal | None:
+    def take(self, datagram: bytes, uid: int | None, now_s: float, pid: int | None = None) -> Refusal | None:
         """Judge a datagram from the user `uid` (None: the system did not tell). Returns why it does not count.
 
         `pid`: the process that sent it. Leases of one process count; of another one when the first has sent nothing for
         the timeout, as after a restart. 0, for all processes of another PID namespace, never counts.
         """
-        refusal = self._judge(datagram, uid, now, pid)
+        refusal = self._judge(datagram, uid, now_s, pid)
         if refusal is not None:
             self.refused[refusal] += 1
         return refusal
 
-    def _judge(self, datagram: bytes, uid: int | None, now: float, pid: int | None) -> Refusal | None:
+    def _judge(self, datagram: bytes, uid: int | None, now_s: float, pid: int | None) -> Refusal | None:
         if (
             self._uid is not None and uid != self._uid
         ) or pid == 0:  # 0: not to be told from others (pid_namespaces(7))
             return Refusal.SENDER
-        if pid != self._pid and now < self._heard_at + self._timeout_s:
+        if pid != self._pid and now_s < self._heard_at + self._timeout_s:
             return Refusal.SECOND
         lease = parse(datagram)
         if isinstance(lease, Refusal):
             return lease
-        refusal = judge(lease, self.last, self._timeout_s, now)
+        refusal = judge(lease, self.last, self._timeout_s, now_s)
         if refusal is None:
-            self._pid, self._heard_at = pid, now
+            self._pid, self._heard_at = pid, now_s
             self.last = lease
-            self.valid_at = min(now, lease.stamp_ns * 1e-9)
+            self.valid_at = min(now_s, lease.stamp_ns * 1e-9)
         return refusal

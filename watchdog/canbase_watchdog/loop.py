@@ -61,21 +61,21 @@ class Loop:
         """Until `asked_to_end` is true and the wheels stand, at most END_S later. Raises BusDeadError, RelayError."""
         while not asked_to_end():
             self._turn()
-        now = time.monotonic()
-        self._watchdog.end(now)
-        while not self._at_rest() and time.monotonic() < now + END_S:
+        now_s = time.monotonic()
+        self._watchdog.end(now_s)
+        while not self._at_rest() and time.monotonic() < now_s + END_S:
             self._turn()
 
     def _turn(self) -> None:
         """One wait, and what it brought."""
-        now = time.monotonic()
+        now_s = time.monotonic()
         wake = min(self._due, self._watchdog.next_expiry(self._acted_at))
-        self._wait(max(wake - now, 0.0))
-        now = self._take_in()
-        if now >= wake:
-            self._acted_at = now
-            self._act(now)
-            self._due = max(self._due, now - TICK_S) + TICK_S if now >= self._due else self._due
+        self._wait(max(wake - now_s, 0.0))
+        now_s = self._take_in()
+        if now_s >= wake:
+            self._acted_at = now_s
+            self._act(now_s)
+            self._due = max(self._due, now_s - TICK_S) + TICK_S if now_s >= self._due else self._due
 
     def _wait(self, timeout_s: float) -> None:
         if self._bus_fd is None:
@@ -85,27 +85,27 @@ class Loop:
 
     def _take_in(self) -> float:
         """Everything that has arrived, leases first. Returns the time [s] of it."""
-        now = time.monotonic()
+        now_s = time.monotonic()
         for datagram, uid, pid in self._leases.receive():
-            self._watchdog.on_lease(datagram, uid, now, pid)
+            self._watchdog.on_lease(datagram, uid, now_s, pid)
         for cob_id, data in self._bus.receive():
-            self._watchdog.on_frame(cob_id, data, now)
-        return now
+            self._watchdog.on_frame(cob_id, data, now_s)
+        return now_s
 
-    def _act(self, now: float) -> None:
+    def _act(self, now_s: float) -> None:
         self._look_for_a_suspend()
         health = self._bus.health
         self._watchdog.on_bus(health.failed_since, health.errors)
         if self._keeper is not None:
             self._watchdog.on_record(self._keeper.written, self._keeper.problem)
-        for frame in self._watchdog.tick(now):
+        for frame in self._watchdog.tick(now_s):
             self._bus.send(frame)
         if self._relay is not None and self._watchdog.keeps_relay:
             self._relay.toggle()
         self._keep_record()
-        self._check_bus(now)
-        self._reporter.tick(health, now, self._bus.datagrams_dropped)
-        self._collect(now)
+        self._check_bus(now_s)
+        self._reporter.tick(health, now_s, self._bus.datagrams_dropped)
+        self._collect(now_s)
 
     def _look_for_a_suspend(self) -> None:
         before_s, self._suspended_s = self._suspended_s, suspended_s()
@@ -123,20 +123,20 @@ class Loop:
             self._record_problem = self._keeper.problem
             _log.warning("%s", self._record_problem or "the record of trips can be written again")
 
-    def _check_bus(self, now: float) -> None:
+    def _check_bus(self, now_s: float) -> None:
         if self._bus.health.takes_frames:
-            self._sent_at = now
-        elif now >= self._sent_at + BUS_DEAD_S:
+            self._sent_at = now_s
+        elif now_s >= self._sent_at + BUS_DEAD_S:
             raise BusDeadError(f"no frame could be sent for {BUS_DEAD_S:.1f} s. Is the interface up, the cable in?")
 
     def _at_rest(self) -> bool:
         status = self._watchdog.status
         return status.state is not State.TRIPPED or status.settled
 
-    def _collect(self, now: float) -> None:
+    def _collect(self, now_s: float) -> None:
         """The collector is off in the loop; what little there is, it takes here, after the frames are out."""
-        if now >= self._collected_at + COLLECT_S:
-            self._collected_at = now
+        if now_s >= self._collected_at + COLLECT_S:
+            self._collected_at = now_s
             gc.collect()
 
 

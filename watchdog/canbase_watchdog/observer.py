@@ -50,9 +50,9 @@ class _Record:
         "velocity_mps",
     )
 
-    def __init__(self, drive: WatchedDrive, config: WatchdogConfig, now: float) -> None:
+    def __init__(self, drive: WatchedDrive, config: WatchdogConfig, now_s: float) -> None:
         self.drive = drive
-        self.feedback = Plausibility(drive, config, now)
+        self.feedback = Plausibility(drive, config, now_s)
         self.push, self.stand = PushWatch(drive, config), StandWatch(drive, config)
         self.state: DriveState | None = None
         self.status_at = self.enabled_since = self.disabled_since = NEVER
@@ -93,7 +93,7 @@ class _Record:
         """Nothing is ordered, and what it measures is noise."""
         return self.setpoint_mps == 0.0 and abs(self.velocity_mps) <= still_mps
 
-    def on_sync(self, now: float) -> None:
+    def on_sync(self, now_s: float) -> None:
         """What came before it counts from now on; each SYNC wants one setpoint, and one answer from one drive."""
         if self.state is ENABLED:
             self.misses.count(not self.fresh)
@@ -103,18 +103,18 @@ class _Record:
             self.doubles.clear()
         self.answers = 0
         if self.fresh:
-            self.setpoint_mps, self.setpoint_at, self.fresh = self.target_mps, now, False
-            self.feedback.evidence.on_setpoint(self.setpoint_mps, now)
+            self.setpoint_mps, self.setpoint_at, self.fresh = self.target_mps, now_s, False
+            self.feedback.evidence.on_setpoint(self.setpoint_mps, now_s)
 
 
 class Observer:
     """Keeps the last values of everything on the bus that concerns the configured drives."""
 
-    def __init__(self, config: WatchdogConfig, now: float) -> None:
+    def __init__(self, config: WatchdogConfig, now_s: float) -> None:
         """Listens for the drives in `config`; the lower axis number of a node uses the PDOs of its first axis."""
         self._gap_s = config.feedback_timeout_s
         self._still_mps = config.motion_tolerance_mps
-        self._records = {(drive.node_id, drive.axis): _Record(drive, config, now) for drive in config.drives}
+        self._records = {(drive.node_id, drive.axis): _Record(drive, config, now_s) for drive in config.drives}
         self._heartbeat_at = {node_id: NEVER for node_id, _ in self._records}
         self._heard_at, self._boot_up_at = dict(self._heartbeat_at), dict(self._heartbeat_at)
         self._configured_at = dict(self._heartbeat_at)
@@ -127,10 +127,10 @@ class Observer:
         """NMT, quick stop PDO and SDO on the bus are our own frames that come back: not signs of another master."""
         self._add_routes()
 
-    def on_frame(self, cob_id: int, data: bytes, now: float) -> None:
+    def on_frame(self, cob_id: int, data: bytes, now_s: float) -> None:
         """Take in one received frame. Never raises for what is on the bus."""
         route = self._routes.get(cob_id)
-        if route is not None and not route(data, now):
+        if route is not None and not route(data, now_s):
             self.dropped += 1
 
     def look(self) -> BusView:
@@ -180,141 +180,141 @@ class Observer:
         self._routes[frames.VELOCITY_TPDO[place] + node_id] = partial(self._on_velocity, record)
         self._routes[setpoint] = partial(self._on_setpoint, record, setpoint)
 
-    def _on_sync(self, data: bytes, now: float) -> bool:
+    def _on_sync(self, data: bytes, now_s: float) -> bool:
         if len(data) > 1:
             return False
-        self._foreign.on_sync(now)
+        self._foreign.on_sync(now_s)
         for record in self._records.values():
-            record.on_sync(now)
+            record.on_sync(now_s)
         rests = all(record.rests(self._still_mps) for record in self._records.values())
         for record in self._records.values():
             record.push.on_sync(record.setpoint_mps, rests)
             record.feedback.evidence.on_sync(rests)
-        if now >= self._sync_at + self._gap_s:
-            self._sync_since = now
-        self._sync_at = now
+        if now_s >= self._sync_at + self._gap_s:
+            self._sync_since = now_s
+        self._sync_at = now_s
         return True
 
-    def _on_driver_heartbeat(self, data: bytes, now: float) -> bool:
+    def _on_driver_heartbeat(self, data: bytes, now_s: float) -> bool:
         if len(data) != 1:
             return False
-        self._foreign.on_heartbeat(now)
-        self._driver_at = now
+        self._foreign.on_heartbeat(now_s)
+        self._driver_at = now_s
         return True
 
-    def _on_heartbeat(self, node_id: int, data: bytes, now: float) -> bool:
+    def _on_heartbeat(self, node_id: int, data: bytes, now_s: float) -> bool:
         if len(data) != 1:
             return False
-        self._heartbeat_at[node_id] = self._heard_at[node_id] = now
-        if data == frames.BOOT_UP and self._is_enabled(node_id, now):
-            self._boot_up_at[node_id] = now
+        self._heartbeat_at[node_id] = self._heard_at[node_id] = now_s
+        if data == frames.BOOT_UP and self._is_enabled(node_id, now_s):
+            self._boot_up_at[node_id] = now_s
         return True
 
-    def _is_enabled(self, node_id: int, now: float) -> bool:
+    def _is_enabled(self, node_id: int, now_s: float) -> bool:
         """A TPDO of the last moments said so."""
         records = (record for key, record in self._records.items() if key[0] == node_id)
-        return any(each.state is ENABLED and now < each.fed_status_at + self._gap_s for each in records)
+        return any(each.state is ENABLED and now_s < each.fed_status_at + self._gap_s for each in records)
 
-    def _on_status(self, record: _Record, data: bytes, now: float) -> bool:
+    def _on_status(self, record: _Record, data: bytes, now_s: float) -> bool:
         status = frames.decode_status(data, record.drive.layout, record.drive.axis)
-        if status is None or not self._note_state(record, status[0], now):
+        if status is None or not self._note_state(record, status[0], now_s):
             return False
-        record.fed_status_at = now
+        record.fed_status_at = now_s
         record.feedback.on_position(status[1])
         record.push.on_position(status[1])
-        record.stand.on_position(status[1], now)
+        record.stand.on_position(status[1], now_s)
         return True
 
-    def _note_state(self, record: _Record, statusword: int, now: float) -> bool:
+    def _note_state(self, record: _Record, statusword: int, now_s: float) -> bool:
         state = frames.decode_state(statusword)
         if state is None:
             return False
         if state is ENABLED and record.state is not ENABLED:
-            record.enabled_since = now
+            record.enabled_since = now_s
         elif state is not ENABLED and record.state is ENABLED:
-            record.disabled_since = now
-        record.state, record.status_at = state, now
-        self._heard_at[record.drive.node_id] = now
+            record.disabled_since = now_s
+        record.state, record.status_at = state, now_s
+        self._heard_at[record.drive.node_id] = now_s
         return True
 
-    def _on_velocity(self, record: _Record, data: bytes, now: float) -> bool:
+    def _on_velocity(self, record: _Record, data: bytes, now_s: float) -> bool:
         bits = frames.decode_velocity(data, record.drive.layout)
         if bits is None:
             return False
-        self._note_velocity(record, bits, now)
-        record.fed_velocity_at = now
+        self._note_velocity(record, bits, now_s)
+        record.fed_velocity_at = now_s
         record.answers += 1
         enabled, powered = record.state is ENABLED, record.state in frames.POWERED
-        record.push.on_sample(frames.decode_torque(data, record.drive.layout), powered, now)
-        record.feedback.on_velocity(record.velocity_mps, powered, enabled, now, record.push.last.share)
+        record.push.on_sample(frames.decode_torque(data, record.drive.layout), powered, now_s)
+        record.feedback.on_velocity(record.velocity_mps, powered, enabled, now_s, record.push.last.share)
         if record.push.lies:
             record.feedback.evidence.doubt()
         return True
 
-    def _note_velocity(self, record: _Record, bits: int, now: float) -> None:
-        record.velocity_mps, record.velocity_at = bits * record.drive.velocity_mps_per_bit, now
-        record.stand.on_velocity(record.velocity_mps, now, record.state in frames.POWERED)
-        self._heard_at[record.drive.node_id] = now
+    def _note_velocity(self, record: _Record, bits: int, now_s: float) -> None:
+        record.velocity_mps, record.velocity_at = bits * record.drive.velocity_mps_per_bit, now_s
+        record.stand.on_velocity(record.velocity_mps, now_s, record.state in frames.POWERED)
+        self._heard_at[record.drive.node_id] = now_s
 
-    def _on_setpoint(self, record: _Record, cob_id: int, data: bytes, now: float) -> bool:
+    def _on_setpoint(self, record: _Record, cob_id: int, data: bytes, now_s: float) -> bool:
         setpoint = frames.decode_setpoint(data, record.drive.layout)
         if setpoint is None:
             return False
-        self._foreign.on_setpoint(cob_id, record.drive.node_id, data, now)
+        self._foreign.on_setpoint(cob_id, record.drive.node_id, data, now_s)
         word, bits = setpoint
-        record.target_mps, record.command_at, record.fresh = bits * record.drive.mps_per_bit, now, True
+        record.target_mps, record.command_at, record.fresh = bits * record.drive.mps_per_bit, now_s, True
         record.asks_for_power = frames.asks_for_power(word)
-        record.feedback.on_target(record.target_mps, now)
+        record.feedback.on_target(record.target_mps, now_s)
         return True
 
-    def _on_sdo_answer(self, node_id: int, data: bytes, now: float) -> bool:
+    def _on_sdo_answer(self, node_id: int, data: bytes, now_s: float) -> bool:
         """Answers to anybody's reading of 6041h, 6064h and 606Ch are as true as a TPDO; all others are not for us."""
-        self._heard_at[node_id] = now
+        self._heard_at[node_id] = now_s
         answer = frames.decode_sdo(data)
         understood = True
         for key, record in self._records.items():
             if answer is not None and key[0] == node_id:
-                understood = self._note_answer(record, *answer, now) and understood
+                understood = self._note_answer(record, *answer, now_s) and understood
         return understood
 
-    def _note_answer(self, record: _Record, place: tuple[int, int], value: int, now: float) -> bool:
+    def _note_answer(self, record: _Record, place: tuple[int, int], value: int, now_s: float) -> bool:
         drive = record.drive
         if place == frames.place_of(frames.STATUSWORD, drive.axis, drive.layout):
-            return self._note_state(record, frames.own_statusword(value, drive.layout, drive.axis), now)
+            return self._note_state(record, frames.own_statusword(value, drive.layout, drive.axis), now_s)
         if place == frames.place_of(frames.VELOCITY, drive.axis, drive.layout):
-            self._note_velocity(record, value, now)
+            self._note_velocity(record, value, now_s)
         if place == frames.place_of(frames.POSITION, drive.axis, drive.layout):
-            record.stand.on_position(value, now)
+            record.stand.on_position(value, now_s)
         return True
 
-    def _on_nmt(self, data: bytes, now: float) -> bool:
+    def _on_nmt(self, data: bytes, now_s: float) -> bool:
         command = frames.decode_nmt(data)
         if command is None:
             return False
         for node_id in self._heard_at:
             if command[1] in (0, node_id):
-                self._note_foreign(node_id, f"NMT command {command[0]} for node {command[1]}", now)
+                self._note_foreign(node_id, f"NMT command {command[0]} for node {command[1]}", now_s)
         return True
 
-    def _on_quick_stop(self, node_id: int, data: bytes, now: float) -> bool:
+    def _on_quick_stop(self, node_id: int, data: bytes, now_s: float) -> bool:
         self._note_foreign(
-            node_id, f"the watchdog's quick stop PDO with {data.hex(' ')} (stop frames at a unit's end do that)", now
+            node_id, f"the watchdog's quick stop PDO with {data.hex(' ')} (stop frames at a unit's end do that)", now_s
         )
         return True
 
-    def _on_sdo_request(self, node_id: int, data: bytes, now: float) -> bool:
+    def _on_sdo_request(self, node_id: int, data: bytes, now_s: float) -> bool:
         written = frames.decode_sdo_download(data)
         stops = written is not None and written % frames.AXIS_OFFSET == _CONTROLWORD and frames.takes_power_away(data)
         if written is not None and written % frames.AXIS_OFFSET in _COMMANDS and not stops:
-            self._note_foreign(node_id, f"an SDO that writes {written:04X}h", now)
+            self._note_foreign(node_id, f"an SDO that writes {written:04X}h", now_s)
         if not frames.concerns_motion(data):
-            self._configured_at[node_id] = now
+            self._configured_at[node_id] = now_s
         return True
 
-    def _note_foreign(self, node_id: int, detail: str, now: float) -> None:
+    def _note_foreign(self, node_id: int, detail: str, now_s: float) -> None:
         enabled = any(record.state is ENABLED for key, record in self._records.items() if key[0] == node_id)
         if enabled and not self.commands_are_ours:
-            self._foreign.note(node_id, f"{detail}, while it is enabled", now)
+            self._foreign.note(node_id, f"{detail}, while it is enabled", now_s)
 
 
 _CONTROLWORD = frames.CONTROLWORD % frames.AXIS_OFFSET

@@ -49,8 +49,8 @@ class Feedback:
 class Plausibility:
     """Follows the setpoints and samples of one axis. Speeds at the rim, forward positive [m/s]."""
 
-    def __init__(self, drive: WatchedDrive, config: WatchdogConfig, now: float) -> None:
-        """Before the monotonic time `now` [s] the wheel may have had any setpoint within the limits."""
+    def __init__(self, drive: WatchedDrive, config: WatchdogConfig, now_s: float) -> None:
+        """Before the monotonic time `now_s` [s] the wheel may have had any setpoint within the limits."""
         self._config = config
         self._m_per_count = drive.m_per_count
         self._fixed_mps = config.motion_tolerance_mps + abs(drive.velocity_mps_per_bit)
@@ -63,60 +63,60 @@ class Plausibility:
         self._target_mps = 0.0
         self._high = self._low = config.max_wheel_mps
         for peak in (self._forward, self._backward):
-            peak.set(config.max_wheel_mps, now, now)
-        self._at = now
+            peak.set(config.max_wheel_mps, now_s, now_s)
+        self._at = now_s
         self._velocity_mps = 0.0
         self._counts: int | None = None
         self._counts_before: int | None = None
         self.last = Feedback()
-        self.evidence = EvidenceWatch(drive, config, now)
+        self.evidence = EvidenceWatch(drive, config, now_s)
 
     def trust(self) -> None:
         """A reset was accepted: what encoder and velocity told against each other is over."""
         self.last = replace(self.last, drift_m=0.0)
         self.evidence.trust()
 
-    def on_target(self, target_mps: float, now: float) -> None:
+    def on_target(self, target_mps: float, now_s: float) -> None:
         """A setpoint, which stays until the next one."""
         self._target_mps = target_mps
-        self._forward.set(target_mps, now, math.inf)
-        self._backward.set(-target_mps, now, math.inf)
-        self._fastest.set(abs(target_mps), now, math.inf)
+        self._forward.set(target_mps, now_s, math.inf)
+        self._backward.set(-target_mps, now_s, math.inf)
+        self._fastest.set(abs(target_mps), now_s, math.inf)
 
     def on_position(self, counts: int) -> None:
         """6064h of a status TPDO; the velocity of the same SYNC follows."""
         self._counts = counts
 
     def on_velocity(
-        self, velocity_mps: float, powered: bool, enabled: bool, now: float, torque: float | None = None
+        self, velocity_mps: float, powered: bool, enabled: bool, now_s: float, torque: float | None = None
     ) -> None:
         """606Ch of a velocity TPDO. A wheel without power may be pushed: nothing of it is bad. The drift of
         before stays, or a drive that lets go after each order would never be found.
 
         `torque`: what it tells of 6077h, as a share of the rated one; None: nothing.
         """
-        elapsed_s, self._at = now - self._at, now
-        self._follow(elapsed_s, now)
+        elapsed_s, self._at = now_s - self._at, now_s
+        self._follow(elapsed_s, now_s)
         step_m, jumped = self._step(elapsed_s)
         drift_m = self._drift(velocity_mps, step_m, jumped, elapsed_s)
-        self._judge(velocity_mps, powered, drift_m, jumped, elapsed_s, now)
+        self._judge(velocity_mps, powered, drift_m, jumped, elapsed_s, now_s)
         step_m = None if jumped else step_m
-        self.evidence.on_sample(velocity_mps, step_m, powered, enabled, elapsed_s, now, torque)
+        self.evidence.on_sample(velocity_mps, step_m, powered, enabled, elapsed_s, now_s, torque)
         if self.last.implausible >= self._config.feedback_samples:
             self.evidence.doubt()
         self._velocity_mps, self._counts_before = velocity_mps, self._counts
 
     def _judge(
-        self, velocity_mps: float, powered: bool, drift_m: float, jumped: bool, elapsed_s: float, now: float
+        self, velocity_mps: float, powered: bool, drift_m: float, jumped: bool, elapsed_s: float, now_s: float
     ) -> None:
         if not powered:
             kept_m = self.last.drift_m * max(1.0 - elapsed_s / DRIFT_S, 0.0)
             self.last = Feedback(-self._low, self._high, drift_m=kept_m)
             return
         config, last = self._config, self.last
-        swing_mps = SWING_SHARE * self._fastest.greatest(now)
+        swing_mps = SWING_SHARE * self._fastest.greatest(now_s)
         slack = self._fixed_mps + max(config.motion_tolerance_share * max(self._low, self._high), swing_mps)
-        forward_mps, backward_mps = self._overshoots(velocity_mps, slack, elapsed_s, now)
+        forward_mps, backward_mps = self._overshoots(velocity_mps, slack, elapsed_s, now_s)
         apart = jumped or abs(drift_m) > config.travel_tolerance_m
         inside = -self._low - slack - backward_mps <= velocity_mps <= self._high + slack + forward_mps
         self.last = Feedback(
@@ -128,7 +128,7 @@ class Plausibility:
             drift_m=drift_m,
         )
 
-    def _overshoots(self, velocity_mps: float, slack_mps: float, elapsed_s: float, now: float) -> tuple[float, float]:
+    def _overshoots(self, velocity_mps: float, slack_mps: float, elapsed_s: float, now_s: float) -> tuple[float, float]:
         """By how much the wheel may be faster than its setpoints, forward and backward, since it was slower."""
         forward_mps, backward_mps = (
             overshoot.on_sample(
@@ -136,16 +136,16 @@ class Plausibility:
                 velocity_mps=way * velocity_mps,
                 slack_mps=slack_mps,
                 elapsed_s=elapsed_s,
-                now_s=now,
+                now_s=now_s,
             )
             for overshoot, way in ((self._ahead, 1.0), (self._behind, -1.0))
         )
         return forward_mps, backward_mps
 
-    def _follow(self, elapsed_s: float, now: float) -> None:
+    def _follow(self, elapsed_s: float, now_s: float) -> None:
         fallen_mps = elapsed_s * self._config.deceleration_mps2
-        self._high = max(self._high - fallen_mps, self._forward.greatest(now), 0.0)
-        self._low = max(self._low - fallen_mps, self._backward.greatest(now), 0.0)
+        self._high = max(self._high - fallen_mps, self._forward.greatest(now_s), 0.0)
+        self._low = max(self._low - fallen_mps, self._backward.greatest(now_s), 0.0)
 
     def _step(self, elapsed_s: float) -> tuple[float | None, bool]:
         """Travel by the encoder since the last sample [m], and whether it jumped.

@@ -99,76 +99,76 @@ def near_power(axis: Axis) -> bool:
     return axis.powered or axis.state is DriveState.SWITCHED_ON or axis.asks_for_power
 
 
-def is_off(axis: Axis, view: View, config: WatchdogConfig, now: float) -> bool:
+def is_off(axis: Axis, view: View, config: WatchdogConfig, now_s: float) -> bool:
     """Fresh feedback says so, or there is no such drive."""
     if view.node(axis.drive.node_id).heard_at == NEVER and not axis.asks_for_power:
         return True
-    return not near_power(axis) and axis.state is not None and now < axis.status_at + config.feedback_timeout_s
+    return not near_power(axis) and axis.state is not None and now_s < axis.status_at + config.feedback_timeout_s
 
 
-def velocity_ordered(view: View, config: WatchdogConfig, now: float) -> bool:
+def velocity_ordered(view: View, config: WatchdogConfig, now_s: float) -> bool:
     """True while the driver's setpoints or the filter's leases of the last moments order anything but zero."""
-    recent = now - config.lease_timeout_s
+    recent = now_s - config.lease_timeout_s
     by_setpoint = any(axis.target_mps != 0.0 and axis.command_at > recent for axis in view.axes)
     return by_setpoint or (view.lease is not None and view.lease.orders_motion and view.lease_at > recent)
 
 
-def _lease_is_lost(view: View, config: WatchdogConfig, now: float) -> bool:
-    return now >= max(view.lease_at, view.started_at) + config.lease_timeout_s
+def _lease_is_lost(view: View, config: WatchdogConfig, now_s: float) -> bool:
+    return now_s >= max(view.lease_at, view.started_at) + config.lease_timeout_s
 
 
-def _lease_lost(view: View, config: WatchdogConfig, now: float) -> Verdict:
+def _lease_lost(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     axis = in_motion(view, config)
-    if axis is None or not _lease_is_lost(view, config, now):
+    if axis is None or not _lease_is_lost(view, config, now_s):
         return FINE
     detail = (
-        f"no valid lease for {now - view.lease_at:.3f} s (allowed {config.lease_timeout_s:.3f} s) while "
+        f"no valid lease for {now_s - view.lease_at:.3f} s (allowed {config.lease_timeout_s:.3f} s) while "
         f"{axis.drive.joint} turns at {axis.velocity_mps:.3f} m/s, ordered {axis.target_mps:.3f} m/s"
     )
     return Verdict(TripCause.LEASE_LOST, 0, detail)
 
 
-def _driver_is_silent(view: View, since: float, config: WatchdogConfig, now: float) -> bool:
+def _driver_is_silent(view: View, since: float, config: WatchdogConfig, now_s: float) -> bool:
     """Its heartbeat or its SYNC is missing: both come from its control loop itself."""
-    return now >= max(min(view.bus.driver_at, view.bus.sync_at), since) + config.drive_heartbeat_s
+    return now_s >= max(min(view.bus.driver_at, view.bus.sync_at), since) + config.drive_heartbeat_s
 
 
-def _driver_silent(view: View, config: WatchdogConfig, now: float) -> Verdict:
+def _driver_silent(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     for axis in view.axes:
         since = max(axis.enabled_since, view.started_at)
-        if (axis.enabled or moving(axis, config)) and _driver_is_silent(view, since, config, now):
+        if (axis.enabled or moving(axis, config)) and _driver_is_silent(view, since, config, now_s):
             bus = view.bus
             detail = (
-                f"driver's heartbeat is {now - bus.driver_at:.3f} s old, its SYNC {now - bus.sync_at:.3f} s "
+                f"driver's heartbeat is {now_s - bus.driver_at:.3f} s old, its SYNC {now_s - bus.sync_at:.3f} s "
                 f"(allowed {config.drive_heartbeat_s:.3f} s) while {axis.drive.joint} has power"
             )
             return Verdict(TripCause.DRIVER_SILENT, 0, detail)
     return FINE
 
 
-def _driver_still_silent(view: View, node_id: int, config: WatchdogConfig, now: float) -> bool:
-    return now >= view.bus.driver_at + config.drive_heartbeat_s
+def _driver_still_silent(view: View, node_id: int, config: WatchdogConfig, now_s: float) -> bool:
+    return now_s >= view.bus.driver_at + config.drive_heartbeat_s
 
 
-def _unfed(axis: Axis, view: View, config: WatchdogConfig, now: float) -> bool:
+def _unfed(axis: Axis, view: View, config: WatchdogConfig, now_s: float) -> bool:
     """SYNCs go on and its TPDOs do not answer them."""
-    synced = now < view.bus.sync_at + config.feedback_timeout_s
-    return synced and now >= max(axis.fed_at, axis.enabled_since, view.bus.sync_since) + config.feedback_timeout_s
+    synced = now_s < view.bus.sync_at + config.feedback_timeout_s
+    return synced and now_s >= max(axis.fed_at, axis.enabled_since, view.bus.sync_since) + config.feedback_timeout_s
 
 
-def _beatless(node: Node, axis: Axis, config: WatchdogConfig, now: float) -> bool:
-    return now >= max(node.heartbeat_at, axis.enabled_since) + config.drive_heartbeat_s
+def _beatless(node: Node, axis: Axis, config: WatchdogConfig, now_s: float) -> bool:
+    return now_s >= max(node.heartbeat_at, axis.enabled_since) + config.drive_heartbeat_s
 
 
-def _has_restarted(view: View, node_id: int, config: WatchdogConfig, now: float) -> bool:
-    return now < view.node(node_id).boot_up_at + SIGN_S
+def _has_restarted(view: View, node_id: int, config: WatchdogConfig, now_s: float) -> bool:
+    return now_s < view.node(node_id).boot_up_at + SIGN_S
 
 
-def _drive_restarted(view: View, config: WatchdogConfig, now: float) -> Verdict:
+def _drive_restarted(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     """A drive that starts anew has no power: this one said that it has. Or there are two drives with its node id."""
     for axis in view.axes:
         node_id = axis.drive.node_id
-        if view.enabled and _has_restarted(view, node_id, config, now):
+        if view.enabled and _has_restarted(view, node_id, config, now_s):
             detail = (
                 f"node {node_id} ({axis.drive.joint}) sends a boot-up while it is enabled: it has restarted (supply?), "
                 "or two drives have this node id"
@@ -177,13 +177,13 @@ def _drive_restarted(view: View, config: WatchdogConfig, now: float) -> Verdict:
     return FINE
 
 
-def _drive_silent(view: View, config: WatchdogConfig, now: float) -> Verdict:
+def _drive_silent(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     for axis in view.axes:
         node = view.node(axis.drive.node_id)
-        if axis.enabled and (_unfed(axis, view, config, now) or _beatless(node, axis, config, now)):
+        if axis.enabled and (_unfed(axis, view, config, now_s) or _beatless(node, axis, config, now_s)):
             detail = (
-                f"{axis.drive.joint} is enabled, its feedback is {now - axis.fed_at:.3f} s old (allowed "
-                f"{config.feedback_timeout_s:.3f} s), its heartbeat {now - node.heartbeat_at:.3f} s "
+                f"{axis.drive.joint} is enabled, its feedback is {now_s - axis.fed_at:.3f} s old (allowed "
+                f"{config.feedback_timeout_s:.3f} s), its heartbeat {now_s - node.heartbeat_at:.3f} s "
                 f"(allowed {config.drive_heartbeat_s:.3f} s)"
             )
             return Verdict(TripCause.DRIVE_SILENT, node.node_id, detail)
@@ -196,7 +196,7 @@ def _allowed(axis: Axis, view: View, config: WatchdogConfig) -> tuple[float, flo
     return max(low, -config.max_wheel_mps), min(high, config.max_wheel_mps)
 
 
-def _target_outside(view: View, config: WatchdogConfig, now: float) -> Verdict:
+def _target_outside(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     """Not debounced: a setpoint is a number that the driver computed, without noise."""
     for axis in view.axes:
         low, high = _allowed(axis, view, config)
@@ -217,7 +217,7 @@ def _target_outside(view: View, config: WatchdogConfig, now: float) -> Verdict:
     return FINE
 
 
-def _motion_outside(view: View, config: WatchdogConfig, now: float) -> Verdict:
+def _motion_outside(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     for axis in view.axes:
         feedback = axis.feedback
         if axis.powered and feedback.outside >= config.feedback_samples:
@@ -229,7 +229,7 @@ def _motion_outside(view: View, config: WatchdogConfig, now: float) -> Verdict:
     return FINE
 
 
-def _overspeed(view: View, config: WatchdogConfig, now: float) -> Verdict:
+def _overspeed(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     for axis in view.axes:
         if axis.powered and axis.feedback.overspeed >= config.feedback_samples:
             limit_mps = config.overspeed_factor * config.max_wheel_mps
@@ -238,7 +238,7 @@ def _overspeed(view: View, config: WatchdogConfig, now: float) -> Verdict:
     return FINE
 
 
-def _feedback_implausible(view: View, config: WatchdogConfig, now: float) -> Verdict:
+def _feedback_implausible(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     for axis in view.axes:
         detail = _implausible(axis, config) if axis.powered else ""
         if detail:
@@ -272,7 +272,7 @@ def _implausible(axis: Axis, config: WatchdogConfig) -> str:
     return ""
 
 
-def _motion_missing(view: View, config: WatchdogConfig, now: float) -> Verdict:
+def _motion_missing(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     for axis in view.axes:
         detail = _missing(axis, config) if axis.enabled else ""
         if detail:
@@ -315,7 +315,7 @@ def _torque(axis: Axis) -> str:
     return "a torque that the drive does not report" if share is None else f"{share:.0%} of the rated torque"
 
 
-def _power_at_stand(view: View, config: WatchdogConfig, now: float) -> Verdict:
+def _power_at_stand(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     for axis in view.axes:
         if axis.powered and axis.push.overdue_s >= config.stand_answer_s:
             detail = (
@@ -328,7 +328,7 @@ def _power_at_stand(view: View, config: WatchdogConfig, now: float) -> Verdict:
     return FINE
 
 
-def _twist_outside(view: View, config: WatchdogConfig, now: float) -> Verdict:
+def _twist_outside(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     if not view.twist:
         return FINE
     return Verdict(TripCause.TWIST_OUTSIDE, 0, f"the base moves otherwise than ordered: {view.twist}")
@@ -339,18 +339,18 @@ def _cycles(config: WatchdogConfig) -> float:
     return config.feedback_timeout_s * config.control_hz
 
 
-def _setpoint_missing(view: View, config: WatchdogConfig, now: float) -> Verdict:
+def _setpoint_missing(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     for axis in view.axes:
         if axis.enabled and axis.missed_setpoints >= _cycles(config):
             detail = (
                 f"{axis.drive.joint} is enabled, and SYNCs come without setpoints for it: "
-                f"the last one is {now - axis.setpoint_at:.3f} s old (allowed {config.feedback_timeout_s:.3f} s)"
+                f"the last one is {now_s - axis.setpoint_at:.3f} s old (allowed {config.feedback_timeout_s:.3f} s)"
             )
             return Verdict(TripCause.SETPOINT_MISSING, axis.drive.node_id, detail)
     return FINE
 
 
-def _answered_twice(view: View, config: WatchdogConfig, now: float) -> Verdict:
+def _answered_twice(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     for axis in view.axes:
         if axis.enabled and axis.double_answers >= _cycles(config):
             detail = f"two drives answer as node {axis.drive.node_id}, that of {axis.drive.joint}: give each its own id"
@@ -358,13 +358,13 @@ def _answered_twice(view: View, config: WatchdogConfig, now: float) -> Verdict:
     return FINE
 
 
-def _drive_down(view: View, config: WatchdogConfig, now: float) -> Verdict:
+def _drive_down(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     """The driver has `feedback_timeout_s` to stop the others by itself. Fault or off: the base turns all the same."""
     driven = [axis for axis in view.axes if axis.enabled and (moving(axis, config) or commanded(axis, config))]
     for axis in view.axes:
         for other in driven:
             since = max(axis.disabled_since, other.enabled_since)
-            if not axis.enabled and now >= since + config.feedback_timeout_s:
+            if not axis.enabled and now_s >= since + config.feedback_timeout_s:
                 state = "unknown" if axis.state is None else axis.state.name.lower().replace("_", " ")
                 detail = (
                     f"{axis.drive.joint} is not enabled (state: {state}) while {other.drive.joint} turns at "
@@ -374,36 +374,36 @@ def _drive_down(view: View, config: WatchdogConfig, now: float) -> Verdict:
     return FINE
 
 
-def _foreign_is_near(view: View, node_id: int, config: WatchdogConfig, now: float) -> bool:
-    return view.bus.foreign is not None and now < view.bus.foreign.at + SIGN_S
+def _foreign_is_near(view: View, node_id: int, config: WatchdogConfig, now_s: float) -> bool:
+    return view.bus.foreign is not None and now_s < view.bus.foreign.at + SIGN_S
 
 
-def _foreign_master(view: View, config: WatchdogConfig, now: float) -> Verdict:
+def _foreign_master(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     sign = view.bus.foreign
-    if sign is None or now >= sign.at + SIGN_S or not view.enabled:
+    if sign is None or now_s >= sign.at + SIGN_S or not view.enabled:
         return FINE
     return Verdict(TripCause.FOREIGN_MASTER, sign.node_id, f"another master is on the bus: {sign.detail}")
 
 
-def _bus_is_failed(view: View, node_id: int, config: WatchdogConfig, now: float) -> bool:
-    return now >= view.bus_failed_since + config.bus_failed_s
+def _bus_is_failed(view: View, node_id: int, config: WatchdogConfig, now_s: float) -> bool:
+    return now_s >= view.bus_failed_since + config.bus_failed_s
 
 
-def _bus_failed(view: View, config: WatchdogConfig, now: float) -> Verdict:
-    if not view.enabled or not _bus_is_failed(view, 0, config, now):
+def _bus_failed(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
+    if not view.enabled or not _bus_is_failed(view, 0, config, now_s):
         return FINE
-    detail = f"the bus takes no frames for {now - view.bus_failed_since:.3f} s (allowed {config.bus_failed_s:.3f} s)"
+    detail = f"the bus takes no frames for {now_s - view.bus_failed_since:.3f} s (allowed {config.bus_failed_s:.3f} s)"
     return Verdict(TripCause.BUS_FAILED, 0, detail)
 
 
-def _loop_late(view: View, config: WatchdogConfig, now: float) -> Verdict:
+def _loop_late(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     if view.tick_gap_s <= config.loop_late_s or not view.enabled:
         return FINE
     detail = f"own loop stood still for {view.tick_gap_s:.3f} s (allowed {config.loop_late_s:.3f} s)"
     return Verdict(TripCause.LOOP_LATE, 0, detail)
 
 
-def _over(view: View, node_id: int, config: WatchdogConfig, now: float) -> bool:
+def _over(view: View, node_id: int, config: WatchdogConfig, now_s: float) -> bool:
     """Nothing is left of the cause when the wheels stand and nothing is ordered, which each reset needs anyway."""
     return False
 
@@ -428,7 +428,7 @@ CHECKS = (
     Check(
         TripCause.LEASE_LOST,
         _lease_lost,
-        lambda view, node_id, config, now: _lease_is_lost(view, config, now),
+        lambda view, node_id, config, now_s: _lease_is_lost(view, config, now_s),
         "leases arrive",
     ),
     Check(TripCause.DRIVER_SILENT, _driver_silent, _driver_still_silent, "the driver's heartbeat is back"),
@@ -441,7 +441,7 @@ CHECKS = (
     Check(
         TripCause.DRIVE_SILENT,
         _drive_silent,
-        lambda view, node_id, config, now: now >= view.node(node_id).heard_at + config.drive_heartbeat_s,
+        lambda view, node_id, config, now_s: now_s >= view.node(node_id).heard_at + config.drive_heartbeat_s,
         "the drive answers again",
     ),
     Check(TripCause.ANSWERED_TWICE, _answered_twice, _over, "nothing else; give each drive a node id of its own first"),
@@ -459,19 +459,19 @@ CHECKS = (
 first. A cause without a row does not stand: nothing of it is left to see."""
 
 
-def decide(view: View, config: WatchdogConfig, now: float) -> Verdict:
-    """The first cause to trip in what is seen at the monotonic time `now` [s], or FINE."""
+def decide(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
+    """The first cause to trip in what is seen at the monotonic time `now_s` [s], or FINE."""
     for check in CHECKS:
-        verdict = check.trips(view, config, now)
+        verdict = check.trips(view, config, now_s)
         if verdict.cause is not TripCause.NONE:
             return verdict
     return FINE
 
 
-def stands(verdict: Verdict, view: View, config: WatchdogConfig, now: float) -> bool:
-    """True while the cause of a trip is still there at the monotonic time `now` [s]."""
+def stands(verdict: Verdict, view: View, config: WatchdogConfig, now_s: float) -> bool:
+    """True while the cause of a trip is still there at the monotonic time `now_s` [s]."""
     rows = (check for check in CHECKS if check.cause is verdict.cause)
-    return any(check.stands(view, verdict.node_id, config, now) for check in rows)
+    return any(check.stands(view, verdict.node_id, config, now_s) for check in rows)
 
 
 def clears_on(verdict: Verdict) -> str:
@@ -479,7 +479,7 @@ def clears_on(verdict: Verdict) -> str:
     return next((check.clears_on for check in CHECKS if check.cause is verdict.cause), "nothing else")
 
 
-def next_expiry(lease_at: float, driver_at: float, config: WatchdogConfig, now: float) -> float:
+def next_expiry(lease_at: float, driver_at: float, config: WatchdogConfig, now_s: float) -> float:
     """When the lease or the driver times out next if nothing comes [s]: a tick just then stops without delay."""
     ends = (lease_at + config.lease_timeout_s, driver_at + config.drive_heartbeat_s)
-    return min((end for end in ends if end > now), default=now + config.lease_timeout_s)
+    return min((end for end in ends if end > now_s), default=now_s + config.lease_timeout_s)

@@ -32,15 +32,15 @@ class Reporter:
         self._counters: dict[str, int] = {}
         self._counters_due = self._alive_due = 0.0
 
-    def tick(self, health: BusHealth, now: float, datagrams_dropped: int = 0) -> None:
+    def tick(self, health: BusHealth, now_s: float, datagrams_dropped: int = 0) -> None:
         """Say what changed. systemd hears that the loop turns; on a dead bus that ends by itself (loop.py)."""
         if self._watchdog.status != self._status:
             self._tell_status(self._watchdog.status)
-        if now >= self._alive_due:
-            self._alive_due = now + ALIVE_PERIOD_S
+        if now_s >= self._alive_due:
+            self._alive_due = now_s + ALIVE_PERIOD_S
             notify("WATCHDOG=1")
-        if now >= self._counters_due:
-            self._tell_counters(health, now, datagrams_dropped)
+        if now_s >= self._counters_due:
+            self._tell_counters(health, now_s, datagrams_dropped)
 
     def _tell_status(self, status: Status) -> None:
         old, self._status = self._status, status
@@ -54,7 +54,7 @@ class Reporter:
         if answer is not Answer.NONE and (old is None or old.reset != status.reset):
             _log.info("reset request %d: %s", number, _words(answer))
 
-    def _tell_counters(self, health: BusHealth, now: float, datagrams_dropped: int) -> None:
+    def _tell_counters(self, health: BusHealth, now_s: float, datagrams_dropped: int) -> None:
         counters = {
             "send errors": health.send_errors,
             "receive errors": health.receive_errors,
@@ -66,7 +66,7 @@ class Reporter:
         changed = {name: n for name, n in counters.items() if n != self._counters.get(name, 0)}
         if not changed:
             return
-        self._counters, self._counters_due = counters, now + COUNTERS_PERIOD_S
+        self._counters, self._counters_due = counters, now_s + COUNTERS_PERIOD_S
         _log.warning("since the start: %s", "; ".join(f"{name}: {n}" for name, n in changed.items()))
 
 

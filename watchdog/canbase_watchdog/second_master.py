@@ -43,11 +43,11 @@ class Pace:
         self._times: deque[float] = deque(maxlen=count)
         self._window_s = window_s
 
-    def too_fast(self, now: float) -> bool:
-        """Note an event at the monotonic time `now` [s]. True: it and the last ones were too many."""
+    def too_fast(self, now_s: float) -> bool:
+        """Note an event at the monotonic time `now_s` [s]. True: it and the last ones were too many."""
         times = self._times
-        times.append(now)
-        return len(times) == times.maxlen and now - times[0] < self._window_s
+        times.append(now_s)
+        return len(times) == times.maxlen and now_s - times[0] < self._window_s
 
 
 class Foreign:
@@ -68,29 +68,29 @@ class Foreign:
         """COB-ID and data of the setpoints since the last SYNC."""
         self.last: Sign | None = None
 
-    def on_setpoint(self, cob_id: int, node_id: int, data: bytes, now: float) -> None:
+    def on_setpoint(self, cob_id: int, node_id: int, data: bytes, now_s: float) -> None:
         """An RPDO of the driver, or of somebody else."""
         other = self._setpoints.setdefault(cob_id, data)
         if other != data:
             self._setpoints[cob_id] = data
-            if now - self._sync_at < self._lost_s and self._disorder.too_fast(now):
-                self.note(node_id, f"two different setpoints {cob_id:03X}h between two SYNCs", now)
+            if now_s - self._sync_at < self._lost_s and self._disorder.too_fast(now_s):
+                self.note(node_id, f"two different setpoints {cob_id:03X}h between two SYNCs", now_s)
 
-    def on_sync(self, now: float) -> None:
+    def on_sync(self, now_s: float) -> None:
         """A SYNC of the driver, or of somebody else."""
-        off_beat = now - self._sync_at < self._off_beat_s
-        if not self._setpoints and off_beat and self._disorder.too_fast(now):
-            self.note(0, "SYNCs without setpoints", now)
+        off_beat = now_s - self._sync_at < self._off_beat_s
+        if not self._setpoints and off_beat and self._disorder.too_fast(now_s):
+            self.note(0, "SYNCs without setpoints", now_s)
         self._setpoints.clear()
-        self._sync_at = now
-        if self._syncs.too_fast(now):
-            self.note(0, f"more SYNCs than the driver's {self._control_hz:g} per second", now)
+        self._sync_at = now_s
+        if self._syncs.too_fast(now_s):
+            self.note(0, f"more SYNCs than the driver's {self._control_hz:g} per second", now_s)
 
-    def on_heartbeat(self, now: float) -> None:
+    def on_heartbeat(self, now_s: float) -> None:
         """A heartbeat of the driver's node, or of somebody else who uses its number."""
-        if self._heartbeats.too_fast(now):
-            self.note(0, f"more heartbeats 77Fh than one each {self._period_s:.3f} s", now)
+        if self._heartbeats.too_fast(now_s):
+            self.note(0, f"more heartbeats 77Fh than one each {self._period_s:.3f} s", now_s)
 
-    def note(self, node_id: int, detail: str, now: float) -> None:
+    def note(self, node_id: int, detail: str, now_s: float) -> None:
         """A sign of which once is enough."""
-        self.last = Sign(now, node_id, detail)
+        self.last = Sign(now_s, node_id, detail)

@@ -61,33 +61,33 @@ class StandWatch:
         """It moved again sooner than it can have rolled out: what it showed as standstill was none."""
         self._off_since, self._was_powered = math.inf, False
 
-    def on_position(self, counts: int, now: float) -> None:
-        """6064h, of a TPDO or of an answer to an SDO, at the monotonic time `now` [s]."""
-        before, elapsed_s = self._counts, now - self.position_at
-        self._counts, self.position_at = counts, now
+    def on_position(self, counts: int, now_s: float) -> None:
+        """6064h, of a TPDO or of an answer to an SDO, at the monotonic time `now_s` [s]."""
+        before, elapsed_s = self._counts, now_s - self.position_at
+        self._counts, self.position_at = counts, now_s
         step_m = 0.0 if before is None else difference(counts, before) * self._m_per_count
         self._note_travel(step_m, elapsed_s)
         if before is None or elapsed_s >= GAP_S:
-            self._steady, self._still_since = before is not None and abs(step_m) <= self._grain_m, now
+            self._steady, self._still_since = before is not None and abs(step_m) <= self._grain_m, now_s
             self._still_m = self._slow_m = 0.0
             return
         self._steady = abs(step_m) <= max(STEP_FACTOR * self._slow_mps * elapsed_s, self._grain_m)
         self._still_m, self._slow_m = self._still_m + step_m, self._slow_m + step_m
         if abs(self._still_m) > self._near_m:
-            self._still_m, self._still_since = 0.0, now
+            self._still_m, self._still_since = 0.0, now_s
         if abs(self._slow_m) > self._near_m:
-            if now - self._slow_since < STILL_S:
-                self._crept_at = now
-            self._slow_m, self._slow_since = 0.0, now
+            if now_s - self._slow_since < STILL_S:
+                self._crept_at = now_s
+            self._slow_m, self._slow_since = 0.0, now_s
 
-    def on_velocity(self, velocity_mps: float, now: float, powered: bool = True) -> None:
+    def on_velocity(self, velocity_mps: float, now_s: float, powered: bool = True) -> None:
         """606Ch, of a TPDO or of an answer to an SDO; `powered`: by the last statusword."""
         if abs(velocity_mps) <= self._slow_mps < self._speed_mps:
-            self._slow_m, self._slow_since, self._crept_at = 0.0, now, -math.inf
-        self._speed_mps, self._velocity_at = abs(velocity_mps), now
-        self._note_power(powered, now)
+            self._slow_m, self._slow_since, self._crept_at = 0.0, now_s, -math.inf
+        self._speed_mps, self._velocity_at = abs(velocity_mps), now_s
+        self._note_power(powered, now_s)
         moves = min(self._speed_mps, self._encoder_mps) > self._noise_mps
-        if moves and not powered and self.unproven and now < self._sudden_since + self._rolls_s:
+        if moves and not powered and self.unproven and now_s < self._sudden_since + self._rolls_s:
             self._never_stood = True
         hardest_mps2 = self._hardest_mps2(powered)
         at_end_mps = self._encoder_mps - hardest_mps2 * self._mean_s / 2.0
@@ -95,7 +95,7 @@ class StandWatch:
         self._stopping.on_speed(max(min(self._speed_mps, self._encoder_mps), at_end_mps), hardest_mps2)
         self._sudden = min(self._sudden + 1, max(self._samples, 2)) if self.sudden else 0
         if self._sudden == 1:
-            self._sudden_since = now
+            self._sudden_since = now_s
 
     def trust(self) -> None:
         """A reset was accepted: everything begins anew."""
@@ -122,10 +122,10 @@ class StandWatch:
         self._stopping.on_travel(0.0 if jumped else step_m)
         self._mean_s = elapsed_s if SELDOM_S <= elapsed_s < GAP_S else math.inf
 
-    def _note_power(self, powered: bool, now: float) -> None:
-        if powered and now >= self._off_since + self._rolls_s:
+    def _note_power(self, powered: bool, now_s: float) -> None:
+        if powered and now_s >= self._off_since + self._rolls_s:
             self.trust()
-        self._off_since = math.inf if powered else min(self._off_since, now)
+        self._off_since = math.inf if powered else min(self._off_since, now_s)
 
     def _hardest_mps2(self, powered: bool) -> float:
         """What brakes it may have changed since the last sample."""

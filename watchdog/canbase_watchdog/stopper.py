@@ -47,11 +47,11 @@ class Stopper:
         node_id: int,
         config: WatchdogConfig,
         view: View,
-        now: float,
+        now_s: float,
         trusted: bool = True,
         resting: bool = False,
     ) -> None:
-        """Begins at the foot of the ladder at the monotonic time `now` [s]; without `trusted`, a sensor lied.
+        """Begins at the foot of the ladder at the monotonic time `now_s` [s]; without `trusted`, a sensor lied.
 
         `resting`: for a trip of before the start. A drive that is off is left alone, so that it can be booted; one that
         has power or moves is stopped. One that tells nothing is asked, unless somebody boots it.
@@ -60,16 +60,16 @@ class Stopper:
         self._config = config
         self._braking = Braking.of(config)
         self._trusted = trusted
-        self._resting_since = now if resting else math.inf
+        self._resting_since = now_s if resting else math.inf
         drives = [drive for drive in config.drives if drive.node_id == node_id]
         self._layout, self._axis_count = drives[0].layout, len(drives)
         self._stale_s = min(config.feedback_timeout_s, max(STALE_S, 2.0 / config.control_hz))
         self._slopes = [Slope.of(config, drive.velocity_mps_per_bit) for drive in drives]
         self._slowing: list[SlowingWatch] = []
-        self._begin_slowing(now)
+        self._begin_slowing(now_s)
         self._seen = self._look(view)
-        foot = first(self._seen, now)
-        self.climb: Climb = replace(foot, stopped=resting, stopped_at=now, assumed=resting and not trusted)
+        foot = first(self._seen, now_s)
+        self.climb: Climb = replace(foot, stopped=resting, stopped_at=now_s, assumed=resting and not trusted)
         self._quick_stop_at = self._nmt_at = self._sdo_at = self._reset_at = NEVER
         self._sdo_turn = 0
 
@@ -78,33 +78,33 @@ class Stopper:
         """True when the node stands and is off or held, as its feedback said, or when there is no such node."""
         return (self.climb.stopped and self._seen.seen_at > self.climb.since) or not self._seen.present
 
-    def is_fresh(self, now: float) -> bool:
+    def is_fresh(self, now_s: float) -> bool:
         """Whether what says so came in the last moments: a wheel that was stopped may roll again, or may have rolled
         unseen. Of a node that nobody has ever heard nothing comes."""
-        return now < self._seen.seen_at + FRESH_S or not self._seen.present
+        return now_s < self._seen.seen_at + FRESH_S or not self._seen.present
 
-    def tick(self, view: View, now: float) -> list[Frame]:
+    def tick(self, view: View, now_s: float) -> list[Frame]:
         """Look at the node, climb where the rules say so, and return the frames that are due."""
         self._follow(view)
         self._seen = self._look(view)
         before = self.climb
-        self.climb = advance(before, self._seen, self._braking, now)
+        self.climb = advance(before, self._seen, self._braking, now_s)
         brakes_already = self.climb.step is Step.PRE_OPERATIONAL and not self._seen.enabled
         if self.climb.since > before.since and not brakes_already:
-            self._begin_slowing(now)
+            self._begin_slowing(now_s)
         if self.climb.step is not before.step:
             self._quick_stop_at = self._nmt_at = self._sdo_at = NEVER
             self._sdo_turn = 0
-        defied = self._defied(view, now)
+        defied = self._defied(view, now_s)
         out: list[Frame] = []
         if not self.climb.stopped or defied:
             # The PDO first: pre-operational makes the node deaf to it.
-            out += self._stop_word(now) + self._reset_node(now) + self._pre_operational(now)
-        return out + self._sdo(view, defied, now)
+            out += self._stop_word(now_s) + self._reset_node(now_s) + self._pre_operational(now_s)
+        return out + self._sdo(view, defied, now_s)
 
-    def _begin_slowing(self, now: float) -> None:
+    def _begin_slowing(self, now_s: float) -> None:
         """A rung begins now. A drive that is braking by its own ramp goes on with it when nothing but NMT changes."""
-        self._slowing = [SlowingWatch(slope, now) for slope in self._slopes]
+        self._slowing = [SlowingWatch(slope, now_s) for slope in self._slopes]
 
     def _follow(self, view: View) -> None:
         for axis, watch in zip(self._axes(view), self._slowing, strict=True):
@@ -154,60 +154,60 @@ class Stopper:
         gain_mps = config.acceleration_mps2 * config.drive_lag_s
         return max(speed_mps, min(abs(axis.target_mps), speed_mps + gain_mps))
 
-    def _defied(self, view: View, now: float) -> bool:
+    def _defied(self, view: View, now_s: float) -> bool:
         """Somebody goes on commanding motion."""
-        recent = now - self._config.lease_timeout_s
+        recent = now_s - self._config.lease_timeout_s
         return any(axis.command_at > recent and axis.target_mps != 0.0 for axis in self._axes(view))
 
-    def _stop_word(self, now: float) -> list[Frame]:
+    def _stop_word(self, now_s: float) -> list[Frame]:
         """By the PDO that is the watchdog's own: quick stop, from the rung of that name on disable voltage."""
-        if now < self._quick_stop_at + QUICK_STOP_PERIOD_S:
+        if now_s < self._quick_stop_at + QUICK_STOP_PERIOD_S:
             return []
-        self._quick_stop_at = now
+        self._quick_stop_at = now_s
         off = self.climb.step >= Step.DISABLE_VOLTAGE
         order = frames.disable_voltage if off else frames.quick_stop
         return [order(self._node_id, self._axis_count, self._layout)]
 
-    def _reset_node(self, now: float) -> list[Frame]:
+    def _reset_node(self, now_s: float) -> list[Frame]:
         """Once, and again where the drive says after it that it still has power. No other one is made to boot."""
         has_power = self._seen.powered and self._seen.seen_at > self._reset_at
-        if self.climb.step < Step.RESET_NODE or not has_power or now < self._reset_at + RESET_PERIOD_S:
+        if self.climb.step < Step.RESET_NODE or not has_power or now_s < self._reset_at + RESET_PERIOD_S:
             return []
-        self._reset_at = now
+        self._reset_at = now_s
         return [frames.reset_node(self._node_id)]
 
-    def _pre_operational(self, now: float) -> list[Frame]:
-        if self.climb.step < Step.PRE_OPERATIONAL or now < self._nmt_at + NMT_PERIOD_S:
+    def _pre_operational(self, now_s: float) -> list[Frame]:
+        if self.climb.step < Step.PRE_OPERATIONAL or now_s < self._nmt_at + NMT_PERIOD_S:
             return []
-        self._nmt_at = now
+        self._nmt_at = now_s
         return [frames.pre_operational(self._node_id)]
 
-    def _sdo(self, view: View, defied: bool, now: float) -> list[Frame]:
+    def _sdo(self, view: View, defied: bool, now_s: float) -> list[Frame]:
         """The next request in turn. A stopped node that tells what it does, or is configured, is left alone."""
         rests = self.climb.stopped and not defied
-        seeks = rests and self._is_unknown(view, now)
+        seeks = rests and self._is_unknown(view, now_s)
         stopped_s = SEEK_PERIOD_S if seeks else IDLE_SDO_PERIOD_S
         period_s = stopped_s if self.climb.stopped else SDO_PERIOD_S
-        if now < self._sdo_at + period_s or (rests and not seeks and not self._is_old(view, now)):
+        if now_s < self._sdo_at + period_s or (rests and not seeks and not self._is_old(view, now_s)):
             return []
-        requests = self._requests(view, now)
+        requests = self._requests(view, now_s)
         if not requests:
             return []
-        self._sdo_at = now
+        self._sdo_at = now_s
         self._sdo_turn += 1
         return [requests[(self._sdo_turn - 1) % len(requests)]]
 
-    def _is_unknown(self, view: View, now: float) -> bool:
+    def _is_unknown(self, view: View, now_s: float) -> bool:
         """Since the start it has told nothing, and no driver boots it: it may turn as it did before the start."""
         configured_at = max(self._resting_since, view.node(self._node_id).configured_at)
-        return self._is_untold(self._axes(view)) and now >= configured_at + self._config.drive_heartbeat_s
+        return self._is_untold(self._axes(view)) and now_s >= configured_at + self._config.drive_heartbeat_s
 
-    def _is_old(self, view: View, now: float) -> bool:
+    def _is_old(self, view: View, now_s: float) -> bool:
         """It told something once, and has not of late; and nobody else needs its SDO channel."""
         told_at, quiet_since = self._seen.seen_at, view.node(self._node_id).configured_at
-        return told_at > NEVER and now >= max(told_at, quiet_since) + AGAIN_S
+        return told_at > NEVER and now_s >= max(told_at, quiet_since) + AGAIN_S
 
-    def _requests(self, view: View, now: float) -> Sequence[Frame]:
+    def _requests(self, view: View, now_s: float) -> Sequence[Frame]:
         """Writes of this rung, and readings of what TPDOs do not tell (no SYNC, or pre-operational)."""
         word = None if self.climb.stopped else _WORD_BY_STEP.get(self.climb.step)
         requests: list[Frame] = []
@@ -216,6 +216,6 @@ class Stopper:
             if word is not None:
                 requests.append(frames.write_controlword(self._node_id, number, word, self._layout))
             stale_s = self._config.feedback_timeout_s if self.climb.stopped else self._stale_s
-            if word is not None or now >= axis.seen_at + stale_s:
+            if word is not None or now_s >= axis.seen_at + stale_s:
                 requests += frames.read_feedback(self._node_id, number, self._layout)
         return requests

@@ -93,9 +93,9 @@ class PushWatch:
         """It was pushed as long as an ordered wheel may show nothing."""
         return self.last.vain_s >= self._config.motion_missing_s
 
-    def on_sample(self, share: float | None, powered: bool, now: float) -> None:
+    def on_sample(self, share: float | None, powered: bool, now_s: float) -> None:
         """A velocity TPDO with what it tells of the torque, None: nothing."""
-        elapsed_s, self._at = min(max(now - self._at, 0.0), LONGEST_STEP_S), now
+        elapsed_s, self._at = min(max(now_s - self._at, 0.0), LONGEST_STEP_S), now_s
         self._tells = self._tells or bool(share)
         known = share if self._tells else None
         lives = self._lives()

@@ -30,16 +30,16 @@ class Reach:
         self._up, self._down, self._slope = Peak(lag_s), Peak(lag_s), slope
         self.high = self.low = most
 
-    def order(self, values: Sequence[float], now: float) -> None:
+    def order(self, values: Sequence[float], now_s: float) -> None:
         """All that may be ordered from now on."""
-        self._up.set(max(values), now, math.inf)
-        self._down.set(-min(values), now, math.inf)
+        self._up.set(max(values), now_s, math.inf)
+        self._down.set(-min(values), now_s, math.inf)
 
-    def advance(self, elapsed_s: float, now: float) -> None:
-        """Bring `high` and `low`, which counts the other way, up to the time `now`."""
+    def advance(self, elapsed_s: float, now_s: float) -> None:
+        """Bring `high` and `low`, which counts the other way, up to the time `now_s`."""
         fallen = elapsed_s * self._slope
-        self.high = max(self.high - fallen, self._up.greatest(now), 0.0)
-        self.low = max(self.low - fallen, self._down.greatest(now), 0.0)
+        self.high = max(self.high - fallen, self._up.greatest(now_s), 0.0)
+        self.low = max(self.low - fallen, self._down.greatest(now_s), 0.0)
 
 
 class SlowWheels:
@@ -65,12 +65,12 @@ class SlowWheels:
 class TwistWatch:
     """Follows the setpoints and speeds of all wheels, from SYNC to SYNC."""
 
-    def __init__(self, config: WatchdogConfig, now: float) -> None:
-        """Before the monotonic time `now` [s] anything within the limits may have been ordered."""
+    def __init__(self, config: WatchdogConfig, now_s: float) -> None:
+        """Before the monotonic time `now_s` [s] anything within the limits may have been ordered."""
         self._config = config
         self._coarsest_mps = max(abs(drive.velocity_mps_per_bit) for drive in config.drives)
         self._sync_at = NEVER
-        self._at = now
+        self._at = now_s
         self._begin(config.linear_mps, config.angular_radps)
 
     def _begin(self, linear_mps: float, angular_radps: float) -> None:
@@ -82,30 +82,30 @@ class TwistWatch:
         self._speeds: list[float] = []
         self._outside_s = 0.0
 
-    def look(self, bus: BusView, now: float) -> str:
+    def look(self, bus: BusView, now_s: float) -> str:
         """Why the base has not moved as ordered for `twist_s`, empty when it has."""
         if bus.sync_at == self._sync_at:
             return ""
         self._sync_at = bus.sync_at
-        elapsed_s, self._at = now - self._at, now
+        elapsed_s, self._at = now_s - self._at, now_s
         if not all(axis.enabled for axis in bus.axes):
             self._begin(0.0, 0.0)
             return ""
-        bounds = self._bounds(bus, elapsed_s, now)
+        bounds = self._bounds(bus, elapsed_s, now_s)
         self._smooth([axis.velocity_mps for axis in bus.axes], elapsed_s)
         why = self._why(bus, bounds)
         outside_s = self._outside_s + (elapsed_s if why else -elapsed_s)
         self._outside_s = min(max(0.0, outside_s), self._config.twist_s)
         return why if self._outside_s >= self._config.twist_s else ""
 
-    def _bounds(self, bus: BusView, elapsed_s: float, now: float) -> Bounds:
+    def _bounds(self, bus: BusView, elapsed_s: float, now_s: float) -> Bounds:
         setpoints = _mean(bus.axes, "left"), _mean(bus.axes, "right")
         wheels = (setpoints, *(slow.follow(setpoints, elapsed_s) for slow in self._slow))
         linear, angular = self._linear, self._angular
-        linear.order([(left + right) / 2.0 for left, right in wheels], now)
-        angular.order([(right - left) / self._config.track_m for left, right in wheels], now)
-        linear.advance(elapsed_s, now)
-        angular.advance(elapsed_s, now)
+        linear.order([(left + right) / 2.0 for left, right in wheels], now_s)
+        angular.order([(right - left) / self._config.track_m for left, right in wheels], now_s)
+        linear.advance(elapsed_s, now_s)
+        angular.advance(elapsed_s, now_s)
         return Bounds(-linear.low, linear.high, -angular.low, angular.high)
 
     def _smooth(self, speeds: list[float], elapsed_s: float) -> None:

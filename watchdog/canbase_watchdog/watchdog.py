@@ -70,27 +70,27 @@ class Watchdog:
     TRIPPED from the first cause on, latched: only an accepted reset request leads back to WATCHING, over restarts too.
     """
 
-    def __init__(self, config: WatchdogConfig, now: float, past: Past | None = None) -> None:
+    def __init__(self, config: WatchdogConfig, now_s: float, past: Past | None = None) -> None:
         """`config.lease_uid` None: leases of any user count, so the caller puts in its own.
 
         `past`: the record of its last life; None: nobody keeps one, which is for virtual time alone.
         """
         self._config = config
-        self._observer = Observer(config, now)
-        self._envelope = Envelope(config, now)
+        self._observer = Observer(config, now_s)
+        self._envelope = Envelope(config, now_s)
         self._pair = PairWatch(config)
-        self._twist = TwistWatch(config, now)
+        self._twist = TwistWatch(config, now_s)
         self._creep, self._halt = CreepWatch(config), HaltWatch(config)
         self._leases = LeaseBook(config.lease_timeout_s, config.lease_uid)
-        self._started_at = self._ticked_at = now
+        self._started_at = self._ticked_at = now_s
         self._bus_failed_since, self._bus_errors = math.inf, 0
-        self._view = self._look(now)
+        self._view = self._look(now_s)
         self._state = State.STARTING
         self._verdict = policy.FINE
         self._stoppers: list[Stopper] = []
         self._reset = (0, Answer.NONE)
         self._reset_at = -math.inf
-        self._heartbeat_due = self._state_due = self._counters_due = now
+        self._heartbeat_due = self._state_due = self._counters_due = now_s
         self._told: Status | None = None
         self._longest_gap_s = 0.0
         self._ledger = Ledger(past)
@@ -98,8 +98,8 @@ class Watchdog:
         """Since the start."""
         before = policy.before_the_start(past) if past is not None else policy.FINE
         if before.cause is not TripCause.NONE:
-            self._latch(before, now, resting=True)
-        self._note_record(now)
+            self._latch(before, now_s, resting=True)
+        self._note_record(now_s)
 
     @property
     def status(self) -> Status:
@@ -142,20 +142,20 @@ class Watchdog:
         """Frames of watched identifiers that could not be understood, since the start."""
         return self._observer.dropped
 
-    def on_frame(self, cob_id: int, data: bytes, now: float) -> None:
+    def on_frame(self, cob_id: int, data: bytes, now_s: float) -> None:
         """Take in a received frame. Never raises for what is on the bus; own frames that come back change nothing."""
         if cob_id == frames.RESET_REQUEST:
-            self._on_reset_request(data, now)
+            self._on_reset_request(data, now_s)
         else:
-            self._observer.on_frame(cob_id, data, now)
+            self._observer.on_frame(cob_id, data, now_s)
 
-    def on_lease(self, datagram: bytes, uid: int | None, now: float, pid: int | None = None) -> Refusal | None:
+    def on_lease(self, datagram: bytes, uid: int | None, now_s: float, pid: int | None = None) -> Refusal | None:
         """Take in a datagram from the lease socket, sent by the user `uid` and the process `pid`. Returns why it does
         not count."""
-        refusal = self._leases.take(datagram, uid, now, pid)
+        refusal = self._leases.take(datagram, uid, now_s, pid)
         lease = self._leases.last
         if refusal is None and lease is not None:
-            self._envelope.order(lease.linear_mps, lease.angular_radps, now)
+            self._envelope.order(lease.linear_mps, lease.angular_radps, now_s)
         return refusal
 
     def on_bus(self, failed_since: float, errors: int) -> None:
@@ -166,39 +166,39 @@ class Watchdog:
         """The computer was suspended for so long [s]. The monotonic clock, and so every age, knows nothing of it."""
         self._ticked_at -= duration_s
 
-    def tick(self, now: float) -> list[Frame]:
+    def tick(self, now_s: float) -> list[Frame]:
         """Judge and act. Returns the frames to send at once, the stop first. To be called at least every 5 ms."""
-        self._view = self._look(now)
+        self._view = self._look(now_s)
         self._longest_gap_s = max(self._longest_gap_s, self._view.tick_gap_s)
-        self._ticked_at = now
-        stop = self._judge(now)
-        self._note_record(now)
-        return stop + self._tell(now)
+        self._ticked_at = now_s
+        stop = self._judge(now_s)
+        self._note_record(now_s)
+        return stop + self._tell(now_s)
 
-    def _judge(self, now: float) -> list[Frame]:
+    def _judge(self, now_s: float) -> list[Frame]:
         if self._state is State.TRIPPED:
-            return self._stop(now)
-        if self._state is State.STARTING and now >= self._started_at + self._config.drive_heartbeat_s:
+            return self._stop(now_s)
+        if self._state is State.STARTING and now_s >= self._started_at + self._config.drive_heartbeat_s:
             self._state = State.WATCHING
-        verdict = policy.decide(self._view, self._config, now)
+        verdict = policy.decide(self._view, self._config, now_s)
         if verdict.cause is TripCause.NONE:
             return []
-        self._trip(verdict, now)
-        return self._stop(now)
+        self._trip(verdict, now_s)
+        return self._stop(now_s)
 
-    def next_expiry(self, now: float) -> float:
+    def next_expiry(self, now_s: float) -> float:
         """When the next timeout would run out [s]: a tick just then stops without delay."""
-        return policy.next_expiry(self._leases.valid_at, self._observer.driver_at, self._config, now)
+        return policy.next_expiry(self._leases.valid_at, self._observer.driver_at, self._config, now_s)
 
-    def end(self, now: float) -> None:
+    def end(self, now_s: float) -> None:
         """The process is asked to end: with a wheel in motion it must not leave without stopping it."""
-        view = self._look(now)
+        view = self._look(now_s)
         axis = policy.in_motion(view, self._config)
         if self._state is State.TRIPPED or axis is None:
             return
         detail = f"asked to end while {axis.drive.joint} turns at {axis.velocity_mps:.3f} m/s"
-        self._trip(Verdict(TripCause.ENDED, 0, detail), now)
-        self._note_record(now)
+        self._trip(Verdict(TripCause.ENDED, 0, detail), now_s)
+        self._note_record(now_s)
 
     def quick_stops(self) -> list[Frame]:
         """A quick stop for every node, whatever the state: for a way out on which nothing else can be trusted."""
@@ -206,43 +206,43 @@ class Watchdog:
         layouts = {drive.node_id: drive.layout for drive in self._config.drives}
         return [frames.quick_stop(node_id, nodes.count(node_id), layout) for node_id, layout in layouts.items()]
 
-    def _look(self, now: float) -> View:
-        bus, bounds = self._observer.look(), self._envelope.advance(now)
+    def _look(self, now_s: float) -> View:
+        bus, bounds = self._observer.look(), self._envelope.advance(now_s)
         skew = self._pair.look(bus, bounds)
-        gap_s = now - self._ticked_at
+        gap_s = now_s - self._ticked_at
         leases, failed = self._leases, self._bus_failed_since
-        twist = self._twist.look(bus, now)
-        creep = self._creep.look(bus, bounds, now)
-        halt = self._halt.look(bus, leases.last, now)
+        twist = self._twist.look(bus, now_s)
+        creep = self._creep.look(bus, bounds, now_s)
+        halt = self._halt.look(bus, leases.last, now_s)
         started_at, at = self._started_at, leases.valid_at
         return View(bus, bounds, started_at, leases.last, at, skew, twist, creep, gap_s, failed, halt)
 
-    def _trip(self, verdict: Verdict, now: float) -> None:
+    def _trip(self, verdict: Verdict, now_s: float) -> None:
         self.trips += 1
-        self._latch(verdict, now)
+        self._latch(verdict, now_s)
 
-    def _latch(self, verdict: Verdict, now: float, resting: bool = False) -> None:
+    def _latch(self, verdict: Verdict, now_s: float, resting: bool = False) -> None:
         self._state = State.TRIPPED
         self._verdict = verdict
         self._observer.commands_are_ours = True
         nodes = dict.fromkeys(drive.node_id for drive in self._config.drives)
         lying = verdict.node_id if resting and verdict.cause in policy.SENSOR_CAUSES else 0
         self._stoppers = [
-            Stopper(node_id, self._config, self._view, now, node_id != lying, resting) for node_id in nodes
+            Stopper(node_id, self._config, self._view, now_s, node_id != lying, resting) for node_id in nodes
         ]
 
-    def _note_record(self, now: float) -> None:
+    def _note_record(self, now_s: float) -> None:
         """LIVE before there is power, and until all of it was seen to be off."""
         verdict, axes = self._verdict, self._view.axes
         if self._state is State.TRIPPED:
             self._ledger.want(Mark.LATCHED, verdict.cause, verdict.node_id, verdict.detail)
-        elif all(policy.is_off(axis, self._view, self._config, now) for axis in axes):
+        elif all(policy.is_off(axis, self._view, self._config, now_s) for axis in axes):
             self._ledger.want(Mark.CLEAR)
         elif self._ledger.wanted.mark is not Mark.CLEAR or any(policy.near_power(axis) for axis in axes):
             self._ledger.want(Mark.LIVE)
 
-    def _stop(self, now: float) -> list[Frame]:
-        return [frame for stopper in self._stoppers for frame in stopper.tick(self._view, now)]
+    def _stop(self, now_s: float) -> list[Frame]:
+        return [frame for stopper in self._stoppers for frame in stopper.tick(self._view, now_s)]
 
     @property
     def _settled(self) -> bool:
@@ -252,24 +252,24 @@ class Watchdog:
     def _step(self) -> Step:
         return max((stopper.climb.step for stopper in self._stoppers), default=Step.NONE)
 
-    def _tell(self, now: float) -> list[Frame]:
+    def _tell(self, now_s: float) -> list[Frame]:
         out: list[Frame] = []
         period_s = self._config.heartbeat_period_s
-        if now >= self._heartbeat_due and self._beats:
-            self._heartbeat_due = max(self._heartbeat_due, now - period_s) + period_s
+        if now_s >= self._heartbeat_due and self._beats:
+            self._heartbeat_due = max(self._heartbeat_due, now_s - period_s) + period_s
             out.append(frames.heartbeat())
         status = self.status
-        if now >= self._state_due or status != self._told:
-            self._state_due = max(self._state_due, now - STATE_PERIOD_S) + STATE_PERIOD_S
+        if now_s >= self._state_due or status != self._told:
+            self._state_due = max(self._state_due, now_s - STATE_PERIOD_S) + STATE_PERIOD_S
             self._told = status
-            out.append(self._state_frame(status, now))
-        if now >= self._counters_due:
-            self._counters_due = max(self._counters_due, now - COUNTERS_PERIOD_S) + COUNTERS_PERIOD_S
+            out.append(self._state_frame(status, now_s))
+        if now_s >= self._counters_due:
+            self._counters_due = max(self._counters_due, now_s - COUNTERS_PERIOD_S) + COUNTERS_PERIOD_S
             out.append(self._counters_frame())
         return out
 
-    def _state_frame(self, status: Status, now: float) -> Frame:
-        age_s = now - self._leases.valid_at
+    def _state_frame(self, status: Status, now_s: float) -> Frame:
+        age_s = now_s - self._leases.valid_at
         verdict = status.verdict
         return frames.state(
             status.state, verdict.cause, status.step, verdict.node_id, age_s, status.reset, status.armed
@@ -280,22 +280,22 @@ class Watchdog:
         self._longest_gap_s = 0.0
         return frames.counters(refused, self._observer.dropped, self._bus_errors, self.trips, gap_s)
 
-    def _on_reset_request(self, data: bytes, now: float) -> None:
+    def _on_reset_request(self, data: bytes, now_s: float) -> None:
         number = frames.decode_reset_request(data)
         if number is None:
             self._observer.dropped += 1
-        elif number != self._reset[0] or now >= self._reset_at + REPEATED_REQUEST_S:
-            self._reset = (number, self._answer(now))
-            self._reset_at = now
+        elif number != self._reset[0] or now_s >= self._reset_at + REPEATED_REQUEST_S:
+            self._reset = (number, self._answer(now_s))
+            self._reset_at = now_s
 
-    def _answer(self, now: float) -> Answer:
+    def _answer(self, now_s: float) -> Answer:
         if self._state is not State.TRIPPED:
             return Answer.NOT_TRIPPED
-        view = self._look(now)
-        fresh = all(stopper.is_fresh(now) for stopper in self._stoppers)
-        if not self._settled or not fresh or policy.stands(self._verdict, view, self._config, now):
+        view = self._look(now_s)
+        fresh = all(stopper.is_fresh(now_s) for stopper in self._stoppers)
+        if not self._settled or not fresh or policy.stands(self._verdict, view, self._config, now_s):
             return Answer.CAUSE_STANDS
-        if policy.velocity_ordered(view, self._config, now):
+        if policy.velocity_ordered(view, self._config, now_s):
             return Answer.VELOCITY_ORDERED
         self._state = State.WATCHING
         self._verdict = policy.FINE

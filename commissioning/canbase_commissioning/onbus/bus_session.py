@@ -81,18 +81,18 @@ class BusSession:
         for _ in range(MOST_FRAMES):
             if frame is None:
                 break
-            now = time.monotonic()
-            if not self._is_own(frame, now):
-                session.on_frame(frame, now)
+            now_s = time.monotonic()
+            if not self._is_own(frame, now_s):
+                session.on_frame(frame, now_s)
             frame = self._port.receive(0.0)
-        now = time.monotonic()
-        for out in session.tick(now):
-            self._send(out, now)
+        now_s = time.monotonic()
+        for out in session.tick(now_s):
+            self._send(out, now_s)
 
-    def _is_own(self, frame: Frame, now: float) -> bool:
-        return self._echo is not None and self._echo.is_own(frame, now)
+    def _is_own(self, frame: Frame, now_s: float) -> bool:
+        return self._echo is not None and self._echo.is_own(frame, now_s)
 
-    def _send(self, frame: Frame, now: float) -> None:
+    def _send(self, frame: Frame, now_s: float) -> None:
         if self._echo is not None:
-            self._echo.sent(frame, now)
+            self._echo.sent(frame, now_s)
         self._port.send(frame)

@@ -76,14 +76,14 @@ def _hold(line: BusSession, session: JogSession) -> None:
     shown_at = 0.0
     while not session.done:
         line.turn(session)
-        now = time.monotonic()
+        now_s = time.monotonic()
         if select.select([sys.stdin], [], [], 0.0)[0]:
             text = os.read(sys.stdin.fileno(), 64).decode("latin-1")
             if not text:
                 raise CommissionError("the terminal is gone")
-            session.press(text, now)
-        if now - shown_at >= SHOW_S:
-            shown_at = now
+            session.press(text, now_s)
+        if now_s - shown_at >= SHOW_S:
+            shown_at = now_s
             sys.stdout.write(f"\r{session.line:<78}")
             sys.stdout.flush()
     sys.stdout.write("\n")

@@ -22,7 +22,7 @@ def refuse_beside_masters(line: BusSession) -> None:
     """Exits with 1 when anybody else commands this bus: two masters are none."""
     listening = ListenSession(LISTEN_S)
     line.run(listening)
-    masters = listening.heard.masters(listening.now)
+    masters = listening.heard.masters(listening.now_s)
     if masters:
         signs = "; ".join(masters)
         fail(f"somebody else commands this bus ({signs}). End canbase up, or sudo systemctl stop 'canbase-*'", FAILED)

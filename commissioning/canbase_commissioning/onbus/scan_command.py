@@ -29,7 +29,7 @@ def run(
         listening = ListenSession(seconds)
         line.run(listening)
         heard = listening.heard
-        masters = heard.masters(listening.now)
+        masters = heard.masters(listening.now_s)
         asks = not passive and (not masters or _may_ask(masters, yes))
         roster = Identification(
             (n for n in range(1, MAX_NODE_ID + 1) if n not in OURS), heard, timeout_s, with_texts=not masters

@@ -60,50 +60,50 @@ class NodeBoot:
         """What the node is to do next, for people; empty when the boot has ended."""
         return "" if self.done else f"waiting for {self._name}: {_awaited(self._step)}"
 
-    def on_frame(self, frame: Frame, now: float) -> None:
-        """Take a frame from the bus, at `now` [s, monotonic]; those of other nodes do nothing."""
+    def on_frame(self, frame: Frame, now_s: float) -> None:
+        """Take a frame from the bus, at `now_s` [s, monotonic]; those of other nodes do nothing."""
         if self.done or self._step is None:
             return
         if parse_heartbeat(frame) == (self.node_id, NmtState.INITIALISING):
-            self._on_boot_up(now)
+            self._on_boot_up(now_s)
         elif self._client.busy:
-            self._outbox += self._client.on_frame(frame, now)
-            self._take_answer(now)
+            self._outbox += self._client.on_frame(frame, now_s)
+            self._take_answer(now_s)
 
-    def tick(self, now: float) -> list[Frame]:
-        """Let time pass until `now` [s, monotonic]. The frames to send, in order. The first call begins the boot."""
+    def tick(self, now_s: float) -> list[Frame]:
+        """Let time pass until `now_s` [s, monotonic]. The frames to send, in order. The first call begins the boot."""
         if self._step is None:
             if not self.done:
-                self._advance(None, now)
+                self._advance(None, now_s)
         elif self._client.busy:
-            self._outbox += self._client.tick(now)
-            self._take_answer(now)
-        elif now >= self._wake_at:
-            self._wake(now)
+            self._outbox += self._client.tick(now_s)
+            self._take_answer(now_s)
+        elif now_s >= self._wake_at:
+            self._wake(now_s)
         frames, self._outbox = self._outbox, []
         return frames
 
-    def _wake(self, now: float) -> None:
+    def _wake(self, now_s: float) -> None:
         held, self._held = self._held, None
         if held is None:
-            self._advance(False, now)
+            self._advance(False, now_s)
         else:
-            self._outbox.append(self._client.start(held, now))
+            self._outbox.append(self._client.start(held, now_s))
 
-    def _on_boot_up(self, now: float) -> None:
+    def _on_boot_up(self, now_s: float) -> None:
         if isinstance(self._step, WaitBootUp):
-            self.boot_up_at = now
-            self._advance(True, now)
+            self.boot_up_at = now_s
+            self._advance(True, now_s)
         elif isinstance(self._step, Quiet):
-            self._wake_at = now + self._step.duration_s
+            self._wake_at = now_s + self._step.duration_s
         elif self._was_reset:
             problem = f"it started anew while it was being configured ({_awaited(self._step)} was due)"
             hint = "The boot begins again and waits for a second boot-up message (start.settle_s of its drive profile)"
             self._end(error=BootError(self.node_id, problem, f"{hint}; if this goes on, check its supply voltage"))
         elif self._client.busy:
-            self._outbox.append(self._client.again(now))
+            self._outbox.append(self._client.again(now_s))
 
-    def _take_answer(self, now: float) -> None:
+    def _take_answer(self, now_s: float) -> None:
         if self._client.duplicates >= DUPLICATES:
             problem = "each request is answered twice: two devices on the bus have this node id"
             self._end(error=BootError(self.node_id, problem, "Give each drive a node id of its own (canbase scan)"))
@@ -112,12 +112,12 @@ class NodeBoot:
         try:
             answer = self._client.answer()
         except SdoError as error:
-            self._advance(error, now)
+            self._advance(error, now_s)
         else:
             self.heard = True
-            self._advance(answer, now)
+            self._advance(answer, now_s)
 
-    def _advance(self, answer: bytes | bool | SdoError | None, now: float) -> None:
+    def _advance(self, answer: bytes | bool | SdoError | None, now_s: float) -> None:
         self._was_reset = self._was_reset or isinstance(self._step, WaitBootUp)
         try:
             step = self._sequence.throw(answer) if isinstance(answer, SdoError) else self._sequence.send(answer)
@@ -126,19 +126,19 @@ class NodeBoot:
         except BootError as error:
             self._end(error=error)
         else:
-            self._begin(step, now)
+            self._begin(step, now_s)
 
-    def _begin(self, step: Step, now: float) -> None:
+    def _begin(self, step: Step, now_s: float) -> None:
         self._step = step
         if isinstance(step, Read | Write) and self._gap_s > 0.0:
-            self._held, self._wake_at = step, now + self._gap_s
+            self._held, self._wake_at = step, now_s + self._gap_s
         elif isinstance(step, Read | Write):
-            self._outbox.append(self._client.start(step, now))
+            self._outbox.append(self._client.start(step, now_s))
         elif isinstance(step, SendNmt):
             self._outbox.append(nmt(step.command, self.node_id))
-            self._advance(None, now)
+            self._advance(None, now_s)
         else:
-            self._wake_at = now + (step.timeout_s if isinstance(step, WaitBootUp) else step.duration_s)
+            self._wake_at = now_s + (step.timeout_s if isinstance(step, WaitBootUp) else step.duration_s)
 
     def _end(self, report: BootReport | None = None, error: BootError | None = None) -> None:
         self.report, self.error = report, error

@@ -165,18 +165,18 @@ class SdoClient:
         """Whether a transfer is under way."""
         return self._transfer is not None
 
-    def start(self, step: Read | Write, now: float) -> Frame:
+    def start(self, step: Read | Write, now_s: float) -> Frame:
         """Begin a transfer. Raises RuntimeError while another is under way."""
         if self._transfer is not None:
             raise RuntimeError(f"node {self.node_id}: {self._transfer.step} is under way; wait for its answer")
         self._answer = None
-        return self._begin(step, self._attempts, now)
+        return self._begin(step, self._attempts, now_s)
 
-    def again(self, now: float) -> Frame:
+    def again(self, now_s: float) -> Frame:
         """Begin the transfer under way anew: the drive has just started. Raises RuntimeError when there is none."""
         if self._transfer is None:
             raise RuntimeError(f"node {self.node_id}: no transfer is under way")
-        return self._begin(self._transfer.step, self._attempts, now)
+        return self._begin(self._transfer.step, self._attempts, now_s)
 
     def answer(self) -> bytes:
         """What the last transfer brought: the object's bytes, or b"" after a write.
@@ -189,13 +189,13 @@ class SdoClient:
             raise self._answer
         return self._answer
 
-    def tick(self, now: float) -> list[Frame]:
+    def tick(self, now_s: float) -> list[Frame]:
         """Let time pass: a transfer without an answer is aborted, then tried again or given up."""
-        if self._transfer is None or now < self._transfer.deadline:
+        if self._transfer is None or now_s < self._transfer.deadline:
             return []
-        return self._fail(self._transfer, TIMED_OUT, now)
+        return self._fail(self._transfer, TIMED_OUT, now_s)
 
-    def on_frame(self, frame: Frame, now: float) -> list[Frame]:
+    def on_frame(self, frame: Frame, now_s: float) -> list[Frame]:
         """Take a frame from the bus; frames of other nodes and services are none of our business."""
         if frame.cob_id != SDO_TO_CLIENT + self.node_id:
             return []
@@ -208,16 +208,16 @@ class SdoClient:
         if frame.data[0] == _ABORT:
             return self._on_abort(transfer.step, frame.data)
         if transfer.initiated:
-            return self._on_segment(transfer, frame.data, now)
-        return self._on_initiated(transfer, frame.data, now)
+            return self._on_segment(transfer, frame.data, now_s)
+        return self._on_initiated(transfer, frame.data, now_s)
 
-    def _begin(self, step: Read | Write, attempts: int, now: float) -> Frame:
+    def _begin(self, step: Read | Write, attempts: int, now_s: float) -> Frame:
         buffer = b"" if isinstance(step, Read) else step.data
-        self._transfer = _Transfer(step, attempts - 1, now, buffer)
-        return self._request(self._transfer, _initiate(step), now)
+        self._transfer = _Transfer(step, attempts - 1, now_s, buffer)
+        return self._request(self._transfer, _initiate(step), now_s)
 
-    def _request(self, transfer: _Transfer, data: bytes, now: float) -> Frame:
-        transfer.deadline = now + self._timeout_s
+    def _request(self, transfer: _Transfer, data: bytes, now_s: float) -> Frame:
+        transfer.deadline = now_s + self._timeout_s
         return Frame(SDO_TO_SERVER + self.node_id, data.ljust(8, b"\0"))
 
     def _on_abort(self, step: Read | Write, data: bytes) -> list[Frame]:
@@ -225,51 +225,51 @@ class SdoClient:
             return self._drop()
         return self._finish(SdoAborted(self.node_id, step, int.from_bytes(data[4:], "little")))
 
-    def _on_initiated(self, transfer: _Transfer, data: bytes, now: float) -> list[Frame]:
+    def _on_initiated(self, transfer: _Transfer, data: bytes, now_s: float) -> list[Frame]:
         step = transfer.step
         if data[1:4] != _address(step) or data[0] >> 5 != (2 if isinstance(step, Read) else 3):
             return self._drop()
         transfer.initiated = True
         if isinstance(step, Write):
-            return self._finish(b"") if len(step.data) <= 4 else [self._send_segment(transfer, now)]
+            return self._finish(b"") if len(step.data) <= 4 else [self._send_segment(transfer, now_s)]
         expedited, sized = data[0] & 0x02, data[0] & 0x01
         if expedited:
             return self._finish(data[4 : 8 - (data[0] >> 2 & 0x03 if sized else 0)])
         transfer.announced = int.from_bytes(data[4:], "little") if sized else None
-        return [self._request(transfer, b"\x60", now)]
+        return [self._request(transfer, b"\x60", now_s)]
 
-    def _on_segment(self, transfer: _Transfer, data: bytes, now: float) -> list[Frame]:
+    def _on_segment(self, transfer: _Transfer, data: bytes, now_s: float) -> list[Frame]:
         is_read = isinstance(transfer.step, Read)
         if data[0] >> 5 != (0 if is_read else 1):
             return self._drop()
         if data[0] >> 4 & 1 != transfer.toggle:
-            return self._fail(transfer, TOGGLE_BIT_WRONG, now)
+            return self._fail(transfer, TOGGLE_BIT_WRONG, now_s)
         transfer.toggle ^= 1
         if is_read:
-            return self._on_uploaded(transfer, data, now)
-        return [self._send_segment(transfer, now)] if transfer.buffer else self._finish(b"")
+            return self._on_uploaded(transfer, data, now_s)
+        return [self._send_segment(transfer, now_s)] if transfer.buffer else self._finish(b"")
 
-    def _on_uploaded(self, transfer: _Transfer, data: bytes, now: float) -> list[Frame]:
+    def _on_uploaded(self, transfer: _Transfer, data: bytes, now_s: float) -> list[Frame]:
         transfer.buffer += data[1 : 8 - (data[0] >> 1 & 0x07)]
         if len(transfer.buffer) > MAX_UPLOAD_BYTES:
-            return self._fail(transfer, OUT_OF_MEMORY, now)
+            return self._fail(transfer, OUT_OF_MEMORY, now_s)
         if not data[0] & 0x01:
-            return [self._request(transfer, bytes((0x60 | transfer.toggle << 4,)), now)]
+            return [self._request(transfer, bytes((0x60 | transfer.toggle << 4,)), now_s)]
         if transfer.announced not in (None, len(transfer.buffer)):
-            return self._fail(transfer, LENGTH_WRONG, now)
+            return self._fail(transfer, LENGTH_WRONG, now_s)
         return self._finish(transfer.buffer)
 
-    def _send_segment(self, transfer: _Transfer, now: float) -> Frame:
+    def _send_segment(self, transfer: _Transfer, now_s: float) -> Frame:
         part, transfer.buffer = transfer.buffer[:7], transfer.buffer[7:]
         is_last = not transfer.buffer
         command = transfer.toggle << 4 | (7 - len(part)) << 1 | is_last
-        return self._request(transfer, bytes((command,)) + part, now)
+        return self._request(transfer, bytes((command,)) + part, now_s)
 
-    def _fail(self, transfer: _Transfer, code: int, now: float) -> list[Frame]:
+    def _fail(self, transfer: _Transfer, code: int, now_s: float) -> list[Frame]:
         step = transfer.step
         abort = Frame(SDO_TO_SERVER + self.node_id, bytes((_ABORT,)) + _address(step) + code.to_bytes(4, "little"))
         if transfer.attempts_left:
-            return [abort, self._begin(step, transfer.attempts_left, now)]
+            return [abort, self._begin(step, transfer.attempts_left, now_s)]
         self._finish(self._timeout(step) if code == TIMED_OUT else SdoAborted(self.node_id, step, code))
         return [abort]
 

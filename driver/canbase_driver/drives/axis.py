@@ -65,13 +65,13 @@ class Axis:
         """When the older one of its values came: 6041h with 6064h, and 606Ch, come in frames of their own."""
         return min(self.status_at, self.velocity_at)
 
-    def age_s(self, now: float) -> float:
+    def age_s(self, now_s: float) -> float:
         """Age of the oldest of its values [s]; infinity: not all came since the last `forget`."""
-        return now - self.fed_at
+        return now_s - self.fed_at
 
-    def stands(self, now: float) -> bool:
+    def stands(self, now_s: float) -> bool:
         """Fresh values are evidence that the wheel stands."""
-        return self.age_s(now) <= self._feedback_s and self.stillness.stands(now)
+        return self.age_s(now_s) <= self._feedback_s and self.stillness.stands(now_s)
 
     def forget(self) -> None:
         """What was heard no longer counts: the drive restarted, or its bus did."""
@@ -85,53 +85,53 @@ class Axis:
         self.travel.reset_reference()
         self._status_is_new = self.has_new_sample = False
 
-    def on_status(self, data: bytes, now: float) -> bool:
+    def on_status(self, data: bytes, now_s: float) -> bool:
         """Take 6041h and 6064h. False: wrong length, to be dropped and counted."""
         status = unpack_status(data, self._layout, self.drive.axis)
         if status is None:
             return False
         self.statusword, counts = status
         self.state = decode_statusword(self.statusword)
-        gap_s = min(now - self.status_at, GAP_MAX_S)
+        gap_s = min(now_s - self.status_at, GAP_MAX_S)
         self.travel.update(counts, max(1, round(gap_s * self._control_hz)))
-        self.status_at = now
+        self.status_at = now_s
         self._status_is_new = True
         has_torque = self.state is None or self.state.has_torque
-        self.stillness.on_power(has_torque, now, self.state is DriveState.OPERATION_ENABLED)
+        self.stillness.on_power(has_torque, now_s, self.state is DriveState.OPERATION_ENABLED)
         return True
 
-    def on_velocity(self, data: bytes, now: float) -> bool:
+    def on_velocity(self, data: bytes, now_s: float) -> bool:
         """Take 606Ch, which follows the status of the same SYNC. False: wrong length, to be dropped and counted."""
         raw = unpack_velocity(data, self._layout)
         if raw is None:
             return False
         self.velocity_mps = self.units.velocity_mps(raw)
-        if now - self.velocity_at > self._feedback_s:
+        if now_s - self.velocity_at > self._feedback_s:
             self.stillness.pause()
-        self.velocity_at = now
+        self.velocity_at = now_s
         ordered_mps = self.target_mps if self.state is DriveState.OPERATION_ENABLED else 0.0
-        self.stillness.on_sample(self.travel.travel_m, self.velocity_mps, ordered_mps, now)
+        self.stillness.on_sample(self.travel.travel_m, self.velocity_mps, ordered_mps, now_s)
         has_torque = self.state is None or self.state.has_torque
         torque = unpack_torque(data, self._layout)
-        self.push.on_sample(self.travel.travel_m, torque, ordered_mps, has_torque, now)
+        self.push.on_sample(self.travel.travel_m, torque, ordered_mps, has_torque, now_s)
         self.has_new_sample = self._status_is_new
         return True
 
-    def on_speed(self, raw: int, now: float) -> None:
+    def on_speed(self, raw: int, now_s: float) -> None:
         """Take 606Ch that was read by SDO, after `forget`: how fast it is, and no evidence that it stands.
 
         Where nothing can have braked it so much since it was lost, its sensor is none either.
         """
-        self.velocity_mps, self.velocity_at = self.units.velocity_mps(raw), now
-        if self.stillness.is_sudden(abs(self._known_mps) - abs(self.velocity_mps), now - self._known_at):
-            after_s = now - self._known_at
+        self.velocity_mps, self.velocity_at = self.units.velocity_mps(raw), now_s
+        if self.stillness.is_sudden(abs(self._known_mps) - abs(self.velocity_mps), now_s - self._known_at):
+            after_s = now_s - self._known_at
             self.stillness.distrust(
                 f"went from {self._known_mps:.2f} to {self.velocity_mps:.2f} m/s in {after_s:.2f} s"
             )
 
-    def has_fresh_sample(self, now: float) -> bool:
+    def has_fresh_sample(self, now_s: float) -> bool:
         """A new sample, and none from before a silence: beside a fresh one of another wheel it would turn the pose."""
-        return self.has_new_sample and self.age_s(now) <= self._feedback_s
+        return self.has_new_sample and self.age_s(now_s) <= self._feedback_s
 
     def rests(self, rim_mps: float) -> bool:
         """Its last setpoint was zero bits of 60FFh, and that of `rim_mps` is: nobody else sees less than one bit."""

@@ -108,11 +108,11 @@ class CanopenNode:
         tells nothing about that, and it may obey its PDOs still. Until its boot begins, which stops it by SDO."""
         return self.has_pdos or self._owed_stop
 
-    def is_off(self, now: float) -> bool:
+    def is_off(self, now_s: float) -> bool:
         """Every axis says, in a fresh statusword, that it has no torque."""
         fresh_s = self._robot.timeouts.feedback_s
         axes = self.axes
-        return all(now - axis.status_at <= fresh_s and axis.state and not axis.state.has_torque for axis in axes)
+        return all(now_s - axis.status_at <= fresh_s and axis.state and not axis.state.has_torque for axis in axes)
 
     @property
     def is_being_configured(self) -> bool:
@@ -124,30 +124,30 @@ class CanopenNode:
         """Its boot has ended well, and it is not started yet."""
         return self._boot is not None and self._boot.report is not None
 
-    def waiting_for(self, now: float) -> str:
+    def waiting_for(self, now_s: float) -> str:
         """What keeps it from being ready; empty when it is, or when it is gone and not being booted."""
         if self._is_configured:
             return f"{self.name}: configured, waits for the boots of the others"
         if self.presence is Presence.BOOTING and self._boot is not None:
-            unheard = not self._boot.heard and now - self._since_s > UNHEARD_S
+            unheard = not self._boot.heard and now_s - self._since_s > UNHEARD_S
             cure = "; check its power and its cable" if unheard else ""
             return self._boot.waiting_for + cure + (f" (last try: {self.boot_error})" if self.boot_error else "")
         if self.presence is Presence.STARTING:
-            return f"{self.name}: waiting for its first feedback since {now - self._since_s:.1f} s"
+            return f"{self.name}: waiting for its first feedback since {now_s - self._since_s:.1f} s"
         return ""
 
-    def missing(self, now: float) -> str:
+    def missing(self, now_s: float) -> str:
         """Why it is not ready though it had timeouts.boot_s for it; empty when it is, or has time left."""
-        if self.presence is Presence.READY or now - self._ready_at <= self._robot.timeouts.boot_s:
+        if self.presence is Presence.READY or now_s - self._ready_at <= self._robot.timeouts.boot_s:
             return ""
         why = self.boot_error or f"{self._why_gone}; check its power and its cable"
-        return f"{self.name} is missing since {now - self._ready_at:.0f} s: {why}"
+        return f"{self.name} is missing since {now_s - self._ready_at:.0f} s: {why}"
 
     def absent(self) -> str:
         """Why it is gone; empty when it is not."""
         return f"{self.name} {self._why_gone}" if self.presence is Presence.GONE else ""
 
-    def silent(self, now: float, sync_since: float) -> str:
+    def silent(self, now_s: float, sync_since: float) -> str:
         """A sentence when its feedback or its heartbeat is too old; only a node that is ready can be silent.
 
         It answers SYNCs: after a pause of ours it has timeouts.feedback_s from `sync_since` on [s], when the present
@@ -158,26 +158,26 @@ class CanopenNode:
         timeouts = self._robot.timeouts
         for axis in self.axes:
             unasked_s = min(max(0.0, sync_since - axis.fed_at), timeouts.drive_heartbeat_s)
-            if axis.age_s(now) - unasked_s > timeouts.feedback_s:
+            if axis.age_s(now_s) - unasked_s > timeouts.feedback_s:
                 value = "status" if axis.status_at <= axis.velocity_at else "velocity"
-                return f"{self.name}: no {value} for {axis.age_s(now):.2f} s"
-        if now - self.heartbeat_at > timeouts.drive_heartbeat_s:
-            return f"{self.name}: no heartbeat for {now - self.heartbeat_at:.2f} s"
+                return f"{self.name}: no {value} for {axis.age_s(now_s):.2f} s"
+        if now_s - self.heartbeat_at > timeouts.drive_heartbeat_s:
+            return f"{self.name}: no heartbeat for {now_s - self.heartbeat_at:.2f} s"
         return ""
 
-    def begin_boot(self, now: float) -> None:
+    def begin_boot(self, now_s: float) -> None:
         """Boot it (again). Does nothing while a boot runs, within RETRY_S after a failed one, and
         while the watchdog's ladder holds it: a boot would work against that.
         """
-        too_soon = self.boot_error and now - self._since_s < RETRY_S
-        if self.presence is not Presence.GONE or too_soon or now < self._held_until:
+        too_soon = self.boot_error and now_s - self._since_s < RETRY_S
+        if self.presence is not Presence.GONE or too_soon or now_s < self._held_until:
             return
         self._boot = NodeBoot(self.node_id, self._drives, self._robot, self._settle_s)
         self._boot_up_at = -math.inf
         self._owed_stop = False
-        self._go(Presence.BOOTING, now)
+        self._go(Presence.BOOTING, now_s)
 
-    def seek(self, now: float, sync_since: float) -> None:
+    def seek(self, now_s: float, sync_since: float) -> None:
         """Boot a node anew that was ready and is silent for SEEK_S: asked, it may answer. Only without power.
 
         `sync_since`: start of the present run of SYNCs [s]; before it the node was not asked.
@@ -185,10 +185,10 @@ class CanopenNode:
         if self.presence is not Presence.READY:
             return
         heard_at = min(self.heartbeat_at, *(axis.status_at for axis in self.axes))
-        if now - max(heard_at, self._since_s, sync_since) > SEEK_S:
-            self.lose(f"gave no sign for {now - heard_at:.1f} s and is looked for", now)
+        if now_s - max(heard_at, self._since_s, sync_since) > SEEK_S:
+            self.lose(f"gave no sign for {now_s - heard_at:.1f} s and is looked for", now_s)
 
-    def lose(self, why: str, now: float) -> None:
+    def lose(self, why: str, now_s: float) -> None:
         """It must be booted again before it counts: `why` completes the sentence that begins with its name."""
         had_power = self.has_pdos and any(axis.state is None or axis.state.has_torque for axis in self.axes)
         self._owed_stop = had_power or self._owed_stop
@@ -196,27 +196,27 @@ class CanopenNode:
             axis.forget()
         self._why_gone = why
         self._boot = self.report = None
-        self._go(Presence.GONE, now)
+        self._go(Presence.GONE, now_s)
 
-    def release(self, now: float) -> None:
+    def release(self, now_s: float) -> None:
         """It is not ours any more until it is booted again; what it failed in before is forgotten."""
-        self.lose("is not configured", now)
+        self.lose("is not configured", now_s)
         self.boot_error, self._ready_at = "", math.inf
 
-    def clear_lost_heartbeat(self, now: float) -> None:
+    def clear_lost_heartbeat(self, now_s: float) -> None:
         """Some drives keep a fault for a lost heartbeat or bus until an NMT reset, which a boot brings."""
         faulty = any(axis.state is DriveState.FAULT for axis in self.axes)
         if self.profile.heartbeat_fault == "reset_communication" and self._lost_heartbeat and faulty:
-            self.lose("is reset: it is in fault for a lost heartbeat", now)
+            self.lose("is reset: it is in fault for a lost heartbeat", now_s)
 
     def forget_emcy(self) -> None:
         """What it told before a reset is no news any more."""
         self.emcy = None
         self._lost_heartbeat = False
 
-    def measured(self, axis: Axis, now: float) -> Values:
+    def measured(self, axis: Axis, now_s: float) -> Values:
         """Voltage, current and temperature of one of its axes."""
-        return self._measures.values(axis.drive.axis, now)
+        return self._measures.values(axis.drive.axis, now_s)
 
     def emcy_text(self) -> str:
         """Its last emergency message in words; empty: none."""
@@ -228,9 +228,9 @@ class CanopenNode:
         words = self.controlwords(goal)
         return [axis.setpoint(goal, speeds[axis.drive.side], word) for axis, word in zip(self.axes, words, strict=True)]
 
-    def stop_by_sdo(self, goal: PowerGoal, now: float) -> list[Frame]:
+    def stop_by_sdo(self, goal: PowerGoal, now_s: float) -> list[Frame]:
         """Controlwords and speeds by SDO while it takes no PDOs; it may have left NMT operational, motors turning."""
-        return [] if self.has_pdos else self._sdo_stop.frames(self.controlwords(goal), now)
+        return [] if self.has_pdos else self._sdo_stop.frames(self.controlwords(goal), now_s)
 
     def controlwords(self, goal: PowerGoal) -> list[int]:
         """6040h of each of its axes, one step towards `goal`; motors that share one get the same."""
@@ -238,28 +238,28 @@ class CanopenNode:
             return [next_controlword(axis.state, goal) for axis in self.axes]
         return [common_controlword([axis.state for axis in self.axes], goal)] * len(self.axes)
 
-    def on_heartbeat(self, frame: Frame, now: float) -> bool:
+    def on_heartbeat(self, frame: Frame, now_s: float) -> bool:
         """Take a frame 700h + id. False: not a heartbeat."""
         parsed = parse_heartbeat(frame)
         if parsed is None or parsed[1] is None:
             return False
         self.nmt_state = parsed[1]
-        self.heartbeat_at = now
+        self.heartbeat_at = now_s
         if (self.has_pdos or self._is_configured) and self.nmt_state is NmtState.INITIALISING:
             self.emcy = None
-            self.lose(f"restarted (boot-up message){self._learn_to_settle(now)}", now)
+            self.lose(f"restarted (boot-up message){self._learn_to_settle(now_s)}", now_s)
         elif self.presence is Presence.READY and self.nmt_state is not NmtState.OPERATIONAL:
-            self.lose(f"left NMT operational ({self.nmt_state.text})", now)
+            self.lose(f"left NMT operational ({self.nmt_state.text})", now_s)
         elif self._boot is not None:
-            self._boot.on_frame(frame, now)
+            self._boot.on_frame(frame, now_s)
             if self._boot.error is not None and self.nmt_state is NmtState.INITIALISING:
                 self._boot_up_at = self._boot.boot_up_at
-                self._learn_to_settle(now)
+                self._learn_to_settle(now_s)
         return True
 
-    def _learn_to_settle(self, now: float) -> str:
+    def _learn_to_settle(self, now_s: float) -> str:
         """A second boot-up message of one start: the next boot waits for it. What to add to a sentence about it."""
-        gap_s = now - self._boot_up_at
+        gap_s = now_s - self._boot_up_at
         before_s, self._second_s = self._second_s, gap_s if gap_s <= SECOND_BOOT_UP_S else math.inf
         if self._second_s == math.inf:
             return ""
@@ -269,18 +269,18 @@ class CanopenNode:
         self._settle_s = max(self._settle_s, SETTLE_FACTOR * gap_s + SETTLE_EXTRA_S)
         return f"{told}, again; the next boot waits for it (drive profile: start.settle_s)"
 
-    def on_nmt(self, frame: Frame, now: float) -> None:
+    def on_nmt(self, frame: Frame, now_s: float) -> None:
         """Take an NMT command (000h) that is on the bus: somebody keeps it pre-operational."""
         if frame.data in (bytes((NmtCommand.ENTER_PRE_OPERATIONAL, node)) for node in (ALL_NODES, self.node_id)):
-            self._held_until = now + HOLD_S
+            self._held_until = now_s + HOLD_S
 
-    def on_status(self, axis: Axis, frame: Frame, now: float) -> bool:
+    def on_status(self, axis: Axis, frame: Frame, now_s: float) -> bool:
         """Take 6041h and 6064h of one of its axes. False: not understood."""
-        return not self.takes_pdos or axis.on_status(frame.data, now)
+        return not self.takes_pdos or axis.on_status(frame.data, now_s)
 
-    def on_velocity(self, axis: Axis, frame: Frame, now: float) -> bool:
+    def on_velocity(self, axis: Axis, frame: Frame, now_s: float) -> bool:
         """Take 606Ch of one of its axes. False: not understood."""
-        return not self.takes_pdos or axis.on_velocity(frame.data, now)
+        return not self.takes_pdos or axis.on_velocity(frame.data, now_s)
 
     def on_emcy(self, frame: Frame, _now: float) -> bool:
         """Take a frame 080h + id. False: not an emergency message. It tells; only the statusword stops anything."""
@@ -291,33 +291,33 @@ class CanopenNode:
         self._lost_heartbeat |= emcy.code in BUS_LOST  # some take the message back, and stay in fault
         return True
 
-    def on_sdo(self, frame: Frame, now: float) -> bool:
+    def on_sdo(self, frame: Frame, now_s: float) -> bool:
         """Take an SDO answer; one that nobody here waits for is somebody else's (a tool's) and fine."""
         if self._boot is not None:
-            self._boot.on_frame(frame, now)
+            self._boot.on_frame(frame, now_s)
         elif self.presence is Presence.READY:
-            self._measures.on_frame(frame, now)
+            self._measures.on_frame(frame, now_s)
         elif (speed := self._sdo_stop.speed(frame)) is not None:
-            self.axes[speed[0]].on_speed(speed[1], now)
+            self.axes[speed[0]].on_speed(speed[1], now_s)
         return True
 
-    def tick(self, now: float) -> list[Frame]:
+    def tick(self, now_s: float) -> list[Frame]:
         """Let the boot go on, or ask for the next measured value. The frames to send."""
         if self.presence is Presence.READY or self._ready_at == math.inf:
-            self._ready_at = now
+            self._ready_at = now_s
         if self.presence is Presence.STARTING:
-            self._check_started(now)
+            self._check_started(now_s)
         if self._boot is None:
-            return self._measures.tick(now) if self.presence is Presence.READY else []
-        frames = self._boot.tick(now)
+            return self._measures.tick(now_s) if self.presence is Presence.READY else []
+        frames = self._boot.tick(now_s)
         if self._boot.error is not None:
             self.boot_error = str(self._boot.error)
-            self.lose(f"could not be booted: {self.boot_error}", now)
+            self.lose(f"could not be booted: {self.boot_error}", now_s)
         elif self._boot.report is not None and self.others_are_configured():
-            frames.append(self._start(self._boot.report, now))
+            frames.append(self._start(self._boot.report, now_s))
         return frames
 
-    def _start(self, report: BootReport, now: float) -> Frame:
+    def _start(self, report: BootReport, now_s: float) -> Frame:
         self._boot_up_at = self._boot.boot_up_at if self._boot is not None else -math.inf
         self.report = report
         self._lost_heartbeat = False
@@ -325,24 +325,24 @@ class CanopenNode:
         self.nmt_state = None
         for axis in self.axes:
             axis.travel.reset_reference()  # to what came since it was lost: another drive of this id may have sent it
-        self._go(Presence.STARTING, now)
+        self._go(Presence.STARTING, now_s)
         return nmt(NmtCommand.START, self.node_id)
 
-    def _check_started(self, now: float) -> None:
-        heard = all(axis.age_s(now) <= self._robot.timeouts.feedback_s for axis in self.axes)
+    def _check_started(self, now_s: float) -> None:
+        heard = all(axis.age_s(now_s) <= self._robot.timeouts.feedback_s for axis in self.axes)
         if heard and self.nmt_state is NmtState.OPERATIONAL:
             self.boot_error = ""
-            self._go(Presence.READY, now)
-        elif now - self._since_s > START_TIMEOUT_S:
-            self.boot_error = f"within {START_TIMEOUT_S:.1f} s of NMT start it sent {self._not_started(now)}"
-            self.lose(f"could not be started: {self.boot_error}", now)
+            self._go(Presence.READY, now_s)
+        elif now_s - self._since_s > START_TIMEOUT_S:
+            self.boot_error = f"within {START_TIMEOUT_S:.1f} s of NMT start it sent {self._not_started(now_s)}"
+            self.lose(f"could not be started: {self.boot_error}", now_s)
 
-    def _not_started(self, now: float) -> str:
+    def _not_started(self, now_s: float) -> str:
         """What a node that was started has not sent, and what that may come from. It has answered SDOs until then."""
         lacking = [
             f"no status of {axis.drive.joint} (its TPDOs: see pdo.synchronous of its drive profile)"
             for axis in self.axes
-            if axis.age_s(now) > self._robot.timeouts.feedback_s
+            if axis.age_s(now_s) > self._robot.timeouts.feedback_s
         ]
         if self.nmt_state is None:
             lacking.append("no heartbeat (1017h; a drive that knows node guarding alone cannot be used)")
@@ -351,5 +351,5 @@ class CanopenNode:
         notes = self.report.notes if self.report else ()
         return " and ".join(lacking) + (f"; its boot noted: {'; '.join(notes)}" if notes else "")
 
-    def _go(self, presence: Presence, now: float) -> None:
-        self.presence, self._since_s = presence, now
+    def _go(self, presence: Presence, now_s: float) -> None:
+        self.presence, self._since_s = presence, now_s

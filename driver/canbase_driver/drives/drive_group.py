@@ -39,7 +39,7 @@ class Drives:
     def _are_configured_without(self, node: CanopenNode) -> bool:
         return not any(other.is_being_configured for other in self.nodes if other is not node)
 
-    def tick(self, now: float, may_boot: bool, sync_since: float) -> list[Frame]:
+    def tick(self, now_s: float, may_boot: bool, sync_since: float) -> list[Frame]:
         """Once a cycle: every node goes on, another one first each time; those that are gone begin their boot, those
         that are silent are looked for. `sync_since`: start of the present run of SYNCs [s].
         """
@@ -47,35 +47,35 @@ class Drives:
         self._first = (self._first + 1) % len(self.nodes)
         frames: list[Frame] = []
         for node in (*self.nodes[self._first :], *self.nodes[: self._first]):
-            frames += self.go_on(node, now)
+            frames += self.go_on(node, now_s)
             if may_boot:
-                node.seek(now, sync_since)
-                node.begin_boot(now)
+                node.seek(now_s, sync_since)
+                node.begin_boot(now_s)
         return frames
 
-    def go_on(self, node: CanopenNode, now: float) -> list[Frame]:
+    def go_on(self, node: CanopenNode, now_s: float) -> list[Frame]:
         """What a node sends next; while it is being configured, only as far as the bus has room for it."""
         if node.is_being_configured and self._budget.is_spent:
             return []
-        frames = node.tick(now)
+        frames = node.tick(now_s)
         self._budget.spend(len(frames))
         return frames
 
-    def booting(self, now: float) -> str:
+    def booting(self, now_s: float) -> str:
         """What a node that is being booted or started is waiting for."""
-        return _first(node.waiting_for(now) for node in self.nodes)
+        return _first(node.waiting_for(now_s) for node in self.nodes)
 
-    def missing(self, now: float) -> str:
+    def missing(self, now_s: float) -> str:
         """Which node could not be booted for timeouts.boot_s, and why."""
-        return _first(node.missing(now) for node in self.nodes)
+        return _first(node.missing(now_s) for node in self.nodes)
 
     def absent(self) -> str:
         """Why a node must be booted again."""
         return _first(node.absent() for node in self.nodes)
 
-    def silent(self, now: float, sync_since: float) -> str:
+    def silent(self, now_s: float, sync_since: float) -> str:
         """Which node gives no fresh status or heartbeat. `sync_since`: start of the present run of SYNCs [s]."""
-        return _first(node.silent(now, sync_since) for node in self.nodes)
+        return _first(node.silent(now_s, sync_since) for node in self.nodes)
 
     def fault(self) -> str:
         """Which axis is in fault or in its reaction to one, and the code that the drive gave."""
@@ -89,22 +89,22 @@ class Drives:
         """Which axis has not got as far as switched on, and what that may come from."""
         return _first(_unprepared(axis) for axis in self.axes)
 
-    def are_fresh(self, now: float) -> bool:
+    def are_fresh(self, now_s: float) -> bool:
         """Every axis has given all its values in time."""
-        return all(self._is_fresh(axis, now) for axis in self.axes)
+        return all(self._is_fresh(axis, now_s) for axis in self.axes)
 
-    def stand(self, now: float) -> bool:
+    def stand(self, now_s: float) -> bool:
         """Measured, fresh, and evidence: no wheel turns."""
-        return all(axis.stands(now) for axis in self.axes)
+        return all(axis.stands(now_s) for axis in self.axes)
 
     def rest(self, left_mps: float, right_mps: float) -> bool:
         """Nothing is ordered of any wheel, and these speeds of the rims order nothing either."""
         speeds = {"left": left_mps, "right": right_mps}
         return all(axis.rests(speeds[axis.drive.side]) for axis in self.axes)
 
-    def turning(self, now: float) -> str:
+    def turning(self, now_s: float) -> str:
         """Which wheel does not stand, and why that is said; empty: all stand."""
-        return _first(self._turning(axis, now) for axis in self.axes)
+        return _first(self._turning(axis, now_s) for axis in self.axes)
 
     def doubt(self, node_id: int, why: str) -> None:
         """What this node measures is no evidence: somebody has caught it with a lie."""
@@ -116,14 +116,16 @@ class Drives:
         """Which wheel's sensors are no evidence, and why; empty: none."""
         return _first(_of(axis, axis.stillness.doubt) for axis in self.axes)
 
-    def assumed(self, now: float) -> str:
+    def assumed(self, now_s: float) -> str:
         """Which wheel's standstill is assumed and not measured, and why; empty: none."""
-        return _first(_of(axis, axis.stillness.assumed(now)) for axis in self.axes)
+        return _first(_of(axis, axis.stillness.assumed(now_s)) for axis in self.axes)
 
-    def may_have_power(self, now: float) -> bool:
+    def may_have_power(self, now_s: float) -> bool:
         """Some axis has torque, or does not tell."""
         fresh_s = self._robot.timeouts.feedback_s
-        return any(now - axis.status_at > fresh_s or axis.state is None or axis.state.has_torque for axis in self.axes)
+        return any(
+            now_s - axis.status_at > fresh_s or axis.state is None or axis.state.has_torque for axis in self.axes
+        )
 
     def have_references(self) -> bool:
         """The travel of every wheel is known since its first sample."""
@@ -150,43 +152,43 @@ class Drives:
         """The axis with the greatest measured speed."""
         return max(self.axes, key=lambda axis: abs(axis.velocity_mps))
 
-    def braking_mps(self, now: float) -> float:
+    def braking_mps(self, now_s: float) -> float:
         """The greatest speed of a wheel with power that was measured in the last moments; 0: there is none [m/s]."""
-        return max((abs(each.velocity_mps) for each in self.axes if self._is_driven(each, now)), default=0.0)
+        return max((abs(each.velocity_mps) for each in self.axes if self._is_driven(each, now_s)), default=0.0)
 
-    def _is_driven(self, axis: Axis, now: float) -> bool:
+    def _is_driven(self, axis: Axis, now_s: float) -> bool:
         """With power, by fresh values; or it tells its speed alone, by SDO, and may have power."""
         if axis.state is None:
-            return now - axis.velocity_at <= self._robot.timeouts.feedback_s
-        return self._is_fresh(axis, now) and axis.state.has_torque
+            return now_s - axis.velocity_at <= self._robot.timeouts.feedback_s
+        return self._is_fresh(axis, now_s) and axis.state.has_torque
 
-    def snapshots(self, now: float) -> tuple[DriveSnapshot, ...]:
+    def snapshots(self, now_s: float) -> tuple[DriveSnapshot, ...]:
         """One per axis, in the order of robot.yaml."""
-        return tuple(_snapshot(node, axis, self._robot, now) for node, axis in self._with_node)
+        return tuple(_snapshot(node, axis, self._robot, now_s) for node, axis in self._with_node)
 
-    def _turning(self, axis: Axis, now: float) -> str:
-        if axis.stands(now):
+    def _turning(self, axis: Axis, now_s: float) -> str:
+        if axis.stands(now_s):
             return ""
         joint, base = axis.drive.joint, self._robot.base
-        if not self._is_fresh(axis, now):
-            return f"{joint} has given no velocity for {axis.age_s(now):.2f} s"
+        if not self._is_fresh(axis, now_s):
+            return f"{joint} has given no velocity for {axis.age_s(now_s):.2f} s"
         if axis.stillness.doubt:
             return f"{joint} {axis.stillness.doubt}: its sensors are no evidence of standstill"
         return f"{joint} turns at {axis.velocity_mps:.3f} m/s (base.standstill_mps {base.standstill_mps:g})"
 
-    def _is_fresh(self, axis: Axis, now: float) -> bool:
-        return axis.age_s(now) <= self._robot.timeouts.feedback_s
+    def _is_fresh(self, axis: Axis, now_s: float) -> bool:
+        return axis.age_s(now_s) <= self._robot.timeouts.feedback_s
 
 
-def age_s(now: float, then: float) -> float:
+def age_s(now_s: float, then: float) -> float:
     """Seconds since `then`; NaN when that never was (minus infinity)."""
-    return now - then if then > -math.inf else math.nan
+    return now_s - then if then > -math.inf else math.nan
 
 
-def _snapshot(node: CanopenNode, axis: Axis, robot: Robot, now: float) -> DriveSnapshot:
+def _snapshot(node: CanopenNode, axis: Axis, robot: Robot, now_s: float) -> DriveSnapshot:
     radius_m = robot.base.wheel_radius_m
     code = node.emcy.code if node.emcy else 0
-    measured = node.measured(axis, now)
+    measured = node.measured(axis, now_s)
     return DriveSnapshot(
         joint=axis.drive.joint,
         node_id=node.node_id,
@@ -199,8 +201,8 @@ def _snapshot(node: CanopenNode, axis: Axis, robot: Robot, now: float) -> DriveS
         target_radps=axis.target_mps / radius_m,
         velocity_radps=axis.velocity_mps / radius_m,
         position_rad=axis.position_rad,
-        feedback_age_s=age_s(now, axis.fed_at),
-        heartbeat_age_s=age_s(now, node.heartbeat_at),
+        feedback_age_s=age_s(now_s, axis.fed_at),
+        heartbeat_age_s=age_s(now_s, node.heartbeat_at),
         stops_by_itself=node.report is not None and node.report.stops_by_itself,
         self_stop=node.report.self_stop if node.report else "",
         warning=bool(axis.statusword & WARNING),

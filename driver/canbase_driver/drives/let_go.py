@@ -47,9 +47,11 @@ class Push:
         """With nothing ordered, only letting go tells whether the wheel stands."""
         return self._owes and self.pushed_s >= self._limit_s
 
-    def on_sample(self, travel_m: float, share: float | None, ordered_mps: float, has_torque: bool, now: float) -> None:
+    def on_sample(
+        self, travel_m: float, share: float | None, ordered_mps: float, has_torque: bool, now_s: float
+    ) -> None:
         """Encoder and torque of one SYNC, and what an enabled drive was ordered before it."""
-        elapsed_s, self._at = min(max(now - self._at, 0.0), LONGEST_STEP_S), now
+        elapsed_s, self._at = min(max(now_s - self._at, 0.0), LONGEST_STEP_S), now_s
         self._tells = self._tells or bool(share)
         self.share = share if self._tells else None
         torque = 1.0 if self.share is None else abs(self.share)
@@ -102,24 +104,24 @@ class LetGo:
         """Nothing is to be ordered."""
         return self._phase is not Phase.HELD
 
-    def excuses(self, now: float) -> bool:
+    def excuses(self, now_s: float) -> bool:
         """A drive that is not enabled is so because of this."""
-        return self.active and now - self._since <= RETURN_S
+        return self.active and now_s - self._since <= RETURN_S
 
     def end(self) -> None:
         """Something else decides about the power."""
         self._phase = Phase.HELD
 
-    def step(self, wheels: Sequence[Wheel], rests: bool, now: float) -> None:
+    def step(self, wheels: Sequence[Wheel], rests: bool, now_s: float) -> None:
         """One cycle in which the drives are to be enabled; `rests`: zero is ordered of all wheels."""
         if self._phase is Phase.HELD and rests and self._is_due(wheels):
-            self._phase, self._since = Phase.LETTING_GO, now
+            self._phase, self._since = Phase.LETTING_GO, now_s
         elif self._phase is Phase.LETTING_GO and all(wheel.state and not wheel.state.has_torque for wheel in wheels):
             self._phase = Phase.RETURNING
         elif self._phase is Phase.RETURNING and all(wheel.state is DriveState.OPERATION_ENABLED for wheel in wheels):
             self._phase = Phase.HELD
 
-    def goal(self, now: float) -> PowerGoal:
+    def goal(self, now_s: float) -> PowerGoal:
         """What the drives are told: disable operation, and where that has no effect, disable voltage.
 
         A wheel that a threshold releases at that moment turns, and its drive brakes it first (605Ch). None may have
@@ -127,7 +129,7 @@ class LetGo:
         """
         if self._phase is not Phase.LETTING_GO:
             return PowerGoal.ON
-        return PowerGoal.LET_GO if now - self._since <= self._disable_s else PowerGoal.READY
+        return PowerGoal.LET_GO if now_s - self._since <= self._disable_s else PowerGoal.READY
 
     def _is_due(self, wheels: Sequence[Wheel]) -> bool:
         stand = all(abs(wheel.velocity_mps) <= self._still_mps for wheel in wheels)

@@ -35,21 +35,21 @@ class OdometryFeed:
         self._sets += 1
         self.odometry.reset(pose)
 
-    def update(self, now: float) -> None:
+    def update(self, now_s: float) -> None:
         """Take the sample in if every wheel has given a fresh one since the last; call it after each feedback."""
         axes = self._drives.axes
-        if not all(axis.has_fresh_sample(now) for axis in axes):
+        if not all(axis.has_fresh_sample(now_s) for axis in axes):
             return
         for axis in axes:
             axis.sample_taken()
-        if now > self._taken_at and self._drives.have_references():
-            self._enter(now)
+        if now_s > self._taken_at and self._drives.have_references():
+            self._enter(now_s)
 
-    def _enter(self, now: float) -> None:
+    def _enter(self, now_s: float) -> None:
         losses = self._drives.losses()
         if losses != self._losses:
             self._losses = losses
             self.odometry.lose_reference()
-        self.odometry.update(*self._drives.travel_m(), min(now - self._taken_at, LONGEST_S))
-        self._taken_at = now
+        self.odometry.update(*self._drives.travel_m(), min(now_s - self._taken_at, LONGEST_S))
+        self._taken_at = now_s
         self.serial += 1

@@ -39,10 +39,10 @@ class SdoStop:
         self._waits_for = b""
         """Address of the request that is not answered yet."""
 
-    def frames(self, controlwords: Sequence[int], now: float) -> list[Frame]:
+    def frames(self, controlwords: Sequence[int], now_s: float) -> list[Frame]:
         """The next request, PERIOD_S after the last one that was answered: 6040h of each axis, once where motors share
         one, then 606Ch of each. A controlword that is not answered is sent again."""
-        if now - self._sent_at < (AGAIN_S if self._waits_for else PERIOD_S):
+        if now_s - self._sent_at < (AGAIN_S if self._waits_for else PERIOD_S):
             return []
         words = zip(self._drives, controlwords, strict=True)
         writes = dict.fromkeys(write_at(drive, CONTROLWORD, word) for drive, word in words)
@@ -50,8 +50,8 @@ class SdoStop:
         reads = isinstance(steps[self._turn % len(steps)], Read)
         if not self._waits_for or reads or self._tries >= TRIES:
             self._turn, self._tries = self._turn + 1, 0
-        frame = SdoClient(self._node_id, AGAIN_S, attempts=1).start(steps[self._turn % len(steps)], now)
-        self._sent_at, self._waits_for, self._tries = now, frame.data[1:4], self._tries + 1
+        frame = SdoClient(self._node_id, AGAIN_S, attempts=1).start(steps[self._turn % len(steps)], now_s)
+        self._sent_at, self._waits_for, self._tries = now_s, frame.data[1:4], self._tries + 1
         return [frame]
 
     def speed(self, frame: Frame) -> tuple[int, int] | None:

@@ -91,30 +91,30 @@ class Stillness:
             self._stopping.forget()
         self.pause()
 
-    def on_power(self, has_torque: bool, now: float, follows: bool = False) -> None:
+    def on_power(self, has_torque: bool, now_s: float, follows: bool = False) -> None:
         """What the statusword tells; `follows`: operation enabled, where it is the watchdog that judges a sudden stop.
 
         Power after a stand that was assumed: the sensors get a new trial.
         """
-        if has_torque and self.doubt and self.rolled_out(now):
+        if has_torque and self.doubt and self.rolled_out(now_s):
             self._lie, self._sudden, self._unshown_m = "", "", 0.0
             self._stopping.forget()
         self._follows = follows
-        self._off_since = math.inf if has_torque else min(self._off_since, now)
+        self._off_since = math.inf if has_torque else min(self._off_since, now_s)
 
-    def on_sample(self, travel_m: float, velocity_mps: float, ordered_mps: float, now: float) -> None:
+    def on_sample(self, travel_m: float, velocity_mps: float, ordered_mps: float, now_s: float) -> None:
         """Encoder and velocity of one SYNC; `ordered_mps`: what an enabled drive was ordered before it, else 0."""
-        limits, elapsed_s = self._limits, now - self._at
+        limits, elapsed_s = self._limits, now_s - self._at
         first = self._at == -math.inf
         step_m = 0.0 if first else abs(travel_m - self._travel_m)
         slow_m = 0.0 if first else STEP_FACTOR * limits.standstill_mps * elapsed_s
         moved = first or abs(travel_m - self._anchor_m) > max(limits.standstill_mps * STILL_S, self._grain_m)
         if moved:
-            self._anchor_m, self._still_since = travel_m, now
+            self._anchor_m, self._still_since = travel_m, now_s
         speed_mps = abs(velocity_mps)
         slow = speed_mps <= limits.standstill_mps and step_m <= max(slow_m, self._grain_m)
-        self._quiet = slow or (speed_mps <= limits.noise_mps and now - self._still_since >= STILL_S)
-        self._travel_m, self._at = travel_m, now
+        self._quiet = slow or (speed_mps <= limits.noise_mps and now_s - self._still_since >= STILL_S)
+        self._travel_m, self._at = travel_m, now_s
         if not first:
             self._compare(moved and speed_mps > limits.standstill_mps, abs(ordered_mps) * elapsed_s)
         shown_mps = 0.0 if first else min(speed_mps, step_m / max(elapsed_s, SHORTEST_S))
@@ -145,19 +145,19 @@ class Stillness:
         """Somebody else has caught the sensors with a lie."""
         self._lie = why
 
-    def stands(self, now: float) -> bool:
+    def stands(self, now_s: float) -> bool:
         """The last sample says so, and is evidence; or nothing has driven it for longer than it rolls."""
-        return self._quiet and (not self.doubt or self.rolled_out(now))
+        return self._quiet and (not self.doubt or self.rolled_out(now_s))
 
-    def rolled_out(self, now: float) -> bool:
+    def rolled_out(self, now_s: float) -> bool:
         """Its power has been off, by its own statusword, for longer than a wheel rolls on a level floor."""
-        return now - self._off_since >= self._limits.coasting_s
+        return now_s - self._off_since >= self._limits.coasting_s
 
-    def assumed(self, now: float) -> str:
+    def assumed(self, now_s: float) -> str:
         """Why its standstill is assumed and not measured; empty: it is measured, or it does not stand."""
-        if not self.doubt or not self.stands(now):
+        if not self.doubt or not self.stands(now_s):
             return ""
-        return f"{self.doubt}; its power has been off for {now - self._off_since:.0f} s, so a stand is assumed"
+        return f"{self.doubt}; its power has been off for {now_s - self._off_since:.0f} s, so a stand is assumed"
 
     def _compare(self, shown: bool, ordered_m: float) -> None:
         if shown:

@@ -52,32 +52,32 @@ class Measures:
         self._asked_at = -math.inf
         self._waits = False
 
-    def tick(self, now: float) -> list[Frame]:
+    def tick(self, now_s: float) -> list[Frame]:
         """The next request, when one is due."""
         if self._waits:
-            frames = self._client.tick(now)
-            self._take(now)
+            frames = self._client.tick(now_s)
+            self._take(now_s)
             return frames
-        if not self._points or now < self._asked_at + PERIOD_S:
+        if not self._points or now_s < self._asked_at + PERIOD_S:
             return []
         self._turn = (self._turn + 1) % len(self._points)
-        self._asked_at, self._waits = now, True
-        return [self._client.start(self._points[self._turn].read, now)]
+        self._asked_at, self._waits = now_s, True
+        return [self._client.start(self._points[self._turn].read, now_s)]
 
-    def on_frame(self, frame: Frame, now: float) -> list[Frame]:
+    def on_frame(self, frame: Frame, now_s: float) -> list[Frame]:
         """Take an SDO answer; those to somebody else's requests are dropped."""
         if not self._waits:
             return []
-        frames = self._client.on_frame(frame, now)
-        self._take(now)
+        frames = self._client.on_frame(frame, now_s)
+        self._take(now_s)
         return frames
 
-    def values(self, axis: int, now: float) -> Values:
+    def values(self, axis: int, now_s: float) -> Values:
         """What is known of an axis."""
-        fresh = [point for point in self._points if point.axis == axis and now - point.at <= STALE_S]
+        fresh = [point for point in self._points if point.axis == axis and now_s - point.at <= STALE_S]
         return Values(**{point.name: point.value for point in fresh})
 
-    def _take(self, now: float) -> None:
+    def _take(self, now_s: float) -> None:
         if self._client.busy:
             return
         self._waits = False
@@ -89,7 +89,7 @@ class Measures:
                 self._points.remove(point)
             return
         raw = int.from_bytes(data[: point.measured.bits // 8], "little", signed=point.measured.signed)
-        point.value, point.at = raw * point.measured.scale, now
+        point.value, point.at = raw * point.measured.scale, now_s
 
 
 def _points(drive: Drive) -> list[_Point]:

@@ -34,24 +34,24 @@ class Slowing:
         self._since = self._slow_at = -math.inf
         self._bad = 0
 
-    def begin(self, now: float) -> None:
+    def begin(self, now_s: float) -> None:
         """A quick stop begins now."""
         self._past.clear()
-        self._since = self._slow_at = now
+        self._since = self._slow_at = now_s
         self._bad = 0
 
-    def fails(self, speed_mps: float, now: float) -> bool:
+    def fails(self, speed_mps: float, now_s: float) -> bool:
         """Once a cycle: for LASTS_S the wheel has been above all lines of HELD_S that are a window old."""
-        height_mps = speed_mps + self._least_mps2 * (now - self._since)
-        self._past.append((now, height_mps))
-        while self._past[0][0] < now - self._window_s - HELD_S:
+        height_mps = speed_mps + self._least_mps2 * (now_s - self._since)
+        self._past.append((now_s, height_mps))
+        while self._past[0][0] < now_s - self._window_s - HELD_S:
             self._past.popleft()
-        heights = [height for at, height in self._past if at <= now - self._window_s]
+        heights = [height for at, height in self._past if at <= now_s - self._window_s]
         slows = not heights or height_mps <= max(heights) + self._noise_mps
-        if slows or speed_mps <= self._floor_mps or now < self._since + self._lag_s + self._window_s:
-            self._slow_at, self._bad = now, -1
+        if slows or speed_mps <= self._floor_mps or now_s < self._since + self._lag_s + self._window_s:
+            self._slow_at, self._bad = now_s, -1
         self._bad += 1
-        return self._bad >= LEAST_SAMPLES and now - self._slow_at >= LASTS_S
+        return self._bad >= LEAST_SAMPLES and now_s - self._slow_at >= LASTS_S
 
 
 class Braking:
@@ -66,11 +66,11 @@ class Braking:
         self._against = 0
         self._slowing, self._cycles = Slowing(robot), samples(robot, BRAKING_SAMPLES)
 
-    def begin(self, speed_mps: float, turn_radps: float, now: float, quick: bool) -> None:
+    def begin(self, speed_mps: float, turn_radps: float, now_s: float, quick: bool) -> None:
         """A ramp, or a quick stop of the drives, from this wheel speed and turn of the base, begins now."""
         speed_mps, turn_radps = abs(speed_mps), abs(turn_radps)
-        self._since, self._against = now, 0
-        self._slowing.begin(now)
+        self._since, self._against = now_s, 0
+        self._slowing.begin(now_s)
         self._from_mps = speed_mps * (1.0 + self._share) + self._fixed_mps
         ordinary = self._limits.deceleration_mps2
         if quick:
@@ -79,15 +79,15 @@ class Braking:
             time_s = ramp(self._limits, max(speed_mps, self._fixed_mps), turn_radps).time_s
             self._slope_mps2 = BRAKING_SHARE * max(speed_mps, self._fixed_mps) / time_s
 
-    def allowed_mps(self, now: float) -> float:
+    def allowed_mps(self, now_s: float) -> float:
         """The speed that is left at most; below zero the wheels should stand."""
-        return self._from_mps - self._slope_mps2 * max(0.0, now - self._since - self._lag_s)
+        return self._from_mps - self._slope_mps2 * max(0.0, now_s - self._since - self._lag_s)
 
-    def fails(self, speed_mps: float, now: float) -> bool:
+    def fails(self, speed_mps: float, now_s: float) -> bool:
         """Once a cycle, while some wheel does not stand: its speed is too high now and was in the last cycles."""
-        self._against = self._against + 1 if abs(speed_mps) > self.allowed_mps(now) else 0
+        self._against = self._against + 1 if abs(speed_mps) > self.allowed_mps(now_s) else 0
         return self._against >= self._cycles
 
-    def keeps_speed(self, speed_mps: float, now: float) -> bool:
+    def keeps_speed(self, speed_mps: float, now_s: float) -> bool:
         """Once a cycle of a quick stop, with the speed of the fastest wheel with power: it has not lost any."""
-        return self._slowing.fails(abs(speed_mps), now)
+        return self._slowing.fails(abs(speed_mps), now_s)

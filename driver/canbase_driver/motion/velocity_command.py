@@ -33,24 +33,24 @@ class Command:
         """Whether the base has to brake with the emergency deceleration, until it is said otherwise or not any more."""
         self._emergency_at = received_at if brakes_hard else -math.inf
 
-    def brakes_hard(self, now: float) -> bool:
+    def brakes_hard(self, now_s: float) -> bool:
         """The emergency deceleration was asked for within the timeout. Whatever the command is, that means a stop."""
-        return now - self._emergency_at <= self._timeout_s
+        return now_s - self._emergency_at <= self._timeout_s
 
     def await_zero(self) -> None:
         """From now on nothing is followed until a zero has come: who holds the stick must let go of it once."""
         self._seen_zero = False
 
-    def is_fresh(self, now: float) -> bool:
+    def is_fresh(self, now_s: float) -> bool:
         """It came within the timeout."""
-        return now - self.received_at <= self._timeout_s
+        return now_s - self.received_at <= self._timeout_s
 
-    def motion(self, now: float) -> str:
+    def motion(self, now_s: float) -> str:
         """A sentence when a fresh command asks for motion, followed or not."""
-        if not self.is_fresh(now) or self._twist == Twist2D.ZERO:
+        if not self.is_fresh(now_s) or self._twist == Twist2D.ZERO:
             return ""
         return f"cmd_vel orders {self._twist.linear_mps:.3f} m/s, {self._twist.angular_radps:.3f} rad/s"
 
-    def target(self, now: float) -> Twist2D:
+    def target(self, now_s: float) -> Twist2D:
         """What to follow: the command, zero when it is too old or no zero was seen yet."""
-        return self._twist if self._seen_zero and self.is_fresh(now) else Twist2D.ZERO
+        return self._twist if self._seen_zero and self.is_fresh(now_s) else Twist2D.ZERO

@@ -81,10 +81,10 @@ class MotorDriverNode(ManagedNode):
         self._warn_of_boots(snapshot)
         self._previous = snapshot
 
-    def look_at_the_clock(self, now: float) -> None:
+    def look_at_the_clock(self, now_s: float) -> None:
         """To be called in each turn of the executor's loop: a pause between two of them ages the commands that wait."""
-        self._receive_times.at(now)
-        self.request_times.at(now)
+        self._receive_times.at(now_s)
+        self.request_times.at(now_s)
 
     def end(self) -> None:
         """The control thread has ended: tell the stops that are still open."""
@@ -99,9 +99,9 @@ class MotorDriverNode(ManagedNode):
         self._stops.on_command(twist, received_at)
 
     def _on_safety(self, message: SafetyState) -> None:
-        now = time.monotonic()
-        self._loop.emergency(message.emergency, now)
-        self._stops.on_filter(message, now)
+        now_s = time.monotonic()
+        self._loop.emergency(message.emergency, now_s)
+        self._stops.on_filter(message, now_s)
 
     def _publish_status(self, snapshot: DriverSnapshot, stamp: object) -> None:
         previous = self._previous

@@ -55,17 +55,17 @@ class StopEvents:
         moves = twist.is_finite and twist != Twist2D.ZERO
         self._news.put(lambda: self._recorder.on_command(moves, received_at))
 
-    def on_filter(self, message: SafetyState, now: float) -> None:
+    def on_filter(self, message: SafetyState, now_s: float) -> None:
         """The safety filter said what it does; from the executor's thread."""
         stops = message.action == SafetyState.STOP
         cause, detail = printable(message.cause), printable(message.detail, SENTENCE_LENGTH)
         said = f"safety_filter {cause} {detail}".rstrip()
         ordered = f"{message.ordered_linear_mps:.4f} m/s {message.ordered_angular_radps:.4f} rad/s"
-        self._ring.note(now, f"{said}; orders {ordered}, lease {message.lease_sequence}")
+        self._ring.note(now_s, f"{said}; orders {ordered}, lease {message.lease_sequence}")
         latched = self._estop_latches and message.cause in (SafetyState.CAUSE_ESTOP, SafetyState.CAUSE_ESTOP_STALE)
         clears_on = printable(message.clears_on, SENTENCE_LENGTH)
-        record = StopRecord(FILTER, cause, detail, latched, clears_on, now)
-        self._news.put(lambda: self._recorder.on_filter(record if stops else None, now))
+        record = StopRecord(FILTER, cause, detail, latched, clears_on, now_s)
+        self._news.put(lambda: self._recorder.on_filter(record if stops else None, now_s))
 
     def note(self, text: str) -> None:
         """A line for the black box."""
@@ -88,9 +88,9 @@ class StopEvents:
             self._publish(report)
 
     def _publish(self, report: StopReport) -> None:
-        record, now = report.record, time.monotonic()
-        stamp_ns = self._node.get_clock().now().nanoseconds - round((now - record.at_s) * 1e9)
-        path = self._write(report, now) if record.latched else ""
+        record, now_s = report.record, time.monotonic()
+        stamp_ns = self._node.get_clock().now().nanoseconds - round((now_s - record.at_s) * 1e9)
+        path = self._write(report, now_s) if record.latched else ""
         stamp = Time(sec=stamp_ns // 1_000_000_000, nanosec=stamp_ns % 1_000_000_000)
         self._publisher.publish(stop_event_message(report, stamp, path))
         end = standstill_text(report)
@@ -108,15 +108,15 @@ class StopEvents:
             black_box=path,
         )
 
-    def _write(self, report: StopReport, now: float) -> str:
-        record, offset_s = report.record, time.time() - now
+    def _write(self, report: StopReport, now_s: float) -> str:
+        record, offset_s = report.record, time.time() - now_s
         title = f"stop by {record.stopped_by}: {record.cause} ({record.detail})"
-        recording = self._ring.cut(now, offset_s)
+        recording = self._ring.cut(now_s, offset_s)
         return self._writer.submit(recording, record.cause, record.at_s + offset_s, title)
 
     def _on_mux(self, message: MuxState) -> None:
-        now, active = time.monotonic(), printable(message.active)
+        now_s, active = time.monotonic(), printable(message.active)
         reasons = (f"{source.name}: {source.reason}" for source in message.sources if source.reason)
         detail = printable("; ".join(reasons), SENTENCE_LENGTH)
-        self._ring.note(now, f"velocity_mux {active or 'no source'}; {detail}")
-        self._news.put(lambda: self._recorder.on_mux(active, detail, now))
+        self._ring.note(now_s, f"velocity_mux {active or 'no source'}; {detail}")
+        self._news.put(lambda: self._recorder.on_mux(active, detail, now_s))

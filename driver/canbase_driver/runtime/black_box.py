@@ -41,17 +41,17 @@ class Ring:
         self._frames: deque[FrameEntry] = deque(maxlen=MAX_FRAMES)
         self._notes: deque[NoteEntry] = deque(maxlen=MAX_NOTES)
 
-    def frame(self, now: float, cob_id: int, data: bytes, received: bool) -> None:
+    def frame(self, now_s: float, cob_id: int, data: bytes, received: bool) -> None:
         """A frame was received, or given to the bus."""
-        self._frames.append((now, cob_id, data, received))
+        self._frames.append((now_s, cob_id, data, received))
 
-    def note(self, now: float, text: str) -> None:
+    def note(self, now_s: float, text: str) -> None:
         """Something else happened."""
-        self._notes.append((now, text))
+        self._notes.append((now_s, text))
 
-    def cut(self, now: float, wall_offset_s: float) -> Recording:
-        """What happened in the last seconds before `now`."""
-        since = now - self._seconds
+    def cut(self, now_s: float, wall_offset_s: float) -> Recording:
+        """What happened in the last seconds before `now_s`."""
+        since = now_s - self._seconds
         frames, notes = self._frames.copy(), self._notes.copy()
         return Recording(
             tuple(entry for entry in frames if entry[0] >= since),

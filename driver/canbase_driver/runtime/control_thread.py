@@ -100,16 +100,16 @@ class ControlLoop(threading.Thread):
 
     def reset(self, on_outcome: OnOutcome) -> None:
         """Reset."""
-        self._ask(lambda now, answer: self._core.request_reset(now, answer), on_outcome)
+        self._ask(lambda now_s, answer: self._core.request_reset(now_s, answer), on_outcome)
 
     def set_pose(self, pose: Pose2D, on_outcome: OnOutcome) -> None:
         """Set the pose of the odometry."""
-        self._ask(lambda now, answer: answer(self._core.set_pose(pose, now)), on_outcome)
+        self._ask(lambda now_s, answer: answer(self._core.set_pose(pose, now_s)), on_outcome)
 
     def aim(self, aim: Aim, on_outcome: OnOutcome) -> None:
         """Go so far. What takes power away is obeyed however late."""
         takes_power = aim <= self._core.aim
-        self._ask(lambda now, answer: self._core.request_aim(aim, now, answer), on_outcome, takes_power)
+        self._ask(lambda now_s, answer: self._core.request_aim(aim, now_s, answer), on_outcome, takes_power)
 
     def deliver(self) -> None:
         """Tell the outcomes that are there. By the thread that asks, and often: nothing here waits."""
@@ -135,11 +135,11 @@ class ControlLoop(threading.Thread):
         def answer(outcome: Outcome) -> None:
             self._outcomes.put((number, outcome))
 
-        def carry_out(now: float) -> None:
-            if now - asked_at > OLD_S and not however_late:
-                answer(Outcome(False, f"refused: motor_driver stood still for {now - asked_at:.1f} s; send it again"))
+        def carry_out(now_s: float) -> None:
+            if now_s - asked_at > OLD_S and not however_late:
+                answer(Outcome(False, f"refused: motor_driver stood still for {now_s - asked_at:.1f} s; send it again"))
             else:
-                request(now, answer)
+                request(now_s, answer)
 
         self._inbox.put(carry_out)
 
@@ -169,16 +169,16 @@ class ControlLoop(threading.Thread):
             cycle_at += self._period_s
             self._take_in_until(cycle_at)
             self._empty_inbox()
-            now = self.cycle_at = time.monotonic()
-            self._core.on_bus(self._bus.problem, now, self._bus.report)
+            now_s = self.cycle_at = time.monotonic()
+            self._core.on_bus(self._bus.problem, now_s, self._bus.report)
             if self._keeper is not None:
                 self._core.on_record(self._keeper.written, self._keeper.problem)
-            self._send(self._core.tick(now, now - cycle_at))
+            self._send(self._core.tick(now_s, now_s - cycle_at))
             if self._keeper is not None:
                 self._keeper.want(self._core.record)
-            self._hand_over_if_due(now)
-            if now - cycle_at > self._period_s:
-                cycle_at = now  # cycles that were missed are not made up for
+            self._hand_over_if_due(now_s)
+            if now_s - cycle_at > self._period_s:
+                cycle_at = now_s  # cycles that were missed are not made up for
 
     def _take_in_until(self, cycle_at: float) -> None:
         """Until then; in a cycle that is late already, what waits: feedback must not starve."""
@@ -187,10 +187,10 @@ class ControlLoop(threading.Thread):
             wait_s = cycle_at - time.monotonic()
             frame = self._bus.receive(max(0.0, wait_s))
             if frame is not None:
-                now = time.monotonic()
-                self._ring.frame(now, frame.cob_id, frame.data, True)
-                self._send(self._core.on_frame(frame, now))
-                self._hand_over_if_due(now)
+                now_s = time.monotonic()
+                self._ring.frame(now_s, frame.cob_id, frame.data, True)
+                self._send(self._core.on_frame(frame, now_s))
+                self._hand_over_if_due(now_s)
             elif wait_s <= 0.0:
                 return
             left -= wait_s <= 0.0
@@ -204,24 +204,26 @@ class ControlLoop(threading.Thread):
             request(time.monotonic())
 
     def _send(self, frames: list[Frame]) -> None:
-        now = time.monotonic()
+        now_s = time.monotonic()
         for frame in frames:
             self._bus.send(frame)
-            self._ring.frame(now, frame.cob_id, frame.data, False)
+            self._ring.frame(now_s, frame.cob_id, frame.data, False)
 
-    def _hand_over_if_due(self, now: float) -> None:
+    def _hand_over_if_due(self, now_s: float) -> None:
         """With each sample of the odometry that is to be published, and at once when the state changes."""
         serial, state = self._core.odometry_serial, self._core.state
         published_serial, published_state = self._published
-        stale = self._snapshot is None and now - self._handed_over_at > self._samples_per_snapshot * self._period_s * 2
+        stale = (
+            self._snapshot is None and now_s - self._handed_over_at > self._samples_per_snapshot * self._period_s * 2
+        )
         if serial - published_serial >= self._samples_per_snapshot or state is not published_state or stale:
-            self._hand_over(now)
+            self._hand_over(now_s)
 
-    def _hand_over(self, now: float) -> None:
+    def _hand_over(self, now_s: float) -> None:
         self._published = (self._core.odometry_serial, self._core.state)
-        self._handed_over_at = now
+        self._handed_over_at = now_s
         with self._condition:
-            self._snapshot = self._core.snapshot(now)
+            self._snapshot = self._core.snapshot(now_s)
             self._stops += self._core.stops
             self._core.stops.clear()
             self._condition.notify_all()

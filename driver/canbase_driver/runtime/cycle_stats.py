@@ -17,14 +17,14 @@ class CycleStats:
         self.overruns = 0
         """Cycles that began more than half a period late."""
 
-    def note(self, now: float, lateness_s: float) -> None:
-        """One cycle began at `now`, `lateness_s` after its time."""
+    def note(self, now_s: float, lateness_s: float) -> None:
+        """One cycle began at `now_s`, `lateness_s` after its time."""
         self.cycles += 1
         self.overruns += lateness_s > self._late_s
         while self._peaks and self._peaks[-1][1] <= lateness_s:
             self._peaks.pop()
-        self._peaks.append((now, lateness_s))
-        while self._peaks[0][0] < now - WINDOW_S:
+        self._peaks.append((now_s, lateness_s))
+        while self._peaks[0][0] < now_s - WINDOW_S:
             self._peaks.popleft()
 
     @property

@@ -132,14 +132,14 @@ def _spin(
     try:
         while not received:
             executor.spin_once(timeout_sec=WAKE_S)
-            now = time.monotonic()
-            node.look_at_the_clock(now)
+            now_s = time.monotonic()
+            node.look_at_the_clock(now_s)
             loop.deliver()
-            failure = _failure(threads) or watch.look(loop.cycle_at, now)
+            failure = _failure(threads) or watch.look(loop.cycle_at, now_s)
             if failure is not None:
                 return failure
             if loop.cycle_at < math.inf:
-                service.alive(node.state_text, now)
+                service.alive(node.state_text, now_s)
     except Exception as error:  # noqa: BLE001 - the base is ramped down, then the process ends by it
         return error
     finally:
@@ -168,12 +168,12 @@ class HangWatch:
         self._cycle_at = self._looked_at = math.inf
         self._seen_s = 0.0
 
-    def look(self, cycle_at: float, now: float) -> TimeoutError | None:
+    def look(self, cycle_at: float, now_s: float) -> TimeoutError | None:
         """Call after each wait with the time of the last cycle. The failure, when there is one."""
-        self._seen_s += max(0.0, min(now - self._looked_at, self._look_s))
-        self._looked_at = now
+        self._seen_s += max(0.0, min(now_s - self._looked_at, self._look_s))
+        self._looked_at = now_s
         if cycle_at != self._cycle_at:
             self._cycle_at, self._seen_s = cycle_at, 0.0
         if self._seen_s <= self._timeout_s:
             return None
-        return TimeoutError(f"the control thread has made no cycle for {now - cycle_at:.1f} s")
+        return TimeoutError(f"the control thread has made no cycle for {now_s - cycle_at:.1f} s")

@@ -72,33 +72,33 @@ class Lifecycle:
         """A sentence while drives must not have power; else empty."""
         return "" if self.aim is Aim.ACTIVE else "lifecycle: not active"
 
-    def request(self, aim: Aim, now: float, on_outcome: Callable[[Outcome], None]) -> None:
+    def request(self, aim: Aim, now_s: float, on_outcome: Callable[[Outcome], None]) -> None:
         """Aim at that; `on_outcome` is called once, when it is there or has failed."""
         if self._change is not None:
             on_outcome(Outcome(False, f"refused: a change to {self.aim.name} is under way"))
             return
-        self._change = _Change(self.aim, now + self._patience_s[aim], on_outcome)
+        self._change = _Change(self.aim, now_s + self._patience_s[aim], on_outcome)
         self.aim = aim
         self.released = self.released and aim is Aim.RELEASED
 
-    def step(self, situation: Situation, state: DriverState, finding: Finding, now: float) -> bool:
+    def step(self, situation: Situation, state: DriverState, finding: Finding, now_s: float) -> bool:
         """Once a cycle, after the supervisor. True: the drives are to be let go now."""
         let_go = self.aim is Aim.RELEASED and not self.released and state in NO_POWER and not situation.powered
         self.released = self.released or let_go
         change = self._change
         if change is not None:
-            outcome = self._outcome(change, situation, state, finding, now)
+            outcome = self._outcome(change, situation, state, finding, now_s)
             if outcome is not None:
                 self._end(change, outcome)
         return let_go
 
     def _outcome(
-        self, change: _Change, situation: Situation, state: DriverState, finding: Finding, now: float
+        self, change: _Change, situation: Situation, state: DriverState, finding: Finding, now_s: float
     ) -> Outcome | None:
         if self._there(change, situation, state):
             return Outcome(True, f"{self.aim.name.lower()} ({state.name.lower()}, {finding.cause.value})")
         hopeless = self.aim is Aim.ACTIVE and state is DriverState.LATCHED
-        if hopeless or now > change.until:
+        if hopeless or now_s > change.until:
             ends = f"; ends on: {finding.clears_on}" if finding.clears_on else ""
             return Outcome(
                 False, f"not {self.aim.name.lower()}: {finding.cause.value} {finding.detail}".rstrip() + ends

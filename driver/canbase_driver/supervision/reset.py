@@ -83,7 +83,7 @@ def refusal(situation: Situation, stopped: bool) -> str | None:
 class Reset:
     """The sequence, stepped once a cycle until it has an outcome."""
 
-    def __init__(self, now: float, cycle_s: float, boot_s: float) -> None:
+    def __init__(self, now_s: float, cycle_s: float, boot_s: float) -> None:
         """`cycle_s`: period of the setpoints; each level of the fault reset bit lasts FAULT_RESET_CYCLES at least.
 
         `boot_s`: how long it waits for drives that boot [s] (timeouts.boot_s).
@@ -91,7 +91,7 @@ class Reset:
         self._boot_s = boot_s
         self.phase = Phase.WATCHDOG
         self._edge_s = max(EDGE_S, FAULT_RESET_CYCLES * cycle_s)
-        self._since_s = now
+        self._since_s = now_s
         self._tries_left = FAULT_TRIES
 
     @property
@@ -99,7 +99,7 @@ class Reset:
         """Bit 7 of the controlword of the drives in fault, in this cycle."""
         return self.phase is Phase.EDGE_HIGH
 
-    def step(self, situation: Situation, answer: int | None, now: float) -> Outcome | None:
+    def step(self, situation: Situation, answer: int | None, now_s: float) -> Outcome | None:
         """Judge the situation and move on; the outcome when it has ended.
 
         `answer`: the watchdog's answer to our request, None while there is none.
@@ -107,42 +107,42 @@ class Reset:
         problem = _first(BREAKS[self.phase], situation)
         if problem:
             return Outcome(False, f"broken off: {problem}")
-        return RULES[self.phase](self, situation, answer, now)
+        return RULES[self.phase](self, situation, answer, now_s)
 
-    def _watchdog(self, situation: Situation, answer: int | None, now: float) -> Outcome | None:
+    def _watchdog(self, situation: Situation, answer: int | None, now_s: float) -> Outcome | None:
         if answer is not None and answer not in ACCEPTED:
             return Outcome(False, f"the watchdog refused: {ANSWERS.get(answer, f'answer {answer}')}")
         if answer is not None and situation.watchdog is WatchdogView.OK:
-            self._go(Phase.DRIVES, now)
-        elif now - self._since_s > WATCHDOG_TIMEOUT_S:
+            self._go(Phase.DRIVES, now_s)
+        elif now_s - self._since_s > WATCHDOG_TIMEOUT_S:
             detail = situation.watchdog_detail or "no answer"
             return Outcome(False, f"the watchdog is not ready after {WATCHDOG_TIMEOUT_S} s ({detail}); reset again")
         return None
 
-    def _drives(self, situation: Situation, _answer: int | None, now: float) -> Outcome | None:
+    def _drives(self, situation: Situation, _answer: int | None, now_s: float) -> Outcome | None:
         if not situation.unready:
-            self._go(Phase.EDGE_LOW if situation.fault else Phase.FAULTS, now)
-        elif now - self._since_s > self._boot_s:
+            self._go(Phase.EDGE_LOW if situation.fault else Phase.FAULTS, now_s)
+        elif now_s - self._since_s > self._boot_s:
             return Outcome(False, f"{situation.unready}; reset again once that is cured")
         return None
 
-    def _edge(self, _situation: Situation, _answer: int | None, now: float) -> Outcome | None:
-        if now - self._since_s >= self._edge_s:
-            self._go(Phase.EDGE_HIGH if self.phase is Phase.EDGE_LOW else Phase.FAULTS, now)
+    def _edge(self, _situation: Situation, _answer: int | None, now_s: float) -> Outcome | None:
+        if now_s - self._since_s >= self._edge_s:
+            self._go(Phase.EDGE_HIGH if self.phase is Phase.EDGE_LOW else Phase.FAULTS, now_s)
         return None
 
-    def _faults(self, situation: Situation, _answer: int | None, now: float) -> Outcome | None:
+    def _faults(self, situation: Situation, _answer: int | None, now_s: float) -> Outcome | None:
         if not situation.fault:
             return Outcome(True, "reset done; the drives get power once the command is zero")
-        if now - self._since_s > FAULT_TIMEOUT_S:
+        if now_s - self._since_s > FAULT_TIMEOUT_S:
             self._tries_left -= 1
             if not self._tries_left:
                 return Outcome(False, f"{situation.fault}: it does not clear; remove its cause, then reset again")
-            self._go(Phase.EDGE_LOW, now)
+            self._go(Phase.EDGE_LOW, now_s)
         return None
 
-    def _go(self, phase: Phase, now: float) -> None:
-        self.phase, self._since_s = phase, now
+    def _go(self, phase: Phase, now_s: float) -> None:
+        self.phase, self._since_s = phase, now_s
 
 
 RULES: dict[Phase, Callable[[Reset, Situation, int | None, float], Outcome | None]] = {

@@ -36,24 +36,24 @@ class ResetRun:
         """Bit 7 of the controlword of the drives in fault, in this cycle."""
         return self._sequence is not None and self._sequence.fault_reset_bit
 
-    def begin(self, situation: Situation, stopped: bool, now: float, on_outcome: OnOutcome) -> bool:
+    def begin(self, situation: Situation, stopped: bool, now_s: float, on_outcome: OnOutcome) -> bool:
         """Whether it begins; `on_outcome` is called at once when it is refused. `stopped`: nothing has power."""
         refused = refusal(situation, stopped)
         if refused is not None:
             on_outcome(Outcome(False, refused))
             return False
-        self._sequence, self._stepped_at = Reset(now, self._cycle_s, self._boot_s), now
+        self._sequence, self._stepped_at = Reset(now_s, self._cycle_s, self._boot_s), now_s
         self._request, self._on_outcome = self._watchdog.request_reset(), on_outcome
         return True
 
-    def step(self, situation: Situation, now: float) -> tuple[list[Frame], Outcome | None]:
+    def step(self, situation: Situation, now_s: float) -> tuple[list[Frame], Outcome | None]:
         """Once a cycle: what to send, and the outcome, which the caller hands to `end`."""
         if self._sequence is None:
             return [], None
-        pause_s, self._stepped_at = now - self._stepped_at, now
+        pause_s, self._stepped_at = now_s - self._stepped_at, now_s
         if pause_s > STOOD_STILL_S:
             return [], Outcome(False, f"broken off: motor_driver stood still for {pause_s:.1f} s; reset again")
-        outcome = self._sequence.step(situation, self._watchdog.answer(), now)
+        outcome = self._sequence.step(situation, self._watchdog.answer(), now_s)
         asks = outcome is None and self._sequence.phase is Phase.WATCHDOG
         return [self._request] if asks else [], outcome
 

@@ -75,24 +75,24 @@ class StopHistory:
         self._moved_at = -math.inf
         self._filter_stops = self._mux_idle = False
 
-    def on_command(self, moves: bool, now: float) -> None:
+    def on_command(self, moves: bool, now_s: float) -> None:
         """A velocity command came; `moves`: it is not zero."""
         if moves:
-            self._moved_at = now
+            self._moved_at = now_s
 
-    def on_filter(self, stop: StopRecord | None, now: float) -> None:
+    def on_filter(self, stop: StopRecord | None, now_s: float) -> None:
         """The safety filter said whether it holds the base, and why; None: it does not."""
         if stop is None:
             self._let_go(FILTER, "")
-        elif not self._filter_stops and (self._is_moving or self._ordered_motion(now)):
+        elif not self._filter_stops and (self._is_moving or self._ordered_motion(now_s)):
             self._begin(stop)
         self._filter_stops = stop is not None
 
-    def on_mux(self, active: str, detail: str, now: float) -> None:
+    def on_mux(self, active: str, detail: str, now_s: float) -> None:
         """The mux said which source drives, empty: none; `detail`: why the last one does not."""
         idle = not active
-        if idle and not self._mux_idle and self._is_moving and self._ordered_motion(now):
-            self._begin(StopRecord(MUX, NO_SOURCE, detail, False, "a source that sends", now))
+        if idle and not self._mux_idle and self._is_moving and self._ordered_motion(now_s):
+            self._begin(StopRecord(MUX, NO_SOURCE, detail, False, "a source that sends", now_s))
         if not idle:
             self._let_go(MUX, "")
         self._mux_idle = idle
@@ -129,8 +129,8 @@ class StopHistory:
     def _is_moving(self) -> bool:
         return self._previous is not None and not self._previous.standstill
 
-    def _ordered_motion(self, now: float) -> bool:
-        return now - self._moved_at <= ORDER_AGE_S
+    def _ordered_motion(self, now_s: float) -> bool:
+        return now_s - self._moved_at <= ORDER_AGE_S
 
     def _begin(self, record: StopRecord) -> None:
         self._open.append(_OpenStop(record, stood=not self._is_moving))

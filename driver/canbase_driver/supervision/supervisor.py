@@ -77,7 +77,7 @@ class Supervisor:
         """A shutdown was asked for, and the way down is at its end."""
         self.latches = latched is not None
         """The stop that is under way, or the last one, needs a reset."""
-        self.now = self._since_s = 0.0
+        self.now_s = self._since_s = 0.0
         self.ramp_timeout_s = ramp_timeout_s
         self.braking = braking
 
@@ -89,11 +89,11 @@ class Supervisor:
     @property
     def elapsed_s(self) -> float:
         """Since the phase began [s]."""
-        return self.now - self._since_s
+        return self.now_s - self._since_s
 
-    def step(self, situation: Situation, now: float) -> Orders:
+    def step(self, situation: Situation, now_s: float) -> Orders:
         """Judge the situation, move on, and say what to do in this cycle."""
-        self.now = now
+        self.now_s = now_s
         before = self.phase
         if situation.shutdown_requested and _is_down(before, situation):
             self._finish()
@@ -118,10 +118,10 @@ class Supervisor:
 
     def _go(self, row: Transition, detail: str, situation: Situation) -> None:
         if row.after is not self.phase:
-            self._since_s = self.now
+            self._since_s = self.now_s
             if row.after in STOPPING:
                 quick = row.after is not Phase.RAMP
-                self.braking.begin(situation.begin_mps, situation.turn_radps, self.now, quick)
+                self.braking.begin(situation.begin_mps, situation.turn_radps, self.now_s, quick)
         told_before = self.phase in STOPPING and self.latches
         self.phase = row.after
         if row.cause is not None and not told_before:
@@ -186,13 +186,13 @@ def _stands(machine: Supervisor, s: Situation) -> str | None:
 
 
 def _keeps_on(machine: Supervisor, s: Situation) -> str | None:
-    fails = machine.braking.fails(s.speed_mps, machine.now) or machine.elapsed_s > machine.ramp_timeout_s
+    fails = machine.braking.fails(s.speed_mps, machine.now_s) or machine.elapsed_s > machine.ramp_timeout_s
     return f"{s.turning} on its ramp, {machine.elapsed_s:.2f} s after it began" if fails else None
 
 
 def _keeps_its_speed(machine: Supervisor, s: Situation) -> str | None:
-    unslowed = machine.braking.keeps_speed(s.braking_mps, machine.now)
-    return "" if unslowed or machine.braking.fails(s.speed_mps, machine.now) else None
+    unslowed = machine.braking.keeps_speed(s.braking_mps, machine.now_s)
+    return "" if unslowed or machine.braking.fails(s.speed_mps, machine.now_s) else None
 
 
 def _is_off(machine: Supervisor, s: Situation) -> str | None:

@@ -122,12 +122,12 @@ class WatchdogLink:
         self.counters = WatchdogCounters()
         """As it said last; zeros until then."""
 
-    def on_frame(self, frame: Frame, now: float) -> bool:
+    def on_frame(self, frame: Frame, now_s: float) -> bool:
         """Take a frame 1FEh. False: it was not understood."""
         state = parse_state(frame)
         if state is None:
             return False
-        self._state, self._received_s = state, now
+        self._state, self._received_s = state, now_s
         return True
 
     def on_counters(self, frame: Frame, _now: float) -> bool:
@@ -157,20 +157,20 @@ class WatchdogLink:
             return math.nan
         return self._state.lease_age_ms / 1000.0
 
-    def age_s(self, now: float) -> float:
+    def age_s(self, now_s: float) -> float:
         """Seconds since the last state frame; NaN: none yet."""
-        return now - self._received_s if self._state else math.nan
+        return now_s - self._received_s if self._state else math.nan
 
     @property
     def cause(self) -> str:
         """Cause of the trip in words; "none" when it has not tripped or was never heard."""
         return self._state.cause_text if self._state else "none"
 
-    def view(self, now: float) -> tuple[WatchdogView, str]:
+    def view(self, now_s: float) -> tuple[WatchdogView, str]:
         """Whether it watches, and a sentence when it does not."""
         if self._state is None:
             return WatchdogView.MISSING, "not heard yet; start it with `canbase watchdog`"
-        age_s = now - self._received_s
+        age_s = now_s - self._received_s
         if age_s > self._timeout_s:
             return WatchdogView.MISSING, f"silent for {age_s:.2f} s (timeout {self._timeout_s:.2f} s)"
         if self._state.state == TRIPPED:
@@ -185,9 +185,9 @@ class WatchdogLink:
         """The last trip was about a drive that is silent or down."""
         return self._state is not None and self._state.cause in DRIVE_CAUSES
 
-    def lying_node(self, now: float) -> int:
+    def lying_node(self, now_s: float) -> int:
         """The node whose sensors the watchdog has caught with a lie; 0: none."""
-        if self._state is None or self.view(now)[0] is not WatchdogView.TRIPPED:
+        if self._state is None or self.view(now_s)[0] is not WatchdogView.TRIPPED:
             return 0
         return self._state.node_id if self._state.cause in SENSOR_CAUSES else 0
 

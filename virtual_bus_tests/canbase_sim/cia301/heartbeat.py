@@ -28,13 +28,13 @@ class HeartbeatProducer:
         """The next heartbeat is due at once: after a boot-up, a change of state or of 1017h."""
         self._due = None
 
-    def due(self, now: float) -> bool:
+    def due(self, now_s: float) -> bool:
         """True once per period of 1017h, late calls do not add up."""
         period = self._values[key(0x1017)] / 1000.0
-        if period == 0.0 or (self._due is not None and now < self._due):
+        if period == 0.0 or (self._due is not None and now_s < self._due):
             return False
-        on_time = self._due is not None and now < self._due + period
-        self._due = (self._due if on_time and self._due is not None else now) + period
+        on_time = self._due is not None and now_s < self._due + period
+        self._due = (self._due if on_time and self._due is not None else now_s) + period
         return True
 
 
@@ -80,7 +80,7 @@ class HeartbeatConsumer:
         for subindex in self._subs:
             self._configure(subindex)
 
-    def receive(self, node_id: int, data: bytes, now: float) -> None:
+    def receive(self, node_id: int, data: bytes, now_s: float) -> None:
         """A heartbeat or boot-up of `node_id`; a boot-up of a producer that was alive is a loss: it restarted."""
         producer = next((p for p in self._producers.values() if p.node_id == node_id), None)
         if producer is None or len(data) != 1:
@@ -89,15 +89,15 @@ class HeartbeatConsumer:
             if producer.watch is Watch.ALIVE:
                 self._lose(producer)
             return
-        producer.last = now
+        producer.last = now_s
         before, producer.watch = producer.watch, Watch.ALIVE
         if before is Watch.LOST:
             self._on_alive(node_id)
 
-    def tick(self, now: float) -> None:
+    def tick(self, now_s: float) -> None:
         """Find the producers whose last heartbeat is older than their time."""
         for producer in self._producers.values():
-            if producer.watch is Watch.ALIVE and now - producer.last > producer.timeout:
+            if producer.watch is Watch.ALIVE and now_s - producer.last > producer.timeout:
                 self._lose(producer)
 
     def _lose(self, producer: Producer) -> None:

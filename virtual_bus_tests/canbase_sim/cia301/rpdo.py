@@ -58,12 +58,12 @@ class Rpdo:
         self._timeout = self._rules.value(EVENT) / 1000.0
         self.cob_id = self._rules.value(COB_ID) & 0x7FF
 
-    def receive(self, data: bytes, now: float) -> None:
+    def receive(self, data: bytes, now_s: float) -> None:
         """A frame with this PDO's COB-ID. Too short: dropped, 8210h; too long: the first bytes count, 8220h."""
         self._came += 1
         if not self.takes_every or self._came % self.takes_every:
             return
-        self.received_at = now
+        self.received_at = now_s
         length = self._codec.size
         if len(data) != length and not self._usable(len(data), length):
             return
@@ -71,7 +71,7 @@ class Rpdo:
             self._errors.clear_error(emcy.PDO_TOO_SHORT, self.number)
             self._errors.clear_error(emcy.PDO_TOO_LONG, self.number)
         if self._timeout:
-            self._deadline = now + self._timeout
+            self._deadline = now_s + self._timeout
             self._errors.clear_error(emcy.RPDO_TIMEOUT, self.number)
         if self._at_sync:
             self._waiting = data
@@ -84,9 +84,9 @@ class Rpdo:
             data, self._waiting = self._waiting, None
             self._apply(data)
 
-    def tick(self, now: float) -> None:
+    def tick(self, now_s: float) -> None:
         """Find the deadline missed; it runs from the first RPDO on."""
-        if self._deadline is not None and now > self._deadline:
+        if self._deadline is not None and now_s > self._deadline:
             self._deadline = None
             self._errors.raise_error(emcy.RPDO_TIMEOUT, self.number)
             self._on_deadline()

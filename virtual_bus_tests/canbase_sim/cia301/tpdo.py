@@ -67,16 +67,16 @@ class Tpdo:
         self._last_data = data
         self._say(data)
 
-    def tick(self, now: float) -> None:
+    def tick(self, now_s: float) -> None:
         """Types 254 and 255: when the data changed, not more often than the inhibit time; and by the event timer."""
-        elapsed = now - self._last_time
+        elapsed = now_s - self._last_time
         if elapsed < self._inhibit:
             return
         values = self._values
         data = self._pack(*[values[place] for place in self._places])
         timer_is_over = self._period > 0.0 and elapsed >= self._period
         if data != self._last_data or timer_is_over:
-            self._last_data, self._last_time = data, now
+            self._last_data, self._last_time = data, now_s
             self._say(data)
 
     def _say(self, data: bytes) -> None:

@@ -81,7 +81,7 @@ class Base:
         standstill_mps: float,
         left: Sequence[MountedWheel],
         right: Sequence[MountedWheel],
-        now: float,
+        now_s: float,
     ) -> None:
         self._h = parameters.step_s
         self._track, self._standstill = track_m, standstill_mps
@@ -97,7 +97,7 @@ class Base:
         """Force on the body along its x axis: a slope [N]."""
         self.travel_left_m = self.travel_right_m = 0.0
         self.travel_m = self.path_m = 0.0
-        self.time_of_motion = now
+        self.time_of_motion = now_s
         self.resting = True
 
     @property
@@ -131,8 +131,8 @@ class Base:
         else:
             self._bound_right = self._own_bounds[1] + impulse
 
-    def step(self, now: float) -> None:
-        """Advance by one inner step that ends at `now`."""
+    def step(self, now_s: float) -> None:
+        """Advance by one inner step that ends at `now_s`."""
         vl, vr, h = self.v_left_mps, self.v_right_mps, self._h
         push = self.push_n / 2.0
         push_left, push_right = push - self._viscous_left * vl, push - self._viscous_right * vr
@@ -143,7 +143,7 @@ class Base:
         a, b, c = self._inverse_left, self._inverse_right, self._cross
         new_left = vl + (a * push_left + c * push_right) * h
         new_right = vr + (c * push_left + b * push_right) * h
-        self._move(*self._rub(new_left, new_right), now)
+        self._move(*self._rub(new_left, new_right), now_s)
 
     def _rub(self, vl: float, vr: float) -> tuple[float, float]:
         """The speeds after Coulomb friction. While both sides slide on, both impulses are at their bounds."""
@@ -168,7 +168,7 @@ class Base:
             vl, vr = vl + c * change, vr + b * change
         return (0.0 if abs(vl) < AT_REST_MPS else vl), (0.0 if abs(vr) < AT_REST_MPS else vr)
 
-    def _move(self, vl: float, vr: float, now: float) -> None:
+    def _move(self, vl: float, vr: float, now_s: float) -> None:
         half = self._h / 2.0
         left, right = (self.v_left_mps + vl) * half, (self.v_right_mps + vr) * half
         self.travel_left_m += left
@@ -185,7 +185,7 @@ class Base:
         self.resting = vl == 0.0 == vr and left == 0.0 == right and not self.push_n
         self.v_left_mps, self.v_right_mps = vl, vr
         if abs(vl) > self._standstill or abs(vr) > self._standstill:
-            self.time_of_motion = now
+            self.time_of_motion = now_s
 
     def _invert_mass_matrix(self, p: PlantParameters) -> None:
         """Kinetic energy = ½ (vl, vr) A (vl, vr)ᵀ; kept is the inverse of A."""

@@ -1,6 +1,6 @@
 """The bench: the simulated drives of one robot.yaml and the robot on them, stepped together. Pure.
 
-Works in virtual time (call `on_frame` and `tick` with any rising `now`) and in real time (`loop.py` does).
+Works in virtual time (call `on_frame` and `tick` with any rising `now_s`) and in real time (`loop.py` does).
 """
 
 from __future__ import annotations
@@ -61,12 +61,12 @@ class Bench:
     def __init__(
         self,
         robot: Robot,
-        now: float = 0.0,
+        now_s: float = 0.0,
         body: PlantParameters = DEFAULT_BODY,
         parameters: BenchParameters | None = None,
     ) -> None:
         self._robot, self._parameters = robot, parameters or BenchParameters()
-        self._start, self._steps, self._h = now, 0, body.step_s
+        self._start, self._steps, self._h = now_s, 0, body.step_s
         self._motors = [body.motor(len(robot.drives)) for _ in robot.drives]
         self.base = Base(
             body,
@@ -74,29 +74,29 @@ class Bench:
             robot.base.standstill_mps,
             left=self._wheels("left"),
             right=self._wheels("right"),
-            now=now,
+            now_s=now_s,
         )
         node_ids = sorted({drive.node_id for drive in robot.drives})
-        self.nodes = {node_id: self._node(node_id, now) for node_id in node_ids}
+        self.nodes = {node_id: self._node(node_id, now_s) for node_id in node_ids}
         self._all_nodes = tuple(self.nodes.values())
 
-    def on_frame(self, frame: Frame, now: float) -> None:
-        """A frame from the bus: the world moves up to `now`, then every node hears it."""
-        self._advance(now)
+    def on_frame(self, frame: Frame, now_s: float) -> None:
+        """A frame from the bus: the world moves up to `now_s`, then every node hears it."""
+        self._advance(now_s)
         for node in self._all_nodes:
-            node.on_frame(frame.cob_id, frame.data, now)
+            node.on_frame(frame.cob_id, frame.data, now_s)
 
-    def tick(self, now: float) -> list[Frame]:
-        """The world moves up to `now`; the frames that the nodes have to say, in order."""
-        self._advance(now)
-        return [frame for node in self._all_nodes for frame in node.tick(now)]
+    def tick(self, now_s: float) -> list[Frame]:
+        """The world moves up to `now_s`; the frames that the nodes have to say, in order."""
+        self._advance(now_s)
+        return [frame for node in self._all_nodes for frame in node.tick(now_s)]
 
-    def truth(self, now: float) -> Truth:
-        """The state of the world at `now`."""
-        self._advance(now)
+    def truth(self, now_s: float) -> Truth:
+        """The state of the world at `now_s`."""
+        self._advance(now_s)
         b = self.base
         return Truth(
-            now,
+            now_s,
             b.x_m,
             b.y_m,
             b.yaw_rad,
@@ -106,7 +106,7 @@ class Bench:
             b.v_right_mps,
             b.travel_m,
             b.path_m,
-            max(0.0, now - b.time_of_motion),
+            max(0.0, now_s - b.time_of_motion),
         )
 
     def state_changes(self) -> list[StateChange]:
@@ -123,9 +123,9 @@ class Bench:
             node.lost_producers.clear()
         return lost
 
-    def _advance(self, now: float) -> None:
+    def _advance(self, now_s: float) -> None:
         """Inner steps lie on a fixed grid from the start, so the result does not depend on when one looks."""
-        target = int((now - self._start) / self._h + 1e-6)
+        target = int((now_s - self._start) / self._h + 1e-6)
         base, h, start = self.base, self._h, self._start
         while self._steps < target:
             if base.resting and not base.push_n and all(motor.at_rest for motor in self._motors):
@@ -138,7 +138,7 @@ class Bench:
         pairs = zip(self._motors, self._robot.drives, strict=True)
         return [MountedWheel(motor, drive.direction) for motor, drive in pairs if drive.side == side]
 
-    def _node(self, node_id: int, now: float) -> SimulatedNode:
+    def _node(self, node_id: int, now_s: float) -> SimulatedNode:
         mounted = {d.axis: i for i, d in enumerate(self._robot.drives) if d.node_id == node_id}
         parts = [self._axis(mounted.get(axis)) for axis in range(max(mounted) + 1)]
         personality = _personality(self._robot.drives[next(iter(mounted.values()))])
@@ -148,7 +148,7 @@ class Bench:
             fixed[key(0x608F + axis * AXIS_STRIDE, 1)] = drive.counts_per_motor_rev
             fixed |= _identity(drive)
         delays = self._parameters
-        return SimulatedNode(node_id, parts, now, delays.boot_delay_s, fixed, personality, delays.sdo_delay_s)
+        return SimulatedNode(node_id, parts, now_s, delays.boot_delay_s, fixed, personality, delays.sdo_delay_s)
 
     def _axis(self, i: int | None) -> AxisParts:
         """The axis of drive `i`; None: an axis of the controller to which nothing is connected."""

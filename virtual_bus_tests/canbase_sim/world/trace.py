@@ -18,14 +18,14 @@ Row = tuple[float, float, float, float, float, float]
 class Trace:
     """A ring of samples of one bench, on a fixed grid of time."""
 
-    def __init__(self, bench: Bench, now: float) -> None:
+    def __init__(self, bench: Bench, now_s: float) -> None:
         self._bench = bench
-        self._start, self._taken = now, 0
+        self._start, self._taken = now_s, 0
         self._rows: deque[Row] = deque(maxlen=int(RATE_HZ * KEPT_S))
 
-    def tick(self, now: float) -> None:
-        """Take the samples that are due; `now` may be late, the samples are not."""
-        while (due := self._start + self._taken / RATE_HZ) <= now:
+    def tick(self, now_s: float) -> None:
+        """Take the samples that are due; `now_s` may be late, the samples are not."""
+        while (due := self._start + self._taken / RATE_HZ) <= now_s:
             t = self._bench.truth(due)
             self._rows.append((t.time_s, t.x_m, t.y_m, t.yaw_rad, t.v_left_mps, t.v_right_mps))
             self._taken += 1

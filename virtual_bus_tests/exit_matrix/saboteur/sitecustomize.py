@@ -47,7 +47,7 @@ def break_control_thread() -> None:
     """The driver's next cycle raises."""
     from canbase_driver.core import DriverCore
 
-    def tick(self: DriverCore, now: float, lateness_s: float = 0.0) -> list[Frame]:
+    def tick(self: DriverCore, now_s: float, lateness_s: float = 0.0) -> list[Frame]:
         raise InjectedError("injected")
 
     DriverCore.tick = tick  # type: ignore[method-assign]
@@ -59,10 +59,10 @@ def hang_control_thread() -> None:
 
     usual = DriverCore.tick
 
-    def tick(self: DriverCore, now: float, lateness_s: float = 0.0) -> list[Frame]:
+    def tick(self: DriverCore, now_s: float, lateness_s: float = 0.0) -> list[Frame]:
         DriverCore.tick = usual  # type: ignore[method-assign]
         be_busy()
-        return usual(self, now, lateness_s)
+        return usual(self, now_s, lateness_s)
 
     DriverCore.tick = tick  # type: ignore[method-assign]
 
@@ -74,8 +74,8 @@ def repeat_setpoints() -> None:
     usual = DriverCore.tick
     stuck: dict[int, Frame] = {}
 
-    def tick(self: DriverCore, now: float, lateness_s: float = 0.0) -> list[Frame]:
-        frames = usual(self, now, lateness_s)
+    def tick(self: DriverCore, now_s: float, lateness_s: float = 0.0) -> list[Frame]:
+        frames = usual(self, now_s, lateness_s)
         return [stuck.setdefault(f.cob_id, f) if 0x200 < f.cob_id < 0x380 else f for f in frames]
 
     DriverCore.tick = tick  # type: ignore[method-assign]
@@ -89,8 +89,8 @@ def ignore_zero() -> None:
     usual = Command.target
     last = [Twist2D.ZERO]
 
-    def target(self: Command, now: float) -> Twist2D:
-        wanted = usual(self, now)
+    def target(self: Command, now_s: float) -> Twist2D:
+        wanted = usual(self, now_s)
         if wanted != Twist2D.ZERO:
             last[0] = wanted
         return last[0]

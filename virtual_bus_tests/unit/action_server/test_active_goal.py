@@ -16,9 +16,9 @@ from support.action_plant import Plant, bench_robot, good_inputs
 REQUEST = DriveRequest(1.0, 0.2)
 
 
-def good(now: float) -> Inputs:
+def good(now_s: float) -> Inputs:
     """A healthy robot that stands."""
-    return good_inputs(Plant().odometry(now))
+    return good_inputs(Plant().odometry(now_s))
 
 
 def test_the_base_has_one_owner_and_is_free_again_after_it() -> None:
@@ -27,17 +27,17 @@ def test_the_base_has_one_owner_and_is_free_again_after_it() -> None:
     owner.take(REQUEST, good(0.0), 0.0)
     with pytest.raises(RuntimeError, match="not free"):
         owner.take(REQUEST, good(0.0), 0.0)
-    now = 0.0
+    now_s = 0.0
     while owner.busy:
-        now += 0.02
-        order = owner.tick(replace(good(now), cancel_requested=now > 0.1), now)
+        now_s += 0.02
+        order = owner.tick(replace(good(now_s), cancel_requested=now_s > 0.1), now_s)
     assert order is not None
     assert order.end is not None
-    farewell, silence = owner.tick(good(now), now + 0.1), owner.tick(good(now), now + FAREWELL_S + 0.01)
+    farewell, silence = owner.tick(good(now_s), now_s + 0.1), owner.tick(good(now_s), now_s + FAREWELL_S + 0.01)
     assert farewell is not None
     assert (farewell.twist, farewell.end) == (Twist(), None)
     assert silence is None
-    owner.take(REQUEST, good(now), now)
+    owner.take(REQUEST, good(now_s), now_s)
 
 
 def test_a_base_that_was_never_seen_is_not_taken() -> None:
@@ -50,10 +50,10 @@ def test_after_a_defect_the_goal_only_stops_and_ends_as_internal() -> None:
     owner.take(REQUEST, good(0.0), 0.0)
     owner.fail(ZeroDivisionError("a defect"), 0.0)
     owner.fail(ValueError("a second one, which changes nothing"), 0.1)
-    now, twists, end = 0.0, set(), None
+    now_s, twists, end = 0.0, set(), None
     while end is None:
-        now += 0.02
-        order = owner.tick(good(now), now)
+        now_s += 0.02
+        order = owner.tick(good(now_s), now_s)
         assert order is not None
         twists.add(order.twist)
         end = order.end

@@ -14,7 +14,7 @@ from support.action_plant import GOOD_DRIVER, GOOD_MUX, GOOD_SAFETY, Plant, repl
 
 GOOD = Situation(
     inputs=Inputs(Plant().odometry(10.0), GOOD_SAFETY, GOOD_DRIVER, GOOD_MUX),
-    now=10.0,
+    now_s=10.0,
     own_source="action",
     odometry_timeout_s=0.2,
     gap_s=0.02,
@@ -41,7 +41,7 @@ PROVOKED: dict[ErrorCode, Provoke] = {
     ErrorCode.DRIVE_FAULT: lambda s: with_inputs(
         s, driver=replace(s.inputs.driver or GOOD_DRIVER, state=DriverState.LATCHED)
     ),
-    ErrorCode.ODOMETRY_LOST: lambda s: replace(s, now=10.21),
+    ErrorCode.ODOMETRY_LOST: lambda s: replace(s, now_s=10.21),
     ErrorCode.TAKEN_OVER: lambda s: with_inputs(s, mux=replace(GOOD_MUX, active="joystick")),
     ErrorCode.SCAN_LOST: lambda s: with_inputs(s, safety=replace(GOOD_SAFETY, cause="scan_stale")),
     ErrorCode.BLOCKED: lambda s: replace(s, stopped_s=0.3),
@@ -62,7 +62,7 @@ ROWS.insert(5, (ErrorCode.DRIVE_FAULT, lambda s: replace(s, off_course=OFF_COURS
 
 def test_nothing_wrong_is_no_cause() -> None:
     assert cause_while_driving(GOOD) is None
-    almost = replace(GOOD, now=10.2, gap_s=0.2, stopped_s=0.299, no_progress_s=2.0, running_s=20.0)
+    almost = replace(GOOD, now_s=10.2, gap_s=0.2, stopped_s=0.299, no_progress_s=2.0, running_s=20.0)
     assert cause_while_driving(almost) is None
     assert cause_while_driving(with_inputs(GOOD, mux=replace(GOOD_MUX, active="action"))) is None
 

@@ -17,7 +17,7 @@ def test_a_goal_runs_to_its_end_while_its_client_lives() -> None:
     key = world.ask_way(1.0)
     world.run(0.1)
     for _ in range(20):
-        world.goal_queue.keepalive(key, world.now)
+        world.goal_queue.keepalive(key, world.now_s)
         world.run(0.98)
     assert world.code(key) is ErrorCode.OK
 
@@ -26,9 +26,9 @@ def test_the_base_stops_within_the_lease_of_the_last_sign_of_life() -> None:
     # heard at 0.5 ... lost at 1.52 ... brakes for 0.4 s
     world = leased_world()
     key = world.ask_way(5.0, 0.4)
-    world.goal_queue.keepalive(key, world.now)
+    world.goal_queue.keepalive(key, world.now_s)
     world.run(0.5)
-    world.goal_queue.keepalive(key, world.now)
+    world.goal_queue.keepalive(key, world.now_s)
     world.run(0.98)
     assert world.goal_queue.phase.value == "driving"
     world.run(0.06)
@@ -42,10 +42,10 @@ def test_the_base_stops_within_the_lease_of_the_last_sign_of_life() -> None:
 def test_the_life_of_another_client_does_not_count() -> None:
     world = leased_world()
     first, second = world.ask_way(3.0), world.ask_way(0.1)
-    world.goal_queue.keepalive(first, world.now)
+    world.goal_queue.keepalive(first, world.now_s)
     world.run(0.6)
-    world.goal_queue.keepalive(first, world.now)
-    world.goal_queue.keepalive("unknown", world.now)
+    world.goal_queue.keepalive(first, world.now_s)
+    world.goal_queue.keepalive("unknown", world.now_s)
     world.run(0.6)
     assert world.code(second) is ErrorCode.CLIENT_LOST
     assert world.goals[first].ends == []

@@ -258,14 +258,14 @@ def test_an_ended_goal_orders_nothing() -> None:
     robot, start = bench_robot(), Plant().odometry(0.0)
     goal = goal_run(robot, 1.0, 0.3, start)
     inputs = Inputs(odometry=start, shutdown=True)
-    now, end = 0.0, None
+    now_s, end = 0.0, None
     while end is None:
-        now += 0.02
-        inputs = replaced(inputs, odometry=Plant().odometry(now))
-        end = goal.tick(inputs, now).end
+        now_s += 0.02
+        inputs = replaced(inputs, odometry=Plant().odometry(now_s))
+        end = goal.tick(inputs, now_s).end
     assert (goal.phase, end.code) == (Phase.ENDED, ErrorCode.SHUTDOWN)
     with pytest.raises(RuntimeError, match="has ended"):
-        goal.tick(inputs, now)
+        goal.tick(inputs, now_s)
 
 
 def test_feedback_comes_at_its_rate() -> None:

@@ -42,9 +42,9 @@ def test_a_goal_that_was_refused_or_is_known_cannot_be_admitted() -> None:
     world = GoalQueueWorld(robot_with("queue"))
     key = world.ask_way(0.3)
     with pytest.raises(RuntimeError, match="known already"):
-        world.goal_queue.admit(key, DriveRequest(0.1, 0.2), world.inputs, world.now)
+        world.goal_queue.admit(key, DriveRequest(0.1, 0.2), world.inputs, world.now_s)
     with pytest.raises(RuntimeError, match="outside"):
-        world.goal_queue.admit("new", DriveRequest(100.0, 0.2), world.inputs, world.now)
+        world.goal_queue.admit("new", DriveRequest(100.0, 0.2), world.inputs, world.now_s)
 
 
 def test_a_queue_runs_in_order_and_the_base_stands_in_between() -> None:
@@ -180,7 +180,7 @@ def test_a_defect_ends_all_as_internal() -> None:
     world = GoalQueueWorld(robot_with("queue"))
     keys = [world.ask_way(1.0) for _ in range(3)]
     world.run(1.0)
-    world.goal_queue.fail(ZeroDivisionError("a defect"), world.now)
+    world.goal_queue.fail(ZeroDivisionError("a defect"), world.now_s)
     world.run_out()
     assert {world.code(key) for key in keys} == {ErrorCode.INTERNAL}
 
@@ -189,7 +189,7 @@ def test_a_process_out_of_time_ends_all_at_once() -> None:
     world = GoalQueueWorld(robot_with("queue"))
     keys = [world.ask_way(1.0) for _ in range(3)]
     world.run(1.0)
-    cycle = world.goal_queue.give_up(ErrorCode.SHUTDOWN, "no time", world.now)
+    cycle = world.goal_queue.give_up(ErrorCode.SHUTDOWN, "no time", world.now_s)
     assert [end.key for end in cycle.ends] == keys
     assert {end.outcome.code for end in cycle.ends} == {ErrorCode.SHUTDOWN}
     assert cycle.twist == STOP

@@ -19,9 +19,9 @@ def steering(distance_m: float, at: Pose) -> tuple[float, float]:
     """Orders when the base is at `at` a second after the start, up to speed: linear [m/s], angular [rad/s]."""
     motion = StraightMotion(START, distance_m, LIMITS)
     for cycle in range(51):
-        now = cycle * 0.02
-        motion.observe(replace(START, received=now, pose=at))
-        twist = motion.order(now)
+        now_s = cycle * 0.02
+        motion.observe(replace(START, received=now_s, pose=at))
+        twist = motion.order(now_s)
     assert twist is not None
     return twist.linear_mps, twist.angular_radps
 

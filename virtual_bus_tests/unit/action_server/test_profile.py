@@ -34,8 +34,8 @@ def test_more_way_never_means_less_speed(a_m: float, b_m: float, deceleration: f
 def test_it_sets_off_with_limited_acceleration_and_jerk_up_to_the_speed_of_the_goal() -> None:
     profile, speeds = Profile(LIMITS), []
     for cycle in range(100):
-        now = cycle * 0.02
-        speeds.append(profile.order(100.0, now, now) or 0.0)
+        now_s = cycle * 0.02
+        speeds.append(profile.order(100.0, now_s, now_s) or 0.0)
     accelerations = [(b - a) / 0.02 for a, b in pairwise(speeds)]
     assert max(accelerations) == pytest.approx(1.0)
     assert accelerations[0] == pytest.approx(0.2)  # 10 m/s³ × 0.02 s
@@ -46,9 +46,9 @@ def test_what_was_ordered_but_not_seen_yet_counts_as_driven() -> None:
     # 0.1 m/s ordered since 1.0; odometry of 1.0 is used at 1.2: seen until 0.95, so 0.2 s × 0.1 m/s are on their way.
     profile = Profile(LIMITS)
     profile._orders.append((1.0, 0.1))
-    assert profile.pending_m(odometry_time=1.0, now=1.2) == pytest.approx(0.02)
-    assert profile.pending_m(odometry_time=1.2, now=1.2) == pytest.approx(0.005)
-    assert profile.pending_m(odometry_time=1.0, now=1.0) == 0.0
+    assert profile.pending_m(odometry_time=1.0, now_s=1.2) == pytest.approx(0.02)
+    assert profile.pending_m(odometry_time=1.2, now_s=1.2) == pytest.approx(0.005)
+    assert profile.pending_m(odometry_time=1.0, now_s=1.0) == 0.0
 
 
 def test_there_is_an_end_and_before_it_the_crawl() -> None:

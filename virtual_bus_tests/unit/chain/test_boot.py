@@ -67,7 +67,7 @@ WAITED_FOR = {
 def without(supply: str) -> World:
     """The right drive starts without it."""
     world = World()
-    apply(world.bench.nodes, 2, supply, world.now, {})
+    apply(world.bench.nodes, 2, supply, world.now_s, {})
     return world
 
 
@@ -79,7 +79,7 @@ def test_a_drive_without_sto_or_main_voltage_is_waited_for_and_enabled_later(sup
     assert (world.core.finding.cause.value, world.core.finding.detail) == ("drive not ready", sentence)
     assert not any(world.powered)
     assert not world.core.stops
-    apply(world.bench.nodes, 2, "heal", world.now, {})
+    apply(world.bench.nodes, 2, "heal", world.now_s, {})
     assert world.run_until(DriverState.ENABLED, within_s=0.3) < 0.3
 
 
@@ -89,7 +89,7 @@ def test_while_it_is_waited_for_a_command_keeps_the_power_off(supply: str) -> No
     world.run(1.0)
     world.command = FORWARD
     world.run(0.1)
-    apply(world.bench.nodes, 2, "heal", world.now, {})
+    apply(world.bench.nodes, 2, "heal", world.now_s, {})
     world.run(1.0)
     assert world.core.state is DriverState.DISARMED
     assert world.core.finding.cause.value == "command not zero"
@@ -99,11 +99,11 @@ def test_while_it_is_waited_for_a_command_keeps_the_power_off(supply: str) -> No
 def test_a_supply_that_is_lost_in_motion_stops_the_base_and_needs_a_reset(supply: str) -> None:
     world = World()
     world.drive()
-    apply(world.bench.nodes, 2, supply, world.now, {})
+    apply(world.bench.nodes, 2, supply, world.now_s, {})
     world.run_until(DriverState.LATCHED, within_s=2.0)
     assert world.core.finding.cause.value == "drive disabled"
     assert world.stands_after() < 2.0
-    apply(world.bench.nodes, 2, "heal", world.now, {})
+    apply(world.bench.nodes, 2, "heal", world.now_s, {})
     world.command = Twist2D.ZERO
     world.run(1.0)
     assert not any(world.powered)

@@ -152,11 +152,11 @@ def test_an_emergency_brakes_with_the_emergency_deceleration_and_trips_nothing(w
     world.drive()
     world.command = Twist2D.ZERO
     for _ in range(2):
-        world.core.on_emergency(True, world.now)
+        world.core.on_emergency(True, world.now_s)
         world.run(0.1)
     assert world.targets_mps()[-4:] == [(0.0, 0.0)] * 4
     assert world.truth.linear_mps < 0.1
-    world.core.on_emergency(False, world.now)
+    world.core.on_emergency(False, world.now_s)
     world.command = FORWARD
     world.run(0.8)
     assert world.core.state is DriverState.ENABLED
@@ -224,7 +224,7 @@ def test_a_stop_during_a_reset_breaks_it_off_and_stays_latched(world: World) -> 
     world.command = Twist2D.ZERO
     world.run(0.1)
     sentences: list[str] = []
-    world.core.request_reset(world.now, lambda outcome: sentences.append(outcome.sentence))
+    world.core.request_reset(world.now_s, lambda outcome: sentences.append(outcome.sentence))
     world.core.request_stop()
     world.run(1.0)
     assert sentences == ["broken off: service motor_driver/stop"]
@@ -238,7 +238,7 @@ def test_a_shutdown_at_any_moment_of_the_start_ends_within_half_a_second(world: 
     world.core.request_shutdown()
     assert world.run(0.5, lambda: world.core.finished)
     assert world.powered == [False, False]
-    off = {node.node_id for node in world.core._drives.nodes if node.is_off(world.now)}
+    off = {node.node_id for node in world.core._drives.nodes if node.is_off(world.now_s)}
     resets = {frame.data[1] for frame in world.ticks[-1] if frame.cob_id == 0x000 and frame.data[0] == 0x82}
     assert resets <= off  # only who has reported that its power is off; one that was just started has not yet
     assert not was_enabled or resets == {drive.node_id for drive in world.robot.drives}

@@ -42,20 +42,20 @@ def robot_with_watchdog(**keys: object) -> Robot:
 
 
 def lose(world: World) -> None:
-    faults.apply(world.bench.nodes, 1, "encoder_lost", world.now, {})
+    faults.apply(world.bench.nodes, 1, "encoder_lost", world.now_s, {})
 
 
 def course(world: World, seconds: float, until_s: float = 0.0) -> Course:
     """`until_s`: then zero is ordered."""
     assert world.watchdog is not None
-    start, before_m, seen = world.now, world.bench.base.travel_left_m, Course()
-    while world.now < start + seconds:
-        if world.now >= start + until_s - STEP_S / 2:
+    start, before_m, seen = world.now_s, world.bench.base.travel_left_m, Course()
+    while world.now_s < start + seconds:
+        if world.now_s >= start + until_s - STEP_S / 2:
             world.command = Twist2D.ZERO
         world.run(STEP_S)
         seen.peak_mps = max(seen.peak_mps, abs(world.truth.v_left_mps))
         if not world.powered[0]:
-            seen.off_s = min(seen.off_s, world.now - start)
+            seen.off_s = min(seen.off_s, world.now_s - start)
     seen.way_m, seen.end_mps = abs(world.bench.base.travel_left_m - before_m), abs(world.truth.v_left_mps)
     seen.cause = world.watchdog.status.verdict.cause
     return seen
@@ -150,12 +150,12 @@ def test_after_an_order_of_less_than_one_bit_a_healthy_drive_lets_go_once_and_is
 def tapping(world: World, tap_s: float, each_s: float, seconds: float, *, until: TripCause) -> Course:
     """0.1 m/s for `tap_s`, again and again, until the watchdog trips."""
     assert world.watchdog is not None
-    start, seen = world.now, Course()
-    while world.now < start + seconds and seen.cause is TripCause.NONE:
-        world.command = Twist2D(0.1 if (world.now - start) % each_s < tap_s else 0.0, 0.0)
+    start, seen = world.now_s, Course()
+    while world.now_s < start + seconds and seen.cause is TripCause.NONE:
+        world.command = Twist2D(0.1 if (world.now_s - start) % each_s < tap_s else 0.0, 0.0)
         world.run(STEP_S)
         seen.peak_mps = max(seen.peak_mps, abs(world.truth.v_left_mps))
-        seen.cause, seen.off_s = world.watchdog.status.verdict.cause, world.now - start
+        seen.cause, seen.off_s = world.watchdog.status.verdict.cause, world.now_s - start
     assert seen.cause is until
     return seen
 
@@ -177,7 +177,7 @@ def test_an_encoder_that_shows_itself_for_moments_is_found_between_taps(kind: st
     world.enable()
     drive = world.robot.drives[0]
     given = {"axis": drive.axis, "off_s": 0.2, "on_s": 0.004}
-    faults.apply(world.bench.nodes, drive.node_id, "encoder_intermittent", world.now, given)
+    faults.apply(world.bench.nodes, drive.node_id, "encoder_intermittent", world.now_s, given)
     seen = tapping(world, tap_s, each_s, 5.0, until=TripCause.FEEDBACK_IMPLAUSIBLE)
     assert seen.off_s <= 2.5
     assert seen.peak_mps <= 2.0
@@ -185,7 +185,7 @@ def test_an_encoder_that_shows_itself_for_moments_is_found_between_taps(kind: st
 
 def never_lets_go(monkeypatch: pytest.MonkeyPatch) -> None:
     """A driver with a defect."""
-    monkeypatch.setattr(LetGo, "step", lambda self, wheels, rests, now: None)
+    monkeypatch.setattr(LetGo, "step", lambda self, wheels, rests, now_s: None)
 
 
 @pytest.mark.parametrize(("kind", "cause"), [("generic", MISSING), ("kinco", AT_STAND)])
@@ -221,7 +221,7 @@ def test_a_drive_that_does_not_obey_disable_operation_loses_its_power_by_disable
     """Before the watchdog has to."""
     goal = LetGo.goal
     monkeypatch.setattr(
-        LetGo, "goal", lambda self, now: PowerGoal.ON if goal(self, now) is PowerGoal.LET_GO else goal(self, now)
+        LetGo, "goal", lambda self, now_s: PowerGoal.ON if goal(self, now_s) is PowerGoal.LET_GO else goal(self, now_s)
     )
     seen = tap(World(), 0.06, 0.1)
     assert seen.cause is TripCause.NONE
@@ -239,8 +239,8 @@ def letting_go(world: World) -> bool:
 def count_of(world: World, seconds: float) -> int:
     """How often it let go."""
     times, before = 0, letting_go(world)
-    end = world.now + seconds
-    while world.now < end:
+    end = world.now_s + seconds
+    while world.now_s < end:
         world.run(STEP_S)
         times, before = times + (letting_go(world) and not before), letting_go(world)
     return times
@@ -270,7 +270,7 @@ def test_a_base_on_a_slope_lets_go_once_for_each_stop_and_rolls_a_millimetre(slo
     world.bench.base.push_n = SLOPE_N * slope
     world.run(1.0)
     world.command = Twist2D.ZERO
-    assert world.run(2.0, lambda: world.core.snapshot(world.now).standstill)
+    assert world.run(2.0, lambda: world.core.snapshot(world.now_s).standstill)
     at_m = world.truth.x_m
     assert count_of(world, 4.0) == 1
     assert abs(world.truth.x_m - at_m) < 0.008
@@ -281,7 +281,7 @@ def test_a_base_on_a_slope_lets_go_once_for_each_stop_and_rolls_a_millimetre(slo
 def test_a_wheel_against_a_threshold_is_let_go_of_and_pushed_again_by_the_next_order() -> None:
     world = World()
     world.enable()
-    faults.apply(world.bench.nodes, 1, "blocked", world.now, {})
+    faults.apply(world.bench.nodes, 1, "blocked", world.now_s, {})
     for _ in range(2):
         world.command = Twist2D(0.1, 0.0)
         world.run(0.06)
@@ -307,9 +307,9 @@ def test_an_order_that_comes_meanwhile_waits_until_all_drives_are_back() -> None
     world = World()
     lets_go_on_a_slope(world)
     world.command = Twist2D(0.3, 0.0)
-    start = world.now
+    start = world.now_s
     assert world.run(1.0, lambda: not letting_go(world))
-    assert world.now - start <= 0.1
+    assert world.now_s - start <= 0.1
     assert abs(world.truth.linear_mps) < 0.1
     world.run(1.0)
     assert world.truth.linear_mps == pytest.approx(0.3, abs=0.01)
@@ -319,7 +319,7 @@ def test_an_order_that_comes_meanwhile_waits_until_all_drives_are_back() -> None
 def test_a_drive_that_does_not_come_back_is_a_latched_stop() -> None:
     world = World()
     lets_go_on_a_slope(world)
-    faults.apply(world.bench.nodes, 1, "sto", world.now, {})
+    faults.apply(world.bench.nodes, 1, "sto", world.now_s, {})
     world.run_until(DriverState.LATCHED, 2.0)
     assert world.core.finding.cause.value == "drive disabled"
 

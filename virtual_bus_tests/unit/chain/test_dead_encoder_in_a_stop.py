@@ -55,7 +55,7 @@ class Course(World):
 
     def lose(self, gap_s: float) -> None:
         self.lost = gap_s > 0.0
-        faults.apply(self.bench.nodes, 1, "encoder_lost", self.now, {})
+        faults.apply(self.bench.nodes, 1, "encoder_lost", self.now_s, {})
         self.run(gap_s, self.look)
         self.lost = False
 

@@ -19,13 +19,13 @@ CAUSE_STANDS, DONE = 2, 1
 
 
 def suffer(world: World, kind: str) -> None:
-    faults.apply(world.bench.nodes, 1, kind, world.now, {})
+    faults.apply(world.bench.nodes, 1, kind, world.now_s, {})
 
 
 def peak_mps(world: World, seconds: float) -> float:
     peak = 0.0
-    end = world.now + seconds
-    while world.now < end:
+    end = world.now_s + seconds
+    while world.now_s < end:
         world.run(STEP_S)
         peak = max(peak, abs(world.truth.v_left_mps), abs(world.truth.v_right_mps))
     return peak

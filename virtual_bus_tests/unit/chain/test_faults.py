@@ -56,7 +56,7 @@ def drive_fault(world: World) -> None:
 
 
 def power_cycle(world: World) -> None:
-    world.node.power_cycle(world.now, off_s=0.5)
+    world.node.power_cycle(world.now_s, off_s=0.5)
 
 
 def silence_a_drive(world: World) -> None:
@@ -131,7 +131,7 @@ def test_drives_that_are_deaf_to_pdos_for_a_lost_heartbeat_are_stopped_by_sdo(wo
 
     t   0  no watchdog ── 0.2  ramp ── 0.3  drives pre-operational ── their heartbeat ── quick stop by SDO
     """
-    lost_at = world.now
+    lost_at = world.now_s
     lose_watchdog(world)
     world.run(2.5)
     assert bytes.fromhex("2b 40 60 00 02 00 00 00") in world.sent(0x601, since=lost_at)
@@ -168,16 +168,16 @@ def test_a_new_driver_takes_over_after_a_kill_and_needs_a_reset(world: World) ->
 
 def test_a_fault_of_one_wheel_stops_both_within_one_cycle_of_knowing(world: World) -> None:
     world.node.fail(0, OVERCURRENT)
-    failed_at = world.now
+    failed_at = world.now_s
     # fault → answer to the next SYNC (10 ms) → next cycle (10 ms)
     world.run(0.022)
     assert [word for word, _ in setpoints(world.ticks[-1])] == [QUICK_STOP, QUICK_STOP]
-    assert world.now - failed_at < 0.025
+    assert world.now_s - failed_at < 0.025
     assert world.core.finding.detail == "left_wheel (node 1): 2310h over-current"
 
 
 def test_a_watchdog_that_restarts_unnoticed_stops_the_base_while_it_is_starting(world: World) -> None:
-    world.watchdog = Watchdog(watchdog_config(world.robot), world.now)
+    world.watchdog = Watchdog(watchdog_config(world.robot), world.now_s)
     world.run(0.05)
     assert (world.core.state, world.core.finding.cause.value) == (DriverState.STOPPING, "watchdog missing")
 

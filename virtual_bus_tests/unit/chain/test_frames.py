@@ -59,7 +59,7 @@ def test_two_axes_on_one_node_have_two_setpoints_before_one_sync() -> None:
 
 
 def test_no_setpoint_before_the_node_is_started_though_the_other_one_is(world: World) -> None:
-    world.bench.nodes[2].power_cycle(world.now, off_s=0.5)
+    world.bench.nodes[2].power_cycle(world.now_s, off_s=0.5)
     world.enable()
     seen = [frame for _, frame in world.log]
     for node_id in (1, 2):
@@ -95,15 +95,15 @@ def test_the_last_words_are_a_quick_stop_for_every_axis_and_sync_in_any_state(wo
 @pytest.mark.parametrize("cob_id", HEARD)
 def test_frames_of_a_wrong_length_are_counted_and_change_nothing(world: World, cob_id: int) -> None:
     world.enable()
-    world.core.on_frame(Frame(cob_id, bytes(7)), world.now)
+    world.core.on_frame(Frame(cob_id, bytes(7)), world.now_s)
     sdo_of_others, emcy_is_short = (0x581, 0x582), (0x081, 0x082)
     assert world.snapshot.frames_dropped == int(cob_id not in sdo_of_others + emcy_is_short)
     assert world.core.state is DriverState.ENABLED
 
 
 def test_a_node_that_runs_before_it_is_booted_does_not_count(world: World) -> None:
-    world.core.on_frame(Frame(0x181, bytes.fromhex("37 06 00 00 10 00")), world.now)
-    world.core.on_frame(Frame(0x281, bytes.fromhex("ff 00 00 00")), world.now)
+    world.core.on_frame(Frame(0x181, bytes.fromhex("37 06 00 00 10 00")), world.now_s)
+    world.core.on_frame(Frame(0x281, bytes.fromhex("ff 00 00 00")), world.now_s)
     left = world.snapshot.drives[0]
     assert (left.state, left.statusword, left.velocity_radps) == ("unknown", 0, 0.0)
 
@@ -115,7 +115,7 @@ def test_mad_frames_never_raise_and_never_give_a_driver_that_stands_a_target(mad
     world.run(0.2)
     world.ticks.clear()
     for i, frame in enumerate(mad):
-        world.core.on_frame(frame, world.now)
+        world.core.on_frame(frame, world.now_s)
         if i % 4 == 0:
             world.run(0.01)
     assert [target for cycle in world.ticks for _, target in setpoints(cycle) if target != 0] == []
@@ -129,7 +129,7 @@ def test_a_storm_of_mad_frames_while_driving_never_raises_and_never_orders_more_
     for _ in range(60):
         for _ in range(20):
             data = dice.randbytes(dice.choice((0, 1, 4, 6, 8, 8)))
-            world.core.on_frame(Frame(dice.choice(HEARD), data), world.now)
+            world.core.on_frame(Frame(dice.choice(HEARD), data), world.now_s)
         world.run(0.01)
     assert max(abs(speed) for pair in world.targets_mps() for speed in pair) < 0.3001
     assert world.snapshot.frames_dropped > 100

@@ -211,7 +211,7 @@ def test_a_watchdog_that_is_tripped_from_the_start_leaves_the_boot_alone() -> No
     world = keeping()
     world.enable()
     world.reboot()
-    start = world.now
+    start = world.now_s
     world.run(1.5)
     assert all(each.data[0] != 0x80 for at, each in world.log if each.cob_id == 0x000 and at > start + 1.0)
     assert world.recovered()

@@ -26,7 +26,7 @@ def test_a_drive_that_came_back_while_its_cable_was_off_is_found_again() -> None
     world = World()
     stopped(world)
     world.node.line.cut = True
-    world.node.power_cycle(world.now, off_s=0.2)
+    world.node.power_cycle(world.now_s, off_s=0.2)
     world.run(2.0)
     world.node.line.cut = False
     world.run(2.0)
@@ -54,7 +54,7 @@ class TwoBootUps(World):
     def run(self, duration_s: float, until: Callable[[], bool] = lambda: False) -> bool:
         def reached() -> bool:
             resets = [at for at, frame in self.log[-2000:] if frame.cob_id == 0 and frame.data == b"\x82\x01"]
-            if resets and resets[-1] != self._answered and self.now >= resets[-1] + self.second_s:
+            if resets and resets[-1] != self._answered and self.now_s >= resets[-1] + self.second_s:
                 self._answered = resets[-1]
                 self.node.say_boot_up()
             return until()
@@ -85,7 +85,7 @@ def test_a_driver_that_is_started_while_drives_still_turn_brings_them_to_a_stand
     world.drive(Twist2D(0.3, 0.0))
     world.command = Twist2D.ZERO
     world.kill_driver()
-    world.watchdog = Watchdog(watchdog_config(world.robot), world.now)
+    world.watchdog = Watchdog(watchdog_config(world.robot), world.now_s)
     world.start_driver()
     world.run(1.5)
     assert world.watchdog is not None

@@ -29,7 +29,7 @@ def world(kind: str) -> World:
 
 
 def test_a_drive_that_was_switched_off_and_on_is_booted_again_and_waits_for_a_reset(world: World) -> None:
-    world.node.power_cycle(world.now, off_s=0.5)
+    world.node.power_cycle(world.now_s, off_s=0.5)
     world.run(0.7)
     before = world.snapshot
     assert not before.odometry_valid
@@ -47,7 +47,7 @@ def test_a_drive_that_was_switched_off_and_on_is_booted_again_and_waits_for_a_re
 
 
 def test_the_pose_never_jumps_while_a_drive_is_switched_off_and_on(world: World) -> None:
-    world.node.power_cycle(world.now, off_s=0.3)
+    world.node.power_cycle(world.now_s, off_s=0.3)
     poses = []
     for _ in range(300):
         world.run(0.01)
@@ -61,12 +61,12 @@ def test_feedback_that_waited_while_the_driver_stood_still_does_not_pass_for_fre
     world: World, waited_s: float, counts: bool
 ) -> None:
     """t   0  cycle, SYNC, answers ── the process stands still ── waited_s: it goes on and reads the answers"""
-    went_on_at = world.now + waited_s
+    went_on_at = world.now_s + waited_s
     core, dropped = world.core, world.core.frames_dropped
-    core.tick(world.now)
-    world.bench.on_frame(BenchFrame(0x080, b""), world.now)
+    core.tick(world.now_s)
+    world.bench.on_frame(BenchFrame(0x080, b""), world.now_s)
     # those without SYNC say theirs in the next 10 ms
-    answers = [each for ms in range(11) for each in world.bench.tick(world.now + ms / 1000) if each.cob_id in TPDOS]
+    answers = [each for ms in range(11) for each in world.bench.tick(world.now_s + ms / 1000) if each.cob_id in TPDOS]
     for answer in answers:
         core.on_frame(Frame(answer.cob_id, answer.data), went_on_at)
     assert core.snapshot(went_on_at).odometry_valid is counts
@@ -123,18 +123,18 @@ def test_an_encoder_that_jumps_for_good_is_no_motion_of_the_base_and_is_reported
 def test_the_pose_is_set_at_a_standstill_only_and_the_way_goes_on_from_there() -> None:
     world = World()
     world.drive()
-    moving = world.core.set_pose(Pose2D(), world.now)
+    moving = world.core.set_pose(Pose2D(), world.now_s)
     assert (moving.done, moving.sentence.split(":")[0]) == (False, "refused")
     world.command = Twist2D.ZERO
     world.run(1.0)
     assert world.snapshot.x_m > 0.1
-    assert not world.core.set_pose(Pose2D(math.nan, 0.0, 0.0), world.now).done
+    assert not world.core.set_pose(Pose2D(math.nan, 0.0, 0.0), world.now_s).done
     assert world.snapshot.pose_resets == 0
-    assert world.core.set_pose(Pose2D(1.0, 2.0, math.pi / 2), world.now).done
+    assert world.core.set_pose(Pose2D(1.0, 2.0, math.pi / 2), world.now_s).done
     fresh = world.snapshot
     assert (fresh.x_m, fresh.y_m, fresh.yaw_rad) == (1.0, 2.0, math.pi / 2)
     assert fresh.pose_resets == 1
-    assert world.core.set_pose(Pose2D(1.0, 2.0, math.pi / 2), world.now).done
+    assert world.core.set_pose(Pose2D(1.0, 2.0, math.pi / 2), world.now_s).done
     assert world.snapshot.pose_resets == 2  # also where nothing jumps
     world.command = FORWARD
     world.run(1.0)

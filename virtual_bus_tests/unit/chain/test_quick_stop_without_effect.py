@@ -49,16 +49,16 @@ def driving(of: Robot, share: float = 0.0) -> World:
     world = World(of)
     mps = of.limits.linear_mps
     world.drive(Twist2D(mps, 0.0), 0.5 + 1.3 * mps / 3.0)
-    apply(world.bench.nodes, 1, "unbraked", world.now, {"share": share})
+    apply(world.bench.nodes, 1, "unbraked", world.now_s, {"share": share})
     assert world.truth.v_left_mps == pytest.approx(mps, rel=0.03)
     return world
 
 
 def power_s(world: World, longest_s: float = 20.0) -> float:
     """So long the drive keeps its power."""
-    begin = world.now
+    begin = world.now_s
     assert world.run(longest_s, lambda: not world.powered[0]), "the drive has power for ever"
-    return world.now - begin
+    return world.now_s - begin
 
 
 def stopped_by_watchdog(of: Robot, share: float = 0.0) -> tuple[float, World]:
@@ -67,8 +67,8 @@ def stopped_by_watchdog(of: Robot, share: float = 0.0) -> tuple[float, World]:
     watchdog, world.leases = world.watchdog, False
     assert watchdog is not None
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Braking, "keeps_speed", lambda self, speed_mps, now: False)
-        patch.setattr(Braking, "fails", lambda self, speed_mps, now: False)
+        patch.setattr(Braking, "keeps_speed", lambda self, speed_mps, now_s: False)
+        patch.setattr(Braking, "fails", lambda self, speed_mps, now_s: False)
         assert world.run(1.0, lambda: watchdog.status.state is State.TRIPPED)
         return power_s(world), world
 
@@ -77,8 +77,8 @@ def stopped_by_driver(of: Robot, share: float = 0.0) -> float:
     """The other drive is in fault: the driver's quick stop. The watchdog judges nothing."""
     world = driving(of, share)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(policy, "decide", lambda view, config, now: policy.FINE)
-        apply(world.bench.nodes, 2, "fault", world.now, {})
+        patch.setattr(policy, "decide", lambda view, config, now_s: policy.FINE)
+        apply(world.bench.nodes, 2, "fault", world.now_s, {})
         assert world.run(1.0, lambda: world.core.state is DriverState.STOPPING)
         return power_s(world)
 
@@ -124,7 +124,7 @@ def test_a_drive_without_power_that_rolls_does_not_cost_the_other_one_its_power(
     """STO opens at the right wheel, which rolls; the left one brakes to the end of its ramp."""
     world = World(robot(0.8, 0.4))
     world.drive(Twist2D(0.8, 0.0), 1.0)
-    apply(world.bench.nodes, 2, "sto", world.now, {})
+    apply(world.bench.nodes, 2, "sto", world.now_s, {})
     assert world.run(1.0, lambda: world.core.state is DriverState.STOPPING)
     assert power_s(world) > 0.7
 

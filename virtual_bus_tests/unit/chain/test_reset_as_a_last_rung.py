@@ -22,8 +22,8 @@ def in_its_fault_reaction(lie: str, mps: float = 0.5) -> World:
     """Driving; the encoder of the left drive lies, and the drive finds that something else is wrong."""
     world = World()
     world.drive(Twist2D(mps, 0.0), 1.2)
-    KINDS[lie][0](world.node, world.now)
-    KINDS["fault"][0](world.node, world.now)
+    KINDS[lie][0](world.node, world.now_s)
+    KINDS["fault"][0](world.node, world.now_s)
     return world
 
 
@@ -35,7 +35,7 @@ def resets(world: World) -> list[float]:
 def test_a_drive_whose_sensor_lies_in_the_fault_reaction_loses_its_power_within_a_second(lie: str, mps: float) -> None:
     """fault reaction ── found ── power off, 0.1 s ── heartbeat withheld, relay open, 0.1 s ── NMT reset node."""
     world = in_its_fault_reaction(lie, mps)
-    begin, watchdog = world.now, world.watchdog
+    begin, watchdog = world.now_s, world.watchdog
     assert watchdog is not None
     assert world.run(1.0, lambda: not world.powered[0])
     assert len(resets(world)) == 1
@@ -55,7 +55,7 @@ def test_the_rung_comes_after_power_off_and_the_relay() -> None:
     entered: dict[Step, float] = {}
 
     def look() -> bool:
-        entered.setdefault(watchdog.status.step, world.now)
+        entered.setdefault(watchdog.status.step, world.now_s)
         return not world.powered[0]
 
     world.run(1.0, look)
@@ -70,7 +70,7 @@ def test_it_has_forgotten_1016h_and_is_configured_by_the_next_boot_before_it_get
     world.run(1.0, lambda: bool(resets(world)))
     world.run(0.05)
     assert world.node.dictionary.values[key(0x1016, 1)] == 0
-    KINDS["heal"][0](world.node, world.now)
+    KINDS["heal"][0](world.node, world.now_s)
     world.command = Twist2D.ZERO
     assert world.run(4.0, lambda: world.truth.standing_s > 0.5)
     assert world.reset().done
@@ -83,7 +83,7 @@ def test_it_has_forgotten_1016h_and_is_configured_by_the_next_boot_before_it_get
 def test_a_drive_that_obeyed_or_is_not_heard_is_never_reset(kind: str) -> None:
     world = World()
     world.drive(Twist2D(0.5, 0.0), 1.2)
-    KINDS[kind][0](world.node, world.now)
+    KINDS[kind][0](world.node, world.now_s)
     world.run(1.5)
     assert world.watchdog is not None
     assert world.watchdog.status.state is State.TRIPPED

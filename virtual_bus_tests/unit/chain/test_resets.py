@@ -86,12 +86,12 @@ def latched(world: World) -> None:
 
 def test_a_reset_waits_for_a_drive_that_is_switched_on_later(world: World) -> None:
     latched(world)
-    world.node.power_cycle(world.now, off_s=4.0)
+    world.node.power_cycle(world.now_s, off_s=4.0)
     world.run(0.5)
-    start = world.now
+    start = world.now_s
     outcome = world.reset()
     assert outcome.done, outcome.sentence
-    assert 3.5 < world.now - start < 3.5 + BOOTED_S
+    assert 3.5 < world.now_s - start < 3.5 + BOOTED_S
     world.run_until(DriverState.ENABLED, within_s=0.5)
 
 
@@ -99,12 +99,12 @@ def test_a_reset_of_a_drive_that_stays_dead_ends_after_ten_seconds_and_says_so(w
     latched(world)
     world.node.line.cut = True
     world.run(0.5)
-    start = world.now
+    start = world.now_s
     outcome = world.reset()
     assert not outcome.done
     assert re.match(r"waiting for node 1 \(left_wheel(, right_wheel)?\): the answer to 1000h:0", outcome.sentence)
     assert outcome.sentence.endswith("check its power and its cable; reset again once that is cured")
-    assert 10.0 < world.now - start < 11.0
+    assert 10.0 < world.now_s - start < 11.0
 
 
 def test_while_a_silent_drive_is_the_watchdogs_cause_its_reset_is_refused(world: World) -> None:
@@ -121,7 +121,7 @@ def test_a_drive_that_restarts_during_a_reset_breaks_it_off(world: World) -> Non
     world.node.fail(0, OVERCURRENT)
     world.run(0.1)
     node_id = world.robot.drives[1].node_id
-    world.bench.nodes[node_id].power_cycle(world.now, off_s=0.0)  # says so later, while the fault reset bit is high
+    world.bench.nodes[node_id].power_cycle(world.now_s, off_s=0.0)  # says so later, while the fault reset bit is high
     outcome = world.reset()
     assert not outcome.done
     assert "broken off: " in outcome.sentence
@@ -137,7 +137,7 @@ def test_a_watchdog_that_dies_during_a_reset_breaks_it_off(world: World) -> None
     world.node.fail(0, OVERCURRENT, holds=True)
     world.run(0.1)
     sentences: list[str] = []
-    world.core.request_reset(world.now, lambda outcome: sentences.append(outcome.sentence))
+    world.core.request_reset(world.now_s, lambda outcome: sentences.append(outcome.sentence))
     world.run(0.1)
     world.watchdog = None
     world.run(0.5)
@@ -149,7 +149,7 @@ def test_a_reset_that_was_under_way_while_the_driver_stood_still_is_broken_off(w
     world.node.fail(0, OVERCURRENT)
     world.run(0.1)
     sentences: list[str] = []
-    world.core.request_reset(world.now, lambda outcome: sentences.append(outcome.sentence))
+    world.core.request_reset(world.now_s, lambda outcome: sentences.append(outcome.sentence))
     world.run(0.02)
     world.pause_driver(9.0)
     world.run(1.0)
@@ -160,7 +160,7 @@ def test_a_reset_that_was_under_way_while_the_driver_stood_still_is_broken_off(w
 
 def test_a_second_reset_is_refused_while_one_is_under_way_and_its_own_caller_may_be_gone(world: World) -> None:
     latched(world)
-    world.core.request_reset(world.now, lambda _outcome: None)
+    world.core.request_reset(world.now_s, lambda _outcome: None)
     assert world.reset().sentence == "refused: a reset is under way"
     world.run_until(DriverState.ENABLED, within_s=0.5)
 
@@ -172,7 +172,7 @@ def test_a_watchdog_that_died_is_needed_for_the_reset(world: World) -> None:
     outcome = world.reset()
     assert not outcome.done
     assert outcome.sentence.startswith("refused: watchdog: silent for")
-    world.watchdog = Watchdog(watchdog_config(world.robot), world.now)
+    world.watchdog = Watchdog(watchdog_config(world.robot), world.now_s)
     world.run(0.1)
     assert world.core.state is DriverState.LATCHED
     assert world.reset().sentence == "refused: watchdog: still starting"
@@ -240,12 +240,12 @@ def hold_node_1(world: World, seconds: float) -> None:
 
 def test_a_node_that_the_watchdog_keeps_pre_operational_is_not_booted_against_it(world: World) -> None:
     world.watchdog = None
-    start = world.now
+    start = world.now_s
     hold_node_1(world, 3.0)
     assert world.core.state is DriverState.LATCHED
     assert world.sent(0x601, since=start) == []
     hold_node_1(world, 0.05)
-    released = world.now
+    released = world.now_s
     world.run(BOOTED_S)
     assert released + 0.1 < next(at for at, frame in world.log if frame.cob_id == 0x601 and at > start) < released + 0.3
     assert world.snapshot.drives[0].nmt_state == "operational"
@@ -255,7 +255,7 @@ def test_a_watchdog_that_forgets_its_trip_in_a_restart_leaves_the_latch_to_the_d
     world.leases = False
     world.run_until(DriverState.LATCHED, within_s=1.5)
     world.command, world.leases = Twist2D.ZERO, True
-    world.watchdog = Watchdog(watchdog_config(world.robot), world.now)
+    world.watchdog = Watchdog(watchdog_config(world.robot), world.now_s)
     world.run(2.0)
     assert world.watchdog.status.state is WatchdogState.WATCHING
     assert (world.core.state, world.core.finding.cause.value) == (DriverState.LATCHED, "watchdog tripped")
@@ -268,7 +268,7 @@ def test_a_trip_that_a_new_driver_found_is_latched_by_it_though_the_watchdog_res
     world.start_driver()
     world.command = Twist2D.ZERO
     world.run(0.2)  # the drives are not even booted
-    world.watchdog = Watchdog(watchdog_config(world.robot), world.now)
+    world.watchdog = Watchdog(watchdog_config(world.robot), world.now_s)
     world.run(2.0)
     assert world.core.state is DriverState.LATCHED
     assert [(stop.stopped_by, stop.latched) for stop in world.core.stops] == [("watchdog", True)]
@@ -292,7 +292,7 @@ def test_a_lost_heartbeat_needs_an_nmt_reset_where_the_profile_says_so(profile: 
     world.run(0.5)
     world.node.emcy.clear_error(code)  # the heartbeat is back, and the fault stays
     world.run(0.5)
-    since = world.now
+    since = world.now_s
     assert world.recovered()
     reset = bytes.fromhex("82 01")
     assert [frame.data for at, frame in world.log if at > since and frame.cob_id == 0].count(reset) == resets

@@ -45,8 +45,8 @@ def test_it_leaves_the_sdo_channel_to_a_driver_that_is_there() -> None:
     watchdog, asked = watchdog_of(world), list[Frame]()
     tick = watchdog.tick
 
-    def tick_and_note(now: float) -> list[Frame]:
-        frames = tick(now)
+    def tick_and_note(now_s: float) -> list[Frame]:
+        frames = tick(now_s)
         asked.extend(frame for frame in frames if frame.cob_id in (0x601, 0x602))
         return frames
 
@@ -62,7 +62,7 @@ def test_a_drive_that_is_known_to_be_off_is_looked_at_now_and_then() -> None:
     world = lost_its_computer("generic")
     world.run(2.0)
     assert watchdog_of(world).status.settled
-    since = world.now
+    since = world.now_s
     world.run(1.2)
     for asked in (world.sent(0x601, since), world.sent(0x602, since)):
         assert {data[0] for data in asked} == {0x40}
@@ -72,13 +72,13 @@ def test_a_drive_that_is_known_to_be_off_is_looked_at_now_and_then() -> None:
 def test_a_watchdog_that_hears_nothing_is_no_watchdog() -> None:
     """It goes deaf while one drive waits for its STO; then the STO closes. It said that it watched, and power came."""
     world = World(keeps=True)
-    apply(world.bench.nodes, 2, "sto", world.now, {})
+    apply(world.bench.nodes, 2, "sto", world.now_s, {})
     world.run(1.2)
     assert watchdog_of(world).status.armed
     watchdog_of(world).on_frame = lambda *_: None  # type: ignore[method-assign]
     world.run(0.4)
     assert not watchdog_of(world).status.armed
-    apply(world.bench.nodes, 2, "heal", world.now, {})
+    apply(world.bench.nodes, 2, "heal", world.now_s, {})
     world.run(1.0)
     assert world.core.state is DriverState.DISARMED
     assert world.core.finding.cause.value == "stop record"

@@ -41,7 +41,7 @@ def test_a_boot_up_message_in_motion_stops_the_drive_that_sent_it_too(nodes: tup
     world.watchdog = (
         None  # it sends a quick stop too; here the driver is alone, with a state frame that says "watching"
     )
-    path_m, begin = world.truth.path_m, world.now
+    path_m, begin = world.truth.path_m, world.now_s
     for node_id in nodes:
         world.inject(0x700 + node_id, "00")
 
@@ -52,7 +52,7 @@ def test_a_boot_up_message_in_motion_stops_the_drive_that_sent_it_too(nodes: tup
         data for at, frame in world.log for data in [frame.data] if at >= begin and frame.cob_id == 0x200 + nodes[0]
     ]
     assert b"\x02\x00" in [data[:2] for data in stopped]
-    assert world.sent(SYNC, world.now - 0.05)
+    assert world.sent(SYNC, world.now_s - 0.05)
 
 
 # --- values that stop coming
@@ -62,7 +62,7 @@ def velocity_lost(world: World, cob_id: int) -> None:
     """Frames of 606Ch of one drive get lost on their way to the driver."""
     driver = world.core
     take = driver.on_frame
-    driver.on_frame = lambda frame, now: [] if frame.cob_id == cob_id else take(frame, now)  # type: ignore[method-assign]
+    driver.on_frame = lambda frame, now_s: [] if frame.cob_id == cob_id else take(frame, now_s)  # type: ignore[method-assign]
 
 
 def test_a_velocity_that_no_longer_comes_stops_the_base_and_is_not_published_as_odometry() -> None:
@@ -85,7 +85,7 @@ def test_a_velocity_that_no_longer_comes_stops_the_base_and_is_not_published_as_
 def test_a_drive_that_does_not_confirm_that_its_power_is_off_keeps_what_stops_it() -> None:
     """NMT reset communication can erase 1016h: a drive that may have power must stop by the missing heartbeat."""
     world = driving()
-    begin = world.now
+    begin = world.now_s
     velocity_lost(world, 0x181)  # nothing of its statusword is heard any more
     world.core.request_shutdown()
     assert world.run(5.0, lambda: world.core.finished)
@@ -159,7 +159,7 @@ def test_a_lost_encoder_is_no_evidence_of_standstill_until_the_wheel_must_have_r
     """0.3 m/s ── encoder lost: 0 m/s, and the wheel runs ── stop requested after 0.2 s ── power off at once."""
     world = driving()
     world.watchdog = None
-    KINDS["encoder_lost"][0](world.node, world.now)
+    KINDS["encoder_lost"][0](world.node, world.now_s)
 
     def watched() -> bool:
         return blind_watchdog(world)

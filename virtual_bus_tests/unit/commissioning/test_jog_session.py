@@ -69,11 +69,11 @@ class Holding(GuideWorld):
         self.jog = JogSession(self.rig, "left", 0.05)
 
     def hold(self, key: str, seconds: float) -> None:
-        end, next_at = self.now + seconds, self.now
-        while self.now < end:
-            if key and self.now >= next_at:
-                next_at = self.now + 0.05
-                self.jog.press(key, self.now)
+        end, next_at = self.now_s + seconds, self.now_s
+        while self.now_s < end:
+            if key and self.now_s >= next_at:
+                next_at = self.now_s + 0.05
+                self.jog.press(key, self.now_s)
             self.turn(self.jog)
 
     def powered(self) -> bool:
@@ -103,7 +103,7 @@ def test_backward_goes_backward() -> None:
 def test_q_ends_it_and_the_farewell_stops_a_wheel_that_turns() -> None:
     world = Holding()
     world.hold("w", 1.5)
-    world.jog.press("q", world.now)
+    world.jog.press("q", world.now_s)
     assert world.jog.done
     took_s = world.run(SafeStop(world.rig))
     assert took_s < 0.5

@@ -31,7 +31,7 @@ def listen(*frames: str, gap_s: float = 0.1) -> Listener:
 
 def test_the_load_is_the_share_of_the_time_that_the_frames_took() -> None:
     heard = listen(*["181 00 00 00 00 00 00 00 00"] * 100, gap_s=0.01)
-    assert heard.load(bitrate=500_000, now=11.0) == pytest.approx(100 * 135 / 500_000)
+    assert heard.load(bitrate=500_000, now_s=11.0) == pytest.approx(100 * 135 / 500_000)
 
 
 def test_heartbeats_tell_state_and_period_and_a_boot_up_is_none_of_them() -> None:
@@ -155,8 +155,8 @@ def test_a_request_waits_until_the_other_master_is_quiet_on_that_channel() -> No
     world = SessionWorld()
     listening = ListenSession(0.1)
     world.run(listening)
-    until = world.now + 1.0
-    world.others.append(lambda now: [frame("601 40 64 60 00 00 00 00 00")] if now < until else [])
+    until = world.now_s + 1.0
+    world.others.append(lambda now_s: [frame("601 40 64 60 00 00 00 00 00")] if now_s < until else [])
     roster = Identification((1,), listening.heard, 0.1, with_texts=False)
     world.turn(roster)
     world.run(roster)

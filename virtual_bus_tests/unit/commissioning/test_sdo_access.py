@@ -22,7 +22,7 @@ STATUS = (Address(0x6041), Address(0x6841))
 
 
 def ask(world: SessionWorld, steps: Steps[T], node: int = 1) -> NodeTask[T]:
-    inquiry = SdoSession({node: steps}, Listener(world.now), lambda node_id: SdoClient(node_id, 0.1, 2))
+    inquiry = SdoSession({node: steps}, Listener(world.now_s), lambda node_id: SdoClient(node_id, 0.1, 2))
     world.run(inquiry)
     return inquiry.tasks[node]
 
@@ -85,9 +85,9 @@ def test_the_statuswords_are_where_the_profile_has_them() -> None:
 
 def test_a_channel_that_others_use_all_the_time_is_left_to_them_for_five_seconds_and_then_given_up() -> None:
     world = SessionWorld()
-    question, heard = Frame(0x601, bytes.fromhex("4064600000000000")), Listener(world.now)
-    heard.on_frame(question, world.now)
-    world.others.append(lambda now: [question])
+    question, heard = Frame(0x601, bytes.fromhex("4064600000000000")), Listener(world.now_s)
+    heard.on_frame(question, world.now_s)
+    world.others.append(lambda now_s: [question])
     inquiry = SdoSession({1: read_object(Address(0x1000))}, heard, lambda node_id: SdoClient(node_id, 0.1, 2))
     assert world.run(inquiry) == pytest.approx(5.0, abs=0.1)
     assert inquiry.tasks[1].blocked

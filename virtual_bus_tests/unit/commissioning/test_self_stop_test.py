@@ -76,9 +76,9 @@ def test_one_drive_of_two_that_lost_its_1016h_is_the_one_that_is_named() -> None
     def sabotaged(rig: PoweredDrives) -> Script[tuple[Outcome, ...]]:
         yield from get_ready(rig)
         request = "23 16 10 01 00 00 00 00"
-        world.bench.on_frame(BenchFrame(0x602, bytes.fromhex(request)), world.now)
+        world.bench.on_frame(BenchFrame(0x602, bytes.fromhex(request)), world.now_s)
         request = "23 16 10 02 00 00 00 00"
-        world.bench.on_frame(BenchFrame(0x602, bytes.fromhex(request)), world.now)
+        world.bench.on_frame(BenchFrame(0x602, bytes.fromhex(request)), world.now_s)
         return (yield from prove(rig, SPEED_MPS))
 
     outcomes = world.guide(sabotaged)
@@ -109,8 +109,8 @@ def test_a_drive_that_is_not_there_ends_it_before_anything_moves() -> None:
 
 def test_the_heartbeat_of_a_driver_ends_it_at_once() -> None:
     world = GuideWorld()
-    spins_at = world.now + 3.0
-    world.others.append(lambda now: [Frame(0x77F, b"\x05")] if now > spins_at else [])
+    spins_at = world.now_s + 3.0
+    world.others.append(lambda now_s: [Frame(0x77F, b"\x05")] if now_s > spins_at else [])
     with pytest.raises(RigError, match="comes from another master"):
         world.guide(whole)
     assert_off(world)

@@ -74,7 +74,7 @@ def test_no_part_sees_it_and_the_base_moves_otherwise_than_ordered(name: str) ->
     """That is why the marks are needed: driver and watchdog compute with the same wrong numbers."""
     change, _, moves = MISTAKES[name]
     world = World(changed(bench_robot(), change))
-    world.bench = Bench(bench_robot(), world.now)
+    world.bench = Bench(bench_robot(), world.now_s)
     world.drive(CURVE, seconds=2.0)
     assert world.core.state is DriverState.ENABLED
     assert (world.truth.linear_mps, world.truth.angular_radps) == pytest.approx(

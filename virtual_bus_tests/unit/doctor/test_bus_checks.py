@@ -118,7 +118,7 @@ def test_a_tripped_watchdog_tells_cause_node_and_rung() -> None:
 def test_a_watchdog_or_driver_that_is_silent_fails() -> None:
     assert not_ok(evidence(heard=heard(*DRIVER, *DRIVES))) == [("watchdog's state (1FEh)", Verdict.FAIL)]
     assert not_ok(evidence(heard=heard(*WATCHDOG, *DRIVES))) == [("driver's heartbeat (77Fh)", Verdict.FAIL)]
-    assert ("watchdog's state (1FEh)", Verdict.FAIL) in not_ok(evidence(now=11.2))
+    assert ("watchdog's state (1FEh)", Verdict.FAIL) in not_ok(evidence(now_s=11.2))
 
 
 def test_the_watchdogs_counters_are_shown_and_refused_leases_are_a_warning() -> None:

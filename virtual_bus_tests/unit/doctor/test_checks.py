@@ -37,19 +37,21 @@ def healthy() -> dict[str, Any]:
     }  # fmt: skip
 
 
-def evidence(now: dict[str, Any], before: dict[str, Any] | None = None) -> Evidence:
-    """A robot that said `before` first and `now` last; a topic whose message is None is silent."""
+def evidence(now_s: dict[str, Any], before: dict[str, Any] | None = None) -> Evidence:
+    """A robot that said `before` first and `now_s` last; a topic whose message is None is silent."""
     first = healthy() if before is None else before
-    heard = {topic: Heard((first[topic], message), (1.0, 2.0)) for topic, message in now.items() if message is not None}
+    heard = {
+        topic: Heard((first[topic], message), (1.0, 2.0)) for topic, message in now_s.items() if message is not None
+    }
     return Evidence(load_robot(sample("bench")).robot, "bench.yaml", 3.0, heard=heard)
 
 
 def changed(topic: str, **values: Any) -> Evidence:
     """A healthy robot but for these fields."""
-    now = healthy()
+    now_s = healthy()
     for name, value in values.items():
-        setattr(now[topic], name, value)
-    return evidence(now)
+        setattr(now_s[topic], name, value)
+    return evidence(now_s)
 
 
 @pytest.mark.parametrize(("age_s", "found"), [(1.5, False), (1.6, True), (18.0, True)])
@@ -57,7 +59,7 @@ def changed(topic: str, **values: Any) -> Evidence:
 def test_a_sample_that_is_old_is_not_taken_for_what_is(topic: str, age_s: float, found: bool) -> None:
     """A latched topic gives the last words of a node that hangs to whoever asks."""
     seen = evidence(healthy())
-    heard = {**seen.heard, topic: Heard(seen.on(topic).messages, (0.0, seen.now - age_s))}
+    heard = {**seen.heard, topic: Heard(seen.on(topic).messages, (0.0, seen.now_s - age_s))}
     checks = robot_checks(replace(seen, heard=heard))
     assert any(f"nothing on {topic} for {age_s:.1f} s" in check.found for check in checks) is found
     assert (exit_code(checks) != 0) is found
@@ -76,10 +78,10 @@ def test_a_source_that_is_not_followed_is_named_with_what_to_do(reason: str, adv
 
 
 def drive_changed(**values: Any) -> Evidence:
-    now = healthy()
+    now_s = healthy()
     for name, value in values.items():
-        setattr(now["motor_driver/status"].drives[1], name, value)
-    return evidence(now)
+        setattr(now_s["motor_driver/status"].drives[1], name, value)
+    return evidence(now_s)
 
 
 def not_ok(seen: Evidence) -> list[tuple[str, Verdict]]:
@@ -134,9 +136,9 @@ def test_each_thing_that_is_wrong_is_one_row_that_says_what_to_do(
 
 
 def test_a_counter_that_grew_before_doctor_came_is_no_warning() -> None:
-    then, now = healthy(), healthy()
-    then["motor_driver/status"].overruns = now["motor_driver/status"].overruns = 7
-    assert not_ok(evidence(now, then)) == []
+    then, now_s = healthy(), healthy()
+    then["motor_driver/status"].overruns = now_s["motor_driver/status"].overruns = 7
+    assert not_ok(evidence(now_s, then)) == []
 
 
 @pytest.mark.parametrize(
@@ -180,9 +182,9 @@ SOUND = {"topic": "scan", "required": True, "fresh": True, "age_s": 0.05, "usabl
     ],
 )
 def test_each_scanner_has_its_row(changes: dict[str, Any], dropped_before: int, verdict: Verdict, told: str) -> None:
-    now, before = healthy(), healthy()
-    now["safety_filter/state"].scanners = [ScannerState(**{**SOUND, **changes})]
+    now_s, before = healthy(), healthy()
+    now_s["safety_filter/state"].scanners = [ScannerState(**{**SOUND, **changes})]
     before["safety_filter/state"].scanners = [ScannerState(**{**SOUND, "dropped": dropped_before})]
-    (row,) = [check for check in robot_checks(evidence(now, before)) if check.name == "scanner scan"]
+    (row,) = [check for check in robot_checks(evidence(now_s, before)) if check.name == "scanner scan"]
     assert row.verdict is verdict
     assert told in row.found

@@ -33,12 +33,12 @@ class BootSession:
     def done(self) -> bool:
         return all(boot.done for boot in self.boots)
 
-    def on_frame(self, frame: Frame, now: float) -> None:
+    def on_frame(self, frame: Frame, now_s: float) -> None:
         for boot in self.boots:
-            boot.on_frame(frame, now)
+            boot.on_frame(frame, now_s)
 
-    def tick(self, now: float) -> list[Frame]:
-        return [frame for boot in self.boots for frame in boot.tick(now)]
+    def tick(self, now_s: float) -> list[Frame]:
+        return [frame for boot in self.boots for frame in boot.tick(now_s)]
 
 
 def inspected(world: SessionWorld, of: Robot | None = None) -> dict[int, Inspection]:
@@ -46,7 +46,7 @@ def inspected(world: SessionWorld, of: Robot | None = None) -> dict[int, Inspect
     nodes = {drive.node_id: tuple(d for d in looked.drives if d.node_id == drive.node_id) for drive in looked.drives}
     inquiry = SdoSession(
         {node_id: inspect(node_id, drives, looked) for node_id, drives in nodes.items()},
-        Listener(world.now),
+        Listener(world.now_s),
         lambda node_id: sdo_client(node_id, nodes[node_id][0].kind.sdo, 0.3),
     )
     world.run(inquiry)

@@ -85,7 +85,7 @@ INPUTS = Inputs(
 HEALTHY = Evidence(
     robot=ROBOT,
     source="bench.yaml",
-    now=10.0,
+    now_s=10.0,
     wall_s=float(WALL_S),
     heard={
         "motor_driver/status": heard(status()),

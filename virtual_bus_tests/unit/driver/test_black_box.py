@@ -22,7 +22,7 @@ def recording(frames: int = 3) -> Recording:
     for k in range(frames):
         ring.frame(100.0 + 0.01 * k, 0x201, SETPOINT, received=False)
         ring.note(100.0 + 0.01 * k + 0.001, f"cmd_vel 0.{k} m/s")
-    return ring.cut(now=105.0, wall_offset_s=WALL_S)
+    return ring.cut(now_s=105.0, wall_offset_s=WALL_S)
 
 
 def text(of: Recording) -> str:
@@ -34,7 +34,7 @@ def test_the_ring_gives_back_the_last_seconds_alone() -> None:
     for k in range(50):
         ring.frame(100.0 + 0.1 * k, k, b"", received=True)
         ring.note(100.0 + 0.1 * k, str(k))
-    cut = ring.cut(now=105.0, wall_offset_s=0.0)
+    cut = ring.cut(now_s=105.0, wall_offset_s=0.0)
     assert [entry[1] for entry in cut.frames] == list(range(30, 50))
     assert [entry[1] for entry in cut.notes] == [str(k) for k in range(30, 50)]
 
@@ -43,7 +43,7 @@ def test_memory_is_bounded_however_full_the_bus_is() -> None:
     ring = Ring(seconds=60.0)
     for k in range(MAX_FRAMES + 10):
         ring.frame(100.0 + k * 1e-5, 0x181, b"", received=True)
-    frames = ring.cut(now=101.0, wall_offset_s=0.0).frames
+    frames = ring.cut(now_s=101.0, wall_offset_s=0.0).frames
     assert len(frames) == MAX_FRAMES
     assert frames[0][0] == pytest.approx(100.0001)
 

@@ -31,7 +31,7 @@ def test_a_drive_out_of_its_box_is_made_ready_without_a_note() -> None:
     assert boot.report.identity == Identity(vendor_id=0x1111, product_code=0x2222, revision=0x10002, serial=0x4444)
     assert drive.nmt == [0x82, 0x80]  # reset communication, enter pre-operational; starting it is not ours
     assert boot.waiting_for == ""
-    assert bench.now == 100.0  # nothing had to be waited for
+    assert bench.now_s == 100.0  # nothing had to be waited for
 
 
 def test_every_write_in_its_order() -> None:
@@ -187,17 +187,17 @@ def test_a_drive_that_starts_anew_in_the_middle_has_forgotten_everything() -> No
     drive = FakeDrive(on_write={(0x6060, 0): lambda drive, _: setattr(drive, "powered", False)})
     bench = Bench(drive, robot())
     bench.run(seconds=0.2)
-    bench.boot.on_frame(Frame(0x701, b"\0"), bench.now)
+    bench.boot.on_frame(Frame(0x701, b"\0"), bench.now_s)
     assert "it started anew while it was being configured" in error_of(bench.boot)
-    assert bench.boot.tick(bench.now + 10.0) == []
+    assert bench.boot.tick(bench.now_s + 10.0) == []
 
 
 def test_boot_up_messages_before_the_reset_are_normal() -> None:
     drive = FakeDrive(powered=False)
     bench = Bench(drive, robot())
     bench.run(seconds=0.1)
-    bench.boot.on_frame(Frame(0x701, b"\0"), bench.now)  # its boot loader
-    bench.boot.on_frame(Frame(0x701, b"\0"), bench.now)  # its firmware
+    bench.boot.on_frame(Frame(0x701, b"\0"), bench.now_s)  # its boot loader
+    bench.boot.on_frame(Frame(0x701, b"\0"), bench.now_s)  # its firmware
     drive.powered = True
     assert bench.run().report is not None
 
@@ -266,7 +266,7 @@ def test_a_drive_that_stays_in_quick_stop_is_disabled_when_it_stands() -> None:
     bench = Bench(drive, robot())
     assert bench.run().report is not None
     assert drive.writes[:2] == [(0x6040, 0, 0x02), (0x6040, 0, 0x00)]
-    assert bench.now == pytest.approx(100.1, abs=0.011)  # five polls of 20 ms
+    assert bench.now_s == pytest.approx(100.1, abs=0.011)  # five polls of 20 ms
 
 
 def test_a_drive_that_is_switched_on_but_not_enabled_is_disabled() -> None:
@@ -285,7 +285,7 @@ def test_a_drive_that_does_not_stop_loses_its_voltage_and_is_an_error() -> None:
     assert "left turns at 0.500 m/s 0.6 s after a quick stop. Its voltage is now disabled" in error_of(boot)
     assert drive.nmt == [0x80]
     assert drive.writes == [(0x6040, 0, 0x02), (0x6040, 0, 0x00)]
-    assert bench.now == pytest.approx(100.6, abs=0.05)
+    assert bench.now_s == pytest.approx(100.6, abs=0.05)
 
 
 # quick stop ── 0.5 m/s ── from there on just slower than the watchdog's floor of noise, and never at standstill
@@ -296,7 +296,7 @@ def test_a_drive_that_never_quite_stands_loses_its_voltage_too() -> None:
     bench = Bench(drive, robot())
     boot = bench.run()
     assert "a quick stop. Its voltage is now disabled" in error_of(boot)
-    assert bench.now < 101.0
+    assert bench.now_s < 101.0
 
 
 def test_both_axes_get_their_quick_stop_before_either_is_waited_for() -> None:
@@ -321,22 +321,22 @@ def test_no_frame_raises(noise: list[list[Frame]]) -> None:
     drive = FakeDrive()
     boot = NodeBoot(1, robot().drives[:1], robot())
     for cycle, strays in enumerate(noise):
-        now = 0.01 * cycle
-        for frame in [answer for sent in boot.tick(now) for answer in drive.on_frame(sent)] + strays:
-            boot.on_frame(frame, now)
+        now_s = 0.01 * cycle
+        for frame in [answer for sent in boot.tick(now_s) for answer in drive.on_frame(sent)] + strays:
+            boot.on_frame(frame, now_s)
 
 
 def test_a_frame_before_the_first_tick_does_nothing() -> None:
     boot = NodeBoot(1, robot().drives[:1], robot())
-    boot.on_frame(Frame(0x701, b"\0"), now=0.0)
-    assert boot.tick(now=0.0) == [Frame(0x601, bytes.fromhex("40 00 10 00 00 00 00 00"))]
+    boot.on_frame(Frame(0x701, b"\0"), now_s=0.0)
+    assert boot.tick(now_s=0.0) == [Frame(0x601, bytes.fromhex("40 00 10 00 00 00 00 00"))]
 
 
 def test_other_answers_on_the_channel_change_nothing() -> None:
     boot = NodeBoot(1, robot().drives[:1], robot())
-    boot.tick(now=0.0)
+    boot.tick(now_s=0.0)
     waits_for = boot.waiting_for
-    boot.on_frame(Frame(0x581, bytes.fromhex("4B 41 60 00 37 06 00 00")), now=0.0)
+    boot.on_frame(Frame(0x581, bytes.fromhex("4B 41 60 00 37 06 00 00")), now_s=0.0)
     assert boot.waiting_for == waits_for != ""
 
 

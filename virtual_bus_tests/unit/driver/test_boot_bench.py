@@ -22,28 +22,28 @@ class World:
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self.bench = Bench(robot)
-        self.now = 0.0
+        self.now_s = 0.0
         self.states: list[DriveState | None] = [None, None]
         self.rims_mps = [0.0, 0.0]
         self._units = [AxisUnits(drive, robot.base) for drive in robot.drives]
 
     def send(self, frame: Frame) -> None:
-        self.bench.on_frame(BenchFrame(frame.cob_id, frame.data), self.now)
+        self.bench.on_frame(BenchFrame(frame.cob_id, frame.data), self.now_s)
 
     def received(self) -> list[Frame]:
-        return [Frame(frame.cob_id, frame.data) for frame in self.bench.tick(self.now)]
+        return [Frame(frame.cob_id, frame.data) for frame in self.bench.tick(self.now_s)]
 
     def boot(self, limit_s: float = 3.0) -> list[NodeBoot]:
         """Both nodes at the same time."""
         boots = [NodeBoot(drive.node_id, (drive,), self.robot) for drive in self.robot.drives]
-        end = self.now + limit_s
-        while self.now < end and not all(boot.done for boot in boots):
-            self.now += 0.001
+        end = self.now_s + limit_s
+        while self.now_s < end and not all(boot.done for boot in boots):
+            self.now_s += 0.001
             for frame in self.received():
                 for boot in boots:
-                    boot.on_frame(frame, self.now)
+                    boot.on_frame(frame, self.now_s)
             for boot in boots:
-                for frame in boot.tick(self.now):
+                for frame in boot.tick(self.now_s):
                     self.send(frame)
         return boots
 
@@ -54,7 +54,7 @@ class World:
             setpoint = pack_setpoint(next_controlword(state, goal), units.velocity_raw(rim_mps))
             self.send(Frame(layout.setpoint_cob_id(0), setpoint))
         self.send(SYNC)
-        self.now += 0.01
+        self.now_s += 0.01
         for frame in self.received():
             self._take(frame)
 
@@ -100,14 +100,14 @@ def test_two_drives_boot_together_within_half_a_second_of_power_on() -> None:
     assert [report.stops_by_itself for report in reports] == [True, True]
     assert [report.notes for report in reports] == [(), ()]
     # 0.3 s of these: the first question came before the drives could hear it
-    assert world.now < 0.5
+    assert world.now_s < 0.5
 
 
 def test_a_booted_pair_is_enabled_within_ten_cycles_and_drives_forward() -> None:
     world = booted()
     assert world.cycles(PowerGoal.ON, world.all_are(DriveState.OPERATION_ENABLED)) <= 10
     world.drive()
-    truth = world.bench.truth(world.now)
+    truth = world.bench.truth(world.now_s)
     assert min(truth.v_left_mps, truth.v_right_mps) > 0.28  # the right motor is mounted mirrored
     assert abs(truth.angular_radps) < 0.05
 
@@ -125,7 +125,7 @@ def test_a_running_robot_is_stopped_by_the_next_boot() -> None:
     world.drive()
     boots = world.boot()  # a new driver, as after a crash; nobody ordered a stop
     assert [boot.error for boot in boots] == [None, None]
-    truth = world.bench.truth(world.now)
+    truth = world.bench.truth(world.now_s)
     assert max(abs(truth.v_left_mps), abs(truth.v_right_mps)) < 0.005
 
 
@@ -147,9 +147,9 @@ def test_a_fault_goes_by_reset_alone_and_only_on_the_edge() -> None:
 def test_the_drives_stop_by_themselves_when_both_heartbeats_end() -> None:
     world = booted()
     world.drive()
-    start = world.now
-    while world.bench.truth(world.now).linear_mps > 0.005:
-        world.now += 0.01
+    start = world.now_s
+    while world.bench.truth(world.now_s).linear_mps > 0.005:
+        world.now_s += 0.01
         world.received()
     # heartbeats count for 0.3 s, then 0.3 m/s go down the quick stop ramp
-    assert 0.3 < world.now - start < 0.7
+    assert 0.3 < world.now_s - start < 0.7

@@ -140,7 +140,7 @@ def test_a_second_boot_up_message_is_waited_for() -> None:
     bench = Bench(drive, base, base.drives[:1])
     bench.run(seconds=0.4)
     assert bench.boot.waiting_for.endswith("no further boot-up message")
-    bench.boot.on_frame(Frame(0x701, b"\0"), bench.now)
+    bench.boot.on_frame(Frame(0x701, b"\0"), bench.now_s)
     bench.run(seconds=0.4)
     assert bench.boot.waiting_for.endswith("no further boot-up message")
     assert bench.run(seconds=0.2).report is not None
@@ -151,7 +151,7 @@ def test_a_drive_that_is_switched_on_late_is_asked_again_at_once() -> None:
     bench = Bench(drive, robot())
     bench.run(seconds=0.05)
     drive.powered = True
-    bench.boot.on_frame(Frame(0x701, b"\0"), bench.now)
+    bench.boot.on_frame(Frame(0x701, b"\0"), bench.now_s)
     assert bench.run(seconds=0.02).report is not None
 
 
@@ -164,7 +164,7 @@ def test_sdo_timeouts_are_those_of_the_profile(monkeypatch: pytest.MonkeyPatch) 
     drive = FakeDrive(on_write={(0x6060, 0): lambda drive, _: setattr(drive, "powered", False)})
     boot, bench = booted(drive, base)
     assert "6060h:0: no answer to 1 requests, 2 s each" in error_of(boot)
-    assert bench.now == pytest.approx(102.0, abs=0.03)
+    assert bench.now_s == pytest.approx(102.0, abs=0.03)
 
 
 def test_requests_keep_the_distance_that_the_profile_wants(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -174,7 +174,7 @@ def test_requests_keep_the_distance_that_the_profile_wants(monkeypatch: pytest.M
     drive = FakeDrive(objects=factory_objects(axes=(0, 1)))
     boot, bench = booted(drive, robot())
     assert boot.report is not None
-    assert bench.now - 100.0 == pytest.approx(0.01 * drive.transfers, rel=0.05)
+    assert bench.now_s - 100.0 == pytest.approx(0.01 * drive.transfers, rel=0.05)
 
 
 def test_another_firmware_is_refused() -> None:

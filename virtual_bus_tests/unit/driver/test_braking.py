@@ -69,15 +69,15 @@ def test_below_the_end_of_the_way_every_speed_fails_even_one_that_is_not_measure
 def test_a_base_that_follows_the_ramp_with_the_lag_never_fails(linear: float, angular: float, jerk: float) -> None:
     bench = robot(jerk_mps3=jerk)
     limiter, motion = Limiter(bench.limits, 0.5), MotionState(Twist2D(linear, angular))
-    braking, now = Braking(bench), 100.0
+    braking, now_s = Braking(bench), 100.0
     fastest = max(abs(speed) for speed in wheel_speeds(motion.twist, 0.5))
-    braking.begin(fastest, angular, now, quick=False)
+    braking.begin(fastest, angular, now_s, quick=False)
     late = [fastest] * round(lag_s(bench) / 0.01)
     while motion.twist != Twist2D.ZERO or late:
-        now += 0.01
+        now_s += 0.01
         motion = limiter.step(motion, Twist2D.ZERO, 0.01)
         late.append(max(abs(speed) for speed in wheel_speeds(motion.twist, 0.5)))
-        assert not braking.fails(late.pop(0), now)
+        assert not braking.fails(late.pop(0), now_s)
         if motion.twist == Twist2D.ZERO and max(late) == 0.0:
             break
 

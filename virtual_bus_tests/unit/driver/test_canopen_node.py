@@ -28,7 +28,7 @@ class Story:
 
     robot: Robot = field(default_factory=bench_robot)
     drive: FakeDrive = field(default_factory=FakeDrive)
-    now: float = 10.0
+    now_s: float = 10.0
     sent: list[Frame] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -41,29 +41,29 @@ class Story:
     def wait(self, seconds: float) -> None:
         """Time passes, nobody says anything but the drive's SDO server."""
         for _ in range(round(seconds / 0.01)):
-            self.now += 0.01
-            waiting = self.node.tick(self.now)
+            self.now_s += 0.01
+            waiting = self.node.tick(self.now_s)
             while waiting:
                 self.sent += waiting
                 answers = [answer for frame in waiting for answer in self.drive.on_frame(frame)]
                 waiting = [frame for answer in answers for frame in self._hear(answer)]
 
     def heartbeat(self, state: int) -> bool:
-        return self.node.on_heartbeat(Frame(0x701, bytes([state])), self.now)
+        return self.node.on_heartbeat(Frame(0x701, bytes([state])), self.now_s)
 
     def status(self) -> bool:
         """Status and velocity, as they answer one SYNC."""
-        status = self.node.on_status(self.axis, Frame(0x181, bytes.fromhex("37 06 10 00 00 00")), self.now)
-        return self.node.on_velocity(self.axis, Frame(0x281, bytes(4)), self.now) and status
+        status = self.node.on_status(self.axis, Frame(0x181, bytes.fromhex("37 06 10 00 00 00")), self.now_s)
+        return self.node.on_velocity(self.axis, Frame(0x281, bytes(4)), self.now_s) and status
 
     def booted(self) -> Story:
-        self.node.begin_boot(self.now)
+        self.node.begin_boot(self.now_s)
         self.wait(1.0)
         return self
 
     def started(self) -> Story:
         """Booted, and an answer of the drive to the NMT start has come."""
-        self.node.begin_boot(self.now)
+        self.node.begin_boot(self.now_s)
         while self.node.presence is not STARTING:
             self.wait(0.01)
         return self
@@ -78,10 +78,10 @@ class Story:
 
     def _hear(self, frame: Frame) -> list[Frame]:
         if frame.cob_id == 0x701:
-            self.node.on_heartbeat(frame, self.now)
+            self.node.on_heartbeat(frame, self.now_s)
         else:
-            self.node.on_sdo(frame, self.now)
-        return self.node.tick(self.now)
+            self.node.on_sdo(frame, self.now_s)
+        return self.node.tick(self.now_s)
 
 
 def test_at_first_it_is_gone_and_sends_nothing() -> None:
@@ -100,8 +100,10 @@ def test_a_boot_that_ends_well_starts_the_node_and_waits_for_its_first_feedback(
     assert story.node.has_pdos
     assert story.node.report is not None
     assert story.node.report.stops_by_itself
-    assert story.node.waiting_for(story.now).startswith("node 1 (left_wheel): waiting for its first feedback since 0.")
-    assert (story.node.absent(), story.node.silent(story.now, NEVER)) == ("", "")
+    assert story.node.waiting_for(story.now_s).startswith(
+        "node 1 (left_wheel): waiting for its first feedback since 0."
+    )
+    assert (story.node.absent(), story.node.silent(story.now_s, NEVER)) == ("", "")
 
 
 def test_when_it_is_configured_it_waits_for_the_boots_of_the_others() -> None:
@@ -111,7 +113,7 @@ def test_when_it_is_configured_it_waits_for_the_boots_of_the_others() -> None:
     assert story.node.presence is BOOTING
     assert not story.node.is_being_configured
     assert START not in story.sent
-    assert story.node.waiting_for(story.now) == "node 1 (left_wheel): configured, waits for the boots of the others"
+    assert story.node.waiting_for(story.now_s) == "node 1 (left_wheel): configured, waits for the boots of the others"
     story.node.others_are_configured = lambda: True
     story.wait(0.01)
     assert story.node.presence is STARTING
@@ -129,7 +131,7 @@ def test_a_restart_while_it_waits_for_the_others_is_noticed_at_once() -> None:
 
 def test_a_drive_that_is_not_there_keeps_nobody_waiting() -> None:
     story = Story(drive=FakeDrive(powered=False))
-    story.node.begin_boot(story.now)
+    story.node.begin_boot(story.now_s)
     story.wait(2.0)
     assert story.node.presence is BOOTING
     assert not story.node.is_being_configured
@@ -150,7 +152,7 @@ def test_without_heartbeat_or_status_it_is_lost_after_a_second(beats: bool, spea
     assert absent.startswith("node 1 (left_wheel) could not be started: within 1.0 s of NMT start it sent ")
     assert ("a heartbeat that says pre-operational, not operational" in absent) is not beats
     assert ("no status of left_wheel (its TPDOs: see pdo.synchronous of its drive profile)" in absent) is not speaks
-    assert "cable" not in story.node.missing(story.now + 60.0)  # it has answered every SDO
+    assert "cable" not in story.node.missing(story.now_s + 60.0)  # it has answered every SDO
 
 
 def test_a_drive_without_a_heartbeat_is_said_to_have_none() -> None:
@@ -165,11 +167,11 @@ def test_a_drive_without_a_heartbeat_is_said_to_have_none() -> None:
 
 def test_a_node_that_is_silent_without_power_is_asked_again_after_a_second() -> None:
     story = Story().ready()
-    ready_at = story.now
+    ready_at = story.now_s
     while story.node.presence is READY:
         story.wait(0.01)
-        story.node.seek(story.now, NEVER)
-    assert story.now - ready_at == pytest.approx(1.0, abs=0.03)
+        story.node.seek(story.now_s, NEVER)
+    assert story.now_s - ready_at == pytest.approx(1.0, abs=0.03)
     assert story.node.absent().endswith("s and is looked for")
     story.sent.clear()
     story.booted()
@@ -180,22 +182,22 @@ def test_a_node_that_is_silent_without_power_is_asked_again_after_a_second() -> 
 def test_a_node_that_was_not_asked_for_a_second_is_not_looked_for() -> None:
     story = Story().ready()
     story.wait(3.0)
-    story.node.seek(story.now, story.now - 0.9)  # the driver itself paused: its SYNCs began 0.9 s ago
+    story.node.seek(story.now_s, story.now_s - 0.9)  # the driver itself paused: its SYNCs began 0.9 s ago
     assert story.node.presence is READY
-    story.node.seek(story.now, story.now - 1.1)
+    story.node.seek(story.now_s, story.now_s - 1.1)
     assert story.node.presence is GONE
 
 
 def test_a_second_boot_up_message_of_one_start_is_waited_for_in_the_next_boot() -> None:
     story = Story().ready()
     for said in ("if it does so after each boot, set start.settle_s", "again; the next boot waits for it"):
-        while story.now - story.node._boot_up_at < 0.8:
+        while story.now_s - story.node._boot_up_at < 0.8:
             story.wait(0.01)
         story.heartbeat(BOOT_UP)
         assert said in story.node.absent()
-        began = story.now
+        began = story.now_s
         story.started()
-    assert story.now - began > 1.3 * 0.8
+    assert story.now_s - began > 1.3 * 0.8
     assert story.node.report is not None
     assert any("set start.settle_s in its drive profile" in note for note in story.node.report.notes)
 
@@ -205,9 +207,9 @@ def test_a_boot_up_message_long_after_the_boot_is_a_restart_and_changes_nothing_
     story.wait(6.0)
     story.heartbeat(BOOT_UP)
     assert story.node.absent() == "node 1 (left_wheel) restarted (boot-up message)"
-    began = story.now
+    began = story.now_s
     story.started()
-    assert story.now - began < 0.5
+    assert story.now_s - began < 0.5
 
 
 def test_a_drive_that_loses_its_supply_soon_after_its_boot_is_booted_at_once() -> None:
@@ -216,14 +218,14 @@ def test_a_drive_that_loses_its_supply_soon_after_its_boot_is_booted_at_once() -
     for lives_s in (2.0, 1.0):
         story.wait(lives_s)
         story.heartbeat(BOOT_UP)
-        began = story.now
+        began = story.now_s
         story.ready()
-        assert story.now - began < 0.5
+        assert story.now_s - began < 0.5
 
 
 def test_why_a_boot_failed_is_known_until_the_node_is_ready() -> None:
     story = Story(drive=FakeDrive(refuse={(0x60FF, 0): 0x08000022}))
-    story.node.begin_boot(story.now)
+    story.node.begin_boot(story.now_s)
     story.wait(0.5)
     assert "60FFh:0: 0800 0022h" in story.node.boot_error
     story.drive.refuse.clear()
@@ -234,7 +236,11 @@ def test_why_a_boot_failed_is_known_until_the_node_is_ready() -> None:
 
 def test_with_both_it_is_ready() -> None:
     story = Story().ready()
-    assert (story.node.waiting_for(story.now), story.node.absent(), story.node.silent(story.now, NEVER)) == ("", "", "")
+    assert (story.node.waiting_for(story.now_s), story.node.absent(), story.node.silent(story.now_s, NEVER)) == (
+        "",
+        "",
+        "",
+    )
     assert story.node.nmt_state is NmtState.OPERATIONAL
 
 
@@ -259,20 +265,22 @@ def test_a_status_that_is_too_old_is_silence(age_s: float, silent: bool) -> None
 def test_a_drive_that_was_not_asked_is_not_silent(run_s: float, age_s: float, silent: bool) -> None:
     """status ──── our pause ──── SYNCs again ── `run_s` ── now: the drive has 0.1 s from there on."""
     story = Story().ready()
-    now = story.axis.status_at + age_s
-    story.node.heartbeat_at = now
+    now_s = story.axis.status_at + age_s
+    story.node.heartbeat_at = now_s
     sentence = f"node 1 (left_wheel): no status for {age_s:.2f} s"
-    assert story.node.silent(now, now - run_s) == (sentence if silent else "")
+    assert story.node.silent(now_s, now_s - run_s) == (sentence if silent else "")
 
 
 def test_a_heartbeat_that_is_too_old_is_silence_though_the_status_is_fresh() -> None:
     story = Story().ready()
     beat_at = story.node.heartbeat_at
-    story.now = beat_at + 0.31
+    story.now_s = beat_at + 0.31
     story.status()
     assert story.node.silent(beat_at + 0.31, NEVER) == "node 1 (left_wheel): no heartbeat for 0.31 s"
     story.heartbeat(OPERATIONAL)
-    assert story.node.silent(story.now, NEVER) == ""  # it is ready again by itself; what is latched is the supervisor's
+    assert (
+        story.node.silent(story.now_s, NEVER) == ""
+    )  # it is ready again by itself; what is latched is the supervisor's
 
 
 @pytest.mark.parametrize(
@@ -313,7 +321,7 @@ def test_a_restart_while_it_is_starting_is_noticed_at_once() -> None:
 
 def test_a_restart_forgets_the_emergency_message_of_the_life_before() -> None:
     story = Story().ready()
-    assert story.node.on_emcy(Frame(0x081, bytes.fromhex("10 23 02 00 00 00 00 00")), story.now)
+    assert story.node.on_emcy(Frame(0x081, bytes.fromhex("10 23 02 00 00 00 00 00")), story.now_s)
     assert story.node.emcy is not None
     story.heartbeat(BOOT_UP)
     assert story.node.emcy is None
@@ -323,8 +331,8 @@ def test_a_restart_forgets_the_emergency_message_of_the_life_before() -> None:
 def test_what_is_no_heartbeat_is_refused_and_changes_nothing(data: str) -> None:
     story = Story().ready()
     beat_at = story.node.heartbeat_at
-    story.now += 0.05
-    assert not story.node.on_heartbeat(Frame(0x701, bytes.fromhex(data)), story.now)
+    story.now_s += 0.05
+    assert not story.node.on_heartbeat(Frame(0x701, bytes.fromhex(data)), story.now_s)
     assert (story.node.presence, story.node.heartbeat_at) == (READY, beat_at)
 
 
@@ -342,26 +350,26 @@ def test_feedback_counts_only_from_the_nmt_start_on_and_its_length_matters_only_
     story = Story()
     velocity = Frame(0x281, bytes.fromhex("10 00 00 00"))
     assert story.status()
-    assert story.node.on_velocity(story.axis, velocity, story.now)
+    assert story.node.on_velocity(story.axis, velocity, story.now_s)
     assert story.node.on_status(story.axis, Frame(0x181), 10.0)
     assert (story.axis.state, story.axis.velocity_mps) == (None, 0.0)
     story.started()
     assert story.status()
-    assert story.node.on_velocity(story.axis, velocity, story.now)
+    assert story.node.on_velocity(story.axis, velocity, story.now_s)
     assert story.axis.velocity_mps > 0.0
-    assert not story.node.on_status(story.axis, Frame(0x181), story.now)
-    assert not story.node.on_velocity(story.axis, Frame(0x281), story.now)
+    assert not story.node.on_status(story.axis, Frame(0x181), story.now_s)
+    assert not story.node.on_velocity(story.axis, Frame(0x281), story.now_s)
 
 
 def test_a_second_begin_does_nothing_while_it_boots_or_is_there() -> None:
     story = Story()
-    story.node.begin_boot(story.now)
+    story.node.begin_boot(story.now_s)
     story.wait(0.01)
-    story.node.begin_boot(story.now)
+    story.node.begin_boot(story.now_s)
     story.wait(0.01)
     assert [str(frame) for frame in story.sent].count("601h [40 00 10 00 00 00 00 00]") == 1
     ready = Story().ready()
-    ready.node.begin_boot(ready.now)
+    ready.node.begin_boot(ready.now_s)
     assert ready.node.presence is READY
 
 
@@ -371,15 +379,17 @@ def test_a_boot_that_fails_is_tried_again_after_a_second_and_its_error_is_told_m
     story.booted()
     assert story.node.presence is GONE
     assert "could not be booted: node 1" in story.node.absent()
-    failed_at = story.now
+    failed_at = story.now_s
     story.node.begin_boot(failed_at)
     assert story.node.presence is GONE
-    story.now += 1.1
+    story.now_s += 1.1
     story.drive.powered = False
-    story.node.begin_boot(story.now)
+    story.node.begin_boot(story.now_s)
     story.wait(0.05)
     assert story.node.presence is BOOTING
-    assert story.node.waiting_for(story.now).startswith("waiting for node 1 (left_wheel): the answer to 1000h:0 (last")
+    assert story.node.waiting_for(story.now_s).startswith(
+        "waiting for node 1 (left_wheel): the answer to 1000h:0 (last"
+    )
 
 
 def test_sdo_answers_without_a_boot_are_somebody_elses_and_fine() -> None:

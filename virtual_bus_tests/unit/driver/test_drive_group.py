@@ -24,7 +24,7 @@ class Story:
     def __init__(self, drives: Drives | None = None) -> None:
         self.drives = drives or Drives(bench_robot())
         self.feed = OdometryFeed(self.drives, 0.5)
-        self.now = 10.0
+        self.now_s = 10.0
         for node in self.drives.nodes:
             node.presence, node.nmt_state = Presence.READY, NmtState.OPERATIONAL
 
@@ -33,12 +33,12 @@ class Story:
         counts, raw = (
             round(axis.drive.direction * value) for value in (travel_m * COUNTS_PER_M, speed_mps * BITS_PER_MPS)
         )
-        axis.on_status(word.to_bytes(2, "little") + counts.to_bytes(4, "little", signed=True), self.now)
-        axis.on_velocity(raw.to_bytes(4, "little", signed=True), self.now)
-        self.feed.update(self.now)
+        axis.on_status(word.to_bytes(2, "little") + counts.to_bytes(4, "little", signed=True), self.now_s)
+        axis.on_velocity(raw.to_bytes(4, "little", signed=True), self.now_s)
+        self.feed.update(self.now_s)
 
     def all_say(self, *travels_m: float) -> None:
-        self.now += 0.01
+        self.now_s += 0.01
         for number, travel_m in enumerate(travels_m):
             self.say(number, travel_m=travel_m)
 
@@ -73,7 +73,7 @@ def test_it_stands_while_every_rim_is_slower_than_the_limit(story: Story, speed_
 
 def test_what_is_not_fresh_cannot_be_seen_to_stand_and_may_have_power(story: Story) -> None:
     story.say(0, SWITCHED_ON)
-    story.now = 10.11
+    story.now_s = 10.11
     story.say(1, SWITCHED_ON)
     assert not story.drives.stand(10.11)
     assert story.drives.may_have_power(10.11)
@@ -150,7 +150,7 @@ def test_the_age_of_what_never_was_is_nan() -> None:
 
 def test_a_sample_enters_the_odometry_when_all_wheels_have_given_theirs(story: Story) -> None:
     assert story.feed.serial == 1
-    story.now = 10.01
+    story.now_s = 10.01
     story.say(0, travel_m=0.004)
     assert story.feed.serial == 1
     story.say(1, travel_m=0.004)
@@ -161,9 +161,9 @@ def test_a_sample_enters_the_odometry_when_all_wheels_have_given_theirs(story: S
 
 def test_after_a_silence_a_wheel_that_speaks_first_turns_no_pose(story: Story) -> None:
     """The right wheel's last sample before the silence found no partner; the left wheel's first one after it comes."""
-    story.now = 10.01
+    story.now_s = 10.01
     story.say(1, travel_m=0.004)
-    story.now = 11.0
+    story.now_s = 11.0
     story.say(0, travel_m=0.3)
     assert story.pose == (0.0, 0.0, 0.0)
     story.say(1, travel_m=0.3)

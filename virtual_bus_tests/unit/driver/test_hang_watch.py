@@ -8,7 +8,7 @@ TIMEOUT_S, LOOK_S = 0.5, 0.1
 
 
 def looks(watch: HangWatch, cycle_at: float, times: list[float]) -> list[bool]:
-    return [watch.look(cycle_at, now) is not None for now in times]
+    return [watch.look(cycle_at, now_s) is not None for now_s in times]
 
 
 def test_a_control_thread_without_a_cycle_hangs_after_the_timeout() -> None:

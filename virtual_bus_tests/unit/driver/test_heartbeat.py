@@ -55,12 +55,12 @@ def test_without_the_drivers_heartbeat_it_stops_by_itself_though_setpoints_go_on
     world = driving(kind)
     assert world.node.dictionary.values[0x1016_02] == 0x7F << 16 | round(1000 * HEARTBEAT_S)
     fall_silent(world, monkeypatch)
-    since = world.now
+    since = world.now_s
     run_beside_a_blind_watchdog(world, HEARTBEAT_S - SENT_EVERY_S - 0.05)
     assert world.truth.linear_mps == pytest.approx(0.3, abs=0.01)
     assert not world.core.stops
     run_beside_a_blind_watchdog(world, 2.5)
-    stood_after_s = world.now - world.truth.standing_s - since
+    stood_after_s = world.now_s - world.truth.standing_s - since
     assert HEARTBEAT_S - SENT_EVERY_S < stood_after_s < HEARTBEAT_S + BRAKING_S
     assert any(data.hex(" ").startswith("30 81") for data in world.sent(0x081, since))
     assert world.core.state is DriverState.LATCHED
@@ -70,9 +70,9 @@ def test_without_the_drivers_heartbeat_it_stops_by_itself_though_setpoints_go_on
 def test_a_driver_that_is_dead_is_missed_by_the_drive_itself(kind: str) -> None:
     world = driving(kind)
     world.kill_driver()
-    since = world.now
+    since = world.now_s
     run_beside_a_blind_watchdog(world, 1.5)
-    assert world.now - world.truth.standing_s - since < HEARTBEAT_S + BRAKING_S
+    assert world.now_s - world.truth.standing_s - since < HEARTBEAT_S + BRAKING_S
     assert not any(world.powered)
 
 
@@ -85,6 +85,6 @@ def test_with_one_entry_it_watches_the_watchdog_alone_and_leaves_the_driver_to_t
     fall_silent(world, monkeypatch)
     run_beside_a_blind_watchdog(world, 1.0)
     assert world.truth.linear_mps == pytest.approx(0.3, abs=0.01)
-    since = world.now
+    since = world.now_s
     world.run(1.5)  # now the watchdog's heartbeat ends too
-    assert world.now - world.truth.standing_s - since < HEARTBEAT_S + BRAKING_S
+    assert world.now_s - world.truth.standing_s - since < HEARTBEAT_S + BRAKING_S

@@ -102,9 +102,9 @@ def robot(proof: str = "let_go") -> Robot:
 def test_the_way_there_and_back() -> None:
     left, right, each = due(), Wheel(), LetGo(robot())
     told = []
-    for now, states in enumerate(((ENABLED, ENABLED), (ENABLED, ENABLED), (ON, ENABLED), (ON, ON), (ENABLED, ON))):
+    for now_s, states in enumerate(((ENABLED, ENABLED), (ENABLED, ENABLED), (ON, ENABLED), (ON, ON), (ENABLED, ON))):
         left.state, right.state = states
-        each.step((left, right), True, float(now))
+        each.step((left, right), True, float(now_s))
         told.append(each.goal(0.0))
         assert each.active
     assert told == [PowerGoal.LET_GO, PowerGoal.LET_GO, PowerGoal.LET_GO, PowerGoal.ON, PowerGoal.ON]

@@ -58,7 +58,7 @@ def test_deactivated_at_speed_the_wheels_stand_before_the_power_goes_and_before_
     world = World()
     world.drive()
     outcomes: list[Outcome] = []
-    world.core.request_aim(Aim.CONFIGURED, world.now, outcomes.append)
+    world.core.request_aim(Aim.CONFIGURED, world.now_s, outcomes.append)
     world.run(5.0, lambda: not any(world.powered))
     assert world.truth.standing_s > 0.0
     assert outcomes == []
@@ -77,7 +77,7 @@ def test_cleaned_up_the_drives_are_let_go_and_do_not_miss_the_driver() -> None:
     world = World()
     world.drive()
     assert world.go(Aim.RELEASED).done
-    let_go = world.now
+    let_go = world.now_s
     assert world.sent(NMT, let_go - 0.02) == [bytes((130, 1)), bytes((130, 2))]
     world.run(3.0)
     assert world.sent(DRIVER_HEARTBEAT, let_go + 0.002) == []
@@ -153,6 +153,6 @@ def test_a_reset_of_an_unconfigured_driver_is_refused(released: World) -> None:
 
 def test_of_two_changes_at_once_the_second_is_refused(released: World) -> None:
     sentences: list[str] = []
-    released.core.request_aim(Aim.CONFIGURED, released.now, lambda _outcome: None)
-    released.core.request_aim(Aim.ACTIVE, released.now, lambda outcome: sentences.append(outcome.sentence))
+    released.core.request_aim(Aim.CONFIGURED, released.now_s, lambda _outcome: None)
+    released.core.request_aim(Aim.ACTIVE, released.now_s, lambda outcome: sentences.append(outcome.sentence))
     assert sentences == ["refused: a change to CONFIGURED is under way"]

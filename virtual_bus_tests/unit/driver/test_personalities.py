@@ -115,7 +115,7 @@ def test_the_driver_says_what_does_not_stop_by_itself(kind: str) -> None:
 def test_a_power_cycle_while_driving_ends_disarmed_and_a_reset_brings_it_back(kind: str) -> None:
     world = world_of(kind)
     world.drive()
-    world.node.power_cycle(world.now, 0.5)
+    world.node.power_cycle(world.now_s, 0.5)
     world.run_until(DriverState.LATCHED, 5.0)
     world.command = Twist2D.ZERO
     world.run(12.5)  # nobody saw the wheel stop: the watchdog waits until it must have rolled out
@@ -180,7 +180,7 @@ def test_what_it_measures_besides_is_read_now_and_then(
 def test_a_drive_with_an_rpdo_timer_tells_that_the_setpoints_stay_away() -> None:
     world = world_of("dryve_d1")
     world.drive(seconds=0.3)
-    killed_at = world.now
+    killed_at = world.now_s
     world.kill_driver()
     world.run(0.5)
     assert "50 82" in [data[:2].hex(" ") for data in world.sent(0x081, since=killed_at)]

@@ -37,7 +37,7 @@ def test_a_drive_that_comes_back_is_booted_again_stays_disarmed_and_waits_for_a_
     must have rolled out (10 s).
     """
     world = driving(kind)
-    apply(world.bench.nodes, 1, loss, world.now, {})
+    apply(world.bench.nodes, 1, loss, world.now_s, {})
     steps = run_with_poses(world, 12.5 if loss == "power_cycle" else 4.0)
     assert max(steps) < FORWARD.linear_mps * 0.01 * 1.5 + 0.01
     assert world.truth.standing_s > 1.0
@@ -68,7 +68,7 @@ def test_a_power_cycle_at_a_stand_costs_nothing_of_the_pose(kind: str) -> None:
     world.command = Twist2D.ZERO
     world.run(1.5)
     before = world.snapshot
-    world.node.power_cycle(world.now)
+    world.node.power_cycle(world.now_s)
     world.run(5.0)
     assert world.recovered()
     world.command = Twist2D.ZERO

@@ -22,16 +22,16 @@ class Story:
 
     def __init__(self, cycle_s: float = 0.01) -> None:
         self.cycle_s = cycle_s
-        self.now = 10.0
-        self.reset = Reset(self.now, cycle_s, boot_s=10.0)
+        self.now_s = 10.0
+        self.reset = Reset(self.now_s, cycle_s, boot_s=10.0)
         self.phases: list[tuple[float, Phase]] = []
 
     def run(self, situation: Situation, seconds: float, answer: int | None = NOT_TRIPPED) -> Outcome | None:
         """Step until it ends, or for so long."""
         for _ in range(round(seconds / self.cycle_s)):
-            self.now += self.cycle_s
-            outcome = self.reset.step(situation, answer, self.now)
-            self.phases.append((round(self.now - 10.0, 3), self.reset.phase))
+            self.now_s += self.cycle_s
+            outcome = self.reset.step(situation, answer, self.now_s)
+            self.phases.append((round(self.now_s - 10.0, 3), self.reset.phase))
             if outcome is not None:
                 return outcome
         return None

@@ -34,10 +34,10 @@ def tx(data: str) -> Frame:
 
 def play(sdo: SdoClient, step: Read | Write, script: Script) -> None:
     """Each line: what the client must have sent, and what the drive answers."""
-    sent = [sdo.start(step, now=0.0)]
+    sent = [sdo.start(step, now_s=0.0)]
     for request, answer in script:
         assert sent == [tx(request)]
-        sent = sdo.on_frame(rx(answer), now=0.0)
+        sent = sdo.on_frame(rx(answer), now_s=0.0)
     assert sent == []
     assert not sdo.busy
 
@@ -86,7 +86,7 @@ def test_expedited_download() -> None:
     ],
 )
 def test_numbers_and_bytes_on_the_wire(step: Write, request_data: str) -> None:
-    assert client().start(step, now=0.0) == tx(request_data)
+    assert client().start(step, now_s=0.0) == tx(request_data)
 
 
 def test_segmented_download() -> None:
@@ -126,11 +126,11 @@ def test_an_abort_code_that_nobody_knows() -> None:
 def test_silence_is_aborted_tried_again_and_given_up() -> None:
     request, abort = tx("40 00 10 00 00 00 00 00"), tx("80 00 10 00 00 00 04 05")
     sdo = client(attempts=2)
-    assert sdo.start(Read(0x1000), now=1.0) == request
-    assert sdo.tick(now=1.299) == []
-    assert sdo.tick(now=1.3) == [abort, request]  # the abort names the object
-    assert sdo.tick(now=1.599) == []
-    assert sdo.tick(now=1.6) == [abort]
+    assert sdo.start(Read(0x1000), now_s=1.0) == request
+    assert sdo.tick(now_s=1.299) == []
+    assert sdo.tick(now_s=1.3) == [abort, request]  # the abort names the object
+    assert sdo.tick(now_s=1.599) == []
+    assert sdo.tick(now_s=1.6) == [abort]
     assert not sdo.busy
     with pytest.raises(SdoTimeout, match=r"node 5, 1000h:0: no answer to 2 requests, 0\.3 s each"):
         sdo.answer()
@@ -138,49 +138,49 @@ def test_silence_is_aborted_tried_again_and_given_up() -> None:
 
 def test_a_second_attempt_can_succeed() -> None:
     sdo = client(attempts=2)
-    sdo.start(Read(0x6041), now=0.0)
-    sdo.tick(now=0.3)
-    sdo.on_frame(rx("4B 41 60 00 37 06 00 00"), now=0.31)
+    sdo.start(Read(0x6041), now_s=0.0)
+    sdo.tick(now_s=0.3)
+    sdo.on_frame(rx("4B 41 60 00 37 06 00 00"), now_s=0.31)
     assert sdo.answer() == bytes.fromhex("37 06")
 
 
 def test_each_segment_has_the_whole_time() -> None:
     sdo = client()
-    sdo.start(Read(0x1008), now=0.0)
-    sdo.on_frame(rx("40 08 10 00 00 00 00 00"), now=0.2)
-    assert sdo.tick(now=0.499) == []
-    assert sdo.tick(now=0.5) == [tx("80 08 10 00 00 00 04 05")]
+    sdo.start(Read(0x1008), now_s=0.0)
+    sdo.on_frame(rx("40 08 10 00 00 00 00 00"), now_s=0.2)
+    assert sdo.tick(now_s=0.499) == []
+    assert sdo.tick(now_s=0.5) == [tx("80 08 10 00 00 00 04 05")]
 
 
 def test_a_wrong_toggle_ends_the_attempt() -> None:
     sdo = client(attempts=2)
-    sdo.start(Read(0x1008), now=0.0)
-    sdo.on_frame(rx("40 08 10 00 00 00 00 00"), now=0.0)
-    again = sdo.on_frame(rx("10 57 68 65 65 6C 20 64"), now=0.0)
+    sdo.start(Read(0x1008), now_s=0.0)
+    sdo.on_frame(rx("40 08 10 00 00 00 00 00"), now_s=0.0)
+    again = sdo.on_frame(rx("10 57 68 65 65 6C 20 64"), now_s=0.0)
     assert again == [tx("80 08 10 00 00 00 03 05"), tx("40 08 10 00 00 00 00 00")]
-    sdo.on_frame(rx("40 08 10 00 00 00 00 00"), now=0.0)
-    sdo.on_frame(rx("10 57 68 65 65 6C 20 64"), now=0.0)
+    sdo.on_frame(rx("40 08 10 00 00 00 00 00"), now_s=0.0)
+    sdo.on_frame(rx("10 57 68 65 65 6C 20 64"), now_s=0.0)
     with pytest.raises(SdoAborted, match="toggle bit not alternated"):
         sdo.answer()
 
 
 def test_more_or_less_than_announced_is_no_answer() -> None:
     sdo = client()
-    sdo.start(Read(0x1008), now=0.0)
-    sdo.on_frame(rx("41 08 10 00 08 00 00 00"), now=0.0)
-    assert sdo.on_frame(rx("01 57 68 65 65 6C 20 64"), now=0.0) == [tx("80 08 10 00 10 00 07 06")]
+    sdo.start(Read(0x1008), now_s=0.0)
+    sdo.on_frame(rx("41 08 10 00 08 00 00 00"), now_s=0.0)
+    assert sdo.on_frame(rx("01 57 68 65 65 6C 20 64"), now_s=0.0) == [tx("80 08 10 00 10 00 07 06")]
     with pytest.raises(SdoAborted, match="length does not match"):
         sdo.answer()
 
 
 def test_a_drive_that_never_ends_is_not_followed() -> None:
     sdo = client()
-    sdo.start(Read(0x1008), now=0.0)
-    sdo.on_frame(rx("40 08 10 00 00 00 00 00"), now=0.0)
+    sdo.start(Read(0x1008), now_s=0.0)
+    sdo.on_frame(rx("40 08 10 00 00 00 00 00"), now_s=0.0)
     segments = 0
     while sdo.busy:
         segments += 1
-        sdo.on_frame(rx(f"{'00' if segments % 2 else '10'} 57 68 65 65 6C 20 64"), now=0.0)
+        sdo.on_frame(rx(f"{'00' if segments % 2 else '10'} 57 68 65 65 6C 20 64"), now_s=0.0)
     assert segments == MAX_UPLOAD_BYTES // 7 + 1
     with pytest.raises(SdoAborted, match="out of memory"):
         sdo.answer()
@@ -200,35 +200,37 @@ def test_a_drive_that_never_ends_is_not_followed() -> None:
 )
 def test_strays_are_dropped_and_counted_and_the_transfer_goes_on(stray: str) -> None:
     sdo = client()
-    sdo.start(Read(0x6041), now=0.0)
-    assert sdo.on_frame(rx(stray), now=0.0) == []
+    sdo.start(Read(0x6041), now_s=0.0)
+    assert sdo.on_frame(rx(stray), now_s=0.0) == []
     assert sdo.dropped == 1
-    sdo.on_frame(rx("4B 41 60 00 37 06 00 00"), now=0.0)
+    sdo.on_frame(rx("4B 41 60 00 37 06 00 00"), now_s=0.0)
     assert sdo.answer() == bytes.fromhex("37 06")
 
 
 def test_a_stray_between_segments_is_dropped_too() -> None:
     sdo = client()
-    sdo.start(Read(0x1008), now=0.0)
-    sdo.on_frame(rx("40 08 10 00 00 00 00 00"), now=0.0)
-    assert sdo.on_frame(rx("4B 41 60 00 37 06 00 00"), now=0.0) == []
+    sdo.start(Read(0x1008), now_s=0.0)
+    sdo.on_frame(rx("40 08 10 00 00 00 00 00"), now_s=0.0)
+    assert sdo.on_frame(rx("4B 41 60 00 37 06 00 00"), now_s=0.0) == []
     assert (sdo.dropped, sdo.busy) == (1, True)
 
 
 def test_an_answer_without_a_question_is_dropped_and_other_nodes_are_not_even_counted() -> None:
     sdo = client()
-    assert sdo.on_frame(rx("4B 41 60 00 37 06 00 00"), now=0.0) == []
-    assert sdo.on_frame(Frame(0x586, bytes(8)), now=0.0) == []
-    assert sdo.on_frame(tx("40 41 60 00 00 00 00 00"), now=0.0) == []  # its own request, as a multicast bus returns it
+    assert sdo.on_frame(rx("4B 41 60 00 37 06 00 00"), now_s=0.0) == []
+    assert sdo.on_frame(Frame(0x586, bytes(8)), now_s=0.0) == []
+    assert (
+        sdo.on_frame(tx("40 41 60 00 00 00 00 00"), now_s=0.0) == []
+    )  # its own request, as a multicast bus returns it
     assert sdo.dropped == 1
 
 
 def test_one_transfer_at_a_time() -> None:
     sdo = client()
-    sdo.start(Read(0x6041), now=0.0)
+    sdo.start(Read(0x6041), now_s=0.0)
     with pytest.raises(RuntimeError, match="6041h:0 is under way"):
-        sdo.start(Read(0x1000), now=0.0)
-    sdo.on_frame(rx("4B 41 60 00 37 06 00 00"), now=0.0)
+        sdo.start(Read(0x1000), now_s=0.0)
+    sdo.on_frame(rx("4B 41 60 00 37 06 00 00"), now_s=0.0)
     assert sdo.answer() == bytes.fromhex("37 06")  # the refused step changed nothing
 
 
@@ -270,9 +272,9 @@ answers = st.one_of(
 @given(steps, st.lists(answers, max_size=30))
 def test_no_answer_of_a_drive_raises(step: Read | Write, drive: list[bytes]) -> None:
     sdo = client(attempts=2)
-    sdo.start(step, now=0.0)
+    sdo.start(step, now_s=0.0)
     for data in drive:
-        sdo.on_frame(Frame(0x585, data), now=0.0)
-    sdo.tick(now=1.0)
-    sdo.tick(now=2.0)
+        sdo.on_frame(Frame(0x585, data), now_s=0.0)
+    sdo.tick(now_s=1.0)
+    sdo.tick(now_s=2.0)
     assert not sdo.busy

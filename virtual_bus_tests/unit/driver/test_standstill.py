@@ -21,35 +21,35 @@ LIMITS = StillnessLimits.of(ROBOT, ROBOT.drives[0])
 
 @dataclass
 class Wheel:
-    now: float = 100.0
+    now_s: float = 100.0
     travel_m: float = 0.0
     stillness: Stillness = field(default_factory=lambda: Stillness(LIMITS, COUNT_M))
 
     def __post_init__(self) -> None:
-        self.stillness.on_power(True, self.now, follows=True)
+        self.stillness.on_power(True, self.now_s, follows=True)
 
     def quick_stop(self) -> None:
-        self.stillness.on_power(True, self.now)
+        self.stillness.on_power(True, self.now_s)
 
     def power_off(self) -> None:
-        self.stillness.on_power(False, self.now)
+        self.stillness.on_power(False, self.now_s)
 
     def brakes(self, from_mps: float, slope_mps2: float, cycle_s: float = 0.01) -> None:
         """Down to standstill, as a sound sensor shows it."""
         mps = from_mps
         while mps > 0.0:
             after_mps = max(0.0, mps - slope_mps2 * cycle_s)
-            self.now += cycle_s
+            self.now_s += cycle_s
             self.travel_m += (mps + after_mps) / 2.0 * cycle_s
             mps = after_mps
-            self.stillness.on_sample(self.travel_m, mps, 0.0, self.now)
+            self.stillness.on_sample(self.travel_m, mps, 0.0, self.now_s)
 
     def turns(self, seconds: float, encoder_mps: float, velocity_mps: float, ordered_mps: float = 0.0) -> bool:
         for _ in range(round(seconds / 0.01)):
-            self.now += 0.01
+            self.now_s += 0.01
             self.travel_m += encoder_mps * 0.01
-            self.stillness.on_sample(self.travel_m, velocity_mps, ordered_mps, self.now)
-        return self.stillness.stands(self.now)
+            self.stillness.on_sample(self.travel_m, velocity_mps, ordered_mps, self.now_s)
+        return self.stillness.stands(self.now_s)
 
 
 def test_the_limits_are_those_of_the_robot() -> None:
@@ -98,7 +98,7 @@ def test_after_a_gap_it_is_measured_anew() -> None:
     wheel = Wheel()
     wheel.turns(0.3, 0.0, 0.02)
     wheel.stillness.forget()
-    assert not wheel.stillness.stands(wheel.now)
+    assert not wheel.stillness.stands(wheel.now_s)
     assert not wheel.turns(0.01, 0.0, 0.02)
     assert wheel.turns(0.25, 0.0, 0.02)
 
@@ -144,29 +144,29 @@ def test_without_power_a_stand_is_assumed_when_it_must_have_rolled_out_and_it_sa
 ) -> None:
     wheel = Wheel()
     wheel.stillness.distrust("was caught with a lie")
-    wheel.stillness.on_power(False, wheel.now)
+    wheel.stillness.on_power(False, wheel.now_s)
     assert wheel.turns(off_s, 0.0, 0.0) is stands
     assumed = "was caught with a lie; its power has been off for 10 s, so a stand is assumed"
-    assert wheel.stillness.assumed(wheel.now) == (assumed if stands else "")
+    assert wheel.stillness.assumed(wheel.now_s) == (assumed if stands else "")
 
 
 def test_a_stand_that_is_measured_is_not_assumed() -> None:
     wheel = Wheel()
-    wheel.stillness.on_power(False, wheel.now)
+    wheel.stillness.on_power(False, wheel.now_s)
     assert wheel.turns(20.0, 0.0, 0.0)
-    assert wheel.stillness.assumed(wheel.now) == ""
+    assert wheel.stillness.assumed(wheel.now_s) == ""
 
 
 def test_power_in_between_begins_the_rolling_anew_and_after_it_the_sensors_have_a_new_trial() -> None:
     wheel = Wheel()
     wheel.stillness.distrust("was caught with a lie")
-    wheel.stillness.on_power(False, wheel.now)
+    wheel.stillness.on_power(False, wheel.now_s)
     wheel.turns(9.0, 0.0, 0.0)
-    wheel.stillness.on_power(True, wheel.now)
-    wheel.stillness.on_power(False, wheel.now)
+    wheel.stillness.on_power(True, wheel.now_s)
+    wheel.stillness.on_power(False, wheel.now_s)
     assert not wheel.turns(9.0, 0.0, 0.0)
     assert wheel.turns(1.0, 0.0, 0.0)
-    wheel.stillness.on_power(True, wheel.now)
+    wheel.stillness.on_power(True, wheel.now_s)
     assert not wheel.stillness.doubt
     assert wheel.turns(0.1, 0.0, 0.0)
 
@@ -174,15 +174,15 @@ def test_power_in_between_begins_the_rolling_anew_and_after_it_the_sensors_have_
 def test_a_wheel_that_shows_motion_stands_never_however_long_its_power_is_off() -> None:
     wheel = Wheel()
     wheel.stillness.distrust("was caught with a lie")
-    wheel.stillness.on_power(False, wheel.now)
+    wheel.stillness.on_power(False, wheel.now_s)
     assert not wheel.turns(20.0, 0.0, 0.3)
 
 
 def lost(wheel: Wheel, partly_m: float = 0.0, seconds: float = 0.5) -> bool:
     """Encoder and velocity show nothing any more, from the middle of a cycle on."""
-    wheel.now += 0.01
+    wheel.now_s += 0.01
     wheel.travel_m += partly_m
-    wheel.stillness.on_sample(wheel.travel_m, 0.0, 0.0, wheel.now)
+    wheel.stillness.on_sample(wheel.travel_m, 0.0, 0.0, wheel.now_s)
     return wheel.turns(seconds, 0.0, 0.0)
 
 
@@ -197,13 +197,13 @@ def test_a_sensor_that_stops_within_less_than_a_wheel_can_is_no_evidence_until_i
     """It rolls without power. The encoder dies at the begin, in the middle or at the end of a cycle."""
     wheel = Wheel()
     wheel.power_off()
-    off_at = wheel.now
+    off_at = wheel.now_s
     wheel.turns(0.3, speed, speed)
     assert not lost(wheel, share * speed * 0.01)
     assert "it met something hard, or its encoder is dead" in wheel.stillness.doubt
-    wheel.turns(off_at + 9.61 - wheel.now, 0.0, 0.0)
-    assert wheel.stillness.stands(wheel.now)
-    assert "a stand is assumed" in wheel.stillness.assumed(wheel.now)
+    wheel.turns(off_at + 9.61 - wheel.now_s, 0.0, 0.0)
+    assert wheel.stillness.stands(wheel.now_s)
+    assert "a stand is assumed" in wheel.stillness.assumed(wheel.now_s)
 
 
 @pytest.mark.parametrize("lost_at", range(1, 24))
@@ -225,11 +225,11 @@ def test_lost_frames_do_not_make_a_lost_sensor_a_stand(gap_s: float) -> None:
     wheel = Wheel()
     wheel.turns(0.3, 0.6, 0.6, ordered_mps=0.6)
     wheel.quick_stop()
-    wheel.now += gap_s
+    wheel.now_s += gap_s
     wheel.travel_m += 0.012
     if gap_s > 0.1:
         wheel.stillness.pause()
-    wheel.stillness.on_sample(wheel.travel_m, 0.0, 0.0, wheel.now)
+    wheel.stillness.on_sample(wheel.travel_m, 0.0, 0.0, wheel.now_s)
     assert not wheel.turns(0.5, 0.0, 0.0)
 
 
@@ -238,11 +238,11 @@ def test_a_stop_that_no_frame_showed_but_the_encoder_counted_is_a_stand(gap_s: f
     wheel = Wheel()
     wheel.turns(0.3, 0.6, 0.6, ordered_mps=0.6)
     wheel.quick_stop()
-    wheel.now += gap_s
+    wheel.now_s += gap_s
     wheel.travel_m += 0.6**2 / 2.0 / 2.0
     if gap_s > 0.1:
         wheel.stillness.pause()
-    wheel.stillness.on_sample(wheel.travel_m, 0.0, 0.0, wheel.now)
+    wheel.stillness.on_sample(wheel.travel_m, 0.0, 0.0, wheel.now_s)
     assert wheel.turns(0.5, 0.0, 0.0)
 
 
@@ -275,7 +275,7 @@ def test_a_wheel_that_brakes_stands_as_soon_as_it_shows_it(
 ) -> None:
     wheel = Wheel()
     wheel.turns(0.3, from_mps, from_mps, ordered_mps=from_mps)
-    wheel.stillness.on_power(power, wheel.now)
+    wheel.stillness.on_power(power, wheel.now_s)
     wheel.brakes(from_mps, slope_mps2, cycle_s)
     assert wheel.turns(0.3, 0.0, 0.0)
     assert not wheel.stillness.doubt
@@ -295,7 +295,7 @@ def test_a_wheel_that_met_something_hard_counts_as_standing_while_its_drive_is_e
     assert lost(wheel)
     wheel.power_off()
     assert not wheel.turns(0.5, 0.0, 0.0)
-    wheel.stillness.on_power(True, wheel.now, follows=True)
+    wheel.stillness.on_power(True, wheel.now_s, follows=True)
     assert wheel.turns(0.5, 0.0, 0.0), "it let go for a moment"
 
 
@@ -332,7 +332,7 @@ def test_power_after_a_stand_that_was_assumed_is_a_new_trial() -> None:
     wheel.power_off()
     wheel.turns(0.3, 1.0, 1.0)
     lost(wheel, 0.0, 10.0)
-    wheel.stillness.on_power(True, wheel.now, follows=True)
+    wheel.stillness.on_power(True, wheel.now_s, follows=True)
     wheel.power_off()
     assert wheel.turns(0.1, 0.0, 0.0)
-    assert wheel.stillness.assumed(wheel.now) == ""
+    assert wheel.stillness.assumed(wheel.now_s) == ""

@@ -179,7 +179,7 @@ def told_by_the_chain(world: World, seconds: float) -> list[StopReport]:
     reports: list[StopReport] = []
     for _ in range(round(seconds / 0.02)):
         if world.command is not None:
-            recorder.on_command(world.command != Twist2D.ZERO, world.now)
+            recorder.on_command(world.command != Twist2D.ZERO, world.now_s)
         world.run(0.02)
         stops = list(world.core.stops)
         world.core.stops.clear()
@@ -196,11 +196,11 @@ def world() -> World:
 
 
 def test_in_the_chain_time_and_way_of_a_lost_lease_are_those_of_the_ground_truth(world: World) -> None:
-    way_m, start = world.truth.path_m, world.now
+    way_m, start = world.truth.path_m, world.now_s
     world.leases = False
     (report,) = told_by_the_chain(world, 3.0)
     tripped_s = report.record.at_s - start
-    truth_s = world.now - world.truth.standing_s - report.record.at_s
+    truth_s = world.now_s - world.truth.standing_s - report.record.at_s
     assert (report.record.stopped_by, report.record.latched, report.standstill) == ("watchdog", True, True)
     assert report.standstill_s == pytest.approx(truth_s, abs=0.05)
     # the truth counts from the last lease on, the report from the trip on, and what came a cycle before it
@@ -213,7 +213,7 @@ def test_in_the_chain_commands_that_end_are_one_stop_and_those_that_go_to_zero_a
     world.command = FORWARD
     assert told_by_the_chain(world, 1.0) == []
     recorder = StopHistory(PATIENCE_S)
-    recorder.on_command(True, world.now)
+    recorder.on_command(True, world.now_s)
     recorder.on_snapshot(world.snapshot, [])
     world.command = None
     reports: list[StopReport] = []

@@ -61,20 +61,20 @@ class Story:
 
     def __init__(self) -> None:
         self.supervisor = Supervisor(Braking(load_robot(sample("bench")).robot), ramp_timeout_s=3.0)
-        self.now = 10.0
+        self.now_s = 10.0
 
     def step(self, situation: Situation, cycles: int = 1) -> Orders:
         for _ in range(cycles):
-            self.now += 0.01
-            orders = self.supervisor.step(situation, self.now)
+            self.now_s += 0.01
+            orders = self.supervisor.step(situation, self.now_s)
         return orders
 
     def lasts(self, situation: Situation, orders: Orders, longest_s: float = 10.0) -> float:
         """How long it gives these orders [s]."""
-        start = self.now
+        start = self.now_s
         while self.step(situation) == orders:
-            assert self.now - start < longest_s
-        return round(self.now - start, 3)
+            assert self.now_s - start < longest_s
+        return round(self.now_s - start, 3)
 
     @property
     def told(self) -> tuple[DriverState, str, bool]:
@@ -210,10 +210,10 @@ def test_a_shutdown_ends_from_every_state_with_everything_wrong_in_bounded_time(
     hopeless = also(RUNNING, WRONG.get(wrong, Situation()))  # still turning, still powered: no feedback helps
     situation = also(hopeless, WRONG["shutdown"])
     last = Orders(PowerGoal.ON, Drive.FOLLOW)
-    start = story.now
+    start = story.now_s
     while not story.supervisor.finished:
         last = story.step(situation)
-        assert story.now - start < 0.6 + 0.4 + 0.5 + 0.1
+        assert story.now_s - start < 0.6 + 0.4 + 0.5 + 0.1
     assert last == OFF
     assert story.supervisor.state in NO_POWER
     assert story.supervisor.finding.cause.value == "shutdown"

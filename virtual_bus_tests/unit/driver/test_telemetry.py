@@ -31,24 +31,24 @@ class Story:
     def __init__(self, objects: dict[Key, bytes], profile: str = "epos4") -> None:
         self.drive = FakeDrive(objects=objects)
         self.measures = Measures(1, drives(profile), 0.3)
-        self.now = 10.0
+        self.now_s = 10.0
         self.sent = 0
 
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds / 0.01)):
-            self.now += 0.01
-            frames = self.measures.tick(self.now)
+            self.now_s += 0.01
+            frames = self.measures.tick(self.now_s)
             assert len(frames) <= 1
             self.sent += len(frames)
             for frame in frames:
                 for answer in self.drive.on_frame(frame):
-                    self.measures.on_frame(answer, self.now)
+                    self.measures.on_frame(answer, self.now_s)
 
 
 def test_everything_is_known_after_one_round() -> None:
     story = Story(EPOS4)
     story.run(3 * PERIOD_S + 0.02)
-    values = story.measures.values(0, story.now)
+    values = story.measures.values(0, story.now_s)
     assert (values.voltage_v, values.current_a, values.temperature_c) == pytest.approx((48.1, -1.25, 31.5))
     assert story.sent == 3
 
@@ -56,7 +56,7 @@ def test_everything_is_known_after_one_round() -> None:
 def test_what_a_drive_does_not_have_is_asked_for_once() -> None:
     story = Story({(0x2200, 1): u16(240)})
     story.run(5.0)
-    values = story.measures.values(0, story.now)
+    values = story.measures.values(0, story.now_s)
     assert values.voltage_v == pytest.approx(24.0)
     assert math.isnan(values.current_a)
     assert story.drive.transfers == pytest.approx(5.0 / PERIOD_S, abs=1)
@@ -68,25 +68,25 @@ def test_a_silent_drive_is_not_hammered_and_its_values_age() -> None:
     story.drive.powered = False
     before = story.sent
     story.run(12.0)
-    assert math.isnan(story.measures.values(0, story.now).voltage_v)
+    assert math.isnan(story.measures.values(0, story.now_s).voltage_v)
     assert story.sent - before <= 2 * 12.0 / 0.3  # a request and its abort
     story.drive.powered = True
     story.run(1.5)
-    assert story.measures.values(0, story.now).voltage_v == pytest.approx(48.1)
+    assert story.measures.values(0, story.now_s).voltage_v == pytest.approx(48.1)
 
 
 def test_the_second_motor_is_the_next_sub_index() -> None:
     story = Story({(0x2100, 1): u16(10), (0x2100, 2): u16(25), (0x210D, 2): u16(480), (0x210F, 2): u16(40)}, "roboteq")
     story.run(2.0)
-    assert story.measures.values(0, story.now).current_a == pytest.approx(1.0)
-    assert story.measures.values(1, story.now).current_a == pytest.approx(2.5)
-    assert story.measures.values(1, story.now).voltage_v == pytest.approx(48.0)
+    assert story.measures.values(0, story.now_s).current_a == pytest.approx(1.0)
+    assert story.measures.values(1, story.now_s).current_a == pytest.approx(2.5)
+    assert story.measures.values(1, story.now_s).voltage_v == pytest.approx(48.0)
 
 
 def test_answers_to_somebody_elses_requests_are_no_values() -> None:
     story = Story({})
-    story.measures.on_frame(Frame(0x581, bytes.fromhex("4b 00 22 01 ff ff 00 00")), story.now)
-    assert math.isnan(story.measures.values(0, story.now).voltage_v)
+    story.measures.on_frame(Frame(0x581, bytes.fromhex("4b 00 22 01 ff ff 00 00")), story.now_s)
+    assert math.isnan(story.measures.values(0, story.now_s).voltage_v)
 
 
 def test_a_drive_without_any_is_never_asked() -> None:

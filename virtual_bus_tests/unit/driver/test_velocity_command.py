@@ -43,22 +43,22 @@ def test_await_zero_forgets_the_zero_that_was_seen() -> None:
     assert made.target(10.1) == FORWARD
 
 
-@pytest.mark.parametrize(("now", "fresh"), [(10.0, True), (10.199, True), (10.201, False), (1e9, False)])
-def test_a_command_counts_for_its_timeout(now: float, fresh: bool) -> None:
+@pytest.mark.parametrize(("now_s", "fresh"), [(10.0, True), (10.199, True), (10.201, False), (1e9, False)])
+def test_a_command_counts_for_its_timeout(now_s: float, fresh: bool) -> None:
     made = command(Twist2D.ZERO, FORWARD)
-    assert made.is_fresh(now) is fresh
-    assert (made.target(now) == FORWARD) is fresh
-    assert (made.motion(now) == "cmd_vel orders 0.300 m/s, 0.100 rad/s") is fresh
+    assert made.is_fresh(now_s) is fresh
+    assert (made.target(now_s) == FORWARD) is fresh
+    assert (made.motion(now_s) == "cmd_vel orders 0.300 m/s, 0.100 rad/s") is fresh
 
 
-@pytest.mark.parametrize(("now", "hard"), [(10.0, True), (10.2, True), (10.201, False)])
-def test_the_emergency_deceleration_counts_for_the_timeout_or_until_it_is_taken_back(now: float, hard: bool) -> None:
+@pytest.mark.parametrize(("now_s", "hard"), [(10.0, True), (10.2, True), (10.201, False)])
+def test_the_emergency_deceleration_counts_for_the_timeout_or_until_it_is_taken_back(now_s: float, hard: bool) -> None:
     made = Command(timeout_s=0.2)
     assert not made.brakes_hard(10.0)
     made.take_emergency(True, 10.0)
-    assert made.brakes_hard(now) is hard
+    assert made.brakes_hard(now_s) is hard
     made.take_emergency(False, 10.0)
-    assert not made.brakes_hard(now)
+    assert not made.brakes_hard(now_s)
 
 
 def test_a_zero_is_no_motion() -> None:
@@ -78,8 +78,8 @@ def test_what_is_not_finite_is_refused_counted_and_changes_nothing(bad: float, p
 def test_the_worst_lateness_is_that_of_the_last_second() -> None:
     stats = CycleStats(period_s=0.01)
     assert stats.worst_s == 0.0
-    for now, lateness_s in ((10.0, 0.004), (10.5, 0.002), (10.9, 0.001)):
-        stats.note(now, lateness_s)
+    for now_s, lateness_s in ((10.0, 0.004), (10.5, 0.002), (10.9, 0.001)):
+        stats.note(now_s, lateness_s)
     assert stats.worst_s == 0.004
     stats.note(11.2, 0.0)
     assert stats.worst_s == 0.002

@@ -53,7 +53,7 @@ def test_before_the_first_frame_it_is_missing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("data", "now", "view", "sentence"),
+    ("data", "now_s", "view", "sentence"),
     [
         (WATCHING, 10.0, WatchdogView.OK, ""),
         (WATCHING, 10.199, WatchdogView.OK, ""),
@@ -65,10 +65,10 @@ def test_before_the_first_frame_it_is_missing() -> None:
         ("00 00 00 00 ff ff 00 00", 10.0, WatchdogView.MISSING, "still starting"),
     ],
 )
-def test_whether_it_watches(data: str, now: float, view: WatchdogView, sentence: str) -> None:
+def test_whether_it_watches(data: str, now_s: float, view: WatchdogView, sentence: str) -> None:
     heard = link(data)
-    assert heard.view(now) == (view, sentence)
-    assert heard.age_s(now) == pytest.approx(now - 10.0)
+    assert heard.view(now_s) == (view, sentence)
+    assert heard.age_s(now_s) == pytest.approx(now_s - 10.0)
 
 
 def test_every_cause_of_docs_bus_md_has_a_text() -> None:

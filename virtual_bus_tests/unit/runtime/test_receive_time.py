@@ -17,8 +17,8 @@ from canbase_runtime.receive_time import GAP_S, SETTLE_S, ReceiveTimes
 def looked(*times: float) -> ReceiveTimes:
     """One that has been asked at these times."""
     receive_times = ReceiveTimes()
-    for now in times:
-        receive_times.at(now)
+    for now_s in times:
+        receive_times.at(now_s)
     return receive_times
 
 
@@ -52,9 +52,9 @@ def test_a_second_pause_before_the_queues_are_empty_is_part_of_the_first() -> No
 
 @given(st.lists(st.floats(0.0, 0.5), min_size=1, max_size=50))
 def test_the_time_is_never_in_the_future_and_never_falls(steps_s: list[float]) -> None:
-    receive_times, now, before = ReceiveTimes(), 0.0, 0.0
+    receive_times, now_s, before = ReceiveTimes(), 0.0, 0.0
     for step_s in steps_s:
-        now += step_s
-        counts_from = receive_times.at(now)
-        assert before <= counts_from <= now
+        now_s += step_s
+        counts_from = receive_times.at(now_s)
+        assert before <= counts_from <= now_s
         before = counts_from

@@ -22,7 +22,7 @@ def test_forward_turns_both_motors_their_own_way() -> None:
     rig = Rig()
     start = rig.read(0x6064), rig.read(0x6064, node=2)
     rig.drive(MPS // 2, MPS // 2, 2.0)
-    truth = rig.bench.truth(rig.now)
+    truth = rig.bench.truth(rig.now_s)
     left, right = rig.read(0x6064) - start[0], rig.read(0x6064, node=2) - start[1]
     assert truth.x_m == pytest.approx(0.875, abs=0.01)  # 0.5 s of ramp count half
     assert left == pytest.approx(truth.x_m * COUNTS_PER_M, abs=1.0)
@@ -61,7 +61,7 @@ def test_the_result_does_not_depend_on_when_one_looks() -> None:
         rig = Rig()
         rig.drive(MPS // 2, MPS // 3, 0.0)
         rig.wait(1.0, step_s=step)
-        truths.append(rig.bench.truth(rig.now))
+        truths.append(rig.bench.truth(rig.now_s))
     assert truths[0] == truths[1] == truths[2]
 
 
@@ -78,7 +78,7 @@ def test_two_axes_of_one_node_have_their_objects_at_800h() -> None:
         for word in (0x06, 0x07, 0x0F):
             rig.write(base + 0x40, word, node=5)
     rig.wait(1.0)
-    truth = rig.bench.truth(rig.now)
+    truth = rig.bench.truth(rig.now_s)
     assert truth.linear_mps == pytest.approx(0.25, abs=0.002)
     assert truth.angular_radps == pytest.approx(0.0, abs=0.01)
     rig.write(0x6840, 0x02, node=5)
@@ -111,24 +111,24 @@ def test_identity_is_what_robot_yaml_expects() -> None:
 
 def test_a_silent_drive_still_obeys() -> None:
     rig = Rig()
-    faults.apply(rig.bench.nodes, 1, "silent", rig.now, {})
+    faults.apply(rig.bench.nodes, 1, "silent", rig.now_s, {})
     assert rig.tx("601 40 00 10 00 00 00 00 00") == []
     rig.tx("000 01 01")
     rig.tx("201 06 00")
     assert rig.state() is State.READY_TO_SWITCH_ON
-    faults.apply(rig.bench.nodes, 1, "heal", rig.now, {})
+    faults.apply(rig.bench.nodes, 1, "heal", rig.now_s, {})
     assert rig.read(0x1000) == 0x20192
 
 
 def test_a_deaf_drive_speaks_and_obeys_nothing() -> None:
     rig = Rig()
     rig.write(0x1017, 100)
-    faults.apply(rig.bench.nodes, 1, "deaf", rig.now, {})
+    faults.apply(rig.bench.nodes, 1, "deaf", rig.now_s, {})
     rig.tx("000 01 01")
     rig.tx("201 06 00")
     assert rig.state() is State.SWITCH_ON_DISABLED
     assert "701 7F" in rig.wait(0.2)
-    faults.apply(rig.bench.nodes, 1, "heal", rig.now, {})
+    faults.apply(rig.bench.nodes, 1, "heal", rig.now_s, {})
     rig.tx("000 01 01")
     rig.tx("201 06 00")
     assert rig.state() is State.READY_TO_SWITCH_ON
@@ -147,7 +147,7 @@ def test_the_bench_tells_once_whose_heartbeat_was_missed() -> None:
 
 def test_a_cut_cable_stops_frames_both_ways() -> None:
     rig = Rig()
-    faults.apply(rig.bench.nodes, 1, "cut", rig.now, {})
+    faults.apply(rig.bench.nodes, 1, "cut", rig.now_s, {})
     assert rig.tx("601 40 00 10 00 00 00 00 00") == []
     rig.tx("000 01 01")
     rig.tx("201 06 00")
@@ -158,9 +158,9 @@ def test_a_power_cycle_boots_again_and_the_encoder_starts_elsewhere() -> None:
     rig = Rig()
     rig.drive(MPS // 2, MPS // 2, 1.0)
     before = rig.read(0x6064)
-    faults.apply(rig.bench.nodes, 1, "power_cycle", rig.now, {"off_s": 0.3})
+    faults.apply(rig.bench.nodes, 1, "power_cycle", rig.now_s, {"off_s": 0.3})
     assert not rig.axis.motor.powered
-    start = rig.now
+    start = rig.now_s
     rig.heard.clear()
     rig.wait(1.0)
     assert [text for _, text in rig.heard] == ["701 00"]
@@ -173,13 +173,13 @@ def test_frozen_encoder_stuck_velocity_and_ignored_setpoints() -> None:
     rig = Rig()
     rig.drive(MPS // 2, MPS // 2, 1.0)
     for kind in ("frozen_encoder", "stuck_velocity", "ignores_setpoints"):
-        faults.apply(rig.bench.nodes, 1, kind, rig.now, {})
+        faults.apply(rig.bench.nodes, 1, kind, rig.now_s, {})
     shown = rig.read(0x6064), rig.read(0x606C)
     rig.write(0x60FF, 0)
     rig.wait(0.5)
     assert (rig.read(0x6064), rig.read(0x606C)) == shown
     assert rig.bench.base.v_left_mps == pytest.approx(0.5, abs=0.01)
-    faults.apply(rig.bench.nodes, 1, "heal", rig.now, {})
+    faults.apply(rig.bench.nodes, 1, "heal", rig.now_s, {})
     rig.write(0x60FF, 0)
     rig.wait(1.0)
     assert rig.read(0x606C) == 0
@@ -189,23 +189,23 @@ def test_frozen_encoder_stuck_velocity_and_ignored_setpoints() -> None:
 def test_a_weak_drive_holds_its_power_and_moves_nothing_until_it_is_healed() -> None:
     rig = Rig()
     for node in (1, 2):
-        faults.apply(rig.bench.nodes, node, "weak", rig.now, {})
+        faults.apply(rig.bench.nodes, node, "weak", rig.now_s, {})
     rig.drive(MPS // 2, MPS // 2, 1.0)
     assert rig.state() is State.OPERATION_ENABLED
     assert rig.bench.base.v_mps == 0.0
     for node in (1, 2):
-        faults.apply(rig.bench.nodes, node, "heal", rig.now, {})
+        faults.apply(rig.bench.nodes, node, "heal", rig.now_s, {})
     rig.wait(1.0)
     assert rig.bench.base.v_mps == pytest.approx(0.5, abs=0.01)
 
 
 def test_a_drive_fault_with_code_that_holds() -> None:
     rig = Rig()
-    faults.apply(rig.bench.nodes, 1, "fault", rig.now, {"code": 0x4210, "holds": True})
+    faults.apply(rig.bench.nodes, 1, "fault", rig.now_s, {"code": 0x4210, "holds": True})
     assert "081 10 42 09 00 00 00 00 00" in rig.wait(0.001)
     rig.write(0x6040, 0x80)
     assert rig.state() is State.FAULT
-    faults.apply(rig.bench.nodes, 1, "heal", rig.now, {})
+    faults.apply(rig.bench.nodes, 1, "heal", rig.now_s, {})
     rig.write(0x6040, 0x00)
     rig.write(0x6040, 0x80)
     assert rig.state() is State.SWITCH_ON_DISABLED
@@ -246,17 +246,17 @@ def test_every_transition_is_told_once() -> None:
 
 def test_standing_time_starts_when_the_rims_stand() -> None:
     rig = Rig()
-    assert rig.bench.truth(rig.now).standing_s == pytest.approx(rig.now)
+    assert rig.bench.truth(rig.now_s).standing_s == pytest.approx(rig.now_s)
     rig.drive(MPS // 2, MPS // 2, 1.0)
-    assert rig.bench.truth(rig.now).standing_s == pytest.approx(0.0, abs=0.003)
+    assert rig.bench.truth(rig.now_s).standing_s == pytest.approx(0.0, abs=0.003)
     rig.write(0x6040, 0x02)
     rig.write(0x6040, 0x02, node=2)
     rig.wait(1.25)
-    assert rig.bench.truth(rig.now).standing_s == pytest.approx(1.0, abs=0.02)
+    assert rig.bench.truth(rig.now_s).standing_s == pytest.approx(1.0, abs=0.02)
 
 
 def test_the_trace_samples_on_its_grid_even_when_looked_at_late() -> None:
-    bench = Bench(robot(), now=50.0, parameters=BenchParameters(boot_delay_s=0.0))
+    bench = Bench(robot(), now_s=50.0, parameters=BenchParameters(boot_delay_s=0.0))
     trace = Trace(bench, 50.0)
     trace.tick(50.5)
     rows = trace.since(50.195)
@@ -266,7 +266,7 @@ def test_the_trace_samples_on_its_grid_even_when_looked_at_late() -> None:
 
 
 def test_an_sdo_answer_takes_its_time() -> None:
-    bench = Bench(robot(), now=0.0, parameters=BenchParameters(boot_delay_s=0.0, sdo_delay_s=0.003))
+    bench = Bench(robot(), now_s=0.0, parameters=BenchParameters(boot_delay_s=0.0, sdo_delay_s=0.003))
     bench.tick(0.010)
     bench.on_frame(Frame(0x601, bytes.fromhex("4000100000000000")), 0.010)
     answers = {at_ms: [f for f in bench.tick(at_ms / 1000) if f.cob_id == 0x581] for at_ms in (10, 11, 12.9, 13.1, 14)}
@@ -283,6 +283,6 @@ def test_frames_at_full_length_for_ids_that_nobody_has_are_ignored() -> None:
     rig = Rig()
     known = {0x000, 0x080, 0x601, 0x602, 0x201, 0x202, 0x301, 0x302, 0x401, 0x402}
     for cob_id in sorted(set(range(0x800)) - known):
-        rig.bench.on_frame(Frame(cob_id, struct.pack("<Q", 0x0F0F_0F0F)), rig.now)
-    assert rig.bench.tick(rig.now) == []
+        rig.bench.on_frame(Frame(cob_id, struct.pack("<Q", 0x0F0F_0F0F)), rig.now_s)
+    assert rig.bench.tick(rig.now_s) == []
     assert rig.state() is State.SWITCH_ON_DISABLED

@@ -18,7 +18,7 @@ def _driving(seconds: float = 1.0) -> Rig:
 
 
 def _suffer(rig: Rig, kind: str, **arguments: float) -> None:
-    faults.apply(rig.bench.nodes, 1, kind, rig.now, arguments)
+    faults.apply(rig.bench.nodes, 1, kind, rig.now_s, arguments)
 
 
 def _shown(rig: Rig) -> tuple[int, int]:
@@ -27,7 +27,7 @@ def _shown(rig: Rig) -> tuple[int, int]:
 
 
 def _left(rig: Rig) -> float:
-    return rig.bench.truth(rig.now).v_left_mps
+    return rig.bench.truth(rig.now_s).v_left_mps
 
 
 def test_with_a_lost_encoder_the_loop_pushes_and_the_wheel_runs_away() -> None:
@@ -136,7 +136,7 @@ def test_a_blocked_wheel_stands_whatever_its_motor_does_and_the_base_turns() -> 
     _suffer(rig, "blocked")
     rig.drive(SLOW, SLOW, 1.0)
     assert _left(rig) == 0.0
-    assert rig.bench.truth(rig.now).angular_radps > 0.3
+    assert rig.bench.truth(rig.now_s).angular_radps > 0.3
     _suffer(rig, "heal")
     rig.wait(2.0)
     assert _left(rig) == pytest.approx(0.3, abs=0.01)
@@ -151,9 +151,9 @@ def test_a_threshold_holds_a_wheel_until_its_motor_is_strong_enough() -> None:
 
 def test_the_right_wheel_is_held_by_its_own_drive() -> None:
     rig = Rig()
-    faults.apply(rig.bench.nodes, 2, "blocked", rig.now, {})
+    faults.apply(rig.bench.nodes, 2, "blocked", rig.now_s, {})
     rig.drive(SLOW, SLOW, 1.0)
-    assert rig.bench.truth(rig.now).v_right_mps == 0.0
+    assert rig.bench.truth(rig.now_s).v_right_mps == 0.0
 
 
 def test_a_limited_wheel_turns_at_a_share_of_its_setpoint() -> None:
@@ -161,7 +161,7 @@ def test_a_limited_wheel_turns_at_a_share_of_its_setpoint() -> None:
     _suffer(rig, "limited", share=0.5)
     rig.drive(SLOW, SLOW, 1.0)
     assert _left(rig) == pytest.approx(0.15, abs=0.01)
-    assert rig.bench.truth(rig.now).v_right_mps == pytest.approx(0.3, abs=0.01)
+    assert rig.bench.truth(rig.now_s).v_right_mps == pytest.approx(0.3, abs=0.01)
 
 
 PDO_SETUP = ((0x1800, 0x181, 0x1A00, (0x60410010, 0x60640020)), (0x1801, 0x281, 0x1A01, (0x606C0020,)))

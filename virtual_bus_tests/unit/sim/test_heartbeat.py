@@ -56,7 +56,7 @@ def test_silence_after_a_heartbeat_is_told_once_after_the_time() -> None:
     for _ in range(3):
         rig.tx("77F 05")
         rig.wait(0.1)
-    start = rig.now - 0.1
+    start = rig.now_s - 0.1
     said = rig.wait(2.0)
     assert said == [LOST_DRIVER]
     assert rig.heard[0][0] - start == pytest.approx(0.3, abs=0.003)

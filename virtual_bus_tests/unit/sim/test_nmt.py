@@ -48,7 +48,7 @@ def test_heartbeat_comes_every_period_and_at_once_after_a_change_of_state() -> N
     heartbeat : 7F  7F   7F   05   05       250: NMT start
     """
     rig = Rig()
-    start = rig.now
+    start = rig.now_s
     rig.write(0x1017, 100)
     rig.wait(0.25)
     rig.tx("000 01 01")

@@ -194,7 +194,7 @@ def test_the_deadline_of_an_rpdo_starts_with_the_first_one() -> None:
     rig.wait(0.04)
     rig.tx("201 00 00")
     rig.heard.clear()
-    start = rig.now
+    start = rig.now_s
     assert rig.wait(0.5) == ["081 50 82 11 01 00 00 00 00"]
     assert rig.heard[0][0] - start == pytest.approx(0.05, abs=0.002)
     assert rig.state() is State.FAULT

@@ -162,10 +162,10 @@ def test_epos4_keeps_the_fault_of_a_lost_heartbeat_until_its_communication_is_re
 
 def test_a_lost_boot_up_and_an_emergency_message_of_three_bytes() -> None:
     rig = rig_with("generic", velocity_unit="rpm")
-    apply(rig.bench.nodes, 1, "mute_boot", rig.now, {})
-    apply(rig.bench.nodes, 1, "short_emcy", rig.now, {})
+    apply(rig.bench.nodes, 1, "mute_boot", rig.now_s, {})
+    apply(rig.bench.nodes, 1, "short_emcy", rig.now_s, {})
     rig.heard.clear()
-    rig.node.power_cycle(rig.now, 0.1)
+    rig.node.power_cycle(rig.now_s, 0.1)
     rig.wait(0.5)
     rig.node.fail(0, 0x2310)
     rig.wait(0.01)

@@ -25,13 +25,13 @@ class Robot:
         self.left = [self.body.motor(count) for _ in range(wheels_per_side)]
         self.right = [self.body.motor(count) for _ in range(wheels_per_side)]
         left, right = ([MountedWheel(motor, 1) for motor in side] for side in (self.left, self.right))
-        self.base = Base(self.body, TRACK_M, 0.005, left, right, now=0.0)
-        self.now = 0.0
+        self.base = Base(self.body, TRACK_M, 0.005, left, right, now_s=0.0)
+        self.now_s = 0.0
 
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds / STEP_S)):
-            self.now += STEP_S
-            self.base.step(self.now)
+            self.now_s += STEP_S
+            self.base.step(self.now_s)
 
     def order(self, left: float, right: float, slope: float = 1.0) -> None:
         for motors, goal in ((self.left, left), (self.right, right)):
@@ -237,8 +237,8 @@ def test_the_end_of_a_stop_is_told_once() -> None:
     robot.order(0.3, 0.3)
     robot.run(1.0)
     for motor in robot.left + robot.right:
-        motor.stop(2.0, lambda: told.append(robot.now))
-    start = robot.now
+        motor.stop(2.0, lambda: told.append(robot.now_s))
+    start = robot.now_s
     robot.run(1.0)
     assert len(told) == 2
     assert all(0.14 <= time - start <= 0.19 for time in told)

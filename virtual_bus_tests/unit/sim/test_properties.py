@@ -41,7 +41,7 @@ def _do(rig: Rig, what: str, value: str | int) -> None:
         case "fault", int():
             rig.node.fail(0, value)
         case "power cycle", _:
-            rig.node.power_cycle(rig.now, 0.01)
+            rig.node.power_cycle(rig.now_s, 0.01)
         case "wait", int():
             rig.wait(value / 1000.0, step_s=0.01)
 
@@ -73,7 +73,7 @@ def test_no_frame_makes_the_bench_raise(noise: list[tuple[int, bytes]]) -> None:
     rig = Rig()
     rig.tx("000 01 00")
     for cob_id, data in noise:
-        rig.bench.on_frame(Frame(cob_id, data), rig.now)
+        rig.bench.on_frame(Frame(cob_id, data), rig.now_s)
         rig.wait(0.002, step_s=0.002)
 
 

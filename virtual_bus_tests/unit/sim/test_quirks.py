@@ -25,7 +25,7 @@ def rig() -> Rig:
 
 def broken(rig: Rig, kind: str, **arguments: object) -> None:
     rig.heard.clear()
-    apply(rig.bench.nodes, 1, kind, rig.now, arguments)
+    apply(rig.bench.nodes, 1, kind, rig.now_s, arguments)
 
 
 def heard(rig: Rig, cob_id: str) -> list[str]:

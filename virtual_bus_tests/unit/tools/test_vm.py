@@ -147,7 +147,7 @@ def test_a_guest_that_is_silent_too_long_is_waited_for_no_longer() -> None:
 def test_a_guest_that_talks_for_ever_is_not_waited_for_either() -> None:
     patience = Patience(1000.0)
 
-    assert [patience.over(now, 1000.0 + now) for now in range(0, 1801, 100)] == [""] * 19
+    assert [patience.over(now_s, 1000.0 + now_s) for now_s in range(0, 1801, 100)] == [""] * 19
     assert patience.over(1801, 2800.1) == "not through after 1800 s on this computer"
 
 

@@ -21,7 +21,7 @@ class Link:
 
     def __init__(self, mux: Mux | None = None) -> None:
         self.mux = mux or rested()
-        self.now = 0.0
+        self.now_s = 0.0
         self.sent_s = 0.0
         self.apart_s = APART_S
         self.drift = 0.0
@@ -30,10 +30,10 @@ class Link:
         """For a while, each message arriving `delay_s` after it was sent; the last decision."""
         for _ in range(round(seconds / PERIOD_S)):
             self.sent_s += PERIOD_S
-            self.now = max(self.now, self.sent_s + delay_s)
+            self.now_s = max(self.now_s, self.sent_s + delay_s)
             stamp_s = self.sent_s * (1.0 + self.drift) + self.apart_s
-            self.mux.on_command("joystick", twist, self.now, sent=Sent(stamp_s, 5e8 + self.now, self.now))
-        return self.mux.decide(self.now)
+            self.mux.on_command("joystick", twist, self.now_s, sent=Sent(stamp_s, 5e8 + self.now_s, self.now_s))
+        return self.mux.decide(self.now_s)
 
 
 @pytest.mark.parametrize("delay_s", [0.0, 0.1, 0.29])
@@ -41,8 +41,8 @@ def test_a_delay_within_the_timeout_is_followed_and_shortens_how_long_the_comman
     link = Link()
     link.send(ZERO, 0.01, 1.0)
     assert link.send(FORWARD, 0.01 + delay_s, 1.0).twist == FORWARD
-    assert link.mux.decide(link.now + 0.29 - delay_s).twist == FORWARD
-    assert link.mux.decide(link.now + 0.31 - delay_s).twist == ZERO
+    assert link.mux.decide(link.now_s + 0.29 - delay_s).twist == FORWARD
+    assert link.mux.decide(link.now_s + 0.31 - delay_s).twist == ZERO
 
 
 def test_letting_go_of_the_stick_over_a_network_that_delays_by_two_seconds_stops_at_once() -> None:
@@ -80,8 +80,8 @@ def test_a_late_source_keeps_a_lower_one_from_driving() -> None:
     link = Link()
     link.send(ZERO, 0.01, 1.0)
     link.send(FORWARD, 1.0)
-    link.mux.on_command("navigation", FORWARD, link.now)
-    decision = link.mux.decide(link.now)
+    link.mux.on_command("navigation", FORWARD, link.now_s)
+    decision = link.mux.decide(link.now_s)
     assert (decision.active, decision.twist) == ("joystick", ZERO)
 
 

@@ -19,7 +19,7 @@ class Robot:
     """A filter whose button speaks on change only, and its disk."""
 
     def __init__(self, *, latched: bool = True) -> None:
-        self.now = 10.0
+        self.now_s = 10.0
         self.disk = StopDisk("velocity")
         self._config = config(scan=False, estop=False, latched=latched)
         self.start()
@@ -30,8 +30,8 @@ class Robot:
         self.settle()
 
     def button(self, pressed: bool) -> None:
-        self.now += 0.02
-        self.filter.on_estop(pressed, self.now)
+        self.now_s += 0.02
+        self.filter.on_estop(pressed, self.now_s)
         self.settle()
 
     def settle(self) -> None:
@@ -39,15 +39,15 @@ class Robot:
             self.order(ZERO)
 
     def order(self, twist: Twist) -> Decision:
-        self.now += 0.02
-        self.filter.on_command(twist, self.now)
-        decision = self.filter.decide(self.now)
+        self.now_s += 0.02
+        self.filter.on_command(twist, self.now_s)
+        decision = self.filter.decide(self.now_s)
         self.filter.on_record(*self.disk.write(self.filter.record))
         return decision
 
     def reset(self) -> bool:
         self.order(ZERO)
-        return self.filter.reset((), self.now)[0]
+        return self.filter.reset((), self.now_s)[0]
 
     @property
     def drives(self) -> bool:
@@ -172,7 +172,7 @@ def test_a_record_that_cannot_be_used_waits_for_a_reset() -> None:
     robot = Robot()
     robot.disk.file.data = bytearray(b"garbage")
     robot.filter = SafetyFilter(robot._config, robot.disk.found())
-    decision = robot.filter.decide(robot.now)
+    decision = robot.filter.decide(robot.now_s)
     assert robot.filter.estop is EstopState.AWAITS_RESET
     assert "wrong size" in decision.detail
 
@@ -216,7 +216,7 @@ def test_a_press_during_an_orderly_end_is_recorded(late: bool) -> None:
     robot = Robot()
     robot.button(False)
     assert robot.drives
-    assert robot.filter.shut_down(robot.now).twist == ZERO
+    assert robot.filter.shut_down(robot.now_s).twist == ZERO
     assert robot.order(FORWARD).cause is StopCause.SHUTDOWN  # whatever still arrives
     assert robot.disk.found().record.mark is Mark.LIVE
     if late:

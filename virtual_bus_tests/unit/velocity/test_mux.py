@@ -243,16 +243,16 @@ commands = st.lists(
 def test_the_order_is_the_newest_valid_command_of_the_highest_fresh_source_or_zero(
     commands: list[tuple[str, Twist, float]], pause_s: float
 ) -> None:
-    mux, now, newest = rested(), 0.0, dict[str, tuple[Twist, float]]()
+    mux, now_s, newest = rested(), 0.0, dict[str, tuple[Twist, float]]()
     for name, twist, before_s in commands:
-        now += before_s
-        mux.on_command(name, twist, now)
+        now_s += before_s
+        mux.on_command(name, twist, now_s)
         if twist.is_finite:
-            newest[name] = (twist, now)
-    now += pause_s
-    fresh = [name for name, (_, at_s) in newest.items() if now - at_s <= TIMEOUTS_S[name]]
+            newest[name] = (twist, now_s)
+    now_s += pause_s
+    fresh = [name for name, (_, at_s) in newest.items() if now_s - at_s <= TIMEOUTS_S[name]]
     expected = max(fresh, key=lambda name: DEFAULT_SOURCES[name].priority, default=None)
-    decision = mux.decide(now)
+    decision = mux.decide(now_s)
     assert decision.active == expected
     assert decision.twist == newest.get(expected or "", (ZERO, 0.0))[0]
     assert [source.name for source in decision.sources if source.reason == ""] == [expected] * (expected is not None)

@@ -27,30 +27,30 @@ class Story:
 
     def __init__(self) -> None:
         self.mux = Mux(DEFAULT_SOURCES)
-        self.now = 100.0
+        self.now_s = 100.0
         self.driver: DriverState | None = DriverState.ENABLED
         self.estop_free = True
         self.cycles = 0
         self.sends: dict[str, Twist] = {}
         self.ordered: list[Twist] = []
-        self._status_due = self.now
+        self._status_due = self.now_s
 
     def run(self, seconds: float) -> MuxDecision:
         """Let time pass; the last decision."""
         for _ in range(round(seconds / STEP_S)):
-            self.now += STEP_S
+            self.now_s += STEP_S
             self.cycles += 2
-            if self.driver is not None and self.now >= self._status_due:
-                self._status_due = self.now + STATUS_S
-                self.mux.on_driver(self.driver, self.cycles, self.now)
+            if self.driver is not None and self.now_s >= self._status_due:
+                self._status_due = self.now_s + STATUS_S
+                self.mux.on_driver(self.driver, self.cycles, self.now_s)
             for name, twist in self.sends.items():
-                self.mux.on_command(name, twist, self.now)
+                self.mux.on_command(name, twist, self.now_s)
             decision = self.decide()
         return decision
 
     def decide(self) -> MuxDecision:
         self.mux.on_estop(self.estop_free)
-        decision = self.mux.decide(self.now)
+        decision = self.mux.decide(self.now_s)
         self.ordered.append(decision.twist)
         return decision
 
@@ -168,8 +168,8 @@ def test_a_program_that_was_idle_begins_with_a_velocity(story: Story, name: str)
 
 def test_absence_that_nobody_watched_arms_nobody(story: Story) -> None:
     assert not story.followed("navigation", 0.5)
-    story.now += 30.0  # this process stood still; navigation did not
-    assert story.mux.decide(story.now).twist == ZERO
+    story.now_s += 30.0  # this process stood still; navigation did not
+    assert story.mux.decide(story.now_s).twist == ZERO
     assert not story.followed("navigation", 1.0)
 
 
@@ -195,18 +195,18 @@ def test_zeros_while_the_base_is_not_ready_arm(story: Story) -> None:
 
 def test_nan_neither_arms_nor_disarms(story: Story) -> None:
     assert not story.followed("joystick")
-    story.mux.on_command("joystick", Twist(float("nan"), 0.0), story.now)
+    story.mux.on_command("joystick", Twist(float("nan"), 0.0), story.now_s)
     assert not story.decide().sources[0].armed
     story.release()
     story.driver = DriverState.LATCHED
     story.run(0.2)
-    story.mux.on_command("joystick", Twist(float("nan"), 0.0), story.now)
+    story.mux.on_command("joystick", Twist(float("nan"), 0.0), story.now_s)
     assert story.decide().sources[0].armed
 
 
 def test_a_zero_that_waited_while_this_process_stood_still_does_not_arm() -> None:
     mux = Mux(DEFAULT_SOURCES)
-    mux.on_command("joystick", ZERO, received=100.0, now=103.0)
+    mux.on_command("joystick", ZERO, received=100.0, now_s=103.0)
     assert not mux.decide(103.0).sources[0].armed
 
 
@@ -298,13 +298,13 @@ def test_what_waited_in_the_radio_comes_at_once_after_a_stop_and_is_not_followed
     """Stamped: zero until 0.0; the stick is pushed in the gap; stop and reset; then 70 messages in one moment."""
 
     def say(twist: Twist, sent_s: float) -> None:
-        sent = Sent(1000.0 + sent_s, story.now, story.now)
-        story.mux.on_command("joystick", twist, story.now, sent=sent)
+        sent = Sent(1000.0 + sent_s, story.now_s, story.now_s)
+        story.mux.on_command("joystick", twist, story.now_s, sent=sent)
 
     for _ in range(50):
         story.run(STEP_S)
-        say(ZERO, story.now)
-    pushed_s = story.now
+        say(ZERO, story.now_s)
+    pushed_s = story.now_s
     story.run(0.2)
     driver_latches(story)
     story.run(1.0)
@@ -315,7 +315,7 @@ def test_what_waited_in_the_radio_comes_at_once_after_a_stop_and_is_not_followed
     story.ordered.clear()
     for _ in range(50):
         story.run(STEP_S)
-        say(FORWARD, story.now)
+        say(FORWARD, story.now_s)
     assert set(story.ordered) == {ZERO}
 
 
@@ -345,7 +345,7 @@ STRANGER = Foreign("cmd_vel_joy", "/stranger", "geometry_msgs/msg/TwistStamped",
 
 
 def lock_closes(story: Story) -> None:
-    story.mux.on_lock(HOLD, True, story.now)
+    story.mux.on_lock(HOLD, True, story.now_s)
 
 
 def lock_is_silent(story: Story) -> None:
@@ -361,7 +361,7 @@ def scans_are_missing(story: Story) -> None:
 
 
 def all_is_well(story: Story) -> None:
-    story.mux.on_lock(HOLD, False, story.now)
+    story.mux.on_lock(HOLD, False, story.now_s)
     story.mux.on_foreign([])
     story.mux.on_scans("")
 
@@ -377,7 +377,7 @@ PAUSES = [
 def paused(lock: MuxLock, sources: dict[str, MuxSource] = DEFAULT_SOURCES) -> Story:
     story = Story()
     story.mux = Mux(sources, {HOLD: lock}, foreign_lock=True)
-    story.mux.on_lock(HOLD, False, story.now)
+    story.mux.on_lock(HOLD, False, story.now_s)
     return story
 
 
@@ -409,8 +409,8 @@ def test_a_lock_that_opens_again_within_one_cycle_counts() -> None:
     story = paused(STICK_LOCK)
     story.release()
     assert story.followed("joystick", 0.2)
-    story.mux.on_lock(HOLD, True, story.now)
-    story.mux.on_lock(HOLD, False, story.now)
+    story.mux.on_lock(HOLD, True, story.now_s)
+    story.mux.on_lock(HOLD, False, story.now_s)
     assert not story.followed("joystick", 5.0)
 
 
@@ -516,11 +516,11 @@ def test_many_nodes_of_a_planner_share_its_topic(story: Story) -> None:
 def test_a_lock_with_two_publishers_holds_whatever_the_last_one_said(locked: bool) -> None:
     story = paused(MuxLock(topic="pause", priority=200, required=False))
     story.mux.on_publishers("pause", ["/gate", "/panel"])
-    story.mux.on_lock(HOLD, locked, story.now)
+    story.mux.on_lock(HOLD, locked, story.now_s)
     story.release()
     assert not story.followed("joystick", 1.0)
     story.mux.on_publishers("pause", ["/gate"])
-    story.mux.on_lock(HOLD, False, story.now)
+    story.mux.on_lock(HOLD, False, story.now_s)
     story.release()
     assert story.followed("joystick", 0.2)
 

@@ -78,11 +78,11 @@ def test_without_an_emergency_stop_nothing_waits_for_a_zero_command() -> None:
     assert safety.decide(0.0).twist == Twist(0.5, 0.0)
 
 
-def latched(now: float, twist: Twist) -> SafetyFilter:
+def latched(now_s: float, twist: Twist) -> SafetyFilter:
     """A filter whose emergency stop needs a reset; it was heard released, and `twist` is ordered."""
-    safety = fed(now, ZERO, the_filter=SafetyFilter(config(latched=True)))
-    assert safety.decide(now).cause is StopCause.NONE  # at the start nothing has to be reset
-    return fed(now, twist, the_filter=safety)
+    safety = fed(now_s, ZERO, the_filter=SafetyFilter(config(latched=True)))
+    assert safety.decide(now_s).cause is StopCause.NONE  # at the start nothing has to be reset
+    return fed(now_s, twist, the_filter=safety)
 
 
 def test_without_an_emergency_stop_a_reset_is_refused_too_while_a_source_orders_a_velocity() -> None:

@@ -195,16 +195,16 @@ def test_the_way_ordered_since_the_scan_is_counted() -> None:
     safety = fed(0.0, ZERO)
     safety.decide(0.0)
     for step in range(1, 101):
-        now = step * HOLD_S
-        fed(now, Twist(1.0, 0.0), the_filter=safety)
-        safety.decide(now)
+        now_s = step * HOLD_S
+        fed(now_s, Twist(1.0, 0.0), the_filter=safety)
+        safety.decide(now_s)
     see(safety, 2.0, (1.1, 0.0))
     orders = {}
     for step in range(1, 14):
-        now = 2.0 + step * HOLD_S
-        safety.on_command(Twist(1.0, 0.0), now)
-        safety.on_estop(False, now)
-        orders[step] = safety.decide(now).twist.linear_mps
+        now_s = 2.0 + step * HOLD_S
+        safety.on_command(Twist(1.0, 0.0), now_s)
+        safety.on_estop(False, now_s)
+        orders[step] = safety.decide(now_s).twist.linear_mps
     assert orders[1] == pytest.approx(0.96, abs=0.03)
     assert list(orders.values()) == sorted(orders.values(), reverse=True)
     assert orders[13] < 0.75

@@ -111,7 +111,7 @@ def test_a_scan_that_says_nothing_or_cannot_be_right_stops_the_base_before_the_w
     assert least_m > 0.14
     assert fastest == 0.0
     assert cause in causes
-    (scanner,) = made.filter.inputs(made.now).scans
+    (scanner,) = made.filter.inputs(made.now_s).scans
     assert scanner.dropped > 0
     assert scanner.why_dropped
 
@@ -354,7 +354,7 @@ def test_a_scanner_whose_clock_is_set_back_loses_one_scan() -> None:
     made.run(AHEAD, 0.5)
     made.fault = lambda scan: dataclasses.replace(scan, stamp_ns=(scan.stamp_ns or 0) - 100_000_000_000)
     made.run(AHEAD, 0.5)
-    (scanner,) = made.filter.inputs(made.now).scans
+    (scanner,) = made.filter.inputs(made.now_s).scans
     assert scanner.dropped == 1
     assert made.decision is not None
     assert made.decision.cause is StopCause.NONE

@@ -58,15 +58,15 @@ class Base:
         found = set()
         for _ in range(round(seconds / 0.05)):
             self.cycle += 1
-            now = 10.0 + 0.05 * self.cycle
+            now_s = 10.0 + 0.05 * self.cycle
             if self.cycle % 10 == 0:
-                self.filter.on_scan_publishers(self.topic, in_graph, now)
+                self.filter.on_scan_publishers(self.topic, in_graph, now_s)
             number = self.cycle % 2
             if number in alive:
-                scan = dataclasses.replace(self.scanners[number].scan(FAR), stamp_ns=round(now * 1e9))
-                self.filter.on_laser_scan(self.topic, scan, PLACE, now)
-            self.filter.on_command(Twist(0.3, 0.0), now)
-            decision = self.filter.decide(now)
+                scan = dataclasses.replace(self.scanners[number].scan(FAR), stamp_ns=round(now_s * 1e9))
+                self.filter.on_laser_scan(self.topic, scan, PLACE, now_s)
+            self.filter.on_command(Twist(0.3, 0.0), now_s)
+            decision = self.filter.decide(now_s)
             found.add((decision.action, decision.cause))
         return found
 

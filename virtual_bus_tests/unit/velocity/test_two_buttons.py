@@ -17,21 +17,21 @@ class Base:
     """Button A publishes when it changes, button B says ten times a second that it is free."""
 
     def __init__(self, *, latched: bool = True, publishers: int = 2) -> None:
-        self.now = 10.0
+        self.now_s = 10.0
         self.filter = SafetyFilter(config(scan=False, estop=False, latched=latched))
         self.filter.on_estop_publishers(publishers)
         self.run(ZERO, 0.2)
 
     def press(self) -> None:
-        self.filter.on_estop(True, self.now)
+        self.filter.on_estop(True, self.now_s)
 
     def run(self, twist: Twist, seconds: float) -> Decision:
-        decision = self.filter.decide(self.now)
+        decision = self.filter.decide(self.now_s)
         for _ in range(round(seconds / 0.1)):
-            self.now += 0.1
-            self.filter.on_estop(False, self.now)
-            self.filter.on_command(twist, self.now)
-            decision = self.filter.decide(self.now)
+            self.now_s += 0.1
+            self.filter.on_estop(False, self.now_s)
+            self.filter.on_command(twist, self.now_s)
+            decision = self.filter.decide(self.now_s)
         return decision
 
 
@@ -47,7 +47,7 @@ def test_what_one_button_says_releases_no_other(latched: bool) -> None:
     decision = base.run(ZERO, 2.0)
     assert decision.cause is StopCause.ESTOP
     assert "has 2 publishers" in decision.detail
-    done, sentence = base.filter.reset((), base.now)
+    done, sentence = base.filter.reset((), base.now_s)
     assert not done
     assert "has 2 publishers" in sentence
     assert base.run(FORWARD, 1.0).twist == ZERO
@@ -61,7 +61,7 @@ def test_when_one_publisher_is_left_its_word_counts_again() -> None:
     base.filter.on_estop_publishers(1)
     base.run(ZERO, 0.2)
     assert base.filter.estop is EstopState.AWAITS_RESET
-    assert base.filter.reset((), base.now)[0]
+    assert base.filter.reset((), base.now_s)[0]
     assert base.run(FORWARD, 0.5).twist == FORWARD
 
 
@@ -71,7 +71,7 @@ def test_a_release_from_before_the_crowd_was_known_is_not_reset_either() -> None
     base.press()
     base.run(ZERO, 0.3)
     base.filter.on_estop_publishers(2)
-    done, sentence = base.filter.reset((), base.now)
+    done, sentence = base.filter.reset((), base.now_s)
     assert not done
     assert "has 2 publishers" in sentence
 
@@ -83,8 +83,8 @@ def test_a_button_of_another_type_holds_the_base_as_long_as_it_is_there() -> Non
     decision = base.run(FORWARD, 0.5)
     assert (decision.cause, decision.twist) == (StopCause.ESTOP, ZERO)
     assert "std_msgs/msg/Int8, which is not heard" in decision.detail
-    assert not base.filter.reset((), base.now)[0]
+    assert not base.filter.reset((), base.now_s)[0]
     base.filter.on_estop_publishers(1)
     base.run(ZERO, 0.2)
-    assert base.filter.reset((), base.now)[0]
+    assert base.filter.reset((), base.now_s)[0]
     assert base.run(FORWARD, 0.5).twist == FORWARD

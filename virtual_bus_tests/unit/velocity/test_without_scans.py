@@ -24,7 +24,7 @@ class Base:
         self.causes: set[StopCause] = set()
 
     @property
-    def now(self) -> float:
+    def now_s(self) -> float:
         return 10.0 + self.cycle * CYCLE_S
 
     def run(self, seconds: float, *ahead: tuple[float, float]) -> str:
@@ -32,9 +32,9 @@ class Base:
         for _ in range(round(seconds / CYCLE_S)):
             self.cycle += 1
             if self.scans and self.cycle % 5 == 0:
-                see(self.filter, self.now, *ahead)
-            self.filter.on_command(FORWARD, self.now)
-            self.causes.add(self.filter.decide(self.now).cause)
+                see(self.filter, self.now_s, *ahead)
+            self.filter.on_command(FORWARD, self.now_s)
+            self.causes.add(self.filter.decide(self.now_s).cause)
         return self.filter.without_scans
 
 

@@ -23,8 +23,8 @@ HOLD_S = config().order_hold_s
 CREEPS = replace(AT_REST, target_mps=0.001)
 
 
-def look(watch: CreepWatch, axis: Axis, bounds: Bounds, now: float) -> str:
-    return watch.look(BusView((AT_REST, axis), ()), bounds, now)
+def look(watch: CreepWatch, axis: Axis, bounds: Bounds, now_s: float) -> str:
+    return watch.look(BusView((AT_REST, axis), ()), bounds, now_s)
 
 
 @pytest.mark.parametrize("target_mps", [0.001, -0.001, 0.029, 0.8])
@@ -98,9 +98,9 @@ def test_a_driver_that_creeps_with_a_zero_now_and_then_is_stopped(turn: int) -> 
     """0.028 m/s for 0.3 s and two zeros, again and again: 0.26 m in 10 s, or a turn of 1 rad, with zero ordered."""
     world = World()
     world.enable()
-    start, slow = world.now, round(0.028 * BITS_PER_MPS)
+    start, slow = world.now_s, round(0.028 * BITS_PER_MPS)
     both = {0x201: slow, 0x202: -turn * slow}  # the right one is mounted mirrored
-    lies(world, lambda cob_id, target: both[cob_id] if (world.now - start) % 0.32 < 0.3 else 0)
+    lies(world, lambda cob_id, target: both[cob_id] if (world.now_s - start) % 0.32 < 0.3 else 0)
     assert world.run(2.0, lambda: world.watchdog is not None and world.watchdog.status.state is State.TRIPPED)
     assert abs(world.truth.x_m) < 0.05
 

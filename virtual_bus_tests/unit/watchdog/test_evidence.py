@@ -57,10 +57,12 @@ class Wheel:
     ) -> Evidence:
         """One cycle. The encoder rolls like the velocity unless it is told otherwise."""
         self.n += 1
-        now, elapsed_s = self.n / HZ, cycles / HZ
-        self.watch.on_setpoint(setpoint, now)
+        now_s, elapsed_s = self.n / HZ, cycles / HZ
+        self.watch.on_setpoint(setpoint, now_s)
         step_m = (velocity if rolls is None else rolls) * elapsed_s
-        self.watch.on_sample(velocity, step_m if known else None, powered, enabled and powered, elapsed_s, now, torque)
+        self.watch.on_sample(
+            velocity, step_m if known else None, powered, enabled and powered, elapsed_s, now_s, torque
+        )
         return self.last
 
     def samples(self, count: int, setpoint: float, velocity: float, **how: Any) -> Evidence:

@@ -168,10 +168,10 @@ def test_a_stuck_driver_with_a_low_jerk_is_stopped_after_a_second_or_two(jerk: f
     stuck = world.core._motion
     object.__setattr__(world.core, "_limiter", type("Stuck", (), {"step": lambda *_, **__: stuck})())
     world.command = Twist2D.ZERO
-    begin = world.now
+    begin = world.now_s
     assert world.run(8.0, lambda: watchdog.status.state is State.TRIPPED)
     assert watchdog.status.verdict.cause is TripCause.TARGET_OUTSIDE
-    assert world.now - begin < 0.37 + RECEIVED_S + sqrt(2.0 * 0.031 / jerk) + 0.05
+    assert world.now_s - begin < 0.37 + RECEIVED_S + sqrt(2.0 * 0.031 / jerk) + 0.05
 
 
 @pytest.mark.parametrize(("jerk", "twist"), [(0.2, Twist2D(0.8, 0.0)), (10.0, Twist2D(0.5, 0.5))])

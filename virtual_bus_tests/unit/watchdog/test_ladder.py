@@ -31,8 +31,8 @@ FOOT = Climb(Step.QUICK_STOP, since=9.9, begin_mps=0.5)
 OFF = Climb(Step.DISABLE_VOLTAGE, since=9.9, begin_mps=0.5)
 
 
-def go(climb: Climb, look: Look, now: float) -> Climb:
-    return advance(climb, look, RULES, now)
+def go(climb: Climb, look: Look, now_s: float) -> Climb:
+    return advance(climb, look, RULES, now_s)
 
 
 def fed(climb: Climb, look: Look, *samples: tuple[float, float]) -> Climb:
@@ -58,7 +58,7 @@ def test_it_begins_with_the_quick_stop() -> None:
 # trip 9.900          10.050 obey: a drive that is still enabled, or not heard, is on the next rung
 #   |------------------|
 @pytest.mark.parametrize(
-    ("now", "look", "step"),
+    ("now_s", "look", "step"),
     [
         (10.049, ENABLED, Step.QUICK_STOP),
         (10.051, ENABLED, Step.PRE_OPERATIONAL),
@@ -76,8 +76,8 @@ def test_it_begins_with_the_quick_stop() -> None:
         (99.0, replace(ENABLED, present=False), Step.QUICK_STOP),  # no such node on the bus
     ],
 )
-def test_deadlines(now: float, look: Look, step: Step) -> None:
-    assert go(FOOT, look, now).step is step
+def test_deadlines(now_s: float, look: Look, step: Step) -> None:
+    assert go(FOOT, look, now_s).step is step
 
 
 def test_at_the_very_deadline_it_climbs() -> None:
@@ -86,7 +86,7 @@ def test_at_the_very_deadline_it_climbs() -> None:
 
 
 @pytest.mark.parametrize(
-    ("now", "look", "step"),
+    ("now_s", "look", "step"),
     [
         (9.999, BRAKING, Step.DISABLE_VOLTAGE),
         (10.001, BRAKING, Step.HEARTBEAT_WITHHELD),  # quick stop active has power still
@@ -94,8 +94,8 @@ def test_at_the_very_deadline_it_climbs() -> None:
         (10.101, ROLLING, Step.HEARTBEAT_WITHHELD),  # heard at 10.000, and never again
     ],
 )
-def test_power_off_is_obeyed_when_the_power_is_off(now: float, look: Look, step: Step) -> None:
-    assert go(OFF, look, now).step is step
+def test_power_off_is_obeyed_when_the_power_is_off(now_s: float, look: Look, step: Step) -> None:
+    assert go(OFF, look, now_s).step is step
 
 
 # allowed: 0.5 × 1.1 + 0.05 = 0.60 m/s until 10.000, then 0.5 m/s² less
@@ -189,11 +189,11 @@ def test_its_standstill_is_no_evidence() -> None:
 
 
 # power off, by feedback, at 10.000 ── 2 s ── a stand is assumed
-@pytest.mark.parametrize(("now", "stopped"), [(11.999, False), (12.0, True), (12.001, True)])
-def test_without_power_a_stand_is_assumed_when_it_must_have_rolled_out(now: float, stopped: bool) -> None:
+@pytest.mark.parametrize(("now_s", "stopped"), [(11.999, False), (12.0, True), (12.001, True)])
+def test_without_power_a_stand_is_assumed_when_it_must_have_rolled_out(now_s: float, stopped: bool) -> None:
     off = go(OFF, replace(STANDING, trusted=False), 10.0)
     assert not off.stopped
-    after = go(off, replace(STANDING, trusted=False, seen_at=now), now)
+    after = go(off, replace(STANDING, trusted=False, seen_at=now_s), now_s)
     assert (after.stopped, after.assumed) == (stopped, stopped)
 
 
@@ -231,12 +231,12 @@ def test_a_rung_more_gives_a_wheel_without_power_none() -> None:
 
 
 # a turn of readings takes 0.08 s, of two axes: one may be lost
-@pytest.mark.parametrize(("now", "step"), [(10.059, Step.DISABLE_VOLTAGE), (10.061, Step.HEARTBEAT_WITHHELD)])
-def test_a_node_of_several_axes_has_the_time_of_two_readings(now: float, step: Step) -> None:
+@pytest.mark.parametrize(("now_s", "step"), [(10.059, Step.DISABLE_VOLTAGE), (10.061, Step.HEARTBEAT_WITHHELD)])
+def test_a_node_of_several_axes_has_the_time_of_two_readings(now_s: float, step: Step) -> None:
     rolling = replace(ROLLING, seen_at=9.9, reading_s=0.08)
-    assert go(OFF, rolling, now).step is step
-    powered = replace(rolling, powered=True, speed_mps=0.0, seen_at=now)
-    assert go(OFF, powered, now).step is step
+    assert go(OFF, rolling, now_s).step is step
+    powered = replace(rolling, powered=True, speed_mps=0.0, seen_at=now_s)
+    assert go(OFF, powered, now_s).step is step
 
 
 def test_a_trusted_stand_is_seen_not_assumed() -> None:
@@ -287,18 +287,18 @@ def test_a_stand_that_a_liar_showed_was_none(step: Step, then: Step) -> None:
 
 
 # standing, and held with power, from 10.0 on ── 0.2 s for the drive or the driver ── power off
-@pytest.mark.parametrize(("now", "step"), [(10.199, Step.QUICK_STOP), (10.2, Step.DISABLE_VOLTAGE)])
-def test_a_drive_that_goes_on_holding_loses_its_power(now: float, step: Step) -> None:
+@pytest.mark.parametrize(("now_s", "step"), [(10.199, Step.QUICK_STOP), (10.2, Step.DISABLE_VOLTAGE)])
+def test_a_drive_that_goes_on_holding_loses_its_power(now_s: float, step: Step) -> None:
     held = replace(STANDING, powered=True)
     stood = go(FOOT, held, 10.0)
     assert stood.stopped
-    assert go(stood, replace(held, seen_at=now), now).step is step
-    assert go(stood, replace(STANDING, seen_at=now), now).step is Step.QUICK_STOP
+    assert go(stood, replace(held, seen_at=now_s), now_s).step is step
+    assert go(stood, replace(STANDING, seen_at=now_s), now_s).step is Step.QUICK_STOP
     off = replace(stood, step=Step.DISABLE_VOLTAGE)
     above = Step.HEARTBEAT_WITHHELD if step is Step.DISABLE_VOLTAGE else Step.DISABLE_VOLTAGE
-    assert go(off, replace(held, seen_at=now), now).step is above
+    assert go(off, replace(held, seen_at=now_s), now_s).step is above
     end = replace(stood, step=Step.HEARTBEAT_WITHHELD)
-    assert go(end, replace(held, seen_at=now), now).step is Step.HEARTBEAT_WITHHELD
+    assert go(end, replace(held, seen_at=now_s), now_s).step is Step.HEARTBEAT_WITHHELD
 
 
 def test_it_stays_stopped_while_it_stands() -> None:
@@ -326,7 +326,7 @@ WITHHELD = Climb(Step.HEARTBEAT_WITHHELD, since=9.9, begin_mps=0.5)
 
 
 @pytest.mark.parametrize(
-    ("now", "look", "step"),
+    ("now_s", "look", "step"),
     [
         (9.999, replace(BRAKING, seen_at=9.99), Step.HEARTBEAT_WITHHELD),
         (10.001, BRAKING, Step.RESET_NODE),
@@ -342,8 +342,8 @@ WITHHELD = Climb(Step.HEARTBEAT_WITHHELD, since=9.9, begin_mps=0.5)
         (10.001, replace(STANDING, seen_at=10.0), Step.HEARTBEAT_WITHHELD),
     ],
 )
-def test_only_a_drive_that_says_itself_that_it_kept_its_power_is_reset(now: float, look: Look, step: Step) -> None:
-    assert go(WITHHELD, look, now).step is step
+def test_only_a_drive_that_says_itself_that_it_kept_its_power_is_reset(now_s: float, look: Look, step: Step) -> None:
+    assert go(WITHHELD, look, now_s).step is step
 
 
 def test_at_its_very_deadline_it_is_reset() -> None:

@@ -55,8 +55,8 @@ class LyingDriver:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._driver, name)
 
-    def tick(self, now: float) -> list[Frame]:
-        frames = self._driver.tick(now)
+    def tick(self, now_s: float) -> list[Frame]:
+        frames = self._driver.tick(now_s)
         if self._parrot is None:
             return [edited(frame, self._edit) for frame in frames]
         beats = [frame for frame in frames if frame.cob_id == 0x77F]
@@ -93,12 +93,12 @@ def driver_gives_one_wheel_nothing(world: World) -> EachStep:
 
 
 def driver_follows_half_of_a_stop(world: World) -> EachStep:
-    begin = world.now
+    begin = world.now_s
     straight = round(0.25 * BITS_PER_MPS)
 
     def at_least_half(cob_id: int, target: int) -> int:
         sign = 1 if cob_id == 0x201 else -1
-        return sign * straight if world.now > begin and sign * target < straight else target
+        return sign * straight if world.now_s > begin and sign * target < straight else target
 
     lies(world, at_least_half)
     world.command = Twist2D.ZERO
@@ -113,9 +113,9 @@ def somebody_publishes_straight_to_cmd_vel(world: World) -> EachStep:
     def zero_leases() -> None:
         nonlocal sequence
         sequence += 1
-        zero = lease_datagram(sequence, round(world.now * 1e9), Twist(0.0, 0.0), stops=False, estop=False)
+        zero = lease_datagram(sequence, round(world.now_s * 1e9), Twist(0.0, 0.0), stops=False, estop=False)
         assert world.watchdog is not None
-        world.watchdog.on_lease(zero, None, world.now)
+        world.watchdog.on_lease(zero, None, world.now_s)
 
     return each(world, 0.02, zero_leases)
 
@@ -127,8 +127,8 @@ def misread(world: World, edit: Edit) -> None:
     """The drives understand other targets than those on the bus."""
     hear = world.bench.on_frame
 
-    def on_frame(frame: BenchFrame, now: float) -> None:
-        hear(BenchFrame(frame.cob_id, edited(Frame(frame.cob_id, frame.data), edit).data), now)
+    def on_frame(frame: BenchFrame, now_s: float) -> None:
+        hear(BenchFrame(frame.cob_id, edited(Frame(frame.cob_id, frame.data), edit).data), now_s)
 
     world.bench.on_frame = on_frame  # type: ignore[method-assign]
 
@@ -176,11 +176,11 @@ def drive_has_a_frozen_encoder(world: World) -> EachStep:
 
 
 def each(world: World, period_s: float, do: Callable[[], None]) -> EachStep:
-    due = world.now + 0.004  # between two cycles of the driver
+    due = world.now_s + 0.004  # between two cycles of the driver
 
     def when_due() -> None:
         nonlocal due
-        if world.now >= due - STEP_S / 2:
+        if world.now_s >= due - STEP_S / 2:
             due += period_s
             do()
 
@@ -268,14 +268,14 @@ def caught(begin: Callable[[World], EachStep], twist: Twist2D) -> tuple[TripCaus
     world = World()
     world.drive(twist, seconds=1.2)
     assert watched(world) == (False, TripCause.NONE)
-    start, each_step = world.now, begin(world)
+    start, each_step = world.now_s, begin(world)
 
     def tripped() -> bool:
         each_step()
         return watched(world)[0]
 
     assert world.run(3.0, tripped), "nobody noticed"
-    trip, cause, truth = world.now, watched(world)[1], world.truth
+    trip, cause, truth = world.now_s, watched(world)[1], world.truth
     fastest = max(abs(truth.v_left_mps), abs(truth.v_right_mps))
 
     def go_on() -> bool:
@@ -284,7 +284,7 @@ def caught(begin: Callable[[World], EachStep], twist: Twist2D) -> tuple[TripCaus
 
     world.run(2.5, go_on)
     assert world.truth.standing_s > 0.3, "the wheels still turn"
-    return cause, trip - start, world.now - world.truth.standing_s - trip, fastest
+    return cause, trip - start, world.now_s - world.truth.standing_s - trip, fastest
 
 
 @pytest.mark.parametrize(("begin", "cause", "within_s"), CASES, ids=[case[0].__name__ for case in CASES])

@@ -32,9 +32,9 @@ def node(it: Observer, node_id: int) -> Node:
     return next(each for each in it.look().nodes if each.node_id == node_id)
 
 
-def rx(it: Observer, cob_id: int, data: str, now: float = 1.0) -> Axis:
+def rx(it: Observer, cob_id: int, data: str, now_s: float = 1.0) -> Axis:
     """A frame, and the first axis after it."""
-    it.on_frame(cob_id, bytes.fromhex(data), now)
+    it.on_frame(cob_id, bytes.fromhex(data), now_s)
     return look(it).axes[0]
 
 
@@ -98,15 +98,15 @@ def test_a_sync_makes_the_setpoints_effective_that_came_for_it() -> None:
 
 def cycle(it: Observer, n: int, *, setpoint: bool = True, answers: int = 1, state: str = "37 02") -> Axis:
     """One cycle of both nodes; node 1 with or without its setpoint, and so many answers of it."""
-    now = 2.0 + n / 100
+    now_s = 2.0 + n / 100
     if setpoint:
-        it.on_frame(0x201, bytes.fromhex("0f 00 2c 01 00 00"), now)
-    it.on_frame(0x202, bytes.fromhex("0f 00 2c 01 00 00"), now)
-    it.on_frame(0x080, b"", now)
+        it.on_frame(0x201, bytes.fromhex("0f 00 2c 01 00 00"), now_s)
+    it.on_frame(0x202, bytes.fromhex("0f 00 2c 01 00 00"), now_s)
+    it.on_frame(0x080, b"", now_s)
     for node_id, count in ((1, answers), (2, 1)):
         for _ in range(count):
-            it.on_frame(0x180 + node_id, bytes.fromhex(f"{state} 00 00 00 00"), now)
-            it.on_frame(0x280 + node_id, bytes.fromhex("00 00 00 00"), now)
+            it.on_frame(0x180 + node_id, bytes.fromhex(f"{state} 00 00 00 00"), now_s)
+            it.on_frame(0x280 + node_id, bytes.fromhex("00 00 00 00"), now_s)
     return look(it).axes[0]
 
 
@@ -312,8 +312,8 @@ def test_good_frames_are_not_counted_as_dropped(cob_id: int, data: str) -> None:
 
 def test_a_run_of_syncs_begins_just_when_the_gap_is_over() -> None:
     it = Observer(replace(config(), feedback_timeout_s=0.125), 0.0)
-    for now in (1.0, 1.125):
-        it.on_frame(0x080, b"", now)
+    for now_s in (1.0, 1.125):
+        it.on_frame(0x080, b"", now_s)
     assert look(it).sync_since == 1.125
 
 

@@ -40,11 +40,11 @@ class Wheel:
     ) -> Feedback:
         """One cycle: setpoint, then feedback. The encoder rolls like the velocity unless it is told otherwise."""
         self.n += round(after_s * 1000)
-        now = self.n / 1000
+        now_s = self.n / 1000
         self.way_m += (velocity if rolls is None else rolls) * after_s
-        self.watch.on_target(target, now)
+        self.watch.on_target(target, now_s)
         self.watch.on_position(self.sign * round(self.way_m * 10_000))
-        self.watch.on_velocity(velocity, powered, powered, now)
+        self.watch.on_velocity(velocity, powered, powered, now_s)
         return self.watch.last
 
     def samples(self, count: int, velocity: float, target: float, rolls: float | None = None) -> Feedback:
@@ -354,9 +354,9 @@ def test_noise_of_a_standing_wheel_does_not_drift() -> None:
 def test_the_counter_goes_round_at_32_bits() -> None:
     wheel = Wheel()
     drive = wheel.watch
-    for counts, now in ((2**31 - 50, 1.0), (-(2**31) + 50, 1.01), (2**31 - 50, 1.02)):
+    for counts, now_s in ((2**31 - 50, 1.0), (-(2**31) + 50, 1.01), (2**31 - 50, 1.02)):
         drive.on_position(counts)
-        drive.on_velocity(0.0, True, True, now)
+        drive.on_velocity(0.0, True, True, now_s)
     forgotten = 0.01 / 0.25 + 0.01 / 10.0
     assert drive.last.drift_m == pytest.approx(0.01 * forgotten, abs=1e-6)  # -0.01 m, a little forgotten, then +0.01 m
 
@@ -401,9 +401,9 @@ def test_what_three_times_the_fastest_wheel_cannot_do_in_two_cycles_is_a_jump(st
 def test_a_step_as_long_as_it_may_be_is_no_jump() -> None:
     """3 × 1 m/s × 2/64 s = 1536/2^14 m."""
     watch = Plausibility(replace(CONFIG.drives[0], m_per_count=2.0**-14), replace(CONFIG, control_hz=64.0), 0.0)
-    for counts, now in ((0, 1.0), (1536, 1.01)):
+    for counts, now_s in ((0, 1.0), (1536, 1.01)):
         watch.on_position(counts)
-        watch.on_velocity(0.0, True, True, now)
+        watch.on_velocity(0.0, True, True, now_s)
     assert watch.last.drift_m == -0.09375
 
 

@@ -41,11 +41,11 @@ def told(kind: str, mps: float, stop: bool = False) -> Story:
     world = World()
     world.drive(Twist2D(mps, 0.0), 1.2)
     assert world.watchdog is not None
-    watchdog, begin, path_m = world.watchdog, world.now, world.truth.path_m
+    watchdog, begin, path_m = world.watchdog, world.now_s, world.truth.path_m
     if stop:
         world.leases = False
         world.run(1.0, lambda: watchdog.status.state is State.TRIPPED)
-    KINDS[kind][0](world.node, world.now)
+    KINDS[kind][0](world.node, world.now_s)
     peak_mps = at_trip_mps = trip_s = 0.0
 
     def off() -> bool:
@@ -53,11 +53,11 @@ def told(kind: str, mps: float, stop: bool = False) -> Story:
         truth = world.truth
         peak_mps = max(peak_mps, abs(truth.v_left_mps), abs(truth.v_right_mps))
         if watchdog.status.state is State.TRIPPED and not trip_s:
-            trip_s, at_trip_mps = world.now - begin, abs(truth.v_left_mps)
+            trip_s, at_trip_mps = world.now_s - begin, abs(truth.v_left_mps)
         return not world.powered[0]
 
     assert world.run(3.0, off), "the drive has power for ever"
-    off_s, keeps_relay = world.now - begin - trip_s, watchdog.keeps_relay
+    off_s, keeps_relay = world.now_s - begin - trip_s, watchdog.keeps_relay
     world.run(12.0)
     assert world.truth.standing_s > 0.5
     assert watchdog.status.step <= Step.DISABLE_VOLTAGE, "the drive obeyed: no rung after it"

@@ -53,7 +53,7 @@ def at_rest() -> World:
 
 
 def suffer(world: World, kind: str, **arguments: Any) -> None:
-    faults.apply(world.bench.nodes, 1, kind, world.now, arguments)
+    faults.apply(world.bench.nodes, 1, kind, world.now_s, arguments)
 
 
 def watchdog(world: World) -> Watchdog:
@@ -67,16 +67,16 @@ def tripped(world: World) -> bool:
 
 def course(world: World, within_s: float) -> Course:
     """Let time pass until the power of the left wheel is off."""
-    start, heading, peak_mps = world.now, world.truth.yaw_rad, 0.0
+    start, heading, peak_mps = world.now_s, world.truth.yaw_rad, 0.0
     trip_s = turned_rad = 0.0
     while world.powered[0]:
         world.run(STEP_S)
         peak_mps = max(peak_mps, abs(world.truth.v_left_mps))
         if tripped(world) and not trip_s:
-            trip_s, turned_rad = world.now - start, abs(world.truth.yaw_rad - heading)
-        assert world.now < start + within_s, f"no trip in time, {world.truth}"
+            trip_s, turned_rad = world.now_s - start, abs(world.truth.yaw_rad - heading)
+        assert world.now_s < start + within_s, f"no trip in time, {world.truth}"
     verdict = watchdog(world).status.verdict
-    return Course(verdict.cause, verdict.detail, trip_s, world.now - start, peak_mps, turned_rad)
+    return Course(verdict.cause, verdict.detail, trip_s, world.now_s - start, peak_mps, turned_rad)
 
 
 # --- all that hangs on one encoder
@@ -184,9 +184,9 @@ def test_an_order_that_is_slower_than_standstill_is_no_cover_for_a_lost_encoder(
     world = at_rest()
     suffer(world, "encoder_lost")
     world.command = Twist2D(speed, 0.0)
-    start = world.now
+    start = world.now_s
     assert course(world, 0.006 / speed + 0.4).cause is MISSING
-    assert world.now - start <= 0.006 / speed + 0.4
+    assert world.now_s - start <= 0.006 / speed + 0.4
 
 
 @pytest.mark.parametrize("speed", [0.5, 0.8])
@@ -251,7 +251,7 @@ def test_a_turn_in_place_about_one_wheel_is_no_turn_in_place() -> None:
 
 def test_on_a_curve_a_slow_wheel_is_found_by_its_own_speed() -> None:
     world = at_rest()
-    faults.apply(world.bench.nodes, 2, "limited", world.now, {"share": 0.5})
+    faults.apply(world.bench.nodes, 2, "limited", world.now_s, {"share": 0.5})
     world.command = Twist2D(0.4, 0.8)
     assert world.run(4.0, lambda: tripped(world))
     verdict = watchdog(world).status.verdict
@@ -347,9 +347,9 @@ class Sieve:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._driver, name)
 
-    def tick(self, now: float) -> list[Frame]:
+    def tick(self, now_s: float) -> list[Frame]:
         self._cycle += 1
-        return [frame for frame in self._driver.tick(now) if not self._drops(frame, self._cycle)]
+        return [frame for frame in self._driver.tick(now_s) if not self._drops(frame, self._cycle)]
 
 
 def sieve(world: World, drops: Callable[[Frame, int], bool]) -> None:
@@ -360,11 +360,11 @@ def sieve(world: World, drops: Callable[[Frame, int], bool]) -> None:
 def test_setpoints_of_one_axis_that_do_not_come_trip(speed: float, every: int, within_s: float) -> None:
     world = driving(speed)
     sieve(world, lambda frame, cycle: frame.cob_id == 0x201 and cycle % every == 0)
-    start = world.now
+    start = world.now_s
     assert world.run(1.0, lambda: tripped(world))
     verdict = watchdog(world).status.verdict
     assert (verdict.cause, verdict.node_id) == (TripCause.SETPOINT_MISSING, 1)
-    assert world.now - start <= within_s
+    assert world.now_s - start <= within_s
 
 
 def test_a_setpoint_that_is_lost_now_and_then_does_not() -> None:
@@ -384,28 +384,28 @@ def test_two_drives_with_one_node_id_trip(speed: float) -> None:
     world = driving(speed)
     tick = world.bench.tick
 
-    def twice(now: float) -> list[BenchFrame]:
-        said = tick(now)
+    def twice(now_s: float) -> list[BenchFrame]:
+        said = tick(now_s)
         return said + [frame for frame in said if frame.cob_id in (0x181, 0x281)]
 
     world.bench.tick = twice  # type: ignore[method-assign]
-    start = world.now
+    start = world.now_s
     assert world.run(1.0, lambda: tripped(world))
     verdict = watchdog(world).status.verdict
     assert (verdict.cause, verdict.node_id) == (TripCause.ANSWERED_TWICE, 1)
-    assert world.now - start <= 0.12
+    assert world.now_s - start <= 0.12
 
 
 # 0.3 m/s ── the left drive, or a second one with its id, sends a boot-up and goes on ── trip in the next turn
 def test_a_boot_up_of_an_enabled_drive_trips_at_once_whatever_the_driver_does() -> None:
     world = driving(0.3)
     deaf(world, 0x701)
-    start = world.now
+    start = world.now_s
     world.inject(0x701, "00")
     assert world.run(0.1, lambda: tripped(world))
     verdict = watchdog(world).status.verdict
     assert (verdict.cause, verdict.node_id) == (TripCause.DRIVE_RESTARTED, 1)
-    assert world.now - start <= 0.006
+    assert world.now_s - start <= 0.006
     assert world.run(1.0, lambda: world.truth.standing_s > 0.1)
 
 
@@ -423,17 +423,17 @@ def test_values_that_somebody_polls_do_not_stand_in_for_a_tpdo_that_is_lost() ->
     world = driving(0.3)
     deaf(world, 0x181, 0x281)  # the driver stops for it by itself, some cycles later
     suffer(world, "tpdo_lost")
-    start = world.now
-    while not tripped(world) and world.now < start + 1.0:
+    start = world.now_s
+    while not tripped(world) and world.now_s < start + 1.0:
         world.inject(0x601, "40 41 60 00 00 00 00 00")
         world.run(0.01)
         world.inject(0x601, "40 6C 60 00 00 00 00 00")
         world.run(0.01)
     assert watchdog(world).status.verdict.cause is TripCause.DRIVE_SILENT
-    assert world.now - start <= 0.13
+    assert world.now_s - start <= 0.13
 
 
 def deaf(world: World, *cob_ids: int) -> None:
     """The driver does not receive these frames."""
     take = world.core.on_frame
-    world.core.on_frame = lambda frame, now: [] if frame.cob_id in cob_ids else take(frame, now)  # type: ignore[method-assign]
+    world.core.on_frame = lambda frame, now_s: [] if frame.cob_id in cob_ids else take(frame, now_s)  # type: ignore[method-assign]

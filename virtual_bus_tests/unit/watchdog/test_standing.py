@@ -21,17 +21,17 @@ CYCLE_S = 0.01
 
 @dataclass
 class Wheel:
-    now: float = 100.0
+    now_s: float = 100.0
     at_m: float = 0.0
     watch: StandWatch = field(default_factory=lambda: StandWatch(CONFIG.drives[0], CONFIG))
 
     def turns(self, seconds: float, encoder_mps: float, velocity_mps: float, noise_mps: float = 0.0) -> bool:
         noise = random.Random(1)
         for _ in range(round(seconds / CYCLE_S)):
-            self.now += CYCLE_S
+            self.now_s += CYCLE_S
             self.at_m += encoder_mps * CYCLE_S
-            self.watch.on_position(round(self.at_m / COUNT_M), self.now)
-            self.watch.on_velocity(velocity_mps + noise.uniform(-noise_mps, noise_mps), self.now + 0.0002)
+            self.watch.on_position(round(self.at_m / COUNT_M), self.now_s)
+            self.watch.on_velocity(velocity_mps + noise.uniform(-noise_mps, noise_mps), self.now_s + 0.0002)
         return self.watch.stands
 
 
@@ -129,7 +129,7 @@ def test_values_that_are_read_by_sdo_may_be_further_apart(gap_s: float) -> None:
 def test_a_position_that_no_longer_comes_is_no_evidence() -> None:
     wheel = Wheel()
     assert wheel.turns(0.5, 0.0, 0.0)
-    wheel.watch.on_velocity(0.0, wheel.now + GAP_S)
+    wheel.watch.on_velocity(0.0, wheel.now_s + GAP_S)
     assert not wheel.watch.stands
 
 
@@ -139,10 +139,10 @@ def test_a_position_that_no_longer_comes_is_no_evidence() -> None:
 class Crawling(FakeDrive):
     """Its velocity says 0, and its encoder goes on at 0.1 m/s while it has power."""
 
-    def step(self, dt: float, now: float) -> list:  # type: ignore[type-arg]
+    def step(self, dt: float, now_s: float) -> list:  # type: ignore[type-arg]
         if self.crawls and self.words[0] != 0x0240:
             self.travel[0] += 100 * dt
-        return super().step(dt, now)
+        return super().step(dt, now_s)
 
     crawls = False
 

@@ -23,15 +23,15 @@ CYCLE_S = 0.01
 @dataclass
 class Wheel:
     powered: bool = True
-    now: float = 100.0
+    now_s: float = 100.0
     at_m: float = 0.0
     watch: StandWatch = field(default_factory=lambda: StandWatch(DRIVE, CONFIG))
 
     def sample(self, step_m: float, velocity_mps: float, after_s: float = CYCLE_S) -> None:
-        self.now += after_s
+        self.now_s += after_s
         self.at_m += step_m
-        self.watch.on_position(round(self.at_m / DRIVE.m_per_count), self.now)
-        self.watch.on_velocity(velocity_mps, self.now + 0.0002, self.powered)
+        self.watch.on_position(round(self.at_m / DRIVE.m_per_count), self.now_s)
+        self.watch.on_velocity(velocity_mps, self.now_s + 0.0002, self.powered)
 
     def turns(self, samples: int, mps: float) -> Wheel:
         for _ in range(samples):

@@ -30,24 +30,24 @@ class Machine:
     dropped_frames, datagrams_dropped, keeps_relay = 0, 0, True
 
     def __init__(self, expires_at: float) -> None:
-        self.now = START_S
+        self.now_s = START_S
         self.expires_at = expires_at
         self.ticks: list[float] = []
         self.health = BusHealth()
         self.refused_leases: dict[Any, int] = {}
 
     def monotonic(self) -> float:
-        return self.now
+        return self.now_s
 
     def select(self, _read: Any, _write: Any, _error: Any, timeout_s: float) -> None:
         """Somebody always says something after 0.7 ms."""
-        self.now += min(timeout_s, 0.0007)
+        self.now_s += min(timeout_s, 0.0007)
 
     def fileno(self) -> int:
         return 0
 
     def receive(self) -> list[Any]:
-        self.now += TURN_S / 2.0
+        self.now_s += TURN_S / 2.0
         return []
 
     def on_bus(self, _failed_since: float, _errors: int) -> None:
@@ -56,8 +56,8 @@ class Machine:
     def next_expiry(self, since: float) -> float:
         return self.expires_at if self.expires_at > since else math.inf
 
-    def tick(self, now: float) -> list[Any]:
-        self.ticks.append(now)
+    def tick(self, now_s: float) -> list[Any]:
+        self.ticks.append(now_s)
         return []
 
 
@@ -71,7 +71,7 @@ def test_a_timeout_is_acted_on_when_it_runs_out_whatever_the_loop_does(
     monkeypatch.setattr("canbase_watchdog.loop.select", SimpleNamespace(select=machine.select))
     anything = cast(Any, machine)
     loop = Loop(anything, anything, anything)
-    while machine.now < START_S + 0.05:
+    while machine.now_s < START_S + 0.05:
         loop._turn()
     first = next(at for at in machine.ticks if at >= machine.expires_at)
     assert first - machine.expires_at <= 2.0 * TURN_S + 1e-9

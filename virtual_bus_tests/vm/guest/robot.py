@@ -192,9 +192,9 @@ class Robot:
         until_s = time.monotonic() + WAIT_S
         while True:
             state, pid = show(unit(part), "ActiveState", "MainPID")
-            now = time.monotonic()
+            now_s = time.monotonic()
             if state == "active" and pid not in (before, "0"):
-                return now
-            if now > until_s:
+                return now_s
+            if now_s > until_s:
                 raise BrokenPromiseError(f"{part} was not started again in {WAIT_S:.0f} s: {state}")
             self.spin(0.4)

@@ -43,9 +43,9 @@ def show(name: str, *properties: str) -> list[str]:
 def send_signal(part: str, number: signal.Signals) -> tuple[float, str]:
     """A signal to a part's main process: when it was sent [s, monotonic], and the process."""
     (pid,) = show(unit(part), "MainPID")
-    now = time.monotonic()
+    now_s = time.monotonic()
     os.kill(int(pid), number)
-    return now, pid
+    return now_s, pid
 
 
 def set_priority(pid: int, priority: int) -> None:
