@@ -1,5 +1,4 @@
-"""What `canbase monitor` shows, drawn from canbase_runtime.driver_state import DriverState, driver_state
-from a snapshot: no ROS, no terminal, no clock. The shell is monitor.py."""
+"""What `canbase monitor` shows, drawn from a snapshot: no ROS, no terminal, no clock. The shell is monitor.py."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ HOT = {
     ),
     "canbase_sim": (
         "axis_parts command_watch frame line node cia301.dictionary cia301.emcy cia301.heartbeat cia301.nmt "
-        "cia301.pdo_rules cia301.rpdo cia301.tpdo cia402.axis cia402.states cia402.units plant.base plant.encoder "
+        "cia301.pdo_rules cia301.rpdo cia301.tpdo cia402.axis cia402.states cia402.raw_units plant.base plant.encoder "
         "plant.motor world.bench"
     ),
     "campaign": (

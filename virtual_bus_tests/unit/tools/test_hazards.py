@@ -108,9 +108,8 @@ def test_a_skipped_proof_fails(pytester: pytest.Pytester) -> None:
     name = next(
         name for name in sorted(proofs.pytest_names(CATALOGUE)) if name.startswith("unit/") and "::" not in name
     )
-    folder = pytester.mkdir("unit")
-    (folder / name.removeprefix("unit/")).write_text(
-        "import pytest\n\n@pytest.mark.skip(reason='no time')\ndef test_it() -> None: ...\n"
-    )
-    (folder / "test_other.py").write_text("import pytest\n\n@pytest.mark.skip\ndef test_it() -> None: ...\n")
+    path = pytester.path / name
+    path.parent.mkdir(parents=True)
+    path.write_text("import pytest\n\n@pytest.mark.skip(reason='no time')\ndef test_it() -> None: ...\n")
+    path.with_name("test_other.py").write_text("import pytest\n\n@pytest.mark.skip\ndef test_it() -> None: ...\n")
     pytester.runpytest_inprocess("-p", "no:cacheprovider").assert_outcomes(errors=1, skipped=1)

@@ -6,7 +6,7 @@ import pytest
 
 from mutation import report
 from mutation.mutants import behaviour, mutants
-from mutation.targets import ROOT, TARGETS, UNIT, Target
+from mutation.targets import ROOT, TARGETS, Target, files
 
 AGAIN = (
     "run `make mutation`: it tries the mutants of changed modules and writes virtual_bus_tests/mutation/report.json. "
@@ -36,8 +36,8 @@ def test_every_survivor_is_explained_and_nothing_else() -> None:
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.module)
 def test_each_module_has_its_tests(target: Target) -> None:
     assert target.source
-    for name in (*target.first, *target.then):
-        assert (ROOT / UNIT / f"test_{name}.py").is_file(), name
+    for name in files((*target.first, *target.then)):
+        assert (ROOT / name).is_file(), name
 
 
 SOURCE = '''
