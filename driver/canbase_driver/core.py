@@ -40,9 +40,9 @@ from canbase_driver.motion.limiter import Limiter, MotionState
 from canbase_driver.motion.odometry import Pose2D
 from canbase_driver.motion.velocity_command import Command
 from canbase_driver.report import Told, snapshot_of
-from canbase_driver.runtime.bus_health import BusReport
-from canbase_driver.runtime.cycle_stats import CycleStats
 from canbase_driver.snapshot import DriverSnapshot, StopRecord, WatchdogView
+from canbase_driver.supervision.bus_health import BusReport
+from canbase_driver.supervision.cycle_stats import CycleStats
 from canbase_driver.supervision.latch import PowerRecord, found_before_the_start
 from canbase_driver.supervision.lifecycle import Aim, Lifecycle
 from canbase_driver.supervision.phases import NO_POWER, Drive, Orders

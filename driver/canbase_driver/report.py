@@ -9,9 +9,9 @@ from canbase_driver.drives.drive_group import Drives, age_s
 from canbase_driver.drives.odometry_feed import OdometryFeed
 from canbase_driver.motion.kinematics import base_twist
 from canbase_driver.motion.velocity_command import Command
-from canbase_driver.runtime.bus_health import BusReport
-from canbase_driver.runtime.cycle_stats import CycleStats
 from canbase_driver.snapshot import DriverSnapshot
+from canbase_driver.supervision.bus_health import BusReport
+from canbase_driver.supervision.cycle_stats import CycleStats
 from canbase_driver.supervision.supervisor import Supervisor
 from canbase_driver.supervision.watchdog_link import WatchdogLink
 

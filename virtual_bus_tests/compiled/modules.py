@@ -25,7 +25,7 @@ HOT = {
     "canbase_driver": (
         "causes cia402 core drive_units report snapshot boot.node_boot cia301.frame cia301.nmt cia301.pdo drives.axis "
         "drives.canopen_node drives.drive_group drives.let_go drives.odometry_feed drives.standstill drives.telemetry "
-        "motion.braking motion.odometry motion.velocity_command runtime.cycle_stats supervision.latch "
+        "motion.braking motion.odometry motion.velocity_command supervision.cycle_stats supervision.latch "
         "supervision.phases supervision.reasons supervision.situation supervision.stop_history supervision.supervisor "
         "supervision.watchdog_link"
     ),

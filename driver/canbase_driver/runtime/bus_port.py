@@ -15,7 +15,7 @@ from typing import Any
 import can
 
 from canbase_driver.cia301.frame import Frame
-from canbase_driver.runtime.bus_health import BusReport
+from canbase_driver.supervision.bus_health import BusReport
 from canbase_runtime.local_frames import keep_to_this_computer
 
 RETRY_S = 1.0

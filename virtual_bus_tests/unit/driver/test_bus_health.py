@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canbase_driver.runtime.bus_health import BusReport
+from canbase_driver.supervision.bus_health import BusReport
 
 CONTROLLER = 0x004
 

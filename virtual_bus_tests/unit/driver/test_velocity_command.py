@@ -8,7 +8,7 @@ import pytest
 
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.motion.velocity_command import Command
-from canbase_driver.runtime.cycle_stats import CycleStats
+from canbase_driver.supervision.cycle_stats import CycleStats
 
 FORWARD = Twist2D(0.3, 0.1)
 
