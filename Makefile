@@ -36,7 +36,8 @@ else
 	PYTHONPATH=$(WORLD) python -m campaign $(if $(SCENARIOS),--scenarios $(SCENARIOS))
 endif
 
-HOT_SOURCES := $(wildcard can_config/canbase_config/*.py driver/canbase_driver/*.py velocity_mux/canbase_velocity/*.py \
+HOT_SOURCES := $(wildcard can_config/canbase_config/*.py runtime/canbase_runtime/*.py driver/canbase_driver/*.py \
+  driver/canbase_driver/*/*.py velocity_mux/canbase_velocity/*.py \
   watchdog/canbase_watchdog/*.py action_server/canbase_action_server/*.py virtual_bus_tests/canbase_sim/*.py \
   virtual_bus_tests/canbase_sim/*/*.py virtual_bus_tests/campaign/*.py virtual_bus_tests/compiled/*.py)
 

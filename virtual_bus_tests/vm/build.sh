@@ -132,7 +132,7 @@ if ! made libraries "$libraries_key"; then
   libraries
   echo "$libraries_key" >"$out/libraries.key"
 fi
-sources=(can_config driver velocity_mux watchdog action_server cli deploy interfaces virtual_bus_tests/canbase_sim pyproject.toml CMakeLists.txt package.xml)
+sources=(can_config runtime driver velocity_mux watchdog action_server commissioning doctor cli deploy interfaces virtual_bus_tests/canbase_sim pyproject.toml CMakeLists.txt package.xml)
 canbase_key=$( (echo "$libraries_key"; find "${sources[@]}" -type f ! -name '*.pyc' -print0 | sort -z | xargs -0 sha256sum) | key)
 if ! made canbase "$canbase_key"; then
   canbase
