@@ -176,8 +176,8 @@ def test_a_second_watchdog_on_the_same_bus_leaves_the_first_alone(watched: Watch
 def test_a_watchdog_that_hears_another_one_never_sends(watched: Watched) -> None:
     """On another computer the name of the first one is not taken: here it is left out."""
     code = (
-        "import sys; from canbase_watchdog import main, sole; "
-        "sole.take = sole.take_record = lambda _: open('/dev/null'); "
+        "import sys; from canbase_watchdog import main, single_instance; "
+        "single_instance.take = single_instance.take_record = lambda _: open('/dev/null'); "
         "sys.exit(main.main(sys.argv[1:]))"
     )
     other = replace(watched.config, lease_socket=f"{watched.config.lease_socket}2")
