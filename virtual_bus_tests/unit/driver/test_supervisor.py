@@ -424,6 +424,15 @@ def test_while_they_are_waited_for_every_blocker_takes_the_power_off() -> None:
         assert story.told == (DISARMED, name, False)
 
 
+@pytest.mark.parametrize("waits", [STO_OPEN, Situation(unarmed="not on disk yet")])
+def test_a_shutdown_takes_drives_back_that_were_prepared_for_power(waits: Situation) -> None:
+    story = at(DISARMED)
+    assert story.step(waits) == Orders(PowerGoal.READY, Drive.ZERO)
+    assert story.step(also(waits, WRONG["shutdown"])) == OFF
+    assert story.told == (DISARMED, "shutdown", False)
+    assert story.supervisor.finished
+
+
 # drives prepared ── the records say so on disk ── power
 def test_no_power_before_the_record_is_on_disk() -> None:
     story = Story()
