@@ -48,10 +48,14 @@ class _Hold:
     def __init__(self, react_s: float, now_s: float) -> None:
         self._envelope = Envelope(react_s, now_s)
         self._since, self._stood = now_s, False
+        self._tau_s = math.inf
 
     def is_broken(self, tau_s: float, now_s: float, coasting: bool) -> bool:
+        """A base without force that slows down rolls out, from however fast it was: `runaway` bounds that."""
         self._stood = self._stood or (tau_s == 0.0 and now_s >= self._since + OBEY_S)
-        return tau_s > self._envelope.bound_s(tau_s, now_s, coasting) or (self._stood and tau_s > 0.0)
+        rolls_out, self._tau_s = coasting and tau_s < self._tau_s, tau_s
+        beyond = tau_s > self._envelope.bound_s(tau_s, now_s, coasting)
+        return (beyond and not rolls_out) or (self._stood and tau_s > 0.0)
 
 
 class Properties:
@@ -213,7 +217,8 @@ class Properties:
         return any(axis.motor.powered for node in self._nodes() for axis in node.axes)
 
     def _coasts(self) -> bool:
-        return any(not axis.motor.powered for node in self._nodes() for axis in node.axes)
+        """A wheel rolls: no power, or no force as its drive sees no motion of a dead encoder."""
+        return any(self._world.drives.rolls(axis) for node in self._nodes() for axis in node.axes)
 
     def _speed(self) -> str:
         base = self._world.drives.bench.base

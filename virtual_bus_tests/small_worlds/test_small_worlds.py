@@ -10,7 +10,7 @@ from small_worlds import canonical
 from small_worlds.copying import Snapshot
 from small_worlds.events import EVENTS, FAULT_EVENTS, OPERATOR_EVENTS
 from small_worlds.explore import Bounds, Search, Story, search, shortest
-from small_worlds.properties import PROPERTIES, Found, Properties
+from small_worlds.properties import PROPERTIES, Found, Properties, _Hold
 from small_worlds.teeth import TEETH, Tooth, bite
 from small_worlds.world import POINT_S, STARTS, SmallWorld
 
@@ -41,6 +41,14 @@ def test_ctrl_c_ends_a_search_with_what_was_found_until_then() -> None:
     found = search(Bounds(1, 0, 4), ["driving"], workers=1, on_news=press)
     assert (news, found.done, found.broken_off) == ([1, 2], 2, True)
     assert 0 < found.states < 300
+
+
+def test_a_base_without_force_may_roll_out_and_never_get_faster() -> None:
+    hold = _Hold(0.1, 10.0)
+    assert not hold.is_broken(2.0, 12.0, coasting=True)
+    assert not hold.is_broken(1.9, 12.2, coasting=True)
+    assert hold.is_broken(1.95, 12.4, coasting=True)
+    assert hold.is_broken(1.8, 12.6, coasting=False)
 
 
 def test_a_world_at_rest_is_told_alike_at_any_time_and_another_one_differently() -> None:
