@@ -28,7 +28,7 @@ KEEPALIVE_S = 0.1
 """So often the server is told that the client lives; the shortest lease is three times as long."""
 SERVICE_QOS = QoSProfile(depth=100)
 """With the usual depth of 10 a server loses the oldest of more requests at once, and their clients wait for ever.
-A client loses answers in the same way, as it hears those to all clients."""
+A client receives the answers to all clients, and loses its own in the same way."""
 
 ResultT = TypeVar("ResultT")
 FeedbackT = TypeVar("FeedbackT")

@@ -122,11 +122,11 @@ class Supervisor:
             if row.after in STOPPING:
                 quick = row.after is not Phase.RAMP
                 self.braking.begin(situation.begin_mps, situation.turn_radps, self.now_s, quick)
-        told_before = self.phase in STOPPING and self.latches
+        keeps_cause = self.phase in STOPPING and self.latches
         self.phase = row.after
-        if row.cause is not None and not told_before:
+        if row.cause is not None and not keeps_cause:
             self.finding = Finding(row.cause, detail, row.clears_on)
-        if row.latches is not None and not told_before:
+        if row.latches is not None and not keeps_cause:
             self.latches = row.latches
 
     def _take_over(self, situation: Situation) -> None:
