@@ -19,8 +19,17 @@ help: ## show the targets
 demo: $(VENV)/ready ## the whole chain on a simulated bus: drives 1 m, refuses a goal, cancels a goal
 	canbase demo
 
+.PHONY: quick
+quick: $(VENV)/ready ## under a minute: ruff, mypy, and the unit tests that import what changed since the last commit; BASE=main since another
+	ruff check -q .
+	ruff format -q --check .
+	mypy
+	@tests=$$(BASE=$(or $(BASE),HEAD) python virtual_bus_tests/changed_tests.py); \
+	  if [[ -n $$tests ]]; then pytest -q -x --numprocesses auto $$tests; else echo "no unit test imports what changed"; fi
+
 .PHONY: test
 test: $(VENV)/ready ## all tests: pure units, simulated drives on a bus, processes over DDS
+	@echo "about 20 minutes on two processors; make quick: under one, for what changed"
 	pytest --numprocesses auto virtual_bus_tests/unit virtual_bus_tests/campaign virtual_bus_tests/small_worlds
 	pytest virtual_bus_tests/bus virtual_bus_tests/ros
 
@@ -78,7 +87,9 @@ DECIDES := $(UNIT)/watchdog $(patsubst %,$(UNIT)/driver/test_%.py,cia402 axis su
 
 .PHONY: coverage
 coverage: $(VENV)/ready ## branch coverage of watchdog policy and CiA 402 tables: all of it, or it fails
-	coverage run --data-file=$(VENV)/coverage -m pytest -q $(DECIDES)
+	rm -f $(VENV)/coverage*
+	coverage run --data-file=$(VENV)/coverage -m pytest -q --numprocesses auto $(DECIDES)
+	coverage combine -q --data-file=$(VENV)/coverage
 	coverage report --data-file=$(VENV)/coverage
 
 .PHONY: mutation

@@ -7,6 +7,7 @@ import io
 import os
 import platform
 import sys
+import time
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from pathlib import Path
@@ -44,21 +45,38 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="benchmarks/run.py", description="measured, beside a floor, against a budget")
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"some of {', '.join(BENCHMARKS)}; all without")
     parser.add_argument("--write", type=Path, metavar="FILE", help="write the table into docs/performance.md")
+    parser.add_argument("--list", action="store_true", help="list them and what they measure, run none")
     arguments = parser.parse_args()
     unknown = sorted(set(arguments.names) - set(BENCHMARKS))
     if unknown:
         parser.error(f"there is no benchmark {', '.join(unknown)}; expected some of {', '.join(BENCHMARKS)}")
+    if arguments.list:
+        print("\n".join(f"{name:14}{_purpose(BENCHMARKS[name])}" for name in arguments.names or BENCHMARKS))
+        return 0
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    figures: list[Figure] = []
-    for name in arguments.names or BENCHMARKS:
-        print(f"{name} …", file=sys.stderr)
-        with redirect_stdout(io.StringIO()):  # what the processes of a robot have said
-            figures += BENCHMARKS[name]()
+    figures = _measured(arguments.names or list(BENCHMARKS))
     Console(width=None if sys.stdout.isatty() else 160).print(_table(figures))
     if arguments.write:
         text = arguments.write.read_text(encoding="utf-8")
         arguments.write.write_text(rewritten(text, figures), encoding="utf-8")
     return 0 if all(figure.kept for figure in figures) else 1
+
+
+def _measured(names: list[str]) -> list[Figure]:
+    """The figures of these benchmarks, one after the other; on stderr which one runs, and how long each took."""
+    figures: list[Figure] = []
+    for number, name in enumerate(names, 1):
+        print(f"[{number}/{len(names)}] {name} … ", end="", file=sys.stderr, flush=True)
+        started_s = time.monotonic()
+        with redirect_stdout(io.StringIO()):  # what the processes of a robot have said
+            figures += BENCHMARKS[name]()
+        print(f"{time.monotonic() - started_s:.0f} s", file=sys.stderr, flush=True)
+    return figures
+
+
+def _purpose(measure: Callable[[], list[Figure]]) -> str:
+    """The first line of its file."""
+    return (sys.modules[measure.__module__].__doc__ or "").partition("\n")[0]
 
 
 def cells(figure: Figure) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Draws docs/safety_filter.png: what the footprint sweeps for four commands, and which obstacle decides about each.
+"""Draws docs/safety_filter.png: the area that the footprint sweeps for four commands, and the limiting obstacle.
 
     python benchmarks/sweep_picture.py docs/safety_filter.png
 
@@ -23,10 +23,10 @@ from canbase_velocity.sweep import fastest_mps
 from canbase_velocity.twist import Twist
 
 COMMANDS = {
-    "straight on": Twist(0.6, 0.0),
+    "straight": Twist(0.6, 0.0),
     "arc": Twist(0.6, 0.8),
-    "backward on an arc": Twist(-0.5, 0.7),
-    "on the spot": Twist(0.0, 1.5),
+    "arc, backward": Twist(-0.5, 0.7),
+    "turn in place": Twist(0.0, 1.5),
 }
 OBSTACLES_M = np.array([(0.6, 0.1), (0.62, 0.58), (-0.75, 0.32), (0.05, 0.39), (0.2, -0.33), (0.2, -0.36)])
 LOOK_S = 1.2
@@ -46,7 +46,7 @@ def draw(axes: mpl.axes.Axes, name: str, twist: Twist, geometry: Geometry) -> No
     colours = ["tab:red" if share == judgement.share < 1.0 else "tab:gray" for share in each]
     axes.scatter(*OBSTACLES_M.T, c=colours, s=30, zorder=3)
     speed_mps = fastest_mps(geometry.box, twist)
-    axes.set_title(f"{name}: {100.0 * judgement.share:.0f} % of {speed_mps:.2f} m/s", fontsize=10)
+    axes.set_title(f"{name}: {100.0 * judgement.share:.0f} % of {speed_mps:.2f} m/s (fastest corner)", fontsize=10)
     axes.set_aspect("equal")
     axes.set(xlim=(-1.1, 1.3), ylim=(-0.9, 1.1))
 
@@ -59,7 +59,7 @@ def main(path: str) -> None:
     for axes, (name, twist) in zip(grid.flat, COMMANDS.items(), strict=True):
         draw(axes, name, twist, geometry)
     figure.legend(handles=_legend(), loc="upper center", ncols=2, fontsize=9)
-    figure.supxlabel("x in base_link [m]; ahead is to the right")
+    figure.supxlabel("x in base_link [m], forward to the right")
     figure.supylabel("y in base_link [m]")
     figure.tight_layout(rect=(0.0, 0.0, 1.0, 0.92), h_pad=2.0)
     figure.savefig(path, dpi=90)
@@ -70,9 +70,9 @@ def _legend() -> list[Line2D | Patch]:
         return Line2D([], [], marker="o", linestyle="", color=colour, label=label)
 
     return [
-        Patch(facecolor="none", edgecolor="black", linewidth=1.5, label="footprint and its padding, now"),
-        Patch(facecolor="tab:blue", alpha=0.3, label=f"what it sweeps in the next {LOOK_S} s"),
-        dot("tab:red", "obstacle that decides: title has the share of the speed that is left"),
+        Patch(facecolor="none", edgecolor="black", linewidth=1.5, label="footprint with padding, now"),
+        Patch(facecolor="tab:blue", alpha=0.3, label=f"area swept in the next {LOOK_S} s"),
+        dot("tab:red", "obstacle that limits the speed (title: allowed share of the commanded speed)"),
         dot("tab:gray", "other obstacle"),
     ]
 

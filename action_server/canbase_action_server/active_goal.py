@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from canbase_action_server.goal import GoalRun, Order, Phase
 from canbase_action_server.goal_request import Request
 from canbase_action_server.inputs import Inputs
-from canbase_action_server.limits import standstill_limits
 from canbase_action_server.motion import STOP
+from canbase_action_server.motion_limits import standstill_limits
 from canbase_action_server.outcome import ErrorCode, Outcome
 from canbase_action_server.standstill import Standstill, Verdict
 from canbase_config.robot import Robot

@@ -10,6 +10,7 @@ from typing import Any
 
 import rclpy
 from canbase.action import Fibonacci
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -17,6 +18,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from canbase_action_server.fibonacci import next_number, refusal
+from canbase_action_server.open_goal import rejection
 
 
 class FibonacciServer(Node):
@@ -25,6 +27,7 @@ class FibonacciServer(Node):
     def __init__(self, period_s: float) -> None:
         super().__init__("fibonacci_action_server")
         self._period_s = period_s
+        self._rejections = self.create_publisher(DiagnosticStatus, "fibonacci/rejection", 10)
         self._server = ActionServer(
             self,
             Fibonacci,
@@ -37,7 +40,10 @@ class FibonacciServer(Node):
     def _on_goal(self, goal: Fibonacci.Goal) -> GoalResponse:
         reason = refusal(goal.order)
         self.get_logger().info(f"order {goal.order}: {reason or 'accepted'}")
-        return GoalResponse.ACCEPT if reason is None else GoalResponse.REJECT
+        if reason is None:
+            return GoalResponse.ACCEPT
+        self._rejections.publish(rejection("fibonacci", goal, reason))  # a rejection itself has none
+        return GoalResponse.REJECT
 
     def _on_cancel(self, _handle: ServerGoalHandle) -> CancelResponse:
         self.get_logger().info("cancel requested")

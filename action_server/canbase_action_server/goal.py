@@ -11,8 +11,8 @@ from enum import Enum
 
 from canbase_action_server.causes import EndCause, Situation, cause_while_driving, cause_while_stopping
 from canbase_action_server.inputs import Inputs, Odometry
-from canbase_action_server.limits import standstill_limits
 from canbase_action_server.motion import STOP, Motion, Twist
+from canbase_action_server.motion_limits import standstill_limits
 from canbase_action_server.outcome import ErrorCode, Outcome
 from canbase_action_server.preconditions import action_source
 from canbase_action_server.standstill import Standstill, Verdict

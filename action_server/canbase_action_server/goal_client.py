@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 from uuid import uuid4
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.action import ActionClient
 from rclpy.action.client import ClientGoalHandle
 from rclpy.executors import Executor, SingleThreadedExecutor
@@ -18,7 +19,10 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from unique_identifier_msgs.msg import UUID
 
+from canbase_action_server.open_goal import exact
 from canbase_action_server.outcome import Status
+from canbase_action_server.rejection import Reasons
+from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
 
 SLICE_S = 0.1
 """Longest time without a look at the deadline, at `interrupted`, and at whether the server is still there."""
@@ -29,6 +33,11 @@ KEEPALIVE_S = 0.1
 SERVICE_QOS = QoSProfile(depth=100)
 """With the usual depth of 10 a server loses the oldest of more requests at once, and their clients wait for ever.
 A client receives the answers to all clients, and loses its own in the same way."""
+
+REJECTION_QOS = QoSProfile(depth=10)
+"""Volatile: the reason of an earlier goal with the same numbers is none of this one's."""
+REASON_S = 0.5
+"""So long a goal waits for the topic of the reasons before it is sent, and its rejection for the reason."""
 
 ResultT = TypeVar("ResultT")
 FeedbackT = TypeVar("FeedbackT")
@@ -47,7 +56,11 @@ class NoResponseError(DriveError):
 
 
 class RejectedError(DriveError):
-    """The server refuses the goal; its log says why."""
+    """The server rejects the goal. `reason`: its sentence; None when none was received: then its log has it."""
+
+    def __init__(self, action: str, reason: str | None) -> None:
+        super().__init__(f"{action} rejects the goal{f': {reason}' if reason else '; the log of its server says why'}")
+        self.reason = reason
 
 
 class ServerLostError(DriveError):
@@ -77,6 +90,11 @@ class GoalClient(Generic[ResultT, FeedbackT]):
     ) -> None:
         # ROS 2 Jazzy remaps topics and services, and no action (ros2/ros2, 1312): the name is resolved here.
         name = node.resolve_topic_name(action)
+        self._reasons = Reasons()
+        # Before the client, so that a server that can receive a goal has found this subscription as well.
+        self._rejections = node.create_subscription(
+            DiagnosticStatus, f"{name}/rejection", self._on_rejection, REJECTION_QOS
+        )
         self._client = ActionClient(
             node,
             kind,
@@ -137,6 +155,10 @@ class GoalClient(Generic[ResultT, FeedbackT]):
     ) -> SentGoal[ResultT]:
         """Find the server, send the goal once, wait for its acceptance. Raises the subclasses of DriveError."""
         self.wait_for_server(discovery_timeout_s, interrupted)
+        self.spin_until(lambda: self._rejections.get_publisher_count() > 0 or interrupted(), REASON_S)
+        if interrupted():
+            raise InterruptedDriveError("interrupted; nothing was sent")
+        self._reasons.expect(exact(goal))
         uuid = UUID(uuid=list(uuid4().bytes))
         response = self._client.send_goal_async(goal, self._feedback_to(on_feedback), uuid)
         self.spin_until(lambda: response.done() or interrupted(), response_timeout_s)
@@ -147,13 +169,19 @@ class GoalClient(Generic[ResultT, FeedbackT]):
             raise NoResponseError(f"{self.action} did not answer within {response_timeout_s} s; its cancel was sent")
         handle: ClientGoalHandle = response.result()
         if not handle.accepted:
-            raise RejectedError(f"{self.action} rejects the goal; the log of its server says why")
+            self.spin_until(lambda: self._reasons.found is not None or interrupted(), REASON_S)
+            reason = self._reasons.found
+            raise RejectedError(self.action, None if reason is None else printable(reason, SENTENCE_LENGTH))
         return SentGoal(self, handle, self._watch(handle))
+
+    def _on_rejection(self, rejection: DiagnosticStatus) -> None:
+        self._reasons.take([(each.key, each.value) for each in rejection.values], rejection.message)
 
     def close(self) -> None:
         """Leaves the action."""
         self._node.destroy_timer(self._timer)
         self._node.destroy_publisher(self._keepalive)
+        self._node.destroy_subscription(self._rejections)
         self._client.destroy()
 
     def _give_up(self, uuid: UUID, response: Any) -> None:

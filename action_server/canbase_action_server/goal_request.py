@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from canbase_action_server.inputs import Odometry
-from canbase_action_server.limits import lever_m, profile_limits, turn_limits
 from canbase_action_server.motion import Motion
+from canbase_action_server.motion_limits import lever_m, profile_limits, turn_limits
 from canbase_action_server.straight import StraightMotion
 from canbase_action_server.turn import TurnMotion
+from canbase_config.action import Action
 from canbase_config.robot import Robot
 
 
@@ -34,8 +35,8 @@ class DriveRequest:
     def range_reason(self, robot: Robot) -> str | None:
         """Why its numbers are refused; None: they are good."""
         action = robot.action
-        return _outside("|distance_m|", abs(self.distance_m), action.min_distance_m, action.max_distance_m) or _outside(
-            "max_speed_mps", self.max_speed_mps, action.min_speed_mps, action.max_speed_mps
+        return _outside(action, "|distance_m|", abs(self.distance_m), "distance_m") or _outside(
+            action, "max_speed_mps", self.max_speed_mps, "speed_mps"
         )
 
     def motion(self, robot: Robot, start: Odometry) -> Motion:
@@ -53,8 +54,8 @@ class RotateRequest:
     def range_reason(self, robot: Robot) -> str | None:
         """Why its numbers are refused; None: they are good."""
         action = robot.action
-        return _outside("|angle_rad|", abs(self.angle_rad), action.min_angle_rad, action.max_angle_rad) or _outside(
-            "max_speed_radps", self.max_speed_radps, action.min_speed_radps, action.max_speed_radps
+        return _outside(action, "|angle_rad|", abs(self.angle_rad), "angle_rad") or _outside(
+            action, "max_speed_radps", self.max_speed_radps, "speed_radps"
         )
 
     def motion(self, robot: Robot, start: Odometry) -> Motion:
@@ -62,10 +63,12 @@ class RotateRequest:
         return TurnMotion(start, self.angle_rad, lever_m(robot), turn_limits(robot, self.max_speed_radps))
 
 
-def _outside(name: str, value: float, low: float, high: float) -> str | None:
+def _outside(action: Action, name: str, value: float, key: str) -> str | None:
+    """`key` without min_ and max_. The interface carries float32: a limit that arrives rounded is still that limit."""
+    low, high = getattr(action, f"min_{key}"), getattr(action, f"max_{key}")
     if not math.isfinite(value):
         return f"{name} is {value}; expected a finite number from {low} to {high}"
-    # The interface carries float32: a limit that arrives rounded is still that limit.
-    if not low * (1 - 1e-6) <= value <= high * (1 + 1e-6):
-        return f"{name} is {value:.6g}, outside {low} to {high} (action.* in robot.yaml)"
-    return None
+    if low * (1 - 1e-6) <= value <= high * (1 + 1e-6):
+        return None
+    limit = f"action.min_{key}" if value < low else f"action.max_{key}"
+    return f"{name} is {value:.6g}, outside {low} to {high} ({limit} of robot.yaml)"

@@ -19,7 +19,7 @@ from canbase_config.robot import Robot
 from canbase_config.stopping import standstill_s
 from canbase_runtime.output import never_wait
 from canbase_runtime.private_process import guard_keys
-from canbase_runtime.systemd import Service
+from canbase_runtime.sd_notify import Service
 
 DELIVERY_S = 0.2
 """After the last result, for the middleware to hand it over."""

@@ -15,6 +15,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 from canbase.msg import DriverStatus, MuxState, SafetyState
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry as OdometryMessage
 from rcl_interfaces.msg import SetParametersResult
@@ -22,18 +23,19 @@ from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from unique_identifier_msgs.msg import UUID
 
 from canbase_action_server import messages
 from canbase_action_server.binding import Binding
 from canbase_action_server.goal import Phase
-from canbase_action_server.goal_client import SERVICE_QOS
+from canbase_action_server.goal_client import REJECTION_QOS, SERVICE_QOS
 from canbase_action_server.goal_queue import Cycle, GoalQueue
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.motion import STOP, Twist
-from canbase_action_server.open_goal import OpenGoal, numbers, uuid_of
-from canbase_action_server.outcome import ErrorCode, Outcome
+from canbase_action_server.open_goal import OpenGoal, numbers, rejection, uuid_of
+from canbase_action_server.outcome import ErrorCode, Outcome, Status
 from canbase_action_server.preconditions import action_source
 from canbase_config.robot import Robot
 from canbase_runtime.journal import Journal, Voice
@@ -73,6 +75,7 @@ class DriveDistanceServer(Node):
         self._listen(SafetyState, "safety_filter/state", LATCHED_QOS, self._on_safety)
         self._listen(DriverStatus, "motor_driver/status", STATUS_QOS, self._on_driver)
         self._listen(MuxState, "velocity_mux/state", LATCHED_QOS, self._on_mux)
+        self._rejections: dict[str, Publisher] = {}
         self._servers = [self._serve(binding) for binding in bindings]
         # The steady clock: setting the computer's time must not stretch a control cycle.
         period_s = 1.0 / robot.action.control_hz
@@ -136,6 +139,7 @@ class DriveDistanceServer(Node):
         # ROS 2 Jazzy remaps topics and services, and no action (ros2/ros2, 1312): the name is resolved here.
         name = self.resolve_topic_name(binding.name)
         self._listen(UUID, f"{name}/keepalive", KEEPALIVE_QOS, self._on_keepalive)
+        self._rejections[binding.name] = self.create_publisher(DiagnosticStatus, f"{name}/rejection", REJECTION_QOS)
         return ActionServer(
             self,
             binding.type,
@@ -162,6 +166,7 @@ class DriveDistanceServer(Node):
             return GoalResponse.ACCEPT
         # rclpy does not tell the UUID of a goal that is not accepted yet.
         self._log("rejected", None, action=binding.name, reason=reason, **numbers(goal))
+        self._rejections[binding.name].publish(rejection(binding.name, goal, reason))
         return GoalResponse.REJECT
 
     def _on_accepted(self, binding: Binding, handle: ServerGoalHandle) -> None:
@@ -219,10 +224,11 @@ class DriveDistanceServer(Node):
         self._orders.publish(message)
 
     def _log(self, step: str, uuid: str | None, **fields: Any) -> None:
+        self._write_log(step, uuid, fields, Priority.INFO)
+
+    def _write_log(self, step: str, uuid: str | None, fields: dict[str, Any], priority: Priority) -> None:
         text = json.dumps({"uuid": uuid, "step": step, **fields})
-        failed = fields.get("status", "SUCCEEDED") != "SUCCEEDED"
         told = {name: fields[name] for name in ("status", "error_code", "reason") if name in fields}
-        priority = Priority.NOTICE if failed else Priority.INFO
         self._voice.tell(text, priority, robot=self._robot.name, goal=uuid, step=step, **told)
 
     def _log_phase(self, uuid: str | None, before: Phase, cycle: Cycle) -> None:
@@ -232,12 +238,12 @@ class DriveDistanceServer(Node):
             self._log("standstill", uuid)
 
     def _log_end(self, uuid: str, goal: OpenGoal, outcome: Outcome, result: Any) -> None:
-        self._log(
-            "ended",
-            uuid,
-            status=outcome.status.name,
-            error_code=outcome.code.name,
+        fields = {
+            "status": outcome.status.name,
+            "error_code": outcome.code.name,
             **numbers(result),
-            duration_s=round(time.monotonic() - goal.accepted, 3),
-            message=outcome.message,
-        )
+            "duration_s": round(time.monotonic() - goal.accepted, 3),
+            "message": outcome.message,
+        }
+        priority = Priority.INFO if outcome.status is Status.SUCCEEDED else Priority.NOTICE
+        self._write_log("ended", uuid, fields, priority)

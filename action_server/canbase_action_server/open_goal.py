@@ -5,17 +5,30 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.action.server import ServerGoalHandle
 from rclpy.task import Future
 
 from canbase_action_server.binding import Binding
 from canbase_action_server.goal import Feedback
 from canbase_action_server.outcome import Outcome, Status
+from canbase_action_server.rejection import as_texts
 
 
 def uuid_of(handle: ServerGoalHandle) -> str:
     """UUID of a goal in hex."""
     return bytes(handle.goal_id.uuid).hex()
+
+
+def exact(goal: Any) -> dict[str, float]:
+    """The numbers of a goal by name, not rounded."""
+    return {name: float(getattr(goal, name)) for name in goal.get_fields_and_field_types()}
+
+
+def rejection(name: str, goal: Any, reason: str) -> DiagnosticStatus:
+    """What `rejection.Reasons` looks for."""
+    values = [KeyValue(key=key, value=text) for key, text in as_texts(exact(goal))]
+    return DiagnosticStatus(level=DiagnosticStatus.WARN, name=f"{name}: goal rejected", message=reason, values=values)
 
 
 def numbers(message: Any) -> dict[str, float]:

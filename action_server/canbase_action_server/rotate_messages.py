@@ -7,7 +7,7 @@ from canbase.action import RotateAngle
 from canbase_action_server.binding import Binding
 from canbase_action_server.goal import Feedback
 from canbase_action_server.goal_request import RotateRequest
-from canbase_action_server.limits import lever_m
+from canbase_action_server.motion_limits import lever_m
 from canbase_action_server.outcome import Outcome
 from canbase_config.robot import Robot
 

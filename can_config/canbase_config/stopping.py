@@ -4,7 +4,7 @@ Ordinary stop: the driver's ramp. The slower of linear and angular velocity sets
 jerk_mps3 rounds its begin and its end (an S-curve; an acceleration that was under way ends at once). A turn in place
 has no jerk limit. Emergency stop: the same ramp, shorter by deceleration_mps2 / emergency_deceleration_mps2, without a
 jerk limit. Quick stop: each drive brakes its own wheel with 6085h, emergency_deceleration_mps2 at the rim.
-The driver's ramp itself is canbase_driver/limits.py; a test compares both.
+The driver's ramp itself is canbase_driver/motion/limiter.py; a test compares both.
 """
 
 from __future__ import annotations

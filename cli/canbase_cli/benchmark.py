@@ -15,7 +15,10 @@ from canbase_runtime.terminal import FAILED, fail
 
 
 def benchmark(
-    names: Annotated[list[str] | None, typer.Argument(metavar="[NAME]…", help="Some of them; all without.")] = None,
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="[NAME]…", help="Benchmarks to run.", show_default="all")
+    ] = None,
+    list_them: Annotated[bool, typer.Option("--list", help="List them, run none.")] = False,
     write: Annotated[Path | None, typer.Option("--write", metavar="FILE", help="Write the table as Markdown.")] = None,
 ) -> None:
     """Measure this computer: reactions, latencies, processor, each beside a floor and against its budget.
@@ -26,7 +29,7 @@ def benchmark(
     script = root / "benchmarks" / "run.py"
     if not script.exists():
         fail("the benchmarks come with the sources: clone the repository, and there `make bench`", FAILED)
-    options = ["--write", str(write.resolve())] if write else []
+    options = [*(["--write", str(write.resolve())] if write else []), *(["--list"] if list_them else [])]
     environment = os.environ | {"PYTHONPATH": str(root / "virtual_bus_tests")}
     command = [sys.executable, str(script), *(names or []), *options]
     raise typer.Exit(subprocess.call(command, env=environment, cwd=root))  # its children import from there at most

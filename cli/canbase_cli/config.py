@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from canbase_runtime.terminal import colour, load_config
+from canbase_runtime.terminal import colour, load_config, warn
+
+if TYPE_CHECKING:
+    from canbase_config.robot import Bus
 
 app = typer.Typer(help="Look at a robot.yaml.", no_args_is_help=True)
 
@@ -22,18 +25,33 @@ def check(
     file: Annotated[
         Path | None, typer.Argument(metavar="FILE", help="The robot.yaml.", show_default="the bench sample")
     ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print problems only, and no warnings.")] = False,
 ) -> None:
     """Check FILE and print the whole configuration that it stands for, the defaults marked.
 
-    What is printed is a robot.yaml itself. Exit code 0: FILE can be used. 2: all its problems are on stderr.
+    What is printed is a robot.yaml itself. Warnings are on stderr, also where this computer has no such bus.
+
+    Exit codes: 0 FILE can be used, 2 it cannot: all its problems are on stderr.
     """
     from canbase_config.effective import DEFAULT_MARK, effective
 
-    loaded = load_config(file)
+    loaded = load_config(file, quiet=quiet)
+    if quiet:
+        return
+    for sentence in _bus_warnings(loaded.robot.bus):
+        warn(sentence)
     for line in effective(loaded).splitlines():
         typer.secho(line, dim=line.endswith(f"# {DEFAULT_MARK}"), color=colour())
     counts = f"{len(loaded.given)} values from the file, {len(loaded.defaults)} defaults"
     typer.secho(f"{loaded.path} is good: {counts}", err=True, fg=typer.colors.GREEN, color=colour())
+
+
+def _bus_warnings(bus: Bus) -> list[str]:
+    from can import VALID_INTERFACES
+
+    from canbase_cli.bus_here import bus_warnings
+
+    return list(bus_warnings(bus, VALID_INTERFACES))
 
 
 @app.command()

@@ -33,7 +33,7 @@ SymptomOption = Annotated[
     ),
 ]
 SecondsOption = Annotated[
-    float, typer.Option("--seconds", metavar="SECONDS", min=0.5, max=60.0, help="to listen for, once found")
+    float, typer.Option("--seconds", metavar="SECONDS", min=0.5, max=60.0, help="Listen so long to the parts found.")
 ]
 BusOption = Annotated[
     bool, typer.Option("--bus/--no-bus", help="Look at the bus and read the drives; or only listen to the processes.")
@@ -71,7 +71,7 @@ def doctor(
 def _walk(symptom: str, loaded: Loaded, arguments: list[str], seconds: float) -> list[Check]:
     with ros_needed():
         from canbase_doctor.observe import observe
-        from canbase_doctor.symptom_walk import walk
+        from canbase_doctor.symptom_checks import walk
     return walk(symptom, observe(loaded, arguments, seconds))
 
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from canbase_cli.goal import ABORTED, CANCELED, NO_SERVER, REJECTED, CancelAfterOption
+from canbase_cli.goal import NO_SERVER, REJECTED, CancelAfterOption, WaitOption, exit_code
 from canbase_cli.options import NamespaceOption, RosCommand, ros_arguments, ros_needed
 from canbase_runtime.terminal import fail
 
@@ -27,11 +27,12 @@ def send(
     ctx: typer.Context,
     order: Annotated[int, typer.Argument(metavar="ORDER", help="1 to 1000; beyond 46 it ends aborted")],
     cancel_after_s: CancelAfterOption = None,
+    wait_s: WaitOption = 5.0,
     namespace: NamespaceOption = "",
 ) -> None:
     """Send a goal, print its feedback and its end.
 
-    Exit codes: 0 succeeded, 3 canceled, 4 aborted, 5 rejected, 6 no server, or it went away.
+    Exit codes: 0 succeeded, 2 wrong command line, 3 canceled, 4 aborted, 5 rejected, 6 no server, or it went away.
     """
     with ros_needed():
         import rclpy
@@ -41,7 +42,11 @@ def send(
     rclpy.init(args=ros_arguments(ctx, namespace))
     try:
         client = FibonacciClient(rclpy.create_node("canbase_fibonacci", enable_rosout=False))
-        goal = client.send(order, on_feedback=lambda numbers: typer.echo(f"feedback: {_words(numbers)}"))
+        goal = client.send(
+            order,
+            on_feedback=lambda numbers: typer.echo(f"feedback: {_words(numbers)}"),
+            discovery_timeout_s=wait_s,
+        )
         typer.echo("accepted: that is no result yet")
         result = goal.wait(cancel_after_s)
         if result is None:
@@ -56,7 +61,7 @@ def send(
     if result is None:
         fail("no result", NO_SERVER)
     typer.echo(f"{result.status.name}: {_words(result.sequence)}")
-    raise typer.Exit({"SUCCEEDED": 0, "CANCELED": CANCELED, "ABORTED": ABORTED}[result.status.name])
+    raise typer.Exit(exit_code(result.status))
 
 
 def _words(numbers: tuple[int, ...]) -> str:

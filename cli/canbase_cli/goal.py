@@ -14,6 +14,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from canbase_action_server.outcome import Status
 from canbase_cli.options import RosCommand
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
 from canbase_runtime.terminal import FAILED, colour, fail
@@ -30,9 +31,16 @@ CANCEL_PATIENCE_S: Final = 10.0
 
 CancelAfterOption = Annotated[
     float | None,
-    typer.Option("--cancel-after", "--timeout", metavar="SECONDS", min=0.1, help="then cancel it", show_default="none"),
+    typer.Option(
+        "--cancel-after",
+        "--timeout",
+        metavar="SECONDS",
+        min=0.1,
+        help="Cancel the goal when it takes longer.",
+        show_default="never",
+    ),
 ]
-WaitOption = Annotated[float, typer.Option("--wait", metavar="SECONDS", min=0.1, help="for the server")]
+WaitOption = Annotated[float, typer.Option("--wait", metavar="SECONDS", min=0.1, help="Look for the server so long.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as one line of JSON.")]
 
 Show = Callable[[float, float], None]
@@ -90,7 +98,12 @@ def run_goal(
     except DriveError as error:
         fail(str(error), NO_SERVER)
     _print_result(result, as_json)
-    raise typer.Exit({"SUCCEEDED": 0, "CANCELED": CANCELED, "ABORTED": ABORTED}[result.status.name])
+    raise typer.Exit(exit_code(result.status))
+
+
+def exit_code(status: Status) -> int:
+    """Of a goal that ended: 0 for success alone."""
+    return {Status.SUCCEEDED: 0, Status.CANCELED: CANCELED, Status.ABORTED: ABORTED}[status]
 
 
 def _cancel(goal: SentGoal[Any], interrupts: Interrupts) -> Any:
@@ -146,7 +159,7 @@ def _print_result(result: Any, as_json: bool) -> None:
         values: dict[str, Any] = asdict(result) | {"status": result.status.name, "code": result.code.name}
         typer.echo(json.dumps(values))
         return
-    good = result.status.name == "SUCCEEDED"
+    good = result.status is Status.SUCCEEDED
     fg = typer.colors.GREEN if good else typer.colors.YELLOW
     typer.secho(
         f"{result.status.name} ({result.code.name}): {printable(result.message, SENTENCE_LENGTH)}",

@@ -31,7 +31,9 @@ def install(
         Path | None,
         typer.Option("--config", "-c", metavar="FILE", help="The robot.yaml.", show_default="the installed one"),
     ] = None,
-    name: Annotated[str, typer.Option("--name", help="Name of the robot.", show_default="name in robot.yaml")] = "",
+    name: Annotated[
+        str, typer.Option("--name", metavar="NAME", help="Name of the robot.", show_default="name in robot.yaml")
+    ] = "",
     prefix: PrefixOption = Path("/"),
     dry_run: DryRunOption = False,
     python: Annotated[
@@ -114,7 +116,7 @@ def install(
 
 
 def uninstall(
-    name: Annotated[str, typer.Argument(help="Name of the robot.")] = "robot",
+    name: Annotated[str, typer.Argument(metavar="[NAME]", help="Name of the robot.")] = "robot",
     prefix: PrefixOption = Path("/"),
     dry_run: DryRunOption = False,
     purge: Annotated[

@@ -54,34 +54,48 @@ def canbase(
 ) -> None:
     """A CANopen motor driver stack for ROS 2 mobile bases.
 
-    Exit codes: 0 success, 1 it did not work out, 2 a wrong command line or a wrong robot.yaml.
+    Exit codes: 0 success, 1 it did not work out, 2 a wrong command line or a wrong robot.yaml. Of goals also: 3
+    canceled, 4 aborted, 5 rejected, 6 no server. Each command's --help has its own.
     """
 
 
 _ROS_USAGE: Final = "[OPTIONS] [--ros-args …]"
+_DRIVE: Final = "Drive"
+_LOOK: Final = "Look"
+_SET_UP: Final = "Set up"
+_LEARN: Final = "Learn and measure"
+_SERVICES: Final = "Services: one process each, as `canbase up` starts them"
 
-app.command("demo")(demo.demo)
-app.command("up", cls=RosCommand, options_metavar=_ROS_USAGE)(up.up)
-app.command("drive", cls=GoalCommand, options_metavar=_ROS_USAGE)(drive.drive)
-app.command("rotate", cls=GoalCommand, options_metavar=_ROS_USAGE)(rotate.rotate)
-app.command("monitor", cls=RosCommand, options_metavar=_ROS_USAGE)(monitor.monitor)
-app.command("stop", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.stop)
-app.command("reset", cls=RosCommand, options_metavar=_ROS_USAGE)(trigger.reset)
-app.command("doctor", cls=RosCommand, options_metavar=_ROS_USAGE, epilog=doctor.EPILOG)(doctor.doctor)
-app.command("scan", epilog=scan.EPILOG)(scan.scan)
-app.add_typer(sdo.app, name="sdo")
-app.command("commission", epilog=commission.EPILOG)(commission.commission)
-app.command("jog", epilog=jog.EPILOG)(jog.jog)
-app.command("inject", epilog=inject.EPILOG)(inject.inject)
-app.command("sample")(sample.sample)
-app.command("benchmark")(benchmark.benchmark)
-app.add_typer(config.app, name="config")
-app.add_typer(fibonacci.app, name="fibonacci")
-app.command("install")(install.install)
-app.command("uninstall")(install.uninstall)
-app.command("support-bundle")(support_bundle.support_bundle)
-app.command("driver", cls=RosCommand, options_metavar=_ROS_USAGE)(services.driver)
-app.command("velocity", cls=RosCommand, options_metavar=_ROS_USAGE)(services.velocity)
-app.command("action-server", cls=RosCommand, options_metavar=_ROS_USAGE)(services.action_server)
-app.command("watchdog", cls=RosCommand)(services.watchdog)
-app.command("sim", cls=RosCommand)(services.sim)
+app.command("demo", rich_help_panel=_DRIVE)(demo.demo)
+app.command("up", cls=RosCommand, options_metavar=_ROS_USAGE, rich_help_panel=_DRIVE)(up.up)
+app.command("drive", cls=GoalCommand, options_metavar=_ROS_USAGE, rich_help_panel=_DRIVE)(drive.drive)
+app.command("rotate", cls=GoalCommand, options_metavar=_ROS_USAGE, rich_help_panel=_DRIVE)(rotate.rotate)
+app.command("stop", cls=RosCommand, options_metavar=_ROS_USAGE, rich_help_panel=_DRIVE)(trigger.stop)
+app.command("reset", cls=RosCommand, options_metavar=_ROS_USAGE, rich_help_panel=_DRIVE)(trigger.reset)
+
+app.command("monitor", cls=RosCommand, options_metavar=_ROS_USAGE, rich_help_panel=_LOOK)(monitor.monitor)
+app.command("doctor", cls=RosCommand, options_metavar=_ROS_USAGE, epilog=doctor.EPILOG, rich_help_panel=_LOOK)(
+    doctor.doctor
+)
+app.command("support-bundle", rich_help_panel=_LOOK)(support_bundle.support_bundle)
+
+app.command("sample", rich_help_panel=_SET_UP)(sample.sample)
+app.add_typer(config.app, name="config", rich_help_panel=_SET_UP)
+app.command("scan", epilog=scan.EPILOG, rich_help_panel=_SET_UP)(scan.scan)
+app.add_typer(sdo.app, name="sdo", rich_help_panel=_SET_UP)
+app.command("jog", epilog=jog.EPILOG, rich_help_panel=_SET_UP)(jog.jog)
+app.command("commission", epilog=commission.EPILOG, rich_help_panel=_SET_UP)(commission.commission)
+app.command("install", rich_help_panel=_SET_UP)(install.install)
+app.command("uninstall", rich_help_panel=_SET_UP)(install.uninstall)
+
+app.add_typer(fibonacci.app, name="fibonacci", rich_help_panel=_LEARN)
+app.command("inject", epilog=inject.EPILOG, rich_help_panel=_LEARN)(inject.inject)
+app.command("benchmark", rich_help_panel=_LEARN)(benchmark.benchmark)
+
+app.command("driver", cls=RosCommand, options_metavar=_ROS_USAGE, rich_help_panel=_SERVICES)(services.driver)
+app.command("velocity", cls=RosCommand, options_metavar=_ROS_USAGE, rich_help_panel=_SERVICES)(services.velocity)
+app.command("action-server", cls=RosCommand, options_metavar=_ROS_USAGE, rich_help_panel=_SERVICES)(
+    services.action_server
+)
+app.command("watchdog", cls=RosCommand, rich_help_panel=_SERVICES)(services.watchdog)
+app.command("sim", cls=RosCommand, rich_help_panel=_SERVICES)(services.sim)

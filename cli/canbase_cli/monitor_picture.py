@@ -5,23 +5,28 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from enum import Enum
+from typing import Any, Final, TypeVar
 
 from rich.console import Group, RenderableType
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from canbase_driver.cia402 import DriveState
+from canbase_driver.snapshot import WatchdogView
 from canbase_runtime.driver_state import DriverState, driver_state
+from canbase_runtime.source_standing import Followed, followed
 
 SILENT_S: Final = 1.5
 """A node that has said nothing for longer is shown as silent: its slowest state comes every 0.5 s."""
 ACTIONS: Final = ("passes", "limits", "slows", "STOPS")
 """SafetyState.action in words."""
-"""DriverStatus.state in words."""
 GOOD: Final = "green"
 WARN: Final = "yellow"
 BAD: Final = "bold red"
+
+Named = TypeVar("Named", bound=Enum)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +113,8 @@ def _driver_words(heard: Heard) -> list[Text]:
     state = driver_state(status.state)
     style = {DriverState.ENABLED: GOOD, DriverState.LATCHED: BAD, DriverState.OFFLINE: BAD}.get(state, WARN)
     cause = "" if status.cause in ("", "none") else f": {status.cause}"
-    watchdog = Text(f"watchdog {status.watchdog}", GOOD if status.watchdog == "ok" else BAD)
+    well = _member(WatchdogView, status.watchdog) is WatchdogView.OK
+    watchdog = Text(f"watchdog {status.watchdog}", GOOD if well else BAD)
     return [Text(f"driver {state.name}{cause}", style), watchdog]
 
 
@@ -126,11 +132,11 @@ def _silence(who: str, heard: Heard) -> Text:
 def _mux(state: Any) -> RenderableType:
     table = _table("", "source", "age", "late by", "timeout", "refused", "why not")
     for source in state.sources:
-        followed = source.active and not source.reason
-        style = GOOD if followed else BAD if source.active else ""
+        standing = followed(source)
+        style = GOOD if standing is Followed.YES else BAD if source.active else ""
         refused = Text(str(source.refused), BAD if source.refused else "")
-        unarmed = "" if source.armed or "waiting" in source.reason else "; needs a zero first"
-        reason = "drives" if followed else source.reason + unarmed
+        unarmed = "" if source.armed or standing is Followed.UNARMED else "; needs a zero first"
+        reason = "drives" if standing is Followed.YES else source.reason + unarmed
         times = (_seconds(source.age_s), _seconds(source.delay_s), _seconds(source.timeout_s))
         values = (str(source.priority), source.name, *times)
         table.add_row(*values, refused, reason, style=style)
@@ -166,7 +172,7 @@ def _driver(status: Any) -> RenderableType:
     first = Text("   ").join([*_driver_words(Heard(status, 0.0)), Text(standing)])
     table = _table("node", "wheel", "NMT", "drive state", "target", "measured", "heartbeat", "error")
     for drive in status.drives:
-        good = drive.state == "operation enabled"
+        good = _member(DriveState, drive.state) is DriveState.OPERATION_ENABLED
         error = Text(f"{drive.error_code:04X}h {drive.error_text}" if drive.error_code else "", BAD)
         speeds = (f"{drive.target_radps:+.2f} rad/s", f"{drive.velocity_radps:+.2f} rad/s")
         state = Text(drive.state, GOOD if good else WARN)
@@ -189,6 +195,11 @@ def _event(heard: Heard) -> Text:
     event = heard.message
     latched = ", latched" if event.latched else ""
     return Text(f"Last stop, {heard.age_s:.0f} s ago: {event.stopped_by}: {event.cause}{latched}. {event.detail}")
+
+
+def _member(kind: type[Named], text: str) -> Named | None:
+    """The state that a message names in words; None: this canbase knows none of that name."""
+    return next((member for member in kind if member.value == text), None)
 
 
 def _table(*titles: str) -> Table:

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Final
 import typer
 from typer.core import TyperCommand
 
+from canbase_cli.log_format import readable_times
 from canbase_cli.middleware import prefer_udp, stay_on_this_computer, take_no_profile_from_here
 from canbase_runtime.terminal import FAILED, fail
 
@@ -69,6 +70,7 @@ def ros_needed() -> Iterator[None]:
     stay_on_this_computer(os.environ)
     prefer_udp(os.environ)
     take_no_profile_from_here(os.environ)
+    readable_times(os.environ)
     try:
         yield
     except ModuleNotFoundError as error:

@@ -25,8 +25,8 @@ def rotate(
 
     Ctrl-C cancels and waits until the base stands; a second Ctrl-C stops waiting.
 
-    Exit codes: 0 succeeded, 2 wrong command line, 3 canceled, 4 aborted, 5 rejected, 6 no server, or it
-    went away, or does not answer, 1 anything else.
+    Exit codes: 0 succeeded, 1 anything else, 2 wrong command line, 3 canceled, 4 aborted, 5 rejected, 6 the server is
+    not there, went away, or does not answer.
     """
     with ros_needed():
         import rclpy

@@ -37,7 +37,7 @@ TypeOption = Annotated[
 ]
 EdsOption = Annotated[Path | None, typer.Option("--eds", metavar="FILE", help="The maker's EDS file: types, names.")]
 TimeoutOption = Annotated[
-    float, typer.Option("--timeout", metavar="SECONDS", min=0.02, max=10.0, help="for one answer")
+    float, typer.Option("--timeout", metavar="SECONDS", min=0.02, max=10.0, help="Wait so long for an SDO answer.")
 ]
 
 

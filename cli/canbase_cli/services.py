@@ -91,13 +91,14 @@ def sim(
     control: Annotated[
         Path | None, typer.Option("--control", metavar="PATH", help="Unix socket to steer the simulation by.")
     ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print warnings only.")] = False,
 ) -> None:
     """Run simulated drives on the robot's bus, in place of the real ones."""
     from canbase_sim.main import run
 
     robot = load_config(config).robot
     raise_priority("sim")
-    raise typer.Exit(run(robot, None if control is None else str(control)))
+    raise typer.Exit(run(robot, None if control is None else str(control), quiet=quiet))
 
 
 def watchdog(

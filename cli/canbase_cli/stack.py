@@ -51,12 +51,15 @@ class Stack:
         ros_args: Sequence[str] = (),
         logs: Path | None = None,
         env: Mapping[str, str] | None = None,
+        quiet_sim: bool = False,
     ) -> None:
         """`sim`: simulated drives too. `ros_args`: for the parts with ROS. `logs`: a folder for the parts' output, one
-        file each; None: they write to this terminal. `env`: their environment; None: that of this process."""
+        file each; None: they write to this terminal. `env`: their environment; None: that of this process.
+        `quiet_sim`: the simulated drives print warnings only."""
         self._config = config
         self._options = ["--config", str(config), *(["--namespace", namespace] if namespace else [])]
         self._ros_args = list(ros_args)
+        self._sim_options = ["--quiet"] if quiet_sim else []
         self._parts = [part for part in START_ORDER if sim or part != "sim"]
         self._logs = logs
         self._env = None if env is None else dict(env)
@@ -122,6 +125,8 @@ class Stack:
 
     def _spawn(self, part: str) -> subprocess.Popen[bytes]:
         argv = module_command("canbase_cli.child", str(os.getpid()), part, *self._options)
+        if part == "sim":
+            argv += self._sim_options
         if part not in WITHOUT_ROS:
             argv += self._ros_args
         with ExitStack() as opened:

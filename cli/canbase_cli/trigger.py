@@ -23,7 +23,9 @@ STATUS_S: Final = 1.0
 """motor_driver/status comes ten times a second."""
 SLICE_S: Final = 0.1
 """Ctrl-C is heard after this at the latest."""
-WaitOption = Annotated[float, typer.Option("--wait", metavar="SECONDS", min=0.1, help="for the motor driver")]
+WaitOption = Annotated[
+    float, typer.Option("--wait", metavar="SECONDS", min=0.1, help="Look for the motor driver so long.")
+]
 
 
 def stop(ctx: typer.Context, wait_s: WaitOption = 5.0, namespace: NamespaceOption = "") -> None:

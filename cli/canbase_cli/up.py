@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Annotated
@@ -13,6 +16,7 @@ import typer
 
 from canbase_cli.options import ConfigOption, NamespaceOption, ros_arguments
 from canbase_cli.stack import POLL_S, Death, Stack
+from canbase_runtime.own_modules import module_command
 from canbase_runtime.terminal import FAILED, colour, fail, load_config
 
 if TYPE_CHECKING:
@@ -27,6 +31,7 @@ def up(
         bool | None,
         typer.Option("--sim/--no-sim", help="Simulated drives too.", show_default="yes on a udp_multicast bus"),
     ] = None,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Show what the simulated drives do.")] = False,
 ) -> None:
     """Run the whole stack: watchdog, velocity mux and safety filter, motor driver, action server.
 
@@ -38,8 +43,10 @@ def up(
     with_sim = loaded.robot.bus.interface == "udp_multicast" if sim is None else sim
     _refuse_twice(loaded.robot)
     ended = _end_signals()
-    stack = Stack(loaded.path, namespace=namespace, sim=with_sim, ros_args=ros_arguments(ctx, ""))
-    with stack:
+    stack = Stack(
+        loaded.path, namespace=namespace, sim=with_sim, ros_args=ros_arguments(ctx, ""), quiet_sim=not verbose
+    )
+    with stack, _reports_when_ready(namespace, ros_arguments(ctx, namespace)):
         _say(f"{loaded.robot.name} is starting; Ctrl-C stops the robot and ends it")
         death = _wait(stack, ended)
         _say(f"{death or 'ending'}; stopping the robot")
@@ -47,6 +54,18 @@ def up(
     bad = [str(Death(part, code)) for part, code in codes.items() if code != 0]
     if death is not None or bad:
         fail("; ".join(bad) or str(death), FAILED)
+
+
+@contextmanager
+def _reports_when_ready(namespace: str, ros_args: list[str]) -> Iterator[None]:
+    """READY is printed when it is, by a process of its own (`ready.py`) that no part waits for."""
+    command = module_command("canbase_cli.ready", str(os.getpid()), namespace, *ros_args)
+    teller = subprocess.Popen(command, stdin=subprocess.DEVNULL, start_new_session=True)
+    try:
+        yield
+    finally:
+        teller.kill()
+        teller.wait()
 
 
 def _refuse_twice(robot: Robot) -> None:

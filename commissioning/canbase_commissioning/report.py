@@ -72,7 +72,8 @@ def _drives(robot: Robot, results: Results) -> list[str]:
         numbers = (identity.vendor_id, identity.product_code, identity.revision, identity.serial)
         told = ":".join("–" if n is None else f"{n:X}" for n in numbers)
         wheels = ", ".join(drive.joint for drive in drives)
-        lines.append(f"| {node_id} | {wheels} | {drives[0].profile} | {told} | {boot.self_stop or 'nothing known'} |")
+        stop = boot.self_stop.text or "nothing known"
+        lines.append(f"| {node_id} | {wheels} | {drives[0].profile} | {told} | {stop} |")
     notes = [f"- node {node_id}: {note}" for node_id, boot in sorted(results.boots.items()) for note in boot.notes]
     return [*lines, "", *notes, *([""] if notes else [])]
 

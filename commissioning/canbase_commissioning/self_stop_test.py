@@ -16,6 +16,7 @@ from canbase_commissioning.session import NodeTask
 from canbase_commissioning.wheel_probe import Sample, look, way_m
 from canbase_config.drive import Drive
 from canbase_config.robot import WATCHDOG_NODE_ID
+from canbase_driver.boot.settings import StopsBy
 from canbase_driver.cia301.sdo_client import SdoClient
 from canbase_driver.cia402 import PowerGoal
 
@@ -62,7 +63,7 @@ class Outcome:
 def watches_heartbeat(rig: PoweredDrives, joint: str) -> bool:
     """Whether the boot could set that the drive watches the watchdog's heartbeat (1016h)."""
     report = rig.report(joint)
-    return report is not None and report.self_stop.startswith("heartbeat")
+    return report is not None and report.self_stop.by is StopsBy.WATCHDOG_HEARTBEAT
 
 
 def prove(rig: PoweredDrives, speed_mps: float) -> Script[tuple[Outcome, ...]]:

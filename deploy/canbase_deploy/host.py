@@ -17,6 +17,7 @@ from canbase_deploy.neighbours import Neighbour
 from canbase_deploy.owner import ETC, owner_paths
 from canbase_deploy.ownership import faults, refusal
 from canbase_deploy.plan import InstallError
+from canbase_runtime.environment_file import variables
 
 PATHS: Final = ("AMENT_PREFIX_PATH", "PYTHONPATH", "LD_LIBRARY_PATH")
 SOURCED: Final = (*PATHS, "ROS_DISTRO", "ROS_VERSION", "ROS_PYTHON_VERSION")
@@ -148,9 +149,7 @@ def named_texts(files: Mapping[str, Path]) -> dict[str, str]:
 def environment(prefix: Path, name: str) -> dict[str, str]:
     """What the environment file of an installed robot sets; empty where there is none."""
     path = prefix / owner_paths(name)[1].relative_to("/")
-    lines = path.read_text("utf-8").splitlines() if path.is_file() else []
-    pairs = (line.strip().partition("=") for line in lines if "=" in line and not line.lstrip().startswith(("#", ";")))
-    return {key: value.strip("'\"") for key, _, value in pairs}
+    return variables(path.read_text("utf-8")) if path.is_file() else {}
 
 
 def neighbours(prefix: Path, name: str, installed: Iterable[str]) -> list[Neighbour]:

@@ -137,7 +137,7 @@ def _settings(access: NodeAccess, drives: tuple[Drive, ...], robot: Robot) -> St
 
 
 def _self_stop(access: NodeAccess, drives: tuple[Drive, ...], robot: Robot, found: list[str]) -> Steps[None]:
-    found.append((yield from configure_self_stop(access, drives, robot)))
+    found.append((yield from configure_self_stop(access, drives, robot)).text)
 
 
 def _identity(node: NodeAccess) -> Steps[Identity]:

@@ -14,12 +14,14 @@ from canbase.msg import DriverStatus, SafetyState
 from canbase_doctor.checks import Check, fail, ok, warn
 from canbase_doctor.evidence import Evidence
 from canbase_runtime.driver_state import driver_state
+from canbase_runtime.source_standing import Followed, followed
 
 UNFOLLOWED = {
-    True: "release the joystick, or let that program order zero (docs/velocity.md, Neutral start)",
-    False: "look at the network between that sender and the robot, and at the clock of the sender",
+    Followed.UNARMED: "release the joystick, or let that program order zero (docs/velocity.md, Neutral start)",
+    Followed.LATE: "look at the network between that sender and the robot, and at the clock of the sender",
+    Followed.UNKNOWN: "look at the log of velocity_mux",
 }
-"""What to do about a source that is not followed, by whether it waits for a zero."""
+"""What to do about a source that holds the base and is not followed."""
 SILENT_S = 1.5
 """A state that was received longer ago says nothing: the slowest one comes every 0.5 s."""
 HANGS = "its process hangs, or its timers stand still: look at its log, and restart it"
@@ -166,10 +168,10 @@ def velocity_mux(evidence: Evidence) -> list[Check]:
     state = evidence.on("velocity_mux/state").last
     if silent := _silent(evidence, "velocity_mux", "velocity_mux/state"):
         return [silent]
-    ignored = [source for source in state.sources if source.active and source.reason]
+    ignored = [source for source in state.sources if followed(source) in UNFOLLOWED]
     if ignored:
         told = f"{ignored[0].name} is not followed: {ignored[0].reason}"
-        return [fail("velocity_mux", told, UNFOLLOWED[ignored[0].reason.startswith("waiting")])]
+        return [fail("velocity_mux", told, UNFOLLOWED[followed(ignored[0])])]
     found = f"{state.active} drives" if state.active else "nobody drives"
     bad = [source.name for source in state.sources if source.refused]
     if bad:

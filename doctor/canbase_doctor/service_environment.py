@@ -9,6 +9,8 @@ import shlex
 from collections.abc import Iterable, Mapping
 from typing import Final
 
+from canbase_runtime.environment_file import variables
+
 _THEIRS: Final = ("ROS_", "RMW_", "CANBASE_", "FASTDDS_", "FASTRTPS_", "CYCLONEDDS_")
 """Whoever asks has no say in these: the services do not see his."""
 _OPERATOR: Final = "/canbase/operator"
@@ -22,11 +24,7 @@ def service_environment(own: Mapping[str, str], drop_ins: Iterable[str], env_fil
         if line.startswith("Environment="):
             pairs = shlex.split(line.removeprefix("Environment=").replace("%%", "%"))
             found |= dict(pair.split("=", 1) for pair in pairs if "=" in pair)
-    for line in (line.strip() for line in env_file.splitlines()):
-        name, equals, value = line.partition("=")
-        if equals and not line.startswith(("#", ";")):
-            found[name.strip()] = _unquoted(value.strip())
-    return found
+    return found | variables(env_file)
 
 
 def arguments(environment: Mapping[str, str]) -> tuple[str, ...]:
@@ -36,7 +34,3 @@ def arguments(environment: Mapping[str, str]) -> tuple[str, ...]:
     namespace = ("--namespace", words[place]) if place < len(words) else ()
     secured = environment.get("ROS_SECURITY_ENABLE") == "true"
     return (*namespace, *(("--ros-args", "--enclave", _OPERATOR) if secured else ()))
-
-
-def _unquoted(value: str) -> str:
-    return value[1:-1] if len(value) > 1 and value[0] == value[-1] and value[0] in "\"'" else value

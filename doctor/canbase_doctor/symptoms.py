@@ -1,4 +1,4 @@
-"""Eight ways in which an action on a robot goes wrong, as people see them. What to look at then: symptom_walk.py."""
+"""Eight ways in which an action on a robot goes wrong, as people see them. What to look at then: symptom_checks.py."""
 
 from __future__ import annotations
 

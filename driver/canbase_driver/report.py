@@ -53,7 +53,7 @@ def snapshot_of(told: Told, base: Base, now_s: float) -> DriverSnapshot:
         watchdog_frames_dropped=counters.frames_dropped,
         watchdog_bus_errors=counters.bus_errors,
         watchdog_pause_max_s=counters.pause_max_ms / 1000.0,
-        standstill=drives.stand(now_s),
+        standstill=drives.are_proven_to_stand(now_s),
         standstill_assumed=drives.assumed(now_s),
         command_age_s=age_s(now_s, told.command.received_at),
         command_fresh=told.command.is_fresh(now_s),

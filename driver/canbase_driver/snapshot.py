@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from enum import Enum
 
 from canbase_driver.causes import Cause
+from canbase_driver.cia301.nmt import NmtState
+from canbase_driver.cia402 import DriveState
 from canbase_runtime.driver_state import DriverState
 
 Covariance = tuple[float, ...]
@@ -34,10 +36,10 @@ class DriveSnapshot:
     """CANopen node id, 1..127."""
     axis: int
     """Axis in that node, 0..7."""
-    nmt_state: str
-    """CiA 301: initialising, pre-operational, operational, stopped, unknown."""
-    state: str
-    """CiA 402 state in words: "operation enabled", "fault", …"""
+    nmt_state: NmtState | None
+    """None: unknown."""
+    state: DriveState | None
+    """None: unknown, its statusword shows no state or none came yet."""
     statusword: int
     """6041h as received, u16."""
     error_code: int
@@ -78,6 +80,16 @@ class DriveSnapshot:
     """Why its last boot failed; empty: it did not."""
     configured: bool = True
     """Its boot has ended well: what it says of itself is set and read back."""
+
+    @property
+    def nmt_text(self) -> str:
+        """Its NMT state in the words of CiA 301, or unknown."""
+        return "unknown" if self.nmt_state is None else self.nmt_state.text
+
+    @property
+    def state_text(self) -> str:
+        """Its state in the words of CiA 402, or unknown."""
+        return "unknown" if self.state is None else self.state.text
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,8 +20,8 @@ WRONG_INPUT: Final = 2
 """Exit code: the command line or robot.yaml has to be changed; typer uses it for the command line too."""
 
 
-def load_config(path: Path | None) -> Loaded:
-    """The robot in `path`, or the bench sample. Prints warnings; what is wrong in the file too, and exits with 2."""
+def load_config(path: Path | None, *, quiet: bool = False) -> Loaded:
+    """The robot in `path`, or the bench sample. Prints warnings unless `quiet`; problems always, and exits with 2."""
     from canbase_config.errors import ConfigError
     from canbase_config.load import load_robot, sample
 
@@ -32,9 +32,14 @@ def load_config(path: Path | None) -> Loaded:
         typer.echo(str(error), err=True)
         count = len(error.problems)
         fail(f"{path} cannot be used: {count} problem{'s' if count > 1 else ''}", WRONG_INPUT)
-    for warning in loaded.warnings:
-        typer.secho(f"warning: {warning}", err=True, fg=typer.colors.YELLOW, color=colour())
+    for warning in () if quiet else loaded.warnings:
+        warn(str(warning))
     return loaded
+
+
+def warn(text: str) -> None:
+    """A line on stderr; the command goes on."""
+    typer.secho(f"warning: {text}", err=True, fg=typer.colors.YELLOW, color=colour())
 
 
 def fail(text: str, code: int) -> NoReturn:

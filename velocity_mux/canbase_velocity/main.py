@@ -22,8 +22,8 @@ from canbase_config.stopping import standstill_s
 from canbase_runtime.latch_file import LatchFile, LatchKeeper, hold, latch_folder
 from canbase_runtime.output import never_wait
 from canbase_runtime.private_process import guard_keys
+from canbase_runtime.sd_notify import Service
 from canbase_runtime.single_instance import TakenError, take
-from canbase_runtime.systemd import Service
 from canbase_velocity.filter_node import FilterNode
 from canbase_velocity.mux_node import MuxNode
 

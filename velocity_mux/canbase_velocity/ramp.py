@@ -1,6 +1,6 @@
 """How the driver goes from one velocity to another: its ramps with their jerk limit, written a second time on purpose.
 
-This package does not know the driver; a test compares both. Rules, as in canbase_driver/limits.py:
+This package does not know the driver; a test compares both. Rules, as in canbase_driver/motion/limiter.py:
 1. The velocity moves along the straight line to the order in the (v, w) plane; the slower axis sets the time. Only
    braking does not wait for a turn that grows.
 2. An acceleration away from the order ends at once. A reversal brakes to an exact zero first.

@@ -25,12 +25,18 @@ from canbase_sim.world.trace import Trace
 log = logging.getLogger(__name__)
 
 
-def run(robot: Robot, control: str | None = None) -> int:
+def run(robot: Robot, control: str | None = None, *, quiet: bool = False) -> int:
     """Simulate the drives of `robot` on its bus, with the control socket at `control` (default `control_path(robot)`).
 
+    `quiet`: warnings alone are logged.
     Returns the exit code: 0 after SIGINT or SIGTERM, 1 when the bus or the control socket cannot be used.
     """
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s sim %(levelname)s %(message)s", stream=sys.stderr)
+    logging.basicConfig(
+        level=logging.WARNING if quiet else logging.INFO,
+        format="%(asctime)s.%(msecs)03d %(levelname)s canbase.sim: %(message)s",
+        datefmt="%Y-%m-%d %H:%M:%S",
+        stream=sys.stderr,
+    )
     logging.getLogger("canopen").setLevel(logging.WARNING)  # it tells of every SDO
     path = Path(control) if control else control_path(robot)
     with _stop_signals() as stop:

@@ -12,7 +12,7 @@ from canbase.action import DriveDistance
 from canbase.msg import DriverStatus
 from rclpy.action import ActionClient
 
-from canbase_action_server.client import DriveClient, NoResponseError, NoServerError, ServerLostError
+from canbase_action_server.client import DriveClient, NoResponseError, NoServerError, RejectedError, ServerLostError
 from ros.conftest import MakeRobot, Spawn
 from support.fake_base import FakeBase, server_code
 from support.ros_harness import Process, TestNode
@@ -76,6 +76,48 @@ def test_exit_codes_tell_the_ends_apart(stage: Stage) -> None:
     stage.base.driver.state = DriverStatus.LATCHED
     assert stage.exit_code(aborted) == 4
     assert "DRIVE_FAULT" in aborted.log()
+
+
+def test_a_rejected_goal_names_the_limit_and_its_key(stage: Stage) -> None:
+    for words, reason in (
+        (("drive", "100"), "|distance_m| is 100, outside 0.01 to 5.0 (action.max_distance_m of robot.yaml)"),
+        (("drive", "1", "--speed", "9"), "(action.max_speed_mps of robot.yaml)"),
+        (("rotate", "1", "--speed", "99"), "(action.max_speed_radps of robot.yaml)"),
+    ):
+        goal = stage.spawn([*CANBASE, *words])
+        assert stage.exit_code(goal) == 5
+        assert goal.log().strip().endswith(reason), goal.log()
+    with pytest.raises(RejectedError) as told:
+        stage.client.send(0.1, 0.3 + 9.0)
+    assert told.value.reason is not None
+    assert "action.max_speed_mps" in told.value.reason
+
+
+REASONLESS_SERVER = """
+import rclpy
+from canbase.action import DriveDistance
+from rclpy.action import ActionServer, GoalResponse
+rclpy.init()
+node = rclpy.create_node("reasonless")
+server = ActionServer(
+    node, DriveDistance, "drive_distance", lambda handle: DriveDistance.Result(),
+    goal_callback=lambda goal: GoalResponse.REJECT,
+)
+rclpy.spin(node)
+"""
+
+
+def test_a_server_that_gives_no_reason_is_asked_for_it_no_longer_than_a_second(
+    test_node: TestNode, spawn: Spawn
+) -> None:
+    spawn(REASONLESS_SERVER)
+    client = DriveClient(test_node.node, test_node.executor)
+    client.wait_for_server(20.0)
+    sent_s = time.monotonic()
+    with pytest.raises(RejectedError, match="the log of its server says why") as told:
+        client.send(1.0, 0.2)
+    assert told.value.reason is None
+    assert time.monotonic() - sent_s < 3.0
 
 
 def test_ctrl_c_cancels_and_waits_until_the_base_stands(stage: Stage) -> None:

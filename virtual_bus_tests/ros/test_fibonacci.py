@@ -52,7 +52,7 @@ def test_a_learner_sees_a_goal_succeed_fail_be_canceled_and_be_rejected(test_nod
     assert too_far is not None
     assert (too_far.status, too_far.sequence[-1]) == (Status.ABORTED, 1836311903)
     for order in (0, -1, 1001):
-        with pytest.raises(RejectedError):
+        with pytest.raises(RejectedError, match=f"rejects the goal: {refusal(order)}"):
             client.send(order)
     server.interrupt()
     assert server.wait(5.0) == 0

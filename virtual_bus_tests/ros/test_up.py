@@ -80,6 +80,19 @@ def test_a_stop_signal_while_the_parts_still_start_ends_it_well() -> None:
         assert "stopping the robot" in up.log()
 
 
+@pytest.mark.parametrize("options", [(), ("-v",)])
+def test_it_says_when_the_robot_is_ready_and_shows_the_simulator_when_asked(options: tuple[str, ...]) -> None:
+    with own_domain() as domain, robot_on(domain, start=False) as robot:
+        up = robot.command("up", "--config", str(robot.config), *options)
+        robot.node.wait_for(lambda: "canbase: READY after" in up.log(), 40.0, "READY")
+        drive = robot.command("drive", "0.05")  # the first thing that it names
+        assert robot.exit_code(drive, 20.0) == 0, drive.log()
+        up.interrupt()
+        assert robot.exit_code(up, END_S) == 0, up.log()
+        assert "`canbase drive 0.5`, `canbase monitor`" in up.log()
+        assert ("canbase.sim:" in up.log()) is bool(options)
+
+
 def test_no_part_imports_from_the_folder_in_which_it_was_started(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

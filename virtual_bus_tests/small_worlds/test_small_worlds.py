@@ -6,13 +6,15 @@ import pytest
 
 from campaign.removed_safeguards import SAFEGUARDS
 from canbase_driver.cia301.sdo_client import Read, SdoAborted
+from canbase_watchdog.policy import TripCause
+from canbase_watchdog.watchdog import State as WatchdogState
 from small_worlds import canonical
 from small_worlds.copying import Snapshot
 from small_worlds.events import EVENTS, FAULT_EVENTS, OPERATOR_EVENTS
 from small_worlds.explore import Bounds, Search, Story, search, shortest
 from small_worlds.properties import PROPERTIES, Found, Properties, _Hold
 from small_worlds.teeth import TEETH, Tooth, bite
-from small_worlds.world import POINT_S, STARTS, SmallWorld
+from small_worlds.world import POINT_S, STARTS, STEP_S, SmallWorld
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(900)]
 
@@ -49,6 +51,36 @@ def test_a_base_without_force_may_roll_out_and_never_get_faster() -> None:
     assert not hold.is_broken(1.9, 12.2, coasting=True)
     assert hold.is_broken(1.95, 12.4, coasting=True)
     assert hold.is_broken(1.8, 12.6, coasting=False)
+
+
+def test_an_encoder_that_dies_as_the_emergency_stop_is_pressed_is_no_stand_and_the_next_order_finds_it() -> None:
+    """Loops of 20 Hz, 0.4 m/s: a drop to zero within a cycle is a possible one (docs/decisions/0058)."""
+    small = SmallWorld("driving")
+    base, driver, watchdog = small.world.drives.bench.base, small.world.driver, small.world.watchdog
+
+    def fastest_mps(seconds: float) -> float:
+        """Of both wheels. The driver says stand of none that rolls."""
+        clock, peak_mps = small.world.clock, 0.0
+        end = clock.now_s + seconds
+        while clock.now_s < end:
+            clock.run_until(clock.now_s + STEP_S)
+            rolls_mps = max(abs(base.v_left_mps), abs(base.v_right_mps))
+            peak_mps = max(peak_mps, rolls_mps)
+            assert driver.snapshot is None or not driver.snapshot.standstill or rolls_mps <= 0.1
+        return peak_mps
+
+    small.happens(EVENTS["drive 1 encoder dead"])
+    small.happens(EVENTS["button"])
+    assert fastest_mps(4.0) < 1.8
+    assert watchdog.core.status.state is WatchdogState.WATCHING
+    small.turn_stick()
+    small.happens(EVENTS["button"])
+    fastest_mps(0.5)
+    small.reset()
+    fastest_mps(1.0)
+    small.turn_stick()
+    assert fastest_mps(3.0) < 0.2
+    assert watchdog.core.status.verdict.cause is TripCause.MOTION_MISSING
 
 
 def test_a_world_at_rest_is_told_alike_at_any_time_and_another_one_differently() -> None:

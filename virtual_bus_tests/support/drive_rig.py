@@ -10,6 +10,7 @@ from typing import Any
 import can
 
 from canbase_config.derive import watchdog_config
+from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.core import DriverCore
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.runtime.black_box import Ring
@@ -160,7 +161,7 @@ class Driver:
         return self.order(
             Twist2D.ZERO,
             25.0,
-            lambda s: all(drive.nmt_state == "operational" for drive in s.drives) and s.odometry_valid,
+            lambda s: all(drive.nmt_state is NmtState.OPERATIONAL for drive in s.drives) and s.odometry_valid,
         )
 
     def reset(self, within_s: float = 0.0) -> None:

@@ -5,6 +5,8 @@ import math
 from typing import Any
 
 from canbase_driver.causes import Cause
+from canbase_driver.cia301.nmt import NmtState
+from canbase_driver.cia402 import DriveState
 from canbase_driver.snapshot import DriverSnapshot, DriveSnapshot, WatchdogView
 from canbase_runtime.driver_state import DriverState
 
@@ -12,8 +14,8 @@ LEFT = DriveSnapshot(
     joint="left_wheel_joint",
     node_id=1,
     axis=0,
-    nmt_state="operational",
-    state="operation enabled",
+    nmt_state=NmtState.OPERATIONAL,
+    state=DriveState.OPERATION_ENABLED,
     statusword=0x0637,
     error_code=0,
     error_text="",

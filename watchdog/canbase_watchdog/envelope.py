@@ -9,7 +9,7 @@ Rules
    velocity that grows or is reversed.
 4. Before the watchdog started anything within the limits may have been ordered.
 
-Pure; written apart from the driver's limits.py on purpose.
+Pure; written apart from the driver's motion/limiter.py on purpose.
 """
 
 from __future__ import annotations

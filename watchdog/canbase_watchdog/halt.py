@@ -5,7 +5,7 @@ its change: 5 s and more with a low jerk_mps3. Once zero alone was leased for `o
 and the setpoints of that moment are known. From there all wheels go to zero together: along the S-curve that a driver
 makes which has only begun to brake, RECEIVED_S later at most. One that had begun before is below it.
 
-Pure; written apart from the driver's limits.py on purpose.
+Pure; written apart from the driver's motion/limiter.py on purpose.
 """
 
 from __future__ import annotations

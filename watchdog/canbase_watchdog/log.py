@@ -28,7 +28,9 @@ def formatter(environment: Mapping[str, str], stderr: os.stat_result) -> logging
     """The one that fits to where stderr goes: a terminal may have inherited JOURNAL_STREAM (systemd.exec(5))."""
     if _is_journal(environment, stderr):
         return JournalFormatter("%(name)s: %(message)s")
-    return logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s")
+    lines = logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s")
+    lines.default_msec_format = "%s.%03d"  # as ROS writes it
+    return lines
 
 
 class Lines(logging.Handler):

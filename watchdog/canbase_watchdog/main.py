@@ -21,8 +21,8 @@ from canbase_watchdog.latch_file import Keeper
 from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
 from canbase_watchdog.log import Lines, formatter, never_wait
 from canbase_watchdog.loop import BusDeadError, Loop
-from canbase_watchdog.notify import notify
 from canbase_watchdog.relay import Relay, RelayError
+from canbase_watchdog.sd_notify import notify
 from canbase_watchdog.watchdog import Watchdog
 
 LISTEN_S = 0.16

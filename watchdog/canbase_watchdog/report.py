@@ -7,7 +7,7 @@ import logging
 
 from canbase_watchdog import policy
 from canbase_watchdog.bus_health import BusHealth
-from canbase_watchdog.notify import notify
+from canbase_watchdog.sd_notify import notify
 from canbase_watchdog.watchdog import Answer, State, Status, Watchdog
 
 COUNTERS_PERIOD_S = 10.0

@@ -94,7 +94,7 @@ def _say_what_happens_after_a_kill(rig: PoweredDrives, joint: str) -> None:
     if report is None or not report.stops_by_itself:
         typer.secho(CANNOT_STOP, fg=typer.colors.RED, bold=True, color=colour())
     else:
-        typer.echo(STOPS.format(report.self_stop))
+        typer.echo(STOPS.format(report.self_stop.text))
     typer.echo("hold w (forward) or s (backward); release stops; q ends")
 
 

@@ -15,6 +15,8 @@ from canbase_config.robot import Robot
 from canbase_config.stopping import standstill_s
 from canbase_driver.boot.pdo_mapping import configure_pdos
 from canbase_driver.boot.settings import (
+    SelfStopSet,
+    StopsBy,
     configure_motion,
     configure_self_stop,
     configure_sync,
@@ -60,8 +62,8 @@ class BootReport:
 
     node_id: int
     identity: Identity
-    self_stop: str
-    """What makes the drive stop by itself when nobody commands it, set and confirmed; empty: nothing."""
+    self_stop: SelfStopSet
+    """What makes the drive stop by itself when nobody commands it, set and confirmed."""
     notes: tuple[str, ...]
     changes: tuple[str, ...] = ()
     """Every object that had another value than wanted: the old one and the new one."""
@@ -69,7 +71,7 @@ class BootReport:
     @property
     def stops_by_itself(self) -> bool:
         """Whether something makes it stop by itself."""
-        return self.self_stop != ""
+        return self.self_stop.by is not StopsBy.NOTHING
 
 
 def boot(node_id: int, drives: tuple[Drive, ...], robot: Robot, settle_s: float = 0.0) -> Steps[BootReport]:

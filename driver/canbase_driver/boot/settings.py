@@ -5,6 +5,9 @@ Which of the objects exist, where and in which unit, is in the drive's profile. 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from enum import Enum
+
 from canbase_config.drive import Drive
 from canbase_config.object_map import MODE, MODE_DISPLAY, TARGET_VELOCITY, place
 from canbase_config.profile import Profile, SdoWrite
@@ -40,6 +43,25 @@ HEARTBEAT_PERIODS_MS = (10, 20, 25, 40, 50, 64, 80, 100, 125, 128, 150, 160, 200
 VALUE_REFUSED = (VALUE_INVALID, VALUE_TOO_HIGH, VALUE_TOO_LOW)
 
 
+class StopsBy(Enum):
+    """By what a drive stops itself when nobody commands it."""
+
+    NOTHING = "nothing"
+    WATCHDOG_HEARTBEAT = "heartbeat of the watchdog"
+    OWN_TIMEOUT = "the drive's own command timeout"
+
+
+@dataclass(frozen=True, slots=True)
+class SelfStopSet:
+    """What the boot set and read back. `text`: for people, with the objects; empty for NOTHING."""
+
+    by: StopsBy
+    text: str
+
+
+STOPS_BY_NOTHING = SelfStopSet(StopsBy.NOTHING, "")
+
+
 def configure_motion(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None]:
     """Mode, ramps, and no target: one of an earlier life would move the drive as soon as it is enabled."""
     kind, mode = drive.kind, drive.used_mode
@@ -54,8 +76,8 @@ def configure_motion(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None
     yield from _configure_ramps(node, drive, robot)
 
 
-def configure_self_stop(node: NodeAccess, drives: tuple[Drive, ...], robot: Robot) -> Steps[str]:
-    """What makes the drive stop by itself, in words; empty: nothing does that is confirmed."""
+def configure_self_stop(node: NodeAccess, drives: tuple[Drive, ...], robot: Robot) -> Steps[SelfStopSet]:
+    """Sets and reads back what makes the drive stop by itself."""
     kind, timeout_ms = drives[0].kind, round(1000 * robot.timeouts.drive_heartbeat_s)
     yield from _produce_heartbeat(node, timeout_ms)
     stops = yield from _watch_heartbeats(node, kind, timeout_ms)
@@ -71,7 +93,9 @@ def configure_self_stop(node: NodeAccess, drives: tuple[Drive, ...], robot: Robo
         reaction = write_at(drive, FAULT_REACTION_OPTION, options.fault_reaction_code)
         yield from node.set_if_present(reaction, options.fault_reaction)
     by_vendor = yield from _set_vendor_watchdog(node, kind, robot.timeouts.drive_heartbeat_s)
-    return "heartbeat of the watchdog (1016h, 6007h)" if stops else by_vendor
+    if stops:
+        return SelfStopSet(StopsBy.WATCHDOG_HEARTBEAT, "heartbeat of the watchdog (1016h, 6007h)")
+    return SelfStopSet(StopsBy.OWN_TIMEOUT, by_vendor) if by_vendor else STOPS_BY_NOTHING
 
 
 def configure_sync(node: NodeAccess, kind: Profile, counter: int | None) -> Steps[None]:

@@ -73,6 +73,10 @@ class Axis:
         """Fresh values are evidence that the wheel stands."""
         return self.age_s(now_s) <= self._feedback_s and self.stillness.stands(now_s)
 
+    def is_proven_to_stand(self, now_s: float) -> bool:
+        """The same, and it cannot be rolling with a dead encoder."""
+        return self.stands(now_s) and self.stillness.is_proven(now_s)
+
     def forget(self) -> None:
         """What was heard no longer counts: the drive restarted, or its bus did."""
         self._restarts += self.status_at > -math.inf

@@ -97,6 +97,10 @@ class Drives:
         """Measured, fresh, and evidence: no wheel turns."""
         return all(axis.stands(now_s) for axis in self.axes)
 
+    def are_proven_to_stand(self, now_s: float) -> bool:
+        """What motor_driver/status reports: no wheel turns, and none may be rolling with a dead encoder."""
+        return all(axis.is_proven_to_stand(now_s) for axis in self.axes)
+
     def rest(self, left_mps: float, right_mps: float) -> bool:
         """Nothing is ordered of any wheel, and these speeds of the rims order nothing either."""
         speeds = {"left": left_mps, "right": right_mps}
@@ -193,8 +197,8 @@ def _snapshot(node: CanopenNode, axis: Axis, robot: Robot, now_s: float) -> Driv
         joint=axis.drive.joint,
         node_id=node.node_id,
         axis=axis.drive.axis,
-        nmt_state=node.nmt_state.text if node.nmt_state is not None else "unknown",
-        state=axis.state.text if axis.state else "unknown",
+        nmt_state=node.nmt_state,
+        state=axis.state,
         statusword=axis.statusword,
         error_code=code,
         error_text=emcy_text(code, node.profile.emcy) if code else "",
@@ -204,7 +208,7 @@ def _snapshot(node: CanopenNode, axis: Axis, robot: Robot, now_s: float) -> Driv
         feedback_age_s=age_s(now_s, axis.fed_at),
         heartbeat_age_s=age_s(now_s, node.heartbeat_at),
         stops_by_itself=node.report is not None and node.report.stops_by_itself,
-        self_stop=node.report.self_stop if node.report else "",
+        self_stop=node.report.self_stop.text if node.report else "",
         warning=bool(axis.statusword & WARNING),
         internal_limit=bool(axis.statusword & INTERNAL_LIMIT),
         voltage_v=measured.voltage_v,

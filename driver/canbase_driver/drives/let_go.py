@@ -22,7 +22,7 @@ LIFE_M, LIFE_COUNTS = 0.001, 2
 """Places that are nearer to each other than this may be jitter; whichever is more. Others are a sign of life."""
 NOISE_SHARE = 0.01
 """Of the rated torque: less moves no wheel."""
-LONGEST_STEP_S = 0.1
+LONGEST_SAMPLE_GAP_S = 0.1
 """Time between two samples counts for so long at most."""
 RETURN_S = 1.0
 """From the power off until all drives are enabled again; then one that is not is a failure."""
@@ -51,7 +51,7 @@ class Push:
         self, travel_m: float, share: float | None, ordered_mps: float, has_torque: bool, now_s: float
     ) -> None:
         """Encoder and torque of one SYNC, and what an enabled drive was ordered before it."""
-        elapsed_s, self._at = min(max(now_s - self._at, 0.0), LONGEST_STEP_S), now_s
+        elapsed_s, self._at = min(max(now_s - self._at, 0.0), LONGEST_SAMPLE_GAP_S), now_s
         self._tells = self._tells or bool(share)
         self.share = share if self._tells else None
         torque = 1.0 if self.share is None else abs(self.share)
@@ -81,7 +81,7 @@ class Wheel(Protocol):
         """Of its drive."""
 
 
-class Phase(Enum):
+class LetGoPhase(Enum):
     """See the drawing at the head of this file."""
 
     HELD = "held"
@@ -96,13 +96,13 @@ class LetGo:
         self._proves = robot.watchdog.stand_proof == "let_go"
         self._still_mps = robot.watchdog.motion_tolerance_mps
         self._disable_s = min(robot.watchdog.stand_answer_s, robot.timeouts.feedback_s) / 2.0
-        self._phase = Phase.HELD
+        self._phase = LetGoPhase.HELD
         self._since = -math.inf
 
     @property
     def active(self) -> bool:
         """Nothing is to be ordered."""
-        return self._phase is not Phase.HELD
+        return self._phase is not LetGoPhase.HELD
 
     def excuses(self, now_s: float) -> bool:
         """A drive that is not enabled is so because of this."""
@@ -110,16 +110,20 @@ class LetGo:
 
     def end(self) -> None:
         """Something else decides about the power."""
-        self._phase = Phase.HELD
+        self._phase = LetGoPhase.HELD
 
     def step(self, wheels: Sequence[Wheel], rests: bool, now_s: float) -> None:
         """One cycle in which the drives are to be enabled; `rests`: zero is ordered of all wheels."""
-        if self._phase is Phase.HELD and rests and self._is_due(wheels):
-            self._phase, self._since = Phase.LETTING_GO, now_s
-        elif self._phase is Phase.LETTING_GO and all(wheel.state and not wheel.state.has_torque for wheel in wheels):
-            self._phase = Phase.RETURNING
-        elif self._phase is Phase.RETURNING and all(wheel.state is DriveState.OPERATION_ENABLED for wheel in wheels):
-            self._phase = Phase.HELD
+        if self._phase is LetGoPhase.HELD and rests and self._is_due(wheels):
+            self._phase, self._since = LetGoPhase.LETTING_GO, now_s
+        elif self._phase is LetGoPhase.LETTING_GO and all(
+            wheel.state and not wheel.state.has_torque for wheel in wheels
+        ):
+            self._phase = LetGoPhase.RETURNING
+        elif self._phase is LetGoPhase.RETURNING and all(
+            wheel.state is DriveState.OPERATION_ENABLED for wheel in wheels
+        ):
+            self._phase = LetGoPhase.HELD
 
     def goal(self, now_s: float) -> PowerGoal:
         """What the drives are told: disable operation, and where that has no effect, disable voltage.
@@ -127,7 +131,7 @@ class LetGo:
         A wheel that a threshold releases at that moment turns, and its drive brakes it first (605Ch). None may have
         power beside one without it for as long as feedback_s: for the watchdog that is a drive that has failed.
         """
-        if self._phase is not Phase.LETTING_GO:
+        if self._phase is not LetGoPhase.LETTING_GO:
             return PowerGoal.ON
         return PowerGoal.LET_GO if now_s - self._since <= self._disable_s else PowerGoal.READY
 

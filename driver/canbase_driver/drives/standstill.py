@@ -68,7 +68,7 @@ class Stillness:
         self._stopping = StoppingDistance(limits.noise_mps, self._grain_m)
         self._lie = ""
         """Why the sensors are no evidence, whatever they show."""
-        self._sudden = ""
+        self._sudden, self._sudden_since = "", math.inf
         """The wheel stopped within less than it can."""
 
     @property
@@ -120,6 +120,7 @@ class Stillness:
         shown_mps = 0.0 if first else min(speed_mps, step_m / max(elapsed_s, SHORTEST_S))
         self._stopping.on_sample(shown_mps, travel_m, self._hardest_mps2())
         self._sudden = self._too_soon() if self._quiet and self._stopping.missing_m else ""
+        self._sudden_since = min(self._sudden_since, now_s) if self._sudden else math.inf
 
     def _hardest_mps2(self) -> float:
         """The hardest braking since the last sample: by its drive, or without power; it may have been either."""
@@ -148,6 +149,10 @@ class Stillness:
     def stands(self, now_s: float) -> bool:
         """The last sample says so, and is evidence; or nothing has driven it for longer than it rolls."""
         return self._quiet and (not self.doubt or self.rolled_out(now_s))
+
+    def is_proven(self, now_s: float) -> bool:
+        """It stands, and a wheel that stopped within less than it can has had the time to roll out, power or not."""
+        return self.stands(now_s) and (not self._sudden or now_s - self._sudden_since >= self._limits.coasting_s)
 
     def rolled_out(self, now_s: float) -> bool:
         """Its power has been off, by its own statusword, for longer than a wheel rolls on a level floor."""

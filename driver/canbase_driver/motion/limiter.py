@@ -18,7 +18,7 @@ from typing import ClassVar
 from canbase_config.robot import Limits
 from canbase_driver.motion.kinematics import Twist2D
 
-MAX_STEP_S = 0.1
+LONGEST_RAMP_STEP_S = 0.1
 """A step after a longer gap counts as this long [s]: a late cycle must not become a jump of the setpoint."""
 NEGLIGIBLE_MPS = 1e-9
 """A change of the linear velocity below this needs no jerk limit [m/s]."""
@@ -84,7 +84,7 @@ class Limiter:
         goal = Twist2D.ZERO if emergency else _waypoint(current.twist, self.limit(target))
         if dt_s == 0.0:
             return current
-        return self._advance(current, goal, min(dt_s, MAX_STEP_S), emergency)
+        return self._advance(current, goal, min(dt_s, LONGEST_RAMP_STEP_S), emergency)
 
     def _advance(self, current: MotionState, goal: Twist2D, dt_s: float, emergency: bool) -> MotionState:
         """`dt_s` along the straight line to `goal`, on which the linear velocity does not change its sign."""

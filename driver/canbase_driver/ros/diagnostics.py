@@ -12,6 +12,8 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from canbase_driver.causes import Cause
+from canbase_driver.cia301.nmt import NmtState
+from canbase_driver.cia402 import DriveState
 from canbase_driver.snapshot import DriverSnapshot, DriveSnapshot, WatchdogView
 from canbase_runtime.driver_state import DriverState
 
@@ -19,6 +21,7 @@ _LOOP_COUNTERS = ("commands_refused", "overruns", "travel_losses")
 _BUS_COUNTERS = ("frames_dropped", "send_errors", "receive_errors", "error_frames", "bus_failures")
 _WATCHDOG_COUNTERS = ("trips", "leases_refused", "frames_dropped", "bus_errors")
 _TRANSIENT = {DriverState.BOOTING, DriverState.DISARMED, DriverState.ENABLING, DriverState.STOPPING}
+_FAULTS = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
 _RUNGS = ("none", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld", "NMT reset node")
 _PAUSE_WARNING_S = 0.05
 """A pause of the watchdog's loop that is worth a look: ten of its turns."""
@@ -50,7 +53,7 @@ def unguarded(snapshot: DriverSnapshot) -> tuple[str, ...]:
         f"{drive.joint} (node {drive.node_id}) WILL NOT STOP BY ITSELF when this computer or the cable fails "
         f"({'; '.join(drive.boot_notes) or '1016h, 6007h not set'}): only STO stops it then"
         for drive in snapshot.drives
-        if drive.configured and drive.nmt_state == "operational" and not drive.stops_by_itself
+        if drive.configured and drive.nmt_state is NmtState.OPERATIONAL and not drive.stops_by_itself
     )
 
 
@@ -149,8 +152,8 @@ def _counters(snapshot: DriverSnapshot, names: Iterable[str]) -> dict[str, int]:
 def _drive_entry(drive: DriveSnapshot, state: DriverState, robot: str) -> DiagnosticStatus:
     level, sentence = _drive_state(drive, state)
     values = {
-        "NMT state": drive.nmt_state,
-        "CiA 402 state": drive.state,
+        "NMT state": drive.nmt_text,
+        "CiA 402 state": drive.state_text,
         "statusword": f"{drive.statusword:04X}h",
         "error code": f"{drive.error_code:04X}h",
         "target [rad/s]": drive.target_radps,
@@ -171,17 +174,18 @@ def _drive_entry(drive: DriveSnapshot, state: DriverState, robot: str) -> Diagno
 
 
 def _drive_state(drive: DriveSnapshot, state: DriverState) -> tuple[bytes, str]:
-    if drive.error_code or "fault" in drive.state:
-        return DiagnosticStatus.ERROR, f"Error {drive.error_code:04X}h: {drive.error_text or drive.state}."
+    if drive.error_code or drive.state in _FAULTS:
+        return DiagnosticStatus.ERROR, f"Error {drive.error_code:04X}h: {drive.error_text or drive.state_text}."
+    words = drive.state_text.capitalize()
     if drive.boot_problem:
         return DiagnosticStatus.ERROR, f"Its last boot failed: {drive.boot_problem.rstrip('.')}."
     if math.isnan(drive.feedback_age_s):
         return DiagnosticStatus.ERROR, f"No feedback yet; its heartbeat was {_heard(drive.heartbeat_age_s)}."
     if state is DriverState.ENABLED and not drive.stops_by_itself:
-        return DiagnosticStatus.WARN, f"{drive.state.capitalize()}, but it would not stop by itself without us (1016h)."
+        return DiagnosticStatus.WARN, f"{words}, but it would not stop by itself without us (1016h)."
     if drive.warning:
-        return DiagnosticStatus.WARN, f"{drive.state.capitalize()}, but it warns of something (statusword bit 7)."
-    return DiagnosticStatus.OK, f"{drive.state.capitalize()}, {drive.nmt_state}."
+        return DiagnosticStatus.WARN, f"{words}, but it warns of something (statusword bit 7)."
+    return DiagnosticStatus.OK, f"{words}, {drive.nmt_text}."
 
 
 def _measured(drive: DriveSnapshot) -> dict[str, float]:

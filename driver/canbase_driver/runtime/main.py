@@ -35,8 +35,8 @@ from canbase_runtime.latch_file import LatchFile, LatchKeeper, hold, latch_folde
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.output import never_wait
 from canbase_runtime.private_process import guard_keys
+from canbase_runtime.sd_notify import Service
 from canbase_runtime.single_instance import TakenError, bus_name, take
-from canbase_runtime.systemd import Service
 
 WAKE_S = 0.02
 """So long an outcome of the control thread may wait for the next message before it is answered."""

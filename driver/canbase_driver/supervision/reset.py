@@ -25,7 +25,7 @@ FAULT_TRIES = 3
 """So many edges, then the reset has failed; a cause that stands is not hammered at."""
 
 
-class Phase(Enum):
+class ResetPhase(Enum):
     """Where the reset is, in this order; without a fault the edges are left out."""
 
     WATCHDOG = "waiting for the watchdog"
@@ -62,12 +62,12 @@ REFUSALS: tuple[Callable[[Situation], str], ...] = (
 )
 """Why a reset may not even begin. A drive that is not heard cannot be seen to stand; it is waited for instead."""
 
-BREAKS: dict[Phase, tuple[Callable[[Situation], str], ...]] = {
-    Phase.WATCHDOG: _BUS_OR_COMMAND,
-    Phase.DRIVES: _BUS_OR_COMMAND + _WATCHDOG,
-    Phase.EDGE_LOW: _BUS_OR_COMMAND + _WATCHDOG + _DRIVES,
-    Phase.EDGE_HIGH: _BUS_OR_COMMAND + _WATCHDOG + _DRIVES,
-    Phase.FAULTS: _BUS_OR_COMMAND + _WATCHDOG + _DRIVES,
+BREAKS: dict[ResetPhase, tuple[Callable[[Situation], str], ...]] = {
+    ResetPhase.WATCHDOG: _BUS_OR_COMMAND,
+    ResetPhase.DRIVES: _BUS_OR_COMMAND + _WATCHDOG,
+    ResetPhase.EDGE_LOW: _BUS_OR_COMMAND + _WATCHDOG + _DRIVES,
+    ResetPhase.EDGE_HIGH: _BUS_OR_COMMAND + _WATCHDOG + _DRIVES,
+    ResetPhase.FAULTS: _BUS_OR_COMMAND + _WATCHDOG + _DRIVES,
 }
 """What ends a reset in each phase: what an earlier phase has found to be well must stay so."""
 
@@ -89,7 +89,7 @@ class Reset:
         `boot_s`: how long it waits for drives that boot [s] (timeouts.boot_s).
         """
         self._boot_s = boot_s
-        self.phase = Phase.WATCHDOG
+        self.phase = ResetPhase.WATCHDOG
         self._edge_s = max(EDGE_S, FAULT_RESET_CYCLES * cycle_s)
         self._since_s = now_s
         self._tries_left = FAULT_TRIES
@@ -97,7 +97,7 @@ class Reset:
     @property
     def fault_reset_bit(self) -> bool:
         """Bit 7 of the controlword of the drives in fault, in this cycle."""
-        return self.phase is Phase.EDGE_HIGH
+        return self.phase is ResetPhase.EDGE_HIGH
 
     def step(self, situation: Situation, answer: int | None, now_s: float) -> Outcome | None:
         """Judge the situation and move on; the outcome when it has ended.
@@ -113,7 +113,7 @@ class Reset:
         if answer is not None and answer not in ACCEPTED:
             return Outcome(False, f"the watchdog refused: {ANSWERS.get(answer, f'answer {answer}')}")
         if answer is not None and situation.watchdog is WatchdogView.OK:
-            self._go(Phase.DRIVES, now_s)
+            self._go(ResetPhase.DRIVES, now_s)
         elif now_s - self._since_s > WATCHDOG_TIMEOUT_S:
             detail = situation.watchdog_detail or "no answer"
             return Outcome(False, f"the watchdog is not ready after {WATCHDOG_TIMEOUT_S} s ({detail}); reset again")
@@ -121,14 +121,14 @@ class Reset:
 
     def _drives(self, situation: Situation, _answer: int | None, now_s: float) -> Outcome | None:
         if not situation.unready:
-            self._go(Phase.EDGE_LOW if situation.fault else Phase.FAULTS, now_s)
+            self._go(ResetPhase.EDGE_LOW if situation.fault else ResetPhase.FAULTS, now_s)
         elif now_s - self._since_s > self._boot_s:
             return Outcome(False, f"{situation.unready}; reset again once that is cured")
         return None
 
     def _edge(self, _situation: Situation, _answer: int | None, now_s: float) -> Outcome | None:
         if now_s - self._since_s >= self._edge_s:
-            self._go(Phase.EDGE_HIGH if self.phase is Phase.EDGE_LOW else Phase.FAULTS, now_s)
+            self._go(ResetPhase.EDGE_HIGH if self.phase is ResetPhase.EDGE_LOW else ResetPhase.FAULTS, now_s)
         return None
 
     def _faults(self, situation: Situation, _answer: int | None, now_s: float) -> Outcome | None:
@@ -138,19 +138,19 @@ class Reset:
             self._tries_left -= 1
             if not self._tries_left:
                 return Outcome(False, f"{situation.fault}: it does not clear; remove its cause, then reset again")
-            self._go(Phase.EDGE_LOW, now_s)
+            self._go(ResetPhase.EDGE_LOW, now_s)
         return None
 
-    def _go(self, phase: Phase, now_s: float) -> None:
+    def _go(self, phase: ResetPhase, now_s: float) -> None:
         self.phase, self._since_s = phase, now_s
 
 
-RULES: dict[Phase, Callable[[Reset, Situation, int | None, float], Outcome | None]] = {
-    Phase.WATCHDOG: Reset._watchdog,
-    Phase.DRIVES: Reset._drives,
-    Phase.EDGE_LOW: Reset._edge,
-    Phase.EDGE_HIGH: Reset._edge,
-    Phase.FAULTS: Reset._faults,
+RULES: dict[ResetPhase, Callable[[Reset, Situation, int | None, float], Outcome | None]] = {
+    ResetPhase.WATCHDOG: Reset._watchdog,
+    ResetPhase.DRIVES: Reset._drives,
+    ResetPhase.EDGE_LOW: Reset._edge,
+    ResetPhase.EDGE_HIGH: Reset._edge,
+    ResetPhase.FAULTS: Reset._faults,
 }
 """What is decided in each phase."""
 

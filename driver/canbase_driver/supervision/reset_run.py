@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from canbase_driver.cia301.frame import Frame
-from canbase_driver.supervision.reset import Outcome, Phase, Reset, refusal
+from canbase_driver.supervision.reset import Outcome, Reset, ResetPhase, refusal
 from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.watchdog_link import WatchdogLink
 
@@ -54,7 +54,7 @@ class ResetRun:
         if pause_s > STOOD_STILL_S:
             return [], Outcome(False, f"broken off: motor_driver stood still for {pause_s:.1f} s; reset again")
         outcome = self._sequence.step(situation, self._watchdog.answer(), now_s)
-        asks = outcome is None and self._sequence.phase is Phase.WATCHDOG
+        asks = outcome is None and self._sequence.phase is ResetPhase.WATCHDOG
         return [self._request] if asks else [], outcome
 
     def end(self, outcome: Outcome) -> None:

@@ -43,7 +43,7 @@ CAUSES = {
     14: "base moves otherwise than ordered",
     15: "setpoint missing",
     16: "two drives with one node id",
-    17: "power at a stand that nothing proves",
+    17: "power at an unproven standstill",
     18: "boot-up of an enabled drive",
     20: "ended while a drive had power",
     21: "record of its last trip unusable",

@@ -7,7 +7,7 @@ import pytest
 
 from canbase_action_server.along_track import Pose
 from canbase_action_server.inputs import Odometry
-from canbase_action_server.limits import profile_limits
+from canbase_action_server.motion_limits import profile_limits
 from canbase_action_server.straight import STEERING_RADPM, StraightMotion
 from support.action_plant import Plant, bench_robot
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from canbase_action_server.along_track import Pose
 from canbase_action_server.goal_request import RotateRequest
 from canbase_action_server.inputs import Odometry
-from canbase_action_server.limits import lever_m, turn_limits
+from canbase_action_server.motion_limits import lever_m, turn_limits
 from canbase_action_server.outcome import ErrorCode
 from canbase_action_server.turn import TurnMotion
 from support.action_plant import Plant, Story, bench_robot, rotate

@@ -110,6 +110,25 @@ def test_an_encoder_that_is_lost_at_the_end_of_a_stop_is_no_stand(speed: float, 
     assert seen.end_mps == 0.0
 
 
+@pytest.mark.parametrize("speed", [0.1, 0.15, 0.2, 0.25])
+def test_an_encoder_that_is_lost_as_the_order_ends_is_no_stand_for_as_long_as_the_wheel_rolls(speed: float) -> None:
+    """The emergency stop, at 2 m/s²: the order is gone before any rule has its time (docs/decisions/0058)."""
+    world = World()
+    world.drive(Twist2D(speed, 0.0), 1.5)
+    lose(world)
+    world.command = Twist2D.ZERO
+    said, peak_mps = [], 0.0
+    for _ in range(round(4.0 / STEP_S)):
+        world.run(STEP_S)
+        rolls_mps = abs(world.truth.v_left_mps)
+        peak_mps = max(peak_mps, rolls_mps)
+        if world.snapshot.standstill and rolls_mps > 0.05:
+            said.append(rolls_mps)
+    assert said == []
+    assert peak_mps <= 1.6
+    assert world.truth.v_left_mps == 0.0
+
+
 def test_taps_add_up_until_the_watchdog_trips() -> None:
     world = World()
     causes = [tap(world, 0.06, 0.1, 1.0).cause]

@@ -105,7 +105,7 @@ def test_a_node_that_runs_before_it_is_booted_does_not_count(world: World) -> No
     world.core.on_frame(Frame(0x181, bytes.fromhex("37 06 00 00 10 00")), world.now_s)
     world.core.on_frame(Frame(0x281, bytes.fromhex("ff 00 00 00")), world.now_s)
     left = world.snapshot.drives[0]
-    assert (left.state, left.statusword, left.velocity_radps) == ("unknown", 0, 0.0)
+    assert (left.state, left.statusword, left.velocity_radps) == (None, 0, 0.0)
 
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])

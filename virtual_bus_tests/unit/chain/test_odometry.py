@@ -9,6 +9,7 @@ import pytest
 
 from canbase_config.robot import Robot
 from canbase_driver.cia301.frame import Frame
+from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.motion.odometry import Pose2D
 from canbase_runtime.driver_state import DriverState
@@ -37,7 +38,7 @@ def test_a_drive_that_was_switched_off_and_on_is_booted_again_and_waits_for_a_re
     after = world.snapshot
     assert after.state is DriverState.LATCHED
     assert after.odometry_valid
-    assert after.drives[0].nmt_state == "operational"
+    assert after.drives[0].nmt_state is NmtState.OPERATIONAL
     assert world.powered == [False, False]
     # its encoder starts anew elsewhere: no jump of the pose, and the way that nobody could measure is reported
     assert (after.x_m, after.y_m, after.yaw_rad) == pytest.approx((before.x_m, before.y_m, before.yaw_rad), abs=1e-3)

@@ -9,6 +9,7 @@ import pytest
 
 from canbase_config.derive import watchdog_config
 from canbase_config.robot import Robot
+from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
 from canbase_watchdog.watchdog import State as WatchdogState
@@ -248,7 +249,7 @@ def test_a_node_that_the_watchdog_keeps_pre_operational_is_not_booted_against_it
     released = world.now_s
     world.run(BOOTED_S)
     assert released + 0.1 < next(at for at, frame in world.log if frame.cob_id == 0x601 and at > start) < released + 0.3
-    assert world.snapshot.drives[0].nmt_state == "operational"
+    assert world.snapshot.drives[0].nmt_state is NmtState.OPERATIONAL
 
 
 def test_a_watchdog_that_forgets_its_trip_in_a_restart_leaves_the_latch_to_the_driver(world: World) -> None:

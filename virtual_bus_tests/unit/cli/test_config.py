@@ -36,7 +36,7 @@ def stand_in(monkeypatch: pytest.MonkeyPatch, module_name: str, exit_code: int =
     """Replaces `run` of a process; returns the list that its calls go to."""
     calls: list[Call] = []
 
-    def run(robot: Robot, argument: Any, *_options: Any) -> int:
+    def run(robot: Robot, argument: Any, *_options: Any, **_named: Any) -> int:
         calls.append((robot, argument))
         return exit_code
 

@@ -6,6 +6,7 @@ import io
 import math
 from dataclasses import replace
 
+import pytest
 from canbase.msg import (
     DriverStatus,
     DriveStatus,
@@ -19,7 +20,7 @@ from canbase.msg import (
 )
 from rich.console import Console
 
-from canbase_cli.monitor_picture import SILENT_S, Heard, Snapshot, line, picture
+from canbase_cli.monitor_picture import GOOD, SILENT_S, WARN, Heard, Snapshot, line, picture
 
 MUX = MuxState(
     active="joystick",
@@ -99,6 +100,21 @@ def test_a_held_stick_that_is_not_followed_is_told_in_the_headline_and_with_its_
     assert line(snapshot).startswith("joystick is not followed: waiting for zero  |")
     assert reason in drawn(snapshot)
     assert "The base cannot move: motor_driver is LATCHED" in drawn(snapshot)
+
+
+@pytest.mark.parametrize(
+    ("state", "style"),
+    [("operation enabled", GOOD), ("fault", WARN), ("unknown", WARN), ("Operation enabled", WARN), ("", WARN)],
+)
+def test_a_drive_is_good_in_one_known_state_alone(state: str, style: str) -> None:
+    """A word that CiA 402 does not have is no state at all."""
+    drives = [DriveStatus(joint="left_wheel", state=state)]
+    console = Console(file=io.StringIO(), width=140, force_terminal=True, color_system="standard")
+    status = DriverStatus(state=DriverStatus.LATCHED, cause="x", watchdog="gone", drives=drives)
+    segments = console.render(picture(replace(ALL, driver=Heard(status, 0.1))))
+    found = [segment.style for segment in segments if state and segment.text.strip() == state]
+    assert all(each == console.get_style(style) for each in found)
+    assert bool(found) is bool(state)
 
 
 def test_a_silent_node_is_told_as_silent_and_nothing_that_it_said_is_shown() -> None:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import pytest
 
 from canbase_commissioning.guide import CommissionError, Script
 from canbase_commissioning.powered_drives import PoweredDrives, RigError
-from canbase_commissioning.self_stop_test import HEARTBEAT, SILENCE, Outcome, get_ready, prove
+from canbase_commissioning.self_stop_test import HEARTBEAT, SILENCE, Outcome, get_ready, prove, watches_heartbeat
+from canbase_driver.boot.settings import STOPS_BY_NOTHING, SelfStopSet, StopsBy
 from canbase_driver.cia301.frame import Frame
 from canbase_sim.cia402.states import POWERED
 from canbase_sim.frame import Frame as BenchFrame
@@ -58,6 +62,20 @@ def test_a_drive_with_a_timeout_of_its_own_stops_and_needs_no_heartbeat(kind: st
     outcomes = world.guide(whole)
     assert [(o.trial, o.stopped, o.is_late) for o in outcomes] == [(SILENCE, True, late)] * 2
     assert_off(world)
+
+
+@pytest.mark.parametrize(
+    ("stop", "watches"),
+    [
+        (SelfStopSet(StopsBy.WATCHDOG_HEARTBEAT, "1016h watches the watchdog"), True),
+        (SelfStopSet(StopsBy.OWN_TIMEOUT, "heartbeat timeout of the maker (2000h:1)"), False),
+        (STOPS_BY_NOTHING, False),
+    ],
+)
+def test_the_second_trial_goes_by_what_the_boot_set_and_not_by_its_words(stop: SelfStopSet, watches: bool) -> None:
+    """A maker may call a command timeout of its own a heartbeat."""
+    rig = SimpleNamespace(report=lambda _joint: SimpleNamespace(self_stop=stop))
+    assert watches_heartbeat(cast(PoweredDrives, rig), "left") is watches
 
 
 @pytest.mark.parametrize("kind", NEVER)

@@ -19,6 +19,7 @@ from canbase_config.drive import Identity
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_driver.boot.sequence import BootReport
+from canbase_driver.boot.settings import STOPS_BY_NOTHING
 from support.crews import robot_with
 from support.guide_world import GuideWorld
 from support.sim_rig import robot
@@ -159,7 +160,7 @@ def test_robot_yaml_keeps_every_comment_and_line_that_is_not_changed(tmp_path: A
 
 
 def boot_of(node_id: int, **identity: int | None) -> BootReport:
-    return BootReport(node_id, Identity.model_validate(identity), "", (), ())
+    return BootReport(node_id, Identity.model_validate(identity), STOPS_BY_NOTHING, (), ())
 
 
 def test_who_the_drives_are_is_added_beside_comments_that_stay_with_their_section(tmp_path: Path) -> None:

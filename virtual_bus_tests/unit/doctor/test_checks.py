@@ -65,12 +65,19 @@ def test_a_sample_that_is_old_is_not_taken_for_what_is(topic: str, age_s: float,
     assert (exit_code(checks) != 0) is found
 
 
-@pytest.mark.parametrize(("reason", "advice"), [
-    ("waiting for zero (motor_driver is LATCHED)", "release the joystick"),
-    ("delayed by 1.20 s (limit 0.30 s)", "look at the network"),
+@pytest.mark.parametrize(("delay_s", "armed", "reason", "advice"), [
+    (math.nan, False, "waiting for zero (motor_driver is LATCHED)", "release the joystick"),
+    (0.1, False, "2 publishers on cmd_vel_joy (joy, other): give each a topic", "release the joystick"),
+    (1.2, True, "delayed by 1.20 s (limit 0.30 s)", "look at the network"),
+    (1.2, False, "waiting in a queue for 1.20 s", "look at the network"),
+    (-1.2, True, "stamped in the future by 1.20 s (limit 0.30 s)", "look at the network"),
+    (0.1, True, "a reason of a later version", "look at the log of velocity_mux"),
 ])  # fmt: skip
-def test_a_source_that_is_not_followed_is_named_with_what_to_do(reason: str, advice: str) -> None:
-    source = MuxSource(name="joystick", active=True, reason=reason)
+def test_a_source_that_is_not_followed_is_named_with_what_to_do(
+    delay_s: float, armed: bool, reason: str, advice: str
+) -> None:
+    """What to do goes by the numbers of the message: its sentence may be any."""
+    source = MuxSource(name="joystick", active=True, armed=armed, delay_s=delay_s, timeout_s=0.3, reason=reason)
     failed = first_failure(robot_checks(changed("velocity_mux/state", active="joystick", sources=[source])))
     assert failed is not None
     assert failed.found == f"joystick is not followed: {reason}"

@@ -81,7 +81,7 @@ def test_after_the_boot_nothing_differs_and_both_say_the_same_about_the_self_sto
         assert (found.settings.changes, found.pdos.changes, found.self_stop_part.changes) == ((), (), ())
         report = next(boot.report for boot in session.boots if boot.node_id == node_id)
         assert report is not None
-        assert found.self_stop == report.self_stop
+        assert found.self_stop == report.self_stop.text
 
 
 def test_what_somebody_changed_afterwards_is_named_with_both_values() -> None:

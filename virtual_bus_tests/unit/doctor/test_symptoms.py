@@ -25,7 +25,7 @@ from canbase_doctor.checks import INCONCLUSIVE, Verdict, exit_code, first_failur
 from canbase_doctor.evidence import Answers, Endpoint, Evidence, Goal, Heard, ServerProcess
 from canbase_doctor.overload import Overload
 from canbase_doctor.server_processes import server_processes, talks_by
-from canbase_doctor.symptom_walk import CHECKS, walk
+from canbase_doctor.symptom_checks import CHECKS, walk
 from canbase_doctor.symptoms import SYMPTOMS
 from canbase_runtime.driver_state import DriverState
 

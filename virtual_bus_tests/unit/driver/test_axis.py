@@ -91,6 +91,28 @@ def test_a_sample_from_before_a_silence_is_not_fresh() -> None:
     assert not left.has_fresh_sample(11.0)
 
 
+def drives(wheel: Axis, way_m: float, speed_mps: float, now_s: float) -> None:
+    wheel.on_status(status(ENABLED, round(way_m * COUNTS_PER_M)), now_s)
+    wheel.on_velocity(velocity(round(speed_mps * BITS_PER_MPS)), now_s)
+
+
+def test_an_enabled_wheel_that_loses_its_speed_at_once_stands_and_is_not_proven_to() -> None:
+    """0.2 m/s until 10.2 s. Then it met something hard, or its encoder died. Without fresh values nothing stands."""
+    left = axis()
+    for n in range(21):
+        drives(left, 0.002 * n, 0.2, 10.0 + 0.01 * n)
+    assert not left.stands(10.2)
+    for n in range(21, 60):
+        drives(left, 0.04, 0.0, 10.0 + 0.01 * n)
+    assert left.stands(10.59)
+    assert not left.is_proven_to_stand(10.59)
+    slow = axis()
+    for n in range(60):
+        drives(slow, 0.0, 0.0, 10.0 + 0.01 * n)
+    assert slow.is_proven_to_stand(10.59)
+    assert not slow.is_proven_to_stand(10.59 + 1.001 * bench_robot().timeouts.feedback_s)
+
+
 def test_a_gap_in_the_feedback_is_measured_in_time_so_nothing_of_the_way_is_lost() -> None:
     left = axis()
     left.on_status(status(ENABLED, 0), 10.0)

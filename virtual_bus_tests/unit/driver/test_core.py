@@ -33,7 +33,7 @@ def test_before_the_first_cycle_the_snapshot_says_that_nothing_is_known(core: Dr
     assert (snapshot.standstill, snapshot.odometry_valid, snapshot.command_fresh) == (False, False, False)
     assert math.isnan(snapshot.command_age_s)
     assert math.isnan(snapshot.watchdog_age_s)
-    assert [drive.state for drive in snapshot.drives] == ["unknown", "unknown"]
+    assert [drive.state for drive in snapshot.drives] == [None, None]
 
 
 def test_the_first_cycles_beat_and_ask_the_drives_who_they_are(core: DriverCore) -> None:

@@ -9,6 +9,8 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from canbase_driver.causes import Cause
+from canbase_driver.cia301.nmt import NmtState
+from canbase_driver.cia402 import DriveState
 from canbase_driver.ros.diagnostics import diagnostics_message, unguarded
 from canbase_driver.snapshot import WatchdogView
 from canbase_runtime.driver_state import DriverState
@@ -202,11 +204,11 @@ def test_a_watchdog_that_does_not_watch_is_an_error(changes: dict[str, Any], sen
     ("changes", "level", "sentence"),
     [
         (
-            {"state": "fault", "error_code": 0x8611, "error_text": "following error"},
+            {"state": DriveState.FAULT, "error_code": 0x8611, "error_text": "following error"},
             ERROR,
             "Error 8611h: following error.",
         ),
-        ({"state": "fault reaction active"}, ERROR, "Error 0000h: fault reaction active."),
+        ({"state": DriveState.FAULT_REACTION_ACTIVE}, ERROR, "Error 0000h: fault reaction active."),
         ({"error_code": 0x3210, "error_text": ""}, ERROR, "Error 3210h: operation enabled."),
         ({"feedback_age_s": math.nan}, ERROR, "No feedback yet; its heartbeat was heard 0.050 s ago."),
         (
@@ -214,7 +216,7 @@ def test_a_watchdog_that_does_not_watch_is_an_error(changes: dict[str, Any], sen
             WARN,
             "Operation enabled, but it would not stop by itself without us (1016h).",
         ),
-        ({"state": "switch on disabled"}, OK, "Switch on disabled, operational."),
+        ({"state": DriveState.SWITCH_ON_DISABLED}, OK, "Switch on disabled, operational."),
     ],
 )
 def test_what_a_drive_says(changes: dict[str, Any], level: bytes, sentence: str) -> None:
@@ -245,4 +247,4 @@ def test_a_drive_that_will_not_stop_by_itself_is_told_once_it_is_booted() -> Non
 @pytest.mark.parametrize("state", [DriverState.OFFLINE, DriverState.BOOTING])
 def test_before_that_nobody_knows(state: DriverState) -> None:
     assert unguarded(dataclasses.replace(with_left(stops_by_itself=False), state=state)) == ()
-    assert unguarded(with_left(stops_by_itself=False, nmt_state="pre-operational")) == ()
+    assert unguarded(with_left(stops_by_itself=False, nmt_state=NmtState.PRE_OPERATIONAL)) == ()

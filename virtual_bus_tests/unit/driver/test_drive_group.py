@@ -140,7 +140,7 @@ def test_a_snapshot_is_in_the_order_of_robot_yaml_and_in_rad() -> None:
     assert right.feedback_age_s == pytest.approx(0.05)
     assert math.isnan(right.heartbeat_age_s)
     assert math.isnan(left.feedback_age_s)
-    assert (left.nmt_state, left.state) == ("unknown", "unknown")
+    assert (left.nmt_state, left.state) == (None, None)
 
 
 def test_the_age_of_what_never_was_is_nan() -> None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canbase_driver.motion.kinematics import Twist2D, wheel_speeds
-from canbase_driver.motion.limiter import MAX_STEP_S, Limiter, MotionState
+from canbase_driver.motion.limiter import LONGEST_RAMP_STEP_S, Limiter, MotionState
 from support.limit_drives import DT_S, LIMITER, LIMITS, NO_JERK, TRACK_M, drive, linear, property_of_all, steps_until
 
 # Speed limits
@@ -84,7 +84,7 @@ def test_no_time_changes_nothing_and_time_does_not_run_backwards() -> None:
 
 def test_a_cycle_that_comes_a_second_late_is_a_step_of_a_tenth() -> None:
     start = MotionState(Twist2D(0.2, 0.0))
-    assert LIMITER.step(start, Twist2D(1.0, 0.0), 1.0) == LIMITER.step(start, Twist2D(1.0, 0.0), MAX_STEP_S)
+    assert LIMITER.step(start, Twist2D(1.0, 0.0), 1.0) == LIMITER.step(start, Twist2D(1.0, 0.0), LONGEST_RAMP_STEP_S)
 
 
 @property_of_all

@@ -141,9 +141,14 @@ def test_each_drive_is_in_the_status_with_every_field_in_the_order_of_the_config
     assert len(message.drives) == 2
     for sent, drive in zip(message.drives, (LEFT, RIGHT), strict=True):
         names = DriveStatus.get_fields_and_field_types()
-        known = dataclasses.asdict(drive)
+        known = dataclasses.asdict(drive) | {"state": "operation enabled", "nmt_state": "operational"}
         assert {name: getattr(sent, name) for name in names} == {name: known[name] for name in names}
         assert known.keys() - names.keys() == DIAGNOSTICS_ALONE
+
+
+def test_a_drive_whose_states_nobody_knows_is_told_as_unknown() -> None:
+    sent = messages.status_message(with_left(state=None, nmt_state=None), STAMP).drives[0]
+    assert (sent.state, sent.nmt_state) == ("unknown", "unknown")
 
 
 def test_before_anything_was_heard_the_ages_are_nan() -> None:

@@ -6,6 +6,7 @@ import itertools
 
 import pytest
 
+from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
 from canbase_sim.faults import apply
@@ -42,7 +43,7 @@ def test_a_drive_that_comes_back_is_booted_again_stays_disarmed_and_waits_for_a_
     assert max(steps) < FORWARD.linear_mps * 0.01 * 1.5 + 0.01
     assert world.truth.standing_s > 1.0
     assert world.core.state is DriverState.LATCHED
-    assert [drive.nmt_state for drive in world.snapshot.drives] == ["operational"] * 2
+    assert [drive.nmt_state for drive in world.snapshot.drives] == [NmtState.OPERATIONAL] * 2
     assert not any(world.powered)
     assert world.recovered()
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from canbase_driver.snapshot import WatchdogView
-from canbase_driver.supervision.reset import FAULT_TRIES, Outcome, Phase, Reset, refusal
+from canbase_driver.supervision.reset import FAULT_TRIES, Outcome, Reset, ResetPhase, refusal
 from canbase_driver.supervision.situation import Situation
 
 WELL = Situation()
@@ -24,7 +24,7 @@ class Story:
         self.cycle_s = cycle_s
         self.now_s = 10.0
         self.reset = Reset(self.now_s, cycle_s, boot_s=10.0)
-        self.phases: list[tuple[float, Phase]] = []
+        self.phases: list[tuple[float, ResetPhase]] = []
 
     def run(self, situation: Situation, seconds: float, answer: int | None = NOT_TRIPPED) -> Outcome | None:
         """Step until it ends, or for so long."""
@@ -36,12 +36,12 @@ class Story:
                 return outcome
         return None
 
-    def lasted(self, phase: Phase) -> float:
+    def lasted(self, phase: ResetPhase) -> float:
         """How long it stayed in a phase [s]."""
         return round(self.cycle_s * sum(each is phase for _, each in self.phases), 3)
 
 
-def in_phase(phase: Phase) -> Story:
+def in_phase(phase: ResetPhase) -> Story:
     """A reset that has got so far."""
     story = Story()
     for situation, seconds, answer in (
@@ -161,42 +161,43 @@ def test_it_waits_ten_seconds_for_a_drive_and_goes_on_when_it_is_there(waiting: 
 def test_each_level_of_the_fault_reset_bit_lasts_50_ms_and_three_cycles(cycle_s: float, edge_s: float) -> None:
     story = Story(cycle_s)
     outcome = story.run(FAULT, 6.0)
-    assert story.lasted(Phase.EDGE_LOW) == pytest.approx(FAULT_TRIES * edge_s, abs=FAULT_TRIES * 1.01 * cycle_s)
-    assert story.lasted(Phase.EDGE_HIGH) == pytest.approx(FAULT_TRIES * edge_s, abs=FAULT_TRIES * 1.01 * cycle_s)
-    assert story.lasted(Phase.EDGE_HIGH) > FAULT_TRIES * edge_s - 1e-6
+    assert story.lasted(ResetPhase.EDGE_LOW) == pytest.approx(FAULT_TRIES * edge_s, abs=FAULT_TRIES * 1.01 * cycle_s)
+    assert story.lasted(ResetPhase.EDGE_HIGH) == pytest.approx(FAULT_TRIES * edge_s, abs=FAULT_TRIES * 1.01 * cycle_s)
+    assert story.lasted(ResetPhase.EDGE_HIGH) > FAULT_TRIES * edge_s - 1e-6
     order = [phase for i, (_, phase) in enumerate(story.phases) if i == 0 or story.phases[i - 1][1] is not phase]
-    assert order == list(Phase)[1:] + (FAULT_TRIES - 1) * list(Phase)[2:]
+    assert order == list(ResetPhase)[1:] + (FAULT_TRIES - 1) * list(ResetPhase)[2:]
     assert sentence(outcome) == "left: over-current: it does not clear; remove its cause, then reset again"
-    assert story.lasted(Phase.FAULTS) == pytest.approx(FAULT_TRIES * 1.0, abs=FAULT_TRIES * 2.01 * cycle_s)
+    assert story.lasted(ResetPhase.FAULTS) == pytest.approx(FAULT_TRIES * 1.0, abs=FAULT_TRIES * 2.01 * cycle_s)
 
 
-@pytest.mark.parametrize("phase", list(Phase))
-def test_the_bit_is_set_on_the_high_level_only(phase: Phase) -> None:
-    assert in_phase(phase).reset.fault_reset_bit is (phase is Phase.EDGE_HIGH)
+@pytest.mark.parametrize("phase", list(ResetPhase))
+def test_the_bit_is_set_on_the_high_level_only(phase: ResetPhase) -> None:
+    assert in_phase(phase).reset.fault_reset_bit is (phase is ResetPhase.EDGE_HIGH)
 
 
 def test_a_fault_that_clears_ends_the_reset_well() -> None:
-    story = in_phase(Phase.FAULTS)
+    story = in_phase(ResetPhase.FAULTS)
     outcome = story.run(WELL, 0.01)
     assert outcome is not None
     assert outcome.done
 
 
+AFTER_BOOT = {ResetPhase.EDGE_LOW, ResetPhase.EDGE_HIGH, ResetPhase.FAULTS}
 BREAKS = {
-    "commanded": (Situation(commanded="cmd_vel orders 0.3 m/s"), set(Phase)),
-    "bus": (Situation(bus="bus-off"), set(Phase)),
-    "tripped": (TRIPPED, set(Phase) - {Phase.WATCHDOG}),
-    "missing": (MISSING, set(Phase) - {Phase.WATCHDOG}),
-    "booting": (Situation(booting="waiting for node 1"), {Phase.EDGE_LOW, Phase.EDGE_HIGH, Phase.FAULTS}),
-    "absent": (Situation(absent="node 1 restarted"), {Phase.EDGE_LOW, Phase.EDGE_HIGH, Phase.FAULTS}),
-    "silent": (Situation(silent="node 1: no status"), {Phase.EDGE_LOW, Phase.EDGE_HIGH, Phase.FAULTS}),
+    "commanded": (Situation(commanded="cmd_vel orders 0.3 m/s"), set(ResetPhase)),
+    "bus": (Situation(bus="bus-off"), set(ResetPhase)),
+    "tripped": (TRIPPED, set(ResetPhase) - {ResetPhase.WATCHDOG}),
+    "missing": (MISSING, set(ResetPhase) - {ResetPhase.WATCHDOG}),
+    "booting": (Situation(booting="waiting for node 1"), AFTER_BOOT),
+    "absent": (Situation(absent="node 1 restarted"), AFTER_BOOT),
+    "silent": (Situation(silent="node 1: no status"), AFTER_BOOT),
 }
 """What breaks it off, in which phases."""
 
 
 @pytest.mark.parametrize("what", BREAKS)
-@pytest.mark.parametrize("phase", list(Phase))
-def test_what_was_well_must_stay_so(phase: Phase, what: str) -> None:
+@pytest.mark.parametrize("phase", list(ResetPhase))
+def test_what_was_well_must_stay_so(phase: ResetPhase, what: str) -> None:
     situation, phases = BREAKS[what]
     outcome = in_phase(phase).run(replace(situation, fault="left: over-current"), 0.01, answer=None)
     assert (outcome is not None and outcome.sentence.startswith("broken off: ")) is (phase in phases)

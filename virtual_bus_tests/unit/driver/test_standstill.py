@@ -206,6 +206,28 @@ def test_a_sensor_that_stops_within_less_than_a_wheel_can_is_no_evidence_until_i
     assert "a stand is assumed" in wheel.stillness.assumed(wheel.now_s)
 
 
+def test_a_wheel_that_follows_and_stops_too_soon_is_not_proven_to_stand_before_it_must_have_rolled_out() -> None:
+    """Nothing depends on it but what is told: the watchdog judges it. 0.2 m/s; 9.6 s later it has rolled out."""
+    wheel = Wheel()
+    wheel.turns(0.3, 0.2, 0.2, ordered_mps=0.2)
+    assert lost(wheel, seconds=9.5)
+    assert not wheel.stillness.is_proven(wheel.now_s)
+    assert wheel.turns(0.2, 0.0, 0.0)
+    assert wheel.stillness.is_proven(wheel.now_s)
+
+
+def test_a_wheel_that_follows_and_met_something_hard_is_proven_to_stand_once_it_has_moved() -> None:
+    """20 ms against a threshold, and then its order is zero."""
+    wheel = Wheel()
+    wheel.turns(0.3, 0.2, 0.2, ordered_mps=0.2)
+    lost(wheel, seconds=0.02)
+    assert not wheel.stillness.is_proven(wheel.now_s)
+    wheel.turns(0.1, 0.1, 0.1, ordered_mps=0.1)
+    wheel.brakes(0.1, 2.0)
+    assert wheel.turns(0.01, 0.0, 0.0)
+    assert wheel.stillness.is_proven(wheel.now_s)
+
+
 @pytest.mark.parametrize("lost_at", range(1, 24))
 def test_a_sensor_that_is_lost_in_a_quick_stop_is_no_evidence_whenever_that_is(lost_at: int) -> None:
     """From 0.5 m/s, 2 m/s²: 25 cycles; the last that leaves more than noise is found is that of 0.1 m/s."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 import run
@@ -46,3 +48,24 @@ def test_an_unknown_name_is_refused(monkeypatch: pytest.MonkeyPatch, capsys: pyt
         run.main()
     assert end.value.code == 2
     assert "there is no benchmark reactoin; expected some of reaction," in capsys.readouterr().err
+
+
+def test_the_list_has_a_line_for_each_and_runs_none(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["run.py", "--list"])
+    assert run.main() == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(run.BENCHMARKS)
+    assert all(len(line.split()) > 3 for line in lines)
+
+
+def test_progress_tells_which_of_how_many_runs_and_how_long_it_took(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    now_s = iter((0.0, 12.0, 100.0, 100.4))
+    monkeypatch.setattr(run, "time", SimpleNamespace(monotonic=lambda: next(now_s)))
+    monkeypatch.setattr(run, "BENCHMARKS", {"first": lambda: [KEPT], "second": lambda: [KEPT]})
+    monkeypatch.setattr("sys.argv", ["run.py"])
+    assert run.main() == 0
+    assert capsys.readouterr().err.splitlines() == ["[1/2] first … 12 s", "[2/2] second … 0 s"]
