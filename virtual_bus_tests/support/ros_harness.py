@@ -106,16 +106,20 @@ RELEASE_S = 0.2
 
 
 class Recorder(Generic[T]):
-    """What arrived on one topic: messages and their local receive times, oldest first."""
+    """What arrived on one topic: messages and the times when they were sent, oldest first.
+
+    Not when they were taken out of the queue: while a test waits for something else, messages wait in it.
+    """
 
     def __init__(self) -> None:
         self.messages: list[T] = []
         self.times_s: list[float] = []
 
-    def on_message(self, message: T) -> None:
+    def on_message(self, message: T, info: Mapping[str, int]) -> None:
         """Callback of the subscription."""
+        age_s = time.time() - 1e-9 * info["source_timestamp"]
         self.messages.append(message)
-        self.times_s.append(time.monotonic())
+        self.times_s.append(time.monotonic() - age_s)
 
     @property
     def last(self) -> T | None:
@@ -123,7 +127,7 @@ class Recorder(Generic[T]):
         return self.messages[-1] if self.messages else None
 
     def since(self, start_s: float) -> list[T]:
-        """Messages received at or after start_s (time.monotonic)."""
+        """Messages that were sent at or after start_s (time.monotonic)."""
         return [message for message, at_s in zip(self.messages, self.times_s, strict=True) if at_s >= start_s]
 
     def clear(self) -> None:
