@@ -14,6 +14,8 @@ from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.outcome import ErrorCode
 from canbase_config.robot import Robot
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.stop_cause import StopCause
+from canbase_runtime.watchdog_view import WatchdogView
 from drive_rig import Case
 
 SLOW_HZ = 10.0
@@ -90,8 +92,8 @@ class StopProfile:
 def _inputs(odometry: Odometry) -> Inputs:
     """A healthy robot."""
     at = odometry.received
-    safety = Safety(at, stops=False, cause="none", detail="", estop=False)
-    driver = Driver(at, DriverState.ENABLED, "none", "", "ok", "none", standstill=False, hears_command=True)
+    safety = Safety(at, stops=False, cause=StopCause.NONE, detail="", estop=False)
+    driver = Driver(at, DriverState.ENABLED, "none", "", WatchdogView.OK, "none", standstill=False, hears_command=True)
     return Inputs(odometry, safety, driver, Mux(at, ""))
 
 

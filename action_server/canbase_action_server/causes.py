@@ -11,16 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from canbase_action_server.inputs import (
-    ESTOP_CAUSES,
-    OBSTACLE_CAUSE,
-    SCAN_LOST_CAUSES,
-    WATCHDOG_OK,
-    Inputs,
-    age_s,
-)
+from canbase_action_server.inputs import Inputs, age_s
 from canbase_action_server.outcome import ErrorCode
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.stop_cause import SCAN_LOST, StopCause
+from canbase_runtime.watchdog_view import WatchdogView
 
 CLIENT_SILENT = "no keepalive from the client (action.require_client_lease): it died, hangs, or does not send any"
 
@@ -58,16 +53,16 @@ class EndCause:
 
 def _estop(s: Situation) -> str | None:
     safety = s.inputs.safety
-    if safety is None or not (safety.estop or safety.cause in ESTOP_CAUSES):
+    if safety is None or not (safety.estop or safety.cause.is_estop):
         return None
     return f"emergency stop: {safety.detail}; release it, reset, and send a new goal"
 
 
 def _watchdog(s: Situation) -> str | None:
     driver = s.inputs.driver
-    if driver is None or driver.watchdog == WATCHDOG_OK:
+    if driver is None or driver.watchdog is WatchdogView.OK:
         return None
-    return f"watchdog {driver.watchdog}, cause {driver.watchdog_cause}; find the cause, then reset"
+    return f"watchdog {driver.watchdog.value}, cause {driver.watchdog_cause}; find the cause, then reset"
 
 
 def _drive_fault(s: Situation) -> str | None:
@@ -106,7 +101,7 @@ def _off_course(s: Situation) -> str | None:
 
 def _scan_lost(s: Situation) -> str | None:
     safety = s.inputs.safety
-    if safety is None or safety.cause not in SCAN_LOST_CAUSES:
+    if safety is None or safety.cause not in SCAN_LOST:
         return None
     return f"laser scan lost: {safety.detail}; is the scanner running?"
 
@@ -116,8 +111,8 @@ def _blocked(s: Situation) -> str | None:
         return f"velocity_mux holds {s.own_source} back: {s.inputs.mux.held_back}; free it and send a new goal"
     if s.stopped_s < s.stopped_patience_s or s.inputs.safety is None:
         return None
-    if s.inputs.safety.cause != OBSTACLE_CAUSE:
-        return f"the safety filter stops the base ({s.inputs.safety.cause}): {s.inputs.safety.detail}"
+    if s.inputs.safety.cause is not StopCause.OBSTACLE:
+        return f"the safety filter stops the base ({s.inputs.safety.cause.value}): {s.inputs.safety.detail}"
     return f"obstacle in the way: {s.inputs.safety.detail}; clear the way and send a new goal for the rest"
 
 

@@ -10,11 +10,8 @@ from dataclasses import dataclass
 
 from canbase_action_server.along_track import Pose
 from canbase_runtime.driver_state import DriverState
-
-WATCHDOG_OK = "ok"
-ESTOP_CAUSES = ("estop", "estop_stale")
-SCAN_LOST_CAUSES = ("scan_stale", "scan_unplaced", "scan_invalid", "scan_frozen")
-OBSTACLE_CAUSE = "obstacle"
+from canbase_runtime.stop_cause import StopCause
+from canbase_runtime.watchdog_view import WatchdogView
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +35,7 @@ class Safety:
 
     received: float
     stops: bool
-    cause: str
+    cause: StopCause
     detail: str
     estop: bool
 
@@ -51,7 +48,7 @@ class Driver:
     state: DriverState
     cause: str
     detail: str
-    watchdog: str
+    watchdog: WatchdogView
     watchdog_cause: str
     standstill: bool
     hears_command: bool

@@ -11,6 +11,8 @@ from canbase_action_server.inputs import Driver, Mux, Odometry, Safety
 from canbase_action_server.motion import Twist
 from canbase_runtime.driver_state import driver_state
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
+from canbase_runtime.stop_cause import stop_cause
+from canbase_runtime.watchdog_view import watchdog_view
 
 
 def odometry_in(message: OdometryMessage, received: float) -> Odometry | None:
@@ -25,7 +27,7 @@ def safety_in(message: SafetyState, received: float) -> Safety:
     """From safety_filter/state."""
     stops = message.action == SafetyState.STOP
     detail = printable(message.detail, SENTENCE_LENGTH)
-    return Safety(received, stops, printable(message.cause), detail, message.estop)
+    return Safety(received, stops, stop_cause(message.cause), detail, message.estop)
 
 
 def driver_in(message: DriverStatus, received: float) -> Driver:
@@ -35,7 +37,7 @@ def driver_in(message: DriverStatus, received: float) -> Driver:
         state=driver_state(message.state),
         cause=printable(message.cause),
         detail=printable(message.detail, SENTENCE_LENGTH),
-        watchdog=printable(message.watchdog),
+        watchdog=watchdog_view(message.watchdog),
         watchdog_cause=printable(message.watchdog_cause, SENTENCE_LENGTH),
         standstill=message.standstill,
         hears_command=message.command_fresh,

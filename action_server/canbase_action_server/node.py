@@ -32,6 +32,7 @@ from canbase_action_server.binding import Binding
 from canbase_action_server.goal import Phase
 from canbase_action_server.goal_client import REJECTION_QOS, SERVICE_QOS
 from canbase_action_server.goal_queue import Cycle, GoalQueue
+from canbase_action_server.goal_step import GoalStep
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.open_goal import OpenGoal, numbers, rejection, uuid_of
@@ -165,7 +166,7 @@ class DriveDistanceServer(Node):
         if reason is None:
             return GoalResponse.ACCEPT
         # rclpy does not tell the UUID of a goal that is not accepted yet.
-        self._log("rejected", None, action=binding.name, reason=reason, **numbers(goal))
+        self._log(GoalStep.REJECTED, None, action=binding.name, reason=reason, **numbers(goal))
         self._rejections[binding.name].publish(rejection(binding.name, goal, reason))
         return GoalResponse.REJECT
 
@@ -173,10 +174,10 @@ class DriveDistanceServer(Node):
         goal, now_s, uuid = handle.request, time.monotonic(), uuid_of(handle)
         self._goal_queue.admit(uuid, binding.request(goal), self._inputs, now_s)
         self._open[uuid] = OpenGoal(handle, binding, now_s)
-        self._log("accepted", uuid, action=binding.name, **numbers(goal))
+        self._log(GoalStep.ACCEPTED, uuid, action=binding.name, **numbers(goal))
 
     def _on_cancel(self, handle: ServerGoalHandle) -> CancelResponse:
-        self._log("cancel requested", uuid_of(handle))
+        self._log(GoalStep.CANCEL_REQUESTED, uuid_of(handle))
         return CancelResponse.ACCEPT
 
     async def _execute(self, handle: ServerGoalHandle) -> Any:
@@ -211,7 +212,7 @@ class DriveDistanceServer(Node):
             self._order(cycle.twist)
         if cycle.began is not None:
             self._open[cycle.began].execute()
-            self._log("started", cycle.began)
+            self._log(GoalStep.STARTED, cycle.began)
         if cycle.feedback is not None:
             uuid, feedback = cycle.feedback
             self._open[uuid].tell(feedback)
@@ -223,19 +224,19 @@ class DriveDistanceServer(Node):
         message.header.stamp = self.get_clock().now().to_msg()
         self._orders.publish(message)
 
-    def _log(self, step: str, uuid: str | None, **fields: Any) -> None:
+    def _log(self, step: GoalStep, uuid: str | None, **fields: Any) -> None:
         self._write_log(step, uuid, fields, Priority.INFO)
 
-    def _write_log(self, step: str, uuid: str | None, fields: dict[str, Any], priority: Priority) -> None:
-        text = json.dumps({"uuid": uuid, "step": step, **fields})
+    def _write_log(self, step: GoalStep, uuid: str | None, fields: dict[str, Any], priority: Priority) -> None:
+        text = json.dumps({"uuid": uuid, "step": step.value, **fields})
         told = {name: fields[name] for name in ("status", "error_code", "reason") if name in fields}
-        self._voice.tell(text, priority, robot=self._robot.name, goal=uuid, step=step, **told)
+        self._voice.tell(text, priority, robot=self._robot.name, goal=uuid, step=step.value, **told)
 
     def _log_phase(self, uuid: str | None, before: Phase, cycle: Cycle) -> None:
         if self._goal_queue.phase is Phase.STOPPING:
-            self._log("stopping", self._goal_queue.running)
+            self._log(GoalStep.STOPPING, self._goal_queue.running)
         elif before is Phase.STOPPING and any(end.key == uuid and end.outcome.stands for end in cycle.ends):
-            self._log("standstill", uuid)
+            self._log(GoalStep.STANDSTILL, uuid)
 
     def _log_end(self, uuid: str, goal: OpenGoal, outcome: Outcome, result: Any) -> None:
         fields = {
@@ -246,4 +247,4 @@ class DriveDistanceServer(Node):
             "message": outcome.message,
         }
         priority = Priority.INFO if outcome.status is Status.SUCCEEDED else Priority.NOTICE
-        self._write_log("ended", uuid, fields, priority)
+        self._write_log(GoalStep.ENDED, uuid, fields, priority)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from canbase_action_server.inputs import ESTOP_CAUSES, WATCHDOG_OK, Inputs, age_s
+from canbase_action_server.inputs import Inputs, age_s
 from canbase_config.robot import Robot
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.watchdog_view import WatchdogView
 
 STATE_TIMEOUT_S = 1.5
 """A state that is older says nothing: three periods of the slowest one (velocity_mux/state, 2 Hz)."""
@@ -47,10 +48,10 @@ def _silence(robot: Robot, inputs: Inputs, now_s: float) -> str | None:
 
 def _condition(robot: Robot, inputs: Inputs) -> str | None:
     safety, driver, mux = inputs.safety, inputs.driver, inputs.mux
-    if safety and (safety.estop or safety.cause in ESTOP_CAUSES):
+    if safety and (safety.estop or safety.cause.is_estop):
         return f"emergency stop holds: {safety.detail}; release it and reset"
-    if driver and driver.watchdog != WATCHDOG_OK:
-        return f"watchdog is {driver.watchdog} (cause {driver.watchdog_cause}); start or reset it"
+    if driver and driver.watchdog is not WatchdogView.OK:
+        return f"watchdog is {driver.watchdog.value} (cause {driver.watchdog_cause}); start or reset it"
     if driver and driver.state is not DriverState.ENABLED:
         return f"motor_driver is {driver.state.word}, not enabled: {driver.detail}"
     if driver and not driver.hears_command:

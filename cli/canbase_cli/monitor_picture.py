@@ -14,9 +14,10 @@ from rich.table import Table
 from rich.text import Text
 
 from canbase_driver.cia402 import DriveState
-from canbase_driver.snapshot import WatchdogView
 from canbase_runtime.driver_state import DriverState, driver_state
-from canbase_runtime.source_standing import Followed, followed
+from canbase_runtime.source_standing import SourceStanding, lock_standing, source_standing
+from canbase_runtime.stop_cause import StopCause, stop_cause
+from canbase_runtime.watchdog_view import WatchdogView, watchdog_view
 
 SILENT_S: Final = 1.5
 """A node that has said nothing for longer is shown as silent: its slowest state comes every 0.5 s."""
@@ -78,7 +79,7 @@ def line(snapshot: Snapshot) -> str:
     words = [headline(snapshot).plain]
     if snapshot.mux.fresh:
         words += [
-            f"lock {lock.name} {lock.reason.split(' for ')[0]}" for lock in snapshot.mux.message.locks if lock.holds
+            f"lock {lock.name} {lock_standing(lock.standing).word}" for lock in snapshot.mux.message.locks if lock.holds
         ]
         words += [f"foreign publisher {foreign.node} on {foreign.topic}" for foreign in snapshot.mux.message.foreign]
     if snapshot.driver.fresh:
@@ -93,8 +94,9 @@ def _mux_word(heard: Heard) -> Text:
     holder = next((source for source in state.sources if source.active), None)
     if holder is None:
         return Text("nobody drives", WARN)
-    if holder.reason:
-        return Text(f"{holder.name} is not followed: {holder.reason.split(' (')[0]}", BAD)
+    standing = source_standing(holder.standing)
+    if standing is not SourceStanding.FOLLOWED:
+        return Text(f"{holder.name} is not followed: {standing.word}", BAD)
     return Text(f"{holder.name} drives", GOOD)
 
 
@@ -103,7 +105,8 @@ def _safety_word(heard: Heard) -> Text:
         return _silence("safety_filter", heard)
     action, cause = heard.message.action, heard.message.cause
     style = (GOOD, WARN, WARN, BAD)[action]
-    return Text(f"filter {ACTIONS[action]}" + ("" if cause == "none" else f": {cause}"), style)
+    none = stop_cause(cause) is StopCause.NONE
+    return Text(f"filter {ACTIONS[action]}" + ("" if none else f": {cause}"), style)
 
 
 def _driver_words(heard: Heard) -> list[Text]:
@@ -112,8 +115,8 @@ def _driver_words(heard: Heard) -> list[Text]:
     status = heard.message
     state = driver_state(status.state)
     style = {DriverState.ENABLED: GOOD, DriverState.LATCHED: BAD, DriverState.OFFLINE: BAD}.get(state, WARN)
-    cause = "" if status.cause in ("", "none") else f": {status.cause}"
-    well = _member(WatchdogView, status.watchdog) is WatchdogView.OK
+    cause = "" if state is DriverState.ENABLED else f": {status.cause}"
+    well = watchdog_view(status.watchdog) is WatchdogView.OK
     watchdog = Text(f"watchdog {status.watchdog}", GOOD if well else BAD)
     return [Text(f"driver {state.name}{cause}", style), watchdog]
 
@@ -132,11 +135,11 @@ def _silence(who: str, heard: Heard) -> Text:
 def _mux(state: Any) -> RenderableType:
     table = _table("", "source", "age", "late by", "timeout", "refused", "why not")
     for source in state.sources:
-        standing = followed(source)
-        style = GOOD if standing is Followed.YES else BAD if source.active else ""
+        standing = source_standing(source.standing)
+        style = GOOD if standing is SourceStanding.FOLLOWED else BAD if source.active else ""
         refused = Text(str(source.refused), BAD if source.refused else "")
-        unarmed = "" if source.armed or standing is Followed.UNARMED else "; needs a zero first"
-        reason = "drives" if standing is Followed.YES else source.reason + unarmed
+        unarmed = "" if source.armed or standing is SourceStanding.UNARMED else "; needs a zero first"
+        reason = "drives" if standing is SourceStanding.FOLLOWED else source.reason + unarmed
         times = (_seconds(source.age_s), _seconds(source.delay_s), _seconds(source.timeout_s))
         values = (str(source.priority), source.name, *times)
         table.add_row(*values, refused, reason, style=style)
@@ -179,7 +182,8 @@ def _driver(status: Any) -> RenderableType:
         table.add_row(
             str(drive.node_id), drive.joint, drive.nmt_state, state, *speeds, _seconds(drive.heartbeat_age_s), error
         )
-    trip = [Text(f"watchdog: {status.watchdog_cause}", BAD)] if status.watchdog_cause not in ("", "none") else []
+    tripped = watchdog_view(status.watchdog) is WatchdogView.TRIPPED
+    trip = [Text(f"watchdog: {status.watchdog_cause}", BAD)] if tripped else []
     return Group(first, *_why(status), *trip, table)
 
 

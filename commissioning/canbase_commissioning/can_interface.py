@@ -7,8 +7,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from canbase_driver.supervision.bus_health import ControllerState
+
 COUNTERS = ("bus_error", "error_warning", "error_passive", "bus_off", "restarts")
 """Of the CAN controller since the interface was set up."""
+_STATES: dict[object, ControllerState] = {
+    "ERROR-ACTIVE": ControllerState.ERROR_ACTIVE,
+    "ERROR-WARNING": ControllerState.ERROR_WARNING,
+    "ERROR-PASSIVE": ControllerState.ERROR_PASSIVE,
+    "BUS-OFF": ControllerState.BUS_OFF,
+    "STOPPED": ControllerState.STOPPED,
+    "SLEEPING": ControllerState.SLEEPING,
+}
+"""The words of iproute2 (iplink_can.c)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,8 +30,7 @@ class Link:
     kind: str
     is_up: bool
     bitrate: int = 0
-    state: str = ""
-    """Of the controller: ERROR-ACTIVE, ERROR-WARNING, ERROR-PASSIVE, BUS-OFF; empty: it has none."""
+    state: ControllerState = ControllerState.UNKNOWN
     send_errors: int = 0
     receive_errors: int = 0
     """The controller's two counters, 0 to 256."""
@@ -50,7 +60,7 @@ def _link(entry: dict[str, Any]) -> Link:
         kind=info.get("info_kind", entry.get("link_type", "")),
         is_up="UP" in entry.get("flags", ()),
         bitrate=data.get("bittiming", {}).get("bitrate", 0),
-        state=data.get("state", ""),
+        state=_STATES.get(data.get("state"), ControllerState.UNKNOWN),
         send_errors=errors.get("tx", 0),
         receive_errors=errors.get("rx", 0),
         restart_ms=data.get("restart_ms", 0),

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any, Generic, TypeVar
 
 from canbase_commissioning.powered_drives import PoweredDrives
 from canbase_driver.cia301.frame import Frame
 
 T = TypeVar("T")
+E = TypeVar("E", bound=Enum)
 
 
 class CommissionError(Exception):
@@ -71,13 +73,13 @@ def number(low: float, high: float) -> Callable[[str], float]:
     return check
 
 
-def one_of(*words: str) -> Callable[[str], str]:
-    """A check for one of some words; their first letter is enough."""
+def one_of(kind: type[E]) -> Callable[[str], E]:
+    """A check for the value of one member of `kind`, a word; its first letter is enough."""
 
-    def check(text: str) -> str:
-        found = next((word for word in words if text.strip().lower() in (word, word[0])), None)
+    def check(text: str) -> E:
+        found = next((member for member in kind if text.strip().lower() in (member.value, member.value[0])), None)
         if found is None:
-            raise ValueError(f"expected one of {', '.join(words)}")
+            raise ValueError(f"expected one of {', '.join(member.value for member in kind)}")
         return found
 
     return check

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import Enum
 
 from canbase_commissioning.calibration import Scale, Turned, scale
 from canbase_commissioning.guide import Ask, CommissionError, Script, Tell, Until, number, one_of, wait
@@ -30,6 +31,16 @@ class WheelFound:
     turned: Turned | None = None
 
 
+class Seen(Enum):
+    """What the person saw while one wheel was ordered forward. The values are the answers."""
+
+    FORWARD = "forward"
+    BACKWARD = "backward"
+    NOTHING = "nothing"
+    OTHER = "other"
+    """Another wheel turned."""
+
+
 AGAIN = ".again"
 """Ends the key of a question that is asked a second time, after a correction."""
 
@@ -52,17 +63,17 @@ def find_direction(rig: PoweredDrives, drive: Drive, again: str = "") -> Script[
             "motor or two tracks of the encoder, or set its polarity with the maker's tool; do not drive it like this"
         )
     text = f"Which way did {joint} turn: forward, backward, nothing, other (another wheel turned)?"
-    seen = yield Ask(f"direction.{joint}{again}", text, one_of("forward", "backward", "nothing", "other"))
-    if seen == "other":
+    seen: Seen = yield Ask(f"direction.{joint}{again}", text, one_of(Seen))
+    if seen is Seen.OTHER:
         raise CommissionError(
             f"another wheel than {joint} turned: exchange node_id (or axis) of the drives in robot.yaml"
         )
-    if seen == "nothing" or moved_m < LEAST_SHARE * FIRST_MPS * FIRST_S:
+    if seen is Seen.NOTHING or moved_m < LEAST_SHARE * FIRST_MPS * FIRST_S:
         raise CommissionError(
-            f"{joint}: {'nobody saw it turn' if seen == 'nothing' else 'it turned'}, its encoder moved by "
+            f"{joint}: {'nobody saw it turn' if seen is Seen.NOTHING else 'it turned'}, its encoder moved by "
             f"{moved_m * 1000:.1f} mm: brake, coupling, encoder cable, or a scale that is far off in robot.yaml"
         )
-    return WheelFound(joint, drive.direction * (1 if seen == "forward" else -1))
+    return WheelFound(joint, drive.direction * (1 if seen is Seen.FORWARD else -1))
 
 
 def measure_scale(

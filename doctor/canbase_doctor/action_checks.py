@@ -9,9 +9,10 @@ import math
 from typing import Any
 
 from canbase_action_server.goal_request import DriveRequest, Request, RotateRequest
+from canbase_action_server.goal_step import GoalStep
 from canbase_action_server.preconditions import state_reason
 from canbase_doctor.checks import Check, fail, ok, too_slow, warn
-from canbase_doctor.evidence import Evidence, Goal
+from canbase_doctor.evidence import Evidence, Goal, LoggedStep
 
 ACTION = "drive_distance"
 SLOW_ANSWER_S = 0.1
@@ -25,6 +26,7 @@ SETTINGS = {
     "RMW_IMPLEMENTATION": "",
 }
 """What has to be alike for two processes to see each other; their defaults in `canbase`."""
+_AFTER_STOPPING = (GoalStep.STANDSTILL, GoalStep.ENDED)
 
 
 def server_process(seen: Evidence) -> Check:
@@ -172,7 +174,7 @@ def stop_procedure(seen: Evidence) -> Check:
     """After the order to stop, does the base stand within its braking time?"""
     name, limits, fastest_mps = "the stop itself", seen.robot.limits, seen.robot.action.max_speed_mps
     allowed_s = fastest_mps / limits.deceleration_mps2 + limits.deceleration_mps2 / limits.jerk_mps3 + MARGIN_S
-    took_s = [_stop_time_s(seen, step) for step in seen.steps if step["step"] == "stopping"]
+    took_s = [_stop_time_s(seen, step) for step in seen.steps if step.step is GoalStep.STOPPING]
     if not took_s:
         return warn(name, "no goal was stopped in the last ten seconds", "cancel one, then call doctor at once")
     found = f"the last one took {took_s[-1]:.2f} s"
@@ -250,7 +252,7 @@ def one_publisher(seen: Evidence) -> Check:
 
 
 def _last_rejected(seen: Evidence) -> Request | None:
-    rejected = [step for step in seen.steps if step["step"] == "rejected"]
+    rejected = [step.values for step in seen.steps if step.step is GoalStep.REJECTED]
     if not rejected:
         return None
     last = rejected[-1]
@@ -273,6 +275,6 @@ def _fast(seen: Evidence, name: str, times_s: tuple[float, ...], advice: str) ->
     return too_slow("" if silent else seen.overload.sentence, name, found, advice)
 
 
-def _stop_time_s(seen: Evidence, stopping: dict[str, Any]) -> float:
-    ends = (s["at_s"] for s in seen.steps if s["uuid"] == stopping["uuid"] and s["step"] in ("standstill", "ended"))
-    return float(next(ends, seen.wall_s)) - float(stopping["at_s"])
+def _stop_time_s(seen: Evidence, stopping: LoggedStep) -> float:
+    ends = (step.at_s for step in seen.steps if step.uuid == stopping.uuid and step.step in _AFTER_STOPPING)
+    return next(ends, seen.wall_s) - stopping.at_s

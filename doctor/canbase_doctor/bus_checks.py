@@ -17,6 +17,7 @@ from canbase_doctor.inspection import Inspection, Part
 from canbase_driver.cia301.emcy import emcy_text
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.cia402 import DriveState
+from canbase_driver.supervision.bus_health import ControllerState
 from canbase_driver.supervision.watchdog_link import LEASE_AGE_UNKNOWN, TRIPPED, WATCHING, WatchdogCounters
 
 SHORT_QUEUE, GOOD_QUEUE, LONG_QUEUE = 32, 64, 100
@@ -24,6 +25,8 @@ SHORT_QUEUE, GOOD_QUEUE, LONG_QUEUE = 32, 64, 100
 goes out late."""
 RUNGS: Final = ("none", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld", "NMT reset node")
 _SHOWN: Final = 4
+_CUT_OFF: Final = (ControllerState.BUS_OFF, ControllerState.ERROR_PASSIVE, ControllerState.STOPPED)
+"""Little or nothing gets through."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,12 +83,12 @@ def _bit_rate(link: Link, wanted: int) -> Check:
 
 def _controller(link: Link) -> Check:
     told = ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in link.counters.items())
-    found = f"{link.state}; error counters: sending {link.send_errors}, receiving {link.receive_errors}"
+    found = f"{link.state.value}; error counters: sending {link.send_errors}, receiving {link.receive_errors}"
     found += f"; since it is up: {told}" if told else ""
     wiring = "cable, termination (60 Ω between CAN_H and CAN_L), bit rate, and is a drive switched on?"
-    if link.state in ("BUS-OFF", "ERROR-PASSIVE", "STOPPED"):
+    if link.state in _CUT_OFF:
         return fail("CAN controller", found, wiring)
-    if link.state == "ERROR-WARNING" or link.send_errors or link.receive_errors:
+    if link.state is not ControllerState.ERROR_ACTIVE or link.send_errors or link.receive_errors:
         return warn("CAN controller", found, wiring)
     if link.counters.get("bus_off", 0):
         return warn("CAN controller", found, f"it was bus-off before; {wiring}")

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from canbase_action_server.goal_step import GoalStep
 from canbase_action_server.inputs import Inputs
 from canbase_config.robot import Robot
 from canbase_doctor.overload import Overload
@@ -78,6 +79,19 @@ class Goal:
 
 
 @dataclass(frozen=True, slots=True)
+class LoggedStep:
+    """One log line of the action server: what happened to which goal (None: it was rejected), and the line's values.
+
+    `at_s`: when, by the server's clock [s].
+    """
+
+    step: GoalStep
+    uuid: str | None
+    at_s: float
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
 class ServerProcess:
     """A process of the action server on this computer, and what of its environment decides whom it can talk to."""
 
@@ -112,8 +126,8 @@ class Evidence:
     """By topic, relative to the robot's namespace."""
     inputs: Inputs = field(default_factory=Inputs)
     """The same as the action server sees it."""
-    steps: tuple[dict[str, Any], ...] = ()
-    """The server's log lines of the last ten seconds; `at_s`: when, by its clock."""
+    steps: tuple[LoggedStep, ...] = ()
+    """The server's log lines of the last ten seconds."""
     servers: Mapping[str, tuple[Endpoint, ...]] = field(default_factory=dict)
     """Who offers an action, by its whole name; in every namespace."""
     publishers: Mapping[str, tuple[Endpoint, ...]] = field(default_factory=dict)

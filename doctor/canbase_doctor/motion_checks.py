@@ -10,13 +10,13 @@ from typing import Any
 from canbase_action_server.preconditions import action_source
 from canbase_doctor.checks import Check, fail, ok, too_slow, warn
 from canbase_doctor.evidence import Evidence
+from canbase_runtime.watchdog_view import WatchdogView, watchdog_view
 
 CLOCKS_APART_S = 1.0
 """A stamp that is farther from this computer's clock was made with another one."""
 BUSY_S = 10.0
 """Older stamps than that no busy computer explains."""
 TWIST = {True: "geometry_msgs/msg/TwistStamped", False: "geometry_msgs/msg/Twist"}
-WATCHDOG_OK = "ok"
 
 
 def zeros_are_ordered(seen: Evidence) -> Check:
@@ -55,7 +55,7 @@ def driver_watchdog(seen: Evidence) -> Check:
     name, status, order = "driver and watchdog", seen.on("motor_driver/status").last, seen.on("cmd_vel").last
     if status is None:
         return fail(name, "motor_driver is silent", "use the emergency stop; then look at its log")
-    if status.watchdog != WATCHDOG_OK:
+    if watchdog_view(status.watchdog) is not WatchdogView.OK:
         return fail(name, f"the watchdog is {status.watchdog}", "use the emergency stop; start it, canbase reset")
     if not status.standstill and (order is None or not _moves(order)):
         return fail(

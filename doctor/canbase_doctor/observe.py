@@ -21,11 +21,12 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import LaserScan
 
 from canbase_action_server import messages
+from canbase_action_server.goal_step import goal_step
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.preconditions import action_source
 from canbase_config.load import Loaded
 from canbase_config.robot import Robot
-from canbase_doctor.evidence import ACTIONS, DOCTOR, Endpoint, Evidence, Goal, Heard
+from canbase_doctor.evidence import ACTIONS, DOCTOR, Endpoint, Evidence, Goal, Heard, LoggedStep
 from canbase_doctor.overload import Overload, load_per_core
 from canbase_doctor.probes import SERVER, TYPES, Prober
 from canbase_doctor.server_processes import server_processes, talks_by
@@ -152,10 +153,14 @@ def _inputs(heard: dict[str, Heard], own_source: str) -> Inputs:
     )
 
 
-def _steps(log: Heard, namespace: str) -> tuple[dict[str, Any], ...]:
+def _steps(log: Heard, namespace: str) -> tuple[LoggedStep, ...]:
     name = ".".join([*filter(None, namespace.split("/")), SERVER])
     lines = [line for line in log.messages if line.name == name and line.msg.startswith('{"uuid"')]
-    return tuple(json.loads(line.msg) | {"at_s": _seconds(line.stamp)} for line in lines)
+    return tuple(_step(json.loads(line.msg), _seconds(line.stamp)) for line in lines)
+
+
+def _step(values: dict[str, Any], at_s: float) -> LoggedStep:
+    return LoggedStep(goal_step(values.get("step")), values["uuid"], at_s, values)
 
 
 def _seconds(stamp: Any) -> float:

@@ -14,12 +14,13 @@ from canbase.msg import DriverStatus, SafetyState
 from canbase_doctor.checks import Check, fail, ok, warn
 from canbase_doctor.evidence import Evidence
 from canbase_runtime.driver_state import driver_state
-from canbase_runtime.source_standing import Followed, followed
+from canbase_runtime.source_standing import SourceStanding, source_standing
+from canbase_runtime.watchdog_view import WatchdogView, watchdog_view
 
 UNFOLLOWED = {
-    Followed.UNARMED: "release the joystick, or let that program order zero (docs/velocity.md, Neutral start)",
-    Followed.LATE: "look at the network between that sender and the robot, and at the clock of the sender",
-    Followed.UNKNOWN: "look at the log of velocity_mux",
+    SourceStanding.UNARMED: "release the joystick, or let that program order zero (docs/velocity.md, Neutral start)",
+    SourceStanding.DELAYED: "look at the network between that sender and the robot, and at the clock of the sender",
+    SourceStanding.UNKNOWN: "look at the log of velocity_mux",
 }
 """What to do about a source that holds the base and is not followed."""
 SILENT_S = 1.5
@@ -73,15 +74,15 @@ def watchdog(evidence: Evidence) -> list[Check]:
     status = heard.last
     if status is None:
         return [fail("watchdog", "unknown: reported by motor_driver, which is not running", PARTS_RUN)]
-    age = _age(status.watchdog_age_s)
-    if status.watchdog == DriverStatus.WATCHDOG_MISSING:
+    age, view = _age(status.watchdog_age_s), watchdog_view(status.watchdog)
+    if view is WatchdogView.MISSING:
         return [fail("watchdog", f"missing, last heard {age} ago", "start canbase watchdog on the same robot.yaml")]
     told = f"last heard {age} ago; last lease {_age(status.watchdog_lease_age_s)} old"
-    if status.watchdog == DriverStatus.WATCHDOG_OK:
+    if view is WatchdogView.OK:
         found = ok("watchdog", f"ok, {told}")
     else:
         rung = RUNGS[min(status.watchdog_rung, len(RUNGS) - 1)]
-        tripped = f"tripped: {status.watchdog_cause}; went as far as {rung}; {told}"
+        tripped = f"{view.value}: {status.watchdog_cause}; went as far as {rung}; {told}"
         found = fail("watchdog", tripped, "remove the cause (docs/bus.md), canbase reset")
     return [found, _watchdog_counters(heard.first, status)]
 
@@ -168,10 +169,10 @@ def velocity_mux(evidence: Evidence) -> list[Check]:
     state = evidence.on("velocity_mux/state").last
     if silent := _silent(evidence, "velocity_mux", "velocity_mux/state"):
         return [silent]
-    ignored = [source for source in state.sources if followed(source) in UNFOLLOWED]
+    ignored = [source for source in state.sources if source.active and source_standing(source.standing) in UNFOLLOWED]
     if ignored:
         told = f"{ignored[0].name} is not followed: {ignored[0].reason}"
-        return [fail("velocity_mux", told, UNFOLLOWED[followed(ignored[0])])]
+        return [fail("velocity_mux", told, UNFOLLOWED[source_standing(ignored[0].standing)])]
     found = f"{state.active} drives" if state.active else "nobody drives"
     bad = [source.name for source in state.sources if source.refused]
     if bad:

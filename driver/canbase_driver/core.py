@@ -40,7 +40,7 @@ from canbase_driver.motion.limiter import Limiter, MotionState
 from canbase_driver.motion.odometry import Pose2D
 from canbase_driver.motion.velocity_command import Command
 from canbase_driver.report import Told, snapshot_of
-from canbase_driver.snapshot import DriverSnapshot, StopRecord, WatchdogView
+from canbase_driver.snapshot import DriverSnapshot, StopRecord
 from canbase_driver.supervision.bus_health import BusReport
 from canbase_driver.supervision.cycle_stats import CycleStats
 from canbase_driver.supervision.latch import PowerRecord, found_before_the_start
@@ -53,6 +53,7 @@ from canbase_driver.supervision.supervisor import Supervisor
 from canbase_driver.supervision.watchdog_link import COUNTERS_COB_ID, STATE_COB_ID, WatchdogLink
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.latch_record import Found, Record
+from canbase_runtime.watchdog_view import WatchdogView
 
 PAUSE = 0.5
 """A cycle that begins so late, in parts of timeouts.feedback_s, begins a new run of SYNCs."""

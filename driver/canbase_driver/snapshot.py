@@ -7,23 +7,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import Enum
 
 from canbase_driver.causes import Cause
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.cia402 import DriveState
+from canbase_driver.supervision.bus_health import ControllerState
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.watchdog_view import WatchdogView
 
 Covariance = tuple[float, ...]
 """36 numbers: 6 × 6, row by row, in the order x, y, z, rotation about x, y, z (geometry_msgs, REP 103)."""
-
-
-class WatchdogView(Enum):
-    """What the driver sees of the watchdog; the words are those of canbase/msg/DriverStatus."""
-
-    OK = "ok"
-    MISSING = "missing"
-    TRIPPED = "tripped"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,8 +136,8 @@ class DriverSnapshot:
     """Frames that could not be sent in time, since start."""
     bus_problem: str = ""
     """Why the bus does not work now; empty when it does."""
-    controller: str = "error active"
-    """What error frames say of the CAN controller: error active, error warning, error passive, bus-off."""
+    controller: ControllerState = ControllerState.ERROR_ACTIVE
+    """What error frames say of the CAN controller."""
     receive_errors: int = 0
     """Failed receptions, since start."""
     error_frames: int = 0

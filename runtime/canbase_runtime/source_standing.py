@@ -1,37 +1,62 @@
-"""Why velocity_mux does not follow the source that holds the base: from the numbers of canbase/msg/MuxSource."""
+"""How each source and lock of velocity_mux stands, as canbase/msg/MuxSource and MuxLock number it."""
 
 from __future__ import annotations
 
-from enum import Enum
-from typing import Protocol
+from enum import IntEnum
 
 
-class Followed(Enum):
-    """Whether the source that holds the base is followed, and if not, what keeps it from that."""
+class SourceStanding(IntEnum):
+    """Why a source of velocities drives or does not. The numbers are the constants of MuxSource.msg."""
 
-    YES = "followed"
-    LATE = "its commands arrive late"
-    UNARMED = "it has not commanded zero yet"
-    UNKNOWN = "no field of the message says why"
-    NOT_HOLDING = "it does not hold the base"
+    UNKNOWN = 0
+    """A number that the interface does not have; the mux never sends it."""
+    FOLLOWED = 1
+    UNARMED = 2
+    """It has the base, and has not shown zero yet, or cannot be armed."""
+    DELAYED = 3
+    """It has the base, and its commands arrive late."""
+    NEVER_RECEIVED = 4
+    SILENT = 5
+    LOCKED = 6
+    LOWER_PRIORITY = 7
+    SHUTDOWN = 8
+
+    @property
+    def word(self) -> str:
+        """In a headline."""
+        return "not armed" if self is SourceStanding.UNARMED else self.name.lower().replace("_", " ")
 
 
-class Source(Protocol):
-    """The fields of MuxSource that tell it."""
-
-    active: bool
-    armed: bool
-    reason: str
-    delay_s: float
-    timeout_s: float
+IGNORED = frozenset({SourceStanding.UNARMED, SourceStanding.DELAYED})
+"""The source has the base and is not followed: the order is zero, and no lower source moves the base."""
 
 
-def followed(source: Source) -> Followed:
-    """The rules of the mux in their order (rule 6 of mux.py); `reason` is empty for a source that is followed."""
-    if not source.active:
-        return Followed.NOT_HOLDING
-    if not source.reason:
-        return Followed.YES
-    if abs(source.delay_s) > source.timeout_s:  # NaN: its messages have no stamp
-        return Followed.LATE
-    return Followed.UNKNOWN if source.armed else Followed.UNARMED
+class LockStanding(IntEnum):
+    """Why a lock holds sources back or does not. The numbers are the constants of MuxLock.msg."""
+
+    UNKNOWN = 0
+    """A number that the interface does not have; the mux never sends it."""
+    FREE = 1
+    LOCKED = 2
+    SHARED = 3
+    """Several publishers: nobody's word frees what another one holds."""
+    NEVER_RECEIVED = 4
+    SILENT = 5
+
+    @property
+    def word(self) -> str:
+        """In a headline."""
+        return self.name.lower().replace("_", " ")
+
+
+def source_standing(number: int) -> SourceStanding:
+    """The standing with this number; UNKNOWN for one that is not in the interface."""
+    return SourceStanding(number) if number in _SOURCE_NUMBERS else SourceStanding.UNKNOWN
+
+
+def lock_standing(number: int) -> LockStanding:
+    """The standing with this number; UNKNOWN for one that is not in the interface."""
+    return LockStanding(number) if number in _LOCK_NUMBERS else LockStanding.UNKNOWN
+
+
+_SOURCE_NUMBERS, _LOCK_NUMBERS = frozenset(SourceStanding), frozenset(LockStanding)

@@ -7,8 +7,10 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from canbase_runtime.log_priority import Priority
-from canbase_velocity.decision import Action, Decision, StopCause
-from canbase_velocity.mux import MuxDecision, Standing
+from canbase_runtime.source_standing import IGNORED, SourceStanding
+from canbase_runtime.stop_cause import StopCause
+from canbase_velocity.decision import Action, Decision
+from canbase_velocity.mux import MuxDecision
 from canbase_velocity.safety_filter import ScanState
 
 Told = tuple[str, Priority, dict[str, str]]
@@ -23,10 +25,6 @@ STOP_PRIORITY: Final = {
 """Of a stop. An obstacle is what the filter is for; each other cause is one that somebody should look at."""
 
 
-NOT_FOLLOWED: Final = (Standing.UNARMED, Standing.DELAYED)
-"""Of a source that has the base all the same."""
-
-
 def changes(before: MuxDecision, now: MuxDecision) -> Iterator[Told]:
     """Locks that hold or let go, and who drives. A source that lost the base to a lock is a notice, as is one that is
     not followed.
@@ -36,13 +34,13 @@ def changes(before: MuxDecision, now: MuxDecision) -> Iterator[Told]:
         if lock.holds != held[lock.name]:
             sentence = f"lock {lock.name} {lock.reason}" if lock.holds else f"lock {lock.name} is free"
             yield sentence, Priority.NOTICE, {"lock": lock.name, "lock_holds": str(lock.holds).lower()}
-    ignored = now.holder is not None and bool(now.holder.reason)
+    ignored = now.holder is not None and now.holder.standing in IGNORED
     if ignored and _standing(now) is not _standing(before):
         yield now.sentence, Priority.NOTICE, {"active": now.active or "", "before": before.active or ""}
-    elif now.active != before.active or (_standing(before) in NOT_FOLLOWED and not ignored):
+    elif now.active != before.active or (_standing(before) in IGNORED and not ignored):
         lost = next((source for source in now.sources if source.name == before.active), None)
         why = f" ({lost.reason})" if lost is not None and lost.reason else ""
-        locked = lost is not None and lost.standing is Standing.LOCKED
+        locked = lost is not None and lost.standing is SourceStanding.LOCKED
         sentence = f"{now.active or 'nobody'} drives, before {before.active or 'nobody'}{why}"
         fields = {"active": now.active or "", "before": before.active or ""}
         yield sentence, Priority.NOTICE if locked else Priority.INFO, fields
@@ -76,7 +74,7 @@ def is_told(before: Decision, now: Decision) -> bool:
     return Action.STOP in actions or Action.LIMIT not in actions or (now.emergency and not before.emergency)
 
 
-def _standing(decision: MuxDecision) -> Standing | None:
+def _standing(decision: MuxDecision) -> SourceStanding | None:
     return None if decision.holder is None else decision.holder.standing
 
 

@@ -1,10 +1,11 @@
-"""What the safety filter decides, in words: actions by severity and causes as in interfaces/msg/SafetyState.msg."""
+"""What the safety filter decides, and its actions by severity, as interfaces/msg/SafetyState.msg numbers them."""
 
 from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
 
+from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.twist import Twist
 
 
@@ -15,28 +16,6 @@ class Action(enum.IntEnum):
     LIMIT = 1
     SLOW = 2
     STOP = 3
-
-
-class StopCause(str, enum.Enum):
-    """Why. The values are the CAUSE_ constants of SafetyState.msg."""
-
-    NONE = "none"
-    COMMAND_STALE = "command_stale"
-    COMMAND_INVALID = "command_invalid"
-    ESTOP = "estop"
-    ESTOP_STALE = "estop_stale"
-    SCAN_STALE = "scan_stale"
-    SCAN_UNPLACED = "scan_unplaced"
-    SCAN_INVALID = "scan_invalid"
-    SCAN_FROZEN = "scan_frozen"
-    SCAN_BLIND = "scan_blind"
-    OBSTACLE = "obstacle"
-    OBSTACLE_NEAR = "obstacle_near"
-    SPEED = "speed_ceiling"
-    ACCELERATION = "acceleration_ceiling"
-    ZONE = "limit_zone"
-    BLIND = "blind"
-    SHUTDOWN = "shutdown"
 
 
 @dataclass(frozen=True, slots=True)

@@ -224,7 +224,7 @@ class FilterNode(Node):
                 time.monotonic_ns(),
                 decision.twist,
                 stops=decision.action is Action.STOP,
-                estop=messages.stopped_by_estop(decision),
+                estop=decision.cause.is_estop,
             )
         )
         if report is not None:

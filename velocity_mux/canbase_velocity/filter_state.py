@@ -10,8 +10,9 @@ import numpy as np
 
 from canbase_config.safety import Scan as ScanConfig
 from canbase_runtime.latch_record import Found, Record
+from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.clearance import FREE, Clearances, Field, Points, ScanReader, clearances
-from canbase_velocity.decision import Action, Decision, StopCause
+from canbase_velocity.decision import Action, Decision
 from canbase_velocity.delay import Delay, Sent
 from canbase_velocity.estop import Estop, EstopEvent, EstopState
 from canbase_velocity.frozen import FrozenWatch

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from canbase_config.mux import MuxLock
+from canbase_runtime.source_standing import LockStanding
 
 
 def crowd(topic: str, nodes: Sequence[str]) -> str:
@@ -24,11 +25,16 @@ class LockView:
     name: str
     topic: str
     priority: int
-    holds: bool
+    standing: LockStanding
     required: bool
     age_s: float | None
     timeout_s: float
     reason: str
+
+    @property
+    def holds(self) -> bool:
+        """It holds back the sources below it."""
+        return self.standing is not LockStanding.FREE
 
 
 class Lock:
@@ -49,25 +55,41 @@ class Lock:
         """Takes its word: true = locked."""
         self._locked, self._at_s = locked, now_s
 
-    def cause(self, now_s: float) -> str:
-        """Why it holds at time `now_s` [s, monotonic]; empty: it does not."""
+    def standing(self, now_s: float) -> LockStanding:
+        """Whether it holds at time `now_s` [s, monotonic], and for what."""
         if self._locked:
-            return "holds"
+            return LockStanding.LOCKED
         if self._crowd:
-            return f"has {self._crowd}"
+            return LockStanding.SHARED
         if not self.config.required:
-            return ""
+            return LockStanding.FREE
         if self._at_s is None:
-            return f"has published nothing yet on {self.config.topic}"
-        age_s = now_s - self._at_s
-        if age_s <= self.config.timeout_s:
-            return ""
-        return f"is silent for {age_s:.2f} s (timeout {self.config.timeout_s:.2f} s)"
+            return LockStanding.NEVER_RECEIVED
+        return LockStanding.FREE if now_s - self._at_s <= self.config.timeout_s else LockStanding.SILENT
+
+    def holds(self, now_s: float) -> bool:
+        """It holds back the sources below it at time `now_s` [s, monotonic]."""
+        return self.standing(now_s) is not LockStanding.FREE
+
+    def reason(self, now_s: float) -> str:
+        """Why it holds, with the values; empty: it does not."""
+        age_s = now_s - (self._at_s or 0.0)
+        return {
+            LockStanding.LOCKED: "holds",
+            LockStanding.SHARED: f"has {self._crowd}",
+            LockStanding.NEVER_RECEIVED: f"has published nothing yet on {self.config.topic}",
+            LockStanding.SILENT: f"is silent for {age_s:.2f} s (timeout {self.config.timeout_s:.2f} s)",
+        }.get(self.standing(now_s), "")
 
     def view(self, now_s: float) -> LockView:
         """What is told of it."""
-        config, cause = self.config, self.cause(now_s)
-        age_s = None if self._at_s is None else now_s - self._at_s
         return LockView(
-            self.name, config.topic, config.priority, bool(cause), config.required, age_s, config.timeout_s, cause
+            name=self.name,
+            topic=self.config.topic,
+            priority=self.config.priority,
+            standing=self.standing(now_s),
+            required=self.config.required,
+            age_s=None if self._at_s is None else now_s - self._at_s,
+            timeout_s=self.config.timeout_s,
+            reason=self.reason(now_s),
         )

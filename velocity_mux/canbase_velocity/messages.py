@@ -11,7 +11,7 @@ from geometry_msgs.msg import TwistStamped
 from sensor_msgs.msg import LaserScan
 
 from canbase_velocity.clearance import Clearances
-from canbase_velocity.decision import Decision, StopCause
+from canbase_velocity.decision import Decision
 from canbase_velocity.delay import Sent
 from canbase_velocity.placement import Transform
 from canbase_velocity.safety_filter import Inputs, ScanState
@@ -86,7 +86,7 @@ def safety_state(decision: Decision, inputs: Inputs, free: Clearances | None, st
         cause=decision.cause.value,
         detail=decision.detail,
         clears_on=decision.clears_on,
-        estop=stopped_by_estop(decision),
+        estop=decision.cause.is_estop,
         emergency=decision.emergency,
         clearance_ahead_m=free.ahead_m if free else NAN,
         clearance_behind_m=free.behind_m if free else NAN,
@@ -115,11 +115,6 @@ def oldest_scan_s(scans: tuple[ScanState, ...]) -> float | None:
     counting = [scan.age_s for scan in scans if scan.required] or [scan.age_s for scan in scans]
     known = [age_s for age_s in counting if age_s is not None]
     return max(known) if len(known) == len(counting) else None
-
-
-def stopped_by_estop(decision: Decision) -> bool:
-    """Whether the emergency stop, or its silence, holds the base."""
-    return decision.cause in (StopCause.ESTOP, StopCause.ESTOP_STALE)
 
 
 def _or_nan(value: float | None) -> float:

@@ -20,32 +20,19 @@ Rules:
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from canbase_config.mux import MuxLock, MuxSource
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.source_standing import IGNORED, SourceStanding
 from canbase_velocity.base_ready import STATUS_TIMEOUT_S, BaseReady
 from canbase_velocity.delay import Delay, Sent
 from canbase_velocity.lock import Lock, LockView, crowd
 from canbase_velocity.neutral import BLIND_S, Arming
 from canbase_velocity.twist import ZERO, Twist
 from canbase_velocity.unexpected_publishers import Foreign
-
-
-class Standing(enum.Enum):
-    """Why a source drives or does not."""
-
-    ACTIVE = "active"
-    UNARMED = "waiting for zero"
-    DELAYED = "delayed"
-    NEVER_RECEIVED = "never received"
-    SILENT = "silent"
-    LOCKED = "locked"
-    LOWER_PRIORITY = "lower priority"
-    SHUTDOWN = "shutdown"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +45,7 @@ class SourceView:
     name: str
     topic: str
     priority: int
-    standing: Standing
+    standing: SourceStanding
     age_s: float | None
     timeout_s: float
     received: int
@@ -96,7 +83,9 @@ class MuxDecision:
         """Who drives, for people."""
         if self.holder is None:
             return "nobody drives"
-        return f"{self.active} is not followed: {self.holder.reason}" if self.holder.reason else f"{self.active} drives"
+        if self.holder.standing in IGNORED:
+            return f"{self.active} is not followed: {self.holder.reason}"
+        return f"{self.active} drives"
 
     @property
     def essence(self) -> tuple[object, ...]:
@@ -164,15 +153,19 @@ class _Source:
         late_s = 0.0 if self.is_late else max(0.0, self.delay_s or 0.0)
         return age_s is not None and age_s + late_s <= self.config.timeout_s
 
-    def standing(self) -> tuple[Standing, str]:
+    def standing(self) -> tuple[SourceStanding, str]:
         """Of the one that has the base."""
         if self.is_late:
             what = "delayed by" if (self.delay_s or 0.0) > 0.0 else "stamped in the future by"
             limit = f"(limit {self.config.timeout_s:.2f} s)"
-            return Standing.DELAYED, f"{what} {abs(self.delay_s or 0.0):.2f} s {limit}"
-        return (Standing.ACTIVE, "") if self.arming.armed else (Standing.UNARMED, self.crowd or self.arming.reason)
+            return SourceStanding.DELAYED, f"{what} {abs(self.delay_s or 0.0):.2f} s {limit}"
+        return (
+            (SourceStanding.FOLLOWED, "")
+            if self.arming.armed
+            else (SourceStanding.UNARMED, self.crowd or self.arming.reason)
+        )
 
-    def view(self, now_s: float, standing: Standing, reason: str, locked: bool = False) -> SourceView:
+    def view(self, now_s: float, standing: SourceStanding, reason: str, locked: bool = False) -> SourceView:
         config = self.config
         return SourceView(
             self.name, config.topic, config.priority, standing, self.age_s(now_s), config.timeout_s,
@@ -265,7 +258,7 @@ class Mux:
         views = tuple(self._view(source, active, held[source.name], now_s) for source in self._sources.values())
         if active is None:
             return MuxDecision(None, ZERO, views, *self._others(now_s))
-        followed = active.standing()[0] is Standing.ACTIVE
+        followed = active.standing()[0] is SourceStanding.FOLLOWED
         return MuxDecision(active.name, active.twist if followed else ZERO, views, *self._others(now_s))
 
     def moving(self, now_s: float) -> tuple[str, ...]:
@@ -275,7 +268,7 @@ class Mux:
 
     def shutdown(self, now_s: float) -> MuxDecision:
         """The order while the process ends: zero, whoever wants to drive."""
-        views = tuple(source.view(now_s, Standing.SHUTDOWN, "shutdown") for source in self._sources.values())
+        views = tuple(source.view(now_s, SourceStanding.SHUTDOWN, "shutdown") for source in self._sources.values())
         return MuxDecision(None, ZERO, views, *self._others(now_s))
 
     def _look(self, now_s: float) -> None:
@@ -298,8 +291,8 @@ class Mux:
     def _held_back(self, source: _Source, now_s: float) -> str:
         """By what; empty: by nothing."""
         for lock in self._locks.values():
-            if lock.config.priority > source.config.priority and (cause := lock.cause(now_s)):
-                return f"locked: {lock.name} {cause}"
+            if lock.config.priority > source.config.priority and lock.holds(now_s):
+                return f"locked: {lock.name} {lock.reason(now_s)}"
         for foreign in self._foreign if self._foreign_lock else ():
             if foreign.disturbs(source.name):
                 return f"locked: {foreign.sentence}"
@@ -310,10 +303,10 @@ class Mux:
         if source is active:
             return source.view(now_s, *source.standing())
         if held:
-            return source.view(now_s, Standing.LOCKED, held, locked=True)
+            return source.view(now_s, SourceStanding.LOCKED, held, locked=True)
         if age_s is None:
-            return source.view(now_s, Standing.NEVER_RECEIVED, "never received")
+            return source.view(now_s, SourceStanding.NEVER_RECEIVED, "never received")
         if active is None or not source.is_fresh(now_s):
             reason = f"silent for {age_s:.2f} s (timeout {source.config.timeout_s:.2f} s)"
-            return source.view(now_s, Standing.SILENT, reason)
-        return source.view(now_s, Standing.LOWER_PRIORITY, f"{active.name} has priority")
+            return source.view(now_s, SourceStanding.SILENT, reason)
+        return source.view(now_s, SourceStanding.LOWER_PRIORITY, f"{active.name} has priority")

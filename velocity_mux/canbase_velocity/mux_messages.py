@@ -8,6 +8,7 @@ from builtin_interfaces.msg import Time
 from canbase.msg import ForeignPublisher, MuxLock, MuxSource, MuxState
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from canbase_runtime.source_standing import IGNORED
 from canbase_velocity.lock import LockView
 from canbase_velocity.mux import MuxDecision, SourceView
 from canbase_velocity.unexpected_publishers import Foreign
@@ -30,7 +31,7 @@ def diagnostics(decision: MuxDecision, robot: str, deaf: tuple[str, ...], stamp:
     """One entry. `deaf`: sentences about subscribers that ask for what we do not offer and hear nothing."""
     problems = [*(foreign.sentence for foreign in decision.foreign), *deaf]
     held = [f"{lock.name} {lock.reason}" for lock in decision.locks if lock.holds]
-    ignored = decision.holder is not None and bool(decision.holder.reason)
+    ignored = decision.holder is not None and decision.holder.standing in IGNORED
     values = {source.name: source.reason or "drives" for source in decision.sources}
     values |= {"the base": decision.not_ready or "can move"}
     values |= {f"refused commands of {source.name}": str(source.refused) for source in decision.sources}
@@ -61,6 +62,7 @@ def _source(source: SourceView, active: str | None) -> MuxSource:
         delay_s=_or_nan(source.delay_s),
         received=source.received,
         refused=source.refused,
+        standing=source.standing,
         reason=source.reason,
     )
 
@@ -74,6 +76,7 @@ def _lock(lock: LockView) -> MuxLock:
         required=lock.required,
         age_s=_or_nan(lock.age_s),
         timeout_s=lock.timeout_s,
+        standing=lock.standing,
         reason=lock.reason,
     )
 

@@ -26,8 +26,9 @@ from typing import Final
 from canbase_config.commissioned import uncommissioned
 from canbase_config.robot import Limits, Robot
 from canbase_config.safety import Ceiling, Safety
+from canbase_runtime.stop_cause import StopCause
 from canbase_velocity import obstacle
-from canbase_velocity.decision import PASSED, Action, Decision, Finding, StopCause, stop
+from canbase_velocity.decision import PASSED, Action, Decision, Finding, stop
 from canbase_velocity.estop import EstopState
 from canbase_velocity.obstacle import Geometry, Sight
 from canbase_velocity.ramp import Moving

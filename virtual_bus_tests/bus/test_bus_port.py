@@ -16,6 +16,7 @@ from can.interfaces.virtual import VirtualBus
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.runtime import bus_port
 from canbase_driver.runtime.bus_port import BUS_OFF, RECEIVE_FAILURES, SEND_FAILURES, SEND_TIMEOUT_S, BusError, BusPort
+from canbase_driver.supervision.bus_health import ControllerState
 from support.flaky_bus import FlakyBus
 
 pytestmark = pytest.mark.bus
@@ -149,7 +150,7 @@ def test_bus_off_is_a_problem_until_something_is_heard_again(port: BusPort, othe
     assert port.problem == BUS_OFF
     other.send(can.Message(arbitration_id=0x701, data=b"\5", is_extended_id=False))
     assert port.receive(0.1) == Frame(0x701, b"\5")
-    assert (port.problem, port.report.controller, port.report.failures) == ("", "error active", 1)
+    assert (port.problem, port.report.controller, port.report.failures) == ("", ControllerState.ERROR_ACTIVE, 1)
 
 
 def test_closing_twice_is_once(port: BusPort) -> None:

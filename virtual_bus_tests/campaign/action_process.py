@@ -15,11 +15,9 @@ from canbase_action_server.outcome import Outcome
 from canbase_action_server.preconditions import action_source
 from canbase_config.robot import Robot
 from canbase_driver.snapshot import DriverSnapshot
-from canbase_velocity.decision import Action, Decision, StopCause
+from canbase_velocity.decision import Action, Decision
 from canbase_velocity.mux import MuxDecision
 from canbase_velocity.twist import Twist
-
-ESTOP_CAUSES = (StopCause.ESTOP, StopCause.ESTOP_STALE)
 
 
 @dataclass(slots=True)
@@ -117,7 +115,7 @@ class ActionProcess(Process):
             state=snapshot.state,
             cause=snapshot.cause.value,
             detail=snapshot.detail,
-            watchdog=snapshot.watchdog.value,
+            watchdog=snapshot.watchdog,
             watchdog_cause=snapshot.watchdog_cause,
             standstill=snapshot.standstill,
             hears_command=snapshot.command_fresh,
@@ -126,8 +124,8 @@ class ActionProcess(Process):
         self._inputs = replace(self._inputs, driver=driver)
 
     def _on_safety(self, decision: Decision) -> None:
-        stops, estop = decision.action is Action.STOP, decision.cause in ESTOP_CAUSES
-        safety = Safety(self.clock.now_s, stops, decision.cause.value, decision.detail, estop)
+        stops, estop = decision.action is Action.STOP, decision.cause.is_estop
+        safety = Safety(self.clock.now_s, stops, decision.cause, decision.detail, estop)
         self._inputs = replace(self._inputs, safety=safety)
 
     def _on_mux(self, decision: MuxDecision) -> None:

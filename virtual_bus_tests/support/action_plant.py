@@ -18,6 +18,8 @@ from canbase_action_server.outcome import Outcome
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.stop_cause import StopCause
+from canbase_runtime.watchdog_view import WatchdogView
 
 STEP_S = 0.001
 COUNT_M = 2 * math.pi * 0.1 / (20 * 4096)
@@ -81,13 +83,13 @@ class Plant:
         return Odometry(received, Pose(x, y, yaw_rad), self.speed_mps, self.turn_radps)
 
 
-GOOD_SAFETY = Safety(received=0.0, stops=False, cause="none", detail="", estop=False)
+GOOD_SAFETY = Safety(received=0.0, stops=False, cause=StopCause.NONE, detail="", estop=False)
 GOOD_DRIVER = Driver(
     received=0.0,
     state=DriverState.ENABLED,
     cause="none",
     detail="",
-    watchdog="ok",
+    watchdog=WatchdogView.OK,
     watchdog_cause="none",
     standstill=True,
     hears_command=True,

@@ -11,8 +11,8 @@ import numpy as np
 from canbase_config.robot import Limits
 from canbase_config.safety import Ceiling, Estop, Footprint, LimitZone, Safety
 from canbase_config.safety import Scan as ScanConfig
+from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.clearance import Points
-from canbase_velocity.decision import StopCause
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.obstacle import NOTHING_IN_SIGHT, Geometry, Sight

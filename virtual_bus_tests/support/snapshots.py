@@ -7,8 +7,9 @@ from typing import Any
 from canbase_driver.causes import Cause
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.cia402 import DriveState
-from canbase_driver.snapshot import DriverSnapshot, DriveSnapshot, WatchdogView
+from canbase_driver.snapshot import DriverSnapshot, DriveSnapshot
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.watchdog_view import WatchdogView
 
 LEFT = DriveSnapshot(
     joint="left_wheel_joint",

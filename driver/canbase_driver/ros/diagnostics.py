@@ -14,8 +14,10 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from canbase_driver.causes import Cause
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.cia402 import DriveState
-from canbase_driver.snapshot import DriverSnapshot, DriveSnapshot, WatchdogView
+from canbase_driver.snapshot import DriverSnapshot, DriveSnapshot
+from canbase_driver.supervision.bus_health import ControllerState
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.watchdog_view import WatchdogView
 
 _LOOP_COUNTERS = ("commands_refused", "overruns", "travel_losses")
 _BUS_COUNTERS = ("frames_dropped", "send_errors", "receive_errors", "error_frames", "bus_failures")
@@ -88,12 +90,14 @@ def _driver_state(snapshot: DriverSnapshot) -> tuple[bytes, str]:
 def _bus_entry(snapshot: DriverSnapshot, previous: DriverSnapshot, robot: str) -> DiagnosticStatus:
     if snapshot.bus_problem:
         level, sentence = DiagnosticStatus.ERROR, f"The bus has failed: {snapshot.bus_problem.rstrip('.')}."
-    elif snapshot.controller == "error active":
+    elif snapshot.controller is ControllerState.ERROR_ACTIVE:
         level, sentence = DiagnosticStatus.OK, "The bus works."
     else:
-        level, sentence = DiagnosticStatus.WARN, f"The CAN controller is {snapshot.controller}: check the cable."
+        level, sentence = DiagnosticStatus.WARN, f"The CAN controller is {snapshot.controller.value}: check the cable."
     level, sentence = _with_news(level, sentence, _grown(snapshot, previous, _BUS_COUNTERS))
-    values = {"problem": snapshot.bus_problem, "controller": snapshot.controller} | _counters(snapshot, _BUS_COUNTERS)
+    values = {"problem": snapshot.bus_problem, "controller": snapshot.controller.value} | _counters(
+        snapshot, _BUS_COUNTERS
+    )
     return _entry(level, f"{robot}: bus", sentence, robot, values)
 
 

@@ -96,7 +96,7 @@ def status_message(snapshot: DriverSnapshot, stamp: Time) -> DriverStatus:
         frames_dropped=_u32(snapshot.frames_dropped),
         send_errors=_u32(snapshot.send_errors),
         bus_problem=snapshot.bus_problem,
-        controller=snapshot.controller,
+        controller=snapshot.controller.value,
         receive_errors=_u32(snapshot.receive_errors),
         error_frames=_u32(snapshot.error_frames),
         bus_failures=_u32(snapshot.bus_failures),

@@ -28,6 +28,7 @@ from canbase_driver.supervision.supervisor import POWER_OFF_TIMEOUT_S
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
 from canbase_runtime.journal import Voice
 from canbase_runtime.log_priority import Priority
+from canbase_runtime.stop_cause import stop_cause
 
 EVENT_QOS = QoSProfile(depth=50, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -62,7 +63,7 @@ class StopEvents:
         said = f"safety_filter {cause} {detail}".rstrip()
         ordered = f"{message.ordered_linear_mps:.4f} m/s {message.ordered_angular_radps:.4f} rad/s"
         self._ring.note(now_s, f"{said}; orders {ordered}, lease {message.lease_sequence}")
-        latched = self._estop_latches and message.cause in (SafetyState.CAUSE_ESTOP, SafetyState.CAUSE_ESTOP_STALE)
+        latched = self._estop_latches and stop_cause(message.cause).is_estop
         clears_on = printable(message.clears_on, SENTENCE_LENGTH)
         record = StopRecord(FILTER, cause, detail, latched, clears_on, now_s)
         self._news.put(lambda: self._recorder.on_filter(record if stops else None, now_s))

@@ -7,14 +7,31 @@ the error frame, details of the class CONTROLLER are in data byte 1. The watchdo
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import Enum
 
 CONTROLLER = 0x004
 BUS_OFF = 0x040
 RESTARTED = 0x100
-DETAILS: tuple[tuple[int, str], ...] = (
-    (0x30, "error passive"),
-    (0x0C, "error warning"),
-    (0x40, "error active"),
+
+
+class ControllerState(Enum):
+    """State of a CAN controller (ISO 11898-1, linux/can/netlink.h). The values are the words of DriverStatus.msg."""
+
+    ERROR_ACTIVE = "error active"
+    """The only one that is fine."""
+    ERROR_WARNING = "error warning"
+    ERROR_PASSIVE = "error passive"
+    BUS_OFF = "bus-off"
+    STOPPED = "stopped"
+    SLEEPING = "sleeping"
+    UNKNOWN = "unknown"
+    """It reports none, or one that this version does not know."""
+
+
+DETAILS: tuple[tuple[int, ControllerState], ...] = (
+    (0x30, ControllerState.ERROR_PASSIVE),
+    (0x0C, ControllerState.ERROR_WARNING),
+    (0x40, ControllerState.ERROR_ACTIVE),
 )
 """Byte 1 of CONTROLLER: passive or warning when receiving or sending; back to active. The worst is the first."""
 
@@ -23,7 +40,7 @@ DETAILS: tuple[tuple[int, str], ...] = (
 class BusReport:
     """Counters since the start, and the controller's last word about itself."""
 
-    controller: str = "error active"
+    controller: ControllerState = ControllerState.ERROR_ACTIVE
     send_errors: int = 0
     receive_errors: int = 0
     error_frames: int = 0
@@ -39,13 +56,13 @@ class BusReport:
     @property
     def is_bus_off(self) -> bool:
         """The controller has taken itself off the bus: nothing is sent or heard until it is restarted."""
-        return self.controller == "bus-off"
+        return self.controller is ControllerState.BUS_OFF
 
 
-def _state(error_class: int, data: bytes, before: str) -> str:
+def _state(error_class: int, data: bytes, before: ControllerState) -> ControllerState:
     if error_class & BUS_OFF:
-        return "bus-off"
+        return ControllerState.BUS_OFF
     if error_class & RESTARTED:
-        return "error active"
+        return ControllerState.ERROR_ACTIVE
     detail = data[1] if error_class & CONTROLLER and len(data) > 1 else 0
-    return next((text for bits, text in DETAILS if detail & bits), before)
+    return next((state for bits, state in DETAILS if detail & bits), before)

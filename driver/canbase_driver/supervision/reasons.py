@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from canbase_driver.causes import Cause
-from canbase_driver.snapshot import WatchdogView
 from canbase_driver.supervision.phases import Phase
 from canbase_driver.supervision.situation import Situation
+from canbase_runtime.watchdog_view import WatchdogView
 
 Seen = Callable[[Situation], str]
 """A sentence when it is so, else empty."""

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 from canbase_driver.cia402 import FAULT_RESET_CYCLES
-from canbase_driver.snapshot import WatchdogView
 from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.watchdog_link import ACCEPTED, ANSWERS
+from canbase_runtime.watchdog_view import WatchdogView
 
 WATCHDOG_TIMEOUT_S = 0.5
 EDGE_S = 0.05

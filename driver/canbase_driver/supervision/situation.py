@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from canbase_driver.snapshot import WatchdogView
+from canbase_runtime.watchdog_view import WatchdogView
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from enum import Enum, auto
 
 from canbase_driver.snapshot import DriverSnapshot, StopRecord
 from canbase_runtime.driver_state import DriverState
@@ -17,6 +18,17 @@ ORDER_AGE_S = 0.1
 """A source that ordered motion so short before its end was lost; one that ordered zero had ended by itself."""
 FILTER, MUX, DRIVER = "safety_filter", "velocity_mux", "motor_driver"
 STALE, NO_SOURCE = "command_stale", "no_source"
+"""Words for people, in a `StopRecord`."""
+
+
+class HeldBy(Enum):
+    """What holds the base in a stop, and may let go of it before it stands."""
+
+    FILTER = auto()
+    MUX = auto()
+    STALE_COMMAND = auto()
+    DRIVER = auto()
+    """The driver's core: it lets go of nothing that it has begun."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +56,7 @@ class _OpenStop:
     """A stop on its way. `let_go`: what held the base holds it no longer."""
 
     record: StopRecord
+    held_by: HeldBy
     stood: bool
     measured: bool = True
     distance_m: float = 0.0
@@ -83,25 +96,25 @@ class StopHistory:
     def on_filter(self, stop: StopRecord | None, now_s: float) -> None:
         """The safety filter said whether it holds the base, and why; None: it does not."""
         if stop is None:
-            self._let_go(FILTER, "")
+            self._let_go(HeldBy.FILTER)
         elif not self._filter_stops and (self._is_moving or self._ordered_motion(now_s)):
-            self._begin(stop)
+            self._begin(stop, HeldBy.FILTER)
         self._filter_stops = stop is not None
 
     def on_mux(self, active: str, detail: str, now_s: float) -> None:
         """The mux said which source drives, empty: none; `detail`: why the last one does not."""
         idle = not active
         if idle and not self._mux_idle and self._is_moving and self._ordered_motion(now_s):
-            self._begin(StopRecord(MUX, NO_SOURCE, detail, False, "a source that sends", now_s))
+            self._begin(StopRecord(MUX, NO_SOURCE, detail, False, "a source that sends", now_s), HeldBy.MUX)
         if not idle:
-            self._let_go(MUX, "")
+            self._let_go(HeldBy.MUX)
         self._mux_idle = idle
 
     def on_snapshot(self, snapshot: DriverSnapshot, stops: list[StopRecord]) -> list[StopReport]:
         """Take what the driver knows now, and the stops that it began since the last call. What is over."""
         before = self._previous or snapshot
         for record in stops:
-            self._begin(record)
+            self._begin(record, HeldBy.DRIVER)
         self._look_for_stale(before, snapshot)
         for stop in self._open:
             stop.add(before, snapshot)
@@ -121,9 +134,11 @@ class StopHistory:
         moved = self._moved_at >= at_s - ORDER_AGE_S
         if ended and moved and self._is_moving and snapshot.state is DriverState.ENABLED:
             detail = f"cmd_vel is silent for {snapshot.command_age_s:.2f} s"
-            self._begin(StopRecord(DRIVER, STALE, detail, False, "a fresh command", snapshot.time_s))
+            self._begin(
+                StopRecord(DRIVER, STALE, detail, False, "a fresh command", snapshot.time_s), HeldBy.STALE_COMMAND
+            )
         if snapshot.command_fresh:
-            self._let_go(DRIVER, STALE)
+            self._let_go(HeldBy.STALE_COMMAND)
 
     @property
     def _is_moving(self) -> bool:
@@ -132,13 +147,12 @@ class StopHistory:
     def _ordered_motion(self, now_s: float) -> bool:
         return now_s - self._moved_at <= ORDER_AGE_S
 
-    def _begin(self, record: StopRecord) -> None:
-        self._open.append(_OpenStop(record, stood=not self._is_moving))
+    def _begin(self, record: StopRecord, held_by: HeldBy) -> None:
+        self._open.append(_OpenStop(record, held_by, stood=not self._is_moving))
 
-    def _let_go(self, stopped_by: str, cause: str) -> None:
+    def _let_go(self, holder: HeldBy) -> None:
         for stop in self._open:
-            same = stop.record.stopped_by == stopped_by and cause in ("", stop.record.cause)
-            stop.let_go = stop.let_go or (same and not stop.record.latched)
+            stop.let_go = stop.let_go or (stop.held_by is holder and not stop.record.latched)
 
     def _is_over(self, stop: _OpenStop, snapshot: DriverSnapshot) -> bool:
         late = snapshot.time_s - stop.record.at_s > self._patience_s

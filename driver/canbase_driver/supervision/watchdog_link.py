@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from canbase_config.robot import WATCHDOG_NODE_ID
 from canbase_driver.cia301.frame import Frame
-from canbase_driver.snapshot import WatchdogView
+from canbase_runtime.watchdog_view import WatchdogView
 
 STATE_COB_ID = 0x180 + WATCHDOG_NODE_ID
 RESET_COB_ID = 0x200 + WATCHDOG_NODE_ID

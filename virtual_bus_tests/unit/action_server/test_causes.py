@@ -10,6 +10,8 @@ from canbase_action_server.causes import TABLE, Situation, cause_while_driving, 
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.outcome import ErrorCode, Status
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.stop_cause import StopCause
+from canbase_runtime.watchdog_view import WatchdogView
 from support.action_plant import GOOD_DRIVER, GOOD_MUX, GOOD_SAFETY, Plant, replaced
 
 GOOD = Situation(
@@ -37,13 +39,15 @@ def with_inputs(situation: Situation, **changes: object) -> Situation:
 Provoke = Callable[[Situation], Situation]
 PROVOKED: dict[ErrorCode, Provoke] = {
     ErrorCode.ESTOP: lambda s: with_inputs(s, safety=replace(GOOD_SAFETY, estop=True)),
-    ErrorCode.WATCHDOG: lambda s: with_inputs(s, driver=replace(s.inputs.driver or GOOD_DRIVER, watchdog="tripped")),
+    ErrorCode.WATCHDOG: lambda s: with_inputs(
+        s, driver=replace(s.inputs.driver or GOOD_DRIVER, watchdog=WatchdogView.TRIPPED)
+    ),
     ErrorCode.DRIVE_FAULT: lambda s: with_inputs(
         s, driver=replace(s.inputs.driver or GOOD_DRIVER, state=DriverState.LATCHED)
     ),
     ErrorCode.ODOMETRY_LOST: lambda s: replace(s, now_s=10.21),
     ErrorCode.TAKEN_OVER: lambda s: with_inputs(s, mux=replace(GOOD_MUX, active="joystick")),
-    ErrorCode.SCAN_LOST: lambda s: with_inputs(s, safety=replace(GOOD_SAFETY, cause="scan_stale")),
+    ErrorCode.SCAN_LOST: lambda s: with_inputs(s, safety=replace(GOOD_SAFETY, cause=StopCause.SCAN_STALE)),
     ErrorCode.BLOCKED: lambda s: replace(s, stopped_s=0.3),
     ErrorCode.CANCELED: lambda s: with_inputs(s, cancel_requested=True),
     ErrorCode.PREEMPTED: lambda s: with_inputs(s, preempted=True),

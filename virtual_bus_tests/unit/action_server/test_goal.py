@@ -15,9 +15,11 @@ from canbase_action_server.outcome import ErrorCode, Status
 from canbase_action_server.standstill import Standstill, StandstillLimits, Verdict
 from canbase_config.stopping import standstill_s
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.stop_cause import StopCause
+from canbase_runtime.watchdog_view import WatchdogView
 from support.action_plant import GOOD_SAFETY, Plant, Story, bench_robot, drive, goal_run, replaced
 
-OBSTACLE = replace(GOOD_SAFETY, stops=True, cause="obstacle", detail="0.12 m ahead")
+OBSTACLE = replace(GOOD_SAFETY, stops=True, cause=StopCause.OBSTACLE, detail="0.12 m ahead")
 
 
 def safety(story: Story, value: Safety) -> None:
@@ -71,8 +73,17 @@ def test_an_obstacle_that_stays_ends_the_goal_and_one_bad_scan_does_not() -> Non
 
 
 # 1 s in front of a scanner that reads nothing there, with blind_mps 0 ── away: the base must not go on by itself
-@pytest.mark.parametrize("cause", ["scan_blind", "blind", "command_stale", "shutdown"])
-def test_every_stop_of_the_filter_that_stays_ends_the_goal(cause: str) -> None:
+@pytest.mark.parametrize(
+    "cause",
+    [
+        StopCause.SCAN_BLIND,
+        StopCause.BLIND,
+        StopCause.COMMAND_STALE,
+        StopCause.SHUTDOWN,
+        StopCause.UNKNOWN,
+    ],
+)
+def test_every_stop_of_the_filter_that_stays_ends_the_goal(cause: StopCause) -> None:
     held = replace(GOOD_SAFETY, stops=True, cause=cause, detail="why it stops")
     story = drive(Plant(), 3.0, 0.3, at={2.0: lambda s: safety(s, held), 3.0: lambda s: safety(s, GOOD_SAFETY)})
     end = story.run()
@@ -300,7 +311,7 @@ def test_turning_is_not_standing() -> None:
 
 
 def test_an_old_word_of_the_driver_is_no_word() -> None:
-    told = Driver(0.1, DriverState.ENABLED, "none", "", "ok", "none", standstill=True, hears_command=True)
+    told = Driver(0.1, DriverState.ENABLED, "none", "", WatchdogView.OK, "none", standstill=True, hears_command=True)
     watch = Standstill(STILL, began=0.0, speed_mps=0.1)
     assert watch.judge(Inputs(driver=told), 0.5) is Verdict.WAIT  # received before the order could act
     assert watch.judge(Inputs(driver=replace(told, received=0.4)), 0.5) is Verdict.STANDS

@@ -10,6 +10,8 @@ from canbase_action_server.inputs import Inputs
 from canbase_action_server.preconditions import NO_SOURCE, STATE_TIMEOUT_S, action_source, state_reason
 from canbase_config.mux import Mux, MuxSource
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.stop_cause import StopCause
+from canbase_runtime.watchdog_view import WatchdogView
 from support.action_plant import GOOD_DRIVER, GOOD_MUX, GOOD_SAFETY, Plant, bench_robot, replaced
 
 ROBOT = bench_robot()  # action.*: 0.01 to 5 m, 0.02 to 0.5 m/s
@@ -57,9 +59,9 @@ def test_a_robot_that_is_ready_has_no_reason_against_it() -> None:
         ({"driver": None}, "nothing received on motor_driver/status"),
         ({"mux": None}, "nothing received on velocity_mux/state"),
         ({"safety": replace(GOOD_SAFETY, estop=True)}, "emergency stop"),
-        ({"safety": replace(GOOD_SAFETY, cause="estop_stale")}, "emergency stop"),
+        ({"safety": replace(GOOD_SAFETY, cause=StopCause.ESTOP_STALE)}, "emergency stop"),
         ({"driver": replace(GOOD_DRIVER, state=DriverState.LATCHED)}, "latched, not enabled"),
-        ({"driver": replace(GOOD_DRIVER, watchdog="missing")}, "watchdog is missing"),
+        ({"driver": replace(GOOD_DRIVER, watchdog=WatchdogView.MISSING)}, "watchdog is missing"),
         ({"driver": replace(GOOD_DRIVER, hears_command=False)}, "hears no cmd_vel"),
         ({"mux": replace(GOOD_MUX, active="joystick")}, "joystick drives"),
         ({"mux": replace(GOOD_MUX, held_back="locked: pause holds")}, "holds action back: locked: pause holds"),

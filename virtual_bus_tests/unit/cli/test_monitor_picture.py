@@ -27,9 +27,25 @@ MUX = MuxState(
     ready=True,
     sources=[
         MuxSource(
-            name="joystick", priority=100, active=True, armed=True, age_s=0.02, delay_s=0.01, timeout_s=0.3, refused=3
+            name="joystick",
+            priority=100,
+            active=True,
+            standing=MuxSource.FOLLOWED,
+            armed=True,
+            age_s=0.02,
+            delay_s=0.01,
+            timeout_s=0.3,
+            refused=3,
         ),
-        MuxSource(name="action", priority=40, age_s=math.nan, delay_s=math.nan, timeout_s=0.3, reason="never received"),
+        MuxSource(
+            name="action",
+            priority=40,
+            age_s=math.nan,
+            delay_s=math.nan,
+            timeout_s=0.3,
+            standing=MuxSource.NEVER_RECEIVED,
+            reason="never received",
+        ),
     ],
     locks=[MuxLock(name="pause", priority=99, required=True, age_s=0.61, timeout_s=0.5)],
 )
@@ -94,10 +110,10 @@ def test_everything_that_an_operator_needs_is_there() -> None:
 
 def test_a_held_stick_that_is_not_followed_is_told_in_the_headline_and_with_its_reason() -> None:
     reason = "waiting for zero (motor_driver is LATCHED)"
-    joystick = MuxSource(name="joystick", active=True, delay_s=math.nan, reason=reason)
+    joystick = MuxSource(name="joystick", active=True, standing=MuxSource.UNARMED, delay_s=math.nan, reason=reason)
     mux = MuxState(active="joystick", not_ready="motor_driver is LATCHED", sources=[joystick])
     snapshot = replace(ALL, mux=Heard(mux, 0.1))
-    assert line(snapshot).startswith("joystick is not followed: waiting for zero  |")
+    assert line(snapshot).startswith("joystick is not followed: not armed  |")
     assert reason in drawn(snapshot)
     assert "The base cannot move: motor_driver is LATCHED" in drawn(snapshot)
 
@@ -173,9 +189,9 @@ def test_the_line_changes_with_states_and_not_with_ages_and_speeds() -> None:
 
 
 def test_the_line_tells_locks_and_foreign_publishers() -> None:
-    lock = MuxLock(name="pause", holds=True, reason="is silent for 0.61 s (timeout 0.50 s)")
+    lock = MuxLock(name="pause", holds=True, standing=MuxLock.SILENT, reason="is silent for 0.61 s (timeout 0.50 s)")
     foreign = ForeignPublisher(topic="/cmd_vel", node="/evil", problem="only /safety_filter should")
     mux = MuxState(locks=[lock], foreign=[foreign])
     text = line(Snapshot("/", mux=Heard(mux, 0.0)))
-    assert "lock pause is silent  |  foreign publisher /evil on /cmd_vel" in text
+    assert "lock pause silent  |  foreign publisher /evil on /cmd_vel" in text
     assert "/evil publishes on /cmd_vel: only /safety_filter should" in drawn(Snapshot("/", mux=Heard(mux, 0.0)))

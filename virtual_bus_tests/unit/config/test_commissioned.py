@@ -16,8 +16,8 @@ from canbase_config.robot import Robot
 from canbase_doctor.checks import Verdict, commissioning
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.stop_cause import StopCause
 from canbase_sim.world.bench import Bench
-from canbase_velocity.decision import StopCause
 from canbase_velocity.safety_filter import FilterConfig, decide
 from canbase_velocity.twist import Twist
 from support.chain_world import World, bench_robot

@@ -17,8 +17,11 @@ from canbase_doctor.checks import Verdict
 from canbase_doctor.inspection import Inspection, Part
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia402 import DriveState
+from canbase_driver.supervision.bus_health import ControllerState
 
-WELL = Link("can0", "can", True, 500_000, "ERROR-ACTIVE", restart_ms=100, queue_length=64, counters={"bus_off": 0})
+WELL = Link(
+    "can0", "can", True, 500_000, ControllerState.ERROR_ACTIVE, restart_ms=100, queue_length=64, counters={"bus_off": 0}
+)
 DRIVES = ["701 05", "702 05", "181 37 02 00 00 00 00", "182 37 02 00 00 00 00"]
 DRIVER, WATCHDOG = ["77F 05", "080"], ["77E 05", "1FE 01 00 00 00 0A 00 00 00", "2FE 00 00 00 00 00 00 00 05"]
 
@@ -79,9 +82,10 @@ def test_a_bus_that_cannot_be_opened_is_the_only_row() -> None:
     [
         ({"is_up": False}, "CAN interface", Verdict.FAIL),
         ({"bitrate": 250_000}, "bit rate", Verdict.FAIL),
-        ({"state": "BUS-OFF"}, "CAN controller", Verdict.FAIL),
-        ({"state": "ERROR-PASSIVE"}, "CAN controller", Verdict.FAIL),
-        ({"state": "ERROR-WARNING"}, "CAN controller", Verdict.WARN),
+        ({"state": ControllerState.BUS_OFF}, "CAN controller", Verdict.FAIL),
+        ({"state": ControllerState.ERROR_PASSIVE}, "CAN controller", Verdict.FAIL),
+        ({"state": ControllerState.ERROR_WARNING}, "CAN controller", Verdict.WARN),
+        ({"state": ControllerState.UNKNOWN}, "CAN controller", Verdict.WARN),
         ({"receive_errors": 3}, "CAN controller", Verdict.WARN),
         ({"counters": {"bus_off": 1}}, "CAN controller", Verdict.WARN),
         ({"restart_ms": 0}, "interface settings", Verdict.WARN),
@@ -185,7 +189,7 @@ NO_ERRORS = {"restarts": 0, "bus_error": 0, "error_warning": 0, "error_passive":
 
 
 def test_what_ip_tells_about_a_can_interface() -> None:
-    assert parse_link(IP) == Link("can0", "can", True, 500_000, "ERROR-ACTIVE", 0, 0, 100, 64, NO_ERRORS)
+    assert parse_link(IP) == Link("can0", "can", True, 500_000, ControllerState.ERROR_ACTIVE, 0, 0, 100, 64, NO_ERRORS)
 
 
 def test_each_number_is_taken_from_its_own_place() -> None:
@@ -197,7 +201,7 @@ def test_each_number_is_taken_from_its_own_place() -> None:
 
     found = parse_link(json.dumps(told))
 
-    assert found == Link("can0", "can", True, 500_000, "ERROR-WARNING", 8, 127, 100, 64, counters)
+    assert found == Link("can0", "can", True, 500_000, ControllerState.ERROR_WARNING, 8, 127, 100, 64, counters)
 
 
 @pytest.mark.parametrize("text", ["", "[]", "[{}]", "{}", "Device does not exist"])

@@ -17,17 +17,20 @@ from sensor_msgs.msg import LaserScan
 from tf2_msgs.msg import TFMessage
 
 from canbase_action_server.along_track import Pose
+from canbase_action_server.goal_step import GoalStep
 from canbase_action_server.inputs import Driver, Inputs, Mux, Safety
 from canbase_action_server.inputs import Odometry as OdometryInput
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_doctor.checks import INCONCLUSIVE, Verdict, exit_code, first_failure
-from canbase_doctor.evidence import Answers, Endpoint, Evidence, Goal, Heard, ServerProcess
+from canbase_doctor.evidence import Answers, Endpoint, Evidence, Goal, Heard, LoggedStep, ServerProcess
 from canbase_doctor.overload import Overload
 from canbase_doctor.server_processes import server_processes, talks_by
 from canbase_doctor.symptom_checks import CHECKS, walk
 from canbase_doctor.symptoms import SYMPTOMS
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.stop_cause import StopCause
+from canbase_runtime.watchdog_view import WatchdogView
 
 WALL_S = 1_700_000_000
 NOW = Time(sec=WALL_S)
@@ -72,14 +75,14 @@ def status(**values: Any) -> DriverStatus:
     return DriverStatus(**{"state": DriverStatus.ENABLED, "watchdog": "ok", "standstill": True} | values)
 
 
-def step(name: str, at_s: float = WALL_S - 2.0, uuid: str | None = "cd", **values: Any) -> dict[str, Any]:
-    return {"uuid": uuid, "step": name, "at_s": at_s, **values}
+def step(name: str, at_s: float = WALL_S - 2.0, uuid: str | None = "cd", **values: Any) -> LoggedStep:
+    return LoggedStep(GoalStep(name), uuid, at_s, values)
 
 
 INPUTS = Inputs(
     odometry=OdometryInput(9.9, Pose(0.0, 0.0, 0.0), 0.0, 0.0),
-    safety=Safety(9.9, False, "none", "", False),
-    driver=Driver(9.9, DriverState.ENABLED, "none", "", "ok", "none", standstill=True, hears_command=True),
+    safety=Safety(9.9, False, StopCause.NONE, "", False),
+    driver=Driver(9.9, DriverState.ENABLED, "none", "", WatchdogView.OK, "none", standstill=True, hears_command=True),
     mux=Mux(9.9, ""),
 )
 HEALTHY = Evidence(

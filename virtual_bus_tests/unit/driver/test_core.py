@@ -9,10 +9,10 @@ import pytest
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.core import DriverCore
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.snapshot import WatchdogView
 from canbase_driver.supervision.bus_health import BusReport
 from canbase_driver.supervision.reset import Outcome
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.watchdog_view import WatchdogView
 from support.chain_world import World, bench_robot
 
 WATCHING = Frame(0x1FE, bytes.fromhex("01 00 80 00 14 00 00 00"))

@@ -12,8 +12,9 @@ from canbase_driver.causes import Cause
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.cia402 import DriveState
 from canbase_driver.ros.diagnostics import diagnostics_message, unguarded
-from canbase_driver.snapshot import WatchdogView
+from canbase_driver.supervision.bus_health import ControllerState
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.watchdog_view import WatchdogView
 from support.snapshots import SNAPSHOT, with_driver, with_left
 
 STAMP = Time(sec=1_700_000_000, nanosec=250_000_000)
@@ -156,7 +157,7 @@ def test_a_growing_counter_does_not_make_an_error_a_warning() -> None:
     ("changes", "level", "sentence"),
     [
         ({"bus_problem": "network is down."}, ERROR, "The bus has failed: network is down."),
-        ({"controller": "error passive"}, WARN, "The CAN controller is error passive: check the cable."),
+        ({"controller": ControllerState.ERROR_PASSIVE}, WARN, "The CAN controller is error passive: check the cable."),
     ],
 )
 def test_what_the_bus_says(changes: dict[str, Any], level: bytes, sentence: str) -> None:

@@ -13,9 +13,10 @@ from canbase_driver.causes import Cause
 from canbase_driver.motion.odometry import Odometry
 from canbase_driver.ros import messages
 from canbase_driver.ros.diagnostics import diagnostics_message
-from canbase_driver.snapshot import StopRecord, WatchdogView
+from canbase_driver.snapshot import StopRecord
 from canbase_driver.supervision.stop_history import StopReport
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.watchdog_view import WatchdogView
 from support.snapshots import LEFT, RIGHT, SNAPSHOT, with_driver, with_left
 
 STAMP = Time(sec=1_700_000_000, nanosec=250_000_000)
@@ -103,7 +104,7 @@ def test_states_and_words_are_those_of_the_interface() -> None:
         name: getattr(DriverStatus, name)
         for name in ("OFFLINE", "BOOTING", "DISARMED", "ENABLING", "ENABLED", "STOPPING", "LATCHED")
     }
-    assert {view.name: view.value for view in WatchdogView} == {
+    assert {view.name: view.value for view in WatchdogView if view is not WatchdogView.UNKNOWN} == {
         "OK": DriverStatus.WATCHDOG_OK,
         "MISSING": DriverStatus.WATCHDOG_MISSING,
         "TRIPPED": DriverStatus.WATCHDOG_TRIPPED,
@@ -124,8 +125,8 @@ def test_the_status_carries_every_field_of_the_snapshot_that_the_interface_has()
     assert message.stamp == STAMP
     assert message.state == DriverStatus.LATCHED
     assert message.watchdog == DriverStatus.WATCHDOG_TRIPPED
-    assert message.cause == "drive fault"
-    plain = set(message.get_fields_and_field_types()) - {"stamp", "state", "cause", "watchdog", "drives"}
+    assert (message.cause, message.controller) == ("drive fault", "error active")
+    plain = set(message.get_fields_and_field_types()) - {"stamp", "state", "cause", "watchdog", "controller", "drives"}
     assert {name: getattr(message, name) for name in plain} == {name: getattr(latched, name) for name in plain}
 
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from canbase_driver.snapshot import WatchdogView
 from canbase_driver.supervision.reset import FAULT_TRIES, Outcome, Reset, ResetPhase, refusal
 from canbase_driver.supervision.situation import Situation
+from canbase_runtime.watchdog_view import WatchdogView
 
 WELL = Situation()
 TRIPPED = Situation(watchdog=WatchdogView.TRIPPED, watchdog_detail="lease lost")

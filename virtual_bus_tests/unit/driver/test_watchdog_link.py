@@ -7,8 +7,8 @@ import math
 import pytest
 
 from canbase_driver.cia301.frame import Frame
-from canbase_driver.snapshot import WatchdogView
 from canbase_driver.supervision.watchdog_link import CAUSES, WatchdogCounters, WatchdogLink, WatchdogState, parse_state
+from canbase_runtime.watchdog_view import WatchdogView
 
 WATCHING = "01 00 00 00 14 00 00 00"
 TRIPPED = "02 03 01 02 ff ff 00 00"  # drive silent, quick stop, node 2, no lease

@@ -8,8 +8,9 @@ import pytest
 
 from canbase_config.mux import MuxLock, MuxSource
 from canbase_runtime.log_priority import Priority
+from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.changes import DropTeller, changed_order, changes, is_told
-from canbase_velocity.decision import Action, Decision, StopCause
+from canbase_velocity.decision import Action, Decision
 from canbase_velocity.safety_filter import ScanState
 from canbase_velocity.twist import ZERO, Twist
 from support.mux_world import rested

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from canbase_config.mux import DEFAULT_SOURCES, MuxSource
+from canbase_runtime.source_standing import SourceStanding
 from canbase_velocity.delay import DRIFT, FORGET_S, SILENCE_S, Delay, Sent
-from canbase_velocity.mux import LATE_S, Mux, MuxDecision, Standing
+from canbase_velocity.mux import LATE_S, Mux, MuxDecision
 from canbase_velocity.twist import ZERO, Twist
 from support.mux_world import rested
 
@@ -51,7 +52,7 @@ def test_letting_go_of_the_stick_over_a_network_that_delays_by_two_seconds_stops
     assert link.send(FORWARD, 0.01, 1.0).twist == FORWARD
     decision = link.send(FORWARD, 2.0)  # the first late one
     assert (decision.active, decision.twist) == ("joystick", ZERO)
-    assert decision.sources[0].standing is Standing.DELAYED
+    assert decision.sources[0].standing is SourceStanding.DELAYED
     assert decision.sources[0].reason == "delayed by 1.99 s (limit 0.30 s)"
     assert link.send(FORWARD, 2.0, 10.0).twist == ZERO
 
@@ -140,8 +141,8 @@ def test_a_clock_that_was_set_back_during_a_minute_of_silence_recovers_within_a_
     link.send(ZERO, 0.01, 1.0)
     link.sent_s += SILENCE_S + 10.0
     link.apart_s -= 5.0  # no stamp is below the last one: it looks like a delay of 5 s
-    assert link.send(ZERO, 0.01, 1.0).sources[0].standing is Standing.DELAYED
-    assert link.send(ZERO, 0.01, FORGET_S).sources[0].standing is Standing.ACTIVE
+    assert link.send(ZERO, 0.01, 1.0).sources[0].standing is SourceStanding.DELAYED
+    assert link.send(ZERO, 0.01, FORGET_S).sources[0].standing is SourceStanding.FOLLOWED
     assert link.send(FORWARD, 0.01).twist == FORWARD
 
 

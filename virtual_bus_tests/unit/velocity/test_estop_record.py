@@ -6,7 +6,8 @@ import pytest
 
 from campaign.disk import FULL, StopDisk
 from canbase_runtime.latch_record import Defect, Found, Mark
-from canbase_velocity.decision import Action, Decision, StopCause
+from canbase_runtime.stop_cause import StopCause
+from canbase_velocity.decision import Action, Decision
 from canbase_velocity.estop import Estop, EstopEvent, EstopState
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.twist import ZERO, Twist

@@ -8,7 +8,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from canbase_config.robot import Robot
-from canbase_velocity.decision import Action, StopCause
+from canbase_runtime.stop_cause import StopCause
+from canbase_velocity.decision import Action
 from canbase_velocity.twist import ZERO, Twist
 from support.filter_world import FilterWorld, robot_with
 

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canbase_config.mux import DEFAULT_SOURCES, MuxLock, MuxSource
-from canbase_velocity.mux import Mux, MuxDecision, Standing
+from canbase_runtime.source_standing import SourceStanding
+from canbase_velocity.mux import Mux, MuxDecision
 from canbase_velocity.twist import ZERO, Twist
 from canbase_velocity.unexpected_publishers import Foreign
 from support.mux_world import rested
@@ -28,7 +29,7 @@ def reasons(decision: MuxDecision) -> dict[str, str]:
     return {source.name: source.reason for source in decision.sources}
 
 
-def standings(decision: MuxDecision) -> list[Standing]:
+def standings(decision: MuxDecision) -> list[SourceStanding]:
     return [source.standing for source in decision.sources]
 
 
@@ -120,7 +121,7 @@ def test_at_shutdown_zero_is_ordered_whoever_wants_to_drive(mux: Mux) -> None:
     mux.on_command("joystick", FAST, 0.0)
     decision = mux.shutdown(0.1)
     assert (decision.active, decision.twist) == (None, ZERO)
-    assert standings(decision) == [Standing.SHUTDOWN] * 3
+    assert standings(decision) == [SourceStanding.SHUTDOWN] * 3
     assert reasons(decision)["joystick"] == "shutdown"
 
 
@@ -129,8 +130,8 @@ def test_the_essence_changes_with_the_reason_and_not_with_the_age(mux: Mux) -> N
     first, later, silent = mux.decide(0.1), mux.decide(0.2), mux.decide(0.6)
     assert first.essence == later.essence
     assert first.essence != silent.essence
-    assert standings(first) == [Standing.NEVER_RECEIVED, Standing.ACTIVE, Standing.NEVER_RECEIVED]
-    assert standings(silent) == [Standing.NEVER_RECEIVED, Standing.SILENT, Standing.NEVER_RECEIVED]
+    assert standings(first) == [SourceStanding.NEVER_RECEIVED, SourceStanding.FOLLOWED, SourceStanding.NEVER_RECEIVED]
+    assert standings(silent) == [SourceStanding.NEVER_RECEIVED, SourceStanding.SILENT, SourceStanding.NEVER_RECEIVED]
 
 
 PAUSE = MuxLock(topic="pause", priority=60, required=False)

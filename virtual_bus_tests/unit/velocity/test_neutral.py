@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 
 from canbase_config.mux import DEFAULT_SOURCES, MuxLock, MuxSource
 from canbase_runtime.driver_state import DriverState, driver_state
+from canbase_runtime.source_standing import SourceStanding
 from canbase_velocity.base_ready import STATUS_TIMEOUT_S, BaseReady, status_timeout_s
 from canbase_velocity.delay import Sent
-from canbase_velocity.mux import Mux, MuxDecision, Standing
+from canbase_velocity.mux import Mux, MuxDecision
 from canbase_velocity.neutral import BLIND_S, Arming
 from canbase_velocity.twist import ZERO, Twist
 from canbase_velocity.unexpected_publishers import Foreign
@@ -73,7 +74,7 @@ def test_a_stick_that_is_held_while_the_mux_starts_moves_nothing_until_it_was_re
     assert not story.followed("joystick", 30.0)
     decision = story.decide()
     assert (decision.active, decision.twist) == ("joystick", ZERO)
-    assert decision.sources[0].standing is Standing.UNARMED
+    assert decision.sources[0].standing is SourceStanding.UNARMED
     assert decision.sources[0].reason == "waiting for zero (velocity_mux started)"
     story.release()
     assert story.followed("joystick")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from canbase_velocity.decision import Action, StopCause
+from canbase_runtime.stop_cause import StopCause
+from canbase_velocity.decision import Action
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import NOTHING_TO_RESET, SafetyFilter
 from canbase_velocity.twist import ZERO, Twist

@@ -6,8 +6,9 @@ import math
 
 import pytest
 
+from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.clearance import NOWHERE, Field
-from canbase_velocity.decision import Action, StopCause
+from canbase_velocity.decision import Action
 from canbase_velocity.obstacle import Sight
 from canbase_velocity.placement import Placement
 from canbase_velocity.safety_filter import decide

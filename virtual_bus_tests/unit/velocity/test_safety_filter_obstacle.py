@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from canbase_config.safety import Scan as ScanConfig
+from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.clearance import Field, Points
-from canbase_velocity.decision import Action, StopCause
+from canbase_velocity.decision import Action
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.obstacle import Geometry, Sight

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.clearance import Field
-from canbase_velocity.decision import Action, Decision, StopCause
+from canbase_velocity.decision import Action, Decision
 from canbase_velocity.estop import EstopState
 from canbase_velocity.obstacle import Sight, allowed_share
 from canbase_velocity.placement import Placement

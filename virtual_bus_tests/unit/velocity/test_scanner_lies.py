@@ -12,8 +12,8 @@ import math
 import numpy as np
 import pytest
 
+from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.clearance import ScanReader
-from canbase_velocity.decision import StopCause
 from canbase_velocity.frozen import FrozenWatch
 from canbase_velocity.placement import Placement
 from canbase_velocity.scan import MAX_READINGS, Scan, ScanError, check

@@ -7,7 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from canbase_velocity.decision import Action, StopCause
+from canbase_runtime.stop_cause import StopCause
+from canbase_velocity.decision import Action
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.placement import Placement
 from canbase_velocity.sole_publisher import LATCHED_S, SolePublisher

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from canbase_velocity.decision import Decision, StopCause
+from canbase_runtime.stop_cause import StopCause
+from canbase_velocity.decision import Decision
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.twist import ZERO, Twist

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from canbase_velocity.decision import StopCause
+from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.filter_state import NO_SCAN, WITHOUT_SCANS_S, SafetyFilter
 from canbase_velocity.twist import Twist
 from support.filter_inputs import config, see

@@ -13,6 +13,7 @@ from typing import Any, Final
 from canbase.msg import DriverStatus
 
 from canbase_commissioning.can_interface import parse_link
+from canbase_driver.supervision.bus_health import ControllerState
 from vm.guest.robot import Robot
 from vm.guest.scenario import Row
 from vm.guest.system import PARTS, ROBOT_YAML, TARGET, BrokenPromiseError, run, show, unit
@@ -132,7 +133,7 @@ def _link_is_read(text: str) -> None:
     link = parse_link(json.dumps([entry for entry in json.loads(text) if entry.get("ifname") == "can0"]))
     if link is None or (link.kind, link.is_up, link.bitrate) != ("can", True, 500_000):
         raise BrokenPromiseError(f"can0 is read as {link} from {text}")
-    if (link.state, link.restart_ms, link.queue_length) != ("ERROR-ACTIVE", 100, 64):
+    if (link.state, link.restart_ms, link.queue_length) != (ControllerState.ERROR_ACTIVE, 100, 64):
         raise BrokenPromiseError(f"can0 is read as {link} from {text}")
 
 
