@@ -172,7 +172,8 @@ class TestNode:
     def record(self, kind: type[T], topic: str, qos: QoSProfile | int = 50) -> Recorder[T]:
         """A subscription that keeps everything."""
         recorder: Recorder[T] = Recorder()
-        self.node.create_subscription(kind, topic, recorder.on_message, qos)
+        with_times: Any = recorder.on_message  # rclpy gives the times to a callback with two arguments
+        self.node.create_subscription(kind, topic, with_times, qos)
         return recorder
 
     def repeat(self, kind: type[T], topic: str, rate_hz: float, qos: QoSProfile | int = 1) -> Repeater[T]:
