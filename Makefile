@@ -28,10 +28,19 @@ quick: $(VENV)/ready ## under a minute: ruff, mypy, and the unit tests that impo
 	  if [[ -n $$tests ]]; then pytest -q -x --numprocesses auto $$tests; else echo "no unit test imports what changed"; fi
 
 .PHONY: test
-test: $(VENV)/ready ## all tests: pure units, simulated drives on a bus, processes over DDS
-	@echo "about 20 minutes on two processors; make quick: under one, for what changed"
-	pytest --numprocesses auto virtual_bus_tests/unit virtual_bus_tests/campaign virtual_bus_tests/small_worlds
-	pytest virtual_bus_tests/bus virtual_bus_tests/ros
+test: test-own-time test-real-time ## all tests: pure units, simulated drives on a bus, processes over DDS
+
+TESTS := virtual_bus_tests
+
+.PHONY: test-own-time
+test-own-time: coverage ## tests that bring their own time: pure units, campaign, small worlds
+	@echo "about 10 minutes on two processors; make quick: under one, for what changed"
+	pytest --numprocesses auto $(addprefix --ignore=,$(DECIDES)) $(TESTS)/unit $(TESTS)/campaign $(TESTS)/small_worlds
+
+.PHONY: test-real-time
+test-real-time: $(VENV)/ready ## tests in real time: simulated drives on a bus, processes over DDS
+	@echo "about 25 minutes, mostly waiting"
+	pytest $(TESTS)/bus $(TESTS)/ros
 
 # COMPILED=1: campaign, stops and soak run with their hot modules compiled, several times as fast, frame by frame the same.
 WORLD := $(if $(COMPILED),$(CURDIR)/build/compiled:)$(CURDIR)/virtual_bus_tests
@@ -81,12 +90,12 @@ small-worlds: $(VENV)/ready ## every failure with every action of an operator in
 fuzz: $(VENV)/ready ## a million random and malformed frames and leases against driver, watchdog and drives
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.fuzz
 
-UNIT := virtual_bus_tests/unit
-DECIDES := $(UNIT)/watchdog $(patsubst %,$(UNIT)/driver/test_%.py,cia402 axis supervisor reset standstill braking) \
+UNIT = $(TESTS)/unit
+DECIDES = $(UNIT)/watchdog $(patsubst %,$(UNIT)/driver/test_%.py,cia402 axis supervisor reset standstill braking) \
   $(UNIT)/chain/test_layouts_agree.py $(UNIT)/runtime/test_latch_record.py
 
 .PHONY: coverage
-coverage: $(VENV)/ready ## branch coverage of watchdog policy and CiA 402 tables: all of it, or it fails
+coverage: $(VENV)/ready ## units of what decides about stops, with their branch coverage: all of it, or it fails
 	rm -f $(VENV)/coverage*
 	coverage run --data-file=$(VENV)/coverage -m pytest -q --numprocesses auto $(DECIDES)
 	coverage combine -q --data-file=$(VENV)/coverage
