@@ -17,7 +17,7 @@ from canbase_runtime.driver_state import DriverState
 from canbase_runtime.stop_cause import SCAN_LOST, StopCause
 from canbase_runtime.watchdog_view import WatchdogView
 
-CLIENT_SILENT = "no keepalive from the client (action.require_client_lease): it died, hangs, or does not send any"
+CLIENT_SILENT = "no keepalive from the client (action.require_client_lease): it ended, hangs, or sends none"
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,23 +76,31 @@ def _odometry_lost(s: Situation) -> str | None:
     odometry = s.inputs.odometry
     age = age_s(odometry.received if odometry else None, s.now_s)
     if s.pose_was_reset:
-        return "the pose of the odometry was set anew during the goal, or missed some travel: send a new goal"
+        return "the pose of the odometry was reset during the goal, or missed some travel; send a new goal"
     if s.odometry_jumped:
         return "odometry jumped farther than the base can move: it was reset, or another node publishes odom"
     if s.gap_s > s.odometry_timeout_s:  # what arrives now may look fresh: the base was driven without it
         return (
-            f"the action server itself stood still for {s.gap_s:.2f} s and saw no odometry; is the computer overloaded?"
+            f"the action server itself did not run for {s.gap_s:.2f} s and saw no odometry; is the computer overloaded?"
         )
     if age <= s.odometry_timeout_s:
         return None
-    return f"no odometry for {age:.2f} s (timeout {s.odometry_timeout_s} s); is motor_driver running?"
+    return f"no odometry for {age:.2f} s (timeout {s.odometry_timeout_s} s); {_why_no_odometry(s)}"
+
+
+def _why_no_odometry(s: Situation) -> str:
+    """A hung driver is silent on both topics at once; its status is sent less often than odometry."""
+    driver, odometry = s.inputs.driver, s.inputs.odometry
+    if driver and odometry and driver.received - odometry.received > s.odometry_timeout_s / 2.0:
+        return "motor_driver still reports its status: check the feedback of the drives with `canbase doctor`"
+    return "motor_driver hangs, has ended, or its messages do not arrive: check with `canbase doctor`"
 
 
 def _taken_over(s: Situation) -> str | None:
     mux = s.inputs.mux
     if mux is None or mux.active in ("", s.own_source):
         return None
-    return f"{mux.active} drives now, it has priority; the base follows it"
+    return f"{mux.active} has taken over: its priority is higher, and the base follows it"
 
 
 def _off_course(s: Situation) -> str | None:
@@ -108,12 +116,12 @@ def _scan_lost(s: Situation) -> str | None:
 
 def _blocked(s: Situation) -> str | None:
     if s.inputs.mux is not None and s.inputs.mux.held_back:
-        return f"velocity_mux holds {s.own_source} back: {s.inputs.mux.held_back}; free it and send a new goal"
+        return f"velocity_mux holds {s.own_source} back: {s.inputs.mux.held_back}; unlock it and send a new goal"
     if s.stopped_s < s.stopped_patience_s or s.inputs.safety is None:
         return None
     if s.inputs.safety.cause is not StopCause.OBSTACLE:
         return f"the safety filter stops the base ({s.inputs.safety.cause.value}): {s.inputs.safety.detail}"
-    return f"obstacle in the way: {s.inputs.safety.detail}; clear the way and send a new goal for the rest"
+    return f"obstacle in the path: {s.inputs.safety.detail}; remove it and send a new goal for the remaining distance"
 
 
 def _canceled(s: Situation) -> str | None:
@@ -121,7 +129,7 @@ def _canceled(s: Situation) -> str | None:
 
 
 def _preempted(s: Situation) -> str | None:
-    return "a newer goal takes its place (action.goal_policy is preempt)" if s.inputs.preempted else None
+    return "replaced by a newer goal (action.goal_policy: preempt)" if s.inputs.preempted else None
 
 
 def _client_lost(s: Situation) -> str | None:
@@ -135,13 +143,15 @@ def _shutdown(s: Situation) -> str | None:
 def _no_progress(s: Situation) -> str | None:
     if s.no_progress_s <= s.progress_timeout_s:
         return None
-    return f"ordered to move, but no progress for {s.no_progress_s:.1f} s; is the base stuck, or slowed down to zero?"
+    return (
+        f"no progress for {s.no_progress_s:.1f} s, although motion is ordered; is it stuck, or its speed limited to 0?"
+    )
 
 
 def _timeout(s: Situation) -> str | None:
     if s.running_s <= s.overall_timeout_s:
         return None
-    return f"not there after {s.running_s:.1f} s (overall timeout {s.overall_timeout_s:.1f} s)"
+    return f"not finished after {s.running_s:.1f} s (overall timeout {s.overall_timeout_s:.1f} s)"
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,9 +33,9 @@ class Phase(Enum):
 
 
 TRANSITIONS = {
-    (Phase.DRIVING, Phase.STOPPING): "the way is gone, or a cause ends the goal",
-    (Phase.STOPPING, Phase.DRIVING): "the base stands short of the goal and nothing else ended the goal",
-    (Phase.STOPPING, Phase.ENDED): "the base stands, or had its time to",
+    (Phase.DRIVING, Phase.STOPPING): "the distance is driven, or a cause ends the goal",
+    (Phase.STOPPING, Phase.DRIVING): "at standstill short of the goal, and nothing else ended it",
+    (Phase.STOPPING, Phase.ENDED): "at standstill, or the time for it is over",
 }
 
 
@@ -171,14 +171,15 @@ class GoalRun:
         motion, cause = self._motion, self._cause
         if verdict is Verdict.STILL_MOVES and cause.code.leaves_the_base_standing:
             cause = EndCause(
-                ErrorCode.DRIVE_FAULT, "ordered to stand, but the base still moves; use the emergency stop"
+                ErrorCode.DRIVE_FAULT,
+                "ordered to stop, but standstill is not confirmed in time; use the emergency stop",
             )
         elif cause.code is ErrorCode.OK and motion.overshoot_m > self._robot.action.tolerance_m:
-            cause = EndCause(ErrorCode.OVERSHOOT, "the base rolled over the goal: too fast for its load or the slope")
+            cause = EndCause(ErrorCode.OVERSHOOT, "the base rolled past the goal: too fast for its load or the slope")
         elif verdict is not Verdict.STANDS:
             cause = EndCause(cause.code, f"{cause.message}; the base {verdict.value}")
         went = motion.report()
-        text = f"{cause.message}; {went}" if cause.message else f"{went}, and stands"
+        text = f"{cause.message}; {went}" if cause.message else f"{went}; at standstill"
         return Outcome(cause.code, motion.traveled_m, max(0.0, motion.overshoot_m), text, verdict is Verdict.STANDS)
 
     def _feedback(self, now_s: float) -> Feedback | None:

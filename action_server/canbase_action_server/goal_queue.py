@@ -168,7 +168,7 @@ class GoalQueue:
         if goal.canceled:
             return EndCause(ErrorCode.CANCELED, "canceled by request")
         if goal.preempted:
-            return EndCause(ErrorCode.PREEMPTED, "a newer goal takes its place")
+            return EndCause(ErrorCode.PREEMPTED, "replaced by a newer goal")
         if self._client_lost(goal, now_s):
             return EndCause(ErrorCode.CLIENT_LOST, CLIENT_SILENT)
         return EndCause(ErrorCode.SHUTDOWN, "the action server is shutting down") if inputs.shutdown else None

@@ -59,5 +59,5 @@ def _condition(robot: Robot, inputs: Inputs) -> str | None:
     if mux and mux.active not in ("", action_source(robot)):
         return f"{mux.active} drives now; let go of it first"
     if mux and mux.held_back:
-        return f"velocity_mux holds {action_source(robot)} back: {mux.held_back}; free it first"
+        return f"velocity_mux holds {action_source(robot)} back: {mux.held_back}; unlock it first"
     return None

@@ -24,11 +24,11 @@ BRAKING_RESERVE_S = 0.5
 class Verdict(Enum):
     """What is known about the base now."""
 
-    WAIT = "not known to stand yet"
-    STANDS = "seen standing"
+    WAIT = "not known to be at standstill yet"
+    STANDS = "at standstill"
     HANDED_OVER = "belongs to another source now, and may be moving"
-    NOT_MEASURED = "had the time to stop, but nothing told whether it did"
-    STILL_MOVES = "still moves after the time in which it must stop"
+    NOT_MEASURED = "had time to stop, but nothing confirms that it did"
+    STILL_MOVES = "is not known to be at standstill after the time in which it must stop"
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ _HEAD: Final = """\
 Every key, what may stand there, its default and what it means. Written by `canbase config keys` from the models
 that check the files; a test compares it, so it is never out of date.
 
-- `canbase config check robot.yaml` names each mistake with its line, and prints the whole of it with every default.
+- `canbase config check --config robot.yaml` names each mistake with its line, and prints all keys with defaults.
 - Lengths are in m, speeds in m/s and rad/s, times in s; the name of a key carries its unit. Forward, left and
   counter-clockwise are positive (REP 103).
 - **must be given**: there is no default that fits every robot. No timeout can be switched off.

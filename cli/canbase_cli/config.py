@@ -7,35 +7,39 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from canbase_cli.options import ConfigOption
 from canbase_runtime.terminal import colour, load_config, warn
 
 if TYPE_CHECKING:
     from canbase_config.robot import Bus
 
-app = typer.Typer(help="Look at a robot.yaml.", no_args_is_help=True)
+app = typer.Typer(help="Check a robot.yaml, list its keys, draft a drive profile.", no_args_is_help=True)
 
 
 @app.callback()
 def _group() -> None:
-    """Look at a robot.yaml."""
+    """Check a robot.yaml, list its keys, draft a drive profile."""
 
 
 @app.command()
 def check(
     file: Annotated[
-        Path | None, typer.Argument(metavar="FILE", help="The robot.yaml.", show_default="the bench sample")
+        Path | None, typer.Argument(metavar="[FILE]", help="The same as --config FILE.", show_default=False)
     ] = None,
+    config: ConfigOption = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print problems only, and no warnings.")] = False,
 ) -> None:
-    """Check FILE and print the whole configuration that it stands for, the defaults marked.
+    """Check a robot.yaml, and print its whole configuration with the defaults marked.
 
-    What is printed is a robot.yaml itself. Warnings are on stderr, also where this computer has no such bus.
+    The output is a robot.yaml itself. Warnings go to stderr, also a warning that this computer has no such bus.
 
-    Exit codes: 0 FILE can be used, 2 it cannot: all its problems are on stderr.
+    Exit codes: 0 the file can be used, 2 it cannot; every problem is on stderr.
     """
     from canbase_config.effective import DEFAULT_MARK, effective
 
-    loaded = load_config(file, quiet=quiet)
+    if file is not None and config is not None:
+        raise typer.BadParameter("give the robot.yaml once: --config FILE, or FILE alone")
+    loaded = load_config(config or file, quiet=quiet)
     if quiet:
         return
     for sentence in _bus_warnings(loaded.robot.bus):
@@ -64,9 +68,9 @@ def keys() -> None:
 
 @app.command("from-eds")
 def from_eds(file: Annotated[Path, typer.Argument(metavar="FILE", help="The EDS or DCF file of a drive.")]) -> None:
-    """Draft a drive profile from an EDS file, on stdout; what to know about it is on stderr.
+    """Draft a drive profile from an EDS file. The profile goes to stdout, notes about it to stderr.
 
-    Exit code 0: a start for `profile` in robot.yaml. 1: the drive lacks what canbase needs. 2: FILE cannot be read.
+    Exit codes: 0 a draft for `profile` in robot.yaml, 1 the drive lacks what canbase needs, 2 FILE cannot be read.
     """
     from canbase_config.eds_file import EdsError, read_eds
     from canbase_config.errors import MOST_TOLD, printable

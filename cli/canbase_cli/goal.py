@@ -33,14 +33,15 @@ CancelAfterOption = Annotated[
     float | None,
     typer.Option(
         "--cancel-after",
-        "--timeout",
         metavar="SECONDS",
         min=0.1,
-        help="Cancel the goal when it takes longer.",
+        help="Cancel the goal after this time.",
         show_default="never",
     ),
 ]
-WaitOption = Annotated[float, typer.Option("--wait", metavar="SECONDS", min=0.1, help="Look for the server so long.")]
+WaitOption = Annotated[
+    float, typer.Option("--wait", metavar="SECONDS", min=0.1, help="How long to look for the server.")
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as one line of JSON.")]
 
 Show = Callable[[float, float], None]
@@ -108,14 +109,14 @@ def exit_code(status: Status) -> int:
 
 def _cancel(goal: SentGoal[Any], interrupts: Interrupts) -> Any:
     seen = interrupts.count
-    typer.echo("canceling; waiting until the base stands", err=True)
+    typer.echo("canceling; waiting for standstill", err=True)
     if goal.cancel():
         typer.echo("the server accepts the cancel", err=True)
     else:
         typer.echo("the server does not accept the cancel: the goal is about to end", err=True)
     result = goal.wait(CANCEL_PATIENCE_S, until=lambda: interrupts.count > seen)
     if result is None:
-        fail("gave up waiting for the final status: the base may still move", FAILED)
+        fail("no longer waiting for the result: the base may still move", FAILED)
     return result
 
 

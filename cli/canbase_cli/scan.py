@@ -26,7 +26,10 @@ def scan(
         float, typer.Option("--seconds", metavar="SECONDS", min=0.1, max=60.0, help="Listen so long before asking.")
     ] = 1.5,
     timeout_s: Annotated[
-        float, typer.Option("--timeout", metavar="SECONDS", min=0.02, max=5.0, help="Wait so long for an SDO answer.")
+        float,
+        typer.Option(
+            "--sdo-timeout", metavar="SECONDS", min=0.02, max=10.0, help="How long to wait for an SDO answer."
+        ),
     ] = 0.3,
     passive: Annotated[bool, typer.Option("--passive", help="Only listen, send nothing.")] = False,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Ask the nodes even where another master is heard.")] = False,

@@ -37,7 +37,8 @@ TypeOption = Annotated[
 ]
 EdsOption = Annotated[Path | None, typer.Option("--eds", metavar="FILE", help="The maker's EDS file: types, names.")]
 TimeoutOption = Annotated[
-    float, typer.Option("--timeout", metavar="SECONDS", min=0.02, max=10.0, help="Wait so long for an SDO answer.")
+    float,
+    typer.Option("--sdo-timeout", metavar="SECONDS", min=0.02, max=10.0, help="How long to wait for an SDO answer."),
 ]
 
 

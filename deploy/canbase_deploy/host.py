@@ -162,7 +162,7 @@ def neighbours(prefix: Path, name: str, installed: Iterable[str]) -> list[Neighb
         except ConfigError as error:
             raise InstallError(
                 f"the robot {other} is installed too, and nobody knows on which bus: {path} cannot be used. Mend it "
-                f"(`canbase config check {path}` says what is wrong), or `sudo canbase uninstall {other}`"
+                f"(`canbase config check --config {path}` says what is wrong), or `sudo canbase uninstall {other}`"
             ) from error
         found.append(Neighbour(other, loaded.robot, named_texts(loaded.files)))
     return found

@@ -172,7 +172,7 @@ class DriverCore:
     def request_shutdown(self) -> None:
         """Ramp to a stand, take the power away, then be `finished`. A reset on its way is broken off."""
         self._shutdown_requested = True
-        self._reset.end(Outcome(False, "broken off: the driver is ending"))
+        self._reset.end(Outcome(False, "broken off: motor_driver is shutting down"))
 
     def request_reset(self, now_s: float, on_outcome: Callable[[Outcome], None]) -> None:
         """Begin a reset; `on_outcome` is called once, at once when it is refused."""
@@ -183,7 +183,7 @@ class DriverCore:
     def request_aim(self, aim: Aim, now_s: float, on_outcome: Callable[[Outcome], None]) -> None:
         """Go so far; `on_outcome` is called once, when it is there or has failed."""
         if self._shutdown_requested:
-            on_outcome(Outcome(False, "refused: the driver is ending"))
+            on_outcome(Outcome(False, "refused: motor_driver is shutting down"))
         else:
             self._readiness.request(aim, now_s, on_outcome)
 
@@ -302,7 +302,7 @@ class DriverCore:
         watchdog, watchdog_detail = self._watchdog.view(now_s)
         liar = self._watchdog.lying_node(now_s)
         if liar:
-            self._drives.doubt(liar, f"reports what cannot be ({watchdog_detail})")
+            self._drives.doubt(liar, f"reports implausible values (watchdog: {watchdog_detail})")
         measured_mps = abs(self._drives.fastest().velocity_mps)
         ordered_mps = max(abs(speed) for speed in wheel_speeds(self._motion.twist, self._robot.base.track_m))
         return Situation(

@@ -227,7 +227,7 @@ class SafetyFilter:
             return False, f"refused: {self.estop_crowd}"
         if moving or not inputs.command.is_zero:
             who = ", ".join(moving) or "cmd_vel_mux"
-            return False, f"refused: {who} orders a velocity; let go of the joystick or cancel the goal first"
+            return False, f"refused: {who} orders a velocity; release the joystick or cancel the goal, then reset"
         self._estop.happens(EstopEvent.RESET)
         return True, "emergency stop reset; the next command is followed"
 

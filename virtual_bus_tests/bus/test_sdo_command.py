@@ -33,7 +33,7 @@ def test_refusals_name_the_abort_code_in_words_and_what_to_try(config: str) -> N
     done = canbase("sdo", "read", "1", "5FFF", "-c", config)
     assert done.returncode == 1
     assert "0602 0000h the object does not exist; the drive has no such object" in done.stderr
-    done = canbase("sdo", "read", "9", "1000", "-c", config, "--timeout", "0.05")
+    done = canbase("sdo", "read", "9", "1000", "-c", config, "--sdo-timeout", "0.05")
     assert done.returncode == 1
     assert "canbase scan shows who answers" in done.stderr
 

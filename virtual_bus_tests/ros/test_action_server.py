@@ -82,7 +82,7 @@ def test_a_pose_that_is_set_anew_by_less_than_a_jump_ends_the_goal(stage: Stage)
     stage.base.driver.pose_resets += 1
     result = stage.end_of(drive)
     assert result.code is ErrorCode.ODOMETRY_LOST
-    assert "set anew" in result.message
+    assert "was reset" in result.message
 
 
 def test_a_base_that_turns_away_ends_the_goal_and_the_message_has_offset_angle_and_wheel(stage: Stage) -> None:

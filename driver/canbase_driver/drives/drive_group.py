@@ -111,7 +111,7 @@ class Drives:
         return _first(self._turning(axis, now_s) for axis in self.axes)
 
     def doubt(self, node_id: int, why: str) -> None:
-        """What this node measures is no evidence: somebody has caught it with a lie."""
+        """What this node measures is no evidence: the watchdog has found it implausible."""
         for axis in self.axes:
             if axis.drive.node_id == node_id:
                 axis.stillness.distrust(why)
@@ -175,9 +175,9 @@ class Drives:
             return ""
         joint, base = axis.drive.joint, self._robot.base
         if not self._is_fresh(axis, now_s):
-            return f"{joint} has given no velocity for {axis.age_s(now_s):.2f} s"
+            return f"{joint} has reported no velocity for {axis.age_s(now_s):.2f} s"
         if axis.stillness.doubt:
-            return f"{joint} {axis.stillness.doubt}: its sensors are no evidence of standstill"
+            return _of(axis, axis.stillness.unproven(now_s))
         return f"{joint} turns at {axis.velocity_mps:.3f} m/s (base.standstill_mps {base.standstill_mps:g})"
 
     def _is_fresh(self, axis: Axis, now_s: float) -> bool:

@@ -76,6 +76,13 @@ class Stillness:
         """Why the sensors are no evidence; empty: they are."""
         return self._lie or ("" if self._follows else self._sudden)
 
+    def unproven(self, now_s: float) -> str:
+        """Why the sensors do not prove standstill, what to do about it, and how long that takes."""
+        limit_s = self._limits.coasting_s
+        left_s = limit_s - max(now_s - self._off_since, 0.0)
+        todo = f"; repair it, and wait until its power has been off for {limit_s:.0f} s" if self._lie else ""
+        return f"{self.doubt}{todo} ({max(math.ceil(left_s), 0)} s left)"
+
     def pause(self) -> None:
         """Samples did not come for a while. What the wheel rolled meanwhile the encoder has counted."""
         self._at = self._still_since = -math.inf
@@ -143,7 +150,7 @@ class Stillness:
         return lost_mps > hardest_mps2 * elapsed_s + limits.noise_mps
 
     def distrust(self, why: str) -> None:
-        """Somebody else has caught the sensors with a lie."""
+        """The watchdog has found the sensors implausible."""
         self._lie = why
 
     def stands(self, now_s: float) -> bool:
@@ -162,7 +169,7 @@ class Stillness:
         """Why its standstill is assumed and not measured; empty: it is measured, or it does not stand."""
         if not self.doubt or not self.stands(now_s):
             return ""
-        return f"{self.doubt}; its power has been off for {now_s - self._off_since:.0f} s, so a stand is assumed"
+        return f"{self.doubt}; its power has been off for {now_s - self._off_since:.0f} s, so standstill is assumed"
 
     def _compare(self, shown: bool, ordered_m: float) -> None:
         if shown:
@@ -170,4 +177,4 @@ class Stillness:
             return
         self._unshown_m += ordered_m
         if self._unshown_m > self._limits.unshown_m:
-            self._lie = f"showed no motion for {self._unshown_m:.3f} m that were ordered"
+            self._lie = f"showed no motion for {self._unshown_m:.3f} m of ordered travel"

@@ -137,7 +137,11 @@ class ControlLoop(threading.Thread):
 
         def carry_out(now_s: float) -> None:
             if now_s - asked_at > OLD_S and not however_late:
-                answer(Outcome(False, f"refused: motor_driver stood still for {now_s - asked_at:.1f} s; send it again"))
+                answer(
+                    Outcome(
+                        False, f"refused: motor_driver did not run for {now_s - asked_at:.1f} s; send the request again"
+                    )
+                )
             else:
                 request(now_s, answer)
 

@@ -84,7 +84,11 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(Cause.STOP_REQUESTED, _stop_requested, False, True, "reset"),
     Hazard(Cause.INACTIVE, lambda s: s.inactive, False, False, "lifecycle transition activate"),
     Hazard(
-        Cause.SHUTDOWN, lambda s: "the driver is ending" if s.shutdown_requested else "", False, False, "a new start"
+        Cause.SHUTDOWN,
+        lambda s: "motor_driver is shutting down" if s.shutdown_requested else "",
+        False,
+        False,
+        "a new start",
     ),
 )
 """All reasons to stop, the most telling first: when several hold, the first one is the cause that is reported.

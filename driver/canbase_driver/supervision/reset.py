@@ -44,19 +44,27 @@ class Outcome:
 
 
 _BUS_OR_COMMAND: tuple[Callable[[Situation], str], ...] = (
-    lambda s: f"{s.commanded}; let go of the joystick or cancel the goal first" if s.commanded else "",
+    lambda s: f"{s.commanded}; release the joystick or cancel the goal, then reset" if s.commanded else "",
     lambda s: s.bus,
 )
 _WATCHDOG: tuple[Callable[[Situation], str], ...] = (
     lambda s: f"watchdog: {s.watchdog_detail}" if s.watchdog is not WatchdogView.OK else "",
 )
+
+
+def _turning(s: Situation) -> str:
+    if s.standstill or s.unready:
+        return ""
+    return f"{s.turning or 'a wheel turns'}; {'then reset again' if s.doubted else 'reset again at standstill'}"
+
+
 _DRIVES: tuple[Callable[[Situation], str], ...] = (lambda s: s.unready,)
 
 REFUSALS: tuple[Callable[[Situation], str], ...] = (
-    lambda s: "the driver is ending" if s.shutdown_requested else "",
+    lambda s: "motor_driver is shutting down" if s.shutdown_requested else "",
     lambda s: "a reset is under way" if s.resetting else "",
     lambda s: f"{s.unconfigured}; configure it first" if s.unconfigured else "",
-    lambda s: s.turning or "a wheel turns" if not s.standstill and not s.unready else "",
+    _turning,
     *_BUS_OR_COMMAND,
     lambda s: f"watchdog: {s.watchdog_detail}" if s.watchdog is WatchdogView.MISSING else "",
 )
@@ -75,7 +83,7 @@ BREAKS: dict[ResetPhase, tuple[Callable[[Situation], str], ...]] = {
 def refusal(situation: Situation, stopped: bool) -> str | None:
     """Why a reset may not even begin; None when it may. `stopped`: the supervisor has taken all power away."""
     if not stopped:
-        return "refused: there is power on the drives; stop first (service motor_driver/stop)"
+        return "refused: the drives have power; an enabled robot needs no reset. `canbase stop` takes the power off"
     problem = _first(REFUSALS, situation)
     return f"refused: {problem}" if problem else None
 
@@ -123,7 +131,7 @@ class Reset:
         if not situation.unready:
             self._go(ResetPhase.EDGE_LOW if situation.fault else ResetPhase.FAULTS, now_s)
         elif now_s - self._since_s > self._boot_s:
-            return Outcome(False, f"{situation.unready}; reset again once that is cured")
+            return Outcome(False, f"{situation.unready}; remedy that, then reset again")
         return None
 
     def _edge(self, _situation: Situation, _answer: int | None, now_s: float) -> Outcome | None:
@@ -133,7 +141,7 @@ class Reset:
 
     def _faults(self, situation: Situation, _answer: int | None, now_s: float) -> Outcome | None:
         if not situation.fault:
-            return Outcome(True, "reset done; the drives get power once the command is zero")
+            return Outcome(True, "Reset. The drives are enabled once every velocity command is zero")
         if now_s - self._since_s > FAULT_TIMEOUT_S:
             self._tries_left -= 1
             if not self._tries_left:

@@ -52,7 +52,7 @@ class ResetRun:
             return [], None
         pause_s, self._stepped_at = now_s - self._stepped_at, now_s
         if pause_s > STOOD_STILL_S:
-            return [], Outcome(False, f"broken off: motor_driver stood still for {pause_s:.1f} s; reset again")
+            return [], Outcome(False, f"broken off: motor_driver did not run for {pause_s:.1f} s; reset again")
         outcome = self._sequence.step(situation, self._watchdog.answer(), now_s)
         asks = outcome is None and self._sequence.phase is ResetPhase.WATCHDOG
         return [self._request] if asks else [], outcome

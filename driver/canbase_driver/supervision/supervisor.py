@@ -142,7 +142,7 @@ class Supervisor:
         self.finished = True
         if self.phase in (Phase.PREPARING, Phase.ARMING):
             self.phase = Phase.DISARMED
-        self.finding = Finding(Cause.SHUTDOWN, "the driver is ending", "a new start")
+        self.finding = Finding(Cause.SHUTDOWN, "motor_driver is shutting down", "a new start")
 
 
 def _is_down(phase: Phase, situation: Situation) -> bool:

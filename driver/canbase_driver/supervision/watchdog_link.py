@@ -54,8 +54,8 @@ DRIVE_CAUSES = (3, 7, 18)
 """What the driver sees at its drives itself, and can tell more about."""
 ANSWERS = {
     1: "reset done",
-    2: "the cause stands, or a wheel is not proven to be at standstill (its log says which)",
-    3: "a velocity is ordered",
+    2: "its cause persists, or a wheel is not proven to be at standstill; its log names which, and what to do",
+    3: "a velocity is ordered; release the joystick or cancel the goal, then reset",
     4: "not tripped",
 }
 ACCEPTED = (1, 4)

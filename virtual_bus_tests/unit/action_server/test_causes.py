@@ -95,14 +95,14 @@ def test_a_pose_that_was_set_anew_is_a_loss_of_odometry_and_not_a_way_off_the_co
     cause = cause_while_driving(replace(GOOD, pose_was_reset=True, off_course=OFF_COURSE))
     assert cause is not None
     assert cause.code is ErrorCode.ODOMETRY_LOST
-    assert "set anew" in cause.message
+    assert "was reset" in cause.message
 
 
 def test_a_lock_of_the_mux_ends_a_goal_at_once_and_names_the_lock() -> None:
     cause = cause_while_driving(with_inputs(GOOD, mux=replace(GOOD_MUX, held_back="locked: pause holds")))
     assert cause is not None
     assert cause.code is ErrorCode.BLOCKED
-    assert cause.message == ("velocity_mux holds action back: locked: pause holds; free it and send a new goal")
+    assert cause.message == ("velocity_mux holds action back: locked: pause holds; unlock it and send a new goal")
 
 
 def test_a_base_off_its_course_is_still_stopped_by_a_trip() -> None:
@@ -111,6 +111,18 @@ def test_a_base_off_its_course_is_still_stopped_by_a_trip() -> None:
     assert cause is not None
     assert cause.code is ErrorCode.WATCHDOG
     assert cause_while_stopping(replace(GOOD, off_course=OFF_COURSE), ErrorCode.DRIVE_FAULT) is None
+
+
+@pytest.mark.parametrize(
+    ("status_at_s", "leads_to"), [(10.0, "hangs, has ended"), (10.11, "the feedback of the drives")]
+)
+def test_lost_odometry_leads_to_the_driver_or_to_its_drives(status_at_s: float, leads_to: str) -> None:
+    """odom came at 10.0 s; a status that came well after it shows that the driver runs."""
+    lost = PROVOKED[ErrorCode.ODOMETRY_LOST](with_inputs(GOOD, driver=replace(GOOD_DRIVER, received=status_at_s)))
+    cause = cause_while_driving(lost)
+    assert cause is not None
+    assert leads_to in cause.message
+    assert "`canbase doctor`" in cause.message
 
 
 def test_a_jump_of_the_odometry_is_a_loss_of_it() -> None:

@@ -213,7 +213,10 @@ def test_a_reset_is_refused_while_there_is_power(world: World) -> None:
     world.enable()
     outcome = world.reset()
     assert not outcome.done
-    assert outcome.sentence == "refused: there is power on the drives; stop first (service motor_driver/stop)"
+    assert (
+        outcome.sentence
+        == "refused: the drives have power; an enabled robot needs no reset. `canbase stop` takes the power off"
+    )
     assert world.core.state is DriverState.ENABLED
 
 

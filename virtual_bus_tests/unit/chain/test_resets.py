@@ -11,6 +11,7 @@ from canbase_config.derive import watchdog_config
 from canbase_config.robot import Robot
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.motion.kinematics import Twist2D
+from canbase_driver.supervision.watchdog_link import ANSWERS
 from canbase_runtime.driver_state import DriverState
 from canbase_watchdog.watchdog import State as WatchdogState
 from canbase_watchdog.watchdog import Watchdog
@@ -104,7 +105,7 @@ def test_a_reset_of_a_drive_that_stays_dead_ends_after_ten_seconds_and_says_so(w
     outcome = world.reset()
     assert not outcome.done
     assert re.match(r"waiting for node 1 \(left_wheel(, right_wheel)?\): the answer to 1000h:0", outcome.sentence)
-    assert outcome.sentence.endswith("check its power and its cable; reset again once that is cured")
+    assert outcome.sentence.endswith("check its power and its cable; remedy that, then reset again")
     assert 10.0 < world.now_s - start < 11.0
 
 
@@ -114,7 +115,7 @@ def test_while_a_silent_drive_is_the_watchdogs_cause_its_reset_is_refused(world:
     world.run(2.5)
     outcome = world.reset()
     assert not outcome.done
-    assert outcome.sentence.startswith("the watchdog refused: the cause stands")
+    assert outcome.sentence.startswith("the watchdog refused: its cause persists")
 
 
 def test_a_drive_that_restarts_during_a_reset_breaks_it_off(world: World) -> None:
@@ -154,7 +155,7 @@ def test_a_reset_that_was_under_way_while_the_driver_stood_still_is_broken_off(w
     world.run(0.02)
     world.pause_driver(9.0)
     world.run(1.0)
-    assert sentences == ["broken off: motor_driver stood still for 9.0 s; reset again"]
+    assert sentences == ["broken off: motor_driver did not run for 9.0 s; reset again"]
     assert world.core.state is DriverState.LATCHED
     assert world.recovered()
 
@@ -190,7 +191,7 @@ def test_after_a_lost_lease_the_watchdog_is_reset_only_when_zero_is_ordered(worl
     world.command = None  # cmd_vel ends, but the filter goes on to order 0.3 m/s
     world.run(0.3)
     outcome = world.reset()
-    assert outcome.sentence == "the watchdog refused: a velocity is ordered"
+    assert outcome.sentence == f"the watchdog refused: {ANSWERS[3]}"
     assert world.core.state is DriverState.LATCHED
     assert world.recovered()
     assert world.watchdog is not None

@@ -175,4 +175,4 @@ def test_a_lost_encoder_is_no_evidence_of_standstill_until_the_wheel_must_have_r
     world.run(1.0, watched)
     assert world.snapshot.standstill
     assert world.snapshot.standstill_assumed.startswith("left_wheel showed no motion for 0.0")
-    assert world.snapshot.standstill_assumed.endswith("so a stand is assumed")
+    assert world.snapshot.standstill_assumed.endswith("so standstill is assumed")

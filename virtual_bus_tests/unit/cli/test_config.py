@@ -182,6 +182,16 @@ def test_without_a_file_the_bench_sample_is_checked() -> None:
     assert (result.exit_code, result.stdout.splitlines()[0]) == (0, "name: bench")
 
 
+def test_the_file_may_be_named_as_for_other_commands_but_only_once(tmp_path: Path) -> None:
+    file = str(write(tmp_path, {}))
+
+    named = CliRunner().invoke(app, ["config", "check", "--config", file])
+    twice = CliRunner().invoke(app, ["config", "check", file, "--config", file])
+
+    assert (named.exit_code, named.output) == (0, CliRunner().invoke(app, ["config", "check", file]).output)
+    assert twice.exit_code == 2
+
+
 def test_colours_go_to_a_terminal_alone_and_not_where_the_user_wants_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NO_COLOR", raising=False)
     check = ["config", "check"]

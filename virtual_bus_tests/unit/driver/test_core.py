@@ -90,12 +90,12 @@ def test_a_shutdown_breaks_off_a_reset_and_tells_its_caller(core: DriverCore) ->
     outcomes: list[Outcome] = []
     core.request_reset(10.0, outcomes.append)
     core.request_shutdown()
-    assert outcomes == [Outcome(False, "broken off: the driver is ending")]
+    assert outcomes == [Outcome(False, "broken off: motor_driver is shutting down")]
     frames = core.tick(10.01)
     assert core.finished
     assert not [frame for frame in frames if frame.cob_id == 0x000]  # of no drive is known that its power is off
     core.request_reset(10.02, outcomes.append)
-    assert outcomes[1] == Outcome(False, "refused: the driver is ending")
+    assert outcomes[1] == Outcome(False, "refused: motor_driver is shutting down")
 
 
 def test_a_shutdown_begins_no_boot(core: DriverCore) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from canbase_driver.supervision.reset import FAULT_TRIES, Outcome, Reset, ResetPhase, refusal
 from canbase_driver.supervision.situation import Situation
+from canbase_driver.supervision.watchdog_link import ANSWERS
 from canbase_runtime.watchdog_view import WatchdogView
 
 WELL = Situation()
@@ -67,12 +68,16 @@ def sentence(outcome: Outcome | None) -> str:
 @pytest.mark.parametrize(
     ("situation", "why"),
     [
-        (Situation(commanded="cmd_vel orders 0.3 m/s"), "cmd_vel orders 0.3 m/s; let go of the joystick"),
-        (Situation(standstill=False), "a wheel turns"),
+        (Situation(commanded="cmd_vel orders 0.3 m/s"), "cmd_vel orders 0.3 m/s; release the joystick"),
+        (Situation(standstill=False), "a wheel turns; reset again at standstill"),
+        (
+            Situation(standstill=False, turning="left is not believed (8 s left)", doubted="left is not believed"),
+            "left is not believed (8 s left); then reset again",
+        ),
         (Situation(bus="bus-off"), "bus-off"),
         (MISSING, "watchdog: silent for 0.40 s"),
         (Situation(resetting=True), "a reset is under way"),
-        (Situation(shutdown_requested=True), "the driver is ending"),
+        (Situation(shutdown_requested=True), "motor_driver is shutting down"),
     ],
 )
 def test_it_may_not_even_begin_while(situation: Situation, why: str) -> None:
@@ -100,7 +105,7 @@ def test_it_may_begin_with(situation: Situation) -> None:
 
 def test_it_may_not_begin_while_there_is_power() -> None:
     assert refusal(WELL, stopped=False) == (
-        "refused: there is power on the drives; stop first (service motor_driver/stop)"
+        "refused: the drives have power; an enabled robot needs no reset. `canbase stop` takes the power off"
     )
 
 
@@ -110,14 +115,14 @@ def test_with_nothing_else_wrong_it_is_done_two_cycles_after_the_watchdogs_answe
     assert story.run(WELL, 0.1, answer=None) is None
     assert story.run(WELL, 0.02, answer) is None
     outcome = story.run(WELL, 0.01, answer)
-    assert outcome == Outcome(True, "reset done; the drives get power once the command is zero")
+    assert outcome == Outcome(True, "Reset. The drives are enabled once every velocity command is zero")
 
 
 @pytest.mark.parametrize(
     ("answer", "why"),
     [
-        (CAUSE_STANDS, "the cause stands, or a wheel is not proven to be at standstill (its log says which)"),
-        (VELOCITY_ORDERED, "a velocity is ordered"),
+        (CAUSE_STANDS, ANSWERS[CAUSE_STANDS]),
+        (VELOCITY_ORDERED, ANSWERS[VELOCITY_ORDERED]),
         (9, "answer 9"),
     ],
 )
@@ -149,7 +154,7 @@ NOT_THERE = "node 1 is not there"
 def test_it_waits_ten_seconds_for_a_drive_and_goes_on_when_it_is_there(waiting: Situation) -> None:
     late = Story()
     assert late.run(waiting, 9.9) is None
-    assert sentence(late.run(waiting, 0.2)) == "node 1 is not there; reset again once that is cured"
+    assert sentence(late.run(waiting, 0.2)) == "node 1 is not there; remedy that, then reset again"
     in_time = Story()
     assert in_time.run(waiting, 9.9) is None
     outcome = in_time.run(WELL, 0.1)

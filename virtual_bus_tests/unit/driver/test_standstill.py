@@ -112,7 +112,13 @@ def test_motion_that_was_ordered_and_not_shown_takes_the_evidence() -> None:
     wheel.turns(0.5, 0.3, 0.3, ordered_mps=0.3)
     assert wheel.turns(0.15, 0.0, 0.0, ordered_mps=0.3)
     assert not wheel.turns(0.05, 0.0, 0.0, ordered_mps=0.3)
-    assert wheel.stillness.doubt == "showed no motion for 0.060 m that were ordered"
+    assert wheel.stillness.doubt == "showed no motion for 0.060 m of ordered travel"
+    wheel.power_off()
+    wheel.turns(2.0, 0.0, 0.0)
+    assert wheel.stillness.unproven(wheel.now_s) == (
+        "showed no motion for 0.060 m of ordered travel; repair it, and wait until its power has been off for 10 s "
+        "(8 s left)"
+    )
     assert not wheel.turns(1.0, 0.0, 0.0)
 
 
@@ -146,7 +152,7 @@ def test_without_power_a_stand_is_assumed_when_it_must_have_rolled_out_and_it_sa
     wheel.stillness.distrust("was caught with a lie")
     wheel.stillness.on_power(False, wheel.now_s)
     assert wheel.turns(off_s, 0.0, 0.0) is stands
-    assumed = "was caught with a lie; its power has been off for 10 s, so a stand is assumed"
+    assumed = "was caught with a lie; its power has been off for 10 s, so standstill is assumed"
     assert wheel.stillness.assumed(wheel.now_s) == (assumed if stands else "")
 
 
@@ -203,7 +209,7 @@ def test_a_sensor_that_stops_within_less_than_a_wheel_can_is_no_evidence_until_i
     assert "it met something hard, or its encoder is dead" in wheel.stillness.doubt
     wheel.turns(off_at + 9.61 - wheel.now_s, 0.0, 0.0)
     assert wheel.stillness.stands(wheel.now_s)
-    assert "a stand is assumed" in wheel.stillness.assumed(wheel.now_s)
+    assert "standstill is assumed" in wheel.stillness.assumed(wheel.now_s)
 
 
 def test_a_wheel_that_follows_and_stops_too_soon_is_not_proven_to_stand_before_it_must_have_rolled_out() -> None:
