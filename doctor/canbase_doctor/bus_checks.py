@@ -18,12 +18,11 @@ from canbase_driver.cia301.emcy import emcy_text
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.cia402 import DriveState
 from canbase_driver.supervision.bus_health import ControllerState
-from canbase_driver.supervision.watchdog_link import LEASE_AGE_UNKNOWN, TRIPPED, WATCHING, WatchdogCounters
+from canbase_driver.supervision.watchdog_link import LEASE_AGE_UNKNOWN, RUNGS, TRIPPED, WATCHING, WatchdogCounters
 
 SHORT_QUEUE, GOOD_QUEUE, LONG_QUEUE = 32, 64, 100
 """Frames. Into the kernel's 10 a cycle of several axes does not fit; what waits in a long one while nobody acknowledges
 goes out late."""
-RUNGS: Final = ("none", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld", "NMT reset node")
 _SHOWN: Final = 4
 _CUT_OFF: Final = (ControllerState.BUS_OFF, ControllerState.ERROR_PASSIVE, ControllerState.STOPPED)
 """Little or nothing gets through."""

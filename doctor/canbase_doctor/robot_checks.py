@@ -13,6 +13,7 @@ from canbase.msg import DriverStatus, SafetyState
 
 from canbase_doctor.checks import Check, fail, ok, warn
 from canbase_doctor.evidence import Evidence
+from canbase_driver.supervision.watchdog_link import RUNGS
 from canbase_runtime.driver_state import driver_state
 from canbase_runtime.source_standing import SourceStanding, source_standing
 from canbase_runtime.watchdog_view import WatchdogView, watchdog_view
@@ -28,7 +29,6 @@ SILENT_S = 1.5
 HANGS = "its process hangs, or its timers stand still: look at its log, and restart it"
 PARTS_RUN = "is it running (canbase up), in this namespace and ROS_DOMAIN_ID?"
 ON_ITS_WAY = (DriverStatus.BOOTING, DriverStatus.ENABLING, DriverStatus.STOPPING)
-RUNGS = ("no rung", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld", "NMT reset node")
 WATCHDOG_COUNTERS = ("leases_refused", "frames_dropped", "bus_errors", "trips")
 MOSTLY_USABLE = 0.5
 """Share of beams: a scanner of which more says nothing is covered, dirty or defective."""

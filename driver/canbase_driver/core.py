@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 from canbase_config import stopping
@@ -39,7 +40,6 @@ from canbase_driver.motion.kinematics import Twist2D, wheel_speeds
 from canbase_driver.motion.limiter import Limiter, MotionState
 from canbase_driver.motion.odometry import Pose2D
 from canbase_driver.motion.velocity_command import Command
-from canbase_driver.report import Told, snapshot_of
 from canbase_driver.snapshot import DriverSnapshot, StopRecord
 from canbase_driver.supervision.bus_health import BusReport
 from canbase_driver.supervision.cycle_stats import CycleStats
@@ -82,7 +82,7 @@ class DriverCore:
         self._record = PowerRecord(found)
         self._let_go = LetGo(robot)
         self._limiter = Limiter(robot.limits, robot.base.track_m)
-        self._feed = OdometryFeed(self._drives, robot.base.track_m)
+        self._feed = OdometryFeed(self._drives, robot.base)
         self._command = Command(robot.timeouts.command_s)
         self._stats = CycleStats(self._period_s)
         self._motion = MotionState.AT_REST
@@ -379,15 +379,17 @@ class DriverCore:
 
     def snapshot(self, now_s: float) -> DriverSnapshot:
         """What the driver knows now."""
-        told = Told(
-            self._supervisor,
-            self._watchdog,
-            self._drives,
-            self._feed,
-            self._command,
-            self._stats,
-            self._bus_report,
-            self._bus_problem,
-            self.frames_dropped,
+        dropped = self.frames_dropped + self._bus_report.dropped
+        return DriverSnapshot(
+            time_s=now_s,
+            state=self._supervisor.state,
+            finding=self._supervisor.finding,
+            standstill=self._drives.are_proven_to_stand(now_s),
+            standstill_assumed=self._drives.assumed(now_s),
+            watchdog=self._watchdog.report(now_s),
+            command=self._command.report(now_s),
+            cycle=self._stats.report(),
+            bus=replace(self._bus_report, dropped=dropped, problem=self._bus_problem),
+            odometry=self._feed.report(now_s),
+            drives=self._drives.snapshots(now_s),
         )
-        return snapshot_of(told, self._robot.base, now_s)

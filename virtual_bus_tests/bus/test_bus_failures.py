@@ -55,13 +55,13 @@ def test_it_stops_latches_and_drives_again_after_a_reset(
     driver.driving()
     fail(arguments["channel"])
     failed = driver.latched(driver.forward)
-    assert failed.cause.value == "bus failed"
-    assert told in failed.detail
+    assert failed.finding.cause.value == "bus failed"
+    assert told in failed.finding.detail
     assert around.truth.standing_s > 0.1  # its own quick stop, the watchdog's or the drives'
     assert [(stop.cause, stop.latched) for stop in driver.stops] == [("bus failed", True)]
     FlakyBus.heal()
     again = driver.heard_again()
-    assert again.bus_failures >= 1
+    assert again.bus.failures >= 1
     assert again.state is DriverState.LATCHED
     driver.reset()
     driver.driving()

@@ -38,13 +38,21 @@ def test_every_drive_is_enabled_and_turns_its_wheel_forward_backward_and_against
 ) -> None:
     driver.order(Twist2D.ZERO, ENABLED_WITHIN_S, lambda snapshot: snapshot.state is DriverState.ENABLED)
     start = driver.enabled()
-    there = driver.order(driver.forward, 5.0, lambda s: s.x_m > start.x_m + crew.way_m and wheels_as_ordered(s))
-    assert there.linear_mps > 0.7 * crew.speed_mps
-    back = driver.order(Twist2D(-crew.speed_mps, 0.0), 8.0, lambda s: s.x_m < there.x_m and wheels_as_ordered(s))
-    assert back.linear_mps < -0.7 * crew.speed_mps
+    start_m = start.odometry.pose.x_m
+    there = driver.order(
+        driver.forward, 5.0, lambda s: s.odometry.pose.x_m > start_m + crew.way_m and wheels_as_ordered(s)
+    )
+    assert there.odometry.twist.linear_mps > 0.7 * crew.speed_mps
+    there_m = there.odometry.pose.x_m
+    back = driver.order(
+        Twist2D(-crew.speed_mps, 0.0), 8.0, lambda s: s.odometry.pose.x_m < there_m and wheels_as_ordered(s)
+    )
+    assert back.odometry.twist.linear_mps < -0.7 * crew.speed_mps
     turn_radps = 2.0 * crew.speed_mps / crew.robot.base.track_m
     turned = driver.order(
-        Twist2D(0.0, turn_radps), 8.0, lambda s: s.angular_radps > 0.7 * turn_radps and wheels_as_ordered(s)
+        Twist2D(0.0, turn_radps),
+        8.0,
+        lambda s: s.odometry.twist.angular_radps > 0.7 * turn_radps and wheels_as_ordered(s),
     )
     sides = {drive.joint: drive.side for drive in crew.robot.drives}
     assert {sides[d.joint] for d in turned.drives if d.velocity_radps > 0.0} == {"right"}
@@ -54,7 +62,7 @@ def test_every_drive_is_enabled_and_turns_its_wheel_forward_backward_and_against
     assert driver.loop.failure is None
     final, stops = driver.loop.next_snapshot(timeout_s=0.1)
     assert final is not None
-    assert (final.cause.value, [stop.cause for stop in driver.stops + stops]) == ("shutdown", ["shutdown"])
+    assert (final.finding.cause.value, [stop.cause for stop in driver.stops + stops]) == ("shutdown", ["shutdown"])
 
 
 @pytest.mark.real_bus
@@ -71,19 +79,19 @@ def test_the_stop_request_and_the_reset_from_another_thread(driver: Driver) -> N
     driver.loop.join(6.0)
     last, _ = driver.loop.next_snapshot(timeout_s=0.1)  # handed over though the state is the same
     assert last is not None
-    assert (last.state, last.cause.value) == (DriverState.LATCHED, "shutdown")
+    assert (last.state, last.finding.cause.value) == (DriverState.LATCHED, "shutdown")
 
 
 @pytest.mark.real_bus
 def test_cycles_keep_their_grid_and_snapshots_come_at_the_rate_of_the_odometry(driver: Driver) -> None:
     first = driver.enabled()
-    before, cycles = driver.snapshots, first.cycles
+    before, cycles = driver.snapshots, first.cycle.cycles
     last = driver.order(Twist2D.ZERO, 10.0, lambda snapshot: snapshot.time_s > first.time_s + 1.0)
     duration_s = last.time_s - first.time_s
     # generous: this machine may be busy, but no cycle may come twice or too early
-    assert 0.5 * 100.0 * duration_s < last.cycles - cycles <= 100.0 * duration_s + 2
+    assert 0.5 * 100.0 * duration_s < last.cycle.cycles - cycles <= 100.0 * duration_s + 2
     assert 0.4 * 50.0 * duration_s < driver.snapshots - before <= 50.0 * duration_s + 2
-    assert last.cycle_lateness_max_s >= 0.0
+    assert last.cycle.lateness_max_s >= 0.0
 
 
 def test_the_fault_of_one_drive_and_the_battery_of_all_stop_the_base_until_a_reset(
@@ -93,8 +101,8 @@ def test_the_fault_of_one_drive_and_the_battery_of_all_stop_the_base_until_a_res
     last = crew.robot.drives[-1]
     around.suffer(last.node_id, "fault", axis=last.axis, code=OVERCURRENT)
     faulty = driver.latched()
-    assert faulty.cause.value == "drive fault"
-    assert f"{last.joint} (node {last.node_id}): 2310h over-current" in faulty.detail
+    assert faulty.finding.cause.value == "drive fault"
+    assert f"{last.joint} (node {last.node_id}): 2310h over-current" in faulty.finding.detail
     driver.reset()
     driver.driving()
     for node_id in {drive.node_id for drive in crew.robot.drives}:
@@ -105,7 +113,7 @@ def test_the_fault_of_one_drive_and_the_battery_of_all_stop_the_base_until_a_res
     assert again.state is DriverState.LATCHED
     driver.reset(within_s=12.0)  # nobody saw the wheels stop: they must have rolled out
     driven = driver.driving()
-    assert driven.linear_mps == pytest.approx(around.truth.linear_mps, abs=0.03)
+    assert driven.odometry.twist.linear_mps == pytest.approx(around.truth.linear_mps, abs=0.03)
 
 
 def test_frames_of_29_bits_that_look_like_the_drives_own_change_nothing(
@@ -114,9 +122,9 @@ def test_frames_of_29_bits_that_look_like_the_drives_own_change_nothing(
     for drive in crew.robot.drives:
         around.suffer(drive.node_id, "aliases")
     driven = driver.driving()
-    assert driven.frames_dropped > 100
+    assert driven.bus.dropped > 100
     assert not driver.stops
-    assert driven.x_m == pytest.approx(around.truth.x_m, abs=0.03)
+    assert driven.odometry.pose.x_m == pytest.approx(around.truth.x_m, abs=0.03)
 
 
 def test_a_defect_in_the_core_sends_quick_stops_ends_the_thread_and_is_kept(

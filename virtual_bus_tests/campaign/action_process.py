@@ -105,21 +105,23 @@ class ActionProcess(Process):
             self._on_end(goal)
 
     def _on_odometry(self, snapshot: DriverSnapshot) -> None:
-        pose = Pose(snapshot.x_m, snapshot.y_m, snapshot.yaw_rad)
-        odometry = Odometry(self.clock.now_s, pose, snapshot.linear_mps, snapshot.angular_radps)
+        pose = Pose(snapshot.odometry.pose.x_m, snapshot.odometry.pose.y_m, snapshot.odometry.pose.yaw_rad)
+        odometry = Odometry(
+            self.clock.now_s, pose, snapshot.odometry.twist.linear_mps, snapshot.odometry.twist.angular_radps
+        )
         self._inputs = replace(self._inputs, odometry=odometry)
 
     def _on_driver(self, snapshot: DriverSnapshot) -> None:
         driver = Driver(
             received=self.clock.now_s,
             state=snapshot.state,
-            cause=snapshot.cause.value,
-            detail=snapshot.detail,
-            watchdog=snapshot.watchdog,
-            watchdog_cause=snapshot.watchdog_cause,
+            cause=snapshot.finding.cause.value,
+            detail=snapshot.finding.detail,
+            watchdog=snapshot.watchdog.view,
+            watchdog_cause=snapshot.watchdog.cause,
             standstill=snapshot.standstill,
-            hears_command=snapshot.command_fresh,
-            pose_resets=snapshot.pose_resets,
+            hears_command=snapshot.command.fresh,
+            pose_resets=snapshot.odometry.pose_resets,
         )
         self._inputs = replace(self._inputs, driver=driver)
 

@@ -159,7 +159,7 @@ class DriverProcess(Process):
         if not due and self._cycle % samples:
             return
         snapshot = self.snapshot = self.core.snapshot(now_s)
-        if snapshot.odometry_valid:
+        if snapshot.odometry.valid:
             self._topics.publish("odom", snapshot)
         if due:
             self._told, self._status_at = status, now_s

@@ -59,11 +59,11 @@ class OdometryJudge:
             self._lies_until = now_s + self._late_s
         if now_s <= self._lies_until:
             self._origins = None
-        if snapshot.travel_losses != self._losses:
-            self._losses, self._origins = snapshot.travel_losses, None
-        if not snapshot.odometry_valid:
+        if snapshot.odometry.travel_losses != self._losses:
+            self._losses, self._origins = snapshot.odometry.travel_losses, None
+        if not snapshot.odometry.valid:
             return ""
-        pose = Pose(snapshot.x_m, snapshot.y_m, snapshot.yaw_rad)
+        pose = Pose(snapshot.odometry.pose.x_m, snapshot.odometry.pose.y_m, snapshot.odometry.pose.yaw_rad)
         return self._jump(pose, now_s) or (self._difference(pose) if now_s > self._lies_until else "")
 
     def _jump(self, pose: Pose, now_s: float) -> str:

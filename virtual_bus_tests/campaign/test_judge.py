@@ -87,13 +87,26 @@ def no_masters(world: World) -> None:
             node.dictionary.values[key(0x1016, sub)] = 0
 
 
+def scaled(seen: DriverSnapshot, factor: float) -> DriverSnapshot:
+    """The same, with this share of each distance and speed."""
+    pose, twist = seen.odometry.pose, seen.odometry.twist
+    return replace(
+        seen,
+        odometry=replace(
+            seen.odometry,
+            pose=replace(pose, x_m=factor * pose.x_m, y_m=factor * pose.y_m),
+            twist=replace(twist, linear_mps=factor * twist.linear_mps),
+        ),
+    )
+
+
 def counts_less(world: World) -> None:
     """drive_distance_server takes 0.8 of each way for the whole."""
     subscribers = world.topics._subscribers["odom"]
     at, (process, do) = next(each for each in enumerate(subscribers) if each[1][0] is world.action)
 
     def less(seen: DriverSnapshot) -> None:
-        do(replace(seen, x_m=0.8 * seen.x_m, y_m=0.8 * seen.y_m, linear_mps=0.8 * seen.linear_mps))
+        do(scaled(seen, 0.8))
 
     subscribers[at] = (process, less)
 
@@ -102,7 +115,7 @@ def counts_more(world: World) -> None:
     """The driver takes each metre for one and a half."""
     core = world.driver.core
     told = core.snapshot
-    core.snapshot = lambda now_s: replace(told(now_s), x_m=1.5 * told(now_s).x_m)  # type: ignore[method-assign]
+    core.snapshot = lambda now_s: scaled(told(now_s), 1.5)  # type: ignore[method-assign]
 
 
 def forgets_the_second(world: World) -> None:

@@ -92,7 +92,7 @@ class VelocityProcess(Process):
             self._send(decision)
 
     def _on_driver(self, snapshot: DriverSnapshot) -> None:
-        self.mux.on_driver(snapshot.state, snapshot.cycles, self.clock.now_s)
+        self.mux.on_driver(snapshot.state, snapshot.cycle.cycles, self.clock.now_s)
 
     def _decide(self) -> MuxDecision:
         self.mux.on_estop(self.filter.estop is EstopState.FREE)

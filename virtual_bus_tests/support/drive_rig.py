@@ -147,7 +147,9 @@ class Driver:
     def driving(self) -> DriverSnapshot:
         """Enabled, and nearly as fast as ordered."""
         self.enabled()
-        return self.order(self.forward, 5.0, lambda snapshot: snapshot.linear_mps > 0.7 * self.forward.linear_mps)
+        return self.order(
+            self.forward, 5.0, lambda snapshot: snapshot.odometry.twist.linear_mps > 0.7 * self.forward.linear_mps
+        )
 
     def latched(self, twist: Twist2D = Twist2D.ZERO, within_s: float = 5.0) -> DriverSnapshot:
         """Order this until a stop is at its end."""
@@ -161,7 +163,7 @@ class Driver:
         return self.order(
             Twist2D.ZERO,
             25.0,
-            lambda s: all(drive.nmt_state is NmtState.OPERATIONAL for drive in s.drives) and s.odometry_valid,
+            lambda s: all(drive.nmt_state is NmtState.OPERATIONAL for drive in s.drives) and s.odometry.valid,
         )
 
     def reset(self, within_s: float = 0.0) -> None:

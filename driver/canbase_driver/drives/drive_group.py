@@ -16,7 +16,7 @@ from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia402 import INTERNAL_LIMIT, PREPARED, REMOTE, WARNING, DriveState
 from canbase_driver.drives.axis import Axis
 from canbase_driver.drives.canopen_node import CanopenNode
-from canbase_driver.snapshot import DriveSnapshot
+from canbase_driver.drives.drive_snapshot import DriveSnapshot
 
 
 class Drives:

@@ -7,22 +7,56 @@ unknown for that while: taking in the others' alone would turn the pose. The pos
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
+from canbase_config.robot import Base
 from canbase_driver.drives.drive_group import Drives
-from canbase_driver.motion.odometry import Odometry, Pose2D
+from canbase_driver.motion.kinematics import Twist2D, base_twist
+from canbase_driver.motion.odometry import Covariance, Odometry, Pose2D
 
 LONGEST_S = 1.0
 """The mean velocity after a longer gap is taken over this time."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OdometryReport:
+    """Where the base is and how it moves, at one moment."""
+
+    pose: Pose2D
+    """Of base_frame in odom_frame; forward, to the left and unwrapped yaw, as they were at the start."""
+    twist: Twist2D
+    """Measured velocity of the base."""
+    pose_covariance: Covariance
+    twist_covariance: Covariance
+    valid: bool
+    """Every wheel has fresh feedback and a reference: the pose moves as the wheels do. Otherwise it is not published.
+
+    It is about now. What was rolled while a wheel had no reference never enters the pose, that of no wheel: the pose
+    goes on without a jump from where it was, and `travel_losses` tells that it is a little behind.
+    """
+    travel_losses: int = 0
+    """How often the pose missed some travel since start: a drive restarted, or an encoder jumped for good."""
+    pose_resets: int = 0
+    """How often the pose was set anew, or missed some travel, since start: distances across one mean nothing."""
+    odom_frame: str = "odom"
+    """REP 105."""
+    base_frame: str = "base_link"
+    """REP 105."""
+
+    @property
+    def events(self) -> dict[str, int]:
+        """What should not grow; in /diagnostics alone."""
+        return {"travel_losses": self.travel_losses}
+
+
 class OdometryFeed:
     """Owns the odometry of the base. `serial` grows by one with each sample that entered it."""
 
-    def __init__(self, drives: Drives, track_m: float) -> None:
-        self._drives = drives
+    def __init__(self, drives: Drives, base: Base) -> None:
+        self._drives, self._base = drives, base
         self._taken_at = -math.inf
         self._losses = self._sets = 0
-        self.odometry = Odometry(track_m)
+        self.odometry = Odometry(base.track_m)
         self.serial = 0
 
     @property
@@ -34,6 +68,20 @@ class OdometryFeed:
         """The pose goes on from there."""
         self._sets += 1
         self.odometry.reset(pose)
+
+    def report(self, now_s: float) -> OdometryReport:
+        """All of it at the time `now_s` [s, monotonic]."""
+        return OdometryReport(
+            pose=self.odometry.pose,
+            twist=base_twist(*self._drives.speeds_mps(), self._base.track_m),
+            pose_covariance=self.odometry.pose_covariance(),
+            twist_covariance=self.odometry.twist_covariance(),
+            valid=self._drives.are_fresh(now_s) and self._drives.have_references(),
+            travel_losses=self._drives.losses(),
+            pose_resets=self.pose_resets,
+            odom_frame=self._base.odom_frame,
+            base_frame=self._base.base_frame,
+        )
 
     def update(self, now_s: float) -> None:
         """Take the sample in if every wheel has given a fresh one since the last; call it after each feedback."""

@@ -10,7 +10,9 @@ import math
 from dataclasses import dataclass
 
 from canbase_driver.motion.kinematics import Twist2D, base_twist
-from canbase_driver.snapshot import Covariance
+
+Covariance = tuple[float, ...]
+"""36 numbers: 6 × 6, row by row, in the order x, y, z, rotation about x, y, z (geometry_msgs, REP 103)."""
 
 RE_REFERENCE_SAMPLES = 3
 """So many samples in a row at a new place, each near the one before: the counter has moved for good."""

@@ -3,8 +3,26 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from canbase_driver.motion.kinematics import Twist2D
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommandReport:
+    """The velocity command at one moment."""
+
+    age_s: float
+    """Age of cmd_vel by local receive time [s]; NaN: none yet."""
+    fresh: bool
+    """It is within timeouts.command_s."""
+    refused: int
+    """Commands that were not finite, since start."""
+
+    @property
+    def events(self) -> dict[str, int]:
+        """What should not grow, by its name in DriverStatus."""
+        return {"commands_refused": self.refused}
 
 
 class Command:
@@ -44,6 +62,12 @@ class Command:
     def is_fresh(self, now_s: float) -> bool:
         """It came within the timeout."""
         return now_s - self.received_at <= self._timeout_s
+
+    def report(self, now_s: float) -> CommandReport:
+        """All of it at the time `now_s` [s, monotonic]."""
+        age_s = now_s - self.received_at
+        known_s = age_s if math.isfinite(age_s) else math.nan
+        return CommandReport(age_s=known_s, fresh=self.is_fresh(now_s), refused=self.refused)
 
     def motion(self, now_s: float) -> str:
         """A sentence when a fresh command asks for motion, followed or not."""

@@ -6,7 +6,7 @@ One entry each for the loop, the bus, the watchdog and every drive.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -14,17 +14,15 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from canbase_driver.causes import Cause
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.cia402 import DriveState
-from canbase_driver.snapshot import DriverSnapshot, DriveSnapshot
-from canbase_driver.supervision.bus_health import ControllerState
+from canbase_driver.drives.drive_snapshot import DriveSnapshot
+from canbase_driver.snapshot import DriverSnapshot
+from canbase_driver.supervision.bus_health import BusReport, ControllerState
+from canbase_driver.supervision.watchdog_link import RUNGS, WatchdogReport
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.watchdog_view import WatchdogView
 
-_LOOP_COUNTERS = ("commands_refused", "overruns", "travel_losses")
-_BUS_COUNTERS = ("frames_dropped", "send_errors", "receive_errors", "error_frames", "bus_failures")
-_WATCHDOG_COUNTERS = ("trips", "leases_refused", "frames_dropped", "bus_errors")
 _TRANSIENT = {DriverState.BOOTING, DriverState.DISARMED, DriverState.ENABLING, DriverState.STOPPING}
 _FAULTS = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
-_RUNGS = ("none", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld", "NMT reset node")
 _PAUSE_WARNING_S = 0.05
 """A pause of the watchdog's loop that is worth a look: ten of its turns."""
 
@@ -40,8 +38,8 @@ def diagnostics_message(
     message.header.stamp = stamp
     message.status = [
         _loop_entry(snapshot, previous or snapshot, robot),
-        _bus_entry(snapshot, previous or snapshot, robot),
-        _watchdog_entry(snapshot, previous or snapshot, robot),
+        _bus_entry(snapshot.bus, (previous or snapshot).bus, robot),
+        _watchdog_entry(snapshot.watchdog, (previous or snapshot).watchdog, robot),
         *(_drive_entry(drive, snapshot.state, robot) for drive in snapshot.drives),
     ]
     return message
@@ -60,97 +58,88 @@ def unguarded(snapshot: DriverSnapshot) -> tuple[str, ...]:
 
 
 def _loop_entry(snapshot: DriverSnapshot, previous: DriverSnapshot, robot: str) -> DiagnosticStatus:
-    level, sentence = _driver_state(snapshot)
-    level, sentence = _with_news(level, sentence, _grown(snapshot, previous, _LOOP_COUNTERS))
+    events, before = _loop_events(snapshot), _loop_events(previous)
+    level, sentence = _with_news(*_driver_state(snapshot), events, before)
     values = {
         "state": snapshot.state.name,
-        "cause": snapshot.cause.value,
-        "clears on": snapshot.clears_on,
+        "cause": snapshot.finding.cause.value,
+        "clears on": snapshot.finding.clears_on,
         "standstill": snapshot.standstill,
-        "odometry valid": snapshot.odometry_valid,
-        "command age [s]": snapshot.command_age_s,
-        "command fresh": snapshot.command_fresh,
-        "cycles": snapshot.cycles,
-        "greatest lateness [s]": snapshot.cycle_lateness_max_s,
-        **_counters(snapshot, _LOOP_COUNTERS),
+        "odometry valid": snapshot.odometry.valid,
+        "command age [s]": snapshot.command.age_s,
+        "command fresh": snapshot.command.fresh,
+        "cycles": snapshot.cycle.cycles,
+        "greatest lateness [s]": snapshot.cycle.lateness_max_s,
+        **_named(events),
     }
     return _entry(level, f"{robot}: motor_driver", sentence, robot, values)
+
+
+def _loop_events(snapshot: DriverSnapshot) -> dict[str, int]:
+    return snapshot.command.events | snapshot.cycle.events | snapshot.odometry.events
 
 
 def _driver_state(snapshot: DriverSnapshot) -> tuple[bytes, str]:
     if snapshot.state is DriverState.ENABLED:
         return DiagnosticStatus.OK, "All drives are enabled."
-    passing = snapshot.state in _TRANSIENT and snapshot.cause is not Cause.DRIVE_MISSING
+    passing = snapshot.state in _TRANSIENT and snapshot.finding.cause is not Cause.DRIVE_MISSING
     level = DiagnosticStatus.WARN if passing else DiagnosticStatus.ERROR
-    detail = f": {snapshot.detail.rstrip('.')}" if snapshot.detail else ""
-    clears = f" It ends with: {snapshot.clears_on}." if snapshot.clears_on else ""
-    return level, f"{snapshot.state.name.capitalize()} ({snapshot.cause.value}){detail}.{clears}"
+    detail = f": {snapshot.finding.detail.rstrip('.')}" if snapshot.finding.detail else ""
+    clears = f" It ends with: {snapshot.finding.clears_on}." if snapshot.finding.clears_on else ""
+    return level, f"{snapshot.state.name.capitalize()} ({snapshot.finding.cause.value}){detail}.{clears}"
 
 
-def _bus_entry(snapshot: DriverSnapshot, previous: DriverSnapshot, robot: str) -> DiagnosticStatus:
-    if snapshot.bus_problem:
-        level, sentence = DiagnosticStatus.ERROR, f"The bus has failed: {snapshot.bus_problem.rstrip('.')}."
-    elif snapshot.controller is ControllerState.ERROR_ACTIVE:
+def _bus_entry(bus: BusReport, previous: BusReport, robot: str) -> DiagnosticStatus:
+    if bus.problem:
+        level, sentence = DiagnosticStatus.ERROR, f"The bus has failed: {bus.problem.rstrip('.')}."
+    elif bus.controller is ControllerState.ERROR_ACTIVE:
         level, sentence = DiagnosticStatus.OK, "The bus works."
     else:
-        level, sentence = DiagnosticStatus.WARN, f"The CAN controller is {snapshot.controller.value}: check the cable."
-    level, sentence = _with_news(level, sentence, _grown(snapshot, previous, _BUS_COUNTERS))
-    values = {"problem": snapshot.bus_problem, "controller": snapshot.controller.value} | _counters(
-        snapshot, _BUS_COUNTERS
-    )
+        level, sentence = DiagnosticStatus.WARN, f"The CAN controller is {bus.controller.value}: check the cable."
+    level, sentence = _with_news(level, sentence, bus.events, previous.events)
+    values = {"problem": bus.problem, "controller": bus.controller.value, **_named(bus.events)}
     return _entry(level, f"{robot}: bus", sentence, robot, values)
 
 
-def _watchdog_entry(snapshot: DriverSnapshot, previous: DriverSnapshot, robot: str) -> DiagnosticStatus:
-    heard = _heard(snapshot.watchdog_age_s)
-    level, sentence = _watchdog_state(snapshot, heard)
-    names = [f"watchdog_{name}" for name in _WATCHDOG_COUNTERS]
-    grown = {name.removeprefix("watchdog_"): count for name, count in _grown(snapshot, previous, names).items()}
-    level, sentence = _with_news(level, sentence, grown)
-    rung = snapshot.watchdog_rung
+def _watchdog_entry(watchdog: WatchdogReport, previous: WatchdogReport, robot: str) -> DiagnosticStatus:
+    events, rung = watchdog.counters.events, watchdog.rung
+    level, sentence = _with_news(*_watchdog_state(watchdog), events, previous.counters.events)
     values = {
-        "state": snapshot.watchdog.value,
-        "cause": snapshot.watchdog_cause,
-        "rung of its ladder": _RUNGS[rung] if rung < len(_RUNGS) else rung,
-        "last heard": heard,
-        "age of the last lease [s]": snapshot.watchdog_lease_age_s,
-        "longest pause of its loop [s]": snapshot.watchdog_pause_max_s,
-        **{name.replace("_", " "): getattr(snapshot, f"watchdog_{name}") for name in _WATCHDOG_COUNTERS},
+        "state": watchdog.view.value,
+        "cause": watchdog.cause,
+        "rung of its ladder": RUNGS[rung] if rung < len(RUNGS) else rung,
+        "last heard": _heard(watchdog.age_s),
+        "age of the last lease [s]": watchdog.lease_age_s,
+        "longest pause of its loop [s]": watchdog.pause_max_s,
+        **_named(events),
     }
     return _entry(level, f"{robot}: watchdog", sentence, robot, values)
 
 
-def _watchdog_state(snapshot: DriverSnapshot, heard: str) -> tuple[bytes, str]:
-    if snapshot.watchdog is WatchdogView.MISSING:
+def _watchdog_state(watchdog: WatchdogReport) -> tuple[bytes, str]:
+    if watchdog.view is WatchdogView.TRIPPED:
+        return DiagnosticStatus.ERROR, f"The watchdog has tripped: {watchdog.cause}. Remove the cause, then reset."
+    if watchdog.view is not WatchdogView.OK:
+        heard = _heard(watchdog.age_s)
         sentence = f"The watchdog is missing: its state frame was {heard}. Is its process running, and on this bus?"
         return DiagnosticStatus.ERROR, sentence
-    if snapshot.watchdog is WatchdogView.TRIPPED:
-        sentence = f"The watchdog has tripped: {snapshot.watchdog_cause}. Remove the cause, then reset."
-        return DiagnosticStatus.ERROR, sentence
-    if snapshot.watchdog_pause_max_s > _PAUSE_WARNING_S:
-        return (
-            DiagnosticStatus.WARN,
-            f"The watchdog watches, but its loop paused {snapshot.watchdog_pause_max_s:.3f} s.",
-        )
+    if watchdog.pause_max_s > _PAUSE_WARNING_S:
+        return DiagnosticStatus.WARN, f"The watchdog watches, but its loop paused {watchdog.pause_max_s:.3f} s."
     return DiagnosticStatus.OK, "The watchdog watches."
 
 
-def _grown(snapshot: DriverSnapshot, previous: DriverSnapshot, names: Iterable[str]) -> dict[str, int]:
-    """The counters that grew, and by how much."""
-    differences = {name: getattr(snapshot, name) - getattr(previous, name) for name in names}
-    return {name: difference for name, difference in differences.items() if difference > 0}
-
-
-def _with_news(level: bytes, sentence: str, grown: Mapping[str, int]) -> tuple[bytes, str]:
-    """A counter that grew is a warning at least."""
+def _with_news(level: bytes, sentence: str, events: Mapping[str, int], before: Mapping[str, int]) -> tuple[bytes, str]:
+    """A counter that grew since the report before is a warning at least."""
+    grown = {name: count - before[name] for name, count in events.items() if count > before[name]}
     if not grown:
         return level, sentence
-    news = ", ".join(f"{count} more {name.replace('_', ' ')}" for name, count in grown.items())
+    news = ", ".join(f"{count} more {name}" for name, count in _named(grown).items())
     return max(level, DiagnosticStatus.WARN), f"{sentence} Since the last report: {news}."
 
 
-def _counters(snapshot: DriverSnapshot, names: Iterable[str]) -> dict[str, int]:
-    return {name.replace("_", " "): getattr(snapshot, name) for name in names}
+def _named(events: Mapping[str, int]) -> dict[str, int]:
+    """As people read their names."""
+    return {name.replace("_", " "): count for name, count in events.items()}
 
 
 def _drive_entry(drive: DriveSnapshot, state: DriverState, robot: str) -> DiagnosticStatus:

@@ -13,8 +13,9 @@ from geometry_msgs.msg import Pose, Quaternion, TransformStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 
+from canbase_driver.drives.drive_snapshot import DriveSnapshot
 from canbase_driver.motion.odometry import Pose2D, wrap_angle
-from canbase_driver.snapshot import DriverSnapshot, DriveSnapshot
+from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervision.stop_history import StopReport
 
 try:
@@ -27,15 +28,15 @@ def odometry_message(snapshot: DriverSnapshot, stamp: Time) -> Odometry:
     """The pose in odom_frame and the velocity in base_frame, each with its covariance."""
     message = Odometry()
     message.header.stamp = stamp
-    message.header.frame_id = snapshot.odom_frame
-    message.child_frame_id = snapshot.base_frame
-    message.pose.pose.position.x = snapshot.x_m
-    message.pose.pose.position.y = snapshot.y_m
-    message.pose.pose.orientation = _quaternion(snapshot.yaw_rad)
-    message.pose.covariance = snapshot.pose_covariance
-    message.twist.twist.linear.x = snapshot.linear_mps
-    message.twist.twist.angular.z = snapshot.angular_radps
-    message.twist.covariance = snapshot.twist_covariance
+    message.header.frame_id = snapshot.odometry.odom_frame
+    message.child_frame_id = snapshot.odometry.base_frame
+    message.pose.pose.position.x = snapshot.odometry.pose.x_m
+    message.pose.pose.position.y = snapshot.odometry.pose.y_m
+    message.pose.pose.orientation = _quaternion(snapshot.odometry.pose.yaw_rad)
+    message.pose.covariance = snapshot.odometry.pose_covariance
+    message.twist.twist.linear.x = snapshot.odometry.twist.linear_mps
+    message.twist.twist.angular.z = snapshot.odometry.twist.angular_radps
+    message.twist.covariance = snapshot.odometry.twist_covariance
     return message
 
 
@@ -43,11 +44,11 @@ def transform_message(snapshot: DriverSnapshot, stamp: Time) -> TransformStamped
     """The transform odom_frame → base_frame: the pose of `odometry_message`."""
     message = TransformStamped()
     message.header.stamp = stamp
-    message.header.frame_id = snapshot.odom_frame
-    message.child_frame_id = snapshot.base_frame
-    message.transform.translation.x = snapshot.x_m
-    message.transform.translation.y = snapshot.y_m
-    message.transform.rotation = _quaternion(snapshot.yaw_rad)
+    message.header.frame_id = snapshot.odometry.odom_frame
+    message.child_frame_id = snapshot.odometry.base_frame
+    message.transform.translation.x = snapshot.odometry.pose.x_m
+    message.transform.translation.y = snapshot.odometry.pose.y_m
+    message.transform.rotation = _quaternion(snapshot.odometry.pose.yaw_rad)
     return message
 
 
@@ -69,37 +70,30 @@ def joint_state_message(snapshot: DriverSnapshot, stamp: Time) -> JointState:
 
 def status_message(snapshot: DriverSnapshot, stamp: Time) -> DriverStatus:
     """Everything that DriverStatus has a field for. Counters go round at 2³² as their type does."""
+    watchdog, command, cycle, bus = snapshot.watchdog, snapshot.command, snapshot.cycle, snapshot.bus
+    events = command.events | cycle.events | bus.events
     return DriverStatus(
         stamp=stamp,
         state=int(snapshot.state),
-        cause=snapshot.cause.value,
-        detail=snapshot.detail,
-        clears_on=snapshot.clears_on,
-        watchdog=snapshot.watchdog.value,
-        watchdog_cause=snapshot.watchdog_cause,
-        watchdog_age_s=snapshot.watchdog_age_s,
-        watchdog_rung=snapshot.watchdog_rung,
-        watchdog_lease_age_s=snapshot.watchdog_lease_age_s,
-        watchdog_trips=snapshot.watchdog_trips,
-        watchdog_leases_refused=snapshot.watchdog_leases_refused,
-        watchdog_frames_dropped=snapshot.watchdog_frames_dropped,
-        watchdog_bus_errors=snapshot.watchdog_bus_errors,
-        watchdog_pause_max_s=snapshot.watchdog_pause_max_s,
-        pose_resets=_u32(snapshot.pose_resets),
+        cause=snapshot.finding.cause.value,
+        detail=snapshot.finding.detail,
+        clears_on=snapshot.finding.clears_on,
+        watchdog=watchdog.view.value,
+        watchdog_cause=watchdog.cause,
+        watchdog_age_s=watchdog.age_s,
+        watchdog_rung=watchdog.rung,
+        watchdog_lease_age_s=watchdog.lease_age_s,
+        watchdog_pause_max_s=watchdog.pause_max_s,
+        **{f"watchdog_{name}": count for name, count in watchdog.counters.events.items()},
+        pose_resets=_u32(snapshot.odometry.pose_resets),
         standstill=snapshot.standstill,
-        command_age_s=snapshot.command_age_s,
-        command_fresh=snapshot.command_fresh,
-        commands_refused=_u32(snapshot.commands_refused),
-        cycles=_u32(snapshot.cycles),
-        overruns=_u32(snapshot.overruns),
-        cycle_lateness_max_s=snapshot.cycle_lateness_max_s,
-        frames_dropped=_u32(snapshot.frames_dropped),
-        send_errors=_u32(snapshot.send_errors),
-        bus_problem=snapshot.bus_problem,
-        controller=snapshot.controller.value,
-        receive_errors=_u32(snapshot.receive_errors),
-        error_frames=_u32(snapshot.error_frames),
-        bus_failures=_u32(snapshot.bus_failures),
+        command_age_s=command.age_s,
+        command_fresh=command.fresh,
+        cycles=_u32(cycle.cycles),
+        cycle_lateness_max_s=cycle.lateness_max_s,
+        bus_problem=bus.problem,
+        controller=bus.controller.value,
+        **{name: _u32(count) for name, count in events.items()},
         drives=[_drive_status(drive) for drive in snapshot.drives],
     )
 

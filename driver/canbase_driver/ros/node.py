@@ -70,7 +70,7 @@ class MotorDriverNode(ManagedNode):
         """Publish a snapshot; called by the publisher's thread alone."""
         stamp = self.get_clock().now().to_msg()
         self._stops.tell(snapshot, stops)
-        if snapshot.odometry_valid:
+        if snapshot.odometry.valid:
             self._odom.publish(messages.odometry_message(snapshot, stamp))
             self._joints.publish(messages.joint_state_message(snapshot, stamp))
             if self._tf is not None:
@@ -114,16 +114,17 @@ class MotorDriverNode(ManagedNode):
             self._diagnostics.publish(diagnostics_message(snapshot, stamp, robot=self._robot.name, previous=before))
 
     def _log_change(self, snapshot: DriverSnapshot) -> None:
-        previous = self._previous
-        if previous is not None and (previous.state, previous.cause) == (snapshot.state, snapshot.cause):
+        previous, finding = self._previous, snapshot.finding
+        if previous is not None and (previous.state, previous.finding.cause) == (snapshot.state, finding.cause):
             return
-        why = f": {snapshot.cause.value}" if snapshot.cause not in _SAID_BY_THE_STATE else ""
-        detail = f" ({snapshot.detail})" if snapshot.detail else ""
-        clears = f"; ends on: {snapshot.clears_on}" if snapshot.clears_on else ""
+        why = f": {finding.cause.value}" if finding.cause not in _SAID_BY_THE_STATE else ""
+        detail = f" ({finding.detail})" if finding.detail else ""
+        clears = f"; ends on: {finding.clears_on}" if finding.clears_on else ""
         text = self.state_text = f"{snapshot.state.name}{why}{detail}{clears}"
         self._stops.note(text)
-        priority = Priority.INFO if snapshot.cause.is_usual else Priority.WARNING
-        self.voice.tell(text, priority, state=snapshot.state.name, cause=snapshot.cause.value, robot=self._robot.name)
+        priority = Priority.INFO if finding.cause.is_usual else Priority.WARNING
+        cause, robot = finding.cause.value, self._robot.name
+        self.voice.tell(text, priority, state=snapshot.state.name, cause=cause, robot=robot)
 
     def _warn_of_boots(self, snapshot: DriverSnapshot) -> None:
         """Once for each reason why a drive cannot be booted, whatever else keeps the robot stopped."""
@@ -145,7 +146,7 @@ class MotorDriverNode(ManagedNode):
 
 def _essence(snapshot: DriverSnapshot) -> tuple[object, ...]:
     """What is published at once when it changes. After odom: who knows of a new pose has seen it."""
-    return snapshot.state, snapshot.cause, snapshot.pose_resets
+    return snapshot.state, snapshot.finding.cause, snapshot.odometry.pose_resets
 
 
 class Publisher(threading.Thread):

@@ -45,9 +45,23 @@ class BusReport:
     receive_errors: int = 0
     error_frames: int = 0
     dropped: int = 0
-    """Received frames that CANopen does not use: remote, 29-bit, CAN FD; datagrams that are no frame."""
+    """Received frames that CANopen does not use (remote, 29-bit, CAN FD), or that nobody understood; datagrams that are
+    no frame."""
     failures: int = 0
     """How often the bus failed, and was closed to be opened anew."""
+    problem: str = ""
+    """Why the bus does not work now; empty: it does."""
+
+    @property
+    def events(self) -> dict[str, int]:
+        """What should not grow, by its name in DriverStatus."""
+        return {
+            "frames_dropped": self.dropped,
+            "send_errors": self.send_errors,
+            "receive_errors": self.receive_errors,
+            "error_frames": self.error_frames,
+            "bus_failures": self.failures,
+        }
 
     def with_error_frame(self, error_class: int, data: bytes) -> BusReport:
         """The report after one error frame. Most are single errors on the wire, and counted alone."""

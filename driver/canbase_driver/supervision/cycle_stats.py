@@ -3,8 +3,26 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass
 
 WINDOW_S = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CycleReport:
+    """The SYNC loop at one moment."""
+
+    cycles: int
+    """Since start."""
+    overruns: int
+    """Cycles that began more than half a period late, since start."""
+    lateness_max_s: float
+    """Greatest lateness of a cycle in the last WINDOW_S [s]."""
+
+    @property
+    def events(self) -> dict[str, int]:
+        """What should not grow, by its name in DriverStatus."""
+        return {"overruns": self.overruns}
 
 
 class CycleStats:
@@ -31,3 +49,7 @@ class CycleStats:
     def worst_s(self) -> float:
         """Greatest lateness in the last WINDOW_S before the last cycle [s]; 0 before the first."""
         return self._peaks[0][1] if self._peaks else 0.0
+
+    def report(self) -> CycleReport:
+        """All of it."""
+        return CycleReport(cycles=self.cycles, overruns=self.overruns, lateness_max_s=self.worst_s)

@@ -65,9 +65,10 @@ class _OpenStop:
 
     def add(self, before: DriverSnapshot, now: DriverSnapshot) -> None:
         """The way between two snapshots."""
-        self.measured = self.measured and now.odometry_valid
-        self.distance_m += math.hypot(now.x_m - before.x_m, now.y_m - before.y_m)
-        self.turned_rad += now.yaw_rad - before.yaw_rad
+        here, there = before.odometry.pose, now.odometry.pose
+        self.measured = self.measured and now.odometry.valid
+        self.distance_m += math.hypot(there.x_m - here.x_m, there.y_m - here.y_m)
+        self.turned_rad += there.yaw_rad - here.yaw_rad
 
     def report(self, snapshot: DriverSnapshot) -> StopReport:
         """As it is now."""
@@ -129,15 +130,15 @@ class StopHistory:
         return [stop.report(last) for stop in rest] if last is not None else []
 
     def _look_for_stale(self, before: DriverSnapshot, snapshot: DriverSnapshot) -> None:
-        ended = before.command_fresh and not snapshot.command_fresh
-        at_s = snapshot.time_s - snapshot.command_age_s
+        ended = before.command.fresh and not snapshot.command.fresh
+        at_s = snapshot.time_s - snapshot.command.age_s
         moved = self._moved_at >= at_s - ORDER_AGE_S
         if ended and moved and self._is_moving and snapshot.state is DriverState.ENABLED:
-            detail = f"cmd_vel is silent for {snapshot.command_age_s:.2f} s"
+            detail = f"cmd_vel is silent for {snapshot.command.age_s:.2f} s"
             self._begin(
                 StopRecord(DRIVER, STALE, detail, False, "a fresh command", snapshot.time_s), HeldBy.STALE_COMMAND
             )
-        if snapshot.command_fresh:
+        if snapshot.command.fresh:
             self._let_go(HeldBy.STALE_COMMAND)
 
     @property

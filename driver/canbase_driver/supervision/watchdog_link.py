@@ -50,6 +50,8 @@ CAUSES = {
 }
 SENSOR_CAUSES = (12, 13, 17)
 """After these, what the node in the state frame reports about its motion is no evidence."""
+RUNGS = ("none", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld", "NMT reset node")
+"""How far up its ladder it has gone; the numbers are those of its state frame and of DriverStatus."""
 DRIVE_CAUSES = (3, 7, 18)
 """What the driver sees at its drives itself, and can tell more about."""
 ANSWERS = {
@@ -91,6 +93,38 @@ class WatchdogCounters:
     bus_errors: int = 0
     trips: int = 0
     pause_max_ms: int = 0
+
+    @property
+    def events(self) -> dict[str, int]:
+        """What should not grow, by its name in DriverStatus without `watchdog_`."""
+        return {
+            "trips": self.trips,
+            "leases_refused": self.leases_refused,
+            "frames_dropped": self.frames_dropped,
+            "bus_errors": self.bus_errors,
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WatchdogReport:
+    """What the driver knows of the watchdog at one moment."""
+
+    view: WatchdogView
+    cause: str
+    """Cause of its trip in words; "none"."""
+    age_s: float
+    """Since its last state frame [s]; NaN: none yet."""
+    rung: int
+    """How far up its ladder it has gone, 0 to 4."""
+    lease_age_s: float
+    """Age of the last valid lease, as it says [s]; NaN: none."""
+    counters: WatchdogCounters = WatchdogCounters()
+    """Since its start."""
+
+    @property
+    def pause_max_s(self) -> float:
+        """Longest pause of its loop in the last half second [s], at most 0.255."""
+        return self.counters.pause_max_ms / 1000.0
 
 
 def parse_counters(frame: Frame) -> WatchdogCounters | None:
@@ -165,6 +199,18 @@ class WatchdogLink:
     def cause(self) -> str:
         """Cause of the trip in words; "none" when it has not tripped or was never heard."""
         return self._state.cause_text if self._state else "none"
+
+    def report(self, now_s: float) -> WatchdogReport:
+        """All of it at the time `now_s` [s, monotonic]."""
+        view, _sentence = self.view(now_s)
+        return WatchdogReport(
+            view=view,
+            cause=self.cause,
+            age_s=self.age_s(now_s),
+            rung=self.rung,
+            lease_age_s=self.lease_age_s,
+            counters=self.counters,
+        )
 
     def view(self, now_s: float) -> tuple[WatchdogView, str]:
         """Whether it watches, and a sentence when it does not."""

@@ -105,7 +105,7 @@ def withhold_odometry() -> None:
     usual = MotorDriverNode.publish
 
     def publish(self: MotorDriverNode, snapshot: DriverSnapshot, stops: list[StopRecord]) -> None:
-        usual(self, replace(snapshot, odometry_valid=False), stops)
+        usual(self, replace(snapshot, odometry=replace(snapshot.odometry, valid=False)), stops)
 
     MotorDriverNode.publish = publish  # type: ignore[method-assign]
 
@@ -120,7 +120,8 @@ def freeze_odometry() -> None:
     def publish(self: MotorDriverNode, snapshot: DriverSnapshot, stops: list[StopRecord]) -> None:
         first = (frozen or [snapshot])[0]
         frozen[:] = [first]
-        usual(self, replace(snapshot, x_m=first.x_m, y_m=first.y_m, yaw_rad=first.yaw_rad), stops)
+        pose = first.odometry.pose
+        usual(self, replace(snapshot, odometry=replace(snapshot.odometry, pose=pose)), stops)
 
     MotorDriverNode.publish = publish  # type: ignore[method-assign]
 

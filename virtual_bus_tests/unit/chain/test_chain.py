@@ -103,16 +103,16 @@ def test_the_frame_that_enables_has_a_zero_target_and_so_has_every_one_before_it
 
 def test_it_drives_to_and_fro_and_the_odometry_is_what_the_robot_did(world: World) -> None:
     world.drive(Twist2D(0.4, 0.0), seconds=1.5)
-    cycles, samples = world.snapshot.cycles, world.core.odometry_serial
+    cycles, samples = world.snapshot.cycle.cycles, world.core.odometry_serial
     world.command = Twist2D(-0.3, 0.0)
     world.run(2.0)
     world.command = Twist2D.ZERO
     world.run(1.0)
     truth, snapshot = world.truth, world.snapshot
     assert truth.path_m > 0.8
-    assert snapshot.x_m == pytest.approx(truth.x_m, abs=1e-4)
+    assert snapshot.odometry.pose.x_m == pytest.approx(truth.x_m, abs=1e-4)
     missed = CYCLES_MISSED[world.robot.drives[0].kind.pdo.synchronous]
-    assert world.core.odometry_serial - samples == pytest.approx(snapshot.cycles - cycles, abs=missed)
+    assert world.core.odometry_serial - samples == pytest.approx(snapshot.cycle.cycles - cycles, abs=missed)
     assert snapshot.standstill
     assert truth.linear_mps == 0.0
 
@@ -175,10 +175,10 @@ def test_what_is_not_finite_is_refused_and_counted_and_does_not_refresh_the_comm
     world.drive()
     world.command = Twist2D(0.0, bad)
     world.run(0.1)
-    assert world.snapshot.commands_refused == 5
+    assert world.snapshot.command.refused == 5
     assert world.truth.linear_mps == pytest.approx(0.3, abs=0.005)  # the last good command still counts
     world.run(1.0)
-    assert world.snapshot.commands_refused == 55
+    assert world.snapshot.command.refused == 55
     assert world.truth.linear_mps == 0.0
     assert world.core.state is DriverState.ENABLED
 

@@ -97,7 +97,7 @@ def test_frames_of_a_wrong_length_are_counted_and_change_nothing(world: World, c
     world.enable()
     world.core.on_frame(Frame(cob_id, bytes(7)), world.now_s)
     sdo_of_others, emcy_is_short = (0x581, 0x582), (0x081, 0x082)
-    assert world.snapshot.frames_dropped == int(cob_id not in sdo_of_others + emcy_is_short)
+    assert world.snapshot.bus.dropped == int(cob_id not in sdo_of_others + emcy_is_short)
     assert world.core.state is DriverState.ENABLED
 
 
@@ -132,7 +132,7 @@ def test_a_storm_of_mad_frames_while_driving_never_raises_and_never_orders_more_
             world.core.on_frame(Frame(dice.choice(HEARD), data), world.now_s)
         world.run(0.01)
     assert max(abs(speed) for pair in world.targets_mps() for speed in pair) < 0.3001
-    assert world.snapshot.frames_dropped > 100
+    assert world.snapshot.bus.dropped > 100
     world.run(3.0)
     assert world.core.state is not DriverState.ENABLED
 

@@ -33,18 +33,20 @@ def test_a_drive_that_was_switched_off_and_on_is_booted_again_and_waits_for_a_re
     world.node.power_cycle(world.now_s, off_s=0.5)
     world.run(0.7)
     before = world.snapshot
-    assert not before.odometry_valid
+    assert not before.odometry.valid
     world.run(12.0)  # nobody saw the wheel stop: the watchdog waits until it must have rolled out
     after = world.snapshot
     assert after.state is DriverState.LATCHED
-    assert after.odometry_valid
+    assert after.odometry.valid
     assert after.drives[0].nmt_state is NmtState.OPERATIONAL
     assert world.powered == [False, False]
     # its encoder starts anew elsewhere: no jump of the pose, and the way that nobody could measure is reported
-    assert (after.x_m, after.y_m, after.yaw_rad) == pytest.approx((before.x_m, before.y_m, before.yaw_rad), abs=1e-3)
-    assert after.travel_losses >= 1
+    assert (after.odometry.pose.x_m, after.odometry.pose.y_m, after.odometry.pose.yaw_rad) == pytest.approx(
+        (before.odometry.pose.x_m, before.odometry.pose.y_m, before.odometry.pose.yaw_rad), abs=1e-3
+    )
+    assert after.odometry.travel_losses >= 1
     assert world.recovered()
-    assert world.snapshot.yaw_rad == pytest.approx(before.yaw_rad, abs=0.01)
+    assert world.snapshot.odometry.pose.yaw_rad == pytest.approx(before.odometry.pose.yaw_rad, abs=0.01)
 
 
 def test_the_pose_never_jumps_while_a_drive_is_switched_off_and_on(world: World) -> None:
@@ -53,7 +55,10 @@ def test_the_pose_never_jumps_while_a_drive_is_switched_off_and_on(world: World)
     for _ in range(300):
         world.run(0.01)
         poses.append(world.snapshot)
-    steps = [abs(b.x_m - a.x_m) + abs(b.yaw_rad - a.yaw_rad) for a, b in itertools.pairwise(poses)]
+    steps = [
+        abs(b.odometry.pose.x_m - a.odometry.pose.x_m) + abs(b.odometry.pose.yaw_rad - a.odometry.pose.yaw_rad)
+        for a, b in itertools.pairwise(poses)
+    ]
     assert max(steps) < 0.3 * 0.01 * 1.5 + 0.01
 
 
@@ -70,7 +75,7 @@ def test_feedback_that_waited_while_the_driver_stood_still_does_not_pass_for_fre
     answers = [each for ms in range(11) for each in world.bench.tick(world.now_s + ms / 1000) if each.cob_id in TPDOS]
     for answer in answers:
         core.on_frame(Frame(answer.cob_id, answer.data), went_on_at)
-    assert core.snapshot(went_on_at).odometry_valid is counts
+    assert core.snapshot(went_on_at).odometry.valid is counts
     assert core.frames_dropped == dropped + (0 if counts else len(answers))
 
 
@@ -89,7 +94,7 @@ def test_other_robots_drive_their_arc_and_stop_all_wheels_for_the_fault_of_one(r
     world.drive(Twist2D(0.3, 0.5), seconds=1.0)
     truth, snapshot = world.truth, world.snapshot
     assert (truth.linear_mps, truth.angular_radps) == pytest.approx((0.3, 0.5), abs=0.01)
-    assert (snapshot.x_m, snapshot.y_m, snapshot.yaw_rad) == pytest.approx(
+    assert (snapshot.odometry.pose.x_m, snapshot.odometry.pose.y_m, snapshot.odometry.pose.yaw_rad) == pytest.approx(
         (truth.x_m, truth.y_m, truth.yaw_rad), abs=1e-3
     )
     world.node.fail(0, OVERCURRENT)
@@ -106,8 +111,8 @@ def test_the_encoder_goes_round_at_32_bits_while_driving_and_nobody_sees_it(offs
     assert world.node.axes[0].position() * first < 0  # it went round
     world.command = Twist2D.ZERO
     world.run(1.0)
-    assert world.snapshot.x_m == pytest.approx(world.truth.x_m, abs=1e-4)
-    assert world.snapshot.travel_losses == 0
+    assert world.snapshot.odometry.pose.x_m == pytest.approx(world.truth.x_m, abs=1e-4)
+    assert world.snapshot.odometry.travel_losses == 0
 
 
 def test_an_encoder_that_jumps_for_good_is_no_motion_of_the_base_and_is_reported(world: World) -> None:
@@ -115,10 +120,10 @@ def test_an_encoder_that_jumps_for_good_is_no_motion_of_the_base_and_is_reported
     world.node.axes[0].encoder_offset += 1_000_000  # 7.7 m at the rim
     world.run(0.5)
     after = world.snapshot
-    assert after.x_m == pytest.approx(before.x_m + 0.15, abs=0.02)
-    assert after.yaw_rad == pytest.approx(before.yaw_rad, abs=0.01)
-    assert after.travel_losses == 1
-    assert after.odometry_valid
+    assert after.odometry.pose.x_m == pytest.approx(before.odometry.pose.x_m + 0.15, abs=0.02)
+    assert after.odometry.pose.yaw_rad == pytest.approx(before.odometry.pose.yaw_rad, abs=0.01)
+    assert after.odometry.travel_losses == 1
+    assert after.odometry.valid
 
 
 def test_the_pose_is_set_at_a_standstill_only_and_the_way_goes_on_from_there() -> None:
@@ -128,18 +133,18 @@ def test_the_pose_is_set_at_a_standstill_only_and_the_way_goes_on_from_there() -
     assert (moving.done, moving.sentence.split(":")[0]) == (False, "refused")
     world.command = Twist2D.ZERO
     world.run(1.0)
-    assert world.snapshot.x_m > 0.1
+    assert world.snapshot.odometry.pose.x_m > 0.1
     assert not world.core.set_pose(Pose2D(math.nan, 0.0, 0.0), world.now_s).done
-    assert world.snapshot.pose_resets == 0
+    assert world.snapshot.odometry.pose_resets == 0
     assert world.core.set_pose(Pose2D(1.0, 2.0, math.pi / 2), world.now_s).done
     fresh = world.snapshot
-    assert (fresh.x_m, fresh.y_m, fresh.yaw_rad) == (1.0, 2.0, math.pi / 2)
-    assert fresh.pose_resets == 1
+    assert (fresh.odometry.pose.x_m, fresh.odometry.pose.y_m, fresh.odometry.pose.yaw_rad) == (1.0, 2.0, math.pi / 2)
+    assert fresh.odometry.pose_resets == 1
     assert world.core.set_pose(Pose2D(1.0, 2.0, math.pi / 2), world.now_s).done
-    assert world.snapshot.pose_resets == 2  # also where nothing jumps
+    assert world.snapshot.odometry.pose_resets == 2  # also where nothing jumps
     world.command = FORWARD
     world.run(1.0)
     snapshot = world.snapshot
-    assert snapshot.x_m == pytest.approx(1.0, abs=0.01)
-    assert snapshot.y_m > 2.15
-    assert snapshot.pose_covariance[0] > fresh.pose_covariance[0]
+    assert snapshot.odometry.pose.x_m == pytest.approx(1.0, abs=0.01)
+    assert snapshot.odometry.pose.y_m > 2.15
+    assert snapshot.odometry.pose_covariance[0] > fresh.odometry.pose_covariance[0]

@@ -25,14 +25,14 @@ def core() -> DriverCore:
 
 def test_before_the_first_cycle_the_snapshot_says_that_nothing_is_known(core: DriverCore) -> None:
     snapshot = core.snapshot(10.0)
-    assert (snapshot.state, snapshot.cause.value, snapshot.watchdog) == (
+    assert (snapshot.state, snapshot.finding.cause.value, snapshot.watchdog.view) == (
         DriverState.BOOTING,
         "booting",
         WatchdogView.MISSING,
     )
-    assert (snapshot.standstill, snapshot.odometry_valid, snapshot.command_fresh) == (False, False, False)
-    assert math.isnan(snapshot.command_age_s)
-    assert math.isnan(snapshot.watchdog_age_s)
+    assert (snapshot.standstill, snapshot.odometry.valid, snapshot.command.fresh) == (False, False, False)
+    assert math.isnan(snapshot.command.age_s)
+    assert math.isnan(snapshot.watchdog.age_s)
     assert [drive.state for drive in snapshot.drives] == [None, None]
 
 
@@ -47,23 +47,23 @@ def test_the_first_cycles_beat_and_ask_the_drives_who_they_are(core: DriverCore)
 def test_frames_of_others_are_none_of_its_business(core: DriverCore) -> None:
     for cob_id in (0x000, 0x080, 0x100, 0x183, 0x201, 0x27E, 0x601, 0x77E, 0x77F, 0x7E5):
         assert core.on_frame(Frame(cob_id, bytes(8)), 10.0) == []
-    assert core.snapshot(10.0).frames_dropped == 0
+    assert core.snapshot(10.0).bus.dropped == 0
 
 
 def test_counters_of_the_bus_are_passed_on(core: DriverCore) -> None:
     core.on_bus("", 10.0, BusReport(send_errors=3, dropped=4))
     core.on_frame(Frame(0x1FE), 10.0)
     snapshot = core.snapshot(10.0)
-    assert (snapshot.send_errors, snapshot.frames_dropped) == (3, 5)
+    assert (snapshot.bus.send_errors, snapshot.bus.dropped) == (3, 5)
 
 
 def test_the_command_is_taken_with_its_receive_time(core: DriverCore) -> None:
     assert core.on_command(Twist2D(0.1, 0.0), 9.9)
     assert not core.on_command(Twist2D(math.nan, 0.0), 10.0)
     snapshot = core.snapshot(10.0)
-    assert snapshot.command_age_s == pytest.approx(0.1)
-    assert (snapshot.command_fresh, snapshot.commands_refused) == (True, 1)
-    assert not core.snapshot(10.11).command_fresh
+    assert snapshot.command.age_s == pytest.approx(0.1)
+    assert (snapshot.command.fresh, snapshot.command.refused) == (True, 1)
+    assert not core.snapshot(10.11).command.fresh
 
 
 def test_without_a_watchdog_a_reset_is_refused_at_once(core: DriverCore) -> None:
@@ -119,7 +119,7 @@ def test_the_lateness_of_cycles_is_counted(core: DriverCore) -> None:
     for cycle, lateness_s in enumerate((0.0, 0.004, 0.006)):
         core.tick(10.0 + 0.01 * cycle, lateness_s)
     snapshot = core.snapshot(10.1)
-    assert (snapshot.cycles, snapshot.overruns, snapshot.cycle_lateness_max_s) == (3, 1, 0.006)
+    assert (snapshot.cycle.cycles, snapshot.cycle.overruns, snapshot.cycle.lateness_max_s) == (3, 1, 0.006)
 
 
 def test_a_stop_by_the_watchdog_is_recorded_as_its_own() -> None:

@@ -8,11 +8,12 @@ import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-from canbase_driver.causes import Cause
+from canbase_driver.causes import Cause, Finding
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.cia402 import DriveState
 from canbase_driver.ros.diagnostics import diagnostics_message, unguarded
 from canbase_driver.supervision.bus_health import ControllerState
+from canbase_driver.supervision.watchdog_link import WatchdogCounters
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.watchdog_view import WatchdogView
 from support.snapshots import SNAPSHOT, with_driver, with_left
@@ -96,12 +97,12 @@ def test_the_values_are_short_and_have_their_units() -> None:
     ],
 )
 def test_the_level_of_the_driver_follows_its_state(state: DriverState, level: bytes) -> None:
-    message = diagnostics_message(with_driver(state=state, cause=Cause.BOOTING), STAMP)
+    message = diagnostics_message(with_driver(state=state, finding={"cause": Cause.BOOTING}), STAMP)
     assert entry(message, "robot: motor_driver").level == level
 
 
 def test_a_drive_that_is_missing_is_an_error() -> None:
-    message = diagnostics_message(with_driver(state=DriverState.BOOTING, cause=Cause.DRIVE_MISSING), STAMP)
+    message = diagnostics_message(with_driver(state=DriverState.BOOTING, finding={"cause": Cause.DRIVE_MISSING}), STAMP)
     assert entry(message, "robot: motor_driver").level == ERROR
 
 
@@ -114,22 +115,22 @@ def test_a_drive_that_is_missing_is_an_error() -> None:
     ],
 )
 def test_a_stopped_driver_says_why_and_what_ends_it(detail: str, clears_on: str, sentence: str) -> None:
-    snapshot = with_driver(state=DriverState.LATCHED, cause=Cause.DRIVE_FAULT, detail=detail, clears_on=clears_on)
+    snapshot = with_driver(state=DriverState.LATCHED, finding=Finding(Cause.DRIVE_FAULT, detail, clears_on))
     assert entry(diagnostics_message(snapshot, STAMP), "robot: motor_driver").message == sentence
 
 
 @pytest.mark.parametrize(
     ("name", "changes", "sentence"),
     [
-        ("motor_driver", {"overruns": 5}, "All drives are enabled. Since the last report: 3 more overruns."),
+        ("motor_driver", {"cycle": {"overruns": 5}}, "All drives are enabled. Since the last report: 3 more overruns."),
         (
             "bus",
-            {"send_errors": 5, "error_frames": 7},
+            {"bus": {"send_errors": 5, "error_frames": 7}},
             "The bus works. Since the last report: 1 more send errors, 7 more error frames.",
         ),
         (
             "watchdog",
-            {"watchdog_leases_refused": 2},
+            {"watchdog": {"counters": WatchdogCounters(leases_refused=2)}},
             "The watchdog watches. Since the last report: 2 more leases refused.",
         ),
     ],
@@ -143,12 +144,12 @@ def test_a_counter_is_a_warning_only_while_it_grows(name: str, changes: dict[str
 
 
 def test_a_watchdog_that_was_restarted_counts_from_zero_and_that_is_no_news() -> None:
-    before = with_driver(watchdog_trips=3)
+    before = with_driver(watchdog={"counters": WatchdogCounters(trips=3)})
     assert entry(diagnostics_message(SNAPSHOT, STAMP, previous=before), "robot: watchdog").level == OK
 
 
 def test_a_growing_counter_does_not_make_an_error_a_warning() -> None:
-    snapshot = with_driver(bus_problem="network is down", send_errors=5)
+    snapshot = with_driver(bus={"problem": "network is down", "send_errors": 5})
     message = diagnostics_message(snapshot, STAMP, previous=SNAPSHOT)
     assert entry(message, "robot: bus").level == ERROR
 
@@ -156,8 +157,12 @@ def test_a_growing_counter_does_not_make_an_error_a_warning() -> None:
 @pytest.mark.parametrize(
     ("changes", "level", "sentence"),
     [
-        ({"bus_problem": "network is down."}, ERROR, "The bus has failed: network is down."),
-        ({"controller": ControllerState.ERROR_PASSIVE}, WARN, "The CAN controller is error passive: check the cable."),
+        ({"bus": {"problem": "network is down."}}, ERROR, "The bus has failed: network is down."),
+        (
+            {"bus": {"controller": ControllerState.ERROR_PASSIVE}},
+            WARN,
+            "The CAN controller is error passive: check the cable.",
+        ),
     ],
 )
 def test_what_the_bus_says(changes: dict[str, Any], level: bytes, sentence: str) -> None:
@@ -167,7 +172,9 @@ def test_what_the_bus_says(changes: dict[str, Any], level: bytes, sentence: str)
 
 @pytest.mark.parametrize(("pause_s", "level"), [(0.05, OK), (0.051, WARN)])
 def test_a_watchdog_whose_loop_pauses_is_a_warning(pause_s: float, level: bytes) -> None:
-    message = diagnostics_message(with_driver(watchdog_pause_max_s=pause_s), STAMP)
+    message = diagnostics_message(
+        with_driver(watchdog={"counters": WatchdogCounters(pause_max_ms=round(1000 * pause_s))}), STAMP
+    )
     assert entry(message, "robot: watchdog").level == level
 
 
@@ -175,7 +182,7 @@ def test_a_watchdog_whose_loop_pauses_is_a_warning(pause_s: float, level: bytes)
     ("rung", "text"), [(0, "none"), (2, "NMT pre-operational"), (4, "heartbeat withheld"), (9, "9")]
 )
 def test_how_far_the_watchdog_has_gone_is_told(rung: int, text: str) -> None:
-    watchdog = entry(diagnostics_message(with_driver(watchdog_rung=rung), STAMP), "robot: watchdog")
+    watchdog = entry(diagnostics_message(with_driver(watchdog={"rung": rung}), STAMP), "robot: watchdog")
     assert {pair.key: pair.value for pair in watchdog.values}["rung of its ladder"] == text
 
 
@@ -183,21 +190,21 @@ def test_how_far_the_watchdog_has_gone_is_told(rung: int, text: str) -> None:
     ("changes", "sentence"),
     [
         (
-            {"watchdog": WatchdogView.MISSING, "watchdog_age_s": 0.25},
+            {"view": WatchdogView.MISSING, "age_s": 0.25},
             "The watchdog is missing: its state frame was heard 0.250 s ago. Is its process running, and on this bus?",
         ),
         (
-            {"watchdog": WatchdogView.MISSING, "watchdog_age_s": math.nan},
+            {"view": WatchdogView.MISSING, "age_s": math.nan},
             "The watchdog is missing: its state frame was never heard. Is its process running, and on this bus?",
         ),
         (
-            {"watchdog": WatchdogView.TRIPPED, "watchdog_cause": "lease lost"},
+            {"view": WatchdogView.TRIPPED, "cause": "lease lost"},
             "The watchdog has tripped: lease lost. Remove the cause, then reset.",
         ),
     ],
 )
 def test_a_watchdog_that_does_not_watch_is_an_error(changes: dict[str, Any], sentence: str) -> None:
-    watchdog = entry(diagnostics_message(with_driver(**changes), STAMP), "robot: watchdog")
+    watchdog = entry(diagnostics_message(with_driver(watchdog=changes), STAMP), "robot: watchdog")
     assert (watchdog.level, watchdog.message) == (ERROR, sentence)
 
 

@@ -39,7 +39,7 @@ def test_configured_drives_are_booted_and_heard_and_get_no_power(released: World
     assert released.core.state is DriverState.DISARMED
     assert released.core.finding.cause.value == "inactive"
     assert released.powered == [False, False]
-    assert released.snapshot.odometry_valid
+    assert released.snapshot.odometry.valid
     assert released.truth.path_m == 0.0
 
 

@@ -9,12 +9,14 @@ from canbase.msg import DriverStatus, DriveStatus
 from geometry_msgs.msg import Point, Pose, Quaternion
 from rclpy.serialization import deserialize_message, serialize_message
 
-from canbase_driver.causes import Cause
-from canbase_driver.motion.odometry import Odometry
+from canbase_driver.causes import Cause, Finding
+from canbase_driver.motion.odometry import Odometry, Pose2D
 from canbase_driver.ros import messages
 from canbase_driver.ros.diagnostics import diagnostics_message
 from canbase_driver.snapshot import StopRecord
+from canbase_driver.supervision.bus_health import BusReport, ControllerState
 from canbase_driver.supervision.stop_history import StopReport
+from canbase_driver.supervision.watchdog_link import WatchdogCounters, WatchdogReport
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.watchdog_view import WatchdogView
 from support.snapshots import LEFT, RIGHT, SNAPSHOT, with_driver, with_left
@@ -42,7 +44,9 @@ def test_odometry_has_rep_105_frames_si_units_and_both_covariances() -> None:
 
 def test_the_covariances_of_the_odometry_fit_into_the_message() -> None:
     odometry = Odometry(0.4)
-    snapshot = with_driver(pose_covariance=odometry.pose_covariance(), twist_covariance=odometry.twist_covariance())
+    snapshot = with_driver(
+        odometry={"pose_covariance": odometry.pose_covariance(), "twist_covariance": odometry.twist_covariance()}
+    )
     message = messages.odometry_message(snapshot, STAMP)
     assert tuple(message.pose.covariance) == odometry.pose_covariance()
     assert tuple(message.twist.covariance) == odometry.twist_covariance()
@@ -50,13 +54,13 @@ def test_the_covariances_of_the_odometry_fit_into_the_message() -> None:
 
 @pytest.mark.parametrize("turns", [-3, -1, 0, 1, 1000])
 def test_however_often_the_base_has_turned_the_orientation_is_the_same(turns: int) -> None:
-    message = messages.odometry_message(with_driver(yaw_rad=0.5 + turns * math.tau), STAMP)
+    message = messages.odometry_message(with_driver(odometry={"pose": Pose2D(0.0, 0.0, 0.5 + turns * math.tau)}), STAMP)
     turn = message.pose.pose.orientation
     assert (turn.z, turn.w) == pytest.approx((math.sin(0.25), math.cos(0.25)))
 
 
 def test_the_transform_is_the_pose_of_the_odometry() -> None:
-    snapshot = with_driver(odom_frame="r1/odom", base_frame="r1/base_link")
+    snapshot = with_driver(odometry={"odom_frame": "r1/odom", "base_frame": "r1/base_link"})
     transform = messages.transform_message(snapshot, STAMP)
     pose = messages.odometry_message(snapshot, STAMP)
     assert transform.header == pose.header
@@ -112,22 +116,30 @@ def test_states_and_words_are_those_of_the_interface() -> None:
 
 
 def test_the_status_carries_every_field_of_the_snapshot_that_the_interface_has() -> None:
-    latched = with_driver(
-        state=DriverState.LATCHED,
-        cause=Cause.DRIVE_FAULT,
-        detail="left_wheel_joint is in fault",
-        clears_on="reset",
-        watchdog=WatchdogView.TRIPPED,
-        watchdog_cause="overspeed",
-        standstill=True,
-    )
-    message = messages.status_message(latched, STAMP)
+    watchdog = WatchdogReport(
+        view=WatchdogView.TRIPPED, cause="overspeed", age_s=0.03, rung=2, lease_age_s=0.5,
+        counters=WatchdogCounters(leases_refused=11, frames_dropped=12, bus_errors=13, trips=14, pause_max_ms=15),
+    )  # fmt: skip
+    bus = BusReport(ControllerState.ERROR_WARNING, 21, 22, 23, 24, 25, "network is down")
+    message = messages.status_message(
+        with_driver(
+            state=DriverState.LATCHED, finding=Finding(Cause.DRIVE_FAULT, "left_wheel_joint is in fault", "reset"),
+            watchdog=watchdog, bus=bus, odometry={"travel_losses": 31, "pose_resets": 32}, standstill=True,
+        ),
+        STAMP,
+    )  # fmt: skip
+    fields = set(message.get_fields_and_field_types()) - {"stamp", "drives"}
+    assert {name: getattr(message, name) for name in fields} == {
+        "state": DriverStatus.LATCHED, "cause": "drive fault", "detail": "left_wheel_joint is in fault",
+        "clears_on": "reset", "watchdog": DriverStatus.WATCHDOG_TRIPPED, "watchdog_cause": "overspeed",
+        "watchdog_age_s": 0.03, "watchdog_rung": 2, "watchdog_lease_age_s": 0.5, "watchdog_leases_refused": 11,
+        "watchdog_frames_dropped": 12, "watchdog_bus_errors": 13, "watchdog_trips": 14, "watchdog_pause_max_s": 0.015,
+        "pose_resets": 32, "standstill": True, "command_age_s": 0.015, "command_fresh": True, "commands_refused": 1,
+        "cycles": 12_345, "overruns": 2, "cycle_lateness_max_s": 0.0004, "bus_problem": "network is down",
+        "controller": "error warning", "send_errors": 21, "receive_errors": 22, "error_frames": 23,
+        "frames_dropped": 24, "bus_failures": 25,
+    }  # fmt: skip
     assert message.stamp == STAMP
-    assert message.state == DriverStatus.LATCHED
-    assert message.watchdog == DriverStatus.WATCHDOG_TRIPPED
-    assert (message.cause, message.controller) == ("drive fault", "error active")
-    plain = set(message.get_fields_and_field_types()) - {"stamp", "state", "cause", "watchdog", "controller", "drives"}
-    assert {name: getattr(message, name) for name in plain} == {name: getattr(latched, name) for name in plain}
 
 
 DIAGNOSTICS_ALONE = {
@@ -154,8 +166,8 @@ def test_a_drive_whose_states_nobody_knows_is_told_as_unknown() -> None:
 
 def test_before_anything_was_heard_the_ages_are_nan() -> None:
     snapshot = with_driver(
-        command_age_s=math.nan,
-        watchdog_age_s=math.nan,
+        command={"age_s": math.nan},
+        watchdog={"age_s": math.nan},
         drives=(dataclasses.replace(LEFT, feedback_age_s=math.nan, heartbeat_age_s=math.nan),),
     )
     sent = deserialize_message(serialize_message(messages.status_message(snapshot, STAMP)), DriverStatus)
@@ -170,7 +182,9 @@ def test_before_anything_was_heard_the_ages_are_nan() -> None:
 
 @pytest.mark.parametrize(("count", "sent"), [(2**32 - 1, 2**32 - 1), (2**32, 0), (2**32 + 5, 5)])
 def test_counters_go_round_like_their_type_after_497_days(count: int, sent: int) -> None:
-    message = messages.status_message(with_driver(cycles=count, frames_dropped=count, send_errors=count), STAMP)
+    message = messages.status_message(
+        with_driver(cycle={"cycles": count}, bus={"dropped": count, "send_errors": count}), STAMP
+    )
     assert (message.cycles, message.frames_dropped, message.send_errors) == (sent, sent, sent)
 
 

@@ -29,7 +29,7 @@ def test_it_boots_and_drives_as_fast_as_ordered(kind: str) -> None:
     world.command = FORWARD
     world.run(1.5)
     assert world.truth.linear_mps == pytest.approx(FORWARD.linear_mps, rel=0.02)
-    assert world.snapshot.linear_mps == pytest.approx(world.truth.linear_mps, rel=0.05)
+    assert world.snapshot.odometry.twist.linear_mps == pytest.approx(world.truth.linear_mps, rel=0.05)
     assert world.truth.angular_radps == pytest.approx(0.0, abs=0.02)
 
 
@@ -39,9 +39,9 @@ def test_its_encoders_tell_the_way(kind: str) -> None:
     world.command = Twist2D.ZERO
     world.run(1.5)
     pose = world.snapshot
-    assert pose.x_m == pytest.approx(world.truth.x_m, abs=0.01)
-    assert pose.y_m == pytest.approx(world.truth.y_m, abs=0.01)
-    assert pose.yaw_rad == pytest.approx(world.truth.yaw_rad, abs=0.03)
+    assert pose.odometry.pose.x_m == pytest.approx(world.truth.x_m, abs=0.01)
+    assert pose.odometry.pose.y_m == pytest.approx(world.truth.y_m, abs=0.01)
+    assert pose.odometry.pose.yaw_rad == pytest.approx(world.truth.yaw_rad, abs=0.03)
 
 
 def test_when_the_driver_dies_the_watchdog_stops_it(kind: str) -> None:

@@ -27,7 +27,12 @@ def run_with_poses(world: World, seconds: float) -> list[float]:
     for _ in range(round(seconds / 0.01)):
         world.run(0.01)
         poses.append(world.snapshot)
-    return [abs(b.x_m - a.x_m) + abs(b.y_m - a.y_m) + abs(b.yaw_rad - a.yaw_rad) for a, b in itertools.pairwise(poses)]
+    return [
+        abs(b.odometry.pose.x_m - a.odometry.pose.x_m)
+        + abs(b.odometry.pose.y_m - a.odometry.pose.y_m)
+        + abs(b.odometry.pose.yaw_rad - a.odometry.pose.yaw_rad)
+        for a, b in itertools.pairwise(poses)
+    ]
 
 
 @pytest.mark.parametrize("loss", LOSSES)
@@ -75,6 +80,8 @@ def test_a_power_cycle_at_a_stand_costs_nothing_of_the_pose(kind: str) -> None:
     world.command = Twist2D.ZERO
     world.run(1.5)
     after, truth = world.snapshot, world.truth
-    assert after.odometry_valid
-    assert after.x_m > before.x_m + 0.1
-    assert (after.x_m, after.y_m, after.yaw_rad) == pytest.approx((truth.x_m, truth.y_m, truth.yaw_rad), abs=0.02)
+    assert after.odometry.valid
+    assert after.odometry.pose.x_m > before.odometry.pose.x_m + 0.1
+    assert (after.odometry.pose.x_m, after.odometry.pose.y_m, after.odometry.pose.yaw_rad) == pytest.approx(
+        (truth.x_m, truth.y_m, truth.yaw_rad), abs=0.02
+    )

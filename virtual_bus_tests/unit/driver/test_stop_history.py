@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import pytest
 
 from canbase_driver.motion.kinematics import Twist2D
+from canbase_driver.motion.odometry import Pose2D
 from canbase_driver.snapshot import DriverSnapshot, StopRecord
 from canbase_driver.supervision.stop_history import StopHistory, StopReport
 from canbase_runtime.driver_state import DriverState
 from support.chain_world import FORWARD, World
-from support.snapshots import SNAPSHOT
+from support.snapshots import with_driver
 
 PATIENCE_S = 5.0
 TRIP = StopRecord("watchdog", "watchdog tripped", "lease lost", True, "reset", at_s=1000.0)
 
 
-def seen(time_s: float, x_m: float = 0.0, standstill: bool = False, **changes: object) -> DriverSnapshot:
+def seen(
+    time_s: float,
+    x_m: float = 0.0,
+    *,
+    yaw_rad: float = 0.0,
+    valid: bool = True,
+    standstill: bool = False,
+    state: DriverState = DriverState.ENABLED,
+    silent_s: float = 0.0,
+) -> DriverSnapshot:
     """A snapshot on the way straight ahead."""
-    way = {"time_s": time_s, "x_m": x_m, "y_m": 0.0, "standstill": standstill}
-    return dataclasses.replace(SNAPSHOT, **(way | changes))  # type: ignore[arg-type]
+    return with_driver(
+        time_s=time_s,
+        state=state,
+        standstill=standstill,
+        odometry={"pose": Pose2D(x_m, 0.0, yaw_rad), "valid": valid},
+        command={"age_s": silent_s, "fresh": silent_s == 0.0},
+    )
 
 
 def held(cause: str, at_s: float) -> StopRecord:
@@ -40,8 +54,8 @@ def driving() -> StopHistory:
 def test_a_stop_is_told_once_when_the_base_stands_with_time_and_way() -> None:
     recorder = driving()
     assert recorder.on_snapshot(seen(1000.0, 0.005), [TRIP]) == []
-    assert recorder.on_snapshot(seen(1000.2, 0.055, yaw_rad=SNAPSHOT.yaw_rad + 0.1), []) == []
-    (report,) = recorder.on_snapshot(seen(1000.3, 0.065, standstill=True, yaw_rad=SNAPSHOT.yaw_rad + 0.1), [])
+    assert recorder.on_snapshot(seen(1000.2, 0.055, yaw_rad=0.1), []) == []
+    (report,) = recorder.on_snapshot(seen(1000.3, 0.065, standstill=True, yaw_rad=0.1), [])
     assert report.record is TRIP
     assert report.standstill
     assert (report.standstill_s, report.distance_m) == pytest.approx((0.3, 0.065))
@@ -74,7 +88,7 @@ def test_without_a_standstill_it_is_told_when_patience_ends(after_s: float, told
 def test_a_way_that_was_not_heard_throughout_is_unknown() -> None:
     recorder = driving()
     recorder.on_snapshot(seen(1000.0, 0.0), [TRIP])
-    recorder.on_snapshot(seen(1000.1, 0.05, odometry_valid=False), [])
+    recorder.on_snapshot(seen(1000.1, 0.05, valid=False), [])
     (report,) = recorder.on_snapshot(seen(1000.2, 0.1, standstill=True), [])
     assert report.standstill_s == pytest.approx(0.2)
     assert (math.isnan(report.distance_m), math.isnan(report.turned_rad)) == (True, True)
@@ -149,8 +163,8 @@ def test_commands_that_end_while_the_base_moves_are_a_stop_of_the_driver(
     recorder = StopHistory(PATIENCE_S)
     recorder.on_command(True, moved_at)
     recorder.on_snapshot(seen(999.99), [])
-    recorder.on_snapshot(seen(1000.1, state=state, command_fresh=False, command_age_s=0.21), [])
-    reports = recorder.on_snapshot(seen(1000.4, standstill=True, command_fresh=False, command_age_s=0.51), [])
+    recorder.on_snapshot(seen(1000.1, state=state, silent_s=0.21), [])
+    reports = recorder.on_snapshot(seen(1000.4, standstill=True, silent_s=0.51), [])
     assert [(each.record.stopped_by, each.record.cause) for each in reports] == [
         ("motor_driver", "command_stale")
     ] * told
@@ -158,7 +172,7 @@ def test_commands_that_end_while_the_base_moves_are_a_stop_of_the_driver(
 
 def test_a_command_that_is_fresh_again_ends_the_stop() -> None:
     recorder = driving()
-    recorder.on_snapshot(seen(1000.1, command_fresh=False, command_age_s=0.12), [])
+    recorder.on_snapshot(seen(1000.1, silent_s=0.12), [])
     (report,) = recorder.on_snapshot(seen(1000.2, 0.1), [])
     assert not report.standstill
 
