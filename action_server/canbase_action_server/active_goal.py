@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from canbase_action_server.goal import GoalRun, Order, Phase
+from canbase_action_server.goal import GoalPhase, GoalRun, Order
 from canbase_action_server.goal_request import Request
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.motion import STOP
@@ -43,9 +43,9 @@ class ActiveGoal:
         return self._goal is not None
 
     @property
-    def phase(self) -> Phase:
+    def phase(self) -> GoalPhase:
         """Of the goal that owns the base; ENDED when there is none."""
-        return self._goal.phase if self._goal else Phase.ENDED
+        return self._goal.phase if self._goal else GoalPhase.ENDED
 
     def take(self, request: Request, inputs: Inputs, now_s: float) -> None:
         """The base now belongs to this goal. RuntimeError when it has an owner, or was never seen."""

@@ -18,6 +18,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from canbase_action_server.fibonacci import next_number, refusal
+from canbase_action_server.goal_client import REJECTION_QOS
 from canbase_action_server.open_goal import rejection
 
 
@@ -27,7 +28,7 @@ class FibonacciServer(Node):
     def __init__(self, period_s: float) -> None:
         super().__init__("fibonacci_action_server")
         self._period_s = period_s
-        self._rejections = self.create_publisher(DiagnosticStatus, "fibonacci/rejection", 10)
+        self._rejections = self.create_publisher(DiagnosticStatus, "fibonacci/rejection", REJECTION_QOS)
         self._server = ActionServer(
             self,
             Fibonacci,

@@ -24,7 +24,7 @@ PROGRESS_M = 0.001
 """Less than this farther than ever before is not progress."""
 
 
-class Phase(Enum):
+class GoalPhase(Enum):
     """Where the goal is."""
 
     DRIVING = "driving"
@@ -33,9 +33,9 @@ class Phase(Enum):
 
 
 TRANSITIONS = {
-    (Phase.DRIVING, Phase.STOPPING): "the distance is driven, or a cause ends the goal",
-    (Phase.STOPPING, Phase.DRIVING): "at standstill short of the goal, and nothing else ended it",
-    (Phase.STOPPING, Phase.ENDED): "at standstill, or the time for it is over",
+    (GoalPhase.DRIVING, GoalPhase.STOPPING): "the distance is driven, or a cause ends the goal",
+    (GoalPhase.STOPPING, GoalPhase.DRIVING): "at standstill short of the goal, and nothing else ended it",
+    (GoalPhase.STOPPING, GoalPhase.ENDED): "at standstill, or the time for it is over",
 }
 
 
@@ -67,7 +67,7 @@ class GoalRun:
         self._overall_s = robot.action.overall_factor * self._motion.ideal_s + robot.action.overall_extra_s
         self._started = self._ticked_at = now_s
         self._gap_s = 0.0
-        self._phase = Phase.DRIVING
+        self._phase = GoalPhase.DRIVING
         self._cause = EndCause(ErrorCode.OK, "")
         self._standstill: Standstill | None = None
         self._last_odometry = start
@@ -81,7 +81,7 @@ class GoalRun:
         self._next_feedback = now_s
 
     @property
-    def phase(self) -> Phase:
+    def phase(self) -> GoalPhase:
         """Where the goal is now."""
         return self._phase
 
@@ -92,11 +92,11 @@ class GoalRun:
 
     def tick(self, inputs: Inputs, now_s: float) -> Order:
         """What to order now, what to tell the client, and whether this was the end. RuntimeError after the end."""
-        if self._phase is Phase.ENDED:
+        if self._phase is GoalPhase.ENDED:
             raise RuntimeError("the goal has ended: it orders nothing any more")
         self._gap_s, self._ticked_at = now_s - self._ticked_at, now_s
         self._observe(inputs, now_s)
-        order = self._drive(inputs, now_s) if self._phase is Phase.DRIVING else self._stop(inputs, now_s)
+        order = self._drive(inputs, now_s) if self._phase is GoalPhase.DRIVING else self._stop(inputs, now_s)
         return replace(order, feedback=self._feedback(now_s))
 
     def _observe(self, inputs: Inputs, now_s: float) -> None:
@@ -140,7 +140,7 @@ class GoalRun:
         if twist is not None:
             return Order(twist)
         self._cause = cause or EndCause(ErrorCode.OK, "")
-        self._go(Phase.STOPPING)
+        self._go(GoalPhase.STOPPING)
         limits = standstill_limits(self._robot, self._motion.deceleration_mps2)
         self._standstill = Standstill(limits, now_s, self._motion.speed_mps(self._last_odometry))
         return Order(self._motion.stop(now_s))
@@ -154,10 +154,10 @@ class GoalRun:
         if verdict is Verdict.WAIT:
             return Order(STOP)
         if self._stands_short(verdict):
-            self._go(Phase.DRIVING)
+            self._go(GoalPhase.DRIVING)
             self._progress_time = now_s
             return Order(STOP)
-        self._go(Phase.ENDED)
+        self._go(GoalPhase.ENDED)
         return Order(STOP, end=self._outcome(verdict))
 
     def _near_enough(self) -> bool:
@@ -188,7 +188,7 @@ class GoalRun:
         self._next_feedback = now_s + 1.0 / self._robot.action.feedback_hz
         return Feedback(self._motion.traveled_m, self._motion.remaining_m)
 
-    def _go(self, phase: Phase) -> None:
+    def _go(self, phase: GoalPhase) -> None:
         if (self._phase, phase) not in TRANSITIONS:
             raise RuntimeError(f"a goal cannot go from {self._phase.value} to {phase.value}")
         self._phase = phase

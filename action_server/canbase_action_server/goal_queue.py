@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 from canbase_action_server.active_goal import ActiveGoal
 from canbase_action_server.causes import CLIENT_SILENT, EndCause
-from canbase_action_server.goal import Feedback, Order, Phase
+from canbase_action_server.goal import Feedback, GoalPhase, Order
 from canbase_action_server.goal_request import Request
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.motion import STOP, Twist
@@ -84,7 +84,7 @@ class GoalQueue:
         return self._running.key if self._running else None
 
     @property
-    def phase(self) -> Phase:
+    def phase(self) -> GoalPhase:
         """Of the goal that owns the base; ENDED when there is none."""
         return self._owner.phase
 

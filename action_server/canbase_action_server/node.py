@@ -29,7 +29,7 @@ from unique_identifier_msgs.msg import UUID
 
 from canbase_action_server import messages
 from canbase_action_server.binding import Binding
-from canbase_action_server.goal import Phase
+from canbase_action_server.goal import GoalPhase
 from canbase_action_server.goal_client import REJECTION_QOS, SERVICE_QOS
 from canbase_action_server.goal_queue import Cycle, GoalQueue
 from canbase_action_server.goal_step import GoalStep
@@ -232,10 +232,10 @@ class DriveDistanceServer(Node):
         told = {name: fields[name] for name in ("status", "error_code", "reason") if name in fields}
         self._voice.tell(text, priority, robot=self._robot.name, goal=uuid, step=step.value, **told)
 
-    def _log_phase(self, uuid: str | None, before: Phase, cycle: Cycle) -> None:
-        if self._goal_queue.phase is Phase.STOPPING:
+    def _log_phase(self, uuid: str | None, before: GoalPhase, cycle: Cycle) -> None:
+        if self._goal_queue.phase is GoalPhase.STOPPING:
             self._log(GoalStep.STOPPING, self._goal_queue.running)
-        elif before is Phase.STOPPING and any(end.key == uuid and end.outcome.stands for end in cycle.ends):
+        elif before is GoalPhase.STOPPING and any(end.key == uuid and end.outcome.stands for end in cycle.ends):
             self._log(GoalStep.STANDSTILL, uuid)
 
     def _log_end(self, uuid: str, goal: OpenGoal, outcome: Outcome, result: Any) -> None:

@@ -1,4 +1,8 @@
-"""What one bit of a drive's velocities (60FFh, 606Ch) and ramps (6083h–6085h) means: the only place with the values."""
+"""What one bit of a drive's velocities (60FFh, 606Ch) and ramps (6083h–6085h) means: the only place with the values.
+
+The driver (`drive_units.py`) and the watchdog's configuration (`derive.py`) take them from here. The simulated drive
+has a table of its own on purpose (`raw_units.py`): a wrong value here shows as a wrong motion there.
+"""
 
 from __future__ import annotations
 

@@ -57,8 +57,8 @@ from canbase_runtime.watchdog_view import WatchdogView
 
 PAUSE = 0.5
 """A cycle that begins so late, in parts of timeouts.feedback_s, begins a new run of SYNCs."""
-LONGEST_STEP_S = 1.0
-"""A cycle after a longer gap, and the first one, counts as this long."""
+LONGEST_CYCLE_S = 1.0
+"""A cycle after a longer gap, and the first one, counts as this long. The limiter takes less of it for its ramp."""
 
 HEALTHY = BusReport()
 
@@ -203,7 +203,7 @@ class DriverCore:
         """One cycle; the frames to send, in this order. `lateness_s`: how late it began."""
         if now_s - self._ticked_at > PAUSE * self._robot.timeouts.feedback_s:
             self._sync_since = now_s
-        dt_s = min(now_s - self._ticked_at, LONGEST_STEP_S)
+        dt_s = min(now_s - self._ticked_at, LONGEST_CYCLE_S)
         self._ticked_at = now_s
         self._stats.note(now_s, lateness_s)
         frames = self._heartbeat(now_s)

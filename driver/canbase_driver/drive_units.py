@@ -1,4 +1,6 @@
-"""The one place of raw drive units: increments of 6064h and bits of 60FFh, 606Ch, 6083h–6085h to SI and back.
+"""Raw values of one axis to SI and back: increments of 6064h and bits of 60FFh, 606Ch, 6083h–6085h.
+
+What one bit is worth stands in canbase_config/units.py.
 
 The mounting direction of the motor is taken in here: everything above is positive when the base drives forward.
 """

@@ -52,13 +52,13 @@ class DropTeller:
     def __init__(self) -> None:
         self._told: dict[str, tuple[StopCause, float]] = {}
 
-    def news(self, scans: Sequence[ScanState], now: float) -> Iterator[Told]:
-        """What is to be told at the time `now` [s, monotonic]."""
+    def news(self, scans: Sequence[ScanState], now_s: float) -> Iterator[Told]:
+        """What is to be told at the time `now_s` [s, monotonic]."""
         for scan in scans:
             why = scan.problem or scan.why_dropped
             cause, told_at = self._told.get(scan.topic, (StopCause.NONE, -math.inf))
-            if why and (scan.cause is not cause or now - told_at >= AGAIN_S):
-                self._told[scan.topic] = scan.cause, now
+            if why and (scan.cause is not cause or now_s - told_at >= AGAIN_S):
+                self._told[scan.topic] = scan.cause, now_s
                 sentence = f"scans of {scan.topic} are dropped, {scan.dropped} so far: {why}"
                 yield sentence, Priority.WARNING, {"topic": scan.topic, "cause": scan.cause.value}
 

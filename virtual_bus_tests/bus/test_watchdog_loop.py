@@ -19,7 +19,7 @@ from canbase_watchdog.bus_port import BusError, BusPort
 from canbase_watchdog.frames import Frame
 from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
 from canbase_watchdog.loop import BusDeadError, Loop
-from canbase_watchdog.policy import TripCause
+from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import Watchdog
 from support.watchdog_live import LiveRobot
 from support.watchdog_story import config

@@ -30,6 +30,7 @@ from canbase_velocity.scan import Scan
 from canbase_velocity.sweep import NO_TOUCH
 from canbase_watchdog import policy
 from canbase_watchdog.latch import Past
+from canbase_watchdog.trip_cause import FINE, TripCause
 from canbase_watchdog.watchdog import State, Watchdog
 
 
@@ -50,7 +51,7 @@ def _put(owner: Any, name: str, value: Any) -> Callable[[], None]:
     return lambda: setattr(owner, name, value)
 
 
-def _trip(cause: policy.TripCause) -> Callable[[], None]:
+def _trip(cause: TripCause) -> Callable[[], None]:
     return _drop(policy, lambda row: getattr(row, "cause", None) is not cause)
 
 
@@ -73,7 +74,7 @@ def _no_latch() -> None:
     def forgetful(self: Watchdog, now_s: float) -> Any:
         frames = tick(self, now_s)
         if self._state is State.TRIPPED and self._settled:
-            self._state, self._verdict, self._stoppers = State.WATCHING, policy.FINE, []
+            self._state, self._verdict, self._stoppers = State.WATCHING, FINE, []
         return frames
 
     Watchdog.tick = forgetful  # type: ignore[method-assign]

@@ -25,7 +25,7 @@ from canbase_driver.snapshot import DriverSnapshot
 from canbase_sim.cia301.dictionary import key
 from canbase_sim.cia402.states import State as Drive
 from canbase_velocity.twist import Twist
-from canbase_watchdog import policy
+from canbase_watchdog.trip_cause import FINE
 from canbase_watchdog.watchdog import State, Watchdog
 
 pytestmark = pytest.mark.campaign
@@ -125,7 +125,7 @@ def forgets_the_second(world: World) -> None:
     def forgetful(self: Watchdog, now_s: float) -> object:
         frames = tick(self, now_s)
         if self._state is State.TRIPPED and self._settled and self.trips >= 2:
-            self._state, self._verdict, self._stoppers = State.WATCHING, policy.FINE, []
+            self._state, self._verdict, self._stoppers = State.WATCHING, FINE, []
         return frames
 
     Watchdog.tick = forgetful  # type: ignore[assignment, method-assign]

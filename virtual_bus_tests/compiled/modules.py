@@ -18,13 +18,13 @@ SOURCES = {
 """Packages of which a compiled world has a copy, and where each of them lies."""
 HOT = {
     "canbase_watchdog": (
-        "bus_health creep envelope evidence frames ladder latch lease observer pair plausibility policy second_master "
-        "standing "
-        "stopper tally torque twist view watchdog"
+        "bus_health creep envelope frames ladder latch lease motion_evidence observer pair plausibility policy "
+        "power_and_motion second_master standing stopper tally torque trip_cause twist view watchdog"
     ),
     "canbase_driver": (
-        "causes cia402 core drive_units report snapshot boot.node_boot cia301.frame cia301.nmt cia301.pdo drives.axis "
-        "drives.canopen_node drives.drive_group drives.let_go drives.odometry_feed drives.standstill drives.telemetry "
+        "causes cia402 core drive_units snapshot boot.node_boot cia301.frame cia301.nmt cia301.pdo drives.axis "
+        "drives.canopen_node drives.drive_group drives.drive_snapshot drives.let_go drives.odometry_feed "
+        "drives.standstill drives.telemetry "
         "motion.braking motion.odometry motion.velocity_command supervision.cycle_stats supervision.latch "
         "supervision.phases supervision.reasons supervision.situation supervision.stop_history supervision.supervisor "
         "supervision.watchdog_link"

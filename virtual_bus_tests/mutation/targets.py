@@ -59,9 +59,11 @@ def _driver(name: str, *then: str) -> Target:
 
 TARGETS = (
     _watchdog("policy", "watchdog/policy", "watchdog/policy_motion"),
+    _watchdog("trip_cause", "watchdog/policy", "watchdog/latch"),
+    _watchdog("power_and_motion", "watchdog/policy"),
     _watchdog("envelope", then=("watchdog/trips", "watchdog/envelope_limiter")),
     _watchdog("plausibility"),
-    _watchdog("evidence", then=("watchdog/observer",)),
+    _watchdog("motion_evidence", then=("watchdog/observer",)),
     _watchdog("torque"),
     _watchdog("standing", "watchdog/standing", "watchdog/stopping_distance", then=("watchdog/observer",)),
     _watchdog("stopping_distance"),

@@ -6,7 +6,7 @@ import pytest
 
 from campaign.removed_safeguards import SAFEGUARDS
 from canbase_driver.cia301.sdo_client import Read, SdoAborted
-from canbase_watchdog.policy import TripCause
+from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import State as WatchdogState
 from small_worlds import canonical
 from small_worlds.copying import Snapshot

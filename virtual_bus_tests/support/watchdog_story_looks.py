@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from canbase_watchdog.ladder import Step
-from canbase_watchdog.policy import TripCause
+from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import State
 from support.watchdog_story import FakeDrive, Story
 

@@ -8,7 +8,8 @@ from typing import Any
 from canbase_watchdog.envelope import Bounds
 from canbase_watchdog.frames import DriveState
 from canbase_watchdog.lease import Lease
-from canbase_watchdog.policy import TripCause, decide
+from canbase_watchdog.policy import decide
+from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.view import Axis, BusView, Node, View
 from support.watchdog_story import config
 

@@ -1,8 +1,8 @@
 """Whether what one drive reports fits its setpoints and itself: three counts of bad samples in a row. No judgement.
 
 The wheel follows its setpoints: it may have the speed of any setpoint of the last `drive_lag_s` and less, and after
-that it falls with the configured deceleration; what it must have at least is evidence.py. A wheel that something held
-back catches up when it comes free (overshoot.py). Encoder and velocity tell the same way, but for a small drift:
+that it falls with the configured deceleration; what it must have at least is motion_evidence.py. A wheel that something
+held back catches up when it comes free (overshoot.py). Encoder and velocity tell the same way, but for a small drift:
 a difference is forgotten over the way on which it did not grow, and very slowly with time, so that it is found at any
 speed (docs/decisions/0020).
 """
@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 from canbase_watchdog.counts import difference
 from canbase_watchdog.envelope import Peak
-from canbase_watchdog.evidence import EvidenceWatch
+from canbase_watchdog.motion_evidence import EvidenceWatch
 from canbase_watchdog.overshoot import Overshoot
 
 DRIFT_M, DRIFT_S = 0.25, 10.0

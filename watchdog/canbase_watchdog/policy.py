@@ -5,112 +5,17 @@ Each check names when it trips, and when its cause still stands, which keeps a r
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from canbase_config.watchdog import WatchdogConfig
-from canbase_watchdog.evidence import BOTH_WAYS
-from canbase_watchdog.frames import DriveState
-from canbase_watchdog.latch import Mark, Past
-from canbase_watchdog.view import NEVER, Axis, Node, View
+from canbase_watchdog.motion_evidence import BOTH_WAYS
+from canbase_watchdog.power_and_motion import commanded, in_motion, moving
+from canbase_watchdog.trip_cause import FINE, TripCause, Verdict
+from canbase_watchdog.view import Axis, Node, View
 
-
-class TripCause(enum.IntEnum):
-    """Byte 1 of the state frame, see docs/bus.md."""
-
-    NONE = 0
-    LEASE_LOST = 1
-    DRIVER_SILENT = 2
-    DRIVE_SILENT = 3
-    TARGET_OUTSIDE = 4
-    MOTION_OUTSIDE = 5
-    OVERSPEED = 6
-    DRIVE_DOWN = 7
-    FOREIGN_MASTER = 8
-    BUS_FAILED = 9
-    LOOP_LATE = 10
-    ENDED = 11
-    FEEDBACK_IMPLAUSIBLE = 12
-    MOTION_MISSING = 13
-    TWIST_OUTSIDE = 14
-    SETPOINT_MISSING = 15
-    ANSWERED_TWICE = 16
-    POWER_AT_STAND = 17
-    DRIVE_RESTARTED = 18
-    POWER_AT_END = 20
-    RECORD_UNUSABLE = 21
-
-
-SENSOR_CAUSES = (TripCause.FEEDBACK_IMPLAUSIBLE, TripCause.MOTION_MISSING, TripCause.POWER_AT_STAND)
-"""After a trip of before the start with one of these, what the drive reports about its motion is no evidence."""
 SIGN_S = 1.0
 """A sign of another master, or of a drive that started anew, counts for so long."""
-
-
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """Why to trip: the cause, the node that it is about (0: none), and one sentence with the values."""
-
-    cause: TripCause = TripCause.NONE
-    node_id: int = 0
-    detail: str = ""
-
-
-FINE = Verdict()
-
-
-def before_the_start(past: Past) -> Verdict:
-    """Why it is tripped from its first moment; FINE where a readable record says that it is not."""
-    if not past.latched:
-        return FINE
-    if past.problem:
-        detail = f"the record of its last trip cannot be used: {past.problem}"
-        return Verdict(TripCause.RECORD_UNUSABLE, 0, detail)
-    entry = past.entry
-    if entry.mark is Mark.LIVE:
-        return Verdict(TripCause.POWER_AT_END, 0, "it ended while a drive had power, or the computer lost its supply")
-    known = entry.cause in tuple(TripCause) and entry.cause != TripCause.NONE
-    cause = TripCause(entry.cause) if known else TripCause.RECORD_UNUSABLE
-    return Verdict(cause, entry.node_id, f"{BEFORE}{entry.detail.removeprefix(BEFORE)}")
-
-
-BEFORE = "since before the start: "
-
-
-def moving(axis: Axis, config: WatchdogConfig) -> bool:
-    """True for a wheel that turns under power. One that is pushed by hand, its power off, may turn."""
-    return axis.powered and not axis.standing
-
-
-def commanded(axis: Axis, config: WatchdogConfig) -> bool:
-    """True for a wheel that is ordered to turn: enabled, or told to be while it tells nothing itself."""
-    unheard = axis.asks_for_power and axis.command_at >= axis.status_at + config.feedback_timeout_s
-    return axis.target_mps != 0.0 and (axis.enabled or unheard)
-
-
-def in_motion(view: View, config: WatchdogConfig) -> Axis | None:
-    """The first wheel that turns or is ordered to, None: all rest."""
-    return next((axis for axis in view.axes if moving(axis, config) or commanded(axis, config)), None)
-
-
-def near_power(axis: Axis) -> bool:
-    """It has power, is ordered to, or is one step before it: from here on the record on disk must say so."""
-    return axis.powered or axis.state is DriveState.SWITCHED_ON or axis.asks_for_power
-
-
-def is_off(axis: Axis, view: View, config: WatchdogConfig, now_s: float) -> bool:
-    """Fresh feedback says so, or there is no such drive."""
-    if view.node(axis.drive.node_id).heard_at == NEVER and not axis.asks_for_power:
-        return True
-    return not near_power(axis) and axis.state is not None and now_s < axis.status_at + config.feedback_timeout_s
-
-
-def velocity_ordered(view: View, config: WatchdogConfig, now_s: float) -> bool:
-    """True while the driver's setpoints or the filter's leases of the last moments order anything but zero."""
-    recent = now_s - config.lease_timeout_s
-    by_setpoint = any(axis.target_mps != 0.0 and axis.command_at > recent for axis in view.axes)
-    return by_setpoint or (view.lease is not None and view.lease.orders_motion and view.lease_at > recent)
 
 
 def _lease_is_lost(view: View, config: WatchdogConfig, now_s: float) -> bool:

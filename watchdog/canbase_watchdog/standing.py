@@ -5,10 +5,10 @@ Rules, with `standstill_mps` s and `motion_tolerance_mps` n:
    velocity is so low the encoder has not gone further than s lasts for in STILL_S.
 2. Still: the encoder has stayed where it is for STILL_S, and the velocity is at most n: noise.
 Anything else is motion: so is a wheel of which position or velocity did not come. The driver has the same rules in code
-of its own. No frames here, no judgement of the sensor: that is evidence.py. But a standstill that came on less travel
-than a wheel needs to stop is unproven (stopping_distance.py), until the encoder has shown it, or the wheel has been
-without power for so long that it has rolled out and gets power again. One that moves again before that, without power,
-has never stood: its encoder comes and goes.
+of its own. No frames here, no judgement of the sensor: that is motion_evidence.py. But a standstill that came on less
+travel than a wheel needs to stop is unproven (stopping_distance.py), until the encoder has shown it, or the wheel has
+been without power for so long that it has rolled out and gets power again. One that moves again before that, without
+power, has never stood: its encoder comes and goes.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 from canbase_watchdog.counts import Life, difference, life_m
-from canbase_watchdog.evidence import KEPT_SHARE, STRAIN_SHARE
+from canbase_watchdog.motion_evidence import KEPT_SHARE, STRAIN_SHARE
 
 ALIKE_SHARE = 0.05
 """Friction takes as much one way as the other."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from canbase_config.watchdog import WatchedDrive
 from canbase_watchdog.envelope import Bounds
-from canbase_watchdog.evidence import Evidence
 from canbase_watchdog.frames import POWERED, DriveState
 from canbase_watchdog.lease import Lease
+from canbase_watchdog.motion_evidence import Evidence
 from canbase_watchdog.plausibility import Feedback
 from canbase_watchdog.second_master import Sign
 from canbase_watchdog.torque import Push
@@ -68,7 +68,7 @@ class Axis:
     def trusted(self) -> bool:
         """False when its sensor was found to show no motion, or a wrong one: no standstill is proven by it.
 
-        Operation enabled, a wheel that met something hard is told from a dead sensor by evidence.py.
+        Operation enabled, a wheel that met something hard is told from a dead sensor by motion_evidence.py.
         """
         return self.evidence.trusted and (self.enabled or not self.unproven)
 

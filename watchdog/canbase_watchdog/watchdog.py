@@ -17,8 +17,9 @@ from canbase_watchdog.latch import Entry, Ledger, Mark, Past
 from canbase_watchdog.lease import LeaseBook, Refusal
 from canbase_watchdog.observer import Observer
 from canbase_watchdog.pair import PairWatch
-from canbase_watchdog.policy import TripCause, Verdict
+from canbase_watchdog.power_and_motion import in_motion, is_off, near_power, velocity_ordered
 from canbase_watchdog.stopper import Stopper
+from canbase_watchdog.trip_cause import FINE, SENSOR_CAUSES, TripCause, Verdict, before_the_start
 from canbase_watchdog.twist import TwistWatch
 from canbase_watchdog.view import View
 
@@ -86,7 +87,7 @@ class Watchdog:
         self._bus_failed_since, self._bus_errors = math.inf, 0
         self._view = self._look(now_s)
         self._state = State.STARTING
-        self._verdict = policy.FINE
+        self._verdict = FINE
         self._stoppers: list[Stopper] = []
         self._reset = (0, Answer.NONE)
         self._reset_at = -math.inf
@@ -96,7 +97,7 @@ class Watchdog:
         self._ledger = Ledger(past)
         self.trips = 0
         """Since the start."""
-        before = policy.before_the_start(past) if past is not None else policy.FINE
+        before = before_the_start(past) if past is not None else FINE
         if before.cause is not TripCause.NONE:
             self._latch(before, now_s, resting=True)
         self._note_record(now_s)
@@ -193,7 +194,7 @@ class Watchdog:
     def end(self, now_s: float) -> None:
         """The process is asked to end: with a wheel in motion it must not leave without stopping it."""
         view = self._look(now_s)
-        axis = policy.in_motion(view, self._config)
+        axis = in_motion(view, self._config)
         if self._state is State.TRIPPED or axis is None:
             return
         detail = f"asked to end while {axis.drive.joint} turns at {axis.velocity_mps:.3f} m/s"
@@ -226,7 +227,7 @@ class Watchdog:
         self._verdict = verdict
         self._observer.commands_are_ours = True
         nodes = dict.fromkeys(drive.node_id for drive in self._config.drives)
-        lying = verdict.node_id if resting and verdict.cause in policy.SENSOR_CAUSES else 0
+        lying = verdict.node_id if resting and verdict.cause in SENSOR_CAUSES else 0
         self._stoppers = [
             Stopper(node_id, self._config, self._view, now_s, node_id != lying, resting) for node_id in nodes
         ]
@@ -236,9 +237,9 @@ class Watchdog:
         verdict, axes = self._verdict, self._view.axes
         if self._state is State.TRIPPED:
             self._ledger.want(Mark.LATCHED, verdict.cause, verdict.node_id, verdict.detail)
-        elif all(policy.is_off(axis, self._view, self._config, now_s) for axis in axes):
+        elif all(is_off(axis, self._view, self._config, now_s) for axis in axes):
             self._ledger.want(Mark.CLEAR)
-        elif self._ledger.wanted.mark is not Mark.CLEAR or any(policy.near_power(axis) for axis in axes):
+        elif self._ledger.wanted.mark is not Mark.CLEAR or any(near_power(axis) for axis in axes):
             self._ledger.want(Mark.LIVE)
 
     def _stop(self, now_s: float) -> list[Frame]:
@@ -295,10 +296,10 @@ class Watchdog:
         fresh = all(stopper.is_fresh(now_s) for stopper in self._stoppers)
         if not self._settled or not fresh or policy.stands(self._verdict, view, self._config, now_s):
             return Answer.CAUSE_STANDS
-        if policy.velocity_ordered(view, self._config, now_s):
+        if velocity_ordered(view, self._config, now_s):
             return Answer.VELOCITY_ORDERED
         self._state = State.WATCHING
-        self._verdict = policy.FINE
+        self._verdict = FINE
         self._stoppers = []
         self._observer.commands_are_ours = False
         self._observer.trust()

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from canbase_action_server.along_track import Pose
-from canbase_action_server.goal import Phase
+from canbase_action_server.goal import GoalPhase
 from canbase_action_server.goal_request import DriveRequest
 from canbase_action_server.inputs import Driver, Inputs, Odometry, Safety
 from canbase_action_server.motion import Twist
@@ -122,7 +122,7 @@ def test_a_server_that_stood_still_does_not_drive_on_with_what_arrives_then() ->
         goal.tick(replaced(inputs, odometry=plant.odometry(tick * 0.02)), tick * 0.02)
     order = goal.tick(replaced(inputs, odometry=plant.odometry(3.0)), 3.0)
     assert order.twist == Twist()
-    assert goal.phase is Phase.STOPPING
+    assert goal.phase is GoalPhase.STOPPING
 
 
 def test_a_fault_during_the_stop_of_a_cancel_is_the_cause() -> None:
@@ -274,7 +274,7 @@ def test_an_ended_goal_orders_nothing() -> None:
         now_s += 0.02
         inputs = replaced(inputs, odometry=Plant().odometry(now_s))
         end = goal.tick(inputs, now_s).end
-    assert (goal.phase, end.code) == (Phase.ENDED, ErrorCode.SHUTDOWN)
+    assert (goal.phase, end.code) == (GoalPhase.ENDED, ErrorCode.SHUTDOWN)
     with pytest.raises(RuntimeError, match="has ended"):
         goal.tick(inputs, now_s)
 

@@ -18,7 +18,7 @@ from canbase_driver.drives.let_go import LetGo
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
 from canbase_sim import faults
-from canbase_watchdog.policy import TripCause
+from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import State
 from support.chain_world import STEP_S, World, bench_robot, world_of
 

@@ -11,7 +11,7 @@ from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.latch_record import Mark
 from canbase_watchdog import latch
-from canbase_watchdog.policy import TripCause
+from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import State, Watchdog
 from support.chain_world import World
 

@@ -23,7 +23,7 @@ from canbase_velocity.lease import lease_datagram
 from canbase_velocity.twist import Twist
 from canbase_watchdog import frames, lease
 from canbase_watchdog.ladder import Step
-from canbase_watchdog.policy import TripCause
+from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import Answer, State
 
 BENCH = load_robot(sample("bench")).robot

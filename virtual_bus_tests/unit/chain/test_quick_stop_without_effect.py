@@ -17,6 +17,7 @@ from canbase_runtime.driver_state import DriverState
 from canbase_sim.faults import apply
 from canbase_watchdog import policy
 from canbase_watchdog.slowing import LASTS_S
+from canbase_watchdog.trip_cause import FINE
 from canbase_watchdog.watchdog import State
 from support.chain_world import World, bench_robot
 
@@ -77,7 +78,7 @@ def stopped_by_driver(of: Robot, share: float = 0.0) -> float:
     """The other drive is in fault: the driver's quick stop. The watchdog judges nothing."""
     world = driving(of, share)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(policy, "decide", lambda view, config, now_s: policy.FINE)
+        patch.setattr(policy, "decide", lambda view, config, now_s: FINE)
         apply(world.bench.nodes, 2, "fault", world.now_s, {})
         assert world.run(1.0, lambda: world.core.state is DriverState.STOPPING)
         return power_s(world)

@@ -7,7 +7,7 @@ import pytest
 from canbase_runtime.driver_state import DriverState
 from canbase_sim.faults import apply
 from canbase_watchdog.frames import Frame
-from canbase_watchdog.policy import TripCause
+from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import State, Watchdog
 from support.chain_world import FORWARD, World
 from support.crews import robot_with

@@ -10,7 +10,8 @@ from canbase_driver.motion.kinematics import Twist2D
 from canbase_watchdog.creep import CreepWatch
 from canbase_watchdog.envelope import Bounds
 from canbase_watchdog.frames import DriveState
-from canbase_watchdog.policy import TripCause, decide
+from canbase_watchdog.policy import decide
+from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.view import Axis, BusView
 from canbase_watchdog.watchdog import State
 from support.chain_world import BITS_PER_MPS, World

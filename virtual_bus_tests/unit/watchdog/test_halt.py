@@ -18,7 +18,8 @@ from canbase_driver.motion.kinematics import Twist2D, wheel_speeds
 from canbase_driver.motion.limiter import Limiter, MotionState
 from canbase_watchdog.halt import RECEIVED_S, HaltWatch
 from canbase_watchdog.lease import Lease
-from canbase_watchdog.policy import TripCause, decide
+from canbase_watchdog.policy import decide
+from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.view import BusView
 from canbase_watchdog.watchdog import State
 from support.chain_world import World, bench_robot

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from canbase_watchdog import frames, policy
+from canbase_watchdog import frames
 from canbase_watchdog.latch import Entry, Mark, Past
-from canbase_watchdog.policy import TripCause
+from canbase_watchdog.trip_cause import FINE, TripCause, before_the_start
 from canbase_watchdog.watchdog import Answer, State, Watchdog
 from support.watchdog_story import FakeDrive, Story
 from support.watchdog_story_looks import driving, until_tripped
@@ -172,4 +172,4 @@ def test_a_trip_at_the_end_is_written() -> None:
 
 
 def test_a_readable_clear_record_is_no_cause() -> None:
-    assert policy.before_the_start(Past()) is policy.FINE
+    assert before_the_start(Past()) is FINE

@@ -19,7 +19,7 @@ from canbase_driver.motion.kinematics import Twist2D
 from canbase_sim.frame import Frame as BenchFrame
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.twist import Twist
-from canbase_watchdog.policy import TripCause
+from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import State
 from support.chain_world import BITS_PER_MPS, STEP_S, World
 

@@ -11,23 +11,9 @@ import pytest
 from canbase_watchdog.frames import DriveState
 from canbase_watchdog.latch import Entry, Mark, Past
 from canbase_watchdog.lease import Lease
-from canbase_watchdog.policy import (
-    CHECKS,
-    FINE,
-    SENSOR_CAUSES,
-    TripCause,
-    Verdict,
-    before_the_start,
-    commanded,
-    decide,
-    in_motion,
-    is_off,
-    moving,
-    near_power,
-    next_expiry,
-    stands,
-    velocity_ordered,
-)
+from canbase_watchdog.policy import CHECKS, decide, next_expiry, stands
+from canbase_watchdog.power_and_motion import commanded, in_motion, is_off, moving, near_power, velocity_ordered
+from canbase_watchdog.trip_cause import FINE, SENSOR_CAUSES, TripCause, Verdict, before_the_start
 from canbase_watchdog.view import NEVER, Node, View
 from support.watchdog_views import AT_REST, CONFIG, LEFT, NOW, OFF, RIGHT, WELL, cause, of, well
 

@@ -10,12 +10,13 @@ import pytest
 
 from canbase_config.watchdog import WatchedDrive
 from canbase_watchdog.envelope import Bounds
-from canbase_watchdog.evidence import Evidence
 from canbase_watchdog.frames import DriveState
+from canbase_watchdog.motion_evidence import Evidence
 from canbase_watchdog.plausibility import Feedback
-from canbase_watchdog.policy import CHECKS, FINE, TripCause, Verdict, clears_on, decide, stands
+from canbase_watchdog.policy import CHECKS, clears_on, decide, stands
 from canbase_watchdog.second_master import Sign
 from canbase_watchdog.torque import Push
+from canbase_watchdog.trip_cause import FINE, TripCause, Verdict
 from canbase_watchdog.view import Axis
 from support.watchdog_views import AT_REST, CONFIG, LEFT, NOW, OFF, RIGHT, STANDING, cause, of, well
 

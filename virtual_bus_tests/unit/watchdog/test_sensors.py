@@ -21,7 +21,7 @@ from canbase_driver.supervision.lifecycle import Aim
 from canbase_sim import faults
 from canbase_sim.frame import Frame as BenchFrame
 from canbase_sim.plant.encoder import EncoderFault
-from canbase_watchdog.policy import TripCause
+from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import State, Watchdog
 from support.chain_world import STEP_S, World
 

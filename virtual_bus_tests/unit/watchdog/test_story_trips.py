@@ -12,7 +12,7 @@ import pytest
 from canbase_watchdog.frames import Frame
 from canbase_watchdog.ladder import Step
 from canbase_watchdog.lease import Refusal
-from canbase_watchdog.policy import TripCause
+from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import State
 from support.watchdog_story import FakeDrive, Story, lease
 from support.watchdog_story_looks import cause, driving, state, step, tripped, until_still, until_tripped

@@ -15,7 +15,7 @@ import pytest
 from canbase_watchdog.bus_health import BusHealth
 from canbase_watchdog.ladder import Step
 from canbase_watchdog.loop import TICK_S, Loop
-from canbase_watchdog.policy import FINE
+from canbase_watchdog.trip_cause import FINE
 from canbase_watchdog.watchdog import Answer, State, Status
 
 START_S = 1000.0

@@ -13,7 +13,7 @@ from random import Random
 import pytest
 
 from canbase_watchdog.frames import Frame
-from canbase_watchdog.policy import TripCause
+from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import Answer, State, Watchdog
 from support.watchdog_story import FAULT, SOD, FakeDrive, Story, lease
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from canbase_watchdog.evidence import Evidence, EvidenceWatch
+from canbase_watchdog.motion_evidence import Evidence, EvidenceWatch
 from support.watchdog_story import config
 
 HZ = 64.0
