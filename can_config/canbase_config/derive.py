@@ -1,4 +1,4 @@
-"""What single processes need of a robot, worked out from it once: raw units become metres and seconds here."""
+"""What single processes need of a robot, worked out from it once, in metres and seconds."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from canbase_config.stopping import (
     max_wheel_mps,
     order_wait_s,
 )
-from canbase_config.units import motor_rev_per_s
+from canbase_config.units import m_per_count, mps_per_bit, velocity_scale
 from canbase_config.watchdog import RelayLine, WatchdogConfig, WatchedDrive, WatchedLayout
 
 NOMINAL_HZ, LEAST_SAMPLES = 100.0, 2
@@ -26,23 +26,6 @@ NOMINAL_HZ, LEAST_SAMPLES = 100.0, 2
 BRAKING_SAMPLES = 3
 SLOWEST_RAMP_SHARE = 0.25
 """Of the limits' acceleration, where watchdog.slowest_ramp_mps2 is not given."""
-
-
-def mps_per_bit(drive: Drive, wheel_radius_m: float) -> float:
-    """Speed of the wheel's rim [m/s] for one bit of the drive's 60FFh; the sign makes forward positive."""
-    motor_rev_s = motor_rev_per_s(drive.target_unit, drive.counts_per_motor_rev)
-    return motor_rev_s * _m_per_motor_rev(drive, wheel_radius_m)
-
-
-def velocity_scale(drive: Drive) -> float:
-    """How many bits of 60FFh one bit of 606Ch is worth."""
-    counts = drive.counts_per_motor_rev
-    return motor_rev_per_s(drive.actual_unit, counts) / motor_rev_per_s(drive.target_unit, counts)
-
-
-def m_per_count(drive: Drive, wheel_radius_m: float) -> float:
-    """Travel of the wheel's rim [m] for one increment of the drive's 6064h; the sign makes forward positive."""
-    return _m_per_motor_rev(drive, wheel_radius_m) / drive.counts_per_motor_rev
 
 
 def speed_noise_mps(robot: Robot) -> float:
@@ -139,16 +122,16 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
 def watched_drive(drive: Drive, wheel_radius_m: float, hardest_mps2: float) -> WatchedDrive:
     """What the watchdog is told about one axis; `hardest_mps2`: stopping.hardest_braking_mps2 of it."""
     return WatchedDrive(
-        drive.joint,
-        drive.node_id,
-        drive.axis,
-        drive.side,
-        mps_per_bit(drive, wheel_radius_m),
-        m_per_count(drive, wheel_radius_m),
-        velocity_scale(drive),
-        drive.kind.pdo.synchronous,
-        _layout(drive.kind.layout),
-        hardest_mps2,
+        joint=drive.joint,
+        node_id=drive.node_id,
+        axis=drive.axis,
+        side=drive.side,
+        mps_per_bit=mps_per_bit(drive, wheel_radius_m),
+        m_per_count=m_per_count(drive, wheel_radius_m),
+        velocity_scale=velocity_scale(drive),
+        answers_sync=drive.kind.pdo.synchronous,
+        layout=_layout(drive.kind.layout),
+        hardest_braking_mps2=hardest_mps2,
     )
 
 
@@ -160,7 +143,3 @@ def _layout(layout: Layout) -> WatchedLayout:
         target_bits=layout.target_bits,
         velocity_bits=layout.velocity_bits,
     )
-
-
-def _m_per_motor_rev(drive: Drive, wheel_radius_m: float) -> float:
-    return drive.direction * 2.0 * math.pi * wheel_radius_m / drive.gear_ratio

@@ -1,4 +1,4 @@
-"""What one bit of a drive's velocities (60FFh, 606Ch) and ramps (6083h–6085h) means: the only place with the values.
+"""What one bit of a drive's velocities (60FFh, 606Ch) and ramps (6083h–6085h) means at the motor and at the rim.
 
 The driver (`drive_units.py`) and the watchdog's configuration (`derive.py`) take them from here. The simulated drive
 has a table of its own on purpose (`raw_units.py`): a wrong value here shows as a wrong motion there.
@@ -6,8 +6,10 @@ has a table of its own on purpose (`raw_units.py`): a wrong value here shows as 
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
+from canbase_config.drive import Drive
 from canbase_config.profile import AccelerationUnit, Units, VelocityUnit
 
 _MOTOR_REV_PER_S: Final[dict[VelocityUnit, float]] = {
@@ -62,3 +64,25 @@ def ramp_raw(units: Units, velocity_unit: VelocityUnit, counts_per_motor_rev: in
     if unit in _MOTOR_REV_PER_S2:
         return motor_rev_per_s2 / _MOTOR_REV_PER_S2[unit]
     return motor_rev_per_s2 * counts_per_motor_rev / _COUNTS_PER_S2[unit]
+
+
+def m_per_motor_rev(drive: Drive, wheel_radius_m: float) -> float:
+    """Travel of the wheel's rim [m] for one revolution of the motor; always positive."""
+    return 2.0 * math.pi * wheel_radius_m / drive.gear_ratio
+
+
+def mps_per_bit(drive: Drive, wheel_radius_m: float) -> float:
+    """Speed of the wheel's rim [m/s] for one bit of the drive's 60FFh; the sign makes forward positive."""
+    motor_rev_s = motor_rev_per_s(drive.target_unit, drive.counts_per_motor_rev)
+    return drive.direction * motor_rev_s * m_per_motor_rev(drive, wheel_radius_m)
+
+
+def velocity_scale(drive: Drive) -> float:
+    """How many bits of 60FFh one bit of 606Ch is worth."""
+    counts = drive.counts_per_motor_rev
+    return motor_rev_per_s(drive.actual_unit, counts) / motor_rev_per_s(drive.target_unit, counts)
+
+
+def m_per_count(drive: Drive, wheel_radius_m: float) -> float:
+    """Travel of the wheel's rim [m] for one increment of the drive's 6064h; the sign makes forward positive."""
+    return drive.direction * m_per_motor_rev(drive, wheel_radius_m) / drive.counts_per_motor_rev

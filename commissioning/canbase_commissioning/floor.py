@@ -47,7 +47,14 @@ def measure_floor(rig: PoweredDrives, distance_m: float, turns: float, speed_mps
     measured_deg = float((yield Ask("floor.angle_deg", text, number(10.0, 36_000.0))))
     factor = new_radius_m / base.wheel_radius_m
     new_track_m = track(base.track_m, odometry_rad, math.radians(measured_deg), factor)
-    return FloorFound(new_radius_m, new_track_m, odometry_m, measured_m, math.degrees(odometry_rad), measured_deg)
+    return FloorFound(
+        wheel_radius_m=new_radius_m,
+        track_m=new_track_m,
+        odometry_m=odometry_m,
+        measured_m=measured_m,
+        odometry_deg=math.degrees(odometry_rad),
+        measured_deg=measured_deg,
+    )
 
 
 def _drive(

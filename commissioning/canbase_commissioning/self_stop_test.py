@@ -185,7 +185,16 @@ def _outcome(
     limit_s = robot.timeouts.drive_heartbeat_s + ramp_s + LATE_S
     sign = rig.signs.get(rig.axes[joint].drive.node_id)
     said = f"it said {sign[1]} after {sign[0] - began:.2f} s" if sign and sign[0] >= began else ""
-    return Outcome(joint, trial, speed_mps, stopped, time_s, rolled_m, limit_s, said)
+    return Outcome(
+        joint=joint,
+        trial=trial,
+        speed_mps=speed_mps,
+        stopped=stopped,
+        time_s=time_s,
+        way_m=rolled_m,
+        limit_s=limit_s,
+        sign=said,
+    )
 
 
 def _looks(rig: PoweredDrives) -> Script[dict[str, Sample]]:

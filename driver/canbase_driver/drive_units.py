@@ -11,7 +11,7 @@ import math
 
 from canbase_config.drive import Drive
 from canbase_config.robot import Base
-from canbase_config.units import motor_rev_per_s, ramp_raw
+from canbase_config.units import m_per_motor_rev, motor_rev_per_s, ramp_raw
 
 UINT32_MAX = 2**32 - 1
 
@@ -20,7 +20,7 @@ class AxisUnits:
     """Conversions of one axis. Speeds and distances are those of the rim of its wheel."""
 
     def __init__(self, drive: Drive, base: Base) -> None:
-        rim_m_per_motor_rev = 2.0 * math.pi * base.wheel_radius_m / drive.gear_ratio
+        rim_m_per_motor_rev = m_per_motor_rev(drive, base.wheel_radius_m)
         counts = drive.counts_per_motor_rev
         target_rev_per_s = motor_rev_per_s(drive.target_unit, counts)
         self._drive = drive

@@ -194,13 +194,13 @@ def field_of(scan: Scan, placement: Placement, says: npt.NDArray[np.intp] | None
     span_rad = increment_rad * (scan.count - 1)
     first_rad = scan.angle_min_rad - (span_rad if scan.angle_increment_rad < 0.0 else 0.0)
     return Field(
-        placement,
-        first_rad - increment_rad / 2.0,
-        span_rad + increment_rad,
-        scan.range_min_m,
-        scan.range_max_m,
-        increment_rad,
-        says if increment_rad > 0.0 else None,
+        placement=placement,
+        first_rad=first_rad - increment_rad / 2.0,
+        span_rad=span_rad + increment_rad,
+        range_min_m=scan.range_min_m,
+        range_max_m=scan.range_max_m,
+        increment_rad=increment_rad,
+        says=says if increment_rad > 0.0 else None,
     )
 
 

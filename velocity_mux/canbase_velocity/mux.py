@@ -168,9 +168,19 @@ class _Source:
     def view(self, now_s: float, standing: SourceStanding, reason: str, locked: bool = False) -> SourceView:
         config = self.config
         return SourceView(
-            self.name, config.topic, config.priority, standing, self.age_s(now_s), config.timeout_s,
-            self.received, self.refused, reason, self.arming.armed, locked, self.delay_s,
-        )  # fmt: skip
+            name=self.name,
+            topic=config.topic,
+            priority=config.priority,
+            standing=standing,
+            age_s=self.age_s(now_s),
+            timeout_s=config.timeout_s,
+            received=self.received,
+            refused=self.refused,
+            reason=reason,
+            armed=self.arming.armed,
+            locked=locked,
+            delay_s=self.delay_s,
+        )
 
 
 class Mux:

@@ -175,7 +175,7 @@ def told_share(order: Twist, sight: Sight, geometry: Geometry) -> float:
 
 def zone_factor(order: Twist, zone: LimitZone, sight: Sight) -> float:
     """Share of `order` that the zone leaves: 1 while it is empty."""
-    box = Box(zone.front_m, zone.rear_m, zone.left_m, zone.right_m)
+    box = Box(front_m=zone.front_m, rear_m=zone.rear_m, left_m=zone.left_m, right_m=zone.right_m)
     if not box.contains(sight.points).any():
         return 1.0
     return speed_factor(order, zone.linear_mps, zone.angular_radps)

@@ -6,8 +6,8 @@ import struct
 
 from campaign.can_bus import CanBus
 from campaign.process import Topics
-from canbase_config.derive import mps_per_bit
 from canbase_config.robot import Robot
+from canbase_config.units import mps_per_bit
 from canbase_velocity.twist import Twist
 
 ENABLE = 0x000F

@@ -19,7 +19,7 @@ from campaign.removed_safeguards import SAFEGUARDS
 from campaign.robots import draw_robot
 from campaign.scenario import Start
 from campaign.world import World
-from canbase_config.derive import mps_per_bit
+from canbase_config.units import mps_per_bit
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_sim.cia301.dictionary import key

@@ -7,9 +7,10 @@ from collections.abc import Callable, Iterator
 from typing import Literal
 
 from campaign.disk import StopDisk, WatchdogDisk
-from canbase_config.derive import mps_per_bit, watchdog_config
+from canbase_config.derive import watchdog_config
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
+from canbase_config.units import mps_per_bit
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.core import DriverCore
 from canbase_driver.motion.kinematics import Twist2D

@@ -29,10 +29,10 @@ from canbase_commissioning.powered_drives import PoweredDrives, RigError
 from canbase_commissioning.report import Results, markdown, verdict
 from canbase_commissioning.self_stop_test import Outcome, get_ready, prove
 from canbase_commissioning.wheel_direction import AGAIN, WheelFound, find_direction, measure_scale
-from canbase_config.derive import mps_per_bit
 from canbase_config.errors import ConfigError
 from canbase_config.load import load_robot
 from canbase_config.robot import Robot
+from canbase_config.units import mps_per_bit
 from canbase_runtime.terminal import FAILED, fail, load_config
 from canbase_runtime.version import installed_version
 

@@ -46,12 +46,12 @@ class StillnessLimits:
         watchdog = robot.watchdog
         rolls_s = coasting_s(watchdog.overspeed_factor * max_wheel_mps(robot))
         return cls(
-            robot.base.standstill_mps,
-            watchdog.motion_tolerance_mps,
-            watchdog.travel_tolerance_m,
-            rolls_s,
-            hardest_braking_mps2(robot, drive),
-            hardest_stop_mps2(robot),
+            standstill_mps=robot.base.standstill_mps,
+            noise_mps=watchdog.motion_tolerance_mps,
+            unshown_m=watchdog.travel_tolerance_m,
+            coasting_s=rolls_s,
+            braking_mps2=hardest_braking_mps2(robot, drive),
+            rolling_mps2=hardest_stop_mps2(robot),
         )
 
 
