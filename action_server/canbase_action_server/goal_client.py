@@ -59,7 +59,9 @@ class RejectedError(DriveError):
     """The server rejects the goal. `reason`: its sentence; None when none was received: then its log has it."""
 
     def __init__(self, action: str, reason: str | None) -> None:
-        super().__init__(f"{action} rejects the goal{f': {reason}' if reason else '; the log of its server says why'}")
+        super().__init__(
+            f"{action} rejects the goal{f': {reason}' if reason else '; the reason is in the log of its server'}"
+        )
         self.reason = reason
 
 

@@ -49,7 +49,7 @@ STATUS_QOS = QoSProfile(depth=1)
 LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 KEEPALIVE_QOS = QoSProfile(depth=100)
 """Deep enough for all goals that may wait."""
-OLD = "the action server stood still before it took the goal in: its client may be gone; send it again"
+OLD = "the goal may be old, because the action server did not run before it; send it again"
 
 T = TypeVar("T")
 

@@ -55,9 +55,9 @@ def _condition(robot: Robot, inputs: Inputs) -> str | None:
     if driver and driver.state is not DriverState.ENABLED:
         return f"motor_driver is {driver.state.word}, not enabled: {driver.detail}"
     if driver and not driver.hears_command:
-        return "motor_driver hears no cmd_vel; is safety_filter running? After a start try again in a second"
+        return "motor_driver receives no cmd_vel; is safety_filter running? After a start try again in a second"
     if mux and mux.active not in ("", action_source(robot)):
-        return f"{mux.active} drives now; let go of it first"
+        return f"{mux.active} drives now; release it first"
     if mux and mux.held_back:
         return f"velocity_mux holds {action_source(robot)} back: {mux.held_back}; unlock it first"
     return None

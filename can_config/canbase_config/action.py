@@ -23,39 +23,49 @@ class Action(Section):
     goal_policy: Annotated[
         Literal["reject", "queue", "preempt"],
         BeforeValidator(_no_parallel),
-        Field(description="a new goal while one runs: refused, waits for its turn, or takes the base after a stop"),
+        Field(description="a new goal while one runs: rejected, queued, or it replaces the running goal after a stop"),
     ] = "reject"
-    queue_length: Annotated[int, Field(ge=1, le=100, description="so many goals may wait with goal_policy: queue")] = 8
+    queue_length: Annotated[
+        int, Field(ge=1, le=100, description="maximum number of waiting goals, with goal_policy: queue")
+    ] = 8
 
     require_client_lease: Annotated[
         bool, Field(description="true: a goal runs only while its client sends keepalives; `canbase drive` does")
     ] = False
     client_lease_s: Annotated[
-        float, Field(ge=0.3, le=10.0, description="no keepalive for so long: CLIENT_LOST, if required [s]")
+        float, Field(ge=0.3, le=10.0, description="without a keepalive for longer: CLIENT_LOST, if required [s]")
     ] = 1.0
     min_distance_m: Annotated[float, Field(gt=0.0, le=1.0, description="[m]")] = 0.01
     max_distance_m: Annotated[float, Field(gt=0.0, le=1000.0, description="[m]")] = 5.0
     min_speed_mps: Annotated[float, Field(gt=0.0, le=1.0, description="[m/s]")] = 0.02
     max_speed_mps: Annotated[float, Field(gt=0.0, le=5.0, description="[m/s]")] = 0.5
-    min_angle_rad: Annotated[float, Field(gt=0.0, le=1.0, description="of rotate_angle [rad]")] = 0.02
-    max_angle_rad: Annotated[float, Field(gt=0.0, le=1000.0, description="ten turns by default [rad]")] = 63.0
+    min_angle_rad: Annotated[float, Field(gt=0.0, le=1.0, description="smallest goal of rotate_angle [rad]")] = 0.02
+    max_angle_rad: Annotated[
+        float, Field(gt=0.0, le=1000.0, description="largest goal of rotate_angle; default: ten turns [rad]")
+    ] = 63.0
     min_speed_radps: Annotated[float, Field(gt=0.0, le=1.0, description="[rad/s]")] = 0.1
     max_speed_radps: Annotated[float, Field(gt=0.0, le=20.0, description="[rad/s]")] = 1.5
     tolerance_m: Annotated[
         float,
-        Field(gt=0.0, le=0.1, description="a goal that ends nearer has succeeded; of a turn, at the wheels' rims [m]"),
+        Field(
+            gt=0.0,
+            le=0.1,
+            description="a goal that ends within this distance has succeeded; of a turn, at the wheels' rims [m]",
+        ),
     ] = 0.005
     lateral_tolerance_m: Annotated[
         float,
-        Field(gt=0.0, le=1.0, description="farther beside its line, or a turn from its place: DRIVE_FAULT [m]"),
+        Field(
+            gt=0.0, le=1.0, description="farther beside its line, or in a turn away from its position: DRIVE_FAULT [m]"
+        ),
     ] = 0.05
     heading_tolerance_rad: Annotated[
-        float, Field(gt=0.0, le=1.5, description="turned farther away from its line: DRIVE_FAULT [rad]")
+        float, Field(gt=0.0, le=1.5, description="heading differs more from its line: DRIVE_FAULT [rad]")
     ] = 0.2
     control_hz: Annotated[float, Field(ge=10.0, le=100.0, description="cmd_vel_action [Hz]")] = 50.0
     feedback_hz: Annotated[float, Field(ge=1.0, le=50.0, description="[Hz]")] = 10.0
     progress_timeout_s: Annotated[
-        float, Field(ge=0.2, le=60.0, description="no motion for so long: NO_PROGRESS [s]")
+        float, Field(ge=0.2, le=60.0, description="without motion for longer: NO_PROGRESS [s]")
     ] = 2.0
     overall_factor: Annotated[
         float,

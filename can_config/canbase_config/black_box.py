@@ -21,5 +21,5 @@ class BlackBox(Section):
         ]
         | None
     ) = None
-    seconds: Annotated[float, Field(ge=2.0, le=60.0, description="before the end of the stop [s]")] = 10.0
-    files: Annotated[int, Field(ge=1, le=1000, description="so many are kept, then the oldest is deleted")] = 20
+    seconds: Annotated[float, Field(ge=2.0, le=60.0, description="time recorded before the end of the stop [s]")] = 10.0
+    files: Annotated[int, Field(ge=1, le=1000, description="number of files kept; then the oldest is deleted")] = 20

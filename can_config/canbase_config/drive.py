@@ -27,7 +27,7 @@ class Drive(Section):
     """One axis of one motor drive, and the wheel that it turns."""
 
     joint: Annotated[Name, Field(description="name in joint_states")]
-    node_id: Annotated[int, Field(ge=1, le=125, description="CANopen node id; 126 and 127 are ours")]
+    node_id: Annotated[int, Field(ge=1, le=125, description="CANopen node id; 126 and 127 are used by canbase")]
     axis: Annotated[int, Field(ge=0, le=1, description="axis in the node; its objects are at 6000h + 800h × axis")] = 0
     side: Annotated[Literal["left", "right"], Field(description="side of the base")]
     direction: Annotated[
@@ -38,7 +38,8 @@ class Drive(Section):
         int, Field(ge=1, le=2**31 - 1, description="increments of 6064h per motor revolution")
     ]
     profile: Annotated[
-        str, Field(min_length=1, description="kind of drive, see docs/drives.md; or a .yaml file beside this one")
+        str,
+        Field(min_length=1, description="drive profile (docs/drives.md), or a .yaml file in the folder of robot.yaml"),
     ] = "generic"
     mode: (
         Annotated[

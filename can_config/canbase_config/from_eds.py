@@ -72,7 +72,7 @@ def draft(eds: Eds) -> Draft:
     if eds.has(0x6079):
         out.section("measures")
         out.lines.append("  voltage: {index: 0x6079, bits: 32, scale: 0.001}   # has 6079h; CiA 402-2: mV")
-    head = f"# Drafted from {eds.path.name} by `canbase config from-eds`: a start, not a proof. See docs/drives.md.\n\n"
+    head = f"# Drafted from {eds.path.name} by `canbase config from-eds`: a draft, not proven. See docs/drives.md.\n\n"
     tail = ["unproven:", *(f"  - {path}" for path in out.unproven)]
     return Draft(head + "\n".join(out.lines + tail) + "\n", missing, self_stop_sentence(eds), UNKNOWN_TO_ANY_EDS)
 
@@ -127,10 +127,10 @@ def _layout(eds: Eds, out: _Lines) -> None:
 def _units(eds: Eds, out: _Lines) -> None:
     out.section("units")
     is_rpm = eds.default(0x60A9) == SI_RPM
-    unit, source = ("rpm", "60A9h = 00B44700h") if is_rpm else (None, "no EDS tells; see the manual")
+    unit, source = ("rpm", "60A9h = 00B44700h") if is_rpm else (None, "not in an EDS; see the manual")
     out.put("target_velocity", unit, source, proven=is_rpm)
     out.put("actual_velocity", unit, source, proven=is_rpm)
-    out.put("acceleration", "velocity/s", "no EDS tells; see the manual", proven=False)
+    out.put("acceleration", "velocity/s", "not in an EDS; see the manual", proven=False)
 
 
 def _modes(eds: Eds, out: _Lines) -> None:

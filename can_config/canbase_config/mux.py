@@ -23,19 +23,23 @@ class MuxSource(Section):
     """One source of velocity commands."""
 
     topic: Annotated[Topic, Field(description="relative to the node's namespace")]
-    priority: Annotated[int, Field(ge=0, le=255, description="the higher wins; no two alike")]
-    timeout_s: Annotated[float, Field(ge=0.05, le=2.0, description="silent for longer: holds no more [s]")]
+    priority: Annotated[int, Field(ge=0, le=255, description="the highest fresh source drives; each value once")]
+    timeout_s: Annotated[float, Field(ge=0.05, le=2.0, description="without a message for longer: not active [s]")]
     stamped: Annotated[bool, Field(description="true: TwistStamped, false: Twist")] = True
     nodes: Annotated[
         tuple[NodeName, ...],
-        Field(min_length=0, max_length=16, strict=False, description="who may publish there; empty: anybody"),
+        Field(min_length=0, max_length=16, strict=False, description="ROS nodes that may publish there; empty: all"),
     ] = ()
     neutral_after_s: Annotated[
         float | None,
-        Field(ge=1.0, le=60.0, description="silent for so long: may start without a zero; null: never [s]"),
+        Field(
+            ge=1.0,
+            le=60.0,
+            description="without a message for longer: may start without a zero command; null: never [s]",
+        ),
     ] = None
     same_clock: Annotated[
-        bool, Field(description="its stamps are of this computer's clock: their age is the delay")
+        bool, Field(description="true: its stamps use this computer's clock, so their age is the delay")
     ] = False
 
 
@@ -43,9 +47,13 @@ class MuxLock(Section):
     """A topic (std_msgs/Bool, true = locked) that holds back every source whose priority is lower than its own."""
 
     topic: Annotated[Topic, Field(description="relative to the node's namespace")]
-    priority: Annotated[int, Field(ge=0, le=255, description="sources below it are held back, those alike are not")]
-    required: Annotated[bool, Field(description="true: a silent topic counts as locked")] = True
-    timeout_s: Annotated[float, Field(ge=0.05, le=5.0, description="silent for longer: locked, if required [s]")] = 0.5
+    priority: Annotated[
+        int, Field(ge=0, le=255, description="blocks sources with a lower priority, not those with the same one")
+    ]
+    required: Annotated[bool, Field(description="true: locked while no message comes")] = True
+    timeout_s: Annotated[
+        float, Field(ge=0.05, le=5.0, description="without a message for longer: locked, if required [s]")
+    ] = 0.5
 
 
 DEFAULT_SOURCES = {
@@ -64,13 +72,15 @@ DEFAULT_SOURCES = {
 class Mux(Section):
     """Who may drive."""
 
-    sources: Annotated[dict[Name, MuxSource], Field(min_length=1, description="who may drive, by name")] = (
+    sources: Annotated[dict[Name, MuxSource], Field(min_length=1, description="velocity sources, by name")] = (
         DEFAULT_SOURCES
     )
-    locks: dict[Name, MuxLock] = Field(default_factory=dict, description="what holds them back, by name")
+    locks: dict[Name, MuxLock] = Field(default_factory=dict, description="locks that block sources, by name")
     foreign_publishers: Annotated[
         Literal["report", "lock"],
-        Field(description="publishers on sources' topics and cmd_vel that no key names: said, or held back too"),
+        Field(
+            description="publishers on sources' topics and cmd_vel that no key names: report, or report and order zero"
+        ),
     ] = "report"
     twist_mux: Annotated[
         tuple[Annotated[str, Field(min_length=1, max_length=400)], ...],
@@ -96,7 +106,7 @@ class Mux(Section):
             self._no_two_alike(what)
         for name, source in self.sources.items():
             if source.topic.removeprefix("/") in OUTPUTS:
-                message = f"{source.topic} is what this robot orders itself; a source needs another topic"
+                message = f"{source.topic} is an output of this robot; a source needs another topic"
                 raise MisfitError(message, ("sources", name, "topic"))
         for name, lock in self.locks.items():
             self._check_lock(name, lock)

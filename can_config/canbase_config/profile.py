@@ -84,7 +84,7 @@ class Pdos(Section):
     rpdos: Annotated[int, Field(ge=1, le=512, description="RPDOs that can be mapped")] = 4
     tpdos: Annotated[int, Field(ge=1, le=512, description="TPDOs that can be mapped")] = 4
     fixed_cob_id_bits: Annotated[
-        int, Field(ge=0, le=0x7FFF_FFFF, description="bits of 1400h:1 and 1800h:1 that are written as they were read")
+        int, Field(ge=0, le=0x7FFF_FFFF, description="bits of 1400h:1 and 1800h:1 that keep their value")
     ] = 0x4000_0000
     synchronous: Annotated[
         bool, Field(description="true: transmission type 1; false: RPDOs act at once, TPDOs go by their event timer")
@@ -97,8 +97,8 @@ class Sdo(Section):
     timeout_s: (
         Annotated[float, Field(ge=0.05, le=5.0, description="one answer; default: timeouts.sdo_s [s]")] | None
     ) = None
-    attempts: Annotated[int, Field(ge=1, le=10, description="requests until it is given up")] = 3
-    gap_s: Annotated[float, Field(ge=0.0, le=0.1, description="at least between two requests [s]")] = 0.0
+    attempts: Annotated[int, Field(ge=1, le=10, description="number of requests before failure")] = 3
+    gap_s: Annotated[float, Field(ge=0.0, le=0.1, description="least time between two requests [s]")] = 0.0
 
 
 class Start(Section):
@@ -109,7 +109,7 @@ class Start(Section):
     ] = "communication"
     boot_up_s: Annotated[float, Field(ge=0.1, le=60.0, description="until the boot-up message after it [s]")] = 5.0
     settle_s: Annotated[
-        float, Field(ge=0.0, le=10.0, description="quiet after a boot-up; a second one may come meanwhile [s]")
+        float, Field(ge=0.0, le=10.0, description="wait after a boot-up, in which a second one may come [s]")
     ] = 0.0
 
 
@@ -120,7 +120,7 @@ class VendorWatchdog(Section):
     sub: Sub = 0
     bits: Bits = 16
     per_s: Annotated[float, Field(gt=0.0, description="value for one second")] = 1000.0
-    text: Annotated[str, Field(min_length=1, description="what it watches and does")]
+    text: Annotated[str, Field(min_length=1, description="what the drive monitors, and its reaction")]
 
 
 class SelfStop(Section):
@@ -219,17 +219,15 @@ class Profile(Section):
     writes: Writes = Writes()
     heartbeat_fault: Annotated[
         Literal["fault_reset", "reset_communication"],
-        Field(description="what a fault for a lost heartbeat or bus needs to go"),
+        Field(description="what clears a fault for a lost heartbeat or bus"),
     ] = "fault_reset"
     measures: Measures = Measures()
     emcy: Annotated[
         dict[Annotated[int, Field(ge=0, le=0xFFFF)], Annotated[str, Field(min_length=1)]],
         Field(description="the maker's emergency codes in words"),
     ] = Field(default_factory=dict)
-    notes: Annotated[tuple[str, ...], Field(strict=False, description="what to know before the first motion")] = ()
-    unproven: Annotated[
-        tuple[str, ...], Field(strict=False, description="keys above without a source: check them on the bench")
-    ] = ()
+    notes: Annotated[tuple[str, ...], Field(strict=False, description="notes for the first motion")] = ()
+    unproven: Annotated[tuple[str, ...], Field(strict=False, description="keys above without a source; test them")] = ()
 
     @model_validator(mode="after")
     def _unproven_keys_exist(self) -> Profile:

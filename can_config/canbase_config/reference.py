@@ -11,16 +11,16 @@ from canbase_config.schema import Schema, Shape, kind_of
 _HEAD: Final = """\
 # Configuration
 
-Every key, what may stand there, its default and what it means. Written by `canbase config keys` from the models
-that check the files; a test compares it, so it is never out of date.
+Every key with its range, default and meaning. `canbase config keys` writes this page from the models that check
+the files; a test compares them.
 
 - `canbase config check --config robot.yaml` names each mistake with its line, and prints all keys with defaults.
 - Lengths are in m, speeds in m/s and rad/s, times in s; the name of a key carries its unit. Forward, left and
   counter-clockwise are positive (REP 103).
 - **must be given**: there is no default that fits every robot. No timeout can be switched off.
-- What the frames of every cycle take of the bus is worked out from `bus.bitrate`, `rates.control_hz`, the drives' PDOs,
+- The bus load of the cyclic frames is computed from `bus.bitrate`, `rates.control_hz`, the drives' PDOs,
   SYNC and heartbeats: above 90 % the file is refused (eight drives at 250 kbit/s and 100 Hz), above 60 % there is a
-  warning. Both say what to change. For boots and tools the rest has to do.
+  warning. Both name what to change. Boots and tools need the rest.
 - A file has at most 256,000 bytes, 5,000 keys and values with every alias written out, 32 levels, 4,000 characters in a
   text and 40 in a number. Of its mistakes the first twenty are printed.
 - `drives[…]` is each entry of a list, `mux.sources.…` each entry under a name that you choose.

@@ -52,7 +52,7 @@ class Bus(Section):
     def _extra_adds_only(self) -> Bus:
         for key in ("interface", "channel", "bitrate"):
             if key in self.extra:
-                raise MisfitError(f"{key} stands in bus itself; extra adds arguments, it replaces none", ("extra", key))
+                raise MisfitError(f"{key} is a key of bus itself; extra only adds arguments", ("extra", key))
         return self
 
     @property
@@ -80,9 +80,9 @@ class Base(Section):
     track_m: Annotated[float, Field(gt=0.02, le=5.0, description="distance between the wheels' contact points [m]")]
     odom_frame: Annotated[str, Field(min_length=1, description="REP 105")] = "odom"
     base_frame: Annotated[str, Field(min_length=1, description="REP 105")] = "base_link"
-    standstill_mps: Annotated[float, Field(gt=0.0, le=0.05, description="a wheel whose rim is slower stands [m/s]")] = (
-        0.005
-    )
+    standstill_mps: Annotated[
+        float, Field(gt=0.0, le=0.05, description="a wheel whose rim is slower is at standstill [m/s]")
+    ] = 0.005
 
 
 class Limits(Section):
@@ -167,7 +167,7 @@ class Robot(Section):
     bus: Bus
     drives: Annotated[
         tuple[Drive, ...],
-        Field(min_length=2, max_length=8, strict=False, description="one for each wheel that is driven"),
+        Field(min_length=2, max_length=8, strict=False, description="one for each driven wheel"),
     ]
     base: Base
     limits: Limits

@@ -26,17 +26,17 @@ class Scan(Section):
     yaw_rad: Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi, description="scanner in base_link [rad]")] = 0.0
     upside_down: Annotated[bool, Field(description="mounted with its z axis down (roll π)")] = False
     min_points: Annotated[
-        int, Field(ge=1, le=10, description="fewer neighbouring beams count one scan later, if they are seen again")
+        int, Field(ge=1, le=10, description="fewer adjacent beams count only if the next scan sees them again")
     ] = 2
     below_range_min: Annotated[
         Literal["invalid", "too_near"],
-        Field(description="0 and finite readings below range_min: the beam says nothing; or something is too near"),
+        Field(description="meaning of 0 and finite readings below range_min: unusable beam, or an object too near"),
     ] = "invalid"
     allow_empty: Annotated[
-        bool, Field(description="false: a scan without any reading in range is not used; it always sees something")
+        bool, Field(description="true: a scan may have no reading in range; false: such a scan is not used")
     ] = True
     frozen_s: Annotated[
-        float, Field(ge=0.2, le=10.0, description="exactly equal readings for so long: the scanner is frozen [s]")
+        float, Field(ge=0.2, le=10.0, description="identical readings for longer: the scanner is frozen [s]")
     ] = 0.5
     noisy: Annotated[
         bool, Field(description="false: a simulator without noise; equal readings count only while the base moves")
@@ -46,7 +46,7 @@ class Scan(Section):
 class Estop(Section):
     """The software emergency stop topic (std_msgs/Bool, true = stop). Not a safety function: STO is."""
 
-    required: Annotated[bool, Field(description="true: a silent topic counts as pressed")]
+    required: Annotated[bool, Field(description="true: pressed while no message comes")]
     topic: Annotated[Topic, Field(description="std_msgs/Bool, true: stop")] = "estop_state"
     timeout_s: Annotated[float, Field(ge=0.05, le=2.0, description="[s]")] = 0.5
     latched: Annotated[
@@ -98,21 +98,23 @@ class Safety(Section):
     reaction_s: Annotated[float, Field(ge=0.01, le=1.0, description="from an order until the wheels follow it [s]")] = (
         0.1
     )
-    stop_distance_m: Annotated[float, Field(gt=0.0, le=5.0, description="free way below: stop [m]")] = 0.15
-    slow_distance_m: Annotated[float, Field(gt=0.0, le=10.0, description="free way below: slow down [m]")] = 0.6
+    stop_distance_m: Annotated[float, Field(gt=0.0, le=5.0, description="free path below: stop [m]")] = 0.15
+    slow_distance_m: Annotated[float, Field(gt=0.0, le=10.0, description="free path below: slow down [m]")] = 0.6
     limit_zones: Annotated[
         tuple[LimitZone, ...], Field(max_length=8, strict=False, description="obstacles in them limit the speed")
     ] = ()
     blind_mps: Annotated[
         float,
-        Field(ge=0.0, le=5.0, description="at most, where no scanner looks or says something; 0: not at all [m/s]"),
+        Field(
+            ge=0.0, le=5.0, description="speed limit in directions without usable readings; 0: no motion there [m/s]"
+        ),
     ] = 0.15
     uncommissioned_mps: Annotated[
-        float, Field(ge=0.02, le=5.0, description="at most, until canbase commission has done all its steps [m/s]")
+        float, Field(ge=0.02, le=5.0, description="speed limit until canbase commission has finished all steps [m/s]")
     ] = 0.3
     usable_share: Annotated[
         float,
-        Field(ge=0.5, le=1.0, description="of the places ahead that scanners face: share with usable readings"),
+        Field(ge=0.5, le=1.0, description="least share of usable readings, of the directions that scanners cover"),
     ] = 0.9
 
     @property

@@ -21,19 +21,21 @@ class Watchdog(Section):
 
     latency_s: Annotated[
         float,
-        Field(ge=0.02, le=0.5, description="an order on its way to the driver, on top of timeouts.command_s [s]"),
+        Field(ge=0.02, le=0.5, description="delay of an order to the driver, in addition to timeouts.command_s [s]"),
     ] = 0.05
     drive_lag_s: Annotated[
-        float, Field(ge=0.01, le=0.5, description="so long a wheel may keep the speed of an older setpoint [s]")
+        float, Field(ge=0.01, le=0.5, description="time for which a wheel may keep the speed of an older setpoint [s]")
     ] = 0.1
     target_tolerance_mps: Annotated[
-        float, Field(gt=0.0, le=0.2, description="a setpoint beyond what the leases allow, at the rim [m/s]")
+        float,
+        Field(gt=0.0, le=0.2, description="tolerance of a setpoint beyond what the leases allow, at the rim [m/s]"),
     ] = 0.03
     target_tolerance_share: Annotated[
         float, Field(ge=0.0, le=0.2, description="the same as a share of the allowed speed, added to it")
     ] = 0.03
     motion_tolerance_mps: Annotated[
-        float, Field(gt=0.0, le=0.5, description="a wheel beyond what its setpoints allow, at the rim [m/s]")
+        float,
+        Field(gt=0.0, le=0.5, description="tolerance of a wheel beyond what its setpoints allow, at the rim [m/s]"),
     ] = 0.05
     motion_tolerance_share: Annotated[
         float, Field(ge=0.0, le=0.5, description="the same as a share of the allowed speed, added to it")
@@ -43,11 +45,11 @@ class Watchdog(Section):
         Field(
             ge=1,
             le=20,
-            description="so many velocity samples in a row must be bad before they stop the base; fewer below 100 Hz",
+            description="number of bad velocity samples in a row that stops the base; fewer below 100 Hz",
         ),
     ] = 5
     overspeed_factor: Annotated[
-        float, Field(ge=1.05, le=2.0, description="a wheel may be so many times as fast as the limits allow")
+        float, Field(ge=1.05, le=2.0, description="overspeed: a multiple of the speed that the limits allow")
     ] = 1.2
     travel_tolerance_m: Annotated[
         float,
@@ -58,25 +60,23 @@ class Watchdog(Section):
         Field(
             ge=0.1,
             le=2.0,
-            description="an ordered wheel shows nothing for so long, after its lag [s]; with a brake: longer",
+            description="no sign of ordered motion for this time, after the lag; with a brake: longer [s]",
         ),
     ] = 0.25
     motion_missing_m: Annotated[
-        float, Field(ge=0.001, le=0.1, description="... and for so much of the ordered travel [m]")
+        float, Field(ge=0.001, le=0.1, description="... and for this much of the ordered travel [m]")
     ] = 0.005
     stand_proof: Annotated[
         Literal["let_go", "none"],
         Field(
             description="let_go: after an order, a drive that holds a wheel at standstill loses its power for a "
-            "moment, as a dead encoder reports standstill too; none: never, and a dead encoder at standstill is not "
-            "detected"
+            "moment, because a dead encoder also reports standstill; none: never, and a dead encoder at standstill is "
+            "not detected"
         ),
     ] = "let_go"
     stand_impulse_s: Annotated[
         float,
-        Field(
-            ge=0.02, le=2.0, description="... once it gave the rated torque for so long, or less torque for longer [s]"
-        ),
+        Field(ge=0.02, le=2.0, description="... after this time at rated torque, or longer at less torque [s]"),
     ] = 0.05
     stand_answer_s: Annotated[
         float,
@@ -87,32 +87,35 @@ class Watchdog(Section):
         ),
     ] = 0.2
     jolt_mps2: Annotated[
-        float, Field(ge=5.0, le=200.0, description="no wheel changes its speed faster; a sensor that fails does [m/s²]")
+        float,
+        Field(ge=5.0, le=200.0, description="greater changes of speed are not plausible: the sensor has failed [m/s²]"),
     ] = 20.0
     slow_wheel_share: Annotated[
         float, Field(ge=0.0, le=0.6, description="a wheel slower than its setpoint, beside motion_tolerance_mps")
     ] = 0.3
-    slow_wheel_s: Annotated[float, Field(ge=0.1, le=3.0, description="a wheel is too slow for so long [s]")] = 0.5
+    slow_wheel_s: Annotated[float, Field(ge=0.1, le=3.0, description="a wheel is too slow for this time [s]")] = 0.5
     slowest_ramp_mps2: (
         Annotated[
             float,
             Field(
                 gt=0.0,
                 le=10.0,
-                description="a wheel gets to its setpoint so fast; default: a quarter of the limits [m/s²]",
+                description="least acceleration towards the setpoint; default: a quarter of the limits [m/s²]",
             ),
         ]
         | None
     ) = None
     twist_tolerance_mps: Annotated[
-        float, Field(gt=0.0, le=0.2, description="the base turns or drives as nobody ordered, at the rim [m/s]")
+        float, Field(gt=0.0, le=0.2, description="tolerance of the base motion that was not ordered, at the rim [m/s]")
     ] = 0.01
     twist_tolerance_share: Annotated[
         float, Field(ge=0.0, le=0.3, description="the same as a share of the ordered speed, added to it")
     ] = 0.08
-    twist_s: Annotated[float, Field(ge=0.1, le=3.0, description="it does so for so long [s]")] = 0.5
-    bus_failed_s: Annotated[float, Field(ge=0.06, le=0.5, description="the bus takes no frames for so long [s]")] = 0.1
-    loop_late_s: Annotated[
-        float, Field(ge=0.02, le=0.5, description="the watchdog's own loop stands still for so long [s]")
+    twist_s: Annotated[float, Field(ge=0.1, le=3.0, description="... and for this time [s]")] = 0.5
+    bus_failed_s: Annotated[
+        float, Field(ge=0.06, le=0.5, description="the bus accepts no frames for this time [s]")
     ] = 0.1
-    relay: Annotated[Relay, Field(description="keeps a safety relay closed")] | None = None
+    loop_late_s: Annotated[
+        float, Field(ge=0.02, le=0.5, description="the watchdog's own loop does not run for this time [s]")
+    ] = 0.1
+    relay: Annotated[Relay, Field(description="GPIO line that keeps a safety relay closed")] | None = None

@@ -21,9 +21,9 @@ def benchmark(
     list_them: Annotated[bool, typer.Option("--list", help="List them, run none.")] = False,
     write: Annotated[Path | None, typer.Option("--write", metavar="FILE", help="Write the table as Markdown.")] = None,
 ) -> None:
-    """Measure this computer: reactions, latencies, processor, each beside a floor and against its budget.
+    """Measure this computer: reaction times, latencies, processor load, each compared with its budget.
 
-    Exit codes: 0 every budget is kept, 1 one is not or there are no sources here, 2 there is no such benchmark.
+    Exit codes: 0 every budget is met, 1 one is not, or the sources are missing, 2 there is no such benchmark.
     """
     root = Path(canbase_cli.__file__).resolve().parents[2]
     script = root / "benchmarks" / "run.py"

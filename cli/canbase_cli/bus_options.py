@@ -11,14 +11,15 @@ InterfaceOption = Annotated[
     typer.Option(
         "--interface",
         metavar="NAME",
-        help="Kind of adapter, as python-can names it, in place of robot.yaml's.",
+        help="python-can's name of the adapter; replaces that of robot.yaml.",
         show_default="socketcan with --channel",
     ),
 ]
 ChannelOption = Annotated[
     str | None,
-    typer.Option("--channel", metavar="NAME", help="Such as can0, in place of robot.yaml's.", show_default="can0"),
+    typer.Option("--channel", metavar="NAME", help="Such as can0; replaces that of robot.yaml.", show_default="can0"),
 ]
 BitrateOption = Annotated[
-    int | None, typer.Option("--bitrate", metavar="BIT/S", help="Only for adapters that the system does not set up.")
+    int | None,
+    typer.Option("--bitrate", metavar="BIT/S", help="Bit rate, only for adapters that the system does not configure."),
 ]

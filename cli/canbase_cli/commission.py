@@ -34,7 +34,7 @@ def commission(
             "--steps",
             metavar="STEPS",
             callback=_steps,
-            help="Some of them, joined by commas.",
+            help="Steps to run, separated by commas.",
             autocompletion=lambda incomplete: one_more_of(STEPS, incomplete),
         ),
     ] = ",".join(STEPS),
@@ -53,27 +53,27 @@ def commission(
         typer.Option(
             "--report",
             metavar="FILE",
-            help="Of the report.",
+            help="File for the report.",
             show_default="commissioning-<robot>-<date>.md beside FILE",
         ),
     ] = None,
     answers: Annotated[
         Path | None, typer.Option("--answers", metavar="FILE", help="YAML with answers by key, for tests.")
     ] = None,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Confirm everything that wants a yes. For tests.")] = False,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Do not change robot.yaml, print the changes.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Answer all confirmations with yes. For tests.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the changes, do not write robot.yaml.")] = False,
 ) -> None:
-    """First motion, guided: WHEELS UP. Direction, scale, the proof of the self-stop, radius and track.
+    """Guided first motion: WHEELS UP. Direction, scale, self-stop test, wheel radius and track.
 
-    Slow, one wheel after the other, with questions in between. Then the proof: at a low speed this computer falls
-    silent, and it is measured that each drive stops by itself, and when. Only with that proven, on the floor: wheel
-    radius and track by a measured drive. Values go into robot.yaml, which keeps its comments, and with them who each
-    drive is (1018h): from then on the driver refuses another one in its place. A report is written.
+    It turns the wheels slowly, one after the other, and asks what you see. Then the self-stop test: at low speed this
+    computer stops sending, and it measures whether and when each drive stops by itself. If all do, the robot drives on
+    the floor to measure wheel radius and track. The results go into robot.yaml, whose comments stay, with the identity
+    of each drive (1018h): from then on the driver refuses a different drive. It also writes a report.
 
-    Nothing else of canbase may run on this bus. Enter, Ctrl-C, a signal, a terminal that goes, an error: each stops
-    the wheels and takes the power away. After SIGKILL the drives stop by themselves, if they can: that is the proof.
+    No other part of canbase may run on this bus. Enter, Ctrl-C, a signal, a closed terminal, an error: each stops the
+    wheels and switches the power off. After SIGKILL only drives that passed the self-stop test stop by themselves.
 
-    Exit codes: 0 done and proven, 1 not proven or not finished, 2 wrong command line, robot.yaml or answers.
+    Exit codes: 0 finished and self-stop proven, 1 not proven or not finished, 2 wrong command line or files.
     """
     from canbase_commissioning.onbus.commission_command import Plan, run
 

@@ -67,8 +67,8 @@ class Report:
 
     def table(self) -> Table:
         """For people."""
-        table = Table(title="What held")
-        for column in ("check", "found", ""):
+        table = Table(title="Checks")
+        for column in ("check", "found", "passed"):
             table.add_column(column)
         for what, found, good in self.rows:
             table.add_row(what, found, "[green]yes[/]" if good else "[red]NO[/]")
@@ -80,12 +80,11 @@ def demo(
         float, typer.Option("--speed", "-s", min=0.05, max=0.5, metavar="SPEED", help="of the 1 m drive, m/s")
     ] = 0.4,
 ) -> None:
-    """Start the whole stack on a simulated CANopen bus, drive 1 m, show a refused and a cancelled goal.
+    """Start the whole stack on a simulated CANopen bus, drive 1 m, reject one goal and cancel another.
 
-    Nothing moves but a simulation on this machine. It uses a bus, a socket and a ROS domain of its own, so it
-    disturbs nothing that runs here.
+    Only a simulation moves. The demo uses its own bus, socket and ROS domain, and does not disturb other processes.
 
-    Exit code: 0 when everything that it shows held, 1 otherwise.
+    Exit codes: 0 every check passed, 1 otherwise.
     """
     console = Console()
     with tempfile.TemporaryDirectory(prefix="canbase-demo-") as folder, _environment() as env:
@@ -104,7 +103,7 @@ def demo(
             for part in codes:
                 console.rule(part)
                 console.print(stack.log(part)[-3000:], markup=False, highlight=False)
-            fail("the demo did not hold", FAILED)
+            fail("a check of the demo failed", FAILED)
 
 
 def _show(console: Console, stack: Stack, config: Path, report: Report, speed_mps: float) -> None:
@@ -174,8 +173,8 @@ def _cancelled(console: Console, sim: SimControl, report: Report) -> None:
     report.check("Ctrl-C cancels the goal", f"exit code {code}", code == CANCELED)
     moved, truth = _moves_within(sim, ended), sim.truth()
     way_m = _distance((start.x_m, start.y_m), (truth.x_m, truth.y_m))
-    report.check("it stood when the result came", f"{moved * 1000:.2f} mm in {QUIET_S:.0f} s", moved < 1e-4)
-    report.check("on the way, not at the goal", f"{way_m:.3f} m of 3 m", 0.05 < way_m < 2.0)
+    report.check("at standstill when the result came", f"{moved * 1000:.2f} mm in {QUIET_S:.0f} s", moved < 1e-4)
+    report.check("stopped on the way, before the goal", f"{way_m:.3f} m of 3 m", 0.05 < way_m < 2.0)
 
 
 def _run(console: Console, *words: str, interrupt: Callable[[], bool] | None = None) -> int:

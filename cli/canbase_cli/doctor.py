@@ -29,15 +29,13 @@ def _known(key: str | None) -> str | None:
 SymptomOption = Annotated[
     str | None,
     typer.Option(
-        "--symptom", metavar="SYMPTOM", callback=_known, help="What you see; say why.", show_default="all parts"
+        "--symptom", metavar="SYMPTOM", callback=_known, help="The symptom to explain.", show_default="all parts"
     ),
 ]
 SecondsOption = Annotated[
-    float, typer.Option("--seconds", metavar="SECONDS", min=0.5, max=60.0, help="Listen so long to the parts found.")
+    float, typer.Option("--seconds", metavar="SECONDS", min=0.5, max=60.0, help="How long to listen.")
 ]
-BusOption = Annotated[
-    bool, typer.Option("--bus/--no-bus", help="Look at the bus and read the drives; or only listen to the processes.")
-]
+BusOption = Annotated[bool, typer.Option("--bus/--no-bus", help="Also check the bus and read the drives.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the rows as one line of JSON.")]
 
 
@@ -50,14 +48,14 @@ def doctor(
     namespace: NamespaceOption = "",
     bus: BusOption = True,
 ) -> None:
-    """Look at a robot: its bus, its drives, and, where canbase runs, its parts. What is wrong, what to do next.
+    """Check a robot: its bus, its drives, and canbase itself if it runs. Report what is wrong and what to do next.
 
-    It only listens, and asks questions that change nothing: nothing moves by it, at any time. The drives are read by
-    SDO and compared with robot.yaml; beside a running driver only while that one is quiet. With --symptom it walks
-    through what can be the reason, up to the first check that fails.
+    It listens and reads; it changes nothing and moves nothing. It reads the drives by SDO and compares them with
+    robot.yaml; while a driver runs, it reads only when that driver does not use SDO. With --symptom it runs the checks
+    for one symptom, up to the first that fails.
 
-    Exit codes: 0 nothing failed, 1 something did, 2 wrong command line or robot.yaml, 3 nothing failed, and something
-    cannot be judged because this computer is overloaded.
+    Exit codes: 0 nothing failed, 1 a check failed, 2 wrong command line or robot.yaml, 3 nothing failed, but some
+    checks could not be judged because this computer is overloaded.
     """
     loaded, arguments = load_config(config), ros_arguments(ctx, namespace)
     checks = _walk(symptom, loaded, arguments, seconds) if symptom else _all(loaded, arguments, seconds, with_bus=bus)

@@ -19,12 +19,12 @@ def drive(
     as_json: JsonOption = False,
     namespace: NamespaceOption = "",
 ) -> None:
-    """Drive DISTANCE metres along the heading of the base, and stand there.
+    """Drive DISTANCE metres along the heading of the base, and stop.
 
-    Ctrl-C cancels and waits until the base stands; a second Ctrl-C stops waiting.
+    Ctrl-C cancels the goal and waits for standstill; a second Ctrl-C stops waiting.
 
-    Exit codes: 0 succeeded, 1 anything else, 2 wrong command line, 3 canceled, 4 aborted, 5 rejected, 6 the server is
-    not there, went away, or does not answer.
+    Exit codes: 0 succeeded, 1 other failures, 2 wrong command line, 3 canceled, 4 aborted, 5 rejected, 6 the server is
+    not found, has ended, or does not answer.
     """
     with ros_needed():
         import rclpy

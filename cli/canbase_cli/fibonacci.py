@@ -10,7 +10,7 @@ from canbase_cli.goal import NO_SERVER, REJECTED, CancelAfterOption, WaitOption,
 from canbase_cli.options import NamespaceOption, RosCommand, ros_arguments, ros_needed
 from canbase_runtime.terminal import fail
 
-app = typer.Typer(help="An action to learn with: nothing moves.", no_args_is_help=True)
+app = typer.Typer(help="An action to learn with; nothing moves.", no_args_is_help=True)
 PeriodOption = Annotated[float, typer.Option("--period", metavar="SECONDS", min=0.01, max=10.0, help="for one number")]
 
 
@@ -30,7 +30,7 @@ def send(
     wait_s: WaitOption = 5.0,
     namespace: NamespaceOption = "",
 ) -> None:
-    """Send a goal, print its feedback and its end.
+    """Send a goal; print its feedback and its result.
 
     Exit codes: 0 succeeded, 2 wrong command line, 3 canceled, 4 aborted, 5 rejected, 6 no server, or it went away.
     """

@@ -31,22 +31,26 @@ EPILOG: Final = (
 
 def inject(
     target: Annotated[
-        str, typer.Argument(metavar="TARGET", help="driver, watchdog, velocity; a joint of robot.yaml; or all drives.")
+        str,
+        typer.Argument(metavar="TARGET", help="driver, watchdog or velocity; a joint of robot.yaml; or `all` drives."),
     ],
     fault: Annotated[
-        str, typer.Argument(metavar="FAULT", help="A part: hang, continue, kill. A drive: cut, encoder_lost, …, heal.")
+        str,
+        typer.Argument(
+            metavar="FAULT",
+            help="Of a process: hang, continue, kill. Of a drive: cut, encoder_lost, … A wrong name prints all.",
+        ),
     ],
     values: Annotated[
-        list[str] | None, typer.Argument(metavar="[NAME=VALUE]…", help="What the fault of a drive takes.")
+        list[str] | None, typer.Argument(metavar="[NAME=VALUE]…", help="Parameters of a drive's fault.")
     ] = None,
     config: ConfigOption = None,
 ) -> None:
-    """Break one thing of a robot on a simulated bus while `canbase up` runs. Refused on a real bus.
+    """Cause one failure on a simulated robot while `canbase up` runs. Refused on a real bus.
 
-    A part that hangs goes on with `continue`; what was killed is started again with `canbase up`. Faults of a drive
-    last until `canbase inject all heal`.
+    `continue` ends a hang. After `kill` start `canbase up` again. `canbase inject all heal` ends the faults of drives.
 
-    Exit codes: 0 done, 1 it does not run or the simulator refuses, 2 wrong command line or robot.yaml.
+    Exit codes: 0 done, 1 the target does not run or the simulator refuses, 2 wrong command line or robot.yaml.
     """
     robot = load_config(config).robot
     if robot.bus.interface not in SIMULATED:

@@ -23,7 +23,7 @@ class Network(str, Enum):
 PrefixOption = Annotated[
     Path, typer.Option("--prefix", metavar="DIR", help="Write below DIR, an image's root; run no command.")
 ]
-DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Only print what would be done.")]
+DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Print the steps, do nothing.")]
 
 
 def install(
@@ -40,7 +40,7 @@ def install(
         str,
         typer.Option(metavar="PATH", help="Python that runs the services, for an image.", show_default="this one"),
     ] = sys.executable,
-    network: Annotated[Network, typer.Option(help="Who may talk ROS with the robot.")] = Network.LOCALHOST,
+    network: Annotated[Network, typer.Option(help="Which computers can reach the ROS nodes.")] = Network.LOCALHOST,
     can: Annotated[bool, typer.Option("--can/--no-can", help="Bring the CAN interface up.")] = True,
     adapter: Annotated[
         str, typer.Option(metavar="PROPERTY=VALUE", help="udev property of the adapter that gets the channel's name.")
@@ -51,11 +51,10 @@ def install(
         int, typer.Option(metavar="SECONDS", min=0, max=600, help="Let a hardware watchdog reset a frozen computer.")
     ] = 0,
 ) -> None:
-    """Install the robot's services: they start at boot, before anybody logs in.
+    """Install the robot's services; they start at boot, without a login.
 
-    Units, the user canbase, robot.yaml and the files it names with mode 0640, the CAN interface. May be given again
-    at any time: what the owner has changed in /etc/canbase is kept, a file of his that is replaced stays beside the
-    new one as .old.
+    Installs the units, the user canbase, robot.yaml and the files it names (mode 0640), and the CAN interface. Can be
+    repeated at any time: changes of the owner in /etc/canbase are kept, and a replaced file is kept as .old.
 
     Exit codes: 0 done, 1 a step failed, 2 wrong command line or robot.yaml, or a robot that services cannot run.
     """
@@ -123,7 +122,7 @@ def uninstall(
         bool, typer.Option("--purge", help="Remove its robot.yaml, the files this names, and its environment too.")
     ] = False,
 ) -> None:
-    """Stop a robot's services and remove them. Its robot.yaml stays, unless --purge.
+    """Stop and remove a robot's services. robot.yaml is kept, except with --purge.
 
     Exit codes: 0 done, 1 a step failed, 2 no such robot.
     """

@@ -22,16 +22,15 @@ def jog(
     ],
     config: ConfigOption = None,
     speed_mps: Annotated[float, typer.Option("--speed", metavar="M/S", min=0.005, max=0.2, help="of the rim")] = 0.05,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="The wheels are up: do not ask.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Confirm that the wheels are up.")] = False,
 ) -> None:
-    """Turn one wheel while a key is held: WHEELS UP. w or arrow up forward, s or arrow down backward, q ends.
+    """Turn one wheel while a key is held: WHEELS UP. w or up arrow: forward, s or down arrow: backward, q: quit.
 
-    The key is a dead-man key: the wheel turns only while it repeats, and stops a quarter of a second after it was
-    released. Refused while canbase's driver, its watchdog or any other master speaks on this bus.
+    The key is a dead-man switch: the wheel turns only while the key repeats, and stops 0.25 s after its release.
+    Refused while canbase's driver, its watchdog or any other master is on this bus.
 
-    The key released, q, Ctrl-C, a signal, a terminal that goes, an error: each stops the wheel and takes the power
-    away. After SIGKILL the drive stops by itself, as its heartbeat consumer (1016h) was set before: jog says so where a
-    drive cannot.
+    Release, q, Ctrl-C, a signal, a closed terminal, an error: each stops the wheel and switches its power off. After
+    SIGKILL the drive stops by itself, because jog has set its heartbeat consumer (1016h); jog warns if it has none.
 
     Exit codes: 0 ended by q, 1 refused or a fault, 2 wrong command line, robot.yaml, or no terminal; 128 + a signal.
     """

@@ -54,14 +54,14 @@ def canbase(
 ) -> None:
     """A CANopen motor driver stack for ROS 2 mobile bases.
 
-    Exit codes: 0 success, 1 it did not work out, 2 a wrong command line or a wrong robot.yaml. Of goals also: 3
-    canceled, 4 aborted, 5 rejected, 6 no server. Each command's --help has its own.
+    Exit codes: 0 success, 1 failure, 2 wrong command line or robot.yaml. Goals also: 3 canceled, 4 aborted, 5 rejected,
+    6 no server. Each command's --help lists its own.
     """
 
 
 _ROS_USAGE: Final = "[OPTIONS] [--ros-args …]"
 _DRIVE: Final = "Drive"
-_LOOK: Final = "Look"
+_LOOK: Final = "Monitor and diagnose"
 _SET_UP: Final = "Set up"
 _LEARN: Final = "Learn and measure"
 _SERVICES: Final = "Services: one process each, as `canbase up` starts them"

@@ -25,9 +25,9 @@ ALL_STOPS: Final = 50
 
 
 def monitor(ctx: typer.Context, namespace: NamespaceOption = "") -> None:
-    """Show a running robot live: who drives and why not the others, the filter's cause, wheels, watchdog, drives.
+    """Show a running robot live: the active source, why others do not drive, filter, wheels, watchdog, drives.
 
-    Ctrl-C ends the picture and touches nothing. Where the output is no terminal, it prints a line for every change.
+    Ctrl-C ends the display; the robot is not affected. If the output is not a terminal, each change is one line.
 
     Exit codes: 0 ended by Ctrl-C or SIGTERM, 2 wrong command line.
     """

@@ -42,7 +42,9 @@ NamespaceOption = Annotated[
 
 UnusedNamespaceOption = Annotated[
     str,
-    typer.Option("--namespace", "-n", metavar="NS", callback=_namespace, help="Changes nothing: no ROS node in here."),
+    typer.Option(
+        "--namespace", "-n", metavar="NS", callback=_namespace, help="No effect: this process has no ROS node."
+    ),
 ]
 """So that one can start all processes of a robot with the same options."""
 

@@ -21,12 +21,12 @@ def rotate(
     as_json: JsonOption = False,
     namespace: NamespaceOption = "",
 ) -> None:
-    """Turn by ANGLE in place, counter-clockwise if positive, and stand there.
+    """Turn in place by ANGLE, counter-clockwise if positive, and stop.
 
-    Ctrl-C cancels and waits until the base stands; a second Ctrl-C stops waiting.
+    Ctrl-C cancels the goal and waits for standstill; a second Ctrl-C stops waiting.
 
-    Exit codes: 0 succeeded, 1 anything else, 2 wrong command line, 3 canceled, 4 aborted, 5 rejected, 6 the server is
-    not there, went away, or does not answer.
+    Exit codes: 0 succeeded, 1 other failures, 2 wrong command line, 3 canceled, 4 aborted, 5 rejected, 6 the server is
+    not found, has ended, or does not answer.
     """
     with ros_needed():
         import rclpy

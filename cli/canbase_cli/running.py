@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 PROC: Final = Path("/proc")
 CLOCKS_S: Final = 2.0
 """A file that changed so shortly after the start of a process was there before: boot time is known to a second."""
-RESTART: Final = "restart all parts, so that they run with what stands there now"
+RESTART: Final = "restart all parts, so that they use the current file"
 OF_THE_USER: Final = ("lease_socket", "lease_uid", "bus_arguments")
 """Values of the watchdog's configuration that follow from who starts it."""
 

@@ -18,10 +18,13 @@ def _names() -> list[str]:
 
 def sample(
     name: Annotated[
-        str | None, typer.Argument(metavar="NAME", help="Which one.", show_default="list them", autocompletion=_names)
+        str | None,
+        typer.Argument(
+            metavar="NAME", help="Name of the sample.", show_default="list the names", autocompletion=_names
+        ),
     ] = None,
 ) -> None:
-    """Print a sample robot.yaml: canbase sample bench > robot.yaml.
+    """Print a sample robot.yaml, for example: canbase sample bench > robot.yaml
 
     Exit codes: 0 printed, 2 there is no such sample.
     """

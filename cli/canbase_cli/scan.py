@@ -23,7 +23,8 @@ def scan(
     channel: ChannelOption = None,
     bitrate: BitrateOption = None,
     seconds: Annotated[
-        float, typer.Option("--seconds", metavar="SECONDS", min=0.1, max=60.0, help="Listen so long before asking.")
+        float,
+        typer.Option("--seconds", metavar="SECONDS", min=0.1, max=60.0, help="How long to listen before reading."),
     ] = 1.5,
     timeout_s: Annotated[
         float,
@@ -32,15 +33,17 @@ def scan(
         ),
     ] = 0.3,
     passive: Annotated[bool, typer.Option("--passive", help="Only listen, send nothing.")] = False,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Ask the nodes even where another master is heard.")] = False,
+    yes: Annotated[
+        bool, typer.Option("--yes", "-y", help="Read the nodes even if another master is on the bus.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the nodes as one line of JSON.")] = False,
 ) -> None:
     """Find the nodes on the bus: identity, profile, NMT state, heartbeat.
 
-    First it only listens. Then it asks every node id by SDO who it is; that reads and changes nothing. Where another
-    master is heard it says so and asks you first. A node in NMT stopped without heartbeat cannot be found.
+    It listens first. Then it reads the identity of every node id by SDO, which changes nothing. If another master is on
+    the bus, it reports that and asks you first. A node in NMT state stopped that sends no heartbeat cannot be found.
 
-    Exit codes: 0 nodes were found, and all of --config, 1 none or not all, 2 wrong command line or robot.yaml.
+    Exit codes: 0 nodes found, and all nodes of --config, 1 none or not all, 2 wrong command line or robot.yaml.
     """
     from canbase_commissioning.onbus.bus_session import choose_bus, robot_if_given
     from canbase_commissioning.onbus.scan_command import run

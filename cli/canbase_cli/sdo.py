@@ -33,7 +33,7 @@ ObjectArgument = Annotated[
 ]
 TypeOption = Annotated[
     str | None,
-    typer.Option("--type", metavar="TYPE", help="u8 … i64, f32, str, hex.", show_default="what is known of the object"),
+    typer.Option("--type", metavar="TYPE", help="u8 … i64, f32, str, hex.", show_default="from EDS or profile"),
 ]
 EdsOption = Annotated[Path | None, typer.Option("--eds", metavar="FILE", help="The maker's EDS file: types, names.")]
 TimeoutOption = Annotated[
@@ -60,7 +60,7 @@ def read(
     timeout_s: TimeoutOption = 0.5,
     raw: Annotated[bool, typer.Option("--raw", help="Print the value alone, for scripts.")] = False,
 ) -> None:
-    """Read one object: its name, its value in hexadecimal and decimal, and what it says.
+    """Read one object: name, value in hexadecimal and decimal, meaning.
 
     Exit codes: 0 read, 1 refused by the drive or no answer, 2 wrong command line or robot.yaml.
     """
@@ -89,8 +89,8 @@ def write(
 ) -> None:
     """Write one object, and read it back.
 
-    Refused while a motor of this node has power, and while canbase's driver runs on this bus: it would not know of the
-    change, and its watchdog takes a write to controlword, mode or target for another master and stops the robot.
+    Refused while a motor of this node has power, and while canbase's driver runs on this bus: the driver would not know
+    of the change, and the watchdog stops the robot when another master writes controlword, mode or target.
 
     Exit codes: 0 written and read back, 1 refused or no answer, 2 wrong command line, value or robot.yaml.
     """

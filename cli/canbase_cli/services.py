@@ -37,12 +37,12 @@ def driver(
     stop_file: StopFileOption = None,
     autostart: Annotated[
         bool,
-        typer.Option("--autostart/--no-autostart", help="Without it the node waits for its lifecycle transitions."),
+        typer.Option("--autostart/--no-autostart", help="Start active; otherwise wait for lifecycle transitions."),
     ] = True,
 ) -> None:
     """Run the motor driver: brings the drives up, turns cmd_vel into setpoints, publishes odom.
 
-    What stands behind --ros-args goes to rclpy.
+    Arguments after --ros-args go to rclpy.
     """
     robot = load_config(config).robot
     with ros_needed():
@@ -53,9 +53,9 @@ def driver(
 
 
 def velocity(ctx: typer.Context, config: ConfigOption = None, namespace: NamespaceOption = "") -> None:
-    """Run velocity mux and safety filter: who may drive, and how fast.
+    """Run velocity mux and safety filter: select the velocity source, limit its speed.
 
-    What stands behind --ros-args goes to rclpy.
+    Arguments after --ros-args go to rclpy.
     """
     robot = load_config(config).robot
     with ros_needed():
@@ -65,9 +65,9 @@ def velocity(ctx: typer.Context, config: ConfigOption = None, namespace: Namespa
 
 
 def action_server(ctx: typer.Context, config: ConfigOption = None, namespace: NamespaceOption = "") -> None:
-    """Run the server of the action drive_distance.
+    """Run the server of the actions drive_distance and rotate_angle.
 
-    What stands behind --ros-args goes to rclpy.
+    Arguments after --ros-args go to rclpy.
     """
     robot = load_config(config).robot
     with ros_needed():
@@ -89,7 +89,7 @@ def sim(
     config: ConfigOption = None,
     namespace: UnusedNamespaceOption = "",
     control: Annotated[
-        Path | None, typer.Option("--control", metavar="PATH", help="Unix socket to steer the simulation by.")
+        Path | None, typer.Option("--control", metavar="PATH", help="Unix socket that controls the simulation.")
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print warnings only.")] = False,
 ) -> None:
@@ -104,9 +104,9 @@ def sim(
 def watchdog(
     config: ConfigOption = None, namespace: UnusedNamespaceOption = "", stop_file: StopFileOption = None
 ) -> None:
-    """Run the watchdog: stops the drives when lease, driver or a drive goes silent or wrong.
+    """Run the watchdog: stops the drives when lease, driver or a drive fails or is implausible.
 
-    It replaces this process by one that has only Python's standard library and python-can in it.
+    This process is replaced by one that contains only Python's standard library and python-can.
     """
     from canbase_config.derive import watchdog_config
 
@@ -130,4 +130,4 @@ def leave_stop_file(robot: Robot, path: Path | None) -> None:
         new.write_text(watchdog_config(robot).to_json(), encoding="utf-8")
         new.replace(path)
     except OSError as error:
-        fail(f"{path} cannot be written: {error}; without it nobody could stop the drives after a crash", FAILED)
+        fail(f"{path} cannot be written: {error}; without it the drives cannot be stopped after a crash", FAILED)

@@ -24,14 +24,14 @@ STATUS_S: Final = 1.0
 SLICE_S: Final = 0.1
 """Ctrl-C is heard after this at the latest."""
 WaitOption = Annotated[
-    float, typer.Option("--wait", metavar="SECONDS", min=0.1, help="Look for the motor driver so long.")
+    float, typer.Option("--wait", metavar="SECONDS", min=0.1, help="How long to look for the motor driver.")
 ]
 
 
 def stop(ctx: typer.Context, wait_s: WaitOption = 5.0, namespace: NamespaceOption = "") -> None:
-    """Stop the robot: ramp to a stand, power off, and stay there until `canbase reset`.
+    """Stop the robot: ramp to standstill, power off, latched until `canbase reset`.
 
-    Not an emergency stop: that is a button that cuts the power (STO).
+    This is not an emergency stop. An emergency stop is a button that removes the torque (STO).
 
     Exit codes: 0 done, 1 refused, 2 wrong command line, 6 no motor driver.
     """
@@ -40,7 +40,7 @@ def stop(ctx: typer.Context, wait_s: WaitOption = 5.0, namespace: NamespaceOptio
 
 
 def reset(ctx: typer.Context, wait_s: WaitOption = 5.0, namespace: NamespaceOption = "") -> None:
-    """Let the robot move again after a latched stop, also after an emergency stop; nothing moves by it.
+    """Reset a latched stop, also an emergency stop. The reset itself moves nothing.
 
     Refused while any source orders a velocity, or while the cause of the stop persists.
 

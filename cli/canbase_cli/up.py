@@ -29,15 +29,15 @@ def up(
     namespace: NamespaceOption = "",
     sim: Annotated[
         bool | None,
-        typer.Option("--sim/--no-sim", help="Simulated drives too.", show_default="yes on a udp_multicast bus"),
+        typer.Option("--sim/--no-sim", help="Start simulated drives too.", show_default="yes on a udp_multicast bus"),
     ] = None,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Show what the simulated drives do.")] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Show the log of the simulated drives.")] = False,
 ) -> None:
     """Run the whole stack: watchdog, velocity mux and safety filter, motor driver, action server.
 
-    Ctrl-C stops the robot and ends all parts. When one of them dies, the robot is stopped and the others are ended.
+    Ctrl-C stops the robot and ends all processes. If one process dies, the robot is stopped and the others are ended.
 
-    Exit codes: 0 ended by Ctrl-C or SIGTERM and every part ended well, 1 a part died, 2 wrong command line or file.
+    Exit codes: 0 every process ended well after Ctrl-C or SIGTERM, 1 a process died, 2 wrong command line or file.
     """
     loaded = load_config(config)
     with_sim = loaded.robot.bus.interface == "udp_multicast" if sim is None else sim

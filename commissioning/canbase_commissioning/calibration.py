@@ -63,7 +63,7 @@ def scale(drive: Drive, turned: Turned) -> Scale:
     if agree(pos, seen):
         return _by_unit(drive, seen / vel)
     raise CalibrationError(
-        f"{drive.joint}: the wheel made {seen:g} revolutions, its encoder counted {pos:.2f}, 606Ch tells of {vel:.2f}: "
+        f"{drive.joint}: the wheel made {seen:g} revolutions, its encoder counted {pos:.2f}, 606Ch gives {vel:.2f}: "
         "more than one of gear_ratio, counts_per_motor_rev and velocity_unit is wrong; take them from the data sheets"
     )
 
@@ -84,10 +84,10 @@ def _by_unit(drive: Drive, factor: float) -> Scale:
     found = next((unit for unit in units if agree(motor_rev_per_s(unit, counts), wanted)), None)
     if found is None:
         raise CalibrationError(
-            f"{drive.joint}: one bit of 606Ch is {factor:.3g} times {drive.actual_unit}, which is no unit that canbase "
-            "knows: set the unit of velocities in the drive itself (60A9h, or the maker's tool)"
+            f"{drive.joint}: one bit of 606Ch is {factor:.3g} times {drive.actual_unit}, a unit that canbase does "
+            "not know: set the unit of velocities in the drive itself (60A9h, or the maker's tool)"
         )
-    why = f"velocity_unit: 606Ch tells of {1.0 / factor:.3g} times the revolutions"
+    why = f"velocity_unit: 606Ch gives {1.0 / factor:.3g} times the revolutions"
     return Scale(drive.gear_ratio, counts, found, why)
 
 

@@ -30,14 +30,14 @@ class FloorFound:
 def measure_floor(rig: PoweredDrives, distance_m: float, turns: float, speed_mps: float) -> Script[FloorFound]:
     """Drives `distance_m` forward, then turns left by `turns`. Raises CommissionError, CalibrationError."""
     base = rig.robot.base
-    clear = f"It will drive {distance_m:g} m forward at {speed_mps:g} m/s. Mark its place. Is the way free?"
+    clear = f"It will drive {distance_m:g} m forward at {speed_mps:g} m/s. Mark its position. Is the path free?"
     yield Ask("floor.straight", clear, confirms=True)
     left_m, right_m = yield from _drive(rig, speed_mps, speed_mps, lambda left, right: (left + right) / 2, distance_m)
     odometry_m = (left_m + right_m) / 2.0
     text = f"How far did it drive, in metres, to the millimetre (odometry: {odometry_m:.3f})?"
     measured_m = float((yield Ask("floor.distance_m", text, number(0.01, 100.0))))
     new_radius_m = radius(base.wheel_radius_m, odometry_m, measured_m)
-    clear = f"It will turn {turns:g} times to the left on the spot. Mark its heading. Is it free all around?"
+    clear = f"It will turn {turns:g} times to the left on the spot. Mark its heading. Is there free space all around?"
     yield Ask("floor.turn", clear, confirms=True)
     arc_m = turns * math.pi * base.track_m
     left_m, right_m = yield from _drive(rig, -speed_mps, speed_mps, lambda left, right: (right - left) / 2, arc_m)

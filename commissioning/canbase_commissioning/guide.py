@@ -89,7 +89,7 @@ def _confirm(text: str) -> None:
     """Raises CommissionError for a no or a bare Enter, ValueError for what is neither yes nor no."""
     word = text.strip().lower()
     if word in ("", "n", "no"):
-        raise CommissionError("not confirmed: nothing more is done")
+        raise CommissionError("not confirmed; stopped here")
     if word not in ("y", "yes"):
         raise ValueError(f"{text.strip()!r} is neither yes nor no")
 

@@ -209,6 +209,6 @@ ABORT_ADVICE: Final[Mapping[int, str]] = {
     0x0601_0000: "a PDO must be off (COB-ID bit 31) and its sub 0 be 0 before it is mapped",
     0x0609_0030: "the manual has the values that it takes",
     0x0800_0022: "not in this state: disable the drive, or NMT pre-operational first",
-    0x0800_0021: "somebody else has control: the maker's tool, or local mode",
+    0x0800_0021: "another master has control: the maker's tool, or local mode",
 }
 """What to try, by SDO abort code."""

@@ -47,7 +47,7 @@ def verdict(results: Results) -> str:
     slowest = max(outcome.time_s for outcome in results.outcomes)
     late = sorted({outcome.joint for outcome in results.outcomes if outcome.is_late})
     told = f" Later than its heartbeat and ramp explain: {', '.join(late)}." if late else ""
-    return f"PROVEN: every drive stopped by itself, the slowest stood after {slowest:.2f} s.{told}"
+    return f"PROVEN: every drive stopped by itself, the slowest was at standstill after {slowest:.2f} s.{told}"
 
 
 def markdown(robot: Robot, results: Results, when: str, version: str) -> str:
@@ -96,16 +96,16 @@ def _trials(results: Results) -> list[str]:
     if not results.outcomes:
         return []
     lines = [
-        "## Watchdog proof",
+        "## Self-stop test",
         "",
-        "| trial | wheel | from [m/s] | stood after [s] | limit [s] | way [mm] | it said |",
+        "| trial | wheel | from [m/s] | standstill after [s] | limit [s] | distance [mm] | drive reported |",
     ]
     lines.append("|---|---|---|---|---|---|---|")
     for trial in (SILENCE, HEARTBEAT):
         for o in (outcome for outcome in results.outcomes if outcome.trial == trial):
             stood = f"{o.time_s:.2f}" if o.stopped else "**did not stop**"
             way = f"{abs(o.way_m) * 1000:.0f}"
-            said = o.sign.removeprefix("it said ")
+            said = o.sign.removeprefix("reported ")
             lines.append(
                 f"| {trial} | {o.joint} | {o.speed_mps:g} | {stood} | {o.limit_s:.2f} | {way} | {said or '–'} |"
             )

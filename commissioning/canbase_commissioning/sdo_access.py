@@ -42,7 +42,7 @@ def write_object(
     """
     powered = None if force else (yield from _powered(status_at))
     if powered is not None:
-        return Refused(f"{powered} says that a motor has power; a write now may move it or stop it")
+        return Refused(f"{powered} reports that a motor has power; a write now may move or stop it")
     before = yield from _read(at)
     if not kind and before is None:
         return Refused("its width is not known, and it cannot be read: give --type")

@@ -20,8 +20,8 @@ from canbase_driver.boot.settings import StopsBy
 from canbase_driver.cia301.sdo_client import SdoClient
 from canbase_driver.cia402 import PowerGoal
 
-SILENCE = "this computer fell silent"
-HEARTBEAT = "the watchdog's heartbeat went missing, setpoints going on"
+SILENCE = "this computer stopped sending"
+HEARTBEAT = "the watchdog's heartbeat stopped, with setpoints still sent"
 SILENCE_S = 2.5
 """At least so long nothing is sent: makers' own command timeouts are up to a second."""
 STILL_S, STILL_M = 0.3, 0.002
@@ -55,9 +55,10 @@ class Outcome:
 
     def __str__(self) -> str:
         if not self.stopped:
-            return f"{self.joint} DID NOT STOP when {self.trial}: it rolled {abs(self.way_m):.2f} m and went on"
+            return f"{self.joint} DID NOT STOP when {self.trial}: it rolled {abs(self.way_m):.2f} m and continued"
         said = f"; {self.sign}" if self.sign else ""
-        return f"{self.joint} stood {self.time_s:.2f} s after {self.trial}: {abs(self.way_m) * 1000:.0f} mm{said}"
+        after = f"{self.joint} was at standstill {self.time_s:.2f} s after {self.trial}"
+        return f"{after}: {abs(self.way_m) * 1000:.0f} mm{said}"
 
 
 def watches_heartbeat(rig: PoweredDrives, joint: str) -> bool:
@@ -83,7 +84,7 @@ def get_ready(rig: PoweredDrives) -> Script[None]:
     held = yield Until(lambda _now: _begun(rig) and not rig.faults, READY_S)
     if not held:
         why = "; ".join(rig.faults) or rig.waiting_for() or "no reason is known"
-        raise CommissionError(f"the drives did not get ready within {READY_S:g} s: {why}. canbase doctor tells more")
+        raise CommissionError(f"the drives were not ready within {READY_S:g} s: {why}. canbase doctor shows more")
 
 
 def recover(rig: PoweredDrives) -> Script[None]:
@@ -184,7 +185,7 @@ def _outcome(
     ramp_s = speed_mps / robot.limits.emergency_deceleration_mps2
     limit_s = robot.timeouts.drive_heartbeat_s + ramp_s + LATE_S
     sign = rig.signs.get(rig.axes[joint].drive.node_id)
-    said = f"it said {sign[1]} after {sign[0] - began:.2f} s" if sign and sign[0] >= began else ""
+    said = f"reported {sign[1]} after {sign[0] - began:.2f} s" if sign and sign[0] >= began else ""
     return Outcome(
         joint=joint,
         trial=trial,

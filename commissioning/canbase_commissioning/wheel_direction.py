@@ -70,7 +70,7 @@ def find_direction(rig: PoweredDrives, drive: Drive, again: str = "") -> Script[
         )
     if seen is Seen.NOTHING or moved_m < LEAST_SHARE * FIRST_MPS * FIRST_S:
         raise CommissionError(
-            f"{joint}: {'nobody saw it turn' if seen is Seen.NOTHING else 'it turned'}, its encoder moved by "
+            f"{joint}: {'it was not seen to turn' if seen is Seen.NOTHING else 'it turned'}, its encoder moved by "
             f"{moved_m * 1000:.1f} mm: brake, coupling, encoder cable, or a scale that is far off in robot.yaml"
         )
     return WheelFound(joint, drive.direction * (1 if seen is Seen.FORWARD else -1))

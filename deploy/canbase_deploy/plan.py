@@ -112,9 +112,9 @@ def next_step(request: Request, changed: Collection[PurePosixPath], *, upgrade: 
     if not upgrade:
         return f"now: sudo systemctl start {target}, or boot; wheels up for the first time"
     if not request.bring_up_can or not {_can_env(interface), UNITS / "canbase-can@.service"} & set(changed):
-        return f"now, with the robot standing: sudo systemctl restart {target}"
+        return f"now, with the robot at standstill: sudo systemctl restart {target}"
     steps = (f"stop {target}", f"restart canbase-can@{interface}.service", f"start {target}")
-    return f"now, with the robot standing: {' && '.join(f'sudo systemctl {step}' for step in steps)}"
+    return f"now, with the robot at standstill: {' && '.join(f'sudo systemctl {step}' for step in steps)}"
 
 
 def network_warning(request: Request, environment: Mapping[str, str]) -> str:

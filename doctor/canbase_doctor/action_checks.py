@@ -119,7 +119,7 @@ def goal_executes(seen: Evidence) -> Check:
     if seen.running:
         return ok(name, f"{seen.running[0].uuid} of {seen.running[0].action}")
     if any(goal.status == Goal.ACCEPTED for goal in seen.goals):
-        return fail(name, "accepted, but it waits for another goal", "action.goal_policy says why")
+        return fail(name, "accepted, but it waits for another goal", "action.goal_policy decides this")
     return fail(name, "none runs now", "send a goal, and call doctor while it runs")
 
 
@@ -142,7 +142,7 @@ def client_listens(seen: Evidence) -> Check:
     if nodes:
         return ok(name, f"{', '.join(nodes)}: has it a feedback callback (--feedback), and does it spin?")
     return fail(
-        name, "nobody subscribes to the feedback", "the client is gone, or in another namespace; the goal still runs"
+        name, "the feedback has no subscriber", "the client has ended, or is in another namespace; the goal still runs"
     )
 
 
@@ -267,7 +267,7 @@ def _finite(goal: Any) -> bool:
 
 def _fast(seen: Evidence, name: str, times_s: tuple[float, ...], advice: str) -> Check:
     if not times_s:
-        return fail(name, "the server was not asked: it is not seen", "canbase doctor --symptom not-listed")
+        return fail(name, "the server was not queried: it was not found", "canbase doctor --symptom not-listed")
     found = f"answers within {max(times_s) * 1e3:.0f} ms at most, {len(times_s)} questions"
     if max(times_s) <= SLOW_ANSWER_S:
         return ok(name, found)

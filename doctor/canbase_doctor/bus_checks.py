@@ -62,9 +62,9 @@ def bus_checks(seen: BusEvidence) -> list[Check]:
 def _interface(seen: BusEvidence) -> list[Check]:
     bus, link = seen.robot.bus, seen.link
     if bus.interface != "socketcan":
-        return [ok("CAN interface", f"{bus.interface} {bus.channel}: no error counters to be had")]
+        return [ok("CAN interface", f"{bus.interface} {bus.channel}: no error counters available")]
     if link is None:
-        return [warn("CAN interface", f"{bus.channel}: ip tells nothing about it", "install iproute2")]
+        return [warn("CAN interface", f"{bus.channel}: `ip` reports nothing about it", "install iproute2")]
     if not link.is_up:
         up = f"sudo ip link set {link.name} up type can bitrate {bus.bitrate} restart-ms 100"
         return [fail("CAN interface", f"{link.name} is down", up)]
@@ -162,7 +162,7 @@ def _counters(counters: WatchdogCounters) -> Check:
         f"bus errors {counters.bus_errors}, longest pause of its loop {counters.pause_max_ms} ms"
     )
     if counters.leases_refused or counters.bus_errors:
-        return warn("watchdog's counters (2FEh)", found, "docs/bus.md says what they count")
+        return warn("watchdog's counters (2FEh)", found, "docs/bus.md explains them")
     return ok("watchdog's counters (2FEh)", found)
 
 
@@ -183,7 +183,7 @@ def _node(seen: BusEvidence, node_id: int, drives: tuple[Drive, ...]) -> list[Ch
 def _unread(seen: BusEvidence, name: str, node_id: int) -> Check:
     why = seen.unread.get(node_id, "it was not asked")
     if node_id in seen.heard.nodes:
-        return warn(name, f"heard, {_ages(seen, node_id)}; {why}", "call doctor again when nobody uses its SDO channel")
+        return warn(name, f"heard, {_ages(seen, node_id)}; {why}", "run doctor again when its SDO channel is free")
     return fail(
         name, f"never heard; {why}", "power, cable, termination, bit rate, node id; canbase scan shows who answers"
     )
@@ -211,7 +211,7 @@ def _life(seen: BusEvidence, name: str, found: Inspection) -> Check:
     told = f"{states}; {_ages(seen, found.node_id)}"
     codes = {joint: code for joint, code in found.error_codes.items() if code}
     if any(state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE) for state in found.states.values()):
-        why = ", ".join(f"{code:04X}h {emcy_text(code)}" for code in codes.values()) or "603Fh tells no code"
+        why = ", ".join(f"{code:04X}h {emcy_text(code)}" for code in codes.values()) or "603Fh has no code"
         return fail(f"{name}: state", f"{told}; {why}", "remove the cause, canbase reset")
     emcy = seen.heard.nodes[found.node_id].emcy if found.node_id in seen.heard.nodes else None
     if emcy is not None:
@@ -240,15 +240,15 @@ def _advice(seen: BusEvidence, node_id: int) -> str:
     node = seen.heard.nodes.get(node_id)
     if node is not None and node.nmt_state is NmtState.OPERATIONAL:
         return "something has changed it since its boot: restart canbase driver, and look for another master or tool"
-    return "the driver could not boot this drive: its log and boot_problem in motor_driver/status say why"
+    return "the driver could not boot this drive: the reason is in its log and in boot_problem of motor_driver/status"
 
 
 def _configured(seen: BusEvidence, name: str, node_id: int, part: Part) -> Check:
     """Beside a running driver a difference is wrong; without it the driver writes it at its start."""
     if part.problem:
-        return fail(name, part.problem, "docs/drives.md says what a drive must have")
+        return fail(name, part.problem, "docs/drives.md lists what a drive must have")
     if not part.changes:
-        return ok(name, "as robot.yaml wants it")
+        return ok(name, "as in robot.yaml")
     told = f"{len(part.changes)} differences: {_some(part.changes)}"
     if seen.heard.driver_lives:
         return fail(name, told, _advice(seen, node_id))
@@ -280,4 +280,4 @@ def _strangers(seen: BusEvidence) -> list[Check]:
     if not others:
         return []
     told = f"node {', '.join(map(str, others))} on the bus and not in robot.yaml"
-    return [warn("other nodes", told, "canbase leaves them alone; canbase scan says who they are")]
+    return [warn("other nodes", told, "canbase does not use them; canbase scan identifies them")]

@@ -92,7 +92,7 @@ def transform(seen: Evidence) -> Check:
     if (base.odom_frame, base.base_frame) in pairs:
         return ok(name, f"{base.odom_frame} → {base.base_frame}")
     return fail(
-        name, f"{base.odom_frame} → {base.base_frame} is missing", "is motor_driver running, and nobody remaps tf?"
+        name, f"{base.odom_frame} → {base.base_frame} is missing", "is motor_driver running? Does a node remap tf?"
     )
 
 
@@ -127,7 +127,7 @@ def command_interface(seen: Evidence) -> Check:
                     f"mux.sources.{source}.stamped: {str(not described.stamped).lower()}, or let it send stamped ones",
                 )
     if not seen.subscribers.get("cmd_vel"):
-        return fail(name, "nobody listens on cmd_vel", "start canbase driver, in the same namespace")
+        return fail(name, "no subscriber on cmd_vel", "start canbase driver, in the same namespace")
     return ok(name, f"{len(seen.robot.mux.sources)} sources with the right type; the driver listens")
 
 

@@ -26,7 +26,7 @@ UNFOLLOWED = {
 """What to do about a source that holds the base and is not followed."""
 SILENT_S = 1.5
 """A state that was received longer ago says nothing: the slowest one comes every 0.5 s."""
-HANGS = "its process hangs, or its timers stand still: look at its log, and restart it"
+HANGS = "its process hangs, or its timers do not run: read its log, and restart it"
 PARTS_RUN = "is it running (canbase up), in this namespace and ROS_DOMAIN_ID?"
 ON_ITS_WAY = (DriverStatus.BOOTING, DriverStatus.ENABLING, DriverStatus.STOPPING)
 WATCHDOG_COUNTERS = ("leases_refused", "frames_dropped", "bus_errors", "trips")
@@ -65,7 +65,7 @@ def _counters(before: Any, now: Any) -> Check:
     grew = [name for name in COUNTERS if getattr(now, name) > getattr(before, name)]
     if not grew:
         return ok("its counters", told)
-    return warn("its counters", told, f"{', '.join(grew)} grew while doctor listened; docs/bus.md says what they count")
+    return warn("its counters", told, f"{', '.join(grew)} grew while doctor listened; docs/bus.md explains them")
 
 
 def watchdog(evidence: Evidence) -> list[Check]:
@@ -96,7 +96,9 @@ def _watchdog_counters(before: Any, now: Any) -> Check:
     if grew:
         return warn(name, told, f"{', '.join(grew)} grew while doctor listened; docs/bus.md, 2FEh")
     if now.watchdog_pause_max_s > PAUSE_S:
-        return warn(name, told, "its loop is held up: is the computer overloaded, has it real-time priority?")
+        return warn(
+            name, told, "its loop is delayed: is the computer overloaded? Does the process have real-time priority?"
+        )
     return ok(name, told)
 
 
@@ -151,7 +153,7 @@ def _scanner(scanner: Any, dropped: int) -> Check:
     """`dropped`: scans within the observation."""
     name, found = f"scanner {scanner.topic}", f"last usable scan {_age(scanner.age_s)} old"
     if not math.isnan(scanner.usable_share):
-        found += f", {scanner.usable_share:.0%} of its beams say something"
+        found += f", {scanner.usable_share:.0%} of its beams are usable"
     if dropped or scanner.problem:
         found += f"; {dropped} scans dropped: {scanner.problem or 'some could not be used'}"
     cure = "look at the scanner and its ROS driver; docs/safety_filter.md, Scanners, has what a scan must be"
@@ -204,7 +206,7 @@ def _silent(evidence: Evidence, name: str, topic: str) -> Check | None:
     age_s = evidence.now_s - heard.times_s[-1]
     if age_s <= SILENT_S:
         return None
-    return fail(name, f"nothing on {topic} for {age_s:.1f} s; what it said before is not looked at", HANGS)
+    return fail(name, f"nothing on {topic} for {age_s:.1f} s; older messages are ignored", HANGS)
 
 
 def _until(clears_on: str) -> str:

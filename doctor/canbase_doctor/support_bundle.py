@@ -255,10 +255,12 @@ def support_bundle(
     ] = None,
     since: Annotated[str, typer.Option(metavar="TIME", help="Journal from then on, as journalctl takes it.")] = "-2h",
 ) -> None:
-    """Collect what helps to find a fault: configuration, versions, units, journal, CAN statistics, black box.
+    """Collect data for remote help: configuration, versions, units, journal, CAN statistics, black box.
 
-    It orders nothing, and touches no key: docs/logs.md. As root it sees more. A robot.yaml with mistakes is collected
-    with a list of them. Exit codes: 0 written, 1 not.
+    It changes nothing and reads no keys (docs/logs.md). As root it can read more. A robot.yaml with mistakes is
+    included with a list of them.
+
+    Exit codes: 0 written, 1 not written.
     """
     from canbase_config.errors import ConfigError
     from canbase_config.load import load_robot, sample

@@ -196,7 +196,7 @@ class DriverCore:
             return Outcome(False, f"refused: {commanded or self._drives.turning(now_s)}; a pose is set at a standstill")
         self._feed.set_pose(pose)
         return Outcome(
-            True, f"odometry goes on from x {pose.x_m:.3f} m, y {pose.y_m:.3f} m, yaw {pose.yaw_rad:.3f} rad"
+            True, f"odometry continues from x {pose.x_m:.3f} m, y {pose.y_m:.3f} m, yaw {pose.yaw_rad:.3f} rad"
         )
 
     def tick(self, now_s: float, lateness_s: float = 0.0) -> list[Frame]:

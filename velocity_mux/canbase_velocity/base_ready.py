@@ -11,7 +11,7 @@ from canbase_runtime.driver_state import DriverState
 STATUS_TIMEOUT_S = 0.5
 STATUS_PERIODS = 2.5
 """A status counts for STATUS_TIMEOUT_S, or for so many of its periods where rates.status_hz is low."""
-ESTOP_HOLDS = "the emergency stop holds or waits for its reset"
+ESTOP_HOLDS = "the emergency stop is pressed or not reset"
 
 
 def status_timeout_s(status_hz: float) -> float:

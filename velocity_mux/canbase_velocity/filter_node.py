@@ -44,7 +44,7 @@ from canbase_velocity.unexpected_publishers import UNKNOWN
 
 STATE_PERIOD_S = 0.1
 GRAPH_PERIOD_S = 0.5
-OLD = "refused: it may be old, safety_filter stood still before it was taken in; send it again"
+OLD = "refused: it may be old, because safety_filter did not run before it; send it again"
 MovingSources = Callable[[], Sequence[str]]
 
 

@@ -26,7 +26,7 @@ from canbase_velocity.sole_publisher import SolePublisher
 from canbase_velocity.sweep import Floats
 from canbase_velocity.twist import ZERO, Twist
 
-NOTHING_TO_RESET = "nothing to reset: the emergency stop waits for no reset"
+NOTHING_TO_RESET = "The emergency stop is not latched: nothing to reset"
 WITHOUT_SCANS_S = 1.0
 """After so long without usable scans nobody who ordered motion meanwhile is followed by himself (neutral.py) [s]."""
 NO_SCAN = (

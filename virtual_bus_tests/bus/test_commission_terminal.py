@@ -33,7 +33,7 @@ def commissioning(config: Path) -> Iterator[Terminal]:
     """At its first question."""
     terminal = Terminal("commission", "--config", str(config), "--steps", "directions")
     try:
-        terminal.read_until("Is it so? [yes/no]")
+        terminal.read_until("Confirm [yes/no]")
         yield terminal
     finally:
         terminal.close()
@@ -88,7 +88,7 @@ def test_an_answer_without_sense_is_asked_again_and_the_next_wheel_is_stopped_by
         terminal.read_until("Which way")
         stands(control)
         terminal.press("sideways\n")
-        terminal.read_until("expected one of forward, backward, nothing, other; please again")
+        terminal.read_until("expected one of forward, backward, nothing, other; try again")
         terminal.press("f\n")
         terminal.hold("", lambda: abs(control.truth().v_right_mps) > TURNS_MPS)
         terminal.press("\n")
@@ -102,10 +102,10 @@ def test_what_is_neither_yes_nor_no_is_asked_again(bench: tuple[Path, SimControl
     path_m = control.truth().path_m
     with commissioning(config) as terminal:
         terminal.press("0,5 m\n")
-        terminal.read_until("'0,5 m' is neither yes nor no; please again")
+        terminal.read_until("'0,5 m' is neither yes nor no; try again")
         terminal.press("no\n")
         assert terminal.wait() == 1
-        assert "not confirmed: nothing more is done" in terminal.shown
+        assert "not confirmed; stopped here" in terminal.shown
     assert control.truth().path_m == path_m
 
 
@@ -115,7 +115,7 @@ def test_who_does_not_confirm_turns_nothing(bench: tuple[Path, SimControl]) -> N
     with commissioning(config) as terminal:
         terminal.press("\n")
         assert terminal.wait() == 1
-        assert "not confirmed: nothing more is done" in terminal.shown
+        assert "not confirmed; stopped here" in terminal.shown
     assert control.truth().path_m == path_m
 
 
@@ -139,7 +139,7 @@ def test_a_terminal_that_goes_stops_the_wheel_and_leaves_a_report(bench: tuple[P
         terminal.hang_up()
         stands(control)
         assert terminal.wait() != 0
-    assert "the terminal is gone" in report(config)
+    assert "the terminal was closed" in report(config)
 
 
 def test_killed_it_leaves_the_wheel_to_the_drive(bench: tuple[Path, SimControl]) -> None:

@@ -52,7 +52,7 @@ def test_where_another_master_speaks_it_only_listens_unless_told_otherwise(tmp_p
         stopped.set()
         thread.join()
     assert "another master is on this bus:\n  SYNC" in quiet.stderr
-    assert "with --yes it asks nevertheless" in quiet.stderr
+    assert "use --yes to read anyway" in quiet.stderr
     assert [row["vendor_id"] for row in json.loads(quiet.stdout)] == [None, None]
     assert asking.returncode == 0
     assert [row["profile"] for row in json.loads(asking.stdout)] == ["generic", "generic"]

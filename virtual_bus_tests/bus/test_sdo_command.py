@@ -52,5 +52,5 @@ def test_write_is_refused_while_the_motor_has_power(config: str) -> None:
         assert canbase("sdo", "write", "2", at, value, "-c", config).returncode == 0
     done = canbase("sdo", "write", "2", "60FF", "100", "-c", config)
     assert done.returncode == 1
-    assert "6041h:0 says that a motor has power" in done.stderr
+    assert "6041h:0 reports that a motor has power" in done.stderr
     assert canbase("sdo", "write", "2", "6040", "0", "-c", config, "--force").returncode == 0

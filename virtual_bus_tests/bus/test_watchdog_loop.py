@@ -122,7 +122,7 @@ def test_every_change_is_one_line_in_the_log(rig: Rig, caplog: pytest.LogCapture
         time.sleep(0.05)
     lines = [record.message for record in caplog.records if record.name == "canbase.watchdog"]
     trips = [line for line in lines if line.startswith("tripped: lease lost: no valid lease for 0.2")]
-    assert (len(trips), lines.count("ladder: quick stop"), lines.count("all drives stand")) == (1, 1, 1)
+    assert (len(trips), lines.count("ladder: quick stop"), lines.count("all drives at standstill")) == (1, 1, 1)
     assert len(lines) <= 4
 
 

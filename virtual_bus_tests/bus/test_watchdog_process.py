@@ -127,7 +127,7 @@ def test_stopped_and_continued_at_speed_it_trips_because_it_was_away(watched: Wa
     begin = time.monotonic()
     watched.process.send_signal(signal.SIGCONT)
     assert watched.robot.first(0x501, begin)[0] - begin < 0.3
-    assert watched.end(signal.SIGTERM)[1].count("own loop stood still") == 1
+    assert watched.end(signal.SIGTERM)[1].count("own loop did not run") == 1
 
 
 # nobody reads its log ── quick stop ── 0.5 s later its heartbeat still comes

@@ -173,7 +173,7 @@ def test_requests_that_waited_while_the_driver_stood_still_are_refused(services:
 
     answers = [services.answer(future) for future in services.pause_driver(ask_all)]
     assert [answer.success for answer in answers] == [False, False]
-    assert all("stood still" in answer.message for answer in answers), answers
+    assert all("did not run before it" in answer.message for answer in answers), answers
     services.robot.wait_state(DriverStatus.LATCHED)  # the watchdog has stopped the drives
     assert services.robot.odometry() == pytest.approx(before, abs=0.005)
 

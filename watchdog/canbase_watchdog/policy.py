@@ -171,7 +171,7 @@ def _implausible(axis: Axis, config: WatchdogConfig) -> str:
         )
     if axis.feedback.implausible >= samples:
         return (
-            f"reports {axis.velocity_mps:.3f} m/s, and its encoder tells otherwise: "
+            f"reports {axis.velocity_mps:.3f} m/s, and its encoder contradicts it: "
             f"{axis.feedback.drift_m:.3f} m apart (allowed {config.travel_tolerance_m:.3f} m)"
         )
     return ""
@@ -226,7 +226,7 @@ def _power_at_stand(view: View, config: WatchdogConfig, now_s: float) -> Verdict
             detail = (
                 f"{axis.drive.joint} is ordered {axis.setpoint_mps:.3f} m/s, reports {axis.velocity_mps:.3f} m/s and "
                 f"has been held with {_torque(axis)} for {axis.push.overdue_s:.3f} s (allowed "
-                f"{config.stand_answer_s:.3f} s) without letting go: that may be a dead encoder and not a stand "
+                f"{config.stand_answer_s:.3f} s) without release of the wheel: its encoder may be dead "
                 "(watchdog.stand_proof, watchdog.stand_answer_s)"
             )
             return Verdict(TripCause.POWER_AT_STAND, axis.drive.node_id, detail)
@@ -236,7 +236,7 @@ def _power_at_stand(view: View, config: WatchdogConfig, now_s: float) -> Verdict
 def _twist_outside(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     if not view.twist:
         return FINE
-    return Verdict(TripCause.TWIST_OUTSIDE, 0, f"the base moves otherwise than ordered: {view.twist}")
+    return Verdict(TripCause.TWIST_OUTSIDE, 0, f"the base does not move as ordered: {view.twist}")
 
 
 def _cycles(config: WatchdogConfig) -> float:
@@ -304,7 +304,7 @@ def _bus_failed(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
 def _loop_late(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     if view.tick_gap_s <= config.loop_late_s or not view.enabled:
         return FINE
-    detail = f"own loop stood still for {view.tick_gap_s:.3f} s (allowed {config.loop_late_s:.3f} s)"
+    detail = f"own loop did not run for {view.tick_gap_s:.3f} s (allowed {config.loop_late_s:.3f} s)"
     return Verdict(TripCause.LOOP_LATE, 0, detail)
 
 

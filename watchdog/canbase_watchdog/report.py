@@ -13,10 +13,10 @@ from canbase_watchdog.watchdog import Answer, State, Status, Watchdog
 COUNTERS_PERIOD_S = 10.0
 ALIVE_PERIOD_S = 0.2
 
-ASSUMED = "standstill is assumed, not measured: a sensor is not to be trusted, and the power is off long enough"
+ASSUMED = "standstill is assumed, not measured: a sensor is not trusted, and the power has been off long enough"
 UNPROVEN = (
-    "%s stopped faster than a wheel can: it met something hard, or its encoder is dead; no reset until it is turned by "
-    "hand, or its power has been off for as long as it may roll"
+    "%s stopped faster than a wheel can: it met something hard, or its encoder is dead; a reset is refused until it is "
+    "turned by hand, or its power has been off for as long as it may roll"
 )
 
 _log = logging.getLogger("canbase.watchdog")
@@ -80,7 +80,7 @@ def _tell_ladder(old: Status, status: Status) -> None:
     if status.unproven and status.unproven != old.unproven:
         _log.warning(UNPROVEN, status.unproven)
     if status.settled and not old.settled:
-        _log.warning(ASSUMED if status.assumed else "all drives stand")
+        _log.warning(ASSUMED if status.assumed else "all drives at standstill")
 
 
 def _state_line(status: Status) -> str:
@@ -89,4 +89,5 @@ def _state_line(status: Status) -> str:
     cause = _words(status.verdict.cause)
     about = f", node {status.verdict.node_id}" if status.verdict.node_id else ""
     clears = policy.clears_on(status.verdict)
-    return f"tripped: {cause}{about}: {status.verdict.detail}; a reset needs standing wheels, zero orders and: {clears}"
+    needs = f"a reset needs standstill, zero velocity ordered, and: {clears}"
+    return f"tripped: {cause}{about}: {status.verdict.detail}; {needs}"

@@ -38,9 +38,9 @@ from canbase_runtime.version import installed_version
 
 WHEELS_UP = (
     "WHEELS UP: all wheels off the floor, nothing near them, the emergency stop (STO) at hand and tried. "
-    "Enter stops everything at any time. Is it so?"
+    "Enter stops everything at any time. Confirm"
 )
-WHEELS_DOWN = "Now on the floor: put the robot down, 3 m free all around, the emergency stop at hand. Is it so?"
+WHEELS_DOWN = "Put the robot on the floor, with 3 m free all around and the emergency stop within reach. Confirm"
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +160,11 @@ def _wheels(
 
 
 def _proof(rig: PoweredDrives, plan: Plan, results: Results) -> Script[tuple[Outcome, ...]]:
-    yield Ask("proof", f"The proof, wheels still up: all wheels turn at {plan.speed_mps:g} m/s. Ready?", confirms=True)
+    yield Ask(
+        "proof",
+        f"Self-stop test, wheels still up: all wheels will turn at {plan.speed_mps:g} m/s. Ready?",
+        confirms=True,
+    )
     yield from get_ready(rig)
     _note_boots(rig, results)
     return (yield from prove(rig, plan.speed_mps))

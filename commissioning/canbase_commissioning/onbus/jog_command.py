@@ -80,7 +80,7 @@ def _hold(line: BusSession, session: JogSession) -> None:
         if select.select([sys.stdin], [], [], 0.0)[0]:
             text = os.read(sys.stdin.fileno(), 64).decode("latin-1")
             if not text:
-                raise CommissionError("the terminal is gone")
+                raise CommissionError("the terminal was closed")
             session.press(text, now_s)
         if now_s - shown_at >= SHOW_S:
             shown_at = now_s

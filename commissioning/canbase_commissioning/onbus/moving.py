@@ -25,7 +25,7 @@ def refuse_beside_masters(line: BusSession) -> None:
     masters = listening.heard.masters(listening.now_s)
     if masters:
         signs = "; ".join(masters)
-        fail(f"somebody else commands this bus ({signs}). End canbase up, or sudo systemctl stop 'canbase-*'", FAILED)
+        fail(f"another master is on this bus ({signs}). End canbase up, or sudo systemctl stop 'canbase-*'", FAILED)
 
 
 def run_script(line: BusSession, robot: Robot, script: Callable[[PoweredDrives], Script[T]], person: Operator) -> T:

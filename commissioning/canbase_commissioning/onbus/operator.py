@@ -79,10 +79,10 @@ class Operator:
         """The words made no sense. Raises CommissionError when they came from a file: they stay the same."""
         if question.key in self._answers:
             raise CommissionError(f"{question.key} in --answers: {error}") from error
-        typer.secho(f"{error}; please again", fg=typer.colors.YELLOW, color=colour())
+        typer.secho(f"{error}; try again", fg=typer.colors.YELLOW, color=colour())
 
     def interrupts(self) -> bool:
-        """Whether Enter was pressed while nothing was asked. Raises CommissionError when the terminal is gone."""
+        """Whether Enter was pressed while nothing was asked. Raises CommissionError when the terminal was closed."""
         if self._has_terminal and _has_line():
             _line()
             return True
@@ -97,7 +97,7 @@ def _line() -> str:
     try:
         text = sys.stdin.readline()
     except OSError as error:  # EIO, of a terminal that was hung up
-        raise CommissionError("the terminal is gone") from error
+        raise CommissionError("the terminal was closed") from error
     if not text:
-        raise CommissionError("the terminal is gone")
+        raise CommissionError("the terminal was closed")
     return text.strip()

@@ -40,10 +40,10 @@ def run(
         problem = _bus_problem(line, rows)
     _print(rows, as_json)
     for reason in roster.lost.values():
-        typer.echo(f"gone while it was asked: {reason}", err=True)
+        typer.echo(f"lost while it was read: {reason}", err=True)
     absent = missing(rows)
     if problem or len(absent) == len(rows):
-        fail(problem or "no node is heard, and none answers: power, cable, termination, bit rate?", FAILED)
+        fail(problem or "no node sends or answers; check power, cable, termination, bit rate", FAILED)
     if absent:
         fail(f"node {', '.join(map(str, absent))} of robot.yaml is not on the bus: power, cable, node id?", FAILED)
 
@@ -56,16 +56,16 @@ def _may_ask(masters: list[str], yes: bool) -> bool:
         return True
     told = "scan would send SDO reads beside it; an answer to them may confuse a master that is asking the same node"
     if not sys.stdin.isatty():
-        typer.echo(f"{told}. Only listened; with --yes it asks nevertheless", err=True)
+        typer.echo(f"{told}. Listened only; use --yes to read anyway", err=True)
         return False
-    return typer.confirm(f"{told}. Ask nevertheless?", default=False, err=True)
+    return typer.confirm(f"{told}. Read anyway?", default=False, err=True)
 
 
 def _bus_problem(line: BusSession, rows: list[ScanRow]) -> str:
     if line.problem:
         return line.problem
     if line.send_errors and not any(row.nmt_state for row in rows):
-        return f"the bus did not take {line.send_errors} frames: nobody acknowledges them (power, cable, bit rate?)"
+        return f"{line.send_errors} frames were not sent: no node acknowledges them (power, cable, bit rate?)"
     return ""
 
 

@@ -101,7 +101,7 @@ def _tell(target: Target, done: Written, value: str) -> None:
     typer.echo(f"{target}: {before} → {show(done.after, target.kind)}")
     wanted = encode(value, target.kind or f"u{8 * len(done.after)}")
     if done.after.rstrip(b"\0") != wanted.rstrip(b"\0"):
-        text = f"it reads back another value than {value}: the drive rounds it, or keeps what it is told elsewhere"
+        text = f"it reads back a value other than {value}: the drive rounds it, or has it set elsewhere"
         typer.secho(text, err=True, fg=typer.colors.YELLOW, color=colour())
 
 

@@ -65,7 +65,7 @@ class ManagedNode(LifecycleNode):
         number = machine.get_transition_by_label(wanted.label) if wanted.label else wanted.id
         aim = AIMS.get(number)
         if aim is None:
-            self._refuse(asked, "refused: nobody may ask for this transition")
+            self._refuse(asked, "refused: this transition cannot be requested")
             return None
         old = refusal(self.request_times.waited(time.monotonic()), asked.sent_s, time.time())
         if old and aim > self._loop.aimed_at:

@@ -19,7 +19,7 @@ def refusal(waited: bool, sent_s: float, now_s: float) -> str:
     clock [s], 0: not known; `now_s`: this computer's system clock.
     """
     if waited:
-        return "refused: it may be old, motor_driver stood still before it was taken in; send it again"
+        return "refused: it may be old, because motor_driver did not run before it; send it again"
     age_s = now_s - sent_s
     if sent_s == 0.0 or abs(age_s) <= LONGEST_S:
         return ""

@@ -79,7 +79,9 @@ class DriverServices:
 
     def _on_set_pose(self, message: PoseWithCovarianceStamped) -> None:
         if self._request_times.waited(time.monotonic()):
-            self._node.get_logger().warning("set_pose refused: it may be old, motor_driver stood still before it")
+            self._node.get_logger().warning(
+                "set_pose refused: it may be old, because motor_driver did not run before it"
+            )
         elif message.header.frame_id != self._odom_frame:
             frame = printable(message.header.frame_id)
             self._node.get_logger().warning(f"set_pose refused: frame_id is {frame!r}, not {self._odom_frame!r}")

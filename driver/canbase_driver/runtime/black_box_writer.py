@@ -94,7 +94,7 @@ class BlackBoxWriter(threading.Thread):
         else:
             problem = ""
         if problem and not self._problem:
-            self._say(f"{problem}. Check the folder (black_box.folder) and the disk; stops are told all the same")
+            self._say(f"{problem}. Check the folder (black_box.folder) and the disk; stops are still reported")
         elif self._problem and not problem:
             self._say(f"the black box writes to {self._folder} again")
         self._problem = problem

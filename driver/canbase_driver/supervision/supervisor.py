@@ -213,29 +213,37 @@ _QUICK, _OFF = (Phase.QUICK_STOP,), (Phase.POWER_OFF,)
 
 TRANSITIONS: tuple[Transition, ...] = (
     *_blocked(),
-    Transition(_PREPARING, "for long", _unprepared_for_long, Phase.PREPARING, Cause.DRIVE_NOT_READY, _SWITCHED_ON),
+    Transition(
+        _PREPARING, "not ready for long", _unprepared_for_long, Phase.PREPARING, Cause.DRIVE_NOT_READY, _SWITCHED_ON
+    ),
     Transition(
         WAITING, "not switched on", _when(lambda s: s.unprepared), Phase.PREPARING, Cause.PREPARING, _SWITCHED_ON
     ),
     Transition(
         WAITING, "no record of power", _when(lambda s: s.unarmed), Phase.ARMING, Cause.NO_RECORD, "the record on disk"
     ),
-    Transition(WAITING, "all is well", _always, Phase.ENABLING, Cause.ENABLING, "operation enabled on all drives"),
+    Transition(WAITING, "nothing blocks", _always, Phase.ENABLING, Cause.ENABLING, "operation enabled on all drives"),
     *_stopped(Phase.ENABLING, _HAZARDS_WHILE_ENABLING),
     Transition(_ENABLING, "operation enabled", lambda m, s: None if s.disabled else "", Phase.ENABLED, Cause.NONE),
     Transition(_ENABLING, "takes too long", _too_late, Phase.QUICK_STOP, Cause.ENABLE_TIMEOUT, "reset", True),
     *_stopped(Phase.ENABLED, HAZARDS),
     Transition(_RAMP, "needs a quick stop", _asks_for_quick_stop, Phase.QUICK_STOP),
-    Transition(_RAMP, "stands", _stands, Phase.POWER_OFF),
+    Transition(_RAMP, "at standstill", _stands, Phase.POWER_OFF),
     Transition(
-        _RAMP, "a sensor lies", _when(lambda s: s.doubted), Phase.POWER_OFF, Cause.FEEDBACK_IMPLAUSIBLE, "reset", True
+        _RAMP,
+        "feedback implausible",
+        _when(lambda s: s.doubted),
+        Phase.POWER_OFF,
+        Cause.FEEDBACK_IMPLAUSIBLE,
+        "reset",
+        True,
     ),
-    Transition(_RAMP, "keeps on", _keeps_on, Phase.QUICK_STOP, Cause.DID_NOT_STOP, "reset", True),
-    Transition(_QUICK, "stands", _stands, Phase.POWER_OFF),
-    Transition(_QUICK, "a sensor lies", _when(lambda s: s.doubted), Phase.POWER_OFF),
-    Transition(_QUICK, "keeps its speed", _keeps_its_speed, Phase.POWER_OFF),
-    Transition(_OFF, "no power, needs a reset", _is_off_for_good, Phase.LATCHED),
-    Transition(_OFF, "no power", _is_off, Phase.DISARMED),
+    Transition(_RAMP, "does not stop in time", _keeps_on, Phase.QUICK_STOP, Cause.DID_NOT_STOP, "reset", True),
+    Transition(_QUICK, "at standstill", _stands, Phase.POWER_OFF),
+    Transition(_QUICK, "feedback implausible", _when(lambda s: s.doubted), Phase.POWER_OFF),
+    Transition(_QUICK, "does not slow down", _keeps_its_speed, Phase.POWER_OFF),
+    Transition(_OFF, "power off, reset needed", _is_off_for_good, Phase.LATCHED),
+    Transition(_OFF, "power off", _is_off, Phase.DISARMED),
 )
 """All that the driver ever does. Out of LATCHED there is no row: `reset` alone leads there."""
 BY_PHASE: dict[Phase, tuple[Transition, ...]] = {

@@ -37,10 +37,10 @@ CAUSES = {
     8: "foreign master",
     9: "bus failed",
     10: "own loop late",
-    11: "told to end while a wheel turned",
+    11: "shut down while a wheel turned",
     12: "feedback implausible",
     13: "motion missing",
-    14: "base moves otherwise than ordered",
+    14: "base motion not as ordered",
     15: "setpoint missing",
     16: "two drives with one node id",
     17: "power at an unproven standstill",
@@ -215,7 +215,7 @@ class WatchdogLink:
     def view(self, now_s: float) -> tuple[WatchdogView, str]:
         """Whether it watches, and a sentence when it does not."""
         if self._state is None:
-            return WatchdogView.MISSING, "not heard yet; start it with `canbase watchdog`"
+            return WatchdogView.MISSING, "no frame of it yet; start it with `canbase watchdog`"
         age_s = now_s - self._received_s
         if age_s > self._timeout_s:
             return WatchdogView.MISSING, f"silent for {age_s:.2f} s (timeout {self._timeout_s:.2f} s)"

@@ -50,7 +50,7 @@ def test_while_the_motor_has_power_nothing_is_written_unless_forced() -> None:
     world = SessionWorld()
     enable(world)
     refused = ask(world, write_object(Address(0x60FF), "1000", "i32", STATUS, force=False)).result
-    assert refused == Refused("6041h:0 says that a motor has power; a write now may move it or stop it")
+    assert refused == Refused("6041h:0 reports that a motor has power; a write now may move or stop it")
     assert world.bench.nodes[1].dictionary.values[0x60FF00] == 0
     forced = ask(world, write_object(Address(0x60FF), "1000", "i32", STATUS, force=True)).result
     assert isinstance(forced, Written)

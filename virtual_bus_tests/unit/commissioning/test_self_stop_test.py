@@ -83,7 +83,7 @@ def test_a_drive_that_does_not_stop_by_itself_is_told_loudly_and_stopped_at_once
     world = GuideWorld(robot_with(kind))
     outcomes = world.guide(whole)
     assert [(o.trial, o.stopped) for o in outcomes] == [(SILENCE, False)] * 2
-    assert "DID NOT STOP when this computer fell silent" in str(outcomes[0])
+    assert "DID NOT STOP when this computer stopped sending" in str(outcomes[0])
     assert_off(world)
 
 
@@ -120,7 +120,7 @@ def test_a_drive_that_does_not_get_power_ends_it_with_its_state() -> None:
 def test_a_drive_that_is_not_there_ends_it_before_anything_moves() -> None:
     world = GuideWorld()
     world.bench.nodes[2].line.cut = True
-    with pytest.raises(CommissionError, match=r"did not get ready within 15 s: .*node 2 \(right\)"):
+    with pytest.raises(CommissionError, match=r"were not ready within 15 s: .*node 2 \(right\)"):
         world.guide(whole)
     assert world.bench.base.path_m == 0.0
 

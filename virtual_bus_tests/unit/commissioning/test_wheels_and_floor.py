@@ -103,7 +103,8 @@ def test_a_wheel_that_runs_ten_times_as_fast_as_ordered_is_stopped_before_anybod
 
 
 @pytest.mark.parametrize(
-    ("answer", "told"), [("other", "exchange node_id"), ("nothing", "nobody saw it turn"), ("n", "nobody saw it turn")]
+    ("answer", "told"),
+    [("other", "exchange node_id"), ("nothing", "it was not seen to turn"), ("n", "it was not seen to turn")],
 )
 def test_a_person_who_sees_something_else_ends_it_with_advice(answer: str, told: str) -> None:
     world = GuideWorld(answers={"direction.left": answer})

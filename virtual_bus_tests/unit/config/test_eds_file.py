@@ -189,7 +189,7 @@ def test_a_draft_is_a_profile_that_knows_what_it_does_not_know(tmp_path: Path) -
     result = CliRunner().invoke(app, ["config", "from-eds", str(written(tmp_path, WHOLE))])
     assert result.exit_code == 0
     assert "It will NOT stop by itself" in result.stderr
-    assert "an EDS cannot tell: what one bit of 60FFh" in result.stderr
+    assert "not in an EDS: what one bit of 60FFh" in result.stderr
     profile = load_profile(str(written(tmp_path, result.stdout, "drafted.yaml")))
     assert profile.title == 'Maker Drive "one"'
     assert profile.identity.vendor_id == 0x42

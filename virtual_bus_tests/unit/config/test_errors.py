@@ -27,7 +27,7 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
     "just above the range": (
         {12: "    node_id: 126"},
         ":12: drives[1].node_id: got 126, expected a whole number >= 1 and <= 125 "
-        "(CANopen node id; 126 and 127 are ours)",
+        "(CANopen node id; 126 and 127 are used by canbase)",
     ),
     "not a number": (
         {18: "  wheel_radius_m: .nan"},
@@ -49,7 +49,7 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
     "a whole number with decimals": (
         {7: "    node_id: 1.0"},
         ":7: drives[0].node_id: got 1.0, expected a whole number >= 1 and <= 125 "
-        "(CANopen node id; 126 and 127 are ours)\n    write 1",
+        "(CANopen node id; 126 and 127 are used by canbase)\n    write 1",
     ),
     "a word of YAML 1.1": (
         {31: "    required: no"},
@@ -115,7 +115,7 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
     ),
     "one drive": (
         dict.fromkeys(range(11, 17), ""),
-        ":5: drives: got a list of 1 entry, expected a list of 2 to 8 entries (one for each wheel that is driven)",
+        ":5: drives: got a list of 1 entry, expected a list of 2 to 8 entries (one for each driven wheel)",
     ),
     "two drives on one node and axis": (
         {12: "    node_id: 1"},
@@ -166,7 +166,7 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
     ),
     "an argument of the bus given twice": (
         {4: "  extra: {channel: can1}"},
-        ":4: bus.extra.channel: channel stands in bus itself; extra adds arguments, it replaces none",
+        ":4: bus.extra.channel: channel is a key of bus itself; extra only adds arguments",
     ),
     "feedback that is shorter than a few cycles": (
         {END: "timeouts: {feedback_s: 0.039}"},

@@ -40,7 +40,7 @@ def test_every_key_has_a_row_and_a_meaning(file: str) -> None:
         "| `command_s` | a number ≥ 0.05 and ≤ 0.5 | 0.2 | cmd_vel at the driver [s] |",
         "| `wheel_radius_m` | a number > 0.005 and ≤ 1 | **must be given** | [m] |",
         "| `side` | one of left, right | **must be given** | side of the base |",
-        "| `sources` | section | joystick, navigation, action | who may drive, by name |",
+        "| `sources` | section | joystick, navigation, action | velocity sources, by name |",
         "| `modes` | a list of 1 to any number of entries | 3, 9 |"
         " values of 6060h that take 60FFh, the preferred one first |",
     ],

@@ -125,14 +125,14 @@ def test_the_effective_configuration_spells_them_out_and_loads_without_the_files
         ("priority: 100", "priority: 10", "mux0.yaml:13: topics.joystick.priority: sources navigation and joystick have"
          " the same priority; each needs its own"),
         ("priority: 100", "priority: 256", "mux0.yaml:13: topics.joystick.priority: got 256, expected a whole number"
-         " >= 0 and <= 255 (the higher wins; no two alike)"),
+         " >= 0 and <= 255 (the highest fresh source drives; each value once)"),
         ("priority: 100", "priorty: 100", "mux0.yaml:11: topics.joystick.priority: missing, expected a whole number"),
         ("timeout : 0.5\n        priority: 10\n", "timeout : 0.0\n        priority: 10\n", "mux0.yaml:8:"
-         " topics.navigation.timeout: got 0.0, expected a number >= 0.05 and <= 2 (silent"),
+         " topics.navigation.timeout: got 0.0, expected a number >= 0.05 and <= 2 (without a message"),
         ("timeout : 0.5\n        priority: 100", "timeout : fast\n        priority: 100", 'mux0.yaml:12:'
          ' topics.joystick.timeout: got "fast", expected a number'),
-        ("joy_vel", "cmd_vel", "mux0.yaml:11: topics.joystick.topic: cmd_vel is what this robot orders itself"),
-        ("joy_vel", "/cmd_vel_mux", "mux0.yaml:11: topics.joystick.topic: /cmd_vel_mux is what this robot orders"),
+        ("joy_vel", "cmd_vel", "mux0.yaml:11: topics.joystick.topic: cmd_vel is an output of this robot"),
+        ("joy_vel", "/cmd_vel_mux", "mux0.yaml:11: topics.joystick.topic: /cmd_vel_mux is an output of this robot"),
         ("use_stamped: false", "use_stamped: 1", "mux0.yaml:4: use_stamped: got 1, expected true or false"),
         ("topics:", "topic:", "mux0.yaml: has no topics and no locks of twist_mux"),
         ("ros__parameters:", "parameters:", "mux0.yaml: has no topics and no locks of twist_mux"),

@@ -60,7 +60,7 @@ def test_a_robot_yaml_that_is_replaced_stays_beside_the_new_one(tmp_path: Path) 
 
 
 TARGET = "canbase@example.target"
-RESTARTED = f"now, with the robot standing: sudo systemctl restart {TARGET}"
+RESTARTED = f"now, with the robot at standstill: sudo systemctl restart {TARGET}"
 
 
 def upgraded(root: Path, wanted: Request) -> str:
@@ -75,7 +75,7 @@ def test_a_new_bit_rate_comes_into_force_with_the_interface_while_the_robot_is_s
     robot = changed(bus=load_robot(EXAMPLE).robot.bus.model_copy(update={"bitrate": 250_000}))
 
     assert upgraded(tmp_path, request(robot=robot)) == (
-        f"now, with the robot standing: sudo systemctl stop {TARGET} && "
+        f"now, with the robot at standstill: sudo systemctl stop {TARGET} && "
         f"sudo systemctl restart canbase-can@can0.service && sudo systemctl start {TARGET}"
     )
 

@@ -27,7 +27,7 @@ DRIVER, WATCHDOG = ["77F 05", "080"], ["77E 05", "1FE 01 00 00 00 0A 00 00 00", 
 
 
 def inspection(node_id: int, **changes: Any) -> Inspection:
-    """A node that is as robot.yaml wants it."""
+    """A node that is as in robot.yaml."""
     joint = {1: "left_wheel", 2: "right_wheel"}[node_id]
     well = Inspection(
         node_id, Identity(vendor_id=0, product_code=0xCB402, revision=1, serial=node_id), "", None,

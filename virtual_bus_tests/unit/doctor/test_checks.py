@@ -177,7 +177,7 @@ SOUND = {"topic": "scan", "required": True, "fresh": True, "age_s": 0.05, "usabl
 @pytest.mark.parametrize(
     ("changes", "dropped_before", "verdict", "told"),
     [
-        ({}, 0, Verdict.OK, "last usable scan 0.05 s old, 98% of its beams say something"),
+        ({}, 0, Verdict.OK, "last usable scan 0.05 s old, 98% of its beams are usable"),
         ({"dropped": 7}, 7, Verdict.OK, "98%"),
         ({"dropped": 7}, 2, Verdict.WARN, "5 scans dropped"),
         ({"usable_share": 0.3}, 0, Verdict.WARN, "30% of its beams"),

@@ -46,7 +46,7 @@ def test_what_is_no_state_frame_is_dropped_and_does_not_keep_the_watchdog_alive(
 
 def test_before_the_first_frame_it_is_missing() -> None:
     silent = WatchdogLink(timeout_s=0.2)
-    assert silent.view(10.0) == (WatchdogView.MISSING, "not heard yet; start it with `canbase watchdog`")
+    assert silent.view(10.0) == (WatchdogView.MISSING, "no frame of it yet; start it with `canbase watchdog`")
     assert math.isnan(silent.age_s(10.0))
     assert silent.cause == "none"
     assert silent.answer() is None
@@ -73,7 +73,7 @@ def test_whether_it_watches(data: str, now_s: float, view: WatchdogView, sentenc
 
 def test_every_cause_of_docs_bus_md_has_a_text() -> None:
     assert sorted(CAUSES) == [*range(19), 20, 21]
-    assert link("02 0b 00 00 00 00 00 00").cause == "told to end while a wheel turned"
+    assert link("02 0b 00 00 00 00 00 00").cause == "shut down while a wheel turned"
 
 
 def test_a_request_in_bytes_and_its_answer() -> None:

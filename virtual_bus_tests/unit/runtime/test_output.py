@@ -116,10 +116,10 @@ def test_the_watchdogs_next_line_tells_how_many_were_lost() -> None:
         assert lines.lost == 2
         os.read(end, 1 << 20)
         logger.warning("ladder: %s", "heartbeat withheld")
-        logger.warning("all drives stand")
+        logger.warning("all drives at standstill")
         assert os.read(end, 4096).decode() == (
             "WARNING (2 lines before this one were lost: nobody read them) ladder: heartbeat withheld\n"
-            "WARNING all drives stand\n"
+            "WARNING all drives at standstill\n"
         )
 
 

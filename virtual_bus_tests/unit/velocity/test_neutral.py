@@ -219,7 +219,7 @@ def test_a_status_counts_until_exactly_its_timeout(age_s: float, problem: str) -
     base = BaseReady()
     assert base.problem(0.0) == "nothing received on motor_driver/status yet"
     base.on_driver(DriverState.ENABLED, 1, 0.0)
-    assert base.problem(0.0) == "the emergency stop holds or waits for its reset"
+    assert base.problem(0.0) == "the emergency stop is pressed or not reset"
     base.on_estop(True)
     assert base.problem(age_s) == problem
 

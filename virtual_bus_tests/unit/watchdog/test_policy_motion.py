@@ -143,7 +143,7 @@ def test_the_sentences_about_feedback_have_the_values() -> None:
         "wheel_1_0 turns at 1.300 m/s (allowed 1.200 m/s)"
     )
     assert detail(replace(fast, feedback=Feedback(implausible=5, drift_m=-0.06)), right) == (
-        "wheel_1_0 reports 1.300 m/s, and its encoder tells otherwise: -0.060 m apart (allowed 0.050 m)"
+        "wheel_1_0 reports 1.300 m/s, and its encoder contradicts it: -0.060 m apart (allowed 0.050 m)"
     )
     verdicts = [
         decide(of(AT_REST, replace(STANDING, feedback=Feedback(**{count: 5}))), CONFIG, NOW) for count, _ in COUNTS
@@ -221,7 +221,7 @@ def test_the_sentence_about_power_at_a_stand_has_the_values() -> None:
     assert (verdict.cause, verdict.node_id) == (TripCause.POWER_AT_STAND, 2)
     assert verdict.detail == (
         "wheel_2_0 is ordered 0.000 m/s, reports 0.000 m/s and has been held with 40% of the rated torque for "
-        "0.300 s (allowed 0.200 s) without letting go: that may be a dead encoder and not a stand "
+        "0.300 s (allowed 0.200 s) without release of the wheel: its encoder may be dead "
         "(watchdog.stand_proof, watchdog.stand_answer_s)"
     )
     untold = replace(AT_REST, push=Push(None, overdue_s=0.3))
@@ -237,7 +237,7 @@ def test_the_sentence_about_a_push_in_vain_has_the_torque() -> None:
 
 def test_a_base_that_moves_otherwise_trips_without_a_node() -> None:
     verdict = decide(of(AT_REST, twist="1.000 rad/s together"), CONFIG, NOW)
-    assert verdict == Verdict(TripCause.TWIST_OUTSIDE, 0, "the base moves otherwise than ordered: 1.000 rad/s together")
+    assert verdict == Verdict(TripCause.TWIST_OUTSIDE, 0, "the base does not move as ordered: 1.000 rad/s together")
 
 
 # --- frames of one axis: 0.1 s at 100 Hz are 10 SYNCs
