@@ -9,7 +9,8 @@ from collections.abc import Callable
 from types import FrameType
 
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import Executor
+from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from canbase_action_server.drive_messages import drive_binding
@@ -32,7 +33,7 @@ def run(robot: Robot, ros_args: list[str], when_ready: Callable[[], None] = lamb
     guard_keys(os.environ)
     never_wait(os.environ)
     rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)
-    executor = SingleThreadedExecutor()
+    executor = EventsExecutor()
     node = DriveDistanceServer(robot, [drive_binding(), rotate_binding(robot)])
     executor.add_node(node)
     asked_to_end = _catch_signals()
@@ -60,7 +61,7 @@ def _catch_signals() -> list[int]:
     return received
 
 
-def _serve(executor: SingleThreadedExecutor, node: DriveDistanceServer, asked_to_end: list[int]) -> None:
+def _serve(executor: Executor, node: DriveDistanceServer, asked_to_end: list[int]) -> None:
     service = Service()
     while not asked_to_end and node.failure is None:
         _spin(executor, node)
@@ -68,14 +69,15 @@ def _serve(executor: SingleThreadedExecutor, node: DriveDistanceServer, asked_to
     service.stopping()
 
 
-def _spin(executor: SingleThreadedExecutor, node: DriveDistanceServer) -> None:
+def _spin(executor: Executor, node: DriveDistanceServer) -> None:
     try:
         executor.spin_once(timeout_sec=SLICE_S)
+        node.look_at_the_clock(time.monotonic())
     except Exception as error:  # noqa: BLE001  a defect in the action's callbacks ends here; the base must stop
         node.fail(error)
 
 
-def _end(executor: SingleThreadedExecutor, node: DriveDistanceServer, stop_s: float) -> None:
+def _end(executor: Executor, node: DriveDistanceServer, stop_s: float) -> None:
     """`stop_s`: the base has this long to stand; then the goal ends without it."""
     node.shut_down()
     give_up = time.monotonic() + stop_s

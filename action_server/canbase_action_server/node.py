@@ -1,7 +1,7 @@
 """The ROS node drive_distance_server: topics in, a timer that ticks the goals, the actions' callbacks, log lines.
 
-Runs in one thread (SingleThreadedExecutor, docs/decisions/0003-executor.md): no callback blocks, and none can come
-between the decision on a goal and its admission.
+Runs in one thread (docs/decisions/0062-an-action-server-that-idles.md): no callback blocks or awaits, and none can
+come between the decision on a goal and its admission. At rest there is no timer, and odometry is kept as it came.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from unique_identifier_msgs.msg import UUID
 
 from canbase_action_server import messages
@@ -65,6 +66,8 @@ class DriveDistanceServer(Node):
         self._goal_queue = GoalQueue(robot)
         self._voice = Voice(self.get_logger(), Journal("drive_distance_server"))
         self._inputs = Inputs()
+        self._odometry_waiting: tuple[bytes, float] | None = None
+        """The last message of odom that was not looked at yet, serialized, and when it was received."""
         self._request_times = ReceiveTimes(REQUEST_GAP_S, RESENT_S)
         self._keepalive_times = ReceiveTimes(robot.action.client_lease_s)
         """One that waited for longer than the lease does not say that the client lives now."""
@@ -72,7 +75,7 @@ class DriveDistanceServer(Node):
         self.failure: Exception | None = None
         """The first exception that a callback raised; the process must end with an error."""
         self._orders = self.create_publisher(TwistStamped, "cmd_vel_action", 1)
-        self._listen(OdometryMessage, "odom", SENSOR_QOS, self._on_odometry)
+        self._listen(OdometryMessage, "odom", SENSOR_QOS, self._on_odometry, raw=True)
         self._listen(SafetyState, "safety_filter/state", LATCHED_QOS, self._on_safety)
         self._listen(DriverStatus, "motor_driver/status", STATUS_QOS, self._on_driver)
         self._listen(MuxState, "velocity_mux/state", LATCHED_QOS, self._on_mux)
@@ -80,7 +83,8 @@ class DriveDistanceServer(Node):
         self._servers = [self._serve(binding) for binding in bindings]
         # The steady clock: setting the computer's time must not stretch a control cycle.
         period_s = 1.0 / robot.action.control_hz
-        self.create_timer(period_s, self._guarded(self._on_timer), clock=Clock(clock_type=ClockType.STEADY_TIME))
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = self.create_timer(period_s, self._guarded(self._on_timer), clock=steady)
 
     @property
     def busy(self) -> bool:
@@ -109,8 +113,16 @@ class DriveDistanceServer(Node):
         for line in "".join(traceback.format_exception(error)).splitlines():
             self._voice.tell(line, Priority.ERROR, robot=self._robot.name)
 
-    def _listen(self, kind: type[T], topic: str, qos: QoSProfile, callback: Callable[[T], None]) -> None:
-        self.create_subscription(kind, topic, self._guarded(callback), qos)
+    def look_at_the_clock(self, now_s: float) -> None:
+        """Call at least every 0.1 s: a pause of this process is found by it."""
+        for times in (self._request_times, self._keepalive_times):
+            times.at(now_s)
+
+    def _listen(
+        self, kind: type[T], topic: str, qos: QoSProfile, callback: Callable[..., None], raw: bool = False
+    ) -> None:
+        """`raw`: the callback gets bytes, as `deserialize_message` takes them."""
+        self.create_subscription(kind, topic, self._guarded(callback), qos, raw=raw)
 
     def _guarded(self, callback: Callable[..., None]) -> Callable[..., None]:
         def guarded(*args: Any) -> None:
@@ -121,10 +133,17 @@ class DriveDistanceServer(Node):
 
         return guarded
 
-    def _on_odometry(self, message: OdometryMessage) -> None:
-        odometry = messages.odometry_in(message, time.monotonic())
-        if odometry is not None:
-            self._inputs = replace(self._inputs, odometry=odometry)
+    def _on_odometry(self, serialized: bytes) -> None:
+        self._odometry_waiting = serialized, time.monotonic()
+
+    def _look(self) -> Inputs:
+        """What was received, odometry too. To take a message of odom apart costs more than to receive it."""
+        if self._odometry_waiting is not None:
+            (serialized, received_s), self._odometry_waiting = self._odometry_waiting, None
+            odometry = messages.odometry_in(deserialize_message(serialized, OdometryMessage), received_s)
+            if odometry is not None:
+                self._inputs = replace(self._inputs, odometry=odometry)
+        return self._inputs
 
     def _on_safety(self, message: SafetyState) -> None:
         self._inputs = replace(self._inputs, safety=messages.safety_in(message, time.monotonic()))
@@ -145,7 +164,7 @@ class DriveDistanceServer(Node):
             self,
             binding.type,
             name,
-            execute_callback=self._execute,
+            execute_callback=self._finish,
             goal_callback=partial(self._on_goal, binding),
             handle_accepted_callback=partial(self._on_accepted, binding),
             cancel_callback=self._on_cancel,
@@ -162,7 +181,7 @@ class DriveDistanceServer(Node):
     def _on_goal(self, binding: Binding, goal: Any) -> GoalResponse:
         now_s = time.monotonic()
         old = OLD if self._request_times.waited(now_s) else None
-        reason = old or self._goal_queue.refusal(binding.request(goal), self._inputs, now_s)
+        reason = old or self._goal_queue.refusal(binding.request(goal), self._look(), now_s)
         if reason is None:
             return GoalResponse.ACCEPT
         # rclpy does not tell the UUID of a goal that is not accepted yet.
@@ -172,40 +191,39 @@ class DriveDistanceServer(Node):
 
     def _on_accepted(self, binding: Binding, handle: ServerGoalHandle) -> None:
         goal, now_s, uuid = handle.request, time.monotonic(), uuid_of(handle)
-        self._goal_queue.admit(uuid, binding.request(goal), self._inputs, now_s)
+        self._goal_queue.admit(uuid, binding.request(goal), self._look(), now_s)
         self._open[uuid] = OpenGoal(handle, binding, now_s)
+        self._timer.reset()
         self._log(GoalStep.ACCEPTED, uuid, action=binding.name, **numbers(goal))
 
     def _on_cancel(self, handle: ServerGoalHandle) -> CancelResponse:
         self._log(GoalStep.CANCEL_REQUESTED, uuid_of(handle))
         return CancelResponse.ACCEPT
 
-    async def _execute(self, handle: ServerGoalHandle) -> Any:
+    def _finish(self, handle: ServerGoalHandle) -> Any:
+        """The execute callback of rclpy, called when a goal has ended: its status is set, its result goes out."""
+        uuid = uuid_of(handle)
         try:
-            return await self._run(uuid_of(handle))
+            goal = self._open[uuid]
+            outcome, result = goal.finish()
+            del self._open[uuid]
+            self._log_end(uuid, goal, outcome, result)
         except Exception as error:
             self.fail(error)  # rclpy would log it, abort the goal, and leave the base moving
             raise
-
-    async def _run(self, uuid: str) -> Any:
-        goal = self._open[uuid]
-        outcome: Outcome = await goal.outcome
-        result = goal.finish(outcome)
-        del self._open[uuid]
-        self._log_end(uuid, goal, outcome, result)
         return result
 
     def _on_timer(self) -> None:
-        for times in (self._request_times, self._keepalive_times):
-            times.at(time.monotonic())
         for uuid, goal in self._open.items():
             if goal.handle.is_cancel_requested:
                 self._goal_queue.cancel(uuid)
         running, before = self._goal_queue.running, self._goal_queue.phase
-        cycle = self._goal_queue.tick(self._inputs, time.monotonic())
+        cycle = self._goal_queue.tick(self._look(), time.monotonic())
         if self._goal_queue.phase is not before:
             self._log_phase(running, before, cycle)
         self._carry_out(cycle)
+        if not self.busy and cycle.twist is None:
+            self._timer.cancel()  # until the next goal is accepted
 
     def _carry_out(self, cycle: Cycle) -> None:
         if cycle.twist is not None:

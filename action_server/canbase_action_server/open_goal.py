@@ -1,13 +1,12 @@
-"""One accepted goal as ROS sees it: its handle, and the outcome that the execute callback waits for."""
+"""One accepted goal as ROS sees it: its handle, and the outcome that it ends with."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-from rclpy.action.server import ServerGoalHandle
-from rclpy.task import Future
+from rclpy.action.server import GoalEvent, ServerGoalHandle
 
 from canbase_action_server.binding import Binding
 from canbase_action_server.goal import Feedback
@@ -45,30 +44,37 @@ class OpenGoal:
     binding: Binding
     accepted: float
     executing: bool = False
-    outcome: Future = field(default_factory=Future)
+    outcome: Outcome | None = None
 
     def execute(self) -> None:
-        """Calls the execute callback soon; the goal is EXECUTING from now on. Once is enough."""
+        """The goal is EXECUTING from now on. Once is enough.
+
+        rclpy ties this state to the start of the execute callback, which then has to wait for the end of the goal. A
+        callback that waits is asked by the executor again and again, so it is called at the end (`end`).
+        """
         if not self.executing:
             self.executing = True
-            self.handle.execute()
+            if not self.handle.is_cancel_requested:
+                self.handle._update_state(GoalEvent.EXECUTE)
 
     def tell(self, feedback: Feedback) -> None:
         """To the client."""
         self.handle.publish_feedback(self.binding.feedback(feedback))
 
     def end(self, outcome: Outcome) -> None:
-        """Lets the execute callback go on. A goal that never ran passes through EXECUTING, as the protocol wants it."""
+        """Has the execute callback called. A goal that never ran passes through EXECUTING, as the protocol wants it."""
         self.execute()
-        self.outcome.set_result(outcome)
+        self.outcome = outcome
+        self.handle._action_server.notify_execute(self.handle, None)
 
-    def finish(self, outcome: Outcome) -> Any:
-        """Sets the final status; the result for the client."""
-        match outcome.status:
+    def finish(self) -> tuple[Outcome, Any]:
+        """Sets the final status; how the goal ended, and the result for the client."""
+        assert self.outcome is not None  # `end` was called before
+        match self.outcome.status:
             case Status.SUCCEEDED:
                 self.handle.succeed()
             case Status.CANCELED:
                 self.handle.canceled()
             case Status.ABORTED:
                 self.handle.abort()
-        return self.binding.result(outcome)
+        return self.outcome, self.binding.result(self.outcome)
