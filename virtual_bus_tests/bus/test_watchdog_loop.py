@@ -165,7 +165,30 @@ def test_only_data_frames_with_11_bits_are_taken_in() -> None:
     with BusPort({"interface": "virtual", "channel": "kinds"}) as port, can.Bus("kinds", interface="virtual") as other:
         for kind in ({"is_extended_id": True}, {"is_remote_frame": True}, {"is_error_frame": True}, {}):
             other.send(can.Message(arbitration_id=0x701, data=b"", **{"is_extended_id": False} | kind))
-        assert list(port.receive()) == [(0x701, b"")]
+        assert [frame[:2] for frame in port.receive(time.monotonic())] == [(0x701, b"")]
+
+
+@pytest.mark.parametrize("set_by_s", [0.0, 3600.0, -3600.0])
+def test_a_frame_has_the_time_at_which_it_came_and_not_that_of_its_taking(
+    set_by_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """0 ms a look, 20 ms a frame comes, 60 ms it is taken. A wall clock that was set in between says nothing."""
+    with BusPort({"interface": "virtual", "channel": "times"}) as port, can.Bus("times", interface="virtual") as other:
+        assert list(port.receive(time.monotonic())) == []
+        time.sleep(0.02)
+        before_s = time.monotonic()
+        other.send(can.Message(arbitration_id=0x701, data=b"\5", is_extended_id=False))
+        after_s = time.monotonic()
+        time.sleep(0.04)
+        wall_clock = time.time
+        monkeypatch.setattr(time, "time", lambda: wall_clock() + set_by_s)
+        now_s = time.monotonic()
+        [(_, _, at_s)] = port.receive(now_s)
+
+        if set_by_s == 0.0:
+            assert before_s - 1e-5 <= at_s <= after_s + 1e-5
+        else:
+            assert at_s == now_s
 
 
 def test_error_frames_tell_that_the_bus_fails_and_frames_that_it_works_again() -> None:
@@ -173,10 +196,10 @@ def test_error_frames_tell_that_the_bus_fails_and_frames_that_it_works_again() -
     with BusPort({"interface": "virtual", "channel": "off"}) as port, can.Bus("off", interface="virtual") as other:
         before = time.monotonic()
         other.send(bus_off)
-        assert list(port.receive()) == []
+        assert list(port.receive(time.monotonic())) == []
         assert before <= port.health.failed_since <= time.monotonic()
         other.send(can.Message(arbitration_id=0x123, is_extended_id=True))
-        assert list(port.receive()) == []
+        assert list(port.receive(time.monotonic())) == []
         assert (port.health.failed_since, port.health.errors) == (math.inf, 1)
 
 

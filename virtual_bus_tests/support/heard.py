@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from functools import partial
 
 import can
@@ -32,7 +33,7 @@ def main(port: int, hop_limit: int) -> None:
         sys.stdin.readline()
         heard = {
             "driver": [frame.cob_id for frame in iter(partial(driver.receive, 0.0), None)],
-            "watchdog": [cob_id for cob_id, _ in watchdog.receive()],
+            "watchdog": [cob_id for cob_id, _, _ in watchdog.receive(time.monotonic())],
             "simulator": [message.arbitration_id for message in iter(partial(simulator.recv, 0.0), None)],
             "neighbour": [message.arbitration_id for message in iter(partial(neighbour.recv, 0.0), None)],
         }

@@ -42,6 +42,7 @@ class BusPort:
                 "Check `bus` in robot.yaml, and that the interface is up (ip -details link show)."
             ) from error
         self._waiting: can.Message | None = None
+        self._received_until = time.monotonic()
         self.health = BusHealth()
         self.datagrams_dropped = 0
         """Those that were no CAN frame. The bus is as good as before."""
@@ -63,11 +64,19 @@ class BusPort:
         """Wait for a frame on a bus without a fileno. It is kept for `receive`."""
         self._waiting = self._take(timeout_s)
 
-    def receive(self) -> Iterator[tuple[int, bytes]]:
-        """Identifier and data of what has arrived, at most BATCH; without error, remote and 29-bit frames."""
+    def receive(self, now_s: float) -> Iterator[tuple[int, bytes, float]]:
+        """Identifier, data and receive time [s, monotonic] of what has arrived, at most BATCH; without error, remote
+        and 29-bit frames.
+
+        The time is the kernel's, which has it by the wall clock, where it lies between the last frame, or the last
+        time that there was none, and `now_s`. Else it is `now_s`: the wall clock was set in between, or an adapter has
+        a clock of its own.
+        """
+        behind_s = time.time() - time.monotonic()
         for _ in range(BATCH):
             message, self._waiting = self._waiting or self._take(0.0), None
             if message is None:
+                self._received_until = now_s
                 return
             if message is NO_FRAME or type(message.arbitration_id) is not int:  # python-can lets 1.5 pass there
                 self.datagrams_dropped += 1
@@ -77,7 +86,9 @@ class BusPort:
                 continue
             self.health.on_data()
             if not (message.is_remote_frame or message.is_extended_id or message.is_fd):
-                yield message.arbitration_id, bytes(message.data)
+                at_s = message.timestamp - behind_s
+                self._received_until = at_s if self._received_until <= at_s <= now_s else now_s
+                yield message.arbitration_id, bytes(message.data), self._received_until
 
     def send(self, frame: Frame) -> None:
         """Send now or never: a frame that the bus does not take at once is counted and dropped."""

@@ -1,4 +1,8 @@
-"""The watchdog's one thread: waits for frames, leases and the next tick, and hands them to watchdog.py."""
+"""The watchdog's one thread: waits for leases and the next tick, and hands them and the frames to watchdog.py.
+
+Frames are acted on in a tick alone, so none of them wakes this thread: a tick takes in what has arrived since the last
+one, each frame with the time at which the kernel received it.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +55,7 @@ class Loop:
         self._keeper = keeper
         self._record_problem = ""
         self._reporter = Reporter(watchdog)
-        self._bus_fd = bus.fileno()
+        self._bus_has_fd = bus.fileno() is not None
         self._due = self._sent_at = self._collected_at = time.monotonic()
         self._suspended_s = suspended_s()
         self._acted_at = self._due
@@ -78,18 +82,18 @@ class Loop:
             self._due = max(self._due, now_s - TICK_S) + TICK_S if now_s >= self._due else self._due
 
     def _wait(self, timeout_s: float) -> None:
-        if self._bus_fd is None:
-            self._bus.wait(timeout_s)
+        if self._bus_has_fd:
+            select.select([self._leases.fileno()], [], [], timeout_s)
         else:
-            select.select([self._bus_fd, self._leases.fileno()], [], [], timeout_s)
+            self._bus.wait(timeout_s)
 
     def _take_in(self) -> float:
         """Everything that has arrived, leases first. Returns the time [s] of it."""
         now_s = time.monotonic()
         for datagram, uid, pid in self._leases.receive():
             self._watchdog.on_lease(datagram, uid, now_s, pid)
-        for cob_id, data in self._bus.receive():
-            self._watchdog.on_frame(cob_id, data, now_s)
+        for cob_id, data, at_s in self._bus.receive(now_s):
+            self._watchdog.on_frame(cob_id, data, at_s)
         return now_s
 
     def _act(self, now_s: float) -> None:

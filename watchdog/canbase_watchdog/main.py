@@ -91,7 +91,8 @@ def _listen_for_another(bus: BusPort) -> None:
     end = time.monotonic() + LISTEN_S
     while (left_s := end - time.monotonic()) > 0.0:
         bus.wait(left_s)
-        if any(cob_id in (frames.STATE, frames.WATCHDOG_HEARTBEAT) for cob_id, _ in bus.receive()):
+        received = bus.receive(time.monotonic())
+        if any(cob_id in (frames.STATE, frames.WATCHDOG_HEARTBEAT) for cob_id, _, _ in received):
             raise sole.TakenError(
                 f"another watchdog is on the bus: its heartbeat or state frame came within {LISTEN_S} s. "
                 "Only one may run; end it first, on the computer that it runs on"

@@ -46,7 +46,7 @@ class Machine:
     def fileno(self) -> int:
         return 0
 
-    def receive(self) -> list[Any]:
+    def receive(self, *_now_s: float) -> list[Any]:
         self.now_s += TURN_S / 2.0
         return []
 
