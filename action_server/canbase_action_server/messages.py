@@ -1,14 +1,12 @@
-"""Topics in, plain inputs out, and the order back. The actions' own messages: `drive_messages.py`."""
+"""Topics in, plain inputs out. The actions' own messages: `drive_messages.py`."""
 
 from __future__ import annotations
 
 from canbase.msg import DriverStatus, MuxState, SafetyState
-from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry as OdometryMessage
 
 from canbase_action_server.along_track import Pose, yaw_of_quaternion
 from canbase_action_server.inputs import Driver, Mux, Odometry, Safety
-from canbase_action_server.motion import Twist
 from canbase_runtime.driver_state import driver_state
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
 from canbase_runtime.stop_cause import stop_cause
@@ -49,11 +47,3 @@ def mux_in(message: MuxState, received: float, own_source: str) -> Mux:
     """From velocity_mux/state. `own_source`: name of the source that the goals' orders go to."""
     locked = (source.reason for source in message.sources if source.name == own_source and source.locked)
     return Mux(received, printable(message.active), printable(next(locked, "")))
-
-
-def twist_out(twist: Twist, frame: str) -> TwistStamped:
-    """For cmd_vel_action, not stamped yet."""
-    message = TwistStamped()
-    message.header.frame_id = frame
-    message.twist.linear.x, message.twist.angular.z = twist.linear_mps, twist.angular_radps
-    return message

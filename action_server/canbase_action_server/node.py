@@ -43,6 +43,7 @@ from canbase_config.robot import Robot
 from canbase_runtime.journal import Journal, Voice
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.receive_time import REQUEST_GAP_S, RESENT_S, ReceiveTimes
+from canbase_runtime.serialized_message import SerializedTwist
 from canbase_runtime.sim_time import refuse_sim_time
 
 SENSOR_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -74,6 +75,7 @@ class DriveDistanceServer(Node):
         self._open: dict[str, OpenGoal] = {}
         self.failure: Exception | None = None
         """The first exception that a callback raised; the process must end with an error."""
+        self._serialized = SerializedTwist(robot.base.base_frame)
         self._orders = self.create_publisher(TwistStamped, "cmd_vel_action", 1)
         self._listen(OdometryMessage, "odom", SENSOR_QOS, self._on_odometry, raw=True)
         self._listen(SafetyState, "safety_filter/state", LATCHED_QOS, self._on_safety)
@@ -238,9 +240,8 @@ class DriveDistanceServer(Node):
             self._open[end.key].end(end.outcome)
 
     def _order(self, twist: Twist) -> None:
-        message = messages.twist_out(twist, self._robot.base.base_frame)
-        message.header.stamp = self.get_clock().now().to_msg()
-        self._orders.publish(message)
+        stamp = self.get_clock().now().to_msg()
+        self._orders.publish(self._serialized.pack(twist.linear_mps, twist.angular_radps, stamp))
 
     def _log(self, step: GoalStep, uuid: str | None, **fields: Any) -> None:
         self._write_log(step, uuid, fields, Priority.INFO)

@@ -26,6 +26,7 @@ from canbase_runtime.journal import Journal, Voice
 from canbase_runtime.latch_file import LatchKeeper
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.receive_time import ReceiveTimes
+from canbase_runtime.serialized_message import SerializedTwist
 from canbase_runtime.sim_time import refuse_sim_time
 from canbase_velocity import messages
 from canbase_velocity.changes import DropTeller, changed_order, is_told
@@ -72,6 +73,7 @@ class FilterNode(Node):
         self._decision = self._filter.decide(time.monotonic())
         self._state_at_s = -math.inf
         self._stands_from_s = -math.inf
+        self._serialized = SerializedTwist(robot.base.base_frame)
         self._commands = self.create_publisher(TwistStamped, "cmd_vel", COMMAND)
         self._states = self.create_publisher(SafetyState, "safety_filter/state", STATE)
         listen_closely(self, Bool, robot.safety.estop.topic, self._on_estop)
@@ -199,9 +201,9 @@ class FilterNode(Node):
         self._request_times.at(now_s)
         self._send_lease(decision)
         stamp = self.get_clock().now().to_msg()
-        self._commands.publish(messages.twist_message(decision.twist, stamp, self._robot.base.base_frame))
-        if not decision.twist.is_zero:
-            order = decision.twist
+        order = decision.twist
+        self._commands.publish(self._serialized.pack(order.linear_mps, order.angular_radps, stamp))
+        if not order.is_zero:
             self._stands_from_s = now_s + ramp(self._robot.limits, order.linear_mps, order.angular_radps).time_s
         self._tell(decision, now_s)
         self._decision = decision

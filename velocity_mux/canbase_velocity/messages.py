@@ -7,7 +7,6 @@ import math
 from builtin_interfaces.msg import Time
 from canbase.msg import SafetyState, ScannerState
 from geometry_msgs.msg import Twist as TwistMessage
-from geometry_msgs.msg import TwistStamped
 from sensor_msgs.msg import LaserScan
 
 from canbase_velocity.clearance import Clearances
@@ -32,16 +31,6 @@ def twist_of(message: TwistMessage) -> Twist:
     if not all(map(math.isfinite, unused)):
         return Twist(NAN, NAN)
     return Twist(message.linear.x, message.angular.z)
-
-
-def twist_message(twist: Twist, stamp: Time, frame_id: str) -> TwistStamped:
-    """A command in `frame_id` (REP 105: base_link)."""
-    message = TwistStamped()
-    message.header.stamp = stamp
-    message.header.frame_id = frame_id
-    message.twist.linear.x = twist.linear_mps
-    message.twist.angular.z = twist.angular_radps
-    return message
 
 
 def sent_at(stamp: Time, wall_s: float, now_s: float) -> Sent | None:

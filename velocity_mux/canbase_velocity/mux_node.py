@@ -23,12 +23,13 @@ from canbase_config.robot import Robot
 from canbase_runtime.driver_state import driver_state
 from canbase_runtime.journal import Journal, Voice
 from canbase_runtime.receive_time import ReceiveTimes
+from canbase_runtime.serialized_message import SerializedTwist
 from canbase_runtime.sim_time import refuse_sim_time
 from canbase_velocity.base_ready import status_timeout_s
 from canbase_velocity.changes import changes
 from canbase_velocity.delay import Sent
 from canbase_velocity.graph import expected, heard, publishers
-from canbase_velocity.messages import sent_at, twist_message, twist_of
+from canbase_velocity.messages import sent_at, twist_of
 from canbase_velocity.mux import Mux, MuxDecision
 from canbase_velocity.mux_messages import diagnostics, mux_state
 from canbase_velocity.qos import ANY_COMMAND, COMMAND, DRIVER_STATUS, STATE, listen_closely, loud
@@ -78,6 +79,7 @@ class MuxNode(Node):
         self._state_at_s = -math.inf
         self._deaf: list[str] = []
         self._ending = False
+        self._serialized = SerializedTwist(robot.base.base_frame)
         self._commands = self.create_publisher(
             TwistStamped, "cmd_vel_mux", COMMAND, event_callbacks=loud(self, "cmd_vel_mux", self._deaf)
         )
@@ -144,7 +146,9 @@ class MuxNode(Node):
         """Into the ROS graph. What is found there is logged when it comes."""
         now_s = time.monotonic()
         before = self._decision.foreign
-        graph = {topic.topic: publishers(self, topic.topic) for topic in self._watch.expected}
+        heard_at = {topic: self.resolve_topic_name(topic) for topic in self._heard}
+        names = {topic.topic for topic in self._watch.expected} | set(heard_at.values())
+        graph = {name: publishers(self, name) for name in names}
         foreign = self._watch.look(graph, now_s)
         for found in foreign:
             if found not in before:
@@ -152,7 +156,7 @@ class MuxNode(Node):
                 self._voice.tell(found.sentence, found.priority, robot=self._robot.name, **told)
         self._mux.on_foreign(foreign)
         for topic, kind in self._heard.items():
-            there = [found for found in publishers(self, self.resolve_topic_name(topic)) if found.kind == kind]
+            there = [found for found in graph[heard_at[topic]] if found.kind == kind]
             self._mux.on_publishers(topic, [found.node for found in there], [found.key for found in there])
         self._send_if_changed(now_s)
 
@@ -178,7 +182,9 @@ class MuxNode(Node):
         if self._follower is not None:
             self._follower.obey(decision.twist, now_s)
         stamp = self.get_clock().now().to_msg()
-        self._commands.publish(twist_message(decision.twist, stamp, self._robot.base.base_frame))
+        if self._commands.get_subscription_count() > 0:
+            order = decision.twist
+            self._commands.publish(self._serialized.pack(order.linear_mps, order.angular_radps, stamp))
         if decision.essence != self._decision.essence or now_s - self._state_at_s >= STATE_PERIOD_S:
             self._states.publish(mux_state(decision, stamp))
             self._state_at_s = now_s

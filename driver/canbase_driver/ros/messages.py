@@ -59,13 +59,18 @@ def tf_message(snapshot: DriverSnapshot, stamp: Time) -> TFMessage | None:
 
 def joint_state_message(snapshot: DriverSnapshot, stamp: Time) -> JointState:
     """Angle and speed of each wheel that has given feedback; one that has not is left out, as its angle is unknown."""
-    heard = [drive for drive in snapshot.drives if not math.isnan(drive.feedback_age_s)]
+    heard = heard_drives(snapshot)
     message = JointState()
     message.header.stamp = stamp
     message.name = [drive.joint for drive in heard]
     message.position = [drive.position_rad for drive in heard]
     message.velocity = [drive.velocity_radps for drive in heard]
     return message
+
+
+def heard_drives(snapshot: DriverSnapshot) -> list[DriveSnapshot]:
+    """The drives that have given feedback."""
+    return [drive for drive in snapshot.drives if not math.isnan(drive.feedback_age_s)]
 
 
 def status_message(snapshot: DriverSnapshot, stamp: Time) -> DriverStatus:
@@ -124,8 +129,13 @@ def pose_of(message: Pose) -> Pose2D:
     return Pose2D(message.position.x, message.position.y, yaw_rad)
 
 
+def half_turn(yaw_rad: float) -> float:
+    """Half of the angle, which its quaternion is made of [rad]. An angle and the same with whole turns have one."""
+    return wrap_angle(yaw_rad) / 2.0
+
+
 def _quaternion(yaw_rad: float) -> Quaternion:
-    half_rad = wrap_angle(yaw_rad) / 2.0
+    half_rad = half_turn(yaw_rad)
     return Quaternion(x=0.0, y=0.0, z=math.sin(half_rad), w=math.cos(half_rad))
 
 

@@ -22,6 +22,7 @@ from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.ros import messages
 from canbase_driver.ros.diagnostics import diagnostics_message, unguarded
 from canbase_driver.ros.managed_node import ManagedNode
+from canbase_driver.ros.serialized_motion import SerializedMotion
 from canbase_driver.ros.services import DriverServices
 from canbase_driver.ros.stop_events import StopEvents
 from canbase_driver.runtime.black_box import Ring
@@ -55,6 +56,7 @@ class MotorDriverNode(ManagedNode):
         self.create_subscription(SafetyState, "safety_filter/state", self._on_safety, COMMAND_QOS)
         self._stops = StopEvents(self, robot, ring, writer, self.voice)
         self._offers = DriverServices(self, loop, robot.base.odom_frame, self.request_times)
+        self._motion = SerializedMotion()
         self._previous: DriverSnapshot | None = None
         self._diagnosed: DriverSnapshot | None = None
         self._status_at = 0.0
@@ -71,10 +73,10 @@ class MotorDriverNode(ManagedNode):
         stamp = self.get_clock().now().to_msg()
         self._stops.tell(snapshot, stops)
         if snapshot.odometry.valid:
-            self._odom.publish(messages.odometry_message(snapshot, stamp))
-            self._joints.publish(messages.joint_state_message(snapshot, stamp))
+            self._odom.publish(self._motion.odometry(snapshot, stamp))
+            self._joints.publish(self._motion.joint_state(snapshot, stamp))
             if self._tf is not None:
-                self._tf.publish(messages.tf_message(snapshot, stamp))
+                self._tf.publish(self._motion.transform(snapshot, stamp))
         self._publish_status(snapshot, stamp)
         self._log_change(snapshot)
         self._warn_of_unguarded(snapshot)

@@ -1,0 +1,91 @@
+"""odom, tf and joint_states of each snapshot as bytes: what `messages.py` makes of it, without its ROS objects."""
+
+from __future__ import annotations
+
+import math
+
+from builtin_interfaces.msg import Time
+from rclpy.serialization import serialize_message
+
+from canbase_driver.ros import messages
+from canbase_driver.snapshot import DriverSnapshot
+from canbase_runtime.serialized_message import SerializedMessage
+
+_STAMP = ("header.stamp.sec", "header.stamp.nanosec")
+_ODOMETRY = (
+    *_STAMP,
+    "pose.pose.position.x",
+    "pose.pose.position.y",
+    "pose.pose.orientation.z",
+    "pose.pose.orientation.w",
+    "pose.covariance",
+    "twist.twist.linear.x",
+    "twist.twist.angular.z",
+    "twist.covariance",
+)
+_TRANSFORM = tuple(
+    f"transforms.0.{name}"
+    for name in (
+        *_STAMP,
+        "transform.translation.x",
+        "transform.translation.y",
+        "transform.rotation.z",
+        "transform.rotation.w",
+    )
+)
+_JOINTS = (*_STAMP, "position", "velocity")
+
+
+class SerializedMotion:
+    """Of one robot: its frames do not change. The names of the joints may, when a drive is heard for the first time."""
+
+    def __init__(self) -> None:
+        self._odometry: SerializedMessage | None = None
+        self._transform: SerializedMessage | None = None
+        self._joints: SerializedMessage | None = None
+        self._names: list[str] = []
+
+    def odometry(self, snapshot: DriverSnapshot, stamp: Time) -> bytes:
+        """`messages.odometry_message`."""
+        if self._odometry is None:
+            self._odometry = SerializedMessage(messages.odometry_message(snapshot, stamp), *_ODOMETRY)
+        seen = snapshot.odometry
+        half_rad = messages.half_turn(seen.pose.yaw_rad)
+        return self._odometry.pack(
+            stamp.sec,
+            stamp.nanosec,
+            seen.pose.x_m,
+            seen.pose.y_m,
+            math.sin(half_rad),
+            math.cos(half_rad),
+            *seen.pose_covariance,
+            seen.twist.linear_mps,
+            seen.twist.angular_radps,
+            *seen.twist_covariance,
+        )
+
+    def transform(self, snapshot: DriverSnapshot, stamp: Time) -> bytes:
+        """`messages.tf_message`, where there is tf2_msgs."""
+        if self._transform is None:
+            self._transform = SerializedMessage(messages.tf_message(snapshot, stamp), *_TRANSFORM)
+        pose = snapshot.odometry.pose
+        half_rad = messages.half_turn(pose.yaw_rad)
+        return self._transform.pack(
+            stamp.sec, stamp.nanosec, pose.x_m, pose.y_m, math.sin(half_rad), math.cos(half_rad)
+        )
+
+    def joint_state(self, snapshot: DriverSnapshot, stamp: Time) -> bytes:
+        """`messages.joint_state_message`."""
+        heard = messages.heard_drives(snapshot)
+        names = [drive.joint for drive in heard]
+        if self._joints is None or names != self._names:
+            message = messages.joint_state_message(snapshot, stamp)
+            if not names:
+                return bytes(serialize_message(message))
+            self._joints, self._names = SerializedMessage(message, *_JOINTS), names
+        return self._joints.pack(
+            stamp.sec,
+            stamp.nanosec,
+            *[drive.position_rad for drive in heard],
+            *[drive.velocity_radps for drive in heard],
+        )
