@@ -109,12 +109,16 @@ mutation: $(VENV)/ready ## mutants of watchdog policy and CiA 402 tables, of cha
 exit-matrix: $(VENV)/ready ## every way out of a driving robot, for real, measured: docs/stop_times.md; ONLY=watchdog runs some
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m exit_matrix --write docs/stop_times.md --only '$(ONLY)'
 
+.PHONY: bench-quick
+bench-quick: $(VENV)/ready ## benchmarks of less than a minute; names what is slower than benchmarks/kept.json says
+	canbase benchmark --quick --compare benchmarks/kept.json
+
 .PHONY: bench
 bench: $(VENV)/ready ## every budget of this computer, measured beside a floor: docs/performance.md; NAME=reaction runs one
 ifdef NAME
 	canbase benchmark $(NAME)
 else
-	canbase benchmark --write docs/performance.md
+	canbase benchmark --write docs/performance.md --json benchmarks/kept.json
 endif
 
 .PHONY: hazards

@@ -9,6 +9,10 @@ from dataclasses import dataclass
 MS = 1000.0
 
 
+NOISE = 0.25
+"""Two runs of one benchmark on one computer differ by this part of their ratio, unless a figure says otherwise."""
+
+
 @dataclass(frozen=True, slots=True)
 class Figure:
     """One line of docs/performance.md. `beside`: the floor or the peer that was measured in the same run."""
@@ -19,6 +23,10 @@ class Figure:
     ratio: float | None
     budget: str
     kept: bool
+    more_is_better: bool = False
+    """Of the ratio."""
+    noise: float = NOISE
+    """By how much of itself the ratio differs between two runs when nothing was changed."""
 
 
 def quantile(values: Sequence[float], share: float) -> float:

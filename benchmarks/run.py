@@ -8,7 +8,7 @@ import os
 import platform
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import redirect_stdout
 from pathlib import Path
 
@@ -16,8 +16,10 @@ from rich.console import Console
 from rich.table import Table
 
 import boot
+import chain
 import cycle
 import intake
+import kept
 import latency
 import reaction
 import startup
@@ -28,6 +30,7 @@ from figures import Figure
 BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "reaction": reaction.measure,
     "intake": intake.measure,
+    "chain": chain.measure,
     "cycle": cycle.measure,
     "latency": latency.measure,
     "stop": stop_service.measure,
@@ -35,6 +38,12 @@ BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "boot": boot.measure,
     "virtual_time": virtual_time.measure,
 }
+QUICK: dict[str, Callable[[], list[Figure]]] = {
+    "boot": boot.measure,
+    "virtual_time": virtual_time.quick,
+    "chain": chain.quick,
+}
+"""Those that together take less than a minute."""
 COLUMNS = ("what", "measured", "beside it, in the same run", "ratio", "budget", "kept")
 
 BEGIN, END = "<!-- make bench: begin -->", "<!-- make bench: end -->"
@@ -45,31 +54,52 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="benchmarks/run.py", description="measured, beside a floor, against a budget")
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"some of {', '.join(BENCHMARKS)}; all without")
     parser.add_argument("--write", type=Path, metavar="FILE", help="write the table into docs/performance.md")
+    parser.add_argument("--quick", action="store_true", help=f"{', '.join(QUICK)} alone, in less than a minute")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="keep the figures in this file")
+    parser.add_argument(
+        "--compare",
+        type=Path,
+        metavar="FILE",
+        help="name the ratios that are worse than in a file of --json",
+    )
     parser.add_argument("--list", action="store_true", help="list them and what they measure, run none")
     arguments = parser.parse_args()
-    unknown = sorted(set(arguments.names) - set(BENCHMARKS))
+    there = QUICK if arguments.quick else BENCHMARKS
+    unknown = sorted(set(arguments.names) - set(there))
     if unknown:
-        parser.error(f"there is no benchmark {', '.join(unknown)}; expected some of {', '.join(BENCHMARKS)}")
+        parser.error(f"there is no benchmark {', '.join(unknown)}; expected some of {', '.join(there)}")
     if arguments.list:
-        print("\n".join(f"{name:14}{_purpose(BENCHMARKS[name])}" for name in arguments.names or BENCHMARKS))
+        print("\n".join(f"{name:14}{_purpose(there[name])}" for name in arguments.names or there))
         return 0
+    try:
+        before = kept.read(arguments.compare) if arguments.compare else None
+    except (OSError, ValueError) as error:
+        parser.error(str(error))
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    figures = _measured(arguments.names or list(BENCHMARKS))
+    figures = _measured({name: there[name] for name in arguments.names or there})
     Console(width=None if sys.stdout.isatty() else 160).print(_table(figures))
     if arguments.write:
         text = arguments.write.read_text(encoding="utf-8")
         arguments.write.write_text(rewritten(text, figures), encoding="utf-8")
+    if arguments.json:
+        kept.write(arguments.json, figures)
+    if before is not None:
+        losses = kept.losses(figures, before)
+        print(
+            "\n".join(f"warning: {loss}" for loss in losses) or "no ratio is worse than before by more than its noise"
+        )
+        return 0
     return 0 if all(figure.kept for figure in figures) else 1
 
 
-def _measured(names: list[str]) -> list[Figure]:
+def _measured(chosen: Mapping[str, Callable[[], list[Figure]]]) -> list[Figure]:
     """The figures of these benchmarks, one after the other; on stderr which one runs, and how long each took."""
     figures: list[Figure] = []
-    for number, name in enumerate(names, 1):
-        print(f"[{number}/{len(names)}] {name} … ", end="", file=sys.stderr, flush=True)
+    for number, (name, measure) in enumerate(chosen.items(), 1):
+        print(f"[{number}/{len(chosen)}] {name} … ", end="", file=sys.stderr, flush=True)
         started_s = time.monotonic()
         with redirect_stdout(io.StringIO()):  # what the processes of a robot have said
-            figures += BENCHMARKS[name]()
+            figures += measure()
         print(f"{time.monotonic() - started_s:.0f} s", file=sys.stderr, flush=True)
     return figures
 

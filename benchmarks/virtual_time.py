@@ -16,32 +16,39 @@ from support.chain_world import FORWARD, World, bench_robot
 from support.sim_rig import MPS, Rig
 
 SECONDS = 60.0
+QUICK_S = 15.0
 BUDGET = 100.0
 
 
-def measure() -> list[Figure]:
+def quick() -> list[Figure]:
+    """The same in less time."""
+    return measure(QUICK_S)
+
+
+def measure(seconds: float = SECONDS) -> list[Figure]:
     """The bench, and the bench with driver and watchdog."""
-    floor = _ratio(_body())
+    floor = _ratio(_body(seconds), seconds)
+    drives, chain = _ratio(_bench(seconds), seconds), _ratio(_chain(seconds), seconds)
     return [
-        _figure("simulated drives and body, setpoints and SYNC at 100 Hz, driving", _ratio(_bench()), floor),
-        _figure("the same with driver and watchdog, driving at 0.3 m/s", _ratio(_chain()), floor),
+        _figure("simulated drives and body, setpoints and SYNC at 100 Hz, driving", drives, floor),
+        _figure("the same with driver and watchdog, driving at 0.3 m/s", chain, floor),
     ]
 
 
 def _figure(what: str, ratio: float, floor: float) -> Figure:
-    beside = f"the body alone, in a bare loop: {floor:.0f} ×"
-    return Figure(
-        f"virtual time: {what}", f"{ratio:.0f} × real time", beside, ratio / floor, "≥ 100 ×", ratio >= BUDGET
-    )
+    beside, measured = f"the body alone, in a bare loop: {floor:.0f} ×", f"{ratio:.0f} × real time"
+    kept = ratio >= BUDGET
+    return Figure(f"virtual time: {what}", measured, beside, ratio / floor, "≥ 100 ×", kept, more_is_better=True)
 
 
-def _ratio(run: Callable[[], object]) -> float:
-    began_s = time.monotonic()
+def _ratio(run: Callable[[], object], seconds: float) -> float:
+    """How much faster than real time, by the time of this process: what others do on the computer does not count."""
+    began_s = time.process_time()
     run()
-    return SECONDS / (time.monotonic() - began_s)
+    return seconds / (time.process_time() - began_s)
 
 
-def _body() -> Callable[[], object]:
+def _body(seconds: float) -> Callable[[], object]:
     robot, body = bench_robot(), PlantParameters()
     left, right = (MountedWheel(body.motor(2), 1) for _ in range(2))
     base = Base(body, robot.base.track_m, robot.base.standstill_mps, [left], [right], 0.0)
@@ -50,20 +57,20 @@ def _body() -> Callable[[], object]:
         wheel.motor.run(FORWARD.linear_mps, 1.0, 1.0)
 
     def run() -> None:
-        for step in range(1, round(SECONDS / body.step_s)):
+        for step in range(1, round(seconds / body.step_s)):
             base.step(step * body.step_s)
 
     return run
 
 
-def _bench() -> Callable[[], object]:
+def _bench(seconds: float) -> Callable[[], object]:
     rig = Rig()
     rig.drive(MPS // 2, MPS // 2, 1.0)
     cycle = [Frame(0x200 + node, struct.pack("<Hi", 0x0F, sign * MPS // 2)) for node, sign in ((1, 1), (2, -1))]
     cycle.append(Frame(0x080, b""))
 
     def run() -> None:
-        for _ in range(round(SECONDS * 100.0)):
+        for _ in range(round(seconds * 100.0)):
             rig.now_s += 0.01
             for frame in cycle:
                 rig.bench.on_frame(frame, rig.now_s)
@@ -72,10 +79,10 @@ def _bench() -> Callable[[], object]:
     return run
 
 
-def _chain() -> Callable[[], object]:
+def _chain(seconds: float) -> Callable[[], object]:
     world = World()
     world.drive(FORWARD)
-    return lambda: world.run(SECONDS)
+    return lambda: world.run(seconds)
 
 
 if __name__ == "__main__":

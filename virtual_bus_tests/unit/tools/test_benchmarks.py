@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+import kept
 import run
 from figures import Figure, quantile, spread
 
@@ -69,3 +72,51 @@ def test_progress_tells_which_of_how_many_runs_and_how_long_it_took(
     monkeypatch.setattr("sys.argv", ["run.py"])
     assert run.main() == 0
     assert capsys.readouterr().err.splitlines() == ["[1/2] first … 12 s", "[2/2] second … 0 s"]
+
+
+# compared with a run before
+
+
+@pytest.mark.parametrize(("ratio", "worse"), [(1.25, False), (1.56, False), (1.57, True), (0.5, False)])
+def test_a_ratio_that_grows_beyond_its_noise_is_worse(tmp_path: Path, ratio: float, worse: bool) -> None:
+    kept.write(tmp_path / "before.json", [KEPT])
+    found = kept.losses([replace(KEPT, ratio=ratio)], kept.read(tmp_path / "before.json"))
+    assert bool(found) is worse
+    assert not worse or "a loop: ratio 1.57, it was 1.25: worse by 26%, of which 25% may be noise" in found
+
+
+@pytest.mark.parametrize(("ratio", "worse"), [(1.0, False), (0.99, True), (3.0, False)])
+def test_where_more_is_better_less_is_worse(ratio: float, worse: bool) -> None:
+    figure = replace(KEPT, ratio=ratio, more_is_better=True)
+    assert bool(kept.losses([figure], {"a loop": 1.25})) is worse
+
+
+def test_a_figure_that_was_not_measured_before_or_has_no_ratio_is_not_compared() -> None:
+    assert kept.losses([MISSED, replace(KEPT, ratio=None)], {"a loop": 1.25}) == []
+
+
+def test_a_run_of_some_keeps_the_ratios_of_the_others(tmp_path: Path) -> None:
+    path = tmp_path / "kept.json"
+    kept.write(path, [KEPT, MISSED])
+    kept.write(path, [replace(MISSED, ratio=2.5), replace(KEPT, what="no ratio", ratio=None)])
+    assert kept.read(path) == {"a loop": 1.25, "a node": 2.5}
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"ratios": 5}', '{"ratios": {"a loop": null}}'])
+def test_a_file_that_is_none_of_these_is_refused_before_anything_runs(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "other.json"
+    path.write_text(text)
+    with pytest.raises(ValueError, match="was not written by `canbase benchmark --json`"):
+        kept.read(path)
+
+
+def test_a_loss_is_told_and_is_no_failure(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Another computer, or a busy one: whoever reads it judges."""
+    path = tmp_path / "before.json"
+    kept.write(path, [replace(MISSED, ratio=1.0)])
+    monkeypatch.setattr(run, "QUICK", {"it": lambda: [MISSED]})
+    monkeypatch.setattr("sys.argv", ["run.py", "--quick", "--compare", str(path)])
+    assert run.main() == 0
+    assert "warning: a node: ratio 3, it was 1: worse by 200%" in capsys.readouterr().out
