@@ -12,26 +12,33 @@ SOURCES = {
     "canbase_velocity": "velocity_mux",
     "canbase_watchdog": "watchdog",
     "canbase_action_server": "action_server",
+    "canbase_runtime": "runtime",
     "canbase_sim": "virtual_bus_tests",
     "campaign": "virtual_bus_tests",
 }
 """Packages of which a compiled world has a copy, and where each of them lies."""
 HOT = {
+    "canbase_config": "watchdog",
+    "canbase_runtime": "driver_state latch_record source_standing stop_cause watchdog_view",
     "canbase_watchdog": (
-        "bus_health creep envelope frames ladder latch lease motion_evidence observer pair plausibility policy "
-        "power_and_motion second_master standing stopper tally torque trip_cause twist view watchdog"
+        "bus_health counts creep envelope frames halt ladder latch lease motion_evidence observer overshoot pair "
+        "plausibility policy power_and_motion second_master slowing standing stopper stopping_distance tally torque "
+        "trip_cause twist view watchdog"
     ),
     "canbase_driver": (
-        "causes cia402 core drive_units snapshot boot.node_boot cia301.frame cia301.nmt cia301.pdo drives.axis "
+        "causes cia402 core drive_units snapshot boot.node_boot boot.sdo_budget cia301.emcy cia301.frame cia301.nmt "
+        "cia301.pdo cia301.sdo_client drives.axis "
         "drives.canopen_node drives.drive_group drives.drive_snapshot drives.let_go drives.odometry_feed "
-        "drives.standstill drives.telemetry "
-        "motion.braking motion.odometry motion.velocity_command supervision.cycle_stats supervision.latch "
-        "supervision.phases supervision.reasons supervision.situation supervision.stop_history supervision.supervisor "
+        "drives.sdo_stop drives.standstill drives.stopping_distance drives.telemetry "
+        "motion.braking motion.kinematics motion.limiter motion.odometry motion.velocity_command "
+        "supervision.bus_health supervision.cycle_stats supervision.latch supervision.lifecycle "
+        "supervision.phases supervision.reasons supervision.reset supervision.reset_run supervision.situation "
+        "supervision.stop_history supervision.supervisor "
         "supervision.watchdog_link"
     ),
     "canbase_velocity": (
-        "base_ready clearance decision estop filter_state frozen glitch lease motion mux neutral obstacle ramp "
-        "safety_filter sweep twist"
+        "base_ready changes clearance decision delay estop filter_state frozen glitch lease lock motion mux neutral "
+        "obstacle ramp safety_filter scan sole_publisher steady sweep twist"
     ),
     "canbase_sim": (
         "axis_parts command_watch frame line node cia301.dictionary cia301.emcy cia301.heartbeat cia301.nmt "
@@ -39,8 +46,8 @@ HOT = {
         "plant.motor world.bench"
     ),
     "campaign": (
-        "action_process can_bus clock process driver_process watchdog_process velocity_process drives envelope wishes "
-        "reach shown strangers motion_judge odometry_judge judge"
+        "action_process can_bus clock disk process driver_process watchdog_process velocity_process drives envelope "
+        "goal_judge hands intruder outside wishes reach shown strangers motion_judge odometry_judge judge"
     ),
 }
 """The compiled modules of each package. Their order does not matter."""

@@ -35,10 +35,10 @@ def _rewrite(node: ast.ClassDef) -> None:
         return
     decorator = node.decorator_list[at]
     given = {word.arg: word.value for word in decorator.keywords} if isinstance(decorator, ast.Call) else {}
-    if "kw_only" in given:
-        return  # mypyc 2.4 stumbles over the text signature of such an __init__
     frozen, equal = _is_true(given.get("frozen")), "eq" not in given
     node.decorator_list[at] = ast.parse("dataclass(init=False, eq=False, slots=True)", mode="eval").body
+    if "kw_only" in given:  # mypyc 2.4 stumbles over the text signature of an __init__ with such parameters
+        node.body.sort(key=lambda item: not isinstance(item, ast.AnnAssign) or item.value is not None)
     fields = _fields(node)
     named = {item.name for item in node.body if isinstance(item, ast.FunctionDef)}
     texts = [_init(fields, "__post_init__" in named)]
@@ -65,8 +65,13 @@ def _fields(node: ast.ClassDef) -> list[_Field]:
     return [
         _field(item.target.id, ast.unparse(item.annotation), item.value)
         for item in node.body
-        if isinstance(item, ast.AnnAssign) and isinstance(item.target, ast.Name)
+        if isinstance(item, ast.AnnAssign) and isinstance(item.target, ast.Name) and not _is_constant(item.annotation)
     ]
+
+
+def _is_constant(kind: ast.expr) -> bool:
+    """Of the class, and no field."""
+    return isinstance(kind, ast.Subscript) and isinstance(kind.value, ast.Name) and kind.value.id == "ClassVar"
 
 
 def _field(name: str, kind: str, value: ast.expr | None) -> _Field:

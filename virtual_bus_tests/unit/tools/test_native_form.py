@@ -19,6 +19,16 @@ SOURCE = '''
 from __future__ import annotations
 import math
 from dataclasses import dataclass, field
+from typing import ClassVar
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Report:
+    NONE: ClassVar[Report]
+
+    note: str = ""
+    age_s: float
+
+Report.NONE = Report(age_s=math.inf)
 
 @dataclass(frozen=True, slots=True)
 class Wheel:
@@ -53,7 +63,7 @@ def module(name: str, source: str) -> Any:
 @pytest.fixture(params=["written", "compiled"])
 def forms(request: pytest.FixtureRequest) -> Any:
     native = native_form(SOURCE)
-    assert native.count("def __init__") == 3
+    assert native.count("def __init__") == 4
     return module(f"a_form_{request.param}", SOURCE if request.param == "written" else native)
 
 
@@ -63,6 +73,13 @@ def test_defaults_and_what_is_made_after_them(forms: Any) -> None:
     first, second = forms.Box(box.wheel), forms.Box(wheel=box.wheel)
     first.kept.append(1)
     assert second.kept == []
+
+
+def test_parameters_by_keyword_and_a_constant_of_the_class(forms: Any) -> None:
+    assert forms.Report(age_s=math.inf) == forms.Report.NONE
+    assert [field.name for field in fields(forms.Report)].count("NONE") == 0
+    assert replace(forms.Report.NONE, note="late").note == "late"
+    assert pickle.loads(pickle.dumps(forms.Report.NONE)) == forms.Report.NONE
 
 
 def test_what_is_equal_and_what_is_not(forms: Any) -> None:
