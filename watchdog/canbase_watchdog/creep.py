@@ -11,7 +11,7 @@ import math
 
 from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog.envelope import Bounds
-from canbase_watchdog.view import BusView
+from canbase_watchdog.view import Axis, BusView
 
 AT_REST = Bounds(0.0, 0.0, 0.0, 0.0)
 """Nothing may move."""
@@ -33,15 +33,25 @@ class CreepWatch:
 
         It begins anew when anything is allowed, and when nothing was ordered for as long.
         """
-        wheel = next((axis for axis in bus.axes if axis.enabled and axis.target_mps != 0.0), None)
         elapsed_s, self._looked_at = now_s - self._looked_at, now_s
-        went_on, self._ordered = self._ordered, wheel is not None and bounds == AT_REST
-        if bounds != AT_REST or now_s >= self._ordered_at + self._hold_s:
+        if bounds != AT_REST:
+            self._ordered, self._ordered_s = False, 0.0
+            return ""
+        wheel = _ordered(bus)
+        went_on, self._ordered = self._ordered, wheel is not None
+        if now_s >= self._ordered_at + self._hold_s:
             self._ordered_s = 0.0
-        if wheel is None or not self._ordered:
+        if wheel is None:
             return ""
         self._ordered_s = min(self._ordered_s + (elapsed_s if went_on else 0.0), self._hold_s)
         self._ordered_at = now_s
         if self._ordered_s < self._hold_s:
             return ""
         return f"{wheel.drive.joint} is ordered {wheel.target_mps:.4f} m/s for {self._ordered_s:.3f} s"
+
+
+def _ordered(bus: BusView) -> Axis | None:
+    for axis in bus.axes:
+        if axis.target_mps != 0.0 and axis.enabled:
+            return axis
+    return None

@@ -33,9 +33,11 @@ class Peak:
 
     def set(self, value: float, now_s: float, until: float) -> None:
         """From `now_s` on `value` is in force, until the next one or until the time `until`, whichever is earlier."""
-        self._keep(self._value, min(self._end, now_s))
         if self._end < now_s:
+            self._keep(self._value, self._end)
             self._keep(0.0, now_s)
+        elif value != self._value:  # else it stays in force
+            self._keep(self._value, now_s)
         self._value, self._end = value, until
 
     def greatest(self, now_s: float) -> float:
@@ -43,9 +45,12 @@ class Peak:
         past, since = self._past, now_s - self._hold_s
         while past and past[0][1] < since:
             past.popleft()
-        before = past[0][0] if past else -math.inf
-        if self._end >= since:
-            before = max(before, self._value)
+        if not past:
+            before = self._value if self._end >= since else -math.inf
+        else:
+            before = past[0][0]
+            if self._value > before and self._end >= since:
+                before = self._value
         return before if self._end >= now_s else max(before, 0.0)
 
     def _keep(self, value: float, end: float) -> None:

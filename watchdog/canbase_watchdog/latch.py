@@ -11,7 +11,7 @@ import enum
 import hashlib
 import struct
 import zlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 PAGE = 4096
 LENGTH = 2 * PAGE
@@ -111,9 +111,9 @@ class Ledger:
 
     def want(self, mark: Mark, cause: int = 0, node_id: int = 0, detail: str = "") -> None:
         """From now on this."""
-        entry = Entry(mark, cause, node_id, detail, self.wanted.number)
-        if entry != self.wanted:
-            self.wanted = replace(entry, number=entry.number + 1)
+        old = self.wanted
+        if mark is not old.mark or cause != old.cause or node_id != old.node_id or detail != old.detail:
+            self.wanted = Entry(mark, cause, node_id, detail, old.number + 1)
         if not self._kept:
             self._written = self.wanted
 
@@ -124,4 +124,4 @@ class Ledger:
     @property
     def is_on_disk(self) -> bool:
         """What is wanted now is on disk."""
-        return self._written == self.wanted
+        return self._written is self.wanted or self._written == self.wanted

@@ -160,30 +160,33 @@ class EvidenceWatch:
         ghost_m = self._ghost_m(
             lives or step_m is None, velocity_mps, elapsed_s if powered and not falls else 0.0, now_s
         )
-        before = self._kept(lives, ghost_m)
         strained_s = self._strained_s(velocity_mps, torque if powered and enabled else None, elapsed_s, now_s)
         if not powered:
-            self.last = before
+            self.last = self._kept(lives, ghost_m)
             return
-        if enabled:
-            before = self._unseen(lives, step_m is not None, elapsed_s, torque)
+        before = (
+            self._unseen(lives, step_m is not None, elapsed_s, torque) if enabled else self._kept(lives, ghost_m)
+        )
         halted, jolts = self._halted(jolted and rolled, lives), self._jolts(jolted, now_s)
         samples, unseen = self._config.feedback_samples, self._is_unseen(before)
         strained = strained_s >= self._config.motion_missing_s
         ghost = abs(ghost_m) >= GHOST_LIVES * self._life_m and self._ghost_s >= GHOST_LAG_S
         lies = unseen or ghost or strained or halted >= samples or jolts >= self._config.jolts
-        self.last = replace(
-            before,
-            ordered_mps=self._ordered_mps,
-            setpoint_mps=self._setpoint_mps,
-            unseen=unseen,
-            halted=halted,
-            jolts=jolts,
-            ghost_m=ghost_m,
-            ghost=ghost,
-            behind_s=self._behind_s(velocity_mps, elapsed_s) if enabled else 0.0,
-            strained_s=strained_s,
-            trusted=self.last.trusted and not lies,
+        self.last = Evidence(
+            self._ordered_mps,
+            self._setpoint_mps,
+            before.unseen_s,
+            before.unseen_m,
+            before.both_s,
+            before.both_m,
+            unseen,
+            halted,
+            jolts,
+            ghost_m,
+            ghost,
+            self._behind_s(velocity_mps, elapsed_s) if enabled else 0.0,
+            strained_s,
+            self.last.trusted and not lies,
         )
 
     def _is_visible(self, ordered_mps: float) -> bool:

@@ -121,6 +121,8 @@ class Observer:
         self._foreign = Foreign(config)
         self._driver_at = self._sync_at = self._sync_since = NEVER
         self._routes: dict[int, Callable[[bytes, float], bool]] = {}
+        self._view: BusView | None = None
+        """As it was looked at last; None: a frame has come since."""
         self.dropped = 0
         """Frames with a watched identifier that could not be understood."""
         self.commands_are_ours = False
@@ -130,11 +132,19 @@ class Observer:
     def on_frame(self, cob_id: int, data: bytes, now_s: float) -> None:
         """Take in one received frame. Never raises for what is on the bus."""
         route = self._routes.get(cob_id)
-        if route is not None and not route(data, now_s):
+        if route is None:
+            return
+        self._view = None
+        if not route(data, now_s):
             self.dropped += 1
 
     def look(self) -> BusView:
-        """Everything as it stands."""
+        """Everything as it stands; the same object as long as nothing has come."""
+        if self._view is None:
+            self._view = self._put_together()
+        return self._view
+
+    def _put_together(self) -> BusView:
         return BusView(
             tuple([record.axis() for record in self._records.values()]),
             tuple(
@@ -151,6 +161,7 @@ class Observer:
 
     def trust(self) -> None:
         """A reset was accepted: what spoke against the sensors is over."""
+        self._view = None
         for record in self._records.values():
             record.feedback.trust()
             record.push.trust()

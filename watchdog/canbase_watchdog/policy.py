@@ -12,7 +12,7 @@ from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog.motion_evidence import BOTH_WAYS
 from canbase_watchdog.power_and_motion import commanded, in_motion, moving
 from canbase_watchdog.trip_cause import FINE, TripCause, Verdict
-from canbase_watchdog.view import Axis, Node, View
+from canbase_watchdog.view import NEVER, Axis, BusView, Node, View
 
 SIGN_S = 1.0
 """A sign of another master, or of a drive that started anew, counts for so long."""
@@ -23,8 +23,8 @@ def _lease_is_lost(view: View, config: WatchdogConfig, now_s: float) -> bool:
 
 
 def _lease_lost(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
-    axis = in_motion(view, config)
-    if axis is None or not _lease_is_lost(view, config, now_s):
+    axis = in_motion(view, config) if _lease_is_lost(view, config, now_s) else None
+    if axis is None:
         return FINE
     detail = (
         f"no valid lease for {now_s - view.lease_at:.3f} s (allowed {config.lease_timeout_s:.3f} s) while "
@@ -39,6 +39,8 @@ def _driver_is_silent(view: View, since: float, config: WatchdogConfig, now_s: f
 
 
 def _driver_silent(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
+    if not _driver_is_silent(view, NEVER, config, now_s):
+        return FINE
     for axis in view.axes:
         since = max(axis.enabled_since, view.started_at)
         if (axis.enabled or moving(axis, config)) and _driver_is_silent(view, since, config, now_s):
@@ -57,8 +59,8 @@ def _driver_still_silent(view: View, node_id: int, config: WatchdogConfig, now_s
 
 def _unfed(axis: Axis, view: View, config: WatchdogConfig, now_s: float) -> bool:
     """SYNCs go on and its TPDOs do not answer them."""
-    synced = now_s < view.bus.sync_at + config.feedback_timeout_s
-    return synced and now_s >= max(axis.fed_at, axis.enabled_since, view.bus.sync_since) + config.feedback_timeout_s
+    missed = now_s >= max(axis.fed_at, axis.enabled_since, view.bus.sync_since) + config.feedback_timeout_s
+    return missed and now_s < view.bus.sync_at + config.feedback_timeout_s
 
 
 def _beatless(node: Node, axis: Axis, config: WatchdogConfig, now_s: float) -> bool:
@@ -73,7 +75,7 @@ def _drive_restarted(view: View, config: WatchdogConfig, now_s: float) -> Verdic
     """A drive that starts anew has no power: this one said that it has. Or there are two drives with its node id."""
     for axis in view.axes:
         node_id = axis.drive.node_id
-        if view.enabled and _has_restarted(view, node_id, config, now_s):
+        if _has_restarted(view, node_id, config, now_s) and view.enabled:
             detail = (
                 f"node {node_id} ({axis.drive.joint}) sends a boot-up while it is enabled: it has restarted (supply?), "
                 "or two drives have this node id"
@@ -84,8 +86,10 @@ def _drive_restarted(view: View, config: WatchdogConfig, now_s: float) -> Verdic
 
 def _drive_silent(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     for axis in view.axes:
+        if not axis.enabled:
+            continue
         node = view.node(axis.drive.node_id)
-        if axis.enabled and (_unfed(axis, view, config, now_s) or _beatless(node, axis, config, now_s)):
+        if (_unfed(axis, view, config, now_s) or _beatless(node, axis, config, now_s)):
             detail = (
                 f"{axis.drive.joint} is enabled, its feedback is {now_s - axis.fed_at:.3f} s old (allowed "
                 f"{config.feedback_timeout_s:.3f} s), its heartbeat {now_s - node.heartbeat_at:.3f} s "
@@ -104,10 +108,12 @@ def _allowed(axis: Axis, view: View, config: WatchdogConfig) -> tuple[float, flo
 def _target_outside(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     """Not debounced: a setpoint is a number that the driver computed, without noise."""
     for axis in view.axes:
+        if not (axis.enabled or axis.asks_for_power):
+            continue
         low, high = _allowed(axis, view, config)
         share = config.target_tolerance_share * max(-low, high)
         slack = config.target_tolerance_mps + abs(axis.drive.mps_per_bit) + share
-        if (axis.enabled or axis.asks_for_power) and not low - slack <= axis.target_mps <= high + slack:
+        if not low - slack <= axis.target_mps <= high + slack:
             detail = (
                 f"{axis.drive.joint} is ordered {axis.target_mps:.3f} m/s, "
                 f"the leases allow {low:.3f} to {high:.3f} m/s (tolerance {slack:.3f} m/s)"
@@ -265,11 +271,14 @@ def _answered_twice(view: View, config: WatchdogConfig, now_s: float) -> Verdict
 
 def _drive_down(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     """The driver has `feedback_timeout_s` to stop the others by itself. Fault or off: the base turns all the same."""
+    down = [axis for axis in view.axes if not axis.enabled]
+    if not down:
+        return FINE
     driven = [axis for axis in view.axes if axis.enabled and (moving(axis, config) or commanded(axis, config))]
-    for axis in view.axes:
+    for axis in down:
         for other in driven:
             since = max(axis.disabled_since, other.enabled_since)
-            if not axis.enabled and now_s >= since + config.feedback_timeout_s:
+            if now_s >= since + config.feedback_timeout_s:
                 state = "unknown" if axis.state is None else axis.state.name.lower().replace("_", " ")
                 detail = (
                     f"{axis.drive.joint} is not enabled (state: {state}) while {other.drive.joint} turns at "
@@ -295,7 +304,7 @@ def _bus_is_failed(view: View, node_id: int, config: WatchdogConfig, now_s: floa
 
 
 def _bus_failed(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
-    if not view.enabled or not _bus_is_failed(view, 0, config, now_s):
+    if not _bus_is_failed(view, 0, config, now_s) or not view.enabled:
         return FINE
     detail = f"the bus takes no frames for {now_s - view.bus_failed_since:.3f} s (allowed {config.bus_failed_s:.3f} s)"
     return Verdict(TripCause.BUS_FAILED, 0, detail)
@@ -324,6 +333,8 @@ class Check:
     trips: Callable[[View, WatchdogConfig, float], Verdict]
     stands: Callable[[View, int, WatchdogConfig, float], bool]
     clears_on: str
+    by_bus: bool = False
+    """It looks at the bus alone: what is fine there stays so until a frame comes."""
 
 
 CHECKS = (
@@ -349,24 +360,31 @@ CHECKS = (
         lambda view, node_id, config, now_s: now_s >= view.node(node_id).heard_at + config.drive_heartbeat_s,
         "the drive answers again",
     ),
-    Check(TripCause.ANSWERED_TWICE, _answered_twice, _over, "nothing else; give each drive a node id of its own first"),
-    Check(TripCause.SETPOINT_MISSING, _setpoint_missing, _over, "nothing else"),
+    Check(
+        TripCause.ANSWERED_TWICE, _answered_twice, _over, "nothing else; give each drive a node id of its own first", True
+    ),
+    Check(TripCause.SETPOINT_MISSING, _setpoint_missing, _over, "nothing else", True),
     Check(TripCause.DRIVE_DOWN, _drive_down, _over, "nothing else; the driver resets the drive's fault after it"),
-    Check(TripCause.FEEDBACK_IMPLAUSIBLE, _feedback_implausible, _over, "nothing else; look at the encoder first"),
-    Check(TripCause.MOTION_MISSING, _motion_missing, _over, "nothing else; look at encoder, motor and wheel first"),
-    Check(TripCause.POWER_AT_STAND, _power_at_stand, _over, "nothing else; look at the encoder and the driver first"),
+    Check(TripCause.FEEDBACK_IMPLAUSIBLE, _feedback_implausible, _over, "nothing else; look at the encoder first", True),
+    Check(
+        TripCause.MOTION_MISSING, _motion_missing, _over, "nothing else; look at encoder, motor and wheel first", True
+    ),
+    Check(
+        TripCause.POWER_AT_STAND, _power_at_stand, _over, "nothing else; look at the encoder and the driver first", True
+    ),
     Check(TripCause.TARGET_OUTSIDE, _target_outside, _over, "nothing else"),
-    Check(TripCause.OVERSPEED, _overspeed, _over, "nothing else"),
-    Check(TripCause.MOTION_OUTSIDE, _motion_outside, _over, "nothing else"),
+    Check(TripCause.OVERSPEED, _overspeed, _over, "nothing else", True),
+    Check(TripCause.MOTION_OUTSIDE, _motion_outside, _over, "nothing else", True),
     Check(TripCause.TWIST_OUTSIDE, _twist_outside, _over, "nothing else"),
 )
 """The first row that trips is the cause: where one failure shows in several rows, the one that explains it most comes
 first. A cause without a row does not stand: nothing of it is left to see."""
+_NOT_BY_BUS = tuple(check for check in CHECKS if not check.by_bus)
 
 
-def decide(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
-    """The first cause to trip in what is seen at the monotonic time `now_s` [s], or FINE."""
-    for check in CHECKS:
+def decide(view: View, config: WatchdogConfig, now_s: float, fine: BusView | None = None) -> Verdict:
+    """The first cause to trip in what is seen at the monotonic time `now_s` [s], or FINE. `fine`: a bus that was."""
+    for check in _NOT_BY_BUS if view.bus is fine else CHECKS:
         verdict = check.trips(view, config, now_s)
         if verdict.cause is not TripCause.NONE:
             return verdict

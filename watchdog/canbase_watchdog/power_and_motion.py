@@ -20,7 +20,10 @@ def commanded(axis: Axis, config: WatchdogConfig) -> bool:
 
 def in_motion(view: View, config: WatchdogConfig) -> Axis | None:
     """The first wheel that turns or is ordered to, None: all rest."""
-    return next((axis for axis in view.axes if moving(axis, config) or commanded(axis, config)), None)
+    for axis in view.axes:
+        if moving(axis, config) or commanded(axis, config):
+            return axis
+    return None
 
 
 def near_power(axis: Axis) -> bool:
@@ -30,9 +33,10 @@ def near_power(axis: Axis) -> bool:
 
 def is_off(axis: Axis, view: View, config: WatchdogConfig, now_s: float) -> bool:
     """Fresh feedback says so, or there is no such drive."""
-    if view.node(axis.drive.node_id).heard_at == NEVER and not axis.asks_for_power:
-        return True
-    return not near_power(axis) and axis.state is not None and now_s < axis.status_at + config.feedback_timeout_s
+    if near_power(axis):
+        return False
+    told = axis.state is not None and now_s < axis.status_at + config.feedback_timeout_s
+    return told or view.node(axis.drive.node_id).heard_at == NEVER
 
 
 def velocity_ordered(view: View, config: WatchdogConfig, now_s: float) -> bool:

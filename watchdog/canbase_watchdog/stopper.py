@@ -11,7 +11,7 @@ from canbase_watchdog import frames
 from canbase_watchdog.frames import Frame
 from canbase_watchdog.ladder import Braking, Climb, Look, Step, advance, first
 from canbase_watchdog.slowing import Slope, SlowingWatch
-from canbase_watchdog.view import NEVER, Axis, View
+from canbase_watchdog.view import NEVER, Axis, BusView, View
 
 QUICK_STOP_PERIOD_S = 0.01
 NMT_PERIOD_S = 0.05
@@ -66,6 +66,8 @@ class Stopper:
         self._stale_s = min(config.feedback_timeout_s, max(STALE_S, 2.0 / config.control_hz))
         self._slopes = [Slope.of(config, drive.velocity_mps_per_bit) for drive in drives]
         self._slowing: list[SlowingWatch] = []
+        self._bus: BusView | None = None
+        """What it has looked at; None: it looks again."""
         self._begin_slowing(now_s)
         self._seen = self._look(view)
         foot = first(self._seen, now_s)
@@ -85,8 +87,10 @@ class Stopper:
 
     def tick(self, view: View, now_s: float) -> list[Frame]:
         """Look at the node, climb where the rules say so, and return the frames that are due."""
-        self._follow(view)
-        self._seen = self._look(view)
+        if view.bus is not self._bus:
+            self._bus = view.bus
+            self._follow(view)
+            self._seen = self._look(view)
         before = self.climb
         self.climb = advance(before, self._seen, self._braking, now_s)
         brakes_already = self.climb.step is Step.PRE_OPERATIONAL and not self._seen.enabled
@@ -104,7 +108,7 @@ class Stopper:
 
     def _begin_slowing(self, now_s: float) -> None:
         """A rung begins now. A drive that is braking by its own ramp goes on with it when nothing but NMT changes."""
-        self._slowing = [SlowingWatch(slope, now_s) for slope in self._slopes]
+        self._slowing, self._bus = [SlowingWatch(slope, now_s) for slope in self._slopes], None
 
     def _follow(self, view: View) -> None:
         for axis, watch in zip(self._axes(view), self._slowing, strict=True):

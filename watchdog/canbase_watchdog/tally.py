@@ -15,7 +15,10 @@ class Tally:
 
     def count(self, bad: bool) -> None:
         """One more cycle."""
-        self.value = self.value + 1.0 if bad else max(0.0, self.value - FORGIVEN)
+        if bad:
+            self.value += 1.0
+        elif self.value:
+            self.value = max(0.0, self.value - FORGIVEN)
 
     def clear(self) -> None:
         """Begin anew."""

@@ -67,7 +67,7 @@ class PushWatch:
     def on_sync(self, setpoint_mps: float, rests: bool) -> None:
         """The setpoint of this wheel; `rests`: those of all wheels are zero, and none moves by what it measures."""
         self._rests, self._setpoint_mps = rests, setpoint_mps
-        if setpoint_mps != 0.0:
+        if setpoint_mps != 0.0 and not self.last.owes:
             self.last = replace(self.last, owes=True)
 
     def on_position(self, counts: int) -> None:

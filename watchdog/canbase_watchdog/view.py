@@ -135,4 +135,7 @@ class View:
 
     def node(self, node_id: int) -> Node:
         """The node with this id. Raises StopIteration for one that is not configured."""
-        return next(node for node in self.bus.nodes if node.node_id == node_id)
+        for node in self.bus.nodes:
+            if node.node_id == node_id:
+                return node
+        raise StopIteration(node_id)

@@ -21,7 +21,7 @@ from canbase_watchdog.power_and_motion import in_motion, is_off, near_power, vel
 from canbase_watchdog.stopper import Stopper
 from canbase_watchdog.trip_cause import FINE, SENSOR_CAUSES, TripCause, Verdict, before_the_start
 from canbase_watchdog.twist import TwistWatch
-from canbase_watchdog.view import View
+from canbase_watchdog.view import BusView, View
 
 STATE_PERIOD_S = 0.05
 COUNTERS_PERIOD_S = 0.5
@@ -86,6 +86,8 @@ class Watchdog:
         self._started_at = self._ticked_at = now_s
         self._bus_failed_since, self._bus_errors = math.inf, 0
         self._view = self._look(now_s)
+        self._fine: BusView | None = None
+        """What the bus showed when nothing tripped."""
         self._state = State.STARTING
         self._verdict = FINE
         self._stoppers: list[Stopper] = []
@@ -105,7 +107,7 @@ class Watchdog:
     @property
     def status(self) -> Status:
         """State, cause and rung as of now."""
-        assumed = any(stopper.climb.assumed for stopper in self._stoppers)
+        assumed = any(stopper.climb.assumed for stopper in self._stoppers) if self._stoppers else False
         hears = self._ticked_at < self._observer.driver_at + self._config.drive_heartbeat_s
         armed = hears and self._ledger.wanted.mark is Mark.LIVE and self._ledger.is_on_disk
         unproven = self._unproven() if self._state is State.TRIPPED else ""
@@ -181,8 +183,9 @@ class Watchdog:
             return self._stop(now_s)
         if self._state is State.STARTING and now_s >= self._started_at + self._config.drive_heartbeat_s:
             self._state = State.WATCHING
-        verdict = policy.decide(self._view, self._config, now_s)
+        verdict = policy.decide(self._view, self._config, now_s, self._fine)
         if verdict.cause is TripCause.NONE:
+            self._fine = self._view.bus
             return []
         self._trip(verdict, now_s)
         return self._stop(now_s)
@@ -234,24 +237,30 @@ class Watchdog:
 
     def _note_record(self, now_s: float) -> None:
         """LIVE before there is power, and until all of it was seen to be off."""
-        verdict, axes = self._verdict, self._view.axes
+        verdict = self._verdict
         if self._state is State.TRIPPED:
             self._ledger.want(Mark.LATCHED, verdict.cause, verdict.node_id, verdict.detail)
-        elif all(is_off(axis, self._view, self._config, now_s) for axis in axes):
+        elif self._are_off(now_s):
             self._ledger.want(Mark.CLEAR)
-        elif self._ledger.wanted.mark is not Mark.CLEAR or any(near_power(axis) for axis in axes):
+        elif self._ledger.wanted.mark is not Mark.CLEAR or any(near_power(axis) for axis in self._view.axes):
             self._ledger.want(Mark.LIVE)
+
+    def _are_off(self, now_s: float) -> bool:
+        for axis in self._view.axes:
+            if not is_off(axis, self._view, self._config, now_s):
+                return False
+        return True
 
     def _stop(self, now_s: float) -> list[Frame]:
         return [frame for stopper in self._stoppers for frame in stopper.tick(self._view, now_s)]
 
     @property
     def _settled(self) -> bool:
-        return all(stopper.settled for stopper in self._stoppers)
+        return not self._stoppers or all(stopper.settled for stopper in self._stoppers)
 
     @property
     def _step(self) -> Step:
-        return max((stopper.climb.step for stopper in self._stoppers), default=Step.NONE)
+        return max(stopper.climb.step for stopper in self._stoppers) if self._stoppers else Step.NONE
 
     def _tell(self, now_s: float) -> list[Frame]:
         out: list[Frame] = []
