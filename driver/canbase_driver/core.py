@@ -78,6 +78,8 @@ class DriverCore:
         self._sync = SyncProducer(robot.bus.sync_counter)
         self._watchdog = WatchdogLink(robot.timeouts.watchdog_s)
         self._standstill_s = stopping.standstill_s(robot)
+        self._track_m, self._feedback_s = robot.base.track_m, robot.timeouts.feedback_s
+        self._heartbeat_s = robot.timeouts.drive_heartbeat_s / HEARTBEATS_PER_TIMEOUT - self._period_s / 2.0
         self._supervisor = Supervisor(Braking(robot), self._standstill_s, found_before_the_start(found))
         self._record = PowerRecord(found)
         self._let_go = LetGo(robot)
@@ -201,7 +203,7 @@ class DriverCore:
 
     def tick(self, now_s: float, lateness_s: float = 0.0) -> list[Frame]:
         """One cycle; the frames to send, in this order. `lateness_s`: how late it began."""
-        if now_s - self._ticked_at > PAUSE * self._robot.timeouts.feedback_s:
+        if now_s - self._ticked_at > PAUSE * self._feedback_s:
             self._sync_since = now_s
         dt_s = min(now_s - self._ticked_at, LONGEST_CYCLE_S)
         self._ticked_at = now_s
@@ -219,15 +221,18 @@ class DriverCore:
         frames += self._stop_by_sdo(orders, situation, now_s)
         if self._motion.twist != Twist2D.ZERO or situation.standstill:
             self._eased_at = now_s
-        # Reset communication forgets 1016h: a drive must not report a lost heartbeat after an orderly end. One that may
-        # have power keeps it, and stops by the missing heartbeat.
-        off = [node.node_id for node in self._drives.nodes if node.is_off(now_s)]
         let_go = self._readiness.step(situation, self.state, self.finding, now_s)
+        if let_go or (self.finished and not self._readiness.released):
+            frames += self._end_communication(let_go, now_s)
+        return frames
+
+    def _end_communication(self, let_go: bool, now_s: float) -> list[Frame]:
+        """Reset communication forgets 1016h: a drive must not report a lost heartbeat after an orderly end. One that
+        may have power keeps it, and stops by the missing heartbeat."""
+        off = [node.node_id for node in self._drives.nodes if node.is_off(now_s)]
         for node in self._drives.nodes if let_go else ():
             node.release(now_s)
-        if let_go or (self.finished and not self._readiness.released):
-            frames += [nmt(NmtCommand.RESET_COMMUNICATION, node_id) for node_id in off]
-        return frames
+        return [nmt(NmtCommand.RESET_COMMUNICATION, node_id) for node_id in off]
 
     def stop_frames(self) -> list[Frame]:
         """Quick stop for all axes in any state: the way out after a defect. Needs no knowledge, cannot fail."""
@@ -263,7 +268,7 @@ class DriverCore:
         goal = self._let_go.goal(now_s) if self._let_go.active else orders.goal
         if self._reset.fault_reset_bit:  # to an axis without a fault RESET is OFF
             goal = PowerGoal.RESET
-        left_mps, right_mps = wheel_speeds(self._motion.twist, self._robot.base.track_m)
+        left_mps, right_mps = wheel_speeds(self._motion.twist, self._track_m)
         frames = [frame for node in started for frame in node.setpoints(goal, left_mps, right_mps)]
         return [*frames, self._sync.next()]
 
@@ -271,7 +276,7 @@ class DriverCore:
         if orders.drive is not Drive.FOLLOW:
             self._let_go.end()
             return
-        rests = self._drives.rest(*wheel_speeds(self._command.target(now_s), self._robot.base.track_m))
+        rests = self._drives.rest(*wheel_speeds(self._command.target(now_s), self._track_m))
         self._let_go.step(self._drives.axes, rests, now_s)
 
     def _stop_by_sdo(self, orders: Orders, situation: Situation, now_s: float) -> list[Frame]:
@@ -292,42 +297,44 @@ class DriverCore:
         return frames
 
     def _heartbeat(self, now_s: float) -> list[Frame]:
-        period_s = self._robot.timeouts.drive_heartbeat_s / HEARTBEATS_PER_TIMEOUT
-        if self._readiness.released or now_s - self._heartbeat_at < period_s - self._period_s / 2.0:
+        if now_s - self._heartbeat_at < self._heartbeat_s or self._readiness.released:
             return []
         self._heartbeat_at = now_s
         return [heartbeat(DRIVER_NODE_ID, NmtState.OPERATIONAL)]
 
     def _situation(self, now_s: float) -> Situation:
+        drives = self._drives
         watchdog, watchdog_detail = self._watchdog.view(now_s)
         liar = self._watchdog.lying_node(now_s)
         if liar:
-            self._drives.doubt(liar, f"reports implausible values (watchdog: {watchdog_detail})")
-        measured_mps = abs(self._drives.fastest().velocity_mps)
-        ordered_mps = max(abs(speed) for speed in wheel_speeds(self._motion.twist, self._robot.base.track_m))
+            drives.doubt(liar, f"reports implausible values (watchdog: {watchdog_detail})")
+        measured_mps = abs(drives.fastest().velocity_mps)
+        left_mps, right_mps = wheel_speeds(self._motion.twist, self._track_m)
+        ordered_mps = max(abs(left_mps), abs(right_mps))
+        ready, enabled, stand = drives.are_ready, drives.are_enabled, drives.stand(now_s)
         return Situation(
             bus=self._bus_problem,
-            booting=self._drives.booting(now_s),
-            missing=self._drives.missing(now_s),
-            fault=self._drives.fault(),
-            absent=self._drives.absent(),
-            silent=self._drives.silent(now_s, self._sync_since),
-            disabled="" if self._let_go.excuses(now_s) else self._drives.disabled(),
-            unprepared=self._drives.unprepared(),
+            booting="" if ready else drives.booting(now_s),
+            missing="" if ready else drives.missing(now_s),
+            fault="" if enabled else drives.fault(),
+            absent="" if ready else drives.absent(),
+            silent=drives.silent(now_s, self._sync_since),
+            disabled="" if enabled or self._let_go.excuses(now_s) else drives.disabled(),
+            unprepared="" if enabled else drives.unprepared(),
             unarmed=self._record.unarmed or self._watchdog.unarmed,
             watchdog=watchdog,
             watchdog_detail=watchdog_detail,
             watchdog_about_drive=self._watchdog.about_drive,
             commanded=self._command.motion(now_s),
             overdue=self._overdue(now_s),
-            standstill=self._drives.stand(now_s),
-            turning=self._drives.turning(now_s),
+            standstill=stand,
+            turning="" if stand else drives.turning(now_s),
             speed_mps=measured_mps,
-            braking_mps=self._drives.braking_mps(now_s),
+            braking_mps=drives.braking_mps(now_s),
             begin_mps=max(measured_mps, ordered_mps),
             turn_radps=self._motion.twist.angular_radps,
-            doubted=self._drives.doubted(),
-            powered=self._drives.may_have_power(now_s),
+            doubted=drives.doubted(),
+            powered=drives.may_have_power(now_s),
             unconfigured=self._readiness.unconfigured,
             inactive=self._readiness.inactive,
             resetting=self._reset.runs,
@@ -359,7 +366,7 @@ class DriverCore:
 
     def _answers_last_sync(self, now_s: float) -> bool:
         """False for a TPDO that waited while this process stood still: it tells of then, and would pass for fresh."""
-        return now_s - self._ticked_at <= self._robot.timeouts.feedback_s
+        return now_s - self._ticked_at <= self._feedback_s
 
     def _dispatch_table(self) -> dict[int, tuple[Handler, CanopenNode | None]]:
         """Who takes a frame, and the node that may go on with its boot after it."""

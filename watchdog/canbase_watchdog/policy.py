@@ -379,12 +379,14 @@ CHECKS = (
 )
 """The first row that trips is the cause: where one failure shows in several rows, the one that explains it most comes
 first. A cause without a row does not stand: nothing of it is left to see."""
-_NOT_BY_BUS = tuple(check for check in CHECKS if not check.by_bus)
 
 
 def decide(view: View, config: WatchdogConfig, now_s: float, fine: BusView | None = None) -> Verdict:
     """The first cause to trip in what is seen at the monotonic time `now_s` [s], or FINE. `fine`: a bus that was."""
-    for check in _NOT_BY_BUS if view.bus is fine else CHECKS:
+    known = view.bus is fine
+    for check in CHECKS:
+        if known and check.by_bus:
+            continue
         verdict = check.trips(view, config, now_s)
         if verdict.cause is not TripCause.NONE:
             return verdict

@@ -30,7 +30,10 @@ class Axis:
         self.drive = drive
         self.units = AxisUnits(drive, robot.base)
         self.statusword = 0
+        self.is_left = drive.side == "left"
         self.state: DriveState | None = None
+        self.has_torque = True
+        """By its last statusword, or unknown."""
         self.velocity_mps = 0.0
         self.target_mps = 0.0
         self.status_at = self.velocity_at = -math.inf
@@ -67,11 +70,12 @@ class Axis:
 
     def age_s(self, now_s: float) -> float:
         """Age of the oldest of its values [s]; infinity: not all came since the last `forget`."""
-        return now_s - self.fed_at
+        status_at, velocity_at = self.status_at, self.velocity_at
+        return now_s - (status_at if status_at < velocity_at else velocity_at)
 
     def stands(self, now_s: float) -> bool:
         """Fresh values are evidence that the wheel stands."""
-        return self.age_s(now_s) <= self._feedback_s and self.stillness.stands(now_s)
+        return self.stillness.stands(now_s) and self.age_s(now_s) <= self._feedback_s
 
     def is_proven_to_stand(self, now_s: float) -> bool:
         """The same, and it cannot be rolling with a dead encoder."""
@@ -83,7 +87,7 @@ class Axis:
         if self.velocity_at > -math.inf:
             self._known_mps, self._known_at = self.velocity_mps, self.velocity_at
         self.status_at = self.velocity_at = -math.inf
-        self.state = None
+        self.state, self.has_torque = None, True
         self.velocity_mps = 0.0
         self.stillness.forget()
         self.travel.reset_reference()
@@ -100,8 +104,8 @@ class Axis:
         self.travel.update(counts, max(1, round(gap_s * self._control_hz)))
         self.status_at = now_s
         self._status_is_new = True
-        has_torque = self.state is None or self.state.has_torque
-        self.stillness.on_power(has_torque, now_s, self.state is DriveState.OPERATION_ENABLED)
+        self.has_torque = self.state is None or self.state.has_torque
+        self.stillness.on_power(self.has_torque, now_s, self.state is DriveState.OPERATION_ENABLED)
         return True
 
     def on_velocity(self, data: bytes, now_s: float) -> bool:
@@ -114,10 +118,10 @@ class Axis:
             self.stillness.pause()
         self.velocity_at = now_s
         ordered_mps = self.target_mps if self.state is DriveState.OPERATION_ENABLED else 0.0
-        self.stillness.on_sample(self.travel.travel_m, self.velocity_mps, ordered_mps, now_s)
-        has_torque = self.state is None or self.state.has_torque
+        travel_m = self.travel.travel_m
+        self.stillness.on_sample(travel_m, self.velocity_mps, ordered_mps, now_s)
         torque = unpack_torque(data, self._layout)
-        self.push.on_sample(self.travel.travel_m, torque, ordered_mps, has_torque, now_s)
+        self.push.on_sample(travel_m, torque, ordered_mps, self.has_torque, now_s)
         self.has_new_sample = self._status_is_new
         return True
 

@@ -100,7 +100,7 @@ class CanopenNode:
     @property
     def has_pdos(self) -> bool:
         """It was configured and started: setpoints may be sent to it, and its feedback counts."""
-        return self.presence in (Presence.STARTING, Presence.READY)
+        return self.presence is Presence.READY or self.presence is Presence.STARTING
 
     @property
     def takes_pdos(self) -> bool:
@@ -156,9 +156,12 @@ class CanopenNode:
         if self.presence is not Presence.READY:
             return ""
         timeouts = self._robot.timeouts
+        feedback_s = timeouts.feedback_s
         for axis in self.axes:
+            if axis.age_s(now_s) <= feedback_s:
+                continue
             unasked_s = min(max(0.0, sync_since - axis.fed_at), timeouts.drive_heartbeat_s)
-            if axis.age_s(now_s) - unasked_s > timeouts.feedback_s:
+            if axis.age_s(now_s) - unasked_s > feedback_s:
                 value = "status" if axis.status_at <= axis.velocity_at else "velocity"
                 return f"{self.name}: no {value} for {axis.age_s(now_s):.2f} s"
         if now_s - self.heartbeat_at > timeouts.drive_heartbeat_s:
@@ -190,7 +193,7 @@ class CanopenNode:
 
     def lose(self, why: str, now_s: float) -> None:
         """It must be booted again before it counts: `why` completes the sentence that begins with its name."""
-        had_power = self.has_pdos and any(axis.state is None or axis.state.has_torque for axis in self.axes)
+        had_power = self.has_pdos and any(axis.has_torque for axis in self.axes)
         self._owed_stop = had_power or self._owed_stop
         for axis in self.axes:
             axis.forget()
@@ -224,9 +227,9 @@ class CanopenNode:
 
     def setpoints(self, goal: PowerGoal, left_mps: float, right_mps: float) -> list[Frame]:
         """The setpoint of each axis, one step towards `goal`; speeds of the rims, forward positive [m/s]."""
-        speeds = {"left": left_mps, "right": right_mps}
         words = self.controlwords(goal)
-        return [axis.setpoint(goal, speeds[axis.drive.side], word) for axis, word in zip(self.axes, words, strict=True)]
+        pairs = zip(self.axes, words, strict=True)
+        return [axis.setpoint(goal, left_mps if axis.is_left else right_mps, word) for axis, word in pairs]
 
     def stop_by_sdo(self, goal: PowerGoal, now_s: float) -> list[Frame]:
         """Controlwords and speeds by SDO while it takes no PDOs; it may have left NMT operational, motors turning."""

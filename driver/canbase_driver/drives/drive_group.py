@@ -15,7 +15,7 @@ from canbase_driver.cia301.emcy import emcy_text
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia402 import INTERNAL_LIMIT, PREPARED, REMOTE, WARNING, DriveState
 from canbase_driver.drives.axis import Axis
-from canbase_driver.drives.canopen_node import CanopenNode
+from canbase_driver.drives.canopen_node import CanopenNode, Presence
 from canbase_driver.drives.drive_snapshot import DriveSnapshot
 
 
@@ -35,6 +35,7 @@ class Drives:
         self.right = tuple(axis for axis in self.axes if axis.drive.side == "right")
         node_of = {node.node_id: node for node in self.nodes}
         self._with_node = tuple((node_of[axis.drive.node_id], axis) for axis in self.axes)
+        self._feedback_s = robot.timeouts.feedback_s
 
     def _are_configured_without(self, node: CanopenNode) -> bool:
         return not any(other.is_being_configured for other in self.nodes if other is not node)
@@ -61,6 +62,22 @@ class Drives:
         self._budget.spend(len(frames))
         return frames
 
+    @property
+    def are_ready(self) -> bool:
+        """Of no node there is anything to tell by `booting`, `missing` and `absent`."""
+        for node in self.nodes:
+            if node.presence is not Presence.READY:
+                return False
+        return True
+
+    @property
+    def are_enabled(self) -> bool:
+        """Of no axis there is anything to tell by `fault`, `disabled` and `unprepared`."""
+        for axis in self.axes:
+            if axis.state is not DriveState.OPERATION_ENABLED:
+                return False
+        return True
+
     def booting(self, now_s: float) -> str:
         """What a node that is being booted or started is waiting for."""
         return _first(node.waiting_for(now_s) for node in self.nodes)
@@ -75,7 +92,10 @@ class Drives:
 
     def silent(self, now_s: float, sync_since: float) -> str:
         """Which node gives no fresh status or heartbeat. `sync_since`: start of the present run of SYNCs [s]."""
-        return _first(node.silent(now_s, sync_since) for node in self.nodes)
+        for node in self.nodes:
+            if told := node.silent(now_s, sync_since):
+                return told
+        return ""
 
     def fault(self) -> str:
         """Which axis is in fault or in its reaction to one, and the code that the drive gave."""
@@ -95,7 +115,10 @@ class Drives:
 
     def stand(self, now_s: float) -> bool:
         """Measured, fresh, and evidence: no wheel turns."""
-        return all(axis.stands(now_s) for axis in self.axes)
+        for axis in self.axes:
+            if not axis.stands(now_s):
+                return False
+        return True
 
     def are_proven_to_stand(self, now_s: float) -> bool:
         """What motor_driver/status reports: no wheel turns, and none may be rolling with a dead encoder."""
@@ -103,8 +126,10 @@ class Drives:
 
     def rest(self, left_mps: float, right_mps: float) -> bool:
         """Nothing is ordered of any wheel, and these speeds of the rims order nothing either."""
-        speeds = {"left": left_mps, "right": right_mps}
-        return all(axis.rests(speeds[axis.drive.side]) for axis in self.axes)
+        for axis in self.axes:
+            if not axis.rests(left_mps if axis.is_left else right_mps):
+                return False
+        return True
 
     def turning(self, now_s: float) -> str:
         """Which wheel does not stand, and why that is said; empty: all stand."""
@@ -118,7 +143,10 @@ class Drives:
 
     def doubted(self) -> str:
         """Which wheel's sensors are no evidence, and why; empty: none."""
-        return _first(_of(axis, axis.stillness.doubt) for axis in self.axes)
+        for axis in self.axes:
+            if doubt := axis.stillness.doubt:
+                return _of(axis, doubt)
+        return ""
 
     def assumed(self, now_s: float) -> str:
         """Which wheel's standstill is assumed and not measured, and why; empty: none."""
@@ -126,14 +154,17 @@ class Drives:
 
     def may_have_power(self, now_s: float) -> bool:
         """Some axis has torque, or does not tell."""
-        fresh_s = self._robot.timeouts.feedback_s
-        return any(
-            now_s - axis.status_at > fresh_s or axis.state is None or axis.state.has_torque for axis in self.axes
-        )
+        for axis in self.axes:
+            if axis.has_torque or now_s - axis.status_at > self._feedback_s:
+                return True
+        return False
 
     def have_references(self) -> bool:
         """The travel of every wheel is known since its first sample."""
-        return all(axis.travel.referenced for axis in self.axes)
+        for axis in self.axes:
+            if not axis.travel.referenced:
+                return False
+        return True
 
     def forget_emcys(self) -> None:
         """After a reset: what the drives told before it is no news any more; some never take it back."""
@@ -142,29 +173,35 @@ class Drives:
 
     def losses(self) -> int:
         """How often the travel of some wheel went on from a new reference, since the start."""
-        return sum(axis.losses for axis in self.axes)
+        return sum([axis.losses for axis in self.axes])
 
     def travel_m(self) -> tuple[float, float]:
         """Travel of the rims, left and right, since the start [m]; several wheels on a side are averaged."""
-        return _mean(axis.travel.travel_m for axis in self.left), _mean(axis.travel.travel_m for axis in self.right)
+        left, right = [axis.travel.travel_m for axis in self.left], [axis.travel.travel_m for axis in self.right]
+        return sum(left) / len(left), sum(right) / len(right)
 
     def speeds_mps(self) -> tuple[float, float]:
         """Measured speeds of the rims, left and right [m/s]; several wheels on a side are averaged."""
-        return _mean(axis.velocity_mps for axis in self.left), _mean(axis.velocity_mps for axis in self.right)
+        left, right = [axis.velocity_mps for axis in self.left], [axis.velocity_mps for axis in self.right]
+        return sum(left) / len(left), sum(right) / len(right)
 
     def fastest(self) -> Axis:
         """The axis with the greatest measured speed."""
-        return max(self.axes, key=lambda axis: abs(axis.velocity_mps))
+        fastest = self.axes[0]
+        for axis in self.axes:
+            if abs(axis.velocity_mps) > abs(fastest.velocity_mps):
+                fastest = axis
+        return fastest
 
     def braking_mps(self, now_s: float) -> float:
         """The greatest speed of a wheel with power that was measured in the last moments; 0: there is none [m/s]."""
-        return max((abs(each.velocity_mps) for each in self.axes if self._is_driven(each, now_s)), default=0.0)
+        return max([abs(each.velocity_mps) for each in self.axes if self._is_driven(each, now_s)], default=0.0)
 
     def _is_driven(self, axis: Axis, now_s: float) -> bool:
         """With power, by fresh values; or it tells its speed alone, by SDO, and may have power."""
         if axis.state is None:
-            return now_s - axis.velocity_at <= self._robot.timeouts.feedback_s
-        return self._is_fresh(axis, now_s) and axis.state.has_torque
+            return now_s - axis.velocity_at <= self._feedback_s
+        return axis.has_torque and self._is_fresh(axis, now_s)
 
     def snapshots(self, now_s: float) -> tuple[DriveSnapshot, ...]:
         """One per axis, in the order of robot.yaml."""
@@ -181,7 +218,7 @@ class Drives:
         return f"{joint} turns at {axis.velocity_mps:.3f} m/s (base.standstill_mps {base.standstill_mps:g})"
 
     def _is_fresh(self, axis: Axis, now_s: float) -> bool:
-        return axis.age_s(now_s) <= self._robot.timeouts.feedback_s
+        return axis.age_s(now_s) <= self._feedback_s
 
 
 def age_s(now_s: float, then: float) -> float:
@@ -250,8 +287,3 @@ def _disabled(axis: Axis) -> str:
 
 def _first(sentences: Iterable[str]) -> str:
     return next((sentence for sentence in sentences if sentence), "")
-
-
-def _mean(values: Iterable[float]) -> float:
-    listed = list(values)
-    return sum(listed) / len(listed)

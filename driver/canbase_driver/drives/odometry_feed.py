@@ -86,8 +86,9 @@ class OdometryFeed:
     def update(self, now_s: float) -> None:
         """Take the sample in if every wheel has given a fresh one since the last; call it after each feedback."""
         axes = self._drives.axes
-        if not all(axis.has_fresh_sample(now_s) for axis in axes):
-            return
+        for axis in axes:
+            if not axis.has_fresh_sample(now_s):
+                return
         for axis in axes:
             axis.sample_taken()
         if now_s > self._taken_at and self._drives.have_references():

@@ -84,6 +84,8 @@ class Limiter:
         goal = Twist2D.ZERO if emergency else _waypoint(current.twist, self.limit(target))
         if dt_s == 0.0:
             return current
+        if goal == current.twist:
+            return MotionState(goal)
         return self._advance(current, goal, min(dt_s, LONGEST_RAMP_STEP_S), emergency)
 
     def _advance(self, current: MotionState, goal: Twist2D, dt_s: float, emergency: bool) -> MotionState:

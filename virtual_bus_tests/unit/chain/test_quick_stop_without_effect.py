@@ -78,7 +78,7 @@ def stopped_by_driver(of: Robot, share: float = 0.0) -> float:
     """The other drive is in fault: the driver's quick stop. The watchdog judges nothing."""
     world = driving(of, share)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(policy, "decide", lambda view, config, now_s: FINE)
+        patch.setattr(policy, "decide", lambda view, config, now_s, fine: FINE)
         apply(world.bench.nodes, 2, "fault", world.now_s, {})
         assert world.run(1.0, lambda: world.core.state is DriverState.STOPPING)
         return power_s(world)

@@ -38,6 +38,19 @@ def rx(it: Observer, cob_id: int, data: str, now_s: float = 1.0) -> Axis:
     return look(it).axes[0]
 
 
+def test_a_look_is_the_same_object_until_a_frame_comes_that_is_watched() -> None:
+    it = observer()
+    for cob_id in (0x080, 0x77F, 0x701, 0x581, 0x601, 0x181, 0x281, 0x201, 0x000):
+        before = it.look()
+        it.on_frame(0x123, b"", 1.0)
+        assert it.look() is before
+        it.on_frame(cob_id, b"", 1.0)  # also where it is too short to be understood
+        assert it.look() is not before, hex(cob_id)
+    before = it.look()
+    it.trust()
+    assert it.look() is not before
+
+
 def test_status_velocity_and_setpoint_of_a_single_axis() -> None:
     it = observer()
     axis = rx(it, 0x181, "37 02 10 00 00 00", 1.0)

@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
+from canbase_watchdog.envelope import Bounds
 from canbase_watchdog.frames import DriveState
 from canbase_watchdog.latch import Entry, Mark, Past
 from canbase_watchdog.lease import Lease
-from canbase_watchdog.policy import CHECKS, decide, next_expiry, stands
+from canbase_watchdog.policy import CHECKS, Check, decide, next_expiry, stands
 from canbase_watchdog.power_and_motion import commanded, in_motion, is_off, moving, near_power, velocity_ordered
 from canbase_watchdog.trip_cause import FINE, SENSOR_CAUSES, TripCause, Verdict, before_the_start
 from canbase_watchdog.view import NEVER, Node, View
@@ -37,6 +38,36 @@ def test_a_node_is_found_by_its_id_wherever_it_stands() -> None:
     assert well(nodes=(two, one)).node(1) is one
     with pytest.raises(StopIteration):
         WELL.node(3)
+
+
+@pytest.mark.parametrize("check", [check for check in CHECKS if check.by_bus], ids=lambda check: check.cause.name)
+def test_what_is_judged_once_a_frame_depends_on_the_bus_alone(check: Check) -> None:
+    """Otherwise it would be found late."""
+    bad = {"overspeed": 9, "outside": 9, "implausible": 9}
+    axis = replace(
+        LEFT,
+        feedback=replace(LEFT.feedback, **bad),
+        evidence=replace(LEFT.evidence, unseen=True),
+        push=replace(LEFT.push, overdue_s=9.0),
+        missed_setpoints=1e6,
+        double_answers=1e6,
+    )
+    seen, changes = of(axis, RIGHT), {"lease_at": NEVER, "bus_failed_since": 0.0, "tick_gap_s": 9.0, "twist": "far off"}
+    causes = {
+        check.trips(view, CONFIG, now_s).cause
+        for view in (seen, replace(seen, bounds=Bounds(0.0, 0.0, 0.0, 0.0), **changes))
+        for now_s in (0.0, NOW, NOW + 100.0)
+    }
+    assert causes == {check.cause}
+    assert check.trips(WELL, CONFIG, NOW + 100.0) == FINE
+
+
+def test_a_bus_that_was_fine_is_judged_again_by_what_depends_on_more() -> None:
+    fast = of(replace(LEFT, feedback=replace(LEFT.feedback, overspeed=9)), RIGHT)
+    assert decide(fast, CONFIG, NOW, WELL.bus).cause is TripCause.OVERSPEED, "another bus"
+    assert decide(fast, CONFIG, NOW, fast.bus) == FINE
+    late = replace(fast, lease_at=NOW - 1.0)
+    assert decide(late, CONFIG, NOW, late.bus).cause is TripCause.LEASE_LOST
 
 
 def test_what_has_not_ticked_yet_is_not_late() -> None:
