@@ -25,6 +25,7 @@ def frame_bits(data_bytes: int) -> float:
     return (FRAME_BITS + 8 * data_bytes) * STUFFED
 
 
+_BITS = tuple(frame_bits(data_bytes) for data_bytes in range(65))
 Receive = Callable[[int, bytes], None]
 
 
@@ -60,6 +61,7 @@ class Member:
         """Put a frame into the transmit buffer."""
         if len(self.waiting) < QUEUE:
             self.waiting.append((cob_id, data))
+            self._bus.queued += 1
             self._bus.start()
 
 
@@ -73,6 +75,8 @@ class CanBus:
         self.watch: Callable[[str, int, bytes], None] | None = None
         """Told of every frame with its sender, for a log."""
         self.frames = 0
+        self.queued = 0
+        """Frames that wait in all members."""
         self._busy = False
 
     def join(self, name: str, receive: Receive) -> Member:
@@ -86,7 +90,7 @@ class CanBus:
 
     def start(self) -> None:
         """Begin the next frame if the bus is free."""
-        if self._busy:
+        if self._busy or not self.queued:
             return
         winner: Member | None = None
         lowest = 0x800
@@ -96,11 +100,12 @@ class CanBus:
                 winner, lowest = member, waiting[0][0]
         if winner is not None:
             self._busy = True
-            self.clock.after(frame_bits(len(winner.waiting[0][1])) / self.bitrate, self._end, winner)
+            self.clock.after(_BITS[len(winner.waiting[0][1])] / self.bitrate, self._end, winner)
 
     def _end(self, sender: Member) -> None:
         """The last bit is over: everybody has the frame."""
         cob_id, data = sender.waiting.popleft()
+        self.queued -= 1
         self.frames += 1
         if self.watch is not None:
             self.watch(sender.name, cob_id, data)

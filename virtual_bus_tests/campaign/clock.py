@@ -45,7 +45,10 @@ class Clock:
 
     def after(self, delay_s: float, do: Callable[..., object], *arguments: Any) -> None:
         """Call `do(*arguments)` after `delay_s`."""
-        self.at(self.now_s + delay_s, do, *arguments)
+        self._entered += 1
+        now_s = self.now_s
+        when = now_s + delay_s
+        heapq.heappush(self._events, (when if when > now_s else now_s, self._entered, do, arguments))
 
     def run_until(self, end: float) -> None:
         """Let time pass up to and including `end` [s]."""

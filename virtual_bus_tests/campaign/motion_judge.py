@@ -60,6 +60,34 @@ class Allowed:
         )
 
 
+class Greatest:
+    """The greatest of the values that were entered and not dropped yet; they are dropped in their order."""
+
+    def __init__(self) -> None:
+        self._numbers: deque[tuple[int, float]] = deque()
+        """Only those that may still be the greatest: the values fall."""
+        self._entered = self._dropped = 0
+
+    def enter(self, value: float) -> None:
+        """One more."""
+        numbers = self._numbers
+        while numbers and numbers[-1][1] <= value:
+            numbers.pop()
+        self._entered += 1
+        numbers.append((self._entered, value))
+
+    def drop(self) -> None:
+        """The oldest one does not count any more."""
+        self._dropped += 1
+        if self._numbers[0][0] == self._dropped:
+            self._numbers.popleft()
+
+    @property
+    def value(self) -> float:
+        """Of all that count."""
+        return self._numbers[0][1]
+
+
 class MotionJudge:
     """To be asked every step. Times in seconds, virtual."""
 
@@ -68,7 +96,10 @@ class MotionJudge:
         self._shown = shown
         self._allowed = Allowed.of(world.robot)
         now_s = world.clock.now_s
-        self._orders: deque[tuple[float, Twist]] = deque([(now_s, Twist(0.0, 0.0))])
+        self._ordered_at: deque[float] = deque()
+        self._wheel, self._left, self._right = Greatest(), Greatest(), Greatest()
+        """Of these orders: the speed of a wheel, and the turn each way."""
+        self.order(Twist(0.0, 0.0))
         self._fast_since = self._beside_since = self._lies_since = now_s
         self._before_mps = 0.0
         self._impulse_s = world.robot.watchdog.stand_impulse_s + JITTER_S
@@ -84,7 +115,10 @@ class MotionJudge:
 
     def order(self, twist: Twist) -> None:
         """The filter ordered this, with a lease."""
-        self._orders.append((self._world.clock.now_s, twist))
+        self._ordered_at.append(self._world.clock.now_s)
+        self._wheel.enter(abs(twist.linear_mps) + abs(twist.angular_radps) * self._half_m)
+        self._left.enter(twist.angular_radps)
+        self._right.enter(-twist.angular_radps)
 
     def step(self, now_s: float, lost: bool) -> tuple[str, str]:
         """Name of the property that does not hold now and what is seen; two empty texts: everything holds.
@@ -93,8 +127,10 @@ class MotionJudge:
         """
         if lost:
             self._fast_since = self._beside_since = self._lies_since = now_s
-        while len(self._orders) > 1 and self._orders[1][0] < now_s - self._allowed.remembered_s:
-            self._orders.popleft()
+        while len(self._ordered_at) > 1 and self._ordered_at[1] < now_s - self._allowed.remembered_s:
+            self._ordered_at.popleft()
+            for greatest in (self._wheel, self._left, self._right):
+                greatest.drop()
         found = self._runaway(now_s) or self._path(now_s) or self._standstill(now_s) or ("", "")
         beyond = not math.isclose(now_s, min(self._fast_since, self._beside_since)) or self._shown.is_blind
         self.ran_away = beyond or (self.ran_away and self._shown.fastest_mps > self._allowed.stands_mps)
@@ -129,7 +165,7 @@ class MotionJudge:
         return max(unasked * timeouts.drive_heartbeat_s, unwatched * timeouts.watchdog_s)
 
     def _runaway(self, now_s: float) -> tuple[str, str] | None:
-        ordered_mps = max(abs(t.linear_mps) + abs(t.angular_radps) * self._half_m for _, t in self._orders)
+        ordered_mps = self._wheel.value
         wheel_mps = self._driven_mps()
         if wheel_mps <= ordered_mps + self._allowed.runaway_mps:
             self._fast_since = now_s
@@ -139,8 +175,7 @@ class MotionJudge:
 
     def _path(self, now_s: float) -> tuple[str, str] | None:
         """Between the slowest and the fastest turn that was ordered, zero among them, as a stop may come any time."""
-        turns = [twist.angular_radps for _, twist in self._orders]
-        low, high = min(0.0, *turns, 0.0), max(0.0, *turns, 0.0)
+        low, high = min(0.0, -self._right.value), max(0.0, self._left.value)
         turn = self._shown.angular_radps
         slack = self._allowed.path_radps + PATH_SHARE * max(-low, high)
         if low - slack <= turn <= high + slack or not self._follows() or self._rolls_blindly():

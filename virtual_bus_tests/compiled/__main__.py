@@ -26,7 +26,7 @@ MYPY = (
     "--python-version",
     f"3.{sys.version_info.minor}",
 )
-FLAGS = ("-fPIC", "-fwrapv", "-g0", "-w", "-UNDEBUG")
+FLAGS = ("-fPIC", "-fno-semantic-interposition", "-fwrapv", "-g0", "-w", "-UNDEBUG")
 """Of the C compiler. Nothing like -ffast-math: floats have to come out bit for bit."""
 
 
@@ -73,7 +73,7 @@ def _compile(source: str, include: list[str], level: str) -> None:
 def _link(level: str, extension: setuptools.Extension) -> None:
     library = extension.name.replace(".", "/") + sysconfig.get_config_var("EXT_SUFFIX")
     objects = [f"{source}.O{level}.o" for source in extension.sources]
-    subprocess.run(["gcc", "-shared", *objects, "-o", library], check=True)
+    subprocess.run(["gcc", "-shared", "-Wl,-Bsymbolic", *objects, "-o", library], check=True)
 
 
 def main() -> None:
