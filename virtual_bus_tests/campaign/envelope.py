@@ -27,15 +27,39 @@ ROLLS_S = 0.002
 """Of τ: what a wheel that rolls out from one step to the next may differ by; 1 mm/s at 0.5 m/s²."""
 
 
+class _Numbers:
+    """Of one robot, worked out once: they are asked for every step."""
+
+    def __init__(self, robot: Robot) -> None:
+        watchdog, t, limits = robot.watchdog, robot.timeouts, robot.limits
+        self.robot = robot
+        share_mps = watchdog.target_tolerance_share * max_wheel_mps(robot)
+        self.tolerance_mps = watchdog.target_tolerance_mps + share_mps + OVERSHOOT_MPS
+        self.tolerance_radps = 2.0 * self.tolerance_mps / robot.base.track_m
+        hold_s = order_hold_s(robot) - jerk_adds_s(limits)
+        self.notice_s = max(hold_s, t.lease_s, t.watchdog_s, t.drive_heartbeat_s) + TICK_S + BUS_S
+        self.deceleration_mps2 = limits.deceleration_mps2
+        self.angular_deceleration_radps2 = limits.angular_deceleration_radps2
+
+
+_last: list[_Numbers] = []
+"""Of the robot that was asked about last, which is the same one for a whole scenario."""
+
+
+def _numbers(robot: Robot) -> _Numbers:
+    if not _last or _last[0].robot is not robot:
+        _last[:] = [_Numbers(robot)]
+    return _last[0]
+
+
 def tolerance_mps(robot: Robot) -> float:
     """At the rim: what no layer can tell from standing or from the ordered speed [m/s]."""
-    watchdog = robot.watchdog
-    return watchdog.target_tolerance_mps + watchdog.target_tolerance_share * max_wheel_mps(robot) + OVERSHOOT_MPS
+    return _numbers(robot).tolerance_mps
 
 
 def tolerance_radps(robot: Robot) -> float:
     """The same of a turn in place [rad/s]."""
-    return 2.0 * tolerance_mps(robot) / robot.base.track_m
+    return _numbers(robot).tolerance_radps
 
 
 def coasting_share(drawn: DrawnRobot) -> float:
@@ -47,12 +71,7 @@ def coasting_share(drawn: DrawnRobot) -> float:
 
 def notice_s(robot: Robot) -> float:
     """Longest time until one layer notices that it must stop the base [s]."""
-    t = robot.timeouts
-    return (
-        max(order_hold_s(robot) - jerk_adds_s(robot.limits), t.lease_s, t.watchdog_s, t.drive_heartbeat_s)
-        + TICK_S
-        + BUS_S
-    )
+    return _numbers(robot).notice_s
 
 
 def react_s(robot: Robot, layers: int) -> float:
@@ -62,13 +81,14 @@ def react_s(robot: Robot, layers: int) -> float:
 
 def braking_s(robot: Robot, linear_mps: float, angular_radps: float) -> float:
     """τ of an order [s]."""
-    limits = robot.limits
-    return max(abs(linear_mps) / limits.deceleration_mps2, abs(angular_radps) / limits.angular_deceleration_radps2)
+    of = _numbers(robot)
+    return max(abs(linear_mps) / of.deceleration_mps2, abs(angular_radps) / of.angular_deceleration_radps2)
 
 
 def moving_s(robot: Robot, linear_mps: float, angular_radps: float) -> float:
     """τ of a motion as it is judged [s]: less the tolerance."""
-    linear, angular = abs(linear_mps) - tolerance_mps(robot), abs(angular_radps) - tolerance_radps(robot)
+    of = _numbers(robot)
+    linear, angular = abs(linear_mps) - of.tolerance_mps, abs(angular_radps) - of.tolerance_radps
     return braking_s(robot, max(0.0, linear), max(0.0, angular))
 
 

@@ -61,15 +61,20 @@ class Reach:
     def step(self, stands: bool) -> None:
         """Look at all drives now."""
         now_s, bench = self._world.clock.now_s, self._world.drives.bench
-        self._ran_at |= {name: now_s for name in self._ran_at if self._world.processes[name].running}
+        for name in self._ran_at:
+            if self._world.processes[name].running:
+                self._ran_at[name] = now_s
         powered = [node for node in bench.nodes.values() if any(axis.motor.powered for axis in node.axes)]
         self._power_from = {node.node_id: self._power_from.get(node.node_id, now_s) for node in powered}
         self._weak = {node.node_id for node in powered if node.node_id in self._weak or self._is_weak(node.axes)}
         lost = {node_id for node_id, _ in self.turning() if not stands and self._is_lost(node_id, now_s)}
         self.lost = bool(lost)
         self.was_lost = self.lost or (self.was_lost and not stands)
-        self.lost_at |= dict.fromkeys(lost, now_s)
-        self._cut_at |= {node.node_id: now_s for node in powered if not self._reached(node.node_id)}
+        if lost:
+            self.lost_at |= dict.fromkeys(lost, now_s)
+        for node in powered:
+            if not self._reached(node.node_id):
+                self._cut_at[node.node_id] = now_s
         wheel_mps = max(abs(bench.base.v_left_mps), abs(bench.base.v_right_mps))
         self.fastest_mps = 0.0 if stands else max(self.fastest_mps, wheel_mps)
 
@@ -84,8 +89,10 @@ class Reach:
     def turning(self) -> Iterator[tuple[int, int]]:
         """Node id and axis of each wheel that turns with power."""
         base, nodes = self._world.drives.bench.base, self._world.drives.bench.nodes
+        if base.resting:
+            return
         speeds = {"left": base.v_left_mps, "right": base.v_right_mps}
-        if max(map(abs, speeds.values())) > self._moves_mps:
+        if max(abs(base.v_left_mps), abs(base.v_right_mps)) > self._moves_mps:
             for node_id, axis, side in self._wheels:
                 if abs(speeds[side]) > self._moves_mps and nodes[node_id].axes[axis].motor.powered:
                     yield node_id, axis
@@ -127,14 +134,13 @@ class Reach:
         """A driver or a watchdog that is there, and that is not mad, has a line to it."""
         world = self._world
         driver, blocked = world.driver, world.bus.disturbance.blocked
+        if not world.drives.bench.nodes[node_id].line.hears:
+            return False
         sane = not driver.bus_problem and not driver.repeats and not driver.ignores_zero
-        senders = {
-            "driver": sane and self._is_there("driver"),
-            "watchdog": not world.watchdog.is_deaf and self._is_there("watchdog"),
-        }
-        return world.drives.bench.nodes[node_id].line.hears and any(
-            talks and (name, f"drive{node_id}") not in blocked for name, talks in senders.items()
-        )
+        if sane and self._is_there("driver") and ("driver", f"drive{node_id}") not in blocked:
+            return True
+        talks = not world.watchdog.is_deaf and self._is_there("watchdog")
+        return talks and ("watchdog", f"drive{node_id}") not in blocked
 
     def _is_there(self, name: str) -> bool:
         """It runs, or has hung for so short that nobody misses it."""

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from canbase_config.watchdog import WatchdogConfig
@@ -108,8 +109,16 @@ class Bounds:
 
     def wheel(self, arm_m: float) -> tuple[float, float]:
         """Least and greatest speed [m/s] of a wheel that is `arm_m` to the right of the middle (left: negative)."""
-        turns = (arm_m * self.angular_low, arm_m * self.angular_high)
-        return self.linear_low + min(turns), self.linear_high + max(turns)
+        one, other = arm_m * self.angular_low, arm_m * self.angular_high
+        return self.linear_low + min(one, other), self.linear_high + max(one, other)
+
+    def pairs(self, lefts: Sequence[float], rights: Sequence[float], track_m: float, tolerance_mps: float) -> str:
+        """The same for each wheel of the left side with each one of the right: the first reason."""
+        for left_mps in lefts:
+            for right_mps in rights:
+                if why := self.pair(left_mps, right_mps, track_m, tolerance_mps):
+                    return why
+        return ""
 
     def pair(self, left_mps: float, right_mps: float, track_m: float, tolerance_mps: float) -> str:
         """Why two wheels that are each allowed are not so together, empty when they are."""
@@ -129,15 +138,17 @@ class Envelope:
         """Rule 4: open at the monotonic time `now_s` [s]."""
         self._config = config
         ceilings = (config.linear_mps, config.linear_mps, config.angular_radps, config.angular_radps)
-        self._ways = tuple(Way(ceiling, config.order_hold_s, now_s) for ceiling in ceilings)
+        self._ways = tuple([Way(ceiling, config.order_hold_s, now_s) for ceiling in ceilings])
         self._at = now_s
 
     def order(self, linear_mps: float, angular_radps: float, now_s: float) -> None:
         """A lease that counts. What it orders above the configured limits allows no more than they do."""
         until = now_s + self._config.lease_timeout_s
-        values = (linear_mps, -linear_mps, angular_radps, -angular_radps)
-        for way, value in zip(self._ways, values, strict=True):
-            way.order(value, now_s, until)
+        forward, backward, left, right = self._ways
+        forward.order(linear_mps, now_s, until)
+        backward.order(-linear_mps, now_s, until)
+        left.order(angular_radps, now_s, until)
+        right.order(-angular_radps, now_s, until)
 
     def advance(self, now_s: float) -> Bounds:
         """The bounds at the monotonic time `now_s` [s], which may not be before that of the last call."""

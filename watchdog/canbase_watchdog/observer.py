@@ -115,6 +115,7 @@ class Observer:
         self._gap_s = config.feedback_timeout_s
         self._still_mps = config.motion_tolerance_mps
         self._records = {(drive.node_id, drive.axis): _Record(drive, config, now_s) for drive in config.drives}
+        self._in_order = tuple(self._records.values())
         self._heartbeat_at = {node_id: NEVER for node_id, _ in self._records}
         self._heard_at, self._boot_up_at = dict(self._heartbeat_at), dict(self._heartbeat_at)
         self._configured_at = dict(self._heartbeat_at)
@@ -146,7 +147,7 @@ class Observer:
 
     def _put_together(self) -> BusView:
         return BusView(
-            tuple([record.axis() for record in self._records.values()]),
+            tuple([record.axis() for record in self._in_order]),
             tuple(
                 [
                     Node(node_id, at, self._heard_at[node_id], self._boot_up_at[node_id], self._configured_at[node_id])
@@ -195,10 +196,11 @@ class Observer:
         if len(data) > 1:
             return False
         self._foreign.on_sync(now_s)
-        for record in self._records.values():
+        rests = True
+        for record in self._in_order:
             record.on_sync(now_s)
-        rests = all(record.rests(self._still_mps) for record in self._records.values())
-        for record in self._records.values():
+            rests = rests and record.rests(self._still_mps)
+        for record in self._in_order:
             record.push.on_sync(record.setpoint_mps, rests)
             record.feedback.evidence.on_sync(rests)
         if now_s >= self._sync_at + self._gap_s:

@@ -27,7 +27,7 @@ class Overshoot:
         self._lacked_at = -math.inf
 
     def on_sample(
-        self, *, target_mps: float, velocity_mps: float, slack_mps: float, elapsed_s: float, now_s: float
+        self, target_mps: float, velocity_mps: float, slack_mps: float, elapsed_s: float, now_s: float
     ) -> float:
         """By how much it may be faster than its setpoints now [m/s].
 

@@ -29,11 +29,13 @@ class PairWatch:
         if bus.sync_at == self._sync_at:
             return ""
         self._sync_at = bus.sync_at
-        if not all(axis.enabled for axis in bus.axes):
-            self._bad = 0
-            return ""
-        if not all(axis.setpoint_at == bus.sync_at for axis in bus.axes):
-            return ""
+        for axis in bus.axes:
+            if not axis.enabled:
+                self._bad = 0
+                return ""
+        for axis in bus.axes:
+            if axis.setpoint_at != bus.sync_at:
+                return ""
         misfit = self._misfit(bus, bounds)
         self._bad = self._bad + 1 if misfit else 0
         return misfit if self._bad >= SYNCS else ""
@@ -41,11 +43,11 @@ class PairWatch:
     def _misfit(self, bus: BusView, bounds: Bounds) -> str:
         """Each wheel of the left side with each one of the right."""
         lefts, rights = _speeds(bus.axes, "left"), _speeds(bus.axes, "right")
-        config, low_high = self._config, bounds.wheel(self._config.track_m / 2.0)
-        share = config.target_tolerance_share * max(abs(speed) for speed in low_high)
+        config = self._config
+        low_mps, high_mps = bounds.wheel(config.track_m / 2.0)
+        share = config.target_tolerance_share * max(abs(low_mps), abs(high_mps))
         tolerance_mps = config.target_tolerance_mps + self._coarsest_mps + share
-        reasons = (bounds.pair(left, right, config.track_m, tolerance_mps) for left in lefts for right in rights)
-        return next((reason for reason in reasons if reason), "")
+        return bounds.pairs(lefts, rights, config.track_m, tolerance_mps)
 
 
 def _speeds(axes: tuple[Axis, ...], side: str) -> list[float]:

@@ -120,27 +120,21 @@ class Plausibility:
         apart = jumped or abs(drift_m) > config.travel_tolerance_m
         inside = -self._low - slack - backward_mps <= velocity_mps <= self._high + slack + forward_mps
         self.last = Feedback(
-            low_mps=-self._low,
-            high_mps=self._high,
-            outside=0 if inside else last.outside + 1,
-            overspeed=last.overspeed + 1 if abs(velocity_mps) > self._fastest_mps else 0,
-            implausible=last.implausible + (elapsed_s >= self._bunched_s) if apart else 0,
-            drift_m=drift_m,
+            -self._low,
+            self._high,
+            0 if inside else last.outside + 1,
+            last.overspeed + 1 if abs(velocity_mps) > self._fastest_mps else 0,
+            last.implausible + (elapsed_s >= self._bunched_s) if apart else 0,
+            drift_m,
         )
 
     def _overshoots(self, velocity_mps: float, slack_mps: float, elapsed_s: float, now_s: float) -> tuple[float, float]:
         """By how much the wheel may be faster than its setpoints, forward and backward, since it was slower."""
-        forward_mps, backward_mps = (
-            overshoot.on_sample(
-                target_mps=way * self._target_mps,
-                velocity_mps=way * velocity_mps,
-                slack_mps=slack_mps,
-                elapsed_s=elapsed_s,
-                now_s=now_s,
-            )
-            for overshoot, way in ((self._ahead, 1.0), (self._behind, -1.0))
+        target_mps = self._target_mps
+        return (
+            self._ahead.on_sample(target_mps, velocity_mps, slack_mps, elapsed_s, now_s),
+            self._behind.on_sample(-target_mps, -velocity_mps, slack_mps, elapsed_s, now_s),
         )
-        return forward_mps, backward_mps
 
     def _follow(self, elapsed_s: float, now_s: float) -> None:
         fallen_mps = elapsed_s * self._config.deceleration_mps2

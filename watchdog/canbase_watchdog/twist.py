@@ -52,8 +52,9 @@ class SlowWheels:
 
     def follow(self, setpoints: tuple[float, float], elapsed_s: float) -> tuple[float, float]:
         """Where they are after so much time."""
-        left, right = (self._ramp(*each, elapsed_s) for each in zip(self.speeds, setpoints, strict=True))
-        self.speeds = left, right
+        if setpoints != self.speeds:
+            left, right = self.speeds
+            self.speeds = self._ramp(left, setpoints[0], elapsed_s), self._ramp(right, setpoints[1], elapsed_s)
         return self.speeds
 
     def _ramp(self, speed_mps: float, setpoint_mps: float, elapsed_s: float) -> float:
@@ -100,10 +101,11 @@ class TwistWatch:
 
     def _bounds(self, bus: BusView, elapsed_s: float, now_s: float) -> Bounds:
         setpoints = _mean(bus.axes, "left"), _mean(bus.axes, "right")
-        wheels = (setpoints, *(slow.follow(setpoints, elapsed_s) for slow in self._slow))
-        linear, angular = self._linear, self._angular
+        one, other = self._slow
+        wheels = (setpoints, one.follow(setpoints, elapsed_s), other.follow(setpoints, elapsed_s))
+        linear, angular, track_m = self._linear, self._angular, self._config.track_m
         linear.order([(left + right) / 2.0 for left, right in wheels], now_s)
-        angular.order([(right - left) / self._config.track_m for left, right in wheels], now_s)
+        angular.order([(right - left) / track_m for left, right in wheels], now_s)
         linear.advance(elapsed_s, now_s)
         angular.advance(elapsed_s, now_s)
         return Bounds(-linear.low, linear.high, -angular.low, angular.high)
@@ -115,11 +117,11 @@ class TwistWatch:
 
     def _why(self, bus: BusView, bounds: Bounds) -> str:
         config = self._config
-        fastest_mps = max(abs(speed) for speed in bounds.wheel(config.track_m / 2.0))
+        low_mps, high_mps = bounds.wheel(config.track_m / 2.0)
+        fastest_mps = max(abs(low_mps), abs(high_mps))
         tolerance_mps = config.twist_tolerance_mps + self._coarsest_mps + config.twist_tolerance_share * fastest_mps
         lefts, rights = self._side(bus, "left"), self._side(bus, "right")
-        pairs = (bounds.pair(left, right, config.track_m, tolerance_mps) for left in lefts for right in rights)
-        why = next((each for each in pairs if each), "")
+        why = bounds.pairs(lefts, rights, config.track_m, tolerance_mps)
         return why and f"{why}; {self._worst(bus)}"
 
     def _side(self, bus: BusView, side: str) -> list[float]:

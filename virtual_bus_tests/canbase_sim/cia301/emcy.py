@@ -49,7 +49,7 @@ class EmcyService:
 
     def clear_error(self, code: int, source: int = 0) -> None:
         """`code` holds no longer."""
-        if self._active.pop((code, source), self) is None:
+        if self._active and self._active.pop((code, source), self) is None:
             self._tell(NO_ERROR, source)
 
     def reset(self) -> None:
