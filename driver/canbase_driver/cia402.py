@@ -153,7 +153,7 @@ def common_controlword(states: Collection[DriveState | None], goal: PowerGoal) -
     """
     if goal is PowerGoal.RESET:
         return max(next_controlword(state, goal) for state in states)
-    voices = [state for state in states if state not in _IN_FAULT] or list(states)
+    voices: list[DriveState | None] = [state for state in states if state not in _IN_FAULT] or list(states)
     return min(next_controlword(state, goal) for state in voices)
 
 

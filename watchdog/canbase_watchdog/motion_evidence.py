@@ -164,9 +164,7 @@ class EvidenceWatch:
         if not powered:
             self.last = self._kept(lives, ghost_m)
             return
-        before = (
-            self._unseen(lives, step_m is not None, elapsed_s, torque) if enabled else self._kept(lives, ghost_m)
-        )
+        before = self._unseen(lives, step_m is not None, elapsed_s, torque) if enabled else self._kept(lives, ghost_m)
         halted, jolts = self._halted(jolted and rolled, lives), self._jolts(jolted, now_s)
         samples, unseen = self._config.feedback_samples, self._is_unseen(before)
         strained = strained_s >= self._config.motion_missing_s

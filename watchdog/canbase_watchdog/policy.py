@@ -89,7 +89,7 @@ def _drive_silent(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
         if not axis.enabled:
             continue
         node = view.node(axis.drive.node_id)
-        if (_unfed(axis, view, config, now_s) or _beatless(node, axis, config, now_s)):
+        if _unfed(axis, view, config, now_s) or _beatless(node, axis, config, now_s):
             detail = (
                 f"{axis.drive.joint} is enabled, its feedback is {now_s - axis.fed_at:.3f} s old (allowed "
                 f"{config.feedback_timeout_s:.3f} s), its heartbeat {now_s - node.heartbeat_at:.3f} s "
@@ -361,20 +361,38 @@ CHECKS = (
         "the drive answers again",
     ),
     Check(
-        TripCause.ANSWERED_TWICE, _answered_twice, _over, "nothing else; give each drive a node id of its own first", True
+        TripCause.ANSWERED_TWICE,
+        _answered_twice,
+        _over,
+        "nothing else; give each drive a node id of its own first",
+        by_bus=True,
     ),
-    Check(TripCause.SETPOINT_MISSING, _setpoint_missing, _over, "nothing else", True),
+    Check(TripCause.SETPOINT_MISSING, _setpoint_missing, _over, "nothing else", by_bus=True),
     Check(TripCause.DRIVE_DOWN, _drive_down, _over, "nothing else; the driver resets the drive's fault after it"),
-    Check(TripCause.FEEDBACK_IMPLAUSIBLE, _feedback_implausible, _over, "nothing else; look at the encoder first", True),
     Check(
-        TripCause.MOTION_MISSING, _motion_missing, _over, "nothing else; look at encoder, motor and wheel first", True
+        TripCause.FEEDBACK_IMPLAUSIBLE,
+        _feedback_implausible,
+        _over,
+        "nothing else; look at the encoder first",
+        by_bus=True,
     ),
     Check(
-        TripCause.POWER_AT_STAND, _power_at_stand, _over, "nothing else; look at the encoder and the driver first", True
+        TripCause.MOTION_MISSING,
+        _motion_missing,
+        _over,
+        "nothing else; look at encoder, motor and wheel first",
+        by_bus=True,
+    ),
+    Check(
+        TripCause.POWER_AT_STAND,
+        _power_at_stand,
+        _over,
+        "nothing else; look at the encoder and the driver first",
+        by_bus=True,
     ),
     Check(TripCause.TARGET_OUTSIDE, _target_outside, _over, "nothing else"),
-    Check(TripCause.OVERSPEED, _overspeed, _over, "nothing else", True),
-    Check(TripCause.MOTION_OUTSIDE, _motion_outside, _over, "nothing else", True),
+    Check(TripCause.OVERSPEED, _overspeed, _over, "nothing else", by_bus=True),
+    Check(TripCause.MOTION_OUTSIDE, _motion_outside, _over, "nothing else", by_bus=True),
     Check(TripCause.TWIST_OUTSIDE, _twist_outside, _over, "nothing else"),
 )
 """The first row that trips is the cause: where one failure shows in several rows, the one that explains it most comes

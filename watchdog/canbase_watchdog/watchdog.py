@@ -246,7 +246,7 @@ class Watchdog:
             self._ledger.want(Mark.LIVE)
 
     def _are_off(self, now_s: float) -> bool:
-        for axis in self._view.axes:
+        for axis in self._view.axes:  # noqa: SIM110 - every cycle
             if not is_off(axis, self._view, self._config, now_s):
                 return False
         return True

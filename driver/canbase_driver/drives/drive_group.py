@@ -65,7 +65,7 @@ class Drives:
     @property
     def are_ready(self) -> bool:
         """Of no node there is anything to tell by `booting`, `missing` and `absent`."""
-        for node in self.nodes:
+        for node in self.nodes:  # noqa: SIM110 - every cycle
             if node.presence is not Presence.READY:
                 return False
         return True
@@ -73,7 +73,7 @@ class Drives:
     @property
     def are_enabled(self) -> bool:
         """Of no axis there is anything to tell by `fault`, `disabled` and `unprepared`."""
-        for axis in self.axes:
+        for axis in self.axes:  # noqa: SIM110 - every cycle
             if axis.state is not DriveState.OPERATION_ENABLED:
                 return False
         return True
@@ -115,7 +115,7 @@ class Drives:
 
     def stand(self, now_s: float) -> bool:
         """Measured, fresh, and evidence: no wheel turns."""
-        for axis in self.axes:
+        for axis in self.axes:  # noqa: SIM110 - every cycle
             if not axis.stands(now_s):
                 return False
         return True
@@ -126,7 +126,7 @@ class Drives:
 
     def rest(self, left_mps: float, right_mps: float) -> bool:
         """Nothing is ordered of any wheel, and these speeds of the rims order nothing either."""
-        for axis in self.axes:
+        for axis in self.axes:  # noqa: SIM110 - every cycle
             if not axis.rests(left_mps if axis.is_left else right_mps):
                 return False
         return True
@@ -154,14 +154,14 @@ class Drives:
 
     def may_have_power(self, now_s: float) -> bool:
         """Some axis has torque, or does not tell."""
-        for axis in self.axes:
+        for axis in self.axes:  # noqa: SIM110 - every cycle
             if axis.has_torque or now_s - axis.status_at > self._feedback_s:
                 return True
         return False
 
     def have_references(self) -> bool:
         """The travel of every wheel is known since its first sample."""
-        for axis in self.axes:
+        for axis in self.axes:  # noqa: SIM110 - every cycle
             if not axis.travel.referenced:
                 return False
         return True

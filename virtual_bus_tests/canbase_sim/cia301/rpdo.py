@@ -96,9 +96,9 @@ class Rpdo:
 
     def _apply(self, data: bytes) -> None:
         for write, value in zip(self._writers, self._codec.unpack_from(data), strict=True):
-            try:
+            try:  # noqa: SIM105 - it costs nothing
                 write(value)
-            except SdoAbortedError:  # noqa: PERF203, SIM105 - it costs nothing; the object does not take it, untold
+            except SdoAbortedError:  # the object does not take it, and nobody is told
                 pass
 
 

@@ -52,7 +52,8 @@ def test_what_is_judged_once_a_frame_depends_on_the_bus_alone(check: Check) -> N
         missed_setpoints=1e6,
         double_answers=1e6,
     )
-    seen, changes = of(axis, RIGHT), {"lease_at": NEVER, "bus_failed_since": 0.0, "tick_gap_s": 9.0, "twist": "far off"}
+    seen = of(axis, RIGHT)
+    changes: dict[str, Any] = {"lease_at": NEVER, "bus_failed_since": 0.0, "tick_gap_s": 9.0, "twist": "far off"}
     causes = {
         check.trips(view, CONFIG, now_s).cause
         for view in (seen, replace(seen, bounds=Bounds(0.0, 0.0, 0.0, 0.0), **changes))
