@@ -80,9 +80,7 @@ class Bench:
         deadline = time.monotonic() + timeout_s
         while not done():
             if time.monotonic() > deadline:
-                raise RuntimeError(
-                    "the benchmark waits in vain: is the robot ready? Another one in this ROS_DOMAIN_ID?"
-                )
+                raise RuntimeError("no answer in time: is the robot ready? Another one in this ROS_DOMAIN_ID?")
             self.executor.spin_once(timeout_sec=0.05)
 
     def accepted(self, name: str) -> Any:

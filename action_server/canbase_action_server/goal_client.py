@@ -249,7 +249,7 @@ class SentGoal(Generic[ResultT]):
         self._seen = time.monotonic()
         self._client.spin_until(lambda: self._result.done() or until() or self._server_lost(), timeout_s)
         if not self._result.done() and self._server_lost():
-            raise ServerLostError("the action server went away; the result is unknown. Look at the base first")
+            raise ServerLostError("the action server has ended; the result is unknown. Check the base first")
         return self.result
 
     def cancel(self, timeout_s: float = 5.0) -> bool:

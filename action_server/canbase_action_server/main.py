@@ -83,7 +83,7 @@ def _end(executor: Executor, node: DriveDistanceServer, stop_s: float) -> None:
     give_up = time.monotonic() + stop_s
     while node.busy and time.monotonic() < give_up:
         _spin(executor, node)
-    node.give_up("the process ends; whether the base stands was not confirmed in time")
+    node.give_up("the process ends; standstill was not confirmed in time")
     node.order_stop()
     deliver_until = time.monotonic() + DELIVERY_S
     while time.monotonic() < deliver_until:

@@ -42,7 +42,9 @@ def _silence(robot: Robot, inputs: Inputs, now_s: float) -> str | None:
         if received is None:
             return f"nothing received on {topic} yet; is {node} running?"
         if age_s(received, now_s) > timeout_s:
-            return f"{topic} is silent for {age_s(received, now_s):.2f} s (timeout {timeout_s} s); is {node} running?"
+            return (
+                f"no message on {topic} for {age_s(received, now_s):.2f} s (timeout {timeout_s} s); is {node} running?"
+            )
     return None
 
 

@@ -83,10 +83,10 @@ def self_stop_sentence(eds: Eds) -> str:
         how = "it watches heartbeats (1016h) and has 6007h for what to do then"
         return f"It can stop by itself when the computer dies: {how}. Prove it with the wheels up."
     if eds.has(0x1400, 5):
-        how = "it has a deadline for setpoints (1400h:5), but nothing says what it does when that runs out"
+        how = "it has a deadline for setpoints (1400h:5), but the EDS does not show what it does when that expires"
         return f"It may stop by itself when the computer dies: {how}. Prove it with the wheels up."
     if eds.has(0x1016):
-        how = "it watches heartbeats (1016h), but has no 6007h: nothing says that the motor stops"
+        how = "it monitors heartbeats (1016h), but has no 6007h: whether the motor stops is unknown"
         return f"Do not count on it to stop by itself when the computer dies: {how}. Prove it with the wheels up."
     how = "it watches no heartbeat (no 1016h) and no setpoints (no 1400h:5)"
     return f"It will NOT stop by itself when the computer dies: {how}. Look for a watchdog of its maker; wire STO."

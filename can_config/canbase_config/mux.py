@@ -126,7 +126,7 @@ class Mux(Section):
             raise MisfitError(message, ("locks", name, "topic"))
         lowest = min(source.priority for source in self.sources.values())
         if lock.priority <= lowest:
-            message = f"{lock.priority} holds nobody back: the lowest source has {lowest}, and a lock must be above it"
+            message = f"{lock.priority} blocks no source: the lowest source has {lowest}, and a lock must be above it"
             raise MisfitError(message, ("locks", name, "priority"))
 
 

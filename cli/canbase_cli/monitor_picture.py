@@ -93,7 +93,7 @@ def _mux_word(heard: Heard) -> Text:
     state = heard.message
     holder = next((source for source in state.sources if source.active), None)
     if holder is None:
-        return Text("nobody drives", WARN)
+        return Text("no active source", WARN)
     standing = source_standing(holder.standing)
     if standing is not SourceStanding.FOLLOWED:
         return Text(f"{holder.name} is not followed: {standing.word}", BAD)
@@ -128,8 +128,8 @@ def _part(title: str, heard: Heard, draw: Callable[[Any], RenderableType]) -> Pa
 
 
 def _silence(who: str, heard: Heard) -> Text:
-    since = "not heard yet" if heard.age_s is None else f"SILENT for {heard.age_s:.0f} s"
-    return Text(f"{who} {since}", BAD)
+    since = "no message yet" if heard.age_s is None else f"no message for {heard.age_s:.0f} s"
+    return Text(f"{who}: {since}", BAD)
 
 
 def _mux(state: Any) -> RenderableType:

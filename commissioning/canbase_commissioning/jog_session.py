@@ -68,7 +68,7 @@ class JogSession:
     @property
     def line(self) -> str:
         """What to show: state, speed, way."""
-        state = "not heard" if self._axis.state is None else self._axis.state.text
+        state = "no status yet" if self._axis.state is None else self._axis.state.text
         way = f"{self._axis.position_rad / (2.0 * math.pi):+.3f} rev"
         return f"{self._joint}: {state}, {self._axis.velocity_mps:+.3f} m/s, {way}"
 

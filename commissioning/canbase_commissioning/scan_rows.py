@@ -50,7 +50,7 @@ def _row(node_id: int, heard: HeardNode | None, card: NodeCard | None, robot: Ro
     state = heard.state_text if heard else "answers" if card else ""
     beat = _heartbeat(heard, card)
     if card is None:
-        what = OURS.get(node_id, "heard, not asked or no answer" if heard else NOT_HERE)
+        what = OURS.get(node_id, "sends frames; not queried, or no answer" if heard else NOT_HERE)
         return ScanRow(node_id, what, state, beat, "", in_robot=", ".join(joints))
     profile = guess(card.vendor_id, card.product_code) or ("generic" if card.profile_402 else "")
     return ScanRow(
@@ -78,5 +78,5 @@ def _heartbeat(heard: HeardNode | None, card: NodeCard | None) -> str:
     if heard is not None and not math.isnan(heard.period_s):
         return f"{heard.period_s * 1000:.0f} ms"
     if card is None or card.heartbeat_ms is None:
-        return "heard once" if heard is not None and heard.heartbeats_at else "none heard"
-    return f"set to {card.heartbeat_ms} ms, none heard" if card.heartbeat_ms else "off (1017h = 0)"
+        return "received once" if heard is not None and heard.heartbeats_at else "none received"
+    return f"set to {card.heartbeat_ms} ms, none received" if card.heartbeat_ms else "off (1017h = 0)"

@@ -49,7 +49,7 @@ def server_name(seen: Evidence) -> Check:
     if wanted in others:
         return ok(name, wanted)
     if not others:
-        return warn(name, f"nobody offers {ACTION} under any name here", "see the next check")
+        return warn(name, f"no server offers {ACTION} under any name here", "see the next check")
     return fail(name, f"not {wanted}, but {', '.join(others)}", f"use --namespace {others[0].rsplit('/', 1)[0]}")
 
 
@@ -226,7 +226,7 @@ def one_server(seen: Evidence) -> Check:
     if len(nodes) == 1:
         return ok(name, nodes[0])
     if not nodes:
-        return fail(name, f"nobody offers {wanted}", "canbase doctor --symptom not-listed")
+        return fail(name, f"no server offers {wanted}", "canbase doctor --symptom not-listed")
     return fail(
         name,
         f"{len(nodes)} servers offer {wanted}: {', '.join(nodes)}",

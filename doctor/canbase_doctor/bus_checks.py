@@ -131,16 +131,16 @@ def _watchdog(seen: BusEvidence) -> list[Check]:
     if state is None:
         if not seen.canbase_runs:
             return []
-        return [fail("watchdog's state (1FEh)", "never heard", "start canbase watchdog on the same robot.yaml")]
+        return [fail("watchdog's state (1FEh)", "never received", "start canbase watchdog on the same robot.yaml")]
     age_s = seen.now_s - seen.heard.watchdog_at
     lease = "none yet" if state.lease_age_ms == LEASE_AGE_UNKNOWN else f"{state.lease_age_ms} ms old"
-    found = f"{('starting', 'watching', 'tripped')[state.state]}, heard {age_s * 1000:.0f} ms ago; lease {lease}"
+    found = f"{('starting', 'watching', 'tripped')[state.state]}, received {age_s * 1000:.0f} ms ago; lease {lease}"
     rows = [_watchdog_state(seen, found, age_s)]
     if WATCHDOG_NODE_ID not in seen.heard.nodes:
-        rows.append(fail("watchdog's heartbeat (77Eh)", "not heard", "it withholds it after a trip: canbase reset"))
+        rows.append(fail("watchdog's heartbeat (77Eh)", "not received", "it withholds it after a trip: canbase reset"))
     if DRIVER_NODE_ID not in seen.heard.nodes:
         rows.append(
-            fail("driver's heartbeat (77Fh)", "not heard", "canbase driver does not run, or hangs: see its log")
+            fail("driver's heartbeat (77Fh)", "not received", "canbase driver does not run, or hangs: see its log")
         )
     return [*rows, *([_counters(seen.heard.counters)] if seen.heard.counters else [])]
 
@@ -181,11 +181,15 @@ def _node(seen: BusEvidence, node_id: int, drives: tuple[Drive, ...]) -> list[Ch
 
 
 def _unread(seen: BusEvidence, name: str, node_id: int) -> Check:
-    why = seen.unread.get(node_id, "it was not asked")
+    why = seen.unread.get(node_id, "it was not queried")
     if node_id in seen.heard.nodes:
-        return warn(name, f"heard, {_ages(seen, node_id)}; {why}", "run doctor again when its SDO channel is free")
+        return warn(
+            name, f"it sends frames, {_ages(seen, node_id)}; {why}", "run doctor again when its SDO channel is free"
+        )
     return fail(
-        name, f"never heard; {why}", "power, cable, termination, bit rate, node id; canbase scan shows who answers"
+        name,
+        f"no frame received; {why}",
+        "power, cable, termination, bit rate, node id; canbase scan shows who answers",
     )
 
 

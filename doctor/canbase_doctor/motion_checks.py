@@ -31,7 +31,7 @@ def zeros_are_ordered(seen: Evidence) -> Check:
         return fail(
             name, f"no goal runs, yet {nodes or 'somebody'} orders motion", "a defect of the server: restart it"
         )
-    return ok(name, "silent" if last is None else "zero")
+    return ok(name, "no message" if last is None else "zero")
 
 
 def mux_owner(seen: Evidence) -> Check:
@@ -44,24 +44,24 @@ def mux_owner(seen: Evidence) -> Check:
                 name, f"{topic} is published by {', '.join(nodes)}", "every source goes through a topic of mux.sources"
             )
     if mux is None:
-        return fail(name, "velocity_mux is silent", "start canbase velocity")
+        return fail(name, "velocity_mux publishes nothing", "start canbase velocity")
     if mux.active not in ("", action_source(seen.robot)):
-        return fail(name, f"{mux.active} drives", "let go of it, or end its node")
-    return ok(name, mux.active or "nobody drives")
+        return fail(name, f"{mux.active} drives", "release it, or end its node")
+    return ok(name, mux.active or "no active source")
 
 
 def driver_watchdog(seen: Evidence) -> Check:
     """Does the driver turn silence and zero into a standstill, and does the watchdog look after it?"""
     name, status, order = "driver and watchdog", seen.on("motor_driver/status").last, seen.on("cmd_vel").last
     if status is None:
-        return fail(name, "motor_driver is silent", "use the emergency stop; then look at its log")
+        return fail(name, "motor_driver publishes nothing", "use the emergency stop; then check its log")
     if watchdog_view(status.watchdog) is not WatchdogView.OK:
         return fail(name, f"the watchdog is {status.watchdog}", "use the emergency stop; start it, canbase reset")
     if not status.standstill and (order is None or not _moves(order)):
         return fail(
             name, "zero is ordered, but a wheel turns", "use the emergency stop; then brake, slope, or drive settings"
         )
-    return ok(name, "the base stands" if status.standstill else "the base moves as cmd_vel orders")
+    return ok(name, "the base is stationary" if status.standstill else "the base moves as cmd_vel orders")
 
 
 def odometry(seen: Evidence) -> Check:

@@ -26,7 +26,9 @@ class Overload:
         """The evidence that times mean nothing now; empty: there is none."""
         if self.late_s <= LATE_S and self.load <= LOAD_PER_CORE:
             return ""
-        return f"doctor's own turns were up to {self.late_s:.2f} s late, {self.load:.1f} processes wanted each core"
+        return (
+            f"doctor's own turns were up to {self.late_s:.2f} s late, {self.load:.1f} runnable processes for each core"
+        )
 
 
 def load_per_core() -> float:

@@ -76,8 +76,8 @@ def watchdog(evidence: Evidence) -> list[Check]:
         return [fail("watchdog", "unknown: reported by motor_driver, which is not running", PARTS_RUN)]
     age, view = _age(status.watchdog_age_s), watchdog_view(status.watchdog)
     if view is WatchdogView.MISSING:
-        return [fail("watchdog", f"missing, last heard {age} ago", "start canbase watchdog on the same robot.yaml")]
-    told = f"last heard {age} ago; last lease {_age(status.watchdog_lease_age_s)} old"
+        return [fail("watchdog", f"missing, last frame {age} ago", "start canbase watchdog on the same robot.yaml")]
+    told = f"last frame {age} ago; last lease {_age(status.watchdog_lease_age_s)} old"
     if view is WatchdogView.OK:
         found = ok("watchdog", f"ok, {told}")
     else:
@@ -115,7 +115,9 @@ def _drive(drive: Any) -> Check:
     if drive.error_code:
         return fail(name, f"{found}; 0x{drive.error_code:04X} {drive.error_text}", "remove the cause, canbase reset")
     if math.isnan(drive.heartbeat_age_s) and math.isnan(drive.feedback_age_s):
-        return fail(name, "never heard", "power, cable, termination, bit rate, node id; canbase scan shows who answers")
+        return fail(
+            name, "no frame received", "power, cable, termination, bit rate, node id; canbase scan shows who answers"
+        )
     if not drive.stops_by_itself:
         return warn(
             name, f"{found}; does not watch the watchdog's heartbeat", "it will not stop when the computer dies"
@@ -175,7 +177,7 @@ def velocity_mux(evidence: Evidence) -> list[Check]:
     if ignored:
         told = f"{ignored[0].name} is not followed: {ignored[0].reason}"
         return [fail("velocity_mux", told, UNFOLLOWED[source_standing(ignored[0].standing)])]
-    found = f"{state.active} drives" if state.active else "nobody drives"
+    found = f"{state.active} drives" if state.active else "no active source"
     bad = [source.name for source in state.sources if source.refused]
     if bad:
         return [warn("velocity_mux", f"{found}; refused NaN or infinity of {', '.join(bad)}", "correct that sender")]

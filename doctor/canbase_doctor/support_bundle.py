@@ -79,7 +79,7 @@ class Bundle:
             if said.strip():
                 self.text(command.file, f"{shown} (exit code {code})", lambda: said + complaint)
             else:
-                last = complaint.strip().splitlines()[-1:] or ["it says nothing"]
+                last = complaint.strip().splitlines()[-1:] or ["no output"]
                 self.missing[command.file] = f"{shown}: exit code {code}, {cleaned(last[0])}"
 
     def write(self, path: Path) -> None:

@@ -44,7 +44,7 @@ class BaseReady:
         if self._at_s is None:
             return "nothing received on motor_driver/status yet"
         if now_s - self._at_s > self._timeout_s:
-            return "motor_driver/status is silent"
+            return "no recent message on motor_driver/status"
         if self._state is not DriverState.ENABLED:
             return f"motor_driver is {self._state.name}"
         return "" if self._estop_free else ESTOP_HOLDS

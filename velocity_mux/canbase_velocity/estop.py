@@ -26,8 +26,8 @@ class EstopEvent(enum.Enum):
     """What happens to it."""
 
     PRESS = "pressed"
-    SILENCE = "required and silent"
-    RELEASE = "neither pressed nor silent"
+    SILENCE = "required, and no message arrives"
+    RELEASE = "released, and messages arrive"
     ZERO = "the command is zero, and fresh"
     RESET = "an accepted reset"
 
@@ -95,7 +95,7 @@ class Estop:
         """The next state. Raises ValueError, with nothing changed, for a reset while it is held."""
         before = self.state
         if event is EstopEvent.RESET and before is HELD:
-            raise ValueError("the emergency stop cannot be reset while it is held; ask `state` before")
+            raise ValueError("the emergency stop cannot be reset while it is held; check `state` first")
         after = TRANSITIONS.get((before, event), before)
         if event is EstopEvent.PRESS or (event is EstopEvent.SILENCE and self._heard):
             self._latched = self._latches

@@ -149,7 +149,7 @@ class FilterNode(Node):
         before, topic = self._filter.estop_crowd, self.resolve_topic_name(self._robot.safety.estop.topic)
         found = publishers(self, topic)
         other = (each for each in found if each.kind != BUTTON_KIND)
-        unheard = (f"{each.node or UNKNOWN} publishes it as {each.kind}, which is not heard" for each in other)
+        unheard = (f"{each.node or UNKNOWN} publishes it as {each.kind}, which is not received" for each in other)
         self._filter.on_estop_publishers(sum(each.kind == BUTTON_KIND for each in found), next(unheard, ""))
         crowd = self._filter.estop_crowd
         if crowd and crowd != before:

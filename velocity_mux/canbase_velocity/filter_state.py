@@ -217,7 +217,7 @@ class SafetyFilter:
         self._advance_estop(now_s)
         inputs = self.inputs(now_s)
         if self._estop.state is EstopState.HELD:
-            held = "pressed" if self._pressed else self._estop_unheard or self.estop_crowd or "silent"
+            held = "pressed" if self._pressed else self._estop_unheard or self.estop_crowd or "not published"
             if self._pressed and self._estop_at_s is None:
                 held = f"not seen released yet ({self._estop.before_the_start}): press and release it"
             return False, f"refused: the emergency stop on {self._config.safety.estop.topic} is {held}"

@@ -78,7 +78,7 @@ class Lock:
             LockStanding.LOCKED: "holds",
             LockStanding.SHARED: f"has {self._crowd}",
             LockStanding.NEVER_RECEIVED: f"has published nothing yet on {self.config.topic}",
-            LockStanding.SILENT: f"is silent for {age_s:.2f} s (timeout {self.config.timeout_s:.2f} s)",
+            LockStanding.SILENT: f"has published nothing for {age_s:.2f} s (timeout {self.config.timeout_s:.2f} s)",
         }.get(self.standing(now_s), "")
 
     def view(self, now_s: float) -> LockView:

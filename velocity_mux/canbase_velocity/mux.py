@@ -82,7 +82,7 @@ class MuxDecision:
     def sentence(self) -> str:
         """Who drives, for people."""
         if self.holder is None:
-            return "nobody drives"
+            return "no active source"
         if self.holder.standing in IGNORED:
             return f"{self.active} is not followed: {self.holder.reason}"
         return f"{self.active} drives"
@@ -317,6 +317,6 @@ class Mux:
         if age_s is None:
             return source.view(now_s, SourceStanding.NEVER_RECEIVED, "never received")
         if active is None or not source.is_fresh(now_s):
-            reason = f"silent for {age_s:.2f} s (timeout {source.config.timeout_s:.2f} s)"
+            reason = f"no message for {age_s:.2f} s (timeout {source.config.timeout_s:.2f} s)"
             return source.view(now_s, SourceStanding.SILENT, reason)
         return source.view(now_s, SourceStanding.LOWER_PRIORITY, f"{active.name} has priority")

@@ -115,7 +115,9 @@ class MuxNode(Node):
         for name, lock in self._robot.mux.locks.items():
             listen_closely(self, Bool, lock.topic, functools.partial(self._on_lock, name))
             if not lock.required:
-                self.get_logger().warning(f"the silence of lock {name} is not noticed: it is not required (timeout 0)")
+                self.get_logger().warning(
+                    f"lock {name} is not required (timeout 0): the mux does not detect that its publisher ended"
+                )
 
     def _on_stamped(self, name: str, message: TwistStamped) -> None:
         now_s = time.monotonic()

@@ -236,7 +236,7 @@ def _limit(command: Twist, factor: float, cause: StopCause, clears_on: str) -> F
         return PASSED
     allowed = command.scaled(factor)
     detail = (
-        f"{command.linear_mps:.2f} m/s, {command.angular_radps:.2f} rad/s asked for, "
+        f"{command.linear_mps:.2f} m/s, {command.angular_radps:.2f} rad/s ordered, "
         f"{allowed.linear_mps:.2f} m/s, {allowed.angular_radps:.2f} rad/s allowed"
     )
     return Finding(Action.LIMIT, cause, detail, clears_on, factor)
@@ -283,7 +283,7 @@ def _growth(twist: Twist, inputs: Inputs, ceiling: Ceiling | None) -> tuple[Twis
     if share >= 1.0:
         return twist, PASSED
     grown = Twist(kept_mps + linear_mps * share, kept_radps + angular_radps * share)
-    return grown, Finding(Action.LIMIT, StopCause.ACCELERATION, "speeding up", "the speed asked for", share)
+    return grown, Finding(Action.LIMIT, StopCause.ACCELERATION, "speeding up", "the ordered speed", share)
 
 
 def _kept(previous: float, asked: float) -> float:
@@ -329,4 +329,4 @@ def _is_fresh(age_s: float | None, timeout_s: float) -> bool:
 def _silence(topic: str, age_s: float | None, timeout_s: float) -> str:
     if age_s is None:
         return f"nothing received on {topic} yet"
-    return f"{topic} silent for {age_s:.2f} s (timeout {timeout_s:.2f} s)"
+    return f"no message on {topic} for {age_s:.2f} s (timeout {timeout_s:.2f} s)"

@@ -111,6 +111,6 @@ def _problem(publisher: Publisher, expected: Expected, count: int) -> str:
     if not expected.nodes:
         return ""
     if publisher.node not in expected.nodes:
-        nobody = "; nobody obeys it" if expected.shown else ""
+        nobody = "; it does not move the base" if expected.shown else ""
         return f"only {' and '.join(expected.nodes)} should{nobody}"
     return f"{count} times; is it running twice?" if expected.alone and count > 1 else ""

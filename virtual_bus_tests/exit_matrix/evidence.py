@@ -11,7 +11,7 @@ from canbase.msg import DriverStatus
 from exit_matrix.driven_robot import Scene
 from exit_matrix.log_evidence import NAMES, Catch, logged
 
-SILENT: Final = "silent"
+SILENT: Final = "no message"
 STOPPED: Final = (DriverStatus.STOPPING, DriverStatus.LATCHED)
 """The driver tells of a stop on stop_events when it is over, and in its status when it begins."""
 

@@ -187,7 +187,7 @@ def test_a_robot_that_cannot_drive_rejects_a_goal(stage: Stage) -> None:
         (fault, "not enabled"),
         (trip, "watchdog"),
         (joystick, "joystick"),
-        (no_odometry, "odom is silent"),
+        (no_odometry, "no message on odom"),
     ):
         change(stage.base)
         stage.node.spin_for(0.7)

@@ -44,7 +44,7 @@ def test_in_a_terminal_it_shows_the_robot_until_ctrl_c(robot: RunningRobot) -> N
 
     try:
         robot.node.wait_for(
-            lambda: sees("nobody drives", "driver ENABLED", "watchdog ok", "left_wheel"), 20.0, "a picture"
+            lambda: sees("no active source", "driver ENABLED", "watchdog ok", "left_wheel"), 20.0, "a picture"
         )
         joystick = robot.node.repeat(TwistStamped, "cmd_vel_joy", 50.0)
         joystick.message = TwistStamped()
@@ -74,7 +74,7 @@ def test_without_a_terminal_it_prints_a_line_for_each_change(robot: RunningRobot
     joystick.message = TwistStamped()
     robot.node.wait_for(lambda: "joystick drives" in monitor.log(), 20.0, "the change")
     joystick.message = None
-    robot.node.wait_for(lambda: "nobody drives" in monitor.log().splitlines()[-1], 20.0, "the change back")
+    robot.node.wait_for(lambda: "no active source" in monitor.log().splitlines()[-1], 20.0, "the change back")
     monitor.interrupt()
     assert robot.exit_code(monitor) == 0
     lines = [text[10:] for text in monitor.log().splitlines()]  # without the time of day

@@ -142,7 +142,7 @@ def test_the_file_of_a_twist_mux_user_drives_with_its_locks(
     velocity.wait_for_order(0.0)
     velocity.node.spin_for(0.1)
     assert [(lock.name, lock.holds) for lock in velocity.state.locks] == [("e_stop", True), ("pause", True)]
-    assert "is silent for" in velocity.reasons()["joy"]
+    assert "has published nothing for" in velocity.reasons()["joy"]
     nav.message = joy.message = None
     e_stop.message, pause.message = Bool(data=False), Bool(data=False)
     velocity.node.release(action)
@@ -249,7 +249,7 @@ def test_a_stranger_on_cmd_vel_mux_moves_nothing_holds_nobody_back_and_is_told(
     assert velocity.ordered_for(1.0) == {0.0}
     (foreign,) = velocity.state.foreign
     assert (foreign.topic, foreign.locks) == ("/cmd_vel_mux", False)
-    assert foreign.problem == "only /velocity_mux should; nobody obeys it"
+    assert foreign.problem == "only /velocity_mux should; it does not move the base"
     joystick = velocity.source(TwistStamped, "cmd_vel_joy")
     joystick.message = drive(0.1)
     velocity.wait_for_order(0.1)

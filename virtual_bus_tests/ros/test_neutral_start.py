@@ -62,7 +62,7 @@ def test_a_stick_held_while_the_driver_latches_or_restarts_is_not_followed_befor
     chain.node.spin_for(0.45)
     chain.joystick.message = drive(0.2)
     assert not followed(chain)
-    assert waits(chain).startswith("waiting for zero (motor_driver/status is silent")
+    assert waits(chain).startswith("waiting for zero (no recent message on motor_driver/status")
     release(chain)
 
 
@@ -179,7 +179,7 @@ def test_without_the_drivers_state_nothing_moves(start: Callable[[Mapping[str, A
     chain.joystick.message = drive(0.2)
     assert not followed(chain)
     assert chain.mux.last is not None
-    assert (chain.mux.last.ready, chain.mux.last.not_ready) == (False, "motor_driver/status is silent")
+    assert (chain.mux.last.ready, chain.mux.last.not_ready) == (False, "no recent message on motor_driver/status")
 
 
 def stamp_s(message: DriverStatus | MuxState) -> float:

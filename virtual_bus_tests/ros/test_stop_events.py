@@ -76,5 +76,5 @@ def test_a_source_that_hangs_is_a_stop_that_is_not_latched(robot: RunningRobot) 
     event = event_since(robot, began_s, "velocity_mux")
     robot.send("action-server", signal.SIGCONT)
     assert (event.cause, event.latched, event.standstill, event.black_box) == ("no_source", False, True, "")
-    assert "action: silent for" in event.detail
+    assert "action: no message for" in event.detail
     assert 0.05 < event.standstill_s < 2.0

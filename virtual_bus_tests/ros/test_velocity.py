@@ -137,7 +137,7 @@ def test_a_button_that_publishes_another_type_holds_the_base(chain: Chain) -> No
     with TestNode("button") as button:
         button.node.create_publisher(Int8, "estop_state", 1).publish(Int8(data=1))
         state = chain.wait_for_cause(SafetyState.CAUSE_ESTOP)
-        assert "publishes it as std_msgs/msg/Int8, which is not heard" in state.detail
+        assert "publishes it as std_msgs/msg/Int8, which is not received" in state.detail
 
 
 # a press and a lock, published once by publishers that keep them (transient local) ── the process starts

@@ -44,7 +44,7 @@ class Lines(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Never raises and never waits."""
-        lost = f"({self.lost} lines before this one were lost: nobody read them) " if self.lost else ""
+        lost = f"({self.lost} lines before this one were lost: the log did not accept them) " if self.lost else ""
         line = f"{lost}{record.getMessage()}"
         try:
             text = self.format(logging.makeLogRecord({**record.__dict__, "msg": line, "args": None}))

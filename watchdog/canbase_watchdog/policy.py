@@ -215,7 +215,7 @@ def _missing(axis: Axis, config: WatchdogConfig) -> str:
         )
     if evidence.behind_s >= config.slow_wheel_s:
         return (
-            f"turns at {axis.velocity_mps:.3f} m/s, its setpoints ask for {evidence.ordered_mps:.3f} m/s for "
+            f"turns at {axis.velocity_mps:.3f} m/s, its setpoints order {evidence.ordered_mps:.3f} m/s for "
             f"{evidence.behind_s:.3f} s (allowed {config.slow_wheel_s:.3f} s; slow ramps: watchdog.slowest_ramp_mps2)"
         )
     return ""
@@ -340,7 +340,7 @@ class Check:
 CHECKS = (
     Check(TripCause.BUS_FAILED, _bus_failed, _bus_is_failed, "the bus takes frames again"),
     Check(TripCause.LOOP_LATE, _loop_late, _over, "nothing else"),
-    Check(TripCause.FOREIGN_MASTER, _foreign_master, _foreign_is_near, "the other master is silent for 1 s"),
+    Check(TripCause.FOREIGN_MASTER, _foreign_master, _foreign_is_near, "the other master has sent nothing for 1 s"),
     Check(
         TripCause.LEASE_LOST,
         _lease_lost,

@@ -55,7 +55,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         config = WatchdogConfig.from_json(Path(given[0]).read_text(encoding="utf-8"))
     except (OSError, TypeError, ValueError, KeyError, AttributeError) as error:
-        print(f"{given[0]} does not tell what to stop: {error}. The driver writes it at its start.", file=sys.stderr)
+        print(
+            f"{given[0]} does not describe what to stop: {error}. The driver writes it at its start.", file=sys.stderr
+        )
         return 2
     try:
         with BusPort(config.bus_arguments) as bus:

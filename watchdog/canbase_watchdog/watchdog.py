@@ -200,7 +200,7 @@ class Watchdog:
         axis = in_motion(view, self._config)
         if self._state is State.TRIPPED or axis is None:
             return
-        detail = f"asked to end while {axis.drive.joint} turns at {axis.velocity_mps:.3f} m/s"
+        detail = f"requested to end while {axis.drive.joint} turns at {axis.velocity_mps:.3f} m/s"
         self._trip(Verdict(TripCause.ENDED, 0, detail), now_s)
         self._note_record(now_s)
 

@@ -41,7 +41,7 @@ def run(config: Path | None, joint: str, speed_mps: float, *, yes: bool) -> None
     if joint not in joints:
         fail(f"there is no wheel {joint!r} in robot.yaml, expected one of {', '.join(joints)}", WRONG_INPUT)
     if not sys.stdin.isatty():
-        fail("a dead-man key needs a terminal: run it on one", WRONG_INPUT)
+        fail("jog needs an interactive terminal", WRONG_INPUT)
     if not yes and not typer.confirm("WHEELS UP, nothing near them, the emergency stop (STO) at hand and tried?"):
         fail("not confirmed", FAILED)
     with open_line(robot.bus) as line, stopping_signals():

@@ -187,14 +187,14 @@ class _Boot:
             slow = slow + 1 if speed_mps < self._robot.base.standstill_mps else 0
             if braking.fails(speed_mps, elapsed_s) and not slow:
                 yield from self._give_up(drive, f"turns at {speed_mps:.3f} m/s {elapsed_s:.1f} s after a quick stop")
-            yield Pause(POLL_S, f"{drive.joint} to stand after a quick stop")
-        yield from self._give_up(drive, f"did not stand {standstill_s(self._robot):.1f} s after a quick stop")
+            yield Pause(POLL_S, f"{drive.joint} to stop after a quick stop")
+        yield from self._give_up(drive, f"was not at standstill {standstill_s(self._robot):.1f} s after a quick stop")
 
     def _give_up(self, drive: Drive, what: str) -> Steps[None]:
         """Setpoints of whoever keeps it moving count no more, then the power goes."""
         yield SendNmt(NmtCommand.ENTER_PRE_OPERATIONAL)
         yield _control(drive, Command.DISABLE_VOLTAGE)
-        hint = "Its voltage is now disabled; look for another master, and at its encoder, 605Ah and 6085h"
+        hint = "Its voltage is now disabled; check for another master, and check its encoder, 605Ah and 6085h"
         raise BootError(self._node.node_id, f"{drive.joint} {what}", hint)
 
     def _forget_earlier_masters(self) -> Steps[None]:

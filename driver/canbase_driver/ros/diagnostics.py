@@ -108,7 +108,7 @@ def _watchdog_entry(watchdog: WatchdogReport, previous: WatchdogReport, robot: s
         "state": watchdog.view.value,
         "cause": watchdog.cause,
         "rung of its ladder": RUNGS[rung] if rung < len(RUNGS) else rung,
-        "last heard": _heard(watchdog.age_s),
+        "last frame": _heard(watchdog.age_s),
         "age of the last lease [s]": watchdog.lease_age_s,
         "longest pause of its loop [s]": watchdog.pause_max_s,
         **_named(events),
@@ -193,7 +193,7 @@ def _measured(drive: DriveSnapshot) -> dict[str, float]:
 
 
 def _heard(age_s: float) -> str:
-    return "never heard" if math.isnan(age_s) else f"heard {age_s:.3f} s ago"
+    return "never received" if math.isnan(age_s) else f"received {age_s:.3f} s ago"
 
 
 def _entry(level: bytes, name: str, sentence: str, hardware_id: str, values: Mapping[str, object]) -> DiagnosticStatus:

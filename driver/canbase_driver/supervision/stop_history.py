@@ -134,7 +134,7 @@ class StopHistory:
         at_s = snapshot.time_s - snapshot.command.age_s
         moved = self._moved_at >= at_s - ORDER_AGE_S
         if ended and moved and self._is_moving and snapshot.state is DriverState.ENABLED:
-            detail = f"cmd_vel is silent for {snapshot.command.age_s:.2f} s"
+            detail = f"no message on cmd_vel for {snapshot.command.age_s:.2f} s"
             self._begin(
                 StopRecord(DRIVER, STALE, detail, False, "a fresh command", snapshot.time_s), HeldBy.STALE_COMMAND
             )

@@ -182,7 +182,7 @@ class WatchdogLink:
         """A sentence until its record of trips is on disk, for which it waits before drives get power; else empty."""
         if self._state is not None and self._state.armed:
             return ""
-        return "the watchdog's record of trips is not on disk yet; if it stays so, look at the watchdog's log"
+        return "the watchdog's record of trips is not on disk yet; if it stays so, check the watchdog's log"
 
     @property
     def lease_age_s(self) -> float:
@@ -218,7 +218,7 @@ class WatchdogLink:
             return WatchdogView.MISSING, "no frame of it yet; start it with `canbase watchdog`"
         age_s = now_s - self._received_s
         if age_s > self._timeout_s:
-            return WatchdogView.MISSING, f"silent for {age_s:.2f} s (timeout {self._timeout_s:.2f} s)"
+            return WatchdogView.MISSING, f"no frame for {age_s:.2f} s (timeout {self._timeout_s:.2f} s)"
         if self._state.state == TRIPPED:
             about = f", node {self._state.node_id}" if self._state.node_id else ""
             return WatchdogView.TRIPPED, self._state.cause_text + about

@@ -74,9 +74,9 @@ def test_each_thing_that_is_missing_is_named(changes: dict[str, object], reason:
 def test_old_messages_are_no_messages() -> None:
     # odom may be 0.2 s old, the states 1.5 s.
     assert state_reason(ROBOT, READY, 0.2) is None
-    assert "odom is silent for 0.21 s" in str(state_reason(ROBOT, READY, 0.21))
+    assert "no message on odom for 0.21 s" in str(state_reason(ROBOT, READY, 0.21))
     fresh = replaced(READY, odometry=Plant().odometry(1.6))
-    assert "motor_driver/status is silent" in str(state_reason(ROBOT, fresh, STATE_TIMEOUT_S + 0.1))
+    assert "no message on motor_driver/status" in str(state_reason(ROBOT, fresh, STATE_TIMEOUT_S + 0.1))
 
 
 @pytest.mark.parametrize(

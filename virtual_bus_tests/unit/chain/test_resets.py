@@ -143,7 +143,7 @@ def test_a_watchdog_that_dies_during_a_reset_breaks_it_off(world: World) -> None
     world.run(0.1)
     world.watchdog = None
     world.run(0.5)
-    assert [sentence[:33] for sentence in sentences] == ["broken off: watchdog: silent for "]
+    assert [sentence[:35] for sentence in sentences] == ["broken off: watchdog: no frame for "]
 
 
 def test_a_reset_that_was_under_way_while_the_driver_stood_still_is_broken_off(world: World) -> None:
@@ -173,7 +173,7 @@ def test_a_watchdog_that_died_is_needed_for_the_reset(world: World) -> None:
     world.run(2.6)
     outcome = world.reset()
     assert not outcome.done
-    assert outcome.sentence.startswith("refused: watchdog: silent for")
+    assert outcome.sentence.startswith("refused: watchdog: no frame for")
     world.watchdog = Watchdog(watchdog_config(world.robot), world.now_s)
     world.run(0.1)
     assert world.core.state is DriverState.LATCHED

@@ -135,7 +135,7 @@ def test_a_drive_is_good_in_one_known_state_alone(state: str, style: str) -> Non
 
 def test_a_silent_node_is_told_as_silent_and_nothing_that_it_said_is_shown() -> None:
     text = drawn(replace(ALL, driver=Heard(DRIVER, 4.2)))
-    assert "motor_driver SILENT for 4 s" in text
+    assert "motor_driver: no message for 4 s" in text
     assert "left_wheel" not in text
     assert "ENABLED" not in text
     assert "joystick drives" in text
@@ -148,7 +148,7 @@ def test_silence_begins_right_after_its_limit() -> None:
 
 def test_before_anything_was_heard_nothing_is_claimed() -> None:
     text = drawn(Snapshot("/"))
-    assert "velocity_mux not heard yet | safety_filter not heard yet | motor_driver not heard yet" in text
+    assert "velocity_mux: no message yet | safety_filter: no message yet | motor_driver: no message yet" in text
     assert "No stop since this picture was opened." in text
 
 
@@ -189,7 +189,9 @@ def test_the_line_changes_with_states_and_not_with_ages_and_speeds() -> None:
 
 
 def test_the_line_tells_locks_and_foreign_publishers() -> None:
-    lock = MuxLock(name="pause", holds=True, standing=MuxLock.SILENT, reason="is silent for 0.61 s (timeout 0.50 s)")
+    lock = MuxLock(
+        name="pause", holds=True, standing=MuxLock.SILENT, reason="has published nothing for 0.61 s (timeout 0.50 s)"
+    )
     foreign = ForeignPublisher(topic="/cmd_vel", node="/evil", problem="only /safety_filter should")
     mux = MuxState(locks=[lock], foreign=[foreign])
     text = line(Snapshot("/", mux=Heard(mux, 0.0)))

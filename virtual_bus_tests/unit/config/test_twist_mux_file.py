@@ -147,7 +147,7 @@ def test_what_is_wrong_is_told_with_the_files_own_line_and_key(tmp_path: Path, o
 
 def test_a_lock_that_can_hold_nobody_back_is_refused(tmp_path: Path) -> None:
     text = refusal(tmp_path, TOPICS, LOCKS.replace("priority: 100", "priority: 10"))
-    assert "mux1.yaml:7: locks.pause.priority: 10 holds nobody back: the lowest source has 10" in text
+    assert "mux1.yaml:7: locks.pause.priority: 10 blocks no source: the lowest source has 10" in text
 
 
 def test_a_lock_on_the_topic_of_a_source_is_refused(tmp_path: Path) -> None:

@@ -66,7 +66,7 @@ def test_the_right_hub_motor_that_runs_is_seen_in_the_upper_half() -> None:
     drive.on_write[0x6040, 0] = lambda drive, data: quick_stops.append(data[0])
     _, bench = booted(drive, of_kind("zlac8015d"), seconds=0.05)
     assert quick_stops == [0x02]
-    assert "to stand after a quick stop" in bench.boot.waiting_for
+    assert "to stop after a quick stop" in bench.boot.waiting_for
 
 
 def test_what_the_profile_denies_is_not_asked_for() -> None:

@@ -67,8 +67,8 @@ def test_the_values_are_short_and_have_their_units() -> None:
         "target [rad/s]": "5",
         "velocity [rad/s]": "4.9",
         "position [rad]": "123.5",
-        "last status TPDO": "never heard",
-        "last heartbeat": "heard 0.050 s ago",
+        "last status TPDO": "never received",
+        "last heartbeat": "received 0.050 s ago",
         "stops by itself": "heartbeat of the watchdog (1016h, 6007h)",
         "warning (bit 7)": "False",
         "internal limit (bit 11)": "True",
@@ -191,11 +191,12 @@ def test_how_far_the_watchdog_has_gone_is_told(rung: int, text: str) -> None:
     [
         (
             {"view": WatchdogView.MISSING, "age_s": 0.25},
-            "The watchdog is missing: its state frame was heard 0.250 s ago. Is its process running, and on this bus?",
+            "The watchdog is missing: its state frame was received 0.250 s ago. "
+            "Is its process running, and on this bus?",
         ),
         (
             {"view": WatchdogView.MISSING, "age_s": math.nan},
-            "The watchdog is missing: its state frame was never heard. Is its process running, and on this bus?",
+            "The watchdog is missing: its state frame was never received. Is its process running, and on this bus?",
         ),
         (
             {"view": WatchdogView.TRIPPED, "cause": "lease lost"},
@@ -218,7 +219,7 @@ def test_a_watchdog_that_does_not_watch_is_an_error(changes: dict[str, Any], sen
         ),
         ({"state": DriveState.FAULT_REACTION_ACTIVE}, ERROR, "Error 0000h: fault reaction active."),
         ({"error_code": 0x3210, "error_text": ""}, ERROR, "Error 3210h: operation enabled."),
-        ({"feedback_age_s": math.nan}, ERROR, "No feedback yet; its heartbeat was heard 0.050 s ago."),
+        ({"feedback_age_s": math.nan}, ERROR, "No feedback yet; its heartbeat was received 0.050 s ago."),
         (
             {"stops_by_itself": False},
             WARN,

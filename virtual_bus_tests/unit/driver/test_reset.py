@@ -13,7 +13,7 @@ from canbase_runtime.watchdog_view import WatchdogView
 
 WELL = Situation()
 TRIPPED = Situation(watchdog=WatchdogView.TRIPPED, watchdog_detail="lease lost")
-MISSING = Situation(watchdog=WatchdogView.MISSING, watchdog_detail="silent for 0.40 s")
+MISSING = Situation(watchdog=WatchdogView.MISSING, watchdog_detail="no frame for 0.40 s")
 FAULT = Situation(fault="left: over-current")
 DONE, CAUSE_STANDS, VELOCITY_ORDERED, NOT_TRIPPED = 1, 2, 3, 4
 
@@ -75,7 +75,7 @@ def sentence(outcome: Outcome | None) -> str:
             "left is not believed (8 s left); then reset again",
         ),
         (Situation(bus="bus-off"), "bus-off"),
-        (MISSING, "watchdog: silent for 0.40 s"),
+        (MISSING, "watchdog: no frame for 0.40 s"),
         (Situation(resetting=True), "a reset is under way"),
         (Situation(shutdown_requested=True), "motor_driver is shutting down"),
     ],
@@ -136,7 +136,7 @@ def test_what_the_watchdog_refuses_is_refused(answer: int, why: str) -> None:
         (WELL, None, "no answer"),
         (TRIPPED, None, "lease lost"),
         (TRIPPED, DONE, "lease lost"),
-        (MISSING, None, "silent"),
+        (MISSING, None, "no frame"),
     ],
 )
 def test_it_waits_half_a_second_for_the_watchdog(situation: Situation, answer: int | None, detail: str) -> None:

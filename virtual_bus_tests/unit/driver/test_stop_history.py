@@ -140,14 +140,14 @@ def test_a_source_that_is_lost_while_it_orders_motion_is_a_stop_and_one_that_end
     recorder.on_command(False, ordered_at + 0.02)
     recorder.on_snapshot(seen(999.99), [])
     recorder.on_mux("joystick", "", 999.9)
-    recorder.on_mux("", "joystick: silent for 0.31 s", 1000.0)
+    recorder.on_mux("", "joystick: no message for 0.31 s", 1000.0)
     reports = recorder.on_snapshot(seen(1000.4, standstill=True), [])
     assert [(each.record.stopped_by, each.record.cause) for each in reports] == [("velocity_mux", "no_source")] * told
 
 
 def test_a_source_that_takes_over_ends_the_stop() -> None:
     recorder = driving()
-    recorder.on_mux("", "joystick: silent", 1000.0)
+    recorder.on_mux("", "joystick: no message", 1000.0)
     recorder.on_mux("navigation", "", 1000.1)
     (report,) = recorder.on_snapshot(seen(1000.1, 0.05), [])
     assert not report.standstill

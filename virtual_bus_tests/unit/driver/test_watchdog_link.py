@@ -57,9 +57,9 @@ def test_before_the_first_frame_it_is_missing() -> None:
     [
         (WATCHING, 10.0, WatchdogView.OK, ""),
         (WATCHING, 10.199, WatchdogView.OK, ""),
-        (WATCHING, 10.201, WatchdogView.MISSING, "silent for 0.20 s (timeout 0.20 s)"),
+        (WATCHING, 10.201, WatchdogView.MISSING, "no frame for 0.20 s (timeout 0.20 s)"),
         (TRIPPED, 10.0, WatchdogView.TRIPPED, "drive silent, node 2"),
-        (TRIPPED, 10.201, WatchdogView.MISSING, "silent for 0.20 s (timeout 0.20 s)"),
+        (TRIPPED, 10.201, WatchdogView.MISSING, "no frame for 0.20 s (timeout 0.20 s)"),
         ("02 01 00 00 00 00 00 00", 10.0, WatchdogView.TRIPPED, "lease lost"),
         ("02 63 00 00 00 00 00 00", 10.0, WatchdogView.TRIPPED, "cause 99"),
         ("00 00 00 00 ff ff 00 00", 10.0, WatchdogView.MISSING, "still starting"),

@@ -118,7 +118,7 @@ def test_the_watchdogs_next_line_tells_how_many_were_lost() -> None:
         logger.warning("ladder: %s", "heartbeat withheld")
         logger.warning("all drives at standstill")
         assert os.read(end, 4096).decode() == (
-            "WARNING (2 lines before this one were lost: nobody read them) ladder: heartbeat withheld\n"
+            "WARNING (2 lines before this one were lost: the log did not accept them) ladder: heartbeat withheld\n"
             "WARNING all drives at standstill\n"
         )
 

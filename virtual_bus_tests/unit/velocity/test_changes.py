@@ -31,11 +31,11 @@ def test_from_first_command_to_silence() -> None:
     silent = mux.decide(1.6)
 
     assert list(changes(nobody, nav)) == [
-        ("nav drives, before nobody", Priority.INFO, {"active": "nav", "before": ""}),
+        ("nav drives; before: none", Priority.INFO, {"active": "nav", "before": ""}),
     ]
     assert list(changes(nav, mux.decide(1.4))) == []
     ((sentence, priority, fields),) = changes(nav, silent)
-    assert sentence == "nobody drives, before nav (silent for 0.60 s (timeout 0.50 s))"
+    assert sentence == "no active source; before: nav (no message for 0.60 s (timeout 0.50 s))"
     assert (priority, fields) == (Priority.INFO, {"active": "", "before": "nav"})
 
 
@@ -50,11 +50,11 @@ def test_a_lock_is_a_notice_and_so_is_what_it_takes_away() -> None:
 
     (lock, lost) = changes(nav, locked)
     assert lock == ("lock gate holds", Priority.NOTICE, {"lock": "gate", "lock_holds": "true"})
-    assert (lost[0].startswith("nobody drives, before nav ("), lost[1]) == (True, Priority.NOTICE)
+    assert (lost[0].startswith("no active source; before: nav ("), lost[1]) == (True, Priority.NOTICE)
     assert "gate" in lost[0]
     assert list(changes(locked, free)) == [
         ("lock gate is free", Priority.NOTICE, {"lock": "gate", "lock_holds": "false"}),
-        ("nav drives, before nobody", Priority.INFO, {"active": "nav", "before": ""}),
+        ("nav drives; before: none", Priority.INFO, {"active": "nav", "before": ""}),
     ]
 
 
@@ -71,7 +71,7 @@ def test_a_source_that_is_not_followed_is_a_notice_with_what_it_waits_for() -> N
     ((sentence, priority, fields),) = changes(nobody, held)
     assert sentence.startswith("joy is not followed: waiting for zero")
     assert (priority, fields) == (Priority.NOTICE, {"active": "joy", "before": ""})
-    assert [sentence for sentence, _, _ in changes(held, released)] == ["joy drives, before joy"]
+    assert [sentence for sentence, _, _ in changes(held, released)] == ["joy drives; before: joy"]
 
 
 @pytest.mark.parametrize("cause", StopCause)

@@ -68,8 +68,8 @@ def test_the_joystick_takes_over_at_once_and_gives_back_only_to_a_source_that_st
     assert (mux.decide(10.30).active, mux.decide(10.30).twist) == ("joystick", ZERO)
     decision = mux.decide(10.56)  # the joystick is silent; so is the action, whose old command must not come back
     assert (decision.active, decision.twist) == (None, ZERO)
-    assert reasons(decision)["joystick"] == "silent for 0.31 s (timeout 0.30 s)"
-    assert reasons(decision)["action"] == "silent for 0.56 s (timeout 0.30 s)"
+    assert reasons(decision)["joystick"] == "no message for 0.31 s (timeout 0.30 s)"
+    assert reasons(decision)["action"] == "no message for 0.56 s (timeout 0.30 s)"
     mux.on_command("action", SLOW, 10.60)  # a new command of its own
     assert mux.decide(10.60).active == "action"
 
@@ -77,7 +77,7 @@ def test_the_joystick_takes_over_at_once_and_gives_back_only_to_a_source_that_st
 def test_a_silent_source_is_told_as_silent_though_a_higher_one_drives(mux: Mux) -> None:
     mux.on_command("navigation", SLOW, 0.0)
     mux.on_command("joystick", FAST, 0.6)
-    assert reasons(mux.decide(0.6))["navigation"] == "silent for 0.60 s (timeout 0.50 s)"
+    assert reasons(mux.decide(0.6))["navigation"] == "no message for 0.60 s (timeout 0.50 s)"
 
 
 def test_a_lower_source_that_kept_talking_drives_on_with_its_newest_command(mux: Mux) -> None:
@@ -173,7 +173,7 @@ def test_a_required_lock_holds_until_it_is_heard_and_again_when_it_falls_silent(
     mux.on_command("joystick", FAST, 0.6)
     assert mux.decide(0.6).active == "joystick"  # 0.5 s after its word, exactly its timeout
     decision = mux.decide(math.nextafter(0.6, 1.0))
-    assert reasons(decision)["joystick"] == "locked: button is silent for 0.50 s (timeout 0.50 s)"
+    assert reasons(decision)["joystick"] == "locked: button has published nothing for 0.50 s (timeout 0.50 s)"
     mux.on_lock("button", False, 0.7)
     mux.on_command("joystick", FAST, 0.7)
     assert mux.decide(0.7).twist == FAST

@@ -213,7 +213,7 @@ def test_a_zero_that_waited_while_this_process_stood_still_does_not_arm() -> Non
 
 @pytest.mark.parametrize(
     ("age_s", "problem"),
-    [(0.0, ""), (STATUS_TIMEOUT_S, ""), (STATUS_TIMEOUT_S + 1e-9, "motor_driver/status is silent")],
+    [(0.0, ""), (STATUS_TIMEOUT_S, ""), (STATUS_TIMEOUT_S + 1e-9, "no recent message on motor_driver/status")],
 )
 def test_a_status_counts_until_exactly_its_timeout(age_s: float, problem: str) -> None:
     base = BaseReady()
@@ -369,7 +369,7 @@ def all_is_well(story: Story) -> None:
 
 PAUSES = [
     (STICK_LOCK, lock_closes, "locked: the pause holds"),
-    (REQUIRED_LOCK, lock_is_silent, "locked: the pause is silent"),
+    (REQUIRED_LOCK, lock_is_silent, "locked: the pause has published nothing"),
     (STICK_LOCK, stranger_comes, "locked: /stranger"),
     (STICK_LOCK, scans_are_missing, "no usable scan"),
 ]

@@ -117,7 +117,7 @@ def test_a_silence_of_the_stop_button_is_latched_once_it_was_heard() -> None:
     safety.on_command(ZERO, 0.6)
     see(safety, 0.6)
     assert safety.decide(0.6).cause is StopCause.ESTOP_STALE
-    assert safety.reset((), 0.6) == (False, "refused: the emergency stop on estop_state is silent")
+    assert safety.reset((), 0.6) == (False, "refused: the emergency stop on estop_state is not published")
     fed(0.7, ZERO, the_filter=safety)
     assert (safety.decide(0.7).cause, safety.estop) == (StopCause.ESTOP, EstopState.AWAITS_RESET)
 

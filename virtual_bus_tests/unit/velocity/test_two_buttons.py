@@ -80,10 +80,10 @@ def test_a_release_from_before_the_crowd_was_known_is_not_reset_either() -> None
 # a button whose node publishes Int8 in place of Bool: it is pressed, and nobody hears it
 def test_a_button_of_another_type_holds_the_base_as_long_as_it_is_there() -> None:
     base = Base(publishers=1)
-    base.filter.on_estop_publishers(0, "/button publishes it as std_msgs/msg/Int8, which is not heard")
+    base.filter.on_estop_publishers(0, "/button publishes it as std_msgs/msg/Int8, which is not received")
     decision = base.run(FORWARD, 0.5)
     assert (decision.cause, decision.twist) == (StopCause.ESTOP, ZERO)
-    assert "std_msgs/msg/Int8, which is not heard" in decision.detail
+    assert "std_msgs/msg/Int8, which is not received" in decision.detail
     assert not base.filter.reset((), base.now_s)[0]
     base.filter.on_estop_publishers(1)
     base.run(ZERO, 0.2)

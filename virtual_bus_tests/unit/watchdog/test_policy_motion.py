@@ -199,7 +199,7 @@ def test_the_sentences_about_evidence_have_the_values() -> None:
         "wheel_1_0 is ordered 0.300 m/s, and its encoder has not moved for 0.300 s and 0.090 m of its orders "
         "(allowed 0.250 s and 0.010 m, to and fro 2 times that way: watchdog.motion_missing_m); it reports 0.100 m/s: "
         "see encoder, motor, wheel",
-        "wheel_1_0 turns at 0.100 m/s, its setpoints ask for 0.300 m/s for 0.500 s "
+        "wheel_1_0 turns at 0.100 m/s, its setpoints order 0.300 m/s for 0.500 s "
         "(allowed 0.500 s; slow ramps: watchdog.slowest_ramp_mps2)",
         "wheel_1_0 is pushed with a torque that the drive does not report and gets no faster than 0.100 m/s for "
         "0.250 s (allowed 0.250 s), ordered 0.300 m/s: its encoder may lose counts, or its load is too heavy",
@@ -363,7 +363,7 @@ def test_each_cause_says_what_a_reset_needs() -> None:
     words = {check.cause: check.clears_on for check in CHECKS}
     assert {cause: clears_on(Verdict(cause)) for cause in words} == words
     assert clears_on(Verdict(TripCause.ENDED)) == "nothing else"
-    assert words[TripCause.FOREIGN_MASTER] == "the other master is silent for 1 s"
+    assert words[TripCause.FOREIGN_MASTER] == "the other master has sent nothing for 1 s"
     assert words[TripCause.BUS_FAILED] == "the bus takes frames again"
 
 

@@ -256,7 +256,7 @@ def test_on_a_curve_a_slow_wheel_is_found_by_its_own_speed() -> None:
     assert world.run(4.0, lambda: tripped(world))
     verdict = watchdog(world).status.verdict
     assert (verdict.cause, verdict.node_id) == (MISSING, 2)
-    assert "right_wheel turns at 0.300 m/s, its setpoints ask for" in verdict.detail
+    assert "right_wheel turns at 0.300 m/s, its setpoints order" in verdict.detail
 
 
 # --- what is not a reason

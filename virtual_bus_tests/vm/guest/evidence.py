@@ -40,7 +40,7 @@ class Evidence:
 
     def _on_mux(self, state: MuxState) -> None:
         for source in state.sources:
-            if state.active == "" and source.reason.startswith("silent"):
+            if state.active == "" and source.reason.startswith("no message"):
                 self._note("velocity_mux", f"{source.name} silent")
 
     def _on_status(self, status: DriverStatus) -> None:
