@@ -121,7 +121,7 @@ class MotorDriverNode(ManagedNode):
             return
         why = f": {finding.cause.value}" if finding.cause not in _SAID_BY_THE_STATE else ""
         detail = f" ({finding.detail})" if finding.detail else ""
-        clears = f"; ends on: {finding.clears_on}" if finding.clears_on else ""
+        clears = f"; ends with: {finding.clears_on}" if finding.clears_on else ""
         text = self.state_text = f"{snapshot.state.name}{why}{detail}{clears}"
         self._stops.note(text)
         priority = Priority.INFO if finding.cause.is_usual else Priority.WARNING

@@ -99,7 +99,7 @@ class Lifecycle:
             return Outcome(True, f"{self.aim.name.lower()} ({state.name.lower()}, {finding.cause.value})")
         hopeless = self.aim is Aim.ACTIVE and state is DriverState.LATCHED
         if hopeless or now_s > change.until:
-            ends = f"; ends on: {finding.clears_on}" if finding.clears_on else ""
+            ends = f"; ends with: {finding.clears_on}" if finding.clears_on else ""
             return Outcome(
                 False, f"not {self.aim.name.lower()}: {finding.cause.value} {finding.detail}".rstrip() + ends
             )
