@@ -34,6 +34,8 @@ REMOTE = 1 << 9
 class DriveState(Enum):
     """State of the power drive system; the value is its name in CiA 402-2."""
 
+    __hash__ = object.__hash__  # that of Enum is written in Python, and tables are looked up in every cycle
+
     NOT_READY_TO_SWITCH_ON = "not ready to switch on"
     SWITCH_ON_DISABLED = "switch on disabled"
     READY_TO_SWITCH_ON = "ready to switch on"
@@ -96,6 +98,8 @@ class Command(Enum):
 class PowerGoal(Enum):
     """Where one axis is to be taken. The rules are at the head of this file."""
 
+    __hash__ = object.__hash__
+
     OFF = "off"
     """Switch on disabled: no torque."""
     ON = "on"
@@ -138,11 +142,12 @@ COMMANDS: dict[PowerGoal, dict[DriveState | None, Command]] = {
     PowerGoal.RESET: dict.fromkeys(_STATES, Command.DISABLE_VOLTAGE) | {DriveState.FAULT: Command.FAULT_RESET},
 }
 """The command for each goal in each state (None: unknown statusword, or none received)."""
+_WORDS = {goal: {state: command.value for state, command in row.items()} for goal, row in COMMANDS.items()}
 
 
 def next_controlword(state: DriveState | None, goal: PowerGoal) -> int:
     """Controlword 6040h that takes an axis one step from `state` (None: unknown) towards `goal`, or keeps it there."""
-    return COMMANDS[goal][state].value
+    return _WORDS[goal][state]
 
 
 def common_controlword(states: Collection[DriveState | None], goal: PowerGoal) -> int:

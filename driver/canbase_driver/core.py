@@ -214,7 +214,8 @@ class DriverCore:
             may_boot = self._supervisor.state in NO_POWER and not ends
             asked_since = now_s if self._bus_problem else self._sync_since
             frames += self._drives.tick(now_s, may_boot, asked_since)
-        situation = self._situation(now_s)
+        unread = self._supervisor.state is DriverState.ENABLED and not self._reset.runs
+        situation = self._situation(now_s, with_motion=not unread)
         orders = self._judge(situation, now_s)
         frames += self._go_on_with_reset(situation, now_s)
         frames += self._setpoints(orders, now_s, dt_s)
@@ -302,7 +303,8 @@ class DriverCore:
         self._heartbeat_at = now_s
         return [heartbeat(DRIVER_NODE_ID, NmtState.OPERATIONAL)]
 
-    def _situation(self, now_s: float) -> Situation:
+    def _situation(self, now_s: float, *, with_motion: bool = True) -> Situation:
+        """`with_motion`: the sentences about it; what is enabled may move, and nothing reads them."""
         drives = self._drives
         watchdog, watchdog_detail = self._watchdog.view(now_s)
         liar = self._watchdog.lying_node(now_s)
@@ -325,10 +327,10 @@ class DriverCore:
             watchdog=watchdog,
             watchdog_detail=watchdog_detail,
             watchdog_about_drive=self._watchdog.about_drive,
-            commanded=self._command.motion(now_s),
+            commanded=self._command.motion(now_s) if with_motion else "",
             overdue=self._overdue(now_s),
             standstill=stand,
-            turning="" if stand else drives.turning(now_s),
+            turning=drives.turning(now_s) if with_motion and not stand else "",
             speed_mps=measured_mps,
             braking_mps=drives.braking_mps(now_s),
             begin_mps=max(measured_mps, ordered_mps),

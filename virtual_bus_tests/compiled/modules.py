@@ -47,7 +47,7 @@ HOT = {
     ),
     "campaign": (
         "action_process can_bus clock disk process driver_process watchdog_process velocity_process drives envelope "
-        "goal_judge hands intruder outside wishes reach shown strangers motion_judge odometry_judge judge"
+        "goal_judge hands intruder outside wishes reach scanner shown strangers motion_judge odometry_judge judge"
     ),
 }
 """The compiled modules of each package. Their order does not matter."""

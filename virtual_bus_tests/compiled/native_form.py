@@ -7,6 +7,7 @@ check at run time that nobody changes them; mypy has made it before.
 from __future__ import annotations
 
 import ast
+import re
 from dataclasses import dataclass
 
 
@@ -26,7 +27,32 @@ def native_form(source: str) -> str:
     for node in tree.body:
         if isinstance(node, ast.ClassDef):
             _rewrite(node)
+    _make_final(tree)
     return ast.unparse(ast.fix_missing_locations(tree))
+
+
+def _make_final(tree: ast.Module) -> None:
+    """Constants of the module are reached directly, and not by their names."""
+    for at, node in enumerate(tree.body):
+        if isinstance(node, ast.Assign) and len(node.targets) == 1:
+            target, kind = node.targets[0], _FINAL
+        elif isinstance(node, ast.AnnAssign) and node.value is not None and "Final" not in ast.unparse(node.annotation):
+            target, kind = node.target, f"{_FINAL}[{ast.unparse(node.annotation)}]"
+        else:
+            continue
+        if isinstance(target, ast.Name) and re.fullmatch("_?[A-Z][A-Z0-9_]+", target.id):
+            assert node.value is not None
+            tree.body[at] = ast.parse(f"{target.id}: {kind} = {ast.unparse(node.value)}").body[0]
+    first = next(at for at, node in enumerate(tree.body) if not _is_head(node))
+    tree.body.insert(first, ast.parse(f"from typing import Final as {_FINAL}").body[0])
+
+
+_FINAL = "_NeverAssignedAgain"
+
+
+def _is_head(node: ast.stmt) -> bool:
+    """The docstring, or what has to come first."""
+    return isinstance(node, ast.Expr) or (isinstance(node, ast.ImportFrom) and node.module == "__future__")
 
 
 def _rewrite(node: ast.ClassDef) -> None:

@@ -247,5 +247,13 @@ def _along_arc(pose: Pose2D, distance_m: float, turn_rad: float) -> Pose2D:
 
 
 def _diagonal(x: float, y: float, yaw: float) -> Covariance:
-    diagonal = (x, y, UNMEASURED, UNMEASURED, UNMEASURED, yaw)
-    return tuple(value if row == column else 0.0 for row, value in enumerate(diagonal) for column in range(6))
+    return (
+        *(x, 0.0, 0.0, 0.0, 0.0, 0.0),
+        *(0.0, y, 0.0, 0.0, 0.0, 0.0),
+        *_NOT_MEASURED,
+        *(0.0, 0.0, 0.0, 0.0, 0.0, yaw),
+    )
+
+
+_NOT_MEASURED = tuple(UNMEASURED if row == column else 0.0 for row in (2, 3, 4) for column in range(6))
+"""z, rotation about x and y."""

@@ -12,6 +12,8 @@ from canbase_runtime.driver_state import DriverState
 class Phase(Enum):
     """Where the driver is. What topics tell of it is `SHOWN`, what it orders there `ORDERS`."""
 
+    __hash__ = object.__hash__  # that of Enum is written in Python, and tables are looked up in every cycle
+
     OFFLINE = "offline"
     BOOTING = "booting"
     DISARMED = "disarmed"

@@ -14,6 +14,8 @@ from typing import NamedTuple
 class State(Enum):
     """States; the value is the statusword's bits 0–3, 5 and 6."""
 
+    __hash__ = object.__hash__  # that of Enum is written in Python
+
     NOT_READY_TO_SWITCH_ON = 0x00
     SWITCH_ON_DISABLED = 0x40
     READY_TO_SWITCH_ON = 0x21
@@ -26,6 +28,8 @@ class State(Enum):
 
 class Command(Enum):
     """What a controlword orders by bits 7, 3, 2, 1 and 0. The fault reset is an edge and not among them."""
+
+    __hash__ = object.__hash__
 
     NONE = "bit 7 is set"
     DISABLE_VOLTAGE = "0xx0x"
