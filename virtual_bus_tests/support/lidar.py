@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from random import Random
 
 import numpy as np
@@ -35,16 +36,14 @@ class Lidar:
 
     def scan(self, obstacles: Floats) -> Scan:
         """What it reads among `obstacles`, places in base_link [m]."""
-        ranges_m = np.full(READINGS, np.inf)
-        for x_m, y_m in obstacles:
-            range_m = max(math.hypot(x_m, y_m), RANGE_MIN_M)
-            middle = (math.atan2(y_m, x_m) + math.pi) / STEP_RAD
-            wide = max(1, math.ceil(SIZE_M / range_m / STEP_RAD))
-            beams = [round(middle + beam) % READINGS for beam in range(-wide, wide + 1)]
-            measured_m = range_m + self._random.gauss(0.0, self._noise_m)
-            ranges_m[beams] = np.minimum(ranges_m[beams], max(measured_m, RANGE_MIN_M))
+        ranges_m = [math.inf] * READINGS
+        for x_m, y_m in np.asarray(obstacles).tolist():
+            range_m, beams = _seen(x_m, y_m)
+            measured_m = max(range_m + self._random.gauss(0.0, self._noise_m), RANGE_MIN_M)
+            for beam in beams:
+                ranges_m[beam] = min(ranges_m[beam], measured_m)
         self._scans += 1
-        return self._of(ranges_m)
+        return self._of(np.array(ranges_m))
 
     def _of(self, ranges_m: Floats) -> Scan:
         return Scan(
@@ -56,6 +55,15 @@ class Lidar:
             angle_max_rad=-math.pi + STEP_RAD * (READINGS - 1),
             stamp_ns=self._scans * 100_000_000,
         )
+
+
+@lru_cache(maxsize=256)
+def _seen(x_m: float, y_m: float) -> tuple[float, list[int]]:
+    """How far away a place is, and which beams meet it."""
+    range_m = max(math.hypot(x_m, y_m), RANGE_MIN_M)
+    middle = (math.atan2(y_m, x_m) + math.pi) / STEP_RAD
+    wide = max(1, math.ceil(SIZE_M / range_m / STEP_RAD))
+    return range_m, [round(middle + beam) % READINGS for beam in range(-wide, wide + 1)]
 
 
 def blind(reading_m: float = math.nan, share: float = 1.0, towards_rad: float = 0.0) -> Fault:

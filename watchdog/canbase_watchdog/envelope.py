@@ -43,7 +43,10 @@ class Peak:
 
     def greatest(self, now_s: float) -> float:
         """The greatest value at the time `now_s`, which may not be before that of the last call."""
-        past, since = self._past, now_s - self._hold_s
+        past = self._past
+        if not past and self._end >= now_s:
+            return self._value
+        since = now_s - self._hold_s
         while past and past[0][1] < since:
             past.popleft()
         if not past:
@@ -156,11 +159,12 @@ class Envelope:
         for way in self._ways:
             way.look(now_s)
         forward, backward, left, right = self._ways
-        linear_s, angular_s = self._falling_s()
-        forward.fall(_kept(elapsed_s, linear_s))
-        backward.fall(_kept(elapsed_s, linear_s))
-        left.fall(_kept(elapsed_s, angular_s))
-        right.fall(_kept(elapsed_s, angular_s))
+        if forward.excess or backward.excess or left.excess or right.excess:
+            linear_s, angular_s = self._falling_s()
+            forward.fall(_kept(elapsed_s, linear_s))
+            backward.fall(_kept(elapsed_s, linear_s))
+            left.fall(_kept(elapsed_s, angular_s))
+            right.fall(_kept(elapsed_s, angular_s))
         return Bounds(-backward.level, forward.level, -right.level, left.level)
 
     def _falling_s(self) -> tuple[float, float]:
