@@ -66,6 +66,10 @@ build/compiled/ready: $(VENV)/ready $(HOT_SOURCES)
 .PHONY: compiled
 compiled: build/compiled/ready ## compiles the hot modules by mypyc into build/compiled: campaign, stops and soak take COMPILED=1
 
+.PHONY: compiled-wheel
+compiled-wheel: $(VENV)/ready ## a wheel for a robot, its deciding modules compiled by mypyc: dist/canbase-…-1compiled-….whl
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m compiled.wheel
+
 .PHONY: same-frames
 same-frames: build/compiled/ready ## SEEDS=10 scenarios and robots, interpreted and compiled: every frame the same, to the last bit
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m compiled.same $(if $(SEEDS),--seeds $(SEEDS)) $(if $(FIRST),--first $(FIRST))

@@ -40,9 +40,9 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from canbase_runtime.version import installed_version
+        from canbase_runtime.version import installed_version, is_compiled
 
-        typer.echo(f"canbase {installed_version()}")
+        typer.echo(f"canbase {installed_version()}{', compiled' if is_compiled() else ''}")
         raise typer.Exit
 
 

@@ -231,12 +231,13 @@ def _box_folders(robot: Robot | None, state: Path) -> list[Path]:
 
 
 def _versions() -> str:
-    from canbase_runtime.version import installed_version
+    from canbase_runtime.version import installed_version, is_compiled
 
     ros = os.environ.get("ROS_DISTRO", "not sourced (the wheels of PyPI, if any)")
     collected = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
     python = f"Python {sys.version}\n{sys.executable}"
-    return f"canbase {installed_version()}\n{python}\n{platform.platform()}\nROS {ros}\ncollected {collected}\n"
+    form = ", compiled" if is_compiled() else ""
+    return f"canbase {installed_version()}{form}\n{python}\n{platform.platform()}\nROS {ros}\ncollected {collected}\n"
 
 
 def _packages() -> str:

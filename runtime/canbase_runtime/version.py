@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -14,6 +16,12 @@ def installed_version() -> str:
         return version("canbase")
     except PackageNotFoundError:
         return _version_in_workspace(os.environ.get("AMENT_PREFIX_PATH", ""))
+
+
+def is_compiled() -> bool:
+    """The deciding modules run compiled (docs/install.md). One build makes all of them: policy stands for the rest."""
+    found = find_spec("canbase_watchdog.policy")
+    return found is not None and (found.origin or "").endswith(tuple(EXTENSION_SUFFIXES))
 
 
 def _version_in_workspace(prefixes: str) -> str:

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -43,19 +44,19 @@ def copy() -> None:
             path.write_bytes(data)
 
 
-def translate(level: str) -> list[setuptools.Extension]:
-    """C sources of one library with all of it, and of a small one for each module, which leads there."""
+def translate(groups: Mapping[str, Sequence[str]], level: str) -> list[setuptools.Extension]:
+    """C sources of a library for each group of modules, and of a small one for each module, which leads there."""
     os.environ["MYPYPATH"] = "."
-    paths = [str(path_of(module)) for module in hot_modules()]
-    made = mypycify([*MYPY, *paths], opt_level=level, debug_level="0", multi_file=True, group_name="canbase")
+    paths = {group: [str(path_of(module)) for module in modules] for group, modules in groups.items()}
+    everything = [path for each in paths.values() for path in each]
+    separate: list[tuple[list[str], str | None]] = [(each, group) for group, each in paths.items()]
+    made = mypycify([*MYPY, *everything], opt_level=level, debug_level="0", multi_file=True, separate=separate)
     assert isinstance(made, list)
     return made
 
 
 def build(extensions: list[setuptools.Extension], level: str, jobs: int) -> None:
     """Compile what has changed, `jobs` at a time, and link."""
-    for library in Path().rglob("*.so"):
-        library.unlink()
     with ThreadPoolExecutor(jobs) as pool:
         jobs_of = [partial(_compile, source, one.include_dirs, level) for one in extensions for source in one.sources]
         list(pool.map(lambda job: job(), jobs_of))
@@ -84,7 +85,9 @@ def main() -> None:
     given = parser.parse_args()
     copy()
     os.chdir(BUILD)
-    build(translate(given.level), given.level, given.jobs)
+    for library in Path().rglob("*.so"):
+        library.unlink()
+    build(translate({"canbase": hot_modules()}, given.level), given.level, given.jobs)
     shutil.copy(finder.__file__, "sitecustomize.py")
 
 
