@@ -1,5 +1,5 @@
 """`python -m canbase_cli` is `canbase`."""
 
-from canbase_cli.main import app
+from canbase_cli.entry import main
 
-app()
+main()

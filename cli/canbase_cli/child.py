@@ -23,6 +23,6 @@ def end_with(parent_pid: int) -> None:
 
 if __name__ == "__main__":
     end_with(int(sys.argv.pop(1)))
-    from canbase_cli.main import app
+    from canbase_cli.entry import main
 
-    app(prog_name="canbase")
+    main()

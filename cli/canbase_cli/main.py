@@ -27,15 +27,10 @@ from canbase_cli import (
     up,
 )
 from canbase_cli.goal import GoalCommand
-from canbase_cli.options import RosCommand
+from canbase_cli.options import ROS_USAGE, RosCommand, new_app
 from canbase_doctor import support_bundle
 
-app = typer.Typer(
-    name="canbase",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+app = new_app()
 
 
 def _version(wanted: bool) -> None:
@@ -59,22 +54,20 @@ def canbase(
     """
 
 
-_ROS_USAGE: Final = "[OPTIONS] [--ros-args …]"
 _DRIVE: Final = "Drive"
 _LOOK: Final = "Monitor and diagnose"
 _SET_UP: Final = "Set up"
 _LEARN: Final = "Learn and measure"
-_SERVICES: Final = "Services: one process each, as `canbase up` starts them"
 
 app.command("demo", rich_help_panel=_DRIVE)(demo.demo)
-app.command("up", cls=RosCommand, options_metavar=_ROS_USAGE, rich_help_panel=_DRIVE)(up.up)
-app.command("drive", cls=GoalCommand, options_metavar=_ROS_USAGE, rich_help_panel=_DRIVE)(drive.drive)
-app.command("rotate", cls=GoalCommand, options_metavar=_ROS_USAGE, rich_help_panel=_DRIVE)(rotate.rotate)
-app.command("stop", cls=RosCommand, options_metavar=_ROS_USAGE, rich_help_panel=_DRIVE)(trigger.stop)
-app.command("reset", cls=RosCommand, options_metavar=_ROS_USAGE, rich_help_panel=_DRIVE)(trigger.reset)
+app.command("up", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_DRIVE)(up.up)
+app.command("drive", cls=GoalCommand, options_metavar=ROS_USAGE, rich_help_panel=_DRIVE)(drive.drive)
+app.command("rotate", cls=GoalCommand, options_metavar=ROS_USAGE, rich_help_panel=_DRIVE)(rotate.rotate)
+app.command("stop", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_DRIVE)(trigger.stop)
+app.command("reset", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_DRIVE)(trigger.reset)
 
-app.command("monitor", cls=RosCommand, options_metavar=_ROS_USAGE, rich_help_panel=_LOOK)(monitor.monitor)
-app.command("doctor", cls=RosCommand, options_metavar=_ROS_USAGE, epilog=doctor.EPILOG, rich_help_panel=_LOOK)(
+app.command("monitor", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_LOOK)(monitor.monitor)
+app.command("doctor", cls=RosCommand, options_metavar=ROS_USAGE, epilog=doctor.EPILOG, rich_help_panel=_LOOK)(
     doctor.doctor
 )
 app.command("support-bundle", rich_help_panel=_LOOK)(support_bundle.support_bundle)
@@ -92,10 +85,4 @@ app.add_typer(fibonacci.app, name="fibonacci", rich_help_panel=_LEARN)
 app.command("inject", epilog=inject.EPILOG, rich_help_panel=_LEARN)(inject.inject)
 app.command("benchmark", rich_help_panel=_LEARN)(benchmark.benchmark)
 
-app.command("driver", cls=RosCommand, options_metavar=_ROS_USAGE, rich_help_panel=_SERVICES)(services.driver)
-app.command("velocity", cls=RosCommand, options_metavar=_ROS_USAGE, rich_help_panel=_SERVICES)(services.velocity)
-app.command("action-server", cls=RosCommand, options_metavar=_ROS_USAGE, rich_help_panel=_SERVICES)(
-    services.action_server
-)
-app.command("watchdog", cls=RosCommand, rich_help_panel=_SERVICES)(services.watchdog)
-app.command("sim", cls=RosCommand, rich_help_panel=_SERVICES)(services.sim)
+services.add_services(app)

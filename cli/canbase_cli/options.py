@@ -16,8 +16,19 @@ from canbase_cli.log_format import readable_times
 from canbase_cli.middleware import prefer_udp, stay_on_this_computer, take_no_profile_from_here
 from canbase_runtime.terminal import FAILED, fail
 
+ROS_USAGE: Final = "[OPTIONS] [--ros-args …]"
 _ROS_FLAG: Final = "--ros-args"
 _NAMESPACE: Final = re.compile(r"/?([A-Za-z_][A-Za-z0-9_]*(?:/[A-Za-z_][A-Za-z0-9_]*)*)/?")
+
+
+def new_app() -> typer.Typer:
+    """An app called canbase, without commands."""
+    return typer.Typer(
+        name="canbase",
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
 
 
 def _namespace(text: str) -> str:

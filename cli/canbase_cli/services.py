@@ -8,11 +8,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from canbase_cli.options import ConfigOption, NamespaceOption, UnusedNamespaceOption, ros_arguments, ros_needed
+from canbase_cli.options import (
+    ROS_USAGE,
+    ConfigOption,
+    NamespaceOption,
+    RosCommand,
+    UnusedNamespaceOption,
+    ros_arguments,
+    ros_needed,
+)
 from canbase_cli.raise_priority import raise_priority
 from canbase_runtime.own_modules import module_command
 from canbase_runtime.sim_time import SimTimeError
@@ -22,6 +30,9 @@ if TYPE_CHECKING:
     from canbase_config.robot import Robot
 
 WRONG_COMMAND_LINE: Final = 2
+SERVICES: Final = ("driver", "velocity", "action-server", "watchdog", "sim")
+"""Names of the commands here."""
+_PANEL: Final = "Services: one process each, as `canbase up` starts them"
 
 
 StopFileOption = Annotated[
@@ -131,3 +142,13 @@ def leave_stop_file(robot: Robot, path: Path | None) -> None:
         new.replace(path)
     except OSError as error:
         fail(f"{path} cannot be written: {error}; without it the drives cannot be stopped after a crash", FAILED)
+
+
+def add_services(app: typer.Typer) -> None:
+    """The commands of SERVICES."""
+    ros: dict[str, Any] = {"cls": RosCommand, "options_metavar": ROS_USAGE, "rich_help_panel": _PANEL}
+    app.command("driver", **ros)(driver)
+    app.command("velocity", **ros)(velocity)
+    app.command("action-server", **ros)(action_server)
+    app.command("watchdog", cls=RosCommand, rich_help_panel=_PANEL)(watchdog)
+    app.command("sim", cls=RosCommand, rich_help_panel=_PANEL)(sim)

@@ -1,0 +1,18 @@
+"""Where `canbase` begins. A service runs for as long as the robot does: it imports its own command and no other."""
+
+from __future__ import annotations
+
+import sys
+
+from canbase_cli.options import new_app
+from canbase_cli.services import SERVICES, add_services
+
+
+def main() -> None:
+    """The command line of this process, to its end."""
+    if sys.argv[1:2] and sys.argv[1] in SERVICES:
+        app = new_app()
+        add_services(app)
+    else:
+        from canbase_cli.main import app
+    app(prog_name="canbase")

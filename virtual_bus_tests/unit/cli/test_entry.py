@@ -1,0 +1,48 @@
+"""A service imports its own command alone: it has that in memory for as long as the robot runs."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from canbase_cli.main import app
+from canbase_cli.services import SERVICES
+
+PROGRAM = """
+import atexit, sys
+from canbase_cli.entry import main
+sys.argv = ["canbase", *{words}]
+atexit.register(lambda: print("canbase_cli.demo" in sys.modules, "canbase_config" in sys.modules))
+main()
+"""
+
+
+def _end_of(*words: str) -> tuple[int, str, str]:
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM.format(words=list(words))],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    return done.returncode, done.stdout, done.stdout.splitlines()[-1]
+
+
+@pytest.mark.parametrize("service", SERVICES)
+def test_a_service_brings_no_other_command(service: str) -> None:
+    code, told, imported = _end_of(service, "--help")
+    assert (code, imported) == (0, "False False")
+    assert f"Usage: canbase {service} [OPTIONS]" in told
+
+
+def test_any_other_command_is_there_as_before() -> None:
+    code, told, imported = _end_of("sample", "--help")
+    assert (code, imported.split()[0]) == (0, "True")
+    assert "Usage: canbase sample [OPTIONS]" in told
+
+
+def test_the_help_of_canbase_names_the_services_too() -> None:
+    names = {command.name for command in app.registered_commands}
+    assert names > set(SERVICES)
