@@ -14,7 +14,7 @@ from canbase_config.section import MisfitError, Name, Section
 
 
 class Identity(Section):
-    """What the objects 1018h and 100Ah must say; a key that is not given is not compared."""
+    """What the objects 1018h and 100Ah must contain; a key that is not given is not compared."""
 
     vendor_id: Annotated[int, Field(ge=0, le=0xFFFF_FFFF, description="1018h:1")] | None = None
     product_code: Annotated[int, Field(ge=0, le=0xFFFF_FFFF, description="1018h:2")] | None = None

@@ -23,7 +23,7 @@ class MuxSource(Section):
     """One source of velocity commands."""
 
     topic: Annotated[Topic, Field(description="relative to the node's namespace")]
-    priority: Annotated[int, Field(ge=0, le=255, description="the highest fresh source drives; each value once")]
+    priority: Annotated[int, Field(ge=0, le=255, description="the highest fresh source is active; each value once")]
     timeout_s: Annotated[float, Field(ge=0.05, le=2.0, description="without a message for longer: not active [s]")]
     stamped: Annotated[bool, Field(description="true: TwistStamped, false: Twist")] = True
     nodes: Annotated[
@@ -50,7 +50,7 @@ class MuxLock(Section):
     priority: Annotated[
         int, Field(ge=0, le=255, description="blocks sources with a lower priority, not those with the same one")
     ]
-    required: Annotated[bool, Field(description="true: locked while no message comes")] = True
+    required: Annotated[bool, Field(description="true: locked while no message arrives")] = True
     timeout_s: Annotated[
         float, Field(ge=0.05, le=5.0, description="without a message for longer: locked, if required [s]")
     ] = 0.5
@@ -70,7 +70,7 @@ DEFAULT_SOURCES = {
 
 
 class Mux(Section):
-    """Who may drive."""
+    """The sources of velocity commands, and the locks that block them."""
 
     sources: Annotated[dict[Name, MuxSource], Field(min_length=1, description="velocity sources, by name")] = (
         DEFAULT_SOURCES

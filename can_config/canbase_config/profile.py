@@ -64,7 +64,7 @@ class Layout(Section):
 
 
 class Units(Section):
-    """What one bit means, at the motor shaft. None: it depends on the drive's own settings, robot.yaml must tell."""
+    """What one bit means, at the motor shaft. None: the drive's settings decide, and robot.yaml names it."""
 
     target_velocity: Annotated[VelocityUnit, Field(description="60FFh")] | None = "rpm"
     actual_velocity: Annotated[VelocityUnit, Field(description="606Ch")] | None = "rpm"
@@ -194,7 +194,7 @@ class Measures(Section):
 
 
 class Kind(Section):
-    """What 1018h says of this kind of drive, to guess the profile by."""
+    """The content of 1018h for this kind of drive, to suggest the profile."""
 
     vendor_id: Annotated[int, Field(ge=0, le=0xFFFF_FFFF, description="1018h:1")] | None = None
     product_code: Annotated[int, Field(ge=0, le=0xFFFF_FFFF, description="1018h:2")] | None = None

@@ -86,7 +86,7 @@ class Base(Section):
 
 
 class Limits(Section):
-    """What the base may do at most. Magnitudes: they hold forward and backward, left and right."""
+    """Greatest velocities and accelerations of the base, as magnitudes: forward and backward, left and right."""
 
     linear_mps: Annotated[float, Field(gt=0.0, le=5.0, description="[m/s]")]
     angular_radps: Annotated[float, Field(gt=0.0, le=20.0, description="[rad/s]")]
@@ -110,7 +110,7 @@ class Limits(Section):
 
 
 class Rates(Section):
-    """How often things happen."""
+    """Rates of the loops and messages."""
 
     control_hz: Annotated[float, Field(ge=20.0, le=200.0, description="SYNC cycle of the driver [Hz]")] = 100.0
     odometry_hz: Annotated[float, Field(ge=1.0, le=100.0, description="odom, tf and joint_states [Hz]")] = 50.0
@@ -147,10 +147,10 @@ class Timeouts(Section):
 
 
 class Lease(Section):
-    """The Unix datagram socket on which the safety filter tells the watchdog what it ordered."""
+    """The Unix datagram socket on which the safety filter sends its orders to the watchdog."""
 
     socket: Annotated[
-        str, Field(min_length=1, max_length=100, description="path, also below $XDG_RUNTIME_DIR; its folder is made")
+        str, Field(min_length=1, max_length=100, description="path, also below $XDG_RUNTIME_DIR; its folder is created")
     ]
     uid: (
         Annotated[

@@ -13,7 +13,7 @@ MAX_SCANS = 8
 
 
 class Scan(Section):
-    """One laser scanner that the safety filter looks at. Its pose is written here, or read from tf_static."""
+    """One laser scanner that the safety filter evaluates. Its pose is written here, or read from tf_static."""
 
     required: Annotated[bool, Field(description="true: without a fresh scan nothing moves")]
     topic: Annotated[Topic, Field(description="sensor_msgs/LaserScan")] = "scan"
@@ -46,7 +46,7 @@ class Scan(Section):
 class Estop(Section):
     """The software emergency stop topic (std_msgs/Bool, true = stop). Not a safety function: STO is."""
 
-    required: Annotated[bool, Field(description="true: pressed while no message comes")]
+    required: Annotated[bool, Field(description="true: pressed while no message arrives")]
     topic: Annotated[Topic, Field(description="std_msgs/Bool, true: stop")] = "estop_state"
     timeout_s: Annotated[float, Field(ge=0.05, le=2.0, description="[s]")] = 0.5
     latched: Annotated[
@@ -84,7 +84,7 @@ class Ceiling(Section):
 
 
 class Safety(Section):
-    """The last place where a command is decided."""
+    """The safety filter, the last part that changes a command."""
 
     footprint: Footprint
     padding_m: Annotated[float, Field(ge=0.0, le=0.5, description="added to the footprint on all sides [m]")] = 0.01

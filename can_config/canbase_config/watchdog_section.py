@@ -17,7 +17,7 @@ class Relay(Section):
 
 
 class Watchdog(Section):
-    """How much the watchdog forgives. No tolerance can be switched off, and none is unlimited."""
+    """Times and tolerances of the watchdog. No tolerance can be switched off, and none is unlimited."""
 
     latency_s: Annotated[
         float,

@@ -125,7 +125,7 @@ def test_the_effective_configuration_spells_them_out_and_loads_without_the_files
         ("priority: 100", "priority: 10", "mux0.yaml:13: topics.joystick.priority: sources navigation and joystick have"
          " the same priority; each needs its own"),
         ("priority: 100", "priority: 256", "mux0.yaml:13: topics.joystick.priority: got 256, expected a whole number"
-         " >= 0 and <= 255 (the highest fresh source drives; each value once)"),
+         " >= 0 and <= 255 (the highest fresh source is active; each value once)"),
         ("priority: 100", "priorty: 100", "mux0.yaml:11: topics.joystick.priority: missing, expected a whole number"),
         ("timeout : 0.5\n        priority: 10\n", "timeout : 0.0\n        priority: 10\n", "mux0.yaml:8:"
          " topics.navigation.timeout: got 0.0, expected a number >= 0.05 and <= 2 (without a message"),
