@@ -19,8 +19,8 @@ ANSWER_S: Final = 16.0
 """A reset may have to boot the drives first."""
 FILTER_S: Final = 1.0
 """Beside a motor driver that is found, the safety filter is as well within this time, or there is none."""
-STATUS_S: Final = 1.0
-"""motor_driver/status comes ten times a second."""
+STATE_S: Final = 1.0
+"""motor_driver/status and safety_filter/state come ten times a second."""
 SLICE_S: Final = 0.1
 """Ctrl-C is heard after this at the latest."""
 WaitOption = Annotated[
@@ -46,13 +46,12 @@ def reset(ctx: typer.Context, wait_s: WaitOption = 5.0, namespace: NamespaceOpti
 
     Exit codes: 0 done, 1 refused, 2 wrong command line, 6 no motor driver.
     """
-    from canbase_velocity.filter_state import NOTHING_TO_RESET
-
     with _Caller(ctx, namespace, wait_s) as caller:
         caller.need_driver("motor_driver/reset")
         if caller.is_offered("safety_filter/reset", FILTER_S):
+            held = caller.estop_holds()
             answer = caller.call("safety_filter/reset")
-            if answer != NOTHING_TO_RESET:
+            if held:
                 _tell(answer)
                 if caller.driver_is_enabled():
                     return
@@ -110,14 +109,26 @@ class _Caller:
             fail(printable(answer.message, SENTENCE_LENGTH), FAILED)
         return printable(answer.message, SENTENCE_LENGTH)
 
+    def estop_holds(self) -> bool:
+        """The emergency stop holds the base, or waits for its reset."""
+        from canbase.msg import SafetyState
+
+        state = self._newest(SafetyState, "safety_filter/state")
+        return state is not None and bool(state.estop)
+
     def driver_is_enabled(self) -> bool:
         """The drives have power: they need no reset."""
         from canbase.msg import DriverStatus
 
-        heard: list[DriverStatus] = []
-        self._node.create_subscription(DriverStatus, "motor_driver/status", heard.append, 1)
-        self._spin_until(lambda: bool(heard), STATUS_S)
-        return bool(heard) and heard[-1].state == DriverStatus.ENABLED
+        status = self._newest(DriverStatus, "motor_driver/status")
+        return status is not None and status.state == DriverStatus.ENABLED
+
+    def _newest(self, kind: Any, topic: str) -> Any:
+        """The next message on a topic that is published ten times a second; None: it did not come."""
+        heard: list[Any] = []
+        self._node.create_subscription(kind, topic, heard.append, 1)
+        self._spin_until(lambda: bool(heard), STATE_S)
+        return heard[-1] if heard else None
 
     def _client(self, service: str) -> Any:
         from std_srvs.srv import Trigger

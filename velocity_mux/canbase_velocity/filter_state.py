@@ -26,7 +26,6 @@ from canbase_velocity.sole_publisher import SolePublisher
 from canbase_velocity.sweep import Floats
 from canbase_velocity.twist import ZERO, Twist
 
-NOTHING_TO_RESET = "The emergency stop is not latched: nothing to reset"
 WITHOUT_SCANS_S = 1.0
 """After so long without usable scans nobody who ordered motion meanwhile is followed by himself (neutral.py) [s]."""
 NO_SCAN = (
@@ -222,7 +221,7 @@ class SafetyFilter:
                 held = f"not seen released yet ({self._estop.before_the_start}): press and release it"
             return False, f"refused: the emergency stop on {self._config.safety.estop.topic} is {held}"
         if self._estop.state is EstopState.FREE and not moving:
-            return True, NOTHING_TO_RESET
+            return True, "The emergency stop is not latched: nothing to reset"
         if self.estop_crowd and self._estop.state is not EstopState.FREE:
             return False, f"refused: {self.estop_crowd}"
         if moving or not inputs.command.is_zero:

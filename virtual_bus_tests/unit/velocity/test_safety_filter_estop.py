@@ -7,7 +7,7 @@ import pytest
 from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.decision import Action
 from canbase_velocity.estop import EstopState
-from canbase_velocity.filter_state import NOTHING_TO_RESET, SafetyFilter
+from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.twist import ZERO, Twist
 from support.filter_inputs import config, fed, see
 
@@ -94,7 +94,7 @@ def test_without_an_emergency_stop_a_reset_is_refused_too_while_a_source_orders_
 
 def test_a_latched_emergency_stop_needs_a_reset_after_its_release() -> None:
     safety = latched(0.0, Twist(0.5, 0.0))
-    assert safety.reset((), 0.0) == (True, NOTHING_TO_RESET)
+    assert safety.reset((), 0.0) == (True, "The emergency stop is not latched: nothing to reset")
     fed(0.1, ZERO, pressed=True, the_filter=safety)
     assert safety.decide(0.1).cause is StopCause.ESTOP
     assert safety.reset((), 0.1) == (False, "refused: the emergency stop on estop_state is pressed")
