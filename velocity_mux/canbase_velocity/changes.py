@@ -83,7 +83,7 @@ def changed_order(now: Decision) -> Told:
     stops = now.action is Action.STOP
     otherwise = Priority.NOTICE if now.emergency else Priority.INFO
     priority = STOP_PRIORITY.get(now.cause, Priority.WARNING) if stops else otherwise
-    hard = "brakes hard" if now.emergency and "brakes hard" not in now.detail else ""
+    hard = "brakes hard" if now.emergency and now.cause is not StopCause.OBSTACLE else ""  # there the detail says it
     sentence = " ".join(word for word in (now.action.name, now.cause.value, now.detail, hard) if word)
     fields = {"action": now.action.name, "cause": now.cause.value, "clears_on": now.clears_on}
     return sentence, priority, fields | {"emergency": str(now.emergency).lower()}

@@ -6,12 +6,11 @@ import time
 from collections.abc import Iterator
 from typing import Final
 
-from canbase.msg import DriverStatus
+from canbase.msg import DriverStatus, MuxSource
 
 from exit_matrix.driven_robot import Scene
 from exit_matrix.log_evidence import NAMES, Catch, logged
 
-SILENT: Final = "no message"
 STOPPED: Final = (DriverStatus.STOPPING, DriverStatus.LATCHED)
 """The driver tells of a stop on stop_events when it is over, and in its status when it begins."""
 
@@ -36,7 +35,7 @@ class Evidence:
     def _silent_sources(self) -> Iterator[str]:
         for state in self._scene.mux.since(self._since_s):
             for source in state.sources:
-                if state.active == "" and source.reason.startswith(SILENT):
+                if state.active == "" and source.standing == MuxSource.SILENT:
                     yield source.name
 
     def _new(self, part: str) -> str:

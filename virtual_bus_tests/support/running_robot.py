@@ -191,7 +191,7 @@ class RunningRobot:
         deadline_s = time.monotonic() + READY_S
         while (status := self.wait_any_state()).state != DriverStatus.ENABLED:
             assert time.monotonic() < deadline_s, f"not ready: {status}\n{self.logs()}"
-            if status.clears_on.startswith("reset"):
+            if status.state == DriverStatus.LATCHED:
                 self.reset()
         self.wait_enabled()
 

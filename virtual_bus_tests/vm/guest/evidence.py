@@ -7,7 +7,7 @@ import time
 from collections import deque
 from typing import Any, Final
 
-from canbase.msg import DriverStatus, MuxState, StopEvent
+from canbase.msg import DriverStatus, MuxSource, MuxState, StopEvent
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
@@ -40,7 +40,7 @@ class Evidence:
 
     def _on_mux(self, state: MuxState) -> None:
         for source in state.sources:
-            if state.active == "" and source.reason.startswith("no message"):
+            if state.active == "" and source.standing == MuxSource.SILENT:
                 self._note("velocity_mux", f"{source.name} silent")
 
     def _on_status(self, status: DriverStatus) -> None:

@@ -167,7 +167,7 @@ class Robot:
         while self.state != DriverStatus.ENABLED or self.status is None or not self.status.command_fresh:
             if time.monotonic() > until_s:
                 raise BrokenPromiseError(f"not ready: {self.told()}")
-            if self.status is not None and self.status.clears_on.startswith("reset"):
+            if self.state == DriverStatus.LATCHED:
                 asked_s = time.monotonic()
                 if self.reset():
                     done_s = time.monotonic() - asked_s
