@@ -71,12 +71,12 @@ class Braking:
     def of(cls, config: WatchdogConfig) -> Braking:
         """The numbers of this robot."""
         return cls(
-            config.drive_lag_s,
-            config.braking_mps2,
-            config.motion_tolerance_mps,
-            config.motion_tolerance_share,
-            config.coasting_s,
-            config.braking_samples,
+            lag_s=config.drive_lag_s,
+            least_mps2=config.braking_mps2,
+            tolerance_mps=config.motion_tolerance_mps,
+            tolerance_share=config.motion_tolerance_share,
+            coasting_s=config.coasting_s,
+            samples=config.braking_samples,
         )
 
     def allowed_mps(self, from_mps: float, elapsed_s: float) -> float:
