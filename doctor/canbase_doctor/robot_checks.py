@@ -14,7 +14,7 @@ from canbase.msg import DriverStatus, SafetyState
 from canbase_doctor.checks import Check, fail, ok, warn
 from canbase_doctor.evidence import Evidence
 from canbase_driver.supervision.watchdog_link import RUNGS
-from canbase_runtime.driver_state import driver_state
+from canbase_runtime.driver_state import DriverState, driver_state
 from canbase_runtime.source_standing import SourceStanding, source_standing
 from canbase_runtime.watchdog_view import WatchdogView, watchdog_view
 
@@ -28,13 +28,10 @@ SILENT_S = 1.5
 """A state that was received longer ago says nothing: the slowest one comes every 0.5 s."""
 HANGS = "its process hangs, or its timers do not run: read its log, and restart it"
 PARTS_RUN = "is it running (canbase up), in this namespace and ROS_DOMAIN_ID?"
-ON_ITS_WAY = (DriverStatus.BOOTING, DriverStatus.ENABLING, DriverStatus.STOPPING)
-WATCHDOG_COUNTERS = ("leases_refused", "frames_dropped", "bus_errors", "trips")
 MOSTLY_USABLE = 0.5
 """Share of beams: a scanner of which more says nothing is covered, dirty or defective."""
 PAUSE_S = 0.05
 """A pause of the watchdog's loop that is worth a look: ten of its turns."""
-COUNTERS = ("commands_refused", "overruns", "frames_dropped", "send_errors")
 
 
 def configuration(evidence: Evidence) -> list[Check]:
@@ -48,24 +45,32 @@ def driver(evidence: Evidence) -> list[Check]:
     status = evidence.on("motor_driver/status").last
     if silent := _silent(evidence, "motor_driver", "motor_driver/status"):
         return [silent]
-    state = driver_state(status.state).word
-    if status.state == DriverStatus.ENABLED:
+    state = driver_state(status.state)
+    if state is DriverState.ENABLED:
         stands = "stands" if status.standstill else "moves"
         found = ok("motor_driver", f"enabled, {stands}; cmd_vel is {_age(status.command_age_s)} old")
-    elif status.state in ON_ITS_WAY:
-        found = warn("motor_driver", f"{state}, {status.cause}: {status.detail}", "look again in a second")
+    elif state.passes:
+        found = warn("motor_driver", f"{state.word}, {status.cause}: {status.detail}", "look again in a second")
     else:
-        found = fail("motor_driver", f"{state}, {status.cause}: {status.detail}", _until(status.clears_on))
+        found = fail("motor_driver", f"{state.word}, {status.cause}: {status.detail}", _until(status.clears_on))
     return [found, _counters(evidence.on("motor_driver/status").first, status)]
 
 
-def _counters(before: Any, now: Any) -> Check:
-    told = ", ".join(f"{name} {getattr(now, name)}" for name in COUNTERS)
-    told += f"; cycles at most {now.cycle_lateness_max_s * 1e3:.1f} ms late"
-    grew = [name for name in COUNTERS if getattr(now, name) > getattr(before, name)]
+def _counters(before: DriverStatus, now: DriverStatus) -> Check:
+    told = f"{_listed(_counts(now))}; cycles at most {now.cycle_lateness_max_s * 1e3:.1f} ms late"
+    grew = _grew(_counts(before), _counts(now))
     if not grew:
         return ok("its counters", told)
-    return warn("its counters", told, f"{', '.join(grew)} grew while doctor listened; docs/bus.md explains them")
+    return warn("its counters", told, f"{grew} grew while doctor listened; docs/bus.md explains them")
+
+
+def _counts(status: DriverStatus) -> dict[str, int]:
+    return {
+        "commands_refused": status.commands_refused,
+        "overruns": status.overruns,
+        "frames_dropped": status.frames_dropped,
+        "send_errors": status.send_errors,
+    }
 
 
 def watchdog(evidence: Evidence) -> list[Check]:
@@ -87,19 +92,26 @@ def watchdog(evidence: Evidence) -> list[Check]:
     return [found, _watchdog_counters(heard.first, status)]
 
 
-def _watchdog_counters(before: Any, now: Any) -> Check:
+def _watchdog_counters(before: DriverStatus, now: DriverStatus) -> Check:
     name = "watchdog's counters"
-    counts = {name: getattr(now, f"watchdog_{name}") for name in WATCHDOG_COUNTERS}
-    told = ", ".join(f"{name} {count}" for name, count in counts.items())
-    told += f"; longest pause of its loop {now.watchdog_pause_max_s * 1e3:.0f} ms"
-    grew = [name for name, count in counts.items() if count > getattr(before, f"watchdog_{name}")]
+    told = f"{_listed(_watchdog_counts(now))}; longest pause of its loop {now.watchdog_pause_max_s * 1e3:.0f} ms"
+    grew = _grew(_watchdog_counts(before), _watchdog_counts(now))
     if grew:
-        return warn(name, told, f"{', '.join(grew)} grew while doctor listened; docs/bus.md, 2FEh")
+        return warn(name, told, f"{grew} grew while doctor listened; docs/bus.md, 2FEh")
     if now.watchdog_pause_max_s > PAUSE_S:
         return warn(
             name, told, "its loop is delayed: is the computer overloaded? Does the process have real-time priority?"
         )
     return ok(name, told)
+
+
+def _watchdog_counts(status: DriverStatus) -> dict[str, int]:
+    return {
+        "leases_refused": status.watchdog_leases_refused,
+        "frames_dropped": status.watchdog_frames_dropped,
+        "bus_errors": status.watchdog_bus_errors,
+        "trips": status.watchdog_trips,
+    }
 
 
 def drives(evidence: Evidence) -> list[Check]:
@@ -209,6 +221,15 @@ def _silent(evidence: Evidence, name: str, topic: str) -> Check | None:
     if age_s <= SILENT_S:
         return None
     return fail(name, f"nothing on {topic} for {age_s:.1f} s; older messages are ignored", HANGS)
+
+
+def _listed(counts: dict[str, int]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in counts.items())
+
+
+def _grew(before: dict[str, int], now: dict[str, int]) -> str:
+    """The names of the counters that grew; empty: none."""
+    return ", ".join(name for name, count in now.items() if count > before[name])
 
 
 def _until(clears_on: str) -> str:

@@ -22,6 +22,11 @@ class DriverState(IntEnum):
         """In a sentence."""
         return self.name.lower()
 
+    @property
+    def passes(self) -> bool:
+        """On its way: of a healthy robot it ends by itself. OFFLINE, DISARMED and LATCHED wait for something else."""
+        return self in _PASSING
+
 
 def driver_state(number: int) -> DriverState:
     """The state with this number; one that is not in the interface counts as offline."""
@@ -29,3 +34,4 @@ def driver_state(number: int) -> DriverState:
 
 
 _NUMBERS = frozenset(DriverState)
+_PASSING = frozenset({DriverState.BOOTING, DriverState.ENABLING, DriverState.STOPPING})

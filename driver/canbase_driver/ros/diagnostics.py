@@ -21,7 +21,6 @@ from canbase_driver.supervision.watchdog_link import RUNGS, WatchdogReport
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.watchdog_view import WatchdogView
 
-_TRANSIENT = {DriverState.BOOTING, DriverState.DISARMED, DriverState.ENABLING, DriverState.STOPPING}
 _FAULTS = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
 _PAUSE_WARNING_S = 0.05
 """A pause of the watchdog's loop that is worth a look: ten of its turns."""
@@ -82,8 +81,9 @@ def _loop_events(snapshot: DriverSnapshot) -> dict[str, int]:
 def _driver_state(snapshot: DriverSnapshot) -> tuple[bytes, str]:
     if snapshot.state is DriverState.ENABLED:
         return DiagnosticStatus.OK, "All drives are enabled."
-    passing = snapshot.state in _TRANSIENT and snapshot.finding.cause is not Cause.DRIVE_MISSING
-    level = DiagnosticStatus.WARN if passing else DiagnosticStatus.ERROR
+    waits = snapshot.state is DriverState.DISARMED  # for a zero command, say: nothing is defective
+    missing = snapshot.finding.cause is Cause.DRIVE_MISSING
+    level = DiagnosticStatus.WARN if (snapshot.state.passes or waits) and not missing else DiagnosticStatus.ERROR
     detail = f": {snapshot.finding.detail.rstrip('.')}" if snapshot.finding.detail else ""
     clears = f" It ends with: {snapshot.finding.clears_on}." if snapshot.finding.clears_on else ""
     return level, f"{snapshot.state.name.capitalize()} ({snapshot.finding.cause.value}){detail}.{clears}"
