@@ -40,7 +40,7 @@ from canbase_driver.motion.kinematics import Twist2D, wheel_speeds
 from canbase_driver.motion.limiter import Limiter, MotionState
 from canbase_driver.motion.odometry import Pose2D
 from canbase_driver.motion.velocity_command import Command
-from canbase_driver.snapshot import DriverSnapshot, StopRecord
+from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervision.bus_health import BusReport
 from canbase_driver.supervision.cycle_stats import CycleStats
 from canbase_driver.supervision.latch import PowerRecord, found_before_the_start
@@ -49,6 +49,7 @@ from canbase_driver.supervision.phases import NO_POWER, Drive, Orders
 from canbase_driver.supervision.reset import Outcome
 from canbase_driver.supervision.reset_run import ResetRun
 from canbase_driver.supervision.situation import Situation
+from canbase_driver.supervision.stop_history import StopRecord
 from canbase_driver.supervision.supervisor import Supervisor
 from canbase_driver.supervision.watchdog_link import COUNTERS_COB_ID, STATE_COB_ID, WatchdogLink
 from canbase_runtime.driver_state import DriverState

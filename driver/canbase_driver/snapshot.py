@@ -38,19 +38,3 @@ class DriverSnapshot:
     odometry: OdometryReport
     drives: tuple[DriveSnapshot, ...]
     """In the order of robot.yaml."""
-
-
-@dataclass(frozen=True, slots=True)
-class StopRecord:
-    """One stop of a moving or enabled base, for the topic stop_events."""
-
-    stopped_by: str
-    """velocity_mux, safety_filter, motor_driver or watchdog."""
-    cause: str
-    detail: str
-    """One sentence with the values."""
-    latched: bool
-    """It needs a reset."""
-    clears_on: str
-    at_s: float
-    """Local monotonic time of the cause [s]."""

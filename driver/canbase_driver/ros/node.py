@@ -28,7 +28,8 @@ from canbase_driver.ros.stop_events import StopEvents
 from canbase_driver.runtime.black_box import Ring
 from canbase_driver.runtime.black_box_writer import BlackBoxWriter
 from canbase_driver.runtime.control_thread import ControlLoop
-from canbase_driver.snapshot import DriverSnapshot, StopRecord
+from canbase_driver.snapshot import DriverSnapshot
+from canbase_driver.supervision.stop_history import StopRecord
 from canbase_runtime.journal import Journal, Voice
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.receive_time import ReceiveTimes

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass, field
 from enum import Enum, auto
 
-from canbase_driver.snapshot import DriverSnapshot, StopRecord
+from canbase_driver.snapshot import DriverSnapshot
 from canbase_runtime.driver_state import DriverState
 
 ORDER_AGE_S = 0.1
@@ -29,6 +29,22 @@ class HeldBy(Enum):
     STALE_COMMAND = auto()
     DRIVER = auto()
     """The driver's core: it lets go of nothing that it has begun."""
+
+
+@dataclass(frozen=True, slots=True)
+class StopRecord:
+    """One stop of a moving or enabled base, for the topic stop_events."""
+
+    stopped_by: str
+    """velocity_mux, safety_filter, motor_driver or watchdog."""
+    cause: str
+    detail: str
+    """One sentence with the values."""
+    latched: bool
+    """It needs a reset."""
+    clears_on: str
+    at_s: float
+    """Local monotonic time of the cause [s]."""
 
 
 @dataclass(frozen=True, slots=True)

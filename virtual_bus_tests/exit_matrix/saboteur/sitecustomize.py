@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from canbase_driver.motion.kinematics import Twist2D
     from canbase_driver.motion.velocity_command import Command
     from canbase_driver.ros.node import MotorDriverNode
-    from canbase_driver.snapshot import DriverSnapshot, StopRecord
+    from canbase_driver.snapshot import DriverSnapshot
+    from canbase_driver.supervision.stop_history import StopRecord
 
 BUSY_S = 4.0
 """How long a thread is busy. It goes on afterwards, as one does that was only slow."""

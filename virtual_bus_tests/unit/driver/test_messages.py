@@ -13,9 +13,8 @@ from canbase_driver.causes import Cause, Finding
 from canbase_driver.motion.odometry import Odometry, Pose2D
 from canbase_driver.ros import messages
 from canbase_driver.ros.diagnostics import diagnostics_message
-from canbase_driver.snapshot import StopRecord
 from canbase_driver.supervision.bus_health import BusReport, ControllerState
-from canbase_driver.supervision.stop_history import StopReport
+from canbase_driver.supervision.stop_history import StopRecord, StopReport
 from canbase_driver.supervision.watchdog_link import WatchdogCounters, WatchdogReport
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.watchdog_view import WatchdogView

@@ -8,8 +8,8 @@ import pytest
 
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.motion.odometry import Pose2D
-from canbase_driver.snapshot import DriverSnapshot, StopRecord
-from canbase_driver.supervision.stop_history import StopHistory, StopReport
+from canbase_driver.snapshot import DriverSnapshot
+from canbase_driver.supervision.stop_history import StopHistory, StopRecord, StopReport
 from canbase_runtime.driver_state import DriverState
 from support.chain_world import FORWARD, World
 from support.snapshots import with_driver
