@@ -1,4 +1,4 @@
-"""Who has power, and what takes it away: every state with every hazard, and the way down step by step."""
+"""Who has power, and what takes it away: every state with every hazard."""
 
 from __future__ import annotations
 
@@ -15,90 +15,27 @@ from canbase_driver.supervision.reasons import BLOCKERS, HAZARDS
 from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.supervisor import Supervisor
 from canbase_runtime.driver_state import DriverState
-from canbase_runtime.watchdog_view import WatchdogView
-
-OFFLINE, BOOTING, DISARMED, ENABLING, ENABLED, STOPPING, LATCHED = DriverState
-OFF, ON = Orders(PowerGoal.OFF, Drive.ZERO), Orders(PowerGoal.ON, Drive.ZERO)
-FOLLOW, RAMP = Orders(PowerGoal.ON, Drive.FOLLOW), Orders(PowerGoal.ON, Drive.RAMP)
-QUICK = Orders(PowerGoal.QUICK_STOP, Drive.ZERO)
-
-READY = Situation(disabled="left is switch on disabled")
-"""Without power, and nothing in the way of it."""
-RUNNING = Situation(powered=True, standstill=False, turning="left turns", speed_mps=0.5, begin_mps=0.5)
-"""Enabled, and turning at a speed that does not fall, whatever is ordered."""
-STANDING = Situation(powered=True)
-
-WRONG: dict[str, Situation] = {
-    "bus failed": Situation(bus="bus-off"),
-    "drive fault": Situation(fault="left: over-current"),
-    "drive restarted": Situation(absent="node 1 restarted"),
-    "booting": Situation(booting="waiting for node 1"),
-    "drive silent": Situation(silent="node 1: no status"),
-    "drive missing": Situation(missing="node 1 is missing"),
-    "watchdog tripped": Situation(watchdog=WatchdogView.TRIPPED, watchdog_detail="lease lost"),
-    "watchdog missing": Situation(watchdog=WatchdogView.MISSING, watchdog_detail="not heard yet"),
-    "resetting": Situation(resetting=True),
-    "drive disabled": Situation(disabled="left is switched on"),
-    "did not stop": Situation(overdue="left turns"),
-    "command not zero": Situation(commanded="0.3 m/s"),
-    "not standing": Situation(standstill=False, turning="left turns"),
-    "stop requested": Situation(stop_requested=True),
-    "not configured": Situation(unconfigured="lifecycle: unconfigured"),
-    "inactive": Situation(inactive="lifecycle: not active"),
-    "shutdown": Situation(shutdown_requested=True),
-}
-
-
-def also(base: Situation, wrong: Situation) -> Situation:
-    """`base`, and what is not as usual in `wrong`."""
-    usual = Situation()
-    fields = {name: getattr(wrong, name) for name in Situation.__dataclass_fields__}
-    return replace(base, **{name: value for name, value in fields.items() if value != getattr(usual, name)})
-
-
-class Story:
-    """A supervisor with a ramp of at most 3 s, stepped every 10 ms: 1 m/s², 0.12 s of lag."""
-
-    def __init__(self) -> None:
-        self.supervisor = Supervisor(Braking(load_robot(sample("bench")).robot), ramp_timeout_s=3.0)
-        self.now_s = 10.0
-
-    def step(self, situation: Situation, cycles: int = 1) -> Orders:
-        for _ in range(cycles):
-            self.now_s += 0.01
-            orders = self.supervisor.step(situation, self.now_s)
-        return orders
-
-    def lasts(self, situation: Situation, orders: Orders, longest_s: float = 10.0) -> float:
-        """How long it gives these orders [s]."""
-        start = self.now_s
-        while self.step(situation) == orders:
-            assert self.now_s - start < longest_s
-        return round(self.now_s - start, 3)
-
-    @property
-    def told(self) -> tuple[DriverState, str, bool]:
-        """State, cause, and whether it needs a reset."""
-        return self.supervisor.state, self.supervisor.finding.cause.value, self.supervisor.latches
-
-
-def at(state: DriverState, wheels: Situation = STANDING) -> Story:
-    """A supervisor that has got into this state in the ordinary way."""
-    story = Story()
-    ways: dict[DriverState, tuple[Situation, ...]] = {
-        OFFLINE: (WRONG["bus failed"],),
-        BOOTING: (WRONG["booting"],),
-        DISARMED: (WRONG["command not zero"],),
-        ENABLING: (READY,),
-        ENABLED: (READY, wheels),
-        STOPPING: (READY, wheels, also(wheels, WRONG["stop requested"])),
-        LATCHED: (WRONG["drive fault"],),
-    }
-    for situation in ways[state]:
-        story.step(situation)
-    assert story.supervisor.state is state
-    return story
-
+from support.supervisor_story import (
+    BOOTING,
+    DISARMED,
+    ENABLED,
+    ENABLING,
+    FOLLOW,
+    LATCHED,
+    OFF,
+    OFFLINE,
+    ON,
+    QUICK,
+    RAMP,
+    READY,
+    RUNNING,
+    STANDING,
+    STOPPING,
+    WRONG,
+    Story,
+    also,
+    at,
+)
 
 NOT_YET = {
     "bus failed": OFFLINE,
@@ -224,105 +161,6 @@ def test_a_shutdown_without_power_ends_in_the_same_cycle(state: DriverState) -> 
     story = at(state)
     story.step(also(READY, WRONG["shutdown"]))
     assert story.supervisor.finished
-
-
-def test_the_way_down_goes_on_at_standstill() -> None:
-    story = at(ENABLED, RUNNING)
-    stop = WRONG["stop requested"]
-    assert story.step(also(RUNNING, stop), cycles=30) == RAMP
-    assert story.step(also(STANDING, stop)) == OFF
-    assert story.supervisor.state is STOPPING  # the drives have not said yet that they are off
-    assert story.step(also(READY, stop)) == OFF
-    assert story.told == (LATCHED, "stop requested", True)
-
-
-def wheels(speed_mps: float, base: Situation = RUNNING) -> Situation:
-    """The same, with the fastest wheel at another speed."""
-    return replace(base, speed_mps=speed_mps, begin_mps=speed_mps, standstill=speed_mps == 0.0)
-
-
-STOP = also(RUNNING, WRONG["stop requested"])
-
-
-def test_a_base_that_does_not_lose_speed_has_its_power_taken_step_by_step_in_less_than_a_second() -> None:
-    """0.5 m/s: allowed 0.6 m/s for 0.12 s, then 0.415 m/s² less on the ramp, 0.5 m/s² less in the quick stop."""
-    story = at(ENABLED, RUNNING)
-    story.step(STOP)
-    assert story.lasts(STOP, RAMP) == pytest.approx(0.12 + 0.1 / 0.415 + 0.03, abs=0.021)
-    assert story.lasts(STOP, QUICK) == pytest.approx(0.12 + 0.1 / 0.5 + 0.03, abs=0.021)
-    while story.supervisor.state is STOPPING:
-        assert story.step(STOP) == OFF
-    assert story.told == (LATCHED, "stop requested", True)
-
-
-def test_a_base_that_brakes_with_half_of_its_deceleration_is_waited_for() -> None:
-    story = at(ENABLED, RUNNING)
-    story.step(STOP)
-    cycles = round(0.5 / 0.4 / 0.01)
-    for cycle in range(cycles):
-        assert story.step(wheels(0.5 - 0.4 * 0.01 * cycle, STOP)) == RAMP
-    assert story.step(wheels(0.0, STOP)) == OFF
-
-
-def test_a_quick_stop_from_3_mps_at_0_9_mps2_is_waited_for_until_it_stands() -> None:
-    story = Story()
-    fast = load_robot(sample("bench")).robot
-    limits = {"linear_mps": 3.0, "deceleration_mps2": 0.9, "emergency_deceleration_mps2": 0.9}
-    fast = fast.model_copy(update={"limits": fast.limits.model_copy(update=limits)})
-    story.supervisor = Supervisor(Braking(fast), ramp_timeout_s=8.0)
-    fault = also(wheels(3.0), WRONG["drive fault"])
-    story.step(READY)
-    story.step(wheels(3.0))
-    assert story.step(fault) == QUICK
-    for cycle in range(round(3.0 / 0.9 / 0.01)):
-        assert story.step(wheels(3.0 - 0.9 * 0.01 * cycle, fault)) == QUICK
-    assert story.step(wheels(0.0, fault)) == OFF
-
-
-def test_a_wheel_that_gets_faster_in_a_quick_stop_has_its_power_taken_in_the_third_cycle() -> None:
-    story = at(ENABLED, RUNNING)
-    story.step(also(RUNNING, WRONG["drive fault"]))
-    runaway = also(wheels(0.7), WRONG["drive fault"])
-    assert [story.step(runaway) for _ in range(3)] == [QUICK, QUICK, OFF]
-
-
-def test_a_ramp_that_is_given_up_latches_with_its_own_cause() -> None:
-    story = at(ENABLED, RUNNING)
-    hopeless = also(RUNNING, WRONG["inactive"])
-    story.step(hopeless)
-    assert story.told == (STOPPING, "inactive", False)
-    story.lasts(hopeless, RAMP)
-    assert story.told == (STOPPING, "did not stop", True)
-    assert story.supervisor.finding.detail.startswith("left turns on its ramp, 0.")
-
-
-def test_the_ramp_takes_no_longer_than_timeouts_standstill_s() -> None:
-    story = at(ENABLED, RUNNING)
-    story.step(STOP)
-    trembles = replace(STOP, speed_mps=0.0)
-    assert story.lasts(trembles, RAMP) < 3.1  # it never stands: the allowed speed falls below zero
-
-
-@pytest.mark.parametrize(
-    ("wrong", "name"), [("stop requested", "stop requested"), ("inactive", "feedback implausible")]
-)
-def test_a_sensor_that_is_no_evidence_has_the_power_taken_at_once(wrong: str, name: str) -> None:
-    story = at(ENABLED, RUNNING)
-    story.step(also(RUNNING, WRONG[wrong]))
-    assert story.step(also(replace(RUNNING, doubted="left showed no motion"), WRONG[wrong])) == OFF
-    assert story.told == (STOPPING, name, True)
-
-
-def test_in_a_quick_stop_too() -> None:
-    story = at(ENABLED, RUNNING)
-    assert story.step(also(RUNNING, WRONG["drive fault"])) == QUICK
-    assert story.step(also(replace(RUNNING, doubted="left showed no motion"), WRONG["drive fault"])) == OFF
-
-
-def test_a_quick_stop_ends_at_standstill_but_lasts_one_cycle_at_least() -> None:
-    story = at(ENABLED)
-    assert story.step(also(STANDING, WRONG["drive fault"])) == QUICK
-    assert story.step(also(STANDING, WRONG["drive fault"])) == OFF
 
 
 def test_enabling_gives_up_after_two_seconds_and_needs_a_reset() -> None:
