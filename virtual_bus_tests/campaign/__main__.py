@@ -12,8 +12,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemaining
 from rich.table import Table
 
 from campaign.faults import FAULTS
-from campaign.judge import PROPERTIES, Violation
+from campaign.judge import Violation
 from campaign.plan import draw_plan
+from campaign.properties import PROPERTIES
 from campaign.removed_safeguards import SAFEGUARDS, remove
 from campaign.replay import replay
 from campaign.runner import Tally, run
