@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from types import FrameType
 
-from vm.guest import bus_failures, computer_failures, integrator, unit_failures
+from vm.guest import bus_failures, computer_failures, integrator, processor, unit_failures
 from vm.guest.robot import Robot
 from vm.guest.scenario import Row, Scenario
 from vm.guest.shutdown_trace import FOLDER
@@ -33,6 +33,7 @@ PLAN = FOLDER / "plan.json"
 FIRST: dict[str, Scenario] = {
     "cold boot": computer_failures.cold_boot,
     "goal": computer_failures.goal,
+    "processor": processor.processor,
     "support bundle": integrator.support_bundle,
     **unit_failures.KILLS,
     "power cut": bus_failures.power_cut,

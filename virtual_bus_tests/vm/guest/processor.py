@@ -1,0 +1,51 @@
+"""What the parts take of the processor. Time of this guest is counted in instructions: a nanosecond is one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+from vm.guest.robot import Robot
+from vm.guest.scenario import Row, elapsed
+from vm.guest.system import PARTS, BrokenPromiseError, show, unit
+
+REST_S: Final = 10.0
+GOAL_M: Final = 3.0
+GOAL_S: Final = 6.0
+"""At the speed of the scenarios it is driven for longer than it is measured."""
+SETTLE_S: Final = 3.0
+MILLION: Final = 1e6
+
+
+def processor(robot: Robot) -> Row:
+    """Instructions of each part in a second, the kernel's work for it included: at rest, and while a goal drives."""
+    robot.make_ready()
+    robot.spin(SETTLE_S)
+    rest = _in_a_second(robot, REST_S)
+    goal = robot.goal(GOAL_M)
+    robot.spin(1.0)
+    driving = _in_a_second(robot, GOAL_S)
+    if goal.result is not None:
+        raise BrokenPromiseError(f"the goal ended before the measurement: {goal.result}")
+    goal.cancel()
+    told = "; ".join(f"{part} {_millions(rest[part])}, {_millions(driving[part])}" for part in PARTS)
+    return Row("processor", "10 s at rest, 6 s of a goal", then=f"million instructions a second: {told}")
+
+
+def _in_a_second(robot: Robot, for_s: float) -> Mapping[str, float]:
+    pids = {part: int(show(unit(part), "MainPID")[0]) for part in PARTS}
+    before = {part: _instructions(pid) for part, pid in pids.items()}
+    begun_s = elapsed(0.0)
+    robot.spin(for_s)
+    lasted_s = elapsed(begun_s)
+    return {part: (_instructions(pid) - before[part]) / lasted_s for part, pid in pids.items()}
+
+
+def _instructions(pid: int) -> int:
+    """Of all threads of a process so far (Documentation/scheduler/sched-stats: the first field is time on the CPU)."""
+    return sum(int(file.read_text().split()[0]) for file in Path(f"/proc/{pid}/task").glob("*/schedstat"))
+
+
+def _millions(instructions: float) -> str:
+    return f"{instructions / MILLION:.0f}"
