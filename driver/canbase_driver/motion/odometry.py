@@ -59,7 +59,7 @@ class WheelTravel:
     """Travel of one wheel's rim since its first sample, from the raw position of its axis (6064h).
 
     Each sample is compared with the last one that was taken in. A step that the wheel cannot have made is a jump: it
-    is dropped and counted. If the samples after it come back, nothing was lost. If `RE_REFERENCE_SAMPLES` in a row
+    is dropped. If the samples after it come back, nothing was lost. If `RE_REFERENCE_SAMPLES` in a row
     stay at the new place, the counter has moved for good: that place becomes the new reference, the travel goes on
     from where it was, and `losses` counts it, as the travel of those samples is unknown. After such a jump no silence
     of more than `DOUBTED_CYCLES` is bridged any more: the first sample after it is a new reference as well.
@@ -74,7 +74,6 @@ class WheelTravel:
         "_metres_per_count",
         "_suspect_raw",
         "_suspects",
-        "jumps",
         "losses",
     )
 
@@ -96,8 +95,6 @@ class WheelTravel:
         self._suspect_raw = 0
         self._suspects = 0
         self._doubted = False
-        self.jumps = 0
-        """Samples that were dropped, since start."""
         self.losses = 0
         """References that were lost to a jump, since start: each time the travel misses what happened meanwhile."""
 
@@ -145,7 +142,6 @@ class WheelTravel:
         self._suspects = 0
 
     def _suspect(self, raw: int, stays: bool) -> None:
-        self.jumps += 1
         self._suspects = self._suspects + 1 if stays else 1
         self._suspect_raw = raw
         if self._suspects >= RE_REFERENCE_SAMPLES:
