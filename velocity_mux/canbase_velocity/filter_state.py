@@ -11,7 +11,7 @@ import numpy as np
 from canbase_config.safety import Scan as ScanConfig
 from canbase_runtime.latch_record import Found, Record
 from canbase_runtime.stop_cause import StopCause
-from canbase_velocity.clearance import FREE, Clearances, Field, Points, ScanReader, clearances
+from canbase_velocity.clearance import FREE, NOWHERE, Clearances, Field, Points, ScanReader, clearances
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.delay import Delay, Sent
 from canbase_velocity.estop import Estop, EstopEvent, EstopState
@@ -53,7 +53,7 @@ class _Scanner:
         self._reach_m = geometry.reach_m(config.timeout_s)
         self.at_s: float | None = None
         self.field: Field | None = None
-        self.points: Floats = np.empty((0, 2))
+        self.points: Floats = NOWHERE
         self.clearances = FREE
         self.measured_from_s = -math.inf
         self._problem = self._why_dropped = ""
@@ -291,7 +291,7 @@ class SafetyFilter:
     def _sight(self, pose: Pose, now_s: float) -> Sight:
         """Each place as it was scanned and as the base must see it by now, where that differs."""
         fresh = self._fresh(now_s)
-        parts = [np.empty((0, 2))]
+        parts = [NOWHERE]
         for scanner in fresh:
             there = self._motion.pose_at(scanner.measured_from_s - self._config.safety.reaction_s)
             parts.append(scanner.points)

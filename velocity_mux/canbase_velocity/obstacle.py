@@ -47,9 +47,6 @@ class Sight:
     fields: tuple[Field, ...] = ()
 
 
-NOTHING_IN_SIGHT = Sight(np.empty((0, 2)))
-
-
 @dataclass(frozen=True, slots=True)
 class Geometry:
     """What the judgement needs of the configuration, computed once. `hold_s`: until the next order at the latest."""

@@ -12,10 +12,10 @@ from canbase_config.robot import Limits
 from canbase_config.safety import Ceiling, Estop, Footprint, LimitZone, Safety
 from canbase_config.safety import Scan as ScanConfig
 from canbase_runtime.stop_cause import StopCause
-from canbase_velocity.clearance import Points
+from canbase_velocity.clearance import NOWHERE, Points
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
-from canbase_velocity.obstacle import NOTHING_IN_SIGHT, Geometry, Sight
+from canbase_velocity.obstacle import Geometry, Sight
 from canbase_velocity.ramp import AT_REST, Moving
 from canbase_velocity.safety_filter import FilterConfig, Inputs, ScanState
 from canbase_velocity.sweep import Box
@@ -72,7 +72,7 @@ GOOD = Inputs(
     command=Twist(0.5, 0.0),
     command_age_s=0.0,
     scans=scanned(0.0),
-    sight=NOTHING_IN_SIGHT,
+    sight=Sight(NOWHERE),
     moving=AT_REST,
     previous=ZERO,
     since_s=HOLD_S,
