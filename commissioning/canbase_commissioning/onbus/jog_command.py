@@ -1,4 +1,4 @@
-"""`canbase jog` on the bus and on the terminal. What a held key means is in `commissioning/jog.py`."""
+"""`canbase jog` on the bus and on the terminal. What a held key means is in `commissioning/jog_session.py`."""
 
 from __future__ import annotations
 
