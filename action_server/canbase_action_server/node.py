@@ -126,12 +126,16 @@ class DriveDistanceServer(Node):
         """`raw`: the callback gets bytes, as `deserialize_message` takes them."""
         self.create_subscription(kind, topic, self._guarded(callback), qos, raw=raw)
 
-    def _guarded(self, callback: Callable[..., None]) -> Callable[..., None]:
-        def guarded(*args: Any) -> None:
+    def _guarded(self, callback: Callable[..., Any], answer: Any = None) -> Callable[..., Any]:
+        """A callback whose exception ends every goal, and the process. Without it, one in a callback of an action
+        would abort the process at once (rclpy 7.1.6, EventsExecutor). `answer`: what it returns then."""
+
+        def guarded(*args: Any) -> Any:
             try:
-                callback(*args)
+                return callback(*args)
             except Exception as error:  # noqa: BLE001  whatever it is, the base must stop first
                 self.fail(error)
+                return answer
 
         return guarded
 
@@ -167,9 +171,9 @@ class DriveDistanceServer(Node):
             binding.type,
             name,
             execute_callback=self._finish,
-            goal_callback=partial(self._on_goal, binding),
-            handle_accepted_callback=partial(self._on_accepted, binding),
-            cancel_callback=self._on_cancel,
+            goal_callback=self._guarded(partial(self._on_goal, binding), GoalResponse.REJECT),
+            handle_accepted_callback=self._guarded(partial(self._on_accepted, binding)),
+            cancel_callback=self._guarded(self._on_cancel, CancelResponse.REJECT),
             goal_service_qos_profile=SERVICE_QOS,
             result_service_qos_profile=SERVICE_QOS,
             cancel_service_qos_profile=SERVICE_QOS,

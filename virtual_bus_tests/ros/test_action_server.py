@@ -323,3 +323,56 @@ def test_a_defect_stops_the_base_ends_the_goal_and_the_process(
     assert "ZeroDivisionError" in result.message
     assert stage.server.wait(5.0) == 1
     assert "a defect" in stage.server.log()
+
+
+def test_a_defect_in_the_callback_of_a_goal_stops_the_base_too(
+    test_node: TestNode, spawn: Spawn, make_robot: MakeRobot
+) -> None:
+    """A second goal comes, and what judges it breaks: it is rejected, and the first one ends as it must."""
+    broken = (
+        "from canbase_action_server.goal_queue import GoalQueue\n"
+        "sound = GoalQueue.refusal\n"
+        "def refusal(self, request, inputs, now):\n"
+        "    if self.busy: raise ZeroDivisionError('a defect')\n"
+        "    return sound(self, request, inputs, now)\n"
+        "GoalQueue.refusal = refusal\n"
+    )
+    stage = Stage(test_node, spawn(broken + server_code(make_robot({"timeouts": {"odometry_s": 0.5}}))))
+    drive = stage.drive_until_moving()
+    with pytest.raises(RejectedError):
+        stage.client.send(0.7, 0.2)
+    result = stage.end_of(drive)
+    assert (result.status, result.code) == (Status.ABORTED, ErrorCode.INTERNAL)
+    assert stage.server.wait(5.0) == 1
+    assert "a defect" in stage.server.log()
+
+
+def test_a_defect_in_the_callback_of_a_cancel_stops_the_base_too(
+    test_node: TestNode, spawn: Spawn, make_robot: MakeRobot
+) -> None:
+    broken = (
+        "from canbase_action_server.node import DriveDistanceServer\n"
+        "def broken(self, handle): raise ZeroDivisionError('a defect')\n"
+        "DriveDistanceServer._on_cancel = broken\n"
+    )
+    stage = Stage(test_node, spawn(broken + server_code(make_robot({"timeouts": {"odometry_s": 0.5}}))))
+    drive = stage.drive_until_moving()
+    assert not drive.cancel()
+    result = stage.end_of(drive)
+    assert (result.status, result.code) == (Status.ABORTED, ErrorCode.INTERNAL)
+    assert stage.server.wait(5.0) == 1
+
+
+def test_a_defect_in_taking_on_a_goal_ends_the_process_in_order(
+    test_node: TestNode, spawn: Spawn, make_robot: MakeRobot
+) -> None:
+    broken = (
+        "from canbase_action_server.goal_queue import GoalQueue\n"
+        "def broken(self, key, request, inputs, now): raise ZeroDivisionError('a defect')\n"
+        "GoalQueue.admit = broken\n"
+    )
+    stage = Stage(test_node, spawn(broken + server_code(make_robot({"timeouts": {"odometry_s": 0.5}}))))
+    stage.client.send(0.7, 0.2)
+    assert stage.server.wait(5.0) == 1
+    assert "a defect" in stage.server.log()
+    assert stage.base.speed_mps == 0.0
