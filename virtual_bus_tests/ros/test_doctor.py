@@ -22,11 +22,11 @@ pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 CANBASE = (sys.executable, "-m", "canbase_cli")
 BLOCKS = (
     "import time\nfrom canbase_action_server.node import DriveDistanceServer\n"
-    "sound = DriveDistanceServer._on_timer\n"
-    "def on_timer(self):\n    time.sleep(0.2)\n    sound(self)\n"
-    "DriveDistanceServer._on_timer = on_timer\n"
+    "sound = DriveDistanceServer.look_at_the_clock\n"
+    "def look(self, now_s):\n    time.sleep(0.2)\n    sound(self, now_s)\n"
+    "DriveDistanceServer.look_at_the_clock = look\n"
 )
-"""A server with a callback that takes ten control cycles."""
+"""A server whose thread is blocked for ten control cycles in each turn, also at rest."""
 LEAVES = (
     "import rclpy\nfrom canbase_action_server.client import DriveClient\n"
     "rclpy.init()\nnode = rclpy.create_node('leaves')\n"
