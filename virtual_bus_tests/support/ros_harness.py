@@ -253,12 +253,25 @@ def reserve_domain(first: int) -> tuple[int, socket.socket]:
     raise RuntimeError("all 99 ROS domains are held by other tests on this machine")
 
 
+_held_ports: list[socket.socket] = []
+"""They hold the ports that this process was given, until it ends."""
+
+
 def free_udp_port() -> int:
-    """A UDP port that nobody uses now: benches on one machine are told apart by it."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-    return port
+    """A UDP port that nobody uses now: benches on one machine are told apart by it. No other test is given it as long
+    as this process lives: between this call and the start of the bench the port itself is free."""
+    while True:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind(("127.0.0.1", 0))
+            port: int = probe.getsockname()[1]
+        holder = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            holder.bind(f"\0canbase-test-port-{port}")
+        except OSError:
+            holder.close()
+            continue
+        _held_ports.append(holder)
+        return port
 
 
 def merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
