@@ -64,7 +64,7 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
     """Everything that the watchdog process is told about the robot."""
     limits, timeouts, watchdog = robot.limits, robot.timeouts, robot.watchdog
     return WatchdogConfig(
-        bus_arguments=robot.bus.arguments(),
+        bus_arguments=robot.bus_arguments(),
         drives=tuple(
             watched_drive(drive, robot.base.wheel_radius_m, hardest_braking_mps2(robot, drive))
             for drive in robot.drives

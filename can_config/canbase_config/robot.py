@@ -20,6 +20,9 @@ from canbase_config.safety import Safety
 from canbase_config.section import MisfitError, Name, Section
 from canbase_config.watchdog_section import Watchdog
 
+BROADCAST = 0
+"""Lower seven bits of the identifiers of NMT, SYNC and TIME."""
+NODE_ID_BITS = 0x7F
 DRIVER_NODE_ID = 127
 """CANopen node id of the motor driver: its heartbeat is COB-ID 77Fh."""
 CYCLES_PER_TIMEOUT = 4
@@ -180,6 +183,17 @@ class Robot(Section):
     action: Action = Action()
     black_box: BlackBox = BlackBox()
     commissioned: Commissioned = Commissioned()
+
+    def bus_arguments(self) -> dict[str, Any]:
+        """Keyword arguments for `can.Bus` of the driver and the watchdog. On SocketCAN the kernel passes the frames of
+        this robot alone, so that a sensor on the same bus wakes neither: broadcast ones (NMT, SYNC), and all 11-bit
+        identifiers whose lower seven bits are the node id of a drive, the driver or the watchdog (CiA 301, 7.3.5).
+        """
+        if self.bus.interface != "socketcan":
+            return self.bus.arguments()
+        nodes = [BROADCAST, *sorted({drive.node_id for drive in self.drives}), WATCHDOG_NODE_ID, DRIVER_NODE_ID]
+        filters = [{"can_id": node_id, "can_mask": NODE_ID_BITS, "extended": False} for node_id in nodes]
+        return {"can_filters": filters} | self.bus.arguments()
 
     @model_validator(mode="after")
     def _drives_fit_together(self) -> Robot:

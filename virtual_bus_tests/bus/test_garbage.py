@@ -69,11 +69,11 @@ def test_the_watchdog_drops_and_counts_it_and_takes_the_frame_behind_it() -> Non
 def test_a_bus_that_fails_is_no_garbage(monkeypatch: pytest.MonkeyPatch) -> None:
     port = free_port()
     with of_the_watchdog.BusPort(arguments(port)) as bus:
-        monkeypatch.setattr(bus._bus, "recv", _network_is_down)
+        monkeypatch.setattr(bus._bus, "read", _network_is_down)
         assert list(bus.receive(time.monotonic())) == []
         assert (bus.health.receive_errors, bus.datagrams_dropped) == (1, 0)
     driver = of_the_driver.BusPort(arguments(port))
-    monkeypatch.setattr(driver._bus, "recv", _network_is_down)
+    monkeypatch.setattr(driver._bus, "read", _network_is_down)
     assert driver.receive(0.0) is None
     assert (driver.report.receive_errors, driver.report.dropped) == (1, 0)
     driver.close()

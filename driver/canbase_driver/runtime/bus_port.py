@@ -14,9 +14,9 @@ from typing import Any
 
 import can
 
-from canbase_driver.cia301.frame import Frame
+from canbase_driver.cia301.frame import MAX_DATA_BYTES, Frame
+from canbase_driver.runtime.frame_socket import ERROR, ERROR_CLASS, MAX_COB_ID, FrameSocket, open_bus
 from canbase_driver.supervision.bus_health import BusReport
-from canbase_runtime.local_frames import keep_to_this_computer
 
 RETRY_S = 1.0
 SEND_TIMEOUT_S = 0.002
@@ -34,14 +34,6 @@ _ERRORS = (can.CanError, OSError, ValueError)
 """ValueError: what select says of a handle whose adapter is gone."""
 
 
-def is_no_frame(error: Exception) -> bool:
-    """A datagram on a simulated bus (udp_multicast) that is no CAN frame: the bus is as good as before.
-
-    python-can gives the reason as the cause of its error; where the bus itself fails, that is an OSError or none.
-    """
-    return isinstance(error, can.CanOperationError) and not isinstance(error.__cause__, OSError | None)
-
-
 class BusError(Exception):
     """The bus cannot be opened. The text says what to look at."""
 
@@ -49,31 +41,31 @@ class BusError(Exception):
 class _Opening(threading.Thread):
     """Opens a bus while the control thread goes on."""
 
-    def __init__(self, open_bus: Callable[[], can.BusABC]) -> None:
+    def __init__(self, open_: Callable[[], FrameSocket]) -> None:
         super().__init__(name="opening", daemon=True)
-        self.bus: can.BusABC | None = None
+        self.bus: FrameSocket | None = None
         self.error: BusError | None = None
-        self._open_bus = open_bus
+        self._open = open_
         self._lock, self._abandoned = threading.Lock(), False
 
     def run(self) -> None:
         """The thread's body."""
         try:
-            bus = self._open_bus()
+            bus = self._open()
         except BusError as error:
             self.error = error
             return
         with self._lock:
             self.bus = bus
             if self._abandoned:
-                bus.shutdown()
+                bus.close()
 
     def abandon(self) -> None:
         """Nobody waits for it any more: what it opens, or has opened, is closed."""
         with self._lock:
             self._abandoned = True
             if self.bus is not None:
-                self.bus.shutdown()
+                self.bus.close()
 
 
 class BusPort:
@@ -87,7 +79,7 @@ class BusPort:
         self._send_failures = self._receive_failures = 0
         self._retry_at = 0.0
         self._opening: _Opening | None = None
-        self._bus: can.BusABC | None = self._open()
+        self._bus: FrameSocket | None = self._open()
 
     def receive(self, timeout_s: float) -> Frame | None:
         """The next data frame with an 11-bit identifier; None when none came in `timeout_s`, or when receiving failed.
@@ -107,25 +99,34 @@ class BusPort:
                 return frame
         return None
 
-    def _receive(self, bus: can.BusABC, timeout_s: float) -> Frame | None:
+    def _receive(self, bus: FrameSocket, timeout_s: float) -> Frame | None:
         """None, and `report` grows, for what is no data frame of CANopen."""
         try:
-            message = bus.recv(timeout_s)
+            received = bus.read(timeout_s)
         except _ERRORS as error:
-            if is_no_frame(error):
-                self._drop()
-            else:
-                self._on_receive_error(error)
+            self._on_receive_error(error)
             return None
-        return None if message is None else self._take(message)
+        if received is None:
+            return None
+        can_id, data, _at_s = received
+        if can_id < 0:
+            self._drop()
+            return None
+        if can_id > MAX_COB_ID and can_id & ERROR:
+            self._on_error_frame(can_id & ERROR_CLASS, data)
+            return None
+        self._on_received()
+        if can_id > MAX_COB_ID or len(data) > MAX_DATA_BYTES:
+            self._drop()
+            return None
+        return Frame(can_id, data)
 
     def send(self, frame: Frame) -> None:
         """Send now or never."""
         if self._bus is None:
             return
-        message = can.Message(arbitration_id=frame.cob_id, data=frame.data, is_extended_id=False)
         try:
-            self._bus.send(message, timeout=SEND_TIMEOUT_S)
+            self._bus.write(frame.cob_id, frame.data, SEND_TIMEOUT_S)
         except _ERRORS as error:
             self._on_send_error(error)
         else:
@@ -139,25 +140,19 @@ class BusPort:
             self._opening.abandon()
         bus, self._bus = self._bus, None
         if bus is not None:
-            bus.shutdown()
+            bus.close()
 
-    def _take(self, message: can.Message) -> Frame | None:
-        if type(message.arbitration_id) is not int:  # python-can lets a simulated bus have 1.5
-            self._drop()
-            return None
-        if message.is_error_frame:
-            before, self.report = self.report, self.report.with_error_frame(message.arbitration_id, bytes(message.data))
-            if self.report.is_bus_off and not before.is_bus_off:
-                self._fail(BUS_OFF)
-            return None
+    def _on_error_frame(self, error_class: int, data: bytes) -> None:
+        before, self.report = self.report, self.report.with_error_frame(error_class, data)
+        if self.report.is_bus_off and not before.is_bus_off:
+            self._fail(BUS_OFF)
+
+    def _on_received(self) -> None:
+        """The bus works."""
         self._receive_failures = 0
         self.problem = ""
         if self.report.is_bus_off:
             self.report = replace(self.report, controller=BusReport().controller)
-        if message.is_remote_frame or message.is_extended_id or message.is_fd:
-            self._drop()
-            return None
-        return Frame(message.arbitration_id, bytes(message.data))
 
     def _drop(self) -> None:
         self.report = replace(self.report, dropped=self.report.dropped + 1)
@@ -174,11 +169,9 @@ class BusPort:
         if self._receive_failures >= RECEIVE_FAILURES:
             self._fail(f"receiving failed {self._receive_failures} times in a row: {error}")
 
-    def _open(self) -> can.BusABC:
+    def _open(self) -> FrameSocket:
         try:
-            bus = can.Bus(**self._arguments)
-            keep_to_this_computer(self._arguments, bus)
-            return bus
+            return open_bus(self._arguments)
         except (*_ERRORS, TypeError, ImportError, NotImplementedError) as error:
             raise BusError(
                 f"the CAN bus {self._arguments} cannot be opened: {error}. "
@@ -192,7 +185,7 @@ class BusPort:
         bus, self._bus = self._bus, None
         try:
             if bus is not None:
-                bus.shutdown()
+                bus.close()
         except _ERRORS as error:
             self.problem = f"{problem}; closing failed too: {error}"
 

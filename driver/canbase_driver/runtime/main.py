@@ -63,7 +63,7 @@ def run(
     folder = latch_folder(os.environ, Path.home(), robot.name)
     try:
         held = take("driver", bus_name(robot.bus.arguments())), hold(folder, "driver")
-        bus = BusPort(robot.bus.arguments())
+        bus = BusPort(robot.bus_arguments())
         _listen_for_another(bus, robot.timeouts.drive_heartbeat_s)
     except (BusError, TakenError) as error:
         print(f"canbase driver: {error}", file=sys.stderr)

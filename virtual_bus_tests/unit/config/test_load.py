@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from canbase_config.effective import effective
 from canbase_config.errors import ConfigError, key_path
 from canbase_config.load import Loaded, leaf_keys, load_robot, sample
-from canbase_config.robot import Robot
+from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
 from support.robot_files import GOOD, LAST_LINE, write
 
 END = LAST_LINE + 1
@@ -51,6 +51,30 @@ def test_the_example_for_a_real_bus_demands_scanner_and_stop_button() -> None:
     assert robot.bus.arguments() == {"interface": "socketcan", "channel": "can0"}
     assert (robot.safety.scan.required, robot.safety.estop.required) == (True, True)
     assert robot.lease.socket == "/run/canbase/lease.sock"
+
+
+def passes(filters: list[dict[str, int]], cob_id: int) -> bool:
+    """Whether the kernel hands on a frame with this 11-bit identifier (linux/can/raw.h, CAN_RAW_FILTER)."""
+    return any(cob_id & one["can_mask"] == one["can_id"] & one["can_mask"] for one in filters)
+
+
+def test_on_socketcan_the_kernel_passes_what_this_robot_sends_and_what_reaches_its_drives_alone() -> None:
+    robot = load_robot(sample("example_can0")).robot
+    filters = robot.bus_arguments()["can_filters"]
+
+    assert {one["extended"] for one in filters} == {False}
+    for node_id in {drive.node_id for drive in robot.drives} | {DRIVER_NODE_ID, WATCHDOG_NODE_ID}:
+        assert all(passes(filters, function << 7 | node_id) for function in range(16))
+    for broadcast in (0x000, 0x080, 0x100):  # NMT, SYNC, TIME
+        assert passes(filters, broadcast)
+    assert sum(passes(filters, cob_id) for cob_id in range(0x800)) == 16 * (len(robot.drives) + 3)
+
+
+def test_a_bus_without_filters_in_the_kernel_has_none_and_the_integrators_own_go_before() -> None:
+    assert "can_filters" not in load_robot(sample("bench")).robot.bus_arguments()
+    robot = load_robot(sample("example_can0")).robot
+    own = robot.model_copy(update={"bus": robot.bus.model_copy(update={"extra": {"can_filters": []}})})
+    assert own.bus_arguments()["can_filters"] == []
 
 
 COMMENTED_KEY = re.compile(r"^( *)# ( *[a-z_]+:( .*)?)$", re.MULTILINE)

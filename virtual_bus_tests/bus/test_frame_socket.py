@@ -1,0 +1,199 @@
+"""Frames read and written at the socket of a bus, in both copies, beside python-can on the same bus."""
+
+from __future__ import annotations
+
+import inspect
+import itertools
+import random
+import socket
+import struct
+import time
+from collections.abc import Iterator
+from types import ModuleType
+from typing import Any
+
+import can
+import pytest
+
+from canbase_driver.runtime import frame_socket as of_the_driver
+from canbase_watchdog import frame_socket as of_the_watchdog
+from support.bus_tool import free_port
+
+pytestmark = pytest.mark.bus
+COPIES = pytest.mark.parametrize("module", [of_the_driver, of_the_watchdog], ids=["driver", "watchdog"])
+FRAME = struct.Struct("=IB3x8s")
+"""linux/can.h, struct can_frame."""
+MANY = 1000
+
+
+class SocketBus:
+    """A `can.BusABC` on a socket whose other end the test holds: the kernel of this computer may have no CAN."""
+
+    def __init__(self, own: socket.socket) -> None:
+        own.setsockopt(socket.SOL_SOCKET, 35, 1)  # asm-generic/socket.h, SO_TIMESTAMPNS, as python-can sets it
+        self.own, self.closed = own, False
+
+    def fileno(self) -> int:
+        return self.own.fileno()
+
+    def shutdown(self) -> None:
+        self.closed = True
+        self.own.close()
+
+
+@pytest.fixture
+def udp() -> dict[str, Any]:
+    return {"interface": "udp_multicast", "channel": "239.74.163.2", "port": free_port(), "hop_limit": 0}
+
+
+@pytest.fixture
+def ends() -> Iterator[tuple[socket.socket, socket.socket]]:
+    """Two ends of one bus of datagrams."""
+    one, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    with one, other:
+        yield one, other
+
+
+def socketcan(module: ModuleType, end: socket.socket, monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.setattr(module.can, "Bus", lambda **_: SocketBus(end))
+    return module.open_bus({"interface": "socketcan", "channel": "can0"})
+
+
+def drawn(rng: random.Random) -> can.Message:
+    """A frame of any kind that a bus may carry."""
+    kind = rng.choice(["data", "data", "data", "remote", "extended", "error", "fd"])
+    extended = kind == "extended"
+    largest = 0x1FFF_FFFF if extended else 0x7FF
+    length = rng.choice([0, 1, 7, 8]) if kind != "fd" else rng.choice([0, 8, 12, 64])
+    return can.Message(
+        arbitration_id=rng.choice([0, 1, largest - 1, largest, rng.randrange(largest)]),
+        is_extended_id=extended,
+        is_remote_frame=kind == "remote",
+        is_error_frame=kind == "error",
+        is_fd=kind == "fd",
+        dlc=length if kind == "remote" else None,
+        data=None if kind == "remote" else rng.randbytes(length),
+        check=True,
+    )
+
+
+def test_the_watchdogs_copy_does_the_same() -> None:
+    def code(module: ModuleType) -> str:
+        return "\n".join(
+            line for line in inspect.getsource(module).split('"""', 2)[2].splitlines() if "local_frames" not in line
+        )
+
+    assert code(of_the_watchdog) == code(of_the_driver)
+
+
+@COPIES
+def test_each_frame_on_the_simulated_bus_is_what_python_can_says_of_it(module: ModuleType, udp: dict[str, Any]) -> None:
+    rng = random.Random(7)
+    reader, sender = module.open_bus(udp), can.Bus(**udp)
+    with can.Bus(**udp) as library:
+        for _ in range(MANY):
+            sender.send(drawn(rng))
+            said, received = library.recv(1.0), reader.read(1.0)
+            assert said is not None
+            can_id, data, at_s = received
+            assert (can_id <= module.MAX_COB_ID) == (
+                not (said.is_extended_id or said.is_remote_frame or said.is_error_frame or said.is_fd)
+            )
+            assert can_id & module.ERROR_CLASS == said.arbitration_id
+            assert bool(can_id & module.EXTENDED) == said.is_extended_id
+            assert bool(can_id & module.REMOTE) == said.is_remote_frame
+            assert bool(can_id & module.ERROR) == said.is_error_frame
+            assert bool(can_id & module.FLEXIBLE) == said.is_fd
+            assert data == bytes(said.data)
+            assert at_s == pytest.approx(said.timestamp, abs=0.05)  # of two sockets
+    reader.close()
+    sender.shutdown()
+
+
+@COPIES
+def test_what_it_writes_is_a_frame_for_python_can(module: ModuleType, udp: dict[str, Any]) -> None:
+    writer = module.open_bus(udp)
+    with can.Bus(**udp) as library:
+        for length in range(9):
+            writer.write(0x181 + length, bytes(range(length)), 0.1)
+            said = library.recv(1.0)
+            assert said is not None
+            assert (said.arbitration_id, bytes(said.data)) == (0x181 + length, bytes(range(length)))
+            assert {said.is_extended_id, said.is_remote_frame, said.is_error_frame, said.is_fd} == {False}
+    writer.close()
+
+
+@COPIES
+def test_a_socketcan_frame_has_its_flags_its_length_and_the_time_of_the_kernel(
+    module: ModuleType, ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus = socketcan(module, ends[0], monkeypatch)
+    before_s = time.time()
+    for can_id in (0x181, 0x7FF, module.EXTENDED | 0x181, module.REMOTE | 0x181, module.ERROR | 0x040):
+        for length in range(9):
+            ends[1].send(FRAME.pack(can_id, length, bytes(range(8))))
+            seen = bus.read(0.0)
+            assert seen is not None
+            assert seen[:2] == (can_id, bytes(range(length)))
+            assert before_s <= seen[2] <= time.time()
+    ends[1].send(bytes(72))  # CAN FD
+    assert bus.read(0.0)[0] > module.MAX_COB_ID
+    assert bus.read(0.0) is None
+
+
+@COPIES
+def test_a_socketcan_frame_is_written_as_the_kernel_wants_it(
+    module: ModuleType, ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus = socketcan(module, ends[0], monkeypatch)
+    bus.write(0x201, b"\x0f\x00\x10", 0.0)
+    assert ends[1].recv(100) == FRAME.pack(0x201, 3, b"\x0f\x00\x10")
+
+
+@COPIES
+def test_a_full_buffer_is_an_error_after_the_timeout_and_nothing_is_sent_later(
+    module: ModuleType, ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus = socketcan(module, ends[0], monkeypatch)
+    sent = itertools.count()
+
+    def write_until_it_fails() -> None:
+        while True:
+            bus.write(0x201, next(sent).to_bytes(4, "little"), 0.01)
+
+    with pytest.raises(BlockingIOError):
+        write_until_it_fails()
+    refused = next(sent) - 1
+    assert refused > 0
+    taken = [int.from_bytes(ends[1].recv(100, socket.MSG_DONTWAIT)[8:12], "little") for _ in range(refused)]
+    assert taken == list(range(refused))
+    with pytest.raises(BlockingIOError):
+        ends[1].recv(100, socket.MSG_DONTWAIT)
+
+
+@COPIES
+def test_waiting_ends_with_the_frame_or_with_the_time(
+    module: ModuleType, ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus = socketcan(module, ends[0], monkeypatch)
+    began = time.monotonic()
+    assert bus.read(0.05) is None
+    assert time.monotonic() - began >= 0.05
+    ends[1].send(FRAME.pack(0x181, 0, b""))
+    began = time.monotonic()
+    assert bus.read(10.0)[0] == 0x181
+    assert time.monotonic() - began < 5.0
+
+
+@COPIES
+def test_a_bus_that_is_gone_raises_and_a_closed_one_is_closed(
+    module: ModuleType, ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus = socketcan(module, ends[0], monkeypatch)
+    ends[1].close()
+    with pytest.raises(OSError, match="refused"):
+        bus.write(0x201, b"", 0.0)
+    bus.close()
+    with pytest.raises(OSError, match="Bad file descriptor"):
+        bus.read(0.0)
+    assert bus._bus.closed

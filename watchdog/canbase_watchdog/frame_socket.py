@@ -1,0 +1,212 @@
+"""Frames of a CAN bus, read and written at its socket: no object and no waiting for a frame that is there already.
+
+python-can opens and configures the bus. Its `recv` waits by one system call, takes by a second one, and builds a
+`can.Message` of 15 fields; a hundred times a second, each time out of cold caches, that was a third of what the control
+loop took of the processor. A bus that is no socket (`virtual`, serial adapters) is read by python-can as before.
+
+Identifiers have the flags of linux/can.h above them. Whatever is greater than MAX_COB_ID is no data frame of CANopen.
+
+A second copy, on purpose, of what canbase_driver.runtime.frame_socket does for the driver; a test compares both.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import struct
+from collections.abc import Callable, Mapping
+from typing import Any, Final, Protocol
+
+import can
+import msgpack  # type: ignore[import-untyped]
+
+from canbase_watchdog.local_frames import keep_to_this_computer
+
+MAX_COB_ID: Final = 0x7FF
+MAX_DATA_BYTES: Final = 8
+EXTENDED: Final = 0x8000_0000
+"""linux/can.h, CAN_EFF_FLAG."""
+REMOTE: Final = 0x4000_0000
+"""linux/can.h, CAN_RTR_FLAG."""
+ERROR: Final = 0x2000_0000
+"""linux/can.h, CAN_ERR_FLAG: the controller reports about itself."""
+ERROR_CLASS: Final = 0x1FFF_FFFF
+"""linux/can.h, CAN_ERR_MASK."""
+FLEXIBLE: Final = 0x1_0000_0000
+"""A CAN FD frame; the kernel has no flag for it."""
+NO_FRAME: Final = -1
+"""In the place of an identifier, and so is any negative one: a datagram on a simulated bus that is no CAN frame."""
+
+_CAN_FRAME: Final = struct.Struct("=IB3x8s")
+"""linux/can.h, struct can_frame: identifier, length, data."""
+_LARGEST: Final = 72
+"""struct canfd_frame."""
+_TIMESPEC: Final = struct.Struct("@ll")
+_ANCILLARY: Final = socket.CMSG_SPACE(_TIMESPEC.size)
+_DATAGRAM: Final = 4096
+"""A longer one is cut, and then no frame."""
+_FLAGS: Final = ("is_extended_id", "is_remote_frame", "is_error_frame", "is_fd")
+"""Fields of a datagram that are all false in a plain frame."""
+_FIELDS: Final = frozenset(
+    {"timestamp", "arbitration_id", "channel", "dlc", "data", "bitrate_switch", "error_state_indicator", *_FLAGS}
+)
+
+Received = tuple[int, bytes, float]
+"""Identifier with flags, data, and when the kernel received it by the wall clock [s]; 0.0: it did not say."""
+
+
+class FrameSocket(Protocol):
+    """One open bus. Errors are those of python-can (can.CanError), OSError and ValueError."""
+
+    def fileno(self) -> int | None:
+        """What to wait on with select; None for a bus that has no such thing."""
+
+    def read(self, timeout_s: float) -> Received | None:
+        """The oldest frame that waits, or the first one that comes in `timeout_s`; None: none came."""
+
+    def write(self, cob_id: int, data: bytes, timeout_s: float) -> None:
+        """Send a data frame with an 11-bit identifier. Raises where the bus does not take it in `timeout_s`."""
+
+    def close(self) -> None:
+        """Close the bus."""
+
+
+def open_bus(arguments: Mapping[str, Any]) -> FrameSocket:
+    """Opens `can.Bus(**arguments)`. Raises what python-can raises: can.CanError, OSError, ValueError, TypeError,
+    ImportError, NotImplementedError.
+    """
+    bus = can.Bus(**arguments)
+    try:
+        keep_to_this_computer(arguments, bus)
+        return _OF_INTERFACE.get(str(arguments.get("interface")), _Library)(bus)
+    except BaseException:
+        bus.shutdown()
+        raise
+
+
+class _Library:
+    """Any bus of python-can."""
+
+    def __init__(self, bus: can.BusABC) -> None:
+        self._bus = bus
+
+    def fileno(self) -> int | None:
+        """See FrameSocket."""
+        try:
+            return self._bus.fileno()
+        except NotImplementedError:
+            return None
+
+    def read(self, timeout_s: float) -> Received | None:
+        """See FrameSocket."""
+        message = self._bus.recv(timeout_s)
+        return None if message is None else _received(message)
+
+    def write(self, cob_id: int, data: bytes, timeout_s: float) -> None:
+        """See FrameSocket."""
+        self._bus.send(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False), timeout=timeout_s)
+
+    def close(self) -> None:
+        """See FrameSocket."""
+        self._bus.shutdown()
+
+
+class _Socket(_Library):
+    """A bus that is a socket, read through a second descriptor of it."""
+
+    def __init__(self, bus: can.BusABC) -> None:
+        super().__init__(bus)
+        self._socket = socket.socket(fileno=os.dup(bus.fileno()))
+
+    def read(self, timeout_s: float) -> Received | None:
+        """See FrameSocket."""
+        received = self._take()
+        if received is None and timeout_s > 0.0:
+            select.select([self._socket], [], [], timeout_s)
+            received = self._take()
+        return received
+
+    def close(self) -> None:
+        """See FrameSocket."""
+        self._socket.close()
+        super().close()
+
+    def _take(self) -> Received | None:
+        raise NotImplementedError
+
+
+class _SocketCan(_Socket):
+    """SocketCAN: a frame is 16 bytes."""
+
+    def _take(self) -> Received | None:
+        try:
+            frame, ancillary, _flags, _address = self._socket.recvmsg(_LARGEST, _ANCILLARY, socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            return None
+        if len(frame) != _CAN_FRAME.size:
+            return FLEXIBLE, b"", _time_s(ancillary)
+        can_id, length, data = _CAN_FRAME.unpack(frame)
+        return can_id, data[:length], _time_s(ancillary)
+
+    def write(self, cob_id: int, data: bytes, timeout_s: float) -> None:
+        """See FrameSocket."""
+        frame = _CAN_FRAME.pack(cob_id, len(data), data)
+        try:
+            self._socket.send(frame, socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            select.select([], [self._socket], [], timeout_s)
+            self._socket.send(frame, socket.MSG_DONTWAIT)
+
+
+class _UdpMulticast(_Socket):
+    """python-can's simulated bus: a frame is a mapping in msgpack."""
+
+    def _take(self) -> Received | None:
+        try:
+            datagram, ancillary, _flags, _address = self._socket.recvmsg(_DATAGRAM, _ANCILLARY, socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            return None
+        try:
+            return _decoded(msgpack.unpackb(datagram), _time_s(ancillary))
+        except Exception:  # noqa: BLE001 - a datagram can be anything, and so can what msgpack and python-can say of it
+            return NO_FRAME, b"", 0.0
+
+
+_OF_INTERFACE: Final[dict[str, Callable[[can.BusABC], FrameSocket]]] = {
+    "socketcan": _SocketCan,
+    "udp_multicast": _UdpMulticast,
+}
+
+
+def _decoded(fields: dict[str, Any], at_s: float) -> Received:
+    """Raises anything for what is no frame: python-can checks all but the plainest ones."""
+    cob_id, data = fields.get("arbitration_id"), fields.get("data")
+    if (
+        fields.keys() == _FIELDS
+        and (type(cob_id) is int and 0 <= cob_id <= MAX_COB_ID)
+        and (type(data) is bytes and len(data) == fields.get("dlc") and len(data) <= MAX_DATA_BYTES)
+        and all(fields.get(flag) is False for flag in _FLAGS)
+    ):
+        return cob_id, data, at_s
+    return _received(can.Message(check=True, **(fields | {"timestamp": at_s})))
+
+
+def _received(message: can.Message) -> Received:
+    if type(message.arbitration_id) is not int:  # python-can lets a simulated bus have 1.5
+        return NO_FRAME, b"", 0.0
+    flags = (
+        (EXTENDED if message.is_extended_id else 0)
+        | (REMOTE if message.is_remote_frame else 0)
+        | (ERROR if message.is_error_frame else 0)
+        | (FLEXIBLE if message.is_fd else 0)
+    )
+    return message.arbitration_id | flags, bytes(message.data), message.timestamp
+
+
+def _time_s(ancillary: list[tuple[int, int, bytes]]) -> float:
+    """python-can sets SO_TIMESTAMPNS on both kinds of socket, so there is one."""
+    for _level, _kind, stamp in ancillary:
+        seconds, nanoseconds = _TIMESPEC.unpack(stamp)
+        return float(seconds + 1e-9 * nanoseconds)
+    return 0.0
