@@ -35,12 +35,12 @@ TESTS := virtual_bus_tests
 .PHONY: test-own-time
 test-own-time: coverage ## tests that bring their own time: pure units, campaign, small worlds
 	@echo "about 10 minutes on two processors; make quick: under one, for what changed"
-	pytest --numprocesses auto $(addprefix --ignore=,$(DECIDES)) $(TESTS)/unit $(TESTS)/campaign $(TESTS)/small_worlds
+	pytest --numprocesses auto --timeout 600 $(addprefix --ignore=,$(DECIDES)) $(TESTS)/unit $(TESTS)/campaign $(TESTS)/small_worlds
 
 .PHONY: test-real-time
-test-real-time: $(VENV)/ready ## tests in real time: simulated drives on a bus, processes over DDS
-	@echo "about 25 minutes, mostly waiting"
-	pytest $(TESTS)/bus $(TESTS)/ros
+test-real-time: $(VENV)/ready ## tests in real time: simulated drives on a bus, processes over DDS; WORKERS=2 two robots at a time
+	@echo "about 25 minutes, mostly waiting; half of that with WORKERS=2"
+	pytest $(if $(WORKERS),--numprocesses $(WORKERS) --dist loadfile) $(TESTS)/bus $(TESTS)/ros
 
 # COMPILED=1: campaign, stops and soak run with their hot modules compiled, several times as fast, frame by frame the same.
 WORLD := $(if $(COMPILED),$(CURDIR)/build/compiled:)$(CURDIR)/virtual_bus_tests
