@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from typing import Any
 
 from figures import Figure
-from shares import BARE, bare_node, resident_mb, shares
+from shares import BARE, IO_ALONE, bare_node, io_alone, resident_mb, shares
 from startup import MANY, drives
 from support.running_robot import PATIENT, RunningRobot, own_domain, robot_on
 
@@ -46,6 +46,7 @@ def measure() -> list[Figure]:
     return [
         *_at_rest(rest),
         _share("whole chain: processor while a goal drives", PARTS, driving, DRIVING),
+        _io(rest),
         _axes(rest, many),
         _memory(memory_mb),
     ]
@@ -61,7 +62,11 @@ def _at_rest(found: Mapping[str, float]) -> list[Figure]:
 def _robot(stack: ExitStack, changes: Mapping[str, Any]) -> tuple[RunningRobot, dict[str, int]]:
     domain = stack.enter_context(own_domain())
     robot = stack.enter_context(robot_on(domain, changes=changes))
-    pids = {part: robot.stack.pids[part] for part in PARTS} | {BARE: bare_node(stack, robot.env["ROS_DOMAIN_ID"])}
+    ros_domain = robot.env["ROS_DOMAIN_ID"]
+    pids = {part: robot.stack.pids[part] for part in PARTS} | {
+        BARE: bare_node(stack, ros_domain),
+        IO_ALONE: io_alone(stack, ros_domain, robot.robot.bus.arguments()),
+    }
     robot.node.spin_for(3.0)
     return robot, pids
 
@@ -73,6 +78,13 @@ def _share(what: str, parts: tuple[str, ...], found: Mapping[str, float], budget
     return Figure(
         what, f"{ours:.1%} of a processor{each}", beside, ratio, f"≤ {budget} × the bare node", ratio <= budget
     )
+
+
+def _io(found: Mapping[str, float]) -> Figure:
+    """What is left of the driver where it decides nothing."""
+    ours, floor = found["driver"], found[IO_ALONE]
+    beside = f"its input and output alone: {floor:.1%}, {floor / found[BARE]:.2f} × the bare node"
+    return Figure("driver: processor", f"{ours:.1%} of a processor", beside, ours / floor, "–", True)
 
 
 def _axes(few: Mapping[str, float], many: Mapping[str, float]) -> Figure:
