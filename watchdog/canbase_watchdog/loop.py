@@ -1,7 +1,7 @@
 """The watchdog's one thread: waits for leases and the next tick, and hands them and the frames to watchdog.py.
 
 Frames are acted on in a tick alone, so none of them wakes this thread: a tick takes in what has arrived since the last
-one, each frame with the time at which the kernel received it.
+one, each frame with the time at which the kernel received it. A lease that runs out stops the drives before that.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import select
 import time
 from collections.abc import Callable
 
+from canbase_watchdog import frames
 from canbase_watchdog.bus_port import BusPort
 from canbase_watchdog.latch_file import Keeper
 from canbase_watchdog.lease_socket import LeaseSocket
@@ -75,8 +76,11 @@ class Loop:
         now_s = time.monotonic()
         wake = min(self._due, self._watchdog.next_expiry(self._acted_at))
         self._wait(max(wake - now_s, 0.0))
-        now_s = self._take_in()
-        if now_s >= wake:
+        now_s = time.monotonic()
+        stops = self._take_leases(now_s)
+        expiry = self._watchdog.next_expiry(now_s)
+        self._take_frames(now_s, min(expiry, now_s + TICK_S))
+        if stops or (now_s >= wake and time.monotonic() < expiry):
             self._acted_at = now_s
             self._act(now_s)
             self._due = max(self._due, now_s - TICK_S) + TICK_S if now_s >= self._due else self._due
@@ -87,14 +91,22 @@ class Loop:
         else:
             self._bus.wait(timeout_s)
 
-    def _take_in(self) -> float:
-        """Everything that has arrived, leases first. Returns the time [s] of it."""
-        now_s = time.monotonic()
+    def _take_leases(self, now_s: float) -> bool:
+        """Those that have arrived. True: the last one that counts ran out while a wheel moves; the stop is sent."""
         for datagram, uid, pid in self._leases.receive():
             self._watchdog.on_lease(datagram, uid, now_s, pid)
+        stop = self._watchdog.expire(now_s)
+        for frame in stop:
+            self._bus.send(frame)
+        return bool(stop)
+
+    def _take_frames(self, now_s: float, until: float) -> None:
+        """Those that have arrived; what is left at the time `until` waits for the next turn, which comes at once."""
         for cob_id, data, at_s in self._bus.receive(now_s):
-            self._watchdog.on_frame(cob_id, data, at_s)
-        return now_s
+            is_request = cob_id == frames.RESET_REQUEST  # it is judged by what holds now
+            self._watchdog.on_frame(cob_id, data, now_s if is_request else at_s)
+            if time.monotonic() >= until:
+                return
 
     def _act(self, now_s: float) -> None:
         self._look_for_a_suspend()

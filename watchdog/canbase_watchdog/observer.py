@@ -5,6 +5,7 @@ Ages count from the local monotonic receive time. A frame that cannot be underst
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 
@@ -126,8 +127,8 @@ class Observer:
         """As it was looked at last; None: a frame has come since."""
         self.dropped = 0
         """Frames with a watched identifier that could not be understood."""
-        self.commands_are_ours = False
-        """NMT, quick stop PDO and SDO on the bus are our own frames that come back: not signs of another master."""
+        self.ours_since = math.inf
+        """NMT, quick stop PDO and SDO from then on [s] are our own that come back: no signs of another master."""
         self._add_routes()
 
     def on_frame(self, cob_id: int, data: bytes, now_s: float) -> None:
@@ -326,7 +327,7 @@ class Observer:
 
     def _note_foreign(self, node_id: int, detail: str, now_s: float) -> None:
         enabled = any(record.state is ENABLED for key, record in self._records.items() if key[0] == node_id)
-        if enabled and not self.commands_are_ours:
+        if enabled and now_s < self.ours_since:
             self._foreign.note(node_id, f"{detail}, while it is enabled", now_s)
 
 

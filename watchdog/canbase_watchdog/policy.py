@@ -22,7 +22,8 @@ def _lease_is_lost(view: View, config: WatchdogConfig, now_s: float) -> bool:
     return now_s >= max(view.lease_at, view.started_at) + config.lease_timeout_s
 
 
-def _lease_lost(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
+def lease_lost(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
+    """The lease has run out, and a wheel moves or is ordered to."""
     axis = in_motion(view, config) if _lease_is_lost(view, config, now_s) else None
     if axis is None:
         return FINE
@@ -343,7 +344,7 @@ CHECKS = (
     Check(TripCause.FOREIGN_MASTER, _foreign_master, _foreign_is_near, "the other master has sent nothing for 1 s"),
     Check(
         TripCause.LEASE_LOST,
-        _lease_lost,
+        lease_lost,
         lambda view, node_id, config, now_s: _lease_is_lost(view, config, now_s),
         "leases arrive",
     ),

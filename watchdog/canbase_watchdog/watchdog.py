@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog import frames, policy
@@ -90,6 +90,8 @@ class Watchdog:
         """What the bus showed when nothing tripped."""
         self._state = State.STARTING
         self._verdict = FINE
+        self._expired = FINE
+        """LEASE_LOST between `expire` and the next tick."""
         self._stoppers: list[Stopper] = []
         self._reset = (0, Answer.NONE)
         self._reset_at = -math.inf
@@ -169,6 +171,25 @@ class Watchdog:
         """The computer was suspended for so long [s]. The monotonic clock, and so every age, knows nothing of it."""
         self._ticked_at -= duration_s
 
+    def expire(self, now_s: float) -> list[Frame]:
+        """Quick stops for a lease that has run out since the last tick while a wheel moves, by the frames taken in.
+
+        To be called before the frames that wait are taken in, which may take longer than a stop may wait. None of them
+        gives the lease back. The tick that has to follow latches the stop; what they say may be a better cause.
+        """
+        if self._state is State.TRIPPED or not self._ticked_at < self._lease_ends_at <= now_s:
+            return []
+        view = replace(self._view, bus=self._observer.look(), lease_at=self._leases.valid_at)
+        self._expired = policy.lease_lost(view, self._config, now_s)
+        if self._expired.cause is TripCause.NONE:
+            return []
+        self._observer.ours_since = now_s  # they may come back before the tick
+        return self.quick_stops()
+
+    @property
+    def _lease_ends_at(self) -> float:
+        return self._leases.valid_at + self._config.lease_timeout_s
+
     def tick(self, now_s: float) -> list[Frame]:
         """Judge and act. Returns the frames to send at once, the stop first. To be called at least every 5 ms."""
         self._view = self._look(now_s)
@@ -184,6 +205,9 @@ class Watchdog:
         if self._state is State.STARTING and now_s >= self._started_at + self._config.drive_heartbeat_s:
             self._state = State.WATCHING
         verdict = policy.decide(self._view, self._config, now_s, self._fine)
+        if verdict.cause is TripCause.NONE:
+            verdict = self._expired
+        self._expired = FINE
         if verdict.cause is TripCause.NONE:
             self._fine = self._view.bus
             return []
@@ -228,7 +252,7 @@ class Watchdog:
     def _latch(self, verdict: Verdict, now_s: float, resting: bool = False) -> None:
         self._state = State.TRIPPED
         self._verdict = verdict
-        self._observer.commands_are_ours = True
+        self._observer.ours_since = -math.inf
         nodes = dict.fromkeys(drive.node_id for drive in self._config.drives)
         lying = verdict.node_id if resting and verdict.cause in SENSOR_CAUSES else 0
         self._stoppers = [
@@ -310,6 +334,6 @@ class Watchdog:
         self._state = State.WATCHING
         self._verdict = FINE
         self._stoppers = []
-        self._observer.commands_are_ours = False
+        self._observer.ours_since = math.inf
         self._observer.trust()
         return Answer.DONE

@@ -6,6 +6,7 @@ period  | RPDO RPDO SYNC | RPDO RPDO SYNC | …        one driver
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from random import Random
 from typing import Any
@@ -336,9 +337,9 @@ def test_a_segmented_write_of_the_controlword_is_a_sign() -> None:
 @pytest.mark.parametrize(("cob_id", "data"), [(0x000, "80 01"), (0x501, "02 00"), (0x601, "2b 40 60 00 0f 00 00 00")])
 def test_our_own_commands_that_come_back_are_none(cob_id: int, data: str) -> None:
     it = enabled()
-    it.commands_are_ours = True
+    it.ours_since = -math.inf
     assert after(cob_id, data, it) is None
-    it.commands_are_ours = False
+    it.ours_since = math.inf
     assert after(cob_id, data, it) is not None
 
 

@@ -53,6 +53,9 @@ class Machine:
     def on_bus(self, _failed_since: float, _errors: int) -> None:
         """All is well."""
 
+    def expire(self, _now_s: float) -> list[Any]:
+        return []
+
     def next_expiry(self, since: float) -> float:
         return self.expires_at if self.expires_at > since else math.inf
 
