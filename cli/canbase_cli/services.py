@@ -22,12 +22,15 @@ from canbase_cli.options import (
     ros_needed,
 )
 from canbase_cli.raise_priority import raise_priority
+from canbase_runtime.latch_file import latch_folder
 from canbase_runtime.own_modules import module_command
 from canbase_runtime.sim_time import SimTimeError
+from canbase_runtime.single_instance import TakenError
 from canbase_runtime.terminal import FAILED, fail, load_config
 
 if TYPE_CHECKING:
     from canbase_config.robot import Robot
+    from canbase_driver.runtime.claim import Claim
 
 WRONG_COMMAND_LINE: Final = 2
 SERVICES: Final = ("driver", "velocity", "action-server", "watchdog", "sim")
@@ -56,11 +59,23 @@ def driver(
     Arguments after --ros-args go to rclpy.
     """
     robot = load_config(config).robot
+    claim = _claim(robot)
     with ros_needed():
         from canbase_driver.runtime.main import run
     leave_stop_file(robot, stop_file)
     with _real_time():
-        raise typer.Exit(run(robot, ros_arguments(ctx, namespace), autostart, partial(raise_priority, "driver")))
+        raise typer.Exit(run(robot, ros_arguments(ctx, namespace), claim, autostart, partial(raise_priority, "driver")))
+
+
+def _claim(robot: Robot) -> Claim:
+    """Of the driver, before ROS is imported; ends the command where it cannot be had."""
+    from canbase_driver.runtime.bus_port import BusError
+    from canbase_driver.runtime.claim import Claim
+
+    try:
+        return Claim(robot, latch_folder(os.environ, Path.home(), robot.name))
+    except (BusError, TakenError) as error:
+        fail(f"driver: {error}", FAILED)
 
 
 def velocity(ctx: typer.Context, config: ConfigOption = None, namespace: NamespaceOption = "") -> None:

@@ -3,50 +3,102 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import can
 import pytest
 
-from canbase_driver.runtime.bus_port import BusPort
-from canbase_driver.runtime.main import _listen_for_another
+from canbase_config.load import load_robot, sample
+from canbase_config.robot import Robot
+from canbase_driver.runtime.claim import Claim
 from canbase_runtime.single_instance import TakenError
 
 pytestmark = pytest.mark.bus
 
 LISTEN_S = 0.3
+FRESH_S = 0.1
+OTHER_DRIVER = [(0x080, b""), (0x080, b"\x01"), (0x77F, b"\x05")]
 
 
 @pytest.fixture
-def other(request: pytest.FixtureRequest) -> Iterator[can.BusABC]:
-    with can.Bus(interface="virtual", channel=request.node.name) as bus:
+def robot(request: pytest.FixtureRequest) -> Robot:
+    """The bench on a bus that this test has for itself."""
+    bench = load_robot(sample("bench")).robot
+    bus = bench.bus.model_copy(update={"interface": "virtual", "channel": request.node.name, "extra": {}})
+    return bench.model_copy(update={"bus": bus})
+
+
+@pytest.fixture
+def other(robot: Robot) -> Iterator[can.BusABC]:
+    with can.Bus(**robot.bus.arguments()) as bus:
         yield bus
 
 
-def listen(other: can.BusABC, name: str, cob_id: int, data: bytes) -> None:
+@pytest.fixture
+def claim(robot: Robot, tmp_path: Path) -> Iterator[Claim]:
+    claimed = Claim(robot, tmp_path)
+    yield claimed
+    claimed.close()
+
+
+def listen(claim: Claim, other: can.BusABC, cob_id: int, data: bytes) -> None:
     """It listens, and after 0.1 s the frame comes."""
-    port = BusPort({"interface": "virtual", "channel": name})
     message = can.Message(arbitration_id=cob_id, data=data, is_extended_id=False)
     timer = threading.Timer(0.1, other.send, (message,))
     timer.start()
     try:
-        _listen_for_another(port, LISTEN_S)
+        claim.listen()
         assert other.recv(0.0) is None  # nothing was sent
     finally:
         timer.join()
-        port.close()
 
 
-@pytest.mark.parametrize(("cob_id", "data"), [(0x080, b""), (0x080, b"\x01"), (0x77F, b"\x05")])
+@pytest.mark.parametrize(("cob_id", "data"), OTHER_DRIVER)
 def test_sync_and_the_heartbeat_of_a_driver_are_another_driver(
-    other: can.BusABC, request: pytest.FixtureRequest, cob_id: int, data: bytes
+    claim: Claim, other: can.BusABC, cob_id: int, data: bytes
 ) -> None:
     with pytest.raises(TakenError, match="another driver is on the bus"):
-        listen(other, request.node.name, cob_id, data)
+        listen(claim, other, cob_id, data)
 
 
 @pytest.mark.parametrize(("cob_id", "data"), [(0x701, b"\x7f"), (0x77E, b"\x05"), (0x1FE, bytes(8)), (0x181, bytes(6))])
-def test_drives_and_the_watchdog_are_none(
-    other: can.BusABC, request: pytest.FixtureRequest, cob_id: int, data: bytes
+def test_drives_and_the_watchdog_are_none(claim: Claim, other: can.BusABC, cob_id: int, data: bytes) -> None:
+    listen(claim, other, cob_id, data)
+
+
+@pytest.mark.parametrize(("cob_id", "data"), OTHER_DRIVER)
+def test_what_came_while_this_one_started_is_heard_as_well(
+    claim: Claim, other: can.BusABC, cob_id: int, data: bytes
 ) -> None:
-    listen(other, request.node.name, cob_id, data)
+    """The bus is open at 0 s, the frame comes, ROS is imported until 0.5 s."""
+    other.send(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
+    time.sleep(0.5)
+
+    with pytest.raises(TakenError, match="another driver is on the bus"):
+        claim.listen()
+
+
+def test_the_time_since_the_bus_was_opened_counts_and_one_period_of_the_heartbeat_is_listened_to_at_least(
+    claim: Claim,
+) -> None:
+    time.sleep(LISTEN_S)
+    began_s = time.monotonic()
+    claim.listen()
+    assert FRESH_S - 0.01 <= time.monotonic() - began_s < LISTEN_S - 0.01
+
+
+def test_a_bus_that_was_just_opened_is_listened_to_for_the_whole_time(claim: Claim) -> None:
+    began_s = time.monotonic()
+    claim.listen()
+    assert time.monotonic() - began_s >= LISTEN_S - 0.05
+
+
+def test_another_driver_of_this_computer_has_the_bus_until_it_closes_its_claim(
+    robot: Robot, claim: Claim, tmp_path: Path
+) -> None:
+    with pytest.raises(TakenError, match="another driver has"):
+        Claim(robot, tmp_path / "other")
+    claim.close()
+    Claim(robot, tmp_path / "other").close()

@@ -13,7 +13,6 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from types import FrameType
 
 import rclpy
@@ -21,22 +20,21 @@ from rclpy.experimental import EventsExecutor
 from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
-from canbase_config.robot import DRIVER_NODE_ID, Robot
+from canbase_config.robot import Robot
 from canbase_config.stopping import given_up_s
-from canbase_driver.cia301.nmt import HEARTBEAT, SYNC
 from canbase_driver.core import DriverCore
 from canbase_driver.ros.node import MotorDriverNode, Publisher
 from canbase_driver.runtime.black_box import Ring
 from canbase_driver.runtime.black_box_writer import BlackBoxWriter
-from canbase_driver.runtime.bus_port import BusError, BusPort
+from canbase_driver.runtime.claim import Claim
 from canbase_driver.runtime.control_thread import ControlLoop
 from canbase_driver.supervision.lifecycle import Aim
-from canbase_runtime.latch_file import LatchFile, LatchKeeper, hold, latch_folder
+from canbase_runtime.latch_file import LatchFile, LatchKeeper
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.output import never_wait
 from canbase_runtime.private_process import guard_keys
 from canbase_runtime.sd_notify import Service
-from canbase_runtime.single_instance import TakenError, bus_name, take
+from canbase_runtime.single_instance import TakenError
 
 WAKE_S = 0.02
 """So long an outcome of the control thread may wait for the next message before it is answered."""
@@ -53,19 +51,22 @@ Worker = ControlLoop | Publisher | BlackBoxWriter | LatchKeeper
 
 
 def run(
-    robot: Robot, ros_args: Sequence[str], autostart: bool = True, when_ready: Callable[[], None] = lambda: None
+    robot: Robot,
+    ros_args: Sequence[str],
+    claim: Claim,
+    autostart: bool = True,
+    when_ready: Callable[[], None] = lambda: None,
 ) -> int:
-    """Runs the driver until SIGINT or SIGTERM. Returns 0 after an orderly end, 1 when the bus cannot be opened or a
-    thread failed. `ros_args`: arguments for rclpy. `autostart`: without it nothing is sent on the bus before the node
-    is configured. `when_ready`: called when all is made and nothing runs yet. Call from the main thread (signals)."""
+    """Runs the driver until SIGINT or SIGTERM. Returns 0 after an orderly end, 1 when another driver is on the bus or a
+    thread failed. `ros_args`: arguments for rclpy. `claim`: of this robot; closed at the end. `autostart`: without it
+    nothing is sent on the bus before the node is configured. `when_ready`: called when all is made and nothing runs
+    yet. Call from the main thread (signals)."""
     guard_keys(os.environ)
     never_wait(os.environ)
-    folder = latch_folder(os.environ, Path.home(), robot.name)
+    folder = claim.folder
     try:
-        held = take("driver", bus_name(robot.bus.arguments())), hold(folder, "driver")
-        bus = BusPort(robot.bus_arguments())
-        _listen_for_another(bus, robot.timeouts.drive_heartbeat_s)
-    except (BusError, TakenError) as error:
+        claim.listen()
+    except TakenError as error:
         print(f"canbase driver: {error}", file=sys.stderr)
         return 1
     received: list[int] = []
@@ -80,7 +81,7 @@ def run(
     ring = Ring(robot.black_box.seconds)
     keeper = LatchKeeper(LatchFile(folder, "driver", robot.name))
     core = DriverCore(robot, aim, keeper.found)
-    loop = ControlLoop(core, bus, robot.rates.control_hz, robot.rates.odometry_hz, ring, keeper)
+    loop = ControlLoop(core, claim.bus, robot.rates.control_hz, robot.rates.odometry_hz, ring, keeper)
     writer = BlackBoxWriter(robot.black_box, robot.name, get_logger("motor_driver").warning)
     node = MotorDriverNode(robot, loop, ring, writer, autostart)
     publisher = Publisher(node, loop)
@@ -100,26 +101,12 @@ def run(
         writer.finish(WRITE_S)
     finally:
         rclpy.shutdown()
-        for each in held:
-            each.close()
+        claim.close()
     failure = failure or loop.failure
     if failure is not None:
         node.voice.tell(f"ended by {type(failure).__name__}: {failure}", Priority.ERROR, robot=robot.name)
         sys.excepthook(type(failure), failure, failure.__traceback__)
     return 0 if failure is None else 1
-
-
-def _listen_for_another(bus: BusPort, listen_s: float) -> None:
-    """A driver on another computer: heard before the first frame of this one. Raises TakenError."""
-    end = time.monotonic() + listen_s
-    while (left_s := end - time.monotonic()) > 0.0:
-        frame = bus.receive(left_s)
-        if frame is not None and frame.cob_id in (SYNC.cob_id, HEARTBEAT + DRIVER_NODE_ID):
-            bus.close()
-            raise TakenError(
-                f"another driver is on the bus: SYNC or the heartbeat of node {DRIVER_NODE_ID} came ({frame}). "
-                "Only one may run; end it first, on the computer that it runs on"
-            )
 
 
 def _spin(

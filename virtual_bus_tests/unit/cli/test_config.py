@@ -43,6 +43,7 @@ def stand_in(monkeypatch: pytest.MonkeyPatch, module_name: str, exit_code: int =
     module = ModuleType(module_name)
     module.run = run  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, module_name, module)
+    monkeypatch.setattr("canbase_cli.services._claim", lambda robot: None)  # no unit test opens a bus
     return calls
 
 
