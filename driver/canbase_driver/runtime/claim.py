@@ -36,7 +36,7 @@ class Claim:
     def listen(self) -> None:
         """Until the timeout of a heartbeat has passed since the bus was opened. Before the first frame is sent.
 
-        All that waits in the socket is looked at. It holds the oldest frames where it was too small for all, so at least
+        All that waits in the socket is looked at. It holds the oldest frames where it was too small, so at least
         one period of the heartbeat is listened to from now on. Raises TakenError: another driver is on the bus.
         """
         fresh_s = self._listen_s / HEARTBEATS_PER_TIMEOUT
