@@ -98,6 +98,7 @@ class LetGo:
         self._disable_s = min(robot.watchdog.stand_answer_s, robot.timeouts.feedback_s) / 2.0
         self._phase = LetGoPhase.HELD
         self._since = -math.inf
+        self._returned = True
 
     @property
     def active(self) -> bool:
@@ -105,17 +106,17 @@ class LetGo:
         return self._phase is not LetGoPhase.HELD
 
     def excuses(self, now_s: float) -> bool:
-        """A drive that is not enabled is so because of this."""
-        return self.active and now_s - self._since <= RETURN_S
+        """A drive that is not enabled is so because of this; also after something else, as an orderly end, took over."""
+        return not self._returned and now_s - self._since <= RETURN_S
 
     def end(self) -> None:
-        """Something else decides about the power."""
+        """Something else decides about the power. Drives that have none yet are not to be taken for failed ones."""
         self._phase = LetGoPhase.HELD
 
     def step(self, wheels: Sequence[Wheel], rests: bool, now_s: float) -> None:
         """One cycle in which the drives are to be enabled; `rests`: zero is ordered of all wheels."""
         if self._phase is LetGoPhase.HELD and rests and self._is_due(wheels):
-            self._phase, self._since = LetGoPhase.LETTING_GO, now_s
+            self._phase, self._since, self._returned = LetGoPhase.LETTING_GO, now_s, False
         elif self._phase is LetGoPhase.LETTING_GO and all(
             wheel.state and not wheel.state.has_torque for wheel in wheels
         ):
@@ -123,7 +124,7 @@ class LetGo:
         elif self._phase is LetGoPhase.RETURNING and all(
             wheel.state is DriveState.OPERATION_ENABLED for wheel in wheels
         ):
-            self._phase = LetGoPhase.HELD
+            self._phase, self._returned = LetGoPhase.HELD, True
 
     def goal(self, now_s: float) -> PowerGoal:
         """What the drives are told: disable operation, and where that has no effect, disable voltage.

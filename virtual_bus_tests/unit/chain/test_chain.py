@@ -7,8 +7,10 @@ import math
 import pytest
 
 from canbase_driver.motion.kinematics import Twist2D
+from canbase_driver.supervision.lifecycle import Aim
 from canbase_runtime.driver_state import DriverState
-from support.chain_world import BOOTED_S, FORWARD, World, setpoints, world_of
+from canbase_runtime.latch_record import Mark
+from support.chain_world import BOOTED_S, FORWARD, STEP_S, World, setpoints, world_of
 
 ENABLE_OPERATION = 0x0F
 CYCLES_MISSED = {True: 1, False: 60}
@@ -259,6 +261,25 @@ def test_a_shutdown_while_driving_ramps_down_disables_and_leaves_drives_without_
     assert not world.sent(0x081)[1:]
     assert world.watchdog is not None
     assert world.watchdog.status.verdict.detail == ""
+
+
+@pytest.mark.parametrize("cycles", range(9))
+@pytest.mark.parametrize("aim", [None, Aim.CONFIGURED, Aim.RELEASED], ids=["shutdown", "deactivated", "cleaned up"])
+def test_an_orderly_end_while_the_drives_let_go_latches_nothing(world: World, aim: Aim | None, cycles: int) -> None:
+    """At 0 s the drives let go, get their power back until 0.03 s, and in one of these cycles the end is ordered."""
+    world.drive(seconds=0.2)
+    world.command = Twist2D.ZERO
+    assert world.run(8.0, lambda: world.core.lets_go)
+    world.run(cycles * STEP_S)
+    if aim is None:
+        world.core.request_shutdown()
+    else:
+        world.core.request_aim(aim, world.now_s, lambda outcome: None)
+    world.run(1.5)
+
+    assert world.powered == [False, False]
+    assert [stop.cause for stop in world.core.stops if stop.latched] == []
+    assert world.core.record.mark is Mark.CLEAR
 
 
 def test_a_shutdown_without_a_watchdog_ends_at_once(world: World) -> None:

@@ -141,7 +141,25 @@ def test_an_order_does_not_end_it_and_another_stop_does() -> None:
     each.step(wheels, False, 1.01)
     assert each.active
     each.end()
-    assert (each.active, each.excuses(1.02)) == (False, False)
+    assert not each.active
+
+
+def test_after_another_stop_the_drives_are_excused_for_as_long_as_they_may_take_to_return() -> None:
+    wheels, each = (due(), Wheel()), LetGo(robot())
+    each.step(wheels, True, 1.0)
+    each.end()
+    assert each.excuses(1.0 + RETURN_S)
+    assert not each.excuses(1.01 + RETURN_S)
+
+
+def test_drives_that_are_back_have_no_excuse_and_a_new_letting_go_has_one_again() -> None:
+    left, right, each = due(), Wheel(), LetGo(robot())
+    for now_s, state in ((1.0, ENABLED), (1.01, ON), (1.02, ENABLED)):
+        left.state = right.state = state
+        each.step((left, right), True, now_s)
+    assert not each.excuses(1.02)
+    each.step((left, right), True, 1.03)
+    assert each.excuses(1.03)
 
 
 @pytest.mark.parametrize(("answer_s", "feedback_s", "until_s"), [(0.2, 0.1, 0.05), (0.2, 0.5, 0.1), (0.06, 0.1, 0.03)])
