@@ -106,7 +106,7 @@ class LetGo:
         return self._phase is not LetGoPhase.HELD
 
     def excuses(self, now_s: float) -> bool:
-        """A drive that is not enabled is so because of this; also after something else, as an orderly end, took over."""
+        """A drive that is not enabled is so because of this; also after an orderly end or another stop took over."""
         return not self._returned and now_s - self._since <= RETURN_S
 
     def end(self) -> None:
