@@ -6,7 +6,7 @@ switched off: each has a range that excludes 0 and infinity. Frames and units fo
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
 
@@ -112,13 +112,28 @@ class Limits(Section):
         return self
 
 
+SMALL_COMPUTER_HZ: Final = {"control_hz": 50.0, "odometry_hz": 25.0}
+"""What the profile of rates of that name changes; odom comes with every second cycle."""
+
+
 class Rates(Section):
     """Rates of the loops and messages."""
 
+    profile: Annotated[
+        Literal["standard", "small_computer"],
+        Field(description="defaults of control_hz and odometry_hz: standard 100 and 50, small_computer 50 and 25"),
+    ] = "standard"
     control_hz: Annotated[float, Field(ge=20.0, le=200.0, description="SYNC cycle of the driver [Hz]")] = 100.0
     odometry_hz: Annotated[float, Field(ge=1.0, le=100.0, description="odom, tf and joint_states [Hz]")] = 50.0
     status_hz: Annotated[float, Field(ge=1.0, le=50.0, description="motor_driver/status [Hz]")] = 10.0
     command_hz: Annotated[float, Field(ge=20.0, le=100.0, description="cmd_vel_mux and cmd_vel at least [Hz]")] = 50.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_the_profile(cls, given: Any) -> Any:
+        if isinstance(given, dict) and given.get("profile") == "small_computer":
+            return SMALL_COMPUTER_HZ | given
+        return given
 
 
 class Timeouts(Section):

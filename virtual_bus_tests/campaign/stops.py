@@ -21,9 +21,12 @@ from random import Random
 from rich.console import Console
 from rich.progress import Progress
 
+from campaign.robots import DrawnRobot, campaign_robot
 from campaign.scenario import Start
 from campaign.twins import GOAL, JOYSTICK, TWINS, Twin
 from campaign.world import World
+from canbase_config.robot import Rates
+from canbase_sim.plant.base import PlantParameters
 from canbase_velocity.twist import ZERO, Twist
 from exit_matrix.page_table import Key, Row
 from exit_matrix.stop_limits import SPEED_MPS
@@ -33,6 +36,7 @@ from support.marked_page import rewritten, section
 CRUISES_S, LONGEST_S, RESTS_S, LOOK_S = 1.5, 8.0, 0.6, 0.002
 """Until the base drives steadily; longer than any stop; a base that stood so long has stopped; how often is looked."""
 GOAL_M, JOYSTICK_S = 4.5, 0.02
+RATES = ("standard", "small_computer")
 PHASE_S = 0.1
 """The failure comes up to so much later: SYNCs, leases and heartbeats are anywhere in their periods then."""
 RUNS = 100
@@ -55,8 +59,10 @@ class Run:
 class Cruise:
     """A world whose base drives steadily. The joystick says `ordered`, for ever; None: it says nothing."""
 
-    def __init__(self, by: str, speed_mps: float = SPEED_MPS) -> None:
-        start = Start()
+    def __init__(self, by: str, speed_mps: float = SPEED_MPS, rates: str = "standard") -> None:
+        """`rates`: a profile of rates in robot.yaml."""
+        robot = campaign_robot().model_copy(update={"rates": Rates.model_validate({"profile": rates})})
+        start = Start(DrawnRobot(0, robot, PlantParameters()))
         self.world, self.around = start.world, start.around
         self.ordered: Twist | None = Twist(speed_mps, 0.0) if by == JOYSTICK else None
         if by == GOAL:
@@ -167,17 +173,19 @@ def _s(seconds: float) -> str:
     return f"{seconds:.2f} s" if math.isfinite(seconds) else "never"
 
 
-def measured(runs: int, workers: int, twins: Sequence[Twin] = TWINS) -> Iterator[tuple[Twin, list[Run]]]:
+def measured(
+    runs: int, workers: int, twins: Sequence[Twin] = TWINS, rates: str = "standard"
+) -> Iterator[tuple[Twin, list[Run]]]:
     """Each row in one of `workers` processes, in their order."""
     context = multiprocessing.get_context("spawn")
-    with context.Pool(workers, _begin) as pool:
+    with context.Pool(workers, _begin, (rates,)) as pool:
         indexes = [TWINS.index(twin) for twin in twins]
         for index, found in zip(indexes, pool.imap(partial(_measure, runs), indexes), strict=True):
             yield TWINS[index], found
 
 
-def _begin() -> None:
-    _cruises.update({by: Cruise(by) for by in (GOAL, JOYSTICK)})
+def _begin(rates: str) -> None:
+    _cruises.update({by: Cruise(by, rates=rates) for by in (GOAL, JOYSTICK)})
 
 
 def _measure(runs: int, index: int) -> list[Run]:
@@ -191,15 +199,18 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=RUNS, help="of each failure")
     parser.add_argument("--workers", type=int, default=2, help="processes")
     parser.add_argument("--only", default="", help="rows with this in their name")
+    parser.add_argument("--rates", choices=RATES, default=RATES[0], help="profile of rates in robot.yaml")
     parser.add_argument("--write", type=Path, help="the page")
     given = parser.parse_args()
+    if given.write is not None and given.rates != RATES[0]:
+        parser.error(f"the page is about the rates {RATES[0]}")
     twins = [twin for twin in TWINS if given.only in f"{twin.what}: {twin.how}"]
     out = Console()
     found: dict[Key, Row] = {}
     stood = True
     with Progress(console=out) as progress:
         task = progress.add_task("", total=len(twins))
-        for twin, runs in measured(given.runs, given.workers, twins):
+        for twin, runs in measured(given.runs, given.workers, twins, given.rates):
             found[twin.key] = cells(twin, runs)
             stood = stood and all(math.isfinite(run.time_s) for run in runs)
             told = ", ".join(f"{name} {cell}" for name, cell in found[twin.key].items())

@@ -88,7 +88,10 @@ class Chain:
         return time.monotonic() - started_s
 
     def wait_for_cause(self, cause: str, detail: str = "") -> SafetyState:
-        """Until the state has that cause, and `detail` in its detail: DDS tells of a node before it tells its name."""
+        """Until the state has that cause, and `detail` in its detail: DDS tells of a node before it tells its name.
+
+        An order that was sent after it has arrived then as well: DDS keeps no order between two topics.
+        """
 
         def state() -> SafetyState | None:
             last = self.state.last
@@ -96,6 +99,8 @@ class Chain:
 
         found = self.node.wait_for(state, CAUSE_S, f"cause {cause} {detail}, state is {self.state.last}")
         assert found is not None
+        sent_s = self.state.times_s[-1]
+        self.node.wait_for(lambda: self.orders.times_s[-1:] >= [sent_s], CAUSE_S, f"an order after the cause {cause}")
         return found
 
     def drain(self) -> None:

@@ -111,7 +111,7 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
     ),
     "a value instead of a section": (
         {END: "rates: 50"},
-        ":36: rates: got 50, expected a section with some of control_hz, odometry_hz, status_hz, command_hz",
+        ":36: rates: got 50, expected a section with some of profile, control_hz, odometry_hz, status_hz, command_hz",
     ),
     "one drive": (
         dict.fromkeys(range(11, 17), ""),

@@ -77,6 +77,30 @@ def test_a_bus_without_filters_in_the_kernel_has_none_and_the_integrators_own_go
     assert own.bus_arguments()["can_filters"] == []
 
 
+@pytest.mark.parametrize(
+    ("rates", "control_hz", "odometry_hz"),
+    [
+        ("{}", 100.0, 50.0),
+        ("{profile: standard}", 100.0, 50.0),
+        ("{profile: small_computer}", 50.0, 25.0),
+        ("{profile: small_computer, odometry_hz: 10.0}", 50.0, 10.0),
+        ("{control_hz: 80.0, profile: small_computer}", 80.0, 25.0),
+    ],
+)
+def test_a_profile_of_rates_gives_the_defaults_and_keys_beside_it_go_before(
+    rates: str, control_hz: float, odometry_hz: float, tmp_path: Path
+) -> None:
+    seen = load(tmp_path, {END: f"rates: {rates}"}).robot.rates
+
+    assert (seen.control_hz, seen.odometry_hz, seen.command_hz) == (control_hz, odometry_hz, 50.0)
+
+
+def test_the_effective_configuration_says_which_rates_the_profile_gave(tmp_path: Path) -> None:
+    lines = marked_as_default(load(tmp_path, {END: "rates: {profile: small_computer}"}))
+
+    assert {"control_hz: 50.0", "odometry_hz: 25.0"} <= set(lines)
+
+
 COMMENTED_KEY = re.compile(r"^( *)# ( *[a-z_]+:( .*)?)$", re.MULTILINE)
 
 

@@ -8,7 +8,7 @@ from typing import Final
 
 from vm.guest.robot import Robot
 from vm.guest.scenario import Row, elapsed
-from vm.guest.system import PARTS, BrokenPromiseError, show, unit
+from vm.guest.system import PARTS, ROBOT_YAML, TARGET, BrokenPromiseError, run, show, unit
 
 REST_S: Final = 10.0
 GOAL_M: Final = 3.0
@@ -18,8 +18,34 @@ SETTLE_S: Final = 3.0
 MILLION: Final = 1e6
 
 
+RATES: Final = "rates: {profile: small_computer}\n"
+
+
 def processor(robot: Robot) -> Row:
     """Instructions of each part in a second, the kernel's work for it included: at rest, and while a goal drives."""
+    return _measured(robot, "10 s at rest, 6 s of a goal")
+
+
+def processor_at_small_rates(robot: Robot) -> Row:
+    """The same with the rates of a small computer; then robot.yaml is as before."""
+    before = ROBOT_YAML.read_text()
+    if "\nrates:" in before:
+        raise BrokenPromiseError(f"{ROBOT_YAML} has rates of its own")
+    try:
+        _restart(robot, before + RATES)
+        return _measured(robot, "the same, rates.profile small_computer")
+    finally:
+        _restart(robot, before)
+
+
+def _restart(robot: Robot, robot_yaml: str) -> None:
+    ROBOT_YAML.write_text(robot_yaml)
+    (pid,) = show(unit("driver"), "MainPID")
+    run("systemctl", "restart", TARGET)
+    robot.restarted("driver", pid)
+
+
+def _measured(robot: Robot, how: str) -> Row:
     robot.make_ready()
     robot.spin(SETTLE_S)
     rest = _in_a_second(robot, REST_S)
@@ -30,7 +56,7 @@ def processor(robot: Robot) -> Row:
         raise BrokenPromiseError(f"the goal ended before the measurement: {goal.result}")
     goal.cancel()
     told = "; ".join(f"{part} {_millions(rest[part])}, {_millions(driving[part])}" for part in PARTS)
-    return Row("processor", "10 s at rest, 6 s of a goal", then=f"million instructions a second: {told}")
+    return Row("processor", how, then=f"million instructions a second: {told}")
 
 
 def _in_a_second(robot: Robot, for_s: float) -> Mapping[str, float]:
