@@ -34,7 +34,7 @@ FIRST: dict[str, Scenario] = {
     "cold boot": computer_failures.cold_boot,
     "goal": computer_failures.goal,
     "processor": processor.processor,
-    "processor at small rates": processor.processor_at_small_rates,
+    "processor at standard rates": processor.processor_at_standard_rates,
     "support bundle": integrator.support_bundle,
     **unit_failures.KILLS,
     "power cut": bus_failures.power_cut,
