@@ -176,7 +176,9 @@ class SafetyFilter:
         """Takes a command of cmd_vel_mux, also one with NaN: that stops."""
         self._command, self._command_at_s = twist, now_s
 
-    def on_scan(self, topic: str, points: Points, field: Field | None, now_s: float, scan_time_s: float = 0.0) -> None:
+    def on_points(
+        self, topic: str, points: Points, field: Field | None, now_s: float, scan_time_s: float = 0.0
+    ) -> None:
         """Takes what a scan shows. `field` None: it looks everywhere. Raises KeyError for another topic."""
         self._scanners[topic].take(points, field, scan_time_s, now_s)
 

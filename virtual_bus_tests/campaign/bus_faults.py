@@ -76,3 +76,6 @@ BUS_FAULTS: dict[str, Kind] = {
         _twin, _no_twin,
     ),
 }  # fmt: skip
+
+SECOND_MASTERS = frozenset({"second_master_setpoints", "second_master_nmt", "second_master_sync"})
+"""Each is fought rung by rung."""

@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 
 from campaign.action_process import Goal
+from campaign.bus_faults import SECOND_MASTERS
 from campaign.envelope import (
     ORDER_S,
     Envelope,
@@ -126,7 +127,7 @@ class Judge:
         for fault in plan.faults:
             if fault.name == "frame_delay":
                 reaction_s += 2.0 * fault.arguments["value"]
-            if fault.name.startswith("second_master"):
+            if fault.name in SECOND_MASTERS:
                 reaction_s += sum(rung.obey_s for rung in RUNGS.values() if rung.step < Step.HEARTBEAT_WITHHELD)
         return reaction_s
 

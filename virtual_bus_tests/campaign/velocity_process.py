@@ -122,7 +122,7 @@ class VelocityProcess(Process):
         if isinstance(seen, Scan):
             self.filter.on_laser_scan(scan.topic, seen, Placement.of(scan), self.clock.now_s)
         else:
-            self.filter.on_scan(scan.topic, seen, None, self.clock.now_s)
+            self.filter.on_points(scan.topic, seen, None, self.clock.now_s)
 
     def _on_lock(self, locked: bool) -> None:
         self.mux.on_lock("lock", locked, self.clock.now_s)

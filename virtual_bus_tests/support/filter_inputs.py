@@ -107,4 +107,4 @@ def fed(now_s: float, twist: Twist, *, pressed: bool = False, the_filter: Safety
 def see(safety: SafetyFilter, now_s: float, *at_m: tuple[float, float]) -> None:
     """A scan with these places, each seen by two beams."""
     rows = np.repeat(np.array(at_m).reshape(-1, 2), 2, axis=0)
-    safety.on_scan("scan", Points(rows, np.arange(len(rows)), 360), None, now_s)
+    safety.on_points("scan", Points(rows, np.arange(len(rows)), 360), None, now_s)

@@ -96,7 +96,7 @@ class FilterWorld:
             return
         count = self.obstacles.shape[0]
         points = Points(self.seen, np.arange(count), max(count, 1) + 1)
-        self.filter.on_scan(scanner.topic, points, None, now_s)
+        self.filter.on_points(scanner.topic, points, None, now_s)
 
     def _turn(self) -> None:
         now_s = self.now_s

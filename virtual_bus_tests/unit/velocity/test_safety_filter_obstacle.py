@@ -175,7 +175,7 @@ def test_of_several_scanners_each_required_one_must_be_fresh_and_all_are_looked_
     safety = fed(0.0, ZERO, the_filter=SafetyFilter(config(more_scans=(rear,))))
     safety.decide(0.0)
     wall = Points(np.array([(-0.42, 0.0), (-0.42, 0.05)]), np.array([0, 1]), 360)
-    safety.on_scan("scan_rear", wall, None, 0.0)
+    safety.on_points("scan_rear", wall, None, 0.0)
     fed(0.1, Twist(-0.3, 0.0), the_filter=safety)
     assert safety.decide(0.1).cause is StopCause.OBSTACLE
     free_way = safety.clearances(0.1)
