@@ -20,6 +20,11 @@ from support.running_robot import LATCHED, own_domain
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 
 CANBASE = (sys.executable, "-m", "canbase_cli")
+DOCTOR = (
+    "from canbase_doctor import observe\nobserve.load_per_core = lambda: 0.0\n"
+    "from canbase_cli.main import app\napp(prog_name='canbase')\n"
+)
+"""`canbase` on a computer with nothing else to do, whatever this one has: a doctor on a busy one judges no times."""
 BLOCKS = (
     "import time\nfrom canbase_action_server.node import DriveDistanceServer\n"
     "sound = DriveDistanceServer.look_at_the_clock\n"
@@ -63,7 +68,7 @@ class Clinic:
     def doctor(self, *words: str) -> list[dict[str, Any]]:
         """The rows; the exit code is 0 only if none of them failed."""
         process = self.spawn(
-            [*CANBASE, "doctor", "--no-bus", "-c", str(self.config), "--json", "--seconds", "1", *words]
+            [*python_argv(DOCTOR), "doctor", "--no-bus", "-c", str(self.config), "--json", "--seconds", "1", *words]
         )
         code = self.end(process)
         rows: list[dict[str, Any]] = json.loads(process.log())
