@@ -85,11 +85,13 @@ class Drives:
                 self._answers = True
                 self._clock.after(0.0, self._answer)
             return
-        node.on_frame(cob_id, data, self._clock.now_s)
-        if cob_id in HEARTBEATS and node.line.hears:
-            self.heard[node_id] = self._clock.now_s
-        elif cob_id & 0x7F == node_id and 0x200 <= cob_id < 0x500 and not cob_id & 0x80:
-            self.ordered[node_id] = self._clock.now_s
+        now_s = self._clock.now_s
+        if node.takes(cob_id):
+            node.on_frame(cob_id, data, now_s)
+            if cob_id in HEARTBEATS and node.line.hears:
+                self.heard[node_id] = now_s
+        if cob_id & 0x7F == node_id and 0x200 <= cob_id < 0x500 and not cob_id & 0x80:
+            self.ordered[node_id] = now_s
 
     def _answer(self) -> None:
         """All nodes have heard the frame."""

@@ -87,6 +87,10 @@ class SimulatedNode:
         elif cob_id > heartbeat.COB_ID and self.state is not NmtState.INITIALISING:
             self._consumer.receive(cob_id - heartbeat.COB_ID, data, now_s)
 
+    def takes(self, cob_id: int) -> bool:
+        """Whether a frame with this COB-ID may mean anything to the node as it is now; most are feedback of others."""
+        return cob_id > heartbeat.COB_ID or cob_id in self._routes
+
     def tick(self, now_s: float) -> list[Frame]:
         """Whatever is due by `now_s`, and every frame since the last call, in order."""
         self._now = now_s

@@ -48,6 +48,8 @@ UNSEEN = frozenset((
     "_timeouts", "clock", "_member", "_topics", "_late", "_kept", "_life", "_random", "_routes", "_handlers", "_values",
     # only encoders that come and go, or jump, look at it
     "_time_s",
+    # a bound on when a heartbeat can be missed: of the times that are seen anyway
+    "_none_before",
     # of the records on the disk what was written last counts
     "file", "_owner", "_cycles", "reset",
 ))  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
@@ -14,6 +15,9 @@ from canbase_sim.cia301.nmt import NmtState
 
 COB_ID = 0x700
 """Heartbeat and boot-up: 700h + node id, one byte."""
+PERIOD = key(0x1017)
+ROUNDING_S = 1e-6
+"""More than a sum of two times can be rounded by."""
 
 
 class HeartbeatProducer:
@@ -30,7 +34,7 @@ class HeartbeatProducer:
 
     def due(self, now_s: float) -> bool:
         """True once per period of 1017h, late calls do not add up."""
-        period = self._values[key(0x1017)] / 1000.0
+        period = self._values[PERIOD] / 1000.0
         if period == 0.0 or (self._due is not None and now_s < self._due):
             return False
         on_time = self._due is not None and now_s < self._due + period
@@ -67,6 +71,8 @@ class HeartbeatConsumer:
         self._subs = range(1, dictionary.personality.heartbeat_entries + 1)
         self._on_lost, self._on_alive = on_lost, on_alive
         self._producers: dict[int, Producer] = {}
+        self._none_before = -math.inf
+        """No producer can be missed before: a heartbeat only makes it later."""
         dictionary.guard(0x1016, self._refuse_twins)
         dictionary.on_write(0x1016, lambda subindex, value: self._configure(subindex))
 
@@ -90,15 +96,21 @@ class HeartbeatConsumer:
                 self._lose(producer)
             return
         producer.last = now_s
+        if producer.watch is not Watch.ALIVE:
+            self._none_before = -math.inf
         before, producer.watch = producer.watch, Watch.ALIVE
         if before is Watch.LOST:
             self._on_alive(node_id)
 
     def tick(self, now_s: float) -> None:
         """Find the producers whose last heartbeat is older than their time."""
+        if now_s < self._none_before:
+            return
         for producer in self._producers.values():
             if producer.watch is Watch.ALIVE and now_s - producer.last > producer.timeout:
                 self._lose(producer)
+        alive = (p.last + p.timeout for p in self._producers.values() if p.watch is Watch.ALIVE)
+        self._none_before = min(alive, default=math.inf) - ROUNDING_S
 
     def _lose(self, producer: Producer) -> None:
         producer.watch = Watch.LOST
