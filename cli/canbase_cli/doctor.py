@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 
 from canbase_cli.options import ConfigOption, NamespaceOption, ros_arguments, ros_needed
-from canbase_doctor.checks import Check, commissioning, exit_code, first_failure, good_file, table
+from canbase_doctor.check import Check, commissioning, exit_code, first_failure, good_file, table
 from canbase_doctor.symptoms import SYMPTOMS
 from canbase_runtime.terminal import load_config
 

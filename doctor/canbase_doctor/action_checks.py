@@ -11,7 +11,7 @@ from typing import Any
 from canbase_action_server.goal_request import DriveRequest, Request, RotateRequest
 from canbase_action_server.goal_step import GoalStep
 from canbase_action_server.preconditions import state_reason
-from canbase_doctor.checks import Check, fail, ok, too_slow, warn
+from canbase_doctor.check import Check, fail, ok, too_slow, warn
 from canbase_doctor.evidence import Evidence, Goal, LoggedStep
 
 ACTION = "drive_distance"

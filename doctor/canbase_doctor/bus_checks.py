@@ -12,7 +12,7 @@ from canbase_commissioning.can_interface import Link
 from canbase_config.bus_load import BUSY_LOAD, FULL_LOAD
 from canbase_config.drive import Drive
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
-from canbase_doctor.checks import Check, fail, ok, warn
+from canbase_doctor.check import Check, fail, ok, warn
 from canbase_doctor.inspection import Inspection, Part
 from canbase_driver.cia301.emcy import emcy_text
 from canbase_driver.cia301.nmt import NmtState

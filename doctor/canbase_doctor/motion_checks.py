@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from canbase_action_server.preconditions import action_source
-from canbase_doctor.checks import Check, fail, ok, too_slow, warn
+from canbase_doctor.check import Check, fail, ok, too_slow, warn
 from canbase_doctor.evidence import Evidence
 from canbase_runtime.watchdog_view import WatchdogView, watchdog_view
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from canbase.msg import DriverStatus, SafetyState
 
-from canbase_doctor.checks import Check, fail, ok, warn
+from canbase_doctor.check import Check, fail, ok, warn
 from canbase_doctor.evidence import Evidence
 from canbase_driver.supervision.watchdog_link import RUNGS
 from canbase_runtime.driver_state import DriverState, driver_state

@@ -7,7 +7,7 @@ from typing import Final
 
 from canbase_doctor import action_checks as action
 from canbase_doctor import motion_checks as motion
-from canbase_doctor.checks import Check, Verdict
+from canbase_doctor.check import Check, Verdict
 from canbase_doctor.evidence import Evidence
 
 CHECKS: Final[dict[str, tuple[Callable[[Evidence], Check], ...]]] = {

@@ -18,8 +18,8 @@ from canbase_driver.motion import velocity_command as command
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.motion.odometry import WheelTravel
 from canbase_driver.supervision import reset, supervisor, watchdog_link
+from canbase_driver.supervision.hazards import HAZARDS, Blocker, Hazard
 from canbase_driver.supervision.phases import Phase
-from canbase_driver.supervision.reasons import HAZARDS, Blocker, Hazard
 from canbase_runtime.latch_record import CLEAR, Defect, Found
 from canbase_runtime.watchdog_view import WatchdogView
 from canbase_sim.cia301.heartbeat import HeartbeatConsumer

@@ -76,7 +76,7 @@ NEEDS: tuple[Need, ...] = (
     Need("watchdog:all", (*_MAD, "lease_lost")),
     Need("watchdog:latch", ("velocity_hangs", "lease_lost", "driver_hangs")),
     Need("watchdog:stop_record", ("all_processes_restart", "watchdog_dies", "encoder_lost", "lease_lost")),
-    # driver: rows of canbase_driver.supervision.reasons.HAZARDS
+    # driver: rows of canbase_driver.supervision.hazards.HAZARDS
     Need("driver:bus_failed", ("bus_problem",), f"driver:watchdog_tripped+{_DRIVER_SEES}+{_AWAY}"),
     Need("driver:watchdog_tripped", ("lease_lost", "driver_repeats", "encoder_lost"), "driver:drive_disabled"),
     Need("driver:drive_fault", _OFF, "driver:drive_disabled+watchdog:drive_down"),

@@ -23,8 +23,8 @@ from dataclasses import dataclass
 
 from canbase_driver.causes import Cause, Finding
 from canbase_driver.motion.braking import Braking
+from canbase_driver.supervision.hazards import BLOCKERS, HAZARDS, Blocker, Hazard, Seen, first
 from canbase_driver.supervision.phases import ORDERS, SHOWN, STOPPING, WAITING, Orders, Phase
-from canbase_driver.supervision.reasons import BLOCKERS, HAZARDS, Blocker, Hazard, Seen, first
 from canbase_driver.supervision.situation import Situation
 from canbase_runtime.driver_state import DriverState
 

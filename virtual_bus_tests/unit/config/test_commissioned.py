@@ -13,7 +13,7 @@ from canbase_commissioning.edits import Edit, commissioned_edits, edited, with_e
 from canbase_config.commissioned import STEPS, Step, mark, uncommissioned
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
-from canbase_doctor.checks import Verdict, commissioning
+from canbase_doctor.check import Verdict, commissioning
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.stop_cause import StopCause

@@ -13,7 +13,7 @@ from canbase_commissioning.can_interface import Link, parse_link
 from canbase_config.drive import Identity
 from canbase_config.load import load_robot, sample
 from canbase_doctor.bus_checks import BusEvidence, bus_checks
-from canbase_doctor.checks import Verdict
+from canbase_doctor.check import Verdict
 from canbase_doctor.inspection import Inspection, Part
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia402 import DriveState

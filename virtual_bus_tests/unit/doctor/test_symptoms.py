@@ -22,7 +22,7 @@ from canbase_action_server.inputs import Driver, Inputs, Mux, Safety
 from canbase_action_server.inputs import Odometry as OdometryInput
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
-from canbase_doctor.checks import INCONCLUSIVE, Verdict, exit_code, first_failure
+from canbase_doctor.check import INCONCLUSIVE, Verdict, exit_code, first_failure
 from canbase_doctor.evidence import Answers, Endpoint, Evidence, Goal, Heard, LoggedStep, ServerProcess
 from canbase_doctor.overload import Overload
 from canbase_doctor.server_processes import server_processes, talks_by

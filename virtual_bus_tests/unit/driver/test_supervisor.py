@@ -10,8 +10,8 @@ from canbase_config.load import load_robot, sample
 from canbase_driver.causes import Cause, Finding
 from canbase_driver.cia402 import PowerGoal
 from canbase_driver.motion.braking import Braking
+from canbase_driver.supervision.hazards import BLOCKERS, HAZARDS
 from canbase_driver.supervision.phases import NO_POWER, ORDERS, SHOWN, Drive, Orders, Phase
-from canbase_driver.supervision.reasons import BLOCKERS, HAZARDS
 from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.supervisor import Supervisor
 from canbase_runtime.driver_state import DriverState

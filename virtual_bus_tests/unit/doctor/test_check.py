@@ -13,7 +13,7 @@ from canbase.msg import DriverStatus, DriveStatus, MuxSource, MuxState, SafetySt
 from rich.console import Console
 
 from canbase_config.load import load_robot, sample
-from canbase_doctor.checks import Verdict, exit_code, first_failure, table
+from canbase_doctor.check import Verdict, exit_code, first_failure, table
 from canbase_doctor.evidence import Evidence, Heard
 from canbase_doctor.robot_checks import robot_checks
 
