@@ -19,7 +19,6 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final, Protocol
 
 import can
-import msgpack  # type: ignore[import-untyped]
 
 from canbase_watchdog.local_frames import keep_to_this_computer
 
@@ -160,7 +159,13 @@ class _SocketCan(_Socket):
 
 
 class _UdpMulticast(_Socket):
-    """python-can's simulated bus: a frame is a mapping in msgpack."""
+    """python-can's simulated bus: a frame is a mapping in msgpack, which python-can brings."""
+
+    def __init__(self, bus: can.BusABC) -> None:
+        super().__init__(bus)
+        from can.interfaces.udp_multicast import utils
+
+        self._unpacked = utils.msgpack.unpackb  # type: ignore[attr-defined]
 
     def _take(self) -> Received | None:
         try:
@@ -168,7 +173,7 @@ class _UdpMulticast(_Socket):
         except BlockingIOError:
             return None
         try:
-            return _decoded(msgpack.unpackb(datagram), _time_s(ancillary))
+            return _decoded(self._unpacked(datagram), _time_s(ancillary))
         except Exception:  # noqa: BLE001 - a datagram can be anything, and so can what msgpack and python-can say of it
             return NO_FRAME, b"", 0.0
 
