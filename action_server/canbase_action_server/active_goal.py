@@ -17,7 +17,7 @@ from canbase_action_server.standstill import Standstill, Verdict
 from canbase_config.robot import Robot
 
 FAREWELL_S = 0.2
-"""After the end of a goal zero is ordered for this long; then the source goes silent and others may drive."""
+"""After the end of a goal the server orders zero for this long. Then the source publishes nothing: others may drive."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class ActiveGoal:
         self._goal = GoalRun(self._robot, request.motion(self._robot, start), start, now_s)
 
     def tick(self, inputs: Inputs, now_s: float) -> Order | None:
-        """One control cycle. None: nothing is to be ordered, the source stays silent."""
+        """One control cycle. None: nothing is ordered, the source publishes nothing."""
         if self._goal is None:
             return Order(STOP) if now_s < self._silent_from else None
         if self._failure is None:

@@ -89,7 +89,7 @@ def _odometry_lost(s: Situation) -> str | None:
 
 
 def _why_no_odometry(s: Situation) -> str:
-    """A hung driver is silent on both topics at once; its status is sent less often than odometry."""
+    """A hung driver stops publishing on both topics at once; its status is published less often than odometry."""
     driver, odometry = s.inputs.driver, s.inputs.odometry
     if driver and odometry and driver.received - odometry.received > s.odometry_timeout_s / 2.0:
         return "motor_driver still reports its status: check the feedback of the drives with `canbase doctor`"

@@ -65,7 +65,7 @@ Drive = SentGoal[DriveResult]
 
 
 class DriveClient(GoalClient[DriveResult, DriveFeedback]):
-    """Sends goals from `node`, which nobody else may spin while a method here waits (or give its own `executor`)."""
+    """Sends goals from `node`. Nothing else may spin it while a method here waits, unless `executor` is its own."""
 
     def __init__(self, node: Node, executor: Executor | None = None, action: str = "drive_distance") -> None:
         super().__init__(node, DriveDistance, action, executor, _feedback, _result)

@@ -23,7 +23,7 @@ class Numbers:
 
 
 class FibonacciClient(GoalClient[Numbers, "tuple[int, ...]"]):
-    """Sends goals from `node`, which nobody else may spin while a method here waits (or give its own `executor`)."""
+    """Sends goals from `node`. Nothing else may spin it while a method here waits, unless `executor` is its own."""
 
     def __init__(self, node: Node, executor: Executor | None = None) -> None:
         super().__init__(node, Fibonacci, "fibonacci", executor, _feedback, _result)

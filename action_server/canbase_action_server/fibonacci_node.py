@@ -1,6 +1,6 @@
 """The action server of Fibonacci.action: an example as small as it can be that does what a server has to.
 
-It refuses wrong numbers, tells how far it is, lets itself be canceled between two numbers, and ends in each of the ways
+It rejects invalid numbers, reports its progress, can be canceled between two numbers, and ends in each of the ways
 that there are. Goals share nothing, so several may run at once: that policy fits here, and never fits a robot's base.
 """
 

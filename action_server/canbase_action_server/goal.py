@@ -91,7 +91,7 @@ class GoalRun:
         return self._motion.traveled_m
 
     def tick(self, inputs: Inputs, now_s: float) -> Order:
-        """What to order now, what to tell the client, and whether this was the end. RuntimeError after the end."""
+        """The order of this cycle, the feedback, and whether the goal has ended. RuntimeError after the end."""
         if self._phase is GoalPhase.ENDED:
             raise RuntimeError("the goal has ended: it orders nothing any more")
         self._gap_s, self._ticked_at = now_s - self._ticked_at, now_s

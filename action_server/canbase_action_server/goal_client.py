@@ -1,7 +1,7 @@
 """What the clients of the actions share: discovery, acceptance, feedback, cancel and final status, each with its error.
 
 A goal is sent once. When its result is lost it may still have run: nothing here sends it again. While a goal runs and
-its executor spins, the server is told that the client lives (action.require_client_lease in robot.yaml).
+its executor spins, it publishes the client lease (action.require_client_lease in robot.yaml).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ SLICE_S = 0.1
 SERVER_LOST_S = 2.0
 """A server that cannot be seen for this long is lost."""
 KEEPALIVE_S = 0.1
-"""So often the server is told that the client lives; the shortest lease is three times as long."""
+"""Period of the client lease [s]; the shortest lease is three times as long."""
 SERVICE_QOS = QoSProfile(depth=100)
 """With the usual depth of 10 a server loses the oldest of more requests at once, and their clients wait for ever.
 A client receives the answers to all clients, and loses its own in the same way."""
@@ -37,14 +37,14 @@ A client receives the answers to all clients, and loses its own in the same way.
 REJECTION_QOS = QoSProfile(depth=10)
 """Volatile: the reason of an earlier goal with the same numbers is none of this one's."""
 REASON_S = 0.5
-"""So long a goal waits for the topic of the reasons before it is sent, and its rejection for the reason."""
+"""A goal waits this long for the topic of the reasons before it is sent, and its rejection for the reason [s]."""
 
 ResultT = TypeVar("ResultT")
 FeedbackT = TypeVar("FeedbackT")
 
 
 class DriveError(Exception):
-    """A goal did not come to a result; the subclass says how far it came."""
+    """A goal did not come to a result. The subclass gives the step that it reached."""
 
 
 class NoServerError(DriveError):
@@ -52,7 +52,7 @@ class NoServerError(DriveError):
 
 
 class NoResponseError(DriveError):
-    """The server did not say in time whether it accepts the goal. It is canceled, if it is accepted after all."""
+    """The server did not answer in time. The goal is canceled if the server accepts it after all."""
 
 
 class RejectedError(DriveError):
@@ -79,7 +79,7 @@ def never() -> bool:
 
 
 class GoalClient(Generic[ResultT, FeedbackT]):
-    """Sends goals from `node`, which nobody else may spin while a method here waits (or give its own `executor`)."""
+    """Sends goals from `node`. Nothing else may spin it while a method here waits, unless `executor` is its own."""
 
     def __init__(
         self,
@@ -187,12 +187,12 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         self._client.destroy()
 
     def _give_up(self, uuid: UUID, response: Any) -> None:
-        """Nobody will watch this goal: its cancel waits at the server behind it, also when this process is gone."""
+        """Nothing watches this goal: its cancel is queued at the server behind it, also when this process is gone."""
         ClientGoalHandle(self._client, uuid, None).cancel_goal_async()
         response.add_done_callback(_cancel_late)
 
     def _watch(self, handle: ClientGoalHandle) -> Any:
-        """The future result; until it is there the server is told that this client lives."""
+        """The future result. Until it is done, this client publishes its lease."""
         result = handle.get_result_async()
         self._alive.append(handle.goal_id)
         result.add_done_callback(lambda _: self._alive.remove(handle.goal_id))
@@ -253,7 +253,7 @@ class SentGoal(Generic[ResultT]):
         return self.result
 
     def cancel(self, timeout_s: float = 5.0) -> bool:
-        """Ask for a cancel; whether the server accepts it. The goal ends later: `wait` for its status.
+        """Request a cancel. True: the server accepts it. The goal ends later: `wait` for its status.
 
         NoResponseError when the server does not answer within timeout_s [s].
         """

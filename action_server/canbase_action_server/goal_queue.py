@@ -3,13 +3,13 @@
 Rules.
 1. `refusal` and `admit` are called one after the other, without another call in between: so no two goals can both find
    the base free.
-2. A goal that is admitted waits. `tick` gives the base to the one that waits longest, as soon as nobody owns it.
-3. `reject`: nobody is admitted while a goal waits or runs. `queue`: up to `queue_length` wait. `preempt`: a new goal
+2. A goal that is admitted waits. `tick` gives the base to the one that has waited longest, as soon as the base is free.
+3. `reject`: no goal is admitted while one waits or runs. `queue`: up to `queue_length` wait. `preempt`: a new goal
    ends all others with PREEMPTED: those that wait at once, the running one when the base stands. Then it has the base.
-4. A goal that waits starts only after an end that left the base standing where it was told to. Any other end, such as
+4. A goal that waits starts only after an end that left the base at standstill at its target. Any other end, such as
    an emergency stop, is theirs too: nothing starts to move by itself when the cause has gone, or from a wrong place.
-5. With `require_client_lease` a goal begins when its client has been heard since its acceptance, and ends with
-   CLIENT_LOST when it was not heard for `client_lease_s`.
+5. With `require_client_lease` a goal begins once a lease of its client arrived after its acceptance. It ends with
+   CLIENT_LOST when no lease arrived for `client_lease_s`.
 6. Each goal that was admitted ends exactly once.
 """
 
@@ -42,7 +42,7 @@ class Cycle:
     """The result of one control cycle."""
 
     twist: Twist | None = None
-    """The order for the base; None: nothing is to be ordered, the source stays silent."""
+    """The order for the base; None: nothing is ordered, the source publishes nothing."""
     began: str | None = None
     """Key of the goal that owns the base from now on."""
     feedback: tuple[str, Feedback] | None = None

@@ -54,7 +54,7 @@ class Driver:
     hears_command: bool
     """cmd_vel reaches it; after a start the ROS network needs a moment for that."""
     pose_resets: int = 0
-    """How often the pose of the odometry was set anew since the driver's start: distances across one mean nothing."""
+    """How often the pose of the odometry was reset since the driver's start: a distance across a reset is invalid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ class Mux:
     received: float
     active: str
     held_back: str = ""
-    """Why cmd_vel_action is locked now, whoever publishes there; empty: it is not."""
+    """Why cmd_vel_action is locked now, for every publisher; empty: it is not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class Inputs:
     preempted: bool = False
     """A newer goal waits for the base."""
     client_lost: bool = False
-    """The client that must stay alive for this goal went silent."""
+    """The client that must stay alive for this goal publishes its lease no longer."""
     shutdown: bool = False
 
 

@@ -71,7 +71,7 @@ class DriveDistanceServer(Node):
         """The last message of odom that was not looked at yet, serialized, and when it was received."""
         self._request_times = ReceiveTimes(REQUEST_GAP_S, RESENT_S)
         self._keepalive_times = ReceiveTimes(robot.action.client_lease_s)
-        """One that waited for longer than the lease does not say that the client lives now."""
+        """A lease that waited for longer than it is valid is no evidence that the client lives now."""
         self._open: dict[str, OpenGoal] = {}
         self.failure: Exception | None = None
         """The first exception that a callback raised; the process must end with an error."""
@@ -190,7 +190,7 @@ class DriveDistanceServer(Node):
         reason = old or self._goal_queue.refusal(binding.request(goal), self._look(), now_s)
         if reason is None:
             return GoalResponse.ACCEPT
-        # rclpy does not tell the UUID of a goal that is not accepted yet.
+        # rclpy does not give the UUID of a goal that is not accepted yet.
         self._log(GoalStep.REJECTED, None, action=binding.name, reason=reason, **numbers(goal))
         self._rejections[binding.name].publish(rejection(binding.name, goal, reason))
         return GoalResponse.REJECT

@@ -50,7 +50,7 @@ class OpenGoal:
         """The goal is EXECUTING from now on. Once is enough.
 
         rclpy ties this state to the start of the execute callback, which then has to wait for the end of the goal. A
-        callback that waits is asked by the executor again and again, so it is called at the end (`end`).
+        callback that waits is polled by the executor all the time, so it is called at the end (`end`).
         """
         if not self.executing:
             self.executing = True

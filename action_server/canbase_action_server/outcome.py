@@ -41,7 +41,7 @@ class ErrorCode(IntEnum):
 
     @property
     def leaves_the_base_standing(self) -> bool:
-        """An end with this code says that the base was seen standing, where it was told to: another goal may follow."""
+        """After an end with this code the base was measured at standstill at its target: another goal may follow."""
         return self in (ErrorCode.OK, ErrorCode.CANCELED, ErrorCode.PREEMPTED)
 
 

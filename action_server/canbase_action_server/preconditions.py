@@ -8,7 +8,7 @@ from canbase_runtime.driver_state import DriverState
 from canbase_runtime.watchdog_view import WatchdogView
 
 STATE_TIMEOUT_S = 1.5
-"""A state that is older says nothing: three periods of the slowest one (velocity_mux/state, 2 Hz)."""
+"""An older state is no evidence: three periods of the slowest one (velocity_mux/state, 2 Hz)."""
 
 
 NO_SOURCE = (

@@ -42,7 +42,7 @@ Turn = SentGoal[RotateResult]
 
 
 class RotateClient(GoalClient[RotateResult, RotateFeedback]):
-    """Sends goals from `node`, which nobody else may spin while a method here waits (or give its own `executor`)."""
+    """Sends goals from `node`. Nothing else may spin it while a method here waits, unless `executor` is its own."""
 
     def __init__(self, node: Node, executor: Executor | None = None, action: str = "rotate_angle") -> None:
         super().__init__(node, RotateAngle, action, executor, _feedback, _result)

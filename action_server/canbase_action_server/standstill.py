@@ -16,7 +16,7 @@ HOLD_S = 0.1
 SETTLE_S = 0.15
 """From the order to stand until it must show at the wheels."""
 DRIVER_AGE_S = 0.5
-"""motor_driver/status older than this does not tell whether the base stands."""
+"""motor_driver/status older than this is no evidence of standstill [s]."""
 BRAKING_RESERVE_S = 0.5
 """Added to the time that braking takes when nothing can be measured."""
 

@@ -101,7 +101,7 @@ def _mapped_bits(drive: Drive, index: int) -> int:
 
 
 def _slow_bits_per_s(robot: Robot) -> float:
-    """Heartbeats of every node, the driver's and the watchdog's, and what the watchdog tells."""
+    """Heartbeats of every node, the driver's and the watchdog's, and the watchdog's state frames."""
     nodes = len({drive.node_id for drive in robot.drives}) + 2
     beats_hz = nodes * HEARTBEATS_PER_TIMEOUT / robot.timeouts.drive_heartbeat_s
     return beats_hz * frame_bits(1) + (STATE_HZ + COUNTERS_HZ) * frame_bits(8)

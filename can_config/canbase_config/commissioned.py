@@ -1,8 +1,8 @@
-"""What `canbase commission` has shown of a robot, and whether robot.yaml still says the same.
+"""What `canbase commission` has proven for a robot, and whether robot.yaml is still the same.
 
-A wheel radius that is a diameter, a gear ratio turned around, a wheel or both sides taken for the other: all parts,
+A wheel radius that is a diameter, an inverted gear ratio, a wheel or both sides swapped: all parts,
 the watchdog too, compute with the same robot.yaml, and the drives agree with it. Only a person who looks at the wheels
-and measures the floor can tell. So each step of the commissioning leaves a mark of what it has shown in robot.yaml.
+and measures the floor can detect it. So each step of the commissioning leaves a mark of its result in robot.yaml.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Commissioned(Section):
 
 
 def mark(robot: Robot, step: Step) -> str:
-    """What is to stand in `commissioned` when this step has shown what `robot` says."""
+    """The value of `commissioned` when this step has proven the values of `robot`."""
     shown = json.dumps(_shown(robot, step), sort_keys=True)
     return step[0] + hashlib.sha256(shown.encode()).hexdigest()[:DIGITS]  # the letter: never a number in YAML
 

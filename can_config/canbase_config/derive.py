@@ -36,12 +36,12 @@ def speed_noise_mps(robot: Robot) -> float:
 
 
 def slope_window_s(robot: Robot) -> float:
-    """Two speeds that are so far apart in time tell a slope of SLOPE_SHARE from noise, up and down [s]."""
+    """Two speeds this far apart in time distinguish a slope of SLOPE_SHARE from noise, up and down [s]."""
     return max(SLOPE_S, 4.0 * speed_noise_mps(robot) / (SLOPE_SHARE * robot.limits.deceleration_mps2))
 
 
 def samples(robot: Robot, count: int) -> int:
-    """So many samples in a row take as long as `count` take at NOMINAL_HZ: two at least, and no more than `count`."""
+    """The number of samples in a row that takes as long as `count` at NOMINAL_HZ: at least two, at most `count`."""
     return min(count, max(LEAST_SAMPLES, math.ceil(count * robot.rates.control_hz / NOMINAL_HZ)))
 
 
@@ -61,7 +61,7 @@ def slowest_ramp_mps2(robot: Robot) -> float:
 
 
 def watchdog_config(robot: Robot) -> WatchdogConfig:
-    """Everything that the watchdog process is told about the robot."""
+    """The whole configuration of the watchdog process."""
     limits, timeouts, watchdog = robot.limits, robot.timeouts, robot.watchdog
     return WatchdogConfig(
         bus_arguments=robot.bus_arguments(),
@@ -120,7 +120,7 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
 
 
 def watched_drive(drive: Drive, wheel_radius_m: float, hardest_mps2: float) -> WatchedDrive:
-    """What the watchdog is told about one axis; `hardest_mps2`: stopping.hardest_braking_mps2 of it."""
+    """The watchdog's configuration of one axis; `hardest_mps2`: stopping.hardest_braking_mps2 of it."""
     return WatchedDrive(
         joint=drive.joint,
         node_id=drive.node_id,

@@ -57,7 +57,7 @@ class Drive(Section):
 
     @property
     def kind(self) -> Profile:
-        """What the profile says about this kind of drive."""
+        """The profile of this kind of drive."""
         return load_profile(self.profile)
 
     @property

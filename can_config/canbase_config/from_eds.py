@@ -1,4 +1,4 @@
-"""Drafts a drive profile from an EDS: what the file says, what it cannot say, and whether the drive stops by itself."""
+"""Drafts a drive profile from an EDS: its values, what no EDS contains, and whether the drive stops by itself."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ UNKNOWN_TO_ANY_EDS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """A profile and what is to be said about it. `missing`: objects without which canbase cannot use the drive."""
+    """A profile, and remarks on it. `missing`: objects without which canbase cannot use the drive."""
 
     text: str
     """The profile as YAML."""
@@ -59,7 +59,7 @@ class _Lines:
 
 
 def draft(eds: Eds) -> Draft:
-    """The profile that follows from the EDS, as a start: units and everything a manual alone tells stay open."""
+    """The profile that follows from the EDS, as a draft: units and everything that only a manual gives stay open."""
     out = _Lines()
     missing = tuple(f"{index:04X}h" for index in NEEDED if not eds.has(index))
     _identity(eds, out)
@@ -78,7 +78,7 @@ def draft(eds: Eds) -> Draft:
 
 
 def self_stop_sentence(eds: Eds) -> str:
-    """Whether the drive can stop by itself when the computer dies, as far as an EDS tells."""
+    """Whether the drive can stop by itself when the computer fails, as far as an EDS shows it."""
     if eds.has(0x1016) and eds.has(0x6007):
         how = "it watches heartbeats (1016h) and has 6007h for what to do then"
         return f"It can stop by itself when the computer dies: {how}. Prove it with the wheels up."

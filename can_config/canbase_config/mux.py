@@ -10,13 +10,13 @@ from pydantic import Field, field_validator, model_validator
 from canbase_config.section import MisfitError, Name, NodeName, Section, Topic
 
 OUTPUTS: Final = ("cmd_vel_mux", "cmd_vel")
-"""What the chain itself says: a source there would make the robot follow its own last command for ever."""
+"""Topics that the chain itself publishes: with such a source the robot would follow its own last command for ever."""
 
 
 NEUTRAL_AFTER_S: Final = 2.0
 """Of a program that begins with a velocity: far longer than a radio gap [s]."""
 PROGRAMS: Final = ("navigation", "action")
-"""Sources with one of these names may start without a zero command, unless their key neutral_after_s says otherwise."""
+"""Sources with one of these names may start without a zero command, unless their key neutral_after_s is set."""
 
 
 class MuxSource(Section):

@@ -92,7 +92,7 @@ class Pdos(Section):
 
 
 class Sdo(Section):
-    """How the SDO server wants to be asked."""
+    """How the SDO server of the drive accepts requests."""
 
     timeout_s: (
         Annotated[float, Field(ge=0.05, le=5.0, description="one answer; default: timeouts.sdo_s [s]")] | None

@@ -14,7 +14,7 @@ def placed(path: str, environment: Mapping[str, str], uid: int) -> str:
     """`path`, with $XDG_RUNTIME_DIR at its beginning replaced; any other path as it is.
 
     It counts if it belongs to the user `uid` alone; else /run/user/UID does. Without either the first folder of the
-    path goes to /tmp with the number of the user in its name; whoever makes it has to look to whom it belongs.
+    path goes to /tmp with the number of the user in its name; the process that creates it must check its owner.
     """
     if not path.startswith(VARIABLE):
         return path

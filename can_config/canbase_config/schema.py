@@ -15,13 +15,13 @@ Shape = dict[str, Any]
 
 
 class Schema:
-    """The JSON schema of a model, asked by places in a file."""
+    """The JSON schema of a model, looked up by places in a file."""
 
     def __init__(self, model: type[BaseModel]) -> None:
         self._model = model
 
     def shape_at(self, loc: Loc) -> Shape:
-        """What the model says about the value at `loc`."""
+        """The schema of the value at `loc`."""
         shape = self._root
         for part in loc:
             shape = self._child(shape, part)
@@ -44,7 +44,7 @@ class Schema:
 
     @functools.cached_property
     def shapes(self) -> tuple[tuple[str, Shape], ...]:
-        """Every section of the file: its path and what the model says about it."""
+        """Every section of the file: its path and its description in the model."""
         return tuple(self._sections(self._root, ""))
 
     @functools.cached_property

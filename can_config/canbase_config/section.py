@@ -41,6 +41,6 @@ class MisfitError(ValueError):
 
 
 class Section(BaseModel):
-    """Base of all sections: immutable, no unknown keys, no silent conversion of types."""
+    """Base of all sections: immutable, no unknown keys, no implicit conversion of types."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, ser_json_inf_nan="constants")

@@ -26,7 +26,7 @@ DISABLE_VOLTAGE: Final = 2
 """6007h: a drive that loses its masters lets its motor coast (CiA 402-2)."""
 
 LONGEST_STUCK_S: Final = 1.0
-"""So long a driver that hangs may be followed without a word about it."""
+"""A driver that hangs may be followed this long without a warning [s]."""
 SLOWEST_HZ: Final = 50.0
 """Below this the peak speed of a wheel without an encoder is noticeably above that of the bench."""
 RUNAWAY_MPS2: Final = 5.0

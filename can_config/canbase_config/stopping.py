@@ -27,9 +27,9 @@ SLOPE_SHARE: Final = 0.25
 SLOPE_S: Final = 0.15
 """The shortest time between two speeds that are compared for that: a ramp that grows for 0.4 s is steep enough then."""
 HELD_S: Final = 0.25
-"""A threshold holds a wheel for so long at most, with its way back to the ramp of its drive."""
+"""A threshold holds a wheel for at most this long, its return to the ramp of its drive included [s]."""
 SEEN_LATE_S: Final = 0.1
-"""A SYNC may wait for the watchdog's process for so long."""
+"""The longest time for which a SYNC waits for the watchdog's process [s]."""
 SETTLE_S: Final = 0.5
 """Until a wheel that has braked is seen to stand."""
 ROLLING_MPS2: Final = 0.1
@@ -37,7 +37,7 @@ ROLLING_MPS2: Final = 0.1
 (soft floors, gears and motors brake more; on a slope nothing is known)."""
 
 HARDEST_SHARE: Final = 2.0
-"""A drive brakes no harder than so many times its stated ramp: overshoot of its loop, light loads, noise."""
+"""A drive brakes at most this many times as hard as its stated ramp: overshoot of its loop, light loads, noise."""
 GRIP_MPS2: Final = 8.0
 """What the floor takes from a wheel at most: a rubber tyre on a dry floor (friction 0.8) slips beyond that. A brake or
 a worm gear may stop a wheel harder: such a standstill is not taken for measured."""
@@ -114,7 +114,7 @@ def given_up_s(robot: Robot) -> float:
 
 
 def stuck_s(robot: Robot) -> float:
-    """A driver that repeats its setpoints is followed for so long after an order of zero [s].
+    """The time for which a driver that repeats its setpoints is followed after an order of zero [s].
 
     Until no other order may be under way, and the jerk-limited ramp has lost the tolerance.
     """

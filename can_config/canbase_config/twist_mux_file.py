@@ -1,7 +1,7 @@
 """Reads parameter files of twist_mux (ros-teleop/twist_mux) as they are, and lays them into a robot.yaml's `mux`.
 
 Such a file has, below NODE: ros__parameters:, `topics` and `locks`, each entry with topic, timeout and priority, nested
-or in dotted keys (topics.joy.timeout: 0.5). What is outside of our ranges is told with the file's own line and key.
+or in dotted keys (topics.joy.timeout: 0.5). A value outside of our ranges is reported with the file's line and key.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def _merged(file: YamlFile, mux: Mapping[str, Any], parameters: Mapping[str, Par
         entries = _entries(parameters, group)
         given = merged.get(ours) or {}
         if not entries or not isinstance(given, dict):
-            continue  # what is no section, the model tells
+            continue  # the model reports what is no section
         for name, entry in entries.items():
             _refuse_second(file, given, ("mux", ours, name), entry)
             places |= _places(("mux", ours, name), group, entry, stamped)
@@ -127,7 +127,7 @@ def _source(entry: Entry, stamped: Parameter | None) -> dict[str, Any]:
 
 
 def _lock(entry: Entry) -> dict[str, Any]:
-    """timeout 0 is twist_mux's way to say that a lock may be silent."""
+    """A timeout of 0 means in twist_mux that the lock needs no messages."""
     values = _known(entry)
     timeout = values.get("timeout_s")
     if type(timeout) in (int, float) and timeout == 0:

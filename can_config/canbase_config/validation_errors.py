@@ -28,7 +28,7 @@ def explain(error: ValidationError, file: YamlFile, schema: Schema) -> tuple[Pro
     told = [_explain(details, file, schema) for details in found[:MOST_TOLD]]
     counted = [
         _at(file, details["loc"], details["msg"]) for details in found[MOST_TOLD:]
-    ]  # no hints: nobody reads them
+    ]  # no hints: they are not printed
     return tuple(sorted([*told, *counted], key=lambda problem: (problem.file, problem.line or 0)))
 
 
@@ -38,7 +38,7 @@ def _at(file: YamlFile, loc: Loc, what: str, expected: str = "", hint: str = "")
 
 
 def _is_echo(details: ErrorDetails) -> bool:
-    """A list is called too short although it is long enough: its entries are wrong, and those are told on their own."""
+    """A list is reported as too short although it is long enough: its entries are invalid and are reported too."""
     return details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"]
 
 

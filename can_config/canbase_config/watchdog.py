@@ -79,7 +79,7 @@ class WatchdogConfig:
     loop_late_s: float
     """It trips when its own loop stood still for longer while a drive is enabled."""
     bus_failed_s: float
-    """It trips when the bus takes no frames for so long while a drive is enabled."""
+    """It trips when the bus takes no frames for this long while a drive is enabled."""
 
     standstill_mps: float
     linear_mps: float
@@ -101,7 +101,7 @@ class WatchdogConfig:
     motion_tolerance_mps: float
     motion_tolerance_share: float
     feedback_samples: int
-    """So many velocity samples in a row must be bad before they count."""
+    """This many velocity samples in a row must be bad before they count."""
     overspeed_factor: float
     travel_tolerance_m: float
     """How far encoder and measured velocity may drift apart."""
@@ -110,7 +110,7 @@ class WatchdogConfig:
     coasting_s: float
     """A wheel without power has rolled out after this on a level floor."""
     motion_missing_s: float
-    """An enabled wheel that is ordered to move may show nothing of it for so long ..."""
+    """An enabled wheel that is ordered to move may show no motion for this long ..."""
     motion_missing_m: float
     """... or for so much of the ordered travel, whichever is longer."""
     jolt_mps2: float
@@ -118,24 +118,24 @@ class WatchdogConfig:
     slow_wheel_share: float
     """A wheel may be slower than its setpoint by this share, on top of motion_tolerance_mps ..."""
     slow_wheel_s: float
-    """... and by more for so long."""
+    """... and by more for this long."""
     slowest_ramp_mps2: float
     """A wheel gets to its setpoint at least so fast."""
     twist_tolerance_mps: float
     twist_tolerance_share: float
     twist_s: float
-    """The measured twist may be outside of the ordered one for so long."""
+    """The measured twist may be outside of the ordered one for this long."""
 
     order_wait_s: float = 0.5
     """An order that another one has replaced gets to the driver, and into its setpoints, within this time."""
     jerk_mps3: float = 100.0
     """The driver's limit; order_hold_s has what it adds to a change of speed."""
     jolts: int = 5
-    """So many changes of its velocity that no wheel can do tell that a sensor lies."""
+    """This many velocity changes that no wheel can do show that a sensor is faulty."""
     braking_samples: int = 3
-    """So many samples in a row of a wheel that brakes too little count."""
+    """This many samples in a row of a wheel that brakes too little count."""
     stand_impulse_s: float = 0.05
-    """A drive may push for so long at rated torque, or longer at less, while its wheel shows no motion."""
+    """A drive may push for this long at rated torque, or longer at less, while its wheel shows no motion."""
     stand_answer_s: float = 0.2
     """With zero ordered, a drive that did so must switch its power off within this time after it [s]."""
     stand_proof: bool = True

@@ -1,4 +1,4 @@
-"""Reads a YAML 1.2 file into plain values and remembers the line of each key. Knows nothing about robots."""
+"""Reads a YAML 1.2 file into plain values and remembers the line of each key. Independent of robots."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def line_of_brackets(text: str) -> int:
 
 
 class ExcessError(MarkedYAMLError):
-    """The file goes beyond a limit. `problem` says which, `problem_mark` where."""
+    """The file goes beyond a limit. `problem` names it, `problem_mark` has the place."""
 
 
 class BoundedComposer(Composer):

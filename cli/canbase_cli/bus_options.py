@@ -1,4 +1,4 @@
-"""The options of the commands that speak on the bus themselves: which bus."""
+"""The options of the commands that use the bus themselves: which bus."""
 
 from __future__ import annotations
 

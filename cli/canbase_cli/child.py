@@ -1,6 +1,6 @@
 """A part of the stack as the child of another process: `python -m canbase_cli.child PARENT_PID driver …`.
 
-It gets SIGTERM when that parent dies, however it dies: nobody may be left driving.
+It gets SIGTERM when that parent ends, however it ends: no part may go on driving.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Shell completion by Tab: names from the robot.yaml that is named earlier on the line, or the bench sample.
 
-A robot.yaml that cannot be read proposes nothing: the command itself tells what is wrong in it.
+A robot.yaml that cannot be read proposes nothing: the command itself reports what is wrong in it.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ CANCEL_AFTER_M: Final = 0.3
 RUN_S: Final = 60.0
 DOMAINS: Final = range(215, 232)
 QUIET_S: Final = 1.0
-"""For so long after a result nothing may move."""
+"""After a result nothing may move for this long [s]."""
 AGAIN_S: Final = 0.5
 PATIENCE: Final = {
     "command_s": 0.5,

@@ -4,7 +4,7 @@ Never over Fast DDS's shared memory.
 
 There a sender waits up to 0.3 s for a receiver that is slow to answer, such as one that is just starting on a loaded
 computer. rclpy holds Python's interpreter lock meanwhile, so one late process would stop the control loop of another,
-and the watchdog would rightly stop the robot. Over UDP a sender waits for nobody.
+and the watchdog would rightly stop the robot. Over UDP no sender waits.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from typing import Final
 _PROFILES: Final = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")  # Fast DDS 2 and 3
 _RANGE: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _CHOICES: Final = (_RANGE, "ROS_STATIC_PEERS", *_PROFILES)
-"""Who has set one of them has said who may hear."""
+"""If one of them is set, the user has chosen the range of discovery."""
 _NO_PROFILES_FROM_HERE: Final = "SKIP_DEFAULT_XML_FILE"
-"""Otherwise Fast DDS reads DEFAULT_FASTRTPS_PROFILES.xml of the current folder, whoever has put it there."""
+"""Otherwise Fast DDS reads DEFAULT_FASTRTPS_PROFILES.xml of the current folder, whose owner is unknown."""
 _FAST_DDS: Final = ("", "rmw_fastrtps_cpp", "rmw_fastrtps_dynamic_cpp")
 _LOCAL: Final = Path(__file__).with_name("fastdds_local.xml")
 
 
 def stay_on_this_computer(environment: MutableMapping[str, str]) -> None:
-    """Changes the environment of this process, unless it says who may hear. DDS has no users: who hears may order."""
+    """Changes the environment of this process, unless it sets the range. DDS has no users: every receiver may order."""
     if not any(environment.get(name) for name in _CHOICES):
         environment[_RANGE] = "LOCALHOST"
 
@@ -39,6 +39,6 @@ def prefer_udp(environment: MutableMapping[str, str]) -> None:
     if environment.get("RMW_IMPLEMENTATION", "") not in _FAST_DDS or any(environment.get(name) for name in _PROFILES):
         return
     environment.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
-    if environment.get(_RANGE) == "LOCALHOST":  # here rmw_fastrtps adds shared memory whatever the line above says
+    if environment.get(_RANGE) == "LOCALHOST":  # here rmw_fastrtps adds shared memory in spite of the line above
         environment[_RANGE] = "SYSTEM_DEFAULT"
         environment.update(dict.fromkeys(_PROFILES, str(_LOCAL)))

@@ -110,7 +110,7 @@ def _snapshot(robot: str, kept: dict[str, tuple[Any, float]], now_s: float) -> S
 
 
 def _end_signals() -> list[int]:
-    """A list that receives the number of each signal that asks for the end."""
+    """A list that receives the number of each signal that requests the end."""
     received: list[int] = []
 
     def note(number: int, _frame: FrameType | None) -> None:

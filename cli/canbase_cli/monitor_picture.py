@@ -20,7 +20,7 @@ from canbase_runtime.stop_cause import StopCause, stop_cause
 from canbase_runtime.watchdog_view import WatchdogView, watchdog_view
 
 SILENT_S: Final = 1.5
-"""A node that has said nothing for longer is shown as silent: its slowest state comes every 0.5 s."""
+"""A node is shown without a state when its last message is older [s]: its slowest state comes every 0.5 s."""
 ACTIONS: Final = ("passes", "limits", "slows", "STOPS")
 """SafetyState.action in words."""
 GOOD: Final = "green"
@@ -39,7 +39,7 @@ class Heard:
 
     @property
     def fresh(self) -> bool:
-        """Whether what it says can be taken for what is."""
+        """Whether its last message is recent enough to be shown as the state."""
         return self.age_s is not None and self.age_s <= SILENT_S
 
 
@@ -122,7 +122,7 @@ def _driver_words(heard: Heard) -> list[Text]:
 
 
 def _part(title: str, heard: Heard, draw: Callable[[Any], RenderableType]) -> Panel:
-    """What a silent node said last is left out: nobody may take it for what is."""
+    """The last state of a node that no longer publishes is left out: it must not be taken for the present one."""
     body = draw(heard.message) if heard.fresh else _silence("the node", heard)
     return Panel(body, title=title, title_align="left", border_style="none" if heard.fresh else BAD)
 

@@ -20,16 +20,16 @@ kernel's threads that serve interrupts run: without them no frame would arrive."
 
 
 LONGEST_US: Final = 1_000_000
-"""A thread with real-time priority that runs for so long without ever waiting ends its process (RLIMIT_RTTIME,
+"""A thread with real-time priority that runs for this long without ever waiting ends its process (RLIMIT_RTTIME,
 SIGXCPU): it would keep everything else of the computer from running. The threads here wait every 20 ms."""
 THREADS: Final = Path("/proc/self/task")
 
 
 def raise_priority(part: str) -> None:
-    """Of all threads that this process has, and of those that they start. Where it is not allowed, one line says so.
+    """Of all threads that this process has, and of those that they start. Where it is not allowed, it logs one line.
 
     For a process that is ready to run: one that is still starting, above others, would hold them up for a second where
-    processors are few, and the mux would take the silence of a joystick for its release.
+    processors are few, and the mux would take a late message of a joystick for its release.
     """
     try:
         resource.setrlimit(resource.RLIMIT_RTTIME, (LONGEST_US, 2 * LONGEST_US))

@@ -12,7 +12,7 @@ NOT_READY_S = 15.0
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What the robot's topics say; `state` None: no motor_driver/status received yet."""
+    """The state of the robot's topics; `state` None: no motor_driver/status received yet."""
 
     state: DriverState | None = None
     detail: str = ""
@@ -45,7 +45,7 @@ class Teller:
     """NOT READY was printed: it is printed once."""
 
     def line(self, seen: Seen, now_s: float) -> str | None:
-        """A line to print now, if any. The robot is ready, and all is said, when `missing` is None."""
+        """A line to print now, if any. The robot is ready when `missing` is None."""
         why = missing(seen)
         if why is None:
             return f"READY after {now_s - self.began_s:.0f} s{self._next('canbase drive 0.5', 'canbase monitor')}"

@@ -1,6 +1,6 @@
 """Whether the parts that run on this computer were started with this robot.yaml and with this canbase. Reads /proc.
 
-Otherwise everything that `canbase doctor` compares is compared with a file that nobody uses.
+Otherwise everything that `canbase doctor` compares is compared with a file that is not in use.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ CLOCKS_S: Final = 2.0
 """A file that changed so shortly after the start of a process was there before: boot time is known to a second."""
 RESTART: Final = "restart all parts, so that they use the current file"
 OF_THE_USER: Final = ("lease_socket", "lease_uid", "bus_arguments")
-"""Values of the watchdog's configuration that follow from who starts it."""
+"""Values of the watchdog's configuration that follow from what starts it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,7 @@ def _running(part: str, name: str, proc: Path) -> Iterator[Running]:
         if pid:
             words = (proc / str(pid) / "cmdline").read_bytes().decode(errors="replace").split("\0")
             yield Running(part, pid, _started_s(pid, proc), tuple(words))
-    except (OSError, ValueError, IndexError):  # it ended meanwhile, or belongs to somebody who hides it
+    except (OSError, ValueError, IndexError):  # it ended meanwhile, or belongs to a user who hides it
         return
 
 

@@ -1,4 +1,4 @@
-"""`canbase scan`: which nodes are on the bus, who they are, and which drive profile fits them."""
+"""`canbase scan`: the nodes on the bus, their identities, and the drive profile that fits each."""
 
 from __future__ import annotations
 

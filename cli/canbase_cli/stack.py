@@ -1,7 +1,7 @@
 """The processes of one robot, started and ended together. Used by `canbase up` and `canbase demo`.
 
 Each part is a process of its own (`child.py`) that gets SIGTERM when this one dies, however it dies. The order of the
-end: who commands ends first, who stops the robot last.
+end: the sources of commands first, the parts that stop the robot last.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ START_ORDER: Final = ("sim", "watchdog", "velocity", "driver", "action-server")
 END_ORDER: Final = ("action-server", "velocity", "driver", "watchdog", "sim")
 WITHOUT_ROS: Final = ("sim", "watchdog")
 GRACE_S: Final = 10.0
-"""A part that still runs so long after SIGTERM is killed; the driver needs the time of its ramp."""
+"""A part that still runs this long after SIGTERM is killed; the driver needs the time of its ramp [s]."""
 POLL_S: Final = 0.02
 
 
@@ -99,7 +99,7 @@ class Stack:
             return
         name = robot.name
         folder = latch_folder(os.environ if self._env is None else self._env, Path.home(), name)
-        # Where they cannot be made the parts start latched, and say why.
+        # Where they cannot be made, the parts start latched and report the reason.
         with suppress(OSError):
             create_first(folder, name)
 

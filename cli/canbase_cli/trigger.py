@@ -22,7 +22,7 @@ FILTER_S: Final = 1.0
 STATE_S: Final = 1.0
 """motor_driver/status and safety_filter/state come ten times a second."""
 SLICE_S: Final = 0.1
-"""Ctrl-C is heard after this at the latest."""
+"""Ctrl-C takes effect after this at the latest [s]."""
 WaitOption = Annotated[
     float, typer.Option("--wait", metavar="SECONDS", min=0.1, help="How long to look for the motor driver.")
 ]
@@ -96,7 +96,7 @@ class _Caller:
             fail(f"no motor driver offers {name}; is it running (canbase up), in this namespace?", NO_DRIVER)
 
     def call(self, service: str) -> str:
-        """The sentence of an answer that says it is done."""
+        """The sentence for an answer that reports success."""
         from std_srvs.srv import Trigger
 
         self.need_driver(service)

@@ -84,7 +84,7 @@ def _refuse_twice(robot: Robot) -> None:
 
 
 def _end_signals() -> list[int]:
-    """A list that receives the number of each signal that asks for the end."""
+    """A list that receives the number of each signal that requests the end."""
     received: list[int] = []
 
     def note(number: int, _frame: FrameType | None) -> None:

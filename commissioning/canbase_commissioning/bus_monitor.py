@@ -1,4 +1,4 @@
-"""Who is on the bus, by what is heard alone: nodes, their states and heartbeats, signs of a master, load. CiA 301.
+"""The nodes on the bus, from received frames alone: their states and heartbeats, signs of a master, load. CiA 301.
 
 Nothing is sent in here, and nothing is remembered longer than the listening lasts.
 """
@@ -36,12 +36,12 @@ from canbase_driver.supervision.watchdog_link import (
 SYNC = 0x080
 OURS = {DRIVER_NODE_ID: "canbase's motor driver", WATCHDOG_NODE_ID: "canbase's watchdog"}
 SDO_QUIET_S = 0.05
-"""An SDO channel on which nobody has asked for so long is free: a boot asks more often, a measurement now and then."""
+"""An SDO channel without a request for this long is free [s]: a boot uses it more often, a measurement now and then."""
 
 
 @dataclass(slots=True)
 class HeardNode:
-    """One node, as far as it spoke."""
+    """One node, as far as its frames show it."""
 
     node_id: int
     nmt_state: NmtState | None = None
@@ -53,7 +53,7 @@ class HeardNode:
 
     @property
     def period_s(self) -> float:
-        """Of its heartbeat, the median [s]; NaN: fewer than two were heard."""
+        """Of its heartbeat, the median [s]; NaN: fewer than two were received."""
         gaps = [b - a for a, b in zip(self.heartbeats_at, self.heartbeats_at[1:], strict=False)]
         return statistics.median(gaps) if gaps else math.nan
 
@@ -76,7 +76,7 @@ class HeardNode:
 
 
 class Listener:
-    """Takes every frame of others, and says what it tells."""
+    """Takes every frame of other nodes, and derives what it shows."""
 
     def __init__(self, now_s: float) -> None:
         self.since = now_s
@@ -146,7 +146,7 @@ class Listener:
             node.heartbeats_at.append(now_s)
 
     def sdo_free(self, node_id: int, now_s: float) -> bool:
-        """Whether nobody else has asked this node by SDO for a while."""
+        """Whether no other master has used SDO with this node for a while."""
         return now_s - self._sdo_asked_at.get(node_id, -math.inf) > SDO_QUIET_S
 
     @property

@@ -19,7 +19,7 @@ BOTH_EDGES: Final = (0.25, 4.0)
 
 
 class CalibrationError(ValueError):
-    """The measurements contradict each other. The text says what to look at."""
+    """The measurements contradict each other. The text names the likely reason."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,7 +67,7 @@ def floor_edits(robot: Robot, found: FloorFound) -> list[Edit]:
 
 
 def identity_edits(robot: Robot, boots: Mapping[int, BootReport]) -> list[Edit]:
-    """What 1018h of each drive that was booted says, where robot.yaml does not say so; later boots compare with it."""
+    """1018h of each drive that was booted, where robot.yaml has no identity; later boots compare with it."""
     edits = []
     for i, drive in enumerate(robot.drives):
         found = boots[drive.node_id].identity if drive.node_id in boots else drive.identity

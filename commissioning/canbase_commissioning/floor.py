@@ -12,7 +12,7 @@ from canbase_commissioning.powered_drives import PoweredDrives
 from canbase_commissioning.wheel_direction import braking_way_m, rest
 
 LIMIT_FACTOR = 3.0
-"""A drive that takes so many times as long as it should is given up."""
+"""A drive that takes this many times its expected time is given up."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""A guided procedure as a script to be read from top to bottom: it moves, waits, asks and reports. The runner is pure.
+"""A guided procedure as a script to be read from top to bottom: it moves, waits, prompts, reports. The runner is pure.
 
 A script is a generator: it yields `Until`, `Ask` or `Tell`, and is sent the answer. While it waits, the rig goes on.
 """
@@ -18,7 +18,7 @@ E = TypeVar("E", bound=Enum)
 
 
 class CommissionError(Exception):
-    """The procedure cannot go on. The text says why, and what to do."""
+    """The procedure cannot go on. The text has the reason and the remedy."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Until:
 class Ask:
     """A question to the person at the machine. `key` names it in an answers file. The answer: their words.
 
-    `check` raises ValueError for words that make no sense: then it is asked again. `confirms`: it wants a yes.
+    `check` raises ValueError for an invalid answer: then the question is repeated. `confirms`: it wants a yes.
     """
 
     key: str
@@ -95,9 +95,9 @@ def _confirm(text: str) -> None:
 
 
 class Guide(Generic[T]):
-    """Runs one script on one rig. A session; when it waits for a person, `question` says for what.
+    """Runs one script on one rig. A session; when it waits for a person, `question` has the question.
 
-    Ends with `result`, or raises what the script or the rig raised: whoever runs it must then say farewell.
+    Ends with `result`, or raises what the script or the rig raised: its caller must then run safe_stop.
     """
 
     def __init__(self, rig: PoweredDrives, script: Script[T], tell: Callable[[Tell], None]) -> None:
@@ -127,7 +127,7 @@ class Guide(Generic[T]):
         return frames
 
     def answer(self, text: str) -> None:
-        """The words of the person. Raises ValueError, and goes on asking, when they make no sense.
+        """The person's answer. Raises ValueError for an invalid one, and keeps the question open.
 
         Raises CommissionError when they did not confirm.
         """

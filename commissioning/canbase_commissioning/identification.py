@@ -1,6 +1,6 @@
 """The active part of `canbase scan`: queries the identity of every node id by SDO reads (CiA 301, 1000h, 1017h, 1018h).
 
-Names and firmware (1008h, 100Ah) take segmented transfers and are read only where nobody else uses the channel.
+Names and firmware (1008h, 100Ah) take segmented transfers and are read only where no other client uses the channel.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ UNHEARD_ATTEMPTS, HEARD_ATTEMPTS = 1, 3
 
 @dataclass(frozen=True, slots=True)
 class NodeCard:
-    """What one node says of itself; None: it lacks the object. `profile_402`: 1000h says motor drive."""
+    """The identity of one node; None: it lacks the object. `profile_402`: 1000h names a motor drive."""
 
     node_id: int
     device_type: int | None
@@ -35,12 +35,12 @@ class NodeCard:
 
     @property
     def profile_402(self) -> bool:
-        """Whether 1000h says that it is a motor drive (CiA 402)."""
+        """Whether 1000h names a motor drive (CiA 402)."""
         return self.device_type is not None and self.device_type & 0xFFFF == 402
 
 
 def identify(node_id: int, with_texts: bool) -> Steps[NodeCard | bool]:
-    """Asks one node who it is; False: nobody answers at this id."""
+    """Reads the identity of one node; False: no node answers at this id."""
     try:
         device_type = yield from _number(0x1000, 0)
     except SdoTimeout:
@@ -71,7 +71,7 @@ def _text(index: int) -> Steps[str]:
 
 
 class Identification:
-    """Asks `node_ids`, those that were heard more patiently. `cards` has who answered, by node id."""
+    """Reads `node_ids`, with more tries where frames were received. `cards` has the nodes that answered, by node id."""
 
     def __init__(self, node_ids: Iterable[int], heard: Listener, timeout_s: float, *, with_texts: bool) -> None:
         self._node_ids = tuple(node_ids)
@@ -90,7 +90,7 @@ class Identification:
 
     @property
     def cards(self) -> dict[int, NodeCard]:
-        """Who answered."""
+        """The nodes that answered."""
         return {task.node_id: task.result for task in self._tasks if isinstance(task.result, NodeCard)}
 
     def on_frame(self, frame: Frame, now_s: float) -> None:

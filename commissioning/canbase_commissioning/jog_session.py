@@ -1,6 +1,6 @@
 """`canbase jog`: one wheel turns while a key is held on a terminal, and only then. Pure.
 
-A terminal tells of key presses alone: a held key repeats, and one that repeats no more is released. So the first press
+A terminal reports only key presses: a held key repeats, and a released key no longer does. So the first press
 moves nothing, motion begins with the first repetition, and ends when the next one does not come in time.
 """
 
@@ -16,7 +16,7 @@ FIRST_S = 0.8
 HELD_S = 0.25
 """Between repetitions: 0.03 s to 0.1 s on usual terminals, and the delay of a remote one."""
 IDLE_S = 1.0
-"""So long after the last motion the power is taken away."""
+"""This long after the last motion the voltage is switched off [s]."""
 KEYS = {"w": 1, "\x1b[A": 1, "s": -1, "\x1b[B": -1}
 """Forward, arrow up; backward, arrow down. Every other key stops."""
 QUIT = ("q", "\x04")
@@ -32,7 +32,7 @@ class DeadMan:
         self._is_held = False
 
     def press(self, key: str, now_s: float) -> None:
-        """A key arrived. Another one than the last begins anew."""
+        """A key arrived. Another one than the last starts again."""
         in_time = now_s - self._pressed_at <= (HELD_S if self._is_held else FIRST_S)
         self._is_held = key in KEYS and key == self._key and in_time
         self._key, self._pressed_at = key, now_s
@@ -55,7 +55,7 @@ def split_keys(text: str) -> list[str]:
 
 
 class JogSession:
-    """One wheel under a dead-man key. `quit` ends it; whoever runs it must then say farewell. Ticks raise RigError."""
+    """One wheel under a dead-man key. `quit` ends it; its caller must then run safe_stop. Ticks raise RigError."""
 
     def __init__(self, rig: PoweredDrives, joint: str, speed_mps: float) -> None:
         """`speed_mps`: of the rim [m/s]. Raises KeyError for an unknown joint."""
@@ -83,7 +83,7 @@ class JogSession:
         self._rig.on_frame(frame, now_s)
 
     def tick(self, now_s: float) -> list[Frame]:
-        """Power comes with the first wish, goes a while after the last one."""
+        """Power comes with the first request, and goes a while after the last one."""
         direction = self._dead_man.direction(now_s) if self._rig.ready else 0
         if direction:
             self._moved_at = now_s

@@ -66,7 +66,7 @@ def parse_address(text: str) -> Address:
 
 
 def known_object(at: Address, eds_files: Iterable[Eds], profile: Profile | None) -> Known:
-    """What the first of the EDS files that has it, or the profile, says. `eds_files`: the maker's first, then ours."""
+    """The entry of the first EDS file that has it, or of the profile. `eds_files`: the maker's first, then ours."""
     by_profile = _of_profile(at, profile) if profile else None
     found = [entry for entry in (_of_eds(at, eds) for eds in eds_files) if entry is not None]
     name = found[0].name if found else ""
@@ -170,7 +170,7 @@ def show(data: bytes, kind: str) -> str:
 
 
 def meaning(at: Address, data: bytes) -> str:
-    """What the value says in words; empty where a number says enough."""
+    """The meaning of the value in words; empty where the number is enough."""
     value = int.from_bytes(data[:8], "little")
     index = at.index - AXIS_OFFSET if 0x6800 <= at.index < 0x7000 else at.index
     if index == 0x6041:

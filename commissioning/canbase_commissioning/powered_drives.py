@@ -1,7 +1,7 @@
 """The drives under a tool that moves them slowly: boot, both heartbeats, setpoints, SYNC, every way to the stop. Pure.
 
-It stands in for driver and watchdog at once, with the driver's own parts, and must be alone on the bus: whoever else
-speaks as a master ends it. Nothing moves unless `speeds_mps` says so, and each exit goes through `safe_stop.py`.
+It stands in for driver and watchdog at once, with the driver's own parts, and must be alone on the bus: a frame of
+another master ends it. Nothing moves unless `speeds_mps` orders it, and each exit goes through `safe_stop.py`.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ BEATS_PER_TIMEOUT = 3
 RAMP_MPS2 = 0.2
 """A tool is in no hurry: the rim's speed changes so fast at most, and never faster than limits.acceleration_mps2."""
 RUNAWAY_FACTOR, RUNAWAY_MPS = 2.0, 0.1
-"""A wheel faster than factor × what was ordered + this is taken for one that does not do what it is told."""
+"""A wheel faster than factor × the order + this does not follow its order."""
 STEP_MAX_S = 0.05
 SILENT_CYCLES = 30
 """SYNCs without an answer; cycles are counted and not seconds, so that a pause of this computer is not the drive's."""
 WINDOW_S = 0.2
-"""Speed by the encoder is taken over so long."""
+"""Speed by the encoder is taken over this time [s]."""
 RESET_CYCLES = 5
 
 
 class RigError(Exception):
-    """The drives do not do what they are told, or somebody else commands them. Everything stops."""
+    """The drives do not follow their orders, or another master commands them. Everything stops."""
 
 
 class PoweredDrives:
@@ -66,7 +66,7 @@ class PoweredDrives:
         self.override: PowerGoal | None = None
         """For all drives, whatever speeds are wanted."""
         self.signs: dict[int, tuple[float, str]] = {}
-        """By node: when it first said that it missed us, and how. Cleared by whoever starts a trial."""
+        """By node: when it first reported that it misses us, and how. The caller clears it at the start of a trial."""
         self.probes: list[NodeTask[Sample]] = []
         """SDO readings that are under way, even while nothing else is sent."""
         self.now_s = -math.inf
@@ -87,7 +87,7 @@ class PoweredDrives:
 
     @property
     def ready(self) -> bool:
-        """Whether all drives are booted and heard."""
+        """Whether all drives are booted and send heartbeats."""
         return all(node.presence is Presence.READY for node in self.nodes.values())
 
     def waiting_for(self) -> str:
@@ -183,7 +183,7 @@ class PoweredDrives:
                 node.on_velocity(axis, frame, now_s)
 
     def tick(self, now_s: float) -> list[Frame]:
-        """What is due. Raises RigError when a wheel runs away, or another master speaks."""
+        """The frames that are due. Raises RigError when a wheel runs away, or at a frame of another master."""
         self.now_s = now_s
         frames, self._pending = self._pending, []
         if self.has_ended:
@@ -280,7 +280,7 @@ class PoweredDrives:
         return [*frames, self._sync.next()]
 
     def off_frames(self) -> list[Frame]:
-        """Voltage off for all axes, then the nodes forget what they were told: a lost heartbeat is no fault then."""
+        """Voltage off for all axes, then an NMT reset of their communication: a lost heartbeat is no fault then."""
         frames = []
         for node in self.nodes.values():
             for axis, word in zip(node.axes, node.controlwords(PowerGoal.OFF), strict=True):
@@ -288,7 +288,7 @@ class PoweredDrives:
         return [*frames, self._sync.next()]
 
     def end_frames(self) -> list[Frame]:
-        """The last words to each node: voltage off by SDO, pre-operational, and forget all that it was told.
+        """The last frames to each node: voltage off by SDO, pre-operational, and an NMT reset of its communication.
 
         Forgotten is 1016h too: a drive must not report a lost heartbeat after an orderly end. One that may still have
         power keeps it, so that it stops by itself.
@@ -307,5 +307,5 @@ class PoweredDrives:
 
 
 def _voltage_off(node_id: int, at: Place) -> Frame:
-    """Expedited SDO download of 6040h = 0 (CiA 301), whose answer nobody waits for."""
+    """Expedited SDO download of 6040h = 0 (CiA 301), without waiting for its answer."""
     return Frame(SDO_TO_SERVER + node_id, bytes((0x2B, at.index & 0xFF, at.index >> 8, at.sub, 0, 0, 0, 0)))

@@ -23,7 +23,7 @@ class Results:
     floor: FloorFound | None = None
     edits: list[Edit] = field(default_factory=list)
     done: set[Step] = field(default_factory=set)
-    """Steps that have come to their end, with what robot.yaml says by `edits`."""
+    """Steps that have ended, with the values of robot.yaml after `edits`."""
     ended_by: str = ""
     """Why it did not come to its end; empty: it did."""
     dry_run: bool = False

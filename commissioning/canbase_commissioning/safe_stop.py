@@ -50,5 +50,5 @@ class SafeStop:
         return rig.end_frames()
 
     def _stands(self, now_s: float) -> bool:
-        """Three quick stops at least, whatever was heard."""
+        """At least three quick stops, whatever was received."""
         return now_s - self._since > self.STOP_S or (now_s - self._since > 0.05 and self._rig.standing)

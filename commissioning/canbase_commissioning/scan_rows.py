@@ -1,4 +1,4 @@
-"""`canbase scan`, from what was heard and answered to its rows. Pure."""
+"""`canbase scan`, from received frames and answers to its rows. Pure."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class ScanRow:
 
 
 def scan_rows(heard: dict[int, HeardNode], cards: dict[int, NodeCard], robot: Robot | None) -> list[ScanRow]:
-    """A row for each node that was heard or answered, by node id; those of robot.yaml that are missing too."""
+    """A row for each node that sent a frame or answered, by node id; those of robot.yaml that are missing too."""
     wired = {drive.node_id for drive in robot.drives} if robot else set()
     return [
         _row(node_id, heard.get(node_id), cards.get(node_id), robot) for node_id in sorted({*heard, *cards, *wired})
@@ -74,7 +74,7 @@ def _what(card: NodeCard, profile: str) -> str:
 
 
 def _heartbeat(heard: HeardNode | None, card: NodeCard | None) -> str:
-    """What is heard counts before what is set."""
+    """What was received counts before what is set."""
     if heard is not None and not math.isnan(heard.period_s):
         return f"{heard.period_s * 1000:.0f} ms"
     if card is None or card.heartbeat_ms is None:

@@ -1,6 +1,6 @@
 """The watchdog proof: whether each drive stops by itself when no commands come any more, and how fast. Wheels up.
 
-Two trials at a low speed. First this computer falls silent, as if it had died; then only the watchdog's heartbeat is
+Two trials at a low speed. First this computer stops sending, as if it had failed; then only the watchdog's heartbeat is
 missing, while setpoints go on, as at the last rung of the watchdog's ladder.
 """
 
@@ -23,7 +23,7 @@ from canbase_driver.cia402 import PowerGoal
 SILENCE = "this computer stopped sending"
 HEARTBEAT = "the watchdog's heartbeat stopped, with setpoints still sent"
 SILENCE_S = 2.5
-"""At least so long nothing is sent: makers' own command timeouts are up to a second."""
+"""Nothing is sent for at least this long [s]: makers' own command timeouts are up to a second."""
 STILL_S, STILL_M = 0.3, 0.002
 """It stands when it rolls less than this in this time."""
 READY_S = 15.0
@@ -46,7 +46,7 @@ class Outcome:
     way_m: float
     limit_s: float
     sign: str
-    """What the drive said itself, and when; empty: nothing."""
+    """What the drive reported itself, and when; empty: nothing."""
 
     @property
     def is_late(self) -> bool:

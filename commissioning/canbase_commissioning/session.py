@@ -1,4 +1,4 @@
-"""How a tool talks on the bus: a session is given frames and the time, and returns frames, until it is done. No bus.
+"""How a tool uses the bus: a session is given frames and the time, and returns frames, until it is done. No bus.
 
 Putting a session on a real bus is `bus_line.py` of the command line.
 """
@@ -33,7 +33,7 @@ class Session(Protocol):
 
 
 class Echo:
-    """Tells frames of our own that come back (udp_multicast does that) from those of others."""
+    """Distinguishes our own frames that come back (udp_multicast does that) from those of others."""
 
     def __init__(self) -> None:
         self._sent: deque[tuple[float, Frame]] = deque()
@@ -54,7 +54,7 @@ class Echo:
 
 
 def always(_now: float) -> bool:
-    """Nobody else uses the SDO channel."""
+    """No other client uses the SDO channel."""
     return True
 
 

@@ -42,11 +42,11 @@ class Seen(Enum):
 
 
 AGAIN = ".again"
-"""Ends the key of a question that is asked a second time, after a correction."""
+"""Ends the key of a question that is repeated after a correction."""
 
 
 def find_direction(rig: PoweredDrives, drive: Drive, again: str = "") -> Script[WheelFound]:
-    """Turns one wheel forward, as robot.yaml has it, and asks. Raises CommissionError when something else happens.
+    """Turns one wheel forward, as robot.yaml has it, and prompts. Raises CommissionError when something else happens.
 
     `again`: AGAIN after a correction.
     """
@@ -79,7 +79,8 @@ def find_direction(rig: PoweredDrives, drive: Drive, again: str = "") -> Script[
 def measure_scale(
     rig: PoweredDrives, drive: Drive, revolutions: float, speed_mps: float, again: str = ""
 ) -> Script[tuple[Scale, Turned]]:
-    """Turns one wheel by `revolutions` as robot.yaml counts them, and asks. Raises CommissionError, CalibrationError.
+    """Turns one wheel by `revolutions` as robot.yaml counts them, and prompts. Raises CommissionError,
+    CalibrationError.
 
     `again`: AGAIN after a correction.
     """

@@ -1,6 +1,6 @@
 """Checks of `canbase doctor --symptom` about the action: its server, its goals, their feedback, cancel and result.
 
-Pure: from `Evidence` to one `Check` each. symptoms.py says which belong to which symptom.
+Pure: from `Evidence` to one `Check` each. symptoms.py has the symptom that each belongs to.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def server_name(seen: Evidence) -> Check:
 
 
 def domain(seen: Evidence) -> Check:
-    """Can the two hear each other?"""
+    """Do the two reach each other?"""
     name, ours = "domain and network", settings(seen.environment)
     if seen.whole_name(ACTION) in seen.servers:
         return ok(name, f"seen with ROS_DOMAIN_ID {ours['ROS_DOMAIN_ID']}")
@@ -134,7 +134,7 @@ def feedback_rate(seen: Evidence) -> Check:
 
 
 def client_listens(seen: Evidence) -> Check:
-    """Is there a client to hear it?"""
+    """Is there a client that receives it?"""
     name = "a client listens"
     nodes = sorted(
         {each.node for goal in seen.running for each in seen.subscribers.get(f"{goal.action}/_action/feedback", ())}

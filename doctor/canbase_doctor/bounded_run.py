@@ -41,7 +41,7 @@ def run(
 
 
 def _ends(streams: Sequence[tuple[IO[bytes], int]], timeout_s: float) -> list[bytearray]:
-    """Of each stream the last bytes, so many at most, once all are closed."""
+    """The last bytes of each stream, at most this many, once all are closed."""
     kept = [bytearray() for _ in streams]
     until = time.monotonic() + timeout_s
     with selectors.DefaultSelector() as selector:

@@ -19,9 +19,9 @@ ENVIRONMENT: Final = re.compile(r"(ROS|RMW|CANBASE|AMENT|COLCON|FASTDDS|FASTRTPS
 FORBIDDEN: Final = re.compile(
     r"(?i)(\.(pem|key|p12|pfx|p7s|crt|cer)$)|(^|/)(keys|keystore|enclaves|private|\.ssh)(/|$)"
 )
-"""No file of such a name or below such a folder is taken, whoever names it."""
+"""No file of such a name or below such a folder is taken, even when an argument names it."""
 BOXES: Final = 5
-"""So many recordings of stops, the newest."""
+"""The number of recordings of stops, the newest first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class Command:
     argv: tuple[str, ...]
     timeout_s: float = 20.0
     environment: Mapping[str, str] | None = None
-    """None: that of whoever asks."""
+    """None: that of the caller."""
 
 
 def commands(config: Path, since: str, services: Mapping[str, str] | None = None) -> tuple[Command, ...]:

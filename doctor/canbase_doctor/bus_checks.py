@@ -1,4 +1,4 @@
-"""The rows of `canbase doctor` about the bus and the drives on it. Pure: from what was heard and read to `Check`s."""
+"""The rows of `canbase doctor` about the bus and the drives on it. Pure: from received frames and reads to `Check`s."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from canbase_driver.supervision.bus_health import ControllerState
 from canbase_driver.supervision.watchdog_link import LEASE_AGE_UNKNOWN, RUNGS, TRIPPED, WATCHING, WatchdogCounters
 
 SHORT_QUEUE, GOOD_QUEUE, LONG_QUEUE = 32, 64, 100
-"""Frames. Into the kernel's 10 a cycle of several axes does not fit; what waits in a long one while nobody acknowledges
+"""Frames. Into the kernel's 10 a cycle of several axes does not fit; what waits in a long one without acknowledgement
 goes out late."""
 _SHOWN: Final = 4
 _CUT_OFF: Final = (ControllerState.BUS_OFF, ControllerState.ERROR_PASSIVE, ControllerState.STOPPED)
@@ -38,14 +38,14 @@ class BusEvidence:
     problem: str = ""
     """Why the bus cannot be used; empty: it can."""
     link: Link | None = None
-    """Of a socketcan interface, where `ip` tells about it."""
+    """Of a socketcan interface, where `ip` reports it."""
     inspections: Mapping[int, Inspection] = field(default_factory=dict)
     unread: Mapping[int, str] = field(default_factory=dict)
     """Nodes that could not be read, and why."""
 
     @property
     def canbase_runs(self) -> bool:
-        """Whether driver or watchdog of canbase were heard."""
+        """Whether frames of canbase's driver or watchdog were received."""
         return any(node_id in self.heard.nodes for node_id in OURS)
 
 
@@ -116,7 +116,7 @@ def _load(seen: BusEvidence) -> Check:
 
 
 def _masters(seen: BusEvidence) -> Check:
-    """Beside canbase's own driver nobody else may command; without it nobody at all."""
+    """Beside canbase's own driver no other master may command; without it none at all."""
     signs = seen.heard.masters(seen.now_s)
     if not seen.canbase_runs and signs:
         return fail("masters", "; ".join(signs), "another program commands this bus: end it before canbase drives")

@@ -1,4 +1,4 @@
-"""The part of `canbase doctor` that looks at the bus: listens, reads the nodes, asks the system about the interface."""
+"""The part of `canbase doctor` that looks at the bus: listens, reads the nodes, queries the system's interface."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def look(robot: Robot) -> BusEvidence:
     with line:
         listening = ListenSession(LISTEN_S)
         line.run(listening)
-        heard, now_s = copy.deepcopy(listening.heard), listening.now_s  # what our own questions bring is no news
+        heard, now_s = copy.deepcopy(listening.heard), listening.now_s  # answers to our own requests are no evidence
         inquiry = ask(robot, listening.heard)
         line.run(inquiry)
         problem = line.problem
@@ -65,7 +65,7 @@ def evidence(
 
 
 def read_link(channel: str) -> Link | None:
-    """What `ip` tells about an interface; None where it cannot."""
+    """The report of `ip` about an interface; None where there is none."""
     words = ["ip", "-details", "-statistics", "-json", "link", "show", channel]
     try:
         done = subprocess.run(words, capture_output=True, text=True, timeout=IP_S, check=False)

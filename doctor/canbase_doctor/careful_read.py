@@ -23,7 +23,7 @@ _FILE: Final = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY | os.O_
 
 
 class RefusedError(OSError):
-    """It is there, and it is not taken. Its text says why."""
+    """The file exists and is not taken. Its text has the reason."""
 
     def __init__(self, why: str) -> None:
         super().__init__(errno.ELOOP, why)

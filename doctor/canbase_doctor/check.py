@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 
 class Verdict(Enum):
-    """What a check says."""
+    """The result of a check."""
 
     OK = "ok"
     WARN = "warn"
-    """It works, or cannot be told now; somebody should look at it."""
+    """It works, or cannot be judged now; a person should look at it."""
     INCONCLUSIVE = "inconclusive"
     """It took too long, and so did everything else on this computer: no evidence for or against."""
     FAIL = "FAIL"
@@ -61,7 +61,7 @@ def fail(name: str, found: str, advice: str) -> Check:
 
 
 def too_slow(overload: str, name: str, found: str, advice: str) -> Check:
-    """A time that is too long: wrong, or no evidence where `overload` says that this computer itself is late."""
+    """A time that is too long: a failure, or no evidence where `overload` shows that this computer itself is late."""
     if not overload:
         return fail(name, found, advice)
     evidence = f"{found}; this computer is overloaded: {overload}"

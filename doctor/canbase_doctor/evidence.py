@@ -57,7 +57,7 @@ class Endpoint:
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A goal as the server's status topic tells it; `status` as in action_msgs/GoalStatus."""
+    """A goal as the server's status topic reports it; `status` as in action_msgs/GoalStatus."""
 
     action: str
     uuid: str
@@ -93,7 +93,7 @@ class LoggedStep:
 
 @dataclass(frozen=True, slots=True)
 class ServerProcess:
-    """A process of the action server on this computer, and what of its environment decides whom it can talk to."""
+    """A process of the action server on this computer, and what of its environment decides which peers it reaches."""
 
     pid: int
     environment: Mapping[str, str]
@@ -106,7 +106,7 @@ class Answers:
     question_s: tuple[float, ...] = ()
     """list_parameters."""
     cancel_s: tuple[float, ...] = ()
-    """The cancel of a goal that nobody has."""
+    """The cancel of a goal that does not exist."""
     results: Mapping[str, bool] = field(default_factory=dict)
     """UUID of an ended goal → whether the server still gives its result."""
 
@@ -129,7 +129,7 @@ class Evidence:
     steps: tuple[LoggedStep, ...] = ()
     """The server's log lines of the last ten seconds."""
     servers: Mapping[str, tuple[Endpoint, ...]] = field(default_factory=dict)
-    """Who offers an action, by its whole name; in every namespace."""
+    """The servers of an action, by its whole name; in every namespace."""
     publishers: Mapping[str, tuple[Endpoint, ...]] = field(default_factory=dict)
     subscribers: Mapping[str, tuple[Endpoint, ...]] = field(default_factory=dict)
     goals: tuple[Goal, ...] = ()

@@ -1,6 +1,6 @@
 """Checks of `canbase doctor --symptom` about motion: its sources, mux and filter, and the topics that report it.
 
-Pure: from `Evidence` to one `Check` each. symptoms.py says which belong to which symptom.
+Pure: from `Evidence` to one `Check` each. symptoms.py has the symptom that each belongs to.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def zeros_are_ordered(seen: Evidence) -> Check:
 
 
 def mux_owner(seen: Evidence) -> Check:
-    """Does nobody else drive, past the mux or through it?"""
+    """Does no other node drive, past the mux or through it?"""
     name, mux = "who owns the base", seen.inputs.mux
     for topic in ("cmd_vel_mux", "cmd_vel"):
         nodes = [endpoint.node for endpoint in seen.publishers.get(topic, ())]
@@ -51,7 +51,7 @@ def mux_owner(seen: Evidence) -> Check:
 
 
 def driver_watchdog(seen: Evidence) -> Check:
-    """Does the driver turn silence and zero into a standstill, and does the watchdog look after it?"""
+    """Does the driver turn a missing command and zero into a standstill, and does the watchdog supervise it?"""
     name, status, order = "driver and watchdog", seen.on("motor_driver/status").last, seen.on("cmd_vel").last
     if status is None:
         return fail(name, "motor_driver publishes nothing", "use the emergency stop; then check its log")
@@ -113,7 +113,7 @@ def sensors(seen: Evidence) -> Check:
 
 
 def command_interface(seen: Evidence) -> Check:
-    """Do all senders of velocities send what the mux reads, and does the driver hear its output?"""
+    """Do all senders of velocities use the type that the mux reads, and does the driver receive its output?"""
     name = "command interface"
     for source, described in seen.robot.mux.sources.items():
         for endpoint in seen.publishers.get(described.topic, ()):

@@ -42,9 +42,9 @@ BEST_EFFORT: Final = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFF
 """Understands every publisher, reliable or not."""
 SLICE_S: Final = 0.1
 STATES: Final = ("motor_driver/status", "safety_filter/state", "velocity_mux/state", "odom")
-"""A robot that is well says all of them."""
+"""A healthy robot publishes all of them."""
 DISCOVERY_S: Final = 5.0
-"""So long their first words and the first answer of the action server may take: nobody is found at once."""
+"""The time for discovery: first messages and the first answer of the action server take this long [s]."""
 STATUS: Final = "/_action/status"
 
 
@@ -88,7 +88,7 @@ class Listener:
         return max(self._kept[topic][0][0] if self._kept[topic] else math.inf for topic in STATES)
 
     def goals(self) -> tuple[Goal, ...]:
-        """As each action told them last."""
+        """As each action reported them last."""
         last = {action: self._kept[f"{action}{STATUS}"][-1:] for action in ACTIONS}
         return tuple(
             Goal(action, bytes(each.goal_info.goal_id.uuid).hex(), each.status)
@@ -102,7 +102,7 @@ class Listener:
 
 
 def observe(loaded: Loaded, ros_args: list[str], seconds: float) -> Evidence:
-    """What a robot says of itself within `seconds` [s] after it was found, or was not."""
+    """What a robot publishes within `seconds` [s] after it was found, or was not."""
     rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = rclpy.create_node(DOCTOR, enable_rosout=False)

@@ -28,7 +28,7 @@ MOST_RESULTS: Final = 5
 
 
 class Series:
-    """Asks one service again and again; the first answer, which waits for discovery, does not count."""
+    """Calls one service again and again; the first answer, which waits for discovery, does not count."""
 
     def __init__(self, client: Client, request: Any) -> None:
         self._client, self._request = client, request
@@ -39,7 +39,7 @@ class Series:
         """When the first answer came; infinite before."""
 
     def step(self, now_s: float) -> bool:
-        """Asks, or looks for the answer; whether no question is on its way any more."""
+        """Calls, or looks for the answer; True: no call is pending any more."""
         if self._answer is None:
             if not self._client.service_is_ready():
                 return True
@@ -59,7 +59,7 @@ class Series:
 
 
 class Prober:
-    """Asks all that there is to ask, one after the other."""
+    """Makes all calls, one after the other."""
 
     def __init__(self, node: Node) -> None:
         self._node = node

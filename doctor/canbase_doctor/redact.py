@@ -88,7 +88,7 @@ _SUSPECT: Final = re.compile(
 )
 """What every pattern below needs in its first line: most of a journal has none, and is copied."""
 _LINES_AFTER: Final = 12
-"""So many lines behind such a one belong to it, and all deeper ones."""
+"""This many lines behind such a line belong to it, and all deeper ones."""
 
 
 def cleaned(text: str) -> str:

@@ -25,11 +25,11 @@ UNFOLLOWED = {
 }
 """What to do about a source that holds the base and is not followed."""
 SILENT_S = 1.5
-"""A state that was received longer ago says nothing: the slowest one comes every 0.5 s."""
+"""A state that was received longer ago is no evidence [s]: the slowest one comes every 0.5 s."""
 HANGS = "its process hangs, or its timers do not run: read its log, and restart it"
 PARTS_RUN = "is it running (canbase up), in this namespace and ROS_DOMAIN_ID?"
 MOSTLY_USABLE = 0.5
-"""Share of beams: a scanner of which more says nothing is covered, dirty or defective."""
+"""Share of beams: a scanner with more invalid beams is covered, dirty or defective."""
 PAUSE_S = 0.05
 """A pause of the watchdog's loop that is worth a look: ten of its turns."""
 
@@ -74,7 +74,7 @@ def _counts(status: DriverStatus) -> dict[str, int]:
 
 
 def watchdog(evidence: Evidence) -> list[Check]:
-    """The watchdog as the driver hears it on the bus: its state, its ages, its counters."""
+    """The watchdog as the driver receives it on the bus: its state, its ages, its counters."""
     heard = evidence.on("motor_driver/status")
     status = heard.last
     if status is None:
@@ -115,7 +115,7 @@ def _watchdog_counts(status: DriverStatus) -> dict[str, int]:
 
 
 def drives(evidence: Evidence) -> list[Check]:
-    """One row per drive that motor_driver tells about."""
+    """One row per drive that motor_driver reports."""
     status = evidence.on("motor_driver/status").last
     return [] if status is None else [_drive(drive) for drive in status.drives]
 
@@ -181,7 +181,7 @@ def _scanner(scanner: Any, dropped: int) -> Check:
 
 
 def velocity_mux(evidence: Evidence) -> list[Check]:
-    """Who drives, and who sends what is no number."""
+    """Which nodes drive, and which publish a value that is not finite."""
     state = evidence.on("velocity_mux/state").last
     if silent := _silent(evidence, "velocity_mux", "velocity_mux/state"):
         return [silent]

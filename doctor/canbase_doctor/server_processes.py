@@ -1,4 +1,4 @@
-"""Finds the processes of the action server on this computer, and what decides whom they can talk to. Reads /proc."""
+"""Finds the processes of the action server on this computer, and what decides which peers they reach. Reads /proc."""
 
 from __future__ import annotations
 

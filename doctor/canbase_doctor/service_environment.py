@@ -12,9 +12,9 @@ from typing import Final
 from canbase_runtime.environment_file import variables
 
 _THEIRS: Final = ("ROS_", "RMW_", "CANBASE_", "FASTDDS_", "FASTRTPS_", "CYCLONEDDS_")
-"""Whoever asks has no say in these: the services do not see his."""
+"""The caller's environment does not decide these: the services do not see it."""
 _OPERATOR: Final = "/canbase/operator"
-"""The enclave of deploy/sros2/policy.xml for those who look and ask."""
+"""The enclave of deploy/sros2/policy.xml for observers."""
 
 
 def service_environment(own: Mapping[str, str], drop_ins: Iterable[str], env_file: str) -> dict[str, str]:

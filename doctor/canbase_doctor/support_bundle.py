@@ -67,7 +67,7 @@ class Bundle:
         self.text(name, str(path), lambda: _regular(path))
 
     def output(self, command: support.Command) -> None:
-        """What a program prints; one that cannot tell anything is missing with its last words."""
+        """The output of a program; one that reports nothing is missing, with its last output."""
         shown = " ".join(command.argv) + (", in the services' environment" if command.environment is not None else "")
         try:
             code, said, complaint = run(command.argv, command.environment, command.timeout_s, LIMIT_BYTES)
@@ -180,7 +180,7 @@ def _black_boxes(bundle: Bundle, robot: Robot | None, state: Path) -> None:
                 path: modified(path) for path in (folder / file for file in names(folder)) if path.suffix == ".asc"
             }
         except OSError:
-            continue  # said below where no folder has any
+            continue  # reported below where no folder has any
     newest = support.newest_boxes(robot.name if robot else "", found)
     if not newest:
         whose = f"of {robot.name}" if robot else "of any robot"

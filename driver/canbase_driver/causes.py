@@ -1,4 +1,4 @@
-"""Why the driver gives no power, or stops: the words that canbase/msg/DriverStatus and stop events tell."""
+"""Why the driver gives no power, or stops: the causes that canbase/msg/DriverStatus and stop events report."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Cause(Enum):
     BOOTING = "booting"
     PREPARING = "preparing"
     NO_RECORD = "stop record"
-    """The records on disk do not say yet that there is power."""
+    """The records on disk are not LIVE yet."""
     ENABLING = "enabling"
     SHUTDOWN = "shutdown"
     NOT_CONFIGURED = "not configured"

@@ -3,7 +3,7 @@
 Rules of the goals
 1. OFF and QUICK_STOP are the same word in every state, an unknown one included: stopping needs no knowledge.
    They never set bit 3 (enable operation), so no way down leads through OPERATION ENABLED.
-2. OFF is disable voltage: the motor coasts. Whoever holds it brings the wheels to a stand first.
+2. OFF is disable voltage: the motor coasts. The caller brings the wheels to standstill first.
 3. ON goes up one step at a time and stays in OPERATION ENABLED. It never interrupts a quick stop: in QUICK STOP ACTIVE
    it keeps the word; a drive that stays there when it stands (605Ah = 5…8) needs OFF first. In an unknown state it is
    a quick stop too.
@@ -58,7 +58,7 @@ class DriveState(Enum):
 
 _WITH_TORQUE = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
 PREPARED = (DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED)
-"""As far as switched on: nothing but the enable is missing."""
+"""At least switched on: nothing but the enable is missing."""
 
 STATUSWORD_STATES = (
     (0x4F, 0x00, DriveState.NOT_READY_TO_SWITCH_ON),

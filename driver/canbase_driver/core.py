@@ -1,7 +1,7 @@
 """The motor driver without bus, clock and ROS: frames and commands in, frames and snapshots out.
 
 One cycle is `tick`: heartbeat, boots, the supervisor's judgement, a reset on its way, the setpoints of all axes,
-SYNC. Who stops what and why is in `supervisor.py`, how a node is booted in `sequence.py`, how fast the base may go in
+SYNC. The reasons to stop are in `hazards.py`, the boot of a node in `sequence.py`, the limits of the speed in
 `limiter.py`.
 """
 
@@ -67,10 +67,10 @@ Handler = Callable[[Frame, float], bool]
 
 
 class DriverCore:
-    """The whole driver as one object that is told the time [s, monotonic]."""
+    """The whole driver as one object. Time is an argument [s, monotonic]."""
 
     def __init__(self, robot: Robot, aim: Aim = Aim.ACTIVE, found: Found | None = None) -> None:
-        """`aim`: how far it goes by itself. `found`: the record of its stops at the start; None: nobody keeps one,
+        """`aim`: how far it goes by itself. `found`: the record of its stops at the start; None: no record is kept,
         which is for virtual time alone."""
         self._robot = robot
         self._readiness = Lifecycle(robot, aim)
@@ -96,7 +96,7 @@ class DriverCore:
         self._stop_requested = self._shutdown_requested = False
         self._heartbeat_at = self._ticked_at = -math.inf
         self._sync_since = -math.inf
-        """Start of the present run of SYNCs without a pause: a drive is not silent that was not asked."""
+        """Start of the present run of SYNCs without a pause: before it a drive had no SYNC to answer."""
         self._handlers = self._dispatch_table()
         self._bus_report = HEALTHY
         self.frames_dropped = 0
@@ -110,7 +110,7 @@ class DriverCore:
 
     @property
     def finished(self) -> bool:
-        """A shutdown was asked for, and nothing has power any more."""
+        """A shutdown was requested, and nothing has power any more."""
         return self._supervisor.finished
 
     @property
@@ -156,11 +156,11 @@ class DriverCore:
         return self._command.take(twist, received_at)
 
     def on_emergency(self, brakes_hard: bool, received_at: float) -> None:
-        """Whether the safety filter asks for the emergency deceleration, with the receive time of that."""
+        """Whether the safety filter requests the emergency deceleration, with the receive time of that."""
         self._command.take_emergency(brakes_hard, received_at)
 
     def on_bus(self, problem: str, now_s: float, report: BusReport = HEALTHY) -> None:
-        """The bus failed (a sentence), or works (empty); after a failure every node is booted anew."""
+        """The bus failed (a sentence), or works (empty); after a failure every node is booted again."""
         self._bus_report = report
         if self._bus_problem and not problem:
             for node in self._drives.nodes:
@@ -368,11 +368,11 @@ class DriverCore:
         return True
 
     def _answers_last_sync(self, now_s: float) -> bool:
-        """False for a TPDO that waited while this process stood still: it tells of then, and would pass for fresh."""
+        """False for a TPDO that waited while this process stood still: its values are old, and would pass for fresh."""
         return now_s - self._ticked_at <= self._feedback_s
 
     def _dispatch_table(self) -> dict[int, tuple[Handler, CanopenNode | None]]:
-        """Who takes a frame, and the node that may go on with its boot after it."""
+        """The part that takes a frame, and the node that may go on with its boot after it."""
         table: dict[int, tuple[Handler, CanopenNode | None]] = {
             STATE_COB_ID: (self._watchdog.on_frame, None),
             COUNTERS_COB_ID: (self._watchdog.on_counters, None),

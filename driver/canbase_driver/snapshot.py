@@ -28,9 +28,9 @@ class DriverSnapshot:
     finding: Finding
     """Why it is not ENABLED; its cause is NONE when it is."""
     standstill: bool
-    """All wheels stand, by encoder and velocity; or a stand is assumed."""
+    """All wheels are at standstill, by encoder and velocity; or that is assumed."""
     standstill_assumed: str = ""
-    """Why it is assumed and not measured; empty: it is measured, or they do not stand."""
+    """Why it is assumed and not measured, for /diagnostics; empty: it is measured, or a wheel turns."""
     watchdog: WatchdogReport
     command: CommandReport
     cycle: CycleReport

@@ -60,7 +60,7 @@ class Logger(Protocol):
 
 
 class Voice:
-    """What one part says: each sentence a line of ROS's log, and an entry of the journal with priority and fields."""
+    """The log of one part: each sentence is a line of ROS's log and a journal entry with priority and fields."""
 
     def __init__(self, logger: Logger, journal: Journal) -> None:
         self._logger, self._journal = logger, journal

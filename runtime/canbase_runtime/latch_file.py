@@ -59,7 +59,7 @@ def record_name(folder: Path, part: str) -> str:
 
 
 def machine() -> str:
-    """What tells this computer from others: its machine-id, and the serial number of a board that has one."""
+    """What identifies this computer: its machine-id, and the serial number of a board that has one."""
     found = []
     for path in _MACHINE:
         with contextlib.suppress(OSError):
@@ -103,7 +103,7 @@ class LatchFile:
         self._sequence = 0
 
     def open(self) -> Found:
-        """What it says. Never raises: what cannot be read counts as latched."""
+        """The mark of the record. Never raises: an unreadable record counts as latched."""
         try:
             found = self._read()
         except FileNotFoundError:
@@ -188,7 +188,7 @@ class LatchKeeper(threading.Thread):
             self._inbox.put(record)
 
     def finish(self, timeout_s: float) -> None:
-        """Write what is wanted, at most for so long, and end."""
+        """Write the wanted record within this time [s], and end."""
         self._inbox.put(None)
         if self.is_alive():
             self.join(timeout_s)
@@ -241,7 +241,7 @@ def _state_home(environment: Mapping[str, str], home: Path) -> Path:
 
 
 def _wrong_access(descriptor: int, path: Path) -> str:
-    """Who else could change it; empty: nobody but root."""
+    """Users besides root who could change it; empty: none."""
     file, folder, me = os.fstat(descriptor), path.parent.stat(), os.geteuid()
     if not stat.S_ISREG(file.st_mode):
         return f"{path} is no regular file"

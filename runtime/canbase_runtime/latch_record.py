@@ -1,7 +1,7 @@
 """The record of one part's latched stop: what a restart has to know, as bytes. Pure; the file is latch_file.py.
 
 Rules
-1. Before there may be power the record on disk already says LIVE. Whoever finds LIVE was not ended in order: latched.
+1. Before there may be power the record on disk is LIVE. A part that finds LIVE was not ended in order: latched.
 2. CLEAR is written after a confirmed power-off alone, and after an accepted reset.
 3. What cannot be read, is another robot's, or is only half there, counts as latched.
 
@@ -34,7 +34,7 @@ _CRC: Final = struct.Struct("<I")
 
 
 class Mark(enum.IntEnum):
-    """What the record says."""
+    """The mark of the record."""
 
     CLEAR = 0
     """No power, and nothing that needs a reset."""
@@ -66,7 +66,7 @@ class Record:
     cause: str = ""
     detail: str = ""
     number: int = 0
-    """Of this wish in this life; not on disk. So "on disk" is never said of an earlier one that looks alike."""
+    """Of this request in this process; not on disk. So an earlier, equal request is never reported as being on disk."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +101,7 @@ CLEAR: Final = Found()
 
 
 def owner_of(part: str, robot: str, machine: str) -> bytes:
-    """32 bytes that name whose record it is. `machine`: what tells this computer from others."""
+    """32 bytes that identify the owner of a record. `machine`: what identifies this computer."""
     return hashlib.sha256("\0".join((part, robot, machine)).encode()).digest()
 
 
@@ -114,7 +114,7 @@ def slot(record: Record, sequence: int, owner: bytes) -> bytes:
 
 
 def whole(record: Record, owner: bytes) -> bytes:
-    """A new file: both slots say the same, with sequences 1 and 2."""
+    """A new file: both slots hold the same record, with sequences 1 and 2."""
     return slot(record, 1, owner) + slot(record, 2, owner)
 
 
@@ -124,7 +124,7 @@ def place_of(sequence: int) -> int:
 
 
 def read(data: bytes, owner: bytes) -> Found:
-    """What a file says. Never raises: whatever is wrong counts as latched."""
+    """The record of a file. Never raises: every defect counts as latched."""
     if len(data) != SIZE:
         return Found(defect=Defect.SIZE, detail=f"{len(data)} bytes of {SIZE}")
     slots = [_read_slot(data[at : at + SLOT], owner) for at in (0, SLOT)]
@@ -161,7 +161,7 @@ def _text(data: bytes) -> str:
 
 
 class WriteAhead:
-    """What a part wants on disk, and whether it is there. `found` None: nobody keeps a record (virtual time), and what
+    """The record that a part wants on disk, and whether it is there. `found` None: no record (virtual time), and
     is wanted counts as written at once."""
 
     def __init__(self, found: Found | None) -> None:
@@ -181,7 +181,7 @@ class WriteAhead:
             self._written = self.wanted
 
     def on_written(self, written: Record | None, problem: str) -> None:
-        """What the writer says: the newest record that is on disk, None: none yet; and what keeps it from writing."""
+        """The writer's report: the newest record on disk, None: none yet; and what keeps it from writing."""
         self._written, self.problem = written or self._written, problem
 
     @property

@@ -1,4 +1,4 @@
-"""Output that never waits for whoever reads it: a terminal that is held (Ctrl-S), a full pipe, a journal that hangs.
+"""Output that never waits for its reader: a terminal that is held (Ctrl-S), a full pipe, a journal that hangs.
 
 Standard library only. rclpy writes its log with Python's lock held: one line that waits would hold up every thread of
 the process, the control thread too. The watchdog has its own copy: it shares no code.
@@ -19,7 +19,7 @@ JOURNAL = "JOURNAL_STREAM"
 def never_wait(environment: Mapping[str, str], descriptors: Iterable[int] = STDOUT_AND_STDERR) -> None:
     """From now on a line that cannot be written at once is lost. Files stay as they are, and so does what is refused.
 
-    Terminals and pipes are opened anew, so that other processes that share them still wait. A socket cannot be: only
+    Terminals and pipes are opened again, so that other processes that share them still wait. A socket cannot be: only
     the one to the journal, which is this process's own, is changed.
     """
     for descriptor in descriptors:

@@ -1,7 +1,7 @@
 """When a message counts as received, also after a pause of this process (SIGSTOP, a busy loop, a frozen computer).
 
 A message that waited in a queue meanwhile looks new when it is taken out. It may be as old as the pause, so it counts
-from before it: what a source said then orders nothing now.
+from before the pause: an order of that time orders nothing now.
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ from typing import Final
 GAP_S: Final = 0.1
 """Two looks that are further apart mean that this process stood still between them."""
 SETTLE_S: Final = 0.1
-"""So long after a pause what is taken out of the queues may be from before its end."""
+"""For this long after a pause a message that is taken out of the queues may be from before its end [s]."""
 REQUEST_GAP_S: Final = 0.5
 REQUEST_SETTLE_S: Final = 0.5
 """The same for requests, whose callers wait for seconds: a busy computer must not have them refused."""
 RESENT_S: Final = 3.5
 """A request that did not fit into the buffers of a process that stood still is sent again by DDS: its heartbeat period
-is 3 s. So long after a pause a goal may be from before its end."""
+is 3 s. For this long after a pause a goal may be from before its end [s]."""
 
 
 class ReceiveTimes:
-    """The loop asks in each of its turns, at the latest every `gap_s` / 2, and at each message."""
+    """The loop calls it in each of its turns, at the latest every `gap_s` / 2, and at each message."""
 
     def __init__(self, gap_s: float = GAP_S, settle_s: float = SETTLE_S) -> None:
         self._gap_s, self._settle_s = gap_s, settle_s

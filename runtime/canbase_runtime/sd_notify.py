@@ -28,7 +28,7 @@ class Service:
     def alive(self, status: str, now_s: float) -> None:
         """To be called by the loop that this process stands for, in each of its turns, at `now_s` [s, monotonic].
 
-        The first call says READY; later ones at most every ALIVE_PERIOD_S that it lives, and `status` when it changed.
+        The first call sends READY; later ones send WATCHDOG at most every ALIVE_PERIOD_S, and `status` when it changed.
         """
         lines = []
         if not self._ready:

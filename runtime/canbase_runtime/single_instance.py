@@ -1,7 +1,7 @@
 """One process for each task: one driver on a bus, one filter for a watchdog. Held by name, released by the kernel.
 
 The name is an abstract Unix socket: it exists once in a network namespace, as a CAN interface does, for all users of
-the computer, and whatever ends its process frees it. Whoever comes second is told who holds it (SO_PEERCRED, unix(7)).
+the computer, and the end of its process frees it. A second process learns who holds it (SO_PEERCRED, unix(7)).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any, Final
 _CREDENTIALS: Final = struct.Struct("iII")
 _LONGEST: Final = 60
 CALLERS: Final = 4096
-"""So many may ask who holds it: nobody takes their calls, and above it they are not told any more."""
+"""The backlog: calls are never accepted, and a process beyond it does not learn who holds it."""
 ADVICE: Final = "Only one may run; end it first (`canbase doctor` shows what runs)"
 
 
@@ -26,7 +26,7 @@ class TakenError(Exception):
 
 
 def bus_name(arguments: Mapping[str, Any]) -> str:
-    """What tells a bus from others on this computer. `arguments`: of `can.Bus`."""
+    """What identifies a bus on this computer. `arguments`: of `can.Bus`."""
     return ":".join(str(arguments.get(key, "")) for key in ("interface", "channel", "port"))
 
 

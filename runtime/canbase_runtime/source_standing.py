@@ -39,7 +39,7 @@ class LockStanding(IntEnum):
     FREE = 1
     LOCKED = 2
     SHARED = 3
-    """Several publishers: nobody's word frees what another one holds."""
+    """Several publishers: a message of one does not release what another one holds."""
     NEVER_RECEIVED = 4
     SILENT = 5
 

@@ -30,7 +30,7 @@ class StopCause(Enum):
 
     @property
     def is_estop(self) -> bool:
-        """The emergency stop, or its silence."""
+        """The emergency stop, or its timeout."""
         return self in (StopCause.ESTOP, StopCause.ESTOP_STALE)
 
 

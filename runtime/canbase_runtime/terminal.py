@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from canbase_config.load import Loaded
 
 FAILED: Final = 1
-"""Exit code: it was asked for rightly and did not work out."""
+"""Exit code: the command was called correctly and did not succeed."""
 WRONG_INPUT: Final = 2
 """Exit code: the command line or robot.yaml has to be changed; typer uses it for the command line too."""
 

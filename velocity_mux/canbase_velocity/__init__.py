@@ -1,1 +1,1 @@
-"""Who may drive, and how fast: the velocity mux and the safety filter."""
+"""Which source drives, and how fast: the velocity mux and the safety filter."""

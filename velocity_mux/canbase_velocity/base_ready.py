@@ -10,12 +10,12 @@ from canbase_runtime.driver_state import DriverState
 
 STATUS_TIMEOUT_S = 0.5
 STATUS_PERIODS = 2.5
-"""A status counts for STATUS_TIMEOUT_S, or for so many of its periods where rates.status_hz is low."""
+"""A status counts for STATUS_TIMEOUT_S, or for this many of its periods where rates.status_hz is low."""
 ESTOP_HOLDS = "the emergency stop is pressed or not reset"
 
 
 def status_timeout_s(status_hz: float) -> float:
-    """So long one motor_driver/status counts [s]. `status_hz`: rates.status_hz."""
+    """How long one motor_driver/status counts [s]. `status_hz`: rates.status_hz."""
     return max(STATUS_TIMEOUT_S, STATUS_PERIODS / status_hz)
 
 

@@ -16,7 +16,7 @@ from canbase_velocity.safety_filter import ScanState
 Told = tuple[str, Priority, dict[str, str]]
 
 AGAIN_S: Final = 10.0
-"""Scans that are dropped all the time are told again after so long [s]."""
+"""Scans that are dropped all the time are reported again after this time [s]."""
 STOP_PRIORITY: Final = {
     StopCause.OBSTACLE: Priority.NOTICE,
     StopCause.OBSTACLE_NEAR: Priority.NOTICE,
@@ -26,8 +26,8 @@ STOP_PRIORITY: Final = {
 
 
 def changes(before: MuxDecision, now: MuxDecision) -> Iterator[Told]:
-    """Locks that hold or let go, and who drives. A source that lost the base to a lock is a notice, as is one that is
-    not followed.
+    """Locks that hold or release, and the source that drives. A source that lost the base to a lock is a notice, as is
+    one that is not followed.
     """
     held = {lock.name: lock.holds for lock in before.locks}
     for lock in now.locks:
@@ -47,13 +47,13 @@ def changes(before: MuxDecision, now: MuxDecision) -> Iterator[Told]:
 
 
 class DropTeller:
-    """Tells that scans are dropped and why: at the first one, for another reason, and AGAIN_S later if it goes on."""
+    """Reports that scans are dropped and why: at the first one, for another reason, and AGAIN_S later if it goes on."""
 
     def __init__(self) -> None:
         self._told: dict[str, tuple[StopCause, float]] = {}
 
     def news(self, scans: Sequence[ScanState], now_s: float) -> Iterator[Told]:
-        """What is to be told at the time `now_s` [s, monotonic]."""
+        """The report at the time `now_s` [s, monotonic]."""
         for scan in scans:
             why = scan.problem or scan.why_dropped
             cause, told_at = self._told.get(scan.topic, (StopCause.NONE, -math.inf))
@@ -66,7 +66,8 @@ class DropTeller:
 def is_told(before: Decision, now: Decision) -> bool:
     """Whether a log line and a journal entry are due: each change but for speed limits, which come and go all the time.
 
-    A stop that begins or ends, and hard braking that begins, are told in any case, a speed limit before or after it.
+    A stop that begins or ends, and hard braking that begins, are reported in any case, a speed limit before or after
+    it.
     """
     if (now.action, now.cause) == (before.action, before.cause):
         return now.emergency and not before.emergency
@@ -83,7 +84,7 @@ def changed_order(now: Decision) -> Told:
     stops = now.action is Action.STOP
     otherwise = Priority.NOTICE if now.emergency else Priority.INFO
     priority = STOP_PRIORITY.get(now.cause, Priority.WARNING) if stops else otherwise
-    hard = "brakes hard" if now.emergency and now.cause is not StopCause.OBSTACLE else ""  # there the detail says it
+    hard = "brakes hard" if now.emergency and now.cause is not StopCause.OBSTACLE else ""  # there the detail has it
     sentence = " ".join(word for word in (now.action.name, now.cause.value, now.detail, hard) if word)
     fields = {"action": now.action.name, "cause": now.cause.value, "clears_on": now.clears_on}
     return sentence, priority, fields | {"emergency": str(now.emergency).lower()}

@@ -27,7 +27,7 @@ MAX_BEAMS: Final = 1440
 TOO_NEAR_M: Final = 0.001
 """What is too near to be measured is taken to be so far beside the footprint [m]: the base can drive away."""
 GAP_M: Final = 0.03
-"""A place so far beside a beam that says something is covered by it [m]: no leg is hidden between two of them."""
+"""A place this far beside a beam with a reading is covered by it [m]: no leg is hidden between two of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class Field:
     range_max_m: float
     increment_rad: float = 0.0
     says: npt.NDArray[np.intp] | None = None
-    """The beams that say something, by their number from `first_rad` on, rising. None: all of them do."""
+    """The beams with a reading, by their number from `first_rad` on, rising. None: all of them have one."""
 
     def sees(self, points: Floats) -> Bools:
         """Which of these places the scanner would see, if nothing stood before them."""
@@ -70,7 +70,7 @@ class Field:
         return seen
 
     def covers(self, points: Floats) -> tuple[Bools, Bools]:
-        """Which of these places it faces, whatever its reach, and at which of them its newest scan says something."""
+        """Which of these places it faces, at any range, and at which of them its newest scan has a reading."""
         ranges_m, from_first_rad, faces = self._looks_at(points)
         told: Bools = faces & (ranges_m <= self.range_max_m)
         if self.says is not None:
@@ -85,7 +85,7 @@ class Field:
         return ranges_m, from_first_rad, faces
 
     def _gaps(self, at: Floats) -> Floats:
-        """From each of these directions, counted in beams, to the nearest beam that says something."""
+        """From each of these directions, counted in beams, to the nearest beam with a reading."""
         assert self.says is not None
         around = FULL_TURN_RAD / self.increment_rad
         says = np.concatenate(([self.says[-1] - around], self.says, [self.says[0] + around]))
@@ -96,7 +96,7 @@ class Field:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """What one scan shows. `share`: of its beams that say something, above 0, at most 1."""
+    """What one scan shows. `share`: of its beams that have a reading, above 0, at most 1."""
 
     points: Points
     field: Field
@@ -118,12 +118,12 @@ class ScanReader:
         self._other_frame: str | None = None
 
     def read(self, scan: Scan, placement: Placement) -> View:
-        """What the scan shows. Raises ScanError for a scan that cannot be used, or in which no beam says something.
+        """What the scan shows. Raises ScanError for a scan that cannot be used, or in which no beam has a reading.
 
         Readings (REP 117): +infinity and above range_max: nothing there. -infinity: too near to be measured, counts as
         the place of its beam next to the footprint, at most range_min away; so does a finite one below range_min (0,
         dust, the housing) where safety.scan.below_range_min is too_near. Otherwise that and NaN are no reading: such a
-        beam says nothing.
+        beam has no reading.
         """
         check(scan)
         self._hold_frame(scan.frame)

@@ -4,9 +4,9 @@ Each stamped message has an offset: local receive time minus its stamp. It is th
 on the way. The least offset stands for the fastest way, and what is above it is delay. Rules:
 1. The least offset rises by DRIFT at most: so far clocks drift apart. A delay that stays is a delay for ever, also one
    that grows slowly.
-2. A stamp below the one before says that the sender's clock was set back, or that another sender took over: the offsets
-   before it are worth nothing. A source of the mux needs a zero command then (neutral.py).
-3. After SILENCE_S without any message nobody knows what happened to the sender's clock: the least offset of FORGET_S of
+2. A stamp below the one before means that the sender's clock was set back, or that another sender took over: the
+   offsets before it are worth nothing. A source of the mux needs a zero command then (neutral.py).
+3. After SILENCE_S without any message the sender's clock may have changed: the least offset of FORGET_S of
    messages since then counts, if it is above the one before.
 4. With `same_clock` the age of the stamp itself is the delay, and a stamp from the future counts like an old one.
 A delay that is there from the first message on, and never less, cannot be seen without `same_clock`. Without stamps

@@ -1,8 +1,8 @@
 """The memory of the emergency stop: what has to happen after it before the base may move again. A table, no clock.
 
-It outlives the process: the record on disk says LIVE from the first message of the button until an orderly end, so that
+It outlives the process: the record on disk is LIVE from the first message of the button until an orderly end, so that
 a filter that was killed takes the button for pressed until it is seen released. A stop that waits for its reset comes
-back held for the same reason: the button may have been pressed again while nobody listened.
+back held for the same reason: the button may have been pressed again while no filter received it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ class EstopState(enum.Enum):
 
     FREE = "free"
     HELD = "held"
-    """Pressed, or required and silent."""
+    """Pressed, or required without a recent message."""
     AWAITS_RESET = "released, waits for a reset"
     AWAITS_ZERO = "released, waits for a zero command"
 
@@ -42,19 +42,19 @@ TRANSITIONS: dict[tuple[EstopState, EstopEvent], EstopState] = {
     (AWAITS_ZERO, EstopEvent.ZERO): FREE,
     (AWAITS_ZERO, EstopEvent.RESET): FREE,
 }
-"""Rules: pressing and silence hold from every state. While it is held neither a zero nor a reset counts. Where a row is
+"""Rules: a press and a timeout hold from every state. While held, neither a zero nor a reset counts. Where a row is
 missing nothing changes, but for a reset: that is refused before, and raises here."""
 
 
 class Estop:
     """The state, and whether it is latched.
 
-    What latches: a press, and a silence after it was heard once. A robot that starts before its stop button speaks has
+    What latches: a press, and a timeout after a first message. A robot that starts before its stop button publishes has
     nothing to reset: there a zero command is enough.
     """
 
     def __init__(self, latches: bool, found: Found | None = None) -> None:
-        """`latches`: safety.estop.latched. `found`: the record at the start; None: nobody keeps one (virtual time)."""
+        """`latches`: safety.estop.latched. `found`: the record at the start; None: no record is kept (virtual time)."""
         self._latches = latches
         self._ahead = WriteAhead(found)
         self.state = _before_the_start(found, latches)

@@ -52,7 +52,7 @@ MovingSources = Callable[[], Sequence[str]]
 class FilterNode(Node):
     """Issues an order on every command, on the emergency stop, and on a timer; each with its lease.
 
-    `moving_sources`: names of the sources that order a velocity now, whoever drives; asked before a reset.
+    `moving_sources`: names of all sources that order a velocity now, also without the base; read before a reset.
     """
 
     def __init__(self, robot: Robot, moving_sources: MovingSources = tuple, keeper: LatchKeeper | None = None) -> None:
@@ -83,8 +83,8 @@ class FilterNode(Node):
         self._timer = steady_timer(self, 1.0 / robot.rates.command_hz, self._tick)
 
     def shut_down(self) -> None:
-        """Orders zero, with its lease, and says so in the state; from here on nothing else is ordered. Called several
-        times: one message may be lost.
+        """Orders zero, with its lease, and publishes that in the state; from here on nothing else is ordered. Called
+        several times: one message may be lost.
         """
         now_s = time.monotonic()
         self._issue(self._filter.shut_down(now_s), now_s)
@@ -171,7 +171,7 @@ class FilterNode(Node):
         self._filter.on_laser_scan(config.topic, messages.scan_of(message), placement, now_s)
 
     def _look_for_scanners(self) -> None:
-        """Into the ROS graph: a message does not tell who sent it."""
+        """Into the ROS graph: a message does not contain its publisher."""
         now_s = time.monotonic()
         for scan in self._robot.safety.scans:
             found = publishers(self, self.resolve_topic_name(scan.topic))
@@ -183,7 +183,7 @@ class FilterNode(Node):
 
     def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         now_s = time.monotonic()
-        if self._request_times.waited(now_s):  # whoever asked may have given up, and be near the base
+        if self._request_times.waited(now_s):  # the caller may have given up, and be near the base
             response.success, response.message = False, OLD
         else:
             response.success, response.message = self._filter.reset(self._moving_sources(), now_s)

@@ -27,7 +27,7 @@ from canbase_velocity.sweep import Floats
 from canbase_velocity.twist import ZERO, Twist
 
 WITHOUT_SCANS_S = 1.0
-"""After so long without usable scans nobody who ordered motion meanwhile is followed by himself (neutral.py) [s]."""
+"""After this long without usable scans a source that ordered motion meanwhile is disarmed (neutral.py) [s]."""
 NO_SCAN = (
     StopCause.SCAN_STALE,
     StopCause.SCAN_UNPLACED,
@@ -101,7 +101,7 @@ class _Scanner:
         self._problem = why if at_once else self._problem
 
     def take(self, points: Points, field: Field | None, scan_time_s: float, now_s: float) -> None:
-        """A scan that says something; its first reading was taken `scan_time_s` before."""
+        """A scan with readings; its first reading was taken `scan_time_s` before."""
         limits = self._geometry.limits
         since_s = self.config.timeout_s if self.at_s is None else min(now_s - self.at_s, self.config.timeout_s)
         genuine = self._glitches.genuine(points, limits.linear_mps * since_s, limits.angular_radps * since_s)
@@ -129,7 +129,7 @@ class SafetyFilter:
     """Keeps the newest of each input. Starts with nothing received: that is a stop for everything required."""
 
     def __init__(self, config: FilterConfig, found: Found | None = None) -> None:
-        """`found`: the record of the emergency stop at the start; None: nobody keeps one, for virtual time alone."""
+        """`found`: the record of the emergency stop at the start; None: no record is kept, for virtual time alone."""
         self._config = config
         self._command = ZERO
         self._command_at_s: float | None = None
@@ -139,7 +139,7 @@ class SafetyFilter:
         self._estop_at_s: float | None = None
         self._estop_unheard = ""
         self.estop_crowd = ""
-        """Why no release of the emergency stop can be told; empty: it can."""
+        """Why a release of the emergency stop cannot be seen; empty: it can."""
         longest_s = max(2.0 * scan.timeout_s + scan.frozen_s for scan in config.safety.scans) + config.safety.reaction_s
         self._motion = ExpectedMotion(config.limits, longest_s)
         self._previous, self._previous_at_s = ZERO, -math.inf
@@ -188,7 +188,7 @@ class SafetyFilter:
         self._scanners[topic].receive(scan, placement, now_s, moves=not self._motion.moving.twist.is_zero)
 
     def on_scan_publishers(self, topic: str, nodes: Sequence[str], now_s: float) -> None:
-        """Takes who publishes on the topic of a scanner: a node's name for each publisher. Raises KeyError for another
+        """Takes the publishers on the topic of a scanner: a node's name for each. Raises KeyError for another
         topic.
         """
         self._scanners[topic].sole.look(nodes, now_s)

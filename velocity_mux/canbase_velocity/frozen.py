@@ -22,9 +22,9 @@ from canbase_velocity.scan import Scan
 FROZEN_SCANS: Final = 4
 """A driver may send each scan twice; three repetitions are no accident."""
 PERIODS: Final = 8
-"""So many scans are remembered."""
+"""The number of scans that are remembered."""
 MANY: Final = 8
-"""So many readings in range tell one scan from another."""
+"""This many readings in range distinguish one scan from another."""
 
 
 class FrozenWatch:
@@ -37,7 +37,7 @@ class FrozenWatch:
         """The readings, newest first, and when they were received first."""
         self._looked_at = math.nan
         self._repeats = [0] * PERIODS
-        """How often in a row a scan was equal to the one so many places, plus one, before it."""
+        """How often in a row a scan was equal to the one this many places, plus one, before it."""
         self._same_s = [0.0] * PERIODS
         self.since = math.nan
         """When these readings were received first (monotonic) [s]."""

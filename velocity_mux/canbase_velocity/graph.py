@@ -1,4 +1,4 @@
-"""What the mux expects in the ROS graph and what is there. Asks a node, decides nothing."""
+"""What the mux expects in the ROS graph and what is there. Queries a node, decides nothing."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _NO_NAME: Final = "_NODE_NAME_UNKNOWN_"
 
 
 def expected(robot: Robot, node: Node) -> tuple[Expected, ...]:
-    """Who may publish what: on every source's topic, and on the two of the chain itself."""
+    """The expected publishers: on every source's topic, and on the two of the chain itself."""
     return (*_of_sources(robot, node), *_of_chain(node))
 
 
@@ -64,5 +64,5 @@ def _of_chain(node: Node) -> Iterator[Expected]:
 
 
 def kind_of(source: MuxSource) -> str:
-    """The message type that a source speaks."""
+    """The message type of a source."""
     return STAMPED if source.stamped else PLAIN

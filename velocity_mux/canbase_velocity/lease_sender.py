@@ -6,7 +6,7 @@ import socket
 
 
 class LeaseSender:
-    """Sends leases to the Unix datagram socket at `path`, which the watchdog makes and may make anew at any time."""
+    """Sends leases to the Unix datagram socket at `path`, which the watchdog makes and may make again at any time."""
 
     def __init__(self, path: str) -> None:
         self.path = path

@@ -1,4 +1,4 @@
-"""One lock of the mux: a Bool that holds sources back, and whose silence does too where it is required."""
+"""One lock of the mux: a Bool that holds sources back, and whose timeout does too where it is required."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Lock:
         self._crowd = ""
 
     def published_by(self, nodes: Sequence[str]) -> None:
-        """Takes who publishes on its topic. It holds while there is more than one: which of them spoke is not known."""
+        """Takes the publishers on its topic. It holds while there is more than one: a message's sender is unknown."""
         self._crowd = crowd(self.config.topic, nodes)
 
     def hear(self, locked: bool, now_s: float) -> None:
@@ -82,7 +82,7 @@ class Lock:
         }.get(self.standing(now_s), "")
 
     def view(self, now_s: float) -> LockView:
-        """What is told of it."""
+        """Its entry in the report."""
         return LockView(
             name=self.name,
             topic=self.config.topic,

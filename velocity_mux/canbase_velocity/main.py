@@ -28,7 +28,7 @@ from canbase_velocity.filter_node import FilterNode
 from canbase_velocity.mux_node import MuxNode
 
 SHUTDOWN_CYCLES = 5
-"""So many zeros go out at least at the end, one per command period."""
+"""At least this many zeros go out at the end, one per command period."""
 WAKE_S = 0.1
 WRITE_S = 1.0
 """For the record of the emergency stop at the end."""

@@ -35,7 +35,7 @@ def twist_of(message: TwistMessage) -> Twist:
 
 def sent_at(stamp: Time, wall_s: float, now_s: float) -> Sent | None:
     """The times of a command that was taken in at `wall_s` by this computer's clock and at `now_s`, monotonic [s].
-    None: its stamp is zero, which says nothing.
+    None: its stamp is zero, which carries no time.
     """
     stamp_s = stamp.sec + stamp.nanosec * 1e-9
     return Sent(stamp_s, wall_s, now_s) if stamp_s > 0.0 else None

@@ -68,10 +68,10 @@ class Pose:
 
 
 class ExpectedMotion:
-    """The motion over time: `order` says what holds from now on."""
+    """The motion over time: `order` gives what holds from now on."""
 
     def __init__(self, limits: Limits, memory_s: float) -> None:
-        """`memory_s`: so long ago `pose_at` can be asked for."""
+        """`memory_s`: how far back `pose_at` reaches [s]."""
         self._limits = limits
         self._memory_s = memory_s
         self._order = ZERO

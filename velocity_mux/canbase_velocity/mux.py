@@ -1,21 +1,21 @@
-"""Who may drive: sources of commands with priority and timeout, and locks. Time comes in as an argument.
+"""Which source drives: sources of commands with priority and timeout, and locks. Time comes in as an argument.
 
 Rules:
 1. A source is fresh while its last valid command is not older than its timeout: by local receive time, plus what it
    was late by (delay.py).
-2. A lock holds while its last word is true, and, where it is required, while it is silent. It holds back every source
+2. A lock holds while its last message is true, and, where it is required, after its timeout. It holds back every source
    whose priority is lower than its own. A foreign publisher may hold back too (unexpected_publishers.py).
 3. The fresh source of the highest priority that is not held back has the base; its last command holds.
-4. None is left: the order is zero, said explicitly. A source that was taken over does not come back with an old
+4. None is left: the order is zero, explicitly. A source that was taken over does not come back with an old
    command: it drives again only while it is fresh by itself.
 5. A command with NaN or infinity is refused and counted, and does not make its source fresh.
 6. A source that is not armed (neutral.py), or whose commands arrive later than its timeout, is not followed. While it
    publishes it has the base all the same: the order is zero, and no lower source moves the base under the hand of
-   somebody who wants to drive it himself.
-7. A message does not tell who sent it. Where two publish on the topic of a source that only a zero arms, the zero of
-   one would arm the stick of the other: while the ROS graph has more than one there, it is disarmed. A lock with more
-   than one publisher holds: nobody's word frees what another one holds. Nor does the zero of a publisher that has ended
-   arm the one that comes after it, such as a joystick node that was started again.
+   the operator of that source.
+7. A message does not contain its publisher. Where two publish on the topic of a source that only a zero arms, the zero
+   of one would arm the joystick of the other: while the ROS graph has more than one there, it is disarmed. A lock with
+   more than one publisher holds: a message of one does not release what another one holds. Nor does the zero of a
+   publisher that has ended arm the one that comes after it, such as a joystick node that was started again.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from canbase_velocity.unexpected_publishers import Foreign
 class SourceView:
     """One source at one moment. `age_s` is None before its first valid command, `delay_s` while nothing is known of it.
 
-    `reason`: why it is not followed; empty when it is. `locked`: something holds it back, also while it is silent.
+    `reason`: why it is not followed; empty when it is. `locked`: a lock holds it back, also without a recent message.
     """
 
     name: str
@@ -58,9 +58,9 @@ class SourceView:
 
 @dataclass(frozen=True, slots=True)
 class MuxDecision:
-    """The order to send now, who has the base (None: nobody), and every source and lock by falling priority.
+    """The order to send now, the source that has the base (None: none), and every source and lock by falling priority.
 
-    Whoever has the base may not be followed (rule 6): then the order is zero, and its view says why.
+    The source that has the base may not be followed (rule 6): then the order is zero, and its view has the reason.
     """
 
     active: str | None
@@ -80,7 +80,7 @@ class MuxDecision:
 
     @property
     def sentence(self) -> str:
-        """Who drives, for people."""
+        """The source that drives, for people."""
         if self.holder is None:
             return "no active source"
         if self.holder.standing in IGNORED:
@@ -129,7 +129,7 @@ class _Source:
         self.arming.command(twist, now_s, on_time=not self.is_late and received == now_s and not self.crowd)
 
     def published_by(self, nodes: Sequence[str], keys: Sequence[str]) -> None:
-        """Takes who publishes on its topic."""
+        """Takes the publishers on its topic."""
         if self.config.neutral_after_s is not None:
             return
         self.crowd = crowd(self.config.topic, nodes)
@@ -195,7 +195,7 @@ class Mux:
         status_timeout_s: float = STATUS_TIMEOUT_S,
     ) -> None:
         """Sources and locks by name, no two sources of one priority (canbase_config refuses that). Raises ValueError
-        without any source. `foreign_lock`: foreign publishers hold back what they disturb. `status_timeout_s`: so long
+        without any source. `foreign_lock`: foreign publishers hold back what they disturb. `status_timeout_s`: how long
         a motor_driver/status counts [s].
         """
         if not sources:
@@ -238,7 +238,7 @@ class Mux:
         self._base.on_estop(free)
 
     def on_scans(self, missing: str) -> None:
-        """Takes what the safety filter says of its scans: why it has been without them for long; empty: it has not."""
+        """Takes why the safety filter has been without usable scans for long; empty: it has not."""
         self._without_scans = missing
 
     def on_lock(self, name: str, locked: bool, now_s: float) -> None:
@@ -247,8 +247,8 @@ class Mux:
         self._look(now_s)
 
     def on_publishers(self, topic: str, nodes: Sequence[str], keys: Sequence[str] = ()) -> None:
-        """Takes who publishes on this topic of robot.yaml: a node's name for each publisher of the type heard there,
-        and what tells it from one that comes after it under the same name."""
+        """Takes the publishers on this topic of robot.yaml: a node's name for each publisher of the subscribed type,
+        and what distinguishes it from a later one of the same name."""
         for source in self._sources.values():
             if source.config.topic == topic:
                 source.published_by(nodes, keys or nodes)
@@ -272,12 +272,12 @@ class Mux:
         return MuxDecision(active.name, active.twist if followed else ZERO, views, *self._others(now_s))
 
     def moving(self, now_s: float) -> tuple[str, ...]:
-        """Fresh sources that do not order zero, whoever drives: a reset is refused while there are any."""
+        """Fresh sources that do not order zero, also without the base: a reset is refused while there are any."""
         moving = (source for source in self._sources.values() if source.is_fresh(now_s) and not source.twist.is_zero)
         return tuple(source.name for source in moving)
 
     def shutdown(self, now_s: float) -> MuxDecision:
-        """The order while the process ends: zero, whoever wants to drive."""
+        """The order while the process ends: zero, whatever the sources order."""
         views = tuple(source.view(now_s, SourceStanding.SHUTDOWN, "shutdown") for source in self._sources.values())
         return MuxDecision(None, ZERO, views, *self._others(now_s))
 

@@ -28,7 +28,7 @@ def mux_state(decision: MuxDecision, stamp: Time) -> MuxState:
 
 
 def diagnostics(decision: MuxDecision, robot: str, deaf: tuple[str, ...], stamp: Time) -> DiagnosticArray:
-    """One entry. `deaf`: sentences about subscribers that ask for what we do not offer and hear nothing."""
+    """One entry. `deaf`: sentences about subscribers that receive nothing: their QoS requests more than we offer."""
     problems = [*(foreign.sentence for foreign in decision.foreign), *deaf]
     held = [f"{lock.name} {lock.reason}" for lock in decision.locks if lock.holds]
     ignored = decision.holder is not None and decision.holder.standing in IGNORED

@@ -58,7 +58,7 @@ class Follower(Protocol):
 
 
 class MuxNode(Node):
-    """Orders at once what the source that has the base says, and repeats it on a timer while that source is fresh."""
+    """Publishes at once the command of the source that has the base, and repeats it while that source is fresh."""
 
     def __init__(self, robot: Robot) -> None:
         super().__init__("velocity_mux")
@@ -103,7 +103,7 @@ class MuxNode(Node):
         self._send(self._decide(now_s), now_s)
 
     def moving_sources(self) -> tuple[str, ...]:
-        """Names of the sources that order a velocity now, whoever drives."""
+        """Names of all sources that order a velocity now, also without the base."""
         return self._mux.moving(time.monotonic())
 
     def _listen(self) -> None:

@@ -1,14 +1,14 @@
-"""Neutral start: who ordered motion while the base could not move is not followed before he has commanded zero.
+"""Neutral start: a source that ordered motion while the base could not move is not followed before it commands zero.
 
 Rules, for each source:
-1. At the start of the mux nobody is armed. Only an armed source is followed.
-2. A zero command arms. One that arrives too late does not: nobody knows what the source wants now.
-3. With `absent_s` (key neutral_after_s), so long without any message arms too: a program that begins with a velocity.
+1. At the start of the mux no source is armed. Only an armed source is followed.
+2. A zero command arms. One that arrives too late does not: what the source wants now is unknown.
+3. With `absent_s` (key neutral_after_s), that long without any message arms too: a program that begins with a velocity.
    What this process did not watch, because it stood still itself, is no absence.
 4. Whose last command orders motion while the base is not ready is armed no more, however old that command is. A radio
    gap across a reset changes nothing.
-5. Who is silent while the base is not ready is armed no more either, unless absence may arm him (rule 3): his last zero
-   is old, and nobody knows whether he has pushed the stick since.
+5. A source that publishes nothing while the base is not ready is disarmed too, unless absence may arm it (rule 3): its
+   last zero is old, and the operator may have moved the joystick since.
 6. A pause counts like 4 and 5 for whom only a zero arms: a lock held him back, or there was no usable scan for
    WITHOUT_SCANS_S. People walk up to a base that is at standstill. A program with `absent_s` goes on after a pause:
    docs/decisions/0047.
@@ -21,7 +21,7 @@ import math
 from canbase_velocity.twist import Twist
 
 BLIND_S = 0.2
-"""The mux decides at 20 Hz at least. After a longer pause it has missed messages, and every absence begins anew."""
+"""The mux decides at 20 Hz at least. After a longer pause it has missed messages, and every absence starts again."""
 STARTED = "velocity_mux started"
 
 
@@ -29,7 +29,7 @@ class Arming:
     """Whether one source may be followed. `waits_since`: what disarmed it, for people; empty while it is armed."""
 
     def __init__(self, absent_s: float | None) -> None:
-        """`absent_s`: silence that arms [s]; None: a zero command alone does."""
+        """`absent_s`: time without a message that arms [s]; None: a zero command alone does."""
         self._absent_s = absent_s
         self._absent_from = math.inf
         self._moves = False
@@ -64,7 +64,7 @@ class Arming:
             self.waits_since, self._moves = "", False
 
     def missed(self, now_s: float) -> None:
-        """Until `now_s` nobody watched: absence counts from here."""
+        """Until `now_s` nothing was watched: absence counts from here."""
         self._absent_from = now_s
 
     @property

@@ -9,7 +9,7 @@ Rules:
    ordered, the base has to brake hard.
 3. Each scan is looked at twice: as it was taken, and as the base must see it after what was ordered since then.
 4. Where less than half of what the footprint will sweep is in the field of view of a scanner, the speed is limited.
-5. So it is where scanners look, and too few of their beams say something, until the base would stand.
+5. It is limited too where scanners look, and too few of their beams have a reading, until the base would stand.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ SEEN_SHARE = 0.5
 _EDGE_POINTS = 8
 _HALVINGS = 30
 _LOOKS = 4
-"""Rule 5 looks at so many places of the footprint on its path."""
+"""Rule 5 looks at this many places of the footprint on its path."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -56,7 +56,7 @@ class Placement:
 
 
 class HeldPlacement:
-    """Where tf_static placed a scanner first: it does not move on its base, and who says so may be wrong."""
+    """The first place of a scanner in tf_static: it does not move on its base; another place is an error."""
 
     def __init__(self) -> None:
         self._first: Placement | None = None

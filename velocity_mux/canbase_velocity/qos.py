@@ -1,4 +1,4 @@
-"""Quality of service of the topics of mux and filter, and subscriptions that hear every publisher."""
+"""Quality of service of the topics of mux and filter, and subscriptions that receive from every publisher."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from rclpy.qos import (
 COMMAND = QoSProfile(depth=1)
 """Velocities: only the newest counts."""
 ANY_COMMAND = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""For subscriptions: hears reliable publishers and those of best effort. A reliable one would not hear the latter."""
+"""For subscriptions: they match reliable and best-effort publishers. A reliable one would not match the latter."""
 SWITCH = QoSProfile(depth=10)
 """Buttons and locks: every message counts, also a press that is released again before this process gets to it."""
 ANY_SWITCH = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 KEPT_SWITCH = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""Latched: who comes late sees the newest state."""
+"""Latched: a late subscriber receives the newest state."""
 DRIVER_STATUS = QoSProfile(depth=10)
 """Every change of state counts, also those that come close together."""
 SCAN = qos_profile_sensor_data
@@ -34,19 +34,20 @@ STATIC_TF = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def listen_closely(node: Node, kind: type[Any], topic: str, callback: Callable[[Any], None]) -> None:
-    """Subscribes to a topic that may speak once and then be silent, such as a button or a lock.
+    """Subscribes to a topic that may publish once and then no more, such as a button or a lock.
 
-    With best effort, to hear every publisher; reliably, so that nothing gets lost of one that is reliable; and what was
-    said before the start by one that keeps it (transient local). One message may call the callback three times.
+    With best effort, to match every publisher; reliably, so that nothing of a reliable one is lost; and with the
+    messages from before the start of a publisher that keeps them (transient local). One message may call the callback
+    three times.
     """
-    silent = SubscriptionEventCallbacks(use_default_callbacks=False)  # another one hears what this one does not
+    silent = SubscriptionEventCallbacks(use_default_callbacks=False)  # another one matches where this one does not
     node.create_subscription(kind, topic, callback, KEPT_SWITCH, event_callbacks=silent)
     node.create_subscription(kind, topic, callback, SWITCH, event_callbacks=silent)
     node.create_subscription(kind, topic, callback, ANY_SWITCH)
 
 
 def loud(node: Node, topic: str, deaf: list[str]) -> PublisherEventCallbacks:
-    """For a publisher: a subscriber that asks for more than it offers hears nothing. Logs that, adds it to `deaf`."""
+    """For a publisher: a subscriber whose QoS requests more receives nothing. Logs that, adds it to `deaf`."""
 
     def on_incompatible(event: Any) -> None:
         policy = qos_policy_name_from_kind(event.last_policy_kind)

@@ -1,12 +1,12 @@
 """How fast the base may go: the last decision about a command. Time comes in as an argument; ROS is in filter_node.py.
 
 Rules, in the order of their precedence:
-1. Emergency stop pressed: stop, with the emergency deceleration. Required and silent counts as pressed. Its memory is
-   estop.py.
-2. Command silent, or with NaN or infinity: stop.
-3. A required scan silent, frozen, not usable, or of a scanner whose place is unknown: stop.
+1. Emergency stop pressed: stop, with the emergency deceleration. Required without a recent message counts as pressed.
+   Its memory is estop.py.
+2. No recent command, or one with NaN or infinity: stop.
+3. A required scan not recent, frozen, not usable, or of a scanner whose place is unknown: stop.
 4. Faster than the limits, the ceiling, the speed of a robot that is not commissioned, a limit zone with something in
-   it, or the speed for where no scanner looks or says something: slower, on the same curve.
+   it, or the speed for where no scanner looks or has a reading: slower, on the same curve.
 5. Growing faster than the ceiling: slower. What falls is never held up.
 6. Obstacle where the footprint will be: slower, on the same curve, so that the base can stop before the stop distance;
    there it stops. Driving away from an obstacle is free. See obstacle.py.
@@ -68,7 +68,7 @@ class FilterConfig:
 
 @dataclass(frozen=True, slots=True)
 class ScanState:
-    """What is known of one scanner. `age_s`: of its last scan that said something [s]; None: none yet."""
+    """The state of one scanner. `age_s`: of its last scan with readings [s]; None: none yet."""
 
     topic: str
     required: bool
@@ -83,7 +83,7 @@ class ScanState:
     why_dropped: str = ""
     """Why the last one was; empty when one that can be used came since."""
     usable_share: float | None = None
-    """Of the beams of its last usable scan that say something, 0 to 1; None: none yet."""
+    """Of the beams of its last usable scan that have a reading, 0 to 1; None: none yet."""
 
     @property
     def is_fresh(self) -> bool:
@@ -108,12 +108,12 @@ class Inputs:
     """How long ago that was [s]."""
     estop: EstopState
     pressed: bool
-    """The last message of the emergency stop said so."""
+    """The state in the last message of the emergency stop."""
     estop_age_s: float | None
     estop_before: str = ""
     """Why the emergency stop holds since the start; empty: it does not."""
     estop_crowd: str = ""
-    """Why no release of the emergency stop can be told; empty: it can."""
+    """Why a release of the emergency stop cannot be seen; empty: it can."""
     estop_unarmed: str = ""
     """A press would not outlive this process: why; empty: it would."""
     braking_hard: bool = False
@@ -207,7 +207,7 @@ def _slower(inputs: Inputs, config: FilterConfig) -> list[Finding]:
 
 
 def _unseen(inputs: Inputs, config: FilterConfig) -> list[Finding]:
-    """Of rule 4: where no scanner looks, or where one looks and says nothing. Before any scan nothing is asked."""
+    """Of rule 4: where no scanner looks, or where one looks and has no reading. Before any scan it does not apply."""
     command, sight, geometry, safety = inputs.command, inputs.sight, config.geometry, config.safety
     if _lost_all(inputs.scans):
         return [
@@ -287,7 +287,7 @@ def _growth(twist: Twist, inputs: Inputs, ceiling: Ceiling | None) -> tuple[Twis
 
 
 def _kept(previous: float, asked: float) -> float:
-    """How much of the last order the new one still asks for: it can be passed at once."""
+    """How much of the last order is still in the new one: it can be passed at once."""
     return 0.0 if previous * asked <= 0.0 else math.copysign(min(abs(previous), abs(asked)), asked)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 MAX_READINGS: Final = 100_000
-"""A scan with more readings is not looked at: no scanner has so many, and looking would hold up the filter."""
+"""A scan with more readings is dropped: no scanner has so many, and processing it would delay the filter."""
 SLACK_RAD: Final = 0.02
 """So far angle_max may be from where the readings end, or 1.5 readings: drivers count the last one differently."""
 FULL_TURN_RAD: Final = 2.0 * math.pi

@@ -1,11 +1,11 @@
 """Whether exactly one scanner publishes on a topic of scans.
 
 Two with one frame_id take turns: each shows as free what only the other sees, and one that dies is hidden by the other.
-A message does not tell who sent it, so the ROS graph is what is left.
+A message does not contain its publisher, so the ROS graph is what is left.
 
 Rules:
 1. While more than one publisher is in the graph, no scan of the topic counts. A killed driver stays there until
-   DDS gives it up, about 20 s: so long its successor waits.
+   DDS gives it up, about 20 s: its successor waits that long.
 2. More than one for LATCHED_S: they are two scanners. From then on no scan counts until the next start: one that is
    left alone does not see what the other one saw.
 """

@@ -75,7 +75,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """The nearest touch on the way. `slack_s`: until the stop distance, at the speed asked about; below 0: passed."""
+    """The nearest contact on the path. `slack_s`: until the stop distance, at the given speed; below 0: passed."""
 
     slack_s: float
     way_m: float

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Twist:
-    """Forward positive [m/s], counter-clockwise positive [rad/s]. May hold NaN or infinity: ask `is_finite`."""
+    """Forward positive [m/s], counter-clockwise positive [rad/s]. May hold NaN or infinity: see `is_finite`."""
 
     linear_mps: float
     angular_radps: float
@@ -20,7 +20,7 @@ class Twist:
 
     @property
     def is_zero(self) -> bool:
-        """Asks for standstill."""
+        """Both speeds are zero."""
         return self.linear_mps == 0.0 and self.angular_radps == 0.0
 
     def scaled(self, factor: float) -> Twist:

@@ -1,13 +1,13 @@
-"""Who publishes velocities without being named: foreign publishers on sources' topics, on cmd_vel_mux and on cmd_vel.
+"""Nodes that publish velocities without being expected: on sources' topics, on cmd_vel_mux and on cmd_vel.
 
-ROS does not say which publisher sent a message, so they are found in the ROS graph. Asking the graph is mux_node.py.
+A ROS message does not contain its publisher, so they are found in the ROS graph. mux_node.py queries the graph.
 
 Rules:
 1. On a source's topic those are foreign that its `nodes` do not name; without `nodes` anybody may publish there.
 2. cmd_vel_mux and cmd_vel belong to one node each; every other publisher, and a second one of that name, is foreign.
-   Nobody obeys cmd_vel_mux: it shows what the mux orders. A foreign publisher there is a notice and disturbs nobody.
-3. A publisher of another message type is not heard at all. That is said, and it disturbs nobody.
-4. A publisher whose node is not known (yet) counts after PATIENCE_S: discovery tells names a little later than topics.
+   Nothing obeys cmd_vel_mux: it shows what the mux orders. A foreign publisher there is a notice and disturbs nothing.
+3. A publisher of another message type is not received at all. That is reported, and it disturbs nothing.
+4. A publisher whose node is not known (yet) counts after PATIENCE_S: discovery finds names a little later than topics.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Expected:
     alone: bool = False
     """One publisher at most."""
     shown: bool = False
-    """Published for people to look at: nobody obeys it."""
+    """Published for people to look at: nothing obeys it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class Foreign:
     obeyed: bool
     """Its messages are obeyed: of the right type, on a topic that counts."""
     shown: bool = False
-    """It is on a topic that nobody obeys."""
+    """It is on a topic that nothing obeys."""
 
     @property
     def priority(self) -> Priority:

@@ -1,6 +1,6 @@
 """Whether the bus takes frames: from the success of sending and from SocketCAN's error frames. No socket, no clock.
 
-python-can's `state` tells nothing on SocketCAN; what the controller has to say comes as error frames. Their bits are
+python-can's `state` is always the same on SocketCAN; the controller reports by error frames. Their bits are
 those of linux/can/error.h: the class is the identifier, details are in byte 1.
 """
 
@@ -62,7 +62,7 @@ class BusHealth:
         self._broken_since = math.inf
 
     def on_error_frame(self, error_class: int, data: bytes, now_s: float) -> None:
-        """What the controller says. Bus errors and lost arbitrations are counted alone: each may be the last one."""
+        """What the controller reports. Bus errors and lost arbitrations are only counted: each may be the last one."""
         self.error_frames += 1
         detail = data[1] if error_class & CONTROLLER and len(data) > 1 else 0
         if error_class & (BUS_OFF | TX_TIMEOUT) or detail & PASSIVE:

@@ -17,7 +17,7 @@ SEND_TIMEOUT_S = 0.001
 BATCH = 256
 """Frames taken in before the loop looks at the clock again."""
 _ERRORS = (can.CanError, OSError, ValueError)
-"""ValueError: what select says of a handle whose adapter is gone."""
+"""ValueError: from select for a handle whose adapter is gone."""
 
 
 class BusError(Exception):

@@ -6,7 +6,7 @@ from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 
 LIFE_M, LIFE_SHARE, LIFE_COUNTS = 0.001, 0.2, 2
 """An encoder that is nearer than this to the place of its last sign of life may jitter. Less where watchdog.
-motion_missing_m is: a share of it. More where the encoder is coarse: so many increments."""
+motion_missing_m is: a share of it. More where the encoder is coarse: this many increments."""
 _WRAP = 2**32
 
 

@@ -31,7 +31,7 @@ class CreepWatch:
     def look(self, bus: BusView, bounds: Bounds, now_s: float) -> str:
         """What is ordered though nothing is allowed, for `order_hold_s` in all; empty: nothing is.
 
-        It begins anew when anything is allowed, and when nothing was ordered for as long.
+        It starts again when anything is allowed, and when nothing was ordered for as long.
         """
         elapsed_s, self._looked_at = now_s - self._looked_at, now_s
         if bounds != AT_REST:

@@ -2,7 +2,7 @@
 
 Rules
 1. An order allows itself and everything between it and zero at once: stopping is always allowed.
-2. It goes on to be allowed for `order_hold_s` after the next order took its place or its lease ran out: so long may
+2. It stays allowed for `order_hold_s` after the next order took its place or its lease ran out: that long may
    the driver still follow it (its command timeout, its cycle, latency, and the time that the jerk limit adds).
 3. Then a bound falls to what is ordered now. As the driver keeps the curvature while it slows down, linear and angular
    bounds wait for each other: braking for a turn that has to end as well, a turn for braking, and also for a linear

@@ -52,7 +52,7 @@ _FIELDS: Final = frozenset(
 )
 
 Received = tuple[int, bytes, float]
-"""Identifier with flags, data, and when the kernel received it by the wall clock [s]; 0.0: it did not say."""
+"""Identifier with flags, data, and when the kernel received it by the wall clock [s]; 0.0: unknown."""
 
 
 class FrameSocket(Protocol):
@@ -174,7 +174,7 @@ class _UdpMulticast(_Socket):
             return None
         try:
             return _decoded(self._unpacked(datagram), _time_s(ancillary))
-        except Exception:  # noqa: BLE001 - a datagram can be anything, and so can what msgpack and python-can say of it
+        except Exception:  # noqa: BLE001 - a datagram can be anything, msgpack and python-can may raise anything
             return NO_FRAME, b"", 0.0
 
 

@@ -26,7 +26,7 @@ WATCHDOG_HEARTBEAT = 0x77E
 STATUS_TPDO = (0x180, 0x380)
 """6041h u16, 6064h i32 of the node's first and second axis."""
 VELOCITY_TPDO = (0x280, 0x480)
-"""606Ch i32 of the node's first and second axis, and 6077h or 6078h i16 of a drive that tells its torque."""
+"""606Ch i32 of the node's first and second axis, and 6077h or 6078h i16 of a drive that reports its torque."""
 RATED = 1000.0
 """6077h and 6078h at rated torque."""
 SETPOINT_RPDO = (0x200, 0x300)
@@ -94,7 +94,7 @@ POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveStat
 
 
 def decode_state(statusword: int) -> DriveState | None:
-    """The state that a statusword 6041h tells; None: bits that no state has."""
+    """The state in a statusword 6041h; None: bits that no state has."""
     for mask, value, state in _STATES:
         if statusword & mask == value:
             return state
@@ -199,7 +199,7 @@ def state(
 ) -> Frame:
     """The state frame. `lease_age_s` above 65.534 s (infinity too) is sent as unknown; `reset`: number, answer.
 
-    `armed`: the record on disk says that there is power.
+    `armed`: the record on disk is LIVE.
     """
     age_ms = int(max(lease_age_s, 0.0) * 1000.0) if lease_age_s < 65.535 else LEASE_AGE_UNKNOWN
     return Frame(STATE, _STATE.pack(number, cause, rung | (ARMED if armed else 0), node_id, age_ms, *reset))
@@ -226,12 +226,12 @@ def _own_pdo(node_id: int, axis_count: int, layout: WatchedLayout, word: int) ->
 
 
 def pre_operational(node_id: int) -> Frame:
-    """NMT: the node leaves OPERATIONAL, so that nobody's PDO counts there any more."""
+    """NMT: the node leaves OPERATIONAL, so that no master's PDO counts there any more."""
     return Frame(NMT, bytes([PRE_OPERATIONAL_COMMAND, node_id]))
 
 
 def reset_node(node_id: int) -> Frame:
-    """NMT: the node starts anew, as after power on. It forgets what was not saved, 1016h and its PDOs among that."""
+    """NMT: the node restarts, as after power on. It forgets what was not saved, 1016h and its PDOs included."""
     return Frame(NMT, bytes([RESET_NODE_COMMAND, node_id]))
 
 

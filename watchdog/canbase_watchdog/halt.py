@@ -18,9 +18,9 @@ from canbase_watchdog.lease import Lease
 from canbase_watchdog.view import NEVER, Axis, BusView
 
 LONGEST_STEP_S = 0.1
-"""A driver that was late by more goes on with its ramp as if so much time had passed: the ramp begins anew here."""
+"""A driver that was late by more goes on with its ramp as if that time had passed: the ramp starts again here."""
 RECEIVED_S = 0.1
-"""A SYNC waits for this process for so long at most: its own loop_late_s is another cause."""
+"""A SYNC waits for this process for at most this long [s]: its own loop_late_s is another cause."""
 SYNCS = 2
 
 

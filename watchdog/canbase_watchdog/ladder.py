@@ -1,9 +1,9 @@
 """How far the watchdog goes to stop a drive: the ladder as a table, and the rule that climbs it. No frames here.
 
-Each node has a ladder of its own: a drive that brakes well is not made to coast because another one is silent.
+Each node has a ladder of its own: a drive that brakes well is not made to coast because another one is lost.
 Quick stop and pre-operational leave the braking to the drive's velocity loop. Where that loop does not brake, or its
 sensor cannot be trusted, only the power can go: then the rungs between are left out. The last rung makes the drive
-start anew; it is for a drive that says itself that it kept its power, and for no other (docs/decisions/0044).
+restart; it is for a drive that reports itself that it kept its power, and for no other (docs/decisions/0044).
 """
 
 from __future__ import annotations
@@ -49,15 +49,15 @@ RUNGS = {
 READINGS = 2.0
 """One reading may be lost."""
 HELD_S = 0.2
-"""A drive that holds a wheel at standstill has so long to switch off, by itself (605Ah) or as the driver says."""
+"""A drive that holds a wheel at standstill has this long to switch off, by 605Ah or by the driver's order [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Braking:
-    """What a wheel under power that is told to stop may do at most, and one without power. From robot.yaml."""
+    """What a wheel under power that is ordered to stop may do at most, and one without power. From robot.yaml."""
 
     lag_s: float
-    """It may keep its speed for so long."""
+    """It may keep its speed for this long [s]."""
     least_mps2: float
     """Then it loses at least this."""
     tolerance_mps: float
@@ -65,7 +65,7 @@ class Braking:
     coasting_s: float
     """A wheel without power has rolled out after this, whatever its sensor reports."""
     samples: int
-    """So many in a row must show that it does not brake: one may be an outlier."""
+    """This many in a row must show that it does not brake: one may be an outlier."""
 
     @classmethod
     def of(cls, config: WatchdogConfig) -> Braking:
@@ -87,10 +87,10 @@ class Braking:
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What the feedback of one node says. `seen_at`: when the oldest of its values came (monotonic, s).
+    """The feedback of one node. `seen_at`: when the oldest of its values came (monotonic, s).
 
     `begin_mps`: the speed from which it may begin to brake, which its last setpoint may have raised within the lag.
-    `trusted`: its sensors have not been caught with a lie. `reading_s`: so long it takes to read all its axes by SDO.
+    `trusted`: its sensors were not found faulty. `reading_s`: the time to read all its axes by SDO.
     """
 
     enabled: bool
@@ -123,7 +123,7 @@ class Climb:
     """Samples in a row that were faster than braking allows."""
     judged_at: float = -math.inf
     off_since: float = math.inf
-    """Since when its feedback says that it has no power; infinity: it does not."""
+    """Since when its feedback shows that it has no power; infinity: it does not."""
 
 
 def first(look: Look, now_s: float) -> Climb:
@@ -135,17 +135,17 @@ def advance(before: Climb, look: Look, braking: Braking, now_s: float) -> Climb:
     """The place of a node after this look at it. Rules, the first that fits:
 
     1. stopped, and enabled again: next rung, somebody works against us; but no reset before the power was ordered off;
-    2. stopped, and moving, or its sensor is caught with a lie after that: not stopped, same rung from the start, or the
-       one before the reset. How long its power is off goes on counting: a look that cannot tell drives no wheel. With
+    2. stopped, and moving, or its sensor is found faulty after that: not stopped, same rung from the start, or the
+       one before the reset. How long its power is off goes on counting: a look without evidence drives no wheel. With
        power for HELD_S: power off, or the next rung, for what holds a wheel by a sensor that stays may drive it;
     3. not enabled and standing, by feedback that came on this rung: stopped. Where the sensor cannot be trusted, its
        power must be off as well, for as long as a wheel may roll: then a stand is assumed;
-    4. never heard of, and not told to have power: stays, there is nothing to climb for;
+    4. no frame ever, and not known to have power: stays, there is nothing to climb for;
     5. a sensor that cannot be trusted: power off at once, for quick stop closes its loop on that sensor;
     6. powered and faster than braking allows, `samples` in a row, or not slower than a moment ago: power off at once,
        or the next rung; the relay opens;
     7. what the rung orders is not done, or not seen, within `obey_s`: next rung. The last one only for a drive that was
-       seen to have power on the rung before: one that is not heard may be off, and a reset makes it forget 1016h;
+       seen to have power on the rung before: one that sends nothing may be off, and a reset makes it forget 1016h;
     8. stays. A wheel that rolls without power is waited for: no rung can brake it.
     """
     climb = _judged(before, look, braking, now_s)
@@ -184,7 +184,7 @@ def _judged(climb: Climb, look: Look, braking: Braking, now_s: float) -> Climb:
 
 
 def _holds(climb: Climb, look: Look, braking: Braking, now_s: float) -> bool:
-    """Nothing drives it, and what says that it stands is evidence, or needs none any more."""
+    """Nothing drives it, and the sign of its standstill is evidence, or needs none any more."""
     return not look.enabled if look.trusted else now_s >= climb.off_since + braking.coasting_s
 
 

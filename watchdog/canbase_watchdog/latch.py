@@ -1,6 +1,6 @@
 """The watchdog's record of its trip, over kills, restarts and reboots. Pure; the file is latch_file.py.
 
-Before a drive may have power the record on disk already says LIVE; CLEAR comes after power was seen to be off, without
+Before a drive may have power the record on disk is already LIVE; CLEAR comes after power was seen to be off, without
 a trip. Found LIVE, or unreadable in any way, it is a trip. The layout is that of canbase_runtime.latch_record, written
 a second time on purpose: a test compares both.
 """
@@ -22,7 +22,7 @@ _CHECKED = PAGE - 4
 
 
 class Mark(enum.IntEnum):
-    """What the record says."""
+    """The mark of the record."""
 
     CLEAR = 0
     LIVE = 1
@@ -33,7 +33,7 @@ class Mark(enum.IntEnum):
 class Entry:
     """What is, or shall be, on disk: the cause of the trip (its number in the state frame), its node and sentence.
 
-    `number`: which wish of this life it is; not on disk.
+    `number`: which request of this life it is; not on disk.
     """
 
     mark: Mark = Mark.CLEAR
@@ -72,7 +72,7 @@ def page(entry: Entry, sequence: int, whose: bytes) -> bytes:
 
 
 def decode(data: bytes, whose: bytes) -> Past:
-    """What a file says. Both pages must be whole: half a record is none. Never raises."""
+    """The record in a file. Both pages must be whole: half a record is none. Never raises."""
     if len(data) != LENGTH:
         return Past(problem=f"{len(data)} bytes, expected {LENGTH}")
     first, second = (_decode_page(data[at : at + PAGE], whose) for at in (0, PAGE))
@@ -100,7 +100,7 @@ def _decode_page(data: bytes, whose: bytes) -> Past:
 class Ledger:
     """What the watchdog wants on disk, and whether it is there.
 
-    `past` None: nobody keeps a record (virtual time), and what is wanted counts as written at once.
+    `past` None: no record is kept (virtual time), and what is wanted counts as written at once.
     """
 
     def __init__(self, past: Past | None) -> None:

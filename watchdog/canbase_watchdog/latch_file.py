@@ -64,7 +64,7 @@ class Keeper(threading.Thread):
             self._inbox.put(entry)
 
     def finish(self, timeout_s: float) -> None:
-        """Write what is wanted, at most for so long, and end."""
+        """Write what is wanted, for at most this long [s], and end."""
         self._inbox.put(None)
         if self.is_alive():
             self.join(timeout_s)
@@ -157,7 +157,7 @@ class Keeper(threading.Thread):
 
 
 def _access(descriptor: int, folder: Path) -> str:
-    """Who else could change it; empty: nobody but root."""
+    """Users besides root who could change it; empty: none."""
     file, parent, me = os.fstat(descriptor), folder.stat(), os.geteuid()
     if not stat.S_ISREG(file.st_mode):
         return "no regular file"

@@ -1,4 +1,4 @@
-"""Leases: what the safety filter tells the watchdog each time that it orders a velocity. Layout: docs/bus.md.
+"""Leases: what the safety filter sends to the watchdog with each velocity that it orders. Layout: docs/bus.md.
 
 A lease counts only when nothing about it is doubtful; each refusal is counted by its reason. No socket here.
 """
@@ -100,7 +100,7 @@ class LeaseBook:
         self.refused: dict[Refusal, int] = dict.fromkeys(Refusal, 0)
 
     def take(self, datagram: bytes, uid: int | None, now_s: float, pid: int | None = None) -> Refusal | None:
-        """Judge a datagram from the user `uid` (None: the system did not tell). Returns why it does not count.
+        """Judge a datagram from the user `uid` (None: unknown to the system). Returns why it does not count.
 
         `pid`: the process that sent it. Leases of one process count; of another one when the first has sent nothing for
         the timeout, as after a restart. 0, for all processes of another PID namespace, never counts.
@@ -113,7 +113,7 @@ class LeaseBook:
     def _judge(self, datagram: bytes, uid: int | None, now_s: float, pid: int | None) -> Refusal | None:
         if (
             self._uid is not None and uid != self._uid
-        ) or pid == 0:  # 0: not to be told from others (pid_namespaces(7))
+        ) or pid == 0:  # 0: cannot be told apart from others (pid_namespaces(7))
             return Refusal.SENDER
         if pid != self._pid and now_s < self._heard_at + self._timeout_s:
             return Refusal.SECOND

@@ -43,7 +43,7 @@ class LeaseSocket:
             self._socket.bind(path)
             self._path.chmod(0o600)
             if foreign:
-                os.chown(path, uid, -1)  # nobody else can fill its queue
+                os.chown(path, uid, -1)  # no other user can fill its queue
         except OSError as error:
             raise LeaseSocketError(f"the lease socket {path} cannot be bound: {error}. Check lease.socket.") from error
 
@@ -59,7 +59,7 @@ class LeaseSocket:
         return self._socket.fileno()
 
     def receive(self) -> Iterator[tuple[bytes, int | None, int | None]]:
-        """What has arrived, at most BATCH: datagram, its sender's user and process (None: the system did not tell)."""
+        """What has arrived, at most BATCH: datagram, its sender's user and process (None: unknown to the system)."""
         for _ in range(BATCH):
             try:
                 datagram, ancillary, _, _ = self._socket.recvmsg(256, _ROOM)
@@ -77,7 +77,7 @@ def _sender(ancillary: list[tuple[int, int, bytes]]) -> tuple[int | None, int | 
 
 
 def _check_folder(folder: Path) -> None:
-    """Whoever may change the folder of the socket can put another socket in its place. Raises LeaseSocketError."""
+    """A user who may change the folder of the socket can put another socket in its place. Raises LeaseSocketError."""
     link, found = folder.lstat(), folder.stat()
     if stat.S_ISLNK(link.st_mode) and link.st_uid not in (0, os.geteuid()):
         raise LeaseSocketError(f"the folder {folder} of the lease socket is a link of user {link.st_uid}. Remove it")

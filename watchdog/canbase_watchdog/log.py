@@ -1,6 +1,6 @@
 """How the watchdog's log lines look: with a time on a terminal, with a priority for the journal (sd-daemon(3)).
 
-And that its loop never waits for whoever reads them: a held terminal (Ctrl-S), a full pipe, a journal that hangs.
+And that its loop never waits for their reader: a held terminal (Ctrl-S), a full pipe, a journal that hangs.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def formatter(environment: Mapping[str, str], stderr: os.stat_result) -> logging
 
 
 class Lines(logging.Handler):
-    """Writes each line at once or not at all; the first one that can be written again tells how many were lost."""
+    """Writes each line at once or not at all; the first one that can be written again has the number of lost ones."""
 
     def __init__(self, descriptor: int = STDERR) -> None:
         """`descriptor`: an open one, for which `never_wait` was called."""
@@ -58,7 +58,7 @@ class Lines(logging.Handler):
 def never_wait(environment: Mapping[str, str], descriptor: int = STDERR) -> None:
     """A second copy, on purpose, of canbase_runtime.output: from now on a write that would wait raises BlockingIOError.
 
-    A terminal and a pipe are opened anew, so that other processes that share them still wait. A socket cannot be: only
+    A terminal and a pipe are opened again, so that other processes that share them still wait. A socket cannot be: only
     the one to the journal, which is this process's own, is changed. Files stay as they are.
     """
     with contextlib.suppress(OSError):  # a closed descriptor; a terminal of another user

@@ -22,9 +22,9 @@ from canbase_watchdog.watchdog import State, Watchdog
 
 TICK_S = 0.005
 BUS_DEAD_S = 1.0
-"""Without one sent frame for so long the process gives up: systemd starts it again."""
+"""Without one sent frame for this long the process gives up [s]: systemd starts it again."""
 END_S = 1.0
-"""How long it goes on stopping the drives after it was asked to end."""
+"""How long it goes on stopping the drives after the request to end [s]."""
 COLLECT_S = 10.0
 SUSPENDED_S = 0.02
 """CLOCK_BOOTTIME goes on in a suspend and CLOCK_MONOTONIC does not: so much between two turns is no lateness."""

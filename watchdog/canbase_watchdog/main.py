@@ -34,7 +34,7 @@ _log = logging.getLogger("canbase.watchdog")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run until SIGINT or SIGTERM. Exit code 0: as asked; 1: bus, socket or relay failed; 2: bad configuration."""
+    """Run until SIGINT or SIGTERM. Exit code 0: by a signal; 1: bus, socket or relay failed; 2: bad configuration."""
     never_wait(os.environ)
     handler = Lines()
     handler.setFormatter(formatter(os.environ, os.fstat(2)))
@@ -87,7 +87,7 @@ def _serve(config: WatchdogConfig) -> int:
 
 
 def _listen_for_another(bus: BusPort) -> None:
-    """A watchdog on another computer: heard before the first frame of this one. Raises sole.TakenError."""
+    """A watchdog on another computer: its frames come before the first frame of this one. Raises sole.TakenError."""
     end = time.monotonic() + LISTEN_S
     while (left_s := end - time.monotonic()) > 0.0:
         bus.wait(left_s)

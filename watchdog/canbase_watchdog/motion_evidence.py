@@ -5,21 +5,21 @@ that is being stopped can lose its sensor as well (docs/decisions/0020)
 1. Unseen: ordered to move, and the encoder has not moved: net, from one place to another, for an encoder that jitters
    moves nothing. The ordered travel adds up until it moves, however slow the order is; a setpoint of zero adds nothing
    and forgets nothing, so short orders add up too, and most of it outlives the power. The time adds up while an order
-   is older than `drive_lag_s`, once it asked for the travel that a sign of life takes: a slow wheel needs its time for
+   is older than `drive_lag_s`, once it ordered the travel that a sign of life takes: a slow wheel needs its time for
    that. Once enough travel was ordered it adds up without such an order too: a wheel runs away after its order; but
-   not while nothing is ordered of any wheel and none moves: then its drive has to let go, which torque.py watches.
+   not while nothing is ordered of any wheel and none moves: then its drive has to release it, which torque.py watches.
    But a wheel that was held, and comes free as its order goes through zero, has nothing to show until the new order
-   asked for it: the loop's integral has to turn round, against its friction. So each direction counts apart, and
-   orders to and fro have BOTH_WAYS times the travel in all; the first turn has no time until it asked for motion.
+   ordered it: the loop's integral has to turn round, against its friction. So each direction counts apart, and
+   orders to and fro have BOTH_WAYS times the travel in all; the first turn has no time until it ordered motion.
    And a slow order may need long until its drive has got over the friction: where that reports no motion, and no more
    torque than friction takes, the time counts as time at rated torque, which bounds the speed that a dead encoder
    hides.
 2. Halted: the velocity of a wheel that rolled drops at once to standstill, as no wheel can, whatever is ordered, and
    the encoder does not move from then on.
 3. Jolts: velocities that change as no wheel can, again and again.
-4. Ghost: the velocity says that the wheel turns, one way, and the encoder does not move. Its drive pushes against a
-   motion that there is not, also with nothing ordered and after it has let go.
-5. Behind: slower than the least that the setpoints of the last `drive_lag_s` ask for, reached by `slowest_ramp_mps2`.
+4. Ghost: the velocity shows that the wheel turns, one way, and the encoder does not move. Its drive pushes against a
+   motion that there is not, also with nothing ordered and after it has released the wheel.
+5. Behind: slower than the least that the setpoints of the last `drive_lag_s` order, reached by `slowest_ramp_mps2`.
    It adds up while the wheel is too slow, and goes down as fast while it is not.
 6. Strained: its drive gives all its torque, and the wheel is slower than ordered and gets no faster: an encoder that
    cannot show the speed (it loses counts) makes its drive push without end, however near to the order it is.
@@ -36,7 +36,7 @@ from canbase_watchdog.counts import Life, life_m
 from canbase_watchdog.envelope import Peak
 
 UNSEEN_COUNTS = 4
-"""Of a coarse encoder nothing is missed before so many increments were ordered."""
+"""With a coarse encoder nothing is missed before this many increments were ordered."""
 KEPT_SHARE = 0.875
 """So much of the time that is allowed without a sign of life, and of the travel of one direction, is remembered while
 there is no power. Not all: a wheel that gets power again needs an order before it can show anything. Of both directions
@@ -46,16 +46,16 @@ STRAIN_SHARE = 0.5
 LEAST_WEIGHT = 0.25
 """A wheel that cannot turn, and takes no torque for it, is found all the same."""
 SLOW_SLACKS = 2.0
-"""An order of less than so many times what a velocity may be off is a slow one: its drive winds up torque slowly."""
+"""An order of less than this many times the error of a velocity is a slow one: its drive winds up torque slowly."""
 STRAINED_SHARE, NEARER_S = 0.9, 0.1
-"""Of the rated torque: a drive gives all that it has for long; after so long without a gain it is strained."""
+"""Of the rated torque: a drive gives all that it has for long; after this time without a gain it is strained [s]."""
 BOTH_WAYS = 2.0
 """Of what one direction may lack."""
 ROLLING_SHARE = 0.5
-"""An encoder that moved by more than this share of what the velocity says: the wheel really rolled."""
+"""An encoder that moved by more than this share of the travel by velocity: the wheel really rolled."""
 JOLT_MEMORY_S = 1.0
 GHOST_LIVES = 2.0
-"""So many signs of life the velocity may tell of that the encoder does not show, ..."""
+"""This many signs of life the velocity may show that the encoder does not show, ..."""
 GHOST_BITS, GHOST_FALLS = 4.0, 0.99
 """A register that shows a few bits at standstill is none, nor is a filter's tail: only a velocity that stays counts."""
 GHOST_LAG_S = 0.1
@@ -64,7 +64,7 @@ GHOST_LAG_S = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What speaks against a wheel. `ordered_mps`: the least that its setpoints ask for, `setpoint_mps` the last one."""
+    """The evidence against a wheel. `ordered_mps`: the least that its setpoints order, `setpoint_mps` the last one."""
 
     ordered_mps: float = 0.0
     setpoint_mps: float = 0.0
@@ -73,7 +73,7 @@ class Evidence:
     """Since the order last went through zero."""
     both_s: float = 0.0
     both_m: float = 0.0
-    """Of both directions, the time since they asked for as much as one may lack."""
+    """Of both directions, the time since they ordered as much as one may lack."""
     unseen: bool = False
     """Time and travel are beyond what is allowed, of one direction or of both: rule 1."""
     halted: int = 0
@@ -128,7 +128,7 @@ class EvidenceWatch:
         self._backward.set(-setpoint_mps, now_s, math.inf)
 
     def trust(self) -> None:
-        """A reset was accepted: everything begins anew."""
+        """A reset was accepted: everything starts again."""
         self._life.begin()
         self._ghost_s = 0.0
         self.last = Evidence()
@@ -149,7 +149,7 @@ class EvidenceWatch:
     ) -> None:
         """606Ch, and the travel of the encoder since the last sample; None: it is not known, or a jump.
 
-        `torque`: 6077h as a share of the rated torque, None: the drive does not tell it.
+        `torque`: 6077h as a share of the rated torque, None: the drive does not report it.
         """
         jolted, rolled = self._is_jolt(velocity_mps, elapsed_s), self._rolled
         lives = self._lives(step_m, jolted)
@@ -250,7 +250,7 @@ class EvidenceWatch:
         return 1.0 if abs(torque) > STRAIN_SHARE else max(abs(torque), LEAST_WEIGHT)
 
     def _kept(self, lives: bool, ghost_m: float) -> Evidence:
-        """What outlives a time without power: most of it, or a drive that lets go after each order is never found."""
+        """What outlives a time without power: most of it, or a drive that releases after each order is never found."""
         last = Evidence(trusted=self.last.trusted) if lives else self.last
         return Evidence(
             unseen_m=min(last.both_m, KEPT_SHARE * self._unseen_m),
@@ -289,7 +289,7 @@ class EvidenceWatch:
         return before + jolted
 
     def _ask(self, elapsed_s: float, now_s: float, enabled: bool) -> None:
-        """The least that the setpoints of the lag ask for, and how far the slowest ramp has got to it from a stand.
+        """The least that the setpoints of the lag order, and how far the slowest ramp has got to it from standstill.
 
         A wheel that still turns the other way has not begun: how fast that ends is the upper bound's, plausibility.py.
         """

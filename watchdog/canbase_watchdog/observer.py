@@ -1,4 +1,4 @@
-"""What the bus says, per axis and node: the last values and when they came. No judgement here: that is policy.py.
+"""The state of the bus, per axis and node: the last values and when they came. No judgement here: that is policy.py.
 
 Ages count from the local monotonic receive time. A frame that cannot be understood is counted and changes nothing.
 """
@@ -162,7 +162,7 @@ class Observer:
         )
 
     def trust(self) -> None:
-        """A reset was accepted: what spoke against the sensors is over."""
+        """A reset was accepted: the evidence against the sensors is dropped."""
         self._view = None
         for record in self._records.values():
             record.feedback.trust()
@@ -225,7 +225,7 @@ class Observer:
         return True
 
     def _is_enabled(self, node_id: int, now_s: float) -> bool:
-        """A TPDO of the last moments said so."""
+        """A TPDO of the last moments showed it."""
         records = (record for key, record in self._records.items() if key[0] == node_id)
         return any(each.state is ENABLED and now_s < each.fed_status_at + self._gap_s for each in records)
 

@@ -11,11 +11,11 @@ from __future__ import annotations
 import math
 
 AFTER_S = 0.2
-"""So long after the last sample that lacked."""
+"""This long after the last sample that lacked [s]."""
 HELD_S = 0.3
 """The way is lost within this time at most: a wheel that is held for longer trips."""
 FASTER = 3.0
-"""So many times what it lacked."""
+"""This many times what it lacked."""
 
 
 class Overshoot:

@@ -2,9 +2,9 @@
 
 The wheel follows its setpoints: it may have the speed of any setpoint of the last `drive_lag_s` and less, and after
 that it falls with the configured deceleration; what it must have at least is motion_evidence.py. A wheel that something
-held back catches up when it comes free (overshoot.py). Encoder and velocity tell the same way, but for a small drift:
-a difference is forgotten over the way on which it did not grow, and very slowly with time, so that it is found at any
-speed (docs/decisions/0020).
+held back catches up when it comes free (overshoot.py). Encoder and velocity show the same travel, but for a small
+drift: a difference is forgotten over the way on which it did not grow, and very slowly with time, so that it is found
+at any speed (docs/decisions/0020).
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ DRIFT_M, DRIFT_S = 0.25, 10.0
 """Differences between encoder and velocity are forgotten over this way, and within this time: noise, filters and a
 scale that is a little wrong have no memory. An error of more than travel_tolerance_m / DRIFT_M is found on the way."""
 JUMP_FACTOR = 3.0
-"""A step of the encoder beyond so many times the fastest wheel's is a jump: it tells nothing about the motion."""
+"""A step of the encoder beyond this many times the fastest wheel's is a jump: it is no evidence of motion."""
 JUMP_CYCLES = 2.0
 BUNCHED = 0.5
-"""Samples that come after fewer periods waited while this process was late: their times say nothing, only their sum."""
+"""Samples after fewer periods waited while this process was late: only the sum of their times is evidence."""
 SWING_SHARE, SWING_S = 0.08, 0.3
-"""A loaded wheel swings beyond its setpoint as its velocity loop does: by this share of the fastest one of so long."""
+"""A loaded wheel swings beyond its setpoint with its velocity loop: by this share of the fastest one in this time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class Plausibility:
         self.evidence = EvidenceWatch(drive, config, now_s)
 
     def trust(self) -> None:
-        """A reset was accepted: what encoder and velocity told against each other is over."""
+        """A reset was accepted: the differences of encoder and velocity are dropped."""
         self.last = replace(self.last, drift_m=0.0)
         self.evidence.trust()
 
@@ -91,9 +91,9 @@ class Plausibility:
         self, velocity_mps: float, powered: bool, enabled: bool, now_s: float, torque: float | None = None
     ) -> None:
         """606Ch of a velocity TPDO. A wheel without power may be pushed: nothing of it is bad. The drift of
-        before stays, or a drive that lets go after each order would never be found.
+        before stays, or a drive that releases after each order would never be found.
 
-        `torque`: what it tells of 6077h, as a share of the rated one; None: nothing.
+        `torque`: its 6077h, as a share of the rated one; None: not reported.
         """
         elapsed_s, self._at = now_s - self._at, now_s
         self._follow(elapsed_s, now_s)
@@ -154,7 +154,7 @@ class Plausibility:
         return step_m, abs(step_m) > self._jump_mps * max(elapsed_s, self._jump_s)
 
     def _drift(self, velocity_mps: float, step_m: float | None, jumped: bool, elapsed_s: float) -> float:
-        """Travel by velocity minus travel by encoder [m]. A jump is no travel; without a step it begins anew."""
+        """Travel by velocity minus travel by encoder [m]. A jump is no travel; without a step it starts again."""
         if step_m is None:
             return 0.0
         by_velocity_m = (velocity_mps + self._velocity_mps) / 2.0 * elapsed_s

@@ -1,4 +1,4 @@
-"""When the watchdog trips: an ordered table of checks on what the bus and the leases say. What it does then: ladder.py.
+"""When the watchdog trips: an ordered table of checks on bus and leases. What it does then: ladder.py.
 
 Each check names when it trips, and when its cause still stands, which keeps a reset away.
 """
@@ -15,7 +15,7 @@ from canbase_watchdog.trip_cause import FINE, TripCause, Verdict
 from canbase_watchdog.view import NEVER, Axis, BusView, Node, View
 
 SIGN_S = 1.0
-"""A sign of another master, or of a drive that started anew, counts for so long."""
+"""A sign of another master, or of a drive that restarted, counts for this long [s]."""
 
 
 def _lease_is_lost(view: View, config: WatchdogConfig, now_s: float) -> bool:
@@ -73,7 +73,7 @@ def _has_restarted(view: View, node_id: int, config: WatchdogConfig, now_s: floa
 
 
 def _drive_restarted(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
-    """A drive that starts anew has no power: this one said that it has. Or there are two drives with its node id."""
+    """A drive that restarts has no power: this one reported that it has. Or there are two drives with its node id."""
     for axis in view.axes:
         node_id = axis.drive.node_id
         if _has_restarted(view, node_id, config, now_s) and view.enabled:
@@ -247,7 +247,7 @@ def _twist_outside(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
 
 
 def _cycles(config: WatchdogConfig) -> float:
-    """So many SYNCs are as long as feedback may be missing."""
+    """This many SYNCs take as long as feedback may be missing."""
     return config.feedback_timeout_s * config.control_hz
 
 
@@ -325,7 +325,7 @@ def _over(view: View, node_id: int, config: WatchdogConfig, now_s: float) -> boo
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One row: `trips` finds the cause; `stands` tells, for the node that it was about, whether it is still there.
+    """One row: `trips` finds the cause; `stands`: for the node that it was about, whether it still holds.
 
     `clears_on`: what a reset needs besides standing wheels and no ordered velocity, in words.
     """

@@ -13,7 +13,7 @@ def moving(axis: Axis, config: WatchdogConfig) -> bool:
 
 
 def commanded(axis: Axis, config: WatchdogConfig) -> bool:
-    """True for a wheel that is ordered to turn: enabled, or told to be while it tells nothing itself."""
+    """True for a wheel that is ordered to turn: enabled, or ordered to be while it reports nothing itself."""
     unheard = axis.asks_for_power and axis.command_at >= axis.status_at + config.feedback_timeout_s
     return axis.target_mps != 0.0 and (axis.enabled or unheard)
 
@@ -27,12 +27,12 @@ def in_motion(view: View, config: WatchdogConfig) -> Axis | None:
 
 
 def near_power(axis: Axis) -> bool:
-    """It has power, is ordered to, or is one step before it: from here on the record on disk must say so."""
+    """It has power, is ordered to, or is one step before it: from here on the record on disk must be LIVE."""
     return axis.powered or axis.state is DriveState.SWITCHED_ON or axis.asks_for_power
 
 
 def is_off(axis: Axis, view: View, config: WatchdogConfig, now_s: float) -> bool:
-    """Fresh feedback says so, or there is no such drive."""
+    """Fresh feedback shows it, or there is no such drive."""
     if near_power(axis):
         return False
     told = axis.state is not None and now_s < axis.status_at + config.feedback_timeout_s

@@ -1,6 +1,6 @@
 """Keeps the process punctual: memory locked, real-time priority, garbage collected only when nothing turns.
 
-Each of them may be forbidden; the watchdog then runs without and says so once.
+Each of them may be forbidden; the watchdog then runs without it and logs that once.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ PRIORITY = 40
 """Below the threads that serve interrupts (50 by default): without them no frame would arrive."""
 
 LONGEST_US = 1_000_000
-"""A thread that runs for so long without a wait ends its process (RLIMIT_RTTIME): it would starve the computer."""
+"""A thread that runs for this long without a wait ends its process (RLIMIT_RTTIME): it would starve the computer."""
 
 _MCL_CURRENT = 1
 _MCL_FUTURE = 2
@@ -41,7 +41,7 @@ def raise_priority() -> str | None:
 
 
 def calm_the_collector() -> None:
-    """What exists now is never collected again, and nothing else without being asked: no pause in the loop."""
+    """What exists now is never collected again, and nothing else without a call of ours: no pause in the loop."""
     gc.collect()
     gc.freeze()
     gc.disable()

@@ -1,4 +1,4 @@
-"""What the watchdog writes to its log and tells systemd: one line per change with the values, never one per cycle."""
+"""The watchdog's log and its notifications to systemd: one line per change with the values, never one per cycle."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _log = logging.getLogger("canbase.watchdog")
 
 
 class Reporter:
-    """Compares with what it said last."""
+    """Compares with its last report."""
 
     def __init__(self, watchdog: Watchdog) -> None:
         """Reports about this watchdog."""
@@ -33,7 +33,7 @@ class Reporter:
         self._counters_due = self._alive_due = 0.0
 
     def tick(self, health: BusHealth, now_s: float, datagrams_dropped: int = 0) -> None:
-        """Say what changed. systemd hears that the loop turns; on a dead bus that ends by itself (loop.py)."""
+        """Report what changed. systemd learns that the loop turns; on a dead bus that ends by itself (loop.py)."""
         if self._watchdog.status != self._status:
             self._tell_status(self._watchdog.status)
         if now_s >= self._alive_due:

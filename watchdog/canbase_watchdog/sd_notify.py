@@ -7,7 +7,7 @@ import socket
 
 
 def notify(message: str) -> bool:
-    """Tell systemd `READY=1`, `WATCHDOG=1`, `STATUS=…` (sd_notify(3)). False: there is nobody to tell."""
+    """Send `READY=1`, `WATCHDOG=1`, `STATUS=…` to systemd (sd_notify(3)). False: there is no systemd."""
     address = os.environ.get("NOTIFY_SOCKET", "")
     if not address:
         return False

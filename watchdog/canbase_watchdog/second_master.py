@@ -1,4 +1,4 @@
-"""Signs of a second master. CAN frames carry no sender: only what one driver alone cannot have sent tells of another.
+"""Signs of a second master. CAN frames carry no sender: only what one driver alone cannot have sent shows another.
 
 Signs, each while a drive that it concerns is enabled or at any time where that does not matter
 1. two different setpoints for one axis in one period, or a SYNC off the beat without any setpoint before it: three
@@ -7,7 +7,7 @@ Signs, each while a drive that it concerns is enabled or at any time where that 
 2. more SYNCs or driver's heartbeats than half as many again as configured. Counted over a window that is long against
    any burst: a loaded machine delivers late, yet not more;
 3. once: an NMT command to an enabled drive, a quick stop PDO, or an SDO that writes its controlword, target or mode.
-   The driver does none of them there. The watchdog does, but only after a trip, when nobody looks for signs.
+   The driver does none of them there. The watchdog does, but only after a trip, when signs are not looked for.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Sign:
 
 
 class Pace:
-    """Tells when `count` events have come within `window_s`."""
+    """Fires when `count` events have come within `window_s`."""
 
     def __init__(self, count: int, window_s: float) -> None:
         """`count` is 2 or more."""
@@ -87,7 +87,7 @@ class Foreign:
             self.note(0, f"more SYNCs than the driver's {self._control_hz:g} per second", now_s)
 
     def on_heartbeat(self, now_s: float) -> None:
-        """A heartbeat of the driver's node, or of somebody else who uses its number."""
+        """A heartbeat of the driver's node, or of another one that uses its number."""
         if self._heartbeats.too_fast(now_s):
             self.note(0, f"more heartbeats 77Fh than one each {self._period_s:.3f} s", now_s)
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 CALLERS = 4096
-"""So many may ask who holds it: nobody takes their calls, and above it they are not told any more."""
+"""The backlog: calls are never accepted, and a process beyond it does not learn who holds it."""
 
 _CREDENTIALS = struct.Struct("iII")
 

@@ -1,7 +1,7 @@
-"""Whether a wheel that is told to stop loses speed, judged from what was measured. Pure, one wheel, one rung.
+"""Whether a wheel that is ordered to stop loses speed, judged from what was measured. Pure, one wheel, one rung.
 
 Rules, with the limits' deceleration d and the noise n of one speed: `base.standstill_mps`, or one bit of 606Ch
-1. From the end of the drive's lag on a wheel loses a quarter of d. The bound of the whole stop (ladder.py) asks for
+1. From the end of the drive's lag on a wheel loses a quarter of d. The bound of the whole stop (ladder.py) demands
    half; the rest is left to ramps that grow slowly, for up to 0.4 s.
 2. It does not where its speed is more than n above the lines that fall so steeply from all places where it was
    `window_s` to `window_s` + HELD_S ago. A wheel that keeps its speed is 4 n above them after a window of
@@ -24,7 +24,7 @@ SLOPE_SHARE = 0.25
 MIN_WINDOW_S = 0.15
 """A ramp that grows for 0.4 s has become steep enough after this and LASTS_S."""
 HELD_S = 0.25
-"""A threshold holds a wheel for so long at most, with its way back to the ramp."""
+"""A threshold holds a wheel for at most this long, its return to the ramp included [s]."""
 LASTS_S = 0.08
 SAMPLES_LEAST = 3
 
@@ -50,7 +50,7 @@ class Slope:
 
     @property
     def window_s(self) -> float:
-        """So far apart two speeds have to be, to tell the slope between them from noise [s]."""
+        """How far apart two speeds have to be, to distinguish the slope between them from noise [s]."""
         return max(MIN_WINDOW_S, 4.0 * self.noise_mps / self.least_mps2)
 
 

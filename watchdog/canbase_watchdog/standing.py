@@ -7,7 +7,7 @@ Rules, with `standstill_mps` s and `motion_tolerance_mps` n:
 Anything else is motion: so is a wheel of which position or velocity did not come. The driver has the same rules in code
 of its own. No frames here, no judgement of the sensor: that is motion_evidence.py. But a standstill that came on less
 travel than a wheel needs to stop is unproven (stopping_distance.py), until the encoder has shown it, or the wheel has
-been without power for so long that it has rolled out and gets power again. One that moves again before that, without
+been without power long enough to have rolled out and gets power again. One that moves again before that, without
 power, has never stood: its encoder comes and goes.
 """
 
@@ -21,17 +21,17 @@ from canbase_watchdog.stopping_distance import StoppingDistance
 
 STILL_S = 0.2
 STEP_FACTOR = 3.0
-"""One step of the encoder may look so many times as fast as it is: samples come early and late."""
+"""One step of the encoder may look this many times as fast as it is: samples come early and late."""
 GAP_S = 0.5
-"""Values that came further apart say no more about each other than whether the wheel is where it was. Two motors that
+"""Values that came further apart only show whether the wheel is where it was. Two motors that
 are read by SDO take 0.15 s a turn."""
 COUNTS = 2
 """An encoder at an edge counts to and fro."""
 SELDOM_S = 0.05
-"""Positions that are further apart, as those that are read by SDO, tell a mean speed well: at its end the wheel had
+"""Positions that are further apart, as those that are read by SDO, give a good mean speed: at its end the wheel had
 this, less what half of the time can brake. Velocities come too seldom then."""
 JUMP_FACTOR = 3.0
-"""A step beyond so many times the fastest wheel's is no travel."""
+"""A step beyond this many times the fastest wheel's is no travel."""
 
 
 class StandWatch:
@@ -98,7 +98,7 @@ class StandWatch:
             self._sudden_since = now_s
 
     def trust(self) -> None:
-        """A reset was accepted: everything begins anew."""
+        """A reset was accepted: everything starts again."""
         self._stopping.forget()
         self._sudden, self._never_stood = 0, False
 
@@ -135,7 +135,7 @@ class StandWatch:
 
     @property
     def stands(self) -> bool:
-        """The last values of both say so."""
+        """The last values of both show it."""
         if not self._steady or not abs(self._velocity_at - self.position_at) < GAP_S:
             return False
         at = self.position_at

@@ -1,4 +1,4 @@
-"""The frames that stop one node, rung by rung, and those that ask whether it stands. Rules: ladder.py."""
+"""The frames that stop one node, rung by rung, and those that read whether it stands. Rules: ladder.py."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ IDLE_SDO_PERIOD_S = 0.05
 STALE_S = 0.02
 """While it is stopped, feedback that is older is read: two cycles, or an SDO's way to and fro."""
 RESET_PERIOD_S = 1.0
-"""A drive needs so long to start anew."""
+"""A drive needs this long to restart [s]."""
 AGAIN_S = 0.5
-"""A stopped node that tells nothing is read again so often, while nobody configures it ..."""
+"""A stopped node that sends nothing is read again after this time, while no master configures it ..."""
 FRESH_S = 1.5
 """... and a reset needs a look at it that is no older: two motors take 0.3 s."""
 SEEK_PERIOD_S = 0.5
-"""A node of which nothing is known after the start is asked so seldom that tools find the SDO channel free."""
+"""A node of which nothing is known after the start is read this seldom: tools find the SDO channel free."""
 
 _WORD_BY_STEP = {
     Step.PRE_OPERATIONAL: frames.QUICK_STOP_WORD,
@@ -54,7 +54,7 @@ class Stopper:
         """Begins at the foot of the ladder at the monotonic time `now_s` [s]; without `trusted`, a sensor lied.
 
         `resting`: for a trip of before the start. A drive that is off is left alone, so that it can be booted; one that
-        has power or moves is stopped. One that tells nothing is asked, unless somebody boots it.
+        has power or moves is stopped. One that sends nothing is read, unless a driver boots it.
         """
         self._node_id = node_id
         self._config = config
@@ -77,16 +77,16 @@ class Stopper:
 
     @property
     def settled(self) -> bool:
-        """True when the node stands and is off or held, as its feedback said, or when there is no such node."""
+        """True when the node stands and is off or held, by its feedback, or when there is no such node."""
         return (self.climb.stopped and self._seen.seen_at > self.climb.since) or not self._seen.present
 
     def is_fresh(self, now_s: float) -> bool:
-        """Whether what says so came in the last moments: a wheel that was stopped may roll again, or may have rolled
-        unseen. Of a node that nobody has ever heard nothing comes."""
+        """Whether that evidence came in the last moments: a wheel that was stopped may roll again, or may have rolled
+        unseen. A node that never sent a frame sends none now."""
         return now_s < self._seen.seen_at + FRESH_S or not self._seen.present
 
     def tick(self, view: View, now_s: float) -> list[Frame]:
-        """Look at the node, climb where the rules say so, and return the frames that are due."""
+        """Look at the node, climb where the rules demand it, and return the frames that are due."""
         if view.bus is not self._bus:
             self._bus = view.bus
             self._follow(view)
@@ -135,9 +135,9 @@ class Stopper:
         )
 
     def _is_untold(self, axes: Sequence[Axis]) -> bool:
-        """Since the start something is not known of it: it is neither said to move, nor stopped.
+        """Since the start a part of its state is not known: neither that it moves, nor that it is stopped.
 
-        A statusword that says that it has power, or a velocity, is enough to stop it, whoever asked for that.
+        A statusword with power, or a velocity, is enough to stop it, whichever client requested the value.
         """
         seen_at, noise_mps = min(axis.seen_at for axis in axes), self._config.motion_tolerance_mps
         told = any(axis.powered or abs(axis.velocity_mps) > noise_mps for axis in axes)
@@ -173,7 +173,7 @@ class Stopper:
         return [order(self._node_id, self._axis_count, self._layout)]
 
     def _reset_node(self, now_s: float) -> list[Frame]:
-        """Once, and again where the drive says after it that it still has power. No other one is made to boot."""
+        """Once, and again where the drive reports after it that it still has power. No other one is made to boot."""
         has_power = self._seen.powered and self._seen.seen_at > self._reset_at
         if self.climb.step < Step.RESET_NODE or not has_power or now_s < self._reset_at + RESET_PERIOD_S:
             return []
@@ -187,7 +187,7 @@ class Stopper:
         return [frames.pre_operational(self._node_id)]
 
     def _sdo(self, view: View, defied: bool, now_s: float) -> list[Frame]:
-        """The next request in turn. A stopped node that tells what it does, or is configured, is left alone."""
+        """The next request in turn. A stopped node that sends feedback, or is configured, is left alone."""
         rests = self.climb.stopped and not defied
         seeks = rests and self._is_unknown(view, now_s)
         stopped_s = SEEK_PERIOD_S if seeks else IDLE_SDO_PERIOD_S
@@ -202,17 +202,17 @@ class Stopper:
         return [requests[(self._sdo_turn - 1) % len(requests)]]
 
     def _is_unknown(self, view: View, now_s: float) -> bool:
-        """Since the start it has told nothing, and no driver boots it: it may turn as it did before the start."""
+        """Since the start it has sent nothing, and no driver boots it: it may turn as it did before the start."""
         configured_at = max(self._resting_since, view.node(self._node_id).configured_at)
         return self._is_untold(self._axes(view)) and now_s >= configured_at + self._config.drive_heartbeat_s
 
     def _is_old(self, view: View, now_s: float) -> bool:
-        """It told something once, and has not of late; and nobody else needs its SDO channel."""
+        """It sent feedback once, and not recently; and no other client needs its SDO channel."""
         told_at, quiet_since = self._seen.seen_at, view.node(self._node_id).configured_at
         return told_at > NEVER and now_s >= max(told_at, quiet_since) + AGAIN_S
 
     def _requests(self, view: View, now_s: float) -> Sequence[Frame]:
-        """Writes of this rung, and readings of what TPDOs do not tell (no SYNC, or pre-operational)."""
+        """Writes of this rung, and readings of what TPDOs do not carry (no SYNC, or pre-operational)."""
         word = None if self.climb.stopped else _WORD_BY_STEP.get(self.climb.step)
         requests: list[Frame] = []
         for axis in self._axes(view):

@@ -21,5 +21,5 @@ class Tally:
             self.value = max(0.0, self.value - FORGIVEN)
 
     def clear(self) -> None:
-        """Begin anew."""
+        """Start again."""
         self.value = 0.0

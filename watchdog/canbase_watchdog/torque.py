@@ -2,16 +2,17 @@
 
 A dead encoder shows a stand, and the integrator of the velocity loop that it left behind goes on to push with nothing
 ordered. A wheel that is held on a slope, or against a threshold, looks the same on the bus. They differ when the drive
-lets go: the healthy wheel rolls, which its encoder shows, or its friction holds it and no torque is needed.
+releases the wheel: the healthy wheel rolls, which its encoder shows, or its friction holds it and no torque is needed.
 
 Rules, for a drive with power
 1. Pushed: torque × time since the last sign of life, or since there was no power, bounds the speed that a dead encoder
-   can hide. With nothing ordered of any wheel, a drive that was ordered motion before must let go once.
+   can hide. With nothing ordered of any wheel, a drive that was ordered motion before must release it once.
 2. In vain: the torque is more than friction takes, and by as much another one than at the last sign of life, or than
    what held the wheel before motion was ordered (a hill), and more than there, whatever its direction; and nothing
    moves. Its time adds up over orders until the encoder moves, and most of it outlives the power. Of the first
    millimetres that it is ordered in one go it is time at rated torque, or longer at less: a wheel breaks loose slowly.
-A drive that does not tell its torque may give the rated one: rule 1 alone. So may one that has only ever told zero.
+A drive that does not report its torque may give the rated one: rule 1 alone. So may one that has only ever reported
+zero.
 """
 
 from __future__ import annotations
@@ -28,20 +29,20 @@ ALIKE_SHARE = 0.05
 NOISE_SHARE = 0.01
 """Of the rated torque: less moves no wheel."""
 LONGEST_STEP_S = 0.1
-"""Time between two samples counts for so long at most: a drive that is silent for longer is another cause."""
+"""Time between two samples counts for at most this long [s]: a drive that sends nothing for longer is another cause."""
 
 
 @dataclass(frozen=True, slots=True)
 class Push:
-    """What a drive has given to a wheel that shows nothing. `share`: torque, of the rated one; None: it is not told."""
+    """The torque of a drive on a wheel that shows no motion. `share`: of the rated one; None: it is not reported."""
 
     share: float | None = None
     pushed_s: float = 0.0
     """Rule 1: time at rated torque that gives the same impulse."""
     owes: bool = False
-    """It was ordered motion, and has not let go since."""
+    """It was ordered motion, and has not released the wheel since."""
     overdue_s: float = 0.0
-    """It has pushed enough, nothing is ordered, and it has had power for so long since then."""
+    """It has pushed enough, nothing is ordered, and it has had power for this long since then [s]."""
     vain_s: float = 0.0
     """Rule 2."""
 
@@ -58,10 +59,10 @@ class PushWatch:
         self._at = math.inf
         self._tells = self._rests = False
         self._setpoint_mps = self._asked_m = 0.0
-        """What was ordered while it was strained, since its last sign of life; infinity: it has let go since."""
+        """What was ordered while it was strained, since its last sign of life; infinity: it was released since."""
         self._usual = 0.0
         """Torque at the last sign of life, of the rated one; or that which held the wheel when motion was ordered first
-        since it let go."""
+        since its last release."""
         self.last = Push()
 
     def on_sync(self, setpoint_mps: float, rests: bool) -> None:
@@ -75,7 +76,7 @@ class PushWatch:
         self._counts = counts
 
     def trust(self) -> None:
-        """A reset was accepted: everything begins anew."""
+        """A reset was accepted: everything starts again."""
         self.last = Push()
 
     @property
@@ -85,7 +86,7 @@ class PushWatch:
 
     @property
     def overdue(self) -> bool:
-        """It had to let go, and had time for it."""
+        """It had to release the wheel, and had time for it."""
         return self.last.overdue_s >= self._config.stand_answer_s
 
     @property
@@ -94,7 +95,7 @@ class PushWatch:
         return self.last.vain_s >= self._config.motion_missing_s
 
     def on_sample(self, share: float | None, powered: bool, now_s: float) -> None:
-        """A velocity TPDO with what it tells of the torque, None: nothing."""
+        """A velocity TPDO with the torque in it, None: none."""
         elapsed_s, self._at = min(max(now_s - self._at, 0.0), LONGEST_STEP_S), now_s
         self._tells = self._tells or bool(share)
         known = share if self._tells else None

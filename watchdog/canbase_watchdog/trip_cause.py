@@ -51,7 +51,7 @@ FINE = Verdict()
 
 
 def before_the_start(past: Past) -> Verdict:
-    """Why it is tripped from its first moment; FINE where a readable record says that it is not."""
+    """Why it is tripped from its first moment; FINE where a readable record is clear."""
     if not past.latched:
         return FINE
     if past.problem:

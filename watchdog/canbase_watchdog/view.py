@@ -42,7 +42,7 @@ class Axis:
     fed_at: float = NEVER
     """When the older one of its TPDOs came: status and velocity. What somebody reads by SDO is not fed."""
     standing: bool = False
-    """Its encoder and its velocity say that the wheel is at standstill: standing.py."""
+    """Its encoder and its velocity show that the wheel is at standstill: standing.py."""
     position_at: float = NEVER
     missed_setpoints: float = 0.0
     """SYNCs without a setpoint while it was enabled, less half of those with one."""
@@ -56,19 +56,19 @@ class Axis:
 
     @property
     def enabled(self) -> bool:
-        """True when its last statusword said OPERATION ENABLED."""
+        """True when its last statusword was OPERATION ENABLED."""
         return self.state is DriveState.OPERATION_ENABLED
 
     @property
     def powered(self) -> bool:
-        """True when its last statusword said a state in which the motor has current."""
+        """True when its last statusword was a state in which the motor has current."""
         return self.state in POWERED
 
     @property
     def trusted(self) -> bool:
         """False when its sensor was found to show no motion, or a wrong one: no standstill is proven by it.
 
-        Operation enabled, a wheel that met something hard is told from a dead sensor by motion_evidence.py.
+        Operation enabled, motion_evidence.py distinguishes a wheel that met something hard from a dead sensor.
         """
         return self.evidence.trusted and (self.enabled or not self.unproven)
 
@@ -88,7 +88,7 @@ class Node:
     boot_up_at: float = NEVER
     """When a boot-up came from it although it had just reported that it was enabled."""
     configured_at: float = NEVER
-    """When somebody last asked it by SDO for anything but its motion: a boot or a tool."""
+    """When a client last used its SDO for anything but its motion: a boot or a tool."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ from canbase_watchdog.view import BusView, View
 STATE_PERIOD_S = 0.05
 COUNTERS_PERIOD_S = 0.5
 REPEATED_REQUEST_S = 1.0
-"""A reset request with the number of the last one is a copy of it for so long, and a new one after."""
+"""A reset request with the number of the last one is a copy of it for this long, and a new one after [s]."""
 
 
 class State(enum.IntEnum):
@@ -49,7 +49,7 @@ class Answer(enum.IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What the watchdog tells about itself, apart from ages and counters. `reset`: last request and its answer."""
+    """The watchdog's state, apart from ages and counters. `reset`: last request and its answer."""
 
     state: State
     verdict: Verdict
@@ -59,7 +59,7 @@ class Status:
     assumed: bool = False
     """Some drive was not seen to stand: its sensor cannot be trusted, and its power is off for longer than it rolls."""
     armed: bool = False
-    """The record on disk says that there is power, and the driver is heard: a deaf watchdog never says so."""
+    """The record on disk is LIVE, and frames of the driver arrive: a watchdog without reception never reports it."""
     unproven: str = ""
     """While it is tripped: the joint that stopped as no wheel can, by what its sensors report; empty: none did."""
 
@@ -74,7 +74,7 @@ class Watchdog:
     def __init__(self, config: WatchdogConfig, now_s: float, past: Past | None = None) -> None:
         """`config.lease_uid` None: leases of any user count, so the caller puts in its own.
 
-        `past`: the record of its last life; None: nobody keeps one, which is for virtual time alone.
+        `past`: the record of its last life; None: no record is kept, which is for virtual time alone.
         """
         self._config = config
         self._observer = Observer(config, now_s)
@@ -168,14 +168,14 @@ class Watchdog:
         self._bus_failed_since, self._bus_errors = failed_since, errors
 
     def on_suspend(self, duration_s: float) -> None:
-        """The computer was suspended for so long [s]. The monotonic clock, and so every age, knows nothing of it."""
+        """The computer was suspended for this long [s]. The monotonic clock, and so every age, does not contain it."""
         self._ticked_at -= duration_s
 
     def expire(self, now_s: float) -> list[Frame]:
         """Quick stops for a lease that has run out since the last tick while a wheel moves, by the frames taken in.
 
         To be called before the frames that wait are taken in, which may take longer than a stop may wait. None of them
-        gives the lease back. The tick that has to follow latches the stop; what they say may be a better cause.
+        gives the lease back. The tick that has to follow latches the stop; those frames may show a better cause.
         """
         if self._state is State.TRIPPED or not self._ticked_at < self._lease_ends_at <= now_s:
             return []
@@ -219,7 +219,7 @@ class Watchdog:
         return policy.next_expiry(self._leases.valid_at, self._observer.driver_at, self._config, now_s)
 
     def end(self, now_s: float) -> None:
-        """The process is asked to end: with a wheel in motion it must not leave without stopping it."""
+        """The process is requested to end: with a wheel in motion it must not leave without stopping it."""
         view = self._look(now_s)
         axis = in_motion(view, self._config)
         if self._state is State.TRIPPED or axis is None:

@@ -16,7 +16,7 @@ from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config
 TURN_S = 0.002
 """Longest wait for a frame, so the longest delay of anything that a session does by itself."""
 MOST_FRAMES = 100
-"""After so many in a row it is the session's turn."""
+"""After this many frames in a row it is the session's turn."""
 
 
 def choose_bus(config: Path | None, interface: str | None, channel: str | None, bitrate: int | None) -> Bus:

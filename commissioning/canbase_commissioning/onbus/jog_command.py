@@ -35,7 +35,7 @@ STOPS: Final = "killed (SIGKILL), it leaves the wheel to the drive, which stops 
 
 
 def run(config: Path | None, joint: str, speed_mps: float, *, yes: bool) -> None:
-    """Until q; exits as `canbase jog --help` says."""
+    """Until q; the exit codes are in `canbase jog --help`."""
     robot = load_config(config).robot
     joints = [drive.joint for drive in robot.drives]
     if joint not in joints:

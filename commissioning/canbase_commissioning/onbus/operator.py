@@ -19,7 +19,7 @@ from canbase_runtime.terminal import WRONG_INPUT, colour, fail
 
 
 class Stopped(BaseException):
-    """A signal asked for the end."""
+    """A signal requested the end."""
 
     def __init__(self, number: int) -> None:
         super().__init__(f"stopped by {signal.Signals(number).name}")
@@ -45,12 +45,12 @@ def stopping_signals() -> Iterator[None]:
 
 
 class Operator:
-    """Asks on the terminal, or takes the answers of a file; `yes` confirms what wants a yes."""
+    """Prompts on the terminal, or takes the answers of a file; `yes` confirms what wants a yes."""
 
     def __init__(self, answers: Path | None, *, yes: bool) -> None:
         """Exits with 2 when the file cannot be read."""
         self._yes = yes
-        self._has_terminal = sys.stdin.isatty()  # asked once: one that has gone says that it is none
+        self._has_terminal = sys.stdin.isatty()  # read once: a terminal that has gone reports that it is none
         try:
             values = read_yaml(answers).values if answers else {}
         except ConfigError as error:
@@ -82,7 +82,7 @@ class Operator:
         typer.secho(f"{error}; try again", fg=typer.colors.YELLOW, color=colour())
 
     def interrupts(self) -> bool:
-        """Whether Enter was pressed while nothing was asked. Raises CommissionError when the terminal was closed."""
+        """Whether Enter was pressed without a question. Raises CommissionError when the terminal was closed."""
         if self._has_terminal and _has_line():
             _line()
             return True

@@ -24,7 +24,7 @@ from canbase_runtime.terminal import FAILED, colour, fail
 def run(
     bus: Bus, robot: Robot | None, seconds: float, timeout_s: float, *, passive: bool, yes: bool, as_json: bool
 ) -> None:
-    """Listens, asks, prints; exits with 1 when nobody or not everybody is there."""
+    """Listens, reads, prints; exits with 1 when no node or not every node is there."""
     with open_line(bus) as line:
         listening = ListenSession(seconds)
         line.run(listening)

@@ -33,7 +33,7 @@ from canbase_runtime.terminal import FAILED, colour, fail
 
 T = TypeVar("T")
 LISTEN_S: Final = 0.4
-"""Three heartbeats of canbase's driver: it is heard if it is there."""
+"""Three heartbeats of canbase's driver: it is received if it is there."""
 ATTEMPTS: Final = 3
 
 

@@ -14,7 +14,7 @@ from canbase_driver.cia301.nmt import NmtState, nmt, parse_heartbeat
 from canbase_driver.cia301.sdo_client import Read, SdoClient, SdoError, Write
 
 DUPLICATES = 3
-"""So many requests that were sent once and answered twice: one may be an answer that somebody else asked for."""
+"""After this many requests that were sent once and answered twice, one may be an answer to another client."""
 
 
 class NodeBoot:
@@ -52,7 +52,7 @@ class NodeBoot:
 
     @property
     def configuring(self) -> bool:
-        """Whether the drive has been heard, and its SDOs fill the bus."""
+        """Whether the drive has answered, and its SDOs fill the bus."""
         return not self.done and self.heard
 
     @property
@@ -146,7 +146,7 @@ class NodeBoot:
 
 
 def sdo_client(node_id: int, sdo: Sdo, timeout_s: float) -> SdoClient:
-    """A client that asks as the profile wants; `timeout_s` [s] where the profile has none."""
+    """A client with the settings of the profile; `timeout_s` [s] where the profile has none."""
     return SdoClient(node_id, sdo.timeout_s or timeout_s, sdo.attempts)
 
 

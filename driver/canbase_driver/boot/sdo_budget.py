@@ -38,5 +38,5 @@ class SdoBudget:
         self._left = max(1.0, (self._frames - cyclic) / FRAMES_PER_REQUEST)
 
     def spend(self, requests: int) -> None:
-        """So many were sent."""
+        """This many were sent."""
         self._left -= requests

@@ -1,6 +1,6 @@
 """How one node is made ready, as a sequence of steps to be read from top to bottom. No bus and no time in here.
 
-CiA 301 and CiA 402-2. It ends in NMT pre-operational and without torque: who starts the nodes, and when, is decided
+CiA 301 and CiA 402-2. It ends in NMT pre-operational and without torque: when the nodes are started is decided
 elsewhere. `node_boot.py` runs it.
 """
 
@@ -49,7 +49,7 @@ PROFILE_402 = 0x0192
 
 POLL_S = 0.02
 STANDING_POLLS = 5
-"""A drive that stays in quick stop active stands when it is slow for so many polls on end."""
+"""A drive that stays in quick stop active is at standstill when this many polls in a row find it slow."""
 _RESETS = {"communication": NmtCommand.RESET_COMMUNICATION, "node": NmtCommand.RESET_NODE}
 _CAN_BE_DISABLED = frozenset(
     (DriveState.READY_TO_SWITCH_ON, DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
@@ -58,12 +58,12 @@ _CAN_BE_DISABLED = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class BootReport:
-    """What was found and done. `notes` tell what the drive lacks, refused or changed without being unfit for it."""
+    """What was found and done. `notes`: what the drive lacks, refused or changed although it can still be used."""
 
     node_id: int
     identity: Identity
     self_stop: SelfStopSet
-    """What makes the drive stop by itself when nobody commands it, set and confirmed."""
+    """What makes the drive stop by itself without commands, set and confirmed."""
     notes: tuple[str, ...]
     changes: tuple[str, ...] = ()
     """Every object that had another value than wanted: the old one and the new one."""
@@ -139,7 +139,7 @@ class _Boot:
         return Identity(**found, software=(yield from self._check_software()))
 
     def _check_software(self) -> Steps[str | None]:
-        """Only where robot.yaml asks for it: it takes a segmented transfer, and not every drive has it."""
+        """Only where robot.yaml has an expected one: it takes a segmented transfer, and not every drive has it."""
         expected = [drive.identity.software for drive in self._drives if drive.identity.software is not None]
         if not expected:
             return None
@@ -191,7 +191,7 @@ class _Boot:
         yield from self._give_up(drive, f"was not at standstill {standstill_s(self._robot):.1f} s after a quick stop")
 
     def _give_up(self, drive: Drive, what: str) -> Steps[None]:
-        """Setpoints of whoever keeps it moving count no more, then the power goes."""
+        """First the setpoints of any other master are shut out, then the power goes."""
         yield SendNmt(NmtCommand.ENTER_PRE_OPERATIONAL)
         yield _control(drive, Command.DISABLE_VOLTAGE)
         hint = "Its voltage is now disabled; check for another master, and check its encoder, 605Ah and 6085h"

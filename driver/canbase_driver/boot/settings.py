@@ -37,14 +37,14 @@ FAULT_SIGNAL = 1
 NO_ACTION = 0
 
 HEARTBEATS_WANTED, HEARTBEATS_NEEDED = 3, 2
-"""In the time after which a drive without a heartbeat counts as silent (timeouts.drive_heartbeat_s)."""
+"""In the time after which a drive without a heartbeat counts as lost (timeouts.drive_heartbeat_s)."""
 HEARTBEAT_PERIODS_MS = (10, 20, 25, 40, 50, 64, 80, 100, 125, 128, 150, 160, 200, 250, 256, 320, 400, 500)
 """Values of 1017h that are tried where a drive refuses the wanted one: those that steps and limits of drives allow."""
 VALUE_REFUSED = (VALUE_INVALID, VALUE_TOO_HIGH, VALUE_TOO_LOW)
 
 
 class StopsBy(Enum):
-    """By what a drive stops itself when nobody commands it."""
+    """By what a drive stops itself without commands."""
 
     NOTHING = "nothing"
     WATCHDOG_HEARTBEAT = "heartbeat of the watchdog"
@@ -99,7 +99,7 @@ def configure_self_stop(node: NodeAccess, drives: tuple[Drive, ...], robot: Robo
 
 
 def configure_sync(node: NodeAccess, kind: Profile, counter: int | None) -> Steps[None]:
-    """1019h as `bus.sync_counter` says; a SYNC of another length than a drive expects is an error to it."""
+    """1019h as `bus.sync_counter` has it; a SYNC of another length than a drive expects is an error to it."""
     if counter is not None:
         yield from node.set(Write(SYNC_COUNTER, 0, counter, 1))
     elif kind.options.sync_counter != "no" and (yield from node.read_if_present(SYNC_COUNTER)):
@@ -213,7 +213,8 @@ def _produce_heartbeat(node: NodeAccess, timeout_ms: int) -> Steps[None]:
 
 
 def _watch_heartbeats(node: NodeAccess, kind: Profile, timeout_ms: int) -> Steps[bool]:
-    """With one entry the watchdog is watched, which is silent when the driver is. Whether it is watched.
+    """With one entry the drive watches the watchdog, which stops its heartbeat when the driver's stops. True: it is
+    watched.
 
     No node may be in two entries, so those of an earlier life go first.
     """

@@ -38,14 +38,14 @@ class SendNmt:
 
 @dataclass(frozen=True, slots=True)
 class WaitBootUp:
-    """Wait for the node's boot-up message. The answer tells whether it came within `timeout_s`."""
+    """Wait for the node's boot-up message. The answer is whether it came within `timeout_s`."""
 
     timeout_s: float
 
 
 @dataclass(frozen=True, slots=True)
 class Pause:
-    """Wait `duration_s`; `until` says what for. It brings no answer."""
+    """Wait `duration_s`; `until` names the reason. It brings no answer."""
 
     duration_s: float
     until: str
@@ -75,7 +75,7 @@ class BootError(Exception):
 
 
 def boot_error(error: SdoError) -> BootError:
-    """What a transfer that failed for good means to the person at the machine."""
+    """The message for the person at the machine about a transfer that failed after all its tries."""
     return BootError(error.node_id, f"{error.index:04X}h:{error.sub}: {error.text}", _hint(error))
 
 
@@ -97,7 +97,7 @@ PROFILE_KEYS: tuple[tuple[range, str], ...] = (
     (range(0x60C2, 0x60C3), "options.interpolation"),
     (range(0x60FF, 0x6100), "layout.target_bits"),
 )
-"""Object → the key of a drive profile (docs/drives.md) that says whether, where or how wide the drive has it."""
+"""Object → the key of a drive profile (docs/drives.md) for whether, where or how wide the drive has it."""
 TRANSMISSION_TYPE = 2
 """Sub-index of 1400h… and 1800h…."""
 WIDTHS = (LENGTH_WRONG, TOO_LONG, TOO_SHORT)
@@ -172,7 +172,7 @@ class NodeAccess:
     def set_if_present(self, step: Write, presence: Presence = "probe", known: int | None = None) -> Steps[bool]:
         """Like `set`, but a drive that lacks, refuses or changes the value only earns a note. Whether it took it.
 
-        `presence`: what the profile says; an object that it denies is not tried.
+        `presence`: from the profile; an object that it denies is not tried.
         """
         if presence == "no":
             return False

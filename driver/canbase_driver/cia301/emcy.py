@@ -74,7 +74,7 @@ class Emcy:
 
     @property
     def is_reset(self) -> bool:
-        """Whether the message says that an error has gone."""
+        """Whether the message reports that an error has gone."""
         return self.code >> 8 == 0
 
     @property

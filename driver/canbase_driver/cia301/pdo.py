@@ -1,6 +1,6 @@
 """The PDOs of docs/bus.md as data: which exist, with which identifiers and contents, and their packing.
 
-The profile of the drive says where its objects are and how wide. Writing the layout into a drive is `pdo_mapping.py`.
+The profile of the drive has the places and widths of its objects. Writing the layout into a drive is `pdo_mapping.py`.
 The layout of the quick stop PDO is the watchdog's; its sender is too.
 """
 
@@ -43,7 +43,7 @@ RATED = 1000.0
 
 @dataclass(frozen=True, slots=True)
 class Pdo:
-    """One PDO as a drive is to be told: `mapping` holds the entries of 1600h/1A00h in order."""
+    """One PDO as it is written to a drive: `mapping` holds the entries of 1600h/1A00h in order."""
 
     kind: str
     """"RPDO" (to the drive) or "TPDO" (from it)."""
@@ -53,7 +53,7 @@ class Pdo:
     transmission_type: int = EVERY_SYNC
     mapping: tuple[int, ...] = ()
     optional: int = 0
-    """So many at the end of the mapping may stay away."""
+    """This many at the end of the mapping may be missing."""
     inhibit_100us: int | None = None
     """1800h:3, None: not written."""
     event_timer_ms: int | None = None
@@ -93,7 +93,7 @@ class NodeLayout:
     profile: Profile = GENERIC_PROFILE
     timing: Timing = Timing()
     with_torque: bool = True
-    """False: the drive refuses to tell its torque in a PDO."""
+    """False: the drive refuses to map its torque."""
 
     def __post_init__(self) -> None:
         if self.axes not in ((0,), (1,), (0, 1)):
@@ -201,6 +201,6 @@ def unpack_velocity(data: bytes, layout: Layout = GENERIC) -> int | None:
 
 
 def unpack_torque(data: bytes, layout: Layout = GENERIC) -> float | None:
-    """Torque behind the velocity, as a share of the rated one; None: the drive does not tell it."""
+    """Torque behind the velocity, as a share of the rated one; None: the drive does not report it."""
     form = _VELOCITY[layout.velocity_bits]
     return _TORQUE.unpack_from(data, form.size)[0] / RATED if len(data) == form.size + _TORQUE.size else None

@@ -105,7 +105,7 @@ class Write:
 
 
 class SdoError(Exception):
-    """A transfer failed for good. Abstract: it is one of the two below."""
+    """A transfer failed after all its tries. Abstract: it is one of the two below."""
 
     def __init__(self, node_id: int, step: Read | Write, text: str) -> None:
         super().__init__(f"node {node_id}, {step}: {text}")
@@ -173,7 +173,7 @@ class SdoClient:
         return self._begin(step, self._attempts, now_s)
 
     def again(self, now_s: float) -> Frame:
-        """Begin the transfer under way anew: the drive has just started. Raises RuntimeError when there is none."""
+        """Restart the transfer under way: the drive has just started. Raises RuntimeError when there is none."""
         if self._transfer is None:
             raise RuntimeError(f"node {self.node_id}: no transfer is under way")
         return self._begin(self._transfer.step, self._attempts, now_s)

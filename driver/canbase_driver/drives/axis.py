@@ -1,4 +1,4 @@
-"""One axis at run time: what its drive said last, in SI, and the setpoint frame for the next cycle. Decides nothing."""
+"""One axis at run time: its drive's last values, in SI, and the setpoint frame of the next cycle. Decides nothing."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Axis:
         return self.stands(now_s) and self.stillness.is_proven(now_s)
 
     def forget(self) -> None:
-        """What was heard no longer counts: the drive restarted, or its bus did."""
+        """What was received no longer counts: the drive restarted, or its bus did."""
         self._restarts += self.status_at > -math.inf
         if self.velocity_at > -math.inf:
             self._known_mps, self._known_at = self.velocity_mps, self.velocity_at
@@ -138,11 +138,11 @@ class Axis:
             )
 
     def has_fresh_sample(self, now_s: float) -> bool:
-        """A new sample, and none from before a silence: beside a fresh one of another wheel it would turn the pose."""
+        """A new sample, and none from before a gap: beside a fresh one of another wheel it would turn the pose."""
         return self.has_new_sample and self.age_s(now_s) <= self._feedback_s
 
     def rests(self, rim_mps: float) -> bool:
-        """Its last setpoint was zero bits of 60FFh, and that of `rim_mps` is: nobody else sees less than one bit."""
+        """Its last setpoint was zero bits of 60FFh, and that of `rim_mps` is: the drive sees nothing below one bit."""
         return self.target_mps == 0.0 and self.units.velocity_raw(rim_mps) == 0
 
     def sample_taken(self) -> None:

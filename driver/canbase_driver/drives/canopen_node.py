@@ -1,12 +1,12 @@
 """One CANopen node of the base at run time: its NMT state and heartbeat, its emergency messages, its boot, its axes.
 
-GONE ──begin_boot──► BOOTING ──boot report──► STARTING ──operational, all axes heard──► READY
-  ▲                     │ error                  │ too late, or boot-up heard             │
-  └─────────────────────┴────────────────────────┴── boot-up or other NMT state heard ────┘
+GONE ──begin_boot──► BOOTING ──boot report──► STARTING ──operational, all axes seen───► READY
+  ▲                     │ error                  │ too late, or boot-up received          │
+  └─────────────────────┴────────────────────────┴── boot-up or other NMT state received ─┘
 
 Between boot report and NMT start it waits for the other nodes' boots: PDOs go before SDOs on the bus.
 
-What a node says before it is STARTING comes from an earlier life, with a layout of its own: none of it counts.
+Frames of a node before it is STARTING come from an earlier life, with a layout of its own: none of them counts.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from canbase_driver.drives.telemetry import Measures, Values
 START_TIMEOUT_S = 1.0
 """From NMT start to a heartbeat "operational" and a status of every axis."""
 HOLD_S = 0.2
-"""So long after the last NMT "enter pre-operational" it is left alone; the watchdog repeats it every 0.05 s."""
+"""After the last NMT "enter pre-operational" it is left alone this long [s]; the watchdog repeats it every 0.05 s."""
 RETRY_S = 1.0
 """Between two boots of a node that failed."""
 UNHEARD_S = 1.0
-"""A node that has answered no request of its boot for so long may have no power or no cable."""
+"""A node that has answered no request of its boot for this long may have no power or no cable [s]."""
 SEEK_S = 1.0
-"""A node that is silent for so long while nothing has power is looked for by a new boot: its boot-up may be lost."""
+"""A node without messages for this long while nothing has power is booted again [s]: its boot-up may be lost."""
 SECOND_BOOT_UP_S, ALIKE, SETTLE_FACTOR, SETTLE_EXTRA_S = 3.0, 0.3, 1.3, 0.2
 """A boot-up message so soon after the one that answered the NMT reset may be a second one of the same start. When it
 comes again after the next boot, as late but for this share, the boots after that wait for it: that time, times the
@@ -72,7 +72,7 @@ class CanopenNode:
         """Of the last boot, while the node is there."""
         self.boot_error = ""
         self.others_are_configured: Callable[[], bool] = lambda: True
-        """Whether no other node is in the middle of its boot; set by whoever has them all."""
+        """Whether no other node is in the middle of its boot; set by the drive group."""
         self._measures = Measures(node_id, self._drives, robot.timeouts.sdo_s)
         self._sdo_stop = SdoStop(node_id, self._drives)
         self._lost_heartbeat = self._owed_stop = False
@@ -105,18 +105,18 @@ class CanopenNode:
     @property
     def takes_pdos(self) -> bool:
         """`has_pdos`; or it had power when it was lost, and nothing has shown since that its motors have none: NMT
-        tells nothing about that, and it may obey its PDOs still. Until its boot begins, which stops it by SDO."""
+        does not show that, and it may obey its PDOs still. Until its boot begins, which stops it by SDO."""
         return self.has_pdos or self._owed_stop
 
     def is_off(self, now_s: float) -> bool:
-        """Every axis says, in a fresh statusword, that it has no torque."""
+        """Every axis reports, in a fresh statusword, that it has no torque."""
         fresh_s = self._robot.timeouts.feedback_s
         axes = self.axes
         return all(now_s - axis.status_at <= fresh_s and axis.state and not axis.state.has_torque for axis in axes)
 
     @property
     def is_being_configured(self) -> bool:
-        """It was heard, and its boot fills the bus with SDOs."""
+        """It has answered, and its boot fills the bus with SDOs."""
         return self._boot is not None and self._boot.configuring
 
     @property
@@ -148,10 +148,10 @@ class CanopenNode:
         return f"{self.name} {self._why_gone}" if self.presence is Presence.GONE else ""
 
     def silent(self, now_s: float, sync_since: float) -> str:
-        """A sentence when its feedback or its heartbeat is too old; only a node that is ready can be silent.
+        """A sentence when its feedback or its heartbeat is too old; only a node that is ready can be too late.
 
         It answers SYNCs: after a pause of ours it has timeouts.feedback_s from `sync_since` on [s], when the present
-        run of SYNCs began. However often we pause, it is silent when timeouts.drive_heartbeat_s are over as well.
+        run of SYNCs began. However often we pause, it is late when timeouts.drive_heartbeat_s are over as well.
         """
         if self.presence is not Presence.READY:
             return ""
@@ -181,9 +181,9 @@ class CanopenNode:
         self._go(Presence.BOOTING, now_s)
 
     def seek(self, now_s: float, sync_since: float) -> None:
-        """Boot a node anew that was ready and is silent for SEEK_S: asked, it may answer. Only without power.
+        """Boot a node again that was ready and sent nothing for SEEK_S: it may answer an SDO. Only without power.
 
-        `sync_since`: start of the present run of SYNCs [s]; before it the node was not asked.
+        `sync_since`: start of the present run of SYNCs [s]; before it the node had none to answer.
         """
         if self.presence is not Presence.READY:
             return
@@ -213,7 +213,7 @@ class CanopenNode:
             self.lose("is reset: it is in fault for a lost heartbeat", now_s)
 
     def forget_emcy(self) -> None:
-        """What it told before a reset is no news any more."""
+        """What it reported before a reset is no news any more."""
         self.emcy = None
         self._lost_heartbeat = False
 
@@ -286,7 +286,7 @@ class CanopenNode:
         return not self.takes_pdos or axis.on_velocity(frame.data, now_s)
 
     def on_emcy(self, frame: Frame, _now: float) -> bool:
-        """Take a frame 080h + id. False: not an emergency message. It tells; only the statusword stops anything."""
+        """Take a frame 080h + id. False: not an emergency message. It informs; only the statusword stops anything."""
         emcy = parse_emcy(frame)
         if emcy is None:
             return False
@@ -295,7 +295,7 @@ class CanopenNode:
         return True
 
     def on_sdo(self, frame: Frame, now_s: float) -> bool:
-        """Take an SDO answer; one that nobody here waits for is somebody else's (a tool's) and fine."""
+        """Take an SDO answer; one without a request of ours is another client's (a tool's) and fine."""
         if self._boot is not None:
             self._boot.on_frame(frame, now_s)
         elif self.presence is Presence.READY:
@@ -305,7 +305,7 @@ class CanopenNode:
         return True
 
     def tick(self, now_s: float) -> list[Frame]:
-        """Let the boot go on, or ask for the next measured value. The frames to send."""
+        """Let the boot go on, or request the next measured value. The frames to send."""
         if self.presence is Presence.READY or self._ready_at == math.inf:
             self._ready_at = now_s
         if self.presence is Presence.STARTING:

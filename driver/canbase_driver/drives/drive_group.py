@@ -1,6 +1,6 @@
 """All drives of the base as one: what keeps them from being ready, whether they stand, how far each side has rolled.
 
-Sentences name joint, node and values and are empty when there is nothing to tell. No decisions: `supervisor.py`.
+Sentences name joint, node and values and are empty when there is nothing to report. No decisions: `supervisor.py`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Drives:
 
     def tick(self, now_s: float, may_boot: bool, sync_since: float) -> list[Frame]:
         """Once a cycle: every node goes on, another one first each time; those that are gone begin their boot, those
-        that are silent are looked for. `sync_since`: start of the present run of SYNCs [s].
+        that send nothing are looked for. `sync_since`: start of the present run of SYNCs [s].
         """
         self._budget.refill(sum(len(node.axes) for node in self.nodes if node.has_pdos))
         self._first = (self._first + 1) % len(self.nodes)
@@ -55,7 +55,7 @@ class Drives:
         return frames
 
     def go_on(self, node: CanopenNode, now_s: float) -> list[Frame]:
-        """What a node sends next; while it is being configured, only as far as the bus has room for it."""
+        """What a node sends next; while it is being configured, only what the bus has room for."""
         if node.is_being_configured and self._budget.is_spent:
             return []
         frames = node.tick(now_s)
@@ -64,7 +64,7 @@ class Drives:
 
     @property
     def are_ready(self) -> bool:
-        """Of no node there is anything to tell by `booting`, `missing` and `absent`."""
+        """`booting`, `missing` and `absent` are empty for every node."""
         for node in self.nodes:  # noqa: SIM110 - every cycle
             if node.presence is not Presence.READY:
                 return False
@@ -72,7 +72,7 @@ class Drives:
 
     @property
     def are_enabled(self) -> bool:
-        """Of no axis there is anything to tell by `fault`, `disabled` and `unprepared`."""
+        """`fault`, `disabled` and `unprepared` are empty for every axis."""
         for axis in self.axes:  # noqa: SIM110 - every cycle
             if axis.state is not DriveState.OPERATION_ENABLED:
                 return False
@@ -106,7 +106,7 @@ class Drives:
         return _first(_disabled(axis) for axis in self.axes)
 
     def unprepared(self) -> str:
-        """Which axis has not got as far as switched on, and what that may come from."""
+        """Which axis is not switched on yet, and the likely reason."""
         return _first(_unprepared(axis) for axis in self.axes)
 
     def are_fresh(self, now_s: float) -> bool:
@@ -132,7 +132,7 @@ class Drives:
         return True
 
     def turning(self, now_s: float) -> str:
-        """Which wheel does not stand, and why that is said; empty: all stand."""
+        """Which wheel is not at standstill, and the evidence; empty: all are."""
         return _first(self._turning(axis, now_s) for axis in self.axes)
 
     def doubt(self, node_id: int, why: str) -> None:
@@ -153,7 +153,7 @@ class Drives:
         return _first(_of(axis, axis.stillness.assumed(now_s)) for axis in self.axes)
 
     def may_have_power(self, now_s: float) -> bool:
-        """Some axis has torque, or does not tell."""
+        """Some axis has torque, or has no fresh statusword."""
         for axis in self.axes:  # noqa: SIM110 - every cycle
             if axis.has_torque or now_s - axis.status_at > self._feedback_s:
                 return True
@@ -167,7 +167,7 @@ class Drives:
         return True
 
     def forget_emcys(self) -> None:
-        """After a reset: what the drives told before it is no news any more; some never take it back."""
+        """After a reset: what the drives reported before it is no news any more; some never take it back."""
         for node in self.nodes:
             node.forget_emcy()
 
@@ -198,7 +198,7 @@ class Drives:
         return max([abs(each.velocity_mps) for each in self.axes if self._is_driven(each, now_s)], default=0.0)
 
     def _is_driven(self, axis: Axis, now_s: float) -> bool:
-        """With power, by fresh values; or it tells its speed alone, by SDO, and may have power."""
+        """With power, by fresh values; or its speed alone is known, by SDO, and it may have power."""
         if axis.state is None:
             return now_s - axis.velocity_at <= self._feedback_s
         return axis.has_torque and self._is_fresh(axis, now_s)

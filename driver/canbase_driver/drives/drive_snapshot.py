@@ -40,7 +40,7 @@ class DriveSnapshot:
     heartbeat_age_s: float
     """Since its last heartbeat [s]; NaN: none yet."""
     stops_by_itself: bool
-    """Something makes it stop when nobody commands it; set and read back."""
+    """Something makes it stop without commands; set and read back."""
     self_stop: str = ""
     """What does; empty: nothing."""
     warning: bool = False
@@ -50,7 +50,7 @@ class DriveSnapshot:
     voltage_v: float = math.nan
     """Of its supply [V]; NaN: not measured."""
     torque_share: float = math.nan
-    """Of the rated torque; NaN: the drive does not tell it."""
+    """Of the rated torque; NaN: the drive does not report it."""
     current_a: float = math.nan
     """Of the motor [A]; NaN: not measured."""
     temperature_c: float = math.nan
@@ -62,7 +62,7 @@ class DriveSnapshot:
     boot_problem: str = ""
     """Why its last boot failed; empty: it did not."""
     configured: bool = True
-    """Its boot has ended well: what it says of itself is set and read back."""
+    """Its boot has succeeded: every setting was read back."""
 
     @property
     def nmt_text(self) -> str:

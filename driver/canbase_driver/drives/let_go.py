@@ -2,7 +2,7 @@
 
 A dead encoder shows a stand, and its drive pushes on with the integrator of its velocity loop, with nothing ordered.
 So a drive that was ordered motion, and gives torque to a wheel that shows none, loses its power as soon as zero is
-ordered of all wheels, and gets it back at once: its loop begins anew. A wheel that is held on a slope rolls a little
+ordered of all wheels, and gets it back at once: its loop starts again. A wheel that is held on a slope rolls a little
 and is held again; one that friction holds does not notice (docs/decisions/0041).
 
     HELD ──pushed for stand_impulse_s──► LETTING GO ──no axis has torque──► RETURNING ──all enabled──► HELD
@@ -23,13 +23,13 @@ LIFE_M, LIFE_COUNTS = 0.001, 2
 NOISE_SHARE = 0.01
 """Of the rated torque: less moves no wheel."""
 LONGEST_SAMPLE_GAP_S = 0.1
-"""Time between two samples counts for so long at most."""
+"""Time between two samples counts for at most this long [s]."""
 RETURN_S = 1.0
 """From the power off until all drives are enabled again; then one that is not is a failure."""
 
 
 class Push:
-    """How hard a drive pushes at a wheel that shows no motion, and whether it was ordered any since it last let go."""
+    """How hard a drive pushes at a wheel that shows no motion, and whether any was ordered since its last release."""
 
     def __init__(self, limit_s: float, m_per_count: float) -> None:
         """`limit_s`: time at rated torque, or longer at less."""
@@ -40,11 +40,11 @@ class Push:
         self._at = math.inf
         self._owes = self._tells = False
         self.share: float | None = None
-        """Torque, of the rated one; None: the drive does not tell it, or has only ever told zero."""
+        """Torque, of the rated one; None: the drive does not report it, or has only ever reported zero."""
 
     @property
     def must_let_go(self) -> bool:
-        """With nothing ordered, only letting go tells whether the wheel stands."""
+        """With nothing ordered, only a release shows whether the wheel is at standstill."""
         return self._owes and self.pushed_s >= self._limit_s
 
     def on_sample(
@@ -90,7 +90,7 @@ class LetGoPhase(Enum):
 
 
 class LetGo:
-    """All drives let go together: the base keeps its heading, and none is enabled beside one that is not."""
+    """All drives release together: the base keeps its heading, and none is enabled beside one that is not."""
 
     def __init__(self, robot: Robot) -> None:
         self._proves = robot.watchdog.stand_proof == "let_go"
@@ -127,7 +127,7 @@ class LetGo:
             self._phase, self._returned = LetGoPhase.HELD, True
 
     def goal(self, now_s: float) -> PowerGoal:
-        """What the drives are told: disable operation, and where that has no effect, disable voltage.
+        """The commands to the drives: disable operation, and where that has no effect, disable voltage.
 
         A wheel that a threshold releases at that moment turns, and its drive brakes it first (605Ch). None may have
         power beside one without it for as long as feedback_s: for the watchdog that is a drive that has failed.

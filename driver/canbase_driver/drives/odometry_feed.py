@@ -1,7 +1,8 @@
 """Feeds the wheels' travel into the odometry, one sample of all wheels at a time. Dead reckoning is `odometry.py`.
 
-A wheel that lost its reference (its drive restarted, or its counter jumped for good) makes the travel of all wheels
-unknown for that while: taking in the others' alone would turn the pose. The pose stands still instead, and goes on.
+A wheel that lost its reference (its drive restarted, or its counter stays at another place) makes the travel of all
+wheels unknown for that while: taking in the others' alone would turn the pose. The pose stands still instead, and goes
+on.
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ class OdometryReport:
     valid: bool
     """Every wheel has fresh feedback and a reference: the pose moves as the wheels do. Otherwise it is not published.
 
-    It is about now. What was rolled while a wheel had no reference never enters the pose, that of no wheel: the pose
-    goes on without a jump from where it was, and `travel_losses` tells that it is a little behind.
+    It is about now. What was rolled while a wheel had no reference never enters the pose, of no wheel: the pose
+    goes on without a jump from where it was, and `travel_losses` counts that travel is missing.
     """
     travel_losses: int = 0
-    """How often the pose missed some travel since start: a drive restarted, or an encoder jumped for good."""
+    """How often the pose missed some travel since start: a drive restarted, or an encoder stayed at another place."""
     pose_resets: int = 0
-    """How often the pose was set anew, or missed some travel, since start: distances across one mean nothing."""
+    """How often the pose was reset, or missed some travel, since start: a distance across a reset is invalid."""
     odom_frame: str = "odom"
     """REP 105."""
     base_frame: str = "base_link"
@@ -61,7 +62,7 @@ class OdometryFeed:
 
     @property
     def pose_resets(self) -> int:
-        """How often the pose was set anew, or missed some travel."""
+        """How often the pose was reset, or missed some travel."""
         return self._sets + self._losses
 
     def set_pose(self, pose: Pose2D) -> None:

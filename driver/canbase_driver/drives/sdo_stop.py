@@ -1,8 +1,8 @@
 """The last way to stop a motor that takes no setpoints any more: its controlword by SDO, and a look at its speed.
 
 A drive without 6007h that misses a heartbeat leaves NMT operational (CiA 301, 1029h) and may go on turning, deaf to
-PDOs. One that brakes by itself then may do so by a sensor that lies, and sends no TPDO that tells it. While the
-watchdog lives that is its ladder's business; without it nobody else is left. Objects: CiA 402-2, 6040h and 606Ch.
+PDOs. One that brakes by itself then may do so by a faulty sensor, and sends no TPDO that shows it. While the
+watchdog lives that is its ladder's task; without it only this is left. Objects: CiA 402-2, 6040h and 606Ch.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from canbase_driver.cia301.sdo_client import Read, SdoClient, Write
 PERIOD_S, AGAIN_S = 0.02, 0.05
 """Between two requests; and until the same one is sent again: a drive keeps one, and may be busy with another's."""
 TRIES = 3
-"""Of a controlword. A speed is asked for once: a drive that never tells it must not keep the next controlword away."""
+"""Of a controlword. A speed is requested once: a drive that never sends it must not delay the next controlword."""
 _UPLOADED, _COMMAND, _EXPEDITED = 2 << 5, 7 << 5, 0x02
 """First byte of an answer to a Read (CiA 301, SDO upload)."""
 
 
 class SdoStop:
-    """Writes the controlwords of one node and reads its speeds in turn. Nobody waits: an answer may be lost."""
+    """Writes the controlwords of one node and reads its speeds in turn. It waits for no answer: one may be lost."""
 
     def __init__(self, node_id: int, drives: Sequence[Drive]) -> None:
         """`drives`: its axes, in the order of the controlwords."""

@@ -17,9 +17,9 @@ from canbase_config.stopping import coasting_s, hardest_braking_mps2, hardest_st
 from canbase_driver.drives.stopping_distance import StoppingDistance
 
 STILL_S = 0.2
-"""An encoder that did not move for so long stands, even if the velocity is noisy."""
+"""An encoder that did not move for this long is at standstill [s], even if the velocity is noisy."""
 STEP_FACTOR = 3.0
-"""One step of the encoder may look so many times as fast as it is: samples come early and late."""
+"""One step of the encoder may look this many times as fast as it is: samples come early and late."""
 SHORTEST_S = 0.005
 """Samples that come together are one cycle apart all the same: rates.control_hz is 200 at most [s]."""
 COUNTS = 2.0
@@ -91,7 +91,7 @@ class Stillness:
     def forget(self) -> None:
         """What was measured no longer counts, after a restart. Doubts and the time without power stay.
 
-        Who judged a sudden stop until then may not see it any more.
+        A part that judged a sudden stop until then may not see it any more.
         """
         self._follows = False
         if not self._sudden:
@@ -99,7 +99,7 @@ class Stillness:
         self.pause()
 
     def on_power(self, has_torque: bool, now_s: float, follows: bool = False) -> None:
-        """What the statusword tells; `follows`: operation enabled, where it is the watchdog that judges a sudden stop.
+        """What the statusword shows; `follows`: operation enabled, where the watchdog judges a sudden stop.
 
         Power after a stand that was assumed: the sensors get a new trial.
         """
@@ -154,7 +154,7 @@ class Stillness:
         self._lie = why
 
     def stands(self, now_s: float) -> bool:
-        """The last sample says so, and is evidence; or nothing has driven it for longer than it rolls."""
+        """The last sample shows it, and is evidence; or nothing has driven it for longer than it rolls."""
         return self._quiet and (not self.doubt or self.rolled_out(now_s))
 
     def is_proven(self, now_s: float) -> bool:

@@ -31,7 +31,7 @@ class Values:
 
 @dataclass(slots=True)
 class _Point:
-    """One object of one axis, and what it said last."""
+    """One object of one axis, and its last value."""
 
     axis: int
     name: str
@@ -42,7 +42,7 @@ class _Point:
 
 
 class Measures:
-    """Asks a node in turn for what its profile measures."""
+    """Reads in turn what the profile of a node measures."""
 
     def __init__(self, node_id: int, drives: tuple[Drive, ...], timeout_s: float) -> None:
         """`timeout_s`: for one answer [s]."""

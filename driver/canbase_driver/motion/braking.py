@@ -6,8 +6,8 @@ that, in the second one where cycles are slow; a wheel that stands is never look
 the deadline of the stop.
 
 In a quick stop the fastest wheel with power must also be slower than it was one window of time ago: by a quarter of the
-deceleration, as soon as that can be told from noise, at any speed (docs/decisions/0023). A wheel without power brakes
-by nobody's order, and costs the others nothing. Pure.
+deceleration, as soon as that exceeds the noise, at any speed (docs/decisions/0023). A wheel without power brakes
+without an order, and costs the others nothing. Pure.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from canbase_config.robot import Robot
 from canbase_config.stopping import BRAKING_SHARE, HELD_S, SLOPE_SHARE, lag_s, ramp
 
 LASTS_S = 0.08
-"""So long it must not be slower: a wheel that was held may swing beyond the ramp of its drive."""
+"""It must not be slower within this time [s]: a wheel that was held may swing beyond the ramp of its drive."""
 
 
 class Slowing:

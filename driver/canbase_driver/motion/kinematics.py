@@ -12,7 +12,7 @@ from typing import ClassVar
 
 @dataclass(frozen=True, slots=True)
 class Twist2D:
-    """Velocity of a base that cannot move sideways. Any float is allowed, NaN too: ask `is_finite`."""
+    """Velocity of a base that cannot move sideways. Any float is allowed, NaN too: see `is_finite`."""
 
     ZERO: ClassVar[Twist2D]
 

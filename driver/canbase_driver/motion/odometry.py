@@ -15,10 +15,10 @@ Covariance = tuple[float, ...]
 """36 numbers: 6 × 6, row by row, in the order x, y, z, rotation about x, y, z (geometry_msgs, REP 103)."""
 
 RE_REFERENCE_SAMPLES = 3
-"""So many samples in a row at a new place, each near the one before: the counter has moved for good."""
+"""This many samples in a row at a new place, each near the one before: the counter stays there."""
 
 DOUBTED_CYCLES = 10
-"""A place that a counter jumped to is not believed after so many cycles of silence: a second drive with the same node
+"""A place that a counter jumped to is doubted after a gap of this many cycles: a second drive with the same node
 id may have reported it."""
 
 POSE_FLOOR_M2 = 1e-6
@@ -51,7 +51,7 @@ def unwrap(previous_raw: int, raw: int) -> int:
 
 
 def wrap_angle(angle_rad: float) -> float:
-    """The same direction in −π … π, for publishing only: whoever counts turns needs the angle unwrapped [rad]."""
+    """The same direction in −π … π, for publishing only: counting turns needs the angle unwrapped [rad]."""
     return math.remainder(angle_rad, math.tau)
 
 
@@ -60,8 +60,8 @@ class WheelTravel:
 
     Each sample is compared with the last one that was taken in. A step that the wheel cannot have made is a jump: it
     is dropped. If the samples after it come back, nothing was lost. If `RE_REFERENCE_SAMPLES` in a row
-    stay at the new place, the counter has moved for good: that place becomes the new reference, the travel goes on
-    from where it was, and `losses` counts it, as the travel of those samples is unknown. After such a jump no silence
+    stay at the new place, the counter stays there: that place becomes the new reference, the travel goes on
+    from where it was, and `losses` counts it, as the travel of those samples is unknown. After such a jump no gap
     of more than `DOUBTED_CYCLES` is bridged any more: the first sample after it is a new reference as well.
     """
 
@@ -80,8 +80,8 @@ class WheelTravel:
     def __init__(self, metres_per_count: float, max_step_counts: float) -> None:
         """`metres_per_count`: rim travel, negative for a mirrored axis. `max_step_counts`: possible in one cycle.
 
-        Raises ValueError for a step that is not positive or not below half the 32-bit range: it could not be told from
-        a wrap.
+        Raises ValueError for a step that is not positive or not below half the 32-bit range: it could not be told apart
+        from a wrap.
         """
         if not 0.0 < max_step_counts < _COUNTS / 2:
             raise ValueError(f"max_step_counts must be above 0 and below 2^31, not {max_step_counts}")
@@ -215,7 +215,7 @@ class Odometry:
     def pose_covariance(self) -> Covariance:
         """Of `pose`, in the odom frame: x and y grow with the distance, yaw with distance and rotation.
 
-        REP 103 order: x, y, z [m²], rotation about x, y, z [rad²]. The base stays on the ground as far as it knows: z,
+        REP 103 order: x, y, z [m²], rotation about x, y, z [rad²]. The base is assumed to stay on the ground: z,
         roll and pitch are published as 0 and `UNMEASURED`.
         """
         xy_m2 = POSE_FLOOR_M2 + POSE_M2_PER_M * self._distance_m

@@ -48,15 +48,15 @@ class Command:
         return True
 
     def take_emergency(self, brakes_hard: bool, received_at: float) -> None:
-        """Whether the base has to brake with the emergency deceleration, until it is said otherwise or not any more."""
+        """Whether to brake with the emergency deceleration: until the filter revokes it, or its message is too old."""
         self._emergency_at = received_at if brakes_hard else -math.inf
 
     def brakes_hard(self, now_s: float) -> bool:
-        """The emergency deceleration was asked for within the timeout. Whatever the command is, that means a stop."""
+        """The emergency deceleration was requested within the timeout. Whatever the command is, that means a stop."""
         return now_s - self._emergency_at <= self._timeout_s
 
     def await_zero(self) -> None:
-        """From now on nothing is followed until a zero has come: who holds the stick must let go of it once."""
+        """From now on nothing is followed until a zero has come: the operator must release the joystick once."""
         self._seen_zero = False
 
     def is_fresh(self, now_s: float) -> bool:
@@ -70,7 +70,7 @@ class Command:
         return CommandReport(age_s=known_s, fresh=self.is_fresh(now_s), refused=self.refused)
 
     def motion(self, now_s: float) -> str:
-        """A sentence when a fresh command asks for motion, followed or not."""
+        """A sentence when a fresh command orders motion, followed or not."""
         if not self.is_fresh(now_s) or self._twist == Twist2D.ZERO:
             return ""
         return f"cmd_vel orders {self._twist.linear_mps:.3f} m/s, {self._twist.angular_radps:.3f} rad/s"

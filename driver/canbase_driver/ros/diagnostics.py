@@ -64,6 +64,7 @@ def _loop_entry(snapshot: DriverSnapshot, previous: DriverSnapshot, robot: str) 
         "cause": snapshot.finding.cause.value,
         "clears on": snapshot.finding.clears_on,
         "standstill": snapshot.standstill,
+        "standstill assumed, not measured": snapshot.standstill_assumed,
         "odometry valid": snapshot.odometry.valid,
         "command age [s]": snapshot.command.age_s,
         "command fresh": snapshot.command.fresh,
@@ -81,7 +82,7 @@ def _loop_events(snapshot: DriverSnapshot) -> dict[str, int]:
 def _driver_state(snapshot: DriverSnapshot) -> tuple[bytes, str]:
     if snapshot.state is DriverState.ENABLED:
         return DiagnosticStatus.OK, "All drives are enabled."
-    waits = snapshot.state is DriverState.DISARMED  # for a zero command, say: nothing is defective
+    waits = snapshot.state is DriverState.DISARMED  # for a zero command, for example: nothing is defective
     missing = snapshot.finding.cause is Cause.DRIVE_MISSING
     level = DiagnosticStatus.WARN if (snapshot.state.passes or waits) and not missing else DiagnosticStatus.ERROR
     detail = f": {snapshot.finding.detail.rstrip('.')}" if snapshot.finding.detail else ""

@@ -22,7 +22,7 @@ class Asked:
     response: Any
     """To be filled in before `answer`."""
     sent_s: float
-    """When it was sent, by the system clock of its sender [s]; 0: the middleware does not say."""
+    """When it was sent, by the system clock of its sender [s]; 0: unknown to the middleware."""
     answer: Callable[[], None]
     """Sends `response`, once, from the thread that spins the service."""
 

@@ -41,7 +41,7 @@ _SAID_BY_THE_STATE = (Cause.NONE, Cause.BOOTING, Cause.ENABLING)
 
 
 class MotorDriverNode(ManagedNode):
-    """Talks ROS for a `ControlLoop`."""
+    """The ROS side of a `ControlLoop`."""
 
     def __init__(self, robot: Robot, loop: ControlLoop, ring: Ring, writer: BlackBoxWriter, autostart: bool) -> None:
         super().__init__("motor_driver", loop, autostart)
@@ -90,7 +90,7 @@ class MotorDriverNode(ManagedNode):
         self.request_times.at(now_s)
 
     def end(self) -> None:
-        """The control thread has ended: tell the stops that are still open."""
+        """The control thread has ended: report the stops that are still open."""
         self._stops.end()
 
     def _on_command(self, message: TwistStamped) -> None:
@@ -148,7 +148,7 @@ class MotorDriverNode(ManagedNode):
 
 
 def _essence(snapshot: DriverSnapshot) -> tuple[object, ...]:
-    """What is published at once when it changes. After odom: who knows of a new pose has seen it."""
+    """What is published at once when it changes. After odom: a subscriber that knows of a new pose has received it."""
     return snapshot.state, snapshot.finding.cause, snapshot.odometry.pose_resets
 
 

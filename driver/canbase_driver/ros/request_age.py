@@ -1,6 +1,6 @@
 """Which requests are too old to be carried out: their caller has given up, and may have gone on to something else.
 
-A ROS request carries no deadline. Two things tell its age: whether this process stood still before it was taken in
+A ROS request carries no deadline. Two things give its age: whether this process stood still before it was taken in
 (`canbase_runtime.receive_time`), and the time at which it was sent. A stop is obeyed however late it comes. Pure.
 """
 

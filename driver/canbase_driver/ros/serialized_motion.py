@@ -37,7 +37,7 @@ _JOINTS = (*_STAMP, "position", "velocity")
 
 
 class SerializedMotion:
-    """Of one robot: its frames do not change. The names of the joints may, when a drive is heard for the first time."""
+    """Of one robot: its frames do not change. The names of the joints may, at the first message of a drive."""
 
     def __init__(self) -> None:
         self._odometry: SerializedMessage | None = None

@@ -59,7 +59,7 @@ class DriverServices:
         asked.answer()
 
     def _on_stop(self, asked: Asked) -> None:
-        """However old it is, and whatever else is under way. The answer says that the control thread obeys."""
+        """However old it is, and whatever else is under way. The answer means that the control thread obeys."""
         self._loop.stop(lambda outcome: self._answer(asked, outcome))
         self._voice.tell("stop requested", Priority.WARNING)
 

@@ -1,6 +1,6 @@
-"""ROS around `stop_history.py` and the black box: what filter and mux say comes in, stop_events go out.
+"""ROS around `stop_history.py` and the black box: states of filter and mux come in, stop_events go out.
 
-Two threads meet here: the executor's brings in commands and states, the publisher's tells. What the first one brings
+Two threads meet here: the executor's brings in commands and states, the publisher's reports. What the first one brings
 waits in a queue until the second one takes it.
 """
 
@@ -57,7 +57,7 @@ class StopEvents:
         self._news.put(lambda: self._recorder.on_command(moves, received_at))
 
     def on_filter(self, message: SafetyState, now_s: float) -> None:
-        """The safety filter said what it does; from the executor's thread."""
+        """The state of the safety filter; from the executor's thread."""
         stops = message.action == SafetyState.STOP
         cause, detail = printable(message.cause), printable(message.detail, SENTENCE_LENGTH)
         said = f"safety_filter {cause} {detail}".rstrip()

@@ -1,6 +1,6 @@
 """The thread that writes recordings to files, beside the control loop: slowly, and bounded in number and size.
 
-A folder that cannot be written or a full disk is said once, and once when it is over; the robot is not disturbed.
+A folder that cannot be written or a full disk is reported once, and once when it is over; the robot is not disturbed.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from canbase_config.black_box import BlackBox
 from canbase_driver.runtime.black_box import Recording, asc_lines
 
 WAITING = 4
-"""Recordings that may wait to be written; more are dropped: a stop every second tells nothing new."""
+"""Recordings that may wait to be written; more are dropped: a stop every second shows nothing new."""
 LINES_AT_ONCE = 20
 PAUSE_S = 0.001
-"""Between so many lines: the control thread never waits for the interpreter longer than they take, about 0.3 ms."""
+"""A pause after this many lines: the control thread never waits for the interpreter longer than they take, 0.3 ms."""
 
 
 def state_folder(environment: Mapping[str, str], home: Path) -> Path:
@@ -70,7 +70,7 @@ class BlackBoxWriter(threading.Thread):
         return "" if self._problem else str(path)
 
     def finish(self, timeout_s: float) -> None:
-        """Write what waits, at most for so long, and end."""
+        """Write what waits, at most for this long [s], and end."""
         try:
             self._jobs.put(None, timeout=timeout_s)
         except queue.Full:
@@ -107,7 +107,7 @@ class BlackBoxWriter(threading.Thread):
         probe.unlink()
 
     def _write(self, job: _Job) -> None:
-        """Under another name first: whoever looks finds whole files alone."""
+        """Under another name first: a reader finds only whole files."""
         self._folder.mkdir(parents=True, exist_ok=True)
         part = job.path.with_suffix(".part")
         try:

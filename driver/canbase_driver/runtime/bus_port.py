@@ -22,20 +22,20 @@ RETRY_S = 1.0
 SEND_TIMEOUT_S = 0.002
 """A frame that the bus does not take within this time is dropped: setpoints of yesterday must not move a wheel."""
 SEND_FAILURES = 10
-"""So many failed sends in a row are a failed bus; fewer are a full transmit buffer."""
+"""This many failed sends in a row are a failed bus; fewer are a full transmit buffer."""
 RECEIVE_FAILURES = 3
 """The same for receptions."""
 IGNORED_AT_ONCE = 100
-"""So many frames that are none of ours are passed over in one reception: more than a bus brings in one cycle."""
+"""This many frames that are not ours are passed over in one reception: more than a bus brings in one cycle."""
 OPENS_AT_ONCE_S = 0.002
 """Most adapters are open by then; a serial one (slcan) takes 2 s, and the control cycle does not wait for it."""
 BUS_OFF = "the CAN controller is bus-off after too many errors: check cable, termination and bit rate"
 _ERRORS = (can.CanError, OSError, ValueError)
-"""ValueError: what select says of a handle whose adapter is gone."""
+"""ValueError: from select for a handle whose adapter is gone."""
 
 
 class BusError(Exception):
-    """The bus cannot be opened. The text says what to look at."""
+    """The bus cannot be opened. The text has the likely reason."""
 
 
 class _Opening(threading.Thread):
@@ -61,7 +61,7 @@ class _Opening(threading.Thread):
                 bus.close()
 
     def abandon(self) -> None:
-        """Nobody waits for it any more: what it opens, or has opened, is closed."""
+        """Nothing waits for it any more: what it opens, or has opened, is closed."""
         with self._lock:
             self._abandoned = True
             if self.bus is not None:
@@ -135,7 +135,7 @@ class BusPort:
                 self.problem = ""
 
     def close(self) -> None:
-        """Close the bus for good."""
+        """Close the bus. It is not opened again."""
         if self._opening is not None:
             self._opening.abandon()
         bus, self._bus = self._bus, None

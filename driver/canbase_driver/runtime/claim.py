@@ -1,4 +1,4 @@
-"""What one driver alone may have: the bus and the record of its stops. And whether another computer's driver is heard.
+"""What one driver alone may have: the bus and the record of its stops. And whether another computer's driver is there.
 
 The bus is opened first of all, before ROS is imported: its frames wait in the socket meanwhile, and the time for which
 this driver has to listen before it sends its first frame passes.

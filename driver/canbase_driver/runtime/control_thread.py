@@ -1,4 +1,4 @@
-"""The control thread: owns the core and the bus, keeps the SYNC cycle, and hands snapshots to whoever publishes them.
+"""The control thread: owns the core and the bus, keeps the SYNC cycle, and hands snapshots to the publisher.
 
 Cycles lie on a grid of absolute times; between two of them the thread does nothing but take in frames. Other threads
 only put requests into the inbox. However the thread ends, its last act on the bus is a quick stop.
@@ -30,7 +30,7 @@ from canbase_runtime.latch_file import LatchKeeper
 OLD_S = 0.5
 """A request that lay in the inbox for longer is refused: this process stood still, and its caller may be gone."""
 FRAMES_WHEN_LATE = 100
-"""So many waiting frames are taken in before a cycle that is already late: more than a bus brings in one cycle."""
+"""This many waiting frames are taken in before a cycle that is already late: more than a bus brings in one cycle."""
 LAST_WORDS = 3
 """How often the quick stop is sent on the way out."""
 
@@ -75,7 +75,7 @@ class ControlLoop(threading.Thread):
         self._inbox.put(lambda _now: self._core.on_command(twist, received_at))
 
     def emergency(self, brakes_hard: bool, received_at: float) -> None:
-        """Hand over whether the safety filter asks for the emergency deceleration, from any thread."""
+        """Hand over whether the safety filter requests the emergency deceleration, from any thread."""
         self._inbox.put(lambda _now: self._core.on_emergency(brakes_hard, received_at))
 
     def request_shutdown(self) -> None:
@@ -113,7 +113,7 @@ class ControlLoop(threading.Thread):
         self._ask(lambda now_s, answer: self._core.request_aim(aim, now_s, answer), on_outcome, takes_power)
 
     def deliver(self) -> None:
-        """Tell the outcomes that are there. By the thread that asks, and often: nothing here waits."""
+        """Report the outcomes that are there. Called by the requesting thread, and often: nothing here waits."""
         ended = not self.is_alive()
         while True:
             try:

@@ -37,9 +37,9 @@ from canbase_runtime.sd_notify import Service
 from canbase_runtime.single_instance import TakenError
 
 WAKE_S = 0.02
-"""So long an outcome of the control thread may wait for the next message before it is answered."""
+"""An outcome of the control thread waits at most this long for the next message before it is answered [s]."""
 LOOP_TIMEOUT_S = 0.5
-"""A control thread without a cycle for so long, while this one ran, hangs: the process ends; the watchdog has already
+"""A control thread without a cycle for this long, while this one ran, hangs: the process ends; the watchdog has already
 stopped the drives."""
 END_MARGIN_S = 1.5
 """Above the time of ramp and quick stop: power off."""
@@ -146,7 +146,7 @@ def _failure(threads: Sequence[Worker]) -> BaseException | None:
 
 
 class HangWatch:
-    """Tells a thread that hangs from a process that was stopped as a whole, and goes on."""
+    """Distinguishes a thread that hangs from a process that was stopped as a whole, and goes on."""
 
     def __init__(self, timeout_s: float, look_s: float) -> None:
         """`look_s`: the longest time between two looks while this thread runs."""

@@ -1,7 +1,7 @@
-"""What the CAN controller says of itself: counters, and SocketCAN's error frames in words. No socket, no clock.
+"""The CAN controller's own reports: counters, and SocketCAN's error frames in words. No socket, no clock.
 
-python-can's `state` tells nothing on SocketCAN. The bits are those of linux/can/error.h: the class is the identifier of
-the error frame, details of the class CONTROLLER are in data byte 1. The watchdog reads them by itself.
+python-can's `state` is always the same on SocketCAN. The bits are those of linux/can/error.h: the class is the
+identifier of the error frame, details of the class CONTROLLER are in data byte 1. The watchdog reads them by itself.
 """
 
 from __future__ import annotations
@@ -45,10 +45,10 @@ class BusReport:
     receive_errors: int = 0
     error_frames: int = 0
     dropped: int = 0
-    """Received frames that CANopen does not use (remote, 29-bit, CAN FD), or that nobody understood; datagrams that are
-    no frame."""
+    """Received frames that CANopen does not use (remote, 29-bit, CAN FD), or that no part understood; datagrams that
+    are no frame."""
     failures: int = 0
-    """How often the bus failed, and was closed to be opened anew."""
+    """How often the bus failed, and was closed to be opened again."""
     problem: str = ""
     """Why the bus does not work now; empty: it does."""
 
@@ -69,7 +69,7 @@ class BusReport:
 
     @property
     def is_bus_off(self) -> bool:
-        """The controller has taken itself off the bus: nothing is sent or heard until it is restarted."""
+        """The controller has taken itself off the bus: nothing is sent or received until it is restarted."""
         return self.controller is ControllerState.BUS_OFF
 
 

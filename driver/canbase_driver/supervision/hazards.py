@@ -1,4 +1,4 @@
-"""Why nothing gets power, and what stops it: two tables, the most telling row first."""
+"""Why nothing gets power, and what stops it: two tables, the most informative row first."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ BLOCKERS: tuple[Blocker, ...] = (
     Blocker(Cause.COMMAND_NOT_ZERO, lambda s: s.commanded, Phase.DISARMED, "a zero command"),
     Blocker(Cause.NOT_STANDING, lambda s: "" if s.standstill else s.turning, Phase.DISARMED, "standstill"),
 )
-"""What keeps the power off while nothing is latched, the most telling first. Nothing moved: most go by themselves."""
+"""What keeps the power off while nothing is latched, the most informative first. Most end by themselves."""
 
 HAZARDS: tuple[Hazard, ...] = (
     Hazard(Cause.BUS_FAILED, lambda s: s.bus, True, True, "reset, with the bus working"),
@@ -91,8 +91,9 @@ HAZARDS: tuple[Hazard, ...] = (
         "a new start",
     ),
 )
-"""All reasons to stop, the most telling first: when several hold, the first one is the cause that is reported.
+"""All reasons to stop, the most informative first: when several hold, the first one is the cause that is reported.
 
 A tripped watchdog stops the drives itself. Where both are seen in the same cycle (this process was stopped for a
-while), drives that left NMT operational, are in fault or silent are what came of it, unless it tripped about a drive.
+while), drives that left NMT operational, are in fault or send nothing are its consequence, unless it tripped about a
+drive.
 """

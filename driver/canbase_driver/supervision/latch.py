@@ -35,7 +35,7 @@ class PowerRecord:
     """The record that the driver wants on disk, cycle by cycle."""
 
     def __init__(self, found: Found | None) -> None:
-        """`found`: what was there at the start; None: nobody keeps a record, which is for virtual time alone."""
+        """`found`: what was there at the start; None: no record is kept, which is for virtual time alone."""
         self._ahead = WriteAhead(found)
 
     @property

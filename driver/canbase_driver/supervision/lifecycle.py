@@ -1,4 +1,4 @@
-"""How far the driver may go: nothing on the bus, drives booted, drives with power. The lifecycle of the ROS node asks.
+"""How far the driver may go: nothing on the bus, drives booted, drives with power. ROS's lifecycle sets it.
 
 RELEASED ──configure──► CONFIGURED ──activate──► ACTIVE      one change at a time; a change that fails is taken back,
    ▲ └────cleanup───────────┘ └──────deactivate────┘         but none that takes power away: a stop goes on.
@@ -34,7 +34,7 @@ class Aim(IntEnum):
     RELEASED = 0
     """It sends nothing."""
     CONFIGURED = 1
-    """Drives are booted and heard, and have no power."""
+    """Drives are booted and send feedback, and have no power."""
     ACTIVE = 2
     """Drives get power as soon as nothing forbids it, and follow commands."""
 
@@ -53,7 +53,7 @@ class Lifecycle:
         timeouts = robot.timeouts
         self.aim = aim
         self.released = aim is Aim.RELEASED
-        """Nothing is sent: never configured, or let go again."""
+        """Nothing is sent: never configured, or cleaned up again."""
         self._change: _Change | None = None
         stop_s = given_up_s(robot) + POWER_OFF_TIMEOUT_S
         self._patience_s = {
@@ -82,7 +82,7 @@ class Lifecycle:
         self.released = self.released and aim is Aim.RELEASED
 
     def step(self, situation: Situation, state: DriverState, finding: Finding, now_s: float) -> bool:
-        """Once a cycle, after the supervisor. True: the drives are to be let go now."""
+        """Once a cycle, after the supervisor. True: the drives are to be released now."""
         let_go = self.aim is Aim.RELEASED and not self.released and state in NO_POWER and not situation.powered
         self.released = self.released or let_go
         change = self._change

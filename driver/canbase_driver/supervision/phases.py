@@ -1,4 +1,4 @@
-"""Where the driver is: what topics tell of it, and what the core orders there."""
+"""The phases of the driver: the state that topics report in each, and what the core orders there."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from canbase_runtime.driver_state import DriverState
 
 
 class Phase(Enum):
-    """Where the driver is. What topics tell of it is `SHOWN`, what it orders there `ORDERS`."""
+    """The phase of the driver. The state that topics report is in `SHOWN`, what it orders there in `ORDERS`."""
 
     __hash__ = object.__hash__  # that of Enum is written in Python, and tables are looked up in every cycle
 
@@ -20,7 +20,7 @@ class Phase(Enum):
     PREPARING = "preparing"
     """Nothing forbids power but drives that are not switched on."""
     ARMING = "arming"
-    """... but the records on disk, which do not say yet that there is power."""
+    """... but the records on disk, which are not LIVE yet."""
     ENABLING = "enabling"
     ENABLED = "enabled"
     RAMP = "ramp"
@@ -42,7 +42,7 @@ SHOWN = {
     **dict.fromkeys(STOPPING, DriverState.STOPPING),
     Phase.LATCHED: DriverState.LATCHED,
 }
-"""The state that canbase/msg/DriverStatus tells."""
+"""The state in canbase/msg/DriverStatus."""
 NO_POWER = (DriverState.OFFLINE, DriverState.BOOTING, DriverState.DISARMED, DriverState.LATCHED)
 
 

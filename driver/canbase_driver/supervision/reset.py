@@ -1,7 +1,7 @@
 """One reset on its way: the watchdog first, then the drives, then their faults. It never gives power to anything.
 
 Rules: refused or broken off while a velocity is commanded, while a wheel turns, or while the bus or the watchdog is
-dead. Each step has a deadline; the sentence of a failed reset says which step failed and what to do. Pure: time is an
+dead. Each step has a deadline; the sentence of a failed reset names the step and the remedy. Pure: time is an
 argument.
 """
 
@@ -22,7 +22,7 @@ EDGE_S = 0.05
 FAULT_TIMEOUT_S = 1.0
 """From the edge of bit 7 until the fault has gone."""
 FAULT_TRIES = 3
-"""So many edges, then the reset has failed; a cause that stands is not hammered at."""
+"""After this many edges the reset has failed; it does not go on against a cause that stays."""
 
 
 class ResetPhase(Enum):
@@ -68,7 +68,7 @@ REFUSALS: tuple[Callable[[Situation], str], ...] = (
     *_BUS_OR_COMMAND,
     lambda s: f"watchdog: {s.watchdog_detail}" if s.watchdog is WatchdogView.MISSING else "",
 )
-"""Why a reset may not even begin. A drive that is not heard cannot be seen to stand; it is waited for instead."""
+"""Why a reset may not even begin. A drive without messages cannot be seen at standstill; the reset waits for it."""
 
 BREAKS: dict[ResetPhase, tuple[Callable[[Situation], str], ...]] = {
     ResetPhase.WATCHDOG: _BUS_OR_COMMAND,

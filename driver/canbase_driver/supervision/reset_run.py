@@ -1,4 +1,4 @@
-"""The reset on its way, its request to the watchdog, and who waits for its outcome. The sequence: `reset.py`."""
+"""The reset on its way, its request to the watchdog, and the waiting caller. The sequence: `reset.py`."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from canbase_driver.supervision.watchdog_link import WatchdogLink
 OnOutcome = Callable[[Outcome], None]
 
 STOOD_STILL_S = 0.5
-"""Two steps that are further apart: the process stood still between them, and whoever asked may be gone."""
+"""Two steps that are further apart: the process stood still between them, and the caller may be gone."""
 
 
 class ResetRun:
-    """At most one at a time; whoever asked is told exactly once how it ended."""
+    """At most one at a time; its caller gets exactly one outcome."""
 
     def __init__(self, watchdog: WatchdogLink, cycle_s: float, boot_s: float) -> None:
         self._watchdog = watchdog

@@ -1,4 +1,4 @@
-"""What is measured at one cycle of the driver, and what was asked of it: all that the supervisor decides by."""
+"""What is measured at one cycle of the driver, and what was requested of it: all that the supervisor decides by."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ class Situation:
     absent: str = ""  # a node restarted, or is not in NMT operational
     silent: str = ""  # statusword or heartbeat too old
     disabled: str = ""  # an axis is not in operation enabled
-    unprepared: str = ""  # an axis has not got as far as switched on: STO open, no main voltage
-    unarmed: str = ""  # the records on disk do not say yet that there is power
+    unprepared: str = ""  # an axis is not switched on yet: STO open, no main voltage
+    unarmed: str = ""  # the records on disk are not LIVE yet
     watchdog: WatchdogView = WatchdogView.OK
     watchdog_detail: str = ""
-    watchdog_about_drive: bool = False  # it tripped because a drive was silent or down
-    commanded: str = ""  # a fresh command asks for motion
+    watchdog_about_drive: bool = False  # it tripped because a drive sent nothing or was down
+    commanded: str = ""  # a fresh command orders motion
     overdue: str = ""  # zero was ordered, and the wheels still turn
     standstill: bool = True  # measured, on all wheels
     turning: str = ""  # which wheel does not stand
@@ -41,5 +41,5 @@ class Situation:
 
     @property
     def unready(self) -> str:
-        """A drive that is being booted, must be booted or is not heard: nothing of it is measured."""
+        """A drive that is being booted, must be booted or sends nothing: nothing of it is measured."""
         return self.booting or self.absent or self.silent

@@ -1,8 +1,9 @@
 """Records stops from their cause to standstill, for the topic stop_events: how long each took, and how far it went.
 
 A stop is opened by the driver's core (`StopRecord`), by the safety filter or the velocity mux when they begin to hold a
-base that moves, or by a command that ends while it moves. It is told once the base stands, when it was let go before,
-or after `patience_s`. Pure: fed with snapshots and with what the other nodes say; times are local monotonic seconds.
+base that moves, or by a command that ends while it moves. It is reported once the base stands, when it was released
+before, or after `patience_s`. Pure: fed with snapshots and with the states of the other nodes; times are local
+monotonic seconds.
 """
 
 from __future__ import annotations
@@ -22,13 +23,13 @@ STALE, NO_SOURCE = "command_stale", "no_source"
 
 
 class HeldBy(Enum):
-    """What holds the base in a stop, and may let go of it before it stands."""
+    """What holds the base in a stop, and may release it before it stands."""
 
     FILTER = auto()
     MUX = auto()
     STALE_COMMAND = auto()
     DRIVER = auto()
-    """The driver's core: it lets go of nothing that it has begun."""
+    """The driver's core: it releases nothing that it has begun to stop."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,10 +96,10 @@ class _OpenStop:
 
 
 class StopHistory:
-    """All stops that are not told yet."""
+    """All stops that are not reported yet."""
 
     def __init__(self, patience_s: float) -> None:
-        """`patience_s`: after so long without a standstill the stop is told all the same [s]."""
+        """`patience_s`: after this long without a standstill the stop is reported all the same [s]."""
         self._patience_s = patience_s
         self._previous: DriverSnapshot | None = None
         self._open: list[_OpenStop] = []
@@ -111,7 +112,7 @@ class StopHistory:
             self._moved_at = now_s
 
     def on_filter(self, stop: StopRecord | None, now_s: float) -> None:
-        """The safety filter said whether it holds the base, and why; None: it does not."""
+        """From the safety filter: whether it holds the base, and why; None: it does not."""
         if stop is None:
             self._let_go(HeldBy.FILTER)
         elif not self._filter_stops and (self._is_moving or self._ordered_motion(now_s)):
@@ -119,7 +120,7 @@ class StopHistory:
         self._filter_stops = stop is not None
 
     def on_mux(self, active: str, detail: str, now_s: float) -> None:
-        """The mux said which source drives, empty: none; `detail`: why the last one does not."""
+        """From the mux: which source drives, empty: none; `detail`: why the last one does not."""
         idle = not active
         if idle and not self._mux_idle and self._is_moving and self._ordered_motion(now_s):
             self._begin(StopRecord(MUX, NO_SOURCE, detail, False, "a source that sends", now_s), HeldBy.MUX)

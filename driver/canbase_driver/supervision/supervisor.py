@@ -1,10 +1,10 @@
 """When the drives may have power, and what takes it away: the driver's own state machine, above CiA 402.
 
 Rules
-1. Nothing gets power while one of BLOCKERS holds: drives booted and heard, watchdog alive and not tripped, standstill,
-   no velocity commanded, no reset under way. The first that holds is the state and the cause. Then the drives are taken
-   as far as switched on, however long that lasts (STO open, no main voltage), and only together any further, and not
-   before the records on disk say that there is power: whoever dies with it comes back latched.
+1. Nothing gets power while one of BLOCKERS holds: drives booted and sending, watchdog alive and not tripped,
+   standstill, no velocity commanded, no reset under way. The first that holds is the state and the cause. Then the
+   drives are taken as far as switched on, however long that takes (STO open, no main voltage), and only together any
+   further, and not before the records on disk are LIVE: a process that dies with power comes back latched.
 2. While there is power, the first of HAZARDS that holds stops the base: by the ramp, or by quick stop at once. On the
    way to operation enabled nothing follows a command yet, so there it is always the quick stop.
 3. A stop goes down one way only: ramp, quick stop, power off. Each step ends by measured standstill, or as soon as the
@@ -13,7 +13,7 @@ Rules
 5. A latched cause is forgotten by `reset` alone, and only when nothing has power; a restart does not end it.
 6. A shutdown ends in every state: at once without power, after the stop with it.
 
-Pure: time is an argument, `Situation` says everything that was measured. It sends nothing; `Orders` says what to do.
+Pure: time is an argument, `Situation` has everything that was measured. It sends nothing; `Orders` has what to do.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Transition:
     when: When
     after: Phase
     cause: Cause | None = None
-    """What the driver tells from then on; None: what it told before."""
+    """The cause that the driver reports from then on; None: the one before."""
     clears_on: str = ""
     latches: bool | None = None
     """Whether it needs a reset; None: as before."""
@@ -74,7 +74,7 @@ class Supervisor:
         self.phase = Phase.LATCHED if latched else Phase.BOOTING
         self.finding = latched or Finding(Cause.BOOTING, "", "drives booted")
         self.finished = False
-        """A shutdown was asked for, and the way down is at its end."""
+        """A shutdown was requested, and the way down is at its end."""
         self.latches = latched is not None
         """The stop that is under way, or the last one, needs a reset."""
         self.now_s = self._since_s = 0.0
@@ -83,7 +83,7 @@ class Supervisor:
 
     @property
     def state(self) -> DriverState:
-        """What topics tell."""
+        """The state for the topics."""
         return SHOWN[self.phase]
 
     @property
@@ -92,7 +92,7 @@ class Supervisor:
         return self.now_s - self._since_s
 
     def step(self, situation: Situation, now_s: float) -> Orders:
-        """Judge the situation, move on, and say what to do in this cycle."""
+        """Judge the situation, move on, and order what to do in this cycle."""
         self.now_s = now_s
         before = self.phase
         if situation.shutdown_requested and _is_down(before, situation):
@@ -146,7 +146,7 @@ class Supervisor:
 
 
 def _is_down(phase: Phase, situation: Situation) -> bool:
-    """There is no power, and nothing latches now: a stop that was asked for just before is not forgotten."""
+    """There is no power, and nothing latches now: a stop that was requested just before is not forgotten."""
     blocker = first(BLOCKERS, situation)
     return phase is Phase.LATCHED or (phase in WAITING and (blocker is None or blocker.phase is not Phase.LATCHED))
 

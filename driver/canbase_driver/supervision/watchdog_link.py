@@ -23,7 +23,7 @@ RESET_KEY = b"RST"
 
 STARTING, WATCHING, TRIPPED = 0, 1, 2
 ARMED = 0x80
-"""Bit of byte 2, above the rung: its record on disk says that there is power."""
+"""Bit of byte 2, above the rung: its record on disk is LIVE."""
 
 CAUSES = {
     0: "none",
@@ -53,7 +53,7 @@ SENSOR_CAUSES = (12, 13, 17)
 RUNGS = ("none", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld", "NMT reset node")
 """How far up its ladder it has gone; the numbers are those of its state frame and of DriverStatus."""
 DRIVE_CAUSES = (3, 7, 18)
-"""What the driver sees at its drives itself, and can tell more about."""
+"""What the driver sees at its drives itself, and can report in more detail."""
 ANSWERS = {
     1: "reset done",
     2: "its cause persists, or a wheel is not proven to be at standstill; its log names which, and what to do",
@@ -76,7 +76,7 @@ class WatchdogState:
     answered: int
     answer: int
     armed: bool = False
-    """Its record on disk says that there is power: killed now, it comes back tripped."""
+    """Its record on disk is LIVE: killed now, it comes back tripped."""
 
     @property
     def cause_text(self) -> str:
@@ -117,7 +117,7 @@ class WatchdogReport:
     rung: int
     """How far up its ladder it has gone, 0 to 4."""
     lease_age_s: float
-    """Age of the last valid lease, as it says [s]; NaN: none."""
+    """Age of the last valid lease, in its state frame [s]; NaN: none."""
     counters: WatchdogCounters = WatchdogCounters()
     """Since its start."""
 
@@ -145,7 +145,7 @@ def parse_state(frame: Frame) -> WatchdogState | None:
 
 
 class WatchdogLink:
-    """What the watchdog said last, how long ago, and our requests to it."""
+    """The last state of the watchdog, its age, and our requests to it."""
 
     def __init__(self, timeout_s: float) -> None:
         """`timeout_s`: a state frame older than this is none (timeouts.watchdog_s)."""
@@ -154,7 +154,7 @@ class WatchdogLink:
         self._received_s = -math.inf
         self._request = 0
         self.counters = WatchdogCounters()
-        """As it said last; zeros until then."""
+        """Its last state frame; zeros until then."""
 
     def on_frame(self, frame: Frame, now_s: float) -> bool:
         """Take a frame 1FEh. False: it was not understood."""
@@ -165,7 +165,7 @@ class WatchdogLink:
         return True
 
     def on_counters(self, frame: Frame, _now: float) -> bool:
-        """Take a frame 2FEh. False: it was not understood. It tells; only the state frame keeps the watchdog alive."""
+        """Take a frame 2FEh. False: it was not understood. Only the state frame shows that the watchdog lives."""
         counters = parse_counters(frame)
         if counters is None:
             return False
@@ -174,7 +174,7 @@ class WatchdogLink:
 
     @property
     def rung(self) -> int:
-        """How far up its ladder it has gone, 0 to 4 (docs/bus.md); 0 while it was never heard."""
+        """How far up its ladder it has gone, 0 to 4 (docs/bus.md); 0 until its first frame."""
         return self._state.rung if self._state else 0
 
     @property
@@ -186,7 +186,7 @@ class WatchdogLink:
 
     @property
     def lease_age_s(self) -> float:
-        """Age of the last valid lease in its last state frame [s]; NaN: none, or not heard."""
+        """Age of the last valid lease in its last state frame [s]; NaN: none, or no frame yet."""
         if self._state is None or self._state.lease_age_ms == LEASE_AGE_UNKNOWN:
             return math.nan
         return self._state.lease_age_ms / 1000.0
@@ -197,7 +197,7 @@ class WatchdogLink:
 
     @property
     def cause(self) -> str:
-        """Cause of the trip in words; "none" when it has not tripped or was never heard."""
+        """Cause of the trip in words; "none" when it has not tripped or has not sent a frame."""
         return self._state.cause_text if self._state else "none"
 
     def report(self, now_s: float) -> WatchdogReport:
@@ -228,11 +228,11 @@ class WatchdogLink:
 
     @property
     def about_drive(self) -> bool:
-        """The last trip was about a drive that is silent or down."""
+        """The last trip was about a drive that sends nothing or is down."""
         return self._state is not None and self._state.cause in DRIVE_CAUSES
 
     def lying_node(self, now_s: float) -> int:
-        """The node whose sensors the watchdog has caught with a lie; 0: none."""
+        """The node whose sensors the watchdog has found faulty; 0: none."""
         if self._state is None or self.view(now_s)[0] is not WatchdogView.TRIPPED:
             return 0
         return self._state.node_id if self._state.cause in SENSOR_CAUSES else 0

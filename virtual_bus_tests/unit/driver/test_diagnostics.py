@@ -48,6 +48,13 @@ def test_a_healthy_robot_is_ok_in_every_entry() -> None:
     assert entry(message, "r1: drive right_wheel_joint").hardware_id == "r1 node 2 axis 1"
 
 
+def test_a_standstill_that_no_sensor_has_shown_is_named_as_assumed() -> None:
+    why = "left_wheel showed no motion; its power has been off for 10 s, so standstill is assumed"
+    for told, snapshot in ((why, with_driver(standstill=True, standstill_assumed=why)), ("", SNAPSHOT)):
+        driver = entry(diagnostics_message(snapshot, STAMP), "robot: motor_driver")
+        assert {pair.key: pair.value for pair in driver.values}["standstill assumed, not measured"] == told
+
+
 def test_the_values_are_short_and_have_their_units() -> None:
     left = with_left(
         feedback_age_s=math.nan,
