@@ -30,7 +30,7 @@ from drive_rig import Case, Rig
 from drive_ways import WAYS, Controller
 
 AFTER_S = 1.5
-"""The base is watched for so long after the result."""
+"""The base is watched for this long after the result [s]."""
 LIMIT_S = 200.0
 LEAST_MM = 0.01
 """Lower values stand at the left edge of the picture: its axis is logarithmic."""

@@ -1,4 +1,4 @@
-"""What a benchmark hands back, and how a set of durations is told. Used by all benchmarks but accuracy.py."""
+"""The result of a benchmark, and how a set of durations is reported. Used by all benchmarks but accuracy.py."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ MS = 1000.0
 
 
 NOISE = 0.25
-"""Two runs of one benchmark on one computer differ by this part of their ratio, unless a figure says otherwise."""
+"""Two runs of one benchmark on one computer differ by this part of their ratio, unless a figure has its own noise."""
 
 
 @dataclass(frozen=True, slots=True)

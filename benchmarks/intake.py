@@ -29,7 +29,7 @@ from support.ros_harness import free_udp_port
 RATE_HZ = 8000
 SECONDS = 5.0
 BATCH = 8
-"""So many frames in one go, 1,000 times a second."""
+"""This many frames in one go, 1,000 times a second."""
 MALFORMED = b"\x01"
 SETTLE_S = 1.0
 

@@ -1,7 +1,7 @@
 """Watchdog: from the moment at which a lease runs out to the quick stop frame, as another process on the bus sees it.
 
 A real watchdog process on the virtual bus, and a robot that is faked here: it drives, its leases end, it is stopped and
-reset, again and again. The floor, in turn with it: a process that does nothing but wait so long and send one frame.
+reset, again and again. The floor, in turn with it: a process that only waits for that time and sends one frame.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ class FakeRobot:
                     self.lease()
 
     def for_s(self, duration_s: float, leases: bool = True) -> None:
-        """Cycles for so long."""
+        """Cycles for this long."""
         end_s = time.monotonic() + duration_s
         self.until(lambda _: time.monotonic() >= end_s, leases)
 

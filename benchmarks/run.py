@@ -98,7 +98,7 @@ def _measured(chosen: Mapping[str, Callable[[], list[Figure]]]) -> list[Figure]:
     for number, (name, measure) in enumerate(chosen.items(), 1):
         print(f"[{number}/{len(chosen)}] {name} … ", end="", file=sys.stderr, flush=True)
         started_s = time.monotonic()
-        with redirect_stdout(io.StringIO()):  # what the processes of a robot have said
+        with redirect_stdout(io.StringIO()):  # the output of the processes of a robot
             figures += measure()
         print(f"{time.monotonic() - started_s:.0f} s", file=sys.stderr, flush=True)
     return figures

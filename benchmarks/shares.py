@@ -110,7 +110,7 @@ def cpu_s(pid: int) -> float:
 
 
 def shares(pids: Mapping[str, int], seconds: float, wait: Callable[[float], None]) -> dict[str, float]:
-    """The part of one processor that each of them takes during so many seconds, for which `wait` waits."""
+    """The part of one processor that each of them takes during this many seconds, for which `wait` waits."""
     before, began_s = {name: cpu_s(pid) for name, pid in pids.items()}, time.monotonic()
     wait(seconds)
     lasted_s = time.monotonic() - began_s

@@ -1,7 +1,7 @@
 """From the start of the driver to drives in Operation Enabled: two drives, and eight.
 
-Drives and watchdog are up. Told apart: the program start, until the driver's first frame (Python, rclpy, DDS), and the
-boot of the drives from there on. The floor of the first part: a process that makes an empty rclpy node.
+Drives and watchdog are up. Measured separately: the program start, until the driver's first frame (Python, ROS), and
+the boot of the drives from there on. The floor of the first part: a process that makes an empty rclpy node.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ BARE_NODE = "import rclpy; rclpy.init(); rclpy.create_node('bare')"
 
 
 def drives(count: int) -> list[dict[str, Any]]:
-    """So many wheels, left and right in turn, on nodes of their own."""
+    """This many wheels, left and right in turn, on nodes of their own."""
     shared = {"gear_ratio": 20.0, "counts_per_motor_rev": 4096, "velocity_unit": "0.1rpm"}
     places = [("left", 1) if i % 2 == 0 else ("right", -1) for i in range(count)]
     return [

@@ -1,6 +1,6 @@
-"""How soon is motor_driver/stop answered while a reset waits for an absent drive? The answer says that it is obeyed.
+"""How soon motor_driver/stop answers while a reset waits for an absent drive. The answer means that it is obeyed.
 
-The whole bench robot as real processes; one drive is off the bus, nothing has power. Each trial asks for a reset, which
+The whole bench robot as real processes; one drive is off the bus, nothing has power. Each trial requests a reset, which
 waits for the drive, and then for a stop, which breaks it off. The floor, in turn with it: a bare rclpy node that
 answers the same service at once.
 """

@@ -3,7 +3,7 @@
     python benchmarks/velocity_latency.py          # about 40 s; prints the table of docs/performance.md
 
 Five sources at 50 Hz and a scan of 720 points at 20 Hz come from one process; `canbase velocity` runs as it does on a
-robot. The relay is a node in a process of its own with one subscription and one publisher, which hears the same
+robot. The relay is a node in a process of its own with one subscription and one publisher, which receives the same
 commands. All three run with the real-time priority of `canbase velocity`. A command carries its number in its angular
 velocity, so each answer is matched to its question.
 """
@@ -128,7 +128,7 @@ def main() -> None:
 
 
 def robot_file(folder: Path) -> Path:
-    """The bench robot with five sources and a scanner, both of which must talk."""
+    """The bench robot with five sources and a scanner, both of which must publish."""
     yaml = YAML(typ="safe")
     values = yaml.load(sample("bench"))
     values["mux"] = {

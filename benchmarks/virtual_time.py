@@ -1,6 +1,6 @@
 """How much faster than real time a two-wheel robot runs in virtual time: drives and body alone, and with the cores.
 
-The floor: the same body and motors stepped in a bare loop, without a bus, a drive or anybody who orders. After
+The floor: the same body and motors stepped in a bare loop, without a bus, a drive or an order. After
 `make compiled`, `PYTHONPATH=build/compiled:virtual_bus_tests python benchmarks/virtual_time.py` measures it compiled.
 """
 

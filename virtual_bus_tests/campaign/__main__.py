@@ -1,4 +1,4 @@
-"""`python -m campaign`: runs scenarios and prints what came of them; `--seed` tells one of them from begin to end."""
+"""`python -m campaign`: runs scenarios and prints what came of them; `--seed` replays one of them step by step."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from campaign.runner import Tally, run
 from campaign.scenario import Result
 
 SHOWN = 50
-"""Violations that are told one by one, as they are found."""
+"""Violations that are printed one by one, as they are found."""
 BROKEN_OFF = 128 + signal.SIGINT
 """Exit code after Ctrl-C, as of a shell."""
 app = typer.Typer(add_completion=False)
@@ -42,7 +42,7 @@ def main(
 ) -> None:
     """Scenarios with 1 to 4 overlapping faults in virtual time. Exit code 1 when a property did not hold.
 
-    Ctrl-C tells what was found until then, with exit code 130.
+    Ctrl-C prints what was found until then, with exit code 130.
     """
     only = [name.value for name in fault or ()]
     taken_out = without.value if without is not None else ""

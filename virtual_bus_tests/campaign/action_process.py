@@ -53,7 +53,7 @@ class ActionProcess(Process):
         self.begin()
 
     def begin(self) -> None:
-        """A new owner without a goal; it has heard nothing."""
+        """A new owner without a goal; it has received nothing."""
         self.goal_queue = GoalQueue(self._robot)
         self._inputs = Inputs()
         self._turned_at = self.clock.now_s
@@ -70,7 +70,7 @@ class ActionProcess(Process):
         self._inputs = replace(self._inputs, shutdown=True)
 
     def send_goal(self, distance_m: float, speed_mps: float) -> None:
-        """A client asks for a goal. It is accepted or refused as in node.py."""
+        """A client sends a goal. It is accepted or refused as in node.py."""
         self.receive("goals", 10, self._on_goal, distance_m, speed_mps)
 
     def cancel(self) -> None:

@@ -39,7 +39,7 @@ def join(node: SimulatedNode, axis: int) -> None:
 
 
 def speak(node: SimulatedNode, axis: int) -> None:
-    """What it says gets onto the bus again."""
+    """Its frames get onto the bus again."""
     node.line.silent = False
 
 

@@ -38,7 +38,7 @@ class Disturbance:
     delay_s: float = 0.0
     """Longest delay; each frame draws its own, and none overtakes another on the same way."""
     blocked: set[tuple[str, str]] = field(default_factory=set)
-    """(sender, receiver) that do not hear each other."""
+    """(sender, receiver) that do not reach each other."""
 
     @property
     def quiet(self) -> bool:
@@ -66,14 +66,14 @@ class Member:
 
 
 class CanBus:
-    """All members hear every frame but their own."""
+    """All members receive every frame but their own."""
 
     def __init__(self, clock: Clock, random: Random, bitrate: int) -> None:
         self.clock, self.random, self.bitrate = clock, random, bitrate
         self.disturbance = Disturbance()
         self.members: list[Member] = []
         self.watch: Callable[[str, int, bytes], None] | None = None
-        """Told of every frame with its sender, for a log."""
+        """Receives every frame with its sender, for a log."""
         self.frames = 0
         self.queued = 0
         """Frames that wait in all members."""

@@ -17,7 +17,7 @@ class Pace:
     drives_poll_s: float = 0.005
     """How often the drives look at their own timers: heartbeats, and heartbeats that are missing."""
     command_parts: float = 4.0
-    """The timers of mux and filter are looked at so many times in a period of rates.command_hz."""
+    """The timers of mux and filter are looked at this many times in a period of rates.command_hz."""
     topic_jitter_s: float = 0.0005
     cycle_jitter_s: float = 0.0005
     sdo_delay_s: float = 0.001

@@ -49,7 +49,7 @@ class StopDisk:
         return self.found().defect is Defect.NONE
 
     def write(self, record: Record) -> tuple[Record | None, str]:
-        """On disk at once; what the part is told of it."""
+        """On disk at once; the report to the part."""
         if not self.file.writable:
             return None, FULL
         if record is not self._last:
@@ -76,7 +76,7 @@ class WatchdogDisk:
         return not self.past().problem
 
     def write(self, entry: Entry) -> tuple[Entry | None, str]:
-        """On disk at once; what the watchdog is told of it."""
+        """On disk at once; the report to the watchdog."""
         if not self.file.writable:
             return None, FULL
         if entry is not self._last:

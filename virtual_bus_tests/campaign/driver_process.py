@@ -1,4 +1,4 @@
-"""motor_driver in virtual time: the core, the cycle of loop.py and the topics of node.py; and two ways to go mad."""
+"""motor_driver in virtual time: the core, the cycle of loop.py and the topics of node.py; and two ways to misbehave."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ENABLE = b"\x0f\x00"
 
 
 class DriverProcess(Process):
-    """`core` is the real driver. `bus_problem`: what its adapter reports. The mad drivers send other frames instead."""
+    """`core` is the real driver. `bus_problem`: what its adapter reports. A misbehaving one sends other frames."""
 
     name = "driver"
 
@@ -46,9 +46,9 @@ class DriverProcess(Process):
         self.never_lets_go = False
         """At a stand it leaves the power on, where it should take it off for a moment."""
         self.asked = ""
-        """It was asked to stop, or to give up the power: until a reset or an activation. Empty: it was not."""
+        """It was requested to stop, or to give up the power: until a reset or an activation. Empty: it was not."""
         self.heartbeats = True
-        """A mad driver may go on with its heartbeat or be silent there."""
+        """A misbehaving driver may go on with its heartbeat or stop sending it."""
         self._last_frames: list[Frame] = []
         self._last_moving: dict[int, bytes] = {}
         self._moves = ZERO
@@ -57,7 +57,7 @@ class DriverProcess(Process):
         self.begin()
 
     def begin(self) -> None:
-        """A new core: nothing is booted, and what its record says is latched."""
+        """A new core: nothing is booted, and its record decides what is latched."""
         self.core = DriverCore(self._robot, found=self.disk.found())
         self.asked = ""
         self._period_s = 1.0 / self._robot.rates.control_hz
@@ -68,7 +68,7 @@ class DriverProcess(Process):
         self.every(self._period_s, self._on_cycle)
 
     def reset(self, on_outcome: list[Outcome]) -> None:
-        """Service motor_driver/reset; nobody answers while the process does not run."""
+        """Service motor_driver/reset; there is no answer while the process does not run."""
         if self.running:
             self.core.request_reset(self.clock.now_s, lambda outcome: self._on_reset(outcome, on_outcome))
 
@@ -128,7 +128,7 @@ class DriverProcess(Process):
             self._member.send(frame.cob_id, frame.data)
 
     def _changed(self, frames: list[Frame]) -> list[Frame]:
-        """The cycle's frames as a mad driver sends them; a sane one changes nothing."""
+        """The cycle's frames as a misbehaving driver sends them; a healthy one changes nothing."""
         if self.repeats:
             beats = [frame for frame in frames if frame.cob_id == 0x700 + DRIVER_NODE_ID and self.heartbeats]
             return beats + self._last_frames

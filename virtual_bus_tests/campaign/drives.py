@@ -1,4 +1,4 @@
-"""The simulated drives as members of the bus: each node hears and sends for itself, and the world moves under them."""
+"""The simulated drives as members of the bus: each node receives and sends for itself, and the world moves."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ROLLS_SHARE = 0.02
 
 
 class Drives:
-    """`bench` is the simulated world. `heard`: when each node last heard the heartbeat of driver and watchdog."""
+    """`bench` is the simulated world. `heard`: when each node last received the heartbeat of driver and watchdog."""
 
     def __init__(self, drawn: DrawnRobot, bus: CanBus, pace: Pace = FINE) -> None:
         self._bus, self._clock, self._poll_s = bus, bus.clock, pace.drives_poll_s
@@ -41,7 +41,7 @@ class Drives:
             self._urgent |= {0x500 + node_id, 0x600 + node_id}
         self.heard = dict.fromkeys(self.bench.nodes, bus.clock.now_s)
         self.ordered = dict.fromkeys(self.bench.nodes, bus.clock.now_s)
-        """When each node last heard a setpoint of its own."""
+        """When each node last received a setpoint of its own."""
         axes = [self.axis(wheel) for wheel in range(len(drawn.robot.drives))]
         pairs = list(zip(drawn.robot.drives, axes, strict=True))
         self.sides = tuple(tuple(axis for drive, axis in pairs if drive.side == side) for side in ("left", "right"))
@@ -94,7 +94,7 @@ class Drives:
             self.ordered[node_id] = now_s
 
     def _answer(self) -> None:
-        """All nodes have heard the frame."""
+        """All nodes have received the frame."""
         self._answers = False
         self._say()
 

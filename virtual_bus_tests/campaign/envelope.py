@@ -28,7 +28,7 @@ ROLLS_S = 0.002
 
 
 class _Numbers:
-    """Of one robot, worked out once: they are asked for every step."""
+    """Of one robot, computed once: they are needed at every step."""
 
     def __init__(self, robot: Robot) -> None:
         watchdog, t, limits = robot.watchdog, robot.timeouts, robot.limits
@@ -43,7 +43,7 @@ class _Numbers:
 
 
 _last: list[_Numbers] = []
-"""Of the robot that was asked about last, which is the same one for a whole scenario."""
+"""Of the last robot, which is the same one for a whole scenario."""
 
 
 def _numbers(robot: Robot) -> _Numbers:
@@ -53,7 +53,7 @@ def _numbers(robot: Robot) -> _Numbers:
 
 
 def tolerance_mps(robot: Robot) -> float:
-    """At the rim: what no layer can tell from standing or from the ordered speed [m/s]."""
+    """At the rim: what no layer can distinguish from standstill or from the ordered speed [m/s]."""
     return _numbers(robot).tolerance_mps
 
 
@@ -114,10 +114,10 @@ class Envelope:
         self._order_s, self._ordered_at = tau_s, now_s
 
     def bound_s(self, tau_s: float, now_s: float, coasting: bool = False, lost: bool = False) -> float:
-        """The greatest τ allowed now, when the base has `tau_s`. To be asked again and again.
+        """The greatest τ allowed now, when the base has `tau_s`. To be called again and again.
 
-        `coasting`: some wheel has no power. `lost`: nobody reaches a drive that turns, so nothing brakes it; who
-        reaches it again has `react_s` from there on.
+        `coasting`: some wheel has no power. `lost`: no process reaches a drive that turns, so nothing brakes it; one
+        that reaches it again has `react_s` from there on.
         """
         elapsed_s, self._at = now_s - self._at, now_s
         fades_s = elapsed_s * (self._coasting if coasting else 1.0)

@@ -28,20 +28,20 @@ NODES = (0, 1, 2, 3, 126, 127)
 SETPOINTS = (0x200, 0x300)
 SDO_REQUEST = 0x600
 WARM_UP = 5
-"""The memory is compared from this part of the frames on, one in so many: until then tables and caches fill."""
+"""The memory is compared from this part of the frames on, once in this many: until then tables and caches fill."""
 GROWTH = 3000
-"""Blocks of memory that may be more at the end: what is in use at one moment differs by so many."""
+"""This many blocks of memory may be more at the end: the number in use differs from moment to moment."""
 GROWTH_BYTES = 4 * 2**20
 """The same for the memory of the whole process."""
 LEASES = 5
-"""One lease to so many frames."""
+"""One lease to this many frames."""
 PRE_OPERATIONAL, RESET_NODE = 0x80, 0x81
 STOPS = (b"\x00\x00", b"\x02\x00")
 """6040h: disable voltage, quick stop."""
 
 
 class FuzzError(AssertionError):
-    """A property did not hold; the text says which frame."""
+    """A property did not hold; the text names the frame."""
 
 
 def random_frame(random: Random) -> tuple[int, bytes]:
@@ -147,7 +147,7 @@ def fuzz_drives_with_orders(frames: int, seed: int = 0) -> float:
 
 
 def orders(cob_id: int, data: bytes) -> bool:
-    """A complete setpoint, or an SDO download: what a drive has to obey, whoever sends it."""
+    """A complete setpoint, or an SDO download: what a drive has to obey, whatever its sender."""
     if cob_id & 0x780 in SETPOINTS:
         return len(data) >= 6
     return cob_id & 0x780 == SDO_REQUEST and len(data) == 8 and data[0] >> 5 in (1, 6)

@@ -14,11 +14,11 @@ from canbase_config.stopping import max_wheel_mps, standstill_s
 
 STEP_S = 0.01
 TOLERANCES = 3.0
-"""So many times action.tolerance_m: wheels roll a little until they stand."""
+"""This many times action.tolerance_m: wheels roll a little until they stand."""
 
 
 class GoalJudge:
-    """To be asked every step, and at each end."""
+    """To be called every step, and at each end."""
 
     def __init__(self, world: World, shown: Shown) -> None:
         self._world, self._shown = world, shown
@@ -53,7 +53,7 @@ class GoalJudge:
         return robot.action.overall_factor * ideal_s + robot.action.overall_extra_s + standstill_s(robot)
 
     def _beside(self, goal: Goal) -> str:
-        """By what it says itself, and by the ground truth."""
+        """By its own report, and by the ground truth."""
         robot = self._world.robot
         off_m, slack_m = abs(goal.ends[-1].traveled_m - goal.distance_m), TOLERANCES * robot.action.tolerance_m
         start = self._from.get(goal.number, NOWHERE)

@@ -1,4 +1,4 @@
-"""Who drives in an ordinary hour: a joystick, a planner, a program; each an endless series of commands with pauses."""
+"""The sources of an ordinary hour: a joystick, a planner, a program; each an endless series of commands with pauses."""
 
 from __future__ import annotations
 

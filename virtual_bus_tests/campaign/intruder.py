@@ -1,4 +1,4 @@
-"""Somebody who does not belong there: a second master on the bus, and a node that publishes straight to cmd_vel."""
+"""Intruders: a second master on the bus, and a node that publishes straight to cmd_vel."""
 
 from __future__ import annotations
 

@@ -42,17 +42,17 @@ STEP_S = 0.01
 OBEY_S = RUNGS[Step.QUICK_STOP].obey_s
 """A base that starts just when something is latched goes on until the stop has reached its drives."""
 RAMP_LATE_S = 0.3
-"""One drive of several may still be on its own ramp, when the others that held it have let go."""
+"""One drive of several may still be on its own ramp, when the others that held it have released."""
 ROUNDING_S = 0.002
 """Of τ, from one step to the next one."""
 TURNED_RAD = 0.35
 """What was ahead of a base that has turned by so much is beside it."""
 SWING_SHARE, SWING_S = 0.1, 0.3
-"""Of the speed that it braked from: a loaded base swings back as its drives' velocity loops do, for so long."""
+"""Of the speed that it braked from: a loaded base swings back with its drives' velocity loops, for this long [s]."""
 HEARD_S = 0.3
-"""The stop button says ten times a second that it is pressed: the filter has heard it then, if it runs."""
+"""The stop button publishes ten times a second that it is pressed: the filter has received it then, if it runs."""
 FOUND_S = 0.6
-"""After its start a process has found out who publishes on a topic."""
+"""After its start a process has found the publishers of a topic."""
 
 
 def longest_lag_s(robot: Robot) -> float:
@@ -91,7 +91,7 @@ class Judge:
         """When the last reset was done, as long as no source has had the base move since."""
         self._hold: Envelope | None = None
         self._from_mps = self._from_tau_s = self._acts_s = self._acted_s = 0.0
-        """The fastest wheel since something is latched; for how long whoever moved it last may, and so long it did."""
+        """The fastest wheel since something is latched; how long its last mover may still act, and how long it did."""
         self._acted_at = -math.inf
         self._stood = False
         self._latched_at = self._again_since = self._tripped_at = now_s
@@ -239,7 +239,7 @@ class Judge:
             self._violate("held", f"{self._shown} while {' and '.join(self._latches)} latched")
 
     def _check_neutral(self, tau_s: float, now_s: float) -> None:
-        """From a reset on until somebody orders motion who may. What rolls without power moves for nobody."""
+        """From a reset on until an allowed source orders motion. What rolls without power moves without an order."""
         if self._latches or self._wishes.greatest_s(now_s) > 0.0:
             self._rests_since = math.inf
         acted_at = self._strangers.acted_at
@@ -303,7 +303,7 @@ class Judge:
         self._latches = latched
 
     def _latched_now(self) -> dict[str, object]:
-        """What is latched, or was when its process died; and what somebody asked the driver for."""
+        """What is latched, or was when its process died; and what was requested of the driver."""
         driver, watchdog, processes = self._world.driver, self._world.watchdog, self._world.processes
         latched = {
             name: core for name, core in self._latches.items() if name in processes and not processes[name].alive

@@ -31,7 +31,7 @@ class Allowed:
     """What robot.yaml lets a wheel do before somebody has to act."""
 
     remembered_s: float
-    """An order counts for so long: hold times of the layers, their reaction, and the ramp that follows the order."""
+    """An order counts for this long: hold times of the layers, their reaction, and the ramp that follows the order."""
     runaway_mps: float
     """So much faster than the fastest that was ordered of it a wheel may be ..."""
     runaway_s: float
@@ -41,7 +41,7 @@ class Allowed:
     path_s: float
     """... and for how long, while it has power."""
     stands_mps: float
-    """A wheel that is faster for longer than STANDS_S does not stand, whoever reports it."""
+    """A wheel that is faster for longer than STANDS_S is not at standstill, whatever is reported."""
 
     @classmethod
     def of(cls, robot: Robot) -> Allowed:
@@ -89,7 +89,7 @@ class Greatest:
 
 
 class MotionJudge:
-    """To be asked every step. Times in seconds, virtual."""
+    """To be called every step. Times in seconds, virtual."""
 
     def __init__(self, world: World, shown: Shown) -> None:
         self._world, self._half_m = world, world.robot.base.track_m / 2.0
@@ -110,7 +110,7 @@ class MotionJudge:
 
     @property
     def runaway_s(self) -> float:
-        """For so long a wheel with power may be wrong before somebody has to have acted [s]."""
+        """How long a wheel with power may be wrong before a layer has to have acted [s]."""
         return self._allowed.runaway_s
 
     def order(self, twist: Twist) -> None:
@@ -123,7 +123,7 @@ class MotionJudge:
     def step(self, now_s: float, lost: bool) -> tuple[str, str]:
         """Name of the property that does not hold now and what is seen; two empty texts: everything holds.
 
-        `lost`: nobody reaches a drive that turns; whoever does again has his time from there on.
+        `lost`: no process reaches a drive that turns; one that does again has its time from there on.
         """
         if lost:
             self._fast_since = self._beside_since = self._lies_since = now_s
@@ -153,8 +153,8 @@ class MotionJudge:
         return any(any(axis.motor.powered for axis in side) and all(map(drives.rolls, side)) for side in drives.sides)
 
     def _missed_s(self, now_s: float) -> float:
-        """No drive tells anything without SYNC: a driver that hangs or is dead is missed first [s]. And a driver alone
-        misses its watchdog before it stops what a stranger's setpoints move."""
+        """No drive reports anything without SYNC: a driver that hangs or is dead is missed first [s]. And a driver
+        alone misses its watchdog before it stops what a stranger's setpoints move."""
         world, timeouts = self._world, self._world.robot.timeouts
         if not world.driver.running:
             self._unasked_at = now_s

@@ -1,7 +1,8 @@
 """Is the driver's pose a pose that the base can have? Compared with the ground truth.
 
-From each standstill after the driver's start, or after the driver said that it missed some travel (`travel_losses`).
-A second drive with the same node id tells another position, while the first one is silent too: nobody can know.
+From each standstill after the driver's start, or after the driver reported that it missed some travel
+(`travel_losses`). A second drive with the same node id reports another position, while the first one sends nothing too:
+undetectable.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ def true_pose(world: World) -> Pose:
 
 
 class OdometryJudge:
-    """To be asked every step."""
+    """To be called every step."""
 
     def __init__(self, world: World, shown: Shown) -> None:
         self._world, self._shown = world, shown
@@ -41,7 +42,7 @@ class OdometryJudge:
         self._seen_at = 0.0
         self._losses = 0
         self._lies_until = -math.inf
-        """So long the newest sample may be one of an encoder that lies, or of a second drive with the same node id."""
+        """How long the newest sample may be one of a faulty encoder, or of a second drive with the same node id."""
         self._last: tuple[float, Pose] | None = None
         self._origins: tuple[Pose, Pose] | None = None
         self._path_from_m = 0.0

@@ -1,4 +1,4 @@
-"""People as faults: a stick held through everything, two hands, a stop button tapped, resets that are too early."""
+"""People as faults: a joystick held through everything, two hands, a stop button tapped, resets that are too early."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def hold_stick(world: World, around: Surroundings, given: Arguments, number: int
 
 
 def release_stick(world: World, around: Surroundings, given: Arguments, number: int) -> None:
-    """It says zero, as a joystick at rest does."""
+    """It sends zero, as a joystick at rest does."""
     world.topics.publish("cmd_vel_joy", ZERO)
 
 
@@ -62,7 +62,7 @@ def tap_button(world: World, around: Surroundings, given: Arguments, number: int
 
 
 def release_button(world: World, around: Surroundings, given: Arguments, number: int) -> None:
-    """Nobody presses it."""
+    """It is not pressed."""
     around.press(False)
 
 
@@ -72,7 +72,7 @@ def reset_again(world: World, around: Surroundings, given: Arguments, number: in
 
 
 def tap_stick(world: World, around: Surroundings, given: Arguments, number: int) -> None:
-    """A touch each second, of a few millimetres; else the stick is at rest."""
+    """A touch each second, of a few millimetres; else the joystick is at rest."""
     world.topics.publish("cmd_vel_joy", given["twist"] if 0 < number % 50 < 4 else ZERO)
 
 

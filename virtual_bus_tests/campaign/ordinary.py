@@ -29,11 +29,11 @@ LOOK_S: Final = 0.02
 STEEPEST: Final = 0.1
 """Slope: 10 %."""
 HOLD_S: Final = (0.02, 0.2)
-"""So long something holds a wheel, like a threshold."""
+"""An obstacle holds a wheel for this long, like a threshold [s]."""
 HOLD_SHARE: Final = (0.2, 3.0)
-"""It holds with so many times what the motor can push,"""
+"""It holds with this many times what the motor can push,"""
 HARDEST_SHARE: Final = 0.85
-"""... but brakes no wheel harder than this share of watchdog.jolt_mps2: whoever meets something harder is stopped."""
+"""... but brakes no wheel harder than this share of watchdog.jolt_mps2: something harder does stop the robot."""
 CARPET: Final = (1.0, 1.0, 2.0, 4.0)
 """Dry friction, in multiples of the bare floor's."""
 STIFF_SHARE: Final = 0.8
@@ -44,7 +44,7 @@ RAMP_SHARES: Final = (1.0, 1.0, 0.5, 0.3)
 NOISE_MPS: Final = (0.0, 0.0, 0.002, 0.005)
 """606Ch beside the true speed, of drives that measure badly; below base.standstill_mps, or the base never stands."""
 LATE_S: Final = {"driver": 0.02, "watchdog": 0.06, "velocity": 0.05, "action": 0.1}
-"""So long a process may get no processor now and then: shorter than the shortest of its timeouts allows."""
+"""A process may get no processor for this long now and then [s]: shorter than the shortest of its timeouts allows."""
 LET_GO: Final = (State.SWITCHED_ON, State.SWITCH_ON_DISABLED)
 """At a stand the driver takes the power off for a moment, which may be over at the next look: docs/decisions/0041."""
 ROLLS_MPS: Final = 0.1
@@ -73,7 +73,7 @@ class OrdinaryHour:
         self.around = Surroundings(self.world)
         self._start = self.world.clock.now_s
         self.moving_s = 0.0
-        """So long the base has been moving."""
+        """How long the base has been moving [s]."""
         self._story: deque[str] = deque(maxlen=STORY)
         self.world.note = self._note
         self._ramps = self.random.choice(RAMP_SHARES)
@@ -147,7 +147,7 @@ class OrdinaryHour:
     def _later(self, delay_s: float, do: Callable[..., None], *arguments: object) -> None:
         self.world.clock.after(delay_s, do, *arguments)
 
-    # Who drives
+    # The source that drives
 
     def _change_hands(self) -> None:
         name = self.random.choice(tuple(HANDS))
@@ -160,7 +160,7 @@ class OrdinaryHour:
         self._later(lasts_s + self.random.choice((0.0, 0.0, 0.1, 1.0)), self._change_hands)
 
     def _publish(self, topic: str, source: Source, until: float) -> None:
-        """At its end it releases the stick, or says nothing any more."""
+        """At its end it releases the joystick, or stops publishing."""
         wait_s, twist = next(source)
         if self.world.clock.now_s >= until:
             if self.random.random() < 0.7:
@@ -172,7 +172,7 @@ class OrdinaryHour:
     # The floor and the load
 
     def _carpet(self) -> None:
-        """Thick carpet or bare floor, as far as the motors get over it."""
+        """Thick carpet or bare floor, within what the motors can overcome."""
         body, base = self.drawn.body, self.world.drives.bench.base
         factor = self.random.choice(CARPET)
         room_n = min(body.peak_force_n - self._needs_n(), CREEP_SHARE * body.peak_force_n - body.coulomb_n)
@@ -236,7 +236,7 @@ class OrdinaryHour:
         return [axis for node in self.world.drives.bench.nodes.values() for axis in node.axes]
 
     def _slow_ramps(self) -> None:
-        """The drives' own ramps upward are slower than the driver's setpoints; down they are as the limits say."""
+        """The drives' own ramps upward are slower than the driver's setpoints; down they are those of the limits."""
         if self._ramps < 1.0:
             for axis in self._axes():
                 axis.ramp_up_mps2 = self._ramps * self.drawn.robot.limits.acceleration_mps2
@@ -264,7 +264,7 @@ class OrdinaryHour:
         self._later(self.random.uniform(0.5, 5.0), self._be_late)
 
     def _interrupt(self) -> None:
-        """Somebody presses the emergency stop and resets it, or walks before the base; a goal is asked for."""
+        """A person presses the emergency stop and resets it, or walks before the base; a goal is sent."""
         what = self.random.choice((self._press, self._walk_by, self._ask_for_goal, self._ask_for_goal))
         what()
         self._later(self.random.uniform(5.0, 30.0), self._interrupt)
@@ -277,7 +277,7 @@ class OrdinaryHour:
         self._later(pressed_s + self.random.uniform(0.3, 2.0), self._reset)
 
     def _reset(self) -> None:
-        """The emergency stop ends by a reset, which needs a joystick that nobody touches."""
+        """The emergency stop ends by a reset, which needs a released joystick."""
         self.world.velocity.reset()
         if self.world.velocity.filter.estop is not EstopState.FREE:
             self._later(0.5, self._reset)

@@ -22,14 +22,14 @@ BEAMS = 360
 
 
 class Outside:
-    """Does what a plan says. `resets`: the outcome of each reset that was asked for."""
+    """Carries out a plan. `resets`: the outcome of each reset that was requested."""
 
     def __init__(self, world: World, around: Surroundings, plan: Plan, start: float) -> None:
         self._world, self._start = world, start
         self._topics = {name: source.topic for name, source in world.robot.mux.sources.items()}
         self.resets: list[Outcome] = []
         self.asked_at = -math.inf
-        """When the operator last asked for one."""
+        """When the operator last requested one."""
         around.reset = self.reset
         clock = world.clock
         for segment in plan.segments:
@@ -40,7 +40,7 @@ class Outside:
             clock.at(start + at_s, self.reset)
 
     def reset(self) -> None:
-        """The operator asks for a reset, whatever the state."""
+        """The operator requests a reset, whatever the state."""
         self._world.note("operator asks for a reset")
         self.asked_at = self._world.clock.now_s
         self._world.velocity.reset()
@@ -88,7 +88,7 @@ class Surroundings:
         """When it came."""
         self._wall_from_m = self._wall_from_rad = 0.0
         self.reset: Callable[[], None] = lambda: None
-        """The operator asks for a reset; set by who plays the operator."""
+        """The operator requests a reset; set by the part that plays the operator."""
         self._scan()
         self._speak()
 
@@ -138,7 +138,7 @@ class Surroundings:
         return Points(np.array(places), np.array((0, 1, BEAMS // 2, BEAMS // 2 + 1)), BEAMS)
 
     def press(self, pressed: bool) -> None:
-        """The emergency stop is pressed or released; that is told at once."""
+        """The emergency stop is pressed or released; that is published at once."""
         self.pressed = pressed
         self._tell()
 

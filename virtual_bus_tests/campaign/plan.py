@@ -1,4 +1,4 @@
-"""What will happen in one scenario, drawn from its seed: who orders what, which faults come, who resets. Only data."""
+"""What will happen in one scenario, drawn from its seed: orders of each source, faults, resets. Only data."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SECOND_LIFE = 0.08
 LIES_S = 2.0
 """So much longer is a scenario whose scanner lies: until the base has come to where the wall is."""
 FIRST_LIFE_S = 1.5
-"""So long the faults of a first life last at most."""
+"""The faults of a first life last at most this long [s]."""
 ADDED_SHARE = 0.03
 """Share of the scenarios that have one of campaign.faults.ADDED."""
 KINDS = ("constant", "constant", "constant", "weave", "burst", "nan", "zero")
@@ -34,7 +34,7 @@ KINDS = ("constant", "constant", "constant", "weave", "burst", "nan", "zero")
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A source sends for a while, at `rate_hz`; before and after it is silent. Times from the scenario's start [s]."""
+    """A source publishes at `rate_hz` for a while; not before, not after. Times from the scenario's start [s]."""
 
     source: str
     start_s: float
@@ -53,7 +53,7 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class GoalRequest:
-    """A client asks for a goal, and may cancel it."""
+    """A client sends a goal, and may cancel it."""
 
     start_s: float
     distance_m: float
@@ -126,7 +126,7 @@ def _longer(plan: Plan) -> Plan:
 
 
 def _with_second_life(plan: Plan, pool: Sequence[str], random: Random, robot: Robot) -> Plan:
-    """Once the faults are over a person lets go of the stick, resets until it works, and drives again."""
+    """Once the faults are over a person releases the joystick, resets until it works, and drives again."""
     faults = tuple(replace(fault, duration_s=min(fault.duration_s, FIRST_LIFE_S)) for fault in plan.faults)
     over_s = max(plan.duration_s, *(fault.start_s + fault.duration_s for fault in faults)) + 0.2
     drives_s = over_s + random.uniform(2.2, 2.8)

@@ -32,7 +32,7 @@ class Process:
         return self.alive and not self._hung_by
 
     def begin(self) -> None:
-        """A new life: make the core anew and start the timers."""
+        """A new life: make the core again and start the timers."""
         raise NotImplementedError
 
     def receive(self, channel: str, depth: int, do: Callable[..., object], *arguments: Any) -> None:
@@ -126,7 +126,7 @@ class Topics:
         self.twice: set[str] = set()
         """Topics whose messages arrive a second time."""
         self.watch: Callable[[str, Any], None] | None = None
-        """Told of every message with its topic."""
+        """Receives every message with its topic."""
 
     def loses(self, topic: str) -> bool:
         """Whether this message on `topic` gets lost."""

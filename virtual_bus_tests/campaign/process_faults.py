@@ -1,4 +1,4 @@
-"""What processes do wrong: they die, hang, go mad, lose their supply, their adapter or their leases."""
+"""How processes fail: they die, hang, misbehave, lose their supply, their adapter or their leases."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Who can still do something about a drive that has power: a process with a line to it, or the drive itself.
+"""What can still act on a drive that has power: a process with a line to it, or the drive itself.
 
-A drive that nobody reaches turns on until its own watch over its masters stops it. Two kinds do not stop then, and no
-software can change it: one that watches nothing (docs/drives.md), and one whose speed sensor lies, since its own
-quick stop closes its loop on that sensor. STO, wired, stops both. A watchdog that reaches it resets the node.
+A drive that no process reaches turns on until its own monitoring of its masters stops it. Two kinds do not stop then,
+and no software can change it: one that monitors nothing (docs/drives.md), and one whose speed sensor is faulty, since
+its own quick stop closes its loop on that sensor. STO, wired, stops both. A watchdog that reaches it resets the node.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from canbase_watchdog.ladder import RUNGS, Step
 RESETS_S = 0.2
 """From the last rung of the watchdog's ladder until the drive is without power: feedback by SDO, late cycles [s]."""
 BRAKES_S = 0.3
-"""A wheel that turns again after a stop is slow: so long its drive takes to brake it [s]."""
+"""A wheel that turns again after a stop is slow: its drive takes this long to brake it [s]."""
 
 
 class Reach:
-    """`lost`: a wheel turns with power, and nobody reaches its drive; asked every step."""
+    """`lost`: a wheel turns with power, and no process reaches its drive; called every step."""
 
     def __init__(self, world: World) -> None:
         self._world = world
         profile = world.robot.drives[0].profile
         self.personality = PERSONALITIES[profile]
         self.alone_s = self.personality.alone_s(world.robot.timeouts.drive_heartbeat_s)
-        """After so long without a word a drive of this kind begins to stop by itself [s]; infinity: never."""
+        """After this long without a frame a drive of this kind begins to stop by itself [s]; infinity: never."""
         self._wheels = [(*world.drives.place(wheel), drive.side) for wheel, drive in enumerate(world.robot.drives)]
         self._moves_mps = tolerance_mps(world.robot) / 2.0
         self.lost = False
@@ -44,11 +44,11 @@ class Reach:
         """The fastest wheel since the base last stood."""
         self.lost_at = dict.fromkeys(world.drives.bench.nodes, -math.inf)
         self._cut_at = dict.fromkeys(world.drives.bench.nodes, -math.inf)
-        """When nobody reached each drive last: who does again has its rungs before him."""
+        """When no process reached each drive last: one that does again has its rungs ahead."""
         self._weak: set[int] = set()
         """Drives whose own stop has had hardly an effect since they have power: a ramp that has begun goes on so."""
         self._ran_at = dict.fromkeys(("driver", "watchdog"), world.clock.now_s)
-        """When each of them ran last: nobody misses it before timeouts.watchdog_s, so it is there until then."""
+        """When each of them ran last: it is not missed before timeouts.watchdog_s, so it counts as there until then."""
         self._power_from: dict[int, float] = {}
         """Since when each drive has power: it gets none before its settings are written."""
         self._reacts_since: dict[int, float] = {}
@@ -79,7 +79,7 @@ class Reach:
         self.fastest_mps = 0.0 if stands else max(self.fastest_mps, wheel_mps)
 
     def stops_alone(self, node_id: int) -> bool:
-        """The drive stops when it hears nobody: it watches its masters, it brakes, and its sensors do not lie."""
+        """The drive stops when it receives nothing: it monitors its masters, it brakes, and its sensors are right."""
         node = self._world.drives.bench.nodes[node_id]
         was_reset = self._world.intruder.resets_at > self._power_from.get(node_id, math.inf)
         forgot = self.personality.heeds_heartbeats and was_reset and not self._knows_masters(node)
@@ -98,16 +98,16 @@ class Reach:
                     yield node_id, axis
 
     def heard(self, node_id: int) -> float:
-        """When the drive last heard what it watches: heartbeats, or setpoints."""
+        """When the drive last received what it monitors: heartbeats, or setpoints."""
         drives = self._world.drives
         heard = drives.heard if self.personality.heeds_heartbeats else drives.ordered
         return heard[node_id]
 
     def acts_s(self, now_s: float, lies_s: float) -> float:
-        """So long a wheel may turn again after a stop, before somebody has to have acted [s]; 0: nobody has a reason.
+        """How long a wheel may turn again after a stop, before a layer has to have acted [s]; 0: none has a reason.
 
-        `lies_s`: for a wheel with power whose encoder lies, or whose drive does not brake, or is reached again since
-        then. Infinity: for one that nobody reaches, until it has ended its setpoint by itself.
+        `lies_s`: for a wheel with power whose encoder is faulty, or whose drive does not brake, or is reached again
+        since then. Infinity: for one that no process reaches, until it has ended its setpoint by itself.
         """
         nodes = self._world.drives.bench.nodes
         longest_s = 0.0
@@ -120,7 +120,7 @@ class Reach:
         return longest_s
 
     def _is_lost(self, node_id: int, now_s: float) -> bool:
-        """Nobody reaches it, and it does not stop by itself, or not yet: a maker's own watch has a time of its own."""
+        """No process reaches it, and it does not stop by itself, or not yet: a maker's watchdog has its own time."""
         if self._reacts(node_id):
             since = self._reacts_since.setdefault(node_id, now_s)
             if not self._watchdog_reaches(node_id):
@@ -131,7 +131,7 @@ class Reach:
         return (waits or not self.stops_alone(node_id)) and not self._reached(node_id)
 
     def _reached(self, node_id: int) -> bool:
-        """A driver or a watchdog that is there, and that is not mad, has a line to it."""
+        """A driver or a watchdog that is there, and that behaves, has a line to it."""
         world = self._world
         driver, blocked = world.driver, world.bus.disturbance.blocked
         if not world.drives.bench.nodes[node_id].line.hears:
@@ -143,12 +143,12 @@ class Reach:
         return talks and ("watchdog", f"drive{node_id}") not in blocked
 
     def _is_there(self, name: str) -> bool:
-        """It runs, or has hung for so short that nobody misses it."""
+        """It runs, or has hung for so short a time that it is not missed."""
         since_s = self._world.clock.now_s - self._ran_at[name]
         return self._world.processes[name].alive and since_s <= self._world.robot.timeouts.watchdog_s
 
     def _watchdog_reaches(self, node_id: int) -> bool:
-        """It is there, and has a line to the drive and from it: it resets no drive that it does not hear."""
+        """It is there, and has a line to the drive and from it: it resets no drive from which it receives nothing."""
         world, drive = self._world, f"drive{node_id}"
         line, blocked = world.drives.bench.nodes[node_id].line, world.bus.disturbance.blocked
         ways = {("watchdog", drive), (drive, "watchdog")}
@@ -165,7 +165,7 @@ class Reach:
         return lies and any(axis.state is State.FAULT_REACTION_ACTIVE for axis in node.axes)
 
     def _is_weak(self, axes: Iterable[Axis]) -> bool:
-        """A quick stop, or a fault reaction, of one of them has hardly an effect, though its settings ask for one."""
+        """A quick stop, or a fault reaction, of one of them has hardly an effect, though its settings demand one."""
         least_mps2 = BRAKING_SHARE * self._world.robot.limits.deceleration_mps2
         return any(axis.motor.stop_mps2 < least_mps2 <= axis.stated_mps2 for axis in axes)
 

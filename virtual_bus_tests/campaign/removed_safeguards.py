@@ -108,7 +108,7 @@ def _watchdog_forgets() -> None:
 
 
 def _unreadable_is_clear() -> None:
-    """A record of stops that cannot be read counts as one that says nothing."""
+    """A record of stops that cannot be read counts as an empty one."""
     found, past = StopDisk.found, WatchdogDisk.past
 
     def found_or_clear(self: StopDisk) -> Found:
@@ -119,7 +119,7 @@ def _unreadable_is_clear() -> None:
 
 
 def _resets_while_commanded() -> None:
-    """A reset is not refused, and not broken off, because a command asks for motion."""
+    """A reset is not refused, and not broken off, because a command orders motion."""
     commanded = reset._BUS_OR_COMMAND[0]
     reset.REFUSALS = tuple(check for check in reset.REFUSALS if check is not commanded)
     for phase, checks in reset.BREAKS.items():

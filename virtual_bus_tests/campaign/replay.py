@@ -1,4 +1,4 @@
-"""One scenario told as a log: the plan, what the processes decide, the speed, and, if wanted, every frame."""
+"""One scenario as a log: the plan, the decisions of the processes, the speed, and, on request, every frame."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The robots of the campaign, drawn from a seed: what robot.yaml says, and the body and the floor that it does not.
+"""The robots of the campaign, drawn from a seed: their robot.yaml, and the body and the floor that it does not contain.
 
 What is drawn passes robot.yaml's own checks, and can do what its file states: its motors are strong enough for the
 stated decelerations with its load on its slope, and without power it rolls out there. What cannot, no software stops.
@@ -22,13 +22,13 @@ from canbase_config.robot import Robot
 from canbase_sim.plant.base import PlantParameters
 
 SCENARIOS = 25
-"""So many scenarios in a row have one robot: a worker boots it once."""
+"""This many scenarios in a row have one robot: a worker boots it once."""
 GRAVITY_MPS2 = 9.81
 SLOPES = (0.0, 0.0, 0.03, 0.06, 0.1)
 FRICTION_LEFT = 0.6
 """A slope takes at most so much of the friction: a base that rolls downhill without power needs brakes."""
 CREEP_SHARE = 0.45
-"""Of the rated torque: friction and slope take no more of a wheel that just turns. docs/bus.md asks for half."""
+"""Of the rated torque: friction and slope take no more of a wheel that just turns. docs/bus.md demands half."""
 TRIES = 100
 BITRATES = (125_000, 250_000, 500_000, 1_000_000)
 STOP_THEMSELVES = ("generic", "epos4", "nanotec", "elmo_gold", "kinco")

@@ -66,7 +66,7 @@ def run(
     refuse_compiled(without)
     tally = Tally()
     batches = [list(batch) for _, batch in groupby(seeds, lambda seed: seed // SCENARIOS)]
-    # Not forked from here: who calls may have threads, and a forked scenario must have none.
+    # Not forked from here: the caller may have threads, and a forked scenario must have none.
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, context, initializer=_begin, initargs=(without,)) as pool:
         try:
@@ -82,7 +82,7 @@ def run(
 
 
 def _begin(without: str) -> None:
-    """A worker: Ctrl-C of a terminal reaches it too, and is for the process that asked for the work."""
+    """A worker: Ctrl-C of a terminal reaches it too, and is for the process that started the work."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     remove(without)
 

@@ -26,7 +26,7 @@ class Need:
     beside: str = ""
     robots: Callable[[Robot], bool] = any_robot
     quiet: bool = False
-    """Nobody orders motion but in a fault."""
+    """No source orders motion but in a fault."""
     proof: str = ""
     """Why no scenario can need it alone: then one has to show that all of them together are needed."""
 

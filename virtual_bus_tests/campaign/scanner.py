@@ -24,7 +24,7 @@ ROOM = [(FAR_M * math.cos(turn), FAR_M * math.sin(turn)) for turn in np.arange(0
 
 @dataclass(frozen=True, slots=True)
 class Lie:
-    """`hides`: it tells nothing of what is ahead, and says so: NaN, or no reading."""
+    """`hides`: it has no reading of what is ahead, and reports that: NaN, or no reading."""
 
     sentence: str
     begin: Callable[[], Fault]
@@ -75,7 +75,7 @@ class Scanner:
 
     @property
     def hides(self) -> bool:
-        """What is ahead is not seen, and the scanner says so."""
+        """What is ahead is not seen, and the scanner reports that."""
         return any(LIES[name].hides for name in self.lies)
 
     def scan(self, ahead_m: float, behind_m: float, now_s: float) -> Scan:

@@ -21,9 +21,9 @@ from campaign.scanner import LIES
 from campaign.world import World
 
 LOOK_S = 0.1
-"""How often it is asked whether anything is still to come."""
+"""How often it is checked whether anything is still to come."""
 QUIET_S = 0.3
-"""A base that is latched and stands is watched for so long after the last fault, reset and goal; then that is all."""
+"""A base that is latched and stands is watched for this long after the last fault, reset and goal; then that is all."""
 GOALS_END_S = 12.0
 """How long a scenario goes on at most until its goals have ended."""
 

@@ -1,8 +1,8 @@
 """The motion of the base as its drives can know it at best: the true one, with the size that their encoders give it.
 
 Position, velocity and the drive's own loop hang on one encoder. Where it counts half of the motion, the wheel is to
-every part of the robot a wheel of half the size; only another sensor could tell them apart. So orders are compared with
-the motion in the measure of the encoders. A side has the measure of the encoder that counts least.
+every part of the robot a wheel of half the size; only another sensor could distinguish them. So orders are compared
+with the motion in the measure of the encoders. A side has the measure of the encoder that counts least.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Shown:
 
     @property
     def pushed_blindly_s(self) -> float:
-        """So long a drive with such an encoder has given its rated torque, or less for longer, without letting go."""
+        """How long a drive with such an encoder has given its rated torque, or less for longer, without a release."""
         pushed = zip(self._axes, self._pushed_s, strict=True)
         return max((given_s for axis, given_s in pushed if not axis.encoder.closes_loop), default=0.0)
 

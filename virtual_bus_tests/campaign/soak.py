@@ -1,7 +1,7 @@
 """`python -m campaign.soak --hours 20`: ordinary driving for simulated hours; whatever trips is a false trip.
 
-`--seed 7` drives one robot again and tells its story. Exit code 1: something tripped, latched or lost its power.
-Ctrl-C tells what was driven until then, with exit code 130.
+`--seed 7` drives one robot again and prints its story. Exit code 1: something tripped, latched or lost its power.
+Ctrl-C prints what was driven until then, with exit code 130.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ BROKEN_OFF = 128 + signal.SIGINT
 
 @dataclass(frozen=True, slots=True)
 class Driven:
-    """What came of one seed. `path_m`: of the base's centre; `moving_s`: so long it moved."""
+    """What came of one seed. `path_m`: of the base's centre; `moving_s`: how long it moved."""
 
     seed: int
     time_s: float

@@ -34,7 +34,7 @@ from exit_matrix.stop_table import COMMANDS, TABLE, VIRTUAL
 from support.marked_page import rewritten, section
 
 CRUISES_S, LONGEST_S, RESTS_S, LOOK_S = 1.5, 8.0, 0.6, 0.002
-"""Until the base drives steadily; longer than any stop; a base that stood so long has stopped; how often is looked."""
+"""Until the base drives steadily; longer than any stop; a base that stood this long has stopped; period of looks."""
 GOAL_M, JOYSTICK_S = 4.5, 0.02
 RATES = ("standard", "small_computer")
 PHASE_S = 0.1
@@ -45,7 +45,7 @@ _cruises: dict[str, Cruise] = {}
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One run. `time_s`: from the failure until the base stood for good, infinity: it never did.
+    """One run. `time_s`: from the failure until the lasting standstill of the base, infinity: it never came.
 
     `power_off_s`: until no motor had power, infinity: some always had. `peak_mps`: of the fastest rim.
     """
@@ -57,7 +57,7 @@ class Run:
 
 
 class Cruise:
-    """A world whose base drives steadily. The joystick says `ordered`, for ever; None: it says nothing."""
+    """A world whose base drives steadily. The joystick orders `ordered`, for ever; None: it publishes nothing."""
 
     def __init__(self, by: str, speed_mps: float = SPEED_MPS, rates: str = "standard") -> None:
         """`rates`: a profile of rates in robot.yaml."""

@@ -1,4 +1,4 @@
-"""Who moves drives past all layers, and who cannot be heard: when it was last so. Asked every step."""
+"""What moves drives past all layers, and what cannot be received: when it was last so. Called every step."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 from campaign.world import World
 
 SENT_S = 0.1
-"""Frames that were sent may be on their way for so long: the delay of the bus, and its queue."""
+"""Frames that were sent may be on their way for this long [s]: the delay of the bus, and its queue."""
 
 
 class Strangers:

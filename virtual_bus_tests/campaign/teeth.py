@@ -26,11 +26,11 @@ from campaign.safeguard_needs import NEEDS, Need
 from campaign.scenario import Result, Start
 
 MOST = 200
-"""So many scenarios are tried for each row."""
+"""This many scenarios are tried for each row."""
 A_ROBOT = 5
-"""So many in a row have one robot, which is booted once."""
+"""This many in a row have one robot, which is booted once."""
 BOOTED = 40
-"""So many robots a process keeps."""
+"""A process keeps this many robots."""
 app = typer.Typer(add_completion=False)
 out = Console()
 

@@ -65,7 +65,7 @@ def test_without_a_safeguard_a_scenario_shows_it_missing_and_with_it_the_same_on
 
 
 def test_a_safeguard_that_nothing_needs_is_reported_and_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A stop that no scenario asks for."""
+    """A stop that is in no scenario."""
     monkeypatch.setattr(teeth, "NEEDS", (Need("driver:stop_requested", ("frame_delay",)),))
     told = CliRunner().invoke(teeth.app, ["--scenarios", "2", "--workers", "1"])
     assert told.exit_code == 1, told.output

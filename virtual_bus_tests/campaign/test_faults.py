@@ -20,7 +20,7 @@ DRIVES_S, HOLDS_S, LASTS_S = 0.8, 0.6, 1.6
 """Before the fault; until the operator orders zero; in all."""
 BY = ("joystick", "goal")
 SEEN_THE_SAME = {"scanner_mirrored"}
-"""It says in each scan which way round it counts: the filter sees the same room."""
+"""Each scan has its direction of counting: the filter sees the same room."""
 SEEN_WITH = {"drive_unbraked": "driver_dies"}
 """Seen only when something stops the base by the drives' own ramps."""
 

@@ -34,7 +34,7 @@ UP = {Drive.SWITCH_ON_DISABLED: 0x06, Drive.READY_TO_SWITCH_ON: 0x07, Drive.QUIC
 SETPOINT = struct.Struct("<Hi")
 STARTS_S, ENDS_S, SPEED_MPS = 1.6, 4.0, 0.4
 WATCHES_NOTHING = 7
-"""A robot whose drives stop for nobody."""
+"""A robot whose drives do not stop by themselves."""
 Break = Callable[[World], None]
 
 

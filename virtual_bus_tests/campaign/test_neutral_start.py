@@ -1,5 +1,5 @@
-"""A stick that is held while parts come and go, with all real cores in virtual time: what stays still until it is
-released. Each story says first that the stick works, and at the end that it works again. Times in s.
+"""A joystick that is held while parts come and go, with all real cores in virtual time: what stays still until it is
+released. Each story shows first that the joystick works, and at the end that it works again. Times in s.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ READY_S = 8.0
 
 
 class Hand:
-    """Somebody at the joystick. `holds`: what the stick orders; None: the radio is silent."""
+    """A person at the joystick. `holds`: what the joystick orders; None: it publishes nothing."""
 
     def __init__(self, topic: str = "cmd_vel_joy") -> None:
         self.world = World()
@@ -60,7 +60,7 @@ class Hand:
         return self.run(seconds) < RESTS_M
 
     def drives(self) -> bool:
-        """The base follows the stick, after it was released."""
+        """The base follows the joystick, after it was released."""
         self.holds = ZERO
         self.run(0.3)
         self.holds = FORWARD
@@ -69,7 +69,7 @@ class Hand:
 
 @pytest.fixture
 def hand() -> Hand:
-    """The robot is enabled, and follows the stick, which is held."""
+    """The robot is enabled, and follows the joystick, which is held."""
     hand = Hand()
     hand.world.enable()
     assert hand.drives()
@@ -137,7 +137,7 @@ def reset_before_an_obstacle(hand: Hand) -> None:
 
 
 def scans_return(hand: Hand) -> None:
-    """Without any stop in between; nobody resets anything."""
+    """Without any stop in between; nothing is reset."""
     hand.around.scans = False
     hand.run(2.0)
     hand.around.scans = True
@@ -167,7 +167,7 @@ def test_a_stick_held_over_it_moves_nothing_until_it_is_released(hand: Hand, eve
     assert hand.world.drives.bench.base.path_m - before_m < RESTS_M
     hand.holds = ZERO
     hand.run(0.2)
-    hand.world.velocity.reset()  # an emergency stop waits for it, and refused it while the stick was held
+    hand.world.velocity.reset()  # an emergency stop waits for it, and refused it while the joystick was held
     assert hand.drives()
 
 
@@ -195,7 +195,7 @@ def test_a_radio_gap_after_a_reset_is_no_release(hand: Hand, gap_s: float) -> No
     hand.wait_enabled()
     hand.holds = None  # the mux orders zero, for which the driver waits
     hand.run(gap_s)
-    hand.holds = FORWARD  # the stick was never released
+    hand.holds = FORWARD  # the joystick was never released
     assert hand.stays()
     assert hand.drives()
 

@@ -1,4 +1,4 @@
-"""The robots that are drawn, and the states of the world that excuse: who reaches a drive, what its encoder counts."""
+"""The robots that are drawn, and the states of the world that excuse: what reaches a drive, what its encoder counts."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ def test_every_failure_stops_the_base() -> None:
 
 
 def test_what_does_not_fail_goes_on() -> None:
-    """The measure would tell a base that does not stop."""
+    """The measurement would report a base that does not stop."""
     nothing = Twin("nothing", "happens", lambda world, around, random: None, JOYSTICK)
     run = Cruise(JOYSTICK).fork(nothing, 1)
     assert (run.time_s, run.power_off_s) == (math.inf, math.inf)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from campaign.world import World
 
 LOOK = 10
-"""Each half second the process looks who publishes what."""
+"""Each half second the process reads the publishers of each topic."""
 SOURCES = ("cmd_vel_joy", "cmd_vel_nav")
 
 
@@ -74,7 +74,7 @@ def two_on_a_lock(world: World, around: Surroundings, given: Arguments, number: 
 
 
 def one_on_a_lock(world: World, around: Surroundings, given: Arguments, number: int) -> None:
-    """The one that is left says that it does not hold."""
+    """The one that is left publishes that it does not hold."""
     world.topics.publish("publishers", ("lock", ("panel",)))
     world.topics.publish("lock", False)
     world.locked_at = math.inf

@@ -18,14 +18,15 @@ from exit_matrix.stop_limits import SPEED_MPS
 
 Begin = Callable[[World, Surroundings, Random], None]
 JOYSTICK, GOAL = "joystick", "goal"
-"""Who drives."""
+"""The source that drives."""
 
 
 @dataclass(frozen=True, slots=True)
 class Twin:
-    """One failure. `by`: who drives. `then_zero_s`: so long after it zero is ordered, and measured from; 0: never.
+    """One failure. `by`: the source that drives. `then_zero_s`: this long after it zero is ordered, and measured from;
+    0: never.
 
-    `lies`: a sensor or a wheel is not as it says, so a wheel may become faster than ordered.
+    `lies`: a sensor or a wheel differs from its description, so a wheel may become faster than ordered.
     """
 
     what: str
@@ -149,6 +150,6 @@ LIES: tuple[Twin, ...] = (
     Twin("wheel", "feedback lost", drive("tpdo_lost"), JOYSTICK),
     Twin("twin node", "a second drive with the same node id, at standstill", fault("twin_node"), JOYSTICK),
 )
-"""Something is not what it says."""
+"""Something differs from its description."""
 TWINS = (*STOPS, *(replace(twin, lies=True) for twin in LIES))
 """Every row."""

@@ -27,7 +27,7 @@ from canbase_velocity.twist import Twist
 STATE_PERIOD_S = 0.1
 MUX_STATE_PERIOD_S = 0.5
 LOCKS = {"lock": MuxLock(topic="lock", priority=255, required=False)}
-"""Nobody publishes on it but in a fault."""
+"""It has a publisher only in a fault."""
 
 
 class VelocityProcess(Process):
@@ -78,7 +78,7 @@ class VelocityProcess(Process):
         self._issue(self.filter.shut_down(self.clock.now_s))
 
     def _on_timer(self) -> None:
-        """Two timers that each message sets anew, at a quarter of their period's resolution."""
+        """Two timers that each message restarts, at a quarter of their period's resolution."""
         now_s = self.clock.now_s
         if now_s >= self._mux_due:
             self._send(self._decide())
@@ -113,7 +113,7 @@ class VelocityProcess(Process):
             self._topics.publish("velocity_mux/state", decision)
 
     def reset(self) -> None:
-        """The operator resets the emergency stop; a process that is dead or hangs does not hear it."""
+        """The operator resets the emergency stop; a process that is dead or hangs does not receive it."""
         if self.alive:
             self.filter.reset(self.mux.moving(self.clock.now_s), self.clock.now_s)
 

@@ -12,7 +12,7 @@ RECENT_S = 0.05
 class Wishes:
     """Each source's last command holds for its timeout in robot.yaml.
 
-    One that orders motion while a reset is done does not count from then on, until it orders zero or was silent for its
+    One that orders motion while a reset is done does not count from then on, until it orders zero or was absent for its
     neutral_after_s.
     """
 
@@ -23,7 +23,7 @@ class Wishes:
         self._held: set[str] = set()
         self._last: dict[str, tuple[float, float]] = dict.fromkeys(self._timeouts, (0.0, now_s))
         self._before = dict(self._last)
-        """The greatest one of RECENT_S before it: who takes the newest of two hands on one stick may take the other."""
+        """The greatest one of RECENT_S before it: a reader of one of two hands on a joystick may take the other."""
 
     def take(self, topic: str, twist: Twist, now_s: float) -> None:
         """A message on any topic; only sources count, and only finite commands."""
@@ -37,7 +37,7 @@ class Wishes:
         self._last[topic] = braking_s(self._robot, twist.linear_mps, twist.angular_radps), now_s
 
     def on_reset(self, now_s: float) -> None:
-        """A reset is done: who orders motion now has held the stick over it."""
+        """A reset is done: a source that orders motion now was held over it."""
         self._held = {topic for topic in self._last if self._orders_s(topic, now_s) > 0.0}
 
     def greatest_s(self, now_s: float) -> float:

@@ -27,7 +27,7 @@ BOOT_S = 10.0
 
 
 class World:
-    """`note` tells a log what happens; `on_lease` hears every order whose lease reaches the watchdog's socket."""
+    """`note` logs what happens; `on_lease` receives every order whose lease reaches the watchdog's socket."""
 
     def __init__(
         self, robot: Robot | None = None, seed: int = 0, pace: Pace = FINE, drawn: DrawnRobot | None = None

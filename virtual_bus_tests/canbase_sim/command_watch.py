@@ -10,7 +10,7 @@ from canbase_sim.cia301.rpdo import Rpdo
 
 
 class CommandWatch:
-    """Counts from the last RPDO. Its time is fixed, or in ms in an object (0: off), as the personality says."""
+    """Counts from the last RPDO. Its time is fixed, or in ms in an object (0: off), by the personality."""
 
     def __init__(self, dictionary: Dictionary, rpdos: Sequence[Rpdo]) -> None:
         self._values, self._rpdos = dictionary.values, rpdos

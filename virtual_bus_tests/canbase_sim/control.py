@@ -20,7 +20,7 @@ SOCKET_NAME = "sim.sock"
 
 
 class ControlError(RuntimeError):
-    """The simulator cannot be reached, went away, or refused a request; the text says which and what to do."""
+    """The simulator cannot be reached, went away, or refused a request; the text has the reason and the remedy."""
 
 
 def control_path(robot: Robot) -> Path:

@@ -60,7 +60,7 @@ class ControlServer:
         self._selector.register(connection, selectors.EVENT_READ, _Client(connection))
 
     def _serve(self, client: _Client, events: int, now_s: float) -> bool:
-        """False when the client has gone or talks nonsense without end."""
+        """False when the client has gone or sends nonsense without end."""
         try:
             if events & selectors.EVENT_READ and not self._read(client, now_s):
                 return False

@@ -47,7 +47,7 @@ class Loop:
                 self._tell_changes()
 
     def _receive(self) -> can.Message | None:
-        """The next frame, None when none came in STEP_S. Whoever may send to the port may send what is no frame."""
+        """The next frame, None when none came in STEP_S. Processes may send to the port what is no frame."""
         try:
             return self._bus.recv(STEP_S)
         except can.CanOperationError as error:

@@ -37,7 +37,7 @@ def run(robot: Robot, control: str | None = None, *, quiet: bool = False) -> int
         datefmt="%Y-%m-%d %H:%M:%S",
         stream=sys.stderr,
     )
-    logging.getLogger("canopen").setLevel(logging.WARNING)  # it tells of every SDO
+    logging.getLogger("canopen").setLevel(logging.WARNING)  # it logs every SDO
     path = Path(control) if control else control_path(robot)
     with _stop_signals() as stop:
         try:

@@ -1,6 +1,6 @@
 """A simulated motor controller: the CiA 301 services and one or two CiA 402 axes, wired together. Pure.
 
-`on_frame` takes what is on the bus, `tick` returns what the node says. The world moves the wheels in between.
+`on_frame` takes what is on the bus, `tick` returns the frames of the node. The world moves the wheels in between.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class SimulatedNode:
         self.state = NmtState.INITIALISING
         self.changes: deque[StateChange] = deque(maxlen=1000)
         self.lost_producers: deque[int] = deque(maxlen=100)
-        """Node ids whose heartbeat this node has missed; whoever tells of them empties it."""
+        """Node ids whose heartbeat this node has missed; the reader that reports them empties it."""
         self._now = now_s
         self._bus_on_at: float | None = None
         d = self.dictionary = Dictionary(node_id, len(axes), fixed, personality)
@@ -114,7 +114,7 @@ class SimulatedNode:
         self._power_up(now_s, off_s)
 
     def reset_node(self, now_s: float) -> None:
-        """As by NMT reset node: everything starts anew, the encoder goes on."""
+        """As by NMT reset node: everything restarts, the encoder goes on."""
         self._power_up(now_s, 0.0)
 
     def bus_off(self, now_s: float, off_s: float = 0.2) -> None:
@@ -214,7 +214,7 @@ class SimulatedNode:
         self._route()
 
     def _route(self) -> None:
-        """Who listens to which COB-ID in this NMT state."""
+        """What listens to which COB-ID in this NMT state."""
         self._routes: dict[int, Callable[[bytes, float], None]] = {}
         if self.state is NmtState.INITIALISING:
             return
@@ -331,7 +331,7 @@ class SimulatedNode:
         )
 
     def _tell_fault(self, code: int, axis: int) -> None:
-        """EMCY of an axis' fault; 81xxh and 82xxh were told by the service that found them."""
+        """EMCY of an axis' fault; 81xxh and 82xxh were sent by the service that found them."""
         if code >> 8 not in (0x81, 0x82):
             self.emcy.raise_error(code, axis)
 

@@ -2,7 +2,7 @@
 
 Written from the makers' EDS files and manuals, and on purpose apart from the drive profiles of canbase_config: the
 driver knows a drive by its profile, the bench by this table, and only a boot on the bus brings the two together.
-"assumed" marks what no source tells; it is there because some drive does it.
+"assumed" marks what no source has; it is there because some drive does it.
 """
 
 from __future__ import annotations
@@ -48,20 +48,20 @@ class Personality:
     modes: tuple[int, ...] = (3, 9)
     """Values of 6060h that it takes, besides 0."""
     target_unit: str | None = None
-    """One bit of 60FFh; None: as robot.yaml says."""
+    """One bit of 60FFh; None: from robot.yaml."""
     actual_unit: str | None = None
-    """One bit of 606Ch; None: as robot.yaml says."""
+    """One bit of 606Ch; None: from robot.yaml."""
     acceleration_unit: str | None = None
     """One bit of 6083h to 6085h; None: the unit of 60FFh per second. `ms`: time from stand to `full_speed_rpm`."""
     full_speed_rpm: float = 0.0
     boot_delay_s: float | None = None
-    """From power on to the boot-up message [s]; None: as the bench says."""
+    """From power on to the boot-up message [s]; None: from the bench."""
     second_boot_up_s: float | None = None
-    """Boot loader and firmware say a boot-up each, so long apart [s]; objects answer only after the second."""
+    """Boot loader and firmware each send a boot-up, this far apart [s]; objects answer only after the second."""
     starts_operational: bool = False
     """Goes to OPERATIONAL by itself after its boot-up."""
     sdo_delay_s: float | None = None
-    """From a request to its answer [s]; None: as the bench says."""
+    """From a request to its answer [s]; None: from the bench."""
     shows_mode_without_power: bool = True
     """False: 6061h is 0 before OPERATION ENABLED."""
     locked_with_power: frozenset[int] = frozenset()
@@ -69,7 +69,7 @@ class Personality:
     heartbeat_fault_needs_communication_reset: bool = False
     """Fault resets are in vain after 8130h until NMT reset communication or node."""
     command_timeout_s: float | None = None
-    """The maker's own watchdog: without a command for so long the motors stop; the next one starts them again [s]."""
+    """The maker's own watchdog: without a command for this long the motors stop; the next one starts them again [s]."""
     command_timeout_object: int | None = None
     """The entry that sets it in ms (0: off), where the bus can."""
 
@@ -79,7 +79,7 @@ class Personality:
         return self.heartbeat_entries > 0 and 0x6007 not in self.missing
 
     def alone_s(self, configured_s: float) -> float:
-        """From the last word of its masters, who set every time limit to `configured_s`, to its own stop [s].
+        """From the last frame of its masters, who set every time limit to `configured_s`, to its own stop [s].
 
         Infinity: it goes on turning.
         """
@@ -137,7 +137,7 @@ PERSONALITIES: Mapping[str, Personality] = {
         missing=_NO_SYNC_COUNTER
         | _LACKS_SELF_STOP
         | {0x1010, 0x1011, 0x605A, 0x605B, 0x605C, 0x605D, 0x605E, 0x60C2, 0x606B, 0x606D, 0x6078},
-        missing_subs=_RPDO_TIMERS,  # the EDS has them; nothing says that the firmware heeds them
+        missing_subs=_RPDO_TIMERS,  # the EDS has them; no source shows that the firmware heeds them
         extras={
             _key(0x2000): Extra("H", 0, writable=True),  # EDS: communication offline time
             _key(0x200F): Extra("H", 1, writable=True),  # both targets packed after power on: assumed

@@ -20,7 +20,7 @@ from exit_matrix.stop_table import COMMANDS
 from support.marked_page import rewritten, section
 
 WIDTH = 140
-"""Of the table where nobody tells how wide the terminal is."""
+"""Of the table where the width of the terminal is unknown."""
 
 PRIORITY = 25
 """Below the processes of the chain (`canbase_cli.raise_priority`)."""
@@ -56,7 +56,7 @@ def main() -> int:
 
 
 def _raise_priority() -> None:
-    """This process stands in for scanner, joystick and stop button: a loaded computer must not silence them.
+    """This process stands in for scanner, joystick and stop button: a loaded computer must not delay them.
 
     Its children start without it, and those of the chain see to themselves.
     """

@@ -26,7 +26,7 @@ WAY_M: Final = 4.5
 """Of a goal: it takes longer than any row needs."""
 CRUISING_MPS: Final = 0.97 * SPEED_MPS
 STEADY_S: Final = 0.2
-"""The base drives so long at its speed before anything happens."""
+"""The base drives this long at its speed before anything happens [s]."""
 CLIENT: Final = "client"
 CHANGES: Final[Mapping[str, Any]] = {
     "safety": {"scan": {"required": True}, "estop": {"required": True}},
@@ -36,7 +36,7 @@ CHANGES: Final[Mapping[str, Any]] = {
 
 
 class By(Enum):
-    """Who orders the motion."""
+    """The source that orders the motion."""
 
     GOAL = "a goal of this process"
     JOYSTICK = "the joystick"
@@ -64,7 +64,7 @@ class Scene(World):
         if by is By.GOAL:
             self.robot.goal(WAY_M, SPEED_MPS)
         elif by is By.JOYSTICK:
-            self.node.release(self.joystick)  # the mux follows nobody who has not shown zero
+            self.node.release(self.joystick)  # the mux follows no source that has not shown zero
             self.push(SPEED_MPS)
         else:
             self._start_client()

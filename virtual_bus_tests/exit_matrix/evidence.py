@@ -1,4 +1,4 @@
-"""Who says that it stopped the robot: stop events, the mux, the driver's status, and what the processes have logged."""
+"""Which parts report that they stopped the robot: stop events, the mux, the driver's status, and the logs."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from exit_matrix.driven_robot import Scene
 from exit_matrix.log_evidence import NAMES, Catch, logged
 
 STOPPED: Final = (DriverStatus.STOPPING, DriverStatus.LATCHED)
-"""The driver tells of a stop on stop_events when it is over, and in its status when it begins."""
+"""The driver reports a stop on stop_events when it is over, and in its status when it begins."""
 
 
 class Evidence:
-    """What has been said since this was made."""
+    """What was published and logged since this was made."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene

@@ -1,4 +1,4 @@
-"""The exit matrix as a table: what fails, how, and who may catch it. What a row means is in `runner.py`."""
+"""The exit matrix as a table: what fails, how, and which parts may catch it. The meaning of a row is in `runner.py`."""
 
 from __future__ import annotations
 

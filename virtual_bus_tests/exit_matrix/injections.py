@@ -75,7 +75,7 @@ def publish_straight(scene: Scene) -> float:
 
 
 def publish_no_more(scene: Scene) -> None:
-    """The publisher on cmd_vel is silent again."""
+    """The publisher on cmd_vel stops publishing."""
     scene.straight.message = None
 
 
@@ -90,24 +90,24 @@ def no_second_master(scene: Scene) -> None:
 
 
 def joystick_dies(scene: Scene) -> float:
-    """It says nothing any more."""
+    """It stops publishing."""
     scene.joystick.message = None
     return time.monotonic()
 
 
 def scan_dies(scene: Scene) -> float:
-    """It says nothing any more."""
+    """It stops publishing."""
     scene.scan.message = None
     return time.monotonic()
 
 
 def estop_dies(scene: Scene) -> float:
-    """It says nothing any more."""
+    """It stops publishing."""
     scene.estop.message = None
     return time.monotonic()
 
 
 def estop_pressed(scene: Scene) -> float:
-    """The button says stop."""
+    """The button publishes a press."""
     scene.estop.message = Bool(data=True)
     return time.monotonic()

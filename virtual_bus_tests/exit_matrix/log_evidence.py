@@ -1,4 +1,4 @@
-"""Who stopped the robot, from what its processes have logged. Pure: text in, catches out."""
+"""Which part stopped the robot, from the logs of its processes. Pure: text in, catches out."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BEAT_LOST: Final = re.compile(r"heartbeat of node \d+ lost")
 INJECTED: Final = "InjectedError"
 
 Catch = tuple[str, str]
-"""Who, and the cause."""
+"""The part, and the cause."""
 
 
 def logged(said: Mapping[str, str]) -> Iterator[Catch]:

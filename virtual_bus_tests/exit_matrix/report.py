@@ -13,7 +13,7 @@ from exit_matrix.stop_table import REAL, TABLE
 
 COLUMNS = ("what", "how", "who caught it", "stood after", "distance", "limit")
 LEFT = 3
-"""So many columns are text."""
+"""This many columns are text."""
 
 
 def table(results: Sequence[Result]) -> Table:
@@ -36,7 +36,7 @@ def cells(result: Result) -> tuple[str, ...]:
 
 
 def merged(before: str, results: Sequence[Result]) -> str:
-    """The part of docs/stop_times.md that was `before`, with the columns of real processes measured anew."""
+    """The part of docs/stop_times.md that was `before`, with the columns of real processes measured again."""
     rows: Rows = {(result.row.what, result.row.how): _row(result) for result in results}
     return TABLE.merged(before, rows, [(row.what, row.how) for row in ROWS])
 

@@ -38,7 +38,7 @@ STANDS_WITHIN_S: Final = 6.0
 TRIES: Final = 3
 """To get a robot that drives: a loaded computer may starve the scanner or the client of this process."""
 END_S: Final = 8.0
-"""A process that ends by itself may take so long."""
+"""A process that ends by itself may take this long [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Result:
 
 
 class FailedError(AssertionError):
-    """The robot did not do what the row asks for."""
+    """The robot did not do what the row demands."""
 
 
 class Runner:

@@ -1,4 +1,4 @@
-"""Who can catch a failure, within what time, and how the base brakes then: computed from robot.yaml, nothing typed in.
+"""Which part can catch a failure, within what time, and how the base brakes then: computed from robot.yaml.
 
 A row of the matrix names the layers that may catch it; its limit follows from the one that did (`limit_s`).
 """
@@ -68,7 +68,7 @@ def coast_from_runaway(robot: Robot, speed_mps: float) -> float:
 
 
 def twisted(robot: Robot, speed_mps: float) -> float:
-    """Until the base has turned for so long as nobody ordered."""
+    """Until the base has turned without an order for this long."""
     return robot.watchdog.twist_s + robot.watchdog.drive_lag_s
 
 
@@ -106,14 +106,14 @@ def kept_motion(robot: Robot, speed_mps: float) -> float:
 
 
 def drift(robot: Robot, speed_mps: float) -> float:
-    """Until encoder and velocity, one of which says that the wheel stands, are too far apart."""
+    """Until encoder and velocity, one of which shows a standstill, are too far apart."""
     forgotten = 1.0 / DRIFT_M + 1.0 / (DRIFT_S * speed_mps)
     way_m = -math.log(1.0 - robot.watchdog.travel_tolerance_m * forgotten) / forgotten
     return way_m / speed_mps + robot.watchdog.feedback_samples / robot.rates.control_hz
 
 
 def disorder(robot: Robot, speed_mps: float) -> float:
-    """Until setpoints of two masters have met so often that it is no chance."""
+    """Until setpoints of two masters have met often enough to exclude chance."""
     return DISORDER_COUNT / robot.rates.control_hz
 
 

@@ -1,5 +1,5 @@
 """`python -m mutation`: tries mutants and writes the report. A module whose text has not changed since the last run is
-not done anew: of it only the survivors are tried again, as a new test may kill them.
+not measured again: of it only the survivors are tried again, as a new test may kill them.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Mutants of a source text: the operators of cosmic-ray, and three for what it leaves alone, which tables live on.
 
 Left out: annotations, docstrings, texts with values, and that a dataclass is frozen (mypy sees to that), which no
-behaviour hangs on, and arithmetic that nobody writes by mistake.
+behaviour hangs on, and arithmetic that is never written by mistake.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What the last run found: `report.json`, with the hash of each source that it holds for; and why survivors may live.
 
 `explained.yaml`: `because` for groups of survivors, each named by its module and its lines before and after.
-`unmeasured.yaml`: modules whose mutants were not tried since they changed; the report says nothing about them.
+`unmeasured.yaml`: modules whose mutants were not tried since they changed; the report does not contain them.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def explanations() -> dict[tuple[str, str, str], str]:
 
 
 def unexplained(report: Report) -> list[tuple[str, Survivor]]:
-    """Survivors that nobody has explained, with their module."""
+    """Survivors without an explanation, with their module."""
     known = explanations()
     return [
         (module, survivor)

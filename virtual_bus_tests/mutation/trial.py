@@ -21,7 +21,7 @@ from mutation.targets import LONG, ROOT, Target, files
 CPU_S = 20
 """A mutant that makes an endless loop is killed by this."""
 WALL_S = 600
-"""A single test may take so long on a busy machine."""
+"""A single test may take this long on a busy machine [s]."""
 MEMORY_BYTES = 3 * 2**30
 UNUSED = [f"-pno:{plugin}" for plugin in ("cacheprovider", "faulthandler", "threadexception", "unraisableexception")]
 """Parts of pytest that take time and would kill no mutant."""
@@ -56,7 +56,7 @@ class _Finder(importlib.abc.MetaPathFinder):
 
 
 def preload() -> None:
-    """What every trial needs. Compiled tests are kept on disk: compiling them anew takes longer than running them."""
+    """What every trial needs. Compiled tests are kept on disk: compiling them again takes longer than running them."""
     sys.dont_write_bytecode = False
     for name in PRELOADED:
         importlib.import_module(name)

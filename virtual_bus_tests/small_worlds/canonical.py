@@ -35,7 +35,7 @@ BEGAN_S = 99.0
 """The clock begins at 100 s."""
 DIGITS = 3
 UNSEEN = frozenset((
-    # counters, and what is only said to people
+    # counters, and what is only shown to people
     "_stats", "_told", "_mux_told", "_cycle", "_sequence", "sequence", "received", "refused", "frames_dropped",
     "dropped", "serial", "stops", "trips", "counters", "lease_age_ms", "stamp_ns", "seen", "detail", "snapshot",
     "_status_at", "_mux_state_at", "_state_at", "_counters_due", "_longest_gap_s", "_request", "answered", "_reset_at",
@@ -55,7 +55,7 @@ UNSEEN = frozenset((
 ))  # fmt: skip
 """Names of fields that no decision looks at."""
 VALUES_UNSEEN = frozenset((0x6064, 0x6864, 0x606C, 0x6041, 0x606B, 0x6077))
-"""Objects of a drive that say again what its motor is: position, velocity, statusword, demand, torque."""
+"""Objects of a drive that repeat the state of its motor: position, velocity, statusword, demand, torque."""
 _FIXED = (
     FunctionType,
     BuiltinFunctionType,
@@ -162,7 +162,7 @@ def told(small: SmallWorld, properties: Properties) -> bytes:
 
 
 def form(world: World, more: Mapping[str, object]) -> tuple[object, ...]:
-    """All that decides: the cores, who lives, the drives, the wheels, the cables, what is on its way, and `more`."""
+    """All that decides: cores, living parts, drives, wheels, cables, what is on its way, and `more`."""
     canon = Canon(world.clock.now_s)
     processes = (world.driver, world.watchdog, world.velocity)
     bench = world.drives.bench

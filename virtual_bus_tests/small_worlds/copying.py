@@ -24,7 +24,7 @@ from canbase_driver.boot.sequence import boot
 from canbase_driver.boot.steps import BootError, Step
 
 _SHARED = (Enum, Random, Struct, MappingProxyType, np.ndarray)
-"""Kinds that nobody changes: of chance nothing is left in a small world."""
+"""Kinds that are never changed: of chance nothing is left in a small world."""
 _things: list[Any] = []
 """What the snapshot that is being restored shares with its copies."""
 

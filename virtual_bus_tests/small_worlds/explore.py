@@ -28,13 +28,13 @@ from small_worlds.properties import Found, Properties
 from small_worlds.world import POINT_S, SmallWorld
 
 LONGEST_S = 40.0
-"""A world that is still new so long after the last event does not come to rest: a story. What goes round in 4.2 s, as a
-boot that asks a drive that does not answer does, comes back to the same grid of events after 16.8 s."""
+"""A world that is still new this long after the last event does not come to rest: a story. What goes round in 4.2 s, as
+a boot with a drive that does not answer does, comes back to the same grid of events after 16.8 s."""
 
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """How much may happen: so many faults, so many things that the operator does, at each so-manieth point."""
+    """How much may happen: the number of faults, of the operator's actions, and every how-many-th point is tried."""
 
     faults: int = 1
     operator: int = 1
@@ -58,7 +58,7 @@ class Story:
     found: Found
 
     def lines(self) -> list[str]:
-        """Told with times."""
+        """The story with its times."""
         told = [f"{at_s:5.2f} s  {EVENTS[name].sentence}" for at_s, name in self.events]
         return [f"    0 s  {self.start}", *told, f"{self.found.at_s:5.2f} s  {self.found.name}: {self.found.detail}"]
 
@@ -83,7 +83,7 @@ class Search:
 
 
 def _nobody(found: Search) -> None:
-    """Nobody wants to know."""
+    """A listener that ignores everything."""
 
 
 class _Shared:
@@ -255,7 +255,7 @@ def _hash(told: bytes, salt: bytes) -> int:
 def search(
     bounds: Bounds, starts: Sequence[str], workers: int = 2, on_news: Callable[[Search], None] = _nobody
 ) -> Search:
-    """Everything within `bounds` from each of `starts`. `on_news` hears of each story and of each task that is done.
+    """Everything within `bounds` from each of `starts`. `on_news` receives each story and each task that is done.
 
     Ctrl-C ends it, with what was found until then. Raises RuntimeError when a searching process died.
     """
@@ -316,7 +316,7 @@ def _work(worker: _Worker, tasks: list[tuple[Snapshot, int]], left: _Left, todo:
     try:
         os.close(reader)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to all; who began the search ends it
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to all; the first process ends it
         gc.collect()
         gc.freeze()
         gc.set_threshold(*COLLECTED)
@@ -325,7 +325,7 @@ def _work(worker: _Worker, tasks: list[tuple[Snapshot, int]], left: _Left, todo:
             worker.branch(snapshot, row, left)
             worker.say(DONE)
         status = 0
-    except BaseException:  # noqa: BLE001 - told, and an exit code
+    except BaseException:  # noqa: BLE001 - reported, and an exit code
         traceback.print_exc()
     finally:
         os._exit(status)

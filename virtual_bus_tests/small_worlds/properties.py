@@ -28,7 +28,7 @@ PROPERTIES = {
     "runaway": "no wheel is faster than it was ordered to be for longer than the stated time",
 }
 HEARD_S = 0.1
-"""The button says at once that it is pressed."""
+"""The button publishes at once that it is pressed."""
 OBEY_S = RUNGS[Step.QUICK_STOP].obey_s + 2.0 * STEP_S
 RUNAWAY_MPS, RUNAWAY_S = 0.3, 0.5
 
@@ -119,7 +119,7 @@ class Properties:
         return {"driver": world.driver.core, "watchdog": world.watchdog.core, "velocity": world.velocity.filter}
 
     def _note_new_lives(self, now_s: float) -> None:
-        """Who died while there was power, or whose record of stops cannot be read, comes back latched."""
+        """A part that died while there was power, or whose record of stops cannot be read, comes back latched."""
         before, self._lives = self._lives, self._cores()
         self._born = {name for name, core in self._lives.items() if core is not before[name]}
         for part in self._small.parts:
@@ -144,7 +144,7 @@ class Properties:
             self._latched = _Hold(self._react_s, now_s)
 
     def _seen_latched(self, now_s: float) -> set[str]:
-        """A filter that ran while the button was pressed has been told."""
+        """A filter that ran while the button was pressed has received it."""
         driver, watchdog, velocity = self._small.parts
         if not (self._small.around.pressed and velocity.running):
             self._pressed_at = now_s
@@ -156,7 +156,7 @@ class Properties:
         return {name for name, is_latched in seen.items() if is_latched}
 
     def _note_starts(self, now_s: float) -> None:
-        """Enabled, or a filter that is new: who holds the stick then has to show zero first."""
+        """Enabled, or a filter that is new: an operator who holds the joystick then has to show zero first."""
         world = self._world
         is_enabled = world.driver.alive and world.driver.core.state is DriverState.ENABLED
         starts = is_enabled and not self._was_enabled

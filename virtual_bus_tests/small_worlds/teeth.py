@@ -30,7 +30,7 @@ _NEUTRAL = "mux:neutral_start+driver:waits_for_zero+driver:zero_before_motion"
 _LEASES = "watchdog:lease_lost+watchdog:motion_outside+watchdog:target_outside+driver:command_timeout"
 
 TEETH = (
-    # who is gone is noticed
+    # a part that is gone is detected
     Tooth("driver:watchdog_missing+drives:heartbeat_consumer", "driving", _with("watchdog dies"), "alive"),
     Tooth("driver:asks_for_watchdog+drives:heartbeat_consumer", "driving", _with("watchdog dies"), "alive"),
     Tooth("watchdog:all+drives:heartbeat_consumer", "driving", _with("driver dies"), "alive"),
@@ -49,7 +49,7 @@ TEETH = (
     Tooth(_RECORDS, "driving", _with("all restart"), "latched"),
     Tooth(_RECORDS, "driving", _with("reboot"), "latched"),
     Tooth("mux:neutral_start+filter:zero_after_estop", "pressed, stick held", _with("button"), "latched"),
-    # nobody who held the stick is followed
+    # no source that was held is followed
     Tooth(_NEUTRAL, "inactive, stick held", _with("lifecycle"), "neutral"),
     Tooth(f"{_NEUTRAL}+driver:reset_needs_zero", "stopped, stick held", _with("reset"), "neutral"),
 )

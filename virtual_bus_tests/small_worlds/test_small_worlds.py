@@ -1,4 +1,4 @@
-"""Small worlds: what holds with every single event, that safeguards taken out are missed, and how states are told."""
+"""Small worlds: what holds with every single event, that removed safeguards are missed, and how states are compared."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_an_encoder_that_dies_as_the_emergency_stop_is_pressed_is_no_stand_and_t
     base, driver, watchdog = small.world.drives.bench.base, small.world.driver, small.world.watchdog
 
     def fastest_mps(seconds: float) -> float:
-        """Of both wheels. The driver says stand of none that rolls."""
+        """Of both wheels. The driver reports standstill of none that rolls."""
         clock, peak_mps = small.world.clock, 0.0
         end = clock.now_s + seconds
         while clock.now_s < end:

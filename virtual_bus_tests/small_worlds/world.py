@@ -56,7 +56,7 @@ def small_robot() -> Robot:
 
 
 def _nobody(outcome: object) -> None:
-    """Nobody waits for it."""
+    """No part waits for it."""
 
 
 class SmallWorld:
@@ -104,14 +104,14 @@ class SmallWorld:
             self.ends.append((math.inf, event.name))
 
     def turn_stick(self) -> None:
-        """Push it if it is released, release it if it is held: then it says zero, as a joystick at rest does."""
+        """Push it if it is released, release it if it is held: then it sends zero, as a joystick at rest does."""
         self.held = not self.held
         if not self._talks:
             self._talks = True
             self._send()
 
     def reset(self) -> None:
-        """Both resets, as `canbase reset` asks for them."""
+        """Both resets, as `canbase reset` requests them."""
         self.asked_s.append(self.world.clock.now_s)
         velocity = self.world.velocity
         before = velocity.filter.estop if velocity.running else None

@@ -77,7 +77,7 @@ class Plant:
         self.y_m += self.speed_mps * math.sin(self.yaw_rad) * STEP_S
 
     def odometry(self, received: float) -> Odometry:
-        """What odom says, in whole encoder counts."""
+        """The odometry, in whole encoder counts."""
         x, y = (COUNT_M * round(value / COUNT_M) for value in (self.x_m, self.y_m))
         yaw_rad = math.remainder(self.yaw_rad, 2.0 * math.pi)
         return Odometry(received, Pose(x, y, yaw_rad), self.speed_mps, self.turn_radps)

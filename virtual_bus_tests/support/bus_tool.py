@@ -22,7 +22,7 @@ ENVIRONMENT = os.environ | {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1", "COLUMNS": "1
 
 
 def free_port() -> int:
-    """A UDP port that nobody uses now."""
+    """A UDP port that is free now."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

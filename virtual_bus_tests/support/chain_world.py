@@ -29,10 +29,10 @@ from canbase_watchdog.watchdog import Watchdog
 from support.crews import robot_with
 
 STEP_S = 0.002
-"""Bus, drives and watchdog look at the clock so often; the watchdog wants it every 5 ms at least."""
+"""Bus, drives and watchdog look at the clock this often; the watchdog wants it every 5 ms at least."""
 COMMAND_PERIOD_S = 0.02
 BOOTED_S = 1.5
-"""From power on, every kind of drive is enabled within it; the slowest says two boot-up messages."""
+"""From power on, every kind of drive is enabled within it; the slowest sends two boot-up messages."""
 FORWARD = Twist2D(0.3, 0.0)
 BITS_PER_MPS = 60.0 / (2.0 * math.pi * 0.1) * 20.0 * 10.0
 """60FFh of the sample robot: 0.1 rpm at the motor, gear 20, wheel radius 0.1 m."""
@@ -61,8 +61,8 @@ def robot_of(*places: tuple[int, int, Literal["left", "right"]]) -> Robot:
 class World:
     """Everything that shares the bus. `run` lets time pass; the parts are open to the tests.
 
-    `command`: what reaches the driver every 20 ms, None: nothing. `leases`: the watchdog hears what was ordered last.
-    `cable`: False: the driver hears and says nothing, and is told that its bus failed.
+    `command`: what reaches the driver every 20 ms, None: nothing. `leases`: the watchdog receives the last order.
+    `cable`: False: the driver receives and sends nothing, and gets the error of a failed bus.
     """
 
     def __init__(
@@ -152,11 +152,11 @@ class World:
         self.run(seconds)
 
     def kill_driver(self) -> None:
-        """As by SIGKILL: from now on it says nothing."""
+        """As by SIGKILL: from now on it sends nothing."""
         self.driver = None
 
     def start_driver(self) -> None:
-        """A new driver process, which knows nothing of the one before."""
+        """A new driver process, without any state of the one before."""
         self.driver, self.ticks = DriverCore(self.robot, found=self.disk.found() if self._keeps else None), []
         self.resume_cycles()
 
@@ -166,7 +166,7 @@ class World:
         self.watchdog = Watchdog(watchdog_config(self.robot), self.now_s, past)
 
     def reboot(self, seconds: float = 0.5) -> None:
-        """The computer loses its supply for so long; the drives keep theirs."""
+        """The computer loses its supply for this long; the drives keep theirs."""
         self.driver = self.watchdog = None
         self.run(seconds)
         self.start_watchdog()
@@ -186,21 +186,21 @@ class World:
         self._next_cycle = self.now_s
 
     def stands_after(self, within_s: float = 3.0) -> float:
-        """Let time pass and see the base come to a stand, for good. Until then, from now [s]."""
+        """Let time pass and see the base come to a lasting standstill. Until then, from now [s]."""
         start = self.now_s
         self.run(within_s)
         assert self.truth.standing_s > 0.5, self.truth
         return self.now_s - self.truth.standing_s - start
 
     def reset(self) -> Outcome:
-        """Ask the driver for a reset and let it run to its end."""
+        """Request a reset of the driver and let it run to its end."""
         outcomes: list[Outcome] = []
         self.core.request_reset(self.now_s, outcomes.append)
         assert self.run(12.0, lambda: bool(outcomes)), "the reset never ended"
         return outcomes[0]
 
     def go(self, aim: Aim) -> Outcome:
-        """Ask the driver to go so far and let it get there, or fail."""
+        """Order the driver to this aim and let it get there, or fail."""
         outcomes: list[Outcome] = []
         self.core.request_aim(aim, self.now_s, outcomes.append)
         assert self.run(20.0, lambda: bool(outcomes)), "the change never ended"

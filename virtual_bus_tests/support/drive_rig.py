@@ -102,7 +102,7 @@ class Surroundings(threading.Thread):
 
 
 class Driver:
-    """The control thread and who talks to it. `seen`: the newest snapshot."""
+    """The control thread and its peers. `seen`: the newest snapshot."""
 
     def __init__(self, crew: Crew, arguments: dict[str, Any], around: Surroundings) -> None:
         robot = crew.robot
@@ -159,7 +159,7 @@ class Driver:
     def heard_again(self) -> DriverSnapshot:
         """Wait, with zero commands, until every drive is booted and its encoder known.
 
-        That is after the wheels rolled out, and after the watchdog has let go: a boot before it is tried again.
+        That is after the wheels rolled out, and after the watchdog has released them: a boot before it is tried again.
         """
         return self.order(
             Twist2D.ZERO,
@@ -177,7 +177,7 @@ class Driver:
         assert outcome.done, outcome.sentence
 
     def stop(self) -> None:
-        """Service motor_driver/stop; nobody waits for the answer."""
+        """Service motor_driver/stop; its answer is not waited for."""
         self.loop.stop(lambda _outcome: None)
 
     def try_reset(self, within_s: float = 20.0) -> Outcome:

@@ -48,7 +48,7 @@ class Wheel:
         cycles: float = 1.0,
         torque: float | None = None,
     ) -> Evidence:
-        """One cycle. The encoder rolls like the velocity unless it is told otherwise."""
+        """One cycle. By default the encoder rolls like the velocity."""
         self.n += 1
         now_s, elapsed_s = self.n / HZ, cycles / HZ
         self.watch.on_setpoint(setpoint, now_s)

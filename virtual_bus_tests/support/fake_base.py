@@ -23,7 +23,7 @@ COMMAND_TIMEOUT_S = 0.3
 
 
 class FakeBase:
-    """The rest of the robot, healthy until a field says otherwise."""
+    """The rest of the robot, healthy unless a field changes it."""
 
     def __init__(self, test_node: TestNode) -> None:
         self.x_m = self.y_m = 0.0

@@ -77,7 +77,7 @@ class FilterWorld:
         return float(self.box.distances_m(self.seen).min(initial=math.inf))
 
     def run(self, command: Twist, duration_s: float) -> float:
-        """Order `command` for so long; the smallest gap meanwhile [m]."""
+        """Order `command` for this long; the smallest gap meanwhile [m]."""
         self.command = command
         least_m = self.gap_m
         for _ in range(round(duration_s / STEP_S)):

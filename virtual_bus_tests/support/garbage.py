@@ -54,7 +54,7 @@ def datagrams(number: int) -> list[bytes]:
 
 
 def send(port: int, number: int) -> None:
-    """To all who listen on this port, none of it beyond this computer."""
+    """To all that listen on this port, none of it beyond this computer."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
         for datagram in datagrams(number):

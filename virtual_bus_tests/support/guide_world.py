@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 
 class GuideWorld(SessionWorld):
-    """`told`: what the procedure said; `answers`: by the key of the question, words or how to find them."""
+    """`told`: the reports of the procedure; `answers`: by the key of the question, words or how to find them."""
 
     def __init__(
         self,

@@ -40,7 +40,7 @@ def texts(actions: list[Action]) -> dict[str, str]:
 
 
 def carried_out(root: Path, actions: list[Action]) -> list[str]:
-    """What is said while the actions are carried out below `root`."""
+    """The output while the actions are carried out below `root`."""
     said: list[str] = []
     Executor(root, said.append).carry_out(actions)
     return said

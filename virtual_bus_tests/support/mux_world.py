@@ -16,7 +16,7 @@ def rested(
     *,
     foreign_lock: bool = False,
 ) -> Mux:
-    """A mux whose base is ready for good and whose sources are all armed, by silence: nobody has said anything yet."""
+    """A mux whose base is always ready and whose sources are all armed, by absence: there was no message yet."""
     patient = {name: source.model_copy(update={"neutral_after_s": 1.0}) for name, source in sources.items()}
     mux = Mux(patient, locks, foreign_lock=foreign_lock, status_timeout_s=math.inf)
     mux.on_estop(True)

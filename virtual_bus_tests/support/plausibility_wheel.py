@@ -30,7 +30,7 @@ class Wheel:
     def sample(
         self, velocity: float, target: float, *, rolls: float | None = None, powered: bool = True, after_s: float = 0.01
     ) -> Feedback:
-        """One cycle: setpoint, then feedback. The encoder rolls like the velocity unless it is told otherwise."""
+        """One cycle: setpoint, then feedback. By default the encoder rolls like the velocity."""
         self.n += round(after_s * 1000)
         now_s = self.n / 1000
         self.way_m += (velocity if rolls is None else rolls) * after_s

@@ -1,4 +1,4 @@
-"""Options of pytest that point the tests of the driver at real drives, and what is said and left out then."""
+"""Options of pytest that point the tests of the driver at real drives, with their warnings and skips."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def add_options(parser: pytest.Parser) -> None:
 
 
 def crews(config: pytest.Config) -> list[Crew]:
-    """The robots that these options ask for."""
+    """The robots that these options name."""
     kind, interface = config.getoption("--personality"), config.getoption("--can-interface")
     if interface is None:
         return simulated_crews(kind)
@@ -41,7 +41,7 @@ def crews(config: pytest.Config) -> list[Crew]:
 
 
 def warning(config: pytest.Config) -> list[str]:
-    """What is said before real wheels turn; nothing for simulated ones."""
+    """The warning before real wheels turn; nothing for simulated ones."""
     if config.getoption("--can-interface") is None:
         return []
     (crew,) = crews(config)

@@ -102,7 +102,7 @@ def python_argv(code: str) -> list[str]:
 
 
 RELEASE_S = 0.2
-"""So long a source commands zero: some of it arrives on a loaded computer too."""
+"""A source commands zero for this long [s]: some of it arrives on a loaded computer too."""
 
 
 class Recorder(Generic[T]):
@@ -137,7 +137,7 @@ class Recorder(Generic[T]):
 
 
 class Repeater(Generic[T]):
-    """Publishes `message` at a fixed rate while the node spins. `message` may be changed; None is silence."""
+    """Publishes `message` at a fixed rate while the node spins. `message` may be changed; None: nothing."""
 
     def __init__(self, node: Node, kind: type[T], topic: str, rate_hz: float, qos: QoSProfile | int) -> None:
         self.kind = kind
@@ -177,7 +177,7 @@ class TestNode:
         return recorder
 
     def repeat(self, kind: type[T], topic: str, rate_hz: float, qos: QoSProfile | int = 1) -> Repeater[T]:
-        """A publisher that says nothing until its `message` is set."""
+        """A publisher that publishes nothing until its `message` is set."""
         return Repeater(self.node, kind, topic, rate_hz, qos)
 
     def source(self, topic: str = "cmd_vel_joy", kind: type[Any] = TwistStamped, qos: QoSProfile | int = 1) -> Any:
@@ -193,7 +193,7 @@ class TestNode:
         return repeater
 
     def release(self, *sources: Repeater[Any]) -> None:
-        """These sources command zero for a moment, and are silent then."""
+        """These sources command zero for a moment, and publish nothing then."""
         for source in sources:
             source.message = source.kind()
         self.spin_for(RELEASE_S)
@@ -258,7 +258,7 @@ _held_ports: list[socket.socket] = []
 
 
 def free_udp_port() -> int:
-    """A UDP port that nobody uses now: benches on one machine are told apart by it. No other test is given it as long
+    """A UDP port that is free now: benches on one machine are distinguished by it. No other test is given it as long
     as this process lives: between this call and the start of the bench the port itself is free."""
     while True:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:

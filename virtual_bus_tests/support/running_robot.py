@@ -92,7 +92,7 @@ class RunningRobot:
         return self.sim.truth()
 
     def wait_state(self, state: int, timeout_s: float = READY_S) -> DriverStatus:
-        """Until motor_driver/status, received from now on, tells that state."""
+        """Until motor_driver/status, received from now on, has that state."""
         asked_s = time.monotonic()
 
         def found() -> DriverStatus | None:
@@ -106,7 +106,7 @@ class RunningRobot:
         return status
 
     def wait_any_state(self) -> DriverStatus:
-        """What motor_driver/status tells from now on."""
+        """The next motor_driver/status from now on."""
         asked_s = time.monotonic()
         return self.node.wait_for(lambda: self.status.since(asked_s), READY_S, "motor_driver/status")[-1]
 
@@ -116,7 +116,7 @@ class RunningRobot:
         self.node.wait_for(lambda: self.odom.last is not None, READY_S, "odom")
 
     def goal(self, distance_m: float, speed_mps: float) -> Drive:
-        """A goal that was accepted: a server that has not heard of all other nodes yet rejects it."""
+        """A goal that was accepted: a server that has not discovered all other nodes yet rejects it."""
         deadline_s = time.monotonic() + READY_S
         while True:
             try:
@@ -187,7 +187,7 @@ class RunningRobot:
         return time.monotonic()
 
     def make_ready(self) -> None:
-        """Until the drives have power, with a reset where one is asked for."""
+        """Until the drives have power, with a reset where one is needed."""
         deadline_s = time.monotonic() + READY_S
         while (status := self.wait_any_state()).state != DriverStatus.ENABLED:
             assert time.monotonic() < deadline_s, f"not ready: {status}\n{self.logs()}"
@@ -196,7 +196,7 @@ class RunningRobot:
         self.wait_enabled()
 
     def reset(self, service: str = "motor_driver/reset") -> None:
-        """Asks once; whether it was done, the state tells."""
+        """Calls once; the state shows whether it was done."""
         client = self.node.node.create_client(Trigger, service)
         self.node.wait_for(client.service_is_ready, READY_S, service)
         answer = client.call_async(Trigger.Request())

@@ -13,16 +13,16 @@ from support.sim_rig import robot as small_robot
 
 
 class SessionWorld:
-    """Drives that have just been switched on, and the clock. `said`: what the session sent, with its time."""
+    """Drives that have just been switched on, and the clock. `said`: the frames of the session, with their times."""
 
     def __init__(self, robot: Robot | None = None, drives: Robot | None = None) -> None:
-        """`drives`: what is really there, where it is not what `robot` says."""
+        """`drives`: the real ones, where they differ from `robot`."""
         self.robot = robot or small_robot()
         self.now_s = 100.0
         self.bench = Bench(drives or self.robot, self.now_s)
         self.said: list[tuple[float, Frame]] = []
         self.others: list[Callable[[float], list[Frame]]] = []
-        """Other programs on the bus: each turn they are asked what they send."""
+        """Other programs on the bus: they are called each turn for their frames."""
         self.wait(0.5)
 
     def wait(self, seconds: float) -> None:

@@ -53,7 +53,7 @@ def robot(*drives: dict[str, Any], **sections: Any) -> Robot:
 
 
 class Rig:
-    """The bench and its clock. It starts with booted nodes, and what was said until then is in `heard`."""
+    """The bench and its clock. It starts with booted nodes; the frames until then are in `heard`."""
 
     def __init__(self, of: Robot | None = None, body: PlantParameters | None = None) -> None:
         self.bench = Bench(of or robot(), 0.0, body or PlantParameters(), AT_ONCE)
@@ -76,7 +76,7 @@ class Rig:
         return self.axis.state
 
     def wait(self, seconds: float, step_s: float = 0.001) -> list[str]:
-        """Let time pass; the frames said meanwhile, as "581 60 40 60 00 00 00 00 00"."""
+        """Let time pass; the frames sent meanwhile, as "581 60 40 60 00 00 00 00 00"."""
         said: list[str] = []
         for _ in range(round(seconds / step_s)):
             self.now_s = round(self.now_s + step_s, 6)
@@ -84,7 +84,7 @@ class Rig:
         return said
 
     def tx(self, text: str) -> list[str]:
-        """Send one frame, written as its COB-ID and bytes in hex; the frames that are said at once."""
+        """Send one frame, written as its COB-ID and bytes in hex; the frames that come at once."""
         cob_id, _, data = text.partition(" ")
         self.bench.on_frame(Frame(int(cob_id, 16), bytes.fromhex(data)), self.now_s)
         return self._take()

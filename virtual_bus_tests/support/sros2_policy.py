@@ -1,4 +1,4 @@
-"""What the shipped SROS2 policy allows a node, and what a running node has: names as the ROS graph tells them."""
+"""What the shipped SROS2 policy allows a node, and what a running node has: names from the ROS graph."""
 
 from __future__ import annotations
 

@@ -53,12 +53,12 @@ class World:
         self.node.release(self.joystick)  # a zero from before the reset does not count
 
     def _cause(self) -> str:
-        """What the safety filter says from now on."""
+        """The states of the safety filter from now on."""
         asked_s = time.monotonic()
         return self.node.wait_for(lambda: self.causes_since(asked_s), CALM_S, "safety_filter/state")[-1]
 
     def causes_since(self, since_s: float) -> list[str]:
-        """What the safety filter has said since then (time.monotonic)."""
+        """The states of the safety filter since then (time.monotonic)."""
         return [state.cause for state in self.robot.safety.since(since_s)]
 
     def joystick_refused(self) -> int:

@@ -17,7 +17,7 @@ from canbase_sim.world.bench import Bench
 from canbase_watchdog.watchdog import Watchdog
 
 IDLE_S = 1e-4
-"""The drives' own delays are looked for so often while the bus is idle."""
+"""The drives' own delays are looked for this often while the bus is idle."""
 COMMAND_PERIOD_S = 0.02
 WATCHDOG_PERIOD_S = 0.005
 

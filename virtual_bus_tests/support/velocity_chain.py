@@ -1,4 +1,4 @@
-"""velocity_mux and safety_filter as a real process, all that it says, and the sources around it."""
+"""velocity_mux and safety_filter as a real process, all that it publishes, and the sources around it."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 LEASE = struct.Struct("<4sQQddII")
 START_S = 15.0
 SILENT_S = 0.4
-"""After it no source of the sample robot is fresh that says nothing."""
+"""After it no source of the sample robot is fresh without a message."""
 CAUSE_S = 10.0
-"""For a cause to be shown: some follow from the ROS graph, which DDS tells of late."""
+"""For a cause to be shown: some follow from the ROS graph, which DDS updates late."""
 RUN = """
 import sys
 from canbase_config.load import load_robot
@@ -48,10 +48,10 @@ def scan(ahead_m: float = math.inf, behind_m: float = math.inf) -> LaserScan:
 
 
 class Chain:
-    """The process, everything that it says, and the sources that a test can move."""
+    """The process, everything that it publishes, and the sources that a test can move."""
 
     def __init__(self, node: TestNode, process: Process, watchdog: socket.socket, released: bool = True) -> None:
-        """`released`: joystick and action have commanded zero, and are silent now."""
+        """`released`: joystick and action have commanded zero, and publish nothing now."""
         self.node, self.process, self.watchdog = node, process, watchdog
         self.leases: list[tuple[Any, ...]] = []
         node.node.create_timer(0.02, self.drain)
@@ -88,7 +88,7 @@ class Chain:
         return time.monotonic() - started_s
 
     def wait_for_cause(self, cause: str, detail: str = "") -> SafetyState:
-        """Until the state has that cause, and `detail` in its detail: DDS tells of a node before it tells its name.
+        """Until the state has that cause, and `detail` in its detail: DDS finds a node before its name.
 
         An order that was sent after it has arrived then as well: DDS keeps no order between two topics.
         """

@@ -1,4 +1,4 @@
-"""A small robot in virtual time for the watchdog's tests: driver, filter and drives that can be told to misbehave.
+"""A small robot in virtual time for the watchdog's tests: driver, filter and drives that a test can make misbehave.
 
 It is not the simulated motor controller of the bench: only what the watchdog looks at, so that a test can lie to it.
 """
@@ -209,7 +209,7 @@ class Story:
         return self.ms / 1000
 
     def run(self, seconds: float) -> None:
-        """Go on for so long."""
+        """Go on for this long."""
         for _ in range(round(seconds * 1000)):
             self._step()
 

@@ -1,4 +1,4 @@
-"""How a story is looked at: what the watchdog says, how fast the wheels are, and how long until something happens."""
+"""How a story is inspected: the watchdog's state, how fast the wheels are, and how long until something happens."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ def well(**changes: Any) -> View:
 
 
 def of(left: Axis, right: Axis | None = None, **changes: Any) -> View:
-    """These wheels; the right one stands, and is enabled like the left one unless it is told otherwise."""
+    """These wheels; the right one stands, and is enabled like the left one by default."""
     like_left = replace(STANDING, state=left.state, enabled_since=left.enabled_since)
     view = well(**changes)
     return replace(view, bus=replace(view.bus, axes=(left, right or like_left)))

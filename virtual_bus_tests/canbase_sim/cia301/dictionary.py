@@ -123,7 +123,7 @@ COUNT, PAIR = 0xFD, 0xFE
 
 
 def visible(node_id: int, axes: int, personality: Personality) -> Mapping[int, Entry]:
-    """The entries that the bus sees, by `key`: those of our EDS, less and more what the personality says."""
+    """The entries that the bus sees, by `key`: those of our EDS, with the changes of the personality."""
     if personality is GENERIC:
         return read_eds(node_id, axes)
     entries = dict(read_eds(node_id, axes))
@@ -195,7 +195,7 @@ class Dictionary:
             self.values[place] = self.values[low] & 0xFFFF | (self.values[high] & 0xFFFF) << 16
 
     def guard(self, index: int, check: Check) -> None:
-        """Ask `check` before each write from the bus to `index`."""
+        """Call `check` before each write from the bus to `index`."""
         self._guards[index] = check
 
     def on_write(self, index: int, reaction: Check) -> None:

@@ -30,7 +30,7 @@ NOT_VALID = 1 << 31
 
 
 class EmcyService:
-    """Active errors of one node. An error is told once when it comes, and once, with code 0000h, when it goes."""
+    """Active errors of one node. An error is sent once when it comes, and once, with code 0000h, when it goes."""
 
     def __init__(self, dictionary: Dictionary, send: Callable[[Frame], None]) -> None:
         self._values = dictionary.values
@@ -40,7 +40,7 @@ class EmcyService:
         dictionary.on_write(0x1003, lambda subindex, value: self._clear_history())
 
     def raise_error(self, code: int, source: int = 0) -> None:
-        """`code` holds from now on; `source` tells errors of one code apart (node id, PDO number, axis)."""
+        """`code` holds from now on; `source` distinguishes errors of one code (node id, PDO number, axis)."""
         if (code, source) in self._active:
             return
         self._active[code, source] = None
@@ -53,7 +53,7 @@ class EmcyService:
             self._tell(NO_ERROR, source)
 
     def reset(self) -> None:
-        """After a reset nothing is wrong and nothing is told."""
+        """After a reset there is no error, and nothing is sent."""
         self._active.clear()
         self._values[key(0x1001)] = 0
 

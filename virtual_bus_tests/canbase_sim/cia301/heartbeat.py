@@ -21,7 +21,7 @@ ROUNDING_S = 1e-6
 
 
 class HeartbeatProducer:
-    """Says when the next heartbeat is due; the node sends it."""
+    """Computes when the next heartbeat is due; the node sends it."""
 
     def __init__(self, dictionary: Dictionary) -> None:
         self._values = dictionary.values
@@ -82,7 +82,7 @@ class HeartbeatConsumer:
         return any(producer.watch is Watch.LOST for producer in self._producers.values())
 
     def configure(self) -> None:
-        """Start anew from 1016h."""
+        """Restart from 1016h."""
         for subindex in self._subs:
             self._configure(subindex)
 

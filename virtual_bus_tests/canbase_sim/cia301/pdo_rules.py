@@ -45,7 +45,7 @@ DUMMIES = {2: "b", 3: "h", 4: "i", 5: "B", 6: "H", 7: "I"}
 
 
 class PdoRules:
-    """Guards of one PDO. `communication` and `mapping` are its indexes, `operational` tells the NMT state."""
+    """Guards of one PDO. `communication` and `mapping` are its indexes, `operational` returns the NMT state."""
 
     def __init__(
         self, dictionary: Dictionary, communication: int, mapping: int, receives: bool, operational: Callable[[], bool]

@@ -98,7 +98,7 @@ class Rpdo:
         for write, value in zip(self._writers, self._codec.unpack_from(data), strict=True):
             try:  # noqa: SIM105 - it costs nothing
                 write(value)
-            except SdoAbortedError:  # the object does not take it, and nobody is told
+            except SdoAbortedError:  # the object does not take it; an RPDO has no answer
                 pass
 
 

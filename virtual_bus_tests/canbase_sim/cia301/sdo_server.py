@@ -16,7 +16,7 @@ RESPONSE = 0x580
 
 
 class _Store:
-    """What canopen's SdoServer asks of a node."""
+    """What canopen's SdoServer needs of a node."""
 
     def __init__(self, dictionary: Dictionary) -> None:
         self.object_dictionary = dictionary
@@ -27,7 +27,7 @@ class _Store:
 
 
 class _Wire:
-    """What canopen's SdoServer asks of a network."""
+    """What canopen's SdoServer needs of a network."""
 
     def __init__(self, send: Callable[[Frame], None]) -> None:
         self._send = send

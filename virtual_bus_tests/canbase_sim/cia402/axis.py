@@ -68,7 +68,7 @@ class AxisFaults:
 
 @dataclass(slots=True)
 class Axis:
-    """Axis `number` of a node. `encoder` measures its motor, `on_change` hears every transition.
+    """Axis `number` of a node. `encoder` measures its motor, `on_change` receives every transition.
 
     `hold`: something holds its wheel with so much force [N].
     """
@@ -283,7 +283,7 @@ class Axis:
             self._go(after(self.state, Event.STOP_DONE))
             self._obey()
 
-    # What the motor is told
+    # The motor's orders
 
     def _enable(self) -> None:
         if not self.motor.powered:

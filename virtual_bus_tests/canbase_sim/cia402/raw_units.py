@@ -46,7 +46,7 @@ class Scale:
 
     @classmethod
     def of(cls, drive: Drive, wheel_radius_m: float, personality: Personality = GENERIC) -> Scale:
-        """The scale of an axis: units of the personality, those that it leaves open as robot.yaml says."""
+        """The scale of an axis: units of the personality; robot.yaml has those that it leaves open."""
         metres, counts = 2.0 * pi * wheel_radius_m / drive.gear_ratio, float(drive.counts_per_motor_rev)
         velocity = STEPS_PER_REVOLUTION | {unit: steps * counts for unit, steps in STEPS_PER_COUNT.items()}
         target = metres / velocity[personality.target_unit or drive.target_unit]

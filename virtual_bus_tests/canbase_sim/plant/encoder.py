@@ -16,11 +16,11 @@ class EncoderFault:
     """What a faulty encoder makes of the motion."""
 
     factor: float = 0.0
-    """It counts so many times the motion: 0 lost, -1 reversed, 0.5 scaled."""
+    """It counts the motion times this: 0 lost, -1 reversed, 0.5 scaled."""
     holds_speed: bool = False
-    """The velocity keeps its last value, like a register that nobody refreshes."""
+    """The velocity keeps its last value, like a register that is no longer refreshed."""
     off_s: float = 0.0
-    """Above 0: for so long the factor holds, then all of the motion counts for `on_s`, and so on."""
+    """Above 0: the factor holds for this long, then all of the motion counts for `on_s`, and so on."""
     on_s: float = 0.0
     """0: as long as `off_s`."""
     most_mps: float = math.inf
@@ -60,7 +60,7 @@ class Encoder:
 
     @property
     def scale(self) -> float:
-        """It counts so many times the motion; 1 for one that counts none of it, or backward."""
+        """It counts the motion times this; 1 for one that counts none of it, or backward."""
         return self._factor if self.closes_loop else 1.0
 
     def suffer(self, fault: EncoderFault, speed_mps: float) -> None:
@@ -98,7 +98,7 @@ class Encoder:
         return by_m / self._step_s
 
     def _count(self, factor: float) -> None:
-        """From now on the motion counts so many times."""
+        """From now on the motion counts times this."""
         if factor != self._factor:
             self._shown_m, self._at_m = self.travel_m, self._true_m()
             self._factor = factor

@@ -25,7 +25,7 @@ DEFAULT_BODY = PlantParameters()
 
 @dataclass(frozen=True, slots=True)
 class BenchParameters:
-    """What robot.yaml does not say about the drives."""
+    """Properties of the drives that robot.yaml does not have."""
 
     boot_delay_s: float = 0.1
     """From power on to the boot-up message [s]."""
@@ -81,13 +81,13 @@ class Bench:
         self._all_nodes = tuple(self.nodes.values())
 
     def on_frame(self, frame: Frame, now_s: float) -> None:
-        """A frame from the bus: the world moves up to `now_s`, then every node hears it."""
+        """A frame from the bus: the world moves up to `now_s`, then every node receives it."""
         self._advance(now_s)
         for node in self._all_nodes:
             node.on_frame(frame.cob_id, frame.data, now_s)
 
     def tick(self, now_s: float) -> list[Frame]:
-        """The world moves up to `now_s`; the frames that the nodes have to say, in order."""
+        """The world moves up to `now_s`; the frames that the nodes send, in order."""
         self._advance(now_s)
         return [frame for node in self._all_nodes for frame in node.tick(now_s)]
 
@@ -117,7 +117,7 @@ class Bench:
         return changes
 
     def lost_heartbeats(self) -> list[tuple[int, int]]:
-        """Each heartbeat that a node has missed since the last call: who missed it, and whose it was (node ids)."""
+        """Each heartbeat that a node has missed since the last call: the node, and the watched one (node ids)."""
         lost = [(node.node_id, producer) for node in self._all_nodes for producer in node.lost_producers]
         for node in self._all_nodes:
             node.lost_producers.clear()

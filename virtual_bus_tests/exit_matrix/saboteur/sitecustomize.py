@@ -29,7 +29,7 @@ FILE = "CANBASE_SABOTAGE"
 
 
 class InjectedError(RuntimeError):
-    """Nobody expects this one."""
+    """An exception that no part expects."""
 
 
 def raise_error() -> NoReturn:
