@@ -91,9 +91,9 @@ def _all(loaded: Loaded, arguments: list[str], seconds: float, *, with_bus: bool
 
 def _parts(loaded: Loaded, arguments: list[str], seconds: float) -> list[Check]:
     with ros_needed():
+        from canbase_doctor.default_checks import default_checks
         from canbase_doctor.observe import observe
-        from canbase_doctor.robot_checks import robot_checks
-    return robot_checks(observe(loaded, arguments, seconds))
+    return default_checks(observe(loaded, arguments, seconds))
 
 
 def _row(check: Check) -> dict[str, Any]:

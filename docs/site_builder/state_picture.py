@@ -7,7 +7,7 @@ from html import escape
 from typing import Final
 
 from canbase_driver.supervision.phases import WAITING, Phase
-from canbase_driver.supervision.supervisor import TRANSITIONS
+from canbase_driver.supervision.state_machine import TRANSITIONS
 
 WIDTH, HEIGHT = 1180, 640
 BOX_W, BOX_H = 116, 40
@@ -49,7 +49,7 @@ PATHS: Final[dict[Edge, tuple[str, int, int]]] = {
 }
 """The line of each edge, and where its words begin. None: from any phase that waits for power."""
 RESET: Final = "M60,490 L60,216"
-"""Supervisor.reset, which no row of the table does."""
+"""StateMachine.reset, which no row of the table does."""
 INSIDE = (Phase.OFFLINE, Phase.BOOTING, Phase.DISARMED, Phase.PREPARING, Phase.ARMING)
 
 

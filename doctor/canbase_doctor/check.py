@@ -1,6 +1,6 @@
 """What `canbase doctor` finds out, as plain values: one `Check` a row, and the table and exit code made of them.
 
-Pure. A new row is a function that returns a `Check`, added to `CHECKS` of robot_checks.py or to a `Symptom`.
+Pure. A new row is a function that returns a `Check`, added to `CHECKS` of default_checks.py or to a `Symptom`.
 """
 
 from __future__ import annotations

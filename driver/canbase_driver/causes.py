@@ -7,7 +7,7 @@ from enum import Enum
 
 
 class Cause(Enum):
-    """What the supervisor found. The value is the word that people and topics see."""
+    """What the state machine found. The value is the word that people and topics see."""
 
     NONE = "none"
     BOOTING = "booting"

@@ -1,6 +1,6 @@
 """The motor driver without bus, clock and ROS: frames and commands in, frames and snapshots out.
 
-One cycle is `tick`: heartbeat, boots, the supervisor's judgement, a reset on its way, the setpoints of all axes,
+One cycle is `tick`: heartbeat, boots, the state machine's judgement, a reset on its way, the setpoints of all axes,
 SYNC. The reasons to stop are in `hazards.py`, the boot of a node in `sequence.py`, the limits of the speed in
 `limiter.py`.
 """
@@ -43,14 +43,14 @@ from canbase_driver.motion.velocity_command import Command
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervision.bus_health import BusReport
 from canbase_driver.supervision.cycle_stats import CycleStats
+from canbase_driver.supervision.fault_reset import Outcome
 from canbase_driver.supervision.latch import PowerRecord, found_before_the_start
 from canbase_driver.supervision.lifecycle import Aim, Lifecycle
 from canbase_driver.supervision.phases import NO_POWER, Drive, Orders
-from canbase_driver.supervision.reset import Outcome
 from canbase_driver.supervision.reset_run import ResetRun
 from canbase_driver.supervision.situation import Situation
+from canbase_driver.supervision.state_machine import StateMachine
 from canbase_driver.supervision.stop_history import StopRecord
-from canbase_driver.supervision.supervisor import Supervisor
 from canbase_driver.supervision.watchdog_link import COUNTERS_COB_ID, STATE_COB_ID, WatchdogLink
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.latch_record import Found, Record
@@ -81,7 +81,7 @@ class DriverCore:
         self._standstill_s = stopping.standstill_s(robot)
         self._track_m, self._feedback_s = robot.base.track_m, robot.timeouts.feedback_s
         self._heartbeat_s = robot.timeouts.drive_heartbeat_s / HEARTBEATS_PER_TIMEOUT - self._period_s / 2.0
-        self._supervisor = Supervisor(Braking(robot), self._standstill_s, found_before_the_start(found))
+        self._state_machine = StateMachine(Braking(robot), self._standstill_s, found_before_the_start(found))
         self._record = PowerRecord(found)
         self._let_go = LetGo(robot)
         self._limiter = Limiter(robot.limits, robot.base.track_m)
@@ -111,17 +111,17 @@ class DriverCore:
     @property
     def finished(self) -> bool:
         """A shutdown was requested, and nothing has power any more."""
-        return self._supervisor.finished
+        return self._state_machine.finished
 
     @property
     def state(self) -> DriverState:
         """State of the driver."""
-        return self._supervisor.state
+        return self._state_machine.state
 
     @property
     def finding(self) -> Finding:
         """Why it is not enabled."""
-        return self._supervisor.finding
+        return self._state_machine.finding
 
     @property
     def lets_go(self) -> bool:
@@ -179,7 +179,7 @@ class DriverCore:
 
     def request_reset(self, now_s: float, on_outcome: Callable[[Outcome], None]) -> None:
         """Begin a reset; `on_outcome` is called once, at once when it is refused."""
-        if self._reset.begin(self._situation(now_s), self._supervisor.state in NO_POWER, now_s, on_outcome):
+        if self._reset.begin(self._situation(now_s), self._state_machine.state in NO_POWER, now_s, on_outcome):
             for node in self._drives.nodes:
                 node.clear_lost_heartbeat(now_s)
 
@@ -212,10 +212,10 @@ class DriverCore:
         frames = self._heartbeat(now_s)
         if not self._readiness.released:
             ends = self._shutdown_requested or self._readiness.unconfigured
-            may_boot = self._supervisor.state in NO_POWER and not ends
+            may_boot = self._state_machine.state in NO_POWER and not ends
             asked_since = now_s if self._bus_problem else self._sync_since
             frames += self._drives.tick(now_s, may_boot, asked_since)
-        unread = self._supervisor.state is DriverState.ENABLED and not self._reset.runs
+        unread = self._state_machine.state is DriverState.ENABLED and not self._reset.runs
         situation = self._situation(now_s, with_motion=not unread)
         orders = self._judge(situation, now_s)
         frames += self._go_on_with_reset(situation, now_s)
@@ -242,15 +242,15 @@ class DriverCore:
         return [frame for node in self._drives.nodes for frame in node.setpoints(goal, 0.0, 0.0)] + [self._sync.next()]
 
     def _judge(self, situation: Situation, now_s: float) -> Orders:
-        before, latched_before = self._supervisor.state, self._supervisor.latches
-        orders = self._supervisor.step(situation, now_s)
-        self._record.note(self._supervisor, situation)
-        state, finding = self._supervisor.state, self._supervisor.finding
+        before, latched_before = self._state_machine.state, self._state_machine.latches
+        orders = self._state_machine.step(situation, now_s)
+        self._record.note(self._state_machine, situation)
+        state, finding = self._state_machine.state, self._state_machine.finding
         began = state is not before and state in (DriverState.STOPPING, DriverState.LATCHED)
         continued = before is DriverState.STOPPING and state in (DriverState.STOPPING, DriverState.LATCHED)
-        if (began and not continued) or (continued and self._supervisor.latches and not latched_before):
+        if (began and not continued) or (continued and self._state_machine.latches and not latched_before):
             by = "watchdog" if finding.cause is Cause.WATCHDOG_TRIPPED else "motor_driver"
-            latches = self._supervisor.latches
+            latches = self._state_machine.latches
             self.stops.append(StopRecord(by, finding.cause.value, finding.detail, latches, finding.clears_on, now_s))
         if state is not before and state is DriverState.ENABLED:
             self._command.await_zero()
@@ -284,7 +284,7 @@ class DriverCore:
     def _stop_by_sdo(self, orders: Orders, situation: Situation, now_s: float) -> list[Frame]:
         """While a watchdog lives its ladder does this, and takes an SDO of ours for another master's."""
         alone = situation.watchdog is WatchdogView.MISSING and not self._bus_problem
-        if not alone or self._supervisor.state is not DriverState.STOPPING:
+        if not alone or self._state_machine.state is not DriverState.STOPPING:
             return []
         return [frame for node in self._drives.nodes for frame in node.stop_by_sdo(orders.goal, now_s)]
 
@@ -292,7 +292,7 @@ class DriverCore:
         frames, outcome = self._reset.step(situation, now_s)
         if outcome is not None and outcome.done:
             self._stop_requested = False
-            self._supervisor.reset()
+            self._state_machine.reset()
             self._drives.forget_emcys()
         if outcome is not None:
             self._reset.end(outcome)
@@ -392,8 +392,8 @@ class DriverCore:
         dropped = self.frames_dropped + self._bus_report.dropped
         return DriverSnapshot(
             time_s=now_s,
-            state=self._supervisor.state,
-            finding=self._supervisor.finding,
+            state=self._state_machine.state,
+            finding=self._state_machine.finding,
             standstill=self._drives.are_proven_to_stand(now_s),
             standstill_assumed=self._drives.assumed(now_s),
             watchdog=self._watchdog.report(now_s),

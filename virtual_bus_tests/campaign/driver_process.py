@@ -11,8 +11,8 @@ from canbase_driver.cia301.frame import Frame
 from canbase_driver.core import DriverCore
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.snapshot import DriverSnapshot
+from canbase_driver.supervision.fault_reset import Outcome
 from canbase_driver.supervision.lifecycle import Aim
-from canbase_driver.supervision.reset import Outcome
 from canbase_velocity.decision import Decision
 from canbase_velocity.twist import ZERO, Twist
 

@@ -11,7 +11,7 @@ from campaign.envelope import react_s
 from campaign.plan import GoalRequest, Plan, Segment
 from campaign.scanner import Scanner
 from campaign.world import World
-from canbase_driver.supervision.reset import Outcome
+from canbase_driver.supervision.fault_reset import Outcome
 from canbase_velocity.clearance import NOWHERE, Points
 from canbase_velocity.twist import Twist
 

@@ -17,7 +17,7 @@ from canbase_driver.drives.let_go import LetGo
 from canbase_driver.motion import velocity_command as command
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.motion.odometry import WheelTravel
-from canbase_driver.supervision import reset, supervisor, watchdog_link
+from canbase_driver.supervision import fault_reset, state_machine, watchdog_link
 from canbase_driver.supervision.hazards import HAZARDS, Blocker, Hazard
 from canbase_driver.supervision.phases import Phase
 from canbase_runtime.latch_record import CLEAR, Defect, Found
@@ -60,7 +60,7 @@ def _reason(kind: type[Blocker | Hazard], cause: Cause) -> Callable[[], None]:
         reason = getattr(row, "reason", row)
         return not (isinstance(reason, kind) and reason.cause is cause)
 
-    return _drop(supervisor, stays)
+    return _drop(state_machine, stays)
 
 
 def _all_trips() -> None:
@@ -82,7 +82,7 @@ def _no_latch() -> None:
 
 def _driver_forgets() -> None:
     """A latched stop of the driver ends by itself."""
-    supervisor.BY_PHASE[Phase.LATCHED] = supervisor.BY_PHASE[Phase.DISARMED]
+    state_machine.BY_PHASE[Phase.LATCHED] = state_machine.BY_PHASE[Phase.DISARMED]
 
 
 def _forget_estop(self: filter_state.SafetyFilter, now_s: float) -> None:
@@ -120,10 +120,10 @@ def _unreadable_is_clear() -> None:
 
 def _resets_while_commanded() -> None:
     """A reset is not refused, and not broken off, because a command orders motion."""
-    commanded = reset._BUS_OR_COMMAND[0]
-    reset.REFUSALS = tuple(check for check in reset.REFUSALS if check is not commanded)
-    for phase, checks in reset.BREAKS.items():
-        reset.BREAKS[phase] = tuple(check for check in checks if check is not commanded)
+    commanded = fault_reset._BUS_OR_COMMAND[0]
+    fault_reset.REFUSALS = tuple(check for check in fault_reset.REFUSALS if check is not commanded)
+    for phase, checks in fault_reset.BREAKS.items():
+        fault_reset.BREAKS[phase] = tuple(check for check in checks if check is not commanded)
 
 
 def _never_frozen(self: FrozenWatch, scan: Scan, now_s: float, *, moves: bool) -> str:

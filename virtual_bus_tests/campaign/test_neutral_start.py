@@ -10,7 +10,7 @@ import pytest
 
 from campaign.outside import Surroundings
 from campaign.world import World
-from canbase_driver.supervision.reset import Outcome
+from canbase_driver.supervision.fault_reset import Outcome
 from canbase_runtime.driver_state import DriverState
 from canbase_velocity.neutral import Arming
 from canbase_velocity.twist import ZERO, Twist

@@ -32,8 +32,8 @@ HOT = {
         "drives.sdo_stop drives.standstill drives.stopping_distance drives.telemetry "
         "motion.braking motion.kinematics motion.limiter motion.odometry motion.velocity_command "
         "supervision.bus_health supervision.cycle_stats supervision.latch supervision.lifecycle "
-        "supervision.phases supervision.hazards supervision.reset supervision.reset_run supervision.situation "
-        "supervision.stop_history supervision.supervisor "
+        "supervision.phases supervision.hazards supervision.fault_reset supervision.reset_run supervision.situation "
+        "supervision.stop_history supervision.state_machine "
         "supervision.watchdog_link"
     ),
     "canbase_velocity": (

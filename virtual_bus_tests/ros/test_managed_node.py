@@ -13,8 +13,8 @@ from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from canbase_driver.ros.managed_node import ManagedNode
+from canbase_driver.supervision.fault_reset import Outcome
 from canbase_driver.supervision.lifecycle import Aim
-from canbase_driver.supervision.reset import Outcome
 from support.ros_harness import TestNode
 
 pytestmark = pytest.mark.ros

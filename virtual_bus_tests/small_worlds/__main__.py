@@ -1,4 +1,4 @@
-"""`python -m small_worlds`: everything that a few events can do to supervisor, watchdog, drives, mux and filter."""
+"""`python -m small_worlds`: everything that a few events can do to state machine, watchdog, drives, mux and filter."""
 
 from __future__ import annotations
 

@@ -12,9 +12,9 @@ from campaign.process import Process
 from campaign.robots import campaign_robot
 from campaign.world import World
 from canbase_config.robot import Robot
-from canbase_driver.supervision import supervisor
+from canbase_driver.supervision import state_machine
+from canbase_driver.supervision.fault_reset import Outcome
 from canbase_driver.supervision.lifecycle import Aim
-from canbase_driver.supervision.reset import Outcome
 from canbase_velocity.twist import ZERO, Twist
 from small_worlds.events import EVENTS, EVER_S, Event
 
@@ -37,7 +37,7 @@ COARSE = Pace(
 TORN_AT = 100
 """A byte of the first of two pages."""
 ENABLE_S = 0.9
-"""In place of supervisor.ENABLE_TIMEOUT_S, which is longer than canonical.OLD_S."""
+"""In place of state_machine.ENABLE_TIMEOUT_S, which is longer than canonical.OLD_S."""
 STICK_S = 0.1
 """Between two messages of the joystick."""
 SPEED_MPS = 0.4
@@ -64,7 +64,7 @@ class SmallWorld:
 
     def __init__(self, start: str) -> None:
         """Raises KeyError for a start that is not in STARTS."""
-        supervisor.ENABLE_TIMEOUT_S = ENABLE_S
+        state_machine.ENABLE_TIMEOUT_S = ENABLE_S
         self.world: World = World(small_robot(), 0, COARSE)
         self.world.bus.bitrate = math.inf  # type: ignore[assignment]
         self.around: Surroundings = Surroundings(self.world)

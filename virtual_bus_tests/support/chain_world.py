@@ -15,8 +15,8 @@ from canbase_driver.cia301.frame import Frame
 from canbase_driver.core import DriverCore
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.snapshot import DriverSnapshot
+from canbase_driver.supervision.fault_reset import Outcome
 from canbase_driver.supervision.lifecycle import Aim
-from canbase_driver.supervision.reset import Outcome
 from canbase_runtime.driver_state import DriverState
 from canbase_sim.cia402.states import State
 from canbase_sim.frame import Frame as BenchFrame

@@ -17,7 +17,7 @@ from canbase_driver.runtime.black_box import Ring
 from canbase_driver.runtime.bus_port import BusPort
 from canbase_driver.runtime.control_thread import ControlLoop
 from canbase_driver.snapshot import DriverSnapshot
-from canbase_driver.supervision.reset import Outcome
+from canbase_driver.supervision.fault_reset import Outcome
 from canbase_driver.supervision.stop_history import StopRecord
 from canbase_runtime.driver_state import DriverState
 from canbase_sim.faults import apply

@@ -1,6 +1,6 @@
 """All drives of the base as one: what keeps them from being ready, whether they stand, how far each side has rolled.
 
-Sentences name joint, node and values and are empty when there is nothing to report. No decisions: `supervisor.py`.
+Sentences name joint, node and values and are empty when there is nothing to report. No decisions: `state_machine.py`.
 """
 
 from __future__ import annotations

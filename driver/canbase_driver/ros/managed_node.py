@@ -18,8 +18,8 @@ from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from canbase_driver.ros.late_answer import Asked, answer_later
 from canbase_driver.ros.request_age import refusal
 from canbase_driver.runtime.control_thread import ControlLoop
+from canbase_driver.supervision.fault_reset import Outcome
 from canbase_driver.supervision.lifecycle import Aim
-from canbase_driver.supervision.reset import Outcome
 from canbase_runtime.receive_time import ReceiveTimes
 from canbase_runtime.sim_time import refuse_sim_time
 

@@ -18,7 +18,7 @@ from canbase_driver.ros.late_answer import Asked, answer_later
 from canbase_driver.ros.messages import pose_of
 from canbase_driver.ros.request_age import refusal
 from canbase_driver.runtime.control_thread import ControlLoop
-from canbase_driver.supervision.reset import Outcome
+from canbase_driver.supervision.fault_reset import Outcome
 from canbase_runtime.foreign_text import printable
 from canbase_runtime.journal import Journal, Voice
 from canbase_runtime.log_priority import Priority

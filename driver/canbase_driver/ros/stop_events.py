@@ -23,8 +23,8 @@ from canbase_driver.ros.messages import stop_event_message
 from canbase_driver.runtime.black_box import Ring
 from canbase_driver.runtime.black_box_writer import BlackBoxWriter
 from canbase_driver.snapshot import DriverSnapshot
+from canbase_driver.supervision.state_machine import POWER_OFF_TIMEOUT_S
 from canbase_driver.supervision.stop_history import FILTER, StopHistory, StopRecord, StopReport, standstill_text
-from canbase_driver.supervision.supervisor import POWER_OFF_TIMEOUT_S
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
 from canbase_runtime.journal import Voice
 from canbase_runtime.log_priority import Priority

@@ -22,8 +22,8 @@ from canbase_driver.motion.odometry import Pose2D
 from canbase_driver.runtime.black_box import Ring
 from canbase_driver.runtime.bus_port import BusPort
 from canbase_driver.snapshot import DriverSnapshot
+from canbase_driver.supervision.fault_reset import Outcome
 from canbase_driver.supervision.lifecycle import Aim
-from canbase_driver.supervision.reset import Outcome
 from canbase_driver.supervision.stop_history import StopRecord
 from canbase_runtime.latch_file import LatchKeeper
 

@@ -1,1 +1,1 @@
-"""When the drives may have power and what takes it away: supervisor, reset, lifecycle, the watchdog, latch."""
+"""When the drives may have power and what takes it away: state machine, reset, lifecycle, the watchdog, latch."""

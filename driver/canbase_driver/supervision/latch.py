@@ -9,7 +9,7 @@ from __future__ import annotations
 from canbase_driver.causes import Cause, Finding
 from canbase_driver.supervision.phases import Phase
 from canbase_driver.supervision.situation import Situation
-from canbase_driver.supervision.supervisor import Supervisor
+from canbase_driver.supervision.state_machine import StateMachine
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.latch_record import Defect, Found, Mark, Record, WriteAhead
 
@@ -54,18 +54,18 @@ class PowerRecord:
             return ""
         return self._ahead.problem or "the driver's record of stops is not on disk yet"
 
-    def note(self, supervisor: Supervisor, situation: Situation) -> None:
-        """After the supervisor's step."""
-        state, finding = supervisor.state, supervisor.finding
-        if state is DriverState.LATCHED or (state is DriverState.STOPPING and supervisor.latches):
-            if not supervisor.finished:  # the shutdown is no cause
+    def note(self, state_machine: StateMachine, situation: Situation) -> None:
+        """After the state machine's step."""
+        state, finding = state_machine.state, state_machine.finding
+        if state is DriverState.LATCHED or (state is DriverState.STOPPING and state_machine.latches):
+            if not state_machine.finished:  # the shutdown is no cause
                 self._ahead.want(Mark.LATCHED, cause=finding.cause.value, detail=finding.detail)
-        elif self._is_live(supervisor, situation):
+        elif self._is_live(state_machine, situation):
             self._ahead.want(Mark.LIVE)
         else:
             self._ahead.want(Mark.CLEAR)
 
-    def _is_live(self, supervisor: Supervisor, situation: Situation) -> bool:
+    def _is_live(self, state_machine: StateMachine, situation: Situation) -> bool:
         """Power is about to come, is there, or was there and was not measured to be off."""
         may_be_left = situation.powered and self._ahead.wanted.mark is not Mark.CLEAR
-        return supervisor.state in _WITH_POWER or supervisor.phase is Phase.ARMING or may_be_left
+        return state_machine.state in _WITH_POWER or state_machine.phase is Phase.ARMING or may_be_left

@@ -5,8 +5,8 @@ RELEASED ──configure──► CONFIGURED ──activate──► ACTIVE     
 
 What is aimed at is the state of the lifecycle: ROS shows it (`managed_node.py`), and owns none of its own.
 
-Rules. What is aimed at holds at once: less than ACTIVE is a reason to stop (`supervisor.py`), and RELEASED follows only
-when nothing has power. A latched stop outlives every change: `reset` alone ends it. Pure: time is an argument.
+Rules. What is aimed at holds at once: less than ACTIVE is a reason to stop (`state_machine.py`), and RELEASED follows
+only when nothing has power. A latched stop outlives every change: `reset` alone ends it. Pure: time is an argument.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from enum import IntEnum
 from canbase_config.robot import Robot
 from canbase_config.stopping import given_up_s
 from canbase_driver.causes import Finding
+from canbase_driver.supervision.fault_reset import Outcome
 from canbase_driver.supervision.phases import NO_POWER
-from canbase_driver.supervision.reset import Outcome
 from canbase_driver.supervision.situation import Situation
-from canbase_driver.supervision.supervisor import ENABLE_TIMEOUT_S, POWER_OFF_TIMEOUT_S
+from canbase_driver.supervision.state_machine import ENABLE_TIMEOUT_S, POWER_OFF_TIMEOUT_S
 from canbase_runtime.driver_state import DriverState
 
 MARGIN_S = 1.0
@@ -82,7 +82,7 @@ class Lifecycle:
         self.released = self.released and aim is Aim.RELEASED
 
     def step(self, situation: Situation, state: DriverState, finding: Finding, now_s: float) -> bool:
-        """Once a cycle, after the supervisor. True: the drives are to be released now."""
+        """Once a cycle, after the state machine. True: the drives are to be released now."""
         let_go = self.aim is Aim.RELEASED and not self.released and state in NO_POWER and not situation.powered
         self.released = self.released or let_go
         change = self._change

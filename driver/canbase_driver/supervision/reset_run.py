@@ -1,11 +1,11 @@
-"""The reset on its way, its request to the watchdog, and the waiting caller. The sequence: `reset.py`."""
+"""The reset on its way, its request to the watchdog, and the waiting caller. The sequence: `fault_reset.py`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from canbase_driver.cia301.frame import Frame
-from canbase_driver.supervision.reset import Outcome, Reset, ResetPhase, refusal
+from canbase_driver.supervision.fault_reset import Outcome, Reset, ResetPhase, refusal
 from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.watchdog_link import WatchdogLink
 

@@ -1,4 +1,4 @@
-"""What is measured at one cycle of the driver, and what was requested of it: all that the supervisor decides by."""
+"""What is measured at one cycle of the driver, and what was requested of it: all that the state machine decides by."""
 
 from __future__ import annotations
 

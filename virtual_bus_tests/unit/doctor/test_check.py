@@ -14,8 +14,8 @@ from rich.console import Console
 
 from canbase_config.load import load_robot, sample
 from canbase_doctor.check import Verdict, exit_code, first_failure, table
+from canbase_doctor.default_checks import default_checks
 from canbase_doctor.evidence import Evidence, Heard
-from canbase_doctor.robot_checks import robot_checks
 
 Change = Callable[[Any], None]
 
@@ -60,7 +60,7 @@ def test_a_sample_that_is_old_is_not_taken_for_what_is(topic: str, age_s: float,
     """A latched topic gives the last words of a node that hangs to whoever asks."""
     seen = evidence(healthy())
     heard = {**seen.heard, topic: Heard(seen.on(topic).messages, (0.0, seen.now_s - age_s))}
-    checks = robot_checks(replace(seen, heard=heard))
+    checks = default_checks(replace(seen, heard=heard))
     assert any(f"nothing on {topic} for {age_s:.1f} s" in check.found for check in checks) is found
     assert (exit_code(checks) != 0) is found
 
@@ -75,7 +75,7 @@ def test_a_sample_that_is_old_is_not_taken_for_what_is(topic: str, age_s: float,
 def test_a_source_that_is_not_followed_is_named_with_what_to_do(standing: int, reason: str, advice: str) -> None:
     """What to do goes by the standing that the mux has decided: the sentence and the ages may be any."""
     source = MuxSource(name="joystick", active=True, standing=standing, timeout_s=0.3, reason=reason)
-    failed = first_failure(robot_checks(changed("velocity_mux/state", active="joystick", sources=[source])))
+    failed = first_failure(default_checks(changed("velocity_mux/state", active="joystick", sources=[source])))
     assert failed is not None
     assert failed.found == f"joystick is not followed: {reason}"
     assert failed.advice.startswith(advice)
@@ -89,11 +89,11 @@ def drive_changed(**values: Any) -> Evidence:
 
 
 def not_ok(seen: Evidence) -> list[tuple[str, Verdict]]:
-    return [(check.name, check.verdict) for check in robot_checks(seen) if check.verdict is not Verdict.OK]
+    return [(check.name, check.verdict) for check in default_checks(seen) if check.verdict is not Verdict.OK]
 
 
 def test_a_robot_that_is_well_has_nothing_but_good_rows_and_exit_code_0() -> None:
-    checks = robot_checks(evidence(healthy()))
+    checks = default_checks(evidence(healthy()))
     assert {check.verdict for check in checks} == {Verdict.OK}
     assert [check.advice for check in checks] == [""] * 9
     assert exit_code(checks) == 0
@@ -135,7 +135,7 @@ def test_each_thing_that_is_wrong_is_one_row_that_says_what_to_do(
     seen: Evidence, row: str, verdict: str, told: str
 ) -> None:
     assert not_ok(seen) == [(row, Verdict(verdict))]
-    check = next(check for check in robot_checks(seen) if check.name == row)
+    check = next(check for check in default_checks(seen) if check.name == row)
     assert told in f"{check.found} {check.advice}"
     assert check.advice
 
@@ -155,7 +155,7 @@ def test_a_counter_that_grew_before_doctor_came_is_no_warning() -> None:
     ],
 )
 def test_a_silent_part_fails_and_the_exit_code_is_1(topic: str, rows: list[str]) -> None:
-    checks = robot_checks(evidence(healthy() | {topic: None}))
+    checks = default_checks(evidence(healthy() | {topic: None}))
     assert [check.name for check in checks if check.verdict is Verdict.FAIL] == rows
     assert exit_code(checks) == 1
     failed = first_failure(checks)
@@ -166,7 +166,7 @@ def test_a_silent_part_fails_and_the_exit_code_is_1(topic: str, rows: list[str])
 def test_the_table_shows_what_was_found_and_what_to_do() -> None:
     told = io.StringIO()
     seen = changed("motor_driver/status", state=DriverStatus.LATCHED, detail="stop asked for", clears_on="reset")
-    Console(file=told, width=120).print(table("bench at /", robot_checks(seen)))
+    Console(file=told, width=120).print(table("bench at /", default_checks(seen)))
     for text in ("bench at /", "motor_driver", "FAIL", "stop asked for", "→ it ends with: reset"):
         assert text in told.getvalue()
 
@@ -190,6 +190,6 @@ def test_each_scanner_has_its_row(changes: dict[str, Any], dropped_before: int, 
     now_s, before = healthy(), healthy()
     now_s["safety_filter/state"].scanners = [ScannerState(**{**SOUND, **changes})]
     before["safety_filter/state"].scanners = [ScannerState(**{**SOUND, "dropped": dropped_before})]
-    (row,) = [check for check in robot_checks(evidence(now_s, before)) if check.name == "scanner scan"]
+    (row,) = [check for check in default_checks(evidence(now_s, before)) if check.name == "scanner scan"]
     assert row.verdict is verdict
     assert told in row.found

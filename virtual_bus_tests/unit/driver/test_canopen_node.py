@@ -280,7 +280,7 @@ def test_a_heartbeat_that_is_too_old_is_silence_though_the_status_is_fresh() -> 
     story.heartbeat(OPERATIONAL)
     assert (
         story.node.silent(story.now_s, NEVER) == ""
-    )  # it is ready again by itself; what is latched is the supervisor's
+    )  # it is ready again by itself; what is latched is the state machine's
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from canbase_driver.cia301.frame import Frame
 from canbase_driver.core import DriverCore
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.supervision.bus_health import BusReport
-from canbase_driver.supervision.reset import Outcome
+from canbase_driver.supervision.fault_reset import Outcome
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.watchdog_view import WatchdogView
 from support.chain_world import World, bench_robot

@@ -9,8 +9,8 @@ import pytest
 from canbase_config.load import load_robot, sample
 from canbase_driver.motion.braking import Braking
 from canbase_driver.supervision.situation import Situation
-from canbase_driver.supervision.supervisor import Supervisor
-from support.supervisor_story import (
+from canbase_driver.supervision.state_machine import StateMachine
+from support.state_machine_story import (
     ENABLED,
     LATCHED,
     OFF,
@@ -32,7 +32,7 @@ def test_the_way_down_goes_on_at_standstill() -> None:
     stop = WRONG["stop requested"]
     assert story.step(also(RUNNING, stop), cycles=30) == RAMP
     assert story.step(also(STANDING, stop)) == OFF
-    assert story.supervisor.state is STOPPING  # the drives have not said yet that they are off
+    assert story.state_machine.state is STOPPING  # the drives have not said yet that they are off
     assert story.step(also(READY, stop)) == OFF
     assert story.told == (LATCHED, "stop requested", True)
 
@@ -51,7 +51,7 @@ def test_a_base_that_does_not_lose_speed_has_its_power_taken_step_by_step_in_les
     story.step(STOP)
     assert story.lasts(STOP, RAMP) == pytest.approx(0.12 + 0.1 / 0.415 + 0.03, abs=0.021)
     assert story.lasts(STOP, QUICK) == pytest.approx(0.12 + 0.1 / 0.5 + 0.03, abs=0.021)
-    while story.supervisor.state is STOPPING:
+    while story.state_machine.state is STOPPING:
         assert story.step(STOP) == OFF
     assert story.told == (LATCHED, "stop requested", True)
 
@@ -70,7 +70,7 @@ def test_a_quick_stop_from_3_mps_at_0_9_mps2_is_waited_for_until_it_stands() -> 
     fast = load_robot(sample("bench")).robot
     limits = {"linear_mps": 3.0, "deceleration_mps2": 0.9, "emergency_deceleration_mps2": 0.9}
     fast = fast.model_copy(update={"limits": fast.limits.model_copy(update=limits)})
-    story.supervisor = Supervisor(Braking(fast), ramp_timeout_s=8.0)
+    story.state_machine = StateMachine(Braking(fast), ramp_timeout_s=8.0)
     fault = also(wheels(3.0), WRONG["drive fault"])
     story.step(READY)
     story.step(wheels(3.0))
@@ -94,7 +94,7 @@ def test_a_ramp_that_is_given_up_latches_with_its_own_cause() -> None:
     assert story.told == (STOPPING, "inactive", False)
     story.lasts(hopeless, RAMP)
     assert story.told == (STOPPING, "did not stop", True)
-    assert story.supervisor.finding.detail.startswith("left turns on its ramp, 0.")
+    assert story.state_machine.finding.detail.startswith("left turns on its ramp, 0.")
 
 
 def test_the_ramp_takes_no_longer_than_timeouts_standstill_s() -> None:

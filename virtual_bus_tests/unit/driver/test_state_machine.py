@@ -13,9 +13,9 @@ from canbase_driver.motion.braking import Braking
 from canbase_driver.supervision.hazards import BLOCKERS, HAZARDS
 from canbase_driver.supervision.phases import NO_POWER, ORDERS, SHOWN, Drive, Orders, Phase
 from canbase_driver.supervision.situation import Situation
-from canbase_driver.supervision.supervisor import Supervisor
+from canbase_driver.supervision.state_machine import StateMachine
 from canbase_runtime.driver_state import DriverState
-from support.supervisor_story import (
+from support.state_machine_story import (
     BOOTING,
     DISARMED,
     ENABLED,
@@ -64,7 +64,7 @@ def test_without_power_whatever_is_wrong_keeps_it_off(
         assert story.step(situation) == OFF
     name = "booting" if wrong == "drive restarted" else wrong
     assert story.told == (shown, name, latched)
-    assert story.supervisor.finding.clears_on
+    assert story.state_machine.finding.clears_on
 
 
 @pytest.mark.parametrize("state", [OFFLINE, BOOTING, DISARMED])
@@ -148,26 +148,26 @@ def test_a_shutdown_ends_from_every_state_with_everything_wrong_in_bounded_time(
     situation = also(hopeless, WRONG["shutdown"])
     last = Orders(PowerGoal.ON, Drive.FOLLOW)
     start = story.now_s
-    while not story.supervisor.finished:
+    while not story.state_machine.finished:
         last = story.step(situation)
         assert story.now_s - start < 0.6 + 0.4 + 0.5 + 0.1
     assert last == OFF
-    assert story.supervisor.state in NO_POWER
-    assert story.supervisor.finding.cause.value == "shutdown"
+    assert story.state_machine.state in NO_POWER
+    assert story.state_machine.finding.cause.value == "shutdown"
 
 
 @pytest.mark.parametrize("state", [OFFLINE, BOOTING, DISARMED, LATCHED])
 def test_a_shutdown_without_power_ends_in_the_same_cycle(state: DriverState) -> None:
     story = at(state)
     story.step(also(READY, WRONG["shutdown"]))
-    assert story.supervisor.finished
+    assert story.state_machine.finished
 
 
 def test_enabling_gives_up_after_two_seconds_and_needs_a_reset() -> None:
     story = at(ENABLING)
     assert story.lasts(READY, ON) == pytest.approx(2.0, abs=0.021)
     assert story.told == (STOPPING, "enable timeout", True)
-    assert story.supervisor.finding.detail == "left is switch on disabled after 2.0 s"
+    assert story.state_machine.finding.detail == "left is switch on disabled after 2.0 s"
     story.step(READY, cycles=3)
     assert story.told == (LATCHED, "enable timeout", True)
 
@@ -177,7 +177,7 @@ def test_when_several_things_are_seen_at_once_the_first_cause_is_told() -> None:
     story = at(ENABLED, RUNNING)
     several = also(also(RUNNING, WRONG["watchdog tripped"]), WRONG["drive disabled"])
     story.step(also(also(several, WRONG["drive fault"]), WRONG["drive restarted"]))
-    assert story.supervisor.finding.cause.value == "watchdog tripped"
+    assert story.state_machine.finding.cause.value == "watchdog tripped"
 
 
 @pytest.mark.parametrize("wrong", ["drive fault", "drive silent", "drive restarted"])
@@ -185,10 +185,10 @@ def test_of_a_drive_that_the_watchdog_tripped_about_the_driver_tells_more(wrong:
     story = at(ENABLED, RUNNING)
     tripped = replace(also(RUNNING, WRONG["watchdog tripped"]), watchdog_about_drive=True)
     story.step(also(tripped, WRONG[wrong]))
-    assert story.supervisor.finding.cause.value == wrong
+    assert story.state_machine.finding.cause.value == wrong
     alone = at(ENABLED, RUNNING)
     alone.step(tripped)
-    assert alone.supervisor.finding.cause.value == "watchdog tripped"
+    assert alone.state_machine.finding.cause.value == "watchdog tripped"
 
 
 @pytest.mark.parametrize("wrong", [name for name, _, latched in STOPS if latched])
@@ -215,9 +215,9 @@ def test_while_the_power_goes_off_drives_that_are_disabled_are_no_news(wrong: st
 @pytest.mark.parametrize("state", [LATCHED, DISARMED])
 def test_a_reset_leads_to_disarmed_and_no_further(state: DriverState) -> None:
     story = at(state)
-    story.supervisor.reset()
-    assert story.supervisor.state is DISARMED
-    assert not story.supervisor.latches
+    story.state_machine.reset()
+    assert story.state_machine.state is DISARMED
+    assert not story.state_machine.latches
     assert story.step(also(READY, WRONG["command not zero"])) == OFF
     assert story.step(READY) == ON
 
@@ -227,7 +227,7 @@ def test_a_reset_in_any_other_state_is_our_own_mistake_and_changes_nothing(state
     story = at(state)
     before = story.told
     with pytest.raises(RuntimeError, match=f"reset in state {state.name}"):
-        story.supervisor.reset()
+        story.state_machine.reset()
     assert story.told == before
 
 
@@ -240,9 +240,9 @@ def test_the_way_to_switched_on_is_no_warning_while_it_takes_less_than_a_second(
     assert story.told == (DISARMED, "preparing", False)
     story.step(WRONG["command not zero"])
     story.step(STO_OPEN, cycles=99)
-    assert story.supervisor.finding.cause.value == "preparing"
+    assert story.state_machine.finding.cause.value == "preparing"
     story.step(STO_OPEN, cycles=3)
-    assert story.supervisor.finding.cause.value == "drive not ready"
+    assert story.state_machine.finding.cause.value == "drive not ready"
 
 
 def test_drives_that_are_not_ready_are_waited_for_without_power_and_without_a_latch() -> None:
@@ -251,7 +251,7 @@ def test_drives_that_are_not_ready_are_waited_for_without_power_and_without_a_la
         assert story.step(STO_OPEN) == Orders(PowerGoal.READY, Drive.ZERO)
     assert story.told == (DISARMED, "drive not ready", False)
     assert story.step(replace(STO_OPEN, unprepared="")) == ON
-    assert story.supervisor.state is ENABLING
+    assert story.state_machine.state is ENABLING
 
 
 def test_while_they_are_waited_for_every_blocker_takes_the_power_off() -> None:
@@ -268,7 +268,7 @@ def test_a_shutdown_takes_drives_back_that_were_prepared_for_power(waits: Situat
     assert story.step(waits) == Orders(PowerGoal.READY, Drive.ZERO)
     assert story.step(also(waits, WRONG["shutdown"])) == OFF
     assert story.told == (DISARMED, "shutdown", False)
-    assert story.supervisor.finished
+    assert story.state_machine.finished
 
 
 # drives prepared ── the records say so on disk ── power
@@ -276,21 +276,21 @@ def test_no_power_before_the_record_is_on_disk() -> None:
     story = Story()
     waits = Situation(unarmed="not on disk yet")
     orders = story.step(waits, 500)
-    assert (story.supervisor.state, story.supervisor.finding.cause.value) == (DISARMED, "stop record")
+    assert (story.state_machine.state, story.state_machine.finding.cause.value) == (DISARMED, "stop record")
     assert orders == ORDERS[Phase.PREPARING]
     story.step(replace(waits, unprepared="no main voltage"), 102)
-    assert story.supervisor.finding.cause.value == "drive not ready"
+    assert story.state_machine.finding.cause.value == "drive not ready"
     story.step(READY)
-    assert story.supervisor.state is ENABLING
+    assert story.state_machine.state is ENABLING
 
 
 def test_a_stop_of_before_the_start_is_latched_until_a_reset() -> None:
     before = Finding(Cause.DRIVE_FAULT, "latched since before the start: left_wheel", "reset")
-    supervisor = Supervisor(Braking(load_robot(sample("bench")).robot), 3.0, before)
+    state_machine = StateMachine(Braking(load_robot(sample("bench")).robot), 3.0, before)
     for step in range(100):
-        orders = supervisor.step(READY, 10.0 + step)
+        orders = state_machine.step(READY, 10.0 + step)
     assert orders == ORDERS[Phase.LATCHED]
-    assert (supervisor.state, supervisor.finding, supervisor.latches) == (LATCHED, before, True)
-    supervisor.reset()
-    supervisor.step(READY, 200.0)
-    assert supervisor.state is ENABLING
+    assert (state_machine.state, state_machine.finding, state_machine.latches) == (LATCHED, before, True)
+    state_machine.reset()
+    state_machine.step(READY, 200.0)
+    assert state_machine.state is ENABLING

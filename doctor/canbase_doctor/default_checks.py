@@ -207,7 +207,7 @@ CHECKS: tuple[Callable[[Evidence], list[Check]], ...] = (
 )
 
 
-def robot_checks(evidence: Evidence) -> list[Check]:
+def default_checks(evidence: Evidence) -> list[Check]:
     """All rows."""
     return [check for checks in CHECKS for check in checks(evidence)]
 

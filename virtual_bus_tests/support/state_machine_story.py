@@ -1,4 +1,4 @@
-"""A supervisor stepped every 10 ms, and every situation that is wrong."""
+"""A state machine stepped every 10 ms, and every situation that is wrong."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from canbase_driver.cia402 import PowerGoal
 from canbase_driver.motion.braking import Braking
 from canbase_driver.supervision.phases import Drive, Orders
 from canbase_driver.supervision.situation import Situation
-from canbase_driver.supervision.supervisor import Supervisor
+from canbase_driver.supervision.state_machine import StateMachine
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.watchdog_view import WatchdogView
 
@@ -53,16 +53,16 @@ def also(base: Situation, wrong: Situation) -> Situation:
 
 
 class Story:
-    """A supervisor with a ramp of at most 3 s, stepped every 10 ms: 1 m/s², 0.12 s of lag."""
+    """A state machine with a ramp of at most 3 s, stepped every 10 ms: 1 m/s², 0.12 s of lag."""
 
     def __init__(self) -> None:
-        self.supervisor = Supervisor(Braking(load_robot(sample("bench")).robot), ramp_timeout_s=3.0)
+        self.state_machine = StateMachine(Braking(load_robot(sample("bench")).robot), ramp_timeout_s=3.0)
         self.now_s = 10.0
 
     def step(self, situation: Situation, cycles: int = 1) -> Orders:
         for _ in range(cycles):
             self.now_s += 0.01
-            orders = self.supervisor.step(situation, self.now_s)
+            orders = self.state_machine.step(situation, self.now_s)
         return orders
 
     def lasts(self, situation: Situation, orders: Orders, longest_s: float = 10.0) -> float:
@@ -75,11 +75,11 @@ class Story:
     @property
     def told(self) -> tuple[DriverState, str, bool]:
         """State, cause, and whether it needs a reset."""
-        return self.supervisor.state, self.supervisor.finding.cause.value, self.supervisor.latches
+        return self.state_machine.state, self.state_machine.finding.cause.value, self.state_machine.latches
 
 
 def at(state: DriverState, wheels: Situation = STANDING) -> Story:
-    """A supervisor that has got into this state in the ordinary way."""
+    """A state machine that has got into this state in the ordinary way."""
     story = Story()
     ways: dict[DriverState, tuple[Situation, ...]] = {
         OFFLINE: (WRONG["bus failed"],),
@@ -92,5 +92,5 @@ def at(state: DriverState, wheels: Situation = STANDING) -> Story:
     }
     for situation in ways[state]:
         story.step(situation)
-    assert story.supervisor.state is state
+    assert story.state_machine.state is state
     return story

@@ -42,7 +42,7 @@ _LATCHED_HAZARDS = tuple(hazard for hazard in HAZARDS if hazard.latched)
 _LATCHED_HAZARDS_ON_THE_WAY_DOWN = tuple(hazard for hazard in _HAZARDS_WHILE_ENABLING if hazard.latched)
 """Drives that are disabled by a quick stop or by us are no hazard there."""
 
-When = Callable[["Supervisor", Situation], "str | None"]
+When = Callable[["StateMachine", Situation], "str | None"]
 """The sentence with the values when it is so, else None."""
 
 
@@ -63,7 +63,7 @@ class Transition:
     """The row of BLOCKERS or HAZARDS that it is made of."""
 
 
-class Supervisor:
+class StateMachine:
     """The state machine. `step` once a cycle; `reset` when the reset sequence has finished."""
 
     def __init__(self, braking: Braking, ramp_timeout_s: float, latched: Finding | None = None) -> None:
@@ -168,42 +168,42 @@ def _stopped(before: Phase, hazards: tuple[Hazard, ...]) -> Iterator[Transition]
         yield Transition((before,), label, when, after, row.cause, row.clears_on, row.latched, row)
 
 
-def _unprepared_for_long(machine: Supervisor, s: Situation) -> str | None:
+def _unprepared_for_long(machine: StateMachine, s: Situation) -> str | None:
     return s.unprepared if s.unprepared and machine.elapsed_s > PREPARE_TIMEOUT_S else None
 
 
-def _too_late(machine: Supervisor, s: Situation) -> str | None:
+def _too_late(machine: StateMachine, s: Situation) -> str | None:
     late = machine.elapsed_s > ENABLE_TIMEOUT_S
     return f"{s.disabled} after {ENABLE_TIMEOUT_S:.1f} s" if late else None
 
 
-def _asks_for_quick_stop(machine: Supervisor, s: Situation) -> str | None:
+def _asks_for_quick_stop(machine: StateMachine, s: Situation) -> str | None:
     return "" if first(_QUICK_HAZARDS, s) is not None else None
 
 
-def _stands(machine: Supervisor, s: Situation) -> str | None:
+def _stands(machine: StateMachine, s: Situation) -> str | None:
     return "" if s.standstill else None
 
 
-def _keeps_on(machine: Supervisor, s: Situation) -> str | None:
+def _keeps_on(machine: StateMachine, s: Situation) -> str | None:
     fails = machine.braking.fails(s.speed_mps, machine.now_s) or machine.elapsed_s > machine.ramp_timeout_s
     return f"{s.turning} on its ramp, {machine.elapsed_s:.2f} s after it began" if fails else None
 
 
-def _keeps_its_speed(machine: Supervisor, s: Situation) -> str | None:
+def _keeps_its_speed(machine: StateMachine, s: Situation) -> str | None:
     unslowed = machine.braking.keeps_speed(s.braking_mps, machine.now_s)
     return "" if unslowed or machine.braking.fails(s.speed_mps, machine.now_s) else None
 
 
-def _is_off(machine: Supervisor, s: Situation) -> str | None:
+def _is_off(machine: StateMachine, s: Situation) -> str | None:
     return None if s.powered and machine.elapsed_s <= POWER_OFF_TIMEOUT_S else ""
 
 
-def _is_off_for_good(machine: Supervisor, s: Situation) -> str | None:
+def _is_off_for_good(machine: StateMachine, s: Situation) -> str | None:
     return _is_off(machine, s) if machine.latches else None
 
 
-def _always(machine: Supervisor, s: Situation) -> str | None:
+def _always(machine: StateMachine, s: Situation) -> str | None:
     return ""
 
 

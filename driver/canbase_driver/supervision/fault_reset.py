@@ -81,7 +81,7 @@ BREAKS: dict[ResetPhase, tuple[Callable[[Situation], str], ...]] = {
 
 
 def refusal(situation: Situation, stopped: bool) -> str | None:
-    """Why a reset may not even begin; None when it may. `stopped`: the supervisor has taken all power away."""
+    """Why a reset may not even begin; None when it may. `stopped`: the state machine has taken all power away."""
     if not stopped:
         return "refused: the drives have power; an enabled robot needs no reset. `canbase stop` takes the power off"
     problem = _first(REFUSALS, situation)

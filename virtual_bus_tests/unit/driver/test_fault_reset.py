@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from canbase_driver.supervision.reset import FAULT_TRIES, Outcome, Reset, ResetPhase, refusal
+from canbase_driver.supervision.fault_reset import FAULT_TRIES, Outcome, Reset, ResetPhase, refusal
 from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.watchdog_link import ANSWERS
 from canbase_runtime.watchdog_view import WatchdogView
