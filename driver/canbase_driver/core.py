@@ -276,7 +276,7 @@ class DriverCore:
 
     def _hold_or_let_go(self, orders: Orders, now_s: float) -> None:
         if orders.drive is not Drive.FOLLOW:
-            self._let_go.end()
+            self._let_go.end(ramps=orders.drive is Drive.RAMP)
             return
         rests = self._drives.rest(*wheel_speeds(self._command.target(now_s), self._track_m))
         self._let_go.step(self._drives.axes, rests, now_s)

@@ -106,12 +106,15 @@ class LetGo:
         return self._phase is not LetGoPhase.HELD
 
     def excuses(self, now_s: float) -> bool:
-        """A drive that is not enabled is so because of this; also after an orderly end or another stop took over."""
+        """A drive that is not enabled is so because of this; also on the ramp of a stop that took over."""
         return not self._returned and now_s - self._since <= RETURN_S
 
-    def end(self) -> None:
-        """Something else decides about the power. Drives that have none yet are not to be taken for failed ones."""
+    def end(self, ramps: bool) -> None:
+        """Something else decides about the power. `ramps`: it is the ramp, on which drives that have none yet are not
+        to be taken for failed ones. Once the power is off, the next that lose it have no excuse.
+        """
         self._phase = LetGoPhase.HELD
+        self._returned = self._returned or not ramps
 
     def step(self, wheels: Sequence[Wheel], rests: bool, now_s: float) -> None:
         """One cycle in which the drives are to be enabled; `rests`: zero is ordered of all wheels."""

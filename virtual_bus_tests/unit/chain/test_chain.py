@@ -6,10 +6,13 @@ import math
 
 import pytest
 
+from canbase_driver.causes import Cause
+from canbase_driver.drives.let_go import RETURN_S
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.latch_record import Mark
+from canbase_sim.cia402.axis import Supply
 from support.chain_world import BOOTED_S, FORWARD, STEP_S, World, setpoints, world_of
 
 ENABLE_OPERATION = 0x0F
@@ -280,6 +283,27 @@ def test_an_orderly_end_while_the_drives_let_go_latches_nothing(world: World, ai
     assert world.powered == [False, False]
     assert [stop.cause for stop in world.core.stops if stop.latched] == []
     assert world.core.record.mark is Mark.CLEAR
+
+
+def test_a_drive_that_fails_after_an_end_and_a_new_start_has_no_excuse_from_before(world: World) -> None:
+    """Deactivated while the drives let go, active again within RETURN_S; then STO opens for a moment."""
+    world.drive(seconds=0.2)
+    world.command = Twist2D.ZERO
+    assert world.run(8.0, lambda: world.core.lets_go)
+    began_s = world.now_s
+    world.core.request_aim(Aim.CONFIGURED, world.now_s, lambda outcome: None)
+    world.run_until(DriverState.DISARMED, RETURN_S)
+    world.core.request_aim(Aim.ACTIVE, world.now_s, lambda outcome: None)
+    world.run_until(DriverState.ENABLED, RETURN_S)
+    assert world.powered == [True, True]
+
+    world.node.axes[0].lose(Supply.NO_TORQUE)
+    world.node.axes[0].lose(Supply.FULL)
+    world.run(1.0)
+
+    assert world.core.state is DriverState.LATCHED
+    assert world.core.finding.cause is Cause.DRIVE_DISABLED
+    assert world.core.stops[-1].at_s - began_s < RETURN_S
 
 
 def test_a_shutdown_without_a_watchdog_ends_at_once(world: World) -> None:

@@ -140,16 +140,26 @@ def test_an_order_does_not_end_it_and_another_stop_does() -> None:
     each.step(wheels, True, 1.0)
     each.step(wheels, False, 1.01)
     assert each.active
-    each.end()
+    each.end(ramps=True)
     assert not each.active
 
 
-def test_after_another_stop_the_drives_are_excused_for_as_long_as_they_may_take_to_return() -> None:
+def test_on_the_ramp_of_a_stop_the_drives_are_excused_for_as_long_as_they_may_take_to_return() -> None:
     wheels, each = (due(), Wheel()), LetGo(robot())
     each.step(wheels, True, 1.0)
-    each.end()
+    each.end(ramps=True)
     assert each.excuses(1.0 + RETURN_S)
     assert not each.excuses(1.01 + RETURN_S)
+
+
+def test_once_the_power_is_off_no_drive_has_an_excuse() -> None:
+    wheels, each = (due(), Wheel()), LetGo(robot())
+    each.step(wheels, True, 1.0)
+    each.end(ramps=True)
+    each.end(ramps=False)
+    assert not each.excuses(1.01)
+    each.end(ramps=True)
+    assert not each.excuses(1.01)
 
 
 def test_drives_that_are_back_have_no_excuse_and_a_new_letting_go_has_one_again() -> None:
