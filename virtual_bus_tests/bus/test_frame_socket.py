@@ -14,6 +14,7 @@ from typing import Any
 
 import can
 import pytest
+from can.interfaces.udp_multicast import utils
 
 from canbase_driver.runtime import frame_socket as of_the_driver
 from canbase_watchdog import frame_socket as of_the_watchdog
@@ -23,6 +24,20 @@ pytestmark = pytest.mark.bus
 COPIES = pytest.mark.parametrize("module", [of_the_driver, of_the_watchdog], ids=["driver", "watchdog"])
 FRAME = struct.Struct("=IB3x8s")
 """linux/can.h, struct can_frame."""
+PLAIN = {
+    "timestamp": 0.0,
+    "arbitration_id": 0x181,
+    "is_extended_id": False,
+    "is_remote_frame": False,
+    "is_error_frame": False,
+    "channel": None,
+    "dlc": 8,
+    "data": bytes(8),
+    "is_fd": False,
+    "bitrate_switch": False,
+    "error_state_indicator": False,
+}
+"""A datagram on the simulated bus, before it is packed."""
 MANY = 1000
 
 
@@ -39,6 +54,12 @@ class SocketBus:
     def shutdown(self) -> None:
         self.closed = True
         self.own.close()
+
+
+def send(bus: Any, fields: dict[str, Any]) -> None:
+    """A datagram onto the simulated bus, past python-can's checks."""
+    packer: Any = utils
+    bus._multicast.send(packer.msgpack.packb(fields), 1.0)
 
 
 @pytest.fixture
@@ -106,6 +127,49 @@ def test_each_frame_on_the_simulated_bus_is_what_python_can_says_of_it(module: M
             assert bool(can_id & module.FLEXIBLE) == said.is_fd
             assert data == bytes(said.data)
             assert at_s == pytest.approx(said.timestamp, abs=0.05)  # of two sockets
+    reader.close()
+    sender.shutdown()
+
+
+@COPIES
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"bitrate_switch": True},
+        {"error_state_indicator": True},
+        {"dlc": 3},
+        {"arbitration_id": 0x800},
+        {"arbitration_id": -1},
+        {"data": bytes(9), "dlc": 9},
+        {"more": 1},
+    ],
+    ids=str,
+)
+def test_a_datagram_that_is_no_frame_for_python_can_is_none_here(
+    module: ModuleType, udp: dict[str, Any], wrong: dict[str, Any]
+) -> None:
+    reader, sender = module.open_bus(udp), can.Bus(**udp)
+    with can.Bus(**udp) as library:
+        send(sender, PLAIN | wrong)
+        with pytest.raises(can.CanOperationError):
+            library.recv(1.0)
+        assert reader.read(1.0)[0] == module.NO_FRAME
+        send(sender, PLAIN)
+        assert reader.read(1.0)[:2] == (0x181, bytes(8))
+    reader.close()
+    sender.shutdown()
+
+
+@COPIES
+def test_a_number_in_the_place_of_the_data_takes_no_memory(
+    module: ModuleType, udp: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reader, sender = module.open_bus(udp), can.Bus(**udp)
+    send(sender, PLAIN | {"data": 2**31})
+    made: list[dict[str, Any]] = []
+    monkeypatch.setattr(module.can, "Message", lambda **fields: made.append(fields))
+    assert reader.read(1.0)[0] == module.NO_FRAME
+    assert made == []
     reader.close()
     sender.shutdown()
 

@@ -43,11 +43,11 @@ _TIMESPEC: Final = struct.Struct("@ll")
 _ANCILLARY: Final = socket.CMSG_SPACE(_TIMESPEC.size)
 _DATAGRAM: Final = 4096
 """A longer one is cut, and then no frame."""
-_FLAGS: Final = ("is_extended_id", "is_remote_frame", "is_error_frame", "is_fd")
+_FLAGS: Final = (
+    "is_extended_id", "is_remote_frame", "is_error_frame", "is_fd", "bitrate_switch", "error_state_indicator",
+)  # fmt: skip
 """Fields of a datagram that are all false in a plain frame."""
-_FIELDS: Final = frozenset(
-    {"timestamp", "arbitration_id", "channel", "dlc", "data", "bitrate_switch", "error_state_indicator", *_FLAGS}
-)
+_FIELDS: Final = frozenset({"timestamp", "arbitration_id", "channel", "dlc", "data", *_FLAGS})
 
 Received = tuple[int, bytes, float]
 """Identifier with flags, data, and when the kernel received it by the wall clock [s]; 0.0: unknown."""
@@ -185,10 +185,12 @@ _OF_INTERFACE: Final[dict[str, Callable[[can.BusABC], FrameSocket]]] = {
 def _decoded(fields: dict[str, Any], at_s: float) -> Received:
     """Raises anything for what is no frame: python-can checks all but the plainest ones."""
     cob_id, data = fields.get("arbitration_id"), fields.get("data")
+    if type(data) is not bytes:  # for a number python-can makes so many bytes
+        return NO_FRAME, b"", 0.0
     if (
         fields.keys() == _FIELDS
         and (type(cob_id) is int and 0 <= cob_id <= MAX_COB_ID)
-        and (type(data) is bytes and len(data) == fields.get("dlc") and len(data) <= MAX_DATA_BYTES)
+        and (len(data) == fields.get("dlc") and len(data) <= MAX_DATA_BYTES)
         and all(fields.get(flag) is False for flag in _FLAGS)
     ):
         return cob_id, data, at_s
