@@ -25,6 +25,7 @@ from canbase_cli import (
     services,
     trigger,
     up,
+    urdf,
 )
 from canbase_cli.goal import GoalCommand
 from canbase_cli.options import ROS_USAGE, RosCommand, new_app
@@ -74,6 +75,7 @@ app.command("support-bundle", rich_help_panel=_LOOK)(support_bundle.support_bund
 
 app.command("sample", rich_help_panel=_SET_UP)(sample.sample)
 app.add_typer(config.app, name="config", rich_help_panel=_SET_UP)
+app.command("urdf", rich_help_panel=_SET_UP)(urdf.urdf)
 app.command("scan", epilog=scan.EPILOG, rich_help_panel=_SET_UP)(scan.scan)
 app.add_typer(sdo.app, name="sdo", rich_help_panel=_SET_UP)
 app.command("jog", epilog=jog.EPILOG, rich_help_panel=_SET_UP)(jog.jog)
