@@ -37,6 +37,17 @@ class Drive(Section):
     counts_per_motor_rev: Annotated[
         int, Field(ge=1, le=2**31 - 1, description="increments of 6064h per motor revolution")
     ]
+    rated_torque_nm: (
+        Annotated[
+            float,
+            Field(
+                gt=0.0,
+                le=1000.0,
+                description="of the motor, 100 % of 6077h; for effort in joint_states [N·m]",
+            ),
+        ]
+        | None
+    ) = None
     profile: Annotated[
         str,
         Field(min_length=1, description="drive profile (docs/drives.md), or a .yaml file in the folder of robot.yaml"),

@@ -15,6 +15,7 @@ from canbase_config.action import Action
 from canbase_config.black_box import BlackBox
 from canbase_config.commissioned import Commissioned
 from canbase_config.drive import Drive
+from canbase_config.health import Battery, Health
 from canbase_config.mux import Mux
 from canbase_config.safety import Safety
 from canbase_config.section import MisfitError, Name, Section
@@ -197,6 +198,8 @@ class Robot(Section):
     watchdog: Watchdog = Watchdog()
     action: Action = Action()
     black_box: BlackBox = BlackBox()
+    health: Health = Health()
+    battery: Annotated[Battery | None, Field(description="none: the drives' supply is not the battery")] = None
     commissioned: Commissioned = Commissioned()
 
     def bus_arguments(self) -> dict[str, Any]:

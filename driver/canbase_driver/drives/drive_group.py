@@ -230,6 +230,7 @@ def _snapshot(node: CanopenNode, axis: Axis, robot: Robot, now_s: float) -> Driv
     radius_m = robot.base.wheel_radius_m
     code = node.emcy.code if node.emcy else 0
     measured = node.measured(axis, now_s)
+    share = math.nan if axis.push.share is None else axis.push.share * axis.drive.direction
     return DriveSnapshot(
         joint=axis.drive.joint,
         node_id=node.node_id,
@@ -249,7 +250,8 @@ def _snapshot(node: CanopenNode, axis: Axis, robot: Robot, now_s: float) -> Driv
         warning=bool(axis.statusword & WARNING),
         internal_limit=bool(axis.statusword & INTERNAL_LIMIT),
         voltage_v=measured.voltage_v,
-        torque_share=math.nan if axis.push.share is None else axis.push.share,
+        torque_share=share,
+        effort_nm=share * (axis.drive.rated_torque_nm or math.nan) * axis.drive.gear_ratio,
         current_a=measured.current_a,
         temperature_c=measured.temperature_c,
         boot_notes=node.report.notes if node.report else (),

@@ -51,6 +51,8 @@ class DriveSnapshot:
     """Of its supply [V]; NaN: not measured."""
     torque_share: float = math.nan
     """Of the rated torque; NaN: the drive does not report it."""
+    effort_nm: float = math.nan
+    """The same at the wheel [N·m]; NaN: the drive does not report it, or robot.yaml has no rated_torque_nm."""
     current_a: float = math.nan
     """Of the motor [A]; NaN: not measured."""
     temperature_c: float = math.nan

@@ -6,7 +6,7 @@ One entry each for the loop, the bus, the watchdog and every drive.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -15,6 +15,7 @@ from canbase_driver.causes import Cause
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.cia402 import DriveState
 from canbase_driver.drives.drive_snapshot import DriveSnapshot
+from canbase_driver.drives.health import Excess
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervision.bus_health import BusReport, ControllerState
 from canbase_driver.supervision.watchdog_link import RUNGS, WatchdogReport
@@ -27,11 +28,17 @@ _PAUSE_WARNING_S = 0.05
 
 
 def diagnostics_message(
-    snapshot: DriverSnapshot, stamp: Time, *, robot: str = "robot", previous: DriverSnapshot | None = None
+    snapshot: DriverSnapshot,
+    stamp: Time,
+    *,
+    robot: str = "robot",
+    previous: DriverSnapshot | None = None,
+    warnings: Sequence[Excess] = (),
 ) -> DiagnosticArray:
     """One entry for the loop, one for the bus, one for the watchdog, one per drive; `robot` makes their names unique.
 
     `previous` is the snapshot of the message before: a counter that grew since then is a warning, an old one is not.
+    `warnings`: of `health`.
     """
     message = DiagnosticArray()
     message.header.stamp = stamp
@@ -39,7 +46,7 @@ def diagnostics_message(
         _loop_entry(snapshot, previous or snapshot, robot),
         _bus_entry(snapshot.bus, (previous or snapshot).bus, robot),
         _watchdog_entry(snapshot.watchdog, (previous or snapshot).watchdog, robot),
-        *(_drive_entry(drive, snapshot.state, robot) for drive in snapshot.drives),
+        *(_drive_entry(drive, snapshot.state, robot, warnings) for drive in snapshot.drives),
     ]
     return message
 
@@ -143,8 +150,10 @@ def _named(events: Mapping[str, int]) -> dict[str, int]:
     return {name.replace("_", " "): count for name, count in events.items()}
 
 
-def _drive_entry(drive: DriveSnapshot, state: DriverState, robot: str) -> DiagnosticStatus:
+def _drive_entry(drive: DriveSnapshot, state: DriverState, robot: str, warnings: Sequence[Excess]) -> DiagnosticStatus:
     level, sentence = _drive_state(drive, state)
+    if excesses := [warning.text for warning in warnings if warning.joint == drive.joint]:
+        level, sentence = max(level, DiagnosticStatus.WARN), f"{sentence} Measured: {'; '.join(excesses)}."
     values = {
         "NMT state": drive.nmt_text,
         "CiA 402 state": drive.state_text,
@@ -187,6 +196,7 @@ def _measured(drive: DriveSnapshot) -> dict[str, float]:
     values = {
         "voltage [V]": drive.voltage_v,
         "torque [% of the rated one]": 100.0 * drive.torque_share,
+        "effort at the wheel [N·m]": drive.effort_nm,
         "current [A]": drive.current_a,
         "temperature [°C]": drive.temperature_c,
     }

@@ -1,4 +1,4 @@
-"""From a `DriverSnapshot` to ROS messages: odom, tf, joint_states, motor_driver/status, stop_events. No node or clock.
+"""From a `DriverSnapshot` to ROS messages: odom, tf, joint_states, status, battery_state, stop_events. No node.
 
 Frames and units are those of REP 103 and REP 105. A stamp is a builtin_interfaces/Time that the caller gives.
 """
@@ -6,14 +6,18 @@ Frames and units are those of REP 103 and REP 105. A stamp is a builtin_interfac
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from builtin_interfaces.msg import Time
 from canbase.msg import DriverStatus, DriveStatus, StopEvent
 from geometry_msgs.msg import Pose, Quaternion, TransformStamped
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import BatteryState, JointState
+from std_msgs.msg import Header
 
+from canbase_config.health import Battery
 from canbase_driver.drives.drive_snapshot import DriveSnapshot
+from canbase_driver.drives.health import Excess, supply_v
 from canbase_driver.motion.odometry import Pose2D, wrap_angle
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervision.stop_history import StopReport
@@ -58,14 +62,48 @@ def tf_message(snapshot: DriverSnapshot, stamp: Time) -> TFMessage | None:
 
 
 def joint_state_message(snapshot: DriverSnapshot, stamp: Time) -> JointState:
-    """Angle and speed of each wheel that has given feedback; one that has not is left out, as its angle is unknown."""
+    """Angle and speed of each wheel that has given feedback; one that has not is left out, as its angle is unknown.
+
+    Effort at the wheel [N·m] where a drive's torque is known; NaN for the others; empty where none is known.
+    """
     heard = heard_drives(snapshot)
     message = JointState()
     message.header.stamp = stamp
     message.name = [drive.joint for drive in heard]
     message.position = [drive.position_rad for drive in heard]
     message.velocity = [drive.velocity_radps for drive in heard]
+    message.effort = efforts_nm(heard)
     return message
+
+
+def efforts_nm(drives: list[DriveSnapshot]) -> list[float]:
+    """At the wheels [N·m], NaN for a drive that is not known; empty where none is."""
+    efforts = [drive.effort_nm for drive in drives]
+    return [] if all(map(math.isnan, efforts)) else efforts
+
+
+def battery_message(snapshot: DriverSnapshot, stamp: Time, battery: Battery) -> BatteryState:
+    """The battery behind the drives' supply. `percentage` is linear from empty_v to full_v; NaN is unknown.
+
+    The voltage falls under load, and the state of charge with it: it is a hint. sensor_msgs/BatteryState.
+    """
+    voltage_v = supply_v(snapshot.drives)
+    share = (voltage_v - battery.empty_v) / (battery.full_v - battery.empty_v)
+    unknown = math.nan
+    return BatteryState(
+        header=Header(stamp=stamp),
+        voltage=voltage_v,
+        temperature=unknown,
+        current=unknown,
+        charge=unknown,
+        capacity=unknown,
+        design_capacity=battery.design_capacity_ah or unknown,
+        percentage=share if math.isnan(share) else min(max(share, 0.0), 1.0),
+        power_supply_status=BatteryState.POWER_SUPPLY_STATUS_UNKNOWN,
+        power_supply_health=BatteryState.POWER_SUPPLY_HEALTH_UNKNOWN,
+        power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_UNKNOWN,
+        present=not math.isnan(voltage_v),
+    )
 
 
 def heard_drives(snapshot: DriverSnapshot) -> list[DriveSnapshot]:
@@ -73,8 +111,11 @@ def heard_drives(snapshot: DriverSnapshot) -> list[DriveSnapshot]:
     return [drive for drive in snapshot.drives if not math.isnan(drive.feedback_age_s)]
 
 
-def status_message(snapshot: DriverSnapshot, stamp: Time) -> DriverStatus:
-    """Everything that DriverStatus has a field for. Counters go round at 2³² as their type does."""
+def status_message(snapshot: DriverSnapshot, stamp: Time, warnings: Sequence[Excess] = ()) -> DriverStatus:
+    """Everything that DriverStatus has a field for. Counters go round at 2³² as their type does.
+
+    `warnings`: of `health`.
+    """
     watchdog, command, cycle, bus = snapshot.watchdog, snapshot.command, snapshot.cycle, snapshot.bus
     events = command.events | cycle.events | bus.events
     return DriverStatus(
@@ -99,7 +140,7 @@ def status_message(snapshot: DriverSnapshot, stamp: Time) -> DriverStatus:
         bus_problem=bus.problem,
         controller=bus.controller.value,
         **{name: _u32(count) for name, count in events.items()},
-        drives=[_drive_status(drive) for drive in snapshot.drives],
+        drives=[_drive_status(drive, warnings) for drive in snapshot.drives],
     )
 
 
@@ -143,7 +184,7 @@ def _u32(counter: int) -> int:
     return counter & 0xFFFF_FFFF
 
 
-def _drive_status(drive: DriveSnapshot) -> DriveStatus:
+def _drive_status(drive: DriveSnapshot, warnings: Sequence[Excess]) -> DriveStatus:
     return DriveStatus(
         joint=drive.joint,
         node_id=drive.node_id,
@@ -159,5 +200,10 @@ def _drive_status(drive: DriveSnapshot) -> DriveStatus:
         feedback_age_s=drive.feedback_age_s,
         heartbeat_age_s=drive.heartbeat_age_s,
         stops_by_itself=drive.stops_by_itself,
+        voltage_v=drive.voltage_v,
+        current_a=drive.current_a,
+        temperature_c=drive.temperature_c,
+        torque_share=drive.torque_share,
+        health="; ".join(warning.text for warning in warnings if warning.joint == drive.joint),
         boot_problem=drive.boot_problem,
     )

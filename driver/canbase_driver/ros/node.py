@@ -1,4 +1,4 @@
-"""The ROS node motor_driver: cmd_vel in; odom, tf, joint_states, status, diagnostics and stop events out.
+"""The ROS node motor_driver: cmd_vel in; odom, tf, joint_states, status, diagnostics, stops out.
 
 Threads: the executor's (main) takes commands, requests and lifecycle transitions, and none of its callbacks waits;
 `publisher` waits for snapshots and publishes them. Neither of them touches the bus.
@@ -14,10 +14,11 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import BatteryState, JointState
 
 from canbase_config.robot import Robot
 from canbase_driver.causes import Cause
+from canbase_driver.drives.health import Excess, HealthWatch
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.ros import messages
 from canbase_driver.ros.diagnostics import diagnostics_message, unguarded
@@ -53,6 +54,7 @@ class MotorDriverNode(ManagedNode):
         self._joints = self.create_publisher(JointState, "joint_states", 10)
         self._status = self.create_publisher(DriverStatus, "motor_driver/status", STATE_QOS)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._battery = self.create_publisher(BatteryState, "battery_state", 10) if robot.battery else None
         self.create_subscription(TwistStamped, "cmd_vel", self._on_command, COMMAND_QOS)
         self.create_subscription(SafetyState, "safety_filter/state", self._on_safety, COMMAND_QOS)
         self._stops = StopEvents(self, robot, ring, writer, self.voice)
@@ -62,6 +64,8 @@ class MotorDriverNode(ManagedNode):
         self._diagnosed: DriverSnapshot | None = None
         self._status_at = 0.0
         self._unguarded: tuple[str, ...] = ()
+        self._health = HealthWatch(robot.health)
+        self._warnings: tuple[Excess, ...] = ()
         self._boot_problems: dict[str, str] = {}
         """By joint: why its last boot failed, as it went to the log."""
         self.state_text = "starting"
@@ -111,10 +115,15 @@ class MotorDriverNode(ManagedNode):
         changed = previous is None or _essence(previous) != _essence(snapshot)
         if changed or snapshot.time_s - self._status_at >= 1.0 / self._robot.rates.status_hz:
             self._status_at = snapshot.time_s
-            self._status.publish(messages.status_message(snapshot, stamp))
+            self._warn_of_health(snapshot)
+            self._status.publish(messages.status_message(snapshot, stamp, self._warnings))
         if self._diagnosed is None or snapshot.time_s - self._diagnosed.time_s >= DIAGNOSTICS_PERIOD_S:
             before, self._diagnosed = self._diagnosed or snapshot, snapshot
-            self._diagnostics.publish(diagnostics_message(snapshot, stamp, robot=self._robot.name, previous=before))
+            self._diagnostics.publish(
+                diagnostics_message(snapshot, stamp, robot=self._robot.name, previous=before, warnings=self._warnings)
+            )
+            if self._battery is not None and self._robot.battery is not None:
+                self._battery.publish(messages.battery_message(snapshot, stamp, self._robot.battery))
 
     def _log_change(self, snapshot: DriverSnapshot) -> None:
         previous, finding = self._previous, snapshot.finding
@@ -137,6 +146,14 @@ class MotorDriverNode(ManagedNode):
                 self._stops.note(sentence)
                 self.voice.tell(sentence, Priority.WARNING, robot=self._robot.name)
             self._boot_problems[drive.joint] = drive.boot_problem
+
+    def _warn_of_health(self, snapshot: DriverSnapshot) -> None:
+        """Once for each value beyond its limit, until it has been inside for a while."""
+        known = {(warning.joint, warning.key) for warning in self._warnings}
+        self._warnings = self._health.look(snapshot.drives, snapshot.time_s)
+        for warning in self._warnings:
+            if (warning.joint, warning.key) not in known:
+                self.voice.tell(warning.text, Priority.WARNING, robot=self._robot.name)
 
     def _warn_of_unguarded(self, snapshot: DriverSnapshot) -> None:
         """Once after each boot, loudly."""

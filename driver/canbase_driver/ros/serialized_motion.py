@@ -37,13 +37,14 @@ _JOINTS = (*_STAMP, "position", "velocity")
 
 
 class SerializedMotion:
-    """Of one robot: its frames do not change. The names of the joints may, at the first message of a drive."""
+    """Of one robot: its frames do not change. Joints may come, and their effort, with the first message of a drive."""
 
     def __init__(self) -> None:
         self._odometry: SerializedMessage | None = None
         self._transform: SerializedMessage | None = None
         self._joints: SerializedMessage | None = None
-        self._names: list[str] = []
+        self._names: tuple[list[str], bool] = ([], False)
+        """Of the joints, and whether they have an effort."""
 
     def odometry(self, snapshot: DriverSnapshot, stamp: Time) -> bytes:
         """`messages.odometry_message`."""
@@ -77,15 +78,17 @@ class SerializedMotion:
     def joint_state(self, snapshot: DriverSnapshot, stamp: Time) -> bytes:
         """`messages.joint_state_message`."""
         heard = messages.heard_drives(snapshot)
-        names = [drive.joint for drive in heard]
+        efforts_nm = messages.efforts_nm(heard)
+        names = ([drive.joint for drive in heard], bool(efforts_nm))
         if self._joints is None or names != self._names:
             message = messages.joint_state_message(snapshot, stamp)
-            if not names:
+            if not heard:
                 return bytes(serialize_message(message))
-            self._joints, self._names = SerializedMessage(message, *_JOINTS), names
+            self._joints, self._names = SerializedMessage(message, *_JOINTS, *(["effort"] if efforts_nm else [])), names
         return self._joints.pack(
             stamp.sec,
             stamp.nanosec,
             *[drive.position_rad for drive in heard],
             *[drive.velocity_radps for drive in heard],
+            *efforts_nm,
         )

@@ -8,9 +8,11 @@ import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
+from canbase_config.health import Health
 from canbase_driver.causes import Cause, Finding
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.cia402 import DriveState
+from canbase_driver.drives.health import HealthWatch
 from canbase_driver.ros.diagnostics import diagnostics_message, unguarded
 from canbase_driver.supervision.bus_health import ControllerState
 from canbase_driver.supervision.watchdog_link import WatchdogCounters
@@ -264,3 +266,14 @@ def test_a_drive_that_will_not_stop_by_itself_is_told_once_it_is_booted() -> Non
 def test_before_that_nobody_knows(state: DriverState) -> None:
     assert unguarded(dataclasses.replace(with_left(stops_by_itself=False), state=state)) == ()
     assert unguarded(with_left(stops_by_itself=False, nmt_state=NmtState.PRE_OPERATIONAL)) == ()
+
+
+def test_a_value_beyond_a_limit_of_health_is_a_warning_of_its_drive_alone() -> None:
+    hot = with_left(temperature_c=91.0)
+    warnings = HealthWatch(Health(temperature_high_c=80.0)).look(hot.drives, 0.0)
+    message = diagnostics_message(hot, STAMP, warnings=warnings)
+    left, right = (entry(message, f"robot: drive {side}_wheel_joint") for side in ("left", "right"))
+    assert (left.level, right.level) == (WARN, OK)
+    assert left.message.endswith("temperature 91 °C is above health.temperature_high_c (80 °C).")
+    faulty = diagnostics_message(with_left(temperature_c=91.0, error_code=0x4310), STAMP, warnings=warnings)
+    assert entry(faulty, "robot: drive left_wheel_joint").level == ERROR

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from typing import Any
 
 import pytest
 from builtin_interfaces.msg import Time
@@ -21,6 +22,8 @@ from canbase_runtime.watchdog_view import WatchdogView
 from support.snapshots import LEFT, RIGHT, SNAPSHOT, with_driver, with_left
 
 STAMP = Time(sec=1_700_000_000, nanosec=250_000_000)
+VALUES: Any = {"voltage_v": 48.0, "current_a": 1.5, "temperature_c": 40.0, "torque_share": 0.25, "effort_nm": 2.5}
+MEASURED = with_driver(drives=tuple(dataclasses.replace(drive, **VALUES) for drive in (LEFT, RIGHT)))
 RECORD = StopRecord("watchdog", "watchdog tripped", "overspeed", latched=True, clears_on="reset", at_s=999.0)
 STOP = StopReport(RECORD, standstill=True, standstill_s=0.31, distance_m=0.05, turned_rad=-0.01)
 
@@ -142,18 +145,17 @@ def test_the_status_carries_every_field_of_the_snapshot_that_the_interface_has()
 
 
 DIAGNOSTICS_ALONE = {
-    *("self_stop", "warning", "internal_limit", "voltage_v", "current_a", "temperature_c"),
-    *("boot_notes", "boot_changes", "configured", "torque_share"),
+    *("self_stop", "warning", "internal_limit", "boot_notes", "boot_changes", "configured", "effort_nm"),
 }
 """What is in /diagnostics and not in the status."""
 
 
 def test_each_drive_is_in_the_status_with_every_field_in_the_order_of_the_configuration() -> None:
-    message = messages.status_message(SNAPSHOT, STAMP)
+    message = messages.status_message(MEASURED, STAMP)
     assert len(message.drives) == 2
-    for sent, drive in zip(message.drives, (LEFT, RIGHT), strict=True):
+    for sent, drive in zip(message.drives, MEASURED.drives, strict=True):
         names = DriveStatus.get_fields_and_field_types()
-        known = dataclasses.asdict(drive) | {"state": "operation enabled", "nmt_state": "operational"}
+        known = dataclasses.asdict(drive) | {"state": "operation enabled", "nmt_state": "operational", "health": ""}
         assert {name: getattr(sent, name) for name in names} == {name: known[name] for name in names}
         assert known.keys() - names.keys() == DIAGNOSTICS_ALONE
 
@@ -206,7 +208,7 @@ def test_every_message_survives_the_wire() -> None:
         messages.odometry_message(SNAPSHOT, STAMP),
         messages.transform_message(SNAPSHOT, STAMP),
         messages.joint_state_message(SNAPSHOT, STAMP),
-        messages.status_message(SNAPSHOT, STAMP),
+        messages.status_message(MEASURED, STAMP),
         messages.stop_event_message(STOP, STAMP, "/state/stop.asc"),
         diagnostics_message(SNAPSHOT, STAMP),
     ):

@@ -45,6 +45,16 @@ def test_tf_of_one_snapshot_after_the_other(snapshot: DriverSnapshot) -> None:
         assert found == messages.tf_message(seen, STAMP)
 
 
+def test_the_effort_comes_and_goes_with_the_drives_that_report_their_torque() -> None:
+    motion = SerializedMotion()
+    one, both = with_left(effort_nm=1.5), with_driver(drives=(with_left(effort_nm=-2.0).drives[0],) * 2)
+    for seen in (SNAPSHOT, one, both, SNAPSHOT, one):
+        joints = deserialize_message(motion.joint_state(seen, STAMP), JointState)
+        known = messages.joint_state_message(seen, STAMP)
+        assert list(joints.effort) == pytest.approx(list(known.effort), nan_ok=True)
+        assert (list(joints.name), list(joints.velocity)) == (list(known.name), list(known.velocity))
+
+
 def test_a_drive_that_is_not_heard_yet_is_left_out_and_comes_later() -> None:
     motion = SerializedMotion()
     silent = with_left(feedback_age_s=math.nan)
