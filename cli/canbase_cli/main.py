@@ -18,6 +18,7 @@ from canbase_cli import (
     install,
     jog,
     monitor,
+    record,
     rotate,
     sample,
     scan,
@@ -68,6 +69,7 @@ app.command("stop", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_
 app.command("reset", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_DRIVE)(trigger.reset)
 
 app.command("monitor", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_LOOK)(monitor.monitor)
+app.command("record", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_LOOK)(record.record)
 app.command("doctor", cls=RosCommand, options_metavar=ROS_USAGE, epilog=doctor.EPILOG, rich_help_panel=_LOOK)(
     doctor.doctor
 )

@@ -11,7 +11,7 @@ import pytest
 from canbase.msg import DriverStatus
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import TwistStamped
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import BatteryState, JointState
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
@@ -25,7 +25,13 @@ from support.surroundings import BLOCKED_M, World, scan
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 
-WATCHES_OUT = merged(PATIENT, {"safety": {"scan": {"required": True, "timeout_s": 1.0}}})
+WATCHES_OUT = merged(
+    PATIENT,
+    {
+        "safety": {"scan": {"required": True, "timeout_s": 1.0}},
+        "battery": {"full_v": 27.0, "empty_v": 22.0, "design_capacity_ah": 20.0},
+    },
+)
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +75,16 @@ def test_odom_and_joint_states_agree_with_each_other_and_with_the_truth(world: W
     assert pose.position.z == pose.orientation.x == pose.orientation.y == 0.0
     assert odom.pose.covariance[0] > 0.0
     assert odom.twist.covariance[0] > 0.0
+
+
+def test_a_battery_whose_voltage_no_drive_measures_is_published_as_not_present(world: World) -> None:
+    """The drives of the bench measure none."""
+    batteries = world.node.record(BatteryState, "battery_state")
+    world.node.wait_for(lambda: len(batteries.messages) >= 2, 10.0, "battery_state")
+    battery = batteries.messages[-1]
+    assert not battery.present
+    assert math.isnan(battery.voltage)
+    assert battery.design_capacity == 20.0
 
 
 def test_tf_says_what_odom_says(world: World) -> None:

@@ -15,8 +15,8 @@ PAGE = Path(__file__).parents[2] / "docs" / "ros_api.md"
 TRIGGER = "std_srvs/srv/Trigger"
 QOS = ("reliable", "best effort", "latched")
 OF_EVERY_NODE = ("/rosout", "/parameter_events")
-OPTIONAL = {"/tf", "/tf_static"}
-"""Without tf2_msgs, or without a scanner with `pose: tf`, there are none."""
+OPTIONAL = {"/tf", "/tf_static", "/battery_state"}
+"""Without tf2_msgs, without a scanner with `pose: tf`, or without `battery` in robot.yaml, there are none."""
 
 
 class Endpoint(NamedTuple):
