@@ -97,11 +97,14 @@ def made_consistent(values: Values) -> Values:
     for extra in ("interface", "channel", "bitrate"):
         values["bus"].get("extra", {}).pop(extra, None)
     make_mux_consistent(values.get("mux", {}))
-    for section, low, high in (("health", "voltage_low_v", "voltage_high_v"), ("battery", "empty_v", "full_v")):
-        given = values.get(section) or {}
-        if given.get(low) is not None and given.get(high) is not None:
-            given[low], given[high] = 10.0 + given[low] / 10.0, 200.0 + given[high] / 10.0
+    make_ordered(values.get("health") or {}, "voltage_low_v", "voltage_high_v")
+    make_ordered(values.get("battery") or {}, "empty_v", "full_v")
     return values
+
+
+def make_ordered(section: Values, low: str, high: str) -> None:
+    if section.get(low) is not None and section.get(high) is not None:
+        section[low], section[high] = 10.0 + section[low] / 10.0, 200.0 + section[high] / 10.0
 
 
 def make_mux_consistent(mux: Values) -> None:
