@@ -25,7 +25,6 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
 from unique_identifier_msgs.msg import UUID
 
 from canbase_action_server import messages
@@ -146,7 +145,7 @@ class DriveDistanceServer(Node):
         """What was received, odometry too. To take a message of odom apart costs more than to receive it."""
         if self._odometry_waiting is not None:
             (serialized, received_s), self._odometry_waiting = self._odometry_waiting, None
-            odometry = messages.odometry_in(deserialize_message(serialized, OdometryMessage), received_s)
+            odometry = messages.odometry_from(serialized, received_s)
             if odometry is not None:
                 self._inputs = replace(self._inputs, odometry=odometry)
         return self._inputs

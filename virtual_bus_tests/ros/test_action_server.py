@@ -11,7 +11,9 @@ from typing import Any
 import pytest
 from canbase.action import DriveDistance
 from canbase.msg import DriverStatus, SafetyState
+from nav_msgs.msg import Odometry
 from rclpy.action import ActionClient
+from rclpy.serialization import serialize_message
 
 from canbase_action_server.client import Drive, DriveClient, DriveFeedback, DriveResult, RejectedError
 from canbase_action_server.goal_client import SERVICE_QOS
@@ -101,6 +103,22 @@ def test_where_the_mux_does_not_hear_the_server_goals_are_rejected_and_it_lives_
     stage = Stage(test_node, spawn(server_code(robot)))
     for _ in range(2):
         assert "cmd_vel_action" in stage.rejection(1.0, 0.2)
+    assert stage.server.exit_code is None
+
+
+def test_bytes_on_odom_that_are_no_message_are_no_odometry_and_the_goal_goes_on(stage: Stage) -> None:
+    drive = stage.drive_until_moving(0.6)
+    publisher = stage.node.node.create_publisher(Odometry, "odom", 10)
+    stage.node.wait_for(lambda: publisher.get_subscription_count() > 0, 5.0, "the server to listen")
+    whole = bytes(serialize_message(Odometry()))
+    for length in (0, 4, len(whole) - 1):
+        stage.base.silent.add("odom")  # else its next message may replace this one before the server looks at it
+        publisher.publish(whole[:length])
+        stage.node.spin_for(0.06)
+        stage.base.silent.clear()
+        stage.node.spin_for(0.1)
+    result = stage.end_of(drive)
+    assert (result.status, result.code) == (Status.SUCCEEDED, ErrorCode.OK)
     assert stage.server.exit_code is None
 
 
