@@ -40,7 +40,7 @@ class Ours:
         self.period_s = 1.0 / robot.action.control_hz
         self._goal_queue = GoalQueue(robot)
         request = DriveRequest(case.distance_m, case.speed_mps)
-        self._goal_queue.admit("goal", request, _inputs(start), start.received)
+        self._goal_queue.admit("goal", request, start.received)
 
     def cycle(self, odometry: Odometry, now_s: float) -> tuple[Twist, bool]:
         """One control cycle."""

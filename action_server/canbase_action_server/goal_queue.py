@@ -92,9 +92,13 @@ class GoalQueue:
         """Why a goal with these numbers is rejected; None: it may be admitted."""
         return request.range_reason(self._robot) or self._no_place() or state_reason(self._robot, inputs, now_s)
 
-    def admit(self, key: str, request: Request, inputs: Inputs, now_s: float) -> None:
-        """From now on the goal waits for the base. RuntimeError when `refusal` would have refused it."""
-        reason = self.refusal(request, inputs, now_s)
+    def admit(self, key: str, request: Request, now_s: float) -> None:
+        """From now on the goal waits for the base. RuntimeError when its numbers are out of range or there is no place.
+
+        `refusal` has judged the state of the robot. The answer to the client can take 0.1 s (DDS waits for a client
+        that it does not know yet): a message that became too old meanwhile ends the goal, and is no defect.
+        """
+        reason = request.range_reason(self._robot) or self._no_place()
         if reason is not None or key in (goal.key for goal in self._goals()):
             raise RuntimeError(f"goal {key} was admitted, but it is known already, or refused: {reason}")
         if self._robot.action.goal_policy == "preempt":

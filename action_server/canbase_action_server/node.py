@@ -196,7 +196,7 @@ class DriveDistanceServer(Node):
 
     def _on_accepted(self, binding: Binding, handle: ServerGoalHandle) -> None:
         goal, now_s, uuid = handle.request, time.monotonic(), uuid_of(handle)
-        self._goal_queue.admit(uuid, binding.request(goal), self._look(), now_s)
+        self._goal_queue.admit(uuid, binding.request(goal), now_s)
         self._open[uuid] = OpenGoal(handle, binding, now_s)
         self._timer.reset()
         self._log(GoalStep.ACCEPTED, uuid, action=binding.name, **numbers(goal))

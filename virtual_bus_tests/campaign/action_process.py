@@ -83,7 +83,7 @@ class ActionProcess(Process):
         if self.goal_queue.refusal(request, self._inputs, now_s) is not None:
             self.refused += 1
             return
-        self.goal_queue.admit(str(len(self.goals)), request, self._inputs, now_s)
+        self.goal_queue.admit(str(len(self.goals)), request, now_s)
         self.goals.append(Goal(len(self.goals), distance_m, speed_mps, now_s, []))
 
     def _on_cancel(self) -> None:

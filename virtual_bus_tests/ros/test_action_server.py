@@ -386,7 +386,7 @@ def test_a_defect_in_taking_on_a_goal_ends_the_process_in_order(
 ) -> None:
     broken = (
         "from canbase_action_server.goal_queue import GoalQueue\n"
-        "def broken(self, key, request, inputs, now): raise ZeroDivisionError('a defect')\n"
+        "def broken(self, key, request, now): raise ZeroDivisionError('a defect')\n"
         "GoalQueue.admit = broken\n"
     )
     stage = Stage(test_node, spawn(broken + server_code(make_robot({"timeouts": {"odometry_s": 0.5}}))))

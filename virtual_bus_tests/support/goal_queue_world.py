@@ -63,7 +63,7 @@ class GoalQueueWorld:
             self.refusals.append(reason)
             return None
         key = str(len(self.goals))
-        self.goal_queue.admit(key, request, self.inputs, self.now_s)
+        self.goal_queue.admit(key, request, self.now_s)
         self.goals[key] = Told(request, self.now_s)
         return key
 

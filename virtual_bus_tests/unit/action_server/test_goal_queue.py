@@ -42,9 +42,23 @@ def test_a_goal_that_was_refused_or_is_known_cannot_be_admitted() -> None:
     world = GoalQueueWorld(robot_with("queue"))
     key = world.ask_way(0.3)
     with pytest.raises(RuntimeError, match="known already"):
-        world.goal_queue.admit(key, DriveRequest(0.1, 0.2), world.inputs, world.now_s)
+        world.goal_queue.admit(key, DriveRequest(0.1, 0.2), world.now_s)
     with pytest.raises(RuntimeError, match="outside"):
-        world.goal_queue.admit("new", DriveRequest(100.0, 0.2), world.inputs, world.now_s)
+        world.goal_queue.admit("new", DriveRequest(100.0, 0.2), world.now_s)
+
+
+def test_odometry_that_becomes_too_old_between_judgement_and_admission_ends_the_goal_and_is_no_defect() -> None:
+    world = GoalQueueWorld(robot_with("reject"))
+    request, last = DriveRequest(0.3, 0.2), world.inputs.odometry
+    world.change = lambda inputs: replace(inputs, odometry=last)
+    world.now_s = 0.19
+    assert world.goal_queue.refusal(request, world.inputs, world.now_s) is None
+    world.now_s = 0.29
+    world.goal_queue.admit("late", request, world.now_s)
+    cycles = [world.goal_queue.tick(world.inputs, world.now_s + at_s) for at_s in (0.02, 2.0, 4.0, 6.0)]
+    assert {cycle.twist for cycle in cycles} <= {STOP, None}
+    (end,) = (end for cycle in cycles for end in cycle.ends)
+    assert end.outcome.code is ErrorCode.ODOMETRY_LOST
 
 
 def test_a_queue_runs_in_order_and_the_base_stands_in_between() -> None:
