@@ -35,7 +35,7 @@ from canbase_action_server.goal_queue import Cycle, GoalQueue
 from canbase_action_server.goal_step import GoalStep
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.motion import STOP, Twist
-from canbase_action_server.open_goal import OpenGoal, numbers, rejection, uuid_of
+from canbase_action_server.open_goal import OpenGoal, defect, numbers, rejection, uuid_of
 from canbase_action_server.outcome import ErrorCode, Outcome, Status
 from canbase_action_server.preconditions import action_source
 from canbase_config.robot import Robot
@@ -169,7 +169,7 @@ class DriveDistanceServer(Node):
             self,
             binding.type,
             name,
-            execute_callback=self._finish,
+            execute_callback=partial(self._finish, binding),
             goal_callback=self._guarded(partial(self._on_goal, binding), GoalResponse.REJECT),
             handle_accepted_callback=self._guarded(partial(self._on_accepted, binding)),
             cancel_callback=self._guarded(self._on_cancel, CancelResponse.REJECT),
@@ -205,17 +205,16 @@ class DriveDistanceServer(Node):
         self._log(GoalStep.CANCEL_REQUESTED, uuid_of(handle))
         return CancelResponse.ACCEPT
 
-    def _finish(self, handle: ServerGoalHandle) -> Any:
+    def _finish(self, binding: Binding, handle: ServerGoalHandle) -> Any:
         """The execute callback of rclpy, called when a goal has ended: its status is set, its result goes out."""
         uuid = uuid_of(handle)
+        result = defect(binding)
         try:
-            goal = self._open[uuid]
+            goal = self._open.pop(uuid)
             outcome, result = goal.finish()
-            del self._open[uuid]
             self._log_end(uuid, goal, outcome, result)
-        except Exception as error:
-            self.fail(error)  # rclpy would log it, abort the goal, and leave the base moving
-            raise
+        except Exception as error:  # noqa: BLE001  rclpy would log it, leave the base moving, and send error code 0: OK
+            self.fail(error)
         return result
 
     def _on_timer(self) -> None:

@@ -10,7 +10,7 @@ from rclpy.action.server import GoalEvent, ServerGoalHandle
 
 from canbase_action_server.binding import Binding
 from canbase_action_server.goal import Feedback
-from canbase_action_server.outcome import Outcome, Status
+from canbase_action_server.outcome import ErrorCode, Outcome, Status
 from canbase_action_server.rejection import as_texts
 
 
@@ -34,6 +34,12 @@ def numbers(message: Any) -> dict[str, float]:
     """The numbers of a goal or a result by name, for the log."""
     values = {name: getattr(message, name) for name in message.get_fields_and_field_types()}
     return {name: round(value, 5) for name, value in values.items() if isinstance(value, float)}
+
+
+def defect(binding: Binding) -> Any:
+    """The result of a goal whose own one cannot be made. rclpy sets its status: aborted."""
+    kind: Any = binding.type
+    return kind.Result(error_code=int(ErrorCode.INTERNAL), message="defect in the action server, see its log")
 
 
 @dataclass(slots=True)
@@ -68,8 +74,9 @@ class OpenGoal:
         self.handle._action_server.notify_execute(self.handle, None)
 
     def finish(self) -> tuple[Outcome, Any]:
-        """Sets the final status; how the goal ended, and the result for the client."""
+        """Sets the final status; how the goal ended, and the result for the client, which is made before that."""
         assert self.outcome is not None  # `end` was called before
+        result = self.binding.result(self.outcome)
         match self.outcome.status:
             case Status.SUCCEEDED:
                 self.handle.succeed()
@@ -77,4 +84,4 @@ class OpenGoal:
                 self.handle.canceled()
             case Status.ABORTED:
                 self.handle.abort()
-        return self.outcome, self.binding.result(self.outcome)
+        return self.outcome, result

@@ -394,3 +394,19 @@ def test_a_defect_in_taking_on_a_goal_ends_the_process_in_order(
     assert stage.server.wait(5.0) == 1
     assert "a defect" in stage.server.log()
     assert stage.base.speed_mps == 0.0
+
+
+def test_a_defect_in_making_the_result_is_no_success_with_code_ok(
+    test_node: TestNode, spawn: Spawn, make_robot: MakeRobot
+) -> None:
+    """Its status would be out already, and rclpy would send a result of zeros, whose error code is OK."""
+    broken = (
+        "from canbase_action_server import drive_messages\n"
+        "def broken(outcome): raise ZeroDivisionError('a defect')\n"
+        "drive_messages._result = broken\n"
+    )
+    stage = Stage(test_node, spawn(broken + server_code(make_robot({"timeouts": {"odometry_s": 0.5}}))))
+    result = stage.end_of(stage.client.send(0.05, 0.3))
+    assert (result.status, result.code) == (Status.ABORTED, ErrorCode.INTERNAL)
+    assert stage.server.wait(5.0) == 1
+    assert "a defect" in stage.server.log()
