@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from canbase.msg import DriverStatus, MuxState, SafetyState
 from nav_msgs.msg import Odometry as OdometryMessage
-from rclpy.serialization import deserialize_message
 
 from canbase_action_server.along_track import Pose, yaw_of_quaternion
 from canbase_action_server.inputs import Driver, Mux, Odometry, Safety
@@ -12,15 +11,6 @@ from canbase_runtime.driver_state import driver_state
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
 from canbase_runtime.stop_cause import stop_cause
 from canbase_runtime.watchdog_view import watchdog_view
-
-
-def odometry_from(serialized: bytes, received: float) -> Odometry | None:
-    """From the bytes of odom; None also when they are no message: anybody may publish any bytes."""
-    try:
-        message = deserialize_message(serialized, OdometryMessage)
-    except RuntimeError:  # RMWError
-        return None
-    return odometry_in(message, received)
 
 
 def odometry_in(message: OdometryMessage, received: float) -> Odometry | None:

@@ -25,6 +25,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from unique_identifier_msgs.msg import UUID
 
 from canbase_action_server import messages
@@ -33,7 +34,7 @@ from canbase_action_server.goal import GoalPhase
 from canbase_action_server.goal_client import REJECTION_QOS, SERVICE_QOS
 from canbase_action_server.goal_queue import Cycle, GoalQueue
 from canbase_action_server.goal_step import GoalStep
-from canbase_action_server.inputs import Inputs
+from canbase_action_server.inputs import Inputs, Odometry
 from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.open_goal import OpenGoal, defect, numbers, rejection, uuid_of
 from canbase_action_server.outcome import ErrorCode, Outcome, Status
@@ -145,7 +146,7 @@ class DriveDistanceServer(Node):
         """What was received, odometry too. To take a message of odom apart costs more than to receive it."""
         if self._odometry_waiting is not None:
             (serialized, received_s), self._odometry_waiting = self._odometry_waiting, None
-            odometry = messages.odometry_from(serialized, received_s)
+            odometry = _odometry_from(serialized, received_s)
             if odometry is not None:
                 self._inputs = replace(self._inputs, odometry=odometry)
         return self._inputs
@@ -269,3 +270,12 @@ class DriveDistanceServer(Node):
         }
         priority = Priority.INFO if outcome.status is Status.SUCCEEDED else Priority.NOTICE
         self._write_log(GoalStep.ENDED, uuid, fields, priority)
+
+
+def _odometry_from(serialized: bytes, received: float) -> Odometry | None:
+    """From the bytes of odom; None also when they are no message: any node may publish any bytes."""
+    try:
+        message = deserialize_message(serialized, OdometryMessage)
+    except RuntimeError:  # RMWError
+        return None
+    return messages.odometry_in(message, received)
