@@ -50,5 +50,5 @@ class McapFile:
             self._writer.finish()
             self._stream.close()
         except OSError as error:
-            return str(error.strerror)
+            return error.strerror or str(error)
         return ""

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import FrameType
 from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
+from canbase_cli.end_signals import end_signals
 from canbase_cli.options import NamespaceOption, ros_arguments, ros_needed
 from canbase_runtime.foreign_text import clean
 
@@ -35,7 +34,7 @@ def monitor(ctx: typer.Context, namespace: NamespaceOption = "") -> None:
         import rclpy
         from rclpy.signals import SignalHandlerOptions
 
-    ended = _end_signals()
+    ended = end_signals()
     rclpy.init(args=ros_arguments(ctx, namespace), signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = rclpy.create_node("canbase_monitor", enable_rosout=False)
@@ -107,15 +106,3 @@ def _snapshot(robot: str, kept: dict[str, tuple[Any, float]], now_s: float) -> S
     from canbase_cli.monitor_picture import Heard, Snapshot
 
     return Snapshot(robot, **{name: Heard(message, now_s - at_s) for name, (message, at_s) in kept.items()})
-
-
-def _end_signals() -> list[int]:
-    """A list that receives the number of each signal that requests the end."""
-    received: list[int] = []
-
-    def note(number: int, _frame: FrameType | None) -> None:
-        received.append(number)
-
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, note)
-    return received

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 import time
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from canbase_cli.end_signals import end_signals
 from canbase_cli.options import NamespaceOption, ros_arguments, ros_needed
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail
 
@@ -48,21 +47,14 @@ def record(
     try:
         from canbase_cli.mcap_file import McapFile
     except ModuleNotFoundError as error:
-        fail(f"{error.name} is not installed: pip install 'canbase[record]'", WRONG_INPUT)
-    ended: list[int] = []
-
-    def note(number: int, _frame: FrameType | None) -> None:
-        ended.append(number)
-
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, note)
-    try:
-        file = McapFile(mcap)
-    except OSError as error:
-        fail(f"{mcap} cannot be written: {error.strerror}", WRONG_INPUT)
+        fail(f"canbase record needs the Python package {error.name}: pip install 'mcap>=1.2,<2'", WRONG_INPUT)
+    ended = end_signals()
     rclpy.init(args=ros_arguments(ctx, namespace), signal_handler_options=SignalHandlerOptions.NO)
     try:
+        file = McapFile(mcap)
         failure = _record(file, topics, seconds, ended)
+    except OSError as error:
+        fail(f"{mcap} cannot be written: {error.strerror}", WRONG_INPUT)
     finally:
         rclpy.try_shutdown()
     if failure:

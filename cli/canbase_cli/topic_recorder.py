@@ -21,12 +21,11 @@ DEPTH = 200
 
 
 class TopicRecorder:
-    """`failure`: why recording ended by itself; empty: it goes on. `left_out`: topics of types unknown here."""
+    """`failure`: why recording ended by itself; empty: it goes on. Topics of unknown types are logged and left out."""
 
     def __init__(self, node: Node, file: McapFile, topics: Sequence[str] | None) -> None:
         """`topics`: names to record, relative ones below the node's namespace; None: all that are not hidden."""
         self.failure = ""
-        self.left_out: dict[str, str] = {}
         self._node, self._file = node, file
         self._wanted = None if topics is None else {node.resolve_topic_name(topic) for topic in topics}
         self._taken: set[str] = set()
@@ -43,7 +42,6 @@ class TopicRecorder:
             try:
                 kind, text = _message_class(types[0]), definition(types[0], _definition_of)
             except (ModuleNotFoundError, AttributeError, ValueError) as error:
-                self.left_out[topic] = str(error)
                 self._node.get_logger().warning(f"{topic} is not recorded: {types[0]} is not known here ({error})")
                 continue
             self._file.add_topic(topic, types[0], text)
@@ -60,7 +58,7 @@ class TopicRecorder:
             try:
                 self._file.add(topic, data, time.time_ns())
             except OSError as error:
-                self.failure = str(error.strerror)
+                self.failure = error.strerror or str(error)
 
         return write
 

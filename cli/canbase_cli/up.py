@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from canbase_cli.end_signals import end_signals
 from canbase_cli.options import ConfigOption, NamespaceOption, ros_arguments
 from canbase_cli.stack import POLL_S, Death, Stack
 from canbase_runtime.own_modules import module_command
@@ -42,7 +41,7 @@ def up(
     loaded = load_config(config)
     with_sim = loaded.robot.bus.interface == "udp_multicast" if sim is None else sim
     _refuse_twice(loaded.robot)
-    ended = _end_signals()
+    ended = end_signals()
     stack = Stack(
         loaded.path, namespace=namespace, sim=with_sim, ros_args=ros_arguments(ctx, ""), quiet_sim=not verbose
     )
@@ -81,18 +80,6 @@ def _refuse_twice(robot: Robot) -> None:
             check(task, name)
     except TakenError as error:
         fail(f"{robot.name} is not started: {error}", FAILED)
-
-
-def _end_signals() -> list[int]:
-    """A list that receives the number of each signal that requests the end."""
-    received: list[int] = []
-
-    def note(number: int, _frame: FrameType | None) -> None:
-        received.append(number)
-
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, note)
-    return received
 
 
 def _wait(stack: Stack, ended: list[int]) -> Death | None:

@@ -15,7 +15,7 @@ import pytest
 
 from canbase_runtime import local_frames as of_the_others
 from canbase_watchdog import local_frames as of_the_watchdog
-from support.heard import INSIDE
+from support.receivers import INSIDE
 
 pytestmark = pytest.mark.bus
 TESTS = Path(__file__).parents[1]
@@ -65,7 +65,7 @@ def python(namespace: str, *arguments: str) -> subprocess.Popen[str]:
 
 def heard(hop_limit: int) -> dict[str, list[int]]:
     """By whom what was heard, while another computer forged frames."""
-    with python(HERE, "-m", "support.heard", str(PORT), str(hop_limit)) as listener:
+    with python(HERE, "-m", "support.receivers", str(PORT), str(hop_limit)) as listener:
         assert listener.stdout is not None
         assert listener.stdout.readline() == "{}\n"
         with python(THERE, "-c", FORGED.format(port=PORT)) as stranger:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -92,10 +93,21 @@ def test_a_file_that_exists_is_not_touched_and_without_a_message_there_is_no_fil
     assert refused.wait(30.0) == 2
     assert "File exists" in refused.log()
     assert kept.read_bytes() == b"mine"
+    nowhere = spawn([*CANBASE, "record", "--mcap", str(tmp_path / "no" / "folder.mcap")])
+    assert nowhere.wait(30.0) == 2
+    assert "No such file or directory" in nowhere.log()
     empty = spawn([*CANBASE, "record", "--mcap", str(tmp_path / "none.mcap"), "--topic", "nothing", "--seconds", "1"])
     assert empty.wait(30.0) == 1
     assert "no message came" in empty.log()
     assert not (tmp_path / "none.mcap").exists()
+
+
+def test_without_foxgloves_library_it_names_the_package_and_the_command(spawn: Spawn, tmp_path: Path) -> None:
+    code = "import sys; sys.modules['mcap'] = None; from canbase_cli.entry import main; main()"
+    process = spawn([sys.executable, "-c", code, "record", "--mcap", str(tmp_path / "run.mcap")])
+    assert process.wait(30.0) == 2
+    assert "pip install 'mcap>=1.2,<2'" in process.log()
+    assert not (tmp_path / "run.mcap").exists()
 
 
 def test_a_file_that_cannot_grow_ends_it_with_the_reason(test_node: TestNode, spawn: Spawn, tmp_path: Path) -> None:

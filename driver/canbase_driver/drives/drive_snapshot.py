@@ -54,7 +54,7 @@ class DriveSnapshot:
     effort_nm: float = math.nan
     """The same at the wheel [N·m]; NaN: the drive does not report it, or robot.yaml has no rated_torque_nm."""
     current_a: float = math.nan
-    """Of the motor [A]; NaN: not measured."""
+    """Of the motor [A], with the sign that the drive gives it; NaN: not measured."""
     temperature_c: float = math.nan
     """Of the drive [°C]; NaN: not measured."""
     boot_notes: tuple[str, ...] = ()

@@ -80,8 +80,8 @@ class WheelTravel:
     def __init__(self, metres_per_count: float, max_step_counts: float) -> None:
         """`metres_per_count`: rim travel, negative for a mirrored axis. `max_step_counts`: possible in one cycle.
 
-        Raises ValueError for a step that is not positive or not below half the 32-bit range: it could not be told apart
-        from a wrap.
+        Raises ValueError for a step that is not positive or not below half the 32-bit range: it would look like a
+        wrap.
         """
         if not 0.0 < max_step_counts < _COUNTS / 2:
             raise ValueError(f"max_step_counts must be above 0 and below 2^31, not {max_step_counts}")

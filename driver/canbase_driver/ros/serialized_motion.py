@@ -43,8 +43,8 @@ class SerializedMotion:
         self._odometry: SerializedMessage | None = None
         self._transform: SerializedMessage | None = None
         self._joints: SerializedMessage | None = None
-        self._names: tuple[list[str], bool] = ([], False)
-        """Of the joints, and whether they have an effort."""
+        self._layout: tuple[list[str], bool] = ([], False)
+        """Of joint_states: the joints, and whether they have an effort."""
 
     def odometry(self, snapshot: DriverSnapshot, stamp: Time) -> bytes:
         """`messages.odometry_message`."""
@@ -79,12 +79,13 @@ class SerializedMotion:
         """`messages.joint_state_message`."""
         heard = messages.heard_drives(snapshot)
         efforts_nm = messages.efforts_nm(heard)
-        names = ([drive.joint for drive in heard], bool(efforts_nm))
-        if self._joints is None or names != self._names:
+        layout = ([drive.joint for drive in heard], bool(efforts_nm))
+        if self._joints is None or layout != self._layout:
             message = messages.joint_state_message(snapshot, stamp)
             if not heard:
                 return bytes(serialize_message(message))
-            self._joints, self._names = SerializedMessage(message, *_JOINTS, *(["effort"] if efforts_nm else [])), names
+            fields = (*_JOINTS, "effort") if efforts_nm else _JOINTS
+            self._joints, self._layout = SerializedMessage(message, *fields), layout
         return self._joints.pack(
             stamp.sec,
             stamp.nanosec,

@@ -1,4 +1,4 @@
-"""`python -m support.heard PORT`: which of driver, watchdog and simulator receives which frames of a simulated bus.
+"""`python -m support.receivers PORT`: which of driver, watchdog and simulator receives which frames of a simulated bus.
 
 Prints a line of JSON when all listen; when it is answered another one: {"driver": [...], …}, identifiers in order.
 """
