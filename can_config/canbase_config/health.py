@@ -10,13 +10,32 @@ from canbase_config.section import MisfitError, Section
 
 
 class Health(Section):
-    """Warnings about values that a drive measures besides its motion. They stop nothing; the drive's own faults do."""
+    """Limits of what a drive measures besides its motion. A value beyond one is a warning and stops nothing; a stall,
+    which has keys of its own, stops the base."""
 
     voltage_low_v: Annotated[float, Field(ge=1.0, le=1000.0, description="a drive's supply below [V]")] | None = None
     voltage_high_v: Annotated[float, Field(ge=1.0, le=1000.0, description="a drive's supply above [V]")] | None = None
     current_high_a: Annotated[float, Field(gt=0.0, le=1000.0, description="a motor's current above [A]")] | None = None
     temperature_high_c: (
         Annotated[float, Field(ge=20.0, le=200.0, description="a drive's temperature above [°C]")] | None
+    ) = None
+    stall_torque_share: Annotated[
+        float,
+        Field(
+            ge=0.1,
+            le=3.0,
+            description="a wheel stalls: at least this share of the rated torque (6077h, 6078h), no speed, though "
+            "motion is ordered; ...",
+        ),
+    ] = 0.8
+    stall_time_s: (
+        Annotated[
+            float,
+            Field(
+                ge=0.05, le=2.0, description="... for this time; default: 0.88 × watchdog.motion_missing_s, 0.22 s [s]"
+            ),
+        ]
+        | None
     ) = None
 
     @model_validator(mode="after")

@@ -166,8 +166,8 @@ def hardest_braking_mps2(robot: Robot, drive: Drive) -> float:
 
 def _rounded_s(straight_s: float, linear: float, jerk: float) -> float:
     """Time of an S-curve whose steepest slope is that of a straight line of `straight_s`, or less where jerk lets it
-    not get so steep. Without a linear part there is no jerk limit."""
-    if linear == 0.0:
+    not get so steep. Without a linear part, or with one too small for a float, there is no jerk limit."""
+    if linear / jerk == 0.0:
         return straight_s
     slope_s = max(straight_s, math.sqrt(linear / jerk))
     return slope_s + linear / slope_s / jerk

@@ -31,6 +31,8 @@ class Cause(Enum):
     DRIVE_SILENT = "drive silent"
     DRIVE_DISABLED = "drive disabled"
     ENABLE_TIMEOUT = "enable timeout"
+    STALLED = "stalled"
+    """Much torque, no speed: a blocked wheel."""
     DID_NOT_STOP = "did not stop"
     FEEDBACK_IMPLAUSIBLE = "feedback implausible"
     STOP_REQUESTED = "stop requested"

@@ -310,6 +310,8 @@ class DriverCore:
         watchdog, watchdog_detail = self._watchdog.view(now_s)
         liar = self._watchdog.lying_node(now_s)
         if liar:
+            if stalling := drives.stalling(liar):
+                watchdog_detail = f"{watchdog_detail}; {stalling}"
             drives.doubt(liar, f"reports implausible values (watchdog: {watchdog_detail})")
         measured_mps = abs(drives.fastest().velocity_mps)
         left_mps, right_mps = wheel_speeds(self._motion.twist, self._track_m)
@@ -329,6 +331,7 @@ class DriverCore:
             watchdog_detail=watchdog_detail,
             watchdog_about_drive=self._watchdog.about_drive,
             commanded=self._command.motion(now_s) if with_motion else "",
+            stalled=drives.stalled(),
             overdue=self._overdue(now_s),
             standstill=stand,
             turning=drives.turning(now_s) if with_motion and not stand else "",

@@ -28,6 +28,8 @@ PACE: Final = Pace(drives_poll_s=0.01, command_parts=2.0)
 LOOK_S: Final = 0.02
 STEEPEST: Final = 0.1
 """Slope: 10 %."""
+LOADED: Final = 2.0
+"""Payload of a robot that is loaded: double mass and yaw inertia."""
 HOLD_S: Final = (0.02, 0.2)
 """An obstacle holds a wheel for this long, like a threshold [s]."""
 HOLD_SHARE: Final = (0.2, 3.0)
@@ -66,9 +68,11 @@ class FalseTrip:
 class OrdinaryHour:
     """One robot that drives for a while. Nothing here is random but by its seed, which is also the robot's number."""
 
-    def __init__(self, seed: int, pace: Pace = PACE) -> None:
+    def __init__(self, seed: int, pace: Pace = PACE, loaded: bool = False) -> None:
+        """`loaded`: with double payload, and never on a level floor."""
         self.seed, self.random = seed, Random(f"ordinary {seed}")
-        self.drawn: DrawnRobot = draw_robot(seed)
+        self._loaded = loaded
+        self.drawn: DrawnRobot = draw_robot(seed, LOADED) if loaded else draw_robot(seed)
         self.world = World(seed=seed, pace=pace, drawn=self.drawn)
         self.around = Surroundings(self.world)
         self._start = self.world.clock.now_s
@@ -199,7 +203,10 @@ class OrdinaryHour:
         body, base, wheels = self.drawn.body, self.world.drives.bench.base, len(self.drawn.robot.drives)
         weight_n = GRAVITY_MPS2 * body.mass_kg * body.payload_factor
         most_n = min(STEEPEST * weight_n, wheels * self._slope_n)
-        base.push_n = most_n * self.random.choice((0.0, 0.0, self.random.uniform(-1.0, 1.0)))
+        if self._loaded:
+            base.push_n = most_n * self.random.choice((-1.0, 1.0)) * self.random.uniform(0.5, 1.0)
+        else:
+            base.push_n = most_n * self.random.choice((0.0, 0.0, self.random.uniform(-1.0, 1.0)))
         self._note(f"slope {base.push_n / weight_n:+.1%}")
         self._slow_ramps()
         self._later(self.random.uniform(2.0, 20.0), self._change_slope)

@@ -63,8 +63,8 @@ def robot_of(seed: int) -> DrawnRobot:
 
 
 @lru_cache(maxsize=64)
-def draw_robot(number: int) -> DrawnRobot:
-    """The same number gives the same robot; 0 is the sample."""
+def draw_robot(number: int, payload: float | None = None) -> DrawnRobot:
+    """The same number gives the same robot; 0 is the sample. `payload`: this factor instead of the one drawn."""
     if number == 0:
         return DrawnRobot(0, campaign_robot(), PlantParameters())
     random = Random(f"robot {number}")
@@ -74,7 +74,7 @@ def draw_robot(number: int) -> DrawnRobot:
         except ValidationError:
             continue
         if bitrates(robot):
-            return _with_body(number, robot, random)
+            return _with_body(number, robot, random, payload)
     raise RuntimeError(f"robot {number}: none of {TRIES} drawn files passes robot.yaml's checks")
 
 
@@ -207,10 +207,11 @@ def _safety(random: Random, linear_mps: float, edge_m: float) -> dict[str, Any]:
     }
 
 
-def _with_body(number: int, robot: Robot, random: Random) -> DrawnRobot:
+def _with_body(number: int, robot: Robot, random: Random, payload_factor: float | None) -> DrawnRobot:
     """Motors that can brake as the file states, with this load on this slope, and some force more."""
     wheels, limits = len(robot.drives), robot.limits
     mass_kg, payload = wheels * random.choice((8.0, 15.0, 40.0)), random.choice((0.5, 1.0, 1.0, 1.5, 2.0))
+    payload = payload if payload_factor is None else payload_factor
     wheel_kg, coulomb_n = (
         mass_kg * random.uniform(0.03, 0.1) / wheels * 2.0,
         mass_kg * random.uniform(0.3, 0.8) / wheels,

@@ -46,7 +46,8 @@ _LIES = ("encoder_frozen", "frozen_encoder", "stuck_velocity", "encoder_jumping"
 _OFF = ("drive_sto", "drive_fault")
 _DRIVER_SEES = "driver:drive_fault+driver:drive_restarted+driver:drive_silent+driver:drive_disabled"
 _DRIVER_HEEDS = "driver:waits_for_zero+driver:reset_needs_zero+driver:zero_before_motion"
-_MOTION = "watchdog:feedback_implausible+watchdog:motion_missing+watchdog:twist_outside"
+_MISSING = "watchdog:motion_missing+driver:stalled"
+_MOTION = f"watchdog:feedback_implausible+{_MISSING}+watchdog:twist_outside"
 _DEAF = "a watchdog that cannot send stops nothing; what it would trip for stays tripped until it can send again"
 _AWAY = "driver:watchdog_missing+drives:heartbeat_consumer"
 
@@ -66,8 +67,8 @@ NEEDS: tuple[Need, ...] = (
          f"{_MOTION}+watchdog:motion_outside+driver:did_not_stop"),
     Need("watchdog:setpoint_missing", ("setpoints_not_sent", "stick_held")),
     Need("watchdog:drive_down", _OFF, "driver:drive_fault+driver:drive_disabled"),
-    Need("watchdog:feedback_implausible", _LIES, "watchdog:motion_missing"),
-    Need("watchdog:motion_missing", ("encoder_lost", "wheel_blocked", "stick_held")),
+    Need("watchdog:feedback_implausible", _LIES, _MISSING),
+    Need("watchdog:motion_missing", ("encoder_lost", "wheel_blocked", "stick_held"), "driver:stalled"),
     Need("watchdog:power_at_stand", ("driver_never_lets_go", "encoder_lost", "stick_tapped")),
     Need("watchdog:target_outside", _MAD),
     Need("watchdog:overspeed", ("encoder_reversed", "driver_ignores_zero"), "watchdog:motion_outside"),
@@ -85,6 +86,7 @@ NEEDS: tuple[Need, ...] = (
     Need("driver:drive_silent", _SILENT, "watchdog:drive_silent"),
     Need("driver:watchdog_missing", _WATCHDOG_GONE, "drives:heartbeat_consumer"),
     Need("driver:drive_disabled", _OFF, "driver:drive_fault+watchdog:drive_down"),
+    Need("driver:stalled", ("encoder_lost", "wheel_blocked", "stick_held"), "watchdog:motion_missing"),
     Need("driver:did_not_stop", ("drive_ignores_setpoints",), f"{_MOTION}+watchdog:motion_outside",
          proof="it acts after the whole ramp and its reserve (timeouts.standstill_s); who has watched the bus "
          "meanwhile trips within feedback_samples of the first sample that is too fast"),
@@ -100,7 +102,7 @@ NEEDS: tuple[Need, ...] = (
     Need("driver:reset_needs_zero", _HELD, "mux:neutral_start+driver:zero_before_motion+driver:waits_for_zero"),
     Need("driver:command_is_finite", ("straight_to_cmd_vel",)),
     Need("driver:odometry_jump_guard", ("frozen_encoder",), f"{_MOTION}+watchdog:motion_outside"),
-    Need("driver:lets_go", ("encoder_lost", "stick_tapped"), "watchdog:power_at_stand+watchdog:motion_missing",
+    Need("driver:lets_go", ("encoder_lost", "stick_tapped"), f"watchdog:power_at_stand+{_MISSING}",
          quiet=True),
     Need("driver:stop_record", ("driver_dies", "drive_fault", "all_processes_restart")),
     Need("records:unreadable", ("driver_dies_torn", "watchdog_dies_torn", "lease_lost")),

@@ -40,24 +40,24 @@ class Driven:
     processor_s: float = field(default=0.0, compare=False)
 
 
-def drive(seed: int, seconds: float = RUN_S) -> Driven:
-    """One robot."""
+def drive(seed: int, seconds: float = RUN_S, loaded: bool = False) -> Driven:
+    """One robot. `loaded`: with double payload on slopes."""
     gc.set_threshold(100_000)
     began = time.process_time()
-    hour = OrdinaryHour(seed)
+    hour = OrdinaryHour(seed, loaded=loaded)
     trip = hour.run(seconds)
     return Driven(
         seed, hour.now_s, hour.moving_s, hour.world.drives.bench.base.path_m, trip, time.process_time() - began
     )
 
 
-def drive_all(seeds: range, seconds: float, workers: int) -> Iterator[Driven]:
+def drive_all(seeds: range, seconds: float, workers: int, loaded: bool = False) -> Iterator[Driven]:
     """As they end. Ctrl-C of a terminal is not for the workers."""
     if workers == 1:
-        yield from (drive(seed, seconds) for seed in seeds)
+        yield from (drive(seed, seconds, loaded) for seed in seeds)
         return
     with multiprocessing.get_context("spawn").Pool(workers, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
-        yield from pool.imap_unordered(partial(drive, seconds=seconds), seeds)
+        yield from pool.imap_unordered(partial(drive, seconds=seconds, loaded=loaded), seeds)
 
 
 def told(trip: FalseTrip) -> str:
@@ -73,6 +73,7 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=1, help="seed of the first robot; the others follow it")
     parser.add_argument("--workers", type=int, default=2, help="processes")
     parser.add_argument("--seed", type=int, help="this robot alone")
+    parser.add_argument("--loaded", action="store_true", help="double payload, and slopes all the time")
     given = parser.parse_args()
     out = Console()
     seconds = min(RUN_S, given.hours * 3600.0)
@@ -85,7 +86,7 @@ def main() -> int:
     with Progress(*columns, console=out) as progress:
         task = progress.add_task("", total=len(seeds), told="")
         try:
-            for driven in drive_all(seeds, seconds, min(given.workers, len(seeds))):
+            for driven in drive_all(seeds, seconds, min(given.workers, len(seeds)), given.loaded):
                 done.append(driven)
                 if driven.trip is not None:
                     out.print(told(driven.trip), highlight=False, soft_wrap=True, markup=False)

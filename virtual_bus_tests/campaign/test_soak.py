@@ -32,6 +32,16 @@ def test_robots_that_were_stopped_once_are_not_any_more(seed: int, seconds: floa
     assert driven.trip is None, told(driven.trip)
 
 
+def test_a_loaded_robot_has_double_payload_and_is_never_on_a_level_floor() -> None:
+    for seed in (1, 2, 4):
+        hour = OrdinaryHour(seed, loaded=True)
+        assert hour.drawn.body.payload_factor == 2.0
+        assert str(hour.drawn.robot) == str(OrdinaryHour(seed).drawn.robot)
+        for _ in range(20):
+            hour._change_slope()
+            assert abs(hour.world.drives.bench.base.push_n) > 0.0
+
+
 def test_the_same_seed_drives_the_same_way() -> None:
     assert [drive_all(range(3, 4), 8.0, 1).__next__() for _ in range(2)] == list(drive_all(range(3, 4), 8.0, 1)) * 2
 

@@ -13,7 +13,7 @@ from canopen import SdoAbortedError
 
 from canbase_sim.axis_parts import AxisParts, StateChange
 from canbase_sim.cia301 import abort, emcy, heartbeat, nmt, sdo_server, store
-from canbase_sim.cia301.dictionary import Dictionary, key
+from canbase_sim.cia301.dictionary import AXIS_STRIDE, FIRST_AXIS, Dictionary, key
 from canbase_sim.cia301.nmt import NmtCommand, NmtState
 from canbase_sim.cia301.rpdo import Rpdo
 from canbase_sim.cia301.tpdo import Tpdo
@@ -23,6 +23,7 @@ from canbase_sim.command_watch import CommandWatch
 from canbase_sim.frame import Frame
 from canbase_sim.line import Line
 from canbase_sim.personality import GENERIC, Personality
+from canbase_sim.plant.battery import REST_V
 from canbase_sim.plant.encoder import Encoder
 
 COMMUNICATION_FAULT = 0x7500
@@ -31,6 +32,10 @@ RESET_S = 0.01
 """From NMT reset communication to the boot-up message [s]."""
 OFFSET_STEP = 1_000_003
 """The encoder shows other counts after each power cycle: it has no battery."""
+
+
+def _unloaded() -> float:
+    return REST_V
 
 
 class SimulatedNode:
@@ -45,7 +50,9 @@ class SimulatedNode:
         fixed: Mapping[int, int] | None = None,
         personality: Personality = GENERIC,
         sdo_delay_s: float = 0.0,
+        supply_v: Callable[[], float] = _unloaded,
     ) -> None:
+        """`supply_v`: what feeds its power stage [V]."""
         self.node_id, self.personality = node_id, personality
         self.boot_delay_s = boot_delay_s if personality.boot_delay_s is None else personality.boot_delay_s
         self.line = Line(sdo_delay_s if personality.sdo_delay_s is None else personality.sdo_delay_s)
@@ -56,7 +63,13 @@ class SimulatedNode:
         self._now = now_s
         self._bus_on_at: float | None = None
         d = self.dictionary = Dictionary(node_id, len(axes), fixed, personality)
-        d.before_read = self._refresh
+        self._supply_v = supply_v
+        self._supply_places = [
+            (place + (AXIS_STRIDE << 8) * axis if place >> 8 in FIRST_AXIS else place, volts)
+            for place, volts in personality.voltage.items()
+            for axis in range(len(axes))
+        ]
+        d.before_read = self._measure
         self.emcy = emcy.EmcyService(d, self._send_emcy)
         self.sdo = sdo_server.SdoService(node_id, d, lambda frame: self.line.answer(frame, self._now))
         self._producer = heartbeat.HeartbeatProducer(d)
@@ -265,6 +278,13 @@ class SimulatedNode:
         for axis in self.axes:
             axis.refresh()
         self.dictionary.pack()
+
+    def _measure(self) -> None:
+        """What SDO alone reads, too."""
+        self._refresh()
+        supply_v = self._supply_v()
+        for place, volts in self._supply_places:
+            self.dictionary.values[place] = round(supply_v / volts)
 
     # Loss of the connection
 

@@ -35,6 +35,8 @@ class Personality:
     """Single entries (`index << 8 | sub-index`) that it does not have."""
     extras: Mapping[int, Extra] = field(default_factory=dict)
     """Objects of the maker, by `index << 8 | sub-index`."""
+    voltage: Mapping[int, float] = field(default_factory=lambda: {_key(0x6079): 0.001})
+    """Entries that show the supply, and the volts of one bit; CiA 402-2: 6079h in mV. Read by SDO alone."""
     defaults: Mapping[int, int] = field(default_factory=dict)
     """Values after power on that are not those of our EDS."""
     heartbeat_entries: int = 2
@@ -99,7 +101,7 @@ GENERIC = Personality()
 PERSONALITIES: Mapping[str, Personality] = {
     "generic": GENERIC,
     "epos4": Personality(
-        missing=_NO_SYNC_COUNTER | {0x6078},  # EDS
+        missing=_NO_SYNC_COUNTER | {0x6078, 0x6079},  # EDS
         missing_subs=_RPDO_TIMERS,  # EDS: no 1400h:5
         sets_no_rtr=True,  # EDS
         defaults={_key(0x6007): 3, _key(0x605A): 6, _key(0x1029, 1): 0},  # EDS
@@ -108,6 +110,7 @@ PERSONALITIES: Mapping[str, Personality] = {
             _key(0x30D1, 1): Extra("i", 0),
             _key(0x3201, 1): Extra("h", 312),
         },
+        voltage={_key(0x2200, 1): 0.1},  # assumed, as in its profile
         target_unit="rpm",  # EDS 60A9h = 00B44700h
         actual_unit="rpm",
         acceleration_unit="rpm/s",  # manual of the motion controller
@@ -115,7 +118,7 @@ PERSONALITIES: Mapping[str, Personality] = {
         heartbeat_fault_needs_communication_reset=True,  # seen by users: 8130h and 8120h
     ),
     "roboteq": Personality(
-        missing=_NO_SYNC_COUNTER | {0x1005, 0x1029, 0x6007, 0x603F, 0x605A, 0x605E, 0x6078},  # EDS v80
+        missing=_NO_SYNC_COUNTER | {0x1005, 0x1029, 0x6007, 0x603F, 0x605A, 0x605E, 0x6078, 0x6079},  # EDS v80
         missing_subs=_RPDO_TIMERS,  # EDS
         sets_no_rtr=True,  # EDS
         defaults=_NO_REACTION | {_key(base + n, 2): 255 for base in (0x1400, 0x1800) for n in range(4)},  # EDS
@@ -125,6 +128,7 @@ PERSONALITIES: Mapping[str, Personality] = {
             _key(0x2100, 2): Extra("h", 0),
             _key(0x210F, 2): Extra("h", 31),
         },
+        voltage={_key(0x210D, 2): 0.1},  # assumed, as in its profile
         heartbeat_entries=4,  # EDS
         needs_no_rtr=True,  # refused with 0609 0030h, as a user of canopen found
         target_unit="rpm",
@@ -136,7 +140,7 @@ PERSONALITIES: Mapping[str, Personality] = {
     "zlac8015d": Personality(
         missing=_NO_SYNC_COUNTER
         | _LACKS_SELF_STOP
-        | {0x1010, 0x1011, 0x605A, 0x605B, 0x605C, 0x605D, 0x605E, 0x60C2, 0x606B, 0x606D, 0x6078},
+        | {0x1010, 0x1011, 0x605A, 0x605B, 0x605C, 0x605D, 0x605E, 0x60C2, 0x606B, 0x606D, 0x6078, 0x6079},
         missing_subs=_RPDO_TIMERS,  # the EDS has them; no source shows that the firmware heeds them
         extras={
             _key(0x2000): Extra("H", 0, writable=True),  # EDS: communication offline time
@@ -190,7 +194,7 @@ PERSONALITIES: Mapping[str, Personality] = {
         boot_delay_s=0.6,  # assumed: a late boot-up
     ),
     "tmcm1636": Personality(
-        missing=_NO_SYNC_COUNTER | {0x6007, 0x603F, 0x6078},  # EDS
+        missing=_NO_SYNC_COUNTER | {0x6007, 0x603F, 0x6078, 0x6079},  # EDS
         missing_subs=_RPDO_TIMERS,  # EDS
         sets_no_rtr=True,  # EDS
         defaults=_NO_REACTION | {_key(0x1029, 1): 0},  # EDS
@@ -201,7 +205,7 @@ PERSONALITIES: Mapping[str, Personality] = {
         acceleration_unit="rpm/s",
     ),
     "dryve_d1": Personality(
-        missing=_NO_SYNC_COUNTER | {0x1011, 0x1029, 0x6007, 0x605A, 0x605E, 0x6077},  # EDS
+        missing=_NO_SYNC_COUNTER | {0x1011, 0x1029, 0x6007, 0x605A, 0x605E, 0x6077, 0x6079},  # EDS
         sets_no_rtr=True,  # EDS
         defaults=_NO_REACTION,
         heartbeat_entries=1,  # EDS

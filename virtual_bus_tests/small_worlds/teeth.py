@@ -27,6 +27,7 @@ def _with(*events: str) -> Bounds:
 
 _RECORDS = "driver:stop_record+watchdog:stop_record"
 _NEUTRAL = "mux:neutral_start+driver:waits_for_zero+driver:zero_before_motion"
+_MOTION = "watchdog:motion_missing+driver:stalled+watchdog:twist_outside"
 _LEASES = "watchdog:lease_lost+watchdog:motion_outside+watchdog:target_outside+driver:command_timeout"
 
 TEETH = (
@@ -38,7 +39,12 @@ TEETH = (
     Tooth("watchdog:all+driver:command_timeout", "driving", _with("velocity dies"), "alive"),
     Tooth(_LEASES, "driving", _with("velocity dies"), "alive"),
     Tooth("mux:timeout", "driving", _with("radio lost"), "fresh"),
-    Tooth("watchdog:motion_missing+watchdog:twist_outside", "driving", _with("drive 1 encoder dead"), "fresh"),
+    Tooth(
+        "watchdog:motion_missing+driver:stalled+watchdog:twist_outside",
+        "driving",
+        _with("drive 1 encoder dead"),
+        "fresh",
+    ),
     # what is latched stays so
     Tooth("watchdog:latch+driver:latch", "driving", _with("lease lost", "stick"), "latched"),
     Tooth("watchdog:latch+driver:latch", "driving", _with("drive 1 power cycle"), "latched"),

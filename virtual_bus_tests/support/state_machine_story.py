@@ -35,6 +35,7 @@ WRONG: dict[str, Situation] = {
     "watchdog missing": Situation(watchdog=WatchdogView.MISSING, watchdog_detail="not heard yet"),
     "resetting": Situation(resetting=True),
     "drive disabled": Situation(disabled="left is switched on"),
+    "stalled": Situation(stalled="left stalls"),
     "did not stop": Situation(overdue="left turns"),
     "command not zero": Situation(commanded="0.3 m/s"),
     "not standing": Situation(standstill=False, turning="left turns"),

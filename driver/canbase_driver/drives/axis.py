@@ -11,6 +11,7 @@ from canbase_driver.cia301.pdo import NodeLayout, pack_setpoint, unpack_status, 
 from canbase_driver.cia402 import DriveState, PowerGoal, decode_statusword
 from canbase_driver.drive_units import AxisUnits
 from canbase_driver.drives.let_go import Push
+from canbase_driver.drives.stall import Stall, StallLimits
 from canbase_driver.drives.standstill import Stillness, StillnessLimits
 from canbase_driver.motion.limiter import Limiter
 from canbase_driver.motion.odometry import WheelTravel
@@ -43,6 +44,7 @@ class Axis:
         self.travel = WheelTravel(metres_per_count, max(1.0, step_m / abs(metres_per_count)))
         self.stillness = Stillness(StillnessLimits.of(robot, drive), metres_per_count)
         self.push = Push(LETS_GO_SHARE * robot.watchdog.stand_impulse_s, metres_per_count)
+        self.stall = Stall(StallLimits.of(robot))
         self._feedback_s = robot.timeouts.feedback_s
         self._layout = layout.profile.layout
         self._setpoint_cob_id = layout.setpoint_cob_id(drive.axis)
@@ -121,7 +123,11 @@ class Axis:
         travel_m = self.travel.travel_m
         self.stillness.on_sample(travel_m, self.velocity_mps, ordered_mps, now_s)
         torque = unpack_torque(data, self._layout)
-        self.push.on_sample(travel_m, torque, ordered_mps, self.has_torque, now_s)
+        push = self.push
+        push.on_sample(travel_m, torque, ordered_mps, self.has_torque, now_s)
+        self.stall.on_sample(self.velocity_mps, push.share, ordered_mps, lives=push.lives, now_s=now_s)
+        if self.stall.is_over:
+            self.stillness.distrust(self.stall.sentence)
         self.has_new_sample = self._status_is_new
         return True
 

@@ -135,6 +135,21 @@ class Drives:
         """Which wheel is not at standstill, and the evidence; empty: all are."""
         return _first(self._turning(axis, now_s) for axis in self.axes)
 
+    def stalled(self) -> str:
+        """Which wheel has stalled for longer than it may, and the evidence."""
+        for axis in self.axes:
+            if axis.stall.is_over:
+                return _of(axis, axis.stall.sentence)
+        return ""
+
+    def stalling(self, node_id: int) -> str:
+        """Which wheel of this node stalls now, however short, and the evidence; empty: none."""
+        return _first(
+            _of(axis, axis.stall.sentence)
+            for axis in self.axes
+            if axis.drive.node_id == node_id and axis.stall.time_s > 0.0
+        )
+
     def doubt(self, node_id: int, why: str) -> None:
         """What this node measures is no evidence: the watchdog has found it implausible."""
         for axis in self.axes:

@@ -39,6 +39,8 @@ class Push:
         """Where it is, and between which places it has been, from that of its last sign of life on."""
         self._at = math.inf
         self._owes = self._tells = False
+        self.lives = True
+        """The last sample was a sign of life of the encoder, or the drive had no torque."""
         self.share: float | None = None
         """Torque, of the rated one; None: the drive does not report it, or has only ever reported zero."""
 
@@ -58,7 +60,8 @@ class Push:
         given_s = torque * elapsed_s if torque >= NOISE_SHARE else 0.0
         self._at_m, self._seen_m = self._at_m + travel_m - self._seen_m, travel_m
         self._low_m, self._high_m = min(self._low_m, self._at_m), max(self._high_m, self._at_m)
-        if self._high_m - self._low_m >= self._life_m or not has_torque:
+        self.lives = self._high_m - self._low_m >= self._life_m or not has_torque
+        if self.lives:
             self._at_m = self._low_m = self._high_m = self.pushed_s = 0.0
         else:
             self.pushed_s = min(self.pushed_s + given_s, self._limit_s)

@@ -150,7 +150,7 @@ class Stillness:
         return lost_mps > hardest_mps2 * elapsed_s + limits.noise_mps
 
     def distrust(self, why: str) -> None:
-        """The watchdog has found the sensors implausible."""
+        """The sensors are no evidence: the watchdog has found them implausible, or the wheel stalls."""
         self._lie = why
 
     def stands(self, now_s: float) -> bool:

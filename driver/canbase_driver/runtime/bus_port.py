@@ -1,11 +1,13 @@
 """The driver's handle on the CAN bus (python-can): errors become a sentence in `problem`, late frames are never sent.
 
 A bus that fails is closed and opened again every RETRY_S, for as long as it takes; it has failed until a frame went out
-or came in. The core disarms meanwhile.
+or came in. The core disarms meanwhile. What was cut off may have got another driver meanwhile, and a bus that was down
+at the start was never listened to: so after a failure a driver listens again before it sends more than one frame.
 """
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -14,7 +16,9 @@ from typing import Any
 
 import can
 
+from canbase_config.robot import DRIVER_NODE_ID
 from canbase_driver.cia301.frame import MAX_DATA_BYTES, Frame
+from canbase_driver.cia301.nmt import HEARTBEAT, SYNC
 from canbase_driver.runtime.frame_socket import ERROR, ERROR_CLASS, MAX_COB_ID, FrameSocket, open_bus
 from canbase_driver.supervision.bus_health import BusReport
 
@@ -30,12 +34,21 @@ IGNORED_AT_ONCE = 100
 OPENS_AT_ONCE_S = 0.002
 """Most adapters are open by then; a serial one (slcan) takes 2 s, and the control cycle does not wait for it."""
 BUS_OFF = "the CAN controller is bus-off after too many errors: check cable, termination and bit rate"
+ANOTHER_DRIVER = (
+    f"another driver is on the bus: SYNC or the heartbeat of node {DRIVER_NODE_ID} came. "
+    "Only one may run; end it first, on the computer that it runs on"
+)
 _ERRORS = (can.CanError, OSError, ValueError)
 """ValueError: from select for a handle whose adapter is gone."""
 
 
 class BusError(Exception):
     """The bus cannot be opened. The text has the likely reason."""
+
+
+def is_of_a_driver(frame: Frame) -> bool:
+    """Whether only a driver sends it: docs/bus.md."""
+    return frame.cob_id in (SYNC.cob_id, HEARTBEAT + DRIVER_NODE_ID)
 
 
 class _Opening(threading.Thread):
@@ -71,9 +84,14 @@ class _Opening(threading.Thread):
 class BusPort:
     """One bus. Only the control thread uses it."""
 
-    def __init__(self, arguments: dict[str, Any]) -> None:
-        """Opens `can.Bus(**arguments)`. Raises BusError."""
+    def __init__(self, arguments: dict[str, Any], listen_s: float = 0.0) -> None:
+        """Opens `can.Bus(**arguments)`. Raises BusError.
+
+        `listen_s`: for so long it listens after each failure; a driver does, for the timeout of a heartbeat.
+        """
         self._arguments = arguments
+        self._listen_s, self._listens, self._silent_until_s = listen_s, False, math.inf
+        self._probe: Frame | None = None
         self.problem = ""
         self.report = BusReport()
         self._send_failures = self._receive_failures = 0
@@ -119,11 +137,14 @@ class BusPort:
         if can_id > MAX_COB_ID or len(data) > MAX_DATA_BYTES:
             self._drop()
             return None
-        return Frame(can_id, data)
+        frame = Frame(can_id, data)
+        if self._listens and is_of_a_driver(frame):
+            self._on_driver(frame)
+        return frame
 
     def send(self, frame: Frame) -> None:
         """Send now or never."""
-        if self._bus is None:
+        if self._bus is None or self._is_silent():
             return
         try:
             self._bus.write(frame.cob_id, frame.data, SEND_TIMEOUT_S)
@@ -132,7 +153,8 @@ class BusPort:
         else:
             self._send_failures = 0
             if not self.report.is_bus_off:  # then the kernel takes frames and drops them
-                self.problem = ""
+                self._probe = frame if self._listens else None
+                self._on_passed()
 
     def close(self) -> None:
         """Close the bus. It is not opened again."""
@@ -150,9 +172,30 @@ class BusPort:
     def _on_received(self) -> None:
         """The bus works."""
         self._receive_failures = 0
-        self.problem = ""
+        self._on_passed()
         if self.report.is_bus_off:
             self.report = replace(self.report, controller=BusReport().controller)
+
+    def _on_passed(self) -> None:
+        """A frame went out or came in. After a failure the listening begins, and the problem stays until it is over."""
+        if not self._listens:
+            self.problem = ""
+        elif self._silent_until_s == math.inf:
+            self._silent_until_s = time.monotonic() + self._listen_s
+
+    def _is_silent(self) -> bool:
+        """Whether it listens now; when that is over, it goes on as before the failure."""
+        if not self._listens or self._silent_until_s == math.inf:
+            return False
+        self._listens = time.monotonic() < self._silent_until_s
+        return self._listens
+
+    def _on_driver(self, frame: Frame) -> None:
+        """While it listens. A simulated bus brings back the one frame that was sent, and that is none of another."""
+        if frame == self._probe:
+            self._probe = None
+        else:
+            self._fail(f"{ANOTHER_DRIVER} ({frame})")
 
     def _drop(self) -> None:
         self.report = replace(self.report, dropped=self.report.dropped + 1)
@@ -182,6 +225,7 @@ class BusPort:
         self.problem = problem
         self.report = replace(self.report, failures=self.report.failures + 1)
         self._retry_at = time.monotonic() + RETRY_S
+        self._listens, self._silent_until_s = self._listen_s > 0.0, math.inf
         bus, self._bus = self._bus, None
         try:
             if bus is not None:

@@ -10,10 +10,9 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from canbase_config.robot import DRIVER_NODE_ID, Robot
+from canbase_config.robot import Robot
 from canbase_config.watchdog import HEARTBEATS_PER_TIMEOUT
-from canbase_driver.cia301.nmt import HEARTBEAT, SYNC
-from canbase_driver.runtime.bus_port import BusPort
+from canbase_driver.runtime.bus_port import ANOTHER_DRIVER, BusPort, is_of_a_driver
 from canbase_runtime.latch_file import hold
 from canbase_runtime.single_instance import TakenError, bus_name, take
 
@@ -27,7 +26,7 @@ class Claim:
         with ExitStack() as held:
             held.enter_context(take("driver", bus_name(robot.bus.arguments())))
             held.enter_context(hold(folder, "driver"))
-            self.bus = BusPort(robot.bus_arguments())
+            self.bus = BusPort(robot.bus_arguments(), robot.timeouts.drive_heartbeat_s)
             held.callback(self.bus.close)
             self._held = held.pop_all()
         self._began_s = time.monotonic()
@@ -43,12 +42,9 @@ class Claim:
         end_s = max(self._began_s + self._listen_s, time.monotonic() + fresh_s)
         while (left_s := end_s - time.monotonic()) > 0.0:
             frame = self.bus.receive(left_s)
-            if frame is not None and frame.cob_id in (SYNC.cob_id, HEARTBEAT + DRIVER_NODE_ID):
+            if frame is not None and is_of_a_driver(frame):
                 self.close()
-                raise TakenError(
-                    f"another driver is on the bus: SYNC or the heartbeat of node {DRIVER_NODE_ID} came ({frame}). "
-                    "Only one may run; end it first, on the computer that it runs on"
-                )
+                raise TakenError(f"{ANOTHER_DRIVER} ({frame})")
 
     def close(self) -> None:
         """Closing the bus twice is closing it once: the control thread does it as well."""

@@ -80,6 +80,7 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(Cause.WATCHDOG_TRIPPED, _TRIPPED, True, True, "reset"),
     Hazard(Cause.WATCHDOG_MISSING, _MISSING, False, True, "reset, with the watchdog alive"),
     Hazard(Cause.DRIVE_DISABLED, lambda s: s.disabled, True, True, "reset"),
+    Hazard(Cause.STALLED, lambda s: s.stalled, True, True, "reset, with the wheel free to turn"),
     Hazard(Cause.DID_NOT_STOP, lambda s: s.overdue, True, True, "reset"),
     Hazard(Cause.STOP_REQUESTED, _stop_requested, False, True, "reset"),
     Hazard(Cause.INACTIVE, lambda s: s.inactive, False, False, "lifecycle transition activate"),

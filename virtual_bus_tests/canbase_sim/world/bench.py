@@ -18,6 +18,7 @@ from canbase_sim.frame import Frame
 from canbase_sim.node import SimulatedNode
 from canbase_sim.personality import GENERIC, PERSONALITIES, Personality
 from canbase_sim.plant.base import Base, MountedWheel, PlantParameters
+from canbase_sim.plant.battery import Battery
 
 DEFAULT_BODY = PlantParameters()
 """An empty robot of 30 kg on dry floor."""
@@ -68,6 +69,7 @@ class Bench:
         self._robot, self._parameters = robot, parameters or BenchParameters()
         self._start, self._steps, self._h = now_s, 0, body.step_s
         self._motors = [body.motor(len(robot.drives)) for _ in robot.drives]
+        self.battery = Battery(self._motors)
         self.base = Base(
             body,
             robot.base.track_m,
@@ -148,7 +150,16 @@ class Bench:
             fixed[key(0x608F + axis * AXIS_STRIDE, 1)] = drive.counts_per_motor_rev
             fixed |= _identity(drive)
         delays = self._parameters
-        return SimulatedNode(node_id, parts, now_s, delays.boot_delay_s, fixed, personality, delays.sdo_delay_s)
+        return SimulatedNode(
+            node_id,
+            parts,
+            now_s,
+            delays.boot_delay_s,
+            fixed,
+            personality,
+            delays.sdo_delay_s,
+            lambda: self.battery.voltage_v,
+        )
 
     def _axis(self, i: int | None) -> AxisParts:
         """The axis of drive `i`; None: an axis of the controller to which nothing is connected."""

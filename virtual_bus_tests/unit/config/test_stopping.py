@@ -10,6 +10,7 @@ from canbase_config.robot import Limits, Robot
 from canbase_config.stopping import (
     Stop,
     coasting_s,
+    jerk_adds_s,
     lag_s,
     longest_quick_stop_s,
     longest_ramp_s,
@@ -108,3 +109,10 @@ def test_no_twist_within_the_limits_takes_longer_than_the_longest() -> None:
 
 def test_a_wheel_without_power_rolls_until_friction_ends_it() -> None:
     assert coasting_s(-0.8) == pytest.approx(8.0)
+
+
+@pytest.mark.parametrize("linear_mps", [5e-324, 1e-308, 1e-30])
+def test_a_speed_that_is_next_to_nothing_has_a_time(linear_mps: float) -> None:
+    """5e-324 m/s divided by 10 is 0 for a float."""
+    limits = robot(linear_mps=linear_mps, acceleration_mps2=10.0, deceleration_mps2=10.0, jerk_mps3=10.0).limits
+    assert jerk_adds_s(limits) >= 0.0

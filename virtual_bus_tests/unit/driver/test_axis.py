@@ -113,6 +113,19 @@ def test_an_enabled_wheel_that_loses_its_speed_at_once_stands_and_is_not_proven_
     assert not slow.is_proven_to_stand(10.59 + 1.001 * bench_robot().timeouts.feedback_s)
 
 
+@pytest.mark.parametrize(("torque_permille", "stalls"), [(799, False), (800, True), (-1000, True)])
+def test_a_wheel_that_stalls_is_no_longer_believed_to_stand(torque_permille: int, stalls: bool) -> None:
+    """0.3 m/s are ordered from 10 s on; the wheel does not move. health.stall_time_s is 0.22 s."""
+    left = axis()
+    left.target_mps = 0.3
+    for n in range(24):
+        left.on_status(status(ENABLED, 0), 10.0 + 0.01 * n)
+        left.on_velocity(velocity(0) + torque_permille.to_bytes(2, "little", signed=True), 10.0 + 0.01 * n)
+        assert not (left.stall.is_over and n < 22)
+    assert left.stall.is_over is stalls
+    assert left.stillness.doubt.startswith("stalls: ") is stalls
+
+
 def test_a_gap_in_the_feedback_is_measured_in_time_so_nothing_of_the_way_is_lost() -> None:
     left = axis()
     left.on_status(status(ENABLED, 0), 10.0)

@@ -30,6 +30,16 @@ def samples_until_due(each: Push, share: float | None, ordered_mps: float = 0.1,
     return most
 
 
+def test_a_millimetre_and_no_torque_are_signs_of_life() -> None:
+    each, lives = push(), []
+    for n, (travel_m, has_torque) in enumerate(
+        [(0.0, True), (0.0009, True), (-0.0001, True), (0.0, True), (0.0, False)]
+    ):
+        each.on_sample(travel_m, 1.0, 0.1, has_torque, n * CYCLE_S)
+        lives.append(each.lives)
+    assert lives == [False, False, True, False, True]
+
+
 @pytest.mark.parametrize(
     ("share", "cycles"), [(1.0, 5), (-1.0, 5), (0.5, 10), (0.051, 99), (0.0099, 200), (0.0, 5), (None, 5)]
 )

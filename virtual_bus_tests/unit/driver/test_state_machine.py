@@ -92,6 +92,7 @@ STOPS = [
     ("watchdog tripped", QUICK, True),
     ("watchdog missing", RAMP, True),
     ("drive disabled", QUICK, True),
+    ("stalled", QUICK, True),
     ("did not stop", QUICK, True),
     ("stop requested", RAMP, True),
     ("inactive", RAMP, False),

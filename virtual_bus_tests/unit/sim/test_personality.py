@@ -60,6 +60,27 @@ def test_roboteq_has_no_sync_and_takes_no_synchronous_pdo() -> None:
     assert rig.write(0x1800, 255, sub=2) == "ok"
 
 
+@pytest.mark.parametrize(
+    ("kind", "index", "sub", "raw"),
+    [
+        ("generic", 0x6079, 0, 23_889),
+        ("elmo_gold", 0x6079, 0, 23_889),
+        ("epos4", 0x2200, 1, 239),
+        ("roboteq", 0x210D, 2, 239),
+    ],
+)
+def test_each_kind_shows_its_supply_where_its_eds_has_it(kind: str, index: int, sub: int, raw: int) -> None:
+    rig = rig_with(kind, velocity_unit="rpm")
+    rig.node._supply_v = lambda: 23.889
+    assert rig.read(index, sub=sub) == raw
+
+
+@pytest.mark.parametrize("kind", ["epos4", "roboteq", "zlac8015d", "tmcm1636", "dryve_d1"])
+def test_a_kind_whose_eds_has_no_6079h_refuses_it(kind: str) -> None:
+    rig = rig_with(kind, velocity_unit="rpm" if kind == "dryve_d1" else None)
+    assert rig.tx("601 40 79 60 00 00 00 00 00") == ["581 80 79 60 00 00 00 02 06"]
+
+
 def test_roboteq_goes_to_operational_by_itself() -> None:
     rig = rig_with("roboteq")
     assert rig.node.state is NmtState.OPERATIONAL

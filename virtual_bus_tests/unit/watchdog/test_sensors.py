@@ -23,7 +23,7 @@ from canbase_sim.frame import Frame as BenchFrame
 from canbase_sim.plant.encoder import EncoderFault
 from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import State, Watchdog
-from support.chain_world import STEP_S, World
+from support.chain_world import STEP_S, World, bench_robot
 
 IMPLAUSIBLE, MISSING, TWIST = TripCause.FEEDBACK_IMPLAUSIBLE, TripCause.MOTION_MISSING, TripCause.TWIST_OUTSIDE
 
@@ -40,14 +40,20 @@ class Course:
     turned_rad: float
 
 
+def watchdog_alone() -> World:
+    """A driver that takes a wheel with torque and no speed for a stall is first at some speeds: here it waits."""
+    robot = bench_robot()
+    return World(robot.model_copy(update={"health": robot.health.model_copy(update={"stall_time_s": 2.0})}))
+
+
 def driving(speed: float, turn: float = 0.0) -> World:
-    world = World()
+    world = watchdog_alone()
     world.drive(Twist2D(speed, turn), 1.2)
     return world
 
 
 def at_rest() -> World:
-    world = World()
+    world = watchdog_alone()
     world.enable()
     return world
 
