@@ -23,3 +23,7 @@ BitrateOption = Annotated[
     int | None,
     typer.Option("--bitrate", metavar="BIT/S", help="Bit rate, only for adapters that the system does not configure."),
 ]
+SdoTimeoutOption = Annotated[
+    float,
+    typer.Option("--sdo-timeout", metavar="SECONDS", min=0.02, max=10.0, help="How long to wait for an SDO answer."),
+]

@@ -62,6 +62,12 @@ def commission(
     ] = None,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Answer all confirmations with yes. For tests.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the changes, do not write robot.yaml.")] = False,
+    as_json: Annotated[
+        bool,
+        typer.Option(
+            "--json", help="Ask and be answered in lines of JSON, for another program: docs/commissioning.md."
+        ),
+    ] = False,
 ) -> None:
     """Guided first motion: WHEELS UP. Direction, scale, self-stop test, wheel radius and track.
 
@@ -80,7 +86,7 @@ def commission(
     if report is not None and report.exists():
         fail(f"{report} exists; a report is never overwritten: give --report another name", WRONG_INPUT)
     if not config.exists():
-        fail(f"{config} does not exist: begin with a copy of a sample, see canbase config check --help", WRONG_INPUT)
+        fail(f"{config} does not exist: canbase init writes one", WRONG_INPUT)
     plan = Plan(
         frozenset(steps.split(",")),
         speed_mps,
@@ -89,4 +95,4 @@ def commission(
         turns,
         report,
     )
-    run(config, plan, answers, yes=yes, dry_run=dry_run)
+    run(config, plan, answers, yes=yes, dry_run=dry_run, as_json=as_json)

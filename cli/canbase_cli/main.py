@@ -14,6 +14,7 @@ from canbase_cli import (
     doctor,
     drive,
     fibonacci,
+    init,
     inject,
     install,
     jog,
@@ -27,6 +28,7 @@ from canbase_cli import (
     trigger,
     up,
     urdf,
+    web,
 )
 from canbase_cli.goal import GoalCommand
 from canbase_cli.options import ROS_USAGE, RosCommand, new_app
@@ -69,12 +71,14 @@ app.command("stop", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_
 app.command("reset", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_DRIVE)(trigger.reset)
 
 app.command("monitor", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_LOOK)(monitor.monitor)
+app.command("web", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_LOOK)(web.web)
 app.command("record", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_LOOK)(record.record)
 app.command("doctor", cls=RosCommand, options_metavar=ROS_USAGE, epilog=doctor.EPILOG, rich_help_panel=_LOOK)(
     doctor.doctor
 )
 app.command("support-bundle", rich_help_panel=_LOOK)(support_bundle.support_bundle)
 
+app.command("init", epilog=init.EPILOG, rich_help_panel=_SET_UP)(init.init)
 app.command("sample", rich_help_panel=_SET_UP)(sample.sample)
 app.add_typer(config.app, name="config", rich_help_panel=_SET_UP)
 app.command("urdf", rich_help_panel=_SET_UP)(urdf.urdf)

@@ -103,6 +103,7 @@ def _listen(node: Node) -> dict[str, tuple[Any, float]]:
 
 
 def _snapshot(robot: str, kept: dict[str, tuple[Any, float]], now_s: float) -> Snapshot:
-    from canbase_cli.monitor_picture import Heard, Snapshot
+    from canbase_cli.monitor_picture import Snapshot
+    from canbase_runtime.last_message import LastMessage
 
-    return Snapshot(robot, **{name: Heard(message, now_s - at_s) for name, (message, at_s) in kept.items()})
+    return Snapshot(robot, **{name: LastMessage(message, now_s - at_s) for name, (message, at_s) in kept.items()})

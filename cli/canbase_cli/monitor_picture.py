@@ -15,12 +15,11 @@ from rich.text import Text
 
 from canbase_driver.cia402 import DriveState
 from canbase_runtime.driver_state import DriverState, driver_state
+from canbase_runtime.last_message import NOT_RECEIVED, LastMessage
 from canbase_runtime.source_standing import SourceStanding, lock_standing, source_standing
 from canbase_runtime.stop_cause import StopCause, stop_cause
 from canbase_runtime.watchdog_view import WatchdogView, watchdog_view
 
-SILENT_S: Final = 1.5
-"""A node is shown without a state when its last message is older [s]: its slowest state comes every 0.5 s."""
 ACTIONS: Final = ("passes", "limits", "slows", "STOPS")
 """SafetyState.action in words."""
 GOOD: Final = "green"
@@ -31,27 +30,14 @@ Named = TypeVar("Named", bound=Enum)
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
-    """The last message of one topic and how old it is [s], by local receive time. None: nothing was received yet."""
-
-    message: Any = None
-    age_s: float | None = None
-
-    @property
-    def fresh(self) -> bool:
-        """Whether its last message is recent enough to be shown as the state."""
-        return self.age_s is not None and self.age_s <= SILENT_S
-
-
-@dataclass(frozen=True, slots=True)
 class Snapshot:
     """What is known of a robot at one moment. mux: MuxState, safety: SafetyState, driver: DriverStatus."""
 
     robot: str
-    mux: Heard = Heard()
-    safety: Heard = Heard()
-    driver: Heard = Heard()
-    event: Heard = Heard()
+    mux: LastMessage = NOT_RECEIVED
+    safety: LastMessage = NOT_RECEIVED
+    driver: LastMessage = NOT_RECEIVED
+    event: LastMessage = NOT_RECEIVED
     """The last StopEvent."""
 
 
@@ -87,10 +73,10 @@ def line(snapshot: Snapshot) -> str:
     return "  |  ".join(words)
 
 
-def _mux_word(heard: Heard) -> Text:
-    if not heard.fresh:
-        return _silence("velocity_mux", heard)
-    state = heard.message
+def _mux_word(last: LastMessage) -> Text:
+    if not last.fresh:
+        return _silence("velocity_mux", last)
+    state = last.message
     holder = next((source for source in state.sources if source.active), None)
     if holder is None:
         return Text("no active source", WARN)
@@ -100,19 +86,19 @@ def _mux_word(heard: Heard) -> Text:
     return Text(f"{holder.name} drives", GOOD)
 
 
-def _safety_word(heard: Heard) -> Text:
-    if not heard.fresh:
-        return _silence("safety_filter", heard)
-    action, cause = heard.message.action, heard.message.cause
+def _safety_word(last: LastMessage) -> Text:
+    if not last.fresh:
+        return _silence("safety_filter", last)
+    action, cause = last.message.action, last.message.cause
     style = (GOOD, WARN, WARN, BAD)[action]
     none = stop_cause(cause) is StopCause.NONE
     return Text(f"filter {ACTIONS[action]}" + ("" if none else f": {cause}"), style)
 
 
-def _driver_words(heard: Heard) -> list[Text]:
-    if not heard.fresh:
-        return [_silence("motor_driver", heard)]
-    status = heard.message
+def _driver_words(last: LastMessage) -> list[Text]:
+    if not last.fresh:
+        return [_silence("motor_driver", last)]
+    status = last.message
     state = driver_state(status.state)
     style = {DriverState.ENABLED: GOOD, DriverState.LATCHED: BAD, DriverState.OFFLINE: BAD}.get(state, WARN)
     cause = "" if state is DriverState.ENABLED else f": {status.cause}"
@@ -121,15 +107,14 @@ def _driver_words(heard: Heard) -> list[Text]:
     return [Text(f"driver {state.name}{cause}", style), watchdog]
 
 
-def _part(title: str, heard: Heard, draw: Callable[[Any], RenderableType]) -> Panel:
+def _part(title: str, last: LastMessage, draw: Callable[[Any], RenderableType]) -> Panel:
     """The last state of a node that no longer publishes is left out: it must not be taken for the present one."""
-    body = draw(heard.message) if heard.fresh else _silence("the node", heard)
-    return Panel(body, title=title, title_align="left", border_style="none" if heard.fresh else BAD)
+    body = draw(last.message) if last.fresh else _silence("the node", last)
+    return Panel(body, title=title, title_align="left", border_style="none" if last.fresh else BAD)
 
 
-def _silence(who: str, heard: Heard) -> Text:
-    since = "no message yet" if heard.age_s is None else f"no message for {heard.age_s:.0f} s"
-    return Text(f"{who}: {since}", BAD)
+def _silence(who: str, last: LastMessage) -> Text:
+    return Text(f"{who}: {last.silence}", BAD)
 
 
 def _mux(state: Any) -> RenderableType:
@@ -157,7 +142,7 @@ def _safety(state: Any) -> RenderableType:
     order = f"orders {state.ordered_linear_mps:+.2f} m/s  {state.ordered_angular_radps:+.2f} rad/s"
     free = f"free ahead {_metres(state.clearance_ahead_m)}, behind {_metres(state.clearance_behind_m)}"
     ages = f"command {_seconds(state.command_age_s)} old, scan {_seconds(state.scan_age_s)}"
-    first = Text.assemble(_safety_word(Heard(state, 0.0)), f"   {order}   {free}   {ages}")
+    first = Text.assemble(_safety_word(LastMessage(state, 0.0)), f"   {order}   {free}   {ages}")
     leases = [Text(f"{state.lease_errors} leases were not delivered", WARN)] if state.lease_errors else []
     return Group(first, *_why(state), *map(_scanner, state.scanners), *leases)
 
@@ -172,7 +157,7 @@ def _scanner(scanner: Any) -> Text:
 
 def _driver(status: Any) -> RenderableType:
     standing = "stands" if status.standstill else "MOVES"
-    first = Text("   ").join([*_driver_words(Heard(status, 0.0)), Text(standing)])
+    first = Text("   ").join([*_driver_words(LastMessage(status, 0.0)), Text(standing)])
     table = _table("node", "wheel", "NMT", "drive state", "target", "measured", "heartbeat", "error")
     for drive in status.drives:
         good = _member(DriveState, drive.state) is DriveState.OPERATION_ENABLED
@@ -193,12 +178,12 @@ def _why(state: Any) -> list[Text]:
     return [Text(f"{state.detail}{clears}", WARN)] if state.detail or clears else []
 
 
-def _event(heard: Heard) -> Text:
-    if heard.age_s is None:
+def _event(last: LastMessage) -> Text:
+    if last.age_s is None:
         return Text("No stop since this picture was opened.", "dim")
-    event = heard.message
+    event = last.message
     latched = ", latched" if event.latched else ""
-    return Text(f"Last stop, {heard.age_s:.0f} s ago: {event.stopped_by}: {event.cause}{latched}. {event.detail}")
+    return Text(f"Last stop, {last.age_s:.0f} s ago: {event.stopped_by}: {event.cause}{latched}. {event.detail}")
 
 
 def _member(kind: type[Named], text: str) -> Named | None:

@@ -71,10 +71,30 @@ class RosCommand(TyperCommand):
 
 
 def ros_arguments(ctx: typer.Context, namespace: str) -> list[str]:
-    """Arguments for `rclpy.init`: the namespace, then what the user wrote behind `--ros-args`; empty without both."""
+    """Arguments for `rclpy.init`: the namespace, then what the user wrote behind `--ros-args`; empty without both.
+
+    Raises typer.BadParameter for what ROS does not take.
+    """
     given = list(ctx.meta.get(_ROS_FLAG, ()))
+    if given:
+        _check_ros_arguments(given)
     remap = ["-r", f"__ns:={namespace}"] if namespace else []
     return [_ROS_FLAG, *remap, *given] if remap or given else []
+
+
+def _check_ros_arguments(given: list[str]) -> None:
+    """ROS reads them for a moment, in a context of its own that reaches nobody."""
+    with ros_needed():
+        from rclpy.context import Context
+        from rclpy.impl.implementation_singleton import rclpy_implementation
+    context = Context()
+    try:
+        context.init([_ROS_FLAG, *given])
+    except rclpy_implementation.UnknownROSArgsError as error:
+        raise typer.BadParameter(f"ROS does not know {error} behind {_ROS_FLAG}") from error
+    except rclpy_implementation.RCLError as error:
+        raise typer.BadParameter(f"behind {_ROS_FLAG}: {str(error).partition(', at /')[0]}") from error
+    context.try_shutdown()
 
 
 @contextmanager

@@ -6,7 +6,7 @@ from typing import Annotated, Final
 
 import typer
 
-from canbase_cli.bus_options import BitrateOption, ChannelOption, InterfaceOption
+from canbase_cli.bus_options import BitrateOption, ChannelOption, InterfaceOption, SdoTimeoutOption
 from canbase_cli.options import ConfigOption
 
 EPILOG: Final = (
@@ -26,12 +26,7 @@ def scan(
         float,
         typer.Option("--seconds", metavar="SECONDS", min=0.1, max=60.0, help="How long to listen before reading."),
     ] = 1.5,
-    timeout_s: Annotated[
-        float,
-        typer.Option(
-            "--sdo-timeout", metavar="SECONDS", min=0.02, max=10.0, help="How long to wait for an SDO answer."
-        ),
-    ] = 0.3,
+    timeout_s: SdoTimeoutOption = 0.3,
     passive: Annotated[bool, typer.Option("--passive", help="Only listen, send nothing.")] = False,
     yes: Annotated[
         bool, typer.Option("--yes", "-y", help="Read the nodes even if another master is on the bus.")

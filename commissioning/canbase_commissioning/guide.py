@@ -34,12 +34,14 @@ class Ask:
     """A question to the person at the machine. `key` names it in an answers file. The answer: their words.
 
     `check` raises ValueError for an invalid answer: then the question is repeated. `confirms`: it wants a yes.
+    `default`: the answer that a bare Enter means; None: there is none.
     """
 
     key: str
     text: str
     check: Callable[[str], object] = str
     confirms: bool = False
+    default: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

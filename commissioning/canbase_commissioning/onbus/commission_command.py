@@ -24,7 +24,8 @@ from canbase_commissioning.floor import FloorFound, measure_floor
 from canbase_commissioning.guide import Ask, CommissionError, Script, Tell
 from canbase_commissioning.onbus.bus_session import BusSession, open_line
 from canbase_commissioning.onbus.moving import refuse_beside_masters, run_script
-from canbase_commissioning.onbus.operator import Operator, Stopped, stopping_signals
+from canbase_commissioning.onbus.operator import Operator, Person, Stopped, stopping_signals
+from canbase_commissioning.onbus.remote_operator import RemoteOperator
 from canbase_commissioning.powered_drives import PoweredDrives, RigError
 from canbase_commissioning.report import Results, markdown, verdict
 from canbase_commissioning.self_stop_test import Outcome, get_ready, prove
@@ -56,10 +57,10 @@ class Plan:
     """None: beside robot.yaml, with the robot's name and the date."""
 
 
-def run(config: Path, plan: Plan, answers: Path | None, *, yes: bool, dry_run: bool) -> None:
+def run(config: Path, plan: Plan, answers: Path | None, *, yes: bool, dry_run: bool, as_json: bool) -> None:
     """All steps; exits with 1 when the self-stop is not proven, or not all was done."""
     robot = load_config(config).robot
-    person = Operator(answers, yes=yes)
+    person: Person = RemoteOperator() if as_json else Operator(answers, yes=yes)
     results = Results(dry_run=dry_run)
     with open_line(robot.bus) as line, stopping_signals():
         refuse_beside_masters(line)
@@ -71,8 +72,8 @@ def run(config: Path, plan: Plan, answers: Path | None, *, yes: bool, dry_run: b
         except Stopped as stopped:
             results.ended_by = str(stopped)
     results.edits += commissioned_edits(robot, results.edits, sorted(results.done))
-    _write_report(robot, plan.report, config, results)
-    _change(config, results.edits, dry_run=dry_run)
+    person.tell(Tell(_write_report(robot, plan.report, config, results)))
+    _change(config, results.edits, person, dry_run=dry_run)
     person.tell(Tell(verdict(results), is_loud=not results.proven))
     if results.ended_by:
         fail(results.ended_by, FAILED)
@@ -80,7 +81,7 @@ def run(config: Path, plan: Plan, answers: Path | None, *, yes: bool, dry_run: b
         raise typer.Exit(FAILED)
 
 
-def _go(line: BusSession, robot: Robot, plan: Plan, person: Operator, results: Results) -> None:
+def _go(line: BusSession, robot: Robot, plan: Plan, person: Person, results: Results) -> None:
     if plan.steps & {"directions", "scale"}:
         robot = _measure_wheels(line, robot, plan, person, results)
         results.done |= {step for step in ("directions", "scale") if step in plan.steps}
@@ -99,7 +100,7 @@ def _go(line: BusSession, robot: Robot, plan: Plan, person: Operator, results: R
     results.done.add("floor")
 
 
-def _measure_wheels(line: BusSession, robot: Robot, plan: Plan, person: Operator, results: Results) -> Robot:
+def _measure_wheels(line: BusSession, robot: Robot, plan: Plan, person: Person, results: Results) -> Robot:
     """The robot with what was found. A correction is measured again before anything else relies on it.
 
     Raises CommissionError when the second measurement contradicts the first: then nothing is changed.
@@ -181,7 +182,7 @@ def _note_boots(rig: PoweredDrives, results: Results) -> None:
     results.boots = {node_id: node.report for node_id, node in rig.nodes.items() if node.report is not None}
 
 
-def _write_report(robot: Robot, wanted: Path | None, config: Path, results: Results) -> None:
+def _write_report(robot: Robot, wanted: Path | None, config: Path, results: Results) -> str:
     """To a file of its own: a report of another day, or of another robot, is never overwritten."""
     when = time.strftime("%Y-%m-%d %H:%M %z")
     path = wanted or config.with_name(f"commissioning-{robot.name}-{time.strftime('%Y%m%d-%H%M%S')}.md")
@@ -192,13 +193,13 @@ def _write_report(robot: Robot, wanted: Path | None, config: Path, results: Resu
     except OSError as error:
         typer.echo(text)
         fail(f"the report above cannot be written: {error}", FAILED)
-    typer.echo(f"report: {path}")
+    return f"report: {path}"
 
 
-def _change(config: Path, edits: list[Edit], *, dry_run: bool) -> None:
+def _change(config: Path, edits: list[Edit], person: Person, *, dry_run: bool) -> None:
     """The new file takes the old one's place only when it is good; the old one stays beside it."""
     for edit in edits:
-        typer.echo(f"{'would change' if dry_run else 'changed'} {edit}")
+        person.tell(Tell(f"{'would change' if dry_run else 'changed'} {edit}"))
     if not edits or dry_run:
         return
     text = config.read_text(encoding="utf-8")

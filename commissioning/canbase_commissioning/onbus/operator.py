@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
+from typing import Protocol
 
 import typer
 
@@ -44,8 +45,24 @@ def stopping_signals() -> Iterator[None]:
             signal.signal(number, handler)
 
 
+class Person(Protocol):
+    """Who is asked, and what they are told: at a terminal, or at another program (remote_operator.py)."""
+
+    def tell(self, line: Tell) -> None:
+        """A line of the procedure."""
+
+    def ask(self, question: Ask, turn: Callable[[], None]) -> str:
+        """The words of the answer; `turn` keeps the bus going meanwhile. Raises CommissionError without a person."""
+
+    def again(self, question: Ask, error: ValueError) -> None:
+        """The words made no sense. Raises CommissionError where they stay the same."""
+
+    def interrupts(self) -> bool:
+        """Whether the person wants everything to stop. Raises CommissionError when nobody is there any more."""
+
+
 class Operator:
-    """Prompts on the terminal, or takes the answers of a file; `yes` confirms what wants a yes."""
+    """Prompts on the terminal, or takes the answers of a file; `yes` confirms what wants a yes, and takes defaults."""
 
     def __init__(self, answers: Path | None, *, yes: bool) -> None:
         """Exits with 2 when the file cannot be read."""
@@ -63,17 +80,22 @@ class Operator:
 
     def ask(self, question: Ask, turn: Callable[[], None]) -> str:
         """The words of the answer; `turn` keeps the bus going meanwhile. Raises CommissionError without a person."""
-        known = "yes" if question.confirms and self._yes else self._answers.get(question.key)
+        known = self._known(question)
         if known is not None:
-            typer.echo(f"{question.text} {known}")
+            typer.echo(f"{_asked(question)} {known}")
             return known
         if not self._has_terminal:
             raise CommissionError(f"no answer to {question.key}: run it on a terminal, or give it in --answers")
-        hint = " [yes/no]" if question.confirms else ""
-        typer.secho(f"{question.text}{hint} ", bold=True, nl=False, color=colour())
+        typer.secho(f"{_asked(question)} ", bold=True, nl=False, color=colour())
         while not _has_line():
             turn()
-        return _line()
+        return _line() or question.default or ""
+
+    def _known(self, question: Ask) -> str | None:
+        """The answer that needs no person; None: a person has to give it."""
+        if question.confirms and self._yes:
+            return "yes"
+        return self._answers.get(question.key, question.default if self._yes else None)
 
     def again(self, question: Ask, error: ValueError) -> None:
         """The words made no sense. Raises CommissionError when they came from a file: they stay the same."""
@@ -87,6 +109,13 @@ class Operator:
             _line()
             return True
         return False
+
+
+def _asked(question: Ask) -> str:
+    """The question with the answers that it wants, or the one that a bare Enter means."""
+    if question.confirms:
+        return f"{question.text} [yes/no]"
+    return question.text if question.default is None else f"{question.text} [{question.default}]"
 
 
 def _has_line() -> bool:

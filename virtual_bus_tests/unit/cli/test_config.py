@@ -261,3 +261,19 @@ def test_in_a_colcon_workspace_the_version_comes_from_package_xml(
 
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "first"))
     assert version.installed_version() == "unknown"
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (["--bad"], "--bad"),
+        (["-r", "foo"], "remap rule: '-r foo'"),
+        (["--params-file", "/none.yaml"], "Error opening YAML file"),
+        (["--log-level", "nonsense"], "valid severity level"),
+    ],
+)
+def test_what_ros_does_not_take_is_a_wrong_command_line_in_words(given: list[str], told: str) -> None:
+    result = CliRunner().invoke(app, ["monitor", "--ros-args", *given], env={"COLUMNS": "300"})
+    assert result.exit_code == 2
+    assert told in " ".join(result.output.split())
+    assert "Traceback" not in result.output

@@ -20,7 +20,8 @@ from canbase.msg import (
 )
 from rich.console import Console
 
-from canbase_cli.monitor_picture import GOOD, SILENT_S, WARN, Heard, Snapshot, line, picture
+from canbase_cli.monitor_picture import GOOD, WARN, Snapshot, line, picture
+from canbase_runtime.last_message import SILENT_S, LastMessage
 
 MUX = MuxState(
     active="joystick",
@@ -78,7 +79,7 @@ DRIVER = DriverStatus(
                     error_text="heartbeat lost", heartbeat_age_s=math.nan),
     ],
 )  # fmt: skip
-ALL = Snapshot("/r1", mux=Heard(MUX, 0.1), safety=Heard(SAFETY, 0.1), driver=Heard(DRIVER, 0.1))
+ALL = Snapshot("/r1", mux=LastMessage(MUX, 0.1), safety=LastMessage(SAFETY, 0.1), driver=LastMessage(DRIVER, 0.1))
 
 
 def drawn(snapshot: Snapshot) -> str:
@@ -112,7 +113,7 @@ def test_a_held_stick_that_is_not_followed_is_told_in_the_headline_and_with_its_
     reason = "waiting for zero (motor_driver is LATCHED)"
     joystick = MuxSource(name="joystick", active=True, standing=MuxSource.UNARMED, delay_s=math.nan, reason=reason)
     mux = MuxState(active="joystick", not_ready="motor_driver is LATCHED", sources=[joystick])
-    snapshot = replace(ALL, mux=Heard(mux, 0.1))
+    snapshot = replace(ALL, mux=LastMessage(mux, 0.1))
     assert line(snapshot).startswith("joystick is not followed: not armed  |")
     assert reason in drawn(snapshot)
     assert "The base cannot move: motor_driver is LATCHED" in drawn(snapshot)
@@ -127,14 +128,14 @@ def test_a_drive_is_good_in_one_known_state_alone(state: str, style: str) -> Non
     drives = [DriveStatus(joint="left_wheel", state=state)]
     console = Console(file=io.StringIO(), width=140, force_terminal=True, color_system="standard")
     status = DriverStatus(state=DriverStatus.LATCHED, cause="x", watchdog="gone", drives=drives)
-    segments = console.render(picture(replace(ALL, driver=Heard(status, 0.1))))
+    segments = console.render(picture(replace(ALL, driver=LastMessage(status, 0.1))))
     found = [segment.style for segment in segments if state and segment.text.strip() == state]
     assert all(each == console.get_style(style) for each in found)
     assert bool(found) is bool(state)
 
 
 def test_a_silent_node_is_told_as_silent_and_nothing_that_it_said_is_shown() -> None:
-    text = drawn(replace(ALL, driver=Heard(DRIVER, 4.2)))
+    text = drawn(replace(ALL, driver=LastMessage(DRIVER, 4.2)))
     assert "motor_driver: no message for 4 s" in text
     assert "left_wheel" not in text
     assert "ENABLED" not in text
@@ -142,8 +143,8 @@ def test_a_silent_node_is_told_as_silent_and_nothing_that_it_said_is_shown() -> 
 
 
 def test_silence_begins_right_after_its_limit() -> None:
-    assert "ENABLED" in drawn(replace(ALL, driver=Heard(DRIVER, SILENT_S)))
-    assert "ENABLED" not in drawn(replace(ALL, driver=Heard(DRIVER, math.nextafter(SILENT_S, math.inf))))
+    assert "ENABLED" in drawn(replace(ALL, driver=LastMessage(DRIVER, SILENT_S)))
+    assert "ENABLED" not in drawn(replace(ALL, driver=LastMessage(DRIVER, math.nextafter(SILENT_S, math.inf))))
 
 
 def test_before_anything_was_heard_nothing_is_claimed() -> None:
@@ -157,7 +158,9 @@ def test_a_trip_a_latched_stop_and_undelivered_leases_are_told() -> None:
                           clears_on="reset", watchdog="tripped", watchdog_cause="overspeed")  # fmt: skip
     event = StopEvent(stopped_by="watchdog", cause="overspeed", detail="2.0 m/s measured", latched=True)
     safety = SafetyState(action=SafetyState.STOP, cause="estop", lease_errors=7)
-    text = drawn(Snapshot("/", safety=Heard(safety, 0.0), driver=Heard(driver, 0.0), event=Heard(event, 12.0)))
+    text = drawn(
+        Snapshot("/", safety=LastMessage(safety, 0.0), driver=LastMessage(driver, 0.0), event=LastMessage(event, 12.0))
+    )
     for words in (
         "filter STOPS: estop | driver LATCHED: watchdog | watchdog tripped",
         "the watchdog tripped; ends with: reset",
@@ -171,7 +174,7 @@ def test_a_trip_a_latched_stop_and_undelivered_leases_are_told() -> None:
 def test_text_from_the_bus_is_shown_as_it_is_and_never_as_markup() -> None:
     drive = DriveStatus(joint="left_wheel", state="fault", error_code=1, error_text="[red]x[/red]")
     driver = DriverStatus(state=DriverStatus.LATCHED, detail="[/bold]", drives=[drive])
-    text = drawn(Snapshot("/", driver=Heard(driver, 0.0)))
+    text = drawn(Snapshot("/", driver=LastMessage(driver, 0.0)))
     assert "[red]x[/red]" in text
     assert "[/bold]" in text
 
@@ -181,7 +184,7 @@ def test_the_line_changes_with_states_and_not_with_ages_and_speeds() -> None:
         DriveStatus(joint="left_wheel", state="operation enabled", velocity_radps=9.0),
         DriveStatus(joint="right_wheel", state="fault"),
     ])  # fmt: skip
-    assert line(ALL) == line(replace(ALL, driver=Heard(faster, 0.3)))
+    assert line(ALL) == line(replace(ALL, driver=LastMessage(faster, 0.3)))
     assert line(ALL) == (
         "joystick drives  |  filter slows: obstacle_near  |  driver ENABLED  |  watchdog ok"
         "  |  left_wheel operation enabled  |  right_wheel fault"
@@ -194,6 +197,6 @@ def test_the_line_tells_locks_and_foreign_publishers() -> None:
     )
     foreign = ForeignPublisher(topic="/cmd_vel", node="/evil", problem="only /safety_filter should")
     mux = MuxState(locks=[lock], foreign=[foreign])
-    text = line(Snapshot("/", mux=Heard(mux, 0.0)))
+    text = line(Snapshot("/", mux=LastMessage(mux, 0.0)))
     assert "lock pause silent  |  foreign publisher /evil on /cmd_vel" in text
-    assert "/evil publishes on /cmd_vel: only /safety_filter should" in drawn(Snapshot("/", mux=Heard(mux, 0.0)))
+    assert "/evil publishes on /cmd_vel: only /safety_filter should" in drawn(Snapshot("/", mux=LastMessage(mux, 0.0)))

@@ -1,0 +1,55 @@
+"""`canbase init`: a robot.yaml from the drives on a bus."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from canbase_cli.bus_options import BitrateOption, ChannelOption, InterfaceOption, SdoTimeoutOption
+
+EPILOG: Final = (
+    "Examples:  \n"
+    "canbase init --channel can0  \n"
+    "canbase init --interface slcan --channel /dev/ttyACM0 --bitrate 500000 --output robot.yaml  \n"
+    "canbase init --config robot.yaml --output new.yaml      (the same bus; on a bench while canbase sim runs)"
+)
+
+
+def init(
+    config: Annotated[
+        Path | None,
+        typer.Option("--config", "-c", metavar="FILE", help="Take the bus of this robot.yaml.", show_default="can0"),
+    ] = None,
+    interface: InterfaceOption = None,
+    channel: ChannelOption = None,
+    bitrate: BitrateOption = None,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The file to write.")] = Path(
+        "robot.yaml"
+    ),
+    timeout_s: SdoTimeoutOption = 0.3,
+    answers: Annotated[
+        Path | None, typer.Option("--answers", metavar="FILE", help="YAML with answers by key, for tests.")
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Take the proposed answer of each question.")] = False,
+    as_json: Annotated[
+        bool,
+        typer.Option(
+            "--json", help="Ask and be answered in lines of JSON, for another program: docs/commissioning.md."
+        ),
+    ] = False,
+) -> None:
+    """Write a robot.yaml: find the drives on the bus, and ask about the robot. Nothing moves.
+
+    It listens first, and ends if another master is on the bus. Then it reads identity, encoder resolution and gear
+    ratio of every drive by SDO, which changes nothing. It asks for what no drive reports: sides, wheels, edges, speed.
+    A bare Enter takes the proposed answer. The file passes `canbase config check`; an existing file is kept.
+
+    Exit codes: 0 written, 1 no drives, another master or values that do not fit, 2 wrong command line.
+    """
+    from canbase_commissioning.onbus.bus_session import choose_bus
+    from canbase_commissioning.onbus.init_command import run
+
+    named = channel if config else channel or "can0"
+    run(choose_bus(config, interface, named, bitrate), output, answers, timeout_s, yes=yes, as_json=as_json)

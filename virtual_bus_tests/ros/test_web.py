@@ -1,0 +1,397 @@
+"""`canbase web` beside a running robot, in a real browser: pages, hold-to-drive, the large stop, and who is refused.
+
+With CANBASE_PICTURES=FOLDER the pictures of the documentation are written there: make pictures.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import random
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pytest
+from canbase.msg import DriverStatus
+from geometry_msgs.msg import TwistStamped
+from sensor_msgs.msg import LaserScan
+
+from canbase_web.access import COOKIE
+from support import api_page
+from support.browser import CHROMIUM, NEEDS_CHROMIUM, TOKEN, browser, free_tcp_port, playwright
+from support.ros_harness import merged
+from support.running_robot import PATIENT, RunningRobot, own_domain, robot_on
+
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(180), NEEDS_CHROMIUM]
+
+SOURCES = {
+    "joystick": {"topic": "cmd_vel_joy", "priority": 100, "timeout_s": 0.3},
+    "web": {"topic": "cmd_vel_web", "priority": 90, "timeout_s": 0.3, "nodes": ["canbase_web"]},
+    "action": {"topic": "cmd_vel_action", "priority": 40, "timeout_s": 0.3, "nodes": ["drive_distance_server"]},
+}
+PAGES = {"/": "Now", "/drive": "Drive", "/commission": "Commission", "/stops": "Stops", "/health": "Health"}
+SIZES = {"desktop": (1280, 900), "phone": (390, 844)}
+LATE_S = 0.35
+"""A loaded computer: above what a joystick takes that goes silent."""
+
+
+class Site:
+    """The page of one robot, and a browser for it."""
+
+    def __init__(self, robot: RunningRobot, launched: Any, folder: Path) -> None:
+        self.robot, self.browser = robot, launched
+        token = folder / "token"
+        token.write_text(f"{TOKEN}\n", encoding="utf-8")
+        self.port = free_tcp_port()
+        self.url = f"http://127.0.0.1:{self.port}"
+        words = ("web", "--config", str(robot.config), "--port", str(self.port), "--token-file", str(token))
+        self.process = robot.command(*words)
+        robot.node.wait_for(lambda: f"open {self.url}/?token=" in self.process.log(), 40.0, "the page")
+
+    def open(self, path: str = "/") -> Any:
+        """A page in a context of its own; what it complains about, and whatever it loads from elsewhere, is kept."""
+        page = self.browser.new_context().new_page()
+        page.complaints = []
+        page.on("console", lambda said: said.type == "error" and page.complaints.append(said.text))
+        page.on("pageerror", lambda error: page.complaints.append(str(error)))
+        page.on("request", lambda sent: self.url in sent.url.replace("ws:", "http:") or sent.url.startswith("data:")
+                or page.complaints.append(sent.url))  # fmt: skip
+        page.goto(f"{self.url}/?token={TOKEN}")
+        page.goto(self.url + path)
+        return page
+
+    @property
+    def joystick(self) -> Any:
+        """A joystick that was released; it publishes its `message` again and again."""
+        return self.robot.node.source("cmd_vel_joy")
+
+    def until(self, page: Any, script: str) -> None:
+        """Until the script is true; publishers of this test go on meanwhile."""
+        try:
+            self.robot.node.wait_for(lambda: page.evaluate(script), 15.0, script)
+        except AssertionError as error:
+            raise AssertionError(f"{error}; the page shows: {page.inner_text('body')}") from None
+
+    def unlocked(self) -> Any:
+        """The page `Drive`, unlocked."""
+        page = self.open("/drive")
+        page.get_by_role("switch").click()
+        page.wait_for_function("document.getElementById('hold-state').textContent.startsWith('unlocked')")
+        return page
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    changes = merged(merged({}, PATIENT), {"mux": {"sources": SOURCES}})
+    with ExitStack() as held:
+        domain = held.enter_context(own_domain())
+        robot = held.enter_context(robot_on(domain, changes=changes))
+        scans = robot.node.node.create_publisher(LaserScan, "scan", 5)
+        robot.node.node.create_timer(0.1, lambda: scans.publish(_room(robot.node.node.get_clock().now().to_msg())))
+        yield Site(robot, held.enter_context(browser()), tmp_path_factory.mktemp("web"))
+
+
+def _room(stamp: Any) -> LaserScan:
+    """Walls that are not quite round, and the noise of a scanner."""
+    count = 360
+    scan = LaserScan(
+        angle_min=-math.pi, angle_max=math.pi, angle_increment=2 * math.pi / count, range_min=0.1, range_max=12.0
+    )
+    scan.header.stamp, scan.header.frame_id = stamp, "laser"
+    angles = [i * scan.angle_increment for i in range(count)]
+    scan.ranges = [2.3 + 0.3 * math.sin(5 * angle) + random.gauss(0.0, 0.01) for angle in angles]
+    return scan
+
+
+@pytest.fixture(autouse=True)
+def standing(site: Site) -> Iterator[None]:
+    """Each test begins and ends with a base that stands and has power, and without pages."""
+    site.robot.make_ready()
+    site.robot.wait_standing()
+    yield
+    for context in site.browser.contexts:
+        context.close()
+
+
+@pytest.mark.parametrize("path", PAGES)
+def test_every_page_in_every_look_without_a_complaint_and_from_the_robot_alone(site: Site, path: str) -> None:
+    page = site.open(path)
+    assert page.title().startswith(PAGES[path])
+    assert page.get_by_role("heading", level=1).count() == 1
+    assert page.get_by_role("navigation", name="Pages").get_by_role("link").count() == len(PAGES)
+    assert page.get_by_role("button", name="Stop the robot").is_visible()
+    if path == "/":
+        for found in ("[data-points]", "#part-5[data-level]", "#scan[d^=M]"):
+            site.until(page, f"document.querySelector('{found}') !== null")
+    for size, (width, height) in SIZES.items():
+        page.set_viewport_size({"width": width, "height": height})
+        for scheme in ("light", "dark"):
+            page.emulate_media(color_scheme=scheme)
+            page.wait_for_function(f"document.body.classList.contains('body--{scheme}')")
+            assert page.evaluate("document.documentElement.scrollWidth") <= width, "no page is wider than the screen"
+            picture(page, f"web_{PAGES[path].lower()}_{scheme}_{size}")
+    assert page.complaints == []
+
+
+def picture(page: Any, name: str) -> None:
+    """For the documentation."""
+    if folder := os.environ.get("CANBASE_PICTURES"):
+        page.screenshot(path=f"{folder}/{name}.png")
+
+
+def test_the_page_of_the_ros_api_has_what_the_node_has(site: Site) -> None:
+    """Its source has the name that robot.yaml gives it."""
+    node = site.robot.node.node
+    found = api_page.present(node, "canbase_web")
+    orders = api_page.Endpoint("out", "/cmd_vel_web", "geometry_msgs/msg/TwistStamped", frozenset({"reliable"}))
+    assert found == api_page.documented("canbase_web") | {orders}
+
+
+def test_the_page_now_tells_who_drives_and_goes_red_when_the_emergency_stop_is_pressed(site: Site) -> None:
+    page = site.open()
+    joystick = site.joystick
+    joystick.message = speed(0.2)
+    try:
+        site.until(page, "document.getElementById('headline').textContent === 'joystick drives'")
+        site.robot.node.spin_for(1.5)
+        picture(page, "web_now_drives")
+    finally:
+        joystick.message = None
+    site.robot.wait_standing()
+    assert site.robot.run("stop") == 0
+    site.until(page, "document.getElementById('part-3').dataset.level === 'bad'")
+    assert "ends with: reset" in page.inner_text("#headline")
+    page.close()
+    page = site.open("/stops")
+    row = page.get_by_role("row").filter(has_text="motor_driver").first
+    row.click()
+    page.wait_for_function("document.body.innerText.includes('.asc')")
+    site.robot.node.wait_for(lambda: "reading" not in page.inner_text("body"), 20.0, "the recording")
+    picture(page, "web_stops_recording")
+
+
+def speed(mps: float) -> TwistStamped:
+    message = TwistStamped()
+    message.twist.linear.x = mps
+    return message
+
+
+def test_whatever_lets_go_of_hold_to_drive_stops_the_base_as_fast_as_a_joystick_that_goes_silent(site: Site) -> None:
+    silent_s = _joystick_silent(site)
+    found = {}
+    for way in ("the finger", "the page", "the network", "a browser that hangs", "a browser that is killed"):
+        with ExitStack() as after:
+            address, leader = _browser(after)
+            page = _driving(site, address, after)
+            began_s = time.monotonic()
+            _let_go(way, page, leader, after)
+            site.robot.wait_standing()
+            found[way] = site.robot.standstill_after(began_s).after_s
+    print(f"a joystick that goes silent: {silent_s:.3f} s; {found}")
+    assert max(found.values()) <= silent_s + LATE_S, found
+
+
+def _joystick_silent(site: Site) -> float:
+    """From the last message of a joystick at the same speed to standstill [s]."""
+    joystick = site.joystick
+    joystick.message = speed(0.16)
+    site.robot.node.wait_for(lambda: site.robot.truth().linear_mps > 0.15, 10.0, "the base to drive")
+    joystick.message = None
+    began_s = time.monotonic()
+    site.robot.wait_standing()
+    return site.robot.standstill_after(began_s).after_s
+
+
+def _driving(site: Site, address: str, after: ExitStack) -> Any:
+    """A page in that browser whose finger is on the key for forward; the base drives."""
+    player = site.browser.browser_type.connect_over_cdp(address)
+    after.callback(_close, player)
+    page = player.new_context().new_page()
+    page.goto(f"{site.url}/?token={TOKEN}")
+    page.goto(f"{site.url}/drive")
+    page.get_by_role("switch").click()
+    page.wait_for_function("document.getElementById('hold-state').textContent.startsWith('unlocked')")
+    box = page.get_by_role("button", name="Forward").bounding_box()
+    page.mouse.move(box["x"] + 10, box["y"] + 10)
+    page.mouse.down()
+    end_s = time.monotonic() + 10.0
+    while site.robot.truth().linear_mps < 0.1:
+        assert time.monotonic() < end_s, page.inner_text("#hold-state")
+        page.wait_for_timeout(50)
+    return page
+
+
+def _browser(after: ExitStack) -> tuple[str, int]:
+    """The address for its control, and its process group, which can be stopped and killed."""
+    port = free_tcp_port()
+    folder = after.enter_context(TemporaryDirectory(prefix="canbase-chromium-", ignore_cleanup_errors=True))
+    options = ("--headless", "--no-sandbox", f"--remote-debugging-port={port}", f"--user-data-dir={folder}")
+    argv = [str(CHROMIUM), *options, "about:blank"]
+    process = subprocess.Popen(argv, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True)
+    after.callback(process.wait)
+    after.callback(_signal, process.pid, signal.SIGKILL)
+    end_s = time.monotonic() + 20.0
+    while True:
+        try:
+            socket.create_connection(("127.0.0.1", port), 1.0).close()
+        except OSError:
+            assert time.monotonic() < end_s
+            time.sleep(0.05)
+        else:
+            return f"http://127.0.0.1:{port}", process.pid
+
+
+def _signal(leader: int, number: signal.Signals) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(leader, number)
+
+
+def _close(player: Any) -> None:
+    with contextlib.suppress(playwright.Error):  # it may have been killed
+        player.close()
+
+
+def _let_go(way: str, page: Any, leader: int, after: ExitStack) -> None:
+    if way == "the finger":
+        page.mouse.up()
+    elif way == "the page":
+        page.close()
+    elif way == "the network":
+        # Nothing of what the page sends arrives any more, and the connection stays open: an unplugged cable.
+        page.evaluate("WebSocket.prototype.send = () => {}")
+    elif way == "a browser that hangs":
+        _signal(leader, signal.SIGSTOP)
+        after.callback(_signal, leader, signal.SIGCONT)
+    else:
+        _signal(leader, signal.SIGKILL)
+
+
+def test_a_browser_that_hung_moves_nothing_before_the_finger_was_lifted(site: Site) -> None:
+    page = site.unlocked()
+    key = page.get_by_role("button", name="Forward")
+    box = key.bounding_box()
+    page.mouse.move(box["x"] + 10, box["y"] + 10)
+    page.mouse.down()
+    page.wait_for_function("document.getElementById('hold-state').textContent === 'drives'")
+    page.evaluate("{ const until = performance.now() + 800; while (performance.now() < until); }")  # the script hangs
+    site.robot.wait_standing()
+    began_s = time.monotonic()
+    page.wait_for_timeout(1000)
+    assert site.robot.moved_since(began_s, 0.0) < 0.001, "the finger is still on the key"
+    page.mouse.up()
+    page.mouse.down()
+    page.wait_for_function("document.getElementById('hold-state').textContent === 'drives'")
+
+
+def test_a_locked_page_drives_nothing_and_its_stop_works(site: Site) -> None:
+    page = site.open("/drive")
+    assert page.get_by_role("button", name="Forward").is_disabled()
+    assert page.get_by_role("button", name="Drive", exact=True).is_disabled()
+    assert page.get_by_role("button", name="Reset", exact=True).is_disabled()
+    page.get_by_role("button", name="Stop the robot").click()
+    page.wait_for_function("document.getElementById('stop-answer').textContent.startsWith('Stop: stopping')")
+    site.robot.wait_state(DriverStatus.LATCHED)
+    page.get_by_role("switch").click()
+    page.get_by_role("button", name="Reset", exact=True).click()
+    site.robot.wait_enabled()
+
+
+def test_the_stop_works_without_the_pages_script(site: Site) -> None:
+    context = site.browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(f"{site.url}/?token={TOKEN}")
+    page.get_by_role("button", name="Stop the robot").click()
+    assert page.inner_text("p").startswith("Stop: stopping")
+
+
+def test_a_goal_shows_its_progress_and_its_end_and_arrow_keys_drive(site: Site) -> None:
+    page = site.unlocked()
+    page.get_by_role("button", name="Drive", exact=True).click()
+    page.wait_for_function("document.body.innerText.includes('m left')")
+    page.wait_for_function("document.body.innerText.includes('SUCCEEDED (OK)')", timeout=20_000)
+    page.locator("body").click(position={"x": 5, "y": 300})
+    page.keyboard.down("ArrowLeft")
+    page.wait_for_function("document.getElementById('hold-state').textContent === 'drives'")
+    end_s = time.monotonic() + 5.0
+    while site.robot.truth().angular_radps < 0.1:
+        assert time.monotonic() < end_s
+        page.wait_for_timeout(50)
+    page.keyboard.up("ArrowLeft")
+    site.robot.wait_standing()
+
+
+def test_the_health_page_shows_the_doctors_rows(site: Site) -> None:
+    page = site.open("/health")
+    page.wait_for_function("/looked at \\d/.test(document.body.innerText)", timeout=40_000)
+    page.wait_for_function("document.body.innerText.includes('velocity_mux')")
+    picture(page, "web_health_rows")
+
+
+def test_who_is_not_let_in_is_refused_and_the_robot_does_not_notice(site: Site) -> None:
+    """Wrong tokens, other sites, huge messages, a thousand connections; meanwhile the robot is enabled and punctual."""
+    before = site.robot.wait_any_state()
+    session = _session(site)
+    mine = f"Host: 127.0.0.1:{site.port}\r\nCookie: {COOKIE}={session}\r\n"
+    upgrade = (
+        "Upgrade: websocket\r\nConnection: Upgrade\r\n"
+        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
+    )
+    assert _status(site, "GET /?token=wrong", f"Host: 127.0.0.1:{site.port}\r\n") == 401
+    assert _status(site, "GET /", mine) == 200
+    assert _status(site, "GET /", mine.replace("127.0.0.1", "evil.example")) == 403
+    assert _status(site, "POST /stop", mine + "Origin: http://evil.example\r\nContent-Length: 0\r\n") == 403
+    assert _status(site, "POST /stop", f"Host: 127.0.0.1:{site.port}\r\nContent-Length: 0\r\n") == 401
+    assert _status(site, "GET /hold", mine + upgrade + "Origin: http://evil.example\r\n") == 403
+    assert _status(site, "GET /hold", mine + upgrade + f"Origin: {site.url}\r\n") == 403, "it has no ticket"
+    assert _status(site, "POST /stop", mine + "Content-Length: 99999999\r\n") == 413
+    assert _status(site, "GET /docs", mine) == 404
+    with ExitStack() as held:
+        for _ in range(1000):
+            connection = socket.create_connection(("127.0.0.1", site.port), 5.0)
+            held.callback(connection.close)
+        site.robot.node.spin_for(7.0)  # SILENT_CONNECTION_S
+        assert _status(site, "GET /", mine) == 200, "those that say nothing have been closed"
+    after = site.robot.wait_any_state()
+    assert (after.state, after.watchdog_trips) == (before.state, before.watchdog_trips)
+    assert after.overruns - before.overruns <= 2
+
+
+def _session(site: Site) -> str:
+    page = site.open()
+    (cookie,) = page.context.cookies()
+    assert (cookie["name"], cookie["httpOnly"], cookie["sameSite"]) == (COOKIE, True, "Strict")
+    assert page.url == f"{site.url}/", "the token has left the address"
+    page.context.close()
+    return str(cookie["value"])
+
+
+def _status(site: Site, line: str, headers: str) -> int:
+    """Of one request over a socket of its own."""
+    with socket.create_connection(("127.0.0.1", site.port), 10.0) as connection:
+        connection.sendall(f"{line} HTTP/1.1\r\n{headers}\r\n".encode())
+        return int(connection.recv(64).split()[1])
+
+
+def test_commissioning_is_refused_while_the_robot_runs_and_says_so(site: Site) -> None:
+    page = site.open("/commission")
+    assert page.get_by_role("button", name="Begin").is_disabled()
+    page.get_by_role("switch").click()
+    page.get_by_role("button", name="Begin").click()
+    site.until(page, "document.body.innerText.includes('another master is on this bus')")
+    site.until(page, "document.body.innerText.includes('ended with exit code 1')")
+    assert site.robot.wait_any_state().state == DriverStatus.ENABLED
+
+
+def test_ctrl_c_ends_it_cleanly(site: Site) -> None:
+    """The last test: it ends the page."""
+    os.kill(site.process.pid, signal.SIGINT)
+    assert site.robot.exit_code(site.process) == 0
+    assert "Traceback" not in site.process.log()

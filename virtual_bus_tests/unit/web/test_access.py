@@ -1,0 +1,78 @@
+"""Who may use the page in the browser: the token, the cookie, and what a page of another site can send."""
+
+from __future__ import annotations
+
+import pytest
+
+from canbase_web.access import COOKIE, MOST_BODY_BYTES, Access, Verdict, hosts
+
+TOKEN, SESSION = "token-of-the-address", "session-of-the-cookie"
+ACCESS = Access(TOKEN, SESSION, hosts("127.0.0.1", 8080))
+MINE = {"host": "127.0.0.1:8080", "cookie": f"{COOKIE}={SESSION}"}
+
+
+def test_the_token_logs_in_and_the_cookie_passes_from_then_on() -> None:
+    assert ACCESS.judge({"host": "127.0.0.1:8080"}, f"token={TOKEN}") is Verdict.LOGS_IN
+    assert ACCESS.judge(MINE, "") is Verdict.PASSES
+
+
+@pytest.mark.parametrize("query", ["", "token=", f"token={TOKEN[:-1]}", f"token={TOKEN}x", "token=é", f"tok={TOKEN}"])
+def test_nobody_gets_in_without_the_token(query: str) -> None:
+    assert ACCESS.judge({"host": "127.0.0.1:8080"}, query) is Verdict.NO_TOKEN
+
+
+@pytest.mark.parametrize(
+    "cookie", ["", f"{COOKIE}=", f"{COOKIE}={TOKEN}", f"{COOKIE}x={SESSION}", "\x00;=;", f"a={SESSION}"]
+)
+def test_another_cookie_is_none(cookie: str) -> None:
+    assert ACCESS.judge(MINE | {"cookie": cookie}, "") is Verdict.NO_TOKEN
+
+
+def test_the_cookie_is_found_among_others() -> None:
+    assert ACCESS.judge(MINE | {"cookie": f"a=b; {COOKIE}={SESSION}; c=d"}, "") is Verdict.PASSES
+
+
+@pytest.mark.parametrize("host", ["evil.example:8080", "127.0.0.1", "127.0.0.1:81", "", "127.0.0.1:8080.evil.example"])
+def test_a_name_that_was_bound_to_this_address_by_someone_else_is_refused_with_a_cookie_too(host: str) -> None:
+    assert ACCESS.judge(MINE | {"host": host}, f"token={TOKEN}") is Verdict.OTHER_HOST
+
+
+def test_without_a_host_there_is_no_access() -> None:
+    assert ACCESS.judge({"cookie": MINE["cookie"]}, "") is Verdict.OTHER_HOST
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "https://127.0.0.1:8080", "http://127.0.0.1:81", ""])
+def test_a_page_of_another_site_is_refused_with_a_cookie_too(origin: str) -> None:
+    assert ACCESS.judge(MINE | {"origin": origin}, "") is Verdict.OTHER_SITE
+
+
+def test_the_pages_own_origin_passes() -> None:
+    assert ACCESS.judge(MINE | {"origin": "http://localhost:8080"}, "") is Verdict.PASSES
+
+
+@pytest.mark.parametrize(
+    ("length", "verdict"),
+    [
+        (str(MOST_BODY_BYTES), Verdict.PASSES),
+        (str(MOST_BODY_BYTES + 1), Verdict.TOO_LONG),
+        ("-1", Verdict.TOO_LONG),
+        ("1e3", Verdict.TOO_LONG),
+        ("9" * 5000, Verdict.TOO_LONG),
+    ],
+)
+def test_a_request_has_a_length(length: str, verdict: Verdict) -> None:
+    assert ACCESS.judge(MINE | {"content-length": length}, "") is verdict
+
+
+@pytest.mark.parametrize(
+    ("host", "names"),
+    [
+        ("127.0.0.1", {"127.0.0.1:80", "localhost:80", "[::1]:80"}),
+        ("192.168.1.5", {"192.168.1.5:80"}),
+        ("Robot.local", {"robot.local:80"}),
+        ("::1", {"127.0.0.1:80", "localhost:80", "[::1]:80"}),
+        ("fd00::5", {"[fd00::5]:80"}),
+    ],
+)
+def test_the_page_is_opened_under_the_names_of_its_address_alone(host: str, names: set[str]) -> None:
+    assert hosts(host, 80) == names

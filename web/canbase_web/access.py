@@ -1,0 +1,91 @@
+"""Who may use the page: the token of its address, the cookie that it becomes, and requests of other sites. Pure.
+
+A page of any other site can make a browser send requests to 127.0.0.1. It has neither the token nor the cookie
+(SameSite=Strict), its Origin is its own, and after DNS rebinding its Host is its own.
+"""
+
+from __future__ import annotations
+
+import hmac
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from http.cookies import CookieError, SimpleCookie
+from typing import Final
+from urllib.parse import parse_qs
+
+COOKIE: Final = "canbase_web"
+MOST_BODY_BYTES: Final = 65_536
+"""No request of the page is longer."""
+
+
+class Verdict(Enum):
+    """What becomes of a request: its status and the sentence of the answer."""
+
+    PASSES = (200, "")
+    LOGS_IN = (303, "the token is right: it becomes a cookie, and leaves the address")
+    NO_TOKEN = (401, "open the address that canbase web has printed: it has the token")
+    OTHER_HOST = (403, "this host name is not that of the page")
+    OTHER_SITE = (403, "a page of another site has sent this")
+    TOO_LONG = (413, "the request is too long")
+
+    @property
+    def status(self) -> int:
+        """The HTTP status."""
+        return self.value[0]
+
+    @property
+    def sentence(self) -> str:
+        """For the person."""
+        return self.value[1]
+
+
+@dataclass(frozen=True, slots=True)
+class Access:
+    """`token`: of the address; `session`: of the cookie; `hosts`: what a Host header may name, with its port."""
+
+    token: str
+    session: str
+    hosts: frozenset[str]
+
+    def judge(self, headers: Mapping[str, str], query: str) -> Verdict:
+        """Of one request, HTTP or websocket. `headers`: by lower-case name."""
+        if headers.get("host", "").lower() not in self.hosts:
+            return Verdict.OTHER_HOST
+        origin = headers.get("origin")
+        if origin is not None and origin.lower() not in {f"http://{host}" for host in self.hosts}:
+            return Verdict.OTHER_SITE
+        if not _short(headers.get("content-length", "0")):
+            return Verdict.TOO_LONG
+        if _same(_cookie(headers.get("cookie", "")), self.session):
+            return Verdict.PASSES
+        given = parse_qs(query).get("token", [""])[0]
+        return Verdict.LOGS_IN if _same(given, self.token) else Verdict.NO_TOKEN
+
+
+def authority(host: str, port: int) -> str:
+    """As it stands in an address (RFC 3986): an IPv6 address in brackets."""
+    return (f"[{host}]:{port}" if ":" in host else f"{host}:{port}").lower()
+
+
+def hosts(host: str, port: int) -> frozenset[str]:
+    """The names under which a page that is bound to `host` may be opened."""
+    local = ("127.0.0.1", "localhost", "::1")
+    return frozenset(authority(name, port) for name in (local if host in local else (host,)))
+
+
+def _same(given: str, expected: str) -> bool:
+    """In a time that does not depend on how much of it is right."""
+    return hmac.compare_digest(given.encode(), expected.encode())
+
+
+def _cookie(header: str) -> str:
+    try:
+        found = SimpleCookie(header).get(COOKIE)
+    except CookieError:
+        return ""
+    return "" if found is None else found.value
+
+
+def _short(length: str) -> bool:
+    return length.isdecimal() and len(length) < 10 and int(length) <= MOST_BODY_BYTES

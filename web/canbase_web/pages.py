@@ -1,0 +1,126 @@
+"""What all pages share: the frame with menu, robot and the large stop, and what they show it from."""
+
+from __future__ import annotations
+
+import html
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+
+from nicegui import ui
+
+from canbase_config.derive import watchdog_config
+from canbase_config.load import Loaded
+from canbase_watchdog.envelope import Bounds, Envelope
+from canbase_web.commissioning_dialog import CommissioningDialog
+from canbase_web.hold_socket import HoldSocket
+from canbase_web.now_view import Robot
+from canbase_web.robot_link import RobotLink
+
+MENU: Final = (
+    ("/", "Now"),
+    ("/drive", "Drive"),
+    ("/commission", "Commission"),
+    ("/stops", "Stops"),
+    ("/health", "Health"),
+)
+STOP: Final = """
+<form class="stop-form" method="post" action="/stop">
+  <button type="submit" aria-label="Stop the robot: ramp, power off, latched until a reset">STOP</button>
+</form>"""
+STOP_SCRIPT: Final = """
+document.addEventListener("submit", async event => {
+  if (event.target.className !== "stop-form") return;
+  event.preventDefault();
+  let said;
+  try {
+    const answer = await fetch("/stop", {method: "POST"});
+    said = new DOMParser().parseFromString(await answer.text(), "text/html").querySelector("p").textContent;
+  } catch (error) {
+    said = "The page does not reach canbase web: press the emergency stop at the robot.";
+  }
+  const place = document.getElementById("stop-answer");
+  if (place) place.textContent = said; else alert(said);
+});"""
+
+
+class Pages:
+    """Shared by the pages. `source`: the key of mux.sources that hold-to-drive publishes on; empty: there is none."""
+
+    def __init__(self, loaded: Loaded, link: RobotLink, hold: HoldSocket, source: str, namespace: str) -> None:
+        self.loaded, self.link, self.hold, self.source, self.namespace = loaded, link, hold, source, namespace
+        self._envelope: Envelope | None = None
+        self.commissioning = CommissioningDialog()
+        """One run for all browsers."""
+
+    def now(self) -> tuple[Robot, float, Bounds]:
+        """The robot, the time, and what its leases allow: by the orders that the filter reports, as the watchdog
+        works it out."""
+        now_s = time.monotonic()
+        robot = self.link.robot(now_s)
+        if self._envelope is None:
+            self._envelope = Envelope(watchdog_config(self.loaded.robot), now_s)
+        if robot.ordered.age_s == 0.0:  # it came since the last look
+            twist = robot.ordered.message.twist
+            self._envelope.order(twist.linear.x, twist.angular.z, now_s)
+        return robot, now_s, self._envelope.advance(now_s)
+
+    @contextmanager
+    def frame(self, path: str) -> Iterator[None]:
+        """Menu above, large stop below, the page's own content between."""
+        title = next(name for each, name in MENU if each == path)
+        robot = self.loaded.robot.name + self.namespace
+        ui.add_head_html('<link rel="stylesheet" href="/static/page.css">')
+        ui.add_body_html(STOP)
+        ui.add_body_html(f"<script>{STOP_SCRIPT}</script>")
+        dark = ui.dark_mode(value=None)
+        with ui.header().classes("items-center q-py-xs"):
+            ui.label(f"canbase · {robot}").classes("text-subtitle1").props('role="heading" aria-level="1"')
+            with ui.element("nav").props('aria-label="Pages"').classes("row"):
+                for each, name in MENU:
+                    here = ' aria-current="page"' if each == path else ""
+                    ui.html(
+                        f'<a href="{each}"{here} style="color:inherit;padding:.5rem .7rem">{name}</a>', sanitize=False
+                    )
+            ui.space()
+            ui.button(icon="contrast", on_click=dark.toggle).props('flat color=white aria-label="Light or dark"')
+        ui.page_title(f"{title} · {robot}")
+        with ui.column().classes("w-full q-pa-sm q-gutter-sm"):
+            ui.html(
+                '<p id="stop-answer" role="alert" data-level="bad" style="margin:0;font-weight:600"></p>',
+                sanitize=False,
+            )
+            yield
+
+    async def stop(self) -> tuple[bool, str]:
+        """The large stop: whichever part moves the wheels, the driver or commissioning. Whether it worked, and why."""
+        if self.commissioning.runs:
+            self.commissioning.stop()
+            return True, "commissioning stops all wheels and takes the power off"
+        return await self.link.stop()
+
+    def stop_answer(self, done: bool, sentence: str) -> str:
+        """The page after the stop, for a browser without script; the script takes its sentence."""
+        said = f"Stop: {sentence}" if done else f"STOP FAILED: {sentence}. Press the emergency stop at the robot."
+        return (
+            f'<!doctype html><html lang="en"><title>Stop</title><body style="font:1.3rem sans-serif">'
+            f'<p>{html.escape(said)}</p><a href="/">back</a></body></html>'
+        )
+
+
+def section(title: str) -> ui.card:
+    """A card with a heading."""
+    card = ui.card().classes("w-full")
+    with card:
+        ui.label(title).classes("text-subtitle2").props('role="heading" aria-level="2"')
+    return card
+
+
+def table(name: str, columns: tuple[str, ...]) -> None:
+    """A table whose rows the page's script fills in."""
+    cells = "".join(f'<th scope="col">{html.escape(column)}</th>' for column in columns)
+    head = f"<thead><tr>{cells}</tr></thead>"
+    ui.html(
+        f'<div class="scroll"><table class="values" id="{name}">{head}<tbody></tbody></table></div>', sanitize=False
+    ).classes("w-full")
