@@ -9,6 +9,8 @@ VENV   := .venv
 
 # Only the environment's own ROS 2 counts here, also in a terminal where another one is sourced.
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH PYTHONHOME RMW_IMPLEMENTATION
+# Bytecode is kept: hundreds of processes that the tests start would each compile canbase anew.
+unexport PYTHONDONTWRITEBYTECODE
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
 .PHONY: help
@@ -39,7 +41,7 @@ test-own-time: coverage ## tests that bring their own time: pure units, campaign
 
 .PHONY: test-real-time
 test-real-time: $(VENV)/ready ## tests in real time; WORKERS=2 two robots at a time; ONLY=bus simulated drives on a bus, ONLY=ros processes over DDS
-	@echo "about 25 minutes, mostly waiting; half of that with WORKERS=2"
+	@echo "about 30 minutes, mostly waiting; half of that with WORKERS=2"
 	pytest $(if $(WORKERS),--numprocesses $(WORKERS) --dist loadfile) $(addprefix $(TESTS)/,$(or $(ONLY),bus ros))
 
 # COMPILED=1: campaign, stops and soak run with their hot modules compiled, several times as fast, frame by frame the same.
@@ -83,8 +85,8 @@ stops: $(WORLD_READY) ## p50, p99 and max of each stop and each lie in virtual t
 	PYTHONPATH=$(WORLD) python -m campaign.stops --write docs/stop_times.md --only '$(ONLY)'
 
 .PHONY: soak
-soak: $(WORLD_READY) ## HOURS=20 of ordinary driving of random robots in virtual time: nothing may trip; SEED=7 tells one
-	PYTHONPATH=$(WORLD) python -m campaign.soak $(if $(SEED),--seed $(SEED)) $(if $(HOURS),--hours $(HOURS)) $(if $(FIRST),--first $(FIRST))
+soak: $(WORLD_READY) ## HOURS=20 of ordinary driving of random robots in virtual time: nothing may trip; SEED=7 tells one; LOADED=1 double payload on slopes
+	PYTHONPATH=$(WORLD) python -m campaign.soak $(if $(SEED),--seed $(SEED)) $(if $(HOURS),--hours $(HOURS)) $(if $(FIRST),--first $(FIRST)) $(if $(LOADED),--loaded)
 
 .PHONY: small-worlds
 small-worlds: $(VENV)/ready ## every failure with every action of an operator in small worlds; FAULTS=2 deeper, EVERY=1 denser
@@ -95,7 +97,7 @@ fuzz: $(VENV)/ready ## a million random and malformed frames and leases against 
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.fuzz
 
 UNIT = $(TESTS)/unit
-DECIDES = $(UNIT)/watchdog $(patsubst %,$(UNIT)/driver/test_%.py,cia402 axis state_machine state_machine_way_down fault_reset standstill braking) \
+DECIDES = $(UNIT)/watchdog $(patsubst %,$(UNIT)/driver/test_%.py,cia402 axis stall state_machine state_machine_way_down fault_reset standstill braking) \
   $(UNIT)/chain/test_layouts_agree.py $(UNIT)/runtime/test_latch_record.py
 
 .PHONY: coverage
@@ -124,6 +126,12 @@ ifdef NAME
 else
 	canbase benchmark --write docs/performance.md --json benchmarks/kept.json
 endif
+
+.PHONY: pictures
+pictures: $(VENV)/ready ## the pictures of docs/web.md, from the test in a real browser
+	@mkdir -p build/pictures docs/pictures
+	CANBASE_PICTURES=$(CURDIR)/build/pictures pytest -q $(TESTS)/ros/test_web.py
+	for picture in $$(grep -o 'web_[a-z_]*\.png' docs/web.md); do cp build/pictures/$$picture docs/pictures; done
 
 .PHONY: hazards
 hazards: $(VENV)/ready ## checks docs/hazards.yaml and writes the tables of docs/safety.md

@@ -24,7 +24,7 @@ from canbase_config.derive import watchdog_config
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from figures import Figure, raise_priority
-from support.ros_harness import free_udp_port
+from support.udp_port import free_udp_port
 
 RATE_HZ = 8000
 SECONDS = 5.0

@@ -26,7 +26,8 @@ from canbase_config.load import load_robot, sample
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.twist import Twist
 from figures import Figure, quantile, raise_priority, spread
-from support.ros_harness import clear_records, free_udp_port
+from support.ros_harness import clear_records
+from support.udp_port import free_udp_port
 
 TRIPS = 1000
 LEASE_S = 0.05

@@ -12,7 +12,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from support.ros_harness import free_udp_port
+from support.udp_port import free_udp_port
 
 BARE = "bare node"
 BARE_NODE = """

@@ -51,3 +51,7 @@ def _finish(app: Any, exception: Exception | None) -> None:
         source_pages.write(Path(app.outdir))
         (Path(app.outdir) / "_static" / "source.css").write_text(source_pages.styles(), encoding="utf-8")
         offline.check(Path(app.outdir))
+
+
+autodoc_mock_imports = ["nicegui", "fastapi", "uvicorn"]
+"""Of the pages in the browser: Sphinx imports modules twice, which NiceGUI does not take."""

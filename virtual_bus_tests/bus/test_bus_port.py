@@ -15,7 +15,15 @@ from can.interfaces.virtual import VirtualBus
 
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.runtime import bus_port
-from canbase_driver.runtime.bus_port import BUS_OFF, RECEIVE_FAILURES, SEND_FAILURES, SEND_TIMEOUT_S, BusError, BusPort
+from canbase_driver.runtime.bus_port import (
+    BUS_OFF,
+    OPENS_AT_ONCE_S,
+    RECEIVE_FAILURES,
+    SEND_FAILURES,
+    SEND_TIMEOUT_S,
+    BusError,
+    BusPort,
+)
 from canbase_driver.supervision.bus_health import ControllerState
 from support.flaky_bus import FlakyBus
 
@@ -32,9 +40,10 @@ WAYS_TO_FAIL = [
 
 @pytest.fixture
 def arguments(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """Of a bus that this test has for itself, and can break; it is opened again soon."""
+    """Of a bus that this test has for itself, and can break; it is opened again soon, however busy the computer is."""
     monkeypatch.setitem(BACKENDS, "virtual", ("support.flaky_bus", "FlakyBus"))
     monkeypatch.setattr(bus_port, "RETRY_S", RETRY_S)
+    monkeypatch.setattr(bus_port, "OPENS_AT_ONCE_S", 10.0)
     FlakyBus.heal()
     return {"interface": "virtual", "channel": f"port-{request.node.name}"}
 
@@ -183,6 +192,7 @@ def test_an_adapter_that_opens_slowly_does_not_hold_up_the_cycle(
     port: BusPort, other: VirtualBus, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A serial adapter (slcan) sleeps 2 s when it is opened. Here it is open when the test says so."""
+    monkeypatch.setattr(bus_port, "OPENS_AT_ONCE_S", OPENS_AT_ONCE_S)
     opens = threading.Event()
     FlakyBus.broken = True
     for _ in range(RECEIVE_FAILURES):
@@ -210,6 +220,7 @@ def test_an_adapter_that_opens_slowly_does_not_hold_up_the_cycle(
 
 
 def test_a_bus_that_opens_after_the_end_is_closed(port: BusPort, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bus_port, "OPENS_AT_ONCE_S", OPENS_AT_ONCE_S)
     opens, closed = threading.Event(), threading.Event()
     FlakyBus.broken = True
     for _ in range(RECEIVE_FAILURES):
@@ -232,3 +243,97 @@ def test_a_bus_that_opens_after_the_end_is_closed(port: BusPort, monkeypatch: py
     assert not closed.is_set()
     opens.set()
     assert closed.wait(20.0)
+
+
+LISTEN_S = 0.1
+
+
+@pytest.fixture
+def listening(arguments: dict[str, Any]) -> Iterator[BusPort]:
+    """As a driver has it, on a bus that has just failed and works again."""
+    opened = BusPort(arguments, LISTEN_S)
+    FlakyBus.deaf = True
+    for _ in range(SEND_FAILURES):
+        opened.send(SYNC)
+    FlakyBus.heal()
+    reopened(opened)
+    yield opened
+    opened.close()
+
+
+def sent(other: VirtualBus) -> int:
+    count = 0
+    while other.recv(0.0) is not None:
+        count += 1
+    return count
+
+
+def test_after_a_failure_one_frame_goes_out_and_nothing_more_for_the_time_of_listening(
+    listening: BusPort, other: VirtualBus
+) -> None:
+    began_s = time.monotonic()
+    while time.monotonic() - began_s < 0.8 * LISTEN_S:
+        listening.send(SYNC)
+        assert listening.problem == "sending failed 10 times in a row: transmit buffer full"
+    assert sent(other) == 1
+    time.sleep(0.4 * LISTEN_S)
+    listening.send(SYNC)
+    assert (sent(other), listening.problem) == (1, "")
+
+
+@pytest.mark.parametrize(("cob_id", "data"), [(0x080, b""), (0x080, b"\x01"), (0x77F, b"\x05")])
+@pytest.mark.parametrize("probes", [False, True])
+def test_another_driver_that_is_heard_then_keeps_this_one_silent(
+    listening: BusPort, other: VirtualBus, cob_id: int, data: bytes, probes: bool
+) -> None:
+    if probes:
+        listening.send(Frame(0x000, b"\x82\x00"))
+    other.send(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
+    listening.receive(0.0)
+    assert listening.problem.startswith("another driver is on the bus: SYNC or the heartbeat of node 127 came.")
+    other_heard = sent(other)
+    for _ in range(3):
+        listening.send(SYNC)
+    assert (other_heard, sent(other)) == (int(probes), 0)
+
+
+def test_when_the_other_driver_has_ended_this_one_listens_once_more_and_goes_on(
+    listening: BusPort, other: VirtualBus
+) -> None:
+    other.send(can.Message(arbitration_id=0x080, is_extended_id=False))
+    listening.receive(0.0)
+
+    def works() -> bool:
+        listening.send(SYNC)
+        return listening.problem == ""
+
+    began_s = time.monotonic()
+    receive_until(listening, works)
+    assert time.monotonic() - began_s >= RETRY_S + LISTEN_S
+
+
+def test_drives_and_the_watchdog_are_no_driver_and_their_frames_come_through(
+    listening: BusPort, other: VirtualBus
+) -> None:
+    for cob_id, data in ((0x701, b"\x7f"), (0x77E, b"\x05"), (0x181, bytes(6))):
+        other.send(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
+        assert listening.receive(0.0) == Frame(cob_id, data)
+    time.sleep(1.2 * LISTEN_S)
+    listening.send(SYNC)
+    assert listening.problem == ""
+
+
+def test_its_own_frame_that_a_simulated_bus_brings_back_is_none_of_another_but_the_same_one_again_is(
+    listening: BusPort, other: VirtualBus
+) -> None:
+    listening.send(SYNC)
+    for expected in ("sending failed 10 times in a row: transmit buffer full", "another driver is on the bus"):
+        other.send(can.Message(arbitration_id=0x080, is_extended_id=False))
+        listening.receive(0.0)
+        assert listening.problem.startswith(expected)
+
+
+def test_at_work_the_frames_of_another_driver_are_the_watchdogs_concern(port: BusPort, other: VirtualBus) -> None:
+    other.send(can.Message(arbitration_id=0x080, is_extended_id=False))
+    assert port.receive(0.0) == SYNC
+    assert port.problem == ""

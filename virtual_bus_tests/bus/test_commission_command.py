@@ -12,7 +12,8 @@ import pytest
 
 from canbase_config.commissioned import mark
 from canbase_config.load import load_robot
-from support.bus_tool import ENVIRONMENT, argv, canbase, drives, free_port, write_robot
+from support.bus_tool import ENVIRONMENT, argv, canbase, drives, write_robot
+from support.udp_port import free_udp_port
 
 pytestmark = [pytest.mark.bus, pytest.mark.timeout(180)]
 
@@ -30,7 +31,7 @@ def only_report(folder: Path) -> str:
 
 def test_a_wrong_count_is_measured_again_and_changes_nothing(tmp_path: Path) -> None:
     """Somebody types 3 revolutions where the wheel made 0.3; by that scale it makes 0.03 the second time."""
-    port = free_port()
+    port = free_udp_port()
     config = write_robot(tmp_path, port)
     before = config.read_text(encoding="utf-8")
     counts = {f"revolutions__{joint}": "0.3" for joint in ("left_wheel", "right_wheel")}
@@ -50,7 +51,7 @@ def test_a_wrong_count_is_measured_again_and_changes_nothing(tmp_path: Path) -> 
 
 
 def test_a_report_is_never_overwritten(tmp_path: Path) -> None:
-    config = write_robot(tmp_path, free_port())
+    config = write_robot(tmp_path, free_udp_port())
     old = tmp_path / "proven.md"
     old.write_text("PROVEN", encoding="utf-8")
     done = canbase("commission", "-c", str(config), "--report", str(old), "--dry-run", "--yes")
@@ -60,7 +61,7 @@ def test_a_report_is_never_overwritten(tmp_path: Path) -> None:
 
 
 def test_a_wrong_direction_is_corrected_and_the_self_stop_proven(tmp_path: Path) -> None:
-    port = free_port()
+    port = free_udp_port()
     with drives(write_robot(tmp_path, port, "truth.yaml")):
         config = write_robot(tmp_path, port)
         text = config.read_text(encoding="utf-8").replace("direction: -1 ", "direction: 1 ")
@@ -100,7 +101,7 @@ def test_a_wrong_direction_is_corrected_and_the_self_stop_proven(tmp_path: Path)
 
 
 def test_a_drive_that_does_not_stop_by_itself_is_not_proven_and_1(tmp_path: Path) -> None:
-    config = write_robot(tmp_path, free_port(), profile="tmcm1636", velocity_unit=None)
+    config = write_robot(tmp_path, free_udp_port(), profile="tmcm1636", velocity_unit=None)
     with drives(config) as control:
         done = canbase("commission", "-c", str(config), "--yes", "--steps", "proof,floor", timeout_s=120.0)
         time.sleep(0.5)
@@ -113,7 +114,7 @@ def test_a_drive_that_does_not_stop_by_itself_is_not_proven_and_1(tmp_path: Path
 
 
 def test_sigterm_while_the_wheels_turn_stops_them_and_the_report_says_so(tmp_path: Path) -> None:
-    config = write_robot(tmp_path, free_port())
+    config = write_robot(tmp_path, free_udp_port())
     words = argv("commission", "-c", str(config), "--yes", "--steps", "floor", "--distance", "5")
     with drives(config) as control:
         process = subprocess.Popen(words, env=ENVIRONMENT, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
@@ -128,7 +129,7 @@ def test_sigterm_while_the_wheels_turn_stops_them_and_the_report_says_so(tmp_pat
 
 
 def test_beside_another_master_nothing_is_sent(tmp_path: Path) -> None:
-    port = free_port()
+    port = free_udp_port()
     config = write_robot(tmp_path, port)
     with can.Bus("239.74.163.2", "udp_multicast", port=port, hop_limit=0) as other:
         process = subprocess.Popen(
@@ -147,7 +148,7 @@ def test_beside_another_master_nothing_is_sent(tmp_path: Path) -> None:
 
 
 def test_without_an_answer_or_a_robot_it_ends_with_advice(tmp_path: Path) -> None:
-    config = write_robot(tmp_path, free_port())
+    config = write_robot(tmp_path, free_udp_port())
     assert canbase("commission", "-c", str(tmp_path / "none.yaml")).returncode == 2
     assert canbase("commission", "-c", str(config), "--steps", "dance").returncode == 2
     done = canbase("commission", "-c", str(config))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,19 +10,18 @@ from pathlib import Path
 import pytest
 
 from canbase_sim.control import SimControl
-from support.bus_tool import drives, free_port, write_robot
+from support.bus_tool import STANDS_S, drives, wheel_stands, write_robot
 from support.terminal import Terminal
+from support.udp_port import free_udp_port
 
 pytestmark = [pytest.mark.bus, pytest.mark.timeout(120)]
 
-STANDS_S = 1.5
-"""1016h is 0.3 s, the ramp 0.25 s; the rest is for a loaded computer."""
 TURNS_MPS = 0.02
 
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, SimControl]]:
-    config = write_robot(tmp_path_factory.mktemp("terminal"), free_port())
+    config = write_robot(tmp_path_factory.mktemp("terminal"), free_udp_port())
     with drives(config) as control:
         yield config, control
 
@@ -45,13 +43,6 @@ def turning(terminal: Terminal, control: SimControl) -> None:
     terminal.hold("", lambda: control.truth().v_left_mps > TURNS_MPS)
 
 
-def stands(control: SimControl) -> None:
-    end = time.monotonic() + STANDS_S
-    while abs(control.truth().v_left_mps) > 0.001:
-        assert time.monotonic() < end, "the wheel still turns"
-        time.sleep(0.01)
-
-
 def report(config: Path) -> str:
     """The newest one: each run has a file of its own."""
     return max(config.parent.glob("commissioning-*.md"), key=lambda path: path.stat().st_mtime_ns).read_text("utf-8")
@@ -63,7 +54,7 @@ def test_enter_stops_the_wheel_and_the_report_says_so(bench: tuple[Path, SimCont
     with commissioning(config) as terminal:
         turning(terminal, control)
         terminal.press("\n")
-        stands(control)
+        wheel_stands(control, STANDS_S)
         assert terminal.wait() == 1
         assert "stopped by Enter" in terminal.shown
     assert "It did not come to its end: stopped by Enter" in report(config)
@@ -75,7 +66,7 @@ def test_any_line_stops_it_too_who_would_look_for_the_right_key(bench: tuple[Pat
     with commissioning(config) as terminal:
         turning(terminal, control)
         terminal.press("stop!!\n")
-        stands(control)
+        wheel_stands(control, STANDS_S)
         assert terminal.wait() == 1
 
 
@@ -86,7 +77,7 @@ def test_an_answer_without_sense_is_asked_again_and_the_next_wheel_is_stopped_by
     with commissioning(config) as terminal:
         turning(terminal, control)
         terminal.read_until("Which way")
-        stands(control)
+        wheel_stands(control, STANDS_S)
         terminal.press("sideways\n")
         terminal.read_until("expected one of forward, backward, nothing, other; try again")
         terminal.press("f\n")
@@ -125,7 +116,7 @@ def test_a_signal_of_the_terminal_stops_the_wheel(bench: tuple[Path, SimControl]
     with commissioning(config) as terminal:
         turning(terminal, control)
         terminal.process.send_signal(number)
-        stands(control)
+        wheel_stands(control, STANDS_S)
         assert terminal.wait() == 1
     assert f"stopped by {signal.Signals(number).name}" in report(config)
 
@@ -137,7 +128,7 @@ def test_a_terminal_that_goes_stops_the_wheel_and_leaves_a_report(bench: tuple[P
     with commissioning(config) as terminal:
         turning(terminal, control)
         terminal.hang_up()
-        stands(control)
+        wheel_stands(control, STANDS_S)
         assert terminal.wait() != 0
     assert "the terminal was closed" in report(config)
 
@@ -147,4 +138,4 @@ def test_killed_it_leaves_the_wheel_to_the_drive(bench: tuple[Path, SimControl])
     with commissioning(config) as terminal:
         turning(terminal, control)
         terminal.process.kill()
-        stands(control)
+        wheel_stands(control, STANDS_S)

@@ -14,7 +14,8 @@ from canbase_cli import forget_current_folder
 from canbase_cli.stack import Stack
 from canbase_config.load import sample
 from canbase_runtime.own_modules import module_command
-from support.bus_tool import free_port, write_robot
+from support.bus_tool import write_robot
+from support.udp_port import free_udp_port
 
 pytestmark = pytest.mark.bus
 
@@ -79,7 +80,7 @@ def test_an_empty_entry_of_the_search_path_is_not_the_current_folder(trap: Path,
 
 def test_a_part_of_the_stack_and_what_it_becomes_import_nothing_from_there(trap: Path) -> None:
     """The watchdog starts as `canbase_cli.child` and becomes `canbase_watchdog`; it says so when its bus is open."""
-    stack = Stack(write_robot(trap, free_port()), sim=True, logs=trap)
+    stack = Stack(write_robot(trap, free_udp_port()), sim=True, logs=trap)
     stack._parts = ["sim", "watchdog"]  # those without ROS
     with stack:
         limit = time.monotonic() + 60.0
@@ -95,7 +96,7 @@ def test_the_support_bundle_asks_no_pip_and_no_canbase_of_the_current_folder(tra
         CONSOLE_SCRIPT,
         "support-bundle",
         "--config",
-        write_robot(trap, free_port()),
+        write_robot(trap, free_udp_port()),
         "--since",
         "-1s",
         "-o",

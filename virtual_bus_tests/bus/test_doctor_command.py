@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from support.bus_tool import canbase, drives, free_port, write_robot
+from support.bus_tool import canbase, drives, write_robot
+from support.udp_port import free_udp_port
 
 pytestmark = pytest.mark.bus
 
 
 def test_drives_alone_are_read_and_one_that_goes_is_named(tmp_path: Path) -> None:
-    config = write_robot(tmp_path, free_port())
+    config = write_robot(tmp_path, free_udp_port())
     with drives(config) as control:
         well = canbase("doctor", "--config", str(config), "--json")
         control.fault(2, "cut")
@@ -29,7 +30,7 @@ def test_drives_alone_are_read_and_one_that_goes_is_named(tmp_path: Path) -> Non
 
 
 def test_a_drive_that_does_not_stop_by_itself_is_a_warning(tmp_path: Path) -> None:
-    config = write_robot(tmp_path, free_port(), profile="roboteq", velocity_unit="rpm")
+    config = write_robot(tmp_path, free_udp_port(), profile="roboteq", velocity_unit="rpm")
     with drives(config):
         done = canbase("doctor", "--config", str(config), "--json")
     rows = {row["name"]: row for row in json.loads(done.stdout)}

@@ -18,7 +18,7 @@ from can.interfaces.udp_multicast import utils
 
 from canbase_driver.runtime import frame_socket as of_the_driver
 from canbase_watchdog import frame_socket as of_the_watchdog
-from support.bus_tool import free_port
+from support.udp_port import free_udp_port
 
 pytestmark = pytest.mark.bus
 COPIES = pytest.mark.parametrize("module", [of_the_driver, of_the_watchdog], ids=["driver", "watchdog"])
@@ -64,7 +64,7 @@ def send(bus: Any, fields: dict[str, Any]) -> None:
 
 @pytest.fixture
 def udp() -> dict[str, Any]:
-    return {"interface": "udp_multicast", "channel": "239.74.163.2", "port": free_port(), "hop_limit": 0}
+    return {"interface": "udp_multicast", "channel": "239.74.163.2", "port": free_udp_port(), "hop_limit": 0}
 
 
 @pytest.fixture

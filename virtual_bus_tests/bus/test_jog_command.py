@@ -12,13 +12,11 @@ import can
 import pytest
 
 from canbase_sim.control import SimControl
-from support.bus_tool import canbase, drives, free_port, write_robot
+from support.bus_tool import STANDS_S, canbase, drives, write_robot
 from support.terminal import Terminal
+from support.udp_port import free_udp_port
 
 pytestmark = [pytest.mark.bus, pytest.mark.timeout(120)]
-
-STANDS_S = 1.5
-"""1016h is 0.3 s, the ramp 0.25 s; the rest is for a loaded computer."""
 
 
 def jog(config: Path) -> tuple[str, ...]:
@@ -45,7 +43,7 @@ def stands(control: SimControl) -> None:
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, SimControl]]:
-    config = write_robot(tmp_path_factory.mktemp("jog"), free_port())
+    config = write_robot(tmp_path_factory.mktemp("jog"), free_udp_port())
     with drives(config) as control:
         yield config, control
 
@@ -81,7 +79,7 @@ def test_a_terminal_that_goes_stops_the_wheel(bench: tuple[Path, SimControl]) ->
 
 
 def test_beside_a_driver_it_is_refused_and_without_a_terminal_too(tmp_path: Path) -> None:
-    port = free_port()
+    port = free_udp_port()
     config = write_robot(tmp_path, port)
     assert canbase("jog", "left_wheel", "--config", str(config)).returncode == 2
     assert canbase("jog", "wheel", "--config", str(config)).returncode == 2

@@ -9,13 +9,14 @@ from pathlib import Path
 import can
 import pytest
 
-from support.bus_tool import canbase, drives, free_port, write_robot
+from support.bus_tool import canbase, drives, write_robot
+from support.udp_port import free_udp_port
 
 pytestmark = pytest.mark.bus
 
 
 def test_it_finds_both_drives_and_says_what_they_are(tmp_path: Path) -> None:
-    config = write_robot(tmp_path, free_port())
+    config = write_robot(tmp_path, free_udp_port())
     with drives(config):
         done = canbase("scan", "--config", str(config), "--seconds", "0.3", "--json")
         table = canbase("scan", "--config", str(config), "--seconds", "0.3")
@@ -31,7 +32,7 @@ def test_it_finds_both_drives_and_says_what_they_are(tmp_path: Path) -> None:
 
 
 def test_a_drive_of_robot_yaml_that_does_not_answer_is_1_and_its_node_is_named(tmp_path: Path) -> None:
-    config = write_robot(tmp_path, free_port())
+    config = write_robot(tmp_path, free_udp_port())
     with drives(config) as control:
         control.fault(2, "cut")
         done = canbase("scan", "--config", str(config), "--seconds", "0.3")
@@ -40,7 +41,7 @@ def test_a_drive_of_robot_yaml_that_does_not_answer_is_1_and_its_node_is_named(t
 
 
 def test_where_another_master_speaks_it_only_listens_unless_told_otherwise(tmp_path: Path) -> None:
-    port = free_port()
+    port = free_udp_port()
     config = write_robot(tmp_path, port)
     with drives(config), can.Bus("239.74.163.2", "udp_multicast", port=port, hop_limit=0) as other:
         message = can.Message(arbitration_id=0x080, is_extended_id=False)
@@ -72,7 +73,7 @@ def test_a_bus_that_cannot_be_opened_is_1_with_advice_and_no_traceback() -> None
 
 
 def test_an_empty_bus_is_1(tmp_path: Path) -> None:
-    config = write_robot(tmp_path, free_port())
+    config = write_robot(tmp_path, free_udp_port())
     done = canbase("scan", "--config", str(config), "--seconds", "0.1")
     assert done.returncode == 1
     assert "power, cable, termination, bit rate" in done.stderr

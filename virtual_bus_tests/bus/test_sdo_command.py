@@ -6,14 +6,15 @@ from collections.abc import Iterator
 
 import pytest
 
-from support.bus_tool import canbase, drives, free_port, write_robot
+from support.bus_tool import canbase, drives, write_robot
+from support.udp_port import free_udp_port
 
 pytestmark = pytest.mark.bus
 
 
 @pytest.fixture(scope="module")
 def config(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    file = write_robot(tmp_path_factory.mktemp("sdo"), free_port())
+    file = write_robot(tmp_path_factory.mktemp("sdo"), free_udp_port())
     with drives(file):
         yield str(file)
 

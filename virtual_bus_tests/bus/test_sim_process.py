@@ -20,16 +20,15 @@ import pytest
 from canbase_config.robot import Robot
 from canbase_sim.control import ControlError, SimControl, control_path
 from support.sim_rig import robot
+from support.udp_port import free_udp_port
 
 pytestmark = pytest.mark.bus
 
 
 def _robot(folder: Path, **bus: Any) -> Robot:
     """The small robot on a UDP port that nobody else uses now, with its sockets in `folder`."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    udp = {"interface": "udp_multicast", "channel": "239.74.163.2", "extra": {"port": port, "hop_limit": 0}}
+    extra = {"port": free_udp_port(), "hop_limit": 0}
+    udp = {"interface": "udp_multicast", "channel": "239.74.163.2", "extra": extra}
     return robot(bus=udp | bus, lease={"socket": str(folder / "lease.sock")})
 
 

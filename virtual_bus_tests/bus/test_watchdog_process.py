@@ -16,6 +16,7 @@ import pytest
 
 from canbase_watchdog.frames import Frame
 from support.ros_harness import clear_records
+from support.udp_port import free_udp_port
 from support.watchdog_live import LiveRobot
 from support.watchdog_story import config
 from unit.runtime.test_output import full_pipe
@@ -25,17 +26,11 @@ pytestmark = pytest.mark.bus
 QUICK_STOP = Frame(0x501, bytes.fromhex("02 00"))
 
 
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("", 0))
-        return int(probe.getsockname()[1])
-
-
 class Watched:
     """The process, the robot, and a stand-in for systemd's notify socket."""
 
     def __init__(self, folder: Path, stderr: int = subprocess.PIPE) -> None:
-        bus = {"interface": "udp_multicast", "channel": "239.74.163.2", "port": free_port(), "hop_limit": 0}
+        bus = {"interface": "udp_multicast", "channel": "239.74.163.2", "port": free_udp_port(), "hop_limit": 0}
         self.config = replace(config(), bus_arguments=bus, lease_socket=str(folder / "run" / "lease"))
         self.systemd = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self.systemd.bind(str(folder / "notify"))

@@ -13,9 +13,9 @@ from typing import Any
 import can
 import pytest
 
-from bus.test_watchdog_process import free_port
 from canbase_config.watchdog import WatchdogConfig, WatchedLayout
 from canbase_watchdog.post_stop import LIMIT_S, main, plan
+from support.udp_port import free_udp_port
 from support.watchdog_story import config
 
 pytestmark = pytest.mark.bus
@@ -26,7 +26,7 @@ PRE_OPERATIONAL = [(0x000, "8001"), (0x000, "8002")]
 
 @pytest.fixture
 def bus_arguments() -> dict[str, Any]:
-    return {"interface": "udp_multicast", "channel": "239.74.163.2", "port": free_port(), "hop_limit": 0}
+    return {"interface": "udp_multicast", "channel": "239.74.163.2", "port": free_udp_port(), "hop_limit": 0}
 
 
 @pytest.fixture

@@ -29,7 +29,7 @@ HOT = {
         "causes cia402 core drive_units snapshot boot.node_boot boot.sdo_budget cia301.emcy cia301.frame cia301.nmt "
         "cia301.pdo cia301.sdo_client drives.axis "
         "drives.canopen_node drives.drive_group drives.drive_snapshot drives.let_go drives.odometry_feed "
-        "drives.sdo_stop drives.standstill drives.stopping_distance drives.telemetry "
+        "drives.sdo_stop drives.stall drives.standstill drives.stopping_distance drives.telemetry "
         "motion.braking motion.kinematics motion.limiter motion.odometry motion.velocity_command "
         "supervision.bus_health supervision.cycle_stats supervision.latch supervision.lifecycle "
         "supervision.phases supervision.hazards supervision.fault_reset supervision.reset_run supervision.situation "
@@ -42,8 +42,8 @@ HOT = {
     ),
     "canbase_sim": (
         "axis_parts command_watch frame line node cia301.dictionary cia301.emcy cia301.heartbeat cia301.nmt "
-        "cia301.pdo_rules cia301.rpdo cia301.tpdo cia402.axis cia402.states cia402.raw_units plant.base plant.encoder "
-        "plant.motor world.bench"
+        "cia301.pdo_rules cia301.rpdo cia301.tpdo cia402.axis cia402.states cia402.raw_units plant.base plant.battery "
+        "plant.encoder plant.motor world.bench"
     ),
     "campaign": (
         "action_process can_bus clock disk process driver_process watchdog_process velocity_process drives envelope "

@@ -90,10 +90,11 @@ def robot(robot_yaml: Path) -> Robot:
 def spawn(tmp_path: Path) -> Iterator[Spawn]:
     """spawn("python code" or [argv], env={…}): a `Process` that ends with the test at the latest."""
     processes: list[Process] = []
+    numbers = itertools.count()  # several threads of a test may start processes
 
     def start(command: str | Sequence[str], env: Mapping[str, str] | None = None) -> Process:
         argv = python_argv(command) if isinstance(command, str) else command
-        process = Process(argv, tmp_path / f"process{len(processes)}.log", env)
+        process = Process(argv, tmp_path / f"process{next(numbers)}.log", env)
         processes.append(process)
         return process
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import random
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -14,7 +16,7 @@ from canbase_action_server.client import DriveClient
 from canbase_action_server.outcome import ErrorCode, Status
 from ros.conftest import MakeRobot, Spawn
 from support.fake_base import FakeBase, server_code
-from support.ros_harness import Process, TestNode
+from support.ros_harness import Process, TestNode, reserve_domain
 
 pytestmark = pytest.mark.ros
 
@@ -22,11 +24,15 @@ pytestmark = pytest.mark.ros
 class Crowd:
     """A server, its base, and several clients that neither wait nor ask twice."""
 
-    def __init__(self, node: TestNode, spawn: Spawn, make_robot: MakeRobot, **action: Any) -> None:
+    def __init__(
+        self, node: TestNode, spawn: Spawn, make_robot: MakeRobot, domain: int | None = None, **action: Any
+    ) -> None:
+        """`domain` None: that of the test."""
         self.node = node
         # A loaded test machine may hold the test's base up for longer than the 0.2 s of a robot.
         robot = make_robot({"timeouts": {"odometry_s": 1.0}, "action": {"progress_timeout_s": 5.0, **action}})
-        self.server: Process = spawn(server_code(robot))
+        environment = {} if domain is None else {"ROS_DOMAIN_ID": str(domain)}
+        self.server: Process = spawn(server_code(robot), environment)
         self.base = FakeBase(node)
         self.clients = [ActionClient(node.node, DriveDistance, "drive_distance") for _ in range(4)]
         DriveClient(node.node, node.executor).wait_for_server(20.0)
@@ -74,16 +80,28 @@ class Crowd:
 
 
 @pytest.mark.timeout(120)
-@pytest.mark.parametrize("policy", ["reject", "queue", "preempt"])
 def test_200_goals_and_cancels_of_several_clients_each_end_once_and_rightly(
-    policy: str, test_node: TestNode, spawn: Spawn, make_robot: MakeRobot
+    spawn: Spawn, make_robot: MakeRobot
 ) -> None:
-    crowd = Crowd(test_node, spawn, make_robot, goal_policy=policy, queue_length=3)
+    """Three robots side by side, each in a domain of its own."""
+
+    def crowd_of(policy: str) -> None:
+        domain, holder = reserve_domain(os.getpid())
+        with holder, TestNode(domain_id=domain) as node:
+            crowd = Crowd(node, spawn, make_robot, domain, goal_policy=policy, queue_length=3)
+            they_end_once_and_rightly(crowd, policy)
+
+    with ThreadPoolExecutor() as robots:
+        assert list(robots.map(crowd_of, ("reject", "queue", "preempt"))) == [None] * 3
+
+
+def they_end_once_and_rightly(crowd: Crowd, policy: str) -> None:
+    """200 goals with cancels among them, to their end. `policy`: the server's."""
     chance, canceled = random.Random(1), set()
     for _ in range(200):
         way_m = chance.choice((-1, 1)) * chance.uniform(0.01, 0.1)
         crowd.send(way_m, chance.uniform(0.1, 0.5), client=chance.randrange(4))
-        test_node.spin_for(chance.choice((0.0, 0.01, 0.05, 0.3)))
+        crowd.node.spin_for(chance.choice((0.0, 0.01, 0.05, 0.3)))
         living = [uuid for uuid in crowd.handles if uuid not in crowd.results]
         if living and chance.random() < 0.5:
             canceled.add(living[-1])
@@ -97,7 +115,7 @@ def test_200_goals_and_cancels_of_several_clients_each_end_once_and_rightly(
     assert [uuid for uuid in crowd.handles if uuid not in allowed.get(crowd.end(uuid), set())] == []
     assert one_at_a_time(crowd.steps())
     assert len(crowd.handles) > 10
-    assert test_node.node.count_publishers("cmd_vel_action") == 1
+    assert crowd.node.node.count_publishers("cmd_vel_action") == 1
 
 
 def one_at_a_time(steps: list[dict[str, Any]]) -> bool:

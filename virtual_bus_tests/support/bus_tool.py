@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import socket
 import subprocess
 import sys
 import time
@@ -20,12 +19,10 @@ from canbase_sim.control import ControlError, SimControl
 
 ENVIRONMENT = os.environ | {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1", "COLUMNS": "160", "PYTHONUNBUFFERED": "1"}
 
-
-def free_port() -> int:
-    """A UDP port that is free now."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+HEARTBEAT_S = 0.6
+"""1016h of the drives [s], twice the default: these tests are not about a computer that runs a tool late."""
+STANDS_S = HEARTBEAT_S + 1.4
+"""A wheel stands by then [s], its tool killed or not: the ramp takes 0.25 s, the rest is for a loaded computer."""
 
 
 def write_robot(folder: Path, port: int, name: str = "robot.yaml", **drives: Any) -> Path:
@@ -34,6 +31,7 @@ def write_robot(folder: Path, port: int, name: str = "robot.yaml", **drives: Any
     values = yaml.load(sample("bench"))
     values["bus"]["extra"]["port"] = port
     values["lease"]["socket"] = str(folder / "lease.sock")
+    values["timeouts"] = {"drive_heartbeat_s": HEARTBEAT_S, "feedback_s": 0.3}
     for drive in values["drives"]:
         drive.update(drives)
     file = folder / name
@@ -75,3 +73,11 @@ def canbase(*words: str, stdin: str | None = None, timeout_s: float = 50.0) -> s
     return subprocess.run(
         argv(*words), input=stdin or "", capture_output=True, text=True, env=ENVIRONMENT, timeout=timeout_s, check=False
     )
+
+
+def wheel_stands(control: SimControl, within_s: float) -> None:
+    """Fails when the left wheel still turns after that time."""
+    end = time.monotonic() + within_s
+    while abs(control.truth().v_left_mps) > 0.001:
+        assert time.monotonic() < end, "the wheel still turns"
+        time.sleep(0.01)

@@ -25,6 +25,7 @@ from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
 from canbase_runtime.latch_file import create_first, latch_folder
+from support.udp_port import free_udp_port
 
 T = TypeVar("T")
 
@@ -251,27 +252,6 @@ def reserve_domain(first: int) -> tuple[int, socket.socket]:
             continue
         return domain, holder
     raise RuntimeError("all 99 ROS domains are held by other tests on this machine")
-
-
-_held_ports: list[socket.socket] = []
-"""They hold the ports that this process was given, until it ends."""
-
-
-def free_udp_port() -> int:
-    """A UDP port that is free now: benches on one machine are distinguished by it. No other test is given it as long
-    as this process lives: between this call and the start of the bench the port itself is free."""
-    while True:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(("127.0.0.1", 0))
-            port: int = probe.getsockname()[1]
-        holder = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        try:
-            holder.bind(f"\0canbase-test-port-{port}")
-        except OSError:
-            holder.close()
-            continue
-        _held_ports.append(holder)
-        return port
 
 
 def merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

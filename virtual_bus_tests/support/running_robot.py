@@ -27,7 +27,8 @@ from canbase_cli.stack import Stack
 from canbase_config.load import load_robot, sample
 from canbase_sim.control import SimControl, control_path
 from canbase_sim.world.bench import Truth
-from support.ros_harness import Process, TestNode, free_udp_port, merged, reserve_domain
+from support.ros_harness import Process, TestNode, merged, reserve_domain
+from support.udp_port import free_udp_port
 
 CANBASE = (sys.executable, "-m", "canbase_cli")
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -16,8 +16,12 @@ from canbase_config.load import load_robot, sample
 from canbase_doctor.check import Verdict, exit_code, first_failure, table
 from canbase_doctor.default_checks import default_checks
 from canbase_doctor.evidence import Evidence, Heard
+from canbase_driver.causes import Cause
+from canbase_driver.supervision.hazards import HAZARDS
 
 Change = Callable[[Any], None]
+
+STALL = next(hazard for hazard in HAZARDS if hazard.cause is Cause.STALLED)
 
 
 def healthy() -> dict[str, Any]:
@@ -104,6 +108,12 @@ def test_a_robot_that_is_well_has_nothing_but_good_rows_and_exit_code_0() -> Non
     [
         (changed("motor_driver/status", state=DriverStatus.LATCHED, clears_on="bye"), "motor_driver", "FAIL", "bye"),
         (changed("motor_driver/status", state=DriverStatus.DISARMED, detail="sim"), "motor_driver", "FAIL", "sim"),
+        (
+            changed("motor_driver/status", state=DriverStatus.LATCHED, cause="stalled", clears_on=STALL.clears_on),
+            "motor_driver",
+            "FAIL",
+            "it ends with: reset, with the wheel free to turn",
+        ),
         (changed("motor_driver/status", state=DriverStatus.OFFLINE), "motor_driver", "FAIL", "offline"),
         (changed("motor_driver/status", state=DriverStatus.BOOTING), "motor_driver", "warn", "booting"),
         (changed("motor_driver/status", state=200), "motor_driver", "FAIL", "offline"),
