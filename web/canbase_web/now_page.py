@@ -88,13 +88,11 @@ def _content(pages: Pages) -> dict[str, str]:
         f'<span class="text" id="part-{i}-text"></span></li>'
         for i, part in enumerate(PARTS)
     )
-    with section("The way of a command"):
+    with section("The path of a command"):
         ui.html(f'<ol class="chain">{items}</ol>', sanitize=False).classes("w-full")
-    names = ("selected", "after the filter", "measured", "allowed from", "to")
+    names = ("selected", "filtered", "measured", "least allowed", "most allowed")
     wheels = tuple(f"{drive.joint} {what}" for drive in robot.drives for what in ("target", "measured"))
-    with ui.element("div").style(
-        "display:grid;grid-template-columns:repeat(auto-fit,minmax(19rem,1fr));gap:.6rem;width:100%"
-    ):
+    with ui.element("div").classes("plots"):
         plots = {
             "linear": _plot("Forward speed [m/s]", names, robot.limits.linear_mps),
             "angular": _plot("Turning speed [rad/s]", names, robot.limits.angular_radps),
@@ -116,9 +114,9 @@ def _content(pages: Pages) -> dict[str, str]:
 def _plot(title: str, names: tuple[str, ...], greatest: float) -> str:
     """A live plot; its lines get their data from the page's script."""
     lines = [
-        {"name": name, "type": "line", "showSymbol": False, "data": [], "animation": False,
-         "lineStyle": {"width": 1 if name in ("allowed from", "to") else 2,
-                       "type": "dashed" if name in ("allowed from", "to", "selected") else "solid"}}
+        {"name": name, "type": "line", "symbol": "none", "data": [], "animation": False,
+         "lineStyle": {"width": 1 if name.endswith("allowed") else 2,
+                       "type": "solid" if name.endswith(("filtered", "measured")) else "dashed"}}
         for name in names
     ]  # fmt: skip
     grey = {"color": "#8a8a8a"}
@@ -127,9 +125,10 @@ def _plot(title: str, names: tuple[str, ...], greatest: float) -> str:
             "color": COLOURS,
             "animation": False,
             "grid": {"left": 45, "right": 10, "top": 40, "bottom": 25},
-            "legend": {"top": 0, "textStyle": grey, "type": "scroll"},
-            "xAxis": {"type": "value", "axisLabel": {"show": False}, "splitLine": {"show": False}},
-            "yAxis": {"type": "value", "min": -greatest, "max": greatest, "axisLabel": grey,
+            "legend": {"top": 0, "textStyle": grey, "type": "scroll", "itemWidth": 18},
+            "xAxis": {"type": "value", "axisLabel": {"show": False}, "axisTick": {"show": False},
+                      "splitLine": {"show": False}},
+            "yAxis": {"type": "value", "min": -greatest, "max": greatest, "interval": greatest / 2, "axisLabel": grey,
                       "splitLine": {"lineStyle": {"color": "rgba(128,128,128,.25)"}}},
             "series": lines,
         }).classes("w-full").style("height:15rem")  # fmt: skip

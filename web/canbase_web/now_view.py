@@ -58,7 +58,7 @@ class Robot:
 
 
 def chain(robot: Robot) -> tuple[Part, ...]:
-    """Source, mux, filter, driver, watchdog, drives: the way of a command."""
+    """Source, mux, filter, driver, watchdog, drives: the path of a command."""
     return (
         _source(robot.mux),
         _mux(robot.mux),
