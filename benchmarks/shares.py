@@ -12,29 +12,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from support import udp_port
 from support.udp_port import free_udp_port
 
 BARE = "bare node"
-BARE_NODE = """
-import os, rclpy
-from geometry_msgs.msg import TwistStamped
-try:
-    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(35))
-except OSError:
-    pass
-rclpy.init()
-node = rclpy.create_node("bare")
-publisher = node.create_publisher(TwistStamped, "bare", 10)
-def tick():
-    message = TwistStamped()
-    message.header.stamp = node.get_clock().now().to_msg()
-    publisher.publish(message)
-node.create_timer(0.01, tick)
-rclpy.spin(node)
-"""
-"""One timer and one publisher at 100 Hz, with the priority of a node of the chain."""
-
-
 IO_ALONE = "input and output"
 IO_CODE = """
 import json, os, sys, threading, time
@@ -86,18 +67,19 @@ a bus of its own, and publishes odom, tf and joint_states as they are, 50 times 
 
 def bare_node(stack: ExitStack, domain: str) -> int:
     """Starts one in that ROS domain; its process id. It ends with the stack."""
-    return _run(stack, domain, BARE_NODE)
+    return _run(stack, domain, "-m", "support.bare_node")
 
 
 def io_alone(stack: ExitStack, domain: str, bus: Mapping[str, Any]) -> int:
     """Starts the driver's input and output alone beside a driver on the virtual bus `bus` (arguments of `can.Bus`); its
     process id. It ends with the stack.
     """
-    return _run(stack, domain, IO_CODE, json.dumps(bus), str(free_udp_port()))
+    return _run(stack, domain, "-c", IO_CODE, json.dumps(bus), str(free_udp_port()))
 
 
-def _run(stack: ExitStack, domain: str, code: str, *arguments: str) -> int:
-    child = subprocess.Popen([sys.executable, "-c", code, *arguments], env=os.environ | {"ROS_DOMAIN_ID": domain})
+def _run(stack: ExitStack, domain: str, *arguments: str) -> int:
+    environment = os.environ | {"ROS_DOMAIN_ID": domain, "PYTHONPATH": str(Path(udp_port.__file__).parents[1])}
+    child = subprocess.Popen([sys.executable, *arguments], env=environment)
     stack.callback(child.wait)
     stack.callback(child.kill)
     return child.pid

@@ -37,6 +37,8 @@ def overlay(folder: Path) -> None:
     ours, ignored = tree / "usr/lib/canbase-vm", shutil.ignore_patterns("__pycache__")
     shutil.copytree(HERE / "guest", ours / "vm/guest", ignore=ignored)
     shutil.copytree(HERE.parent / "exit_matrix", ours / "exit_matrix", ignore=ignored)
+    (ours / "support").mkdir()
+    shutil.copy(HERE.parent / "support/bare_node.py", ours / "support")
 
 
 def _drives(etc: Path) -> None:

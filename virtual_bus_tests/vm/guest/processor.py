@@ -1,9 +1,14 @@
-"""What the parts take of the processor. Time of this guest is counted in instructions: a nanosecond is one of them."""
+"""What the parts take of the processor, beside a bare rclpy node. Time of this guest is counted in instructions: a
+nanosecond is one of them."""
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Mapping
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
@@ -17,7 +22,9 @@ GOAL_S: Final = 6.0
 """At the speed of the scenarios it is driven for longer than it is measured."""
 SETTLE_S: Final = 3.0
 MILLION: Final = 1e6
-
+BARE: Final = "a bare node of 100 Hz"
+BARE_DOMAIN: Final = "77"
+"""It hears nothing of the robot, nor the robot of it."""
 
 OWN_RATES: Final = re.compile(r"^(rates|action):.*\n", re.MULTILINE)
 """The scenarios' robot has those of a small computer, overlay.py."""
@@ -47,8 +54,9 @@ def _restart(robot: Robot, robot_yaml: str) -> None:
 
 def _measured(robot: Robot, how: str) -> Row:
     robot.make_ready()
-    robot.spin(SETTLE_S)
-    rest = _in_a_second(robot, REST_S)
+    with _bare_node() as bare:
+        robot.spin(SETTLE_S)
+        rest = _in_a_second(robot, REST_S, bare)
     goal = robot.goal(GOAL_M)
     robot.spin(1.0)
     driving = _in_a_second(robot, GOAL_S)
@@ -56,11 +64,24 @@ def _measured(robot: Robot, how: str) -> Row:
         raise BrokenPromiseError(f"the goal ended before the measurement: {goal.result}")
     goal.cancel()
     told = "; ".join(f"{part} {_millions(rest[part])}, {_millions(driving[part])}" for part in PARTS)
-    return Row("processor", how, then=f"million instructions a second: {told}")
+    return Row("processor", how, then=f"million instructions a second: {told}; {BARE} {_millions(rest[BARE])}")
 
 
-def _in_a_second(robot: Robot, for_s: float) -> Mapping[str, float]:
-    pids = {part: int(show(unit(part), "MainPID")[0]) for part in PARTS}
+@contextmanager
+def _bare_node() -> Iterator[int]:
+    """The floor that the benchmarks have as well; its process id."""
+    child = subprocess.Popen(
+        [sys.executable, "-m", "support.bare_node"], env=os.environ | {"ROS_DOMAIN_ID": BARE_DOMAIN}
+    )
+    try:
+        yield child.pid
+    finally:
+        child.kill()
+        child.wait()
+
+
+def _in_a_second(robot: Robot, for_s: float, bare: int | None = None) -> Mapping[str, float]:
+    pids = {part: int(show(unit(part), "MainPID")[0]) for part in PARTS} | ({BARE: bare} if bare else {})
     before = {part: _instructions(pid) for part, pid in pids.items()}
     begun_s = elapsed(0.0)
     robot.spin(for_s)
