@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 
 from canbase_config import stopping
@@ -402,7 +401,7 @@ class DriverCore:
             watchdog=self._watchdog.report(now_s),
             command=self._command.report(now_s),
             cycle=self._stats.report(),
-            bus=replace(self._bus_report, dropped=dropped, problem=self._bus_problem),
+            bus=self._bus_report.completed(dropped, self._bus_problem),
             odometry=self._feed.report(now_s),
             drives=self._drives.snapshots(now_s),
         )

@@ -144,12 +144,17 @@ class ScanReader:
 
     def _points(self, scan: Scan, hit_m: Floats, placement: Placement) -> Points:
         together = -(-hit_m.size // MAX_BEAMS)
+        if together == 1:
+            beams = np.flatnonzero(np.isfinite(hit_m))
+            return Points(self._at_m(hit_m, beams, placement), beams, hit_m.size)
         groups = np.pad(hit_m, (0, -hit_m.size % together), constant_values=np.inf).reshape(-1, together)
         nearest = groups.argmin(axis=1) + np.arange(groups.shape[0]) * together
         beams = np.flatnonzero(np.isfinite(groups.min(axis=1)))
-        hits = nearest[beams]
-        at_m = placement.points(hit_m[hits] * self._cos[hits], hit_m[hits] * self._sin[hits])
-        return Points(at_m, beams, groups.shape[0])
+        return Points(self._at_m(hit_m, nearest[beams], placement), beams, groups.shape[0])
+
+    def _at_m(self, hit_m: Floats, hits: npt.NDArray[np.intp], placement: Placement) -> Floats:
+        """Where these beams hit, in base_link."""
+        return placement.points(hit_m[hits] * self._cos[hits], hit_m[hits] * self._sin[hits])
 
     def _beside_m(self, placement: Placement) -> Floats:
         """How far along each beam its first place beside the footprint is [m]; 0 for a scanner outside of it."""

@@ -301,7 +301,8 @@ class SafetyFilter:
                 parts.append(pose.from_here(scanner.points, there))
         fields = tuple(scanner.field for scanner in fresh if scanner.field is not None)
         sees_all = any(scanner.field is None for scanner in fresh)
-        return Sight(np.concatenate(parts), () if sees_all else fields)
+        points = np.concatenate(parts) if len(parts) > 2 else parts[-1]
+        return Sight(points, () if sees_all else fields)
 
     def _advance_estop(self, now_s: float) -> None:
         """A fresh zero command counts only while the emergency stop is free. In a crowd neither does a release."""

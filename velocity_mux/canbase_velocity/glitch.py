@@ -42,8 +42,8 @@ class GlitchFilter:
 def _group_sizes(points: Points) -> npt.NDArray[np.intp]:
     """For each point the number of points in its group. The first and the last beam of a full circle are neighbours."""
     at_m, beams = points.at_m, points.beams
-    gaps_m = np.hypot(*(at_m - np.roll(at_m, 1, axis=0)).T)
-    steps = np.mod(beams - np.roll(beams, 1), points.beam_count)
+    gaps_m = np.hypot(*(at_m - np.concatenate((at_m[-1:], at_m[:-1]))).T)
+    steps = np.mod(beams - np.concatenate((beams[-1:], beams[:-1])), points.beam_count)
     breaks = (steps > 1) | (gaps_m > NEIGHBOUR_M)
     if not breaks.any():
         return np.full(beams.size, beams.size)

@@ -73,13 +73,16 @@ class Lock:
 
     def reason(self, now_s: float) -> str:
         """Why it holds, with the values; empty: it does not."""
+        standing = self.standing(now_s)
+        if standing is LockStanding.FREE:
+            return ""
         age_s = now_s - (self._at_s or 0.0)
         return {
             LockStanding.LOCKED: "holds",
             LockStanding.SHARED: f"has {self._crowd}",
             LockStanding.NEVER_RECEIVED: f"has published nothing yet on {self.config.topic}",
             LockStanding.SILENT: f"has published nothing for {age_s:.2f} s (timeout {self.config.timeout_s:.2f} s)",
-        }.get(self.standing(now_s), "")
+        }[standing]
 
     def view(self, now_s: float) -> LockView:
         """Its entry in the report."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -63,14 +64,21 @@ class Box:
         return inside
 
     def edge(self, per_side: int) -> Floats:
-        """Points along the four sides, the corners among them."""
-        share = np.linspace(0.0, 1.0, per_side, endpoint=False)
-        x_m, y_m = self.front_m + self.rear_m, self.left_m + self.right_m
-        front = np.column_stack((np.full(per_side, self.front_m), self.left_m - share * y_m))
-        right = np.column_stack((self.front_m - share * x_m, np.full(per_side, -self.right_m)))
-        rear = np.column_stack((np.full(per_side, -self.rear_m), share * y_m - self.right_m))
-        left = np.column_stack((share * x_m - self.rear_m, np.full(per_side, self.left_m)))
-        return np.vstack((front, right, rear, left))
+        """Points along the four sides, the corners among them. Read-only: every decision needs the same ones."""
+        return _edge(self, per_side)
+
+
+@lru_cache(maxsize=16)
+def _edge(box: Box, per_side: int) -> Floats:
+    share = np.linspace(0.0, 1.0, per_side, endpoint=False)
+    x_m, y_m = box.front_m + box.rear_m, box.left_m + box.right_m
+    front = np.column_stack((np.full(per_side, box.front_m), box.left_m - share * y_m))
+    right = np.column_stack((box.front_m - share * x_m, np.full(per_side, -box.right_m)))
+    rear = np.column_stack((np.full(per_side, -box.rear_m), share * y_m - box.right_m))
+    left = np.column_stack((share * x_m - box.rear_m, np.full(per_side, box.left_m)))
+    points = np.vstack((front, right, rear, left))
+    points.flags.writeable = False
+    return points
 
 
 @dataclass(frozen=True, slots=True)

@@ -180,7 +180,11 @@ def _judged(climb: Climb, look: Look, braking: Braking, now_s: float) -> Climb:
     too_fast = look.speed_mps > max(0.0, braking.allowed_mps(climb.begin_mps, look.seen_at - climb.since))
     against = climb.against + 1 if look.powered and too_fast and not look.standing else 0
     off_since = math.inf if look.powered else min(climb.off_since, now_s)
-    return replace(climb, against=against, judged_at=look.seen_at, off_since=off_since)
+    at, stopped_at, seen_at = climb.since, climb.stopped_at, look.seen_at
+    assumed, runaway = climb.assumed, climb.runaway
+    return Climb(
+        climb.step, at, climb.begin_mps, climb.stopped, stopped_at, assumed, runaway, against, seen_at, off_since
+    )
 
 
 def _holds(climb: Climb, look: Look, braking: Braking, now_s: float) -> bool:

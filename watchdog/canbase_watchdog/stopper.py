@@ -188,6 +188,8 @@ class Stopper:
 
     def _sdo(self, view: View, defied: bool, now_s: float) -> list[Frame]:
         """The next request in turn. A stopped node that sends feedback, or is configured, is left alone."""
+        if now_s < self._sdo_at + (IDLE_SDO_PERIOD_S if self.climb.stopped else SDO_PERIOD_S):
+            return []
         rests = self.climb.stopped and not defied
         seeks = rests and self._is_unknown(view, now_s)
         stopped_s = SEEK_PERIOD_S if seeks else IDLE_SDO_PERIOD_S

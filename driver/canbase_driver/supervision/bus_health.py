@@ -67,6 +67,11 @@ class BusReport:
         """The report after one error frame. Most are single errors on the wire, and counted alone."""
         return replace(self, error_frames=self.error_frames + 1, controller=_state(error_class, data, self.controller))
 
+    def completed(self, dropped: int, problem: str) -> BusReport:
+        """With what the driver alone knows. It is made for each snapshot, so without `replace`, which is slow."""
+        errors = self.send_errors, self.receive_errors, self.error_frames
+        return BusReport(self.controller, *errors, dropped, self.failures, problem)
+
     @property
     def is_bus_off(self) -> bool:
         """The controller has taken itself off the bus: nothing is sent or received until it is restarted."""
