@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 
 END_GAIN_PER_S = 5.0
@@ -32,10 +32,10 @@ class ProfileLimits:
     """From an order to the wheels' motion, without the odometry's age: mux, filter, cycle and lag of the drives."""
 
     def __post_init__(self) -> None:
-        for name in self.__slots__:
-            value = getattr(self, name)
+        for field in fields(self):
+            value = getattr(self, field.name)
             if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{name} must be finite and above 0, not {value}")
+                raise ValueError(f"{field.name} must be finite and above 0, not {value}")
 
 
 def braking_speed_mps(remaining_m: float, deceleration_mps2: float, jerk_mps3: float) -> float:

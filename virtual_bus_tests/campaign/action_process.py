@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from campaign.clock import Clock
 from campaign.process import Process, Topics
@@ -44,6 +44,7 @@ class ActionProcess(Process):
     def __init__(self, robot: Robot, clock: Clock, topics: Topics, on_end: Callable[[Goal], None]) -> None:
         super().__init__(clock)
         self._robot, self._topics, self._on_end = robot, topics, on_end
+        self._own_source = action_source(robot)
         self.goals: list[Goal] = []
         self.refused = 0
         topics.subscribe("odom", self, self._on_odometry)
@@ -55,7 +56,11 @@ class ActionProcess(Process):
     def begin(self) -> None:
         """A new owner without a goal; it has received nothing."""
         self.goal_queue = GoalQueue(self._robot)
-        self._inputs = Inputs()
+        self._odometry: Odometry | None = None
+        self._safety: Safety | None = None
+        self._driver: Driver | None = None
+        self._mux: Mux | None = None
+        self._shutdown = False
         self._turned_at = self.clock.now_s
         self.every(1.0 / self._robot.action.control_hz, self._on_timer, phase_s=0.002)
 
@@ -67,7 +72,7 @@ class ActionProcess(Process):
 
     def end(self) -> None:
         """Its goal ends first, with a base that stands."""
-        self._inputs = replace(self._inputs, shutdown=True)
+        self._shutdown = True
 
     def send_goal(self, distance_m: float, speed_mps: float) -> None:
         """A client sends a goal. It is accepted or refused as in node.py."""
@@ -77,10 +82,13 @@ class ActionProcess(Process):
         """The client of the running goal wants it to end."""
         self.receive("cancels", 10, self._on_cancel)
 
+    def _inputs(self) -> Inputs:
+        return Inputs(self._odometry, self._safety, self._driver, self._mux, shutdown=self._shutdown)
+
     def _on_goal(self, distance_m: float, speed_mps: float) -> None:
         now_s = self.clock.now_s
         request = DriveRequest(distance_m, speed_mps)
-        if self.goal_queue.refusal(request, self._inputs, now_s) is not None:
+        if self.goal_queue.refusal(request, self._inputs(), now_s) is not None:
             self.refused += 1
             return
         self.goal_queue.admit(str(len(self.goals)), request, now_s)
@@ -95,7 +103,7 @@ class ActionProcess(Process):
         if self.goals and not self.goals[-1].ends:
             self.goals[-1].held_up_s += max(0.0, now_s - self._turned_at - 1.0 / self._robot.action.control_hz)
         self._turned_at = now_s
-        cycle = self.goal_queue.tick(self._inputs, now_s)
+        cycle = self.goal_queue.tick(self._inputs(), now_s)
         if cycle.twist is not None:
             self._topics.publish("cmd_vel_action", Twist(cycle.twist.linear_mps, cycle.twist.angular_radps))
         for end in cycle.ends:
@@ -106,13 +114,12 @@ class ActionProcess(Process):
 
     def _on_odometry(self, snapshot: DriverSnapshot) -> None:
         pose = Pose(snapshot.odometry.pose.x_m, snapshot.odometry.pose.y_m, snapshot.odometry.pose.yaw_rad)
-        odometry = Odometry(
+        self._odometry = Odometry(
             self.clock.now_s, pose, snapshot.odometry.twist.linear_mps, snapshot.odometry.twist.angular_radps
         )
-        self._inputs = replace(self._inputs, odometry=odometry)
 
     def _on_driver(self, snapshot: DriverSnapshot) -> None:
-        driver = Driver(
+        self._driver = Driver(
             received=self.clock.now_s,
             state=snapshot.state,
             cause=snapshot.finding.cause.value,
@@ -123,14 +130,12 @@ class ActionProcess(Process):
             hears_command=snapshot.command.fresh,
             pose_resets=snapshot.odometry.pose_resets,
         )
-        self._inputs = replace(self._inputs, driver=driver)
 
     def _on_safety(self, decision: Decision) -> None:
         stops, estop = decision.action is Action.STOP, decision.cause.is_estop
-        safety = Safety(self.clock.now_s, stops, decision.cause, decision.detail, estop)
-        self._inputs = replace(self._inputs, safety=safety)
+        self._safety = Safety(self.clock.now_s, stops, decision.cause, decision.detail, estop)
 
     def _on_mux(self, decision: MuxDecision) -> None:
-        own = action_source(self._robot)
+        own = self._own_source
         locked = (source.reason for source in decision.sources if source.name == own and source.locked)
-        self._inputs = replace(self._inputs, mux=Mux(self.clock.now_s, decision.active or "", next(locked, "")))
+        self._mux = Mux(self.clock.now_s, decision.active or "", next(locked, ""))

@@ -16,6 +16,8 @@ FRAME_BITS = 50
 """Of a data frame without data and without stuff bits, with the pause after it (11-bit identifier)."""
 STUFFED = 1.1
 """Typical growth by stuff bits."""
+NOTHING = 0x800
+"""No identifier: above all of eleven bits."""
 QUEUE = 100
 """Frames that wait in one member's adapter; further ones are dropped, as a full transmit buffer does."""
 
@@ -26,7 +28,13 @@ def frame_bits(data_bytes: int) -> float:
 
 
 _BITS = tuple(frame_bits(data_bytes) for data_bytes in range(65))
-Receive = Callable[[int, bytes], None]
+
+
+class Receiver:
+    """What is connected to the bus. This one ignores all frames."""
+
+    def hear(self, cob_id: int, data: bytes) -> None:
+        """A frame of another member."""
 
 
 @dataclass(slots=True)
@@ -49,10 +57,12 @@ class Disturbance:
 class Member:
     """One node on the bus."""
 
-    def __init__(self, bus: CanBus, name: str, receive: Receive) -> None:
-        self.name, self.receive = name, receive
+    def __init__(self, bus: CanBus, name: str, receiver: Receiver) -> None:
+        self.name, self.receiver = name, receiver
         self.waiting: deque[tuple[int, bytes]] = deque()
-        self.others: list[Receive] = []
+        self.head = NOTHING
+        """Identifier of the first one of them."""
+        self.others: list[Receiver] = []
         """Where its frames go."""
         self.late_until: dict[str, float] = {}
         self._bus = bus
@@ -60,9 +70,18 @@ class Member:
     def send(self, cob_id: int, data: bytes) -> None:
         """Put a frame into the transmit buffer."""
         if len(self.waiting) < QUEUE:
+            if not self.waiting:
+                self.head = cob_id
             self.waiting.append((cob_id, data))
             self._bus.queued += 1
             self._bus.start()
+
+
+    def take(self) -> tuple[int, bytes]:
+        """The first frame leaves the buffer."""
+        frame = self.waiting.popleft()
+        self.head = self.waiting[0][0] if self.waiting else NOTHING
+        return frame
 
 
 class CanBus:
@@ -79,12 +98,12 @@ class CanBus:
         """Frames that wait in all members."""
         self._busy = False
 
-    def join(self, name: str, receive: Receive) -> Member:
+    def join(self, name: str, receiver: Receiver) -> Member:
         """A new member."""
-        member = Member(self, name, receive)
+        member = Member(self, name, receiver)
         for other in self.members:
-            other.others.append(receive)
-        member.others = [other.receive for other in self.members]
+            other.others.append(receiver)
+        member.others = [other.receiver for other in self.members]
         self.members.append(member)
         return member
 
@@ -93,25 +112,24 @@ class CanBus:
         if self._busy or not self.queued:
             return
         winner: Member | None = None
-        lowest = 0x800
+        lowest = NOTHING
         for member in self.members:
-            waiting = member.waiting
-            if waiting and waiting[0][0] < lowest:
-                winner, lowest = member, waiting[0][0]
+            if member.head < lowest:
+                winner, lowest = member, member.head
         if winner is not None:
             self._busy = True
             self.clock.after(_BITS[len(winner.waiting[0][1])] / self.bitrate, self._end, winner)
 
     def _end(self, sender: Member) -> None:
         """The last bit is over: everybody has the frame."""
-        cob_id, data = sender.waiting.popleft()
+        cob_id, data = sender.take()
         self.queued -= 1
         self.frames += 1
         if self.watch is not None:
             self.watch(sender.name, cob_id, data)
         if self.disturbance.quiet:
-            for receive in sender.others:
-                receive(cob_id, data)
+            for receiver in sender.others:
+                receiver.hear(cob_id, data)
         else:
             for member in self.members:
                 if member is not sender:
@@ -126,8 +144,8 @@ class CanBus:
         if trouble.delay_s > 0.0:
             arrival = max(self.clock.now_s + draw() * trouble.delay_s, member.late_until.get(sender.name, 0.0))
             member.late_until[sender.name] = arrival
-            self.clock.at(arrival, member.receive, cob_id, data)
+            self.clock.at(arrival, member.receiver.hear, cob_id, data)
         else:
-            member.receive(cob_id, data)
+            member.receiver.hear(cob_id, data)
         if draw() < trouble.duplication:
-            self.clock.after(FRAME_BITS / self.bitrate, member.receive, cob_id, data)
+            self.clock.after(FRAME_BITS / self.bitrate, member.receiver.hear, cob_id, data)

@@ -31,7 +31,7 @@ class DriverProcess(Process):
         super().__init__(bus.clock)
         self._jitter_s = pace.cycle_jitter_s
         self._robot, self._topics, self._random = robot, topics, bus.random
-        self._member = bus.join(self.name, self._hear)
+        self._member = bus.join(self.name, self)
         self.disk = StopDisk("driver")
         """Its record of stops, which outlives it."""
         self.bus_problem = ""
@@ -94,8 +94,12 @@ class DriverProcess(Process):
             self.core.request_shutdown()
             self.asked = "end"
 
-    def _hear(self, cob_id: int, data: bytes) -> None:
-        self.receive("frames", FRAMES_HELD, self._on_frame, cob_id, data)
+    def hear(self, cob_id: int, data: bytes) -> None:
+        """A frame on the bus."""
+        if self.running:
+            self._on_frame(cob_id, data)
+        else:
+            self.receive("frames", FRAMES_HELD, self._on_frame, cob_id, data)
 
     def _on_frame(self, cob_id: int, data: bytes) -> None:
         if not self.bus_problem:

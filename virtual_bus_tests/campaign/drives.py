@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
-from campaign.can_bus import CanBus
+from campaign.can_bus import CanBus, Receiver
 from campaign.clock import FINE, Pace
 from campaign.robots import DrawnRobot
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID
@@ -18,6 +17,16 @@ from canbase_sim.world.bench import Bench, BenchParameters
 HEARTBEATS = {0x700 + DRIVER_NODE_ID: "driver", 0x700 + WATCHDOG_NODE_ID: "watchdog"}
 ROLLS_SHARE = 0.02
 """Of its greatest force: less neither brakes nor drives a wheel."""
+
+
+class _Port(Receiver):
+    """One node's end of the bus."""
+
+    def __init__(self, drives: Drives, node_id: int, node: SimulatedNode) -> None:
+        self._drives, self._node_id, self._node = drives, node_id, node
+
+    def hear(self, cob_id: int, data: bytes) -> None:
+        self._drives.hear(self._node_id, self._node, cob_id, data)
 
 
 class Drives:
@@ -33,7 +42,7 @@ class Drives:
         self.measured: Callable[[int, bytes], bytes] = lambda cob_id, data: data
         """What becomes of a drive's frame before it is sent: sensors with noise."""
         self._members = {
-            node_id: bus.join(f"drive{node_id}", partial(self._hear, node_id, node))
+            node_id: bus.join(f"drive{node_id}", _Port(self, node_id, node))
             for node_id, node in self.bench.nodes.items()
         }
         self._urgent = {0x000, 0x080}
@@ -75,8 +84,8 @@ class Drives:
         """Transitions of all axes since the last call."""
         return self.bench.state_changes()
 
-    def _hear(self, node_id: int, node: SimulatedNode, cob_id: int, data: bytes) -> None:
-        """What acts at once, or samples, needs the world as it is now; all else may be some milliseconds early."""
+    def hear(self, node_id: int, node: SimulatedNode, cob_id: int, data: bytes) -> None:
+        """A frame for a node. What acts at once, or samples, needs the world of now; all else may be a little early."""
         if cob_id in self._urgent:
             if self.moved_at < self._clock.now_s:
                 self._say()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from campaign.can_bus import CanBus
+from campaign.can_bus import CanBus, Receiver
 from campaign.process import Topics
 from canbase_config.robot import Robot
 from canbase_config.units import mps_per_bit
@@ -25,7 +25,7 @@ class Intruder:
 
     def __init__(self, robot: Robot, bus: CanBus, topics: Topics) -> None:
         self._clock, self._topics = bus.clock, topics
-        self._member = bus.join("intruder", lambda cob_id, data: None)
+        self._member = bus.join("intruder", Receiver())
         self._robot = robot
         self.setpoints_mps = 0.0
         """It sends enabling setpoints of this speed and SYNC, as if it were the driver."""

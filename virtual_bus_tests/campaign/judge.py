@@ -76,7 +76,7 @@ class Judge:
         self._world, self._around, self._outside = world, around, outside
         self._start = now_s = world.clock.now_s
         self.violations: list[Violation] = []
-        self.react_s = self._react_s(plan)
+        self.react_s, self._max_wheel_mps = self._react_s(plan), max_wheel_mps(world.robot)
         self._coasting = coasting_share(world.drawn)
         self._reach, self._strangers, self._shown = Reach(world), Strangers(world), Shown(world)
         self._envelope = Envelope(self.react_s, now_s, self._coasting)
@@ -339,7 +339,7 @@ class Judge:
             by_stranger = now_s < self._strangers.sent_at + SENT_S
             if change.after is State.OPERATION_ENABLED and now_s > self._watching_at + grace_s and not by_stranger:
                 self._violate("enabling", f"drive {change.node_id}, {now_s - self._watching_at:.2f} s without watchdog")
-        fastest_mps = max(max_wheel_mps(robot), self._reach.fastest_mps)
+        fastest_mps = max(self._max_wheel_mps, self._reach.fastest_mps)
         brakes_s = fastest_mps / robot.limits.emergency_deceleration_mps2
         for node_id, axis in self._reach.turning():
             alone_s = now_s - max(self._reach.heard(node_id), self._reach.lost_at[node_id])

@@ -7,13 +7,14 @@ from collections.abc import Callable
 from random import Random
 from typing import Any
 
-from campaign.clock import Clock
+from campaign.can_bus import Receiver
+from campaign.clock import Clock, call
 
 FRAMES_HELD = 2000
 """Frames or datagrams that the system keeps for a process that hangs."""
 
 
-class Process:
+class Process(Receiver):
     """Receives and ticks while it runs. Hung (SIGSTOP), it finds on its return what the system kept for it."""
 
     name = ""
@@ -42,7 +43,7 @@ class Process:
         if self._hung_by:
             self._kept.setdefault(channel, deque(maxlen=depth)).append((do, arguments))
         else:
-            do(*arguments)
+            call(do, arguments)
 
     def every(self, period_s: float, do: Callable[[], None], phase_s: float = 0.0) -> None:
         """Call `do` on a grid of absolute times as long as this life lasts."""
@@ -84,7 +85,7 @@ class Process:
         kept, self._kept = self._kept, {}
         for things in kept.values():
             for do, arguments in things:
-                do(*arguments)
+                call(do, arguments)
         late, self._late = self._late, []
         for turn in late:
             turn()

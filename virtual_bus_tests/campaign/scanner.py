@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.lidar import ByTurns, Fault, Frozen, Late, Lidar, blind, one_beam_left
 from canbase_velocity.scan import Scan
-from support.lidar import ByTurns, Fault, Frozen, Late, Lidar, blind, one_beam_left
 
 NAN = math.nan
 HALF_WALL_M = 0.6

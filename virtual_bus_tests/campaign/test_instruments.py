@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from random import Random
 
 import pytest
 
 from campaign import plan
-from campaign.can_bus import CanBus
+from campaign.can_bus import CanBus, Receiver
 from campaign.clock import Clock
 from campaign.envelope import Envelope, moving_s, react_s
 from campaign.faults import ADDED, FAULTS
@@ -32,6 +33,14 @@ class Listener(Process):
         self.every(0.01, lambda: self.ticks.append(round(self.clock.now_s, 4)))
 
 
+class Ear(Receiver):
+    def __init__(self, take: Callable[[int], None]) -> None:
+        self._take = take
+
+    def hear(self, cob_id: int, data: bytes) -> None:
+        self._take(cob_id)
+
+
 def bus_of(bitrate: int) -> tuple[Clock, CanBus]:
     clock = Clock(0.0)
     return clock, CanBus(clock, Random(0), bitrate)
@@ -40,8 +49,8 @@ def bus_of(bitrate: int) -> tuple[Clock, CanBus]:
 def test_the_lower_identifier_wins_and_each_sender_keeps_its_order() -> None:
     clock, bus = bus_of(1_000_000)
     heard: list[int] = []
-    bus.join("ear", lambda cob_id, data: heard.append(cob_id))
-    one, two = bus.join("one", lambda cob_id, data: None), bus.join("two", lambda cob_id, data: None)
+    bus.join("ear", Ear(heard.append))
+    one, two = bus.join("one", Receiver()), bus.join("two", Receiver())
     one.send(0x201, b"")
     one.send(0x080, b"")
     two.send(0x181, b"")
@@ -54,8 +63,8 @@ def test_the_lower_identifier_wins_and_each_sender_keeps_its_order() -> None:
 def test_eight_bytes_take_a_quarter_of_a_millisecond_at_500_kbit_per_s() -> None:
     clock, bus = bus_of(500_000)
     times: list[float] = []
-    bus.join("ear", lambda cob_id, data: times.append(clock.now_s))
-    bus.join("mouth", lambda cob_id, data: None).send(0x100, bytes(8))
+    bus.join("ear", Ear(lambda cob_id: times.append(clock.now_s)))
+    bus.join("mouth", Receiver()).send(0x100, bytes(8))
     clock.run_until(1.0)
     assert times == pytest.approx([0.00025], rel=0.02)
 
@@ -64,8 +73,8 @@ def test_who_is_cut_off_hears_nothing_and_the_others_do() -> None:
     clock, bus = bus_of(500_000)
     heard: list[str] = []
     for name in ("near", "far"):
-        bus.join(name, lambda cob_id, data, name=name: heard.append(name))  # type: ignore[misc]
-    mouth = bus.join("mouth", lambda cob_id, data: None)
+        bus.join(name, Ear(lambda cob_id, name=name: heard.append(name)))  # type: ignore[misc]
+    mouth = bus.join("mouth", Receiver())
     bus.disturbance.blocked.add(("mouth", "far"))
     mouth.send(0x100, b"")
     clock.run_until(1.0)
@@ -75,8 +84,8 @@ def test_who_is_cut_off_hears_nothing_and_the_others_do() -> None:
 def test_what_is_delayed_does_not_overtake() -> None:
     clock, bus = bus_of(500_000)
     heard: list[int] = []
-    bus.join("ear", lambda cob_id, data: heard.append(cob_id))
-    mouth = bus.join("mouth", lambda cob_id, data: None)
+    bus.join("ear", Ear(heard.append))
+    mouth = bus.join("mouth", Receiver())
     bus.disturbance.delay_s = 0.05
     for cob_id in range(0x100, 0x120):
         mouth.send(cob_id, b"")

@@ -23,7 +23,7 @@ class WatchdogProcess(Process):
         self._failed_since = math.inf
         self.disk = WatchdogDisk()
         """Its record of a trip, which outlives it."""
-        self._member = bus.join(self.name, self._hear)
+        self._member = bus.join(self.name, self)
         self.begin()
 
     def fail_bus(self, fails: bool) -> None:
@@ -51,8 +51,12 @@ class WatchdogProcess(Process):
     def _on_lease(self, datagram: bytes) -> None:
         self.core.on_lease(datagram, None, self.clock.now_s)
 
-    def _hear(self, cob_id: int, data: bytes) -> None:
-        self.receive("frames", FRAMES_HELD, self._on_frame, cob_id, data)
+    def hear(self, cob_id: int, data: bytes) -> None:
+        """A frame on the bus."""
+        if self.running:
+            self._on_frame(cob_id, data)
+        else:
+            self.receive("frames", FRAMES_HELD, self._on_frame, cob_id, data)
 
     def _on_frame(self, cob_id: int, data: bytes) -> None:
         if self._failed_since == math.inf:

@@ -38,7 +38,11 @@ HOT = {
     ),
     "canbase_velocity": (
         "base_ready changes clearance decision delay estop filter_state frozen glitch lease lock motion mux neutral "
-        "obstacle ramp safety_filter scan sole_publisher steady sweep twist"
+        "obstacle placement ramp safety_filter scan sole_publisher steady sweep twist"
+    ),
+    "canbase_action_server": (
+        "along_track causes goal goal_queue goal_request goal_step inputs motion motion_limits outcome "
+        "preconditions profile standstill straight turn"
     ),
     "canbase_sim": (
         "axis_parts command_watch frame line node cia301.dictionary cia301.emcy cia301.heartbeat cia301.nmt "
@@ -47,7 +51,8 @@ HOT = {
     ),
     "campaign": (
         "action_process can_bus clock disk process driver_process watchdog_process velocity_process drives envelope "
-        "goal_judge hands intruder outside wishes reach scanner shown strangers motion_judge odometry_judge judge"
+        "fault goal_judge hands intruder lidar outside plan wishes reach "
+        "scanner shown strangers motion_judge odometry_judge judge"
     ),
 }
 """The compiled modules of each package. Their order does not matter."""

@@ -10,6 +10,7 @@ from collections import deque
 
 import numpy as np
 
+from campaign.lidar import Fault, Lidar
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_driver.motion.kinematics import Twist2D
@@ -22,7 +23,6 @@ from canbase_velocity.placement import Placement
 from canbase_velocity.safety_filter import FilterConfig
 from canbase_velocity.sweep import Box, Floats
 from canbase_velocity.twist import ZERO, Twist
-from support.lidar import Fault, Lidar
 
 STEP_S = 0.01
 """The driver's cycle, in which the base moves."""

@@ -12,6 +12,7 @@ import math
 import numpy as np
 import pytest
 
+from campaign.lidar import ByTurns, Fault, Frozen, Late, Lidar, TwoOnOneTopic, blind, far_from, one_beam_left
 from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.clearance import ScanReader
 from canbase_velocity.frozen import FrozenWatch
@@ -20,7 +21,6 @@ from canbase_velocity.scan import MAX_READINGS, Scan, ScanError, check
 from canbase_velocity.sweep import Floats, fastest_mps
 from canbase_velocity.twist import ZERO, Twist
 from support.filter_world import FilterWorld, robot_with
-from support.lidar import ByTurns, Fault, Frozen, Late, Lidar, TwoOnOneTopic, blind, far_from, one_beam_left
 
 WALL = np.array([(2.0, y_m / 20.0) for y_m in range(-20, 21)] + [(-3.0, 0.5)])
 AHEAD = Twist(0.8, 0.0)

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from campaign.lidar import Lidar
 from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.decision import Action
 from canbase_velocity.filter_state import SafetyFilter
@@ -14,7 +15,6 @@ from canbase_velocity.placement import Placement
 from canbase_velocity.sole_publisher import LATCHED_S, SolePublisher
 from canbase_velocity.twist import Twist
 from support.filter_inputs import config
-from support.lidar import Lidar
 
 ONE, TWO = ("/front",), ("/rear", "/front")
 FAR = np.array([(5.0, 0.0), (-4.0, 1.0)])
