@@ -187,6 +187,8 @@ def _black_boxes(bundle: Bundle, robot: Robot | None, state: Path) -> None:
         bundle.missing["black_box"] = f"no recording of a stop {whose} in {', '.join(map(str, folders))}"
     for path in newest:
         bundle.file(f"black_box/{path.name}", path)
+        if os.path.lexists(beside := path.with_suffix(".json")):
+            bundle.file(f"black_box/{beside.name}", beside)
 
 
 def _records(bundle: Bundle, robot: str, state: Path) -> None:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import can
 import pytest
 from canbase.msg import StopEvent
 
+from canbase_config.robot import Robot
 from canbase_driver.runtime.black_box import MAX_FRAMES
 from support.running_robot import RunningRobot, own_domain, robot_on
 
@@ -18,6 +21,9 @@ pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 
 WRITTEN_S = 20.0
 SETPOINT, WATCHDOG_STATE, STATUS = 0x201, 0x1FE, 0x181
+KINDS = (
+    "order", "cmd_vel", "safety_filter/state", "velocity_mux/state", "motor_driver/state", "request", "answer",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -68,6 +74,29 @@ def test_a_latched_stop_has_its_time_its_way_and_a_file_that_python_can_reads(ro
     comments = [line for line in file.read_text(encoding="utf-8").splitlines() if line.startswith("//")]
     for what in ("cmd_vel 0.3", "motor_driver STOPPING: stop requested", "safety_filter ", "velocity_mux action"):
         assert [line for line in comments if what in line], what
+    found = json.loads(file.with_suffix(".json").read_text(encoding="utf-8"))
+    assert (found["cause"], found["robot"], found["frames"]) == ("stop requested", robot.robot.name, file.name)
+    assert Robot.model_validate(found["robot_yaml"]) == robot.robot
+    assert found["at_s"] == pytest.approx(cause_s, abs=0.1)
+    tells_all_that_was_ordered_and_what_became_of_it(found["events"])
+
+
+def tells_all_that_was_ordered_and_what_became_of_it(events: list[dict[str, Any]]) -> None:
+    """`events` of a goal at 0.3 m/s until motor_driver/stop, over the last seconds."""
+    assert [event["at_s"] for event in events] == sorted(event["at_s"] for event in events)
+    by_kind = {what: [event for event in events if event["what"] == what] for what in KINDS}
+    orders = [order for order in by_kind["order"] if order["source"] == "action"]
+    assert max(order["linear_mps"] for order in orders) == pytest.approx(0.3, abs=0.01)
+    assert len(orders) > 50
+    commands = by_kind["cmd_vel"]
+    assert max(command["linear_mps"] for command in commands) == pytest.approx(0.3, abs=0.01)
+    wall_s = [command["stamp_s"] - command["at_s"] for command in commands]
+    assert max(wall_s) - min(wall_s) < 0.1
+    assert any(state["ordered_linear_mps"] > 0.25 for state in by_kind["safety_filter/state"])
+    assert any(state["active"] == "action" for state in by_kind["velocity_mux/state"])
+    assert [state["state"] for state in by_kind["motor_driver/state"]][-2:] == ["ENABLED", "STOPPING"]
+    assert [request["request"] for request in by_kind["request"]][-1] == "stop"
+    assert by_kind["answer"][-1]["done"]
 
 
 def test_a_source_that_hangs_is_a_stop_that_is_not_latched(robot: RunningRobot) -> None:

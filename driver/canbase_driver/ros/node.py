@@ -103,7 +103,8 @@ class MotorDriverNode(ManagedNode):
         if not twist.is_finite:
             self.get_logger().error(f"cmd_vel refused: {twist} is not finite", throttle_duration_sec=1.0)
         self._loop.command(twist, received_at)
-        self._stops.on_command(twist, received_at)
+        stamp = message.header.stamp
+        self._stops.on_command(twist, stamp.sec + stamp.nanosec * 1e-9, received_at)
 
     def _on_safety(self, message: SafetyState) -> None:
         now_s = time.monotonic()
@@ -134,6 +135,7 @@ class MotorDriverNode(ManagedNode):
         clears = f"; ends with: {finding.clears_on}" if finding.clears_on else ""
         text = self.state_text = f"{snapshot.state.name}{why}{detail}{clears}"
         self._stops.note(text)
+        self._stops.on_state(snapshot)
         priority = Priority.INFO if finding.cause.is_usual else Priority.WARNING
         cause, robot = finding.cause.value, self._robot.name
         self.voice.tell(text, priority, state=snapshot.state.name, cause=cause, robot=robot)

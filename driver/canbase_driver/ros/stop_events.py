@@ -19,7 +19,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from canbase_config.robot import Robot
 from canbase_config.stopping import given_up_s
 from canbase_driver.motion.kinematics import Twist2D
+from canbase_driver.ros.event_values import driver_values, filter_values, mux_values
 from canbase_driver.ros.messages import stop_event_message
+from canbase_driver.ros.source_orders import SourceOrders
 from canbase_driver.runtime.black_box import Ring
 from canbase_driver.runtime.black_box_writer import BlackBoxWriter
 from canbase_driver.snapshot import DriverSnapshot
@@ -43,6 +45,7 @@ class StopEvents:
         self._robot_name = robot.name
         self._ring = ring
         self._writer = writer
+        self._orders = SourceOrders(node, robot.mux, ring.seconds)
         self._estop_latches = robot.safety.estop.latched
         patience_s = given_up_s(robot) + POWER_OFF_TIMEOUT_S
         self._recorder = StopHistory(patience_s)
@@ -50,9 +53,12 @@ class StopEvents:
         self._publisher = node.create_publisher(StopEvent, "stop_events", EVENT_QOS)
         node.create_subscription(MuxState, "velocity_mux/state", self._on_mux, STATE_QOS)
 
-    def on_command(self, twist: Twist2D, received_at: float) -> None:
-        """A command came; from the executor's thread."""
-        self._ring.note(received_at, f"cmd_vel {twist.linear_mps:.4f} m/s {twist.angular_radps:.4f} rad/s")
+    def on_command(self, twist: Twist2D, stamp_s: float, received_at: float) -> None:
+        """A command came, with the stamp of its header [s since 1970]; from the executor's thread."""
+        linear_mps, angular_radps = twist.linear_mps, twist.angular_radps
+        self._ring.note(received_at, f"cmd_vel {linear_mps:.4f} m/s {angular_radps:.4f} rad/s")
+        values = {"linear_mps": linear_mps, "angular_radps": angular_radps, "stamp_s": stamp_s}
+        self._ring.event(received_at, "cmd_vel", values)
         moves = twist.is_finite and twist != Twist2D.ZERO
         self._news.put(lambda: self._recorder.on_command(moves, received_at))
 
@@ -63,6 +69,7 @@ class StopEvents:
         said = f"safety_filter {cause} {detail}".rstrip()
         ordered = f"{message.ordered_linear_mps:.4f} m/s {message.ordered_angular_radps:.4f} rad/s"
         self._ring.note(now_s, f"{said}; orders {ordered}, lease {message.lease_sequence}")
+        self._ring.event(now_s, "safety_filter/state", filter_values(message))
         latched = self._estop_latches and stop_cause(message.cause).is_estop
         clears_on = printable(message.clears_on, SENTENCE_LENGTH)
         record = StopRecord(FILTER, cause, detail, latched, clears_on, now_s)
@@ -71,6 +78,10 @@ class StopEvents:
     def note(self, text: str) -> None:
         """A line for the black box."""
         self._ring.note(time.monotonic(), f"motor_driver {text}")
+
+    def on_state(self, snapshot: DriverSnapshot) -> None:
+        """The driver's state or its cause is another one."""
+        self._ring.event(snapshot.time_s, "motor_driver/state", driver_values(snapshot))
 
     def tell(self, snapshot: DriverSnapshot, stops: list[StopRecord]) -> None:
         """Take a snapshot and the stops that the core began; publish what is over. From the publisher's thread."""
@@ -110,14 +121,13 @@ class StopEvents:
         )
 
     def _write(self, report: StopReport, now_s: float) -> str:
-        record, offset_s = report.record, time.time() - now_s
-        title = f"stop by {record.stopped_by}: {record.cause} ({record.detail})"
-        recording = self._ring.cut(now_s, offset_s)
-        return self._writer.submit(recording, record.cause, record.at_s + offset_s, title)
+        offset_s = time.time() - now_s
+        return self._writer.submit(self._ring.cut(now_s, offset_s), report.record, self._orders.during)
 
     def _on_mux(self, message: MuxState) -> None:
         now_s, active = time.monotonic(), printable(message.active)
         reasons = (f"{source.name}: {source.reason}" for source in message.sources if source.reason)
         detail = printable("; ".join(reasons), SENTENCE_LENGTH)
         self._ring.note(now_s, f"velocity_mux {active or 'no source'}; {detail}")
+        self._ring.event(now_s, "velocity_mux/state", mux_values(message))
         self._news.put(lambda: self._recorder.on_mux(active, detail, now_s))

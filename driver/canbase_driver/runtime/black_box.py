@@ -1,26 +1,32 @@
-"""The last seconds of CAN frames and commands in memory, and as a text of Vector's ASC format. No files, no threads.
+"""The last seconds of CAN frames, commands and states in memory, and as a text of Vector's ASC format. No files.
 
-python-can, SavvyCAN, CANalyzer and others read ASC; what is no frame (commands, states) stands between them as comment
-lines, which readers pass over and people can read.
+No threads either. python-can, SavvyCAN, CANalyzer and others read ASC; what is no frame (commands, states) stands
+between the frames as comment lines, which readers pass over and people can read. The same as exact values is an event,
+for black_box_json.py.
 """
 
 from __future__ import annotations
 
 import io
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import can
 
 MAX_FRAMES = 80_000
 """A full bus of 1 Mbit/s for ten seconds; about 15 MB in memory, 6 MB in a file."""
 MAX_NOTES = 10_000
+MAX_EVENTS = 12_000
+"""About 2 MB in a file; 7 MB where another node floods the driver with states of the longest texts."""
 
 FrameEntry = tuple[float, int, bytes, bool]
 """Local monotonic time [s], COB-ID, data, received. A plain tuple: the garbage collector need not look at it."""
 NoteEntry = tuple[float, str]
 """Local monotonic time [s] and one line of text."""
+EventEntry = tuple[float, str, Mapping[str, Any]]
+"""Local monotonic time [s], what it is (docs/ros_api.md, "The black box"), and its values: plain ones alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +36,12 @@ class Recording:
     frames: tuple[FrameEntry, ...]
     notes: tuple[NoteEntry, ...]
     wall_offset_s: float
+    events: tuple[EventEntry, ...] = ()
+
+    @property
+    def began_s(self) -> float:
+        """Local monotonic time of the zero of the ASC file: its first entry [s]."""
+        return min([frame[0] for frame in self.frames[:1]] + [note[0] for note in self.notes[:1]], default=0.0)
 
 
 class Ring:
@@ -40,6 +52,12 @@ class Ring:
         self._seconds = seconds
         self._frames: deque[FrameEntry] = deque(maxlen=MAX_FRAMES)
         self._notes: deque[NoteEntry] = deque(maxlen=MAX_NOTES)
+        self._events: deque[EventEntry] = deque(maxlen=MAX_EVENTS)
+
+    @property
+    def seconds(self) -> float:
+        """How far a recording goes back."""
+        return self._seconds
 
     def frame(self, now_s: float, cob_id: int, data: bytes, received: bool) -> None:
         """A frame was received, or given to the bus."""
@@ -49,14 +67,19 @@ class Ring:
         """Something else happened."""
         self._notes.append((now_s, text))
 
+    def event(self, now_s: float, what: str, values: Mapping[str, Any]) -> None:
+        """The same with its exact values. They are kept as they are: nobody may change them."""
+        self._events.append((now_s, what, values))
+
     def cut(self, now_s: float, wall_offset_s: float) -> Recording:
         """What happened in the last seconds before `now_s`."""
         since = now_s - self._seconds
-        frames, notes = self._frames.copy(), self._notes.copy()
+        frames, notes, events = self._frames.copy(), self._notes.copy(), self._events.copy()
         return Recording(
             tuple(entry for entry in frames if entry[0] >= since),
             tuple(entry for entry in notes if entry[0] >= since),
             wall_offset_s,
+            tuple(entry for entry in events if entry[0] >= since),
         )
 
 
@@ -64,8 +87,7 @@ def asc_lines(recording: Recording, title: str) -> Iterator[str]:
     """The recording as an ASC file, piece by piece in the order of time; `title` is its first comment."""
     text = io.StringIO()
     writer = can.ASCWriter(text)
-    firsts = [frame[0] for frame in recording.frames[:1]] + [note[0] for note in recording.notes[:1]]
-    start = min(firsts, default=0.0)
+    start = recording.began_s
     writer.log_event(f"// {title}", start + recording.wall_offset_s)
     notes = deque(recording.notes)
     for at, cob_id, data, received in recording.frames:

@@ -60,7 +60,8 @@ class ControlLoop(threading.Thread):
         self._inbox: queue.SimpleQueue[Callable[[float], object]] = queue.SimpleQueue()
         self._outcomes: queue.SimpleQueue[tuple[int, Outcome]] = queue.SimpleQueue()
         self._numbers = itertools.count()
-        self._asked: dict[int, OnOutcome] = {}
+        self._asked: dict[int, tuple[str, OnOutcome]] = {}
+        """By number: what was requested, and who gets the outcome."""
         self._condition = threading.Condition()
         self._snapshot: DriverSnapshot | None = None
         self._stops: list[StopRecord] = []
@@ -97,20 +98,21 @@ class ControlLoop(threading.Thread):
             self._core.request_stop()
             answer(Outcome(True, "stopping; nothing moves until motor_driver/reset"))
 
-        self._ask(carry_out, on_outcome, however_late=True)
+        self._ask("stop", carry_out, on_outcome, however_late=True)
 
     def reset(self, on_outcome: OnOutcome) -> None:
         """Reset."""
-        self._ask(lambda now_s, answer: self._core.request_reset(now_s, answer), on_outcome)
+        self._ask("reset", lambda now_s, answer: self._core.request_reset(now_s, answer), on_outcome)
 
     def set_pose(self, pose: Pose2D, on_outcome: OnOutcome) -> None:
         """Set the pose of the odometry."""
-        self._ask(lambda now_s, answer: answer(self._core.set_pose(pose, now_s)), on_outcome)
+        self._ask("set_pose", lambda now_s, answer: answer(self._core.set_pose(pose, now_s)), on_outcome)
 
     def aim(self, aim: Aim, on_outcome: OnOutcome) -> None:
         """Go so far. What takes power away is obeyed however late."""
         takes_power = aim <= self._core.aim
-        self._ask(lambda now_s, answer: self._core.request_aim(aim, now_s, answer), on_outcome, takes_power)
+        name = f"aim {aim.name.lower()}"
+        self._ask(name, lambda now_s, answer: self._core.request_aim(aim, now_s, answer), on_outcome, takes_power)
 
     def deliver(self) -> None:
         """Report the outcomes that are there. Called by the requesting thread, and often: nothing here waits."""
@@ -120,18 +122,26 @@ class ControlLoop(threading.Thread):
                 number, outcome = self._outcomes.get_nowait()
             except queue.Empty:
                 break
-            self._asked.pop(number)(outcome)
+            self._answer(number, outcome)
         for number in tuple(self._asked) if ended else ():
-            self._asked.pop(number)(Outcome(False, "refused: the control loop has ended"))
+            self._answer(number, Outcome(False, "refused: the control loop has ended"))
+
+    def _answer(self, number: int, outcome: Outcome) -> None:
+        name, on_outcome = self._asked.pop(number)
+        values = {"request": name, "done": outcome.done, "sentence": outcome.sentence}
+        self._ring.event(time.monotonic(), "answer", values)
+        on_outcome(outcome)
 
     def _ask(
         self,
+        name: str,
         request: Callable[[float, OnOutcome], None],
         on_outcome: OnOutcome,
         however_late: bool = False,
     ) -> None:
         number, asked_at = next(self._numbers), time.monotonic()
-        self._asked[number] = on_outcome
+        self._asked[number] = name, on_outcome
+        self._ring.event(asked_at, "request", {"request": name})
 
         def answer(outcome: Outcome) -> None:
             self._outcomes.put((number, outcome))

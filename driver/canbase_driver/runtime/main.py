@@ -25,6 +25,7 @@ from canbase_config.stopping import given_up_s
 from canbase_driver.core import DriverCore
 from canbase_driver.ros.node import MotorDriverNode, Publisher
 from canbase_driver.runtime.black_box import Ring
+from canbase_driver.runtime.black_box_about import about
 from canbase_driver.runtime.black_box_writer import BlackBoxWriter
 from canbase_driver.runtime.claim import Claim
 from canbase_driver.runtime.control_thread import ControlLoop
@@ -82,7 +83,7 @@ def run(
     keeper = LatchKeeper(LatchFile(folder, "driver", robot.name))
     core = DriverCore(robot, aim, keeper.found)
     loop = ControlLoop(core, claim.bus, robot.rates.control_hz, robot.rates.odometry_hz, ring, keeper)
-    writer = BlackBoxWriter(robot.black_box, robot.name, get_logger("motor_driver").warning)
+    writer = BlackBoxWriter(robot.black_box, robot.name, get_logger("motor_driver").warning, about(robot))
     node = MotorDriverNode(robot, loop, ring, writer, autostart)
     publisher = Publisher(node, loop)
     threads = (loop, publisher, writer, keeper)

@@ -76,8 +76,10 @@ def test_an_installed_robot_is_collected_without_its_keys(tmp_path: Path) -> Non
     (etc / "keys" / "key.pem").write_text(KEY)
     (etc / "stolen.yaml").symlink_to(etc / "keys" / "key.pem")
     (state / "stop_bench_1.asc").write_text("date\n")
+    (state / "stop_bench_1.json").write_text("{}\n")
     bundle = collect(ROBOT, etc / "robot.yaml", "-1h", etc, state)
     assert {"config/robot.yaml", "config/installed/robot.env", "black_box/stop_bench_1.asc"} <= set(bundle.files)
+    assert bundle.files["black_box/stop_bench_1.json"] == b"{}\n"
     everything = b"".join(bundle.files.values())
     assert b"hunter2" not in everything
     assert b"PRIVATE KEY" not in everything

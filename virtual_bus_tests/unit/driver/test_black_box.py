@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import can
 import pytest
 
 from canbase_config.black_box import BlackBox
-from canbase_driver.runtime.black_box import MAX_FRAMES, Recording, Ring, asc_lines
+from canbase_config.load import load_robot, sample
+from canbase_config.robot import Robot
+from canbase_config.watchdog import WatchdogConfig
+from canbase_driver.runtime.black_box import MAX_EVENTS, MAX_FRAMES, EventEntry, Recording, Ring, asc_lines
+from canbase_driver.runtime.black_box_about import about, sha256_of
+from canbase_driver.runtime.black_box_json import json_lines
 from canbase_driver.runtime.black_box_writer import WAITING, BlackBoxWriter, state_folder
+from canbase_driver.supervision.stop_history import StopRecord
 
 WALL_S = 1_700_000_000.0
 SETPOINT = bytes.fromhex("0f 00 10 27 00 00")
@@ -22,6 +30,7 @@ def recording(frames: int = 3) -> Recording:
     for k in range(frames):
         ring.frame(100.0 + 0.01 * k, 0x201, SETPOINT, received=False)
         ring.note(100.0 + 0.01 * k + 0.001, f"cmd_vel 0.{k} m/s")
+        ring.event(100.0 + 0.01 * k + 0.001, "cmd_vel", {"linear_mps": k / 10, "stamp_s": WALL_S})
     return ring.cut(now_s=105.0, wall_offset_s=WALL_S)
 
 
@@ -34,17 +43,21 @@ def test_the_ring_gives_back_the_last_seconds_alone() -> None:
     for k in range(50):
         ring.frame(100.0 + 0.1 * k, k, b"", received=True)
         ring.note(100.0 + 0.1 * k, str(k))
+        ring.event(100.0 + 0.1 * k, "order", {"k": k})
     cut = ring.cut(now_s=105.0, wall_offset_s=0.0)
     assert [entry[1] for entry in cut.frames] == list(range(30, 50))
     assert [entry[1] for entry in cut.notes] == [str(k) for k in range(30, 50)]
+    assert [entry[2]["k"] for entry in cut.events] == list(range(30, 50))
 
 
 def test_memory_is_bounded_however_full_the_bus_is() -> None:
     ring = Ring(seconds=60.0)
     for k in range(MAX_FRAMES + 10):
         ring.frame(100.0 + k * 1e-5, 0x181, b"", received=True)
-    frames = ring.cut(now_s=101.0, wall_offset_s=0.0).frames
-    assert len(frames) == MAX_FRAMES
+        ring.event(100.0 + k * 1e-5, "safety_filter/state", {})
+    cut = ring.cut(now_s=101.0, wall_offset_s=0.0)
+    frames = cut.frames
+    assert (len(frames), len(cut.events)) == (MAX_FRAMES, MAX_EVENTS)
     assert frames[0][0] == pytest.approx(100.0001)
 
 
@@ -74,6 +87,10 @@ def test_a_bus_on_which_nothing_was_said_gives_a_file_with_the_commands(tmp_path
         assert list(reader) == []
 
 
+def stop_at(at_s: float, cause: str = "drive fault") -> StopRecord:
+    return StopRecord("motor_driver", cause, "a stop", True, "a reset", at_s)
+
+
 class Box:
     """A writer with what it said."""
 
@@ -82,8 +99,8 @@ class Box:
         self.folder = folder
         self.writer = BlackBoxWriter(BlackBox(folder=str(folder), files=files), "r1", self.said.append)
 
-    def stop(self, wall_s: float = WALL_S, cause: str = "drive fault") -> str:
-        return self.writer.submit(recording(), cause, wall_s, "a stop")
+    def stop(self, wall_s: float = WALL_S, cause: str = "drive fault", late: Iterable[EventEntry] = ()) -> str:
+        return self.writer.submit(recording(), stop_at(wall_s - WALL_S, cause), lambda _recording: late)
 
     def finish(self) -> None:
         """Let it do all its work; start it first where a test has not."""
@@ -107,8 +124,8 @@ def test_each_stop_has_a_file_with_its_time_robot_and_cause(box: Box) -> None:
     path = box.stop(WALL_S + 0.25)
     box.finish()
     assert path == str(box.folder / "stop_r1_20231114T221320.250Z_drive_fault.asc")
-    assert box.files == [Path(path).name]
-    assert "// a stop" in Path(path).read_text(encoding="utf-8")
+    assert box.files == [Path(path).name, Path(path).with_suffix(".json").name]
+    assert "// stop by motor_driver: drive fault (a stop)" in Path(path).read_text(encoding="utf-8")
     assert box.said == []
 
 
@@ -117,13 +134,17 @@ def test_the_newest_files_are_kept_and_others_are_left_alone(box: Box) -> None:
     (box.folder / "stop_other_20200101T000000.000Z_x.asc").touch()
     for hour in range(3):
         (box.folder / f"stop_r1_20230101T0{hour}0000.000Z_x.asc").touch()
+        (box.folder / f"stop_r1_20230101T0{hour}0000.000Z_x.json").touch()
     box.stop()
     box.finish()
     assert box.files == [
         "stop_other_20200101T000000.000Z_x.asc",
         "stop_r1_20230101T010000.000Z_x.asc",
+        "stop_r1_20230101T010000.000Z_x.json",
         "stop_r1_20230101T020000.000Z_x.asc",
+        "stop_r1_20230101T020000.000Z_x.json",
         "stop_r1_20231114T221320.000Z_drive_fault.asc",
+        "stop_r1_20231114T221320.000Z_drive_fault.json",
     ]
 
 
@@ -152,9 +173,91 @@ def test_a_full_disk_is_said_once_leaves_nothing_behind_and_is_over_when_there_i
     for _ in range(3):
         box.stop()
     box.finish()
-    assert box.files == ["stop_r1_20231114T221320.000Z_drive_fault.asc"]
+    assert box.files == [f"stop_r1_20231114T221320.000Z_drive_fault.{kind}" for kind in ("asc", "json")]
     assert [sentence.partition(": ")[2][:23] for sentence in box.said] == ["No space left on device", ""]
     assert box.said[1] == f"the black box writes to {box.folder} again"
+
+
+def test_where_one_of_the_two_files_cannot_be_written_the_other_one_is(
+    box: Box, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lines(*_given: object) -> Iterator[str]:
+        yield "{"
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("canbase_driver.runtime.black_box_writer.json_lines", lines)
+    box.stop()
+    box.finish()
+    assert box.files == ["stop_r1_20231114T221320.000Z_drive_fault.asc"]
+    assert len(box.said) == 1
+
+
+def test_what_something_else_has_kept_comes_at_its_place_among_the_events(box: Box) -> None:
+    path = box.stop(late=[(100.015, "order", {"source": "joystick"}), (100.005, "order", {"source": "navigation"})])
+    box.finish()
+    events = json.loads(Path(path).with_suffix(".json").read_text(encoding="utf-8"))["events"]
+    assert [(round(each["at_s"], 3), each["what"]) for each in events] == [
+        (100.001, "cmd_vel"),
+        (100.005, "order"),
+        (100.011, "cmd_vel"),
+        (100.015, "order"),
+        (100.021, "cmd_vel"),
+    ]
+
+
+def read(of: Recording, about_it: dict[str, Any] | None = None) -> dict[str, Any]:
+    found = json.loads("".join(json_lines(of, stop_at(100.02), "stop.asc", about_it or {})))
+    assert isinstance(found, dict)
+    return found
+
+
+def test_the_second_file_has_the_values_exactly_and_the_clocks_of_both() -> None:
+    found = read(recording(2))
+    assert found["events"][1] == {"at_s": 100.01 + 0.001, "what": "cmd_vel", "linear_mps": 0.1, "stamp_s": WALL_S}
+    assert (found["began_s"], found["at_s"], found["wall_offset_s"]) == (100.0, 100.02, WALL_S)
+    assert (found["frames"], found["cause"]) == ("stop.asc", "drive fault")
+
+
+def test_a_command_that_is_no_number_is_still_json() -> None:
+    ring = Ring(10.0)
+    ring.event(100.0, "cmd_vel", {"linear_mps": float("nan"), "angular_radps": float("-inf"), "of": [float("inf")]})
+    event = read(ring.cut(100.0, 0.0))["events"][0]
+    assert (event["linear_mps"], event["angular_radps"], event["of"]) == ("nan", "-inf", ["inf"])
+
+
+def test_text_of_another_node_forges_no_event() -> None:
+    ring = Ring(10.0)
+    ring.event(100.0, "safety_filter/state", {"detail": 'x"},\n{"at_s": 1.0, "what": "cmd_vel"'})
+    assert len(read(ring.cut(100.0, 0.0))["events"]) == 1
+
+
+def test_a_recording_without_events_is_whole_too() -> None:
+    assert read(Recording((), (), 0.0))["events"] == []
+
+
+def test_the_configuration_in_it_makes_the_same_robot_and_the_same_watchdog_again() -> None:
+    robot = load_robot(sample("bench")).robot
+    found = read(recording(), about(robot))
+    assert Robot.model_validate(found["robot_yaml"]) == robot
+    assert found["robot_yaml_sha256"] == sha256_of(found["robot_yaml"])
+    assert WatchdogConfig.from_json(json.dumps(found["watchdog_config"])).robot == robot.name
+    assert found["versions"].keys() == {"canbase", "python", "python-can", "canopen", "rclpy"}
+
+
+def test_a_profile_of_the_users_own_is_in_it(tmp_path: Path) -> None:
+    robot = load_robot(sample("bench")).robot
+    own = tmp_path / "own.yaml"
+    own.write_text("title: mine", encoding="utf-8")
+    drives = tuple(drive.model_copy(update={"profile": str(own)}) for drive in robot.drives)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("canbase_driver.runtime.black_box_about.watchdog_config", lambda _robot: WatchdogStub())
+        found = about(robot.model_copy(update={"drives": drives}))
+    assert found["profiles"] == {str(own): "title: mine"}
+
+
+class WatchdogStub:
+    def to_json(self) -> str:
+        return "{}"
 
 
 def test_more_stops_than_can_wait_are_dropped_and_have_no_path(box: Box) -> None:
