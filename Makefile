@@ -163,8 +163,8 @@ release-check: $(VENV)/ready ## version, changelog entry, sdist and wheel, and t
 	.ci/release-check
 
 .PHONY: vm-test
-vm-test: $(VENV)/ready ## a Linux guest with systemd and CAN: killed, unplugged, frozen; SCENARIOS=driver runs some
-	virtual_bus_tests/vm/build.sh
+vm-test: $(VENV)/ready ## a Linux guest with systemd and CAN: killed, unplugged, frozen; SCENARIOS=driver runs some; COMPILED=1 the compiled wheel
+	COMPILED=$(COMPILED) virtual_bus_tests/vm/build.sh
 	python virtual_bus_tests/vm/host.py $(SCENARIOS)
 
 .PHONY: clean

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # Makes the virtual robot's parts in build/vm: kernel, initial ramdisk, root file system, and /opt/canbase as an image.
+#   COMPILED=1: the wheel whose deciding modules are compiled by mypyc.
 #   root needed: yes (mmdebstrap).  network: a Debian mirror and PyPI.  Each part is made again only when its recipe changed.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
@@ -100,9 +101,17 @@ from pip._vendor import tomli
 project = tomli.load(open("pyproject.toml", "rb"))["project"]
 print(*project["dependencies"], *project["optional-dependencies"]["ros"], sep="\n")'
 
+wheel() {
+  if [[ -n ${COMPILED:-} ]]; then
+    PYTHONPATH=virtual_bus_tests python -m compiled.wheel --dest "$out/wheel"
+  else
+    python -m pip wheel --quiet --no-deps --no-build-isolation --config-settings "build-dir=$out/cmake" --wheel-dir "$out/wheel" .
+  fi
+}
+
 canbase() {
   rm -rf "$out/wheel"
-  python -m pip wheel --quiet --no-deps --no-build-isolation --config-settings "build-dir=$out/cmake" --wheel-dir "$out/wheel" .
+  wheel
   python -m pip --python "$out/venv/bin/python3" install --quiet --no-deps --force-reinstall "$out"/wheel/canbase-*.whl
   "$out/venv/bin/python3" -m compileall -q "$out/venv/lib" >/dev/null || true
   rm -f "$out/venv.ext4"
@@ -132,8 +141,8 @@ if ! made libraries "$libraries_key"; then
   libraries
   echo "$libraries_key" >"$out/libraries.key"
 fi
-sources=(can_config runtime driver velocity_mux watchdog action_server commissioning doctor cli deploy interfaces virtual_bus_tests/canbase_sim pyproject.toml CMakeLists.txt package.xml)
-canbase_key=$( (echo "$libraries_key"; find "${sources[@]}" -type f ! -name '*.pyc' -print0 | sort -z | xargs -0 sha256sum) | key)
+sources=(can_config runtime driver velocity_mux watchdog action_server commissioning doctor web cli deploy interfaces virtual_bus_tests/canbase_sim pyproject.toml CMakeLists.txt package.xml)
+canbase_key=$( (echo "$libraries_key ${COMPILED:-}"; find "${sources[@]}" -type f ! -name '*.pyc' -print0 | sort -z | xargs -0 sha256sum) | key)
 if ! made canbase "$canbase_key"; then
   canbase
   echo "$canbase_key" >"$out/canbase.key"
