@@ -13,7 +13,10 @@ from canbase_driver.cia301.sdo_client import Read, SdoAborted
 
 ENCODER_RESOLUTION, GEAR_RATIO = 0x608F, 0x6091
 """Increments for motor revolutions; motor revolutions for shaft revolutions (sub-indexes 1 and 2, CiA 402-2)."""
-MOST_GEAR = 10_000.0
+LEAST_GEAR, MOST_GEAR = 1e-3, 10_000.0
+MOST_COUNTS = 2**31 - 1
+MOST_BYTES = 4
+"""Both are numbers of 32 bits at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +63,8 @@ def survey(node_id: int, profile: str) -> Steps[tuple[FoundAxis, ...]]:
                 node_id,
                 axis,
                 profile,
-                int(counts) if counts is not None and counts >= 1.0 and counts.is_integer() else None,
-                gear if gear is not None and gear <= MOST_GEAR else None,
+                int(counts) if counts is not None and 1 <= counts <= MOST_COUNTS and counts.is_integer() else None,
+                gear if gear is not None and LEAST_GEAR <= gear <= MOST_GEAR else None,
             )
         )
     return tuple(axes)
@@ -84,6 +87,7 @@ def _ratio(index: int) -> Steps[float | None]:
 
 def _number(index: int, sub: int) -> Steps[int | None]:
     try:
-        return unsigned((yield Read(index, sub)))
+        data = yield Read(index, sub)
     except SdoAborted:
         return None
+    return unsigned(data) if 0 < len(data) <= MOST_BYTES else None

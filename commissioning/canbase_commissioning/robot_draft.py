@@ -14,7 +14,7 @@ from typing import Any, Final, get_args
 
 from pydantic import TypeAdapter, ValidationError
 
-from canbase_commissioning.drive_survey import MOST_GEAR, FoundAxis
+from canbase_commissioning.drive_survey import LEAST_GEAR, MOST_COUNTS, MOST_GEAR, FoundAxis
 from canbase_commissioning.edits import Edit, edited
 from canbase_commissioning.guide import Ask, CommissionError, Tell, number, one_of
 from canbase_config.profile import VelocityUnit
@@ -113,7 +113,7 @@ def _ask_about_wheel(axis: FoundAxis, side: Side) -> Generator[Ask | Tell, Any, 
     if where is Side.NEITHER:
         return []
     text = "Motor revolutions for one revolution of the wheel"
-    gear = yield _ask(f"{key}.gear_ratio", text, number(1e-3, MOST_GEAR), _shown(axis.gear_ratio))
+    gear = yield _ask(f"{key}.gear_ratio", text, number(LEAST_GEAR, MOST_GEAR), _shown(axis.gear_ratio))
     text = "Increments of the position (6064h) for one revolution of the motor: encoder lines × 4"
     counts = yield _ask(f"{key}.counts_per_motor_rev", text, _counts, _shown(axis.counts_per_motor_rev))
     unit = None
@@ -140,8 +140,8 @@ def _name(text: str) -> str:
 
 
 def _counts(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text) < 2**31:
-        raise ValueError(f"expected a whole number from 1 to {2**31 - 1}, found {text!r}")
+    if not text.isdecimal() or not 1 <= int(text) <= MOST_COUNTS:
+        raise ValueError(f"expected a whole number from 1 to {MOST_COUNTS}, found {text!r}")
     return int(text)
 
 

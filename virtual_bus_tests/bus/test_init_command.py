@@ -98,6 +98,32 @@ def test_a_file_that_exists_is_kept(tmp_path: Path) -> None:
     assert output.read_text(encoding="utf-8") == "name: mine\n"
 
 
+def test_a_draft_that_a_person_has_corrected_is_kept_too(tmp_path: Path) -> None:
+    output, draft = tmp_path / "robot.yaml", tmp_path / "robot.yaml.draft.yaml"
+    draft.write_text("name: mine\n", encoding="utf-8")
+    done = canbase("init", "--channel", "can0", "--output", str(output), "--yes")
+    assert (done.returncode, draft.read_text(encoding="utf-8")) == (2, "name: mine\n")
+
+
+def test_a_file_that_came_while_the_person_answered_is_kept(bench: Path, tmp_path: Path) -> None:
+    output = tmp_path / "new.yaml"
+    page = Page("init", "--config", str(bench), "--output", str(output), "--json")
+    answered: set[str] = set()
+
+    def answer() -> bool:
+        for question in page.questions:
+            if question["ask"] not in answered:
+                output.write_text("name: mine\n", encoding="utf-8")
+                answered.add(question["ask"])
+                page.say(answer="20" if question["default"] is None else "", key=question["ask"])
+        return page.process.poll() is not None
+
+    page.live_until(answer)
+    assert "File exists" in page.ends()
+    assert page.process.returncode == 1
+    assert output.read_text(encoding="utf-8") == "name: mine\n"
+
+
 def test_an_empty_bus_is_1(tmp_path: Path) -> None:
     config = write_robot(tmp_path, free_udp_port())
     words = ("--config", str(config), "--output", str(tmp_path / "new.yaml"))

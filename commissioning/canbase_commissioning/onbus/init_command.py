@@ -32,8 +32,9 @@ THINKING_S = 0.02
 
 def run(bus: Bus, output: Path, answers: Path | None, timeout_s: float, *, yes: bool, as_json: bool) -> None:
     """From the bus to the file; exits with 1 when no robot comes of what is there."""
-    if output.exists():
-        fail(f"{output} exists; it is never overwritten: give --output another name", WRONG_INPUT)
+    for file in (output, _draft(output)):
+        if file.exists():
+            fail(f"{file} exists; it is never overwritten: give --output another name", WRONG_INPUT)
     person: Person = RemoteOperator() if as_json else Operator(answers, yes=yes)
     with open_line(bus) as line:
         axes = _axes(line, timeout_s, person)
@@ -110,19 +111,22 @@ def _sample_for(bus: Bus) -> str:
     return sample("bench" if bus.is_virtual else "example_can0").read_text(encoding="utf-8")
 
 
+def _draft(output: Path) -> Path:
+    """Where the file is until it has passed the check."""
+    return output.with_name(f"{output.name}.draft.yaml")
+
+
 def _write(output: Path, text: str, person: Person) -> None:
     """A robot.yaml that does not pass the check is written beside its name, so that no answer is lost."""
-    draft = output.with_name(f"{output.name}.draft.yaml")
-    try:
-        draft.write_text(text, encoding="utf-8")
-    except OSError as error:
-        fail(f"{draft} cannot be written: {error}", FAILED)
+    draft = _draft(output)
+    _write_first(draft, text)
     try:
         loaded = load_robot(draft)
     except ConfigError as error:
         typer.echo(str(error), err=True)
-        fail(f"these values do not fit together; they are in {draft}: correct them there", FAILED)
-    draft.replace(output)
+        fail(f"these values do not fit together; they are in {draft}: correct them there, and rename it", FAILED)
+    _write_first(output, text)
+    draft.unlink()
     for warning in loaded.warnings:
         warn(str(warning).replace(str(draft), str(output)))
     told = (
@@ -131,3 +135,12 @@ def _write(output: Path, text: str, person: Person) -> None:
         f"  canbase commission --config {output}    direction, scale, and whether the drives stop by themselves"
     )
     person.tell(Tell(told))
+
+
+def _write_first(file: Path, text: str) -> None:
+    """A file of that name may have come while the person answered."""
+    try:
+        with file.open("x", encoding="utf-8") as stream:
+            stream.write(text)
+    except OSError as error:
+        fail(f"{file} cannot be written: {error}", FAILED)

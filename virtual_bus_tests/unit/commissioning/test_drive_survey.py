@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 
 import pytest
 
@@ -20,7 +21,7 @@ def card(vendor_id: int | None = 0x99, product_code: int | None = 1, device_type
     return NodeCard(5, device_type, vendor_id, product_code, None, None, None, "", "")
 
 
-def answered(profile: str, objects: dict[tuple[int, int], int]) -> tuple[FoundAxis, ...]:
+def answered(profile: str, objects: Mapping[tuple[int, int], int | bytes]) -> tuple[FoundAxis, ...]:
     """The survey of a drive that has these objects and no other."""
     steps = survey(5, profile)
     read = next(steps)
@@ -31,7 +32,7 @@ def answered(profile: str, objects: dict[tuple[int, int], int]) -> tuple[FoundAx
             if value is None:
                 read = steps.throw(SdoAborted(5, read, NO_OBJECT))
             else:
-                read = steps.send(struct.pack("<I", value))
+                read = steps.send(value if isinstance(value, bytes) else struct.pack("<I", value))
         except StopIteration as end:
             found: tuple[FoundAxis, ...] = end.value
             return found
@@ -91,6 +92,9 @@ def test_a_drive_without_a_second_statusword_has_one_axis() -> None:
         (1, 2, None),
         (0, 1, None),
         (4096, 0, None),
+        (2**31 - 1, 1, 2**31 - 1),
+        (2**31, 1, None),
+        (2**32 - 1, 1, None),
     ],
 )
 def test_counts_of_a_revolution_are_a_whole_number_or_unknown(
@@ -100,9 +104,18 @@ def test_counts_of_a_revolution_are_a_whole_number_or_unknown(
     assert answered("epos4", objects)[0].counts_per_motor_rev == counts
 
 
-@pytest.mark.parametrize(("motor", "shaft", "gear"), [(20, 1, 20.0), (1, 1, 1.0), (10_000, 1, 1e4), (10_001, 1, None)])
+@pytest.mark.parametrize(
+    ("motor", "shaft", "gear"),
+    [(20, 1, 20.0), (1, 1, 1.0), (10_000, 1, 1e4), (10_001, 1, None), (1, 1000, 1e-3), (1, 1001, None)],
+)
 def test_a_gear_ratio_that_robot_yaml_does_not_take_is_unknown(motor: int, shaft: int, gear: float | None) -> None:
     assert answered("epos4", {(0x6091, 1): motor, (0x6091, 2): shaft})[0].gear_ratio == gear
+
+
+@pytest.mark.parametrize("answer", [b"", bytes(300), b"\xff" * 300])
+def test_an_answer_that_is_no_number_of_32_bits_is_none(answer: bytes) -> None:
+    (axis,) = answered("epos4", {(index, sub): answer for index in (0x608F, 0x6091) for sub in (1, 2)})
+    assert (axis.counts_per_motor_rev, axis.gear_ratio) == (None, None)
 
 
 def test_a_drive_that_stops_answering_ends_the_survey() -> None:
