@@ -5,11 +5,16 @@ from __future__ import annotations
 import signal
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 
+from canbase_commissioning.onbus.bus_session import BusSession
 from canbase_commissioning.onbus.remote_operator import SILENCE_S, Alive, Answer, Stop, parse
+from canbase_config.load import load_robot
+from canbase_driver.cia301.frame import Frame
+from canbase_driver.cia301.nmt import NmtCommand, nmt
 from canbase_sim.control import SimControl
 from support.bus_tool import STANDS_S, drives, wheel_stands, write_robot
 from support.json_page import Page
@@ -94,6 +99,41 @@ def test_a_signal_stops_the_wheel(bench: tuple[Path, SimControl], page: Page) ->
     page.process.send_signal(signal.SIGTERM)
     wheel_stands(bench[1], STANDS_S)
     assert page.process.wait(20.0) == 1
+
+
+def test_a_signal_during_the_farewell_does_not_leave_the_drives_with_power(
+    bench: tuple[Path, SimControl], page: Page
+) -> None:
+    """Somebody presses Stop, and ends `canbase web` before the wheels have stopped."""
+    turning(page, bench[1])
+    with BusSession(load_robot(bench[0]).robot.bus) as line:
+        page.say(stop=True)
+        heard = Heard(until_s=time.monotonic() + 0.03)
+        line.run(heard)
+        page.process.send_signal(signal.SIGTERM)
+        heard.until_s = time.monotonic() + 3.0
+        line.run(heard)
+    assert page.process.wait(20.0) == 1
+    assert nmt(NmtCommand.ENTER_PRE_OPERATIONAL, 2) in heard.frames, "the farewell came to its end"
+
+
+@dataclass
+class Heard:
+    """A session that listens until a time."""
+
+    until_s: float
+    frames: list[Frame] = field(default_factory=list)
+
+    @property
+    def done(self) -> bool:
+        return time.monotonic() >= self.until_s
+
+    def on_frame(self, frame: Frame, now_s: float) -> None:
+        if frame.cob_id < 0x100:  # NMT and SYNC: what a master sends
+            self.frames.append(frame)
+
+    def tick(self, now_s: float) -> list[Frame]:
+        return []
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from canbase_commissioning.guide import CommissionError, Guide, Script
 from canbase_commissioning.jog_session import JogSession
 from canbase_commissioning.onbus.bus_session import BusSession, open_line
 from canbase_commissioning.onbus.moving import refuse_beside_masters
-from canbase_commissioning.onbus.operator import Stopped, stopping_signals
+from canbase_commissioning.onbus.operator import Stopped, stopping_signals, unbroken
 from canbase_commissioning.powered_drives import PoweredDrives, RigError
 from canbase_commissioning.safe_stop import SafeStop
 from canbase_commissioning.self_stop_test import get_ready
@@ -64,7 +64,8 @@ def _jog(line: BusSession, robot: Robot, joint: str, speed_mps: float) -> None:
         with _single_keys():
             _hold(line, session)
     finally:
-        line.run(SafeStop(rig))
+        with unbroken():
+            line.run(SafeStop(rig))
 
 
 def _boot(rig: PoweredDrives) -> Script[bool]:

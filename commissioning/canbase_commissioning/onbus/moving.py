@@ -8,7 +8,7 @@ from typing import TypeVar
 from canbase_commissioning.bus_monitor import Listener, ListenSession
 from canbase_commissioning.guide import CommissionError, Guide, Script
 from canbase_commissioning.onbus.bus_session import BusSession
-from canbase_commissioning.onbus.operator import Person
+from canbase_commissioning.onbus.operator import Person, unbroken
 from canbase_commissioning.powered_drives import PoweredDrives
 from canbase_commissioning.safe_stop import SafeStop
 from canbase_config.robot import Robot
@@ -41,7 +41,8 @@ def run_script(line: BusSession, robot: Robot, script: Callable[[PoweredDrives],
             elif person.interrupts():
                 raise CommissionError("stopped by Enter")
     finally:
-        line.run(SafeStop(rig))
+        with unbroken():
+            line.run(SafeStop(rig))
     if guide.result is None:
         raise RuntimeError("the script ended without a result")
     return guide.result

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import Protocol
+from typing import Final, Protocol
 
 import typer
 
@@ -17,6 +17,8 @@ from canbase_commissioning.guide import Ask, CommissionError, Tell
 from canbase_config.errors import ConfigError
 from canbase_config.yaml_file import read_yaml
 from canbase_runtime.terminal import WRONG_INPUT, colour, fail
+
+ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Stopped(BaseException):
@@ -30,19 +32,32 @@ class Stopped(BaseException):
 @contextmanager
 def stopping_signals() -> Iterator[None]:
     """SIGINT, SIGTERM and SIGHUP raise `Stopped` inside, once: what runs on the way out is not broken off."""
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
     def stop(number: int, _frame: FrameType | None) -> None:
-        for each in numbers:
+        for each in ENDING:
             signal.signal(each, signal.SIG_IGN)
         raise Stopped(number)
 
-    before = {number: signal.signal(number, stop) for number in numbers}
+    before = {number: signal.signal(number, stop) for number in ENDING}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def unbroken() -> Iterator[None]:
+    """What runs inside comes to its end: a signal of these takes effect behind it."""
+    came: list[int] = []
+    before = {number: signal.signal(number, lambda number, _frame: came.append(number)) for number in ENDING}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if came:
+            signal.raise_signal(came[0])
 
 
 class Person(Protocol):
