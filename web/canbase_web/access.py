@@ -14,7 +14,8 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Final
 from urllib.parse import parse_qs
 
-COOKIE: Final = "canbase_web"
+COOKIE: Final = "canbase_web_{port}"
+"""A browser gives a cookie to every port of a host: by one name the pages of two robots would replace each other's."""
 MOST_BODY_BYTES: Final = 65_536
 """No request of the page is longer."""
 
@@ -42,9 +43,11 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """`token`: of the address; `session`: of the cookie; `hosts`: what a Host header may name, with its port."""
+    """`token`: of the address; `cookie`, `session`: the cookie's name and value; `hosts`: what a Host header may name,
+    with its port."""
 
     token: str
+    cookie: str
     session: str
     hosts: frozenset[str]
 
@@ -57,7 +60,7 @@ class Access:
             return Verdict.OTHER_SITE
         if not _short(headers.get("content-length", "0")):
             return Verdict.TOO_LONG
-        if _same(_cookie(headers.get("cookie", "")), self.session):
+        if _same(_value(self.cookie, headers.get("cookie", "")), self.session):
             return Verdict.PASSES
         given = parse_qs(query).get("token", [""])[0]
         return Verdict.LOGS_IN if _same(given, self.token) else Verdict.NO_TOKEN
@@ -79,9 +82,9 @@ def _same(given: str, expected: str) -> bool:
     return hmac.compare_digest(given.encode(), expected.encode())
 
 
-def _cookie(header: str) -> str:
+def _value(name: str, header: str) -> str:
     try:
-        found = SimpleCookie(header).get(COOKIE)
+        found = SimpleCookie(header).get(name)
     except CookieError:
         return ""
     return "" if found is None else found.value

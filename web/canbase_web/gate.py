@@ -7,7 +7,7 @@ from urllib.parse import parse_qs, urlencode
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from canbase_web.access import COOKIE, MOST_BODY_BYTES, Access, Verdict
+from canbase_web.access import MOST_BODY_BYTES, Access, Verdict
 
 MOST_SOCKETS: Final = 32
 """Websockets that are open at a time: a page has two at most."""
@@ -45,7 +45,7 @@ class Gate:
             await self._log_in(scope, send)
         else:
             verdict = Verdict.NO_TOKEN if verdict is Verdict.LOGS_IN else verdict
-            await _answer(send, verdict.status, verdict.sentence)
+            await _answer(send, verdict.status, verdict.sentence, (b"connection", b"close"))
 
     async def _websocket(self, verdict: Verdict, scope: Scope, receive: Receive, send: Send) -> None:
         if verdict is not Verdict.PASSES or self._sockets >= MOST_SOCKETS:
@@ -63,7 +63,7 @@ class Gate:
         query.pop("token")
         rest = urlencode(query, doseq=True)
         place = "/" + scope["path"].lstrip("/") + (f"?{rest}" if rest else "")
-        cookie = f"{COOKIE}={self._access.session}; Path=/; HttpOnly; SameSite=Strict"
+        cookie = f"{self._access.cookie}={self._access.session}; Path=/; HttpOnly; SameSite=Strict"
         await _answer(send, Verdict.LOGS_IN.status, "", (b"location", place.encode()), (b"set-cookie", cookie.encode()))
 
 

@@ -23,16 +23,18 @@ from nicegui import ui
 
 from canbase_config.load import Loaded
 from canbase_web import commission_page, drive_page, health_page, now_page, stops_page
-from canbase_web.access import MOST_BODY_BYTES, Access, authority, hosts
+from canbase_web.access import COOKIE, MOST_BODY_BYTES, Access, authority, hosts
 from canbase_web.gate import Gate
 from canbase_web.hold import Hold
 from canbase_web.hold_socket import HoldSocket
 from canbase_web.pages import Pages
 from canbase_web.robot_link import RobotLink
 
-MOST_CONNECTIONS: Final = 100
-SILENT_CONNECTION_S: Final = 5.0
-"""A connection that has sent no request for so long is closed: it may not keep others out."""
+MOST_SILENT: Final = 100
+"""Of more connections without a request the oldest are closed: whoever floods the page keeps nobody from the stop."""
+SILENT_S: Final = 5.0
+"""A connection that has sent no request for so long is closed."""
+LOOK_S: Final = 0.25
 SOURCE_NAME: Final = "web"
 """Key of `mux.sources` whose topic the page publishes on."""
 
@@ -88,13 +90,15 @@ def run(loaded: Loaded, address: Address, ros_args: list[str], namespace: str) -
         page.add(pages)
     ui.run_with(app, title=f"canbase {robot.name}", dark=None, show_welcome_message=False, reconnect_timeout=3.0,
                 tailwind=False, favicon="🛞", binding_refresh_interval=None)  # fmt: skip
-    access = Access(address.token, secrets.token_urlsafe(32), hosts(address.host, address.port))
+    cookie = COOKIE.format(port=address.port)
+    access = Access(address.token, cookie, secrets.token_urlsafe(32), hosts(address.host, address.port))
     config = uvicorn.Config(
         Gate(app, access),
         host=address.host,
         port=address.port,
         log_level="warning",
-        limit_concurrency=MOST_CONNECTIONS,
+        http="h11",  # bounds what a request may have before its body; httptools takes headers without end
+        h11_max_incomplete_event_size=MOST_BODY_BYTES,
         ws_max_size=MOST_BODY_BYTES,
         timeout_graceful_shutdown=1,
         server_header=False,
@@ -129,13 +133,15 @@ def _end_with(server: uvicorn.Server, loop: asyncio.Task[None]) -> None:
 
 
 async def _drop_silent(server: uvicorn.Server) -> None:
-    """Closes connections without a request, again and again: a thousand of them keep nobody from the stop for long."""
+    """Closes connections without a request, again and again; who is refused has none any more (gate.py)."""
     seen: dict[object, float] = {}
     while True:
-        await asyncio.sleep(1.0)
+        await asyncio.sleep(LOOK_S)
         now_s = time.monotonic()
-        idle = {each for each in tuple(server.server_state.connections) if getattr(each, "cycle", True) is None}
-        seen = {each: seen.get(each, now_s) for each in idle}
-        for each in [each for each, since_s in seen.items() if now_s - since_s > SILENT_CONNECTION_S]:
-            with contextlib.suppress(AttributeError, RuntimeError):
-                each.transport.abort()  # type: ignore[attr-defined]
+        silent = [each for each in tuple(server.server_state.connections) if getattr(each, "cycle", True) is None]
+        seen = {each: seen.get(each, now_s) for each in silent}
+        oldest = sorted(seen, key=lambda each: seen[each])
+        for i, each in enumerate(oldest):
+            if i < len(oldest) - MOST_SILENT or now_s - seen[each] > SILENT_S:
+                with contextlib.suppress(AttributeError, RuntimeError):
+                    each.transport.abort()  # type: ignore[attr-defined]

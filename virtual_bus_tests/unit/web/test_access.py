@@ -7,8 +7,9 @@ import pytest
 from canbase_web.access import COOKIE, MOST_BODY_BYTES, Access, Verdict, hosts
 
 TOKEN, SESSION = "token-of-the-address", "session-of-the-cookie"
-ACCESS = Access(TOKEN, SESSION, hosts("127.0.0.1", 8080))
-MINE = {"host": "127.0.0.1:8080", "cookie": f"{COOKIE}={SESSION}"}
+NAME = COOKIE.format(port=8080)
+ACCESS = Access(TOKEN, NAME, SESSION, hosts("127.0.0.1", 8080))
+MINE = {"host": "127.0.0.1:8080", "cookie": f"{NAME}={SESSION}"}
 
 
 def test_the_token_logs_in_and_the_cookie_passes_from_then_on() -> None:
@@ -21,20 +22,26 @@ def test_nobody_gets_in_without_the_token(query: str) -> None:
     assert ACCESS.judge({"host": "127.0.0.1:8080"}, query) is Verdict.NO_TOKEN
 
 
-@pytest.mark.parametrize(
-    "cookie", ["", f"{COOKIE}=", f"{COOKIE}={TOKEN}", f"{COOKIE}x={SESSION}", "\x00;=;", f"a={SESSION}"]
-)
+@pytest.mark.parametrize("cookie", ["", f"{NAME}=", f"{NAME}={TOKEN}", f"{NAME}x={SESSION}", "\x00;=;", f"a={SESSION}"])
 def test_another_cookie_is_none(cookie: str) -> None:
     assert ACCESS.judge(MINE | {"cookie": cookie}, "") is Verdict.NO_TOKEN
 
 
 def test_the_cookie_is_found_among_others() -> None:
-    assert ACCESS.judge(MINE | {"cookie": f"a=b; {COOKIE}={SESSION}; c=d"}, "") is Verdict.PASSES
+    assert ACCESS.judge(MINE | {"cookie": f"a=b; {NAME}={SESSION}; c=d"}, "") is Verdict.PASSES
 
 
 @pytest.mark.parametrize("host", ["evil.example:8080", "127.0.0.1", "127.0.0.1:81", "", "127.0.0.1:8080.evil.example"])
 def test_a_name_that_was_bound_to_this_address_by_someone_else_is_refused_with_a_cookie_too(host: str) -> None:
     assert ACCESS.judge(MINE | {"host": host}, f"token={TOKEN}") is Verdict.OTHER_HOST
+
+
+def test_the_pages_of_two_robots_in_one_browser_have_cookies_of_their_own() -> None:
+    """127.0.0.1:8080 and 127.0.0.1:8081 are one host to a browser: a login at one must not end that at the other."""
+    other = Access(TOKEN, COOKIE.format(port=8081), "session-of-another", hosts("127.0.0.1", 8081))
+    cookies = f"{NAME}={SESSION}; {other.cookie}={other.session}"
+    assert ACCESS.judge(MINE | {"cookie": cookies}, "") is Verdict.PASSES
+    assert other.judge({"host": "127.0.0.1:8081", "cookie": cookies}, "") is Verdict.PASSES
 
 
 def test_without_a_host_there_is_no_access() -> None:

@@ -10,8 +10,9 @@ import pytest
 from canbase_web.access import COOKIE, MOST_BODY_BYTES, Access, hosts
 from canbase_web.gate import MOST_SOCKETS, Gate
 
-ACCESS = Access("the-token-of-the-page", "the-session", hosts("127.0.0.1", 8080))
-HOST, MINE = ("host", "127.0.0.1:8080"), ("cookie", f"{COOKIE}=the-session")
+NAME = COOKIE.format(port=8080)
+ACCESS = Access("the-token-of-the-page", NAME, "the-session", hosts("127.0.0.1", 8080))
+HOST, MINE = ("host", "127.0.0.1:8080"), ("cookie", f"{NAME}=the-session")
 
 
 class Inside:
@@ -67,7 +68,7 @@ def test_the_token_becomes_a_cookie_that_scripts_and_other_sites_do_not_get_and_
     inside = Inside()
     status, headers = ask(inside, HOST, query="token=the-token-of-the-page&a=1", path="/drive")
     assert (status, headers["location"], inside.seen) == (303, "/drive?a=1", [])
-    assert headers["set-cookie"] == f"{COOKIE}=the-session; Path=/; HttpOnly; SameSite=Strict"
+    assert headers["set-cookie"] == f"{NAME}=the-session; Path=/; HttpOnly; SameSite=Strict"
 
 
 def test_the_address_after_the_token_is_never_one_of_another_host() -> None:
@@ -79,7 +80,7 @@ def test_the_address_after_the_token_is_never_one_of_another_host() -> None:
     ("headers", "status"),
     [
         ((HOST,), 401),
-        ((HOST, ("cookie", f"{COOKIE}=wrong")), 401),
+        ((HOST, ("cookie", f"{NAME}=wrong")), 401),
         ((("host", "evil.example:8080"), MINE), 403),
         ((HOST, MINE, ("origin", "http://evil.example")), 403),
         ((HOST, MINE, ("content-length", str(MOST_BODY_BYTES + 1))), 413),
@@ -90,6 +91,11 @@ def test_nothing_of_what_is_refused_reaches_the_application(headers: Any, status
     inside = Inside()
     assert ask(inside, *headers, method=method)[0] == status
     assert inside.seen == []
+
+
+def test_who_is_refused_loses_the_connection_and_keeps_no_place() -> None:
+    assert ask(Inside(), HOST)[1]["connection"] == "close"
+    assert "connection" not in ask(Inside(), HOST, MINE)[1]
 
 
 def test_a_token_does_not_post() -> None:

@@ -48,6 +48,7 @@ const canbaseHold = (() => {
   for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) addEventListener(kind, release);
   addEventListener("contextmenu", event => { if (event.target.closest && event.target.closest("[data-hold]")) event.preventDefault(); });
   addEventListener("keydown", event => {
+    if (event.metaKey || event.ctrlKey || event.altKey) return release();  // a keyboard may keep the keyup of the others to itself (macOS)
     if (!(event.key in KEYS) || !socket || !document.querySelector("[data-hold]") || event.target.closest("input")) return;
     event.preventDefault();
     if (!event.repeat) { keys.add(event.key); fromKeys(); }
