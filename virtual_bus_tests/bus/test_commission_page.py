@@ -66,7 +66,10 @@ def turning(page_of_bench: tuple[str, SimControl, Any]) -> Iterator[Any]:
     time.sleep(1.0)  # the process behind the page ends
 
 
-@pytest.mark.parametrize("way", ["the large STOP", "Stop on the page", "the page goes", "nobody looks at it"])
+WAYS = ("the large STOP", "Stop on the page", "the page goes", "nobody looks at it", "another browser looks on")
+
+
+@pytest.mark.parametrize("way", WAYS)
 def test_the_wheel_stops(page_of_bench: tuple[str, SimControl, Any], turning: Any, way: str) -> None:
     control = page_of_bench[1]
     if way == "the large STOP":
@@ -77,6 +80,12 @@ def test_the_wheel_stops(page_of_bench: tuple[str, SimControl, Any], turning: An
     elif way == "Stop on the page":
         turning.get_by_role("button", name="Stop", exact=True).click()
     elif way == "the page goes":
+        turning.close()
+    elif way == "another browser looks on":
+        other = page_of_bench[2].new_context().new_page()
+        other.goto(f"{page_of_bench[0]}/?token={TOKEN}")
+        other.goto(f"{page_of_bench[0]}/commission")
+        other.wait_for_function("document.body.innerText.includes('in another browser')")
         turning.close()
     else:
         turning.evaluate("Object.defineProperty(document, 'hidden', {value: true})")

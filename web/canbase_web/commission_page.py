@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from nicegui import Client, ui
+from nicegui.events import GenericEventArguments
 
 from canbase_config.robot import Robot
 from canbase_web.floor_view import outlines
 from canbase_web.pages import Pages, section
+from canbase_web.presence import PERIOD_S, SEEN
 
-PERIOD_S: Final = 0.25
 STEPS: Final = {"directions": "directions", "scale": "scale", "proof": "self-stop", "floor": "radius and track"}
 BEFORE: Final = (
     "Wheels up: all wheels off the floor, nothing near them, the emergency stop (STO) within reach and tried. "
@@ -40,11 +41,13 @@ class _View:
         self._pages, self._dialog, self._client = pages, pages.commissioning, client
         self._lines_shown: object = None
         self._key_shown: str | None = None
+        self._leads = False
+        """This browser has begun the run: it alone proves that somebody is there, and answers. Others may stop it."""
         self._before()
         self._question()
         with section("Messages"):
             self._lines = ui.column().classes("w-full q-gutter-none")
-        ui.on("canbase_proof", lambda event: self._dialog.on_proof(event.args, time.monotonic()))
+        ui.on("canbase_proof", self._on_proof)
         self._refresh()
         ui.timer(PERIOD_S, self._refresh)
         ui.timer(PERIOD_S, self._prove)
@@ -78,8 +81,9 @@ class _View:
         self._begin.set_enabled(bool(self._unlocked.value) and not dialog.runs)
         self._init.set_enabled(bool(self._unlocked.value) and not dialog.runs)
         self._stop.set_enabled(dialog.runs)
-        self._answers.set_visibility(question is not None)
-        self._said.set_text(question["text"] if question else "at work" if dialog.runs else dialog.ended)
+        self._answers.set_visibility(question is not None and self._leads)
+        said = question["text"] if question else "at work" if dialog.runs else dialog.ended
+        self._said.set_text(f"{said}{self._other}")
         self._wrong.set_text(dialog.again)
         if dialog.told is not self._lines_shown:
             self._lines_shown = dialog.told
@@ -105,28 +109,49 @@ class _View:
         known = [words for start, words in CHOICES.items() if question["ask"].startswith(start)]
         with self._choices:
             for word in known[0] if known else ("yes", "no") if question["confirms"] else ():
-                ui.button(word, on_click=lambda word=word: self._dialog.answer(word)).props("outline")
+                ui.button(word, on_click=lambda word=word: self._answer_with(word)).props("outline")
+
+    @property
+    def _other(self) -> str:
+        return " (in another browser, which has begun this)" if self._dialog.runs and not self._leads else ""
 
     def _answer(self) -> None:
-        self._dialog.answer(str(self._text.value or ""))
+        self._answer_with(str(self._text.value or ""))
+
+    def _answer_with(self, words: str) -> None:
+        if self._leads:
+            self._dialog.answer(words)
+
+    async def _run(self, *words: str) -> None:
+        if self._dialog.runs:
+            return
+        self._leads = True
+        try:
+            await self._dialog.run(*words)
+        finally:
+            self._leads = False
 
     async def _start(self) -> None:
         steps = ",".join(step for step, box in self._steps.items() if box.value)
         if steps and self._unlocked.value:
-            await self._dialog.run("commission", "--config", str(self._pages.loaded.path), "--steps", steps)
+            await self._run("commission", "--config", str(self._pages.loaded.path), "--steps", steps)
 
     async def _write(self) -> None:
         if not self._unlocked.value:
             return
         here = self._pages.loaded.path
         file = here.parent / Path(str(self._output.value)).name
-        await self._dialog.run("init", "--config", str(here), "--output", str(file))
+        await self._run("init", "--config", str(here), "--output", str(file))
+
+    def _on_proof(self, event: GenericEventArguments) -> None:
+        if self._leads:
+            self._dialog.on_proof(event.args, time.monotonic())
 
     def _prove(self) -> None:
         """The browser sends the number back, unless nobody looks at the page."""
-        if self._dialog.runs:
+        if self._leads:
             number = self._dialog.proof(time.monotonic())
-            self._client.run_javascript(f"if (!document.hidden) emitEvent('canbase_proof', {number})")
+            self._client.run_javascript(SEEN.format(event="canbase_proof", number=number))
 
 
 def _wheels(robot: Robot, key: str) -> str:

@@ -12,9 +12,10 @@ import json
 from typing import Any, Final
 
 from canbase_runtime.own_modules import module_command
+from canbase_web.presence import Presence
 
-PROOF_S: Final = 0.8
-"""A number that comes back later proves nothing."""
+ENDS_S: Final = 3.5
+"""A process that was told to stop ends within this time: safe_stop.py takes 2.1 s, its report and its end the rest."""
 MOST_LINES: Final = 500
 LONGEST_LINE: Final = 8192
 
@@ -24,8 +25,11 @@ class CommissioningDialog:
 
     def __init__(self) -> None:
         self._process: asyncio.subprocess.Process | None = None
-        self._sent: dict[int, float] = {}
-        self._number = 0
+        self._over = asyncio.Event()
+        self._over.set()
+        self._stops = False
+        self._code: int | None = None
+        self._presence = Presence()
         self.told: list[tuple[str, bool]] = []
         """Text, and whether it must not be overlooked."""
         self.question: dict[str, Any] | None = None
@@ -35,14 +39,24 @@ class CommissioningDialog:
 
     @property
     def runs(self) -> bool:
-        """Whether the process lives."""
-        return self._process is not None and self._process.returncode is None
+        """Whether a process lives, or is being started."""
+        return not self._over.is_set()
 
     async def run(self, *words: str) -> None:
         """From the start of `canbase WORDS --json` to its end."""
         if self.runs:
             return
+        self._over.clear()
+        self._stops, self._code = False, None
         self.told, self.question, self.again, self.ended = [], None, "", ""
+        try:
+            await self._live(*words)
+        finally:
+            self.question = self._process = None
+            self.ended = "finished" if self._code == 0 else f"ended with exit code {self._code}"
+            self._over.set()
+
+    async def _live(self, *words: str) -> None:
         self._process = process = await asyncio.create_subprocess_exec(
             *module_command("canbase_cli", *words, "--json"),
             stdin=asyncio.subprocess.PIPE,
@@ -51,6 +65,8 @@ class CommissioningDialog:
             limit=LONGEST_LINE,
         )
         assert process.stdout is not None
+        if self._stops:  # meanwhile
+            self.stop()
         is_read = False
         try:
             while line := await process.stdout.readline():
@@ -58,21 +74,17 @@ class CommissioningDialog:
             is_read = True
         finally:
             if not is_read:  # a line without an end, or this page's server ends: then the wheels stop as well
-                process.terminate()
-            code = await process.wait()
-            self.question = None
-            self.ended = "finished" if code == 0 else f"ended with exit code {code}"
+                with contextlib.suppress(ProcessLookupError):
+                    process.terminate()
+            self._code = await process.wait()
 
     def proof(self, now_s: float) -> int:
         """A number for the browser."""
-        self._number += 1
-        self._sent = {each: at_s for each, at_s in self._sent.items() if at_s > now_s - PROOF_S} | {self._number: now_s}
-        return self._number
+        return self._presence.number(now_s)
 
     def on_proof(self, number: object, now_s: float) -> None:
         """The number came back: the person is told to be there, once for each number."""
-        sent_s = self._sent.pop(number, None) if isinstance(number, int) else None
-        if sent_s is not None and now_s - sent_s <= PROOF_S:
+        if self._presence.on_number(number, now_s):
             self._say(alive=True)
 
     def answer(self, text: str) -> None:
@@ -83,10 +95,23 @@ class CommissioningDialog:
 
     def stop(self) -> None:
         """Everything, at once."""
+        self._stops = True
         self._say(stop=True)
 
+    async def end(self) -> tuple[bool, str]:
+        """Stop everything, and wait for the end of the process: it takes the power off before. Whether it did, and the
+        sentence."""
+        self.stop()
+        try:
+            await asyncio.wait_for(self._over.wait(), ENDS_S)
+        except asyncio.TimeoutError:
+            return False, f"commissioning was told to stop, and has not ended within {ENDS_S:g} s: wheels may turn"
+        if self._code is None or self._code < 0:
+            return False, f"commissioning {self.ended} before it took the power off: wheels may turn"
+        return True, "commissioning has ended: quick stop, then power off for every drive that it moved"
+
     def _say(self, **values: object) -> None:
-        if self.runs and self._process is not None and self._process.stdin is not None:
+        if self._process is not None and self._process.stdin is not None:
             with contextlib.suppress(OSError, RuntimeError):  # it is ending
                 self._process.stdin.write(json.dumps(values).encode() + b"\n")
 

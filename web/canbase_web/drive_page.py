@@ -108,7 +108,7 @@ def _start(pages: Pages, distance: ui.number, speed: ui.number) -> None:
     if not distance.value or not speed.value:
         ui.notify("A distance and a speed are numbers other than 0.", type="warning")
         return
-    pages.link.goals.start(float(distance.value), float(speed.value))
+    pages.drive(float(distance.value), float(speed.value))
 
 
 async def _reset(pages: Pages, answer: ui.label) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import math
 import secrets
 import time
 from typing import Any, Final
@@ -62,7 +63,7 @@ class HoldSocket:
                 ):
                     break
                 self._take(page, json.loads(text))
-        except (WebSocketDisconnect, ValueError, TypeError, KeyError, RuntimeError):
+        except (WebSocketDisconnect, ValueError, TypeError, KeyError, OverflowError, RuntimeError):
             pass  # it has gone, or what it sent is no order: both end what it held
         finally:
             self._hold.forget(page)
@@ -80,15 +81,22 @@ class HoldSocket:
             self._hold.on_order(page, press, number, float(said["forward"]), float(said["turn"]), time.monotonic())
 
     async def run(self) -> None:
-        """Every NUMBER_S: publish what is held, and give the pages a new number."""
-        while True:
-            now_s = time.monotonic()
-            speed = self._hold.speed(now_s)
-            if speed is not None:
-                self._link.order(speed)
-            if self._pages:
-                await self._tell(now_s)
-            await asyncio.sleep(NUMBER_S)
+        """Every NUMBER_S: publish what is held, and give the pages a new number. However it ends, nothing is held."""
+        try:
+            while True:
+                now_s = time.monotonic()
+                self._publish(now_s)
+                if self._pages:
+                    await self._tell(now_s)
+                await asyncio.sleep(NUMBER_S)
+        finally:
+            self._publish(math.inf)
+
+    def _publish(self, now_s: float) -> None:
+        """Nothing where nothing is held: a zero of this source would take the base from a lower one."""
+        speed = self._hold.speed(now_s)
+        if speed is not None:
+            self._link.order(speed)
 
     async def _tell(self, now_s: float) -> None:
         number, holder = self._hold.number(now_s), self._hold.holder(now_s)

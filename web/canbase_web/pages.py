@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import html
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
 
-from nicegui import ui
+from nicegui import Client, ui
 
 from canbase_config.derive import watchdog_config
 from canbase_config.load import Loaded
@@ -16,6 +17,7 @@ from canbase_watchdog.envelope import Bounds, Envelope
 from canbase_web.commissioning_dialog import CommissioningDialog
 from canbase_web.hold_socket import HoldSocket
 from canbase_web.now_view import Robot
+from canbase_web.presence import PERIOD_S, SEEN, Presence
 from canbase_web.robot_link import RobotLink
 
 MENU: Final = (
@@ -53,6 +55,8 @@ class Pages:
         self._envelope: Envelope | None = None
         self.commissioning = CommissioningDialog()
         """One run for all browsers."""
+        self.watch = Presence()
+        """Whether any browser shows any page: each has the stop."""
 
     def now(self) -> tuple[Robot, float, Bounds]:
         """The robot, the time, and what its leases allow: by the orders that the filter reports, as the watchdog
@@ -92,13 +96,30 @@ class Pages:
                 sanitize=False,
             )
             yield
+        client = ui.context.client
+        ui.on("canbase_seen", lambda event: self.watch.on_number(event.args, time.monotonic()))
+        ui.timer(PERIOD_S, lambda: self._prove(client))
+
+    def _prove(self, client: Client) -> None:
+        if self.link.goals.runs:
+            number = self.watch.number(time.monotonic())
+            client.run_javascript(SEEN.format(event="canbase_seen", number=number))
+
+    def drive(self, distance_m: float, speed_mps: float) -> None:
+        """Send a goal, which is canceled when no browser shows a page any more: who sent it can then stop nothing."""
+        self.watch.begin(time.monotonic())
+        self.link.goals.start(distance_m, speed_mps, lambda: self.watch.is_lost(time.monotonic()))
 
     async def stop(self) -> tuple[bool, str]:
-        """The large stop: whichever part moves the wheels, the driver or commissioning. Whether it worked, and why."""
-        if self.commissioning.runs:
-            self.commissioning.stop()
-            return True, "commissioning stops all wheels and takes the power off"
-        return await self.link.stop()
+        """The large stop: of every part that may move the wheels. Whether each of them stops, and what it said.
+
+        Commissioning may be at work beside a driver: until it has heard it, and while it waits for an answer.
+        """
+        parts = [self.commissioning.end()] if self.commissioning.runs else []
+        if not parts or self.link.has_driver:
+            parts.append(self.link.stop())
+        answers = await asyncio.gather(*parts)
+        return all(done for done, _ in answers), "; ".join(sentence for _, sentence in answers)
 
     def stop_answer(self, done: bool, sentence: str) -> str:
         """The page after the stop, for a browser without script; the script takes its sentence."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
+from collections.abc import Callable
 from typing import Any, Final
 
 import rclpy
@@ -110,11 +111,16 @@ class RobotLink:
         else:
             self._order.publish(twist)
 
+    @property
+    def has_driver(self) -> bool:
+        """Whether a motor driver offers to be stopped."""
+        return bool(self._stop.service_is_ready())
+
     async def stop(self) -> tuple[bool, str]:
         """Call motor_driver/stop; whether the driver stops, and its sentence. Several pages may do it at once."""
         client = self._stop
         end_s = time.monotonic() + STOP_ANSWER_S
-        if not client.service_is_ready():
+        if not self.has_driver:
             return False, f"no motor driver offers {client.srv_name}: is canbase up running, in this namespace?"
         with client.handle:
             number = client.handle.send_request(Trigger.Request())
@@ -130,8 +136,7 @@ class RobotLink:
         return bool(answer.success), printable(answer.message, SENTENCE_LENGTH)
 
     def close(self) -> None:
-        """The last order is a zero; then ROS ends."""
-        self.order(Speed(0.0, 0.0))
+        """Cancel what runs; then ROS ends."""
         self.goals.close()
         rclpy.try_shutdown()
 
@@ -153,13 +158,15 @@ class Goals:
         """Whether a goal is under way."""
         return self._thread is not None and self._thread.is_alive()
 
-    def start(self, distance_m: float, speed_mps: float) -> None:
-        """Send a goal; what becomes of it is in `text`."""
+    def start(self, distance_m: float, speed_mps: float, is_lost: Callable[[], bool]) -> None:
+        """Send a goal; what becomes of it is in `text`. It is canceled when `is_lost()`: who sent it has gone."""
         if self.runs:
             return
         self._canceled.clear()
         self.text, self.share = "sent", 0.0
-        self._thread = threading.Thread(target=self._run, args=(distance_m, speed_mps), name="goal", daemon=True)
+        self._thread = threading.Thread(
+            target=self._run, args=(distance_m, speed_mps, is_lost), name="goal", daemon=True
+        )
         self._thread.start()
 
     def cancel(self) -> None:
@@ -172,14 +179,17 @@ class Goals:
         if self._thread is not None:
             self._thread.join(5.0)
 
-    def _run(self, distance_m: float, speed_mps: float) -> None:
+    def _run(self, distance_m: float, speed_mps: float, is_lost: Callable[[], bool]) -> None:
+        def ends() -> bool:
+            return self._canceled.is_set() or is_lost()
+
         def show(feedback: Any) -> None:
             self.share = 1.0 - feedback.remaining_m / abs(distance_m)
             self.text = f"{feedback.traveled_m:+.3f} m, {feedback.remaining_m:.3f} m left"
 
         try:
-            goal = self._client.send(distance_m, speed_mps, on_feedback=show, interrupted=self._canceled.is_set)
-            result = goal.wait(until=self._canceled.is_set)
+            goal = self._client.send(distance_m, speed_mps, on_feedback=show, interrupted=ends)
+            result = goal.wait(until=ends)
             if result is None:
                 self.text = "canceling; waiting for standstill"
                 goal.cancel()

@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from canbase_web import commissioning_dialog
-from canbase_web.commissioning_dialog import PROOF_S, CommissioningDialog
+from canbase_web.commissioning_dialog import CommissioningDialog
+from canbase_web.presence import PROOF_S
 
 ECHO = """
 import json, sys
@@ -96,6 +97,66 @@ def test_one_run_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
 
     asyncio.run(story())
     assert heard(dialog) == [{"stop": True}]
+
+
+def test_two_fingers_on_begin_start_one_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    dialog = dialog_with(monkeypatch, 1)
+    started = []
+    start = asyncio.create_subprocess_exec
+
+    async def counted(*words: str, **options: Any) -> Any:
+        started.append(words)
+        return await start(*words, **options)
+
+    monkeypatch.setattr(asyncio, "create_subprocess_exec", counted)
+
+    async def story() -> None:
+        both = asyncio.gather(dialog.run("commission"), dialog.run("commission"))
+        await until_asked(dialog)
+        dialog.stop()
+        await both
+
+    asyncio.run(story())
+    assert len(started) == 1
+
+
+def test_a_stop_while_the_process_is_being_started_reaches_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    dialog = dialog_with(monkeypatch, 1, code=1)
+
+    async def story() -> tuple[bool, str]:
+        run = asyncio.create_task(dialog.run("commission"))
+        await asyncio.sleep(0)
+        answer = await dialog.end()
+        await run
+        return answer
+
+    done, said = asyncio.run(story())
+    assert (done, said.startswith("commission"), heard(dialog)) == (True, True, [{"stop": True}])
+
+
+@pytest.mark.parametrize(
+    ("script", "said"),
+    [
+        ("import time; time.sleep(60)", "has not ended within"),
+        ("import os, sys; sys.stdin.readline(); os.abort()", "before it took the power off"),
+    ],
+)
+def test_a_process_that_does_not_obey_is_no_stop(monkeypatch: pytest.MonkeyPatch, script: str, said: str) -> None:
+    monkeypatch.setattr(commissioning_dialog, "module_command", lambda *_: [sys.executable, "-c", script])
+    monkeypatch.setattr(commissioning_dialog, "ENDS_S", 0.5 if "sleep" in script else 20.0)
+    dialog = CommissioningDialog()
+
+    async def story() -> tuple[bool, str]:
+        run = asyncio.create_task(dialog.run("commission"))
+        await asyncio.sleep(0)
+        answer = await dialog.end()
+        run.cancel()
+        await asyncio.gather(run, return_exceptions=True)
+        return answer
+
+    done, sentence = asyncio.run(story())
+    assert not done
+    assert said in sentence
 
 
 def test_without_a_process_nothing_is_said() -> None:

@@ -157,6 +157,9 @@ def test_a_page_that_is_locked_while_its_socket_opens_orders_nothing(monkeypatch
         "no json",
         "[]",
         "1",
+        '{"press": Infinity, "number": 1, "forward": 0, "turn": 0}',
+        '{"press": NaN, "number": 1, "forward": 0, "turn": 0}',
+        '{"press": 1, "number": 1, "forward": 1' + "0" * 160 + '0, "turn": 1e400}',
         "{}",
         '{"press": 1}',
         '{"press": "x", "number": 1, "forward": 0, "turn": 0}',
@@ -191,3 +194,24 @@ def test_more_orders_than_a_page_sends_end_it(monkeypatch: pytest.MonkeyPatch) -
         return task.done()
 
     assert asyncio.run(tell())
+
+
+def test_the_end_of_the_server_orders_zero_where_it_held_and_says_nothing_where_it_did_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A zero of this source has the base for its timeout: it would take it from a goal that drives."""
+
+    async def tell(holds: bool) -> list[Speed]:
+        story = Story(monkeypatch)
+        loop = asyncio.create_task(story.socket.run())
+        socket, page = await story.page(story.socket.ticket())
+        for _ in range(3 if holds else 0):
+            socket.hold()
+            await story.turn()
+        story.robot.orders.clear()
+        loop.cancel()
+        page.cancel()
+        await asyncio.gather(loop, page, return_exceptions=True)
+        return story.robot.orders
+
+    assert [asyncio.run(tell(holds)) for holds in (True, False)] == [[Speed(0.0, 0.0)], []]
