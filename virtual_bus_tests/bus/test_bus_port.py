@@ -246,6 +246,8 @@ def test_a_bus_that_opens_after_the_end_is_closed(port: BusPort, monkeypatch: py
 
 
 LISTEN_S = 0.1
+BEAT = Frame(0x77F, b"\x05")
+"""The heartbeat of the driver."""
 
 
 @pytest.fixture
@@ -273,7 +275,7 @@ def test_after_a_failure_one_frame_goes_out_and_nothing_more_for_the_time_of_lis
 ) -> None:
     began_s = time.monotonic()
     while time.monotonic() - began_s < 0.8 * LISTEN_S:
-        listening.send(SYNC)
+        listening.send(BEAT)
         assert listening.problem == "sending failed 10 times in a row: transmit buffer full"
     assert sent(other) == 1
     time.sleep(0.4 * LISTEN_S)
@@ -287,14 +289,31 @@ def test_another_driver_that_is_heard_then_keeps_this_one_silent(
     listening: BusPort, other: VirtualBus, cob_id: int, data: bytes, probes: bool
 ) -> None:
     if probes:
-        listening.send(Frame(0x000, b"\x82\x00"))
-    other.send(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
-    listening.receive(0.0)
+        listening.send(BEAT)
+    for _ in range(2):  # the first one may be its own that came back
+        other.send(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
+        listening.receive(0.0)
     assert listening.problem.startswith("another driver is on the bus: SYNC or the heartbeat of node 127 came.")
     other_heard = sent(other)
     for _ in range(3):
         listening.send(SYNC)
     assert (other_heard, sent(other)) == (int(probes), 0)
+
+
+@pytest.mark.parametrize(
+    "frame", [SYNC, Frame(0x000, b"\x82\x00"), Frame(0x201, b"\x02\x00" + bytes(4)), Frame(0x601, b"\x40" + bytes(7))]
+)
+def test_nothing_that_drives_of_another_driver_obey_goes_out_before_it_has_listened(
+    listening: BusPort, other: VirtualBus, frame: Frame
+) -> None:
+    """SYNC, NMT, a setpoint, an SDO request: the other driver's robot may be in motion."""
+    for _ in range(3):
+        listening.send(frame)
+    assert (sent(other), listening.problem != "") == (0, True)
+    listening.send(BEAT)
+    time.sleep(1.2 * LISTEN_S)
+    listening.send(frame)
+    assert (sent(other), listening.problem) == (2, "")
 
 
 def test_when_the_other_driver_has_ended_this_one_listens_once_more_and_goes_on(
@@ -304,7 +323,7 @@ def test_when_the_other_driver_has_ended_this_one_listens_once_more_and_goes_on(
     listening.receive(0.0)
 
     def works() -> bool:
-        listening.send(SYNC)
+        listening.send(BEAT)
         return listening.problem == ""
 
     began_s = time.monotonic()
@@ -326,9 +345,9 @@ def test_drives_and_the_watchdog_are_no_driver_and_their_frames_come_through(
 def test_its_own_frame_that_a_simulated_bus_brings_back_is_none_of_another_but_the_same_one_again_is(
     listening: BusPort, other: VirtualBus
 ) -> None:
-    listening.send(SYNC)
+    listening.send(BEAT)
     for expected in ("sending failed 10 times in a row: transmit buffer full", "another driver is on the bus"):
-        other.send(can.Message(arbitration_id=0x080, is_extended_id=False))
+        other.send(can.Message(arbitration_id=0x77F, data=b"\x05", is_extended_id=False))
         listening.receive(0.0)
         assert listening.problem.startswith(expected)
 

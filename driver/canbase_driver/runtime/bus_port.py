@@ -2,7 +2,8 @@
 
 A bus that fails is closed and opened again every RETRY_S, for as long as it takes; it has failed until a frame went out
 or came in. The core disarms meanwhile. What was cut off may have got another driver meanwhile, and a bus that was down
-at the start was never listened to: so after a failure a driver listens again before it sends more than one frame.
+at the start was never listened to: so after a failure a driver listens again before it sends more than its heartbeat,
+once, which shows whether the bus carries and orders nothing of the drives of another one.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ ANOTHER_DRIVER = (
     f"another driver is on the bus: SYNC or the heartbeat of node {DRIVER_NODE_ID} came. "
     "Only one may run; end it first, on the computer that it runs on"
 )
+_OWN_HEARTBEAT = HEARTBEAT + DRIVER_NODE_ID
 _ERRORS = (can.CanError, OSError, ValueError)
 """ValueError: from select for a handle whose adapter is gone."""
 
@@ -48,7 +50,7 @@ class BusError(Exception):
 
 def is_of_a_driver(frame: Frame) -> bool:
     """Whether only a driver sends it: docs/bus.md."""
-    return frame.cob_id in (SYNC.cob_id, HEARTBEAT + DRIVER_NODE_ID)
+    return frame.cob_id in (SYNC.cob_id, _OWN_HEARTBEAT)
 
 
 class _Opening(threading.Thread):
@@ -144,7 +146,7 @@ class BusPort:
 
     def send(self, frame: Frame) -> None:
         """Send now or never."""
-        if self._bus is None or self._is_silent():
+        if self._bus is None or self._is_silent() or (self._listens and frame.cob_id != _OWN_HEARTBEAT):
             return
         try:
             self._bus.write(frame.cob_id, frame.data, SEND_TIMEOUT_S)
