@@ -76,7 +76,6 @@ class Member:
             self._bus.queued += 1
             self._bus.start()
 
-
     def take(self) -> tuple[int, bytes]:
         """The first frame leaves the buffer."""
         frame = self.waiting.popleft()
