@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from functools import partial
 
 from canbase_config import stopping
 from canbase_config.robot import DRIVER_NODE_ID, Robot
@@ -385,9 +384,16 @@ class DriverCore:
             table[HEARTBEAT + node.node_id] = (node.on_heartbeat, node)
             table[SDO_TO_CLIENT + node.node_id] = (node.on_sdo, node)
             for axis in node.axes:
-                table[node.layout.status_cob_id(axis.drive.axis)] = (partial(self._on_status, node, axis), None)
-                table[node.layout.velocity_cob_id(axis.drive.axis)] = (partial(self._on_velocity, node, axis), None)
+                status, velocity = self._feedback_handlers(node, axis)
+                table[node.layout.status_cob_id(axis.drive.axis)] = (status, None)
+                table[node.layout.velocity_cob_id(axis.drive.axis)] = (velocity, None)
         return table
+
+    def _feedback_handlers(self, node: CanopenNode, axis: Axis) -> tuple[Handler, Handler]:
+        return (
+            lambda frame, now_s: self._on_status(node, axis, frame, now_s),
+            lambda frame, now_s: self._on_velocity(node, axis, frame, now_s),
+        )
 
     def snapshot(self, now_s: float) -> DriverSnapshot:
         """What the driver knows now."""

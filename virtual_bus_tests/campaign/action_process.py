@@ -62,7 +62,8 @@ class ActionProcess(Process):
         self._mux: Mux | None = None
         self._shutdown = False
         self._turned_at = self.clock.now_s
-        self.every(1.0 / self._robot.action.control_hz, self._on_timer, phase_s=0.002)
+        self._period_s = 1.0 / self._robot.action.control_hz
+        self.every(self._period_s, self._on_timer, phase_s=0.002)
 
     def die(self) -> None:
         """The goal dies with its server."""
@@ -101,7 +102,7 @@ class ActionProcess(Process):
     def _on_timer(self) -> None:
         now_s = self.clock.now_s
         if self.goals and not self.goals[-1].ends:
-            self.goals[-1].held_up_s += max(0.0, now_s - self._turned_at - 1.0 / self._robot.action.control_hz)
+            self.goals[-1].held_up_s += max(0.0, now_s - self._turned_at - self._period_s)
         self._turned_at = now_s
         cycle = self.goal_queue.tick(self._inputs(), now_s)
         if cycle.twist is not None:

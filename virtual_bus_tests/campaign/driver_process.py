@@ -60,7 +60,9 @@ class DriverProcess(Process):
         """A new core: nothing is booted, and its record decides what is latched."""
         self.core = DriverCore(self._robot, found=self.disk.found())
         self.asked = ""
-        self._period_s = 1.0 / self._robot.rates.control_hz
+        rates = self._robot.rates
+        self._period_s, self._status_s = 1.0 / rates.control_hz, 1.0 / rates.status_hz
+        self._samples = round(rates.control_hz / rates.odometry_hz)
         self._cycle = 0
         self.snapshot: DriverSnapshot | None = None
         self._told: tuple[object, object] | None = None
@@ -158,9 +160,8 @@ class DriverProcess(Process):
     def _publish(self, now_s: float) -> None:
         """odom at 50 Hz while it is valid, the status at its rate and on every change."""
         status = (self.core.state, self.core.finding.cause)
-        due = status != self._told or now_s - self._status_at >= 1.0 / self._robot.rates.status_hz
-        samples = round(self._robot.rates.control_hz / self._robot.rates.odometry_hz)
-        if not due and self._cycle % samples:
+        due = status != self._told or now_s - self._status_at >= self._status_s
+        if not due and self._cycle % self._samples:
             return
         snapshot = self.snapshot = self.core.snapshot(now_s)
         if snapshot.odometry.valid:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
-from campaign.can_bus import CanBus, Receiver
+from campaign.can_bus import NOTHING, CanBus, Receiver
 from campaign.clock import FINE, Pace
 from campaign.robots import DrawnRobot
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID
@@ -45,9 +45,9 @@ class Drives:
             node_id: bus.join(f"drive{node_id}", _Port(self, node_id, node))
             for node_id, node in self.bench.nodes.items()
         }
-        self._urgent = {0x000, 0x080}
-        for node_id in self.bench.nodes:
-            self._urgent |= {0x500 + node_id, 0x600 + node_id}
+        urgent = {0x000, 0x080} | {first + node_id for node_id in self.bench.nodes for first in (0x500, 0x600)}
+        self._urgent = [cob_id in urgent for cob_id in range(NOTHING)]
+        """By identifier: the world moves before the frame is taken."""
         self.heard = dict.fromkeys(self.bench.nodes, bus.clock.now_s)
         self.ordered = dict.fromkeys(self.bench.nodes, bus.clock.now_s)
         """When each node last received a setpoint of its own."""
@@ -65,6 +65,14 @@ class Drives:
         motor = axis.motor
         blind = not axis.encoder.closes_loop and abs(motor.force_n) <= ROLLS_SHARE * motor.peak_force_n
         return blind or not motor.powered
+
+    @staticmethod
+    def roll(axes: Iterable[Axis]) -> bool:
+        """All of them do."""
+        for axis in axes:  # noqa: SIM110 - every step
+            if not Drives.rolls(axis):
+                return False
+        return True
 
     def place(self, wheel: int) -> tuple[int, int]:
         """Node id and axis of a wheel, counted in the order of robot.yaml, and round again."""
@@ -86,7 +94,7 @@ class Drives:
 
     def hear(self, node_id: int, node: SimulatedNode, cob_id: int, data: bytes) -> None:
         """A frame for a node. What acts at once, or samples, needs the world of now; all else may be a little early."""
-        if cob_id in self._urgent:
+        if self._urgent[cob_id]:
             if self.moved_at < self._clock.now_s:
                 self._say()
             node.on_frame(cob_id, data, self._clock.now_s)

@@ -35,7 +35,7 @@ from canbase_runtime.driver_state import DriverState
 from canbase_sim.cia402.states import State
 from canbase_velocity.twist import ZERO, Twist
 from canbase_watchdog.ladder import RUNGS, Step
-from canbase_watchdog.watchdog import Answer
+from canbase_watchdog.watchdog import Answer, Status
 from canbase_watchdog.watchdog import State as WatchdogState
 
 STEP_S = 0.01
@@ -285,8 +285,8 @@ class Judge:
         done = sum(outcome.done for outcome in self._outside.resets)
         if watchdog.running and status.state is WatchdogState.WATCHING:
             self._watching_at = now_s
-        latched = self._latched_now()
-        if "watchdog" in latched.keys() - self._latches.keys():
+        latched = self._latched_now(status)
+        if "watchdog" in latched and "watchdog" not in self._latches:
             self._tripped_at = now_s
             self.trips.append(status.verdict.cause.name.lower())
         if self._gone("driver", latched) and done == self._resets_done:
@@ -298,21 +298,20 @@ class Judge:
             self._wishes.on_reset(now_s)
             self._rests_since = now_s
         self._fresh, self._resets_done = self._fresh or done > self._resets_done, done
-        if latched.keys() != self._latches.keys():
+        if (latched or self._latches) and latched.keys() != self._latches.keys():
             self._note_latches(latched, now_s)
         self._latches = latched
 
-    def _latched_now(self) -> dict[str, object]:
+    def _latched_now(self, status: Status) -> dict[str, object]:
         """What is latched, or was when its process died; and what was requested of the driver."""
         driver, watchdog, processes = self._world.driver, self._world.watchdog, self._world.processes
-        latched = {
-            name: core for name, core in self._latches.items() if name in processes and not processes[name].alive
-        }
+        latches = self._latches.items()
+        latched = {name: core for name, core in latches if name in processes and not processes[name].alive}
         if driver.alive and driver.core.state is DriverState.LATCHED:
             latched["driver"] = driver.core
         if driver.alive and driver.asked:
             latched[f"the request to {driver.asked}"] = driver.core
-        if watchdog.alive and watchdog.core.status.state is WatchdogState.TRIPPED:
+        if watchdog.alive and status.state is WatchdogState.TRIPPED:
             latched["watchdog"] = watchdog.core
         return latched
 
@@ -333,15 +332,16 @@ class Judge:
 
     def _check_drives(self, now_s: float) -> None:
         robot = self._world.robot
-        grace_s = robot.timeouts.watchdog_s + notice_s(robot)
         for change in self._world.drives.changes():
             self._world.note(f"drive {change.node_id}: {change.before.name} → {change.after.name}")
             by_stranger = now_s < self._strangers.sent_at + SENT_S
+            grace_s = robot.timeouts.watchdog_s + notice_s(robot)
             if change.after is State.OPERATION_ENABLED and now_s > self._watching_at + grace_s and not by_stranger:
                 self._violate("enabling", f"drive {change.node_id}, {now_s - self._watching_at:.2f} s without watchdog")
         fastest_mps = max(self._max_wheel_mps, self._reach.fastest_mps)
-        brakes_s = fastest_mps / robot.limits.emergency_deceleration_mps2
-        for node_id, axis in self._reach.turning():
+        turning = self._reach.turning()
+        brakes_s = fastest_mps / robot.limits.emergency_deceleration_mps2 if turning else 0.0
+        for node_id, axis in turning:
             alone_s = now_s - max(self._reach.heard(node_id), self._reach.lost_at[node_id])
             if alone_s > self._reach.alone_s + brakes_s + 0.1 and self._reach.stops_alone(node_id):
                 self._violate("heartbeat", f"drive {node_id}.{axis} turns, {alone_s:.2f} s without its masters")
@@ -374,7 +374,7 @@ class Judge:
     def _coasts(self) -> bool:
         """The wheels of one side roll: no motor of it brakes."""
         drives = self._world.drives
-        return any(all(drives.rolls(axis) for axis in side) for side in drives.sides)
+        return any(drives.roll(side) for side in drives.sides)
 
     def _was_pushed(self) -> bool:
         """Strange hands moved the base after the wall came, or just before."""

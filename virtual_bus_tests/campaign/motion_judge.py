@@ -102,6 +102,8 @@ class MotionJudge:
         self.order(Twist(0.0, 0.0))
         self._fast_since = self._beside_since = self._lies_since = now_s
         self._before_mps = 0.0
+        self._heartbeat_s = world.robot.timeouts.drive_heartbeat_s
+        self._watchdog_s = world.robot.timeouts.watchdog_s
         self._impulse_s = world.robot.watchdog.stand_impulse_s + JITTER_S
         self._unasked_at = self._unwatched_at = -math.inf
         self.ran_away = False
@@ -145,24 +147,24 @@ class MotionJudge:
         """The faster side with a motor that drives or brakes it."""
         drives, speeds = self._world.drives, (self._shown.left_mps, self._shown.right_mps)
         sides = zip(speeds, drives.sides, strict=True)
-        return max((abs(mps) for mps, side in sides if not all(map(drives.rolls, side))), default=0.0)
+        return max((abs(mps) for mps, side in sides if not drives.roll(side)), default=0.0)
 
     def _rolls_blindly(self) -> bool:
         """The wheels of a side roll, with power, as their drives see nothing of it."""
         drives = self._world.drives
-        return any(any(axis.motor.powered for axis in side) and all(map(drives.rolls, side)) for side in drives.sides)
+        return any(any(axis.motor.powered for axis in side) and drives.roll(side) for side in drives.sides)
 
     def _missed_s(self, now_s: float) -> float:
         """No drive reports anything without SYNC: a driver that hangs or is dead is missed first [s]. And a driver
         alone misses its watchdog before it stops what a stranger's setpoints move."""
-        world, timeouts = self._world, self._world.robot.timeouts
+        world = self._world
         if not world.driver.running:
             self._unasked_at = now_s
         if not world.watchdog.running and world.intruder.setpoints_mps:
             self._unwatched_at = now_s
-        unasked = self._fast_since - timeouts.drive_heartbeat_s <= self._unasked_at
-        unwatched = self._fast_since - timeouts.watchdog_s <= self._unwatched_at
-        return max(unasked * timeouts.drive_heartbeat_s, unwatched * timeouts.watchdog_s)
+        unasked = self._fast_since - self._heartbeat_s <= self._unasked_at
+        unwatched = self._fast_since - self._watchdog_s <= self._unwatched_at
+        return max(unasked * self._heartbeat_s, unwatched * self._watchdog_s)
 
     def _runaway(self, now_s: float) -> tuple[str, str] | None:
         ordered_mps = self._wheel.value
@@ -189,7 +191,7 @@ class MotionJudge:
         the wheel rolls out after that."""
         slower, drives = self._shown.fastest_mps < self._before_mps, self._world.drives
         self._before_mps = self._shown.fastest_mps
-        rolls_out = slower and any(all(map(drives.rolls, side)) for side in drives.sides)
+        rolls_out = slower and any(drives.roll(side) for side in drives.sides)
         return self._shown.is_blind and (rolls_out or self._shown.pushed_blindly_s <= self._impulse_s)
 
     def _standstill(self, now_s: float) -> tuple[str, str] | None:

@@ -8,7 +8,7 @@ its own quick stop closes its loop on that sensor. STO, wired, stops both. A wat
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
 from campaign.envelope import tolerance_mps
 from campaign.world import World
@@ -57,6 +57,8 @@ class Reach:
         rungs_s = RUNGS[Step.DISABLE_VOLTAGE].obey_s + RUNGS[Step.HEARTBEAT_WITHHELD].obey_s
         found_s = max(watchdog.motion_missing_s, world.robot.timeouts.feedback_s) + watchdog.drive_lag_s
         self._reset_s = found_s + rungs_s + RESETS_S
+        self._least_mps2 = BRAKING_SHARE * world.robot.limits.deceleration_mps2
+        self._missed_s = world.robot.timeouts.watchdog_s
 
     def step(self, stands: bool) -> None:
         """Look at all drives now."""
@@ -86,16 +88,16 @@ class Reach:
         able = node_id not in self._weak and not self._lies(node)
         return self.alone_s < math.inf and able and not forgot
 
-    def turning(self) -> Iterator[tuple[int, int]]:
+    def turning(self) -> list[tuple[int, int]]:
         """Node id and axis of each wheel that turns with power."""
         base, nodes = self._world.drives.bench.base, self._world.drives.bench.nodes
         if base.resting:
-            return
-        speeds = {"left": base.v_left_mps, "right": base.v_right_mps}
-        if max(abs(base.v_left_mps), abs(base.v_right_mps)) > self._moves_mps:
-            for node_id, axis, side in self._wheels:
-                if abs(speeds[side]) > self._moves_mps and nodes[node_id].axes[axis].motor.powered:
-                    yield node_id, axis
+            return []
+        left, right = abs(base.v_left_mps) > self._moves_mps, abs(base.v_right_mps) > self._moves_mps
+        if not (left or right):
+            return []
+        turn = [(node_id, axis) for node_id, axis, side in self._wheels if (left if side == "left" else right)]
+        return [(node_id, axis) for node_id, axis in turn if nodes[node_id].axes[axis].motor.powered]
 
     def heard(self, node_id: int) -> float:
         """When the drive last received what it monitors: heartbeats, or setpoints."""
@@ -137,15 +139,15 @@ class Reach:
         if not world.drives.bench.nodes[node_id].line.hears:
             return False
         sane = not driver.bus_problem and not driver.repeats and not driver.ignores_zero
-        if sane and self._is_there("driver") and ("driver", f"drive{node_id}") not in blocked:
+        if sane and self._is_there("driver") and (not blocked or ("driver", f"drive{node_id}") not in blocked):
             return True
         talks = not world.watchdog.is_deaf and self._is_there("watchdog")
-        return talks and ("watchdog", f"drive{node_id}") not in blocked
+        return talks and (not blocked or ("watchdog", f"drive{node_id}") not in blocked)
 
     def _is_there(self, name: str) -> bool:
         """It runs, or has hung for so short a time that it is not missed."""
         since_s = self._world.clock.now_s - self._ran_at[name]
-        return self._world.processes[name].alive and since_s <= self._world.robot.timeouts.watchdog_s
+        return self._world.processes[name].alive and since_s <= self._missed_s
 
     def _watchdog_reaches(self, node_id: int) -> bool:
         """It is there, and has a line to the drive and from it: it resets no drive from which it receives nothing."""
@@ -166,8 +168,7 @@ class Reach:
 
     def _is_weak(self, axes: Iterable[Axis]) -> bool:
         """A quick stop, or a fault reaction, of one of them has hardly an effect, though its settings demand one."""
-        least_mps2 = BRAKING_SHARE * self._world.robot.limits.deceleration_mps2
-        return any(axis.motor.stop_mps2 < least_mps2 <= axis.stated_mps2 for axis in axes)
+        return any(axis.motor.stop_mps2 < self._least_mps2 <= axis.stated_mps2 for axis in axes)
 
     @staticmethod
     def _lies(node: SimulatedNode) -> bool:

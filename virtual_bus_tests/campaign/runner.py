@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
@@ -64,6 +65,7 @@ def run(
     Ctrl-C ends it after the robots at hand, with what was done.
     """
     refuse_compiled(without)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy's threads have nothing to do, and each fork ends them
     tally = Tally()
     batches = [list(batch) for _, batch in groupby(seeds, lambda seed: seed // SCENARIOS)]
     # Not forked from here: the caller may have threads, and a forked scenario must have none.

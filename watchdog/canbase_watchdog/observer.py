@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 from canbase_watchdog import frames
@@ -179,19 +178,23 @@ class Observer:
         self._routes[frames.SYNC] = self._on_sync
         self._routes[frames.DRIVER_HEARTBEAT] = self._on_driver_heartbeat
         for node_id in self._heard_at:
-            self._routes[frames.HEARTBEAT + node_id] = partial(self._on_heartbeat, node_id)
-            self._routes[frames.SDO_ANSWER + node_id] = partial(self._on_sdo_answer, node_id)
-            self._routes[frames.SDO_REQUEST + node_id] = partial(self._on_sdo_request, node_id)
-            self._routes[frames.QUICK_STOP_RPDO + node_id] = partial(self._on_quick_stop, node_id)
+            self._add_node_routes(node_id)
             for place, key in enumerate(sorted(key for key in self._records if key[0] == node_id)):
                 self._add_axis_routes(place, key)
 
+    def _add_node_routes(self, node_id: int) -> None:
+        routes = self._routes
+        routes[frames.HEARTBEAT + node_id] = lambda data, now_s: self._on_heartbeat(node_id, data, now_s)
+        routes[frames.SDO_ANSWER + node_id] = lambda data, now_s: self._on_sdo_answer(node_id, data, now_s)
+        routes[frames.SDO_REQUEST + node_id] = lambda data, now_s: self._on_sdo_request(node_id, data, now_s)
+        routes[frames.QUICK_STOP_RPDO + node_id] = lambda data, now_s: self._on_quick_stop(node_id, data, now_s)
+
     def _add_axis_routes(self, place: int, key: _Key) -> None:
-        node_id, record = key[0], self._records[key]
+        node_id, record, routes = key[0], self._records[key], self._routes
         setpoint = frames.SETPOINT_RPDO[place] + node_id
-        self._routes[frames.STATUS_TPDO[place] + node_id] = partial(self._on_status, record)
-        self._routes[frames.VELOCITY_TPDO[place] + node_id] = partial(self._on_velocity, record)
-        self._routes[setpoint] = partial(self._on_setpoint, record, setpoint)
+        routes[frames.STATUS_TPDO[place] + node_id] = lambda data, now_s: self._on_status(record, data, now_s)
+        routes[frames.VELOCITY_TPDO[place] + node_id] = lambda data, now_s: self._on_velocity(record, data, now_s)
+        routes[setpoint] = lambda data, now_s: self._on_setpoint(record, setpoint, data, now_s)
 
     def _on_sync(self, data: bytes, now_s: float) -> bool:
         if len(data) > 1:

@@ -95,9 +95,10 @@ class Rpdo:
         return given > mapped
 
     def _apply(self, data: bytes) -> None:
-        for write, value in zip(self._writers, self._codec.unpack_from(data), strict=True):
+        values = self._codec.unpack_from(data)
+        for at, write in enumerate(self._writers):
             try:  # noqa: SIM105 - it costs nothing
-                write(value)
+                write(values[at])
             except SdoAbortedError:  # the object does not take it; an RPDO has no answer
                 pass
 

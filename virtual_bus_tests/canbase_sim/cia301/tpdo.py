@@ -60,8 +60,7 @@ class Tpdo:
         if self._syncs < self._type:
             return
         self._syncs = 0
-        values = self._values
-        data = self._pack(*[values[place] for place in self._places])
+        data = self._mapped()
         if self._type == 0 and data == self._last_data:
             return
         self._last_data = data
@@ -72,12 +71,18 @@ class Tpdo:
         elapsed = now_s - self._last_time
         if elapsed < self._inhibit:
             return
-        values = self._values
-        data = self._pack(*[values[place] for place in self._places])
+        data = self._mapped()
         timer_is_over = self._period > 0.0 and elapsed >= self._period
         if data != self._last_data or timer_is_over:
             self._last_data, self._last_time = data, now_s
             self._say(data)
+
+    def _mapped(self) -> bytes:
+        """What it carries now. Nearly all carry two values; compiled, a star makes a list of them first."""
+        values, places = self._values, self._places
+        if len(places) == 2:
+            return self._pack(values[places[0]], values[places[1]])
+        return self._pack(*[values[place] for place in places])
 
     def _say(self, data: bytes) -> None:
         if not self.lost:
