@@ -73,7 +73,7 @@ def add(pages: Pages) -> None:
 
 def _read(pages: Pages, file: Path) -> list[WheelSpeeds]:
     """Raises OSError and ValueError for a file that is none."""
-    if file.suffix != ".asc" or file.stat().st_size > LARGEST_BYTES:
+    if file.suffix != ".asc" or not file.is_file() or file.stat().st_size > LARGEST_BYTES:
         raise ValueError("it is no recording of a stop")
     with can.ASCReader(file) as reader:
         found: list[FrameAt] = [

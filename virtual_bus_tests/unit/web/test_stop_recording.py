@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import struct
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from canbase_config.load import load_robot, sample
 from canbase_driver.drive_units import AxisUnits
 from canbase_web.stop_recording import MOST_POINTS, wheel_speeds
+from canbase_web.stops_page import LARGEST_BYTES, _read
 
 BENCH = load_robot(sample("bench")).robot
 
@@ -39,3 +44,19 @@ def test_a_long_recording_is_thinned(frames: int, points: int) -> None:
     data = struct.pack("<Hi", 0x0F, 100)
     (left, _) = wheel_speeds(BENCH, ((i * 0.01, 0x201, data) for i in range(frames)))
     assert len(left.ordered) == points <= MOST_POINTS
+
+
+@pytest.mark.parametrize("kind", ["a pipe", "a folder", "none", "too large", "another name"])
+def test_what_a_foreign_stop_event_names_is_not_waited_for(tmp_path: Path, kind: str) -> None:
+    """Anybody may publish on stop_events: opening a pipe would hold up a thread of the page for ever."""
+    file = tmp_path / ("stop.asc" if kind != "another name" else "stop.txt")
+    if kind == "a pipe":
+        os.mkfifo(file)
+    elif kind == "a folder":
+        file.mkdir()
+    elif kind != "none":
+        with file.open("wb") as stream:
+            stream.truncate(LARGEST_BYTES + 1 if kind == "too large" else 1)
+    pages: Any = SimpleNamespace(loaded=SimpleNamespace(robot=BENCH))
+    with pytest.raises(ValueError, match="no recording"):
+        _read(pages, file)
