@@ -52,7 +52,7 @@ class PoweredDrives:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self.nodes = {drive.node_id: CanopenNode(drive.node_id, robot) for drive in robot.drives}
+        self.nodes = {drive.node_id: CanopenNode(drive.node_id, robot, identify=True) for drive in robot.drives}
         self.axes: dict[str, Axis] = {a.drive.joint: a for node in self.nodes.values() for a in node.axes}
         self.speeds_mps: dict[str, float] = {}
         """What is wanted of each wheel's rim, forward positive; those that are not in here have no power."""

@@ -15,25 +15,29 @@ from canbase_driver.cia301.sdo_client import Read, SdoClient, SdoError, Write
 
 DUPLICATES = 3
 """After this many requests that were sent once and answered twice, one may be an answer to another client."""
+SLOW_S = 0.05
+"""A request without an answer for this long: the drive is slow or gone, and nobody else waits for it [s]."""
 
 
 class NodeBoot:
     """One boot of one node; for another try make a new one. `drives` are the axes of the node, one or two.
 
     Give it every frame by `on_frame`, then, and at least every 10 ms, call `tick` and send what it returns. It has
-    ended when `report` or `error` is set. One boot takes 45 to 125 SDO transfers an axis: calling `tick` right after
+    ended when `report` or `error` is set. One boot takes 45 to 110 SDO transfers an axis: calling `tick` right after
     `on_frame` makes them follow each other without waiting.
     """
 
-    def __init__(self, node_id: int, drives: tuple[Drive, ...], robot: Robot, settle_s: float = 0.0) -> None:
-        """`settle_s`: see `boot`."""
+    def __init__(
+        self, node_id: int, drives: tuple[Drive, ...], robot: Robot, settle_s: float = 0.0, *, identify: bool = True
+    ) -> None:
+        """`settle_s`, `identify`: see `boot`."""
         self.node_id = node_id
         self.boot_up_at = -math.inf
         """When the boot-up message came that answered the NMT reset [s]; minus infinity: none did."""
         self.report: BootReport | None = None
         self.error: BootError | None = None
         self._name = f"node {node_id} ({', '.join(drive.joint for drive in drives)})"
-        self._sequence = boot(node_id, drives, robot, settle_s)
+        self._sequence = boot(node_id, drives, robot, settle_s, identify=identify)
         self._client = sdo_client(node_id, drives[0].kind.sdo, robot.timeouts.sdo_s)
         self._gap_s = drives[0].kind.sdo.gap_s
         self._held: Read | Write | None = None
@@ -41,6 +45,9 @@ class NodeBoot:
         self._step: Step | None = None
         self._wake_at = 0.0
         self._was_reset = False
+        self.transfers = 0
+        """How many SDO transfers it has begun."""
+        self._begun_at = 0.0
         self.heard = False
         """Whether it has answered any request."""
         self._outbox: list[Frame] = []
@@ -54,6 +61,10 @@ class NodeBoot:
     def configuring(self) -> bool:
         """Whether the drive has answered, and its SDOs fill the bus."""
         return not self.done and self.heard
+
+    def is_transferring(self, now_s: float) -> bool:
+        """Whether its next step is an SDO transfer, and the drive answers."""
+        return self.configuring and isinstance(self._step, Read | Write) and now_s - self._begun_at < SLOW_S
 
     @property
     def waiting_for(self) -> str:
@@ -130,6 +141,9 @@ class NodeBoot:
 
     def _begin(self, step: Step, now_s: float) -> None:
         self._step = step
+        if isinstance(step, Read | Write):
+            self.transfers += 1
+            self._begun_at = now_s
         if isinstance(step, Read | Write) and self._gap_s > 0.0:
             self._held, self._wake_at = step, now_s + self._gap_s
         elif isinstance(step, Read | Write):

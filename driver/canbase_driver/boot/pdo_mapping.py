@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from canbase_driver.boot.steps import BootError, NodeAccess, Steps, unsigned
-from canbase_driver.cia301.pdo import NodeLayout, Pdo
+from canbase_driver.cia301.pdo import AT_ONCE, NodeLayout, Pdo
 from canbase_driver.cia301.sdo_client import Read, SdoAborted, Write
 
 PDO_OFF = 1 << 31
@@ -32,11 +32,8 @@ def configure_pdos(node: NodeAccess, layout: NodeLayout) -> Steps[None]:
         if index not in wanted:
             yield from _switch_off(node, index, cob_id)
     for index, pdo in wanted.items():
-        cob_id = cob_ids[index] & layout.profile.pdo.fixed_cob_id_bits | pdo.cob_id
-        if cob_ids[index] != cob_id or not (yield from _is_right(node, pdo)):
-            yield from _suspend(node, index, cob_ids[index])
-            yield from _configure(node, pdo)
-            yield from node.overwrite(Write(index, 1, cob_id, 4), f"{cob_ids[index]:08X}h")
+        found = cob_ids[index]
+        yield from _make_right(node, pdo, found, found & layout.profile.pdo.fixed_cob_id_bits | pdo.cob_id)
 
 
 def _with_what_it_has(node: NodeAccess, layout: NodeLayout) -> Steps[NodeLayout]:
@@ -81,53 +78,74 @@ def _times(pdo: Pdo) -> list[Write]:
     return [Write(pdo.communication, sub, value, 2) for sub, value in values if value is not None]
 
 
-def _is_right(node: NodeAccess, pdo: Pdo) -> Steps[bool]:
-    for write in (Write(pdo.communication, 2, pdo.transmission_type, 1), *_times(pdo)):
-        if (yield from node.read_if_present(write.index, write.sub)) != write.value:
-            return False
-    return (yield from _is_mapped(pdo))
-
-
-def _configure(node: NodeAccess, pdo: Pdo) -> Steps[None]:
-    yield from _map_what_it_takes(node, pdo)
-    yield from node.set(Write(pdo.communication, 2, pdo.transmission_type, 1))
+def _make_right(node: NodeAccess, pdo: Pdo, found: int, cob_id: int) -> Steps[None]:
+    """`found`: its present COB-ID. The mapping is looked at first: a drive out of its box has another one."""
+    mapped = yield from _other_mapping(pdo)
+    if mapped is None and found == cob_id and (yield from _is_timed(node, pdo)):
+        return
+    yield from _suspend(node, pdo.communication, found)
+    if mapped is not None:
+        yield from _map_what_it_takes(node, pdo, mapped)
+    unread = mapped is not None and pdo.transmission_type != AT_ONCE
+    yield from node.set(_type(pdo), unread=unread)
     for time in _times(pdo):
         yield from node.set_if_present(time)
+    # that a TPDO is on shows by itself: a node without every one of its layout does not become ready
+    on = Write(pdo.communication, 1, cob_id, 4)
+    yield from node.overwrite(on, f"{found:08X}h", read_back=not pdo.is_heard)
 
 
-def _map_what_it_takes(node: NodeAccess, pdo: Pdo) -> Steps[None]:
-    """Without what is optional, where the drive refuses that."""
+def _is_timed(node: NodeAccess, pdo: Pdo) -> Steps[bool]:
+    for write in (_type(pdo), *_times(pdo)):
+        if (yield from node.read_if_present(write.index, write.sub)) != write.value:
+            return False
+    return True
+
+
+def _type(pdo: Pdo) -> Write:
+    return Write(pdo.communication, 2, pdo.transmission_type, 1)
+
+
+def _map_what_it_takes(node: NodeAccess, pdo: Pdo, mapped: int) -> Steps[None]:
+    """Without what is optional, where the drive refuses that. A mapping that is right then stays as it is: some drives
+    have a fixed one."""
     try:
-        yield from _map(node, pdo)
+        yield from _map(node, pdo, mapped)
     except (SdoAborted, BootError) as refused:
         if not pdo.optional:
             raise
         _note_no_torque(node, f"{pdo.name} does not take it ({refused})")
-        yield from _map(node, replace(pdo, mapping=pdo.mapping[: -pdo.optional], optional=0))
+        less = replace(pdo, mapping=pdo.mapping[: -pdo.optional], optional=0)
+        left = yield from _other_mapping(less)
+        if left is not None:
+            yield from _map(node, less, left)
 
 
 def _note_no_torque(node: NodeAccess, why: str) -> None:
     node.notes.append(f"torque unknown: {why}; see options.torque of its drive profile, watchdog.stand_proof")
 
 
-def _map(node: NodeAccess, pdo: Pdo) -> Steps[None]:
-    """A mapping that is right stays as it is: some drives have a fixed one."""
-    count = yield from _count(pdo)
-    if count == len(pdo.mapping) and (yield from _holds(pdo)):
-        return
+def _map(node: NodeAccess, pdo: Pdo, mapped: int) -> Steps[None]:
+    """In place of the `mapped` objects that it carries now. The number in a PDO that is heard shows in its length."""
     node.changes.append(f"{pdo.name}: mapped anew, {len(pdo.mapping)} objects")
-    if count:
+    if mapped:
         yield Write(pdo.mapping_object, 0, 0, 1)
     for sub, entry in enumerate(pdo.mapping, start=1):
         yield Write(pdo.mapping_object, sub, entry, 4)
     yield Write(pdo.mapping_object, 0, len(pdo.mapping), 1)
-    if not (yield from _is_mapped(pdo)):
+    if not (yield from (_holds(pdo) if pdo.is_heard else _is_mapped(pdo))):
         problem = f"{pdo.name} reads back another mapping than was written to {pdo.mapping_object:04X}h"
         raise BootError(node.node_id, problem, "Look up in the manual what this PDO can carry")
 
 
+def _other_mapping(pdo: Pdo) -> Steps[int | None]:
+    """How many objects are mapped; None: the right ones."""
+    count = yield from _count(pdo)
+    return None if count == len(pdo.mapping) and (yield from _holds(pdo)) else count
+
+
 def _is_mapped(pdo: Pdo) -> Steps[bool]:
-    return (yield from _count(pdo)) == len(pdo.mapping) and (yield from _holds(pdo))
+    return (yield from _other_mapping(pdo)) is None
 
 
 def _count(pdo: Pdo) -> Steps[int]:

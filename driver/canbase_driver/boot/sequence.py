@@ -74,13 +74,17 @@ class BootReport:
         return self.self_stop.by is not StopsBy.NOTHING
 
 
-def boot(node_id: int, drives: tuple[Drive, ...], robot: Robot, settle_s: float = 0.0) -> Steps[BootReport]:
+def boot(
+    node_id: int, drives: tuple[Drive, ...], robot: Robot, settle_s: float = 0.0, *, identify: bool = True
+) -> Steps[BootReport]:
     """All steps for one node, its used axes being `drives`. Raises ValueError when they are not one or two axes.
 
     `settle_s`: quiet after a boot-up message [s] where the profile has less (start.settle_s): learnt from a drive that
-    sent a second one. The steps end with the report, or raise BootError when the node cannot be made ready.
+    sent a second one. `identify`: read all of 1018h, not just what `identity` in robot.yaml expects.
+
+    The steps end with the report, or raise BootError when the node cannot be made ready.
     """
-    return _explained(_Boot(node_id, drives, robot, settle_s).run())
+    return _explained(_Boot(node_id, drives, robot, settle_s, identify).run())
 
 
 def _explained(steps: Steps[BootReport]) -> Steps[BootReport]:
@@ -91,8 +95,8 @@ def _explained(steps: Steps[BootReport]) -> Steps[BootReport]:
 
 
 class _Boot:
-    def __init__(self, node_id: int, drives: tuple[Drive, ...], robot: Robot, settle_s: float) -> None:
-        self._settle_s = settle_s
+    def __init__(self, node_id: int, drives: tuple[Drive, ...], robot: Robot, settle_s: float, identify: bool) -> None:
+        self._settle_s, self._identify = settle_s, identify
         self._drives = tuple(sorted(drives, key=lambda drive: drive.axis))
         self._layout = node_layout(node_id, self._drives, robot)
         self._kind = drives[0].kind
@@ -131,6 +135,8 @@ class _Boot:
     def _check_identity(self) -> Steps[Identity]:
         found: dict[str, int | None] = {}
         for sub, name in enumerate(NUMBERS, start=1):
+            if not self._identify and all(getattr(drive.identity, name) is None for drive in self._drives):
+                continue
             found[name] = yield from self._node.read_if_present(IDENTITY, sub)
             for drive in self._drives:
                 shown = "missing" if found[name] is None else f"{found[name]:08X}h"
@@ -204,7 +210,8 @@ class _Boot:
         if command is not None:
             yield from self._make_reset_harmless()
             yield SendNmt(command)
-            if not (yield WaitBootUp(start.boot_up_s)):
+            self._node.was_reset = yield WaitBootUp(start.boot_up_s)
+            if not self._node.was_reset:
                 name = command.name.lower().replace("_", " ")
                 self._node.notes.append(f"no boot-up message within {start.boot_up_s:g} s of NMT {name}")
             if self._settle_s > start.settle_s:
@@ -223,7 +230,7 @@ class _Boot:
                 continue
             found = yield from self._node.read_if_present(write.index, write.sub)
             if found is not None:
-                yield from self._node.set_if_present(write, known=found)
+                yield from self._node.try_to_write(write, known=found)
 
 
 def _state(drive: Drive) -> Steps[DriveState | None]:

@@ -13,7 +13,7 @@ from canbase_config.object_map import MODE, MODE_DISPLAY, TARGET_VELOCITY, place
 from canbase_config.profile import Profile, SdoWrite
 from canbase_config.robot import CYCLIC, DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
 from canbase_driver.boot.steps import BootError, NodeAccess, Steps
-from canbase_driver.cia301.sdo_client import VALUE_INVALID, VALUE_TOO_HIGH, VALUE_TOO_LOW, SdoAborted, Write
+from canbase_driver.cia301.sdo_client import VALUE_INVALID, VALUE_TOO_HIGH, VALUE_TOO_LOW, Read, SdoAborted, Write
 from canbase_driver.drive_units import AxisUnits
 
 HEARTBEAT_CONSUMER, HEARTBEAT_PRODUCER, SYNC_COUNTER, ERROR_BEHAVIOUR = 0x1016, 0x1017, 0x1019, 0x1029
@@ -65,9 +65,9 @@ STOPS_BY_NOTHING = SelfStopSet(StopsBy.NOTHING, "")
 def configure_motion(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None]:
     """Mode, ramps, and no target: one of an earlier life would move the drive as soon as it is enabled."""
     kind, mode = drive.kind, drive.used_mode
-    yield from node.set(write_at(drive, MODE, mode))
-    if kind.options.mode_display in ("yes", "probe"):
-        yield from _check_mode(node, drive, mode)
+    at = place(kind.layout, MODE_DISPLAY, drive.axis)
+    shown_at = Read(at.index, at.sub) if kind.options.mode_display in ("yes", "probe") else None
+    yield from node.set(write_at(drive, MODE, mode), shown_at=shown_at)
     if mode == CYCLIC:
         cycle_ms = round(1000.0 / robot.rates.control_hz)
         yield from node.set_if_present(Write(INTERPOLATION, 1, cycle_ms, 1), kind.options.interpolation)
@@ -133,13 +133,6 @@ def write_at(drive: Drive, index: int, value: int) -> Write:
     return Write(at.index, at.sub, value, at.bits // 8)
 
 
-def _check_mode(node: NodeAccess, drive: Drive, mode: int) -> Steps[None]:
-    at = place(drive.kind.layout, MODE_DISPLAY, drive.axis)
-    shown = yield from node.read_if_present(at.index, at.sub)
-    if shown is not None and shown != mode & 0xFF:
-        node.notes.append(f"{at.index:04X}h:{at.sub} shows mode {shown}, {mode} was set; it may take power to change")
-
-
 def _configure_ramps(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None]:
     """Raises BootError when the drive keeps a softer stop: its way would be longer than all others count with."""
     units, presence = AxisUnits(drive, robot.base), drive.kind.options.ramps
@@ -192,7 +185,7 @@ def _produce_heartbeat(node: NodeAccess, timeout_ms: int) -> Steps[None]:
     refusal = ""
     for period_ms in (wanted, *others):
         try:
-            yield from node.set(Write(HEARTBEAT_PRODUCER, 0, period_ms, 2))
+            yield from node.set(Write(HEARTBEAT_PRODUCER, 0, period_ms, 2), unread=True)
         except SdoAborted as refused:
             refusal = f"1017h:0: {refused.text}"
             if refused.code not in VALUE_REFUSED:
@@ -224,6 +217,8 @@ def _watch_heartbeats(node: NodeAccess, kind: Profile, timeout_ms: int) -> Steps
         node.notes.append("1016h: the drive watches no heartbeat, it will not stop by it")
         return False
     watchdog, driver = (node_id << 16 | timeout_ms for node_id in (WATCHDOG_NODE_ID, DRIVER_NODE_ID))
+    if entries == 2 and node.was_reset and (yield from _takes(node, watchdog, driver)):
+        return True
     left: int | None = None
     for sub in range(2, entries + 1):
         found = yield from node.read_if_present(HEARTBEAT_CONSUMER, sub)
@@ -236,6 +231,16 @@ def _watch_heartbeats(node: NodeAccess, kind: Profile, timeout_ms: int) -> Steps
     if entries > 1:
         yield from node.set_if_present(Write(HEARTBEAT_CONSUMER, 2, driver, 4), known=left)
     return is_watched
+
+
+def _takes(node: NodeAccess, *entries: int) -> Steps[bool]:
+    """1016h:1, 1016h:2 as most drives have it after a reset: empty. False: refused, or not kept."""
+    try:
+        for sub, entry in enumerate(entries, start=1):
+            yield from node.set(Write(HEARTBEAT_CONSUMER, sub, entry, 4), unread=True)
+    except (SdoAborted, BootError):
+        return False
+    return True
 
 
 def _set_vendor_watchdog(node: NodeAccess, kind: Profile, timeout_s: float) -> Steps[str]:

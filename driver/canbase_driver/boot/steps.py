@@ -136,6 +136,8 @@ class NodeAccess:
         self.node_id = node_id
         self.notes: list[str] = []
         self.changes: list[str] = []
+        self.was_reset = False
+        """Its objects 1000h to 1FFFh have the values of power-on (CiA 301): no earlier master's are left to look at."""
 
     def read_if_present(self, index: int, sub: int = 0) -> Steps[int | None]:
         """An unsigned number; None when the drive lacks the object, or refuses it with whatever abort code.
@@ -150,26 +152,53 @@ class NodeAccess:
                 self.notes.append(f"{index:04X}h:{sub} cannot be read: {refused.text}{_see(index, sub)}")
             return None
 
-    def set(self, step: Write, known: int | None = None) -> Steps[None]:
+    def set(
+        self, step: Write, known: int | None = None, *, unread: bool = False, shown_at: Read | None = None
+    ) -> Steps[None]:
         """Write where it differs, and read back. A read-only object may pass when it has the value.
 
-        `known`: the present value, unsigned, where it was read just now. Raises BootError when another value is read
-        back.
+        `known`: the present value, unsigned, where it was read just now. `unread`: after a reset, write at once what no
+        drive has by itself. `shown_at`: where the drive shows what it has taken. Raises BootError when another value is
+        read back.
         """
+        if unread and self.was_reset:
+            yield from self.overwrite(step, "?")
+            return
         before = (yield from self._read(step)) if known is None else _as_bytes(known, step.size)
         if before is None or not _same(before, step.data):
-            yield from self.overwrite(step, _hex(before) if before else "?")
+            yield from self.overwrite(step, _hex(before) if before else "?", shown_at)
+        elif shown_at is not None:
+            yield from self._shows(shown_at, step)
 
-    def overwrite(self, step: Write, before: str) -> Steps[None]:
-        """Write what is known to differ from `before`, and read back. Raises BootError when another value is read."""
+    def overwrite(
+        self, step: Write, before: str, shown_at: Read | None = None, *, read_back: bool = True
+    ) -> Steps[None]:
+        """Write what is known to differ from `before`, and read back, unless it shows elsewhere. Raises BootError when
+        another value is read."""
         refusal = yield from self._write(step)
-        found = yield from self._read(step)
+        is_shown = shown_at is not None and (yield from self._shows(shown_at, step))
+        needs_no_look = is_shown or not (read_back or refusal)
+        found = None if needs_no_look else (yield from self._read(step))
         if found is not None and not _same(found, step.data):
             problem = f"{step} is {_hex(found)}, expected {_hex(step.data)}{refusal}"
             raise BootError(self.node_id, problem, "Set it with the maker's tool, or look for what sets it otherwise")
+        self.note_change(step, before)
+
+    def _shows(self, shown_at: Read, step: Write) -> Steps[bool]:
+        """Whether another object shows the mode that was written."""
+        shown = yield from self.read_if_present(shown_at.index, shown_at.sub)
+        if shown is None or shown == unsigned(step.data):
+            return shown is not None
+        self.notes.append(f"{shown_at} shows mode {shown}, {step.value!r} was set; it may take power to change")
+        return False
+
+    def note_change(self, step: Write, before: str) -> None:
+        """It was written, in place of `before`."""
         self.changes.append(f"{step}: {before} → {_hex(step.data)}")
 
-    def set_if_present(self, step: Write, presence: Presence = "probe", known: int | None = None) -> Steps[bool]:
+    def set_if_present(
+        self, step: Write, presence: Presence = "probe", known: int | None = None, *, unread: bool = False
+    ) -> Steps[bool]:
         """Like `set`, but a drive that lacks, refuses or changes the value only earns a note. Whether it took it.
 
         `presence`: from the profile; an object that it denies is not tried.
@@ -177,7 +206,7 @@ class NodeAccess:
         if presence == "no":
             return False
         try:
-            yield from self.set(step, known)
+            yield from self.set(step, known, unread=unread)
         except SdoAborted as refused:
             self.notes.append(f"{step}: {refused.text}")
             return False
@@ -185,6 +214,18 @@ class NodeAccess:
             self.notes.append(other.problem)
             return False
         return True
+
+    def try_to_write(self, step: Write, known: int) -> Steps[None]:
+        """Write where it differs from `known`, what is read again later in any case; a refusal earns a note."""
+        before = _as_bytes(known, step.size)
+        if _same(before, step.data):
+            return
+        try:
+            yield step
+        except SdoAborted as refused:
+            self.notes.append(f"{step}: {refused.text}")
+        else:
+            self.note_change(step, _hex(before))
 
     def _write(self, step: Write) -> Steps[str]:
         """Empty, or why a read-only object refused."""

@@ -65,6 +65,11 @@ class Pdo:
         return f"{self.kind}{self.number}"
 
     @property
+    def is_heard(self) -> bool:
+        """Whether the driver receives it: whether it is on, and how long it is, shows by itself."""
+        return self.kind == "TPDO"
+
+    @property
     def communication(self) -> int:
         """Index of its communication parameters, 1400h… or 1800h…"""
         return (0x1400 if self.kind == "RPDO" else 0x1800) + self.number - 1

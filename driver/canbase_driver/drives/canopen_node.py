@@ -58,8 +58,10 @@ class Presence(Enum):
 class CanopenNode:
     """A node and its one or two axes."""
 
-    def __init__(self, node_id: int, robot: Robot) -> None:
+    def __init__(self, node_id: int, robot: Robot, *, identify: bool = False) -> None:
+        """`identify`: its report shall have all of 1018h, whatever robot.yaml expects."""
         self.node_id = node_id
+        self._identify = identify
         self._robot = robot
         self._drives = tuple(drive for drive in robot.drives if drive.node_id == node_id)
         self.layout = node_layout(node_id, self._drives, robot)
@@ -120,6 +122,15 @@ class CanopenNode:
         return self._boot is not None and self._boot.configuring
 
     @property
+    def transfers(self) -> int:
+        """How many SDO transfers its boot has begun."""
+        return self._boot.transfers if self._boot is not None else 0
+
+    def is_transferring(self, now_s: float) -> bool:
+        """Its boot has a transfer to make, and the drive answers."""
+        return self._boot is not None and self._boot.is_transferring(now_s)
+
+    @property
     def _is_configured(self) -> bool:
         """Its boot has ended well, and it is not started yet."""
         return self._boot is not None and self._boot.report is not None
@@ -175,7 +186,7 @@ class CanopenNode:
         too_soon = self.boot_error and now_s - self._since_s < RETRY_S
         if self.presence is not Presence.GONE or too_soon or now_s < self._held_until:
             return
-        self._boot = NodeBoot(self.node_id, self._drives, self._robot, self._settle_s)
+        self._boot = NodeBoot(self.node_id, self._drives, self._robot, self._settle_s, identify=self._identify)
         self._boot_up_at = -math.inf
         self._owed_stop = False
         self._go(Presence.BOOTING, now_s)

@@ -13,6 +13,7 @@ from canbase_config.robot import Robot
 from canbase_driver.boot.sdo_budget import SdoBudget
 from canbase_driver.cia301.emcy import emcy_text
 from canbase_driver.cia301.frame import Frame
+from canbase_driver.cia301.nmt import NMT
 from canbase_driver.cia402 import INTERNAL_LIMIT, PREPARED, REMOTE, WARNING, DriveState
 from canbase_driver.drives.axis import Axis
 from canbase_driver.drives.canopen_node import CanopenNode, Presence
@@ -44,7 +45,7 @@ class Drives:
         """Once a cycle: every node goes on, another one first each time; those that are gone begin their boot, those
         that send nothing are looked for. `sync_since`: start of the present run of SYNCs [s].
         """
-        self._budget.refill(sum(len(node.axes) for node in self.nodes if node.has_pdos))
+        self._share_the_bus(now_s)
         self._first = (self._first + 1) % len(self.nodes)
         frames: list[Frame] = []
         for node in (*self.nodes[self._first :], *self.nodes[: self._first]):
@@ -56,11 +57,20 @@ class Drives:
 
     def go_on(self, node: CanopenNode, now_s: float) -> list[Frame]:
         """What a node sends next; while it is being configured, only what the bus has room for."""
-        if node.is_being_configured and self._budget.is_spent:
+        if node.presence is not Presence.BOOTING:
+            return node.tick(now_s)
+        if node.is_being_configured and self._budget.is_spent(node.node_id):
             return []
         frames = node.tick(now_s)
-        self._budget.spend(len(frames))
+        self._budget.spend(node.node_id, sum([frame.cob_id != NMT for frame in frames]))
         return frames
+
+    def _share_the_bus(self, now_s: float) -> None:
+        booting = [node for node in self.nodes if node.presence is Presence.BOOTING]
+        if booting:
+            running_axes = sum([len(node.axes) for node in self.nodes if node.has_pdos])
+            transfers = {node.node_id: node.transfers for node in booting if node.is_transferring(now_s)}
+            self._budget.refill(running_axes, transfers)
 
     @property
     def are_ready(self) -> bool:

@@ -163,7 +163,7 @@ def test_sdo_timeouts_are_those_of_the_profile(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(Drive, "kind", slow)
     drive = FakeDrive(on_write={(0x6060, 0): lambda drive, _: setattr(drive, "powered", False)})
     boot, bench = booted(drive, base)
-    assert "6060h:0: no answer to 1 requests, 2 s each" in error_of(boot)
+    assert "6061h:0: no answer to 1 requests, 2 s each" in error_of(boot)
     assert bench.now_s == pytest.approx(102.0, abs=0.03)
 
 

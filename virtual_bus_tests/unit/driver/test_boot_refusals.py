@@ -284,6 +284,54 @@ def test_a_mapping_that_reads_back_differently_is_an_error() -> None:
     assert "TPDO1 reads back another mapping than was written to 1A00h" in text
 
 
+@pytest.mark.parametrize("index", [0x1600, 0x1603])
+def test_an_rpdo_that_keeps_another_number_of_objects_is_an_error(index: int) -> None:
+    """Nobody hears an RPDO: all of it is read back, also what shows by itself in a TPDO."""
+
+    def kept(drive: FakeDrive, data: bytes) -> None:
+        drive.objects[index, 0] = u8(max(0, data[0] - 1))
+
+    text = error_of(boot_one_axis(FakeDrive(on_write={(index, 0): kept})))
+    assert f"reads back another mapping than was written to {index:04X}h" in text
+
+
+@pytest.mark.parametrize(("key", "found"), [((0x1400, 2), 254), ((0x1800, 2), 254), ((0x1016, 1), 0), ((0x1016, 2), 0)])
+def test_what_is_written_after_a_reset_without_a_look_is_read_back_all_the_same(key: Key, found: int) -> None:
+    before = FakeDrive().objects[key]
+
+    def ignored(drive: FakeDrive, _: bytes) -> None:
+        drive.objects[key] = before
+
+    boot = boot_one_axis(FakeDrive(on_write={key: ignored}))
+    said = (*boot.report.notes,) if boot.report else (error_of(boot),)
+    assert any(f"{key[0]:04X}h:{key[1]} is {found:0{2 * len(before)}X}h" in text for text in said)
+
+
+def test_a_pdo_that_does_not_come_back_on_is_an_error() -> None:
+    def stays_off(drive: FakeDrive, data: bytes) -> None:
+        drive.objects[0x1403, 1] = u32(int.from_bytes(data, "little") | 0x8000_0000)
+
+    assert "1403h:1 is C0000501h" in error_of(boot_one_axis(FakeDrive(on_write={(0x1403, 1): stays_off})))
+
+
+def test_entries_that_a_drive_has_stored_the_other_way_round_are_sorted_out() -> None:
+    """No node may be in two entries (CiA 301, 1016h): the first write is refused until the second entry is cleared."""
+
+    @dataclass
+    class Strict(FakeDrive):
+        def _write(self, key: Key, data: bytes) -> int:
+            others = [self.number(0x1016, sub) >> 16 for sub in (1, 2) if key != (0x1016, sub)]
+            node = int.from_bytes(data, "little") >> 16
+            return 0x06040043 if key[0] == 0x1016 and node and node in others else super()._write(key, data)
+
+    drive = Strict()
+    drive.objects |= {(0x1016, 1): u32(0x007F_0064), (0x1016, 2): u32(0x007E_0064)}
+    boot = boot_one_axis(drive)
+    assert [drive.number(0x1016, sub) for sub in (1, 2)] == [0x007E_012C, 0x007F_012C]
+    assert boot.report is not None
+    assert boot.report.stops_by_itself
+
+
 def test_a_missing_pdo_is_an_error() -> None:
     text = error_of(boot_one_axis(FakeDrive(objects=factory_objects(pdos=3))))
     assert "it has no RPDO4 (1403h)" in text
