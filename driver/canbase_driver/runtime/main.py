@@ -27,6 +27,7 @@ from canbase_driver.ros.node import MotorDriverNode, Publisher
 from canbase_driver.runtime.black_box import Ring
 from canbase_driver.runtime.black_box_about import about
 from canbase_driver.runtime.black_box_writer import BlackBoxWriter
+from canbase_driver.runtime.bus_port import BusError
 from canbase_driver.runtime.claim import Claim
 from canbase_driver.runtime.control_thread import ControlLoop
 from canbase_driver.supervision.lifecycle import Aim
@@ -67,7 +68,7 @@ def run(
     folder = claim.folder
     try:
         claim.listen()
-    except TakenError as error:
+    except (TakenError, BusError) as error:
         print(f"canbase driver: {error}", file=sys.stderr)
         return 1
     received: list[int] = []
