@@ -17,7 +17,6 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import BatteryState, JointState
 
 from canbase_config.robot import Robot
-from canbase_driver.causes import Cause
 from canbase_driver.drives.health import Excess, HealthWatch
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.ros import messages
@@ -27,6 +26,7 @@ from canbase_driver.ros.serialized_motion import SerializedMotion
 from canbase_driver.ros.services import DriverServices
 from canbase_driver.ros.stop_events import StopEvents
 from canbase_driver.runtime.black_box import Ring
+from canbase_driver.runtime.black_box_notes import state_text
 from canbase_driver.runtime.black_box_writer import BlackBoxWriter
 from canbase_driver.runtime.control_thread import ControlLoop
 from canbase_driver.snapshot import DriverSnapshot
@@ -38,7 +38,6 @@ from canbase_runtime.receive_time import ReceiveTimes
 COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 STATE_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 DIAGNOSTICS_PERIOD_S = 1.0
-_SAID_BY_THE_STATE = (Cause.NONE, Cause.BOOTING, Cause.ENABLING)
 
 
 class MotorDriverNode(ManagedNode):
@@ -130,10 +129,7 @@ class MotorDriverNode(ManagedNode):
         previous, finding = self._previous, snapshot.finding
         if previous is not None and (previous.state, previous.finding.cause) == (snapshot.state, finding.cause):
             return
-        why = f": {finding.cause.value}" if finding.cause not in _SAID_BY_THE_STATE else ""
-        detail = f" ({finding.detail})" if finding.detail else ""
-        clears = f"; ends with: {finding.clears_on}" if finding.clears_on else ""
-        text = self.state_text = f"{snapshot.state.name}{why}{detail}{clears}"
+        text = self.state_text = state_text(snapshot)
         self._stops.note(text)
         self._stops.on_state(snapshot)
         priority = Priority.INFO if finding.cause.is_usual else Priority.WARNING

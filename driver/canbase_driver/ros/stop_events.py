@@ -23,6 +23,7 @@ from canbase_driver.ros.event_values import driver_values, filter_values, mux_va
 from canbase_driver.ros.messages import stop_event_message
 from canbase_driver.ros.source_orders import SourceOrders
 from canbase_driver.runtime.black_box import Ring
+from canbase_driver.runtime.black_box_notes import command_note, driver_note, filter_note, mux_note
 from canbase_driver.runtime.black_box_writer import BlackBoxWriter
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervision.state_machine import POWER_OFF_TIMEOUT_S
@@ -56,7 +57,7 @@ class StopEvents:
     def on_command(self, twist: Twist2D, stamp_s: float, received_at: float) -> None:
         """A command came, with the stamp of its header [s since 1970]; from the executor's thread."""
         linear_mps, angular_radps = twist.linear_mps, twist.angular_radps
-        self._ring.note(received_at, f"cmd_vel {linear_mps:.4f} m/s {angular_radps:.4f} rad/s")
+        self._ring.note(received_at, command_note(linear_mps, angular_radps))
         values = {"linear_mps": linear_mps, "angular_radps": angular_radps, "stamp_s": stamp_s}
         self._ring.event(received_at, "cmd_vel", values)
         moves = twist.is_finite and twist != Twist2D.ZERO
@@ -66,9 +67,8 @@ class StopEvents:
         """The state of the safety filter; from the executor's thread."""
         stops = message.action == SafetyState.STOP
         cause, detail = printable(message.cause), printable(message.detail, SENTENCE_LENGTH)
-        said = f"safety_filter {cause} {detail}".rstrip()
-        ordered = f"{message.ordered_linear_mps:.4f} m/s {message.ordered_angular_radps:.4f} rad/s"
-        self._ring.note(now_s, f"{said}; orders {ordered}, lease {message.lease_sequence}")
+        ordered = message.ordered_linear_mps, message.ordered_angular_radps
+        self._ring.note(now_s, filter_note(cause, detail, *ordered, message.lease_sequence))
         self._ring.event(now_s, "safety_filter/state", filter_values(message))
         latched = self._estop_latches and stop_cause(message.cause).is_estop
         clears_on = printable(message.clears_on, SENTENCE_LENGTH)
@@ -77,7 +77,7 @@ class StopEvents:
 
     def note(self, text: str) -> None:
         """A line for the black box."""
-        self._ring.note(time.monotonic(), f"motor_driver {text}")
+        self._ring.note(time.monotonic(), driver_note(text))
 
     def on_state(self, snapshot: DriverSnapshot) -> None:
         """The driver's state or its cause is another one."""
@@ -128,6 +128,6 @@ class StopEvents:
         now_s, active = time.monotonic(), printable(message.active)
         reasons = (f"{source.name}: {source.reason}" for source in message.sources if source.reason)
         detail = printable("; ".join(reasons), SENTENCE_LENGTH)
-        self._ring.note(now_s, f"velocity_mux {active or 'no source'}; {detail}")
+        self._ring.note(now_s, mux_note(active, detail))
         self._ring.event(now_s, "velocity_mux/state", mux_values(message))
         self._news.put(lambda: self._recorder.on_mux(active, detail, now_s))

@@ -20,6 +20,7 @@ from typing import Any, TypeVar
 from canbase_config.black_box import BlackBox
 from canbase_driver.runtime.black_box import EventEntry, Recording, asc_lines
 from canbase_driver.runtime.black_box_json import json_lines
+from canbase_driver.runtime.black_box_notes import title
 from canbase_driver.supervision.stop_history import StopRecord
 
 WAITING = 4
@@ -130,7 +131,7 @@ class BlackBoxWriter(threading.Thread):
         for suffix in SUFFIXES:
             name = f"{job.stem}.asc"
             lines = (
-                asc_lines(recording, _title(job.record))
+                asc_lines(recording, title(job.record.stopped_by, job.record.cause, job.record.detail))
                 if suffix == ".asc"
                 else json_lines(recording, job.record, name, self._about)
             )
@@ -159,10 +160,6 @@ class BlackBoxWriter(threading.Thread):
         for stem in sorted({path.stem for path in mine})[: -self._files]:
             for suffix in SUFFIXES:
                 (self._folder / f"{stem}{suffix}").unlink(missing_ok=True)
-
-
-def _title(record: StopRecord) -> str:
-    return f"stop by {record.stopped_by}: {record.cause} ({record.detail})"
 
 
 def _slowly(things: Iterable[T]) -> Iterator[T]:
