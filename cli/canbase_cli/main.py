@@ -13,6 +13,9 @@ from canbase_cli import (
     demo,
     doctor,
     drive,
+    dump,
+    explain,
+    export,
     fibonacci,
     init,
     inject,
@@ -76,6 +79,9 @@ app.command("record", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel
 app.command("doctor", cls=RosCommand, options_metavar=ROS_USAGE, epilog=doctor.EPILOG, rich_help_panel=_LOOK)(
     doctor.doctor
 )
+app.command("explain", epilog=explain.EPILOG, rich_help_panel=_LOOK)(explain.explain)
+app.command("dump", epilog=dump.EPILOG, rich_help_panel=_LOOK)(dump.dump)
+app.command("export", epilog=export.EPILOG, rich_help_panel=_LOOK)(export.export)
 app.command("support-bundle", rich_help_panel=_LOOK)(support_bundle.support_bundle)
 
 app.command("init", epilog=init.EPILOG, rich_help_panel=_SET_UP)(init.init)

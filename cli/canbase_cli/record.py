@@ -14,7 +14,7 @@ from canbase_cli.options import NamespaceOption, ros_arguments, ros_needed
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail
 
 if TYPE_CHECKING:
-    from canbase_cli.mcap_file import McapFile
+    from canbase_recording.mcap_file import McapFile
 
 LOOK_S: Final = 1.0
 """Between two looks at the graph for new topics, and two lines of progress."""
@@ -45,7 +45,7 @@ def record(
         import rclpy
         from rclpy.signals import SignalHandlerOptions
     try:
-        from canbase_cli.mcap_file import McapFile
+        from canbase_recording.mcap_file import McapFile
     except ModuleNotFoundError as error:
         fail(f"canbase record needs the Python package {error.name}: pip install 'mcap>=1.2,<2'", WRONG_INPUT)
     ended = end_signals()

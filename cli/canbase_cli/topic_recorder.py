@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
-from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from canbase_cli.mcap_file import McapFile
-from canbase_cli.ros_definition import definition, of_fields
+from canbase_recording.mcap_file import McapFile
+from canbase_recording.ros_types import message_class, whole_definition
 
 DEPTH = 200
 """Messages of one topic that may wait: 2 s at 100 Hz."""
@@ -40,7 +36,7 @@ class TopicRecorder:
                 continue
             self._taken.add(topic)
             try:
-                kind, text = _message_class(types[0]), definition(types[0], _definition_of)
+                kind, text = message_class(types[0]), whole_definition(types[0])
             except (ModuleNotFoundError, AttributeError, ValueError) as error:
                 self._node.get_logger().warning(f"{topic} is not recorded: {types[0]} is not known here ({error})")
                 continue
@@ -72,30 +68,3 @@ def _qos(publishers: Sequence[Any]) -> QoSProfile:
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if keeps else DurabilityPolicy.VOLATILE,
     )
-
-
-def _message_class(name: str) -> Any:
-    """Of a type such as nav_msgs/msg/Odometry. Raises ModuleNotFoundError, AttributeError: not installed."""
-    package, space, kind = name.split("/")
-    found: Any = importlib.import_module(f"{package}.{space}")
-    if space == "action":  # the feedback of an action, and the message around it
-        action, part = kind.rsplit("_", 1)
-        found = getattr(found, action)
-        return getattr(found.Impl if part == "FeedbackMessage" else found, part)
-    return getattr(found, kind)
-
-
-def _definition_of(package: str, space: str, kind: str) -> str:
-    """The .msg file, which has comments and constants; where there is none, as for an action's feedback: the fields."""
-    try:
-        return (_share_folder(package) / space / f"{kind}.msg").read_text(encoding="utf-8")
-    except OSError:
-        return of_fields(_message_class(f"{package}/{space}/{kind}").get_fields_and_field_types())
-
-
-def _share_folder(package: str) -> Path:
-    """Of a sourced ROS 2, or of the ROS wheels in this environment."""
-    try:
-        return Path(get_package_share_directory(package))
-    except (PackageNotFoundError, OSError):
-        return Path(sys.prefix) / "share" / package

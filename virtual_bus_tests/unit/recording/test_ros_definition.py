@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from mcap_ros2._vendor.rosidl_adapter.parser import parse_message_string
 
-from canbase_cli.ros_definition import SEPARATOR, definition, of_fields
+from canbase_recording.ros_definition import SEPARATOR, definition, of_fields
 
 FILES = {
     (

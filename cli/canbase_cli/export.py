@@ -1,0 +1,54 @@
+"""`canbase export`: a recording of a CAN bus as ROS messages, for Foxglove and PlotJuggler."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from canbase_cli.explain import ChannelOfFile, RecordingConfig
+from canbase_cli.options import ros_needed
+from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config, warn
+
+EPILOG: Final = "For example: canbase export stop.asc --config robot.yaml --mcap stop.mcap"
+
+
+def export(
+    recording: Annotated[
+        Path, typer.Argument(metavar="FILE", help="What canbase explain reads: ASC, candump -L, BLF, …")
+    ],
+    mcap: Annotated[Path, typer.Option("--mcap", metavar="FILE", help="The file to write; it must not exist yet.")],
+    config: RecordingConfig = None,
+    channel: ChannelOfFile = None,
+) -> None:
+    """Write a recording as an MCAP file of ROS messages, which Foxglove and PlotJuggler open.
+
+    It has joint_states (measured) and joint_states_ordered, cmd_vel, the log, and each frame (can_msgs/Frame).
+    Without --config the joints are called after their nodes, in topics that end in _raw. It needs ROS 2, as canbase
+    does, and Foxglove's library. `canbase explain` reads the file again.
+
+    Exit codes: 0 written, 1 nothing in the file can be read or the MCAP file is not complete, 2 wrong command line or
+    robot.yaml.
+    """
+    robot = None if config is None else load_config(config, quiet=True).robot
+    with ros_needed():
+        try:
+            from canbase_recording.mcap_export import export as write
+        except ModuleNotFoundError as error:
+            if error.name != "mcap":
+                raise
+            fail("canbase export needs the Python package mcap: pip install 'mcap>=1.2,<2'", WRONG_INPUT)
+    from canbase_recording.recording_file import NoRecordingError
+
+    try:
+        read, file, problem = write(recording, mcap, robot, channel)
+    except NoRecordingError as error:
+        fail(str(error), FAILED)
+    except OSError as error:
+        fail(f"{mcap} cannot be written: {error.strerror}", WRONG_INPUT)
+    for sentence in read.problems.sentences:
+        warn(sentence)
+    if problem:
+        fail(f"{mcap} is not complete: {problem}", FAILED)
+    typer.echo(f"{mcap}: {read.frames} frames, {file.messages} messages of {file.topics} topics", err=True)

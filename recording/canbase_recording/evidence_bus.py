@@ -1,0 +1,316 @@
+"""Signs on the bus that somebody is silent, has restarted, receives nothing, or does not belong there. Pure."""
+
+from __future__ import annotations
+
+import bisect
+import itertools
+import math
+from typing import Final
+
+from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID
+from canbase_driver.cia301.nmt import TPDO
+from canbase_driver.cia402 import DriveState
+from canbase_recording.beat import Beat
+from canbase_recording.cause import Found
+from canbase_recording.frame_words import nmt_text
+from canbase_recording.scene import Scene
+from canbase_recording.trace import Line, first_after, last_before, times_between
+
+LOST_PERIODS: Final = 4.0
+"""So many periods without it are no lost frame."""
+LEAST_SILENCE_S: Final = 0.03
+TOGETHER_S: Final = 0.05
+"""Nodes that fall silent within this time do so together."""
+LOOKS_AHEAD_S: Final = 1.0
+"""What comes so much later tells whether a node lives [s]."""
+PAUSE_S: Final = 0.12
+SIGNS: Final = 3
+TWINS: Final = 2
+"""So many answers too many, while none is missing: the watchdog trips soon after."""
+_STOPPING: Final = (0x01, 0x02, 0x80, 0x81, 0x82)
+_RESETS: Final = (0x81, 0x82)
+_RECEIVES_NOTHING: Final = (0x8130, 0x8250, 0x8120, 0x8140)
+"""EMCY: heartbeat or life guarding lost, RPDO timeout, error passive, recovered from bus-off."""
+_MOTION: Final = (0x6040, 0x6060, 0x60FF, 0x6840, 0x6860, 0x68FF)
+
+
+def recorder_paused(scene: Scene) -> Found | None:
+    """Nothing at all was recorded for a while: neither sent nor received."""
+    times = [at for at in scene.frame_times if scene.reaction_s - 2.0 <= at <= scene.reaction_s + 0.5]
+    gaps = [(b - a, a) for a, b in itertools.pairwise(times)]
+    if not gaps:
+        return None
+    longest_s, since_s = max(gaps)
+    usual_s = sorted(gap for gap, _ in gaps)[len(gaps) // 2]
+    if longest_s < max(PAUSE_S, 20.0 * usual_s) or since_s > scene.reaction_s:
+        return None
+    who = "the driver stood still" if scene.sent_any else "the recorder stood still, or its bus was cut"
+    return Found(since_s, f"no frame was sent or received for {longest_s:.3f} s: {who}")
+
+
+def second_master(scene: Scene) -> Found | None:
+    """Frames that canbase's one driver cannot have sent, before the watchdog tripped."""
+    if not scene.is_canbase:
+        return None
+    signs = (_foreign_nmt(scene), _two_setpoints(scene), _extra_syncs(scene), _foreign_write(scene))
+    return min((sign for sign in signs if sign is not None), key=lambda sign: sign.at_s, default=None)
+
+
+def nmt_command(scene: Scene) -> Found | None:
+    """An NMT command that takes a drive with power out of operational, in a network of another master."""
+    return None if scene.is_canbase else _foreign_nmt(scene)
+
+
+def _foreign_nmt(scene: Scene) -> Found | None:
+    for at_s, (command, node_id, sent) in scene.nmt:
+        before = scene.reaction_s - 0.5 <= at_s <= min(scene.reaction_s, scene.tripped_s)
+        if before and not sent and command in _STOPPING and _has_power(scene, node_id, at_s):
+            text = nmt_text(bytes((command, node_id)))
+            return Found(at_s, f"somebody sent {text}, while a drive had power", node_id)
+    return None
+
+
+def _has_power(scene: Scene, node_id: int, at_s: float) -> bool:
+    """Whether a node, 0: any, reported operation enabled at this time."""
+    traces = [trace for trace in scene.axes.values() if node_id in (0, trace.node_id)]
+    return any(trace.state_at(at_s) is DriveState.OPERATION_ENABLED for trace in traces)
+
+
+def _two_setpoints(scene: Scene) -> Found | None:
+    """Different targets for one axis between two SYNCs."""
+    if len(scene.syncs) < SIGNS:
+        return None
+    for trace in scene.enabled_axes():
+        signs = []
+        for (a_s, a), (b_s, b) in itertools.pairwise(trace.target):
+            if a != b and last_before(scene.syncs, a_s) == last_before(scene.syncs, b_s) and b_s <= scene.reaction_s:
+                signs.append((a_s, a, b))
+        recent = [sign for sign in signs if sign[0] >= scene.reaction_s - 1.0]
+        if len(recent) >= SIGNS:
+            at_s, a, b = recent[0]
+            unit = " m/s" if trace.has_units else ""
+            text = f"{trace.name} gets two setpoints in one cycle, {trace.speed(a):.2f} and {trace.speed(b):.2f}{unit}"
+            return Found(at_s, f"{text}, {len(recent)} times: two masters order it", trace.node_id)
+    return None
+
+
+def _extra_syncs(scene: Scene) -> Found | None:
+    """SYNCs that come too soon after each other, without setpoints between them."""
+    targets = sorted(at for trace in scene.axes.values() for at, _ in trace.target)
+    window = [at for at in scene.syncs if scene.reaction_s - 1.0 <= at <= scene.reaction_s]
+    soon = [
+        (a, b)
+        for a, b in itertools.pairwise(window)
+        if b - a < 0.75 * scene.period_s and targets and not times_between(targets, a, b)
+    ]
+    if len(soon) < SIGNS:
+        return None
+    return Found(soon[0][1], f"SYNC comes {len(soon)} times too early: two masters send it")
+
+
+def _foreign_write(scene: Scene) -> Found | None:
+    for at_s, (node_id, index) in scene.writes:
+        before = scene.reaction_s - 0.5 <= at_s < min(scene.reaction_s, scene.tripped_s)
+        if before and index in _MOTION and _has_power(scene, node_id, at_s):
+            return Found(at_s, f"somebody wrote {index:04X}h of {scene.who(node_id)} by SDO in motion", node_id)
+    return None
+
+
+def twin_node(scene: Scene) -> Found | None:
+    """A PDO of a node that answers each SYNC comes twice for one."""
+    for cob_id, times in scene.pdo_times.items():
+        if cob_id & 0x780 not in TPDO or cob_id & 0x7F == WATCHDOG_NODE_ID:
+            continue
+        twice = _twice(scene.syncs, times, scene.reaction_s)
+        syncs = times_between(scene.syncs, twice[0] - 0.001, scene.reaction_s) if twice else ()
+        came = times_between(times, twice[0] - scene.period_s, scene.reaction_s) if twice else ()
+        if len(twice) >= TWINS and len(came) > 1.4 * len(syncs):
+            node_id = cob_id & 0x7F
+            text = f"{scene.who(node_id)} answers one SYNC twice, {len(twice)} times: two nodes have this id"
+            return Found(twice[0], text, node_id)
+    return None
+
+
+def _twice(syncs: list[float], times: list[float], until_s: float) -> list[float]:
+    """Times of PDOs that follow another one of the same SYNC, in the half second before."""
+    window = [at for at in times if until_s - 0.5 <= at <= until_s]
+    return [b for a, b in itertools.pairwise(window) if last_before(syncs, a) == last_before(syncs, b) > -math.inf]
+
+
+def node_restarted(scene: Scene) -> Found | None:
+    """A drive sends its boot-up though nobody has reset it."""
+    for node_id in scene.drive_nodes:
+        for at_s, state in scene.heartbeats.get(node_id, ()):
+            if state != 0 or at_s < scene.reaction_s - 1.0:
+                continue
+            reset = any(command in _RESETS and to in (0, node_id) and at <= at_s for at, (command, to, _) in scene.nmt)
+            since_s = last_before(scene.node_times[node_id], min(at_s - 1e-6, scene.reaction_s))
+            away = since_s if since_s < at_s - LEAST_SILENCE_S else at_s
+            if not reset and away <= scene.reaction_s:
+                gone = f" after {at_s - away:.2f} s of silence" if away < at_s else ""
+                return Found(
+                    away, f"{scene.who(node_id)} sends a boot-up at {at_s:.3f} s{gone}: it has restarted", node_id
+                )
+    return None
+
+
+def driver_silent(scene: Scene) -> Found | None:
+    """SYNC ends, and the master's heartbeat with it, while others go on."""
+    period_s, syncs = scene.period_s, scene.syncs
+    if len(syncs) < SIGNS or scene.silence_s(syncs) < max(LEAST_SILENCE_S, LOST_PERIODS * period_s):
+        return None
+    since_s = last_before(syncs, scene.reaction_s)
+    others = [at for node, times in scene.node_times.items() if node != DRIVER_NODE_ID for at in times]
+    if not any(since_s + period_s < at <= scene.reaction_s + LOOKS_AHEAD_S for at in others):
+        return None
+    beats = [at for at, _ in scene.heartbeats.get(DRIVER_NODE_ID, ())]
+    lives = first_after(beats, since_s + period_s) <= scene.reaction_s
+    if lives:
+        return Found(
+            since_s, f"SYNC ends at {since_s:.3f} s, though the heartbeat of the driver goes on", DRIVER_NODE_ID
+        )
+    whose = "and the driver's heartbeat end" if beats else "ends"
+    back = first_after(syncs, scene.reaction_s)
+    later = f"; it is back after {back - since_s:.2f} s: the driver hung" if back < math.inf else ""
+    return Found(since_s, f"SYNC {whose} at {since_s:.3f} s, other nodes go on{later}", DRIVER_NODE_ID)
+
+
+def watchdog_silent(scene: Scene) -> Found | None:
+    """The watchdog's state frame and heartbeat end, while SYNC goes on."""
+    beat = _beat([at for at, _ in scene.watchdog], scene.reaction_s)
+    if not beat.is_missing(scene.reaction_s) or scene.silence_s(scene.syncs) > LOST_PERIODS * scene.period_s:
+        return None
+    heart = [at for at, _ in scene.heartbeats.get(WATCHDOG_NODE_ID, ())]
+    if times_between(heart, beat.last_s + LEAST_SILENCE_S, scene.reaction_s):
+        return None
+    return Found(beat.last_s, f"no frame of canbase's watchdog since {beat.last_s:.3f} s", WATCHDOG_NODE_ID)
+
+
+def watchdog_ended(scene: Scene) -> Found | None:
+    """The watchdog trips because somebody ended it."""
+    at_s = scene.tripped_s
+    if at_s > scene.reaction_s + LEAST_SILENCE_S or not any(s.cause == ENDED for at, s in scene.watchdog if at == at_s):
+        return None
+    return Found(
+        at_s, "the watchdog was asked to end while a wheel turned; it stopped the drives first", WATCHDOG_NODE_ID
+    )
+
+
+ENDED: Final = 11
+
+
+def drives_deaf(scene: Scene) -> Found | None:
+    """Drives report that the computer's frames do not reach them, while the recording has these frames."""
+    since_s = scene.silence_s(scene.syncs)
+    codes = {
+        node: (at, code)
+        for at, (node, code) in reversed(scene.emergencies)
+        if code in _RECEIVES_NOTHING and scene.reaction_s - 1.0 <= at <= scene.reaction_s + LOOKS_AHEAD_S
+    }
+    if not codes or since_s > max(LEAST_SILENCE_S, LOST_PERIODS * scene.period_s) or not scene.syncs:
+        return None
+    quiet = [at for node in codes if (at := _no_answer_since(scene, node)) is not None]
+    at_s = min(quiet, default=min(at for at, _ in codes.values()))
+    if at_s > scene.reaction_s:
+        return None
+    whom = " and ".join(scene.who(node) for node in sorted(codes))
+    code = next(iter(codes.values()))[1]
+    text = f"{whom} report {code:04X}h and answer no SYNC since {at_s:.3f} s, though SYNC and heartbeats are sent"
+    return Found(at_s, text, next(iter(codes)) if len(codes) == 1 else 0)
+
+
+def bus_cut(scene: Scene) -> Found | None:
+    """All drives, two at least, fall silent together."""
+    silent = _silent_nodes(scene)
+    if len(silent) < 2 or len(silent) < len(scene.drive_nodes):
+        return None
+    times = [at for at, _ in silent]
+    if max(times) - min(times) > TOGETHER_S:
+        return None
+    return Found(
+        min(times), f"no drive sends anything after {max(times):.3f} s: all {len(silent)} fall silent together"
+    )
+
+
+def node_silent(scene: Scene) -> Found | None:
+    """One node sends nothing any more, while SYNC and others go on."""
+    silent = _silent_nodes(scene)
+    if not silent:
+        return None
+    at_s, node_id = min(silent)
+    back = first_after(scene.node_times[node_id], scene.reaction_s)
+    later = f"; it is back after {back - at_s:.2f} s" if back < math.inf else ""
+    others = sorted(set(scene.drive_nodes) - {node for _, node in silent})
+    more = f", {', '.join(scene.who(each) for each in others)} goes on" if others else ""
+    return Found(at_s, f"{scene.who(node_id)} sends nothing after {at_s:.3f} s{more}{later}", node_id)
+
+
+def _silent_nodes(scene: Scene) -> list[tuple[float, int]]:
+    """Time of the last frame and id of nodes that were there, and send nothing at the reaction nor soon after."""
+    found = []
+    for node_id, times in scene.node_times.items():
+        if node_id in (DRIVER_NODE_ID, WATCHDOG_NODE_ID):
+            continue
+        since_s = _no_answer_since(scene, node_id)
+        beat = _beat([at for at, _ in scene.heartbeats.get(node_id, ())], scene.reaction_s)
+        if since_s is None and beat.is_missing(scene.reaction_s):
+            since_s = last_before(times, scene.reaction_s)
+        if since_s is None or scene.reaction_s - since_s < LEAST_SILENCE_S:
+            continue
+        last_s = last_before(times, scene.reaction_s)
+        soon = min(beat.limit_s(), LOOKS_AHEAD_S)
+        if last_s <= since_s + scene.period_s and not times_between(times, last_s, last_s + soon):
+            found.append((last_s, node_id))
+    return found
+
+
+def _no_answer_since(scene: Scene, node_id: int) -> float | None:
+    """When a node that answered each SYNC last did, if it does not any more while SYNC goes on; None: it does."""
+    own = [came for cob_id, came in scene.pdo_times.items() if cob_id & 0x7F == node_id and cob_id & 0x780 in TPDO]
+    times = sorted(itertools.chain.from_iterable(own))
+    last_s = last_before(times, scene.reaction_s)
+    if last_s < scene.reaction_s - 2.0:
+        return None
+    was_regular = len(times_between(times, last_s - 10.0 * scene.period_s, last_s)) >= 8
+    unanswered = len(times_between(scene.syncs, last_s, scene.reaction_s))
+    return last_s if was_regular and unanswered >= LOST_PERIODS else None
+
+
+def feedback_lost(scene: Scene) -> Found | None:
+    """A TPDO of a node that lives does not come any more, while SYNC goes on."""
+    for cob_id, times in scene.pdo_times.items():
+        node_id, last_s = cob_id & 0x7F, last_before(times, scene.reaction_s)
+        if cob_id & 0x780 not in TPDO or node_id == WATCHDOG_NODE_ID or last_s < scene.reaction_s - 2.0:
+            continue
+        regular = len(times_between(times, last_s - 10.0 * scene.period_s, last_s)) >= 8
+        if not regular or len(times_between(scene.syncs, last_s, scene.reaction_s)) < LOST_PERIODS:
+            continue
+        lives = last_before(scene.node_times[node_id], scene.ended_s) > last_s + scene.period_s
+        more = "the node sends other frames" if lives else "nothing else of the node came"
+        layout = scene.pdo_layouts.get(cob_id)
+        name = layout.name if layout else f"{cob_id:03X}h"
+        return Found(last_s, f"{name} of {scene.who(node_id)} does not come after {last_s:.3f} s; {more}", node_id)
+    return None
+
+
+def bus_errors(scene: Scene) -> Found | None:
+    """The CAN controller reports errors."""
+    errors = times_between(scene.error_frames, scene.reaction_s - 1.0, scene.reaction_s)
+    if len(errors) < SIGNS:
+        return None
+    return Found(errors[0], f"{len(errors)} error frames of the CAN controller in the second before")
+
+
+def _beat(times: list[float], until_s: float) -> Beat:
+    beat = Beat()
+    for at_s in times[: bisect.bisect_right(times, until_s)]:
+        beat.on_beat(at_s)
+    return beat
+
+
+def emergencies_before(scene: Scene) -> Line[tuple[int, int]]:
+    """EMCY with an error code in the second before the reaction."""
+    return [
+        (at, found) for at, found in scene.emergencies
+        if found[1] >> 8 and scene.reaction_s - 1.0 <= at <= scene.reaction_s + LEAST_SILENCE_S
+    ]  # fmt: skip

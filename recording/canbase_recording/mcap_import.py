@@ -1,0 +1,45 @@
+"""Frames and notes out of an MCAP file of `canbase export`, by Foxglove's library."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from typing import IO, TYPE_CHECKING
+
+import can
+
+from canbase_recording.can_message import FRAME_TYPE, NOTES_TOPIC, unpack_frame, unpack_text
+from canbase_recording.entry import Note
+
+if TYPE_CHECKING:
+    from canbase_recording.recording_file import Problems
+
+
+def messages(file: IO[bytes], problems: Problems) -> Iterator[can.Message | Note]:
+    """In the order of the file. What is broken is counted; a file that ends early is read up to there."""
+    try:
+        from mcap.exceptions import McapError
+        from mcap.reader import NonSeekingReader
+    except ModuleNotFoundError as error:
+        problems.truncated = f"MCAP needs the Python package {error.name}: pip install 'mcap>=1.2,<2'"
+        return
+    try:
+        for schema, channel, message in NonSeekingReader(file).iter_messages(log_time_order=False):
+            at_s = message.log_time / 1e9
+            is_note = channel.topic.rstrip("/").endswith(NOTES_TOPIC)
+            if not is_note and (schema is None or schema.name != FRAME_TYPE):
+                continue
+            try:
+                yield Note(at_s, unpack_text(message.data)) if is_note else _frame(at_s, message.data)
+            except ValueError:
+                problems.broken += 1
+    except (McapError, struct.error, ValueError, EOFError, KeyError, AssertionError, OSError) as error:
+        problems.truncated = f"{type(error).__name__} {error}".strip()
+
+
+def _frame(at_s: float, data: bytes) -> can.Message:
+    can_id, payload, sent, remote, extended, error = unpack_frame(data)
+    return can.Message(
+        timestamp=at_s, arbitration_id=can_id, data=payload, is_rx=not sent, is_remote_frame=remote,
+        is_extended_id=extended, is_error_frame=error,
+    )  # fmt: skip

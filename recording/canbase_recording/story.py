@@ -1,0 +1,155 @@
+"""Each stop of a recording: its first cause, who caught it, and what every part did then. Pure.
+
+The table RULES is what this package is for. How it is read:
+1. The first part that reacts begins a stop; what a rule looks at lies before that. What comes later is a consequence.
+2. Rows stand in the order of cause and effect: who orders a stop comes before what breaks, the bus before the drives on
+   it, the drives before what their sensors show, and what parts report without anything to be seen comes last.
+3. The first row that has evidence names the first cause. Other rows that have evidence too are reported beside it.
+4. No evidence is not "nothing": the story says "reported only", or "cannot tell".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from canbase_driver.causes import Cause as DriverCause
+from canbase_recording import evidence_bus as bus
+from canbase_recording import evidence_drive as drive
+from canbase_recording import evidence_motion as motion
+from canbase_recording import evidence_orders as orders
+from canbase_recording.cause import ADVICE, Cause, Found
+from canbase_recording.event import Event, EventKind, Level
+from canbase_recording.scene import Scene
+from canbase_recording.standstill import Standstill, standstill_of
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One possible first cause, and what shows it; None: nothing does."""
+
+    cause: Cause
+    seen: Callable[[Scene], Found | None]
+
+
+RULES: Final = (
+    # who orders a stop: a person, or a part that did its work
+    Rule(Cause.EMERGENCY_STOP, orders.filter_stops(orders.ESTOP)),
+    Rule(Cause.BUTTON_SILENT, orders.filter_stops(orders.BUTTON)),
+    Rule(Cause.SCANNER, orders.filter_stops(orders.SCANNER)),
+    Rule(Cause.OBSTACLE, orders.filter_stops(orders.OBSTACLE)),
+    Rule(Cause.FILTER, orders.filter_stops(orders.OTHER)),
+    Rule(Cause.SOURCE_LOST, orders.source_lost),
+    Rule(Cause.STOP_REQUESTED, orders.driver_reports(DriverCause.STOP_REQUESTED)),
+    Rule(Cause.SHUTDOWN, orders.driver_reports(DriverCause.SHUTDOWN)),
+    Rule(Cause.DEACTIVATED, orders.driver_reports(DriverCause.INACTIVE)),
+    Rule(Cause.WATCHDOG_ENDED, bus.watchdog_ended),
+    # who is on the bus, and who is not any more
+    Rule(Cause.RECORDER_PAUSED, bus.recorder_paused),
+    Rule(Cause.SECOND_MASTER, bus.second_master),
+    Rule(Cause.NMT_COMMAND, bus.nmt_command),
+    Rule(Cause.TWIN_NODE, bus.twin_node),
+    Rule(Cause.NODE_RESTARTED, bus.node_restarted),
+    Rule(Cause.DRIVER_SILENT, bus.driver_silent),
+    Rule(Cause.WATCHDOG_SILENT, bus.watchdog_silent),
+    Rule(Cause.BUS_CUT, bus.bus_cut),
+    Rule(Cause.NODE_SILENT, bus.node_silent),
+    Rule(Cause.DRIVES_DEAF, bus.drives_deaf),
+    Rule(Cause.FEEDBACK_LOST, bus.feedback_lost),
+    Rule(Cause.BUS_ERRORS, bus.bus_errors),
+    # what a drive reports about itself
+    Rule(Cause.DRIVE_FAULT, drive.drive_fault),
+    Rule(Cause.DRIVE_DISABLED, drive.drive_disabled),
+    # what reaches the drives, and what was ordered
+    Rule(Cause.SETPOINTS_MISSING, drive.setpoints_missing),
+    Rule(Cause.TWO_COMMANDERS, orders.two_commanders),
+    Rule(Cause.SETPOINTS_KEPT, orders.setpoints_kept),
+    Rule(Cause.LEASES_LOST, orders.leases_lost),
+    Rule(Cause.COMMANDS_LOST, orders.commands_lost),
+    # what the sensors of a wheel show
+    Rule(Cause.ENCODER_JUMPS, motion.encoder_jumps),
+    Rule(Cause.POSITION_STUCK, motion.position_stuck),
+    Rule(Cause.VELOCITY_STUCK, motion.velocity_stuck),
+    Rule(Cause.WRONG_WAY, motion.wrong_way),
+    Rule(Cause.NO_MOTION, motion.no_motion),
+    Rule(Cause.WHEEL_SLOW, motion.wheel_slow),
+    Rule(Cause.WHEEL_RUNS_ON, motion.wheel_runs_on),
+    # what a part says, and a master that takes the power away: the reason is not in the recording
+    Rule(Cause.REPORTED, orders.reported),
+    Rule(Cause.ORDERED_OFF, drive.ordered_off),
+)
+
+CATCHERS: Final = {
+    EventKind.WATCHDOG: "watchdog",
+    EventKind.DRIVER: "motor_driver",
+    EventKind.FILTER: "safety_filter",
+    EventKind.MUX: "velocity_mux",
+    EventKind.DRIVE_STATE: "the drive itself",
+    EventKind.CONTROL: "the master",
+    EventKind.COMMAND: "motor_driver",
+}
+"""Parts that act. What only reports (EMCY, a heartbeat that is missing) catches nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Story:
+    """One stop. `also`: other things that the recording shows before it; `chain`: what happened, in order."""
+
+    cause: Cause
+    found: Found
+    caught_by: str
+    reported: str
+    also: tuple[tuple[Cause, Found], ...]
+    chain: tuple[Event, ...]
+    standstill: Standstill
+    scene: Scene
+
+    @property
+    def advice(self) -> str:
+        """What to look at first."""
+        return ADVICE[self.cause]
+
+
+def tell(scene: Scene) -> Story:
+    """The story of one stop."""
+    seen = [(rule.cause, found) for rule in RULES if (found := rule.seen(scene)) is not None]
+    cause, found = seen[0] if seen else _unknown(scene)
+    chain = tuple(event for event in scene.events if event.at_s >= found.at_s - BEFORE_S)
+    caught_by, reported = _catcher(chain)
+    return Story(
+        cause=cause,
+        found=found,
+        caught_by=caught_by,
+        reported=reported,
+        also=tuple(each for each in seen[1:] if each[0] not in (Cause.REPORTED, Cause.ORDERED_OFF)),
+        chain=chain,
+        standstill=standstill_of(scene, found.at_s),
+        scene=scene,
+    )
+
+
+BEFORE_S: Final = 0.001
+"""A cause and the event that shows it may have one time."""
+
+
+def _catcher(chain: tuple[Event, ...]) -> tuple[str, str]:
+    """The first part that acted, and what it gave as its reason."""
+    first = next((event for event in chain if event.level is Level.ALARM and event.kind in CATCHERS), None)
+    if first is None:
+        return "", ""
+    said = [event.text for event in chain if event.kind is first.kind and event.at_s <= first.at_s + SAYS_S]
+    return CATCHERS[first.kind], next((text for text in said if text.startswith("tripped")), first.text)
+
+
+SAYS_S: Final = 0.1
+"""A part acts first and reports then."""
+
+
+def _unknown(scene: Scene) -> tuple[Cause, Found]:
+    """No rule has evidence, and nobody says why."""
+    said = next((event for event in scene.events if event.level is Level.ALARM), None)
+    if said is None:
+        return Cause.UNKNOWN, Found(scene.reaction_s, "nothing in this recording shows what began the stop")
+    text = f"it begins with: {said.who} {said.text}; nothing before it shows why"
+    return Cause.UNKNOWN, Found(said.at_s, text, said.node_id)

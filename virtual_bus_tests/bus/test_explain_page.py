@@ -1,0 +1,68 @@
+"""The page of `canbase explain` in a real browser, from a file and without a network; and its pictures for the docs."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+from typer.testing import CliRunner
+
+from canbase_cli.main import app
+from canbase_config.load import sample
+from support.browser import NEEDS_CHROMIUM, browser
+
+pytestmark = [pytest.mark.bus, pytest.mark.timeout(120), NEEDS_CHROMIUM]
+DATA: Final = Path(__file__).parent.parent / "unit" / "recording" / "data"
+PICTURES: Final = os.environ.get("CANBASE_PICTURES")
+
+
+def page_of(recording: str, folder: Path) -> Path:
+    target = folder / "stop.html"
+    words = ["explain", str(DATA / recording), "--config", str(sample("bench")), "--html", str(target)]
+    assert CliRunner().invoke(app, words, catch_exceptions=False).exit_code == 0
+    return target
+
+
+def opened(player: Any, page: Path, *, width: int, height: int, dark: bool) -> tuple[Any, list[str]]:
+    """Offline; and all that the browser complains about or asks a network for."""
+    context = player.new_context(
+        viewport={"width": width, "height": height}, color_scheme="dark" if dark else "light", offline=True
+    )
+    shown, complaints = context.new_page(), []
+    shown.on("console", lambda message: complaints.append(message.text))
+    shown.on("pageerror", lambda error: complaints.append(str(error)))
+    shown.on("request", lambda request: complaints.append(request.url) if not request.url.startswith("file:") else None)
+    shown.goto(page.as_uri())
+    shown.wait_for_selector("#plot1 .bars .point")
+    return shown, [text for text in complaints if not text.startswith(("data:", "blob:"))]
+
+
+@pytest.mark.parametrize(
+    ("recording", "picture", "width", "height", "dark"),
+    [
+        ("cable_of_left_wheel_cut.asc", "explain_cable", 1100, 1250, False),
+        ("encoder_of_left_wheel_lost.asc", "explain_encoder_dark_phone", 420, 1400, True),
+    ],
+)
+def test_plots_tables_and_filter(
+    recording: str, picture: str, width: int, height: int, dark: bool, tmp_path: Path
+) -> None:
+    with browser() as player:
+        shown, complaints = opened(player, page_of(recording, tmp_path), width=width, height=height, dark=dark)
+        assert shown.evaluate("document.documentElement.scrollWidth") <= width
+        assert shown.locator("#plot1 .scatterlayer .trace").count() >= 6
+        assert shown.locator("#load .scatterlayer .trace").count() == 1
+        if PICTURES:
+            shown.wait_for_timeout(300)
+            shown.screenshot(path=str(Path(PICTURES) / f"{picture}.png"))
+        rows = shown.locator("#frames1 tbody tr")
+        assert rows.count() > 100
+        shown.locator("#frames1 input").fill("1fe tripped")
+        assert 0 < rows.count() < 60
+        assert all("tripped" in text for text in rows.all_inner_texts())
+        shown.locator("#frames1 input").fill("")
+        shown.locator("#frames1 select").select_option("nmt")
+        assert all("NMT" in text for text in rows.all_inner_texts())
+        assert complaints == []

@@ -1,0 +1,172 @@
+"""The first cause of a stop: failures of the real cores in virtual time, each explained from what would be recorded."""
+
+from __future__ import annotations
+
+import functools
+
+import pytest
+
+from campaign.robots import campaign_robot
+from campaign.stops import Cruise
+from canbase_recording.cause import ADVICE, Cause
+from canbase_recording.entry import Note, RecordedFrame
+from canbase_recording.explanation import Explanation, explain
+from canbase_recording.story import RULES
+from canbase_velocity.twist import Twist
+from support.recorded_world import WorldRecorder, recorded, twin
+
+ROBOT = campaign_robot()
+NO_STOP = None
+BOX, WIRE = "black box", "listener"
+
+
+@functools.cache
+def recorder(what: str, how: str) -> WorldRecorder:
+    return recorded(twin(what, how))
+
+
+def explained(what: str, how: str, view: str, *, with_robot: bool = True) -> Explanation:
+    found = recorder(what, how)
+    return explain(found.box if view == BOX else found.wire, ROBOT if with_robot else None)
+
+
+FAILURES = (
+    # what fails, how, first cause by a black box, by a listener that has frames alone
+    ("motor_driver", "SIGTERM", Cause.SHUTDOWN, NO_STOP),
+    ("motor_driver", "SIGKILL", NO_STOP, Cause.DRIVER_SILENT),
+    ("motor_driver", "SIGSTOP", NO_STOP, Cause.DRIVER_SILENT),
+    ("motor_driver", "busy loop", Cause.COMMANDS_LOST, NO_STOP),
+    ("velocity process", "SIGTERM", Cause.FILTER, NO_STOP),
+    ("velocity process", "SIGKILL", Cause.LEASES_LOST, Cause.LEASES_LOST),
+    ("watchdog", "SIGTERM", Cause.WATCHDOG_ENDED, Cause.WATCHDOG_ENDED),
+    ("watchdog", "SIGKILL", Cause.WATCHDOG_SILENT, Cause.WATCHDOG_SILENT),
+    ("drive_distance_server", "SIGKILL", Cause.SOURCE_LOST, NO_STOP),
+    ("cable", "cut both ways", Cause.BUS_CUT, Cause.DRIVES_DEAF),
+    ("cable", "nothing reaches the drives", Cause.DRIVES_DEAF, Cause.DRIVES_DEAF),
+    ("cable", "nothing comes from the drives", Cause.BUS_CUT, Cause.REPORTED),
+    ("cable", "of one drive is cut", Cause.NODE_SILENT, Cause.NODE_SILENT),
+    ("drive", "silent", Cause.NODE_SILENT, Cause.NODE_SILENT),
+    ("drive", "in fault", Cause.DRIVE_FAULT, Cause.DRIVE_FAULT),
+    ("drive", "STO opens", Cause.DRIVE_DISABLED, Cause.DRIVE_DISABLED),
+    ("drive", "reset: without power for 0.5 s", Cause.NODE_RESTARTED, Cause.NODE_RESTARTED),
+    ("drive", "starts again", Cause.NODE_RESTARTED, Cause.NODE_RESTARTED),
+    ("motor_driver", "repeats its last setpoints for ever, then zero is ordered", Cause.SETPOINTS_KEPT, Cause.REPORTED),
+    ("motor_driver", "ignores zero, then zero is ordered", Cause.SETPOINTS_KEPT, Cause.REPORTED),
+    ("cmd_vel", "somebody publishes straight to it, then zero is ordered", Cause.TWO_COMMANDERS, Cause.REPORTED),
+    ("second master", "sends setpoints and SYNC", Cause.SECOND_MASTER, Cause.SECOND_MASTER),
+    ("joystick", "dies", Cause.SOURCE_LOST, NO_STOP),
+    ("scan", "stale", Cause.SCANNER, NO_STOP),
+    ("emergency stop", "pressed", Cause.EMERGENCY_STOP, NO_STOP),
+    ("emergency stop", "stale", Cause.BUTTON_SILENT, NO_STOP),
+    ("drive", "encoder frozen", Cause.POSITION_STUCK, Cause.POSITION_STUCK),
+    ("drive", "actual velocity stuck at 0", Cause.VELOCITY_STUCK, Cause.VELOCITY_STUCK),
+    ("drive", "actual velocity stuck, then zero is ordered", Cause.VELOCITY_STUCK, Cause.VELOCITY_STUCK),
+    ("drive", "ignores its setpoints, then zero is ordered", Cause.WHEEL_RUNS_ON, Cause.WHEEL_RUNS_ON),
+    ("encoder", "lost: nothing counts, no speed", Cause.NO_MOTION, Cause.NO_MOTION),
+    ("encoder", "frozen: nothing counts, the last speed", Cause.POSITION_STUCK, Cause.POSITION_STUCK),
+    ("encoder", "counts backward", Cause.WRONG_WAY, Cause.WRONG_WAY),
+    ("encoder", "jumps to and fro", Cause.ENCODER_JUMPS, Cause.ENCODER_JUMPS),
+    ("wheel", "blocked", Cause.NO_MOTION, Cause.NO_MOTION),
+    ("wheel", "follows half of its setpoint", Cause.WHEEL_SLOW, Cause.WHEEL_SLOW),
+    ("wheel", "motor without force", Cause.WHEEL_SLOW, Cause.WHEEL_SLOW),
+    ("wheel", "setpoints lost, then zero is ordered", Cause.WHEEL_RUNS_ON, Cause.WHEEL_RUNS_ON),
+    ("wheel", "feedback lost", Cause.FEEDBACK_LOST, Cause.FEEDBACK_LOST),
+    ("twin node", "a second drive with the same node id, at standstill", Cause.TWIN_NODE, Cause.TWIN_NODE),
+)
+
+
+NEEDS_UNITS = (Cause.ENCODER_JUMPS, Cause.VELOCITY_STUCK)
+
+
+@pytest.mark.parametrize(("what", "how", "box", "wire"), FAILURES, ids=[f"{row[0]}: {row[1]}" for row in FAILURES])
+def test_the_first_cause_of_each_failure(what: str, how: str, box: Cause | None, wire: Cause | None) -> None:
+    """By the driver's black box, by a listener's frames, and without robot.yaml, in raw numbers."""
+    for view, expected in ((BOX, box), (WIRE, wire)):
+        told = explained(what, how, view)
+        causes = [story.cause for story in told.stories]
+        assert causes == ([] if expected is NO_STOP else [expected]), (view, [s.found.text for s in told.stories])
+    if box is not NO_STOP and box not in NEEDS_UNITS:
+        (story,) = explained(what, how, BOX, with_robot=False).stories
+        assert story.cause is box
+        assert all(wheel.unit == "increments" for wheel in story.standstill.wheels)
+
+
+def test_what_needs_units_is_not_guessed_without_them() -> None:
+    (jumps,) = explained("encoder", "jumps to and fro", BOX, with_robot=False).stories
+    assert jumps.cause is Cause.REPORTED
+    assert "the frames of this recording do not show what it saw" in jumps.found.text
+
+
+@pytest.mark.parametrize("by", ["joystick", "goal"])
+def test_ordinary_driving_has_no_stop(by: str) -> None:
+    """24 s: speeds up and down, both directions, turns, pauses."""
+    cruise = Cruise(by)
+    recorder = WorldRecorder(cruise.world)
+    for step in range(60):
+        if by == "joystick":
+            cruise.ordered = Twist(0.5 * (step % 5 - 2) / 2.0, 1.0 * (step % 3 - 1)) if step % 7 else Twist(0.0, 0.0)
+        cruise.world.clock.run_until(cruise.world.clock.now_s + 0.4)
+    for entries in (recorder.box, recorder.wire):
+        assert explain(entries, ROBOT).stories == []
+
+
+def test_who_caught_it_how_late_and_how_far_the_wheels_went() -> None:
+    """The drive fails at 1.03 s; it brakes by itself, the other wheel is stopped by driver and watchdog."""
+    (story,) = explained("drive", "in fault", BOX).stories
+    assert story.caught_by == "the drive itself"
+    assert story.found.at_s == pytest.approx(1.03, abs=0.02)
+    assert "7305h encoder" in story.found.text
+    assert story.standstill.stood_s == pytest.approx(0.21, abs=0.05)
+    assert story.standstill.way_m == pytest.approx(0.047, abs=0.01)
+    whats = [f"{event.who}: {event.text}" for event in story.chain]
+    fault = next(i for i, text in enumerate(whats) if "fault reaction active" in text)
+    stopping = next(i for i, text in enumerate(whats) if text.startswith("motor_driver: STOPPING: drive fault"))
+    assert fault < stopping
+
+
+def test_a_wheel_whose_encoder_died_proves_no_standstill() -> None:
+    (story,) = explained("encoder", "lost: nothing counts, no speed", BOX).stories
+    dead = next(wheel for wheel in story.standstill.wheels if wheel.stood_s is None)
+    assert dead.why_not.startswith("6064h ends at")
+    assert story.standstill.stood_s is None
+    assert "a dead encoder, a blocked wheel and a motor without current look the same here" in story.found.text
+
+
+def test_a_consequence_is_not_the_cause() -> None:
+    """After the driver has died the drives report lost heartbeats and go to fault: that comes later."""
+    (story,) = explained("motor_driver", "SIGKILL", WIRE).stories
+    assert story.cause is Cause.DRIVER_SILENT
+    assert any("EMCY 8130h" in event.text for event in story.chain)
+    assert story.found.at_s < min(event.at_s for event in story.chain if "EMCY" in event.text)
+
+
+def test_the_time_of_the_cause_is_that_of_the_last_frame_not_of_the_alarm() -> None:
+    (story,) = explained("cable", "of one drive is cut", BOX).stories
+    last_s = max(
+        entry.at_s
+        for entry in recorder("cable", "of one drive is cut").box
+        if isinstance(entry, RecordedFrame) and entry.cob_id == 0x180 + story.found.node_id
+    )
+    assert story.found.at_s == pytest.approx(last_s, abs=0.002)
+    assert story.scene.reaction_s == pytest.approx(story.found.at_s + ROBOT.timeouts.feedback_s, abs=0.03)
+
+
+def test_the_end_of_a_recording_in_motion_is_said() -> None:
+    told = explained("motor_driver", "SIGKILL", BOX)
+    assert told.stories == []
+    assert any(axis.is_enabled and axis.moves for node in told.network.nodes.values() for axis in node.axes.values())
+
+
+def test_every_cause_has_its_advice_and_every_rule_another_cause() -> None:
+    assert set(ADVICE) == set(Cause)
+    causes = [rule.cause for rule in RULES]
+    assert len(set(causes)) == len(causes)
+    assert set(causes) == set(Cause) - {Cause.UNKNOWN}
+
+
+def test_an_unknown_end_is_said_to_be_unknown() -> None:
+    """The driver says that it stops, and not why; the recording has no frame before."""
+    entries = [Note(0.0, "motor_driver ENABLED"), Note(1.0, "motor_driver LATCHED")]
+    (story,) = explain(entries, ROBOT).stories
+    assert story.cause is Cause.UNKNOWN
+    assert "nothing before it shows why" in story.found.text
