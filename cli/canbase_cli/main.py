@@ -23,6 +23,7 @@ from canbase_cli import (
     jog,
     monitor,
     record,
+    replay,
     rotate,
     sample,
     scan,
@@ -82,6 +83,7 @@ app.command("doctor", cls=RosCommand, options_metavar=ROS_USAGE, epilog=doctor.E
 app.command("explain", epilog=explain.EPILOG, rich_help_panel=_LOOK)(explain.explain)
 app.command("dump", epilog=dump.EPILOG, rich_help_panel=_LOOK)(dump.dump)
 app.command("export", epilog=export.EPILOG, rich_help_panel=_LOOK)(export.export)
+app.command("replay", epilog=replay.EPILOG, rich_help_panel=_LOOK)(replay.replay)
 app.command("support-bundle", rich_help_panel=_LOOK)(support_bundle.support_bundle)
 
 app.command("init", epilog=init.EPILOG, rich_help_panel=_SET_UP)(init.init)

@@ -60,7 +60,7 @@ class Ring:
         return self._seconds
 
     def frame(self, now_s: float, cob_id: int, data: bytes, received: bool) -> None:
-        """A frame was received, or given to the bus."""
+        """A frame was received, or given to the bus. `now_s`: when the kernel had it."""
         self._frames.append((now_s, cob_id, data, received))
 
     def note(self, now_s: float, text: str) -> None:
@@ -72,15 +72,20 @@ class Ring:
         self._events.append((now_s, what, values))
 
     def cut(self, now_s: float, wall_offset_s: float) -> Recording:
-        """What happened in the last seconds before `now_s`."""
+        """What happened in the last seconds before `now_s`, in the order of time: frames that waited in the socket came
+        before others that were sent meanwhile."""
         since = now_s - self._seconds
         frames, notes, events = self._frames.copy(), self._notes.copy(), self._events.copy()
         return Recording(
-            tuple(entry for entry in frames if entry[0] >= since),
+            tuple(sorted((entry for entry in frames if entry[0] >= since), key=_time)),
             tuple(entry for entry in notes if entry[0] >= since),
             wall_offset_s,
             tuple(entry for entry in events if entry[0] >= since),
         )
+
+
+def _time(entry: FrameEntry) -> float:
+    return entry[0]
 
 
 def asc_lines(recording: Recording, title: str) -> Iterator[str]:

@@ -30,6 +30,8 @@ SEND_FAILURES = 10
 """This many failed sends in a row are a failed bus; fewer are a full transmit buffer."""
 RECEIVE_FAILURES = 3
 """The same for receptions."""
+LATEST_S = 60.0
+"""A frame does not wait longer in a socket [s]."""
 IGNORED_AT_ONCE = 100
 """This many frames that are not ours are passed over in one reception: more than a bus brings in one cycle."""
 OPENS_AT_ONCE_S = 0.002
@@ -96,6 +98,8 @@ class BusPort:
         self._probe: Frame | None = None
         self.problem = ""
         self.report = BusReport()
+        self._received_wall_s = 0.0
+        """When the kernel received the last frame, by the wall clock; 0.0: unknown."""
         self._send_failures = self._receive_failures = 0
         self._retry_at = 0.0
         self._opening: _Opening | None = None
@@ -119,6 +123,14 @@ class BusPort:
                 return frame
         return None
 
+    def received_at(self, now_s: float) -> float:
+        """When the kernel received the last frame that `receive` gave, `now_s` ago or before [s, monotonic].
+
+        `now_s` where it does not tell, or the wall clock was set meanwhile.
+        """
+        late_s = time.time() - self._received_wall_s
+        return now_s - late_s if 0.0 < late_s < LATEST_S else now_s
+
     def _receive(self, bus: FrameSocket, timeout_s: float) -> Frame | None:
         """None, and `report` grows, for what is no data frame of CANopen."""
         try:
@@ -128,7 +140,7 @@ class BusPort:
             return None
         if received is None:
             return None
-        can_id, data, _at_s = received
+        can_id, data, self._received_wall_s = received
         if can_id < 0:
             self._drop()
             return None

@@ -203,7 +203,7 @@ class ControlLoop(threading.Thread):
             frame = self._bus.receive(max(0.0, wait_s))
             if frame is not None:
                 now_s = time.monotonic()
-                self._ring.frame(now_s, frame.cob_id, frame.data, True)
+                self._ring.frame(self._bus.received_at(now_s), frame.cob_id, frame.data, True)
                 self._send(self._core.on_frame(frame, now_s))
                 self._hand_over_if_due(now_s)
             elif wait_s <= 0.0:

@@ -1,0 +1,76 @@
+"""`canbase replay`: a recorded stop once more, through the real watchdog, and with another robot.yaml."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+from canbase_runtime.terminal import FAILED, fail, load_config
+
+if TYPE_CHECKING:
+    from canbase_config.robot import Robot
+    from canbase_recording.recorded_inputs import RecordedInputs
+    from canbase_recording.replay import WatchdogReplay
+
+EPILOG: Final = (
+    "Examples:  \ncanbase replay stop_robot_20261124T201500.000Z_watchdog_tripped.asc  \n"
+    "canbase replay stop.asc --config shorter_lease.yaml"
+)
+
+
+def replay(
+    recording: Annotated[
+        Path, typer.Argument(metavar="FILE", help="The .asc of a black box; its .json lies beside it.")
+    ],
+    config: Annotated[
+        Path | None,
+        typer.Option("--config", "-c", metavar="FILE", help="Another robot.yaml: what would have been different."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Feed a recorded stop to the real watchdog: would it have tripped, when, and why, beside what was recorded.
+
+    With --config, also what another configuration would have changed. Nothing is sent and no robot is needed. What a
+    recording does not contain (scans, the watchdog's own process) is not replayed, and reported.
+
+    Exit codes: 0 the replay does what was recorded, 1 it differs or the files cannot be read, 2 wrong command line or
+    robot.yaml.
+    """
+    from canbase_recording.recorded_inputs import NoInputsError
+    from canbase_recording.replay import replay_watchdog
+    from canbase_recording.replay_file import read_inputs
+
+    other = None if config is None else load_config(config, quiet=True).robot
+    try:
+        inputs = read_inputs(recording)
+        found = replay_watchdog(inputs)
+        values, lines = _told(inputs, found, other)
+    except NoInputsError as error:
+        fail(str(error), FAILED)
+    typer.echo(json.dumps(values, indent=1) if as_json else "\n".join(lines))
+    if any(life.differs for life in found.lives):
+        raise typer.Exit(FAILED)
+
+
+def _told(
+    inputs: RecordedInputs, found: WatchdogReplay, other: Robot | None
+) -> tuple[dict[str, Any], Iterator[str] | list[str]]:
+    from canbase_recording import replay_text as words
+    from canbase_recording.replay_compare import compare
+
+    stop = f"stop by {inputs.stopped_by}: {inputs.cause} ({inputs.detail}), at {inputs.at_s - inputs.began_s:.3f} s"
+    values: dict[str, Any] = {
+        "stop": {"by": inputs.stopped_by, "cause": inputs.cause, "at_s": inputs.at_s - inputs.began_s},
+        "versions": dict(inputs.versions),
+        "watchdog": words.watchdog_values(inputs, found),
+    }
+    lines = [stop, *words.watchdog_lines(inputs, found)]
+    if other is not None:
+        comparison = compare(inputs, other)
+        values["other_robot_yaml"] = words.comparison_values(inputs, comparison)
+        lines += words.comparison_lines(inputs, comparison)
+    return values, lines

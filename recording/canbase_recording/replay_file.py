@@ -1,0 +1,83 @@
+"""The files of a recorded stop, read for `canbase replay`. A shell: files alone."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import can
+from pydantic import ValidationError
+
+from canbase_config.robot import Robot
+from canbase_recording.entry import Entry, FrameKind, RecordedFrame
+from canbase_recording.recorded_inputs import NoInputsError, RecordedInputs, recorded_inputs
+
+MOST_BYTES: Final = 64_000_000
+"""Of the .json file: canbase writes a few MB."""
+
+
+def read_inputs(path: Path) -> RecordedInputs:
+    """Both files of one stop; `path`: either of them. Raises NoInputsError."""
+    beside = path.with_suffix(".json")
+    told = _told(beside)
+    try:
+        return recorded_inputs(_entries(path.with_suffix(".asc")), told)
+    except NoInputsError as error:
+        raise NoInputsError(f"{beside}: {error}") from error
+
+
+def _entries(path: Path) -> list[Entry]:
+    """The frames of the .asc file: canbase wrote it whole, or not at all."""
+    if not path.is_file():
+        raise NoInputsError(f"there is no {path.name} beside it")
+    try:
+        with can.ASCReader(path) as reader:
+            return [_entry(message) for message in reader]
+    except (ValueError, IndexError, KeyError, OSError, can.CanError) as error:
+        raise NoInputsError(f"{path.name} beside it is no recording of canbase: {error}") from error
+
+
+def _entry(message: can.Message) -> RecordedFrame:
+    plain = not (message.is_error_frame or message.is_extended_id or message.is_remote_frame)
+    kind = FrameKind.DATA if plain else FrameKind.EXTENDED
+    return RecordedFrame(message.timestamp, message.arbitration_id, bytes(message.data), not message.is_rx, kind)
+
+
+def robot_of(inputs: RecordedInputs) -> Robot:
+    """The robot as it was configured, with the user's own profiles out of the recording. Raises NoInputsError."""
+    values: Any = json.loads(json.dumps(inputs.robot_yaml))
+    with tempfile.TemporaryDirectory(prefix="canbase-") as folder:
+        for number, (name, text) in enumerate(inputs.profiles.items()):
+            own = Path(folder) / f"{number}.yaml"
+            own.write_text(text, encoding="utf-8")
+            for drive in values.get("drives", ()):
+                drive["profile"] = str(own) if drive.get("profile") == name else drive.get("profile")
+        try:
+            return Robot.model_validate(values)
+        except ValidationError as error:
+            raise NoInputsError(f"this canbase refuses the recorded robot.yaml: {error}") from error
+
+
+def _told(path: Path) -> Mapping[str, Any]:
+    try:
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+    except FileNotFoundError as error:
+        raise NoInputsError(
+            f"{path}: there is no such file; it is written beside the .asc, and needed for a replay "
+            "(canbase explain needs the .asc alone)"
+        ) from error
+    except OSError as error:
+        raise NoInputsError(f"{path}: cannot be read: {error.strerror or error}") from error
+    if len(content) > MOST_BYTES:
+        raise NoInputsError(f"{path}: longer than {MOST_BYTES // 1_000_000} MB")
+    try:
+        told = json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise NoInputsError(f"{path}: no JSON: {error}") from error
+    if not isinstance(told, dict):
+        raise NoInputsError(f"{path}: no JSON object")
+    return told

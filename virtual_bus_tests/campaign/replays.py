@@ -1,0 +1,152 @@
+"""`python -m campaign.replays`: black boxes of drawn scenarios, replayed as `canbase replay` does it. What agrees?
+
+Each scenario drives in virtual time with faults; what its driver would have recorded is written to files, read, and fed
+to a new watchdog. Exit code 1: less than AGREE of the trips that a recording can explain come out the same.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import pickle
+import sys
+import tempfile
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+
+from rich.console import Console
+from rich.table import Table
+
+from campaign.plan import Plan, draw_plan
+from campaign.runner import start_of
+from campaign.world import World
+from canbase_recording.replay import Replayed, replay_watchdog
+from canbase_recording.replay_file import read_inputs
+from canbase_recording.replay_text import trip_text, verdict
+from support.recorded_stops import record_in_a_copy
+
+STOPS = 100
+AGREE = 0.9
+STUFFING = (0.9, 1.05)
+"""A frame has more or fewer stuff bits than the typical one: else everything lies on one grid, and on its limits."""
+SAME, CYCLE, CANNOT, DIFFERS = "same within a tick", "a cycle apart", "cannot be replayed", "differs"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """One life of the watchdog in one scenario."""
+
+    seed: int
+    faults: tuple[str, ...]
+    cause: str
+    """That was recorded; `none`: no trip."""
+    result: str
+    said: str
+    late_s: float
+
+
+def replayed(seed: int, folder: Path) -> list[Outcome]:
+    """The scenario of this seed: all lives of its watchdog."""
+    start, plan = start_of(seed), draw_plan(seed)
+    path = folder / f"{seed}.asc"
+
+    def run() -> None:
+        _wobble(start.world, plan)
+        start.run(plan)
+
+    record_in_a_copy(start.world, run, path, plan.bitrate)
+    inputs = read_inputs(path)
+    for suffix in (".asc", ".json"):
+        path.with_suffix(suffix).unlink()
+    faults = tuple(fault.name for fault in plan.faults)
+    return [
+        _outcome(seed, faults, life, f"{verdict(life)}; {trip_text(inputs, life.trip)}")
+        for life in replay_watchdog(inputs).lives
+    ]
+
+
+def _outcome(seed: int, faults: tuple[str, ...], life: Replayed, said: str) -> Outcome:
+    results = ((life.agrees, SAME), (life.is_a_cycle_apart, CYCLE), (life.cannot, CANNOT), (True, DIFFERS))
+    result = next(name for holds, name in results if holds)
+    return Outcome(seed, faults, life.life.trip.name if life.life.trip else "none", result, said, life.late_s)
+
+
+def _wobble(world: World, plan: Plan) -> None:
+    random = Random(f"stuffing {plan.seed}")
+
+    def on_frame(_sender: str, _cob_id: int, _data: bytes) -> None:
+        world.bus.bitrate = round(plan.bitrate * random.uniform(*STUFFING))
+
+    world.bus.watch = on_frame
+
+
+def drawn(stops: int, first: int = 0) -> Iterator[Outcome]:
+    """Scenarios from this seed on, until so many trips were recorded. Each in a process of its own robot's world."""
+    tripped, seed = 0, first
+    with tempfile.TemporaryDirectory(prefix="canbase-replays-") as folder:
+        while tripped < stops:
+            for outcome in in_a_copy(seed, Path(folder)):
+                tripped += outcome.cause != "none"
+                yield outcome
+            seed += 1
+
+
+def in_a_copy(seed: int, folder: Path) -> list[Outcome]:
+    """The replay is for every scenario the first thing that its process does: nothing is left of the one before."""
+    start_of(seed)
+    reader, writer = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        try:
+            with os.fdopen(writer, "wb") as pipe:
+                pipe.write(pickle.dumps(replayed(seed, folder)))
+        finally:
+            os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader, "rb") as pipe:
+        told = pipe.read()
+    os.waitpid(pid, 0)
+    if not told:
+        raise RuntimeError(f"the replay of seed {seed} failed")
+    found: list[Outcome] = pickle.loads(told)
+    return found
+
+
+def table(outcomes: Iterable[Outcome]) -> Table:
+    """By the recorded cause."""
+    counts: dict[str, Counter[str]] = defaultdict(Counter)
+    for outcome in outcomes:
+        counts[outcome.cause][outcome.result] += 1
+    shown = Table("recorded cause", SAME, CYCLE, DIFFERS, CANNOT)
+    for cause in sorted(counts):
+        shown.add_row(cause, *(str(counts[cause][result]) for result in (SAME, CYCLE, DIFFERS, CANNOT)))
+    return shown
+
+
+def main() -> int:
+    """Print what differs, and the table."""
+    parser = argparse.ArgumentParser(prog="campaign.replays", description=__doc__)
+    parser.add_argument("--stops", type=int, default=STOPS, help="recorded trips")
+    parser.add_argument("--first", type=int, default=0, help="seed of the first scenario")
+    given = parser.parse_args()
+    out, outcomes = Console(), []
+    for outcome in drawn(given.stops, given.first):
+        outcomes.append(outcome)
+        if outcome.result in (CYCLE, DIFFERS):
+            told = f"seed {outcome.seed} ({', '.join(outcome.faults)}): recorded {outcome.cause}; {outcome.said}"
+            out.print(told, highlight=False, markup=False, soft_wrap=True)
+    out.print(table(outcomes))
+    known = [outcome for outcome in outcomes if outcome.cause != "none" and outcome.result != CANNOT]
+    late_ms = sorted(1000.0 * outcome.late_s for outcome in known if outcome.result == SAME)
+    if late_ms:
+        out.print(f"replayed minus recorded: {late_ms[0]:.1f} to {late_ms[-1]:.1f} ms", highlight=False)
+    agree = sum(outcome.result == SAME for outcome in known)
+    out.print(f"{agree} of {len(known)} trips that a recording can explain are the same", highlight=False)
+    return 0 if agree >= AGREE * len(known) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,164 @@
+"""Black boxes of stops in virtual time: the driver's ring, filled and written as its process does it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from campaign.world import World
+from canbase_config.robot import Robot
+from canbase_driver.runtime.black_box import Ring, asc_lines
+from canbase_driver.runtime.black_box_about import about
+from canbase_driver.runtime.black_box_json import json_lines
+from canbase_driver.supervision.stop_history import StopRecord
+from canbase_velocity.decision import Decision
+from canbase_velocity.mux import MuxDecision
+from canbase_velocity.twist import Twist
+
+WALL_S = 1_790_000_000.0
+"""Of the monotonic clock to the wall clock."""
+WARM_UP_S = 2.0
+
+
+class DriverBox:
+    """What the driver of a world would have recorded from now on. A driver that starts again begins with nothing."""
+
+    def __init__(self, world: World, bitrate: int = 0, seconds: float = 60.0) -> None:
+        """`bitrate`: of the bus [bit/s], where robot.yaml has another one."""
+        self._world, self._seconds, self._bitrate = world, seconds, bitrate or world.robot.bus.bitrate
+        self.ring = Ring(seconds)
+        self._sent: dict[int, tuple[Twist, float]] = {}
+        """By identity of the message: when the filter sent it, 0: somebody else did."""
+        self._leased = False
+        self._state: tuple[object, object] | None = None
+        driver: Any = world.driver
+        self._member_send, driver._member.send = driver._member.send, self._on_sent
+        self._receive, driver.receive = driver.receive, self._on_received
+        self._begin, driver.begin = driver.begin, self._on_begin
+        velocity: Any = world.velocity
+        self._lease, velocity._send_lease = velocity._send_lease, self._on_lease
+        topics: Any = world.topics
+        self._publish, topics.publish = topics.publish, self._on_published
+        for topic, note in (("cmd_vel", self._on_command), ("safety_filter/state", self._on_filter)):
+            self._tap(topic, note)
+
+    @property
+    def now_s(self) -> float:
+        return self._world.clock.now_s
+
+    def _tap(self, topic: str, note: Callable[[Any], None]) -> None:
+        """What the driver takes out of a topic, when it does."""
+        subscribers: list[Any] = self._world.topics._subscribers[topic]
+
+        def both(do: Callable[[Any], None], message: Any) -> None:
+            note(message)
+            do(message)
+
+        for at, (process, do) in enumerate(subscribers):
+            if process is self._world.driver:
+                subscribers[at] = (process, lambda message, do=do: both(do, message))
+
+    def _on_begin(self) -> None:
+        self.ring, self._state = Ring(self._seconds), None
+        self._begin()
+
+    def _on_sent(self, cob_id: int, data: bytes) -> None:
+        self.ring.frame(self.now_s, cob_id, data, False)
+        self._member_send(cob_id, data)
+
+    def _on_received(self, channel: str, depth: int, do: Callable[..., object], *arguments: Any) -> None:
+        """A frame has the time at which it came, also where the driver hangs and takes it in later."""
+        if channel == "frames":
+            at_s = self.now_s
+            self._receive(channel, depth, lambda: self._take_in(at_s, do, *arguments))
+        else:
+            self._receive(channel, depth, do, *arguments)
+
+    def _take_in(self, at_s: float, do: Callable[..., object], cob_id: int, data: bytes) -> None:
+        if not self._world.driver.bus_problem:
+            self.ring.frame(at_s, cob_id, data, True)
+        do(cob_id, data)
+
+    def _on_lease(self, datagram: bytes, twist: Twist) -> None:
+        self._leased = True
+        self._lease(datagram, twist)
+
+    def _on_published(self, topic: str, message: Any) -> None:
+        if topic == "cmd_vel":
+            message = Twist(message.linear_mps, message.angular_radps)
+            self._sent[id(message)] = message, WALL_S + self.now_s if self._leased else 0.0
+            self._leased = False
+        elif topic == "motor_driver/status":
+            self._on_state(message)
+        elif topic == "velocity_mux/state":
+            self._on_mux(message)
+        for name, source in self._world.robot.mux.sources.items():
+            if source.topic == topic:
+                values = {"source": name, "linear_mps": message.linear_mps, "angular_radps": message.angular_radps}
+                self.ring.event(self.now_s + self._world.topics.FASTEST_S, "order", values)
+        self._publish(topic, message)
+
+    def _on_command(self, twist: Twist) -> None:
+        stamp_s = self._sent[id(twist)][1]
+        values = {"linear_mps": twist.linear_mps, "angular_radps": twist.angular_radps, "stamp_s": stamp_s}
+        self.ring.event(self.now_s, "cmd_vel", values)
+
+    def _on_filter(self, decision: Decision) -> None:
+        values = {"action": decision.action.value, "cause": decision.cause.value, "emergency": decision.emergency}
+        ordered = decision.twist
+        ordered_values = {"ordered_linear_mps": ordered.linear_mps, "ordered_angular_radps": ordered.angular_radps}
+        self.ring.event(self.now_s, "safety_filter/state", values | ordered_values)
+
+    def _on_mux(self, decision: MuxDecision) -> None:
+        standing = {source.name: source.standing.value for source in decision.sources}
+        locks = [lock.name for lock in decision.locks if lock.holds]
+        values = {"active": decision.active or "", "standing": standing, "locks": locks}
+        self.ring.event(self.now_s, "velocity_mux/state", values)
+
+    def _on_state(self, snapshot: Any) -> None:
+        told = (snapshot.state, snapshot.finding.cause)
+        if told != self._state:
+            self._state = told
+            values = {"state": snapshot.state.name, "cause": snapshot.finding.cause.value}
+            self.ring.event(self.now_s, "motor_driver/state", values)
+
+    @property
+    def _robot(self) -> Robot:
+        """A scenario has a bit rate of its own."""
+        robot = self._world.robot
+        bus = robot.bus.model_copy(update={"bitrate": self._bitrate})
+        return robot.model_copy(update={"bus": bus})
+
+    def write(self, path: Path) -> Path:
+        """Both files, as `black_box_writer.py` does it; `path`: of the .asc."""
+        now_s = self.now_s
+        cut = self.ring.cut(now_s, WALL_S)
+        recording = replace(cut, events=tuple(sorted(cut.events, key=lambda event: event[0])))
+        verdict = self._world.watchdog.core.status.verdict
+        record = StopRecord("watchdog", verdict.cause.name.lower(), verdict.detail, True, "", now_s)
+        path.write_text("".join(asc_lines(recording, "a stop")), encoding="utf-8")
+        told = "".join(json_lines(recording, record, path.name, about(self._robot)))
+        path.with_suffix(".json").write_text(told, encoding="utf-8")
+        return path
+
+
+def record_in_a_copy(world: World, run: Callable[[], object], path: Path, bitrate: int = 0) -> None:
+    """`run` in a copy of this process, and its recording to `path`: the world stays as it is here.
+
+    The recording begins WARM_UP_S before: a watchdog that is replayed from its begin has seen the robot by then.
+    """
+    pid = os.fork()
+    if pid == 0:
+        status = 1
+        try:
+            box = DriverBox(world, bitrate)
+            world.clock.run_until(world.clock.now_s + WARM_UP_S)
+            run()
+            box.write(path)
+            status = 0
+        finally:
+            os._exit(status)
+    assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0

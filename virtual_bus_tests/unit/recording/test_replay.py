@@ -1,0 +1,235 @@
+"""Recorded stops of a robot in virtual time, replayed: the watchdog trips again; another robot.yaml changes that."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+
+import pytest
+from typer.testing import CliRunner
+
+from campaign.faults import FAULTS
+from campaign.stops import Cruise
+from campaign.twins import JOYSTICK
+from canbase_cli.main import app
+from canbase_config.robot import Robot
+from canbase_recording.recorded_inputs import NoInputsError, RecordedInputs
+from canbase_recording.recorded_watchdog import Life, Trip
+from canbase_recording.replay import EDGE, Replayed, replay_watchdog
+from canbase_recording.replay_compare import compare
+from canbase_recording.replay_file import read_inputs, robot_of
+from canbase_recording.replay_text import comparison_lines, verdict, watchdog_lines
+from canbase_watchdog.trip_cause import TripCause
+from support.recorded_stops import record_in_a_copy
+
+FAULT_S, AFTER_S = 1.0, 1.5
+CASES = {
+    "velocity_dies": TripCause.LEASE_LOST,
+    "driver_hangs": TripCause.DRIVER_SILENT,
+    "frozen_encoder": TripCause.FEEDBACK_IMPLAUSIBLE,
+    "feedback_lost": TripCause.DRIVE_SILENT,
+}
+"""Faults of the campaign, of a robot that drives at 0.3 m/s."""
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, RecordedInputs]:
+    """By the name of the fault; `nothing`: it drives on. All drive for 3 s before."""
+    folder = tmp_path_factory.mktemp("recordings")
+    cruise = Cruise(JOYSTICK)
+    for name in ("nothing", *CASES):
+        record_in_a_copy(cruise.world, lambda name=name: _go_wrong(cruise, name), folder / f"{name}.asc")  # type: ignore[misc]
+    return {path.stem: read_inputs(path) for path in folder.glob("*.asc")}
+
+
+def _go_wrong(cruise: Cruise, name: str) -> None:
+    clock = cruise.world.clock
+    clock.run_until(clock.now_s + FAULT_S)
+    if name in FAULTS:
+        FAULTS[name].begin(cruise.world, cruise.around, FAULTS[name].draw(Random(1)))
+    clock.run_until(clock.now_s + AFTER_S)
+    if name in FAULTS:
+        FAULTS[name].end(cruise.world, cruise.around, FAULTS[name].draw(Random(1)))
+    clock.run_until(clock.now_s + 0.2)
+
+
+def robot_with(inputs: RecordedInputs, **timeouts: float) -> Robot:
+    robot = robot_of(inputs)
+    return robot.model_copy(update={"timeouts": robot.timeouts.model_copy(update=timeouts)})
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_same_cause_within_a_tick(recordings: dict[str, RecordedInputs], name: str) -> None:
+    life = replay_watchdog(recordings[name]).lives[0]
+    assert life.trip is not None
+    assert life.life.trip is not None
+    assert (life.trip.cause, life.life.trip.cause) == (CASES[name], CASES[name])
+    assert abs(life.late_s) <= 0.006 + EDGE
+    assert life.agrees
+    assert life.starts == 0
+
+
+def test_no_trip_where_there_was_none(recordings: dict[str, RecordedInputs]) -> None:
+    (life,) = replay_watchdog(recordings["nothing"]).lives
+    assert (life.trip, life.life.trip, life.agrees) == (None, None, True)
+    assert life.life.until_s - life.life.from_s > 4.0
+
+
+def test_without_the_leases_of_the_recording_it_would_have_tripped(recordings: dict[str, RecordedInputs]) -> None:
+    """The replay can tell: the same frames with fewer inputs give another verdict."""
+    without = replace(recordings["nothing"], commands=())
+    (life,) = replay_watchdog(without).lives
+    assert life.trip is not None
+    assert not life.agrees
+    assert verdict(life) == "DIFFERS: the watchdog that ran did not trip"
+
+
+def test_a_shorter_timeout_trips_earlier_by_the_difference(recordings: dict[str, RecordedInputs]) -> None:
+    inputs = recordings["velocity_dies"]
+    lease_s = robot_of(inputs).timeouts.lease_s
+    found = compare(inputs, robot_with(inputs, lease_s=lease_s - 0.07))
+    difference = found.differences[0]
+    assert difference.earlier_s == pytest.approx(0.07, abs=0.006)
+    assert [change.key for change in found.of_the_watchdog] == ["timeouts.lease_s"]
+    assert [change.key for change in difference.by] == ["timeouts.lease_s"]
+    line = list(comparison_lines(inputs, found))[1]
+    assert f"s earlier: timeouts.lease_s {lease_s} -> {lease_s - 0.07}" in line
+
+
+def test_a_longer_timeout_does_not_trip_until_the_recorded_stop_and_more_is_not_known(
+    recordings: dict[str, RecordedInputs],
+) -> None:
+    inputs = recordings["velocity_dies"]
+    lease_s = robot_of(inputs).timeouts.lease_s
+    found = compare(inputs, robot_with(inputs, lease_s=lease_s + 0.1))
+    assert found.differences[0].other.trip is None
+    assert "the consequence of its stop" in list(comparison_lines(inputs, found))[1]
+
+
+def test_a_key_that_the_watchdog_does_not_know_changes_nothing(recordings: dict[str, RecordedInputs]) -> None:
+    inputs = recordings["velocity_dies"]
+    found = compare(inputs, robot_with(inputs, boot_s=33.0))
+    assert [change.key for change in found.changes] == ["timeouts.boot_s"]
+    assert found.of_the_watchdog == ()
+    assert all(difference.is_none for difference in found.differences)
+
+
+def test_a_robot_with_other_drives_cannot_be_compared(recordings: dict[str, RecordedInputs]) -> None:
+    inputs = recordings["velocity_dies"]
+    robot = robot_of(inputs)
+    drives = tuple(drive.model_copy(update={"node_id": drive.node_id + 10}) for drive in robot.drives)
+    with pytest.raises(NoInputsError, match="the drives differ: recorded node 1 axis 0"):
+        compare(inputs, robot.model_copy(update={"drives": drives}))
+
+
+def life(recorded: TripCause | None, replayed: TripCause | None, at_s: float = 105.0, **changes: object) -> Replayed:
+    trip = None if recorded is None else Trip(105.0, recorded, 0)
+    other = None if replayed is None else Trip(at_s, replayed, 0)
+    return replace(Replayed(Life(100.0, 105.0, trip, False, ()), other, 0), **changes)  # type: ignore[arg-type]
+
+
+LEASE, LATE, DRIVER = TripCause.LEASE_LOST, TripCause.LOOP_LATE, TripCause.DRIVER_SILENT
+SILENT = Life(100.0, 105.0, Trip(105.0, LEASE, 0), False, ((104.0, 105.0),))
+SHORT = Life(104.5, 105.0, Trip(105.0, LEASE, 0), False, ())
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (life(LEASE, LEASE, 104.998), "the same cause, 2.0 ms earlier"),
+        (life(None, None), "the same: no trip"),
+        (life(LEASE, None), "DIFFERS: the replay does not trip"),
+        (life(LEASE, DRIVER), "DIFFERS: another cause"),
+        (life(LEASE, LEASE, 104.9), "DIFFERS: the same cause, 0.100 s earlier"),
+        (life(LEASE, LEASE, 104.988), "the same cause, 12.0 ms earlier: one cycle of the driver"),
+        (life(LATE, None), "cannot be replayed: the watchdog's own loop was late"),
+        (life(LEASE, None, life=SILENT), "cannot be replayed: no frame of the watchdog came just before"),
+        (life(LEASE, None, life=SHORT), "cannot be replayed: only 0.50 s are recorded before it"),
+    ],
+)
+def test_what_is_said_of_a_replay(given: Replayed, said: str) -> None:
+    assert verdict(given).startswith(said)
+
+
+def test_what_was_recorded_and_what_was_replayed_stand_beside_each_other(recordings: dict[str, RecordedInputs]) -> None:
+    inputs = recordings["velocity_dies"]
+    text = "\n".join(watchdog_lines(inputs, replay_watchdog(inputs)))
+    assert "recorded: " in text
+    assert "trips: lease lost" in text
+    assert "replayed: " in text
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("one") / "stop.asc"
+    cruise = Cruise(JOYSTICK)
+    record_in_a_copy(cruise.world, lambda: _go_wrong(cruise, "velocity_dies"), path)
+    return path
+
+
+def replay(*arguments: object) -> tuple[int, str]:
+    found = CliRunner().invoke(app, ["replay", *map(str, arguments)])
+    return found.exit_code, found.output
+
+
+def test_the_command_tells_it_and_exits_with_0_where_the_replay_agrees(recorded: Path) -> None:
+    code, output = replay(recorded)
+    assert code == 0
+    assert "the same cause" in output
+    assert replay(recorded.with_suffix(".json"))[1] == output
+
+
+def test_as_json_it_is_one_object(recorded: Path) -> None:
+    code, output = replay(recorded, "--json")
+    told = json.loads(output)
+    assert code == 0
+    (first, *_) = told["watchdog"]["lives"]
+    assert (first["recorded"]["cause"], first["replayed"]["cause"], first["agrees"]) == (
+        "LEASE_LOST",
+        "LEASE_LOST",
+        True,
+    )
+    assert math.isfinite(first["late_s"])
+
+
+def test_another_robot_yaml_is_compared(recorded: Path, tmp_path: Path) -> None:
+    other = json.loads(recorded.with_suffix(".json").read_text(encoding="utf-8"))["robot_yaml"]
+    other["timeouts"]["lease_s"] -= 0.05
+    file = tmp_path / "other.yaml"
+    file.write_text(json.dumps(other), encoding="utf-8")
+    code, output = replay(recorded, "--config", file)
+    assert code == 0
+    assert "earlier: timeouts.lease_s" in output
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, "there is no such file; it is written beside the .asc"),
+        ("{", "no JSON"),
+        ("[]", "no JSON object"),
+        ("[" * 100_000, "no JSON"),
+        ('{"format": 1}', "is missing"),
+        (b"\xff\xfe", "no JSON"),
+    ],
+)
+def test_a_second_file_that_is_none_is_told_with_its_name(
+    recorded: Path, tmp_path: Path, content: str | bytes | None, said: str
+) -> None:
+    frames = tmp_path / "stop.asc"
+    frames.write_bytes(recorded.read_bytes())
+    if content is not None:
+        frames.with_suffix(".json").write_bytes(content if isinstance(content, bytes) else content.encode())
+    code, output = replay(frames)
+    assert code == 1
+    assert said in " ".join(output.split())
+    assert "stop.json" in output
+
+
+def test_frames_that_are_missing_or_none_are_told(recorded: Path, tmp_path: Path) -> None:
+    beside = tmp_path / "stop.json"
+    beside.write_bytes(recorded.with_suffix(".json").read_bytes())
+    assert "there is no stop.asc beside it" in " ".join(replay(beside)[1].split())
