@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -14,7 +13,6 @@ from canbase_runtime.terminal import FAILED, fail, load_config
 if TYPE_CHECKING:
     from canbase_config.robot import Robot
     from canbase_recording.recorded_inputs import RecordedInputs
-    from canbase_recording.replay import WatchdogReplay
 
 EPILOG: Final = (
     "Examples:  \ncanbase replay stop_robot_20261124T201500.000Z_watchdog_tripped.asc  \n"
@@ -34,43 +32,54 @@ def replay(
 ) -> None:
     """Feed a recorded stop to the real watchdog: would it have tripped, when, and why, beside what was recorded.
 
-    With --config, also what another configuration would have changed. Nothing is sent and no robot is needed. What a
-    recording does not contain (scans, the watchdog's own process) is not replayed, and reported.
+    Also the driver's limiter: the setpoints that cmd_vel orders. With --config, what another configuration would have
+    changed. Nothing is sent and no robot is needed. What a recording does not contain is not replayed, and reported.
 
     Exit codes: 0 the replay does what was recorded, 1 it differs or the files cannot be read, 2 wrong command line or
     robot.yaml.
     """
     from canbase_recording.recorded_inputs import NoInputsError
-    from canbase_recording.replay import replay_watchdog
     from canbase_recording.replay_file import read_inputs
 
     other = None if config is None else load_config(config, quiet=True).robot
     try:
-        inputs = read_inputs(recording)
-        found = replay_watchdog(inputs)
-        values, lines = _told(inputs, found, other)
+        values, lines, agrees = _told(read_inputs(recording), other)
     except NoInputsError as error:
         fail(str(error), FAILED)
     typer.echo(json.dumps(values, indent=1) if as_json else "\n".join(lines))
-    if any(life.differs for life in found.lives):
+    if not agrees:
         raise typer.Exit(FAILED)
 
 
-def _told(
-    inputs: RecordedInputs, found: WatchdogReplay, other: Robot | None
-) -> tuple[dict[str, Any], Iterator[str] | list[str]]:
+def _told(inputs: RecordedInputs, other: Robot | None) -> tuple[dict[str, Any], list[str], bool]:
+    """For JSON, for people, and whether the replay does what was recorded."""
     from canbase_recording import replay_text as words
-    from canbase_recording.replay_compare import compare
+    from canbase_recording.replay import replay_watchdog
+    from canbase_recording.replay_file import robot_of
+    from canbase_recording.replay_setpoints import replay_setpoints
 
+    found, setpoints = replay_watchdog(inputs), replay_setpoints(inputs, robot_of(inputs))
     stop = f"stop by {inputs.stopped_by}: {inputs.cause} ({inputs.detail}), at {inputs.at_s - inputs.began_s:.3f} s"
     values: dict[str, Any] = {
         "stop": {"by": inputs.stopped_by, "cause": inputs.cause, "at_s": inputs.at_s - inputs.began_s},
         "versions": dict(inputs.versions),
         "watchdog": words.watchdog_values(inputs, found),
+        "driver": words.setpoint_values(inputs, setpoints),
+        "not_replayed": words.NOT_REPLAYED,
     }
-    lines = [stop, *words.watchdog_lines(inputs, found)]
+    lines = [stop, *words.watchdog_lines(inputs, found), *words.setpoint_lines(inputs, setpoints), words.NOT_REPLAYED]
     if other is not None:
-        comparison = compare(inputs, other)
-        values["other_robot_yaml"] = words.comparison_values(inputs, comparison)
-        lines += words.comparison_lines(inputs, comparison)
-    return values, lines
+        values["other_robot_yaml"], more = _with_other(inputs, other)
+        lines += more
+    return values, lines, not (setpoints.differences or any(life.differs for life in found.lives))
+
+
+def _with_other(inputs: RecordedInputs, other: Robot) -> tuple[dict[str, Any], list[str]]:
+    from canbase_recording import replay_text as words
+    from canbase_recording.replay_compare import compare
+    from canbase_recording.replay_setpoints import replay_setpoints
+
+    comparison, setpoints = compare(inputs, other), replay_setpoints(inputs, other)
+    values = words.comparison_values(inputs, comparison) | {"driver": words.setpoint_values(inputs, setpoints)}
+    lines = [*words.comparison_lines(inputs, comparison)]
+    return values, [*lines, *(f"  {line}" for line in words.setpoint_lines(inputs, setpoints))]

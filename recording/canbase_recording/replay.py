@@ -30,6 +30,8 @@ EDGE: Final = 0.002
 """Accuracy of the time between two recorded moments, as a share: the driver records when it gave a frame to the bus,
 not when the watchdog heard it. Where a limit is reached to within that, the one that ran may have judged a cycle sooner
 or later."""
+EVIDENCE: Final = ("motion_missing_s", "slow_wheel_s", "stand_answer_s", "twist_s")
+"""Keys of WatchdogConfig: for so long a sensor or a wheel must have shown it. It adds up from cycle to cycle."""
 NOT_RECORDED: Final = {
     TripCause.BUS_FAILED: "the watchdog's own bus adapter failed, which the driver's recording does not show",
     TripCause.LOOP_LATE: "the watchdog's own loop was late, which the recording does not show",
@@ -52,6 +54,8 @@ class Replayed:
     """A tick, and the time for which the frames of the trip are on the bus."""
     cycle_s: float = 0.01
     """Of the driver."""
+    lacks_a_cycle: bool = False
+    """It trips where the evidence against a sensor has to last one cycle less: the new watchdog began it later."""
     on_edge: bool = False
     """It agrees within the accuracy of the recorded times, EDGE: a limit was reached just so."""
 
@@ -92,7 +96,8 @@ class Replayed:
         """Both trip by the same cause within one tick, and the time of a frame on the bus; or none trips."""
         if self.trip is None or self.life.trip is None:
             return self.trip is self.life.trip is None
-        return self.trip.cause is self.life.trip.cause and abs(self.late_s) <= self.tolerance_s
+        near = abs(self.late_s) <= self.tolerance_s
+        return self.trip.cause is self.life.trip.cause and near and not self.lacks_a_cycle
 
     @property
     def is_a_cycle_apart(self) -> bool:
@@ -172,7 +177,15 @@ def _life(given: _Inputs, life: Life, config: WatchdogConfig, after_s: float) ->
     if first.agrees or first.cannot or after_s == 0.0:
         return first
     edges = (_warmed_up(given.stretched(edge, life.until_s), life, config, until_s) for edge in (EDGE, -EDGE))
-    return next((replace(edge, on_edge=True) for edge in edges if edge.agrees and edge.trip is not None), first)
+    found = next((replace(edge, on_edge=True) for edge in edges if edge.agrees and edge.trip is not None), first)
+    if found.agrees or found.is_a_cycle_apart:
+        return found
+    short = replace(_warmed_up(given, life, _a_cycle_less(config), until_s), lacks_a_cycle=True)
+    return short if short.is_a_cycle_apart else first
+
+
+def _a_cycle_less(config: WatchdogConfig) -> WatchdogConfig:
+    return replace(config, **{name: getattr(config, name) - 1.0 / config.control_hz for name in EVIDENCE})
 
 
 def _warmed_up(given: _Inputs, life: Life, config: WatchdogConfig, until_s: float) -> Replayed:

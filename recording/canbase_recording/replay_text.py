@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Final
 
 from canbase_driver.supervision.watchdog_link import CAUSES
 from canbase_recording.recorded_inputs import RecordedInputs
 from canbase_recording.recorded_watchdog import Trip
 from canbase_recording.replay import Replayed, WatchdogReplay
 from canbase_recording.replay_compare import Comparison, Difference
+from canbase_recording.replay_setpoints import SetpointReplay
+
+NOT_REPLAYED: Final = "safety filter: not replayed, since scans, estop_state and locks are not recorded"
 
 
 def watchdog_lines(inputs: RecordedInputs, found: WatchdogReplay) -> Iterator[str]:
@@ -54,13 +57,8 @@ def verdict(life: Replayed) -> str:
     """Whether the replay does what was recorded."""
     if life.cannot:
         return f"cannot be replayed: {life.cannot}"
-    if life.agrees:
-        if life.trip is None:
-            return "the same: no trip"
-        edge = ", within the accuracy of the recorded times: a limit was reached just so" if life.on_edge else ""
-        return f"the same cause, {abs(life.late_s) * 1000.0:.1f} ms {_later(life.late_s)}{edge}"
-    if life.is_a_cycle_apart:
-        return f"the same cause, {abs(life.late_s) * 1000.0:.1f} ms {_later(life.late_s)}: one cycle of the driver"
+    if not life.differs:
+        return _same(life)
     if life.trip is None:
         return "DIFFERS: the replay does not trip"
     if life.life.trip is None:
@@ -68,6 +66,16 @@ def verdict(life: Replayed) -> str:
     if life.trip.cause is not life.life.trip.cause:
         return "DIFFERS: another cause"
     return f"DIFFERS: the same cause, {abs(life.late_s):.3f} s {_later(life.late_s)}"
+
+
+def _same(life: Replayed) -> str:
+    if life.trip is None:
+        return "the same: no trip"
+    if life.lacks_a_cycle:
+        return "the same cause, where the evidence lasts one cycle of the driver less: a new watchdog began it later"
+    edge = ", within the accuracy of the recorded times: a limit was reached just so" if life.on_edge else ""
+    cycle = ": one cycle of the driver" if life.is_a_cycle_apart else ""
+    return f"the same cause, {abs(life.late_s) * 1000.0:.1f} ms {_later(life.late_s)}{cycle}{edge}"
 
 
 def _later(late_s: float) -> str:
@@ -107,6 +115,38 @@ def difference_text(inputs: RecordedInputs, found: Difference) -> str:
     when = f"{abs(found.earlier_s):.3f} s {_later(-found.earlier_s)}"
     cause = "" if before.cause is after.cause else f" by another cause, {CAUSES.get(int(after.cause or 0), 'unknown')}"
     return f"trips {when}{cause}{why}"
+
+
+def setpoint_lines(inputs: RecordedInputs, found: SetpointReplay) -> Iterator[str]:
+    """The driver: the setpoints that cmd_vel orders, beside the recorded ones."""
+    if not found.compared:
+        yield "driver: it followed no commands in this recording"
+        return
+    yield (
+        f"driver: {found.compared} cycles in which it followed cmd_vel; setpoints differ by at most "
+        f"{found.greatest_mps:.4f} m/s (tolerance {found.tolerance_mps:.4f} m/s)"
+    )
+    for each in found.differences:
+        span = f"from {_at(inputs, each.from_s)} to {_at(inputs, each.until_s)}"
+        yield f"  DIFFERS {span}: recorded {each.recorded_mps:.3f} m/s, replayed {each.replayed_mps:.3f} m/s"
+
+
+def setpoint_values(inputs: RecordedInputs, found: SetpointReplay) -> dict[str, Any]:
+    """The same, for JSON."""
+    return {
+        "compared": found.compared,
+        "greatest_mps": found.greatest_mps,
+        "tolerance_mps": found.tolerance_mps,
+        "differences": [
+            {
+                "from_s": each.from_s - inputs.began_s,
+                "until_s": each.until_s - inputs.began_s,
+                "recorded_mps": each.recorded_mps,
+                "replayed_mps": each.replayed_mps,
+            }
+            for each in found.differences
+        ],
+    }
 
 
 def watchdog_values(inputs: RecordedInputs, found: WatchdogReplay) -> dict[str, Any]:

@@ -39,7 +39,7 @@ CASES = {
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, RecordedInputs]:
     """By the name of the fault; `nothing`: it drives on. All drive for 3 s before."""
     folder = tmp_path_factory.mktemp("recordings")
-    cruise = Cruise(JOYSTICK)
+    cruise = Cruise(JOYSTICK, 0.3)
     for name in ("nothing", *CASES):
         record_in_a_copy(cruise.world, lambda name=name: _go_wrong(cruise, name), folder / f"{name}.asc")  # type: ignore[misc]
     return {path.stem: read_inputs(path) for path in folder.glob("*.asc")}
@@ -145,6 +145,10 @@ SHORT = Life(104.5, 105.0, Trip(105.0, LEASE, 0), False, ())
         (life(LEASE, DRIVER), "DIFFERS: another cause"),
         (life(LEASE, LEASE, 104.9), "DIFFERS: the same cause, 0.100 s earlier"),
         (life(LEASE, LEASE, 104.988), "the same cause, 12.0 ms earlier: one cycle of the driver"),
+        (
+            life(LEASE, LEASE, lacks_a_cycle=True),
+            "the same cause, where the evidence lasts one cycle of the driver less",
+        ),
         (life(LATE, None), "cannot be replayed: the watchdog's own loop was late"),
         (life(LEASE, None, life=SILENT), "cannot be replayed: no frame of the watchdog came just before"),
         (life(LEASE, None, life=SHORT), "cannot be replayed: only 0.50 s are recorded before it"),
@@ -165,7 +169,7 @@ def test_what_was_recorded_and_what_was_replayed_stand_beside_each_other(recordi
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("one") / "stop.asc"
-    cruise = Cruise(JOYSTICK)
+    cruise = Cruise(JOYSTICK, 0.3)
     record_in_a_copy(cruise.world, lambda: _go_wrong(cruise, "velocity_dies"), path)
     return path
 
