@@ -1,4 +1,4 @@
-"""A whole recording explained, in one pass: its network, its events, its stops. Pure; memory does not grow with it."""
+"""A whole recording explained, read once: its network, its events, its stops. Pure; memory does not grow with it."""
 
 from __future__ import annotations
 

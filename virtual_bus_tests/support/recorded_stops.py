@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from campaign.process import FRAMES_HELD
 from campaign.world import World
 from canbase_config.robot import Robot
 from canbase_driver.runtime.black_box import Ring, asc_lines
@@ -36,7 +38,7 @@ class DriverBox:
         self._state: tuple[object, object] | None = None
         driver: Any = world.driver
         self._member_send, driver._member.send = driver._member.send, self._on_sent
-        self._receive, driver.receive = driver.receive, self._on_received
+        driver.hear = self._on_heard
         self._begin, driver.begin = driver.begin, self._on_begin
         velocity: Any = world.velocity
         self._lease, velocity._send_lease = velocity._send_lease, self._on_lease
@@ -69,13 +71,14 @@ class DriverBox:
         self.ring.frame(self.now_s, cob_id, data, False)
         self._member_send(cob_id, data)
 
-    def _on_received(self, channel: str, depth: int, do: Callable[..., object], *arguments: Any) -> None:
+    def _on_heard(self, cob_id: int, data: bytes) -> None:
         """A frame has the time at which it came, also where the driver hangs and takes it in later."""
-        if channel == "frames":
-            at_s = self.now_s
-            self._receive(channel, depth, lambda: self._take_in(at_s, do, *arguments))
+        driver: Any = self._world.driver
+        take_in = partial(self._take_in, self.now_s, driver._on_frame, cob_id, data)
+        if driver.running:
+            take_in()
         else:
-            self._receive(channel, depth, do, *arguments)
+            driver.receive("frames", FRAMES_HELD, take_in)
 
     def _take_in(self, at_s: float, do: Callable[..., object], cob_id: int, data: bytes) -> None:
         if not self._world.driver.bus_problem:
