@@ -22,7 +22,7 @@ from fastapi.staticfiles import StaticFiles
 from nicegui import ui
 
 from canbase_config.load import Loaded
-from canbase_web import commission_page, drive_page, health_page, now_page, stops_page
+from canbase_web import commission_page, drive_page, explained_stop, health_page, now_page, stops_page
 from canbase_web.access import COOKIE, MOST_BODY_BYTES, Access, authority, hosts
 from canbase_web.gate import Gate
 from canbase_web.hold import Hold
@@ -85,6 +85,7 @@ def run(loaded: Loaded, address: Address, ros_args: list[str], namespace: str) -
     async def hold_to_drive(websocket: WebSocket) -> None:
         await socket.serve(websocket)
 
+    _add_explained(app, link, loaded)
     app.mount("/static", StaticFiles(directory=Path(__file__).parent / "static"))
     for page in (now_page, drive_page, commission_page, stops_page, health_page):
         page.add(pages)
@@ -108,6 +109,18 @@ def run(loaded: Loaded, address: Address, ros_args: list[str], namespace: str) -
         server.run()
     finally:
         link.close()
+
+
+def _add_explained(app: FastAPI, link: RobotLink, loaded: Loaded) -> None:
+    """The page of each recording of the page `Stops`."""
+
+    @app.get(explained_stop.ADDRESS)
+    async def explained(name: str) -> HTMLResponse:
+        path = explained_stop.named((event.black_box for event in link.stops), name)
+        if path is None:
+            return HTMLResponse(explained_stop.missing(name), 404)
+        status, text = await asyncio.to_thread(explained_stop.explained, path, loaded.robot, loaded.path.name)
+        return HTMLResponse(text, status)
 
 
 class _Server(uvicorn.Server):

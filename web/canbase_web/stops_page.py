@@ -12,6 +12,7 @@ from typing import Any, Final
 import can
 from nicegui import Client, ui
 
+from canbase_web import explained_stop
 from canbase_web.pages import Pages, section
 from canbase_web.stop_recording import MOST_FRAMES, FrameAt, WheelSpeeds, wheel_speeds
 
@@ -42,6 +43,8 @@ def add(pages: Pages) -> None:
                 ui.label("Select a stop to see its recording.").classes("text-caption")
             with section("Recording"):
                 said = ui.label("no recording selected").props('role="status"')
+                story = ui.link("What stopped it: the recording explained", "", new_tab=True)
+                story.set_visibility(False)
                 chart = ui.echart(_options([])).classes("w-full").style("height:20rem")
                 chart.props('role="img" aria-label="Speeds of the wheels in the recording"')
 
@@ -53,6 +56,8 @@ def add(pages: Pages) -> None:
         async def show(event: Any) -> None:
             key = event.args[1]["key"]
             file = next((each.black_box for each in pages.link.stops if _key(each) == key), "")
+            story.set_visibility(bool(address := explained_stop.link(file)))
+            story.props(f'href="{address}"')
             if not file:
                 said.text = "this stop has no recording: only latched stops have one"
                 return
