@@ -310,6 +310,18 @@ def test_a_locked_page_drives_nothing_and_its_stop_works(site: Site) -> None:
     site.robot.wait_enabled()
 
 
+def test_a_stop_that_nobody_hears_is_told_to_the_person(site: Site) -> None:
+    """canbase web hangs: the button must not look as if it had stopped anything."""
+    page = site.open("/drive")
+    os.kill(site.process.pid, signal.SIGSTOP)
+    try:
+        page.get_by_role("button", name="Stop the robot").click()
+        page.wait_for_function("document.getElementById('stop-answer').textContent === 'Stop: no answer yet'")
+        site.until(page, "document.getElementById('stop-answer').textContent.includes('press the emergency stop')")
+    finally:
+        os.kill(site.process.pid, signal.SIGCONT)
+
+
 def test_the_stop_works_without_the_pages_script(site: Site) -> None:
     context = site.browser.new_context(java_script_enabled=False)
     page = context.new_page()

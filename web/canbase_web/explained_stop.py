@@ -31,9 +31,9 @@ def explained(path: Path, robot: Robot, config: str) -> tuple[int, str]:
     try:
         from canbase_recording.explain_page import page
     except ModuleNotFoundError as error:
-        return 503, _sentence(f"this page needs the Python package {error.name}: pip install 'canbase[explain]'")
+        return 503, _sentence(f"this page needs the Python package {error.name}: pip install 'plotly>=6,<8'")
     try:
-        if path.suffix != ".asc" or path.stat().st_size > LARGEST_BYTES:
+        if path.suffix != ".asc" or not path.is_file() or path.stat().st_size > LARGEST_BYTES:
             return 404, _sentence(f"{path.name} is no recording of a stop")
         return 200, page(*explain_file(path, robot, config=config))
     except (OSError, NoRecordingError) as error:

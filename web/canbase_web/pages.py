@@ -35,14 +35,17 @@ STOP_SCRIPT: Final = """
 document.addEventListener("submit", async event => {
   if (event.target.className !== "stop-form") return;
   event.preventDefault();
+  const place = document.getElementById("stop-answer");
+  if (place) place.textContent = "Stop: no answer yet";
+  const patience = new AbortController(), timer = setTimeout(() => patience.abort(), 5000);  // both parts answer sooner
   let said;
   try {
-    const answer = await fetch("/stop", {method: "POST"});
+    const answer = await fetch("/stop", {method: "POST", signal: patience.signal});
     said = new DOMParser().parseFromString(await answer.text(), "text/html").querySelector("p").textContent;
   } catch (error) {
     said = "The page does not reach canbase web: press the emergency stop at the robot.";
   }
-  const place = document.getElementById("stop-answer");
+  clearTimeout(timer);
   if (place) place.textContent = said; else alert(said);
 });"""
 

@@ -22,6 +22,7 @@ from fastapi.staticfiles import StaticFiles
 from nicegui import ui
 
 from canbase_config.load import Loaded
+from canbase_runtime.terminal import FAILED, fail
 from canbase_web import commission_page, drive_page, explained_stop, health_page, now_page, stops_page
 from canbase_web.access import COOKIE, MOST_BODY_BYTES, Access, authority, hosts
 from canbase_web.gate import Gate
@@ -54,7 +55,7 @@ class Address:
 
 
 def run(loaded: Loaded, address: Address, ros_args: list[str], namespace: str) -> None:
-    """Serves until SIGINT or SIGTERM. Raises OSError when the port cannot be had."""
+    """Serves until SIGINT or SIGTERM. Exits with 1 when a part of it has failed."""
     robot = loaded.robot
     source = SOURCE_NAME if SOURCE_NAME in robot.mux.sources else ""
     link = RobotLink(robot, source, ros_args)
@@ -109,6 +110,8 @@ def run(loaded: Loaded, address: Address, ros_args: list[str], namespace: str) -
         server.run()
     finally:
         link.close()
+    if server.failure:
+        fail(f"canbase web ends: {server.failure}", FAILED)
 
 
 def _add_explained(app: FastAPI, link: RobotLink, loaded: Loaded) -> None:
@@ -124,7 +127,12 @@ def _add_explained(app: FastAPI, link: RobotLink, loaded: Loaded) -> None:
 
 
 class _Server(uvicorn.Server):
-    """Ends in order by each of the signals that request it; uvicorn would raise them once more at its end."""
+    """Ends in order by each of the signals that request it; uvicorn would raise them once more at its end.
+
+    `failure`: what ended it otherwise.
+    """
+
+    failure = ""
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -138,10 +146,10 @@ class _Server(uvicorn.Server):
         yield
 
 
-def _end_with(server: uvicorn.Server, loop: asyncio.Task[None]) -> None:
+def _end_with(server: _Server, loop: asyncio.Task[None]) -> None:
     """A loop that fails ends the process: a page that only looks alive is worse than none."""
     if not loop.cancelled() and loop.exception() is not None:
-        typer.echo(f"canbase web ends: {loop.exception()!r}", err=True)
+        server.failure = repr(loop.exception())
         server.should_exit = True
 
 
