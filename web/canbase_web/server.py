@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import resource
 import secrets
 import signal
 import time
@@ -56,6 +57,7 @@ class Address:
 
 def run(loaded: Loaded, address: Address, ros_args: list[str], namespace: str) -> None:
     """Serves until SIGINT or SIGTERM. Exits with 1 when a part of it has failed."""
+    _take_all_descriptors()
     robot = loaded.robot
     source = SOURCE_NAME if SOURCE_NAME in robot.mux.sources else ""
     link = RobotLink(robot, source, ros_args)
@@ -146,6 +148,12 @@ class _Server(uvicorn.Server):
         yield
 
 
+def _take_all_descriptors() -> None:
+    """The usual 1024 are few: where they end, whoever connects next is cut off, the stop too."""
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+
+
 def _end_with(server: _Server, loop: asyncio.Task[None]) -> None:
     """A loop that fails ends the process: a page that only looks alive is worse than none."""
     if not loop.cancelled() and loop.exception() is not None:
@@ -163,6 +171,7 @@ async def _drop_silent(server: uvicorn.Server) -> None:
         seen = {each: seen.get(each, now_s) for each in silent}
         oldest = sorted(seen, key=lambda each: seen[each])
         for i, each in enumerate(oldest):
-            if i < len(oldest) - MOST_SILENT or now_s - seen[each] > SILENT_S:
+            is_new = seen[each] == now_s  # its request may be on the way
+            if (i < len(oldest) - MOST_SILENT and not is_new) or now_s - seen[each] > SILENT_S:
                 with contextlib.suppress(AttributeError, RuntimeError):
                     each.transport.abort()  # type: ignore[attr-defined]
