@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,6 +19,9 @@ from canbase_runtime.terminal import FAILED, fail
 
 ROS_USAGE: Final = "[OPTIONS] [--ros-args …]"
 _ROS_FLAG: Final = "--ros-args"
+_GENERATOR: Final = "rosidl_generator_py.generate_py_impl"
+"""The messages' package imports the generator of their Python code, a parser with it, wherever that can be imported.
+Only a build needs it: 2.6 MB of each process, and 0.02 s of its start."""
 _NAMESPACE: Final = re.compile(r"/?([A-Za-z_][A-Za-z0-9_]*(?:/[A-Za-z_][A-Za-z0-9_]*)*)/?")
 
 
@@ -104,6 +108,7 @@ def ros_needed() -> Iterator[None]:
     prefer_udp(os.environ)
     take_no_profile_from_here(os.environ)
     readable_times(os.environ)
+    sys.modules.setdefault(_GENERATOR, None)  # type: ignore[arg-type] # documented: its import fails
     try:
         yield
     except ModuleNotFoundError as error:

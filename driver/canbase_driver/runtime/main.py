@@ -88,8 +88,7 @@ def run(
     node = MotorDriverNode(robot, loop, ring, writer, autostart)
     publisher = Publisher(node, loop)
     threads = (loop, publisher, writer, keeper)
-    gc.collect()
-    gc.freeze()  # what is there now lives for ever: later collections need not look at it
+    gc.freeze()  # what is there now lives for ever: later collections need not look at it; of garbage there is little
     when_ready()
     for thread in threads:
         thread.start()

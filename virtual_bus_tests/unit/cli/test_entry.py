@@ -46,3 +46,19 @@ def test_any_other_command_is_there_as_before() -> None:
 def test_the_help_of_canbase_names_the_services_too() -> None:
     names = {command.name for command in app.registered_commands}
     assert names > set(SERVICES)
+
+
+MESSAGES = """
+import sys
+from canbase_cli.options import ros_needed
+with ros_needed():
+    import canbase_driver.runtime.main
+    from nav_msgs.msg import Odometry
+Odometry.__class__.__import_type_support__()
+print(Odometry.__class__._TYPE_SUPPORT is not None, "rosidl_parser.parser" in sys.modules, "lark" in sys.modules)
+"""
+
+
+def test_messages_come_without_the_generator_of_their_python_code() -> None:
+    done = subprocess.run([sys.executable, "-c", MESSAGES], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.split() == ["True", "False", "False"]
