@@ -19,6 +19,8 @@ from canbase_watchdog import latch
 from canbase_watchdog.latch import Entry, Past
 
 RETRY_S = 1.0
+STACK_BYTES = 512 * 1024
+"""Of the keeper's stack. The watchdog locks its memory (`realtime.py`), so all of it is resident: 8 MB by default."""
 _MACHINE = (Path("/etc/machine-id"), Path("/sys/firmware/devicetree/base/serial-number"))
 _FLAGS = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
 
@@ -56,6 +58,14 @@ class Keeper(threading.Thread):
         self.written: Entry | None = None
         self.problem = ""
         self.failure: BaseException | None = None
+
+    def start(self) -> None:
+        """With a small stack."""
+        usual = threading.stack_size(STACK_BYTES)
+        try:
+            super().start()
+        finally:
+            threading.stack_size(usual)
 
     def want(self, entry: Entry) -> None:
         """This shall be on disk. Never waits."""

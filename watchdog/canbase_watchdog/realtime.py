@@ -9,7 +9,6 @@ import ctypes
 import gc
 import os
 import resource
-import threading
 
 PRIORITY = 40
 """Below the threads that serve interrupts (50 by default): without them no frame would arrive."""
@@ -17,16 +16,12 @@ PRIORITY = 40
 LONGEST_US = 1_000_000
 """A thread that runs for this long without a wait ends its process (RLIMIT_RTTIME): it would starve the computer."""
 
-STACK_BYTES = 512 * 1024
-"""Of a thread that starts after the memory was locked: all of its stack is resident then, 8 MB by default."""
-
 _MCL_CURRENT = 1
 _MCL_FUTURE = 2
 
 
 def lock_memory() -> str | None:
     """mlockall(2): no page of this process is swapped out. Returns why not, or None."""
-    threading.stack_size(STACK_BYTES)
     try:
         libc = ctypes.CDLL(None, use_errno=True)
         failed = libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -236,3 +237,21 @@ def test_both_look_in_the_same_folder(environment: dict[str, str], folder: str) 
 def test_both_copies_say_on_which_computer_they_are(folder: Path) -> None:
     assert latch_file.machine() != ""
     assert not latch_file.Keeper(folder / "watchdog.latch", "carl").past.latched
+
+
+def test_the_watchdogs_thread_has_a_small_stack_as_its_memory_is_locked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """mlockall makes all of a stack resident. Threads that start later have theirs as before."""
+    sizes, begin, usual = [], threading.Thread.start, threading.stack_size()
+
+    def start(thread: threading.Thread) -> None:
+        sizes.append(threading.stack_size())
+        begin(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", start)
+    keeper = latch_file.Keeper(tmp_path / "watchdog.latch", "carl")
+    keeper.start()
+    assert sizes == [512 * 1024]
+    assert threading.stack_size() == usual
+    keeper.finish(5.0)

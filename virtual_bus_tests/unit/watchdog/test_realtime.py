@@ -7,8 +7,6 @@ import errno
 import os
 import subprocess
 import sys
-import threading
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -50,14 +48,6 @@ def a_collector_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(realtime, "calm_the_collector", lambda: None)
 
 
-@pytest.fixture(autouse=True)
-def stacks_of_their_own() -> Iterator[None]:
-    """Those of the tests' threads are as they were."""
-    before = threading.stack_size()
-    yield
-    threading.stack_size(before)
-
-
 def libc(monkeypatch: pytest.MonkeyPatch, result: int) -> FakeLibc:
     it = FakeLibc(result)
     monkeypatch.setattr(ctypes, "CDLL", lambda _name, **_keys: it)
@@ -90,13 +80,6 @@ def test_what_is_forbidden_is_one_sentence_with_what_to_do(
         for name in ["sched_setscheduler"] * forbidden:
             patch.setattr(os, name, forbid)
         assert realtime.prepare() == told + ADVICE
-
-
-@pytest.mark.usefixtures("scheduled")
-def test_a_thread_that_starts_later_has_a_small_stack_as_all_of_it_is_locked(monkeypatch: pytest.MonkeyPatch) -> None:
-    libc(monkeypatch, 0)
-    realtime.prepare()
-    assert threading.stack_size() == 512 * 1024
 
 
 def test_a_system_without_mlockall_is_no_crash(
