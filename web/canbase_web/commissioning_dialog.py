@@ -74,8 +74,7 @@ class CommissioningDialog:
             is_read = True
         finally:
             if not is_read:  # a line without an end, or this page's server ends: then the wheels stop as well
-                with contextlib.suppress(ProcessLookupError):
-                    process.terminate()
+                self._terminate()
             self._code = await process.wait()
 
     def proof(self, now_s: float) -> int:
@@ -105,10 +104,17 @@ class CommissioningDialog:
         try:
             await asyncio.wait_for(self._over.wait(), ENDS_S)
         except asyncio.TimeoutError:
+            self._terminate()
             return False, f"commissioning was told to stop, and has not ended within {ENDS_S:g} s: wheels may turn"
         if self._code is None or self._code < 0:
             return False, f"commissioning {self.ended} before it took the power off: wheels may turn"
         return True, "commissioning has ended: quick stop, then power off for every drive that it moved"
+
+    def _terminate(self) -> None:
+        """A process that moves wheels stops them first."""
+        if self._process is not None:
+            with contextlib.suppress(ProcessLookupError):
+                self._process.terminate()
 
     def _say(self, **values: object) -> None:
         if self._process is not None and self._process.stdin is not None:
