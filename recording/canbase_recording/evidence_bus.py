@@ -1,4 +1,4 @@
-"""Signs on the bus that somebody is silent, has restarted, receives nothing, or does not belong there. Pure."""
+"""Signs on the bus that somebody is silent, has restarted, or receives nothing. Pure."""
 
 from __future__ import annotations
 
@@ -9,10 +9,8 @@ from typing import Final
 
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID
 from canbase_driver.cia301.nmt import TPDO
-from canbase_driver.cia402 import DriveState
 from canbase_recording.beat import Beat
 from canbase_recording.cause import Found
-from canbase_recording.frame_words import nmt_text
 from canbase_recording.scene import Scene
 from canbase_recording.trace import Line, first_after, last_before, times_between
 
@@ -25,13 +23,9 @@ LOOKS_AHEAD_S: Final = 1.0
 """What comes so much later tells whether a node lives [s]."""
 PAUSE_S: Final = 0.12
 SIGNS: Final = 3
-TWINS: Final = 2
-"""So many answers too many, while none is missing: the watchdog trips soon after."""
-_STOPPING: Final = (0x01, 0x02, 0x80, 0x81, 0x82)
 _RESETS: Final = (0x81, 0x82)
 _RECEIVES_NOTHING: Final = (0x8130, 0x8250, 0x8120, 0x8140)
 """EMCY: heartbeat or life guarding lost, RPDO timeout, error passive, recovered from bus-off."""
-_MOTION: Final = (0x6040, 0x6060, 0x60FF, 0x6840, 0x6860, 0x68FF)
 
 
 def recorder_paused(scene: Scene) -> Found | None:
@@ -46,95 +40,6 @@ def recorder_paused(scene: Scene) -> Found | None:
         return None
     who = "the driver stood still" if scene.sent_any else "the recorder stood still, or its bus was cut"
     return Found(since_s, f"no frame was sent or received for {longest_s:.3f} s: {who}")
-
-
-def second_master(scene: Scene) -> Found | None:
-    """Frames that canbase's one driver cannot have sent, before the watchdog tripped."""
-    if not scene.is_canbase:
-        return None
-    signs = (_foreign_nmt(scene), _two_setpoints(scene), _extra_syncs(scene), _foreign_write(scene))
-    return min((sign for sign in signs if sign is not None), key=lambda sign: sign.at_s, default=None)
-
-
-def nmt_command(scene: Scene) -> Found | None:
-    """An NMT command that takes a drive with power out of operational, in a network of another master."""
-    return None if scene.is_canbase else _foreign_nmt(scene)
-
-
-def _foreign_nmt(scene: Scene) -> Found | None:
-    for at_s, (command, node_id, sent) in scene.nmt:
-        before = scene.reaction_s - 0.5 <= at_s <= min(scene.reaction_s, scene.tripped_s)
-        if before and not sent and command in _STOPPING and _has_power(scene, node_id, at_s):
-            text = nmt_text(bytes((command, node_id)))
-            return Found(at_s, f"somebody sent {text}, while a drive had power", node_id)
-    return None
-
-
-def _has_power(scene: Scene, node_id: int, at_s: float) -> bool:
-    """Whether a node, 0: any, reported operation enabled at this time."""
-    traces = [trace for trace in scene.axes.values() if node_id in (0, trace.node_id)]
-    return any(trace.state_at(at_s) is DriveState.OPERATION_ENABLED for trace in traces)
-
-
-def _two_setpoints(scene: Scene) -> Found | None:
-    """Different targets for one axis between two SYNCs."""
-    if len(scene.syncs) < SIGNS:
-        return None
-    for trace in scene.enabled_axes():
-        signs = []
-        for (a_s, a), (b_s, b) in itertools.pairwise(trace.target):
-            if a != b and last_before(scene.syncs, a_s) == last_before(scene.syncs, b_s) and b_s <= scene.reaction_s:
-                signs.append((a_s, a, b))
-        recent = [sign for sign in signs if sign[0] >= scene.reaction_s - 1.0]
-        if len(recent) >= SIGNS:
-            at_s, a, b = recent[0]
-            unit = " m/s" if trace.has_units else ""
-            text = f"{trace.name} gets two setpoints in one cycle, {trace.speed(a):.2f} and {trace.speed(b):.2f}{unit}"
-            return Found(at_s, f"{text}, {len(recent)} times: two masters order it", trace.node_id)
-    return None
-
-
-def _extra_syncs(scene: Scene) -> Found | None:
-    """SYNCs that come too soon after each other, without setpoints between them."""
-    targets = sorted(at for trace in scene.axes.values() for at, _ in trace.target)
-    window = [at for at in scene.syncs if scene.reaction_s - 1.0 <= at <= scene.reaction_s]
-    soon = [
-        (a, b)
-        for a, b in itertools.pairwise(window)
-        if b - a < 0.75 * scene.period_s and targets and not times_between(targets, a, b)
-    ]
-    if len(soon) < SIGNS:
-        return None
-    return Found(soon[0][1], f"SYNC comes {len(soon)} times too early: two masters send it")
-
-
-def _foreign_write(scene: Scene) -> Found | None:
-    for at_s, (node_id, index) in scene.writes:
-        before = scene.reaction_s - 0.5 <= at_s < min(scene.reaction_s, scene.tripped_s)
-        if before and index in _MOTION and _has_power(scene, node_id, at_s):
-            return Found(at_s, f"somebody wrote {index:04X}h of {scene.who(node_id)} by SDO in motion", node_id)
-    return None
-
-
-def twin_node(scene: Scene) -> Found | None:
-    """A PDO of a node that answers each SYNC comes twice for one."""
-    for cob_id, times in scene.pdo_times.items():
-        if cob_id & 0x780 not in TPDO or cob_id & 0x7F == WATCHDOG_NODE_ID:
-            continue
-        twice = _twice(scene.syncs, times, scene.reaction_s)
-        syncs = times_between(scene.syncs, twice[0] - 0.001, scene.reaction_s) if twice else ()
-        came = times_between(times, twice[0] - scene.period_s, scene.reaction_s) if twice else ()
-        if len(twice) >= TWINS and len(came) > 1.4 * len(syncs):
-            node_id = cob_id & 0x7F
-            text = f"{scene.who(node_id)} answers one SYNC twice, {len(twice)} times: two nodes have this id"
-            return Found(twice[0], text, node_id)
-    return None
-
-
-def _twice(syncs: list[float], times: list[float], until_s: float) -> list[float]:
-    """Times of PDOs that follow another one of the same SYNC, in the half second before."""
-    window = [at for at in times if until_s - 0.5 <= at <= until_s]
-    return [b for a, b in itertools.pairwise(window) if last_before(syncs, a) == last_before(syncs, b) > -math.inf]
 
 
 def node_restarted(scene: Scene) -> Found | None:

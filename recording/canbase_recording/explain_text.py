@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from canbase_recording.event import Event
 from canbase_recording.explanation import Explanation
 from canbase_recording.frame_words import pdo_sources
-from canbase_recording.network import NodeSeen
+from canbase_recording.node_seen import NodeSeen
 from canbase_recording.recording_facts import RecordingFacts
 from canbase_recording.standstill import WheelStop
 from canbase_recording.story import Story

@@ -93,6 +93,7 @@ class Decoder:
         self._joints = {(drive.node_id, drive.axis): drive.joint for drive in drives}
         self._profiles: dict[int, Profile] = {drive.node_id: drive.kind for drive in drives}
         self._names: dict[tuple[int, Address], Known] = {}
+        self._who: dict[tuple[int, int | None], str] = {}
 
     def words(self, frame: RecordedFrame) -> FrameWords:
         """Never raises, whatever the frame is."""
@@ -118,6 +119,12 @@ class Decoder:
 
     def who(self, node_id: int, axis: int | None = None) -> str:
         """A node for people: its joints where robot.yaml has them."""
+        key = (node_id, axis)
+        if key not in self._who:
+            self._who[key] = self._who_is(node_id, axis)
+        return self._who[key]
+
+    def _who_is(self, node_id: int, axis: int | None) -> str:
         if node_id in _OURS:
             return _OURS[node_id]
         joints = [joint for (node, of), joint in self._joints.items() if node == node_id and axis in (None, of)]

@@ -6,92 +6,36 @@ out. CiA 301, CiA 402-2, and canbase's watchdog (docs/bus.md).
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Final
 
-from canbase_commissioning.object_dictionary import Address
 from canbase_config.bus_load import frame_bits
-from canbase_config.object_map import CONTROLWORD, STATUSWORD, TARGET_VELOCITY, VELOCITY_ACTUAL
+from canbase_config.object_map import CONTROLWORD, STATUSWORD
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID
 from canbase_driver.cia301.frame import MAX_COB_ID, Frame
 from canbase_driver.cia301.nmt import EMCY, HEARTBEAT, NMT, SDO_TO_CLIENT, SDO_TO_SERVER, NmtState
 from canbase_driver.cia301.sdo_client import abort_text
-from canbase_driver.cia402 import Command, DriveState, decode_statusword
 from canbase_driver.supervision.watchdog_link import RUNGS, STATE_COB_ID, TRIPPED, WATCHING, WatchdogState, parse_state
+from canbase_recording.axis_events import HALTED_S, OnWord, on_controlword, on_statusword, on_watchdog_word
 from canbase_recording.beat import Beat
 from canbase_recording.entry import FrameKind, RecordedFrame
 from canbase_recording.event import Event, EventKind, Level
-from canbase_recording.frame_words import CONTROLWORDS, SYNC, Decoder, controlword_command, nmt_state, nmt_text
+from canbase_recording.frame_words import SYNC, Decoder, nmt_state, nmt_text
 from canbase_recording.load_series import LoadSeries
+from canbase_recording.node_seen import NodeSeen
 from canbase_recording.pdo_layouts import PdoLayouts
 from canbase_recording.sdo_words import SdoChannels, SdoDone
 
 LOOK_S: Final = 0.02
 """Between two looks for what is missing."""
-MOVES_SHARE: Final = 0.05
-"""Of the greatest speed so far: less is noise, or creeping."""
 QUICK_STOP_RPDO: Final = 0x500
-HALTED_S: Final = 0.5
-"""The watchdog repeats its quick stop every 0.01 s; a pause of this length is a new one [s]."""
+"""Beside canbase's watchdog this PDO is its own (docs/bus.md)."""
 MOST_ABORTS: Final = 200
 """Different ones of a node that are counted apart."""
 NONE: Final[Sequence[Event]] = ()
 _STOPPING_COMMANDS: Final = (0x02, 0x80, 0x81, 0x82)
 """NMT: stop, pre-operational, the two resets."""
-_POWERED: Final = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
-_FAULTS: Final = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
-
-
-@dataclass(slots=True)
-class AxisSeen:
-    """One CiA 402 axis. `state` None: no statusword came; `command` None: no controlword came."""
-
-    state: DriveState | None = None
-    command: Command | None = None
-    target: int = 0
-    velocity: int = 0
-    peak: int = 0
-    """The greatest number of both so far: what is a motion without knowing the unit."""
-    halted_s: float = -math.inf
-    """When canbase's watchdog last sent it its quick stop or disable voltage."""
-
-    @property
-    def is_enabled(self) -> bool:
-        """It reports operation enabled."""
-        return self.state is DriveState.OPERATION_ENABLED
-
-    @property
-    def moves(self) -> bool:
-        """Motion is ordered or measured."""
-        return max(abs(self.target), abs(self.velocity)) > MOVES_SHARE * self.peak
-
-
-@dataclass(slots=True)
-class NodeSeen:
-    """One node, as far as its frames show it."""
-
-    node_id: int
-    frames: int = 0
-    first_s: float = math.nan
-    last_s: float = math.nan
-    nmt: NmtState | None = None
-    heartbeat: Beat = field(default_factory=Beat)
-    guarded: bool = False
-    """It answers node guarding."""
-    boot_ups: int = 0
-    emergencies: Counter[int] = field(default_factory=Counter)
-    aborts: Counter[tuple[Address, int]] = field(default_factory=Counter)
-    axes: dict[int, AxisSeen] = field(default_factory=dict)
-    identity: dict[int, int] = field(default_factory=dict)
-    """1018h by sub-index, where the recording shows it being read."""
-
-    @property
-    def is_enabled(self) -> bool:
-        """One of its axes reports operation enabled."""
-        return any(axis.is_enabled for axis in self.axes.values())
 
 
 class Network:
@@ -152,10 +96,16 @@ class Network:
             return self._on_sdo(at_s, node_id, data, by_client=function == SDO_TO_SERVER)
         return self._on_pdo(at_s, cob_id, data)
 
-    def _seen(self, node_id: int, at_s: float) -> NodeSeen:
+    def _known(self, node_id: int, at_s: float) -> NodeSeen:
+        """The node that a frame is about, though another one sent it."""
         node = self.nodes.get(node_id)
         if node is None:
-            node = self.nodes[node_id] = NodeSeen(node_id, first_s=at_s)
+            node = self.nodes[node_id] = NodeSeen(node_id, first_s=at_s, last_s=at_s)
+        return node
+
+    def _seen(self, node_id: int, at_s: float) -> NodeSeen:
+        """The node that has sent a frame."""
+        node = self._known(node_id, at_s)
         node.frames += 1
         node.last_s = at_s
         return node
@@ -244,7 +194,7 @@ class Network:
         return self._on_abort(at_s, done) if done.abort else self._on_transfer(at_s, done)
 
     def _on_abort(self, at_s: float, done: SdoDone) -> Sequence[Event]:
-        node = self.nodes.setdefault(done.node_id, NodeSeen(done.node_id, first_s=at_s, last_s=at_s))
+        node = self._known(done.node_id, at_s)
         key = done.at, done.abort
         if len(node.aborts) >= MOST_ABORTS and key not in node.aborts:
             return NONE
@@ -265,11 +215,11 @@ class Network:
         if 0x1400 <= index < 0x1C00:
             self._layouts.on_object(node_id, index, sub, value)
         elif index == 0x1018 and sub:
-            self.nodes[node_id].identity[sub] = value
+            self._known(node_id, at_s).identity[sub] = value
         elif index == STATUSWORD and not sub and len(done.data) == 2 and not done.is_write:
-            return self._on_statusword(at_s, self.nodes[node_id], 0, value)
+            return self._on_word(at_s, self._known(node_id, at_s), 0, value, on_statusword)
         elif index == CONTROLWORD and not sub and done.is_write:
-            return self._on_controlword(at_s, self.nodes[node_id], 0, value)
+            return self._on_word(at_s, self._known(node_id, at_s), 0, value, on_controlword)
         return NONE
 
     def _on_pdo(self, at_s: float, cob_id: int, data: bytes) -> Sequence[Event]:
@@ -277,65 +227,25 @@ class Network:
         layout = self._layouts.of(cob_id, len(data))
         if layout is None or not layout.fits(len(data)):
             return NONE
-        is_from_node = layout.name[0] == "T"
+        node = self._seen(layout.node_id, at_s) if layout.name[0] == "T" else self._known(layout.node_id, at_s)
         is_watchdog = self.watchdog is not None and cob_id & 0x780 == QUICK_STOP_RPDO
-        node = self._seen(layout.node_id, at_s) if is_from_node else self.nodes.get(layout.node_id)
-        if node is None:
-            node = self.nodes.setdefault(layout.node_id, NodeSeen(layout.node_id, first_s=at_s, last_s=at_s))
+        on_command = on_watchdog_word if is_watchdog else on_controlword
         events: Sequence[Event] = NONE
         for mapped in layout.mapped:
-            base, axis = mapped.base, mapped.axis
+            base, value = mapped.base, mapped.value(data)
             if base == STATUSWORD:
-                found = self._on_statusword(at_s, node, axis, mapped.value(data))
-                events = [*events, *found] if found else events
+                found = self._on_word(at_s, node, mapped.axis, value, on_statusword)
             elif base == CONTROLWORD:
-                on_word = self._on_watchdog_word if is_watchdog else self._on_controlword
-                found = on_word(at_s, node, axis, mapped.value(data))
-                events = [*events, *found] if found else events
-            elif base == TARGET_VELOCITY:
-                seen = node.axes.setdefault(axis, AxisSeen())
-                seen.target = mapped.value(data)
-                seen.peak = max(seen.peak, abs(seen.target))
-            elif base == VELOCITY_ACTUAL:
-                seen = node.axes.setdefault(axis, AxisSeen())
-                seen.velocity = mapped.value(data)
-                seen.peak = max(seen.peak, abs(seen.velocity))
+                found = self._on_word(at_s, node, mapped.axis, value, on_command)
+            else:
+                node.axis(mapped.axis).on_speed(base, value)
+                continue
+            events = [*events, *found] if found else events
         return events
 
-    def _on_statusword(self, at_s: float, node: NodeSeen, number: int, word: int) -> Sequence[Event]:
-        axis, state = node.axes.setdefault(number, AxisSeen()), decode_statusword(word)
-        before, axis.state = axis.state, state
-        if state is before or state is None:
-            return NONE
-        level = _level(axis, before, state, at_s)
-        was = f", before {before.text}" if before else ""
-        own = " by itself" if level is Level.ALARM and state not in _FAULTS else ""
-        return [
-            Event(
-                at_s, EventKind.DRIVE_STATE, level, self._decoder.who(node.node_id, number), f"{state.text}{own}{was}",
-                node.node_id,
-            )
-        ]  # fmt: skip
-
-    def _on_controlword(self, at_s: float, node: NodeSeen, number: int, word: int) -> Sequence[Event]:
-        axis, command = node.axes.setdefault(number, AxisSeen()), controlword_command(word)
-        before, axis.command = axis.command, command
-        if command is before or command is None:
-            return NONE
-        stops = axis.is_enabled and command is not Command.ENABLE_OPERATION
-        level = Level.ALARM if stops and axis.moves else Level.INFO
-        text = f"ordered: {CONTROLWORDS[command]}{' in motion' if level is Level.ALARM else ''}"
-        return [Event(at_s, EventKind.CONTROL, level, self._decoder.who(node.node_id, number), text, node.node_id)]
-
-    def _on_watchdog_word(self, at_s: float, node: NodeSeen, number: int, word: int) -> Sequence[Event]:
-        """The PDO that is the watchdog's own (docs/bus.md)."""
-        axis, command = node.axes.setdefault(number, AxisSeen()), controlword_command(word)
-        is_first, axis.halted_s = at_s - axis.halted_s > HALTED_S, at_s
-        if not is_first or command is None:
-            return NONE
-        level = Level.ALARM if axis.is_enabled else Level.INFO
-        text = f"orders {CONTROLWORDS[command]}: {self._decoder.who(node.node_id, number)}"
-        return [Event(at_s, EventKind.WATCHDOG, level, "watchdog", text, node.node_id)]
+    def _on_word(self, at_s: float, node: NodeSeen, number: int, word: int, on_word: OnWord) -> Sequence[Event]:
+        event = on_word(at_s, node.axis(number), self._decoder.who(node.node_id, number), node.node_id, word)
+        return NONE if event is None else (event,)
 
     def _on_watchdog(self, at_s: float, state: WatchdogState) -> Sequence[Event]:
         self.kinds["canbase's watchdog"] += 1
@@ -380,14 +290,3 @@ class Network:
 
 def _lost(what: str, beat: Beat) -> str:
     return f"no {what} since {beat.last_s:.3f} s, its period was {1000.0 * beat.period_s:.0f} ms"
-
-
-def _level(axis: AxisSeen, before: DriveState | None, state: DriveState, at_s: float) -> Level:
-    """Of a new state: a fault, and a power-off that nobody ordered, are alarms."""
-    if state in _FAULTS:
-        return Level.ALARM if before is not None and before not in _FAULTS else Level.WARNING
-    if before is not DriveState.OPERATION_ENABLED or state in _POWERED or at_s - axis.halted_s <= HALTED_S:
-        return Level.INFO
-    if axis.command is None:
-        return Level.WARNING
-    return Level.ALARM if axis.command is Command.ENABLE_OPERATION else Level.INFO

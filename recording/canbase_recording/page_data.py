@@ -4,21 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final, TypeVar
+from typing import Final
 
 from canbase_driver.cia402 import DriveState, decode_statusword
 from canbase_driver.supervision.watchdog_link import TRIPPED, WATCHING
 from canbase_recording.frame_words import Decoder
 from canbase_recording.lease_bounds import Bounds, lease_bounds
 from canbase_recording.scene import Scene
-from canbase_recording.trace import AxisTrace, Line
+from canbase_recording.trace import AxisTrace, Line, thinned
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
 from canbase_runtime.stop_cause import StopCause
-
-T = TypeVar("T")
-MOST_POINTS: Final = 1_500
-"""Of one line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +67,7 @@ def commands(scene: Scene) -> list[Curve]:
     sources = (("cmd_vel", scene.commands), ("safety_filter", scene.filters))
     for what, field in (("linear [m/s]", "linear_mps"), ("angular [rad/s]", "angular_radps")):
         for name, notes in sources:
-            points = _thinned([(note.at_s, getattr(note, field)) for note in notes])
+            points = thinned([(note.at_s, getattr(note, field)) for note in notes])
             curve = Curve(f"{name} {what}", *_columns(points), dashed=name != "cmd_vel")
             if any(curve.values) or (curve.times and what.startswith("linear")):
                 found.append(curve)
@@ -92,7 +88,7 @@ def bars(scene: Scene) -> list[Bar]:
         *_bars("watchdog", dogs, end_s, lambda text: {"watching": "good", "tripped": "bad"}.get(text, "idle")),
     ]
     for _, trace in sorted(scene.axes.items()):
-        states = _with_silence(trace.status, scene)
+        states = _with_silence(trace, scene.period_s)
         found += _bars(trace.name, states, end_s, lambda text: _DRIVE.get(text, "idle"))
     return found
 
@@ -119,18 +115,13 @@ _DRIVE: Final = {
 }  # fmt: skip
 
 
-def _with_silence(line: Line[int], scene: Scene) -> list[tuple[float, str]]:
+def _with_silence(trace: AxisTrace, period_s: float) -> list[tuple[float, str]]:
     """States, and that nothing is known of them while no statusword comes."""
-    found: list[tuple[float, str]] = []
-    ends = [*(at_s for at_s, _ in line[1:]), scene.ended_s]
-    for (at_s, word), next_s in zip(line, ends, strict=False):
-        found.append((at_s, _state_text(word)))
-        if next_s - at_s > SILENT_PERIODS * scene.period_s:
-            found.append((at_s + scene.period_s, NOT_KNOWN))
-    return found
+    states = [(at_s, _state_text(word)) for at_s, word in trace.status]
+    ends = [(at_s + period_s, NOT_KNOWN) for at_s in trace.silent_since]
+    return sorted([*states, *ends])
 
 
-SILENT_PERIODS: Final = 10.0
 NOT_KNOWN: Final = "no statusword"
 
 
@@ -152,15 +143,10 @@ def _bars(lane: str, states: Sequence[tuple[float, str]], end_s: float, tone: Ca
 
 
 def _curve(name: str, trace: AxisTrace, line: Line[int], *, dashed: bool = False) -> Curve:
-    points = _thinned([(at_s, trace.speed(raw)) for at_s, raw in line])
+    points = thinned([(at_s, trace.speed(raw)) for at_s, raw in line])
     return Curve(name, *_columns(points), dashed=dashed)
 
 
 def _columns(points: Iterable[tuple[float, float]]) -> tuple[tuple[float, ...], tuple[float, ...]]:
     rounded = [(round(at_s, 4), round(value, 5)) for at_s, value in points]
     return tuple(at_s for at_s, _ in rounded), tuple(value for _, value in rounded)
-
-
-def _thinned(points: list[T]) -> list[T]:
-    step = max(1, -(-len(points) // MOST_POINTS))
-    return points[::step]

@@ -30,6 +30,8 @@ from canbase_driver.cia301.pdo import NodeLayout, node_layout
 
 MOST_MAPPED: Final = 64
 """Objects in one PDO: one bit each (CiA 301)."""
+MOST_LEARNED: Final = 2_000
+"""PDOs whose settings are remembered: four of each node are about a thousand."""
 OFF: Final = 1 << 31
 TARGET_POSITION: Final = 0x607A
 SIGNED: Final = frozenset(
@@ -133,7 +135,10 @@ class PdoLayouts:
         if where is None:
             return
         objects, is_rpdo, is_mapping = where
-        learned = self._learned.setdefault((node_id, is_rpdo, index - objects.start + 1), _Learned())
+        key = (node_id, is_rpdo, index - objects.start + 1)
+        if key not in self._learned and len(self._learned) >= MOST_LEARNED:
+            return
+        learned = self._learned.setdefault(key, _Learned())
         if not is_mapping and sub == 1:
             learned.cob_id = value & 0x7FF if not value & OFF else -1
         elif is_mapping and sub == 0:

@@ -125,7 +125,7 @@ class RecordingFile:
             for message in self._messages():
                 yield from self._notes()
                 if isinstance(message, Note):
-                    yield Note(self._time(message.at_s), message.text)
+                    yield Note(self._time(message.at_s), message.text[:NOTE_LENGTH])
                 elif (frame := self._frame(message)) is not None:
                     yield frame
             yield from self._notes()
@@ -217,7 +217,7 @@ class RecordingFile:
     def _notes(self) -> Iterator[Note]:
         while self._lines is not None and self._lines.notes:
             at_s, text = self._lines.notes.popleft()
-            yield Note(self._last_s if at_s is None else max(at_s, self._last_s), text)
+            yield Note(self._last_s if at_s is None else max(at_s, self._last_s), text[:NOTE_LENGTH])
 
     def _frame(self, message: can.Message) -> RecordedFrame | None:
         channel = "" if message.channel is None else str(message.channel)
@@ -255,6 +255,8 @@ class RecordingFile:
 
 
 MOST_CHANNELS: Final = 100
+NOTE_LENGTH: Final = 1_200
+"""Characters; those of canbase are shorter."""
 RELATIVE: Final = ("ASC", "TRC")
 """Formats whose times begin with the recording."""
 _DATES: Final = (

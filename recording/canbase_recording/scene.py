@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Iterable
@@ -33,11 +34,13 @@ _LINES: Final = {
     STATUSWORD: "status", CONTROLWORD: "control", TARGET_VELOCITY: "target", VELOCITY_ACTUAL: "velocity",
     POSITION_ACTUAL: "position", TORQUE_ACTUAL: "torque", CURRENT_ACTUAL: "torque",
 }  # fmt: skip
+SILENT_PERIODS: Final = 10.0
+"""A statusword that has not come for so many cycles is no longer known."""
 DEFAULT_PERIOD_S: Final = 0.01
 """Of SYNC, where the recording shows none."""
 
 
-@dataclass(slots=True)
+@dataclass
 class Scene:
     """`reaction_s`: when the first part reacted; what lies after it may be its consequence."""
 
@@ -73,12 +76,22 @@ class Scene:
     sent_any: bool = False
     """Some frames are marked as sent: it is a black box of canbase's driver, or was recorded by a master."""
 
-    @property
+    @functools.cached_property
     def period_s(self) -> float:
         """Of SYNC before the reaction [s]."""
         times = [at_s for at_s in self.syncs if at_s <= self.reaction_s]
         gaps = sorted(b - a for a, b in itertools.pairwise(times))
         return gaps[len(gaps) // 2] if gaps else DEFAULT_PERIOD_S
+
+    def slim(self) -> None:
+        """Keeps what is shown: the story is told, and a long recording has many scenes."""
+        _ = self.period_s
+        for times in (self.frame_times, self.syncs, self.error_frames):
+            times.clear()
+        self.pdo_times.clear()
+        self.node_times.clear()
+        for trace in self.axes.values():
+            trace.slim(SILENT_PERIODS * self.period_s, self.ended_s)
 
     @property
     def is_canbase(self) -> bool:

@@ -17,6 +17,7 @@ from typing import Final
 from canbase_driver.causes import Cause as DriverCause
 from canbase_recording import evidence_bus as bus
 from canbase_recording import evidence_drive as drive
+from canbase_recording import evidence_masters as masters
 from canbase_recording import evidence_motion as motion
 from canbase_recording import evidence_orders as orders
 from canbase_recording.cause import ADVICE, Cause, Found
@@ -47,9 +48,9 @@ RULES: Final = (
     Rule(Cause.WATCHDOG_ENDED, bus.watchdog_ended),
     # who is on the bus, and who is not any more
     Rule(Cause.RECORDER_PAUSED, bus.recorder_paused),
-    Rule(Cause.SECOND_MASTER, bus.second_master),
-    Rule(Cause.NMT_COMMAND, bus.nmt_command),
-    Rule(Cause.TWIN_NODE, bus.twin_node),
+    Rule(Cause.SECOND_MASTER, masters.second_master),
+    Rule(Cause.NMT_COMMAND, masters.nmt_command),
+    Rule(Cause.TWIN_NODE, masters.twin_node),
     Rule(Cause.NODE_RESTARTED, bus.node_restarted),
     Rule(Cause.DRIVER_SILENT, bus.driver_silent),
     Rule(Cause.WATCHDOG_SILENT, bus.watchdog_silent),

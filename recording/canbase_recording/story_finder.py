@@ -79,6 +79,7 @@ class StoryFinder:
             scene = self._maker.make(self._ring, list(self._events), self._began_s, ended_s)
             if self._acted or not _all_went_on(scene):
                 self.stories.append(tell(scene))
+                scene.slim()
         else:
             self.further += 1
         self._began_s = None

@@ -22,6 +22,8 @@ Line = list[tuple[float, T]]
 """Values with their times, in order."""
 COUNTER_BITS: Final = 32
 MOVES_SHARE: Final = 0.05
+MOST_POINTS: Final = 1_500
+"""Of one line that is shown."""
 
 
 @dataclass(slots=True)
@@ -38,6 +40,8 @@ class AxisTrace:
     velocity: Line[int] = field(default_factory=list)
     position: Line[int] = field(default_factory=list)
     torque: Line[int] = field(default_factory=list)
+    silent_since: list[float] = field(default_factory=list)
+    """After `slim`: the last statuswords before pauses."""
 
     @property
     def has_units(self) -> bool:
@@ -61,6 +65,14 @@ class AxisTrace:
         """The command that the last controlword had."""
         word = value_at(self.control, at_s)
         return None if word is None else controlword_command(word)
+
+    def slim(self, silent_s: float, ended_s: float) -> None:
+        """Fewer points to show; of the words their changes, and when none came for `silent_s` until `ended_s`."""
+        times = [*(at_s for at_s, _ in self.status), ended_s]
+        self.silent_since = [a for a, b in itertools.pairwise(times) if b - a > silent_s]
+        self.status, self.control = _changes(self.status, silent_s), _changes(self.control, silent_s)
+        self.target, self.velocity, self.torque = thinned(self.target), thinned(self.velocity), thinned(self.torque)
+        self.position = thinned(self.position)
 
     def was_enabled(self, since_s: float, until_s: float) -> bool:
         """Whether it reported operation enabled at some time."""
@@ -94,10 +106,21 @@ class AxisTrace:
         return None
 
 
+def thinned(points: list[T]) -> list[T]:
+    """Every one, or every second, third, … of a long line."""
+    return points[:: max(1, -(-len(points) // MOST_POINTS))]
+
+
 def wrapped(counts: int) -> int:
     """A difference of two readings of a 32-bit counter."""
     half = 1 << (COUNTER_BITS - 1)
     return (counts + half) % (1 << COUNTER_BITS) - half
+
+
+def _changes(line: Line[int], silent_s: float) -> Line[int]:
+    """Another value, or the first one after a silence."""
+    pairs = itertools.pairwise(line)
+    return line[:1] + [entry for before, entry in pairs if entry[1] != before[1] or entry[0] - before[0] > silent_s]
 
 
 def _time(entry: tuple[float, T]) -> float:
