@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from canbase_recording.event import Event
-from canbase_recording.explain_text import node_facts
+from canbase_recording.explain_text import gaps, node_facts
 from canbase_recording.explanation import Explanation
 from canbase_recording.frame_words import pdo_sources
 from canbase_recording.recording_facts import RecordingFacts
@@ -52,7 +52,7 @@ def _network(told: Explanation) -> dict[str, Any]:
     network = told.network
     return {
         "bus_load_mean": network.load.mean, "bus_load_highest": network.load.highest, "bitrate": network.load.bitrate,
-        "error_frames": network.error_frames, "frames": dict(network.kinds),
+        "gaps": gaps(told), "error_frames": network.error_frames, "frames": dict(network.kinds),
         "pdo_sources": {
             source.value: [f"{each:03X}" for each in cob_ids] for source, cob_ids in pdo_sources(told.layouts).items()
         },

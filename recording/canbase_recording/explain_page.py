@@ -18,7 +18,7 @@ from plotly.subplots import make_subplots
 
 from canbase_recording import page_data
 from canbase_recording.event import Event, Level
-from canbase_recording.explain_text import collapsed, ending, node_facts, standstill_sentence
+from canbase_recording.explain_text import collapsed, ending, gaps, node_facts, standstill_sentence
 from canbase_recording.explanation import Explanation
 from canbase_recording.frame_words import pdo_sources
 from canbase_recording.kind import Kind
@@ -208,9 +208,10 @@ def _network(told: Explanation) -> str:
         f"<tr><td>{_text(source.value)}</td><td>{', '.join(f'{each:03X}h' for each in ids[:50])}</td></tr>"
         for source, ids in pdo_sources(told.layouts).items()
     )
+    unknown = "".join(f'<p class="warning">{_text(line)}</p>' for line in gaps(told))
     return (
         f'<section id="network"><h2>Network</h2>{_table(("node", "what the recording shows"), nodes)}'
-        f"<h3>How the contents of PDOs are known</h3>{_table(('source', 'COB-IDs'), sources)}"
+        f"<h3>How the contents of PDOs are known</h3>{_table(('source', 'COB-IDs'), sources)}{unknown}"
         f"<h3>Bus load</h3>{_plot('load', _load(told), ' small')}"
         f"<h3>Events of the whole recording</h3>{_events(told.events)}{_left_out(told)}</section>"
     )

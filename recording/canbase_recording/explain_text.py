@@ -122,6 +122,24 @@ def _network(told: Explanation) -> Iterator[str]:
         yield f"  {network.error_frames} error frames of the CAN controller"
     for source, cob_ids in pdo_sources(told.layouts).items():
         yield f"  PDOs {_ids(cob_ids)}: {source.value}"
+    yield from (f"  {line}" for line in gaps(told))
+
+
+def gaps(told: Explanation) -> list[str]:
+    """What robot.yaml has and the recording has not, and frames that nobody can decode."""
+    drives = told.robot.drives if told.robot else ()
+    sent = {node.node_id for node in told.network.nodes.values() if node.frames}
+    lines = [
+        f"{told.decoder.who(node_id)} of robot.yaml sends nothing in this recording"
+        for node_id in sorted({drive.node_id for drive in drives} - sent)
+    ]
+    unknown = sorted(told.network.unknown_pdos)
+    if unknown:
+        shown = ", ".join(f"{cob_id:03X}h ({length} bytes)" for cob_id, length in unknown[:8])
+        more = f" and {len(unknown) - 8} more" if len(unknown) > 8 else ""
+        why = "they do not fit robot.yaml" if told.robot else "give --config robot.yaml, or record from the boot on"
+        lines.append(f"PDOs {shown}{more}: contents not known; {why}")
+    return lines
 
 
 def node_facts(told: Explanation, node: NodeSeen) -> list[str]:

@@ -31,6 +31,7 @@ LOOK_S: Final = 0.02
 """Between two looks for what is missing."""
 QUICK_STOP_RPDO: Final = 0x500
 """Beside canbase's watchdog this PDO is its own (docs/bus.md)."""
+MOST_UNKNOWN: Final = 500
 MOST_ABORTS: Final = 200
 """Different ones of a node that are counted apart."""
 NONE: Final[Sequence[Event]] = ()
@@ -48,6 +49,8 @@ class Network:
         self.sync = Beat()
         self.kinds: Counter[str] = Counter()
         """Frames by service of CiA 301, in words."""
+        self.unknown_pdos: Counter[tuple[int, int]] = Counter()
+        """Frames whose contents are not known, by COB-ID and length."""
         self.error_frames = 0
         self.watchdog: WatchdogState | None = None
         self._decoder, self._layouts = decoder, layouts
@@ -226,6 +229,8 @@ class Network:
         self.kinds["PDO"] += 1
         layout = self._layouts.of(cob_id, len(data))
         if layout is None or not layout.fits(len(data)):
+            if len(self.unknown_pdos) < MOST_UNKNOWN or (cob_id, len(data)) in self.unknown_pdos:
+                self.unknown_pdos[cob_id, len(data)] += 1
             return NONE
         node = self._seen(layout.node_id, at_s) if layout.name[0] == "T" else self._known(layout.node_id, at_s)
         is_watchdog = self.watchdog is not None and cob_id & 0x780 == QUICK_STOP_RPDO

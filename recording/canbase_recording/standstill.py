@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Final
 
 from canbase_recording.scene import Scene
-from canbase_recording.trace import AxisTrace, around, between, last_before, wrapped
+from canbase_recording.trace import AxisTrace, around, between, last_before, value_at, wrapped
 
-STANDS_MPS: Final = 0.005
-STANDS_PERIODS: Final = 2.0
-"""6064h must have stood for so many cycles at the end of what is known."""
+STANDS_SHARE: Final = 0.02
+"""Of the greatest speed: slower is at standstill, where no unit is known."""
+CONTRADICTS: Final = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,16 +57,36 @@ def _wheel(trace: AxisTrace, scene: Scene, since_s: float) -> WheelStop:
     last_s = last_before([at for at, _ in trace.position], scene.ended_s)
     if last_s < scene.ended_s - 0.5:
         return WheelStop(trace.name, None, None, unit, f"6064h ends at {last_s:.3f} s")
-    moved_s = _last_motion(trace, since_s, scene.ended_s)
-    if last_s - moved_s < (STANDS_PERIODS - 0.5) * scene.period_s:
-        return WheelStop(trace.name, None, trace.travel(since_s, scene.ended_s), unit, "it still moves at the end")
+    moved_s = _last_motion(trace, scene, since_s)
+    if moved_s >= last_s:
+        return WheelStop(trace.name, None, trace.travel(since_s, last_s), unit, "it still moves at the end")
     return WheelStop(trace.name, max(0.0, moved_s - since_s), trace.travel(since_s, moved_s), unit)
 
 
-def _last_motion(trace: AxisTrace, since_s: float, until_s: float) -> float:
-    """When 6064h last moved faster than STANDS_MPS; without units when it last changed."""
+def _last_motion(trace: AxisTrace, scene: Scene, since_s: float) -> float:
+    """The last time at which the wheel did not stand: 606Ch above the limit, or 6064h contradicts it (docs/bus.md)."""
+    steps = [
+        (b_s, abs(trace.way(wrapped(b - a))) / max(b_s - a_s, scene.period_s))
+        for (a_s, a), (b_s, b) in itertools.pairwise(around(trace.position, since_s, scene.ended_s))
+    ]
+    limit = _limit(trace, scene, max((speed for _, speed in steps), default=0.0))
     moved_s = since_s
-    for (a_s, a), (b_s, b) in itertools.pairwise(around(trace.position, since_s, until_s)):
-        if abs(trace.way(wrapped(b - a))) > (STANDS_MPS * (b_s - a_s) if trace.has_units else 0.0):
-            moved_s = b_s
+    for at_s, speed in steps:
+        shown = value_at(trace.velocity, at_s + scene.period_s / 2.0)
+        stands = speed <= limit if shown is None else _is_slow(trace, scene, shown) and speed <= CONTRADICTS * limit
+        if not stands:
+            moved_s = at_s
     return moved_s
+
+
+def _is_slow(trace: AxisTrace, scene: Scene, raw: int) -> bool:
+    if scene.robot is not None and trace.has_units:
+        return abs(trace.speed(raw)) <= scene.robot.base.standstill_mps
+    return abs(raw) <= STANDS_SHARE * trace.peak
+
+
+def _limit(trace: AxisTrace, scene: Scene, fastest: float) -> float:
+    """Of 6064h at a wheel that stands [m/s], or in increments a second a share of its fastest step."""
+    if scene.robot is not None and trace.has_units:
+        return scene.robot.base.standstill_mps
+    return STANDS_SHARE * fastest

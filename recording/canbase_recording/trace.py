@@ -88,11 +88,15 @@ class AxisTrace:
             return None
         return sum(abs(self.way(wrapped(b - a))) for a, b in itertools.pairwise(counts))
 
+    @property
+    def peak(self) -> int:
+        """The greatest number of 60FFh and 606Ch."""
+        return max((abs(value) for line in (self.target, self.velocity) for _, value in line), default=0)
+
     def moves_at(self, at_s: float) -> bool:
         """Whether motion is ordered or measured, without knowing its unit: a share of the greatest number here."""
-        peak = max((abs(value) for line in (self.target, self.velocity) for _, value in line), default=0)
         now = [value_at(line, at_s) or 0 for line in (self.target, self.velocity)]
-        return max(abs(value) for value in now) > MOVES_SHARE * peak
+        return max(abs(value) for value in now) > MOVES_SHARE * self.peak
 
     def last_change(self, line: Line[int], until_s: float) -> float | None:
         """When a line last took another value, at or before `until_s`; None: it never did, or is empty."""

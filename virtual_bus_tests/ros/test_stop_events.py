@@ -13,8 +13,11 @@ import can
 import pytest
 from canbase.msg import StopEvent
 
+from canbase_config.load import load_robot
 from canbase_config.robot import Robot
 from canbase_driver.runtime.black_box import MAX_FRAMES
+from canbase_recording.cause import Cause
+from canbase_recording.explain_file import explain_file
 from support.running_robot import RunningRobot, own_domain, robot_on
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
@@ -79,6 +82,11 @@ def test_a_latched_stop_has_its_time_its_way_and_a_file_that_python_can_reads(ro
     assert Robot.model_validate(found["robot_yaml"]) == robot.robot
     assert found["at_s"] == pytest.approx(cause_s, abs=0.1)
     tells_all_that_was_ordered_and_what_became_of_it(found["events"])
+    _, told = explain_file(file, load_robot(robot.config).robot)
+    story = told.stories[-1]
+    assert (story.cause, story.caught_by) == (Cause.STOP_REQUESTED, "motor_driver")
+    assert story.standstill.stood_s == pytest.approx(truth.after_s, abs=0.1)
+    assert story.standstill.way_m == pytest.approx(truth.way_m, abs=0.02)
 
 
 def tells_all_that_was_ordered_and_what_became_of_it(events: list[dict[str, Any]]) -> None:

@@ -8,13 +8,14 @@ from collections.abc import Iterator
 import pytest
 
 from canbase_commissioning.object_dictionary import Address
+from canbase_config.load import load_robot, sample
 from canbase_driver.cia402 import DriveState
 from canbase_recording.beat import Beat
 from canbase_recording.cause import Cause
 from canbase_recording.echo import EchoFilter
 from canbase_recording.entry import Entry, FrameKind, Note, RecordedFrame
 from canbase_recording.event import EventKind, Level
-from canbase_recording.explain_text import collapsed, node_facts, text_lines
+from canbase_recording.explain_text import collapsed, gaps, node_facts, text_lines
 from canbase_recording.explanation import Explanation, explain
 from canbase_recording.load_series import MOST_BINS, LoadSeries
 from canbase_recording.recording_facts import RecordingFacts
@@ -94,6 +95,20 @@ def test_nodes_states_heartbeats_aborts_and_how_pdos_are_known() -> None:
     assert "PDOs 183h: assumed: default mapping of CiA 402" not in text  # 503h, 504h are assumed too, in one line
     assert "PDOs 183h, 503h, 504h: assumed: default mapping of CiA 402" in text
     assert "PDOs 184h: mapping written or read by SDO in this recording" in text
+
+
+def test_what_robot_yaml_has_and_the_recording_has_not_and_what_nobody_can_decode() -> None:
+    """The robot.yaml of another robot: its nodes 1 and 2 are not here."""
+    told = explain(somebody_s_robot(), load_robot(sample("bench")).robot)
+    assert gaps(told) == [
+        "node 1 (left_wheel) of robot.yaml sends nothing in this recording",
+        "node 2 (right_wheel) of robot.yaml sends nothing in this recording",
+        "PDOs 183h (2 bytes), 503h (6 bytes), 504h (6 bytes): contents not known; they do not fit robot.yaml",
+    ]
+    frames = [RecordedFrame(0.01 * i, 0x285, bytes(7)) for i in range(5)]
+    assert gaps(explain(frames)) == [
+        "PDOs 285h (7 bytes): contents not known; give --config robot.yaml, or record from the boot on"
+    ]
 
 
 def test_a_node_that_falls_silent_is_named_with_its_time() -> None:
