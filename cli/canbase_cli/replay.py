@@ -32,8 +32,9 @@ def replay(
 ) -> None:
     """Feed a recorded stop to the real watchdog: would it have tripped, when, and why, beside what was recorded.
 
-    Also the driver's limiter: the setpoints that cmd_vel orders. With --config, what another configuration would have
-    changed. Nothing is sent and no robot is needed. What a recording does not contain is not replayed, and reported.
+    Also the mux (which source has the base) and the driver's limiter (setpoints). With --config, what another
+    configuration would have changed. Nothing is sent and no robot is needed. What a recording does not contain is not
+    replayed, and reported.
 
     Exit codes: 0 the replay does what was recorded, 1 it differs or the files cannot be read, 2 wrong command line or
     robot.yaml.
@@ -56,30 +57,41 @@ def _told(inputs: RecordedInputs, other: Robot | None) -> tuple[dict[str, Any], 
     from canbase_recording import replay_text as words
     from canbase_recording.replay import replay_watchdog
     from canbase_recording.replay_file import robot_of
-    from canbase_recording.replay_setpoints import replay_setpoints
 
-    found, setpoints = replay_watchdog(inputs), replay_setpoints(inputs, robot_of(inputs))
+    found = replay_watchdog(inputs)
+    chain_values, chain_lines, chain_agrees = _chain(inputs, robot_of(inputs))
     stop = f"stop by {inputs.stopped_by}: {inputs.cause} ({inputs.detail}), at {inputs.at_s - inputs.began_s:.3f} s"
     values: dict[str, Any] = {
         "stop": {"by": inputs.stopped_by, "cause": inputs.cause, "at_s": inputs.at_s - inputs.began_s},
         "versions": dict(inputs.versions),
         "watchdog": words.watchdog_values(inputs, found),
-        "driver": words.setpoint_values(inputs, setpoints),
+        **chain_values,
         "not_replayed": words.NOT_REPLAYED,
     }
-    lines = [stop, *words.watchdog_lines(inputs, found), *words.setpoint_lines(inputs, setpoints), words.NOT_REPLAYED]
+    lines = [stop, *words.watchdog_lines(inputs, found), *chain_lines, words.NOT_REPLAYED]
     if other is not None:
         values["other_robot_yaml"], more = _with_other(inputs, other)
         lines += more
-    return values, lines, not (setpoints.differences or any(life.differs for life in found.lives))
+    return values, lines, chain_agrees and not any(life.differs for life in found.lives)
+
+
+def _chain(inputs: RecordedInputs, robot: Robot) -> tuple[dict[str, Any], list[str], bool]:
+    """Mux and driver; whether they do what was recorded."""
+    from canbase_recording import replay_text as words
+    from canbase_recording.replay_setpoints import replay_setpoints
+    from canbase_recording.replay_sources import replay_sources
+
+    setpoints, sources = replay_setpoints(inputs, robot), replay_sources(inputs, robot)
+    values = {"mux": words.source_values(inputs, sources), "driver": words.setpoint_values(inputs, setpoints)}
+    lines = [*words.source_lines(inputs, sources), *words.setpoint_lines(inputs, setpoints)]
+    return values, lines, not (sources.differences or setpoints.differences)
 
 
 def _with_other(inputs: RecordedInputs, other: Robot) -> tuple[dict[str, Any], list[str]]:
     from canbase_recording import replay_text as words
     from canbase_recording.replay_compare import compare
-    from canbase_recording.replay_setpoints import replay_setpoints
 
-    comparison, setpoints = compare(inputs, other), replay_setpoints(inputs, other)
-    values = words.comparison_values(inputs, comparison) | {"driver": words.setpoint_values(inputs, setpoints)}
-    lines = [*words.comparison_lines(inputs, comparison)]
-    return values, [*lines, *(f"  {line}" for line in words.setpoint_lines(inputs, setpoints))]
+    comparison = compare(inputs, other)
+    chain_values, chain_lines, _ = _chain(inputs, other)
+    lines = [*words.comparison_lines(inputs, comparison), *(f"  {line}" for line in chain_lines)]
+    return words.comparison_values(inputs, comparison) | chain_values, lines

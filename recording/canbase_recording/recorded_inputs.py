@@ -70,6 +70,8 @@ class RecordedInputs:
     commands: tuple[Command, ...]
     happenings: tuple[Happening, ...]
     began_s: float
+    wall_offset_s: float
+    """On top of a time: seconds since 1970."""
     at_s: float
     """Of the stop."""
     stopped_by: str
@@ -110,6 +112,7 @@ def recorded_inputs(entries: Iterable[Entry], told: Mapping[str, Any]) -> Record
             commands=tuple(_commands(happenings)),
             happenings=happenings,
             began_s=began_s,
+            wall_offset_s=float(told["wall_offset_s"]),
             at_s=at_s,
             stopped_by=str(told.get("stopped_by", "")),
             cause=str(told.get("cause", "")),

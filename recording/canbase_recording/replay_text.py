@@ -12,7 +12,9 @@ from canbase_recording.recorded_watchdog import Trip
 from canbase_recording.replay import Replayed, WatchdogReplay
 from canbase_recording.replay_compare import Comparison, Difference
 from canbase_recording.replay_setpoints import SetpointReplay
+from canbase_recording.replay_sources import NOBODY, SourceReplay
 
+MOST_LINES: Final = 20
 NOT_REPLAYED: Final = "safety filter: not replayed, since scans, estop_state and locks are not recorded"
 
 
@@ -129,6 +131,29 @@ def setpoint_lines(inputs: RecordedInputs, found: SetpointReplay) -> Iterator[st
     for each in found.differences:
         span = f"from {_at(inputs, each.from_s)} to {_at(inputs, each.until_s)}"
         yield f"  DIFFERS {span}: recorded {each.recorded_mps:.3f} m/s, replayed {each.replayed_mps:.3f} m/s"
+
+
+def source_lines(inputs: RecordedInputs, found: SourceReplay) -> Iterator[str]:
+    """The mux: which source has the base by its orders, beside its recorded states."""
+    orders = ", ".join(f"{name} {count}" for name, count in sorted(found.orders.items())) or "none"
+    yield f"velocity mux: orders of {orders}; {found.compared} states compared, {found.left_out} left out"
+    yield from (f"  {_at(inputs, each.at_s)} {each.source or NOBODY}" for each in found.takeovers[:MOST_LINES])
+    for each in found.differences[:MOST_LINES]:
+        yield f"  DIFFERS at {_at(inputs, each.at_s)}: recorded {each.recorded}, replayed {each.replayed}"
+
+
+def source_values(inputs: RecordedInputs, found: SourceReplay) -> dict[str, Any]:
+    """The same, for JSON."""
+    return {
+        "orders": dict(found.orders),
+        "compared": found.compared,
+        "left_out": found.left_out,
+        "takeovers": [{"at_s": each.at_s - inputs.began_s, "source": each.source} for each in found.takeovers],
+        "differences": [
+            {"at_s": each.at_s - inputs.began_s, "recorded": each.recorded, "replayed": each.replayed}
+            for each in found.differences
+        ],
+    }
 
 
 def setpoint_values(inputs: RecordedInputs, found: SetpointReplay) -> dict[str, Any]:
