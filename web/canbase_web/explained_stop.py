@@ -6,6 +6,7 @@ import html
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
+from urllib.parse import quote
 
 from canbase_config.robot import Robot
 from canbase_recording.explain_file import explain_file
@@ -23,7 +24,7 @@ def named(recordings: Iterable[str], name: str) -> Path | None:
 
 def link(recording: str) -> str:
     """Where its page is; empty: there is no recording, or it is not on this computer."""
-    return ADDRESS.format(name=Path(recording).name) if recording and Path(recording).is_file() else ""
+    return ADDRESS.format(name=quote(Path(recording).name)) if recording and Path(recording).is_file() else ""
 
 
 def explained(path: Path, robot: Robot, config: str) -> tuple[int, str]:

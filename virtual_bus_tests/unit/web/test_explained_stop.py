@@ -41,3 +41,10 @@ def test_a_file_that_is_gone_or_is_no_recording(tmp_path: Path) -> None:
 
 def test_a_name_is_escaped() -> None:
     assert "<img" not in missing("<img src=x>")
+
+
+def test_a_file_name_stays_inside_the_address_of_its_link(tmp_path: Path) -> None:
+    """A local user may name a file anything, and publish a stop event with it."""
+    hostile = tmp_path / 'a" onclick="alert(1).asc'
+    hostile.write_text("")
+    assert link(str(hostile)) == "/explained/a%22%20onclick%3D%22alert%281%29.asc"
