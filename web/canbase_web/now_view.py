@@ -92,6 +92,18 @@ def _source(last: LastMessage) -> Part:
     return Part(name, Level.BAD, f"{active.name} is not followed: {active.reason}")
 
 
+def held_sentence(last: LastMessage, source: str) -> str:
+    """What becomes of the orders of hold-to-drive, whose source has this name: by velocity_mux/state."""
+    if not last.fresh:
+        return f"not followed: velocity_mux: {last.silence}"
+    state = next((each for each in last.message.sources if each.name == source), None)
+    if state is None:
+        return f"velocity_mux has no source {source}: it runs with another robot.yaml"
+    if state.active and source_standing(state.standing) is SourceStanding.FOLLOWED:
+        return "drives"
+    return f"not followed: {state.reason or source_standing(state.standing).word}"
+
+
 def _mux(last: LastMessage) -> Part:
     name = "velocity_mux"
     if not last.fresh:

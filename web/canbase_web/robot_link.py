@@ -25,7 +25,7 @@ from canbase_action_server.client import DriveClient, DriveResult
 from canbase_action_server.goal_client import DriveError
 from canbase_config.robot import Robot as RobotConfig
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, clean, printable
-from canbase_runtime.last_message import LastMessage
+from canbase_runtime.last_message import NOT_RECEIVED, LastMessage
 from canbase_runtime.receive_time import ReceiveTimes
 from canbase_web.hold import Speed
 from canbase_web.now_view import Robot
@@ -83,10 +83,24 @@ class RobotLink:
         While no page was open nothing was taken: what has waited since then counts as old.
         """
         received_s = self._receive_times.at(now_s)
-        for name, subscription in self._topics.items():
-            if (message := _take(subscription)) is not None:
-                self._kept[name] = (clean(message), received_s)
-        return Robot(**{name: LastMessage(message, now_s - at_s) for name, (message, at_s) in self._kept.items()})
+        for name in self._topics:
+            self._look(name, received_s)
+        return Robot(**{name: self._last(name, now_s) for name in self._kept})
+
+    def mux(self, now_s: float) -> LastMessage:
+        """velocity_mux/state alone."""
+        self._look("mux", self._receive_times.at(now_s))
+        return self._last("mux", now_s)
+
+    def _look(self, name: str, received_s: float) -> None:
+        if (message := _take(self._topics[name])) is not None:
+            self._kept[name] = (clean(message), received_s)
+
+    def _last(self, name: str, now_s: float) -> LastMessage:
+        if name not in self._kept:
+            return NOT_RECEIVED
+        message, at_s = self._kept[name]
+        return LastMessage(message, now_s - at_s)
 
     def scans(self) -> list[Any]:
         """The scan of each scanner that came since the last call, or None."""

@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 from starlette.websockets import WebSocketDisconnect
 
+from canbase_runtime.last_message import LastMessage
+from canbase_runtime.source_standing import SourceStanding
 from canbase_web import hold_socket
 from canbase_web.hold import Hold, Speed
 from canbase_web.hold_socket import LONGEST_ORDER, MOST_ORDERS_PER_S, TICKET_S, HoldSocket
@@ -51,10 +53,14 @@ class Socket:
 
 
 class Robot:
-    """What was ordered."""
+    """What was ordered; its mux follows every order, unless a test says otherwise."""
 
     def __init__(self) -> None:
         self.orders: list[Speed] = []
+        self.source = SimpleNamespace(name="web", active=True, standing=SourceStanding.FOLLOWED, reason="")
+
+    def mux(self, now_s: float) -> LastMessage:
+        return LastMessage(SimpleNamespace(sources=[self.source]), 0.0)
 
     def order(self, speed: Speed) -> None:
         self.orders.append(speed)
@@ -215,3 +221,24 @@ def test_the_end_of_the_server_orders_zero_where_it_held_and_says_nothing_where_
         return story.robot.orders
 
     assert [asyncio.run(tell(holds)) for holds in (True, False)] == [[Speed(0.0, 0.0)], []]
+
+
+def test_a_page_whose_orders_the_mux_does_not_follow_is_told_why_and_not_that_it_drives(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def tell() -> list[str]:
+        story = Story(monkeypatch)
+        socket, _ = await story.page(story.socket.ticket())
+        said = []
+        for standing, reason in (
+            (SourceStanding.UNARMED, "waiting for zero (restarted)"),
+            (SourceStanding.FOLLOWED, ""),
+        ):
+            story.robot.source.standing, story.robot.source.reason = standing, reason
+            socket.hold()
+            await story.turn()
+            await story.turn()
+            said.append(socket.sent[-1]["state"])
+        return said
+
+    assert asyncio.run(tell()) == ["not followed: waiting for zero (restarted)", "drives"]

@@ -14,9 +14,9 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState, LaserScan
 
 from canbase_config.load import load_robot, sample
-from canbase_runtime.last_message import SILENT_S, LastMessage
+from canbase_runtime.last_message import NOT_RECEIVED, SILENT_S, LastMessage
 from canbase_web.floor_view import MOST_POINTS, outlines, points
-from canbase_web.now_view import Level, Robot, chain, fast_values, headline, slow_values
+from canbase_web.now_view import Level, Robot, chain, fast_values, headline, held_sentence, slow_values
 
 NAN = math.nan
 
@@ -227,3 +227,26 @@ def test_angles_that_are_no_numbers_give_no_points_that_are_none(field: str, val
 
 def test_an_empty_scan_has_no_points() -> None:
     assert points(load_robot(sample("example_can0")).robot.safety.scan, LaserScan()) == []
+
+
+UNARMED = {"standing": MuxSource.UNARMED, "reason": "waiting for zero (restarted)"}
+BEHIND = {"active": False, "standing": MuxSource.LOWER_PRIORITY, "reason": "joystick has priority"}
+
+
+def of(*sources: MuxSource) -> LastMessage:
+    return LastMessage(MuxState(sources=sources), 0.1)
+
+
+HELD = (
+    (of(source(name="web")), "drives"),
+    (of(source(name="web", **UNARMED)), "not followed: waiting for zero (restarted)"),
+    (of(source(), source(name="web", **BEHIND)), "not followed: joystick has priority"),
+    (of(source()), "velocity_mux has no source web: it runs with another robot.yaml"),
+    (replace(of(source(name="web")), age_s=3.0), "not followed: velocity_mux: no message for 3 s"),
+    (NOT_RECEIVED, "not followed: velocity_mux: no message yet"),
+)
+
+
+@pytest.mark.parametrize(("last", "sentence"), HELD)
+def test_a_page_that_holds_says_drives_only_while_the_mux_follows_it(last: LastMessage, sentence: str) -> None:
+    assert held_sentence(last, "web") == sentence
