@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 from canbase_cli.options import new_app
@@ -10,6 +11,8 @@ from canbase_cli.services import SERVICES, add_services
 
 def main() -> None:
     """The command line of this process, to its end."""
+    # Plugins of pydantic would be code of others in each service, and are looked for in all that is installed.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")
     if sys.argv[1:2] and sys.argv[1] in SERVICES:
         app = new_app()
         add_services(app)

@@ -48,6 +48,23 @@ def test_the_help_of_canbase_names_the_services_too() -> None:
     assert names > set(SERVICES)
 
 
+PLUGINS = """
+import atexit, importlib.metadata, sys
+looked_for = []
+importlib.metadata.entry_points = lambda **which: looked_for.append(which["group"]) or ()
+from canbase_cli.entry import main
+sys.argv = ["canbase", "velocity", "--config", "missing.yaml"]
+atexit.register(lambda: print("pydantic.plugin._loader" in sys.modules, looked_for))
+main()
+"""
+
+
+def test_a_service_loads_no_plugins_of_pydantic_and_looks_for_none() -> None:
+    done = subprocess.run([sys.executable, "-c", PLUGINS], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2  # there is no such file
+    assert done.stdout.split() == ["True", "[]"]
+
+
 MESSAGES = """
 import sys
 from canbase_cli.options import ros_needed
