@@ -63,8 +63,10 @@ class NodeBoot:
         return not self.done and self.heard
 
     def is_transferring(self, now_s: float) -> bool:
-        """Whether its next step is an SDO transfer, and the drive answers."""
-        return self.configuring and isinstance(self._step, Read | Write) and now_s - self._begun_at < SLOW_S
+        """Whether its next step is an SDO transfer, and the drive answers, or the request still waits to be sent."""
+        if not self.configuring or not isinstance(self._step, Read | Write):
+            return False
+        return bool(self._outbox) or now_s - self._begun_at < SLOW_S
 
     @property
     def waiting_for(self) -> str:

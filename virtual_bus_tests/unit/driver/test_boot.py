@@ -354,6 +354,23 @@ def test_other_answers_on_the_channel_change_nothing() -> None:
     assert boot.waiting_for == waits_for != ""
 
 
+def test_a_request_that_waits_for_the_bus_is_no_drive_that_does_not_answer() -> None:
+    """On a slow and full bus a node's share of a cycle is less than a request: it waits for several cycles."""
+    boot, drive = NodeBoot(1, robot().drives[:1], robot()), FakeDrive()
+    for frame in [answer for sent in boot.tick(0.0) for answer in drive.on_frame(sent)]:
+        boot.on_frame(frame, 0.001)
+    assert (boot.transfers, boot.is_transferring(0.001), boot.is_transferring(0.5)) == (2, True, True)
+    assert boot.tick(0.5) != []
+    assert not boot.is_transferring(0.6)
+
+
+def test_a_drive_that_waits_for_its_boot_up_message_makes_no_transfers() -> None:
+    bench = Bench(FakeDrive(answers_nmt_reset=False), robot())
+    boot = bench.run(seconds=1.0)
+    assert boot.configuring
+    assert not boot.is_transferring(bench.now_s)
+
+
 def test_axes_that_no_node_has_raise_at_once() -> None:
     with pytest.raises(ValueError, match="axes"):
         NodeBoot(1, (), robot())
