@@ -22,6 +22,7 @@ class Cause(Enum):
     SHUTDOWN = "driver shut down"
     DEACTIVATED = "driver deactivated"
     RECORDER_PAUSED = "recorder paused"
+    ADAPTER_FAILED = "bus adapter failed"
     SECOND_MASTER = "second master"
     NMT_COMMAND = "NMT command"
     TWIN_NODE = "two nodes with one id"
@@ -64,6 +65,7 @@ ADVICE: Final[dict[Cause, str]] = {
     Cause.SHUTDOWN: "the driver was asked to end",
     Cause.DEACTIVATED: "a lifecycle manager or a person deactivated motor_driver",
     Cause.RECORDER_PAUSED: "look for what held the computer: load, suspend, a debugger, swapping",
+    Cause.ADAPTER_FAILED: "check the CAN adapter, its plug and the interface: ip -details link show can0",
     Cause.SECOND_MASTER: "find the other master: a second driver, a maker's tool, a PLC; a bus has one master",
     Cause.NMT_COMMAND: "find out which master sent it, and why",
     Cause.TWIN_NODE: "give each node its own id (switches, or LSS)",

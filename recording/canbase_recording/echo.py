@@ -6,8 +6,12 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from typing import Final
 
+from canbase_config.robot import DRIVER_NODE_ID
+from canbase_driver.cia301.nmt import HEARTBEAT
 from canbase_recording.entry import Entry, RecordedFrame
 
+OWN_HEARTBEAT: Final = HEARTBEAT + DRIVER_NODE_ID
+"""The driver alone sends it. If it comes back, the bus echoes; if not, an equal frame is somebody else's."""
 ECHO_S: Final = 0.1
 """An echo comes within this time [s]; what comes later was sent by somebody else."""
 
@@ -17,6 +21,7 @@ class EchoFilter:
 
     def __init__(self) -> None:
         self.echoes = 0
+        self._hears_itself = False
         self._sent: dict[tuple[int, bytes], deque[float]] = {}
 
     def without(self, entries: Iterable[Entry]) -> Iterator[Entry]:
@@ -32,12 +37,15 @@ class EchoFilter:
             if len(self._sent) > MOST_KEYS:
                 self._forget(frame.at_s)
             return False
+        if not self._hears_itself and frame.cob_id != OWN_HEARTBEAT:
+            return False
         times = self._sent.get(key)
         while times and times[0] < frame.at_s - ECHO_S:
             times.popleft()
         if not times:
             return False
         times.popleft()
+        self._hears_itself = True
         self.echoes += 1
         return True
 

@@ -69,17 +69,29 @@ def _two_setpoints(scene: Scene) -> Found | None:
 
 
 def _extra_syncs(scene: Scene) -> Found | None:
-    """SYNCs that come too soon after each other, without setpoints between them."""
+    """SYNCs that the one driver cannot have sent: strangers, too many, or one soon after another without setpoints."""
+    window = times_between(scene.syncs, scene.reaction_s - SYNC_WINDOW_S, scene.reaction_s)
+    strangers = times_between(scene.foreign_syncs, scene.reaction_s - SYNC_WINDOW_S, scene.reaction_s)
+    if scene.own_syncs and len(strangers) >= SIGNS:
+        text = f"SYNC comes {len(strangers)} times that this driver did not send"
+        return Found(strangers[0], f"{text}: another master sends it")
+    early = [b for a, b in itertools.pairwise(window) if b - a < EARLY * scene.period_s]
     targets = sorted(at for trace in scene.axes.values() for at, _ in trace.target)
-    window = [at for at in scene.syncs if scene.reaction_s - 1.0 <= at <= scene.reaction_s]
-    soon = [
-        (a, b)
-        for a, b in itertools.pairwise(window)
-        if b - a < 0.75 * scene.period_s and targets and not times_between(targets, a, b)
-    ]
-    if len(soon) < SIGNS:
-        return None
-    return Found(soon[0][1], f"SYNC comes {len(soon)} times too early: two masters send it")
+    bare = [
+        b for a, b in itertools.pairwise(window)
+        if b - a < BARE * scene.period_s and targets and not times_between(targets, a, b)
+    ]  # fmt: skip
+    half = times_between(window, scene.reaction_s - MANY_S, scene.reaction_s)
+    if len(bare) >= SIGNS or (early and len(half) > MANY * MANY_S / scene.period_s):
+        signs = bare or early
+        return Found(signs[0], f"SYNC comes {len(signs)} times too early: two masters send it")
+    return None
+
+
+SYNC_WINDOW_S: Final = 1.0
+EARLY, BARE = 0.95, 0.75
+"""Shares of the period: with setpoints before it, and without."""
+MANY, MANY_S = 1.5, 0.15
 
 
 def _foreign_write(scene: Scene) -> Found | None:

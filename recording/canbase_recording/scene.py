@@ -36,6 +36,7 @@ _LINES: Final = {
 }  # fmt: skip
 SILENT_PERIODS: Final = 10.0
 """A statusword that has not come for so many cycles is no longer known."""
+PERIOD_SAMPLES: Final = 100
 DEFAULT_PERIOD_S: Final = 0.01
 """Of SYNC, where the recording shows none."""
 
@@ -54,6 +55,9 @@ class Scene:
     """Those around the reaction, to be shown: MOST_SHOWN at most."""
     frame_times: list[float] = field(default_factory=list)
     syncs: list[float] = field(default_factory=list)
+    own_syncs: int = 0
+    """Of these, how many the recorder sent: all, where it is the one master."""
+    foreign_syncs: list[float] = field(default_factory=list)
     pdo_times: dict[int, list[float]] = field(default_factory=dict)
     """By COB-ID: the PDOs that came."""
     pdo_layouts: dict[int, PdoLayout] = field(default_factory=dict)
@@ -78,8 +82,8 @@ class Scene:
 
     @functools.cached_property
     def period_s(self) -> float:
-        """Of SYNC before the reaction [s]."""
-        times = [at_s for at_s in self.syncs if at_s <= self.reaction_s]
+        """Of SYNC [s], from the begin of the scene: later somebody else may send it too."""
+        times = [at_s for at_s in self.syncs if at_s <= self.reaction_s][:PERIOD_SAMPLES]
         gaps = sorted(b - a for a, b in itertools.pairwise(times))
         return gaps[len(gaps) // 2] if gaps else DEFAULT_PERIOD_S
 
@@ -155,7 +159,7 @@ class SceneMaker:
         if kind is not FrameKind.DATA:
             return
         if cob_id == SYNC:
-            scene.syncs.append(at_s)
+            _sync(scene, at_s, sent=sent)
         elif cob_id == NMT and len(data) == 2:
             scene.nmt.append((at_s, (data[0], data[1], sent)))
         elif cob_id == STATE_COB_ID and (state := parse_state(Frame(cob_id, data))):
@@ -198,6 +202,14 @@ class SceneMaker:
             name, units = self._units.get(key, (f"node {node_id}" + (f" axis {axis}" if axis else ""), None))
             trace = scene.axes[key] = AxisTrace(node_id, axis, name, units)
         return trace
+
+
+def _sync(scene: Scene, at_s: float, *, sent: bool) -> None:
+    scene.syncs.append(at_s)
+    if sent:
+        scene.own_syncs += 1
+    else:
+        scene.foreign_syncs.append(at_s)
 
 
 def _count(scene: Scene, frame: RecordedFrame) -> None:

@@ -48,6 +48,7 @@ RULES: Final = (
     Rule(Cause.WATCHDOG_ENDED, bus.watchdog_ended),
     # who is on the bus, and who is not any more
     Rule(Cause.RECORDER_PAUSED, bus.recorder_paused),
+    Rule(Cause.ADAPTER_FAILED, orders.driver_reports(DriverCause.BUS_FAILED)),
     Rule(Cause.SECOND_MASTER, masters.second_master),
     Rule(Cause.NMT_COMMAND, masters.nmt_command),
     Rule(Cause.TWIN_NODE, masters.twin_node),
@@ -117,7 +118,7 @@ def tell(scene: Scene) -> Story:
     seen = [(rule.cause, found) for rule in RULES if (found := rule.seen(scene)) is not None]
     cause, found = seen[0] if seen else _unknown(scene)
     chain = tuple(event for event in scene.events if event.at_s >= found.at_s - BEFORE_S)
-    caught_by, reported = _catcher(chain)
+    caught_by, reported = _catcher(scene, chain)
     return Story(
         cause=cause,
         found=found,
@@ -134,13 +135,15 @@ BEFORE_S: Final = 0.001
 """A cause and the event that shows it may have one time."""
 
 
-def _catcher(chain: tuple[Event, ...]) -> tuple[str, str]:
+def _catcher(scene: Scene, chain: tuple[Event, ...]) -> tuple[str, str]:
     """The first part that acted, and what it gave as its reason."""
     first = next((event for event in chain if event.level is Level.ALARM and event.kind in CATCHERS), None)
     if first is None:
         return "", ""
     said = [event.text for event in chain if event.kind is first.kind and event.at_s <= first.at_s + SAYS_S]
-    return CATCHERS[first.kind], next((text for text in said if text.startswith("tripped")), first.text)
+    is_driver = first.kind is EventKind.CONTROL and scene.is_canbase
+    who = CATCHERS[EventKind.DRIVER if is_driver else first.kind]
+    return who, next((text for text in said if text.startswith("tripped")), first.text)
 
 
 SAYS_S: Final = 0.1

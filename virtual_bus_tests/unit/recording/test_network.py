@@ -203,17 +203,24 @@ class TestLoad:
         assert len(load.shares) <= MOST_BINS
 
 
+HEARTBEAT = (RecordedFrame(0.9, 0x77F, b"\x05", sent=True), RecordedFrame(0.901, 0x77F, b"\x05"))
+
+
 class TestEcho:
     def test_one_copy_of_each_sent_frame_is_taken_away(self) -> None:
         sent, received = RecordedFrame(1.0, 0x80, b"", sent=True), RecordedFrame(1.001, 0x80, b"")
         stranger = RecordedFrame(1.002, 0x80, b"")
         echo = EchoFilter()
-        assert list(echo.without([sent, received, stranger])) == [sent, stranger]
-        assert echo.echoes == 1
+        assert list(echo.without([*HEARTBEAT, sent, received, stranger])) == [HEARTBEAT[0], sent, stranger]
+        assert echo.echoes == 2
+
+    def test_where_the_driver_does_not_hear_its_heartbeat_an_equal_frame_is_another_master_s(self) -> None:
+        frames = [HEARTBEAT[0], RecordedFrame(1.0, 0x80, b"", sent=True), RecordedFrame(1.001, 0x80, b"")]
+        assert list(EchoFilter().without(frames)) == frames
 
     def test_a_late_copy_is_somebody_else_s(self) -> None:
         frames = [RecordedFrame(1.0, 0x201, b"\x0f\x00", sent=True), RecordedFrame(1.2, 0x201, b"\x0f\x00")]
-        assert list(EchoFilter().without(frames)) == frames
+        assert list(EchoFilter().without([*HEARTBEAT, *frames])) == [HEARTBEAT[0], *frames]
 
 
 def test_levels_are_ordered() -> None:

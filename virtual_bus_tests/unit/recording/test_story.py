@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import functools
+import struct
+from random import Random
 
 import pytest
 
+from campaign.outside import Surroundings
 from campaign.robots import campaign_robot
 from campaign.stops import Cruise
+from campaign.twins import JOYSTICK, Begin, Twin, fault
+from campaign.world import World
 from canbase_recording.cause import ADVICE, Cause
-from canbase_recording.entry import Note, RecordedFrame
+from canbase_recording.entry import Entry, FrameKind, Note, RecordedFrame
 from canbase_recording.explanation import Explanation, explain
 from canbase_recording.story import RULES
 from canbase_velocity.twist import Twist
@@ -73,6 +78,43 @@ FAILURES = (
     ("wheel", "feedback lost", Cause.FEEDBACK_LOST, Cause.FEEDBACK_LOST),
     ("twin node", "a second drive with the same node id, at standstill", Cause.TWIN_NODE, Cause.TWIN_NODE),
 )
+
+
+def hiccup(name: str, seconds: float) -> Begin:
+    """A process that gets no processor for a while, and goes on."""
+
+    def begin(world: World, around: Surroundings, random: Random) -> None:
+        world.processes[name].hang("hiccup")
+        world.clock.after(seconds, world.processes[name].go_on, "hiccup")
+
+    return begin
+
+
+MORE = (
+    (Twin("obstacle", "appears", fault("obstacle", margin_m=0.05), JOYSTICK), Cause.OBSTACLE, NO_STOP),
+    (Twin("service", "stop", fault("stop_requested"), JOYSTICK), Cause.STOP_REQUESTED, NO_STOP),
+    (Twin("lifecycle", "deactivate", fault("driver_deactivated"), JOYSTICK), Cause.DEACTIVATED, NO_STOP),
+    (Twin("driver", "pauses", hiccup("driver", 0.4), JOYSTICK), Cause.RECORDER_PAUSED, Cause.DRIVER_SILENT),
+    (Twin("velocity", "pauses", hiccup("velocity", 0.4), JOYSTICK), Cause.LEASES_LOST, Cause.LEASES_LOST),
+    (Twin("driver", "omits one axis", fault("setpoints_not_sent", wheel=0), JOYSTICK), Cause.SETPOINTS_MISSING,
+     Cause.SETPOINTS_MISSING),
+    (Twin("second master", "NMT", fault("second_master_nmt", nmt=b"\x80\x00"), JOYSTICK), Cause.SECOND_MASTER,
+     Cause.SECOND_MASTER),
+    (Twin("second master", "SYNC", fault("second_master_sync", on=True), JOYSTICK), Cause.SECOND_MASTER,
+     Cause.SECOND_MASTER),
+    (Twin("adapter", "fails", fault("bus_problem"), JOYSTICK), Cause.ADAPTER_FAILED, Cause.DRIVER_SILENT),
+    (Twin("leases", "lost", fault("lease_lost", value=1.0), JOYSTICK), Cause.LEASES_LOST, Cause.LEASES_LOST),
+    (Twin("drive", "bus-off", fault("drive_bus_off", wheel=1), JOYSTICK), Cause.DRIVES_DEAF, Cause.DRIVES_DEAF),
+)  # fmt: skip
+"""Failures that the exit matrix has not."""
+
+
+@pytest.mark.parametrize(("failure", "box", "wire"), MORE, ids=[f"{row[0].what}: {row[0].how}" for row in MORE])
+def test_the_first_cause_of_more_failures(failure: Twin, box: Cause | None, wire: Cause | None) -> None:
+    found = recorded(failure)
+    for entries, expected in ((found.box, box), (found.wire, wire)):
+        causes = [story.cause for story in explain(entries, ROBOT).stories]
+        assert causes == ([] if expected is NO_STOP else [expected])
 
 
 NEEDS_UNITS = (Cause.ENCODER_JUMPS, Cause.VELOCITY_STUCK)
@@ -170,3 +212,26 @@ def test_an_unknown_end_is_said_to_be_unknown() -> None:
     (story,) = explain(entries, ROBOT).stories
     assert story.cause is Cause.UNKNOWN
     assert "nothing before it shows why" in story.found.text
+
+
+def test_errors_of_the_controller_and_a_master_that_switches_off_in_motion() -> None:
+    """Beside frames alone: five error frames; then, in another recording, disable voltage at full speed."""
+    frames: list[Entry] = []
+    for cycle in range(200):
+        at_s = 0.01 * cycle
+        word = 0x0000 if cycle >= 150 else 0x000F
+        frames += [
+            RecordedFrame(at_s, 0x203, struct.pack("<Hi", word, 1000)),
+            RecordedFrame(at_s + 0.001, 0x080, b""),
+            RecordedFrame(at_s + 0.002, 0x183, struct.pack("<Hi", 0x0250 if cycle >= 151 else 0x0237, 100 * cycle)),
+            RecordedFrame(at_s + 0.003, 0x283, struct.pack("<ih", 990, 0)),
+        ]
+    state = RecordedFrame(0.0, 0x1FE, struct.pack("<BBBBHBB", 1, 0, 0, 0, 5, 0, 0))
+    (story,) = explain([state, *frames]).stories
+    assert story.cause is Cause.ORDERED_OFF
+    assert story.found.text.startswith("node 3 is ordered: disable voltage in motion")
+    errors = [RecordedFrame(1.3 + 0.01 * i, 0x20, bytes(8), kind=FrameKind.ERROR) for i in range(5)]
+    entries = sorted([state, *frames, *errors], key=lambda entry: entry.at_s)
+    (story,) = explain(entries).stories
+    assert story.cause is Cause.BUS_ERRORS
+    assert story.found.at_s == pytest.approx(1.3)
