@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import can
@@ -18,6 +20,7 @@ from canbase_driver.runtime.black_box import MAX_EVENTS, MAX_FRAMES, EventEntry,
 from canbase_driver.runtime.black_box_about import about, sha256_of
 from canbase_driver.runtime.black_box_json import json_lines
 from canbase_driver.runtime.black_box_writer import WAITING, BlackBoxWriter, state_folder
+from canbase_driver.runtime.bus_port import BusPort
 from canbase_driver.supervision.stop_history import StopRecord
 
 WALL_S = 1_700_000_000.0
@@ -48,6 +51,29 @@ def test_the_ring_gives_back_the_last_seconds_alone() -> None:
     assert [entry[1] for entry in cut.frames] == list(range(30, 50))
     assert [entry[1] for entry in cut.notes] == [str(k) for k in range(30, 50)]
     assert [entry[2]["k"] for entry in cut.events] == list(range(30, 50))
+
+
+def test_a_frame_that_waited_in_the_socket_stands_where_it_came() -> None:
+    ring = Ring(seconds=10.0)
+    ring.frame(100.02, 0x80, b"", received=False)
+    ring.frame(100.01, 0x181, b"", received=True)
+    assert [entry[1] for entry in ring.cut(now_s=105.0, wall_offset_s=0.0).frames] == [0x181, 0x80]
+
+
+@pytest.mark.parametrize(("later_s", "at_s"), [(0.5, 199.5), (0.0, 200.0), (-3600.0, 200.0), (3600.0, 200.0)])
+def test_the_time_of_a_frame_is_the_kernels_unless_the_wall_clock_was_set(
+    later_s: float, at_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`later_s`: by the wall clock, when the control thread takes it out."""
+    arguments = {"interface": "virtual", "channel": f"received {later_s}"}
+    with can.Bus(**arguments) as other:
+        port = BusPort(arguments)
+        other.send(can.Message(arbitration_id=0x181, is_extended_id=False))
+        assert port.receive(1.0) is not None
+        now_s = time.time()
+        monkeypatch.setattr("canbase_driver.runtime.bus_port.time", SimpleNamespace(time=lambda: now_s + later_s))
+        assert port.received_at(200.0) == pytest.approx(at_s, abs=0.1)
+        port.close()
 
 
 def test_memory_is_bounded_however_full_the_bus_is() -> None:

@@ -92,6 +92,10 @@ def test_the_frame_of_another_master_that_it_trips_on_is_heard() -> None:
     assert list(heard([foreign], [Trip(101.0, TripCause.FOREIGN_MASTER, 1)])) == [foreign]
 
 
+def test_what_the_ladder_sends_after_that_trip_is_its_own() -> None:
+    assert list(heard([QUICK_STOP._replace(at_s=101.2)], [Trip(101.0, TripCause.FOREIGN_MASTER, 1)])) == []
+
+
 def test_what_the_driver_sends_is_heard_always() -> None:
     own = SDO._replace(at_s=101.2, sent=True)
     assert list(heard([own], [Trip(101.0, LEASE, 0)])) == [own]

@@ -9,12 +9,14 @@ import pytest
 from campaign.stops import Cruise
 from campaign.twins import JOYSTICK
 from canbase_config.robot import Robot
-from canbase_recording.recorded_inputs import RecordedInputs
+from canbase_recording.recorded_inputs import Happening, RecordedInputs
 from canbase_recording.replay_file import read_inputs, robot_of
 from canbase_recording.replay_setpoints import recorded_setpoints, replay_setpoints
 from canbase_recording.replay_text import setpoint_lines
 from canbase_velocity.twist import Twist
 from support.recorded_stops import record_in_a_copy
+
+STATE = "motor_driver/state"
 
 
 def turns_and_stops(cruise: Cruise) -> None:
@@ -88,6 +90,17 @@ def test_a_shorter_command_timeout_would_have_begun_the_ramp_earlier(recordings:
     assert differences
     assert differences[0].from_s > inputs.ends_s - 0.4
     assert all(each.replayed_mps < each.recorded_mps for each in differences)
+
+
+def test_after_each_enabled_a_command_is_followed_only_after_a_zero(recordings: dict[str, RecordedInputs]) -> None:
+    """As if it had been latched and enabled again within 50 ms, the joystick still pushed."""
+    inputs = recordings["turns_and_stops"]
+    at_s = inputs.began_s + 2.4
+    again = [Happening(at_s, STATE, {"state": "LATCHED"}), Happening(at_s + 0.05, STATE, {"state": "ENABLED"})]
+    happenings = tuple(sorted([*inputs.happenings, *again], key=lambda each: each.at_s))
+    found = replay_setpoints(replace(inputs, happenings=happenings), robot_of(inputs))
+    assert found.differences[0].from_s == pytest.approx(at_s + 0.15, abs=0.1)
+    assert found.differences[0].replayed_mps == pytest.approx(0.0, abs=0.001)
 
 
 def test_a_recording_in_which_nothing_was_followed_says_so(recordings: dict[str, RecordedInputs]) -> None:
