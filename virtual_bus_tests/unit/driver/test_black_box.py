@@ -65,7 +65,7 @@ def test_the_time_of_a_frame_is_the_kernels_unless_the_wall_clock_was_set(
     later_s: float, at_s: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """`later_s`: by the wall clock, when the control thread takes it out."""
-    arguments = {"interface": "virtual", "channel": f"received {later_s}"}
+    arguments: dict[str, Any] = {"interface": "virtual", "channel": f"received {later_s}"}
     with can.Bus(**arguments) as other:
         port = BusPort(arguments)
         other.send(can.Message(arbitration_id=0x181, is_extended_id=False))
