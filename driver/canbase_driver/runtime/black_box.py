@@ -7,9 +7,10 @@ for black_box_json.py.
 
 from __future__ import annotations
 
+import heapq
 import io
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,8 @@ import can
 
 MAX_FRAMES = 80_000
 """A full bus of 1 Mbit/s for ten seconds; about 15 MB in memory, 6 MB in a file."""
+WAITED = 2_500
+"""More frames than wait in a socket while the driver does not run."""
 MAX_NOTES = 10_000
 MAX_EVENTS = 12_000
 """About 2 MB in a file; 7 MB where another node floods the driver with states of the longest texts."""
@@ -41,7 +44,7 @@ class Recording:
     @property
     def began_s(self) -> float:
         """Local monotonic time of the zero of the ASC file: its first entry [s]."""
-        return min([frame[0] for frame in self.frames[:1]] + [note[0] for note in self.notes[:1]], default=0.0)
+        return min([frame[0] for frame in self.frames[:WAITED]] + [note[0] for note in self.notes[:1]], default=0.0)
 
 
 class Ring:
@@ -72,20 +75,27 @@ class Ring:
         self._events.append((now_s, what, values))
 
     def cut(self, now_s: float, wall_offset_s: float) -> Recording:
-        """What happened in the last seconds before `now_s`, in the order of time: frames that waited in the socket came
-        before others that were sent meanwhile."""
+        """What happened in the last seconds before `now_s`."""
         since = now_s - self._seconds
         frames, notes, events = self._frames.copy(), self._notes.copy(), self._events.copy()
         return Recording(
-            tuple(sorted((entry for entry in frames if entry[0] >= since), key=_time)),
+            tuple(entry for entry in frames if entry[0] >= since),
             tuple(entry for entry in notes if entry[0] >= since),
             wall_offset_s,
             tuple(entry for entry in events if entry[0] >= since),
         )
 
 
-def _time(entry: FrameEntry) -> float:
-    return entry[0]
+def in_order(frames: Sequence[FrameEntry]) -> Iterator[FrameEntry]:
+    """By time, one by one: a frame that waited in the socket came before others that were sent meanwhile.
+
+    A sort of all of them at once would hold the interpreter up for milliseconds.
+    """
+    waiting = list(frames[:WAITED])
+    heapq.heapify(waiting)
+    for at in range(len(waiting), len(frames)):
+        yield heapq.heappushpop(waiting, frames[at])
+    yield from sorted(waiting)
 
 
 def asc_lines(recording: Recording, title: str) -> Iterator[str]:
@@ -95,7 +105,7 @@ def asc_lines(recording: Recording, title: str) -> Iterator[str]:
     start = recording.began_s
     writer.log_event(f"// {title}", start + recording.wall_offset_s)
     notes = deque(recording.notes)
-    for at, cob_id, data, received in recording.frames:
+    for at, cob_id, data, received in in_order(recording.frames):
         while notes and notes[0][0] <= at:
             _write_note(text, *notes.popleft(), start)
         writer.on_message_received(
