@@ -145,9 +145,9 @@ class MotionJudge:
 
     def _driven_mps(self) -> float:
         """The faster side with a motor that drives or brakes it."""
-        drives, speeds = self._world.drives, (self._shown.left_mps, self._shown.right_mps)
-        sides = zip(speeds, drives.sides, strict=True)
-        return max((abs(mps) for mps, side in sides if not drives.roll(side)), default=0.0)
+        drives, (left, right) = self._world.drives, self._world.drives.sides
+        left_mps = 0.0 if drives.roll(left) else abs(self._shown.left_mps)
+        return max(left_mps, 0.0 if drives.roll(right) else abs(self._shown.right_mps))
 
     def _rolls_blindly(self) -> bool:
         """The wheels of a side roll, with power, as their drives see nothing of it."""

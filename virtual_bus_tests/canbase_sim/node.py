@@ -102,7 +102,7 @@ class SimulatedNode:
 
     def takes(self, cob_id: int) -> bool:
         """Whether a frame with this COB-ID may mean anything to the node as it is now; most are feedback of others."""
-        return cob_id > heartbeat.COB_ID or cob_id in self._routes
+        return cob_id > heartbeat.COB_ID or self._heeds[cob_id]
 
     def tick(self, now_s: float) -> list[Frame]:
         """Whatever is due by `now_s`, and every frame since the last call, in order."""
@@ -229,8 +229,14 @@ class SimulatedNode:
     def _route(self) -> None:
         """What listens to which COB-ID in this NMT state."""
         self._routes: dict[int, Callable[[bytes, float], None]] = {}
-        if self.state is NmtState.INITIALISING:
-            return
+        if self.state is not NmtState.INITIALISING:
+            self._add_routes()
+        self._heeds = [False] * (heartbeat.COB_ID + 1)
+        """By identifier: it has a route."""
+        for cob_id in self._routes:
+            self._heeds[cob_id] = True
+
+    def _add_routes(self) -> None:
         if self.state is NmtState.OPERATIONAL:
             self._routes |= {r.cob_id: r.receive for r in self._active_rpdos if r.cob_id is not None}
         if self.state in nmt.HAS_SDO:

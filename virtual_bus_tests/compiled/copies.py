@@ -18,7 +18,7 @@ def copies() -> Iterator[tuple[Path, bytes]]:
             if source.is_file() and "__pycache__" not in name.parts and not source.name.startswith("test_"):
                 data = source.read_bytes()
                 is_hot = name.suffix == ".py" and ".".join(name.with_suffix("").parts) in hot
-                yield BUILD / name, native_form(data.decode()).encode() if is_hot else data
+                yield BUILD / name, native_form(data.decode(), plain_values=True).encode() if is_hot else data
 
 
 def outdated() -> list[str]:

@@ -21,18 +21,25 @@ class _Field:
     compared: bool
 
 
-def native_form(source: str) -> str:
-    """The same module, its dataclasses with methods of their own."""
+def native_form(source: str, plain_values: bool = False) -> str:
+    """The same module, its dataclasses with methods of their own.
+
+    `plain_values`: for virtual time alone. The collector does not know the frozen ones. Python 3.11 overwrites memory
+    when one of them is the 50th of objects that free each other; no robot may depend on that it never is.
+    """
     tree = ast.parse(source)
     for node in tree.body:
         if isinstance(node, ast.ClassDef):
-            _rewrite(node)
+            _rewrite(node, plain_values)
     _make_final(tree)
+    first = next(at for at, node in enumerate(tree.body) if not _is_head(node))
+    tree.body[first:first] = ast.parse(_NAMES_OF_VALUES if plain_values else _NAMES).body
     return ast.unparse(ast.fix_missing_locations(tree))
 
 
 def _make_final(tree: ast.Module) -> None:
     """Constants of the module are reached directly, and not by their names."""
+    tree.body = [one for node in tree.body for one in _one_by_one(node)]
     for at, node in enumerate(tree.body):
         if isinstance(node, ast.Assign) and len(node.targets) == 1:
             target, kind = node.targets[0], _FINAL
@@ -40,14 +47,42 @@ def _make_final(tree: ast.Module) -> None:
             target, kind = node.target, f"{_FINAL}[{ast.unparse(node.annotation)}]"
         else:
             continue
-        if isinstance(target, ast.Name) and re.fullmatch("_?[A-Z][A-Z0-9_]+", target.id):
+        if isinstance(target, ast.Name) and _is_constant_name(target.id):
             assert node.value is not None
             tree.body[at] = ast.parse(f"{target.id}: {kind} = {ast.unparse(node.value)}").body[0]
-    first = next(at for at, node in enumerate(tree.body) if not _is_head(node))
-    tree.body.insert(first, ast.parse(f"from typing import Final as {_FINAL}").body[0])
+
+
+def _one_by_one(node: ast.stmt) -> list[ast.stmt]:
+    """`A, B = 1, 2` as two assignments, where the values do not look at the names."""
+    if not (isinstance(node, ast.Assign) and len(node.targets) == 1):
+        return [node]
+    target, value = node.targets[0], node.value
+    if not (isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and len(target.elts) == len(value.elts)):
+        return [node]
+    names = [each.id for each in target.elts if isinstance(each, ast.Name) and _is_constant_name(each.id)]
+    if len(names) < len(target.elts) or any(isinstance(each, ast.Starred) for each in value.elts):
+        return [node]
+    return [ast.parse(f"{name} = {ast.unparse(each)}").body[0] for name, each in zip(names, value.elts, strict=True)]
+
+
+def _is_constant_name(name: str) -> bool:
+    return re.fullmatch("_?[A-Z][A-Z0-9_]+", name) is not None
 
 
 _FINAL = "_NeverAssignedAgain"
+_NAMES = f"from typing import Final as {_FINAL}"
+_NAMES_OF_VALUES = f"""
+import sys as _sys
+from typing import TYPE_CHECKING
+{_NAMES}
+from typing import final as _unchanged
+if TYPE_CHECKING:
+    from mypy_extensions import mypyc_attr
+vars(_sys.modules[__name__]).setdefault("mypyc_attr", lambda **words: _unchanged)
+"""
+"""The compiler alone needs `mypyc_attr`: where Python runs this form it does nothing."""
+_PLAIN_VALUE = "mypyc_attr(acyclic=True, free_list_len=1)"
+"""Of a frozen dataclass. It is made before what would have to refer back to it: no cycle, nothing to collect."""
 
 
 def _is_head(node: ast.stmt) -> bool:
@@ -55,7 +90,7 @@ def _is_head(node: ast.stmt) -> bool:
     return isinstance(node, ast.Expr) or (isinstance(node, ast.ImportFrom) and node.module == "__future__")
 
 
-def _rewrite(node: ast.ClassDef) -> None:
+def _rewrite(node: ast.ClassDef, plain_values: bool) -> None:
     at = next((n for n, one in enumerate(node.decorator_list) if _is_dataclass(one)), None)
     if at is None:
         return
@@ -63,6 +98,8 @@ def _rewrite(node: ast.ClassDef) -> None:
     given = {word.arg: word.value for word in decorator.keywords} if isinstance(decorator, ast.Call) else {}
     frozen, equal = _is_true(given.get("frozen")), "eq" not in given
     node.decorator_list[at] = ast.parse("dataclass(init=False, eq=False, slots=True)", mode="eval").body
+    if plain_values and frozen and not node.bases:
+        node.decorator_list.insert(0, ast.parse(_PLAIN_VALUE, mode="eval").body)
     if "kw_only" in given:  # mypyc 2.4 stumbles over the text signature of an __init__ with such parameters
         node.body.sort(key=lambda item: not isinstance(item, ast.AnnAssign) or item.value is not None)
     fields = _fields(node)

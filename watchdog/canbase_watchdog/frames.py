@@ -60,6 +60,7 @@ _STATUS = {False: struct.Struct("<Hi"), True: struct.Struct("<Ii")}
 _SETPOINT = {16: struct.Struct("<Hh"), 32: struct.Struct("<Hi")}
 _VELOCITY = {16: struct.Struct("<h"), 32: struct.Struct("<i")}
 _TORQUE = struct.Struct("<h")
+TORQUE_BYTES = 2
 _U16 = struct.Struct("<H")
 _SDO_HEAD = struct.Struct("<BHB")
 _STATE = struct.Struct("<BBBBHBB")
@@ -89,8 +90,12 @@ class DriveState(enum.Enum):
 
 ARMED = 0x80
 """Byte 2 of the state frame, above the rung."""
-POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
-"""States in which the motor has current."""
+
+
+def is_powered(state: DriveState | None) -> bool:
+    """It is a state in which the motor has current."""
+    stops = state is DriveState.QUICK_STOP_ACTIVE or state is DriveState.FAULT_REACTION_ACTIVE
+    return stops or state is DriveState.OPERATION_ENABLED
 
 
 def decode_state(statusword: int) -> DriveState | None:
@@ -127,13 +132,15 @@ def decode_velocity(data: bytes, layout: WatchedLayout = CIA_402) -> int | None:
     """Velocity 606Ch of a velocity TPDO in the drive's own unit, with a torque behind it or not; None: of another
     length."""
     form = _VELOCITY[layout.velocity_bits]
-    return int(form.unpack_from(data)[0]) if len(data) in (form.size, form.size + _TORQUE.size) else None
+    beyond = len(data) - form.size
+    return int(form.unpack_from(data)[0]) if beyond == 0 or beyond == TORQUE_BYTES else None
 
 
 def decode_torque(data: bytes, layout: WatchedLayout = CIA_402) -> float | None:
     """Torque of a velocity TPDO as a share of the rated one; None: there is none in it."""
     form = _VELOCITY[layout.velocity_bits]
-    return _TORQUE.unpack_from(data, form.size)[0] / RATED if len(data) == form.size + _TORQUE.size else None
+    size = form.size
+    return _TORQUE.unpack_from(data, size)[0] / RATED if len(data) == size + TORQUE_BYTES else None
 
 
 def decode_setpoint(data: bytes, layout: WatchedLayout = CIA_402) -> tuple[int, int] | None:

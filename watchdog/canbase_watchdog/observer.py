@@ -261,7 +261,7 @@ class Observer:
         self._note_velocity(record, bits, now_s)
         record.fed_velocity_at = now_s
         record.answers += 1
-        enabled, powered = record.state is ENABLED, record.state in frames.POWERED
+        enabled, powered = record.state is ENABLED, frames.is_powered(record.state)
         record.push.on_sample(frames.decode_torque(data, record.drive.layout), powered, now_s)
         record.feedback.on_velocity(record.velocity_mps, powered, enabled, now_s, record.push.last.share)
         if record.push.lies:
@@ -270,7 +270,7 @@ class Observer:
 
     def _note_velocity(self, record: _Record, bits: int, now_s: float) -> None:
         record.velocity_mps, record.velocity_at = bits * record.drive.velocity_mps_per_bit, now_s
-        record.stand.on_velocity(record.velocity_mps, now_s, record.state in frames.POWERED)
+        record.stand.on_velocity(record.velocity_mps, now_s, frames.is_powered(record.state))
         self._heard_at[record.drive.node_id] = now_s
 
     def _on_setpoint(self, record: _Record, cob_id: int, data: bytes, now_s: float) -> bool:

@@ -111,8 +111,8 @@ class Stopper:
         self._slowing, self._bus = [SlowingWatch(slope, now_s) for slope in self._slopes], None
 
     def _follow(self, view: View) -> None:
-        for axis, watch in zip(self._axes(view), self._slowing, strict=True):
-            watch.on_sample(axis.velocity_mps, axis.powered, axis.velocity_at)
+        for at, axis in enumerate(self._axes(view)):
+            self._slowing[at].on_sample(axis.velocity_mps, axis.powered, axis.velocity_at)
 
     def _axes(self, view: View) -> list[Axis]:
         return [axis for axis in view.axes if axis.drive.node_id == self._node_id]
@@ -139,9 +139,11 @@ class Stopper:
 
         A statusword with power, or a velocity, is enough to stop it, whichever client requested the value.
         """
+        if self._resting_since == math.inf:
+            return False
         seen_at, noise_mps = min(axis.seen_at for axis in axes), self._config.motion_tolerance_mps
         told = any(axis.powered or abs(axis.velocity_mps) > noise_mps for axis in axes)
-        return seen_at <= self._resting_since < math.inf and not told
+        return seen_at <= self._resting_since and not told
 
     def _stands(self, axis: Axis) -> bool:
         """Standing takes several samples to prove. Until then a drive that was found off is not stopped in vain.

@@ -113,7 +113,7 @@ class TwistWatch:
     def _smooth(self, speeds: list[float], elapsed_s: float) -> None:
         share = min(elapsed_s / SMOOTHED_S, 1.0)
         before = self._speeds or speeds
-        self._speeds = [old + share * (new - old) for old, new in zip(before, speeds, strict=True)]
+        self._speeds = [before[at] + share * (new - before[at]) for at, new in enumerate(speeds)]
 
     def _why(self, bus: BusView, bounds: Bounds) -> str:
         config = self._config
@@ -125,8 +125,7 @@ class TwistWatch:
         return why and f"{why}; {self._worst(bus)}"
 
     def _side(self, bus: BusView, side: str) -> list[float]:
-        pairs = zip(bus.axes, self._speeds, strict=True)
-        return [speed for axis, speed in pairs if axis.drive.side == side]
+        return [self._speeds[at] for at, axis in enumerate(bus.axes) if axis.drive.side == side]
 
     def _worst(self, bus: BusView) -> str:
         """The wheel that is farthest from its setpoint, in words."""

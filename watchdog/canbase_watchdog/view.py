@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from canbase_config.watchdog import WatchedDrive
 from canbase_watchdog.envelope import Bounds
-from canbase_watchdog.frames import POWERED, DriveState
+from canbase_watchdog.frames import DriveState, is_powered
 from canbase_watchdog.lease import Lease
 from canbase_watchdog.motion_evidence import Evidence
 from canbase_watchdog.plausibility import Feedback
@@ -62,7 +62,7 @@ class Axis:
     @property
     def powered(self) -> bool:
         """True when its last statusword was a state in which the motor has current."""
-        return self.state in POWERED
+        return is_powered(self.state)
 
     @property
     def trusted(self) -> bool:
@@ -75,7 +75,8 @@ class Axis:
     @property
     def seen_at(self) -> float:
         """When statusword, position and velocity were all known, by a TPDO or from an answer to an SDO."""
-        return min(self.status_at, self.velocity_at, self.position_at)
+        status_or_velocity_at = min(self.status_at, self.velocity_at)
+        return min(status_or_velocity_at, self.position_at)
 
 
 @dataclass(frozen=True, slots=True)

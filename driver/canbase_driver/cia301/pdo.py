@@ -37,6 +37,7 @@ _STATUS = {False: struct.Struct("<Hi"), True: struct.Struct("<Ii")}
 """By whether the statuswords of two axes are packed into one object."""
 _VELOCITY = {16: struct.Struct("<h"), 32: struct.Struct("<i")}
 _TORQUE = struct.Struct("<h")
+TORQUE_BYTES = 2
 RATED = 1000.0
 """6077h and 6078h at rated torque (CiA 402-2)."""
 
@@ -202,10 +203,12 @@ def unpack_velocity(data: bytes, layout: Layout = GENERIC) -> int | None:
     """Velocity 606Ch [raw], with or without a torque behind it; None when the length is wrong: to be dropped and
     counted."""
     form = _VELOCITY[layout.velocity_bits]
-    return int(form.unpack_from(data)[0]) if len(data) in (form.size, form.size + _TORQUE.size) else None
+    beyond = len(data) - form.size
+    return int(form.unpack_from(data)[0]) if beyond == 0 or beyond == TORQUE_BYTES else None
 
 
 def unpack_torque(data: bytes, layout: Layout = GENERIC) -> float | None:
     """Torque behind the velocity, as a share of the rated one; None: the drive does not report it."""
     form = _VELOCITY[layout.velocity_bits]
-    return _TORQUE.unpack_from(data, form.size)[0] / RATED if len(data) == form.size + _TORQUE.size else None
+    size = form.size
+    return _TORQUE.unpack_from(data, size)[0] / RATED if len(data) == size + TORQUE_BYTES else None

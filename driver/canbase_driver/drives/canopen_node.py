@@ -239,8 +239,9 @@ class CanopenNode:
     def setpoints(self, goal: PowerGoal, left_mps: float, right_mps: float) -> list[Frame]:
         """The setpoint of each axis, one step towards `goal`; speeds of the rims, forward positive [m/s]."""
         words = self.controlwords(goal)
-        pairs = zip(self.axes, words, strict=True)
-        return [axis.setpoint(goal, left_mps if axis.is_left else right_mps, word) for axis, word in pairs]
+        return [
+            axis.setpoint(goal, left_mps if axis.is_left else right_mps, words[at]) for at, axis in enumerate(self.axes)
+        ]
 
     def stop_by_sdo(self, goal: PowerGoal, now_s: float) -> list[Frame]:
         """Controlwords and speeds by SDO while it takes no PDOs; it may have left NMT operational, motors turning."""

@@ -29,6 +29,9 @@ class Values:
     temperature_c: float = math.nan
 
 
+UNKNOWN = Values()
+
+
 @dataclass(slots=True)
 class _Point:
     """One object of one axis, and its last value."""
@@ -74,8 +77,10 @@ class Measures:
 
     def values(self, axis: int, now_s: float) -> Values:
         """What is known of an axis."""
-        fresh = [point for point in self._points if point.axis == axis and now_s - point.at <= STALE_S]
-        return Values(**{point.name: point.value for point in fresh})
+        fresh = {
+            point.name: point.value for point in self._points if point.axis == axis and now_s - point.at <= STALE_S
+        }
+        return Values(**fresh) if fresh else UNKNOWN
 
     def _take(self, now_s: float) -> None:
         if self._client.busy:

@@ -34,8 +34,10 @@ class HeartbeatProducer:
 
     def due(self, now_s: float) -> bool:
         """True once per period of 1017h, late calls do not add up."""
+        if self._due is not None and now_s < self._due:
+            return False
         period = self._values[PERIOD] / 1000.0
-        if period == 0.0 or (self._due is not None and now_s < self._due):
+        if period == 0.0:
             return False
         on_time = self._due is not None and now_s < self._due + period
         self._due = (self._due if on_time and self._due is not None else now_s) + period

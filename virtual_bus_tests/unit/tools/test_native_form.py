@@ -21,6 +21,9 @@ import math
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+LOW, HIGH = 1.0, 2.0
+(ONE, *OTHERS), LAST = (1, 2, 3), 4
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
     NONE: ClassVar[Report]
@@ -60,9 +63,9 @@ def module(name: str, source: str) -> Any:
     return made
 
 
-@pytest.fixture(params=["written", "compiled"])
+@pytest.fixture(params=["written", "compiled", "compiled_for_virtual_time"])
 def forms(request: pytest.FixtureRequest) -> Any:
-    native = native_form(SOURCE)
+    native = native_form(SOURCE, plain_values=request.param == "compiled_for_virtual_time")
     assert native.count("def __init__") == 4
     return module(f"a_form_{request.param}", SOURCE if request.param == "written" else native)
 
@@ -80,6 +83,17 @@ def test_parameters_by_keyword_and_a_constant_of_the_class(forms: Any) -> None:
     assert [field.name for field in fields(forms.Report)].count("NONE") == 0
     assert replace(forms.Report.NONE, note="late").note == "late"
     assert pickle.loads(pickle.dumps(forms.Report.NONE)) == forms.Report.NONE
+
+
+def test_constants_that_share_a_line(forms: Any) -> None:
+    assert (forms.LOW, forms.HIGH, forms.ONE, forms.OTHERS, forms.LAST) == (1.0, 2.0, 1, [2, 3], 4)
+
+
+def test_the_compiler_learns_what_is_constant_and_in_virtual_time_what_needs_no_collector() -> None:
+    assert "mypyc_attr" not in native_form(SOURCE), "on a robot the collector knows all of them"
+    native = native_form(SOURCE, plain_values=True)
+    assert "LOW: _NeverAssignedAgain = 1.0\nHIGH: _NeverAssignedAgain = 2.0" in native
+    assert native.count("@mypyc_attr(acyclic=True, free_list_len=1)") == 3, "of the frozen ones, and not of Box"
 
 
 def test_what_is_equal_and_what_is_not(forms: Any) -> None:
