@@ -26,6 +26,8 @@ WAY_S: Final = 0.003
 """A frame or a lease is on its way for less than this [s]."""
 OWN_S: Final = 0.006
 """Its own stop frames come so shortly before the state frame that reports the trip [s]."""
+BINS, NEAR_BINS = 50, 4
+"""Parts of a tick, and so many of them are one place: frames differ in their stuff bits."""
 _STATE: Final = struct.Struct("<BBBBHBB")
 _SDO_REQUESTS: Final = range(frames.SDO_REQUEST + 1, frames.SDO_REQUEST + 0x80)
 _STOP_PDOS: Final = range(frames.QUICK_STOP_RPDO + 1, frames.QUICK_STOP_RPDO + 0x80)
@@ -136,11 +138,15 @@ def _is_own(frame: RecordedFrame, trips: Sequence[Trip]) -> bool:
 
 
 def tick_phase_s(states: Sequence[Seen], tick_s: float, frame_s: float) -> float:
-    """A time on the grid of the watchdog's ticks [s]: state frames leave in a tick, most of them undelayed, and take
-    `frame_s` on the bus. 0.0 where there is none.
+    """A time on the grid of the watchdog's ticks [s]: state frames leave in a tick, and take `frame_s` on the bus. Some
+    wait for it; those that do not are where most of them are. 0.0 where there is none.
     """
     if not states:
         return 0.0
     origin = states[0].at_s
-    offsets = sorted((each.at_s - origin + tick_s / 2.0) % tick_s - tick_s / 2.0 for each in states)
-    return origin + offsets[len(offsets) // 10] - frame_s
+    counts = [0] * BINS
+    for each in states:
+        counts[int((each.at_s - origin) % tick_s / tick_s * BINS) % BINS] += 1
+    best = max(range(BINS), key=lambda at: sum(counts[(at + k) % BINS] for k in range(NEAR_BINS)))
+    first = next(at for at in range(best, best + NEAR_BINS) if counts[at % BINS])
+    return origin + first * tick_s / BINS - frame_s
