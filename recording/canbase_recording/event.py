@@ -20,6 +20,7 @@ class EventKind(Enum):
     DRIVE_STATE = "drive state"
     CONTROL = "controlword"
     SDO_ABORT = "SDO abort"
+    TRIP = "watchdog tripped"
     WATCHDOG = "watchdog"
     ERROR_FRAME = "error frame"
     COMMAND = "cmd_vel"

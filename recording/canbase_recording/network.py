@@ -264,9 +264,10 @@ class Network:
         if state.state == TRIPPED:
             news = before is not None and before.state != TRIPPED
             rung = f": {RUNGS[state.rung]}" if 0 < state.rung < len(RUNGS) else ""
-            text = f"tripped: {state.cause_text}{about}" if news or before is None else f"its ladder{rung}"
-            text += " (since before the recording)" if before is None else ""
-            return [Event(at_s, EventKind.WATCHDOG, Level.ALARM if news else Level.INFO, who, text, state.node_id)]
+            if not news and before is not None:
+                return [Event(at_s, EventKind.WATCHDOG, Level.INFO, who, f"its ladder{rung}", state.node_id)]
+            text = f"tripped: {state.cause_text}{about}{'' if news else ' (since before the recording)'}"
+            return [Event(at_s, EventKind.TRIP, Level.ALARM if news else Level.INFO, who, text, state.node_id)]
         text = "watching" if state.state == WATCHING else "starting"
         return [Event(at_s, EventKind.WATCHDOG, Level.INFO, who, text)]
 

@@ -83,6 +83,7 @@ RULES: Final = (
 )
 
 CATCHERS: Final = {
+    EventKind.TRIP: "watchdog",
     EventKind.WATCHDOG: "watchdog",
     EventKind.DRIVER: "motor_driver",
     EventKind.FILTER: "safety_filter",
@@ -140,10 +141,10 @@ def _catcher(scene: Scene, chain: tuple[Event, ...]) -> tuple[str, str]:
     first = next((event for event in chain if event.level is Level.ALARM and event.kind in CATCHERS), None)
     if first is None:
         return "", ""
-    said = [event.text for event in chain if event.kind is first.kind and event.at_s <= first.at_s + SAYS_S]
     is_driver = first.kind is EventKind.CONTROL and scene.is_canbase
     who = CATCHERS[EventKind.DRIVER if is_driver else first.kind]
-    return who, next((text for text in said if text.startswith("tripped")), first.text)
+    trips = (event.text for event in chain if event.kind is EventKind.TRIP and event.at_s <= first.at_s + SAYS_S)
+    return who, next(trips, first.text) if who == CATCHERS[EventKind.TRIP] else first.text
 
 
 SAYS_S: Final = 0.1
