@@ -14,6 +14,7 @@ import typer
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config
 
 if TYPE_CHECKING:
+    from canbase_config.robot import Robot
     from canbase_recording.explain_file import Progress
     from canbase_recording.explanation import Explanation
     from canbase_recording.recording_facts import RecordingFacts
@@ -34,7 +35,13 @@ ChannelOfFile = Annotated[
 ]
 RecordingConfig = Annotated[
     Path | None,
-    typer.Option("--config", "-c", metavar="FILE", help="The robot.yaml: joints, units, PDOs.", show_default="none"),
+    typer.Option(
+        "--config",
+        "-c",
+        metavar="FILE",
+        help="The robot.yaml: joints, units, PDOs.",
+        show_default="that of the .json beside a black box, else none",
+    ),
 ]
 
 
@@ -57,7 +64,7 @@ def explain(
     """Tell what stopped the robot: the first cause of each stop, who caught it, and what every part did then.
 
     It also explains recordings of other CiA 402 networks: states, missing heartbeats, emergencies, SDO aborts. Without
-    --config, speeds are the raw numbers of the drives. What the recording does not show is reported as such.
+    a robot.yaml, speeds are the raw numbers of the drives. What the recording does not show is reported as such.
 
     Exit codes: 0 explained (also if there was no stop), 1 nothing in the file can be read, 2 wrong command line or
     robot.yaml.
@@ -66,14 +73,14 @@ def explain(
     from canbase_recording.explain_file import explain_file
     from canbase_recording.recording_file import NoRecordingError
 
-    robot = None if config is None else load_config(config, quiet=True).robot
+    robot, source = recorded_robot(recording, config)
     make_page = _page_maker() if html is not None else None
     if not recording.is_file():
         fail(f"{recording}: there is no such file", WRONG_INPUT)
     try:
         with _progress(recording) as progress:
             facts, told = explain_file(
-                recording, robot, config=config.name if config else "", channel=channel, eds_files=eds or (),
+                recording, robot, config=source, channel=channel, eds_files=eds or (),
                 bitrate=bitrate, progress=progress,
             )  # fmt: skip
     except NoRecordingError as error:
@@ -87,6 +94,21 @@ def explain(
         except OSError as error:
             fail(f"{html} cannot be written: {error.strerror}", WRONG_INPUT)
         typer.echo(f"canbase: {html} written", err=True)
+
+
+def recorded_robot(recording: Path, config: Path | None) -> tuple[Robot | None, str]:
+    """The robot of --config, else the one that canbase has recorded beside an .asc file; and the name of its file."""
+    from canbase_recording.recorded_inputs import NoInputsError
+    from canbase_recording.replay_file import robot_beside
+
+    if config is not None:
+        return load_config(config, quiet=True).robot, config.name
+    try:
+        robot = robot_beside(recording)
+    except NoInputsError as error:
+        typer.echo(f"canbase: {error}. It is not used; --config names a robot.yaml", err=True)
+        robot = None
+    return robot, recording.with_suffix(".json").name if robot else ""
 
 
 def _print(facts: RecordingFacts, told: Explanation, *, as_json: bool) -> None:

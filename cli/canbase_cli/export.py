@@ -7,9 +7,9 @@ from typing import Annotated, Final
 
 import typer
 
-from canbase_cli.explain import ChannelOfFile, RecordingConfig
+from canbase_cli.explain import ChannelOfFile, RecordingConfig, recorded_robot
 from canbase_cli.options import ros_needed
-from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config, warn
+from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, warn
 
 EPILOG: Final = "For example: canbase export stop.asc --config robot.yaml --mcap stop.mcap"
 
@@ -25,13 +25,13 @@ def export(
     """Write a recording as an MCAP file of ROS messages, which Foxglove and PlotJuggler open.
 
     It has joint_states (measured) and joint_states_ordered, cmd_vel, the log, and each frame (can_msgs/Frame).
-    Without --config the joints are called after their nodes, in topics that end in _raw. It needs ROS 2, as canbase
+    Without a robot.yaml the joints are called after their nodes, in topics that end in _raw. It needs ROS 2, as canbase
     does, and Foxglove's library. `canbase explain` reads the file again.
 
     Exit codes: 0 written, 1 nothing in the file can be read or the MCAP file is not complete, 2 wrong command line or
     robot.yaml.
     """
-    robot = None if config is None else load_config(config, quiet=True).robot
+    robot, _ = recorded_robot(recording, config)
     with ros_needed():
         try:
             from canbase_recording.mcap_export import export as write

@@ -1,4 +1,4 @@
-"""The files of a recorded stop, read for `canbase replay`. A shell: files alone."""
+"""Both files of a recorded stop: the inputs for `canbase replay`, and the robot. A shell: files alone."""
 
 from __future__ import annotations
 
@@ -48,9 +48,31 @@ def _entry(message: can.Message) -> RecordedFrame:
 
 def robot_of(inputs: RecordedInputs) -> Robot:
     """The robot as it was configured, with the user's own profiles out of the recording. Raises NoInputsError."""
-    values: Any = json.loads(json.dumps(inputs.robot_yaml))
+    return _robot(inputs.robot_yaml, inputs.profiles)
+
+
+def robot_beside(path: Path) -> Robot | None:
+    """The robot in the .json file beside the .asc file of a stop; None: there is none. Raises NoInputsError for a file
+    that has no robot."""
+    beside = path.with_suffix(".json")
+    if path.suffix != ".asc" or not beside.is_file():
+        return None
+    told = _told(beside)
+    try:
+        robot_yaml = dict(told["robot_yaml"])
+        profiles = {str(name): str(text) for name, text in told["profiles"].items()}
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise NoInputsError(f"{beside}: it has no robot.yaml as canbase writes it") from error
+    try:
+        return _robot(robot_yaml, profiles)
+    except NoInputsError as error:
+        raise NoInputsError(f"{beside}: {error}") from error
+
+
+def _robot(robot_yaml: Mapping[str, Any], profiles: Mapping[str, str]) -> Robot:
+    values: Any = json.loads(json.dumps(robot_yaml))
     with tempfile.TemporaryDirectory(prefix="canbase-") as folder:
-        for number, (name, text) in enumerate(inputs.profiles.items()):
+        for number, (name, text) in enumerate(profiles.items()):
             own = Path(folder) / f"{number}.yaml"
             own.write_text(text, encoding="utf-8")
             for drive in values.get("drives", ()):
@@ -58,7 +80,9 @@ def robot_of(inputs: RecordedInputs) -> Robot:
         try:
             return Robot.model_validate(values)
         except ValidationError as error:
-            raise NoInputsError(f"this canbase refuses the recorded robot.yaml: {error}") from error
+            first = error.errors(include_url=False)[0]
+            key = ".".join(str(part) for part in first["loc"])
+            raise NoInputsError(f"this canbase refuses the recorded robot.yaml: {key}: {first['msg']}") from error
 
 
 def _told(path: Path) -> Mapping[str, Any]:

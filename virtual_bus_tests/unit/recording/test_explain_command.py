@@ -14,7 +14,8 @@ from mcap_ros2.decoder import DecoderFactory
 from typer.testing import CliRunner
 
 from canbase_cli.main import app
-from canbase_config.load import sample
+from canbase_config.load import load_robot, sample
+from canbase_driver.runtime.black_box_about import about
 from canbase_recording.entry import Note
 from canbase_recording.explain_page import page
 from canbase_recording.explanation import explain
@@ -56,6 +57,20 @@ def test_recordings_of_real_processes(file: Path, cause: str, text: str) -> None
     assert code == 0
     (stop,) = json.loads(out)["stops"]
     assert stop["cause"] == cause
+
+
+def test_the_robot_that_was_recorded_beside_a_black_box_is_taken_and_another_file_there_is_not(tmp_path: Path) -> None:
+    recording = Path(shutil.copy(CABLE, tmp_path / "stop.asc"))
+    beside = recording.with_suffix(".json")
+    for content in ("", "[]", '{"robot_yaml": {}, "profiles": []}', '{"robot_yaml": {"name": 1}, "profiles": {}}'):
+        beside.write_text(content)
+        code, out, err = run("explain", str(recording))
+        assert (code, "without robot.yaml" in out, "stop.json" in err) == (0, True, True), content
+    beside.write_text(json.dumps(about(load_robot(sample("bench")).robot)))
+    code, out, err = run("explain", str(recording))
+    assert (code, err) == (0, "")
+    assert "read with stop.json" in out
+    assert "right_wheel after 0.25 s and 0.056 m" in out
 
 
 def test_what_canbase_explain_cannot_take(tmp_path: Path) -> None:
