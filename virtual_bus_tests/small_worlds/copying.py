@@ -49,13 +49,13 @@ class Snapshot:
 class _Boot:
     """The steps of one boot, as canbase_driver.boot.sequence has them, with every answer."""
 
-    def __init__(self, *of: Any) -> None:
-        self._begin(*of)
+    def __init__(self, *of: Any, **named: Any) -> None:
+        self._begin(of, named)
 
-    def _begin(self, *of: Any) -> None:
-        self._of = of
+    def _begin(self, of: tuple[Any, ...], named: dict[str, Any]) -> None:
+        self._of, self._named = of, named
         self._answers: list[Any] = []
-        self._steps = boot(*of)
+        self._steps = boot(*of, **named)
 
     def send(self, answer: bytes | bool | None) -> Step:
         self._answers.append(answer)
@@ -65,12 +65,13 @@ class _Boot:
         self._answers.append(error)
         return self._steps.throw(error)
 
-    def __getstate__(self) -> tuple[Any, list[Any]]:
-        return self._of, self._answers
+    def __getstate__(self) -> tuple[Any, Any, list[Any]]:
+        return self._of, self._named, self._answers
 
-    def __setstate__(self, state: tuple[Any, list[Any]]) -> None:
-        self._begin(*state[0])
-        for answer in state[1]:
+    def __setstate__(self, state: tuple[Any, Any, list[Any]]) -> None:
+        of, named, answers = state
+        self._begin(of, named)
+        for answer in answers:
             with suppress(StopIteration, BootError):
                 self.throw(answer) if isinstance(answer, Exception) else self.send(answer)
 

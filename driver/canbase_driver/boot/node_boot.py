@@ -46,7 +46,7 @@ class NodeBoot:
         self._wake_at = 0.0
         self._was_reset = False
         self.transfers = 0
-        """How many SDO transfers it has begun."""
+        """How many SDO transfers it has begun since it was heard: looking for an absent drive counts for nothing."""
         self._begun_at = 0.0
         self.heard = False
         """Whether it has answered any request."""
@@ -144,7 +144,7 @@ class NodeBoot:
     def _begin(self, step: Step, now_s: float) -> None:
         self._step = step
         if isinstance(step, Read | Write):
-            self.transfers += 1
+            self.transfers += self.heard
             self._begun_at = now_s
         if isinstance(step, Read | Write) and self._gap_s > 0.0:
             self._held, self._wake_at = step, now_s + self._gap_s
