@@ -359,9 +359,17 @@ def test_a_request_that_waits_for_the_bus_is_no_drive_that_does_not_answer() -> 
     boot, drive = NodeBoot(1, robot().drives[:1], robot()), FakeDrive()
     for frame in [answer for sent in boot.tick(0.0) for answer in drive.on_frame(sent)]:
         boot.on_frame(frame, 0.001)
-    assert (boot.transfers, boot.is_transferring(0.001), boot.is_transferring(0.5)) == (2, True, True)
+    assert (boot.transfers, boot.is_transferring(0.001), boot.is_transferring(0.5)) == (1, True, True)
     assert boot.tick(0.5) != []
     assert not boot.is_transferring(0.6)
+
+
+def test_looking_for_a_drive_that_is_not_there_counts_for_nothing_in_the_shares_of_the_bus() -> None:
+    """After a minute it would be far ahead of a drive that begins its boot then, and would get no share meanwhile."""
+    boot = NodeBoot(1, robot().drives[:1], robot())
+    requests = [frame for cycle in range(6000) for frame in boot.tick(cycle * 0.01)]
+    assert len(requests) > 100
+    assert boot.transfers == 0
 
 
 def test_a_drive_that_waits_for_its_boot_up_message_makes_no_transfers() -> None:
