@@ -37,15 +37,19 @@ class Wishes:
         self._last[topic] = braking_s(self._robot, twist.linear_mps, twist.angular_radps), now_s
 
     def on_reset(self, now_s: float) -> None:
-        """A reset is done: a source that orders motion now was held over it."""
-        self._held = {topic for topic in self._last if self._orders_s(topic, now_s) > 0.0}
+        """A reset is done: a source that orders motion now was held over it. Its last command tells: of two hands one
+        has shown zero since the motion of the other."""
+        self._held = {topic for topic in self._last if self._last_s(topic, now_s) > 0.0}
 
     def greatest_s(self, now_s: float) -> float:
         """τ of the greatest command that holds [s]."""
         return max(0.0 if topic in self._held else self._orders_s(topic, now_s) for topic in self._last)
 
     def _orders_s(self, topic: str, now_s: float) -> float:
-        tau_s, at = self._last[topic]
         before_s, before_at = self._before[topic]
         recent_s = before_s if now_s <= before_at + RECENT_S else 0.0
-        return max(tau_s if now_s <= at + self._timeouts[topic] else 0.0, recent_s)
+        return max(self._last_s(topic, now_s), recent_s)
+
+    def _last_s(self, topic: str, now_s: float) -> float:
+        tau_s, at = self._last[topic]
+        return tau_s if now_s <= at + self._timeouts[topic] else 0.0
