@@ -111,9 +111,11 @@ def measure(robot: RunningRobot, site: Site, bare: int, seconds: float, rounds: 
         began_s = time.monotonic()
         for name, share in shares(pids, seconds, robot.node.spin_for).items():
             found[kind][name].append(share)
-        heard = robot.status.since(began_s)
-        found[kind]["overruns"].append((heard[-1].overruns - heard[0].overruns) / seconds)
-        found[kind]["lateness"] += [each.cycle_lateness_max_s for each in heard[:: max(1, int(len(heard) / seconds))]]
+        reports = robot.status.since(began_s)
+        found[kind]["overruns"].append((reports[-1].overruns - reports[0].overruns) / seconds)
+        found[kind]["lateness"] += [
+            each.cycle_lateness_max_s for each in reports[:: max(1, int(len(reports) / seconds))]
+        ]
         if page is not None:
             page.context.close()
     return found

@@ -61,7 +61,7 @@ def explain(
         typer.Option("--bitrate", metavar="BIT/S", min=10_000, help="Of the bus, for its load.", show_default="500000"),
     ] = None,
 ) -> None:
-    """Tell what stopped the robot: the first cause of each stop, who caught it, and what every part did then.
+    """Explain what stopped the robot: the first cause of each stop, which part reacted, and what each part did then.
 
     It also explains recordings of other CiA 402 networks: states, missing heartbeats, emergencies, SDO aborts. Without
     a robot.yaml, speeds are the raw numbers of the drives. What the recording does not show is reported as such.
@@ -79,7 +79,7 @@ def explain(
         fail(f"{recording}: there is no such file", WRONG_INPUT)
     try:
         with _progress(recording) as progress:
-            facts, told = explain_file(
+            facts, explanation = explain_file(
                 recording, robot, config=source, channel=channel, eds_files=eds or (),
                 bitrate=bitrate, progress=progress,
             )  # fmt: skip
@@ -87,10 +87,10 @@ def explain(
         fail(str(error), FAILED)
     except EdsError as error:
         fail(f"--eds: {error}", WRONG_INPUT)
-    _print(facts, told, as_json=as_json)
+    _print(facts, explanation, as_json=as_json)
     if html is not None and make_page is not None:
         try:
-            html.write_text(make_page(facts, told), encoding="utf-8")
+            html.write_text(make_page(facts, explanation), encoding="utf-8")
         except OSError as error:
             fail(f"{html} cannot be written: {error.strerror}", WRONG_INPUT)
         typer.echo(f"canbase: {html} written", err=True)
@@ -111,15 +111,15 @@ def recorded_robot(recording: Path, config: Path | None) -> tuple[Robot | None, 
     return robot, recording.with_suffix(".json").name if robot else ""
 
 
-def _print(facts: RecordingFacts, told: Explanation, *, as_json: bool) -> None:
+def _print(facts: RecordingFacts, explanation: Explanation, *, as_json: bool) -> None:
     if as_json:
         from canbase_recording.explain_json import as_json as to_json
 
-        typer.echo(json.dumps(to_json(facts, told), ensure_ascii=False))
+        typer.echo(json.dumps(to_json(facts, explanation), ensure_ascii=False))
         return
     from canbase_recording.explain_text import text_lines
 
-    for line in text_lines(facts, told):
+    for line in text_lines(facts, explanation):
         typer.echo(line)
 
 

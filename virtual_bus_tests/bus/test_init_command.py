@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -70,19 +70,25 @@ def test_a_person_is_asked_again_after_a_typing_mistake_and_ctrl_c_writes_nothin
     assert list(tmp_path.glob("new.yaml*")) == []
 
 
-def test_another_program_asks_in_place_of_the_terminal(bench: Path, tmp_path: Path) -> None:
-    output = tmp_path / "new.yaml"
-    page = Page("init", "--config", str(bench), "--output", str(output), "--json")
+def answer_until_the_end(page: Page, first: Callable[[], object] = lambda: None) -> None:
+    """Takes the proposed answers, and 20 where there is none; `first` is called before each answer."""
     answered: set[str] = set()
 
     def answer() -> bool:
         for question in page.questions:
             if question["ask"] not in answered:
+                first()
                 answered.add(question["ask"])
                 page.say(answer="20" if question["default"] is None else "", key=question["ask"])
         return page.process.poll() is not None
 
     page.live_until(answer)
+
+
+def test_another_program_asks_in_place_of_the_terminal(bench: Path, tmp_path: Path) -> None:
+    output = tmp_path / "new.yaml"
+    page = Page("init", "--config", str(bench), "--output", str(output), "--json")
+    answer_until_the_end(page)
     assert page.ends() == ""
     assert page.process.returncode == 0
     assert load_robot(output).robot.drives[1].gear_ratio == 20.0
@@ -108,17 +114,7 @@ def test_a_draft_that_a_person_has_corrected_is_kept_too(tmp_path: Path) -> None
 def test_a_file_that_came_while_the_person_answered_is_kept(bench: Path, tmp_path: Path) -> None:
     output = tmp_path / "new.yaml"
     page = Page("init", "--config", str(bench), "--output", str(output), "--json")
-    answered: set[str] = set()
-
-    def answer() -> bool:
-        for question in page.questions:
-            if question["ask"] not in answered:
-                output.write_text("name: mine\n", encoding="utf-8")
-                answered.add(question["ask"])
-                page.say(answer="20" if question["default"] is None else "", key=question["ask"])
-        return page.process.poll() is not None
-
-    page.live_until(answer)
+    answer_until_the_end(page, lambda: output.write_text("name: mine\n", encoding="utf-8"))
     assert "File exists" in page.ends()
     assert page.process.returncode == 1
     assert output.read_text(encoding="utf-8") == "name: mine\n"
