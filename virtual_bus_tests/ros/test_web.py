@@ -175,10 +175,12 @@ def test_the_page_now_tells_who_drives_and_goes_red_when_the_emergency_stop_is_p
     page = site.open("/stops")
     row = page.get_by_role("row").filter(has_text="motor_driver").first
     row.click()
-    page.wait_for_function("document.body.innerText.includes('.asc')")
-    site.robot.node.wait_for(lambda: "reading" not in page.inner_text("body"), 20.0, "the recording")
+    story = page.locator("a[href^='/explained/']")
+    story.wait_for()  # its row was selected, and the page answered
+    read = page.get_by_role("status").filter(has_text="stop_requested.asc").filter(has_not_text="reading")
+    site.robot.node.wait_for(lambda: read.count() == 1, 20.0, "the recording")
     picture(page, "web_stops_recording")
-    address = page.get_by_text("What stopped it").get_attribute("href")
+    address = story.get_attribute("href")
     told = page.request.get(f"{page.url.removesuffix('/stops')}{address}")
     assert (told.status, "stop requested" in told.text()) == (200, True)
     assert page.request.get(f"{page.url.removesuffix('/stops')}/explained/robot.yaml").status == 404
