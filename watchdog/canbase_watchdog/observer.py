@@ -119,6 +119,7 @@ class Observer:
         self._heartbeat_at = {node_id: NEVER for node_id, _ in self._records}
         self._heard_at, self._boot_up_at = dict(self._heartbeat_at), dict(self._heartbeat_at)
         self._configured_at = dict(self._heartbeat_at)
+        self._operational = dict.fromkeys(self._heartbeat_at, False)
         self._foreign = Foreign(config)
         self._driver_at = self._sync_at = self._sync_since = NEVER
         self._routes: dict[int, Callable[[bytes, float], bool]] = {}
@@ -148,17 +149,17 @@ class Observer:
     def _put_together(self) -> BusView:
         return BusView(
             tuple([record.axis() for record in self._in_order]),
-            tuple(
-                [
-                    Node(node_id, at, self._heard_at[node_id], self._boot_up_at[node_id], self._configured_at[node_id])
-                    for node_id, at in self._heartbeat_at.items()
-                ]
-            ),
+            tuple([self._node(node_id) for node_id in self._heartbeat_at]),
             self._driver_at,
             self._sync_at,
             self._sync_since,
             self._foreign.last,
         )
+
+    def _node(self, node_id: int) -> Node:
+        heartbeat_at, heard_at = self._heartbeat_at[node_id], self._heard_at[node_id]
+        boot_up_at, configured_at = self._boot_up_at[node_id], self._configured_at[node_id]
+        return Node(node_id, heartbeat_at, heard_at, boot_up_at, configured_at, self._operational[node_id])
 
     def trust(self) -> None:
         """A reset was accepted: the evidence against the sensors is dropped."""
@@ -223,6 +224,7 @@ class Observer:
         if len(data) != 1:
             return False
         self._heartbeat_at[node_id] = self._heard_at[node_id] = now_s
+        self._operational[node_id] = data[0] == frames.OPERATIONAL
         if data == frames.BOOT_UP and self._is_enabled(node_id, now_s):
             self._boot_up_at[node_id] = now_s
         return True

@@ -194,7 +194,8 @@ class Stopper:
             return []
         rests = self.climb.stopped and not defied
         seeks = rests and self._is_unknown(view, now_s)
-        stopped_s = SEEK_PERIOD_S if seeks else IDLE_SDO_PERIOD_S
+        seldom = seeks and not view.node(self._node_id).operational
+        stopped_s = SEEK_PERIOD_S if seldom else IDLE_SDO_PERIOD_S
         period_s = stopped_s if self.climb.stopped else SDO_PERIOD_S
         if now_s < self._sdo_at + period_s or (rests and not seeks and not self._is_old(view, now_s)):
             return []
@@ -206,9 +207,17 @@ class Stopper:
         return [requests[(self._sdo_turn - 1) % len(requests)]]
 
     def _is_unknown(self, view: View, now_s: float) -> bool:
-        """Since the start it has sent nothing, and no driver boots it: it may turn as it did before the start."""
-        configured_at = max(self._resting_since, view.node(self._node_id).configured_at)
-        return self._is_untold(self._axes(view)) and now_s >= configured_at + self._config.drive_heartbeat_s
+        """Since the start it has not told its state, and no driver boots it: it may turn as it did before the start.
+
+        One that is NMT operational was started by a driver, and has told nothing for as long as SYNCs would take: it
+        may have power, and nobody needs its SDO channel. Any other one may be booted within a heartbeat's time.
+        """
+        if not self._is_untold(self._axes(view)):
+            return False
+        node, config = view.node(self._node_id), self._config
+        if node.operational and now_s >= node.configured_at + config.drive_heartbeat_s:
+            return now_s >= self._resting_since + config.feedback_timeout_s
+        return now_s >= max(self._resting_since, node.configured_at) + config.drive_heartbeat_s
 
     def _is_old(self, view: View, now_s: float) -> bool:
         """It sent feedback once, and not recently; and no other client needs its SDO channel."""

@@ -90,6 +90,8 @@ class Node:
     """When a boot-up came from it although it had just reported that it was enabled."""
     configured_at: float = NEVER
     """When a client last used its SDO for anything but its motion: a boot or a tool."""
+    operational: bool = False
+    """Its last heartbeat said NMT operational: a driver has configured it, and may have given it power."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from canbase_watchdog import frames
 from canbase_watchdog.latch import Entry, Mark, Past
 from canbase_watchdog.trip_cause import FINE, TripCause, before_the_start
 from canbase_watchdog.watchdog import Answer, State, Watchdog
-from support.watchdog_story import FakeDrive, Story
+from support.watchdog_story import ENABLED, FakeDrive, Story
 from support.watchdog_story_looks import driving, until_tripped
 
 STATE = 0x1FE
@@ -81,6 +81,47 @@ def test_a_drive_that_has_power_is_stopped() -> None:
     story.run(2.0)
     assert story.since(0.0, 0x501) or story.since(0.0, 0x601)
     assert drive.speed[0] == 0
+
+
+# 0 s start, tripped, no driver ── a drive turns, on its own ── 0.1 s nothing told ── read, and stopped
+def test_a_drive_that_is_operational_and_tells_nothing_is_read_before_its_heartbeat_time() -> None:
+    drive = FakeDrive(1)
+    story = abandoned(drive)
+    story.run(0.095)
+    assert not story.since(0.0, 0x601)
+    story.run(0.02)
+    assert story.since(0.0, 0x601)
+    story.run(0.15)
+    assert drive.words[0] != ENABLED, "before 0.3 s"
+    story.run(1.0)
+    assert drive.speed[0] == 0
+
+
+@pytest.mark.parametrize(("nmt", "read_from_s"), [(0x7F, 0.3), (0x04, 0.3), (0x05, 0.1)])
+def test_a_drive_that_may_be_booted_soon_is_read_after_its_heartbeat_time(nmt: int, read_from_s: float) -> None:
+    drive = FakeDrive(1, nmt=nmt)
+    story = abandoned(drive)
+    story.run(1.5)
+    times = [at_s for at_s, _ in story.since(0.0, 0x601)]
+    assert times[0] == pytest.approx(read_from_s, abs=0.006)
+
+
+# 0 s start ── 0.05 s a client reads its identity, and the drive still reports operational ── 0.35 s read
+def test_a_drive_that_is_configured_is_read_after_its_heartbeat_time_although_it_is_operational() -> None:
+    story = abandoned(FakeDrive(1))
+    story.run(0.05)
+    story.watchdog.on_frame(0x601, bytes.fromhex("40 18 10 01 00 00 00 00"), story.t)
+    story.run(1.0)
+    times = [at_s for at_s, _ in story.since(0.0, 0x601)]
+    assert times[0] == pytest.approx(0.35, abs=0.006)
+
+
+def abandoned(drive: FakeDrive) -> Story:
+    """A watchdog that starts with a latched record beside a drive that has power and turns; driver and filter died."""
+    story = resumed(Past(problem="/x: damaged"), drive, FakeDrive(2, mute=True))
+    story.driver = story.heartbeat = story.sync = story.filter = False
+    drive.words[0], drive.target[0], drive.speed[0] = ENABLED, 300, 300.0
+    return story
 
 
 def test_no_reset_before_the_drives_were_seen_to_stand() -> None:
