@@ -59,7 +59,7 @@ endif
 HOT_SOURCES := $(wildcard can_config/canbase_config/*.py runtime/canbase_runtime/*.py driver/canbase_driver/*.py \
   driver/canbase_driver/*/*.py velocity_mux/canbase_velocity/*.py \
   watchdog/canbase_watchdog/*.py action_server/canbase_action_server/*.py virtual_bus_tests/canbase_sim/*.py \
-  virtual_bus_tests/canbase_sim/*/*.py virtual_bus_tests/campaign/*.py virtual_bus_tests/compiled/*.py)
+  virtual_bus_tests/canbase_sim/*/*.py virtual_bus_tests/canbase_campaign/*.py virtual_bus_tests/compiled/*.py)
 
 build/compiled/ready: $(VENV)/ready $(HOT_SOURCES)
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m compiled

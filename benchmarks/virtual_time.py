@@ -12,13 +12,13 @@ import time
 from collections.abc import Callable
 from random import Random
 
-from campaign.can_bus import CanBus
-from campaign.clock import FINE, Clock
-from campaign.driver_process import DriverProcess
-from campaign.drives import Drives
-from campaign.process import Topics
-from campaign.robots import DrawnRobot
-from campaign.watchdog_process import WatchdogProcess
+from canbase_campaign.can_bus import CanBus
+from canbase_campaign.clock import FINE, Clock
+from canbase_campaign.driver_process import DriverProcess
+from canbase_campaign.drives import Drives
+from canbase_campaign.process import Topics
+from canbase_campaign.robots import DrawnRobot
+from canbase_campaign.watchdog_process import WatchdogProcess
 from canbase_config.derive import watchdog_config
 from canbase_driver import core
 from canbase_runtime.driver_state import DriverState

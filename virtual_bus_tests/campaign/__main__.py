@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import signal
+from functools import partial
 from typing import Annotated
 
 import typer
@@ -11,14 +12,14 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 from rich.table import Table
 
-from campaign.faults import FAULTS
-from campaign.judge import Violation
-from campaign.plan import draw_plan
-from campaign.properties import PROPERTIES
-from campaign.removed_safeguards import SAFEGUARDS, remove
-from campaign.replay import replay
-from campaign.runner import Tally, run
-from campaign.scenario import Result
+from campaign.removed_safeguards import SAFEGUARDS, refuse_compiled, remove
+from canbase_campaign.faults import FAULTS
+from canbase_campaign.judge import Violation
+from canbase_campaign.plan import draw_plan
+from canbase_campaign.properties import PROPERTIES
+from canbase_campaign.replay import replay
+from canbase_campaign.runner import Tally, run
+from canbase_campaign.scenario import Result
 
 SHOWN = 50
 """Violations that are printed one by one, as they are found."""
@@ -51,6 +52,7 @@ def main(
         result = replay(draw_plan(seed, only), frames, print)
         raise typer.Exit(1 if result.violations else 0)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    refuse_compiled(taken_out)
     tally = _run(range(first, first + scenarios), workers, only, taken_out)
     _tell_faults(tally)
     _tell_sums(tally)
@@ -73,7 +75,7 @@ def _run(seeds: range, workers: int, only: list[str], without: str) -> Tally:
                 _tell(result.seed, violation, only)
             progress.update(task, advance=1, found=f"{found} violations")
 
-        return run(seeds, workers, only, without, on_result)
+        return run(seeds, workers, only, partial(remove, without), on_result)
 
 
 def _tell(seed: int, violation: Violation, only: list[str]) -> None:

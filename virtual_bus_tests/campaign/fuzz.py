@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from random import Random
 
-from campaign.world import World
+from canbase_campaign.world import World
 from canbase_driver.cia301.frame import Frame
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.twist import Twist

@@ -9,9 +9,9 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
-from campaign.disk import StopDisk, WatchdogDisk
 from canbase_action_server import causes
 from canbase_action_server.outcome import ErrorCode
+from canbase_campaign.disk import StopDisk, WatchdogDisk
 from canbase_driver.causes import Cause
 from canbase_driver.drives.let_go import LetGo
 from canbase_driver.motion import velocity_command as command

@@ -21,9 +21,9 @@ from random import Random
 from rich.console import Console
 from rich.table import Table
 
-from campaign.plan import Plan, draw_plan
-from campaign.runner import start_of
-from campaign.world import World
+from canbase_campaign.plan import Plan, draw_plan
+from canbase_campaign.runner import start_of
+from canbase_campaign.world import World
 from canbase_recording.replay import Replayed, replay_watchdog
 from canbase_recording.replay_file import read_inputs
 from canbase_recording.replay_text import trip_text, verdict

@@ -20,7 +20,7 @@ from functools import partial
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from campaign.ordinary import FalseTrip, OrdinaryHour
+from canbase_campaign.ordinary import FalseTrip, OrdinaryHour
 
 RUN_S = 120.0
 """One seed: one robot, one load, one floor."""

@@ -19,11 +19,12 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress
 from rich.table import Table
 
-from campaign.plan import draw_plan
-from campaign.robots import SCENARIOS as SEEDS_A_ROBOT
-from campaign.robots import draw_robot
+from campaign.removed_safeguards import remove
 from campaign.safeguard_needs import NEEDS, Need
-from campaign.scenario import Result, Start
+from canbase_campaign.plan import draw_plan
+from canbase_campaign.robots import SCENARIOS as SEEDS_A_ROBOT
+from canbase_campaign.robots import draw_robot
+from canbase_campaign.scenario import Result, Start
 
 MOST = 200
 """This many scenarios are tried for each row."""
@@ -62,9 +63,9 @@ def missed(need: Need, seed: int) -> str:
     start, plan = _start(seed // SEEDS_A_ROBOT), draw_plan(seed, need.faults)
     if need.quiet:
         plan = replace(plan, segments=(), goals=())
-    found = _properties(start.fork(plan, need.taken_out))
+    found = _properties(start.fork(plan, partial(remove, need.taken_out)))
     if found:
-        found -= _properties(start.fork(plan, "" if need.proof else need.beside))
+        found -= _properties(start.fork(plan, partial(remove, "" if need.proof else need.beside)))
     return min(found) if found else ""
 
 

@@ -9,13 +9,13 @@ from typer.testing import CliRunner
 
 from campaign import teeth
 from campaign.__main__ import app
-from campaign.faults import FAULTS
-from campaign.plan import MOST_FAULTS, draw_plan
 from campaign.removed_safeguards import SAFEGUARDS
-from campaign.runner import run
 from campaign.safeguard_needs import NEEDS, Need
-from campaign.scenario import Result, Start
 from campaign.teeth import look_at
+from canbase_campaign.faults import FAULTS
+from canbase_campaign.plan import MOST_FAULTS, draw_plan
+from canbase_campaign.runner import run
+from canbase_campaign.scenario import Result, Start
 from hazards.catalogue import load
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(1800)]

@@ -8,9 +8,9 @@ from random import Random
 
 import pytest
 
-from campaign.faults import FAULTS
-from campaign.scenario import Start
-from campaign.world import World
+from canbase_campaign.faults import FAULTS
+from canbase_campaign.scenario import Start
+from canbase_campaign.world import World
 from canbase_sim.cia402.states import State
 from canbase_sim.plant.encoder import EncoderFault
 from canbase_velocity.twist import ZERO, Twist

@@ -7,14 +7,14 @@ from random import Random
 
 import pytest
 
-from campaign import plan
-from campaign.can_bus import CanBus, Receiver
-from campaign.clock import Clock
-from campaign.envelope import Envelope, moving_s, react_s
-from campaign.faults import ADDED, FAULTS
-from campaign.process import Process, Topics
-from campaign.robots import campaign_robot
-from campaign.wishes import Wishes
+from canbase_campaign import plan
+from canbase_campaign.can_bus import CanBus, Receiver
+from canbase_campaign.clock import Clock
+from canbase_campaign.envelope import Envelope, moving_s, react_s
+from canbase_campaign.faults import ADDED, FAULTS
+from canbase_campaign.process import Process, Topics
+from canbase_campaign.robots import campaign_robot
+from canbase_campaign.wishes import Wishes
 from canbase_velocity.twist import ZERO, Twist
 
 pytestmark = pytest.mark.campaign

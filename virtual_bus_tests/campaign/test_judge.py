@@ -13,12 +13,12 @@ from functools import lru_cache, partial
 
 import pytest
 
-from campaign.fault import PlannedFault
-from campaign.plan import GoalRequest, Plan, Segment
-from campaign.removed_safeguards import SAFEGUARDS
-from campaign.robots import draw_robot
-from campaign.scenario import Start
-from campaign.world import World
+from campaign.removed_safeguards import SAFEGUARDS, remove
+from canbase_campaign.fault import PlannedFault
+from canbase_campaign.plan import GoalRequest, Plan, Segment
+from canbase_campaign.robots import draw_robot
+from canbase_campaign.scenario import Start
+from canbase_campaign.world import World
 from canbase_config.units import mps_per_bit
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.snapshot import DriverSnapshot
@@ -206,7 +206,8 @@ def properties(story: Story, monkeypatch: pytest.MonkeyPatch, broken: bool) -> s
     start = start_of(story.robot)
     breaks = story.breaks
     monkeypatch.setitem(SAFEGUARDS, "broken", lambda: breaks(start.world) if breaks else None)
-    result = start.fork(story.plan, "+".join(filter(None, (story.without, "broken"))) if broken else "")
+    taken_out = "+".join(filter(None, (story.without, "broken"))) if broken else ""
+    result = start.fork(story.plan, partial(remove, taken_out))
     return {violation.name for violation in result.violations}
 
 

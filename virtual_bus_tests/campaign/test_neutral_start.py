@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 import pytest
 
-from campaign.outside import Surroundings
-from campaign.world import World
+from canbase_campaign.outside import Surroundings
+from canbase_campaign.world import World
 from canbase_driver.supervision.fault_reset import Outcome
 from canbase_runtime.driver_state import DriverState
 from canbase_velocity.neutral import Arming

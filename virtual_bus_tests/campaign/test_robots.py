@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from campaign.outside import Surroundings
-from campaign.reach import Reach
-from campaign.robots import BITRATES, GRAVITY_MPS2, bitrates, draw_robot, robot_of, rolls_out
-from campaign.shown import Shown
-from campaign.world import World
+from canbase_campaign.outside import Surroundings
+from canbase_campaign.reach import Reach
+from canbase_campaign.robots import BITRATES, GRAVITY_MPS2, bitrates, draw_robot, robot_of, rolls_out
+from canbase_campaign.shown import Shown
+from canbase_campaign.world import World
 from canbase_config.commissioned import uncommissioned
 from canbase_config.robot import Robot
 from canbase_sim.faults import apply

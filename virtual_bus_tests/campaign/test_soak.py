@@ -9,8 +9,8 @@ from collections.abc import Iterator
 import pytest
 
 from campaign import soak
-from campaign.ordinary import OrdinaryHour
 from campaign.soak import Driven, drive_all, told
+from canbase_campaign.ordinary import OrdinaryHour
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(600)]
 

@@ -6,8 +6,9 @@ import math
 
 import pytest
 
-from campaign.stops import Cruise, Run, cells, measured, quantile
-from campaign.twins import JOYSTICK, LIES, STOPS, TWINS, Twin, drive
+from campaign.stops import cells, measured, quantile
+from canbase_campaign.cruise import Cruise, Run
+from canbase_campaign.twins import JOYSTICK, LIES, STOPS, TWINS, Twin, drive
 from exit_matrix.stop_table import VIRTUAL
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(600)]

@@ -15,7 +15,7 @@ def copies() -> Iterator[tuple[Path, bytes]]:
     for package, folder in SOURCES.items():
         for source in (ROOT / folder / package).rglob("*"):
             name = source.relative_to(ROOT / folder)
-            if source.is_file() and "__pycache__" not in name.parts and not source.name.startswith("test_"):
+            if source.is_file() and "__pycache__" not in name.parts:
                 data = source.read_bytes()
                 is_hot = name.suffix == ".py" and ".".join(name.with_suffix("").parts) in hot
                 yield BUILD / name, native_form(data.decode(), plain_values=True).encode() if is_hot else data

@@ -12,11 +12,11 @@ import hashlib
 from dataclasses import replace
 from importlib import import_module
 
-from campaign.ordinary import OrdinaryHour
-from campaign.plan import draw_plan
-from campaign.robots import robot_of
-from campaign.scenario import Start
-from campaign.world import World
+from canbase_campaign.ordinary import OrdinaryHour
+from canbase_campaign.plan import draw_plan
+from canbase_campaign.robots import robot_of
+from canbase_campaign.scenario import Start
+from canbase_campaign.world import World
 from compiled.modules import hot_modules
 
 DRIVE_S = 8.0

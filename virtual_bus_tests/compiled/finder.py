@@ -9,7 +9,7 @@ from pathlib import Path
 from types import ModuleType
 
 HERE = Path(__file__).resolve().parent
-PACKAGES = {path.parent.name for path in HERE.glob("*/__init__.py")} | {"campaign"}
+PACKAGES = {path.parent.name for path in HERE.glob("*/__init__.py")}
 
 
 class CompiledPackages:

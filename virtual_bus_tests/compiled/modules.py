@@ -14,7 +14,7 @@ SOURCES = {
     "canbase_action_server": "action_server",
     "canbase_runtime": "runtime",
     "canbase_sim": "virtual_bus_tests",
-    "campaign": "virtual_bus_tests",
+    "canbase_campaign": "virtual_bus_tests",
 }
 """Packages of which a compiled world has a copy, and where each of them lies."""
 HOT = {
@@ -49,7 +49,7 @@ HOT = {
         "cia301.pdo_rules cia301.rpdo cia301.tpdo cia402.axis cia402.states cia402.raw_units plant.base plant.battery "
         "plant.encoder plant.motor world.bench"
     ),
-    "campaign": (
+    "canbase_campaign": (
         "action_process can_bus clock disk process driver_process watchdog_process velocity_process drives envelope "
         "fault goal_judge hands intruder lidar outside plan wishes reach "
         "scanner shown strangers motion_judge odometry_judge judge"

@@ -14,10 +14,10 @@ from typing import Any, Final
 import can
 from geometry_msgs.msg import TwistStamped
 
+from canbase_campaign.twins import SPEED_MPS
 from canbase_config.robot import Robot
 from canbase_config.units import mps_per_bit
 from exit_matrix.saboteur import sitecustomize as saboteur
-from exit_matrix.stop_limits import SPEED_MPS
 from support.ros_harness import Process, Repeater
 from support.running_robot import READY_S, RunningRobot
 from support.surroundings import World

@@ -8,8 +8,8 @@ from signal import SIGCONT, Signals
 
 from std_msgs.msg import Bool
 
+from canbase_campaign.twins import SPEED_MPS
 from exit_matrix.driven_robot import Scene
-from exit_matrix.stop_limits import SPEED_MPS
 
 Inject = Callable[[Scene], float]
 """Breaks something; the moment from which the stop is measured (time.monotonic)."""

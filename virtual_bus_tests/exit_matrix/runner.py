@@ -21,12 +21,13 @@ from typing import Final
 from std_msgs.msg import Bool
 
 from canbase_action_server.goal_client import DriveError
+from canbase_campaign.twins import SPEED_MPS
 from canbase_sim.control import ControlError
 from exit_matrix.driven_robot import CHANGES, Scene, sabotaged
 from exit_matrix.evidence import Evidence
 from exit_matrix.failures import SERVER, Row
 from exit_matrix.log_evidence import Catch
-from exit_matrix.stop_limits import SPEED_MPS, Layer
+from exit_matrix.stop_limits import Layer
 from support.running_robot import RESTS_M, Standstill, own_domain, robot_on
 from support.surroundings import scan
 

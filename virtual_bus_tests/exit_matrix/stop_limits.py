@@ -15,8 +15,6 @@ from canbase_sim.world.bench import DEFAULT_BODY
 from canbase_watchdog.plausibility import DRIFT_M, DRIFT_S
 from canbase_watchdog.second_master import DISORDER_COUNT
 
-SPEED_MPS = 0.4
-"""The base drives at it when something fails."""
 ALLOWANCE_S = 0.25
 """On top of timeout and braking: signals, processes that wait for a processor, topics, one cycle."""
 

@@ -16,9 +16,9 @@ from random import Random
 from types import BuiltinFunctionType, FunctionType, GeneratorType, MethodType
 from typing import TYPE_CHECKING, Any
 
-from campaign.clock import Clock
-from campaign.process import Process, Topics
-from campaign.world import World
+from canbase_campaign.clock import Clock
+from canbase_campaign.process import Process, Topics
+from canbase_campaign.world import World
 from canbase_sim.cia301.dictionary import Dictionary
 
 if TYPE_CHECKING:

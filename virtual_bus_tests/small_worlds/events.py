@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from campaign.faults import FAULTS
+from canbase_campaign.faults import FAULTS
 from canbase_sim.faults import apply
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from campaign.envelope import Envelope, braking_s, moving_s, notice_s, react_s
-from campaign.wishes import Wishes
+from canbase_campaign.envelope import Envelope, braking_s, moving_s, notice_s, react_s
+from canbase_campaign.wishes import Wishes
 from canbase_config.stopping import max_wheel_mps
 from canbase_runtime.driver_state import DriverState
 from canbase_sim.cia402.states import State

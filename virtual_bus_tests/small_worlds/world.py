@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from campaign.clock import Pace
-from campaign.disk import StopDisk, WatchdogDisk
-from campaign.outside import Surroundings
-from campaign.process import Process
-from campaign.robots import campaign_robot
-from campaign.world import World
+from canbase_campaign.clock import Pace
+from canbase_campaign.disk import StopDisk, WatchdogDisk
+from canbase_campaign.outside import Surroundings
+from canbase_campaign.process import Process
+from canbase_campaign.robots import campaign_robot
+from canbase_campaign.world import World
 from canbase_config.robot import Robot
 from canbase_driver.supervision import state_machine
 from canbase_driver.supervision.fault_reset import Outcome

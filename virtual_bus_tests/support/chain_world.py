@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Literal
 
-from campaign.disk import StopDisk, WatchdogDisk
+from canbase_campaign.disk import StopDisk, WatchdogDisk
 from canbase_config.derive import watchdog_config
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot

@@ -10,7 +10,7 @@ from collections import deque
 
 import numpy as np
 
-from campaign.lidar import Fault, Lidar
+from canbase_campaign.lidar import Fault, Lidar
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_driver.motion.kinematics import Twist2D

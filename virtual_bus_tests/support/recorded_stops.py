@@ -9,8 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from campaign.process import FRAMES_HELD
-from campaign.world import World
+from canbase_campaign.process import FRAMES_HELD
+from canbase_campaign.world import World
 from canbase_config.robot import Robot
 from canbase_driver.runtime.black_box import Ring, asc_lines
 from canbase_driver.runtime.black_box_about import about

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from campaign.stops import Cruise
-from campaign.twins import TWINS, Twin
-from campaign.world import World
+from canbase_campaign.cruise import Cruise
+from canbase_campaign.twins import TWINS, Twin
+from canbase_campaign.world import World
 from canbase_driver.runtime import black_box_notes as notes
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_recording.entry import Entry, Note, RecordedFrame

@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 import itertools
 
-from campaign.can_bus import frame_bits
+from canbase_campaign.can_bus import frame_bits
 from canbase_config.derive import watchdog_config
 from canbase_config.robot import Robot
 from canbase_driver.cia301.frame import Frame

@@ -6,7 +6,7 @@ import struct
 
 import pytest
 
-from campaign.robots import campaign_robot
+from canbase_campaign.robots import campaign_robot
 from canbase_recording import page_data
 from canbase_recording.entry import RecordedFrame
 from canbase_recording.explanation import explain

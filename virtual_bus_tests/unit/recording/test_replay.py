@@ -11,9 +11,9 @@ from random import Random
 import pytest
 from typer.testing import CliRunner
 
-from campaign.faults import FAULTS
-from campaign.stops import Cruise
-from campaign.twins import JOYSTICK
+from canbase_campaign.cruise import Cruise
+from canbase_campaign.faults import FAULTS
+from canbase_campaign.twins import JOYSTICK
 from canbase_cli.main import app
 from canbase_config.robot import Robot
 from canbase_recording.recorded_inputs import NoInputsError, RecordedInputs

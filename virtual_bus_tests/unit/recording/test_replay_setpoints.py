@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from campaign.stops import Cruise
-from campaign.twins import JOYSTICK
+from canbase_campaign.cruise import Cruise
+from canbase_campaign.twins import JOYSTICK
 from canbase_config.robot import Robot
 from canbase_recording.recorded_inputs import Happening, RecordedInputs
 from canbase_recording.replay_file import read_inputs, robot_of

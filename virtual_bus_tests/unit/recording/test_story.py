@@ -8,11 +8,11 @@ from random import Random
 
 import pytest
 
-from campaign.outside import Surroundings
-from campaign.robots import campaign_robot
-from campaign.stops import Cruise
-from campaign.twins import JOYSTICK, Begin, Twin, fault
-from campaign.world import World
+from canbase_campaign.cruise import Cruise
+from canbase_campaign.outside import Surroundings
+from canbase_campaign.robots import campaign_robot
+from canbase_campaign.twins import JOYSTICK, Begin, Twin, fault
+from canbase_campaign.world import World
 from canbase_recording.cause import ADVICE, Cause
 from canbase_recording.entry import Entry, FrameKind, Note, RecordedFrame
 from canbase_recording.explanation import Explanation, explain

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.twins import TWINS
+from canbase_campaign.twins import TWINS
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from exit_matrix import stop_limits

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from campaign.disk import FULL, StopDisk
+from canbase_campaign.disk import FULL, StopDisk
 from canbase_runtime.latch_record import Defect, Found, Mark
 from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.decision import Action, Decision

@@ -12,7 +12,7 @@ import math
 import numpy as np
 import pytest
 
-from campaign.lidar import ByTurns, Fault, Frozen, Late, Lidar, TwoOnOneTopic, blind, far_from, one_beam_left
+from canbase_campaign.lidar import ByTurns, Fault, Frozen, Late, Lidar, TwoOnOneTopic, blind, far_from, one_beam_left
 from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.clearance import ScanReader
 from canbase_velocity.frozen import FrozenWatch

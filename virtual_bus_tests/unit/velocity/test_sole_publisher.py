@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from campaign.lidar import Lidar
+from canbase_campaign.lidar import Lidar
 from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.decision import Action
 from canbase_velocity.filter_state import SafetyFilter

@@ -1,0 +1,40 @@
+"""What can go wrong: each fault by its name.
+
+Faults are plain switches of the processes, the bus and the drives. Several may hold at once; each end undoes its own.
+"""
+
+from __future__ import annotations
+
+from canbase_campaign.bus_faults import BUS_FAULTS
+from canbase_campaign.drive_faults import DRIVE_FAULTS
+from canbase_campaign.fault import Kind
+from canbase_campaign.operator_faults import PEOPLE
+from canbase_campaign.process_faults import PROCESS_FAULTS
+from canbase_campaign.sensor_faults import SENSOR_FAULTS
+from canbase_campaign.topic_faults import TOPIC_FAULTS
+
+FAULTS: dict[str, Kind] = {
+    **PROCESS_FAULTS,
+    **BUS_FAULTS,
+    **DRIVE_FAULTS,
+    **SENSOR_FAULTS,
+    **TOPIC_FAULTS,
+    **PEOPLE,
+}
+"""Every fault that a scenario may draw."""
+ADDED = (
+    "cmd_vel_ends",
+    "drive_unbraked",
+    "driver_asked_to_end",
+    "driver_deactivated",
+    "driver_dies_torn",
+    "driver_never_lets_go",
+    "scanner_late",
+    "setpoints_not_sent",
+    "stick_tapped",
+    "stop_requested",
+    "two_on_a_lock",
+    "watchdog_dies_torn",
+    "watchdog_starved",
+)
+"""Drawn beside the others, each by itself: a new one here leaves the scenarios without it as they were."""

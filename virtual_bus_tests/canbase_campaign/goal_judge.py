@@ -1,0 +1,67 @@
+"""Every goal ends once, in its time; one that succeeded is where it should be, by the ground truth."""
+
+from __future__ import annotations
+
+import math
+
+from canbase_action_server.along_track import Pose, displacement
+from canbase_action_server.outcome import ErrorCode
+from canbase_campaign.action_process import Goal
+from canbase_campaign.odometry_judge import FLOOR_M, SHARE, true_pose
+from canbase_campaign.shown import Shown
+from canbase_campaign.world import World
+from canbase_config.stopping import max_wheel_mps, standstill_s
+
+STEP_S = 0.01
+TOLERANCES = 3.0
+"""This many times action.tolerance_m: wheels roll a little until they stand."""
+
+
+class GoalJudge:
+    """To be called every step, and at each end."""
+
+    def __init__(self, world: World, shown: Shown) -> None:
+        self._world, self._shown = world, shown
+        self._from: dict[int, Pose] = {}
+        """Where the base truly was when a goal began; a goal during which an encoder lies is not compared."""
+
+    def step(self) -> None:
+        """Now."""
+        for goal in self._world.action.goals[len(self._from) :]:
+            self._from[goal.number] = true_pose(self._world)
+        if not self._shown.tells_truth:
+            self._from = dict.fromkeys(self._from, NOWHERE)
+
+    def ended(self, goal: Goal) -> str:
+        """What is wrong with this end; empty: nothing."""
+        if len(goal.ends) > 1:
+            return f"goal {goal.number} ended {len(goal.ends)} times"
+        took_s = goal.ended_at - goal.began
+        if took_s > self._longest_s(goal) + goal.held_up_s + 1.0:
+            return f"goal {goal.number} took {took_s:.1f} s"
+        return self._beside(goal) if goal.ends[-1].code is ErrorCode.OK else ""
+
+    def left(self) -> str:
+        """The scenario is over: no goal may be left."""
+        left = [goal.number for goal in self._world.action.goals if not goal.ends and not goal.died]
+        return f"goal {left[0]} never ended" if left else ""
+
+    def _longest_s(self, goal: Goal) -> float:
+        robot = self._world.robot
+        ramps_s = goal.speed_mps * (1.0 / robot.limits.acceleration_mps2 + 1.0 / robot.limits.deceleration_mps2) + 0.5
+        ideal_s = abs(goal.distance_m) / goal.speed_mps + ramps_s
+        return robot.action.overall_factor * ideal_s + robot.action.overall_extra_s + standstill_s(robot)
+
+    def _beside(self, goal: Goal) -> str:
+        """By its own report, and by the ground truth."""
+        robot = self._world.robot
+        off_m, slack_m = abs(goal.ends[-1].traveled_m - goal.distance_m), TOLERANCES * robot.action.tolerance_m
+        start = self._from.get(goal.number, NOWHERE)
+        if start is not NOWHERE:
+            true_m = displacement(start, true_pose(self._world)).along_m
+            slips_m = FLOOR_M + SHARE * abs(goal.distance_m) + STEP_S * max_wheel_mps(robot)
+            off_m = max(off_m, abs(true_m - goal.distance_m) - slips_m)
+        return f"goal {goal.number} succeeded {off_m:.3f} m beside its distance" if off_m > slack_m else ""
+
+
+NOWHERE = Pose(math.nan, math.nan, math.nan)

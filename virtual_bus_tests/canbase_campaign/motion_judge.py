@@ -1,0 +1,204 @@
+"""Does each wheel do what was ordered? Runaway, another path than ordered, and a standstill that is none."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from math import sqrt
+
+from canbase_campaign.envelope import notice_s
+from canbase_campaign.shown import Shown
+from canbase_campaign.world import World
+from canbase_config.robot import Robot
+from canbase_config.stopping import longest_ramp_s, max_wheel_mps
+from canbase_sim.cia402.states import State
+from canbase_velocity.twist import Twist
+
+OBEY_S = 0.15
+"""From the trip until the drives have obeyed: a rung of the watchdog's ladder."""
+JITTER_S = 0.05
+"""Cycles that are late, and the samples in a row that the watchdog wants."""
+CARRIED_SHARE = 0.2
+"""So much of its greatest speed a wheel may gain beyond the tolerances before it is noticed."""
+PATH_SHARE = 0.25
+"""... and turn faster by this share of what was ordered."""
+STANDS_S = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Allowed:
+    """What robot.yaml lets a wheel do before somebody has to act."""
+
+    remembered_s: float
+    """An order counts for this long: hold times of the layers, their reaction, and the ramp that follows the order."""
+    runaway_mps: float
+    """So much faster than the fastest that was ordered of it a wheel may be ..."""
+    runaway_s: float
+    """... and for how long, while it has power."""
+    path_radps: float
+    """So far beside what was ordered the base may turn, on top of PATH_SHARE ..."""
+    path_s: float
+    """... and for how long, while it has power."""
+    stands_mps: float
+    """A wheel that is faster for longer than STANDS_S is not at standstill, whatever is reported."""
+
+    @classmethod
+    def of(cls, robot: Robot) -> Allowed:
+        """The watchdog's tolerances and times, each with the lag of a drive and the time until the drives obey."""
+        watchdog, fastest_mps = robot.watchdog, max_wheel_mps(robot)
+        margin_mps = watchdog.motion_tolerance_mps + watchdog.motion_tolerance_share * fastest_mps
+        ways_s = sqrt(2.0 * watchdog.motion_missing_m / robot.limits.acceleration_mps2)
+        acts_s = watchdog.drive_lag_s + JITTER_S + OBEY_S
+        return cls(
+            notice_s(robot) + longest_ramp_s(robot),
+            margin_mps + CARRIED_SHARE * fastest_mps,
+            max(watchdog.motion_missing_s, ways_s) + acts_s,
+            2.0 * margin_mps / robot.base.track_m,
+            max(watchdog.twist_s, watchdog.slow_wheel_s, watchdog.motion_missing_s) + acts_s + watchdog.drive_lag_s,
+            margin_mps + 0.02,
+        )
+
+
+class Greatest:
+    """The greatest of the values that were entered and not dropped yet; they are dropped in their order."""
+
+    def __init__(self) -> None:
+        self._numbers: deque[tuple[int, float]] = deque()
+        """Only those that may still be the greatest: the values fall."""
+        self._entered = self._dropped = 0
+
+    def enter(self, value: float) -> None:
+        """One more."""
+        numbers = self._numbers
+        while numbers and numbers[-1][1] <= value:
+            numbers.pop()
+        self._entered += 1
+        numbers.append((self._entered, value))
+
+    def drop(self) -> None:
+        """The oldest one does not count any more."""
+        self._dropped += 1
+        if self._numbers[0][0] == self._dropped:
+            self._numbers.popleft()
+
+    @property
+    def value(self) -> float:
+        """Of all that count."""
+        return self._numbers[0][1]
+
+
+class MotionJudge:
+    """To be called every step. Times in seconds, virtual."""
+
+    def __init__(self, world: World, shown: Shown) -> None:
+        self._world, self._half_m = world, world.robot.base.track_m / 2.0
+        self._shown = shown
+        self._allowed = Allowed.of(world.robot)
+        now_s = world.clock.now_s
+        self._ordered_at: deque[float] = deque()
+        self._wheel, self._left, self._right = Greatest(), Greatest(), Greatest()
+        """Of these orders: the speed of a wheel, and the turn each way."""
+        self.order(Twist(0.0, 0.0))
+        self._fast_since = self._beside_since = self._lies_since = now_s
+        self._before_mps = 0.0
+        self._heartbeat_s = world.robot.timeouts.drive_heartbeat_s
+        self._watchdog_s = world.robot.timeouts.watchdog_s
+        self._impulse_s = world.robot.watchdog.stand_impulse_s + JITTER_S
+        self._unasked_at = self._unwatched_at = -math.inf
+        self.ran_away = False
+        """Since the base last stood, some wheel was faster than ordered, or the base turned otherwise: `runaway` and
+        `path` bound for how long. Or a wheel with a dead encoder rolls, which no drive can brake."""
+
+    @property
+    def runaway_s(self) -> float:
+        """How long a wheel with power may be wrong before a layer has to have acted [s]."""
+        return self._allowed.runaway_s
+
+    def order(self, twist: Twist) -> None:
+        """The filter ordered this, with a lease."""
+        self._ordered_at.append(self._world.clock.now_s)
+        self._wheel.enter(abs(twist.linear_mps) + abs(twist.angular_radps) * self._half_m)
+        self._left.enter(twist.angular_radps)
+        self._right.enter(-twist.angular_radps)
+
+    def step(self, now_s: float, lost: bool) -> tuple[str, str]:
+        """Name of the property that does not hold now and what is seen; two empty texts: everything holds.
+
+        `lost`: no process reaches a drive that turns; one that does again has its time from there on.
+        """
+        if lost:
+            self._fast_since = self._beside_since = self._lies_since = now_s
+        while len(self._ordered_at) > 1 and self._ordered_at[1] < now_s - self._allowed.remembered_s:
+            self._ordered_at.popleft()
+            for greatest in (self._wheel, self._left, self._right):
+                greatest.drop()
+        found = self._runaway(now_s) or self._path(now_s) or self._standstill(now_s) or ("", "")
+        beyond = not math.isclose(now_s, min(self._fast_since, self._beside_since)) or self._shown.is_blind
+        self.ran_away = beyond or (self.ran_away and self._shown.fastest_mps > self._allowed.stands_mps)
+        return found
+
+    def _follows(self) -> bool:
+        """A drive follows its setpoints. Where all brake by ramps of their own, a turn ends when the base stands."""
+        nodes = self._world.drives.bench.nodes.values()
+        return any(axis.state is State.OPERATION_ENABLED for node in nodes for axis in node.axes)
+
+    def _driven_mps(self) -> float:
+        """The faster side with a motor that drives or brakes it."""
+        drives, (left, right) = self._world.drives, self._world.drives.sides
+        left_mps = 0.0 if drives.roll(left) else abs(self._shown.left_mps)
+        return max(left_mps, 0.0 if drives.roll(right) else abs(self._shown.right_mps))
+
+    def _rolls_blindly(self) -> bool:
+        """The wheels of a side roll, with power, as their drives see nothing of it."""
+        drives = self._world.drives
+        return any(any(axis.motor.powered for axis in side) and drives.roll(side) for side in drives.sides)
+
+    def _missed_s(self, now_s: float) -> float:
+        """No drive reports anything without SYNC: a driver that hangs or is dead is missed first [s]. And a driver
+        alone misses its watchdog before it stops what a stranger's setpoints move."""
+        world = self._world
+        if not world.driver.running:
+            self._unasked_at = now_s
+        if not world.watchdog.running and world.intruder.setpoints_mps:
+            self._unwatched_at = now_s
+        unasked = self._fast_since - self._heartbeat_s <= self._unasked_at
+        unwatched = self._fast_since - self._watchdog_s <= self._unwatched_at
+        return max(unasked * self._heartbeat_s, unwatched * self._watchdog_s)
+
+    def _runaway(self, now_s: float) -> tuple[str, str] | None:
+        ordered_mps = self._wheel.value
+        wheel_mps = self._driven_mps()
+        if wheel_mps <= ordered_mps + self._allowed.runaway_mps:
+            self._fast_since = now_s
+        if now_s <= self._fast_since + self._allowed.runaway_s + self._missed_s(now_s):
+            return None
+        return "runaway", f"a wheel turns at {wheel_mps:.2f} m/s, {ordered_mps:.2f} m/s was the most ordered of it"
+
+    def _path(self, now_s: float) -> tuple[str, str] | None:
+        """Between the slowest and the fastest turn that was ordered, zero among them, as a stop may come any time."""
+        low, high = min(0.0, -self._right.value), max(0.0, self._left.value)
+        turn = self._shown.angular_radps
+        slack = self._allowed.path_radps + PATH_SHARE * max(-low, high)
+        if low - slack <= turn <= high + slack or not self._follows() or self._rolls_blindly():
+            self._beside_since = now_s
+        if now_s <= self._beside_since + self._allowed.path_s:
+            return None
+        return "path", f"the base turns at {turn:+.2f} rad/s, between {low:+.2f} and {high:+.2f} rad/s were ordered"
+
+    def _unproven(self) -> bool:
+        """A dead encoder shows a stand, and its drive has not given more torque yet than it may before it lets go, or
+        the wheel rolls out after that."""
+        slower, drives = self._shown.fastest_mps < self._before_mps, self._world.drives
+        self._before_mps = self._shown.fastest_mps
+        rolls_out = slower and any(drives.roll(side) for side in drives.sides)
+        return self._shown.is_blind and (rolls_out or self._shown.pushed_blindly_s <= self._impulse_s)
+
+    def _standstill(self, now_s: float) -> tuple[str, str] | None:
+        driver = self._world.driver
+        says = not self._unproven() and driver.running and driver.snapshot is not None and driver.snapshot.standstill
+        if not says or self._shown.fastest_mps <= self._allowed.stands_mps or math.isclose(now_s, self._lies_since):
+            self._lies_since = now_s
+        if now_s <= self._lies_since + STANDS_S:
+            return None
+        return "standstill", f"the driver says standstill, a wheel turns at {self._shown.fastest_mps:.2f} m/s"

@@ -1,0 +1,159 @@
+"""The world around the base: joystick, navigation, the client of the action, the operator, scanner, stop button."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from canbase_campaign.envelope import react_s
+from canbase_campaign.plan import GoalRequest, Plan, Segment
+from canbase_campaign.scanner import Scanner
+from canbase_campaign.world import World
+from canbase_driver.supervision.fault_reset import Outcome
+from canbase_velocity.clearance import NOWHERE, Points
+from canbase_velocity.twist import Twist
+
+SPEEDING_UP_MPS = 0.2
+"""By so much the base may become faster until the wall is noticed."""
+NAN = Twist(math.nan, 0.3)
+BEAMS = 360
+
+
+class Outside:
+    """Carries out a plan. `resets`: the outcome of each reset that was requested."""
+
+    def __init__(self, world: World, around: Surroundings, plan: Plan, start: float) -> None:
+        self._world, self._start = world, start
+        self._topics = {name: source.topic for name, source in world.robot.mux.sources.items()}
+        self.resets: list[Outcome] = []
+        self.asked_at = -math.inf
+        """When the operator last requested one."""
+        around.reset = self.reset
+        clock = world.clock
+        for segment in plan.segments:
+            clock.at(start + segment.start_s, self._send, segment)
+        for goal in plan.goals:
+            clock.at(start + goal.start_s, self._ask, goal)
+        for at_s in plan.resets_s:
+            clock.at(start + at_s, self.reset)
+
+    def reset(self) -> None:
+        """The operator requests a reset, whatever the state."""
+        self._world.note("operator asks for a reset")
+        self.asked_at = self._world.clock.now_s
+        self._world.velocity.reset()
+        self._world.driver.reset(self.resets)
+
+    def _ask(self, goal: GoalRequest) -> None:
+        self._world.note(f"client asks for {goal.distance_m:+.3f} m")
+        self._world.action.send_goal(goal.distance_m, goal.speed_mps)
+        if goal.cancel_after_s is not None:
+            self._world.clock.after(goal.cancel_after_s, self._world.action.cancel)
+
+    def _send(self, segment: Segment) -> None:
+        elapsed_s = self._world.clock.now_s - self._start - segment.start_s
+        if elapsed_s >= segment.duration_s:
+            return
+        self._world.topics.publish(self._topics[segment.source], self._twist(segment, elapsed_s))
+        self._world.clock.after(1.0 / segment.rate_hz, self._send, segment)
+
+    def _twist(self, segment: Segment, elapsed_s: float) -> Twist:
+        whole = Twist(segment.linear_mps, segment.angular_radps)
+        if segment.kind == "weave":
+            return whole.scaled(math.cos(6.0 * elapsed_s))
+        if segment.kind == "burst":
+            return whole.scaled(self._world.random.uniform(-1.0, 1.0))
+        if segment.kind == "nan":
+            return NAN
+        return Twist(0.0, 0.0) if segment.kind == "zero" else whole
+
+
+class Surroundings:
+    """Scanner and stop button. `wall_m`: free way ahead and behind at the time of `put_wall`; None: nothing there."""
+
+    SCAN_S = 0.1
+    BUTTON_S = 0.1
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self.pressed = False
+        self.scans = self.speaks = True
+        """The scanner sends, the stop button sends."""
+        self.scanner: Scanner | None = None
+        """Its readings go the whole way into the filter; None: places do."""
+        self.wall_m: float | None = None
+        self.wall_at = -math.inf
+        """When it came."""
+        self._wall_from_m = self._wall_from_rad = 0.0
+        self.reset: Callable[[], None] = lambda: None
+        """The operator requests a reset; set by the part that plays the operator."""
+        self._scan()
+        self._speak()
+
+    def look_closely(self) -> None:
+        """The scanner sends readings from now on."""
+        footprint = self._world.robot.safety.footprint
+        self.scanner = Scanner(footprint.front_m, footprint.rear_m)
+
+    def put_wall(self, margin_m: float) -> None:
+        """A wall appears in both directions of travel, where the base can still stop before it."""
+        base, robot = self._world.drives.bench.base, self._world.robot
+        limits, safety = robot.limits, robot.safety
+        gentlest = limits.linear_mps**2 / (2.0 * (safety.slow_distance_m - safety.stop_distance_m))
+        braking_m = base.v_mps**2 / (2.0 * min(gentlest, limits.deceleration_mps2))
+        sees_s = react_s(robot, layers=2) + self.SCAN_S
+        if self.scanner is not None and self.scanner.lies:
+            sees_s = max(sees_s, react_s(robot, layers=1) + safety.scan.frozen_s + safety.scan.timeout_s)
+        noticing_m = (abs(base.v_mps) + SPEEDING_UP_MPS) * sees_s
+        self.wall_at = self._world.clock.now_s
+        self.wall_m = safety.padding_m + safety.stop_distance_m + braking_m + noticing_m + margin_m
+        self._wall_from_m, self._wall_from_rad = base.travel_m, base.turned_rad
+
+    def take_wall(self) -> None:
+        """The wall is gone."""
+        self.wall_m = None
+
+    @property
+    def turned_rad(self) -> float:
+        """How far the base is turned away from the wall that was put."""
+        return abs(self._world.drives.bench.base.turned_rad - self._wall_from_rad)
+
+    @property
+    def free_m(self) -> tuple[float, float]:
+        """Free way ahead and behind now [m]."""
+        if self.wall_m is None:
+            return math.inf, math.inf
+        gone_m = self._world.drives.bench.base.travel_m - self._wall_from_m
+        return self.wall_m - gone_m, self.wall_m + gone_m
+
+    def _seen(self) -> Points:
+        """Each wall as two neighbouring beams see it; a wall that the base has run into stays at its edge."""
+        if self.wall_m is None:
+            return Points(NOWHERE, np.empty(0, dtype=np.intp), BEAMS)
+        footprint, (ahead_m, behind_m) = self._world.robot.safety.footprint, self.free_m
+        ahead_x_m, behind_x_m = footprint.front_m + max(0.0, ahead_m), -footprint.rear_m - max(0.0, behind_m)
+        places = [(ahead_x_m, -0.02), (ahead_x_m, 0.02), (behind_x_m, 0.02), (behind_x_m, -0.02)]
+        return Points(np.array(places), np.array((0, 1, BEAMS // 2, BEAMS // 2 + 1)), BEAMS)
+
+    def press(self, pressed: bool) -> None:
+        """The emergency stop is pressed or released; that is published at once."""
+        self.pressed = pressed
+        self._tell()
+
+    def _tell(self) -> None:
+        if self.speaks:
+            self._world.topics.publish("estop_state", self.pressed)
+
+    def _scan(self) -> None:
+        if self.scans:
+            self._world.topics.publish(
+                "scan",
+                self._seen() if self.scanner is None else self.scanner.scan(*self.free_m, self._world.clock.now_s),
+            )
+        self._world.clock.after(self.SCAN_S, self._scan)
+
+    def _speak(self) -> None:
+        self._tell()
+        self._world.clock.after(self.BUTTON_S, self._speak)

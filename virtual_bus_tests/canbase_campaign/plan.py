@@ -1,0 +1,192 @@
+"""What will happen in one scenario, drawn from its seed: orders of each source, faults, resets. Only data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from random import Random
+
+from canbase_campaign.fault import PlannedFault
+from canbase_campaign.faults import ADDED, FAULTS
+from canbase_campaign.robots import bitrates, robot_of
+from canbase_campaign.scanner import LIES
+from canbase_config.robot import Robot
+from canbase_velocity.twist import Twist
+
+FAULTS_S = (0.1, 0.9)
+"""Faults begin in this part of a scenario."""
+SCENARIO_S = (1.7, 2.4)
+MOST_FAULTS = 4
+SAMPLE_MPS, SAMPLE_RADPS = 0.8, 2.0
+"""Limits of the sample robot."""
+SECOND_LIFE = 0.08
+"""Share of the scenarios that go on: stop, reset by a person, driving again, a second fault."""
+LIES_S = 2.0
+"""So much longer is a scenario whose scanner lies: until the base has come to where the wall is."""
+FIRST_LIFE_S = 1.5
+"""The faults of a first life last at most this long [s]."""
+ADDED_SHARE = 0.03
+"""Share of the scenarios that have one of canbase_campaign.faults.ADDED."""
+KINDS = ("constant", "constant", "constant", "weave", "burst", "nan", "zero")
+"""How a source behaves for a while; a word that stands more often is drawn more often."""
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A source publishes at `rate_hz` for a while; not before, not after. Times from the scenario's start [s]."""
+
+    source: str
+    start_s: float
+    duration_s: float
+    kind: str
+    linear_mps: float
+    angular_radps: float
+    rate_hz: float
+
+    def __str__(self) -> str:
+        speed = f"{self.linear_mps:+.2f} m/s {self.angular_radps:+.2f} rad/s"
+        return (
+            f"{self.start_s:5.2f} s  {self.source} {self.kind} {speed}, {self.rate_hz:.0f} Hz, {self.duration_s:.2f} s"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class GoalRequest:
+    """A client sends a goal, and may cancel it."""
+
+    start_s: float
+    distance_m: float
+    speed_mps: float
+    cancel_after_s: float | None
+
+    def __str__(self) -> str:
+        cancel = "" if self.cancel_after_s is None else f", cancelled after {self.cancel_after_s:.2f} s"
+        return f"{self.start_s:5.2f} s  goal {self.distance_m:+.3f} m at {self.speed_mps:.2f} m/s{cancel}"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Everything that is given from outside."""
+
+    seed: int
+    duration_s: float
+    bitrate: int
+    segments: tuple[Segment, ...]
+    goals: tuple[GoalRequest, ...]
+    resets_s: tuple[float, ...]
+    faults: tuple[PlannedFault, ...]
+
+    def lines(self) -> list[str]:
+        """The plan in words."""
+        resets = [f"{at_s:5.2f} s  operator resets" for at_s in self.resets_s]
+        parts = [str(part) for part in (*self.segments, *self.goals, *self.faults)]
+        head = f"seed {self.seed}: {self.duration_s:.2f} s at {self.bitrate} bit/s"
+        return [head, str(robot_of(self.seed)), *sorted(parts + resets)]
+
+
+def _added(seed: int) -> Iterator[str]:
+    """Those of ADDED that this scenario has too. Each is drawn by itself: the others stay what they were."""
+    return (name for name in ADDED if Random(f"{seed} {name}").random() < ADDED_SHARE)
+
+
+def draw_plan(seed: int, only: Sequence[str] = ()) -> Plan:
+    """The same seed gives the same plan. `only`: the faults to draw from; empty: all.
+
+    Speeds are drawn for the sample robot, and scaled to the limits of this one.
+    """
+    robot = robot_of(seed).robot
+    pool = sorted(only or FAULTS.keys() - ADDED)
+    random = Random(seed)
+    duration_s = random.uniform(*SCENARIO_S)
+    by_goals = random.random() < 0.35
+    segments = () if by_goals and random.random() < 0.5 else _segments(random, duration_s, late=by_goals)
+    names = random.sample(pool, min(random.randint(1, MOST_FAULTS), len(pool)))
+    plan = Plan(
+        seed,
+        duration_s,
+        random.choice(bitrates(robot)),
+        tuple(_scaled_segment(segment, robot) for segment in segments),
+        _goals(random) if by_goals else (),
+        tuple(random.uniform(0.8, duration_s) for _ in range(random.choice((0, 0, 1, 1, 2)))),
+        tuple(_fault(name, random, robot) for name in names),
+    )
+    more = () if only else tuple(_fault(name, Random(f"{seed} {name}"), robot) for name in _added(seed))
+    plan = replace(plan, faults=(*plan.faults, *more))
+    if any(fault.name in LIES for fault in plan.faults):
+        plan = _longer(plan)
+    return _with_second_life(plan, pool, random, robot) if random.random() < SECOND_LIFE else plan
+
+
+def _longer(plan: Plan) -> Plan:
+    """Somebody drives on, whatever the scanner shows."""
+    first, rest = plan.segments[:1], plan.segments[1:]
+    longer = tuple(replace(segment, duration_s=segment.duration_s + LIES_S) for segment in first)
+    return replace(plan, duration_s=plan.duration_s + LIES_S, segments=(*longer, *rest))
+
+
+def _with_second_life(plan: Plan, pool: Sequence[str], random: Random, robot: Robot) -> Plan:
+    """Once the faults are over a person releases the joystick, resets until it works, and drives again."""
+    faults = tuple(replace(fault, duration_s=min(fault.duration_s, FIRST_LIFE_S)) for fault in plan.faults)
+    over_s = max(plan.duration_s, *(fault.start_s + fault.duration_s for fault in faults)) + 0.2
+    drives_s = over_s + random.uniform(2.2, 2.8)
+    hand = Segment("joystick", over_s, drives_s - over_s, "zero", 0.0, 0.0, 20.0)
+    again = replace(hand, start_s=drives_s, duration_s=1.8, kind="constant", linear_mps=random.uniform(0.2, 0.8))
+    second = _fault(random.choice(pool), random, robot)
+    return replace(
+        plan,
+        duration_s=drives_s + 2.2,
+        segments=(*plan.segments, hand, _scaled_segment(again, robot)),
+        resets_s=(*plan.resets_s, *(over_s + wait_s for wait_s in (0.4, 1.0, 1.7))),
+        faults=(*faults, replace(second, start_s=drives_s + random.uniform(0.5, 1.2))),
+    )
+
+
+def _scales(robot: Robot) -> tuple[float, float]:
+    """Limits of this robot in those of the sample: linear, angular."""
+    return robot.limits.linear_mps / SAMPLE_MPS, robot.limits.angular_radps / SAMPLE_RADPS
+
+
+def _scaled_segment(segment: Segment, robot: Robot) -> Segment:
+    linear, angular = _scales(robot)
+    return replace(segment, linear_mps=linear * segment.linear_mps, angular_radps=angular * segment.angular_radps)
+
+
+def _scaled(value: object, name: str, robot: Robot) -> object:
+    linear, angular = _scales(robot)
+    if isinstance(value, Twist):
+        return Twist(linear * value.linear_mps, angular * value.angular_radps)
+    return linear * value if name == "speed" and isinstance(value, float) else value
+
+
+def _segments(random: Random, duration_s: float, late: bool) -> tuple[Segment, ...]:
+    """Mostly somebody drives when the faults come; `late`: a goal drives first, and may be taken over."""
+    segments: list[Segment] = []
+    for _ in range(random.randint(1, 3)):
+        first = not segments and not late
+        start_s = random.uniform(0.0, 0.3) if first else random.uniform(0.5, duration_s)
+        kind = "constant" if first else random.choice(KINDS)
+        linear_mps = random.choice((-1.0, 1.0)) * random.uniform(0.1, 1.0)
+        angular_radps = random.choice((0.0, 0.0, random.uniform(-2.5, 2.5)))
+        rate_hz = 200.0 if kind == "burst" else random.choice((10.0, 20.0, 50.0))
+        source = random.choice(("joystick", "navigation"))
+        lasts_s = random.uniform(0.4, duration_s) if first else random.uniform(0.1, 1.5)
+        segments.append(Segment(source, start_s, lasts_s, kind, linear_mps, angular_radps, rate_hz))
+    return tuple(segments)
+
+
+def _goals(random: Random) -> tuple[GoalRequest, ...]:
+    goals = []
+    for number in range(random.randint(1, 2)):
+        start_s = random.uniform(0.0, 0.2) + number * random.uniform(0.3, 1.5)
+        distance_m = math.copysign(random.uniform(0.02, 0.8), random.choice((-1.0, 1.0)))
+        cancel_after_s = random.uniform(0.1, 1.5) if random.random() < 0.25 else None
+        goals.append(GoalRequest(start_s, distance_m, random.uniform(0.1, 0.5), cancel_after_s))
+    return tuple(goals)
+
+
+def _fault(name: str, random: Random, robot: Robot) -> PlannedFault:
+    kind = FAULTS[name]
+    start_s = random.uniform(*FAULTS_S)
+    lasts_s, drawn = random.uniform(*kind.lasts_s), kind.draw(random)
+    return PlannedFault(name, start_s, lasts_s, {key: _scaled(value, key, robot) for key, value in drawn.items()})

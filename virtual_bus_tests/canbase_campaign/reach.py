@@ -1,0 +1,180 @@
+"""What can still act on a drive that has power: a process with a line to it, or the drive itself.
+
+A drive that no process reaches turns on until its own monitoring of its masters stops it. Two kinds do not stop then,
+and no software can change it: one that monitors nothing (docs/drives.md), and one whose speed sensor is faulty, since
+its own quick stop closes its loop on that sensor. STO, wired, stops both. A watchdog that reaches it resets the node.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from canbase_campaign.envelope import tolerance_mps
+from canbase_campaign.world import World
+from canbase_config.stopping import BRAKING_SHARE
+from canbase_sim.cia301.dictionary import key
+from canbase_sim.cia402.axis import Axis
+from canbase_sim.cia402.states import State
+from canbase_sim.node import SimulatedNode
+from canbase_sim.personality import PERSONALITIES
+from canbase_watchdog.ladder import RUNGS, Step
+
+RESETS_S = 0.2
+"""From the last rung of the watchdog's ladder until the drive is without power: feedback by SDO, late cycles [s]."""
+BRAKES_S = 0.3
+"""A wheel that turns again after a stop is slow: its drive takes this long to brake it [s]."""
+
+
+class Reach:
+    """`lost`: a wheel turns with power, and no process reaches its drive; called every step."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        profile = world.robot.drives[0].profile
+        self.personality = PERSONALITIES[profile]
+        self.alone_s = self.personality.alone_s(world.robot.timeouts.drive_heartbeat_s)
+        """After this long without a frame a drive of this kind begins to stop by itself [s]; infinity: never."""
+        self._wheels = [(*world.drives.place(wheel), drive.side) for wheel, drive in enumerate(world.robot.drives)]
+        self._moves_mps = tolerance_mps(world.robot) / 2.0
+        self.lost = False
+        self.was_lost = False
+        """It was so since the base last stood."""
+        self.fastest_mps = 0.0
+        """The fastest wheel since the base last stood."""
+        self.lost_at = dict.fromkeys(world.drives.bench.nodes, -math.inf)
+        self._cut_at = dict.fromkeys(world.drives.bench.nodes, -math.inf)
+        """When no process reached each drive last: one that does again has its rungs ahead."""
+        self._weak: set[int] = set()
+        """Drives whose own stop has had hardly an effect since they have power: a ramp that has begun goes on so."""
+        self._ran_at = dict.fromkeys(("driver", "watchdog"), world.clock.now_s)
+        """When each of them ran last: it is not missed before timeouts.watchdog_s, so it counts as there until then."""
+        self._power_from: dict[int, float] = {}
+        """Since when each drive has power: it gets none before its settings are written."""
+        self._reacts_since: dict[int, float] = {}
+        """Drives in a fault reaction that their own sensor never ends; since when the watchdog reaches them."""
+        watchdog = world.robot.watchdog
+        rungs_s = RUNGS[Step.DISABLE_VOLTAGE].obey_s + RUNGS[Step.HEARTBEAT_WITHHELD].obey_s
+        found_s = max(watchdog.motion_missing_s, world.robot.timeouts.feedback_s) + watchdog.drive_lag_s
+        self._reset_s = found_s + rungs_s + RESETS_S
+        self._least_mps2 = BRAKING_SHARE * world.robot.limits.deceleration_mps2
+        self._missed_s = world.robot.timeouts.watchdog_s
+
+    def step(self, stands: bool) -> None:
+        """Look at all drives now."""
+        now_s, bench = self._world.clock.now_s, self._world.drives.bench
+        for name in self._ran_at:
+            if self._world.processes[name].running:
+                self._ran_at[name] = now_s
+        powered = [node for node in bench.nodes.values() if any(axis.motor.powered for axis in node.axes)]
+        self._power_from = {node.node_id: self._power_from.get(node.node_id, now_s) for node in powered}
+        self._weak = {node.node_id for node in powered if node.node_id in self._weak or self._is_weak(node.axes)}
+        lost = {node_id for node_id, _ in self.turning() if not stands and self._is_lost(node_id, now_s)}
+        self.lost = bool(lost)
+        self.was_lost = self.lost or (self.was_lost and not stands)
+        if lost:
+            self.lost_at |= dict.fromkeys(lost, now_s)
+        for node in powered:
+            if not self._reached(node.node_id):
+                self._cut_at[node.node_id] = now_s
+        wheel_mps = max(abs(bench.base.v_left_mps), abs(bench.base.v_right_mps))
+        self.fastest_mps = 0.0 if stands else max(self.fastest_mps, wheel_mps)
+
+    def stops_alone(self, node_id: int) -> bool:
+        """The drive stops when it receives nothing: it monitors its masters, it brakes, and its sensors are right."""
+        node = self._world.drives.bench.nodes[node_id]
+        was_reset = self._world.intruder.resets_at > self._power_from.get(node_id, math.inf)
+        forgot = self.personality.heeds_heartbeats and was_reset and not self._knows_masters(node)
+        able = node_id not in self._weak and not self._lies(node)
+        return self.alone_s < math.inf and able and not forgot
+
+    def turning(self) -> list[tuple[int, int]]:
+        """Node id and axis of each wheel that turns with power."""
+        base, nodes = self._world.drives.bench.base, self._world.drives.bench.nodes
+        if base.resting:
+            return []
+        left, right = abs(base.v_left_mps) > self._moves_mps, abs(base.v_right_mps) > self._moves_mps
+        if not (left or right):
+            return []
+        turn = [(node_id, axis) for node_id, axis, side in self._wheels if (left if side == "left" else right)]
+        return [(node_id, axis) for node_id, axis in turn if nodes[node_id].axes[axis].motor.powered]
+
+    def heard(self, node_id: int) -> float:
+        """When the drive last received what it monitors: heartbeats, or setpoints."""
+        drives = self._world.drives
+        heard = drives.heard if self.personality.heeds_heartbeats else drives.ordered
+        return heard[node_id]
+
+    def acts_s(self, now_s: float, lies_s: float) -> float:
+        """How long a wheel may turn again after a stop, before a layer has to have acted [s]; 0: none has a reason.
+
+        `lies_s`: for a wheel with power whose encoder is faulty, or whose drive does not brake, or is reached again
+        since then. Infinity: for one that no process reaches, until it has ended its setpoint by itself.
+        """
+        nodes = self._world.drives.bench.nodes
+        longest_s = 0.0
+        for node_id, _ in self.turning():
+            node = nodes[node_id]
+            lies = self._lies(node) or self._is_weak(node.axes) or now_s < self._cut_at[node_id] + lies_s
+            waits = now_s < self.heard(node_id) + self.alone_s + BRAKES_S
+            alone = not self._reached(node_id) and self.stops_alone(node_id) and waits
+            longest_s = max(longest_s, lies_s if lies else 0.0, math.inf if alone else 0.0)
+        return longest_s
+
+    def _is_lost(self, node_id: int, now_s: float) -> bool:
+        """No process reaches it, and it does not stop by itself, or not yet: a maker's watchdog has its own time."""
+        if self._reacts(node_id):
+            since = self._reacts_since.setdefault(node_id, now_s)
+            if not self._watchdog_reaches(node_id):
+                self._reacts_since[node_id] = now_s
+            return now_s <= since + self._reset_s
+        self._reacts_since.pop(node_id, None)
+        waits = not self.personality.heeds_heartbeats and now_s <= self.heard(node_id) + self.alone_s
+        return (waits or not self.stops_alone(node_id)) and not self._reached(node_id)
+
+    def _reached(self, node_id: int) -> bool:
+        """A driver or a watchdog that is there, and that behaves, has a line to it."""
+        world = self._world
+        driver, blocked = world.driver, world.bus.disturbance.blocked
+        if not world.drives.bench.nodes[node_id].line.hears:
+            return False
+        sane = not driver.bus_problem and not driver.repeats and not driver.ignores_zero
+        if sane and self._is_there("driver") and (not blocked or ("driver", f"drive{node_id}") not in blocked):
+            return True
+        talks = not world.watchdog.is_deaf and self._is_there("watchdog")
+        return talks and (not blocked or ("watchdog", f"drive{node_id}") not in blocked)
+
+    def _is_there(self, name: str) -> bool:
+        """It runs, or has hung for so short a time that it is not missed."""
+        since_s = self._world.clock.now_s - self._ran_at[name]
+        return self._world.processes[name].alive and since_s <= self._missed_s
+
+    def _watchdog_reaches(self, node_id: int) -> bool:
+        """It is there, and has a line to the drive and from it: it resets no drive from which it receives nothing."""
+        world, drive = self._world, f"drive{node_id}"
+        line, blocked = world.drives.bench.nodes[node_id].line, world.bus.disturbance.blocked
+        ways = {("watchdog", drive), (drive, "watchdog")}
+        talks = self._is_there("watchdog") and not world.watchdog.is_deaf
+        return talks and line.hears and not line.silent and not ways & blocked
+
+    def _reacts(self, node_id: int) -> bool:
+        """In its fault reaction a drive takes no controlword (CiA 402-2, transition 14), and it ends on its sensor.
+
+        Or it does not brake in it.
+        """
+        node = self._world.drives.bench.nodes[node_id]
+        lies = self._lies(node) or self._is_weak(node.axes)
+        return lies and any(axis.state is State.FAULT_REACTION_ACTIVE for axis in node.axes)
+
+    def _is_weak(self, axes: Iterable[Axis]) -> bool:
+        """A quick stop, or a fault reaction, of one of them has hardly an effect, though its settings demand one."""
+        return any(axis.motor.stop_mps2 < self._least_mps2 <= axis.stated_mps2 for axis in axes)
+
+    @staticmethod
+    def _lies(node: SimulatedNode) -> bool:
+        """The loop of one of its motors closes on a sensor on which it cannot brake."""
+        return any(not axis.encoder.closes_loop for axis in node.axes)
+
+    def _knows_masters(self, node: SimulatedNode) -> bool:
+        subs = range(1, self.personality.heartbeat_entries + 1)
+        return any(node.dictionary.values[key(0x1016, sub)] for sub in subs)

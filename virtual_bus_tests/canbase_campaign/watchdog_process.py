@@ -1,0 +1,70 @@
+"""The watchdog in virtual time: its core with the ticks of its loop; leases come by a queue as from a Unix socket."""
+
+from __future__ import annotations
+
+import math
+
+from canbase_campaign.can_bus import CanBus
+from canbase_campaign.clock import FINE, Pace
+from canbase_campaign.disk import WatchdogDisk
+from canbase_campaign.process import FRAMES_HELD, Process
+from canbase_config.watchdog import WatchdogConfig
+from canbase_watchdog.watchdog import Watchdog
+
+
+class WatchdogProcess(Process):
+    """`core` is the real watchdog."""
+
+    name = "watchdog"
+
+    def __init__(self, config: WatchdogConfig, bus: CanBus, pace: Pace = FINE) -> None:
+        super().__init__(bus.clock)
+        self._config, self._tick_s = config, pace.watchdog_tick_s
+        self._failed_since = math.inf
+        self.disk = WatchdogDisk()
+        """Its record of a trip, which outlives it."""
+        self._member = bus.join(self.name, self)
+        self.begin()
+
+    def fail_bus(self, fails: bool) -> None:
+        """Its adapter takes and gives no frames from now on; or does again."""
+        self._failed_since = self.clock.now_s if fails else math.inf
+
+    @property
+    def is_deaf(self) -> bool:
+        """Its adapter takes and gives no frames."""
+        return self._failed_since < math.inf
+
+    def begin(self) -> None:
+        """A new core, which knows of a trip before by its record."""
+        self.core = Watchdog(self._config, self.clock.now_s, self.disk.past())
+        self.every(self._tick_s, self._on_tick, phase_s=0.001)
+
+    def end(self) -> None:
+        """With a wheel in motion it stops it first."""
+        self.core.end(self.clock.now_s)
+
+    def on_lease(self, datagram: bytes) -> None:
+        """A datagram arrives at the socket."""
+        self.receive("leases", FRAMES_HELD, self._on_lease, datagram)
+
+    def _on_lease(self, datagram: bytes) -> None:
+        self.core.on_lease(datagram, None, self.clock.now_s)
+
+    def hear(self, cob_id: int, data: bytes) -> None:
+        """A frame on the bus."""
+        if self.running:
+            self._on_frame(cob_id, data)
+        else:
+            self.receive("frames", FRAMES_HELD, self._on_frame, cob_id, data)
+
+    def _on_frame(self, cob_id: int, data: bytes) -> None:
+        if self._failed_since == math.inf:
+            self.core.on_frame(cob_id, data, self.clock.now_s)
+
+    def _on_tick(self) -> None:
+        self.core.on_bus(self._failed_since, 0)
+        for frame in self.core.tick(self.clock.now_s):
+            if self._failed_since == math.inf:
+                self._member.send(frame.cob_id, frame.data)
+        self.core.on_record(*self.disk.write(self.core.record))
