@@ -18,6 +18,7 @@ from canbase_campaign.judge import Violation
 from canbase_campaign.plan import draw_plan
 from canbase_campaign.properties import PROPERTIES
 from canbase_campaign.replay import replay
+from canbase_campaign.robots import robot_of
 from canbase_campaign.runner import Tally, run
 from canbase_campaign.scenario import Result
 
@@ -49,7 +50,7 @@ def main(
     taken_out = without.value if without is not None else ""
     if seed is not None:
         remove(taken_out)
-        result = replay(draw_plan(seed, only), frames, print)
+        result = replay(robot_of(seed), draw_plan(seed, only), frames, print)
         raise typer.Exit(1 if result.violations else 0)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     refuse_compiled(taken_out)

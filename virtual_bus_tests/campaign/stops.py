@@ -18,7 +18,10 @@ from rich.console import Console
 from rich.progress import Progress
 
 from canbase_campaign.cruise import Cruise, Run
+from canbase_campaign.robots import DrawnRobot, campaign_robot
 from canbase_campaign.twins import GOAL, JOYSTICK, TWINS, Twin
+from canbase_config.robot import Rates
+from canbase_sim.plant.base import PlantParameters
 from exit_matrix.page_table import Key, Row
 from exit_matrix.stop_table import COMMANDS, TABLE, VIRTUAL
 from support.marked_page import rewritten, section
@@ -60,7 +63,9 @@ def measured(
 
 
 def _begin(rates: str) -> None:
-    _cruises.update({by: Cruise(by, rates=rates) for by in (GOAL, JOYSTICK)})
+    robot = campaign_robot().model_copy(update={"rates": Rates.model_validate({"profile": rates})})
+    drawn = DrawnRobot(0, robot, PlantParameters())
+    _cruises.update({by: Cruise(by, drawn=drawn) for by in (GOAL, JOYSTICK)})
 
 
 def _measure(runs: int, index: int) -> list[Run]:

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from campaign.stops import cells, measured, quantile
-from canbase_campaign.cruise import Cruise, Run
+from canbase_campaign.cruise import Cruise, Run, longest_stop_s
 from canbase_campaign.twins import JOYSTICK, LIES, STOPS, TWINS, Twin, drive
 from exit_matrix.stop_table import VIRTUAL
 
@@ -31,9 +31,11 @@ def test_every_failure_stops_the_base() -> None:
 def test_what_does_not_fail_goes_on() -> None:
     """The measurement would report a base that does not stop."""
     nothing = Twin("nothing", "happens", lambda world, around, random: None, JOYSTICK)
-    run = Cruise(JOYSTICK).fork(nothing, 1)
+    cruise = Cruise(JOYSTICK)
+    run = cruise.fork(nothing, 1)
     assert (run.time_s, run.power_off_s) == (math.inf, math.inf)
-    assert run.distance_m == pytest.approx(8.0 * 0.4, rel=0.05)
+    assert run.distance_m == pytest.approx(longest_stop_s(cruise.world.drawn) * 0.4, rel=0.05)
+    assert run.cause == ""
 
 
 def test_the_same_seed_gives_the_same_run() -> None:

@@ -5,19 +5,26 @@ from __future__ import annotations
 import math
 import os
 import pickle
+import traceback
 from dataclasses import dataclass
 from random import Random
 
-from canbase_campaign.robots import DrawnRobot, campaign_robot
+from canbase_campaign.robots import DrawnRobot, rolls_out
 from canbase_campaign.scenario import Start
 from canbase_campaign.twins import GOAL, JOYSTICK, SPEED_MPS, Twin
 from canbase_campaign.world import World
-from canbase_config.robot import Rates
-from canbase_sim.plant.base import PlantParameters
+from canbase_config.stopping import jerk_adds_s, longest_ramp_s, max_wheel_mps
+from canbase_runtime.driver_state import DriverState
+from canbase_velocity.decision import Action
 from canbase_velocity.twist import ZERO, Twist
+from canbase_watchdog.watchdog import State as WatchdogState
 
 CRUISES_S, LONGEST_S, RESTS_S, LOOK_S = 1.5, 8.0, 0.6, 0.002
-"""Until the base drives steadily; longer than any stop; a base that stood this long has stopped; period of looks."""
+"""Until the base drives steadily; longer than a stop of the sample; a base that stood this long has stopped; looks."""
+REACTS_S, LEAST_ROLL_MPS2 = 3.0, 0.05
+"""Until the last layer has acted; a base without power that loses less speed than this does not stop."""
+STEADY_S = 0.5
+"""The base drives at its speed for so long at least, before something fails."""
 GOAL_M, JOYSTICK_S = 4.5, 0.02
 PHASE_S = 0.1
 """The failure comes up to so much later: SYNCs, leases and heartbeats are anywhere in their periods then."""
@@ -34,21 +41,35 @@ class Run:
     distance_m: float
     power_off_s: float
     peak_mps: float
+    speed_mps: float = 0.0
+    """Of the base when the failure began."""
+    cause: str = ""
+    """Which part reported first that it stops the base, and why; empty: none did."""
+
+
+class RunError(RuntimeError):
+    """A run ended with an exception, or its process died."""
 
 
 class Cruise:
     """A world whose base drives steadily. The joystick orders `ordered`, for ever; None: it publishes nothing."""
 
-    def __init__(self, by: str, speed_mps: float = SPEED_MPS, rates: str = "standard") -> None:
-        """`rates`: a profile of rates in robot.yaml."""
-        robot = campaign_robot().model_copy(update={"rates": Rates.model_validate({"profile": rates})})
-        start = Start(DrawnRobot(0, robot, PlantParameters()))
+    def __init__(self, by: str, speed_mps: float = SPEED_MPS, drawn: DrawnRobot | None = None) -> None:
+        """`drawn`: None: the sample robot. Raises RuntimeError: its drives cannot be enabled."""
+        start = Start(drawn)
         self.world, self.around = start.world, start.around
+        self.around.cruise_mps = speed_mps
         self.ordered: Twist | None = Twist(speed_mps, 0.0) if by == JOYSTICK else None
         if by == GOAL:
-            self.world.action.send_goal(GOAL_M, speed_mps)
+            self.world.action.send_goal(self._goal_m(speed_mps), speed_mps)
         self._push()
-        self.world.clock.run_until(self.world.clock.now_s + CRUISES_S)
+        limits = self.world.robot.limits
+        speeds_up_s = speed_mps / limits.acceleration_mps2 + jerk_adds_s(limits)
+        self.world.clock.run_until(self.world.clock.now_s + max(CRUISES_S, speeds_up_s + STEADY_S))
+
+    def _goal_m(self, speed_mps: float) -> float:
+        """Far enough for every failure, or as far as robot.yaml lets a goal be."""
+        return min(self.world.robot.action.max_distance_m, max(GOAL_M, 4.0 * speed_mps))
 
     def _push(self) -> None:
         if self.ordered is not None:
@@ -56,21 +77,28 @@ class Cruise:
         self.world.clock.after(JOYSTICK_S, self._push)
 
     def fork(self, twin: Twin, seed: int) -> Run:
-        """One run in a copy of this process: the base goes on driving here."""
+        """One run in a copy of this process: the base goes on driving here. RunError: it raised, with its traceback."""
         reader, writer = os.pipe()
         pid = os.fork()
         if pid == 0:
             try:
-                os.write(writer, pickle.dumps(self.run(twin, seed)))
+                os.write(writer, pickle.dumps(self._run_or_error(twin, seed)))
             finally:
                 os._exit(0)
         os.close(writer)
         with os.fdopen(reader, "rb") as pipe:
             told = pipe.read()
         os.waitpid(pid, 0)
-        run = pickle.loads(told)
-        assert isinstance(run, Run)
+        run = pickle.loads(told) if told else "the process of the run died"
+        if not isinstance(run, Run):
+            raise RunError(str(run))
         return run
+
+    def _run_or_error(self, twin: Twin, seed: int) -> Run | str:
+        try:
+            return self.run(twin, seed)
+        except Exception:  # noqa: BLE001 - whatever it is: that nothing raises is one of the properties
+            return traceback.format_exc(limit=-4)
 
     def run(self, twin: Twin, seed: int) -> Run:
         """One run in this very world, which is spent then."""
@@ -92,13 +120,14 @@ class _Watch:
 
     def __init__(self, world: World) -> None:
         self._world, self._peak_mps, self._power_off_at = world, 0.0, math.inf
+        self._longest_s, self._cause = longest_stop_s(world.drawn), ""
         self.begin()
 
     def begin(self) -> None:
         """What is measured begins now; the fastest wheel and the power are watched since this was made."""
         base = self._world.drives.bench.base
         self._began = self._moved_at = self._world.clock.now_s
-        self._from_m = (base.x_m, base.y_m)
+        self._from_m, self._from_mps = (base.x_m, base.y_m), abs(base.v_mps)
 
     def look_for(self, seconds: float) -> None:
         """Let time pass."""
@@ -107,8 +136,8 @@ class _Watch:
             self._look()
 
     def until_it_rests(self) -> None:
-        """Until it has been standing for a while, or LONGEST_S."""
-        while self._world.clock.now_s < min(self._moved_at + RESTS_S, self._began + LONGEST_S):
+        """Until it has been standing for a while, or for longer than any stop takes."""
+        while self._world.clock.now_s < min(self._moved_at + RESTS_S, self._began + self._longest_s):
             self._look()
 
     def _look(self) -> None:
@@ -116,6 +145,7 @@ class _Watch:
         clock.run_until(clock.now_s + LOOK_S)
         rim_mps = max(abs(drives.base.v_left_mps), abs(drives.base.v_right_mps))
         self._peak_mps = max(self._peak_mps, rim_mps)
+        self._cause = self._cause or _cause(self._world)
         if rim_mps > self._world.robot.base.standstill_mps:
             self._moved_at = clock.now_s
         if any(axis.motor.powered for node in drives.nodes.values() for axis in node.axes):
@@ -130,4 +160,24 @@ class _Watch:
         stood = self._world.clock.now_s >= self._moved_at + RESTS_S - LOOK_S
         distance_m = math.dist(self._from_m, (base.x_m, base.y_m))
         time_s = self._moved_at - self._began if stood else math.inf
-        return Run(time_s, distance_m, self._power_off_at - self._began, self._peak_mps)
+        power_off_s = self._power_off_at - self._began
+        return Run(time_s, distance_m, power_off_s, self._peak_mps, self._from_mps, self._cause)
+
+
+def longest_stop_s(drawn: DrawnRobot) -> float:
+    """No stop of this robot takes longer: two ramps and a roll without power, or LONGEST_S."""
+    robot = drawn.robot
+    rolls_s = max_wheel_mps(robot) / max(rolls_out(drawn)[0], LEAST_ROLL_MPS2)
+    return max(LONGEST_S, REACTS_S + 2.0 * longest_ramp_s(robot) + rolls_s)
+
+
+def _cause(world: World) -> str:
+    """What stops the base now, as the part that does it reports it; of two the one that takes the power."""
+    watchdog, driver, decision = world.watchdog, world.driver, world.velocity.decision
+    if watchdog.running and watchdog.core.status.state is WatchdogState.TRIPPED:
+        return f"watchdog: {watchdog.core.status.verdict.cause.name.lower().replace('_', ' ')}"
+    if driver.running and driver.core.state is not DriverState.ENABLED:
+        return f"driver: {driver.core.finding.cause.value}"
+    if world.velocity.running and decision is not None and decision.action is Action.STOP:
+        return f"safety filter: {decision.cause.value}"
+    return ""

@@ -41,6 +41,12 @@ class GoalJudge:
             return f"goal {goal.number} took {took_s:.1f} s"
         return self._beside(goal) if goal.ends[-1].code is ErrorCode.OK else ""
 
+    @property
+    def longest_s(self) -> float:
+        """No goal so far may take longer, from its begin [s]."""
+        goals = self._world.action.goals
+        return max((self._longest_s(goal) + goal.held_up_s + 1.0 for goal in goals), default=0.0)
+
     def left(self) -> str:
         """The scenario is over: no goal may be left."""
         left = [goal.number for goal in self._world.action.goals if not goal.ends and not goal.died]

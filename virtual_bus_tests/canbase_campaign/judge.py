@@ -115,6 +115,11 @@ class Judge:
         """Something is latched, and the base has come to a stand since."""
         return bool(self._latches) and self._stood
 
+    @property
+    def longest_goal_s(self) -> float:
+        """No goal of this scenario may take longer [s]."""
+        return self._goals.longest_s
+
     def finish(self) -> None:
         """The scenario is over: no goal may be left."""
         problem = self._goals.left()

@@ -68,13 +68,23 @@ class FalseTrip:
 class OrdinaryHour:
     """One robot that drives for a while. Nothing here is random but by its seed, which is also the robot's number."""
 
-    def __init__(self, seed: int, pace: Pace = PACE, loaded: bool = False) -> None:
-        """`loaded`: with double payload, and never on a level floor."""
+    def __init__(
+        self,
+        seed: int,
+        pace: Pace = PACE,
+        loaded: bool = False,
+        drawn: DrawnRobot | None = None,
+        steepest: float = STEEPEST,
+    ) -> None:
+        """`loaded`: with double payload, and never on a level floor. `drawn`: this robot in place of the seed's.
+
+        `steepest`: slope of the floor at most, as a share.
+        """
         self.seed, self.random = seed, Random(f"ordinary {seed}")
-        self._loaded = loaded
-        self.drawn: DrawnRobot = draw_robot(seed, LOADED) if loaded else draw_robot(seed)
+        self._loaded, self._steepest = loaded, steepest
+        self.drawn = drawn or (draw_robot(seed, LOADED) if loaded else draw_robot(seed))
         self.world = World(seed=seed, pace=pace, drawn=self.drawn)
-        self.around = Surroundings(self.world)
+        self.around = Surroundings(self.world, has_scanner=self.drawn.robot.safety.scan.required)
         self._start = self.world.clock.now_s
         self.moving_s = 0.0
         """How long the base has been moving [s]."""
@@ -154,7 +164,8 @@ class OrdinaryHour:
     # The source that drives
 
     def _change_hands(self) -> None:
-        name = self.random.choice(tuple(HANDS))
+        sources = self.drawn.robot.mux.sources
+        name = self.random.choice([name for name, (source, _) in HANDS.items() if source in sources])
         source, hands = HANDS[name]
         self._note(f"{name} drives")
         topic = self.drawn.robot.mux.sources[source].topic
@@ -202,7 +213,7 @@ class OrdinaryHour:
         """Up or down, no steeper than the motors climb while they accelerate."""
         body, base, wheels = self.drawn.body, self.world.drives.bench.base, len(self.drawn.robot.drives)
         weight_n = GRAVITY_MPS2 * body.mass_kg * body.payload_factor
-        most_n = min(STEEPEST * weight_n, wheels * self._slope_n)
+        most_n = min(self._steepest * weight_n, wheels * self._slope_n)
         if self._loaded:
             base.push_n = most_n * self.random.choice((-1.0, 1.0)) * self.random.uniform(0.5, 1.0)
         else:

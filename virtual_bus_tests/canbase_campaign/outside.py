@@ -76,11 +76,14 @@ class Surroundings:
     SCAN_S = 0.1
     BUTTON_S = 0.1
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, has_scanner: bool = True) -> None:
+        """`has_scanner`: of a robot without one nothing is known about walls."""
         self._world = world
         self.pressed = False
-        self.scans = self.speaks = True
+        self.scans, self.speaks = has_scanner, True
         """The scanner sends, the stop button sends."""
+        self.cruise_mps = 0.0
+        """The base drives at it when one failure is to stop it."""
         self.scanner: Scanner | None = None
         """Its readings go the whole way into the filter; None: places do."""
         self.wall_m: float | None = None

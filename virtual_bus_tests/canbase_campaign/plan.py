@@ -11,6 +11,7 @@ from canbase_campaign.fault import PlannedFault
 from canbase_campaign.faults import ADDED, FAULTS
 from canbase_campaign.robots import bitrates, robot_of
 from canbase_campaign.scanner import LIES
+from canbase_config.action import Action
 from canbase_config.robot import Robot
 from canbase_velocity.twist import Twist
 
@@ -28,6 +29,8 @@ FIRST_LIFE_S = 1.5
 """The faults of a first life last at most this long [s]."""
 ADDED_SHARE = 0.03
 """Share of the scenarios that have one of canbase_campaign.faults.ADDED."""
+HANDS = ("joystick", "navigation")
+"""Sources that order motion, by their names in robot.yaml; a robot may lack the second one."""
 KINDS = ("constant", "constant", "constant", "weave", "burst", "nan", "zero")
 """How a source behaves for a while; a word that stands more often is drawn more often."""
 
@@ -77,12 +80,12 @@ class Plan:
     resets_s: tuple[float, ...]
     faults: tuple[PlannedFault, ...]
 
-    def lines(self) -> list[str]:
-        """The plan in words."""
+    def lines(self, robot: str) -> list[str]:
+        """The plan in words, after those about its `robot`."""
         resets = [f"{at_s:5.2f} s  operator resets" for at_s in self.resets_s]
         parts = [str(part) for part in (*self.segments, *self.goals, *self.faults)]
         head = f"seed {self.seed}: {self.duration_s:.2f} s at {self.bitrate} bit/s"
-        return [head, str(robot_of(self.seed)), *sorted(parts + resets)]
+        return [head, robot, *sorted(parts + resets)]
 
 
 def _added(seed: int) -> Iterator[str]:
@@ -91,23 +94,29 @@ def _added(seed: int) -> Iterator[str]:
 
 
 def draw_plan(seed: int, only: Sequence[str] = ()) -> Plan:
-    """The same seed gives the same plan. `only`: the faults to draw from; empty: all.
+    """The same seed gives the same plan, for the robot of this seed. `only`: the faults to draw from; empty: all."""
+    robot = robot_of(seed).robot
+    return plan_for(robot, seed, bitrates(robot), only)
+
+
+def plan_for(robot: Robot, seed: int, rates: Sequence[int], only: Sequence[str] = ()) -> Plan:
+    """A plan for this robot. `rates`: bit rates to draw from [bit/s].
 
     Speeds are drawn for the sample robot, and scaled to the limits of this one.
     """
-    robot = robot_of(seed).robot
     pool = sorted(only or FAULTS.keys() - ADDED)
     random = Random(seed)
     duration_s = random.uniform(*SCENARIO_S)
     by_goals = random.random() < 0.35
-    segments = () if by_goals and random.random() < 0.5 else _segments(random, duration_s, late=by_goals)
+    hands = [name for name in HANDS if name in robot.mux.sources]
+    segments = () if by_goals and random.random() < 0.5 else _segments(random, duration_s, hands, late=by_goals)
     names = random.sample(pool, min(random.randint(1, MOST_FAULTS), len(pool)))
     plan = Plan(
         seed,
         duration_s,
-        random.choice(bitrates(robot)),
+        random.choice(rates),
         tuple(_scaled_segment(segment, robot) for segment in segments),
-        _goals(random) if by_goals else (),
+        _goals(random, robot.action) if by_goals else (),
         tuple(random.uniform(0.8, duration_s) for _ in range(random.choice((0, 0, 1, 1, 2)))),
         tuple(_fault(name, random, robot) for name in names),
     )
@@ -159,7 +168,7 @@ def _scaled(value: object, name: str, robot: Robot) -> object:
     return linear * value if name == "speed" and isinstance(value, float) else value
 
 
-def _segments(random: Random, duration_s: float, late: bool) -> tuple[Segment, ...]:
+def _segments(random: Random, duration_s: float, hands: Sequence[str], late: bool) -> tuple[Segment, ...]:
     """Mostly somebody drives when the faults come; `late`: a goal drives first, and may be taken over."""
     segments: list[Segment] = []
     for _ in range(random.randint(1, 3)):
@@ -169,19 +178,20 @@ def _segments(random: Random, duration_s: float, late: bool) -> tuple[Segment, .
         linear_mps = random.choice((-1.0, 1.0)) * random.uniform(0.1, 1.0)
         angular_radps = random.choice((0.0, 0.0, random.uniform(-2.5, 2.5)))
         rate_hz = 200.0 if kind == "burst" else random.choice((10.0, 20.0, 50.0))
-        source = random.choice(("joystick", "navigation"))
+        source = random.choice(hands)
         lasts_s = random.uniform(0.4, duration_s) if first else random.uniform(0.1, 1.5)
         segments.append(Segment(source, start_s, lasts_s, kind, linear_mps, angular_radps, rate_hz))
     return tuple(segments)
 
 
-def _goals(random: Random) -> tuple[GoalRequest, ...]:
+def _goals(random: Random, action: Action) -> tuple[GoalRequest, ...]:
     goals = []
     for number in range(random.randint(1, 2)):
         start_s = random.uniform(0.0, 0.2) + number * random.uniform(0.3, 1.5)
         distance_m = math.copysign(random.uniform(0.02, 0.8), random.choice((-1.0, 1.0)))
         cancel_after_s = random.uniform(0.1, 1.5) if random.random() < 0.25 else None
-        goals.append(GoalRequest(start_s, distance_m, random.uniform(0.1, 0.5), cancel_after_s))
+        speed_mps = min(random.uniform(0.1, 0.5), action.max_speed_mps)
+        goals.append(GoalRequest(start_s, distance_m, speed_mps, cancel_after_s))
     return tuple(goals)
 
 

@@ -17,7 +17,7 @@ from canbase_sim.cia301.dictionary import key
 from canbase_sim.cia402.axis import Axis
 from canbase_sim.cia402.states import State
 from canbase_sim.node import SimulatedNode
-from canbase_sim.personality import PERSONALITIES
+from canbase_sim.personality import GENERIC, PERSONALITIES
 from canbase_watchdog.ladder import RUNGS, Step
 
 RESETS_S = 0.2
@@ -32,7 +32,7 @@ class Reach:
     def __init__(self, world: World) -> None:
         self._world = world
         profile = world.robot.drives[0].profile
-        self.personality = PERSONALITIES[profile]
+        self.personality = PERSONALITIES.get(profile, GENERIC)
         self.alone_s = self.personality.alone_s(world.robot.timeouts.drive_heartbeat_s)
         """After this long without a frame a drive of this kind begins to stop by itself [s]; infinity: never."""
         self._wheels = [(*world.drives.place(wheel), drive.side) for wheel, drive in enumerate(world.robot.drives)]

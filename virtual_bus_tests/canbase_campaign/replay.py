@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from canbase_campaign.plan import Plan
-from canbase_campaign.robots import robot_of
+from canbase_campaign.robots import DrawnRobot
 from canbase_campaign.scenario import Result, Start
 from canbase_campaign.world import World
 
@@ -43,11 +43,11 @@ class _Teller:
             self._world.note(f"{who} is {text}".rstrip())
 
 
-def replay(plan: Plan, frames: bool, say: Callable[[str], None]) -> Result:
-    """Run the scenario and `say` what happens, line by line."""
-    start = Start(robot_of(plan.seed))
+def replay(drawn: DrawnRobot, plan: Plan, frames: bool, say: Callable[[str], None]) -> Result:
+    """Run the scenario with this robot and `say` what happens, line by line."""
+    start = Start(drawn)
     world = start.world
-    for line in plan.lines():
+    for line in plan.lines(str(drawn)):
         say(line)
     if frames:
         world.bus.watch = lambda sender, cob_id, data: world.note(
@@ -59,7 +59,3 @@ def replay(plan: Plan, frames: bool, say: Callable[[str], None]) -> Result:
     for violation in result.violations:
         say(f"{violation.name} at {violation.at_s:.3f} s: {violation.detail}")
     return result
-
-
-def _hex(cob_id: int, data: bytes) -> str:
-    return f"{cob_id:03X} {data.hex(' ').upper()}"

@@ -6,7 +6,7 @@ stated decelerations with its load on its slope, and without power it rolls out 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import lru_cache
 from math import ceil
 from random import Random
@@ -24,6 +24,10 @@ from canbase_sim.plant.base import PlantParameters
 SCENARIOS = 25
 """This many scenarios in a row have one robot: a worker boots it once."""
 GRAVITY_MPS2 = 9.81
+MASSES_KG = (8.0, 15.0, 40.0)
+"""Of the empty robot, for each wheel."""
+FRICTION_NPKG = (0.3, 0.8)
+"""Dry friction of all wheels and gears [N], for each kg of the empty robot."""
 SLOPES = (0.0, 0.0, 0.03, 0.06, 0.1)
 FRICTION_LEFT = 0.6
 """A slope takes at most so much of the friction: a base that rolls downhill without power needs brakes."""
@@ -70,7 +74,7 @@ def draw_robot(number: int, payload: float | None = None) -> DrawnRobot:
     random = Random(f"robot {number}")
     for _ in range(TRIES):
         try:
-            robot = _commissioned(Robot.model_validate(_file(random)))
+            robot = commissioned(Robot.model_validate(_file(random)))
         except ValidationError:
             continue
         if bitrates(robot):
@@ -78,8 +82,8 @@ def draw_robot(number: int, payload: float | None = None) -> DrawnRobot:
     raise RuntimeError(f"robot {number}: none of {TRIES} drawn files passes robot.yaml's checks")
 
 
-def _commissioned(robot: Robot) -> Robot:
-    """So that its limits are those that were drawn."""
+def commissioned(robot: Robot) -> Robot:
+    """The same robot after its commissioning: its limits are those of its file."""
     marks = {step: mark(robot, step) for step in STEPS}
     return robot.model_copy(update={"commissioned": Commissioned(**marks)})
 
@@ -208,17 +212,53 @@ def _safety(random: Random, linear_mps: float, edge_m: float) -> dict[str, Any]:
 
 
 def _with_body(number: int, robot: Robot, random: Random, payload_factor: float | None) -> DrawnRobot:
-    """Motors that can brake as the file states, with this load on this slope, and some force more."""
-    wheels, limits = len(robot.drives), robot.limits
-    mass_kg, payload = wheels * random.choice((8.0, 15.0, 40.0)), random.choice((0.5, 1.0, 1.0, 1.5, 2.0))
+    """With a load on a slope."""
+    wheels = len(robot.drives)
+    mass_kg, payload = wheels * random.choice(MASSES_KG), random.choice((0.5, 1.0, 1.0, 1.5, 2.0))
     payload = payload if payload_factor is None else payload_factor
     wheel_kg, coulomb_n = (
         mass_kg * random.uniform(0.03, 0.1) / wheels * 2.0,
-        mass_kg * random.uniform(0.3, 0.8) / wheels,
+        mass_kg * random.uniform(*FRICTION_NPKG) / wheels,
     )
     weight_n = mass_kg * payload * GRAVITY_MPS2
     most_n = FRICTION_LEFT * coulomb_n * wheels
     push_n = random.choice((-1.0, 1.0)) * min(weight_n * random.choice(SLOPES), most_n)
+    return _strong_enough(number, robot, random, _Load(mass_kg, payload, wheel_kg, coulomb_n, push_n))
+
+
+@dataclass(frozen=True, slots=True)
+class _Load:
+    """What the motors have to move and to hold; `wheel_kg` and `coulomb_n` of each wheel."""
+
+    mass_kg: float
+    payload: float
+    wheel_kg: float
+    coulomb_n: float
+    push_n: float
+
+
+def body_for(number: int, robot: Robot, payloads: tuple[float, float], slope: float) -> DrawnRobot:
+    """A body for a given robot.yaml: the same number gives the same one.
+
+    `payloads`: from, to, in multiples of the empty robot's mass; the ends are drawn more often than what lies between.
+    `slope`: the steepest floor, as a share. Without power the base does not roll away on it: where dry friction as
+    drawn does not hold the load there, it is as large as it has to be.
+    """
+    random = Random(f"body {number}")
+    wheels = len(robot.drives)
+    payload = random.choice((*payloads, random.uniform(*payloads)))
+    floor = random.choice((-1.0, 1.0)) * random.choice((0.0, slope, random.uniform(0.0, slope)))
+    mass_kg = wheels * random.choice(MASSES_KG)
+    push_n = mass_kg * payload * GRAVITY_MPS2 * floor + 0.0  # never -0.0
+    friction_n = max(mass_kg * random.uniform(*FRICTION_NPKG), abs(push_n) / FRICTION_LEFT)
+    wheel_kg = mass_kg * random.uniform(0.03, 0.1) / wheels * 2.0
+    return _strong_enough(number, robot, random, _Load(mass_kg, payload, wheel_kg, friction_n / wheels, push_n))
+
+
+def _strong_enough(number: int, robot: Robot, random: Random, load: _Load) -> DrawnRobot:
+    """Motors that can brake as the file states, with this load on this slope, and some force more."""
+    wheels, limits = len(robot.drives), robot.limits
+    mass_kg, payload, wheel_kg, coulomb_n, push_n = astuple(load)
     inertia_kg = mass_kg * payload + wheels * wheel_kg
     hardest = max(limits.emergency_deceleration_mps2, limits.acceleration_mps2)
     needs_n = (inertia_kg * hardest + abs(push_n)) / wheels + coulomb_n

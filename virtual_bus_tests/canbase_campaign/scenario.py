@@ -24,7 +24,7 @@ LOOK_S = 0.1
 QUIET_S = 0.3
 """A base that is latched and stands is watched for this long after the last fault, reset and goal; then that is all."""
 GOALS_END_S = 12.0
-"""How long a scenario goes on at most until its goals have ended."""
+"""So long a scenario goes on at least until its goals have ended; longer where robot.yaml leaves them more time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class Start:
     def __init__(self, drawn: DrawnRobot | None = None) -> None:
         """`drawn`: None: the sample robot."""
         self.world = World(drawn=drawn)
-        self.around = Surroundings(self.world)
+        self.around = Surroundings(self.world, has_scanner=self.world.robot.safety.scan.required)
         self.world.enable()
         gc.collect()
         gc.freeze()
@@ -134,7 +134,7 @@ class _Run:
         try:
             while clock.now_s < end and not self._is_over():
                 clock.run_until(clock.now_s + LOOK_S)
-            while self._goals_run() and clock.now_s < end + GOALS_END_S:
+            while self._goals_run() and clock.now_s < end + max(GOALS_END_S, self._judge.longest_goal_s):
                 clock.run_until(clock.now_s + LOOK_S)
             self._judge.finish()
         except Exception:  # noqa: BLE001 - whatever it is: that nothing raises is one of the properties

@@ -76,6 +76,14 @@ def _ignores_zero(world: World, around: Surroundings, random: Random) -> None:
     world.driver.keeps_motion = True
 
 
+def _straight_to_cmd_vel(world: World, around: Surroundings, random: Random) -> None:
+    world.intruder.twist = Twist(around.cruise_mps, 0.0)
+
+
+def _second_master(world: World, around: Surroundings, random: Random) -> None:
+    world.intruder.setpoints_mps = around.cruise_mps / 2.0
+
+
 def _goal_canceled(world: World, around: Surroundings, random: Random) -> None:
     world.action.cancel()
 
@@ -86,7 +94,6 @@ def _joystick_dies(world: World, around: Surroundings, random: Random) -> None:
 
 DRIVER, VELOCITY, WATCHDOG, SERVER = "motor_driver", "velocity process", "watchdog", "drive_distance_server"
 ZERO_S = 0.2
-FORWARD = Twist(SPEED_MPS, 0.0)
 
 STOPS: tuple[Twin, ...] = (
     Twin(DRIVER, "SIGINT", ends("driver")),
@@ -124,9 +131,8 @@ STOPS: tuple[Twin, ...] = (
     Twin(DRIVER, "repeats its last setpoints for ever, then zero is ordered", fault("driver_repeats", heartbeats=True),
          JOYSTICK, ZERO_S),
     Twin(DRIVER, "ignores zero, then zero is ordered", _ignores_zero, JOYSTICK, ZERO_S),
-    Twin("cmd_vel", "somebody publishes straight to it, then zero is ordered",
-         fault("straight_to_cmd_vel", twist=FORWARD), JOYSTICK, ZERO_S),
-    Twin("second master", "sends setpoints and SYNC", fault("second_master_setpoints", speed=SPEED_MPS / 2.0)),
+    Twin("cmd_vel", "somebody publishes straight to it, then zero is ordered", _straight_to_cmd_vel, JOYSTICK, ZERO_S),
+    Twin("second master", "sends setpoints and SYNC", _second_master),
     Twin("joystick", "dies", _joystick_dies, JOYSTICK),
     Twin("odometry", "stale", fault("odometry_lost")),
     Twin("scan", "stale", fault("scan_stale", share=1.0)),

@@ -63,6 +63,8 @@ class VelocityProcess(Process):
         self.mux = Mux(self._robot.mux.sources, LOCKS, status_timeout_s=status_timeout_s(self._robot.rates.status_hz))
         self.filter = SafetyFilter(FilterConfig.of(self._robot), self.disk.found())
         self._sequence, self._ending = 0, False
+        self.decision: Decision | None = None
+        """The last order."""
         self._mux_told: tuple[object, ...] = ()
         self._told: tuple[object, ...] = ()
         self._mux_state_at = self._state_at = -math.inf
@@ -140,7 +142,7 @@ class VelocityProcess(Process):
         now_s = self.clock.now_s
         if self._ending:
             decision = self.filter.shut_down(now_s)
-        self._filter_due = now_s + self._period_s
+        self._filter_due, self.decision = now_s + self._period_s, decision
         self._sequence += 1
         stops = decision.action is Action.STOP
         datagram = lease_datagram(self._sequence, round(now_s * 1e9), decision.twist, stops=stops, estop=False)
