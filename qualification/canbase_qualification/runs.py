@@ -92,13 +92,13 @@ def _scenarios(job: Job, batch: Batch, drawn: DrawnRobot) -> Iterator[Outcome]:
 def _stops(job: Job, batch: Batch, drawn: DrawnRobot) -> Iterator[Outcome]:
     cruises: dict[str, Cruise] = {}
     for seed in batch.seeds:
-        failure = _by_joystick(FAILURES[seed % len(FAILURES)])
+        failure = by_joystick(FAILURES[seed % len(FAILURES)])
         if failure.by not in cruises:
             cruises[failure.by] = Cruise(failure.by, full_mps(job, failure.by), drawn)
         yield _stop(cruises[failure.by], failure, _empty(STOP, seed, drawn))
 
 
-def _by_joystick(failure: Twin) -> Twin:
+def by_joystick(failure: Twin) -> Twin:
     """The same failure while a joystick orders full speed, where it stops a base then as well."""
     return failure if failure.what in OF_GOALS else replace(failure, by=JOYSTICK)
 

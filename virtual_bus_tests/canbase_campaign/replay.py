@@ -43,17 +43,28 @@ class _Teller:
             self._world.note(f"{who} is {text}".rstrip())
 
 
+def tell(world: World, frames: bool, note: Callable[[float, str], None]) -> None:
+    """From now on `note` receives what happens, with its time from now [s]; `frames`: each frame on the bus as well."""
+    start = world.clock.now_s
+    world.note = lambda text: note(world.clock.now_s - start, text)
+    _watch(world, frames)
+
+
+def _watch(world: World, frames: bool) -> None:
+    if frames:
+        world.bus.watch = lambda sender, cob_id, data: world.note(
+            f"    {sender:9} {cob_id:03X} {data.hex(' ').upper()}"
+        )
+    _Teller(world)
+
+
 def replay(drawn: DrawnRobot, plan: Plan, frames: bool, say: Callable[[str], None]) -> Result:
     """Run the scenario with this robot and `say` what happens, line by line."""
     start = Start(drawn)
     world = start.world
     for line in plan.lines(str(drawn)):
         say(line)
-    if frames:
-        world.bus.watch = lambda sender, cob_id, data: world.note(
-            f"    {sender:9} {cob_id:03X} {data.hex(' ').upper()}"
-        )
-    _Teller(world)
+    _watch(world, frames)
     result = start.run(plan, lambda at_s, text: say(f"{at_s:8.4f} {text}"))
     say(f"{len(result.violations)} violations")
     for violation in result.violations:

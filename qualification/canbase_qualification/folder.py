@@ -1,0 +1,103 @@
+"""The folder of a qualification: what was run, on which robot, by which software, and its results.
+
+qualification.json says what results.jsonl is about; robot.yaml is the file as it was. `--resume` compares them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from canbase_qualification.job import Amount, Load
+from canbase_qualification.software import Software
+
+NAME: Final = "qualification.json"
+ROBOT: Final = "robot.yaml"
+
+
+class FolderError(ValueError):
+    """The folder cannot be used: a sentence with its name, and what can be done."""
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """Of one qualification. `mark`: of the configuration and the load, see job.mark."""
+
+    robot: str
+    """Name in robot.yaml."""
+    file: str
+    """robot.yaml as it was named on the command line."""
+    mark: str
+    software: Software
+    load: Load
+    amount: Amount
+    full_mps: float
+    """The speed from which the stops are measured."""
+    assumed: tuple[str, ...]
+    not_judged: tuple[str, ...]
+
+    def text(self) -> str:
+        """As JSON."""
+        return json.dumps(asdict(self), indent=2, ensure_ascii=False) + "\n"
+
+    @staticmethod
+    def of_text(text: str) -> About:
+        """From JSON. ValueError, KeyError, TypeError: it is none."""
+        plain: Mapping[str, Any] = json.loads(text)
+        low, high = plain["load"]["payloads"]
+        parts = {
+            "software": Software.of_plain(plain["software"]),
+            "load": Load((low, high), plain["load"]["slope"]),
+            "amount": Amount(**plain["amount"]),
+            "assumed": tuple(plain["assumed"]),
+            "not_judged": tuple(plain["not_judged"]),
+        }
+        return About(**{**plain, **parts})
+
+
+def read_about(folder: Path) -> About:
+    """FolderError: there is none, or it cannot be read."""
+    try:
+        return About.of_text((folder / NAME).read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise FolderError(f"{folder} has no {NAME}: it is no folder of canbase qualify") from error
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise FolderError(f"{folder / NAME} cannot be read: {error}") from error
+
+
+def check_new(folder: Path) -> None:
+    """FolderError: something of a qualification is there already."""
+    if (folder / NAME).exists():
+        raise FolderError(f"{folder} has results already: --resume goes on with them, --out names another folder")
+
+
+def check_same(folder: Path, before: About, now: About) -> None:
+    """FolderError: results of both do not belong together."""
+    if before.software != now.software:
+        raise FolderError(
+            f"{folder} was computed by {before.software}; this is {now.software}. Results of both do not belong "
+            "together: go on with the same version, or begin again with another --out"
+        )
+    if before.load != now.load:
+        raise FolderError(f"{folder} has {_words(before.load)}; now it is {_words(now.load)}. Choose another --out")
+    if before.mark != now.mark:
+        raise FolderError(
+            f"{folder} is about another configuration: mark {before.mark}, and {now.file} has {now.mark}. Compare it "
+            f"with {folder / ROBOT}, or begin again with another --out"
+        )
+
+
+def _words(load: Load) -> str:
+    low, high = load.payloads
+    return f"--payload {low:g}..{high:g} --slope {load.slope:g}"
+
+
+def write(folder: Path, about: About, robot_yaml: bytes) -> None:
+    """OSError. A crash leaves a whole file."""
+    for name, data in ((ROBOT, robot_yaml), (NAME, about.text().encode())):
+        new = folder / f"{name}.new"
+        new.write_bytes(data)
+        new.replace(folder / name)

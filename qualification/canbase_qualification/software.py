@@ -1,0 +1,60 @@
+"""Which software computes: results are the same to the last bit where it is the same."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Final
+
+from canbase_runtime.version import installed_version
+
+COMPUTES: Final = (
+    "canbase_config", "canbase_runtime", "canbase_driver", "canbase_velocity", "canbase_watchdog",
+    "canbase_action_server", "canbase_sim", "canbase_campaign", "canbase_qualification",
+)  # fmt: skip
+"""Packages whose sources decide what comes out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Software:
+    """Of this process. `sources`: a mark of canbase's own files, which differs where one version was changed."""
+
+    canbase: str
+    sources: str
+    python: str
+    numpy: str
+
+    def __str__(self) -> str:
+        return f"canbase {self.canbase} (sources {self.sources}), Python {self.python}, numpy {self.numpy}"
+
+    def plain(self) -> dict[str, str]:
+        """For JSON."""
+        return asdict(self)
+
+    @staticmethod
+    def of_plain(plain: Mapping[str, Any]) -> Software:
+        """From JSON. KeyError: something is missing."""
+        return Software(*(str(plain[name]) for name in ("canbase", "sources", "python", "numpy")))
+
+
+@cache
+def software() -> Software:
+    """Of this process."""
+    return Software(installed_version(), _sources(), platform.python_version(), version("numpy"))
+
+
+def _sources() -> str:
+    digest = hashlib.sha256()
+    for package in COMPUTES:
+        folder = Path(str(import_module(package).__file__)).parent
+        for file in sorted(folder.rglob("*")):
+            if file.suffix in (".py", ".yaml", ".eds"):
+                digest.update(f"{package}/{file.relative_to(folder)}\0".encode())
+                digest.update(file.read_bytes())
+    return digest.hexdigest()[:12]
