@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import re
 import signal
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
 
@@ -16,10 +17,14 @@ from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config
 
 if TYPE_CHECKING:
     from canbase_config.load import Loaded
+    from canbase_qualification.crew import LocalCrew
+    from canbase_qualification.dask_crew import DaskCrew
     from canbase_qualification.folder import About
     from canbase_qualification.job import Amount, Job, Load
     from canbase_qualification.outcome import Outcome
     from canbase_qualification.results_file import ResultsFile
+
+    AnyCrew = LocalCrew | DaskCrew
 
 BROKEN_OFF: Final = 128 + signal.SIGINT
 """Exit code after Ctrl-C, as of a shell."""
@@ -61,6 +66,10 @@ def qualify(
     workers: Annotated[
         int | None, typer.Option(min=1, max=1024, metavar="N", help="Processes.", show_default="all processors")
     ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Of a dask cluster that runs it: tcp://host:8786.", show_default="none"),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="For the results.", show_default="qualification_NAME")
     ] = None,
@@ -86,7 +95,23 @@ def qualify(
     amount = {name: value for name, value in given.items() if value is not None}
     folder = out or Path(f"qualification_{loaded.robot.name}")
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    _Qualify(loaded, folder, amount, payloads, slope).run(workers or os.cpu_count() or 1, resume=resume)
+    if scheduler is not None and workers is not None:
+        raise typer.BadParameter("the workers of a cluster are started there: dask worker", param_hint="--workers")
+    crew = partial(_crew, scheduler, workers or os.cpu_count() or 1)
+    _Qualify(loaded, folder, amount, payloads, slope).run(crew, resume=resume)
+
+
+def _crew(scheduler: str | None, workers: int) -> AnyCrew:
+    if scheduler is None:
+        from canbase_qualification.crew import LocalCrew
+
+        return LocalCrew(workers)
+    try:
+        from canbase_qualification.dask_crew import DaskCrew
+
+        return DaskCrew(scheduler)
+    except ModuleNotFoundError as error:
+        fail(f"--scheduler needs the Python package {error.name}: pip install 'distributed>=2025.1,<2027'", WRONG_INPUT)
 
 
 def _load(payloads: tuple[float, float] | None, slope: float | None, before: Load | None = None) -> Load:
@@ -142,7 +167,7 @@ class _Qualify:
         self._payloads, self._slope = payloads, slope
         self._tally, self._load = Tally(), _load(payloads, slope)
 
-    def run(self, workers: int, *, resume: bool) -> NoReturn:
+    def run(self, new_crew: Callable[[], AnyCrew], *, resume: bool) -> NoReturn:
         """To the end of the command."""
         from canbase_qualification.crew import CrewError
         from canbase_qualification.folder import FolderError
@@ -153,7 +178,7 @@ class _Qualify:
         try:
             job, about = self._prepared(resume=resume)
             with ResultsFile(self._folder) as results:
-                self._carry_out(job, about, results, workers)
+                self._carry_out(job, about, results, new_crew)
         except (FolderError, ResultsError) as error:
             fail(str(error), WRONG_INPUT)
         except (CrewError, WorkError, WorkerDiedError, OSError) as error:
@@ -203,11 +228,10 @@ class _Qualify:
         except WorkError as error:
             _unfit(self._loaded, RuntimeError(f"in simulation its drives get no power: {str(error).splitlines()[-1]}"))
 
-    def _carry_out(self, job: Job, about: About, results: ResultsFile, workers: int) -> None:
+    def _carry_out(self, job: Job, about: About, results: ResultsFile, new_crew: Callable[[], AnyCrew]) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-        from canbase_qualification.crew import LocalCrew
         from canbase_qualification.qualification import carry_out, missing
 
         self._tally.add(results.before)
@@ -215,7 +239,7 @@ class _Qualify:
         _say_before(about)
         columns = (BarColumn(), MofNCompleteColumn(), TextColumn("runs"), TimeRemainingColumn())
         with (
-            LocalCrew(workers) as crew,
+            new_crew() as crew,
             Progress(*columns, TextColumn("{task.fields[found]}"), console=Console(stderr=True)) as bar,
         ):
             done = len(results.done)
