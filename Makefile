@@ -134,7 +134,7 @@ pictures: $(VENV)/ready ## the pictures of docs/web.md and docs/explain.md, from
 	for picture in $$(grep -ho '\(web\|explain\)_[a-z_]*\.png' docs/web.md docs/explain.md); do cp build/pictures/$$picture docs/pictures; done
 
 .PHONY: hazards
-hazards: $(VENV)/ready ## checks docs/hazards.yaml and writes the tables of docs/safety.md
+hazards: $(VENV)/ready ## checks hazards.yaml and writes the tables of docs/safety.md
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m hazards
 
 .PHONY: structure

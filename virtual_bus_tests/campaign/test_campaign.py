@@ -16,7 +16,7 @@ from canbase_campaign.faults import FAULTS
 from canbase_campaign.plan import MOST_FAULTS, draw_plan
 from canbase_campaign.runner import run
 from canbase_campaign.scenario import Result, Start
-from hazards.catalogue import load
+from canbase_hazards.catalogue import load
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(1800)]
 SCENARIOS = 24
@@ -52,7 +52,7 @@ def test_every_row_of_the_teeth_names_safeguards_and_faults_that_exist() -> None
     assert {name for need in NEEDS for name in need.taken_out.split("+")} <= set(SAFEGUARDS)
     assert {fault for need in NEEDS for fault in need.faults} <= set(FAULTS)
     named = {name for row in load().rows for name in row.safeguard.split("+") if name}
-    assert named <= {need.safeguard for need in NEEDS}, "each safeguard of docs/hazards.yaml"
+    assert named <= {need.safeguard for need in NEEDS}, "each safeguard of hazards.yaml"
     assert sorted(need.safeguard for need in NEEDS) == sorted(SAFEGUARDS), "one row each"
 
 

@@ -1,1 +1,1 @@
-"""docs/hazards.yaml: what fails, what must hold, which component holds it, and the tests that prove it."""
+"""The page docs/safety.md of the catalogue of hazards, and whether the tests that it names exist and run."""

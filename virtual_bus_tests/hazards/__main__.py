@@ -1,11 +1,12 @@
-"""`make hazards`: checks docs/hazards.yaml and writes the tables of docs/safety.md."""
+"""`make hazards`: checks hazards.yaml and writes the tables of docs/safety.md."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 
-from hazards import catalogue, page, proofs
+from canbase_hazards import catalogue
+from hazards import page, proofs
 from support.marked_page import rewritten
 
 

@@ -1,4 +1,4 @@
-"""The tables of docs/safety.md, made of docs/hazards.yaml. What stands around them is written by hand."""
+"""The tables of docs/safety.md, made of canbase_hazards/hazards.yaml. What stands around them is written by hand."""
 
 from __future__ import annotations
 
@@ -6,20 +6,14 @@ from collections.abc import Iterator
 
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
-from hazards.catalogue import ROOT, Braking, Catalogue, Hazard, Part, Row
-from hazards.formula import evaluate
+from canbase_hazards.catalogue import Braking, Catalogue, Hazard, Part, Row
+from canbase_hazards.formula import evaluate
+from canbase_hazards.promise import worst_distance_m
+from hazards.proofs import ROOT
 
 PAGE = ROOT / "docs" / "safety.md"
 COMMAND = "make hazards"
 SAMPLE = "bench"
-HEADINGS = {
-    Part.PROCESS: "A process",
-    Part.BUS_AND_DRIVES: "Bus and drives",
-    Part.COMPUTER: "The computer",
-    Part.ROS: "ROS",
-    Part.OPERATOR: "Operators",
-    Part.ACCESS: "Access",
-}
 BRAKES = {
     Braking.RAMP: "driver's ramp",
     Braking.QUICK_STOP: "quick stop",
@@ -41,25 +35,10 @@ def tables(catalogue: Catalogue, robot: Robot) -> str:
     return "\n\n".join([*(part for part in parts if part), _gaps(catalogue)])
 
 
-def worst_distance_m(row: Row, robot: Robot) -> float | None:
-    """From the failure at limits.linear_mps until standstill [m]; None where no formula holds."""
-    if row.distance_m:
-        return evaluate(row.distance_m, robot)
-    limits = robot.limits
-    rate = {
-        Braking.RAMP: limits.deceleration_mps2,
-        Braking.QUICK_STOP: limits.emergency_deceleration_mps2,
-    }.get(row.braking)
-    if rate is None or not row.within_s:
-        return None
-    speed_mps = limits.linear_mps
-    return float(speed_mps * evaluate(row.within_s, robot) + speed_mps**2 / (2.0 * rate))
-
-
 def _table(part: Part, rows: list[Row], robot: Robot) -> str:
     if not rows:
         return ""
-    return "\n".join([f"## {HEADINGS[part]}", "", HEAD, *(_line(row, robot) for row in rows)])
+    return "\n".join([f"## {part.heading}", "", HEAD, *(_line(row, robot) for row in rows)])
 
 
 def _line(row: Row, robot: Robot) -> str:

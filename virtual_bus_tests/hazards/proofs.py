@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import ast
 from functools import cache
+from pathlib import Path
 
+from canbase_hazards.catalogue import Catalogue
 from exit_matrix.failures import ROWS
 from exit_matrix.page_table import NOTHING
 from exit_matrix.stop_table import COMMANDS, REAL_RUN, TABLE
-from hazards.catalogue import ROOT, Catalogue
 from support.marked_page import section
 from vm.guest.main import ALL
 
+ROOT = Path(__file__).resolve().parents[2]
 TESTS = ROOT / "virtual_bus_tests"
 MATRIX, VIRTUAL_ROBOT = "matrix: ", "virtual robot: "
 STOP_TIMES = ROOT / "docs" / "stop_times.md"

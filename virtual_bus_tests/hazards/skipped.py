@@ -1,4 +1,4 @@
-"""Hook of pytest: a test that a row of docs/hazards.yaml names proves nothing when it is skipped, so that fails it."""
+"""Hook of pytest: a test that a row of hazards.yaml names proves nothing when it is skipped, so that fails it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from functools import cache
 
 import pytest
 
-from hazards import catalogue, proofs
+from canbase_hazards import catalogue
+from hazards import proofs
 
 
 @cache
@@ -23,5 +24,5 @@ def pytest_runtest_makereport(
     report = yield
     if report.skipped and proofs.is_proof(item.nodeid, _names()):
         report.outcome = "failed"
-        report.longrepr = f"{item.nodeid} proves a row of docs/hazards.yaml and was skipped: {report.longrepr}"
+        report.longrepr = f"{item.nodeid} proves a row of hazards.yaml and was skipped: {report.longrepr}"
     return report

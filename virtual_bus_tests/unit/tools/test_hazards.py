@@ -1,4 +1,4 @@
-"""docs/hazards.yaml: tests that exist, formulas that robot.yaml can answer, and a page that is up to date."""
+"""hazards.yaml: tests that exist, formulas that robot.yaml can answer, and a page that is up to date."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import pytest
 from pydantic import ValidationError
 
 from campaign.removed_safeguards import SAFEGUARDS
+from canbase_hazards.catalogue import Braking, Catalogue, Row, load
+from canbase_hazards.formula import FormulaError, evaluate
+from canbase_hazards.promise import worst_distance_m
 from hazards import page, proofs
-from hazards.catalogue import Braking, Catalogue, Row, load
-from hazards.formula import FormulaError, evaluate
 from support.marked_page import rewritten
 
 CATALOGUE = load()
@@ -40,9 +41,9 @@ def test_the_page_is_up_to_date() -> None:
 def test_the_distance_is_the_way_until_it_acts_and_braking() -> None:
     row = CATALOGUE.rows[1].model_copy(update={"within_s": "0.3", "braking": Braking.QUICK_STOP, "distance_m": ""})
     speed, rate = ROBOT.limits.linear_mps, ROBOT.limits.emergency_deceleration_mps2
-    assert page.worst_distance_m(row, ROBOT) == pytest.approx(speed * 0.3 + speed**2 / (2.0 * rate))
-    assert page.worst_distance_m(row.model_copy(update={"braking": Braking.COAST}), ROBOT) is None
-    assert page.worst_distance_m(row.model_copy(update={"distance_m": "0.25 * 2"}), ROBOT) == 0.5
+    assert worst_distance_m(row, ROBOT) == pytest.approx(speed * 0.3 + speed**2 / (2.0 * rate))
+    assert worst_distance_m(row.model_copy(update={"braking": Braking.COAST}), ROBOT) is None
+    assert worst_distance_m(row.model_copy(update={"distance_m": "0.25 * 2"}), ROBOT) == 0.5
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""docs/hazards.yaml as validated rows. The form is that of STPA: unsafe control action, hazard, constraint, layer."""
+"""hazards.yaml as validated rows. The form is that of STPA: unsafe control action, hazard, constraint, layer."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from ruamel.yaml import YAML
 
-ROOT = Path(__file__).resolve().parents[2]
-FILE = ROOT / "docs" / "hazards.yaml"
+FILE = Path(__file__).with_name("hazards.yaml")
+"""The catalogue that canbase is installed with."""
 
 Sentence = Annotated[str, Field(min_length=3)]
 
 
 class Part(Enum):
-    """What fails; one table of docs/safety.md each. The value is its heading."""
+    """What fails; one table of docs/safety.md each."""
 
     PROCESS = "process"
     BUS_AND_DRIVES = "bus_and_drives"
@@ -24,6 +24,21 @@ class Part(Enum):
     ROS = "ros"
     OPERATOR = "operator"
     ACCESS = "access"
+
+    @property
+    def heading(self) -> str:
+        """Of its table."""
+        return _HEADINGS[self]
+
+
+_HEADINGS = {
+    Part.PROCESS: "A process",
+    Part.BUS_AND_DRIVES: "Bus and drives",
+    Part.COMPUTER: "The computer",
+    Part.ROS: "ROS",
+    Part.OPERATOR: "Operators",
+    Part.ACCESS: "Access",
+}
 
 
 class Hazard(Enum):
