@@ -6,6 +6,8 @@ import pytest
 from pydantic import ValidationError
 
 from campaign.removed_safeguards import SAFEGUARDS
+from canbase_campaign.faults import FAULTS
+from canbase_campaign.twins import TWINS
 from canbase_hazards.catalogue import Braking, Catalogue, Row, load
 from canbase_hazards.formula import FormulaError, evaluate
 from canbase_hazards.promise import worst_distance_m
@@ -14,6 +16,11 @@ from support.marked_page import rewritten
 
 CATALOGUE = load()
 ROBOT = page.sample_robot()
+WITHOUT_A_ROW = {
+    "drive_sto", "frame_duplication", "lease_garbage", "orders_shuffled", "orders_twice", "resets_too_early",
+    "status_lost", "two_hands",
+}  # fmt: skip
+"""Faults of the campaign that are no failure of a part, or that the catalogue does not have."""
 
 
 @pytest.mark.parametrize("row", CATALOGUE.rows, ids=lambda row: row.id)
@@ -31,6 +38,18 @@ def test_each_time_and_distance_follows_from_robot_yaml(row: Row) -> None:
 @pytest.mark.parametrize("row", [row for row in CATALOGUE.rows if row.safeguard], ids=lambda row: row.id)
 def test_each_safeguard_can_be_taken_out(row: Row) -> None:
     assert [name for name in row.safeguard.split("+") if name not in SAFEGUARDS] == []
+
+
+@pytest.mark.parametrize("row", [row for row in CATALOGUE.rows if row.faults], ids=lambda row: row.id)
+def test_each_failure_of_a_row_is_one_of_the_campaign(row: Row) -> None:
+    known = FAULTS.keys() | {": ".join(twin.key) for twin in TWINS}
+    assert [name for name in row.faults if name not in known] == []
+    assert len(set(row.faults)) == len(row.faults)
+
+
+def test_failures_of_the_campaign_without_a_row_are_known() -> None:
+    named = {name for row in CATALOGUE.rows for name in row.faults}
+    assert FAULTS.keys() - named == WITHOUT_A_ROW
 
 
 def test_the_page_is_up_to_date() -> None:
