@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
 
 import typer
 
+from canbase_cli.qualify_report import write, write_and_exit
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config
 
 if TYPE_CHECKING:
@@ -31,7 +32,8 @@ BROKEN_OFF: Final = 128 + signal.SIGINT
 EPILOG: Final = (
     "Examples:  \ncanbase qualify robot.yaml  \n"
     "canbase qualify robot.yaml --scenarios 10000 --payload 1..3 --slope 0.05  \n"
-    "canbase qualify robot.yaml --resume  \ncanbase qualify robot.yaml --scenario 637"
+    "canbase qualify robot.yaml --resume  \ncanbase qualify robot.yaml --scenario 637  \n"
+    "canbase qualify robot.yaml --report"
 )
 LEAST, MOST = 0.1, 20.0
 """Of a payload."""
@@ -74,6 +76,9 @@ def qualify(
         Path | None, typer.Option(metavar="FOLDER", help="For the results.", show_default="qualification_NAME")
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the results in the folder.")] = False,
+    report: Annotated[
+        bool, typer.Option("--report", help="Run nothing: make the report of the results in the folder again.")
+    ] = False,
     scenario: Annotated[int | None, typer.Option(min=0, metavar="SEED", help="Tell this scenario as a log.")] = None,
     stop: Annotated[int | None, typer.Option(min=0, metavar="SEED", help="Tell this stop as a log.")] = None,
     frames: Annotated[bool, typer.Option("--frames", help="In a log: every frame on the bus as well.")] = False,
@@ -84,8 +89,10 @@ def qualify(
     action server run on simulated drives. The body (mass, friction, force of the motors) is drawn. What is assumed and
     what cannot be judged is printed. It needs no robot and sends nothing. This is simulation, no certificate.
 
-    Exit codes: 0 every property held, 1 a violation, or it did not work out, 2 wrong command line or robot.yaml, 130
-    after Ctrl-C: what is done stays, and --resume goes on.
+    At its end there is a report in the folder: report.html opens offline, report.md and report.json have the same.
+
+    Exit codes: 0 every property held (with --report: and everything was run), 1 a violation, or it did not work out, 2
+    wrong command line or robot.yaml, 130 after Ctrl-C: what is done stays, and --resume goes on.
     """
     payloads = None if payload is None else payload_range(payload)
     loaded = load_config(config, quiet=True)
@@ -94,6 +101,8 @@ def qualify(
     given = {"scenarios": scenarios, "stops": stops, "drives": drives, "first": seed}
     amount = {name: value for name, value in given.items() if value is not None}
     folder = out or Path(f"qualification_{loaded.robot.name}")
+    if report:
+        write_and_exit(folder, loaded)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     if scheduler is not None and workers is not None:
         raise typer.BadParameter("the workers of a cluster are started there: dask worker", param_hint="--workers")
@@ -188,6 +197,7 @@ class _Qualify:
             typer.echo(f"canbase: broken off, nothing of it is lost: {again}", err=True)
             raise typer.Exit(BROKEN_OFF) from None
         self._end()
+        write(self._folder, self._loaded)
         raise typer.Exit(FAILED if self._tally.violations else 0)
 
     def _prepared(self, *, resume: bool) -> tuple[Job, About]:

@@ -1,0 +1,63 @@
+"""The page of a qualification in a real browser, from a file and without a network; and its picture for the docs."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from canbase_qualification.report_page import page
+from canbase_qualification.report_sections import sections
+from support.browser import NEEDS_CHROMIUM, browser
+from support.made_results import made, passed
+
+pytestmark = [pytest.mark.bus, pytest.mark.timeout(120), NEEDS_CHROMIUM]
+PICTURES: Final = os.environ.get("CANBASE_PICTURES")
+
+
+def opened(player: Any, file: Path, *, width: int, height: int, dark: bool) -> tuple[Any, list[str]]:
+    """Offline; and all that the browser complains about or asks a network for."""
+    context = player.new_context(
+        viewport={"width": width, "height": height}, color_scheme="dark" if dark else "light", offline=True
+    )
+    shown, complaints = context.new_page(), []
+    shown.on("console", lambda message: complaints.append(message.text))
+    shown.on("pageerror", lambda error: complaints.append(str(error)))
+    shown.on("request", lambda request: complaints.append(request.url) if not request.url.startswith("file:") else None)
+    shown.goto(file.as_uri())
+    shown.wait_for_selector("#curve .scatterlayer .trace")
+    return shown, complaints
+
+
+def ticks(shown: Any) -> str:
+    """The last number of the axis of the overview, with its unit."""
+    return str(shown.locator("#overview .xtick").last.text_content())
+
+
+@pytest.mark.parametrize(("width", "height", "dark"), [(1100, 1000, False), (420, 900, True)])
+def test_plots_choices_and_tables(width: int, height: int, dark: bool, tmp_path: Path) -> None:
+    report = made(passed())
+    file = tmp_path / "report.html"
+    file.write_text(page("canbase qualify: bench", report, sections(report)), encoding="utf-8")
+    with browser() as player:
+        shown, complaints = opened(player, file, width=width, height=height, dark=dark)
+        assert shown.evaluate("document.documentElement.scrollWidth") <= width
+        assert shown.locator(".verdict").inner_text().startswith("No violation in 1,135 stops")
+        assert shown.locator("#overview .scatterlayer .trace").count() == 5
+        assert "estop pressed" in shown.locator("#overview").text_content()
+        assert ticks(shown).endswith("m")
+        shown.keyboard.press("Tab")  # the first link of the contents
+        assert shown.evaluate("document.activeElement.getAttribute('href')") == "#distance"
+        shown.get_by_label("distance", exact=True).focus()
+        shown.keyboard.press("ArrowRight")
+        assert ticks(shown).endswith("s")
+        shown.locator("#which").select_option("estop pressed")
+        assert "estop pressed, 100 runs" in shown.locator("#curve").text_content()
+        rows = shown.locator("#stops tbody tr")
+        assert rows.count() == 5
+        assert [text for text in complaints if not text.startswith(("data:", "blob:"))] == []
+        if PICTURES and not dark:
+            shown.evaluate("scrollTo(0, 0)")
+            shown.screenshot(path=str(Path(PICTURES) / "qualify_report.png"))
