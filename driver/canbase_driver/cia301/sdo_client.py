@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
+from canbase_config.object_map import AXIS_OFFSET, CONTROLWORD, POSITION_ACTUAL, STATUSWORD, VELOCITY_ACTUAL
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import MAX_NODE_ID, SDO_TO_CLIENT, SDO_TO_SERVER
 
@@ -22,6 +23,13 @@ OUT_OF_MEMORY, ACCESS_UNSUPPORTED, WRITE_ONLY, READ_ONLY = 0x0504_0005, 0x0601_0
 NO_OBJECT, NO_SUB_INDEX, LENGTH_WRONG, DEVICE_STATE = 0x0602_0000, 0x0609_0011, 0x0607_0010, 0x0800_0022
 TOO_LONG, TOO_SHORT = 0x0607_0012, 0x0607_0013
 VALUE_INVALID, VALUE_TOO_HIGH, VALUE_TOO_LOW = 0x0609_0030, 0x0609_0031, 0x0609_0032
+
+_OF_THE_WATCHDOG = frozenset(
+    index + axis * AXIS_OFFSET
+    for index in (CONTROLWORD, STATUSWORD, POSITION_ACTUAL, VELOCITY_ACTUAL)
+    for axis in (0, 1)
+)
+"""It requests them as well while it stops a drive: their second answer may be its own."""
 
 ABORT_TEXTS = {
     TOGGLE_BIT_WRONG: "toggle bit not alternated",
@@ -145,7 +153,7 @@ class SdoClient:
 
     `start` gives the first frame, `on_frame` and `tick` give those that follow; when `busy` ends, `answer()` has it.
     `dropped` counts the frames of this channel that did not belong to the transfer, `duplicates` those among them that
-    answer the request before it once more, though that one was sent once.
+    answer the request before it once more, though that one was sent once, and the watchdog requests no such object.
     """
 
     def __init__(self, node_id: int, timeout_s: float, attempts: int) -> None:
@@ -278,8 +286,8 @@ class SdoClient:
 
     def _finish(self, answer: bytes | SdoError) -> list[Frame]:
         transfer, self._transfer = self._transfer, None
-        asked_once = transfer is not None and transfer.attempts_left == self._attempts - 1
-        self._answered = _address(transfer.step) if transfer is not None and asked_once else None
+        step = transfer.step if transfer is not None and transfer.attempts_left == self._attempts - 1 else None
+        self._answered = _address(step) if step is not None and step.index not in _OF_THE_WATCHDOG else None
         self._answer = answer
         return []
 

@@ -57,6 +57,15 @@ def test_it_leaves_the_sdo_channel_to_a_driver_that_is_there() -> None:
     assert asked == []
 
 
+def test_a_boot_beside_the_stop_of_the_watchdog_succeeds_at_once() -> None:
+    """Both stop the drives by SDO. Their requests for one object once looked like two drives with one node id."""
+    world = World(keeps=True)
+    world.drive(FORWARD, 0.4)
+    world.reboot(0.2)
+    assert world.truth.linear_mps > 0.2
+    assert world.run(0.6, lambda: world.core._drives.are_ready)
+
+
 def test_a_drive_that_is_known_to_be_off_is_looked_at_now_and_then() -> None:
     """Each 0.5 s three readings, and no writing: a wheel may be pushed."""
     world = lost_its_computer("generic")

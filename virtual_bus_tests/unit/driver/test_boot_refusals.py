@@ -234,6 +234,20 @@ def test_two_drives_with_one_node_id_are_named() -> None:
     assert text.startswith("node 1: each request is answered twice: two devices on the bus have this node id.")
 
 
+def test_a_watchdog_that_stops_the_drive_meanwhile_is_no_second_drive() -> None:
+    """It writes 6040h and reads 6041h, 6064h and 606Ch of a drive with power, just as the boot does."""
+
+    class Watched(FakeDrive):
+        def on_frame(self, frame: Frame) -> list[Frame]:
+            index = int.from_bytes(frame.data[1:3], "little")
+            return super().on_frame(frame) * (2 if index in (0x6040, 0x6041, 0x6064, 0x606C) else 1)
+
+    drive = Watched()
+    drive.objects[0x6041, 0] = u16(0x0237)
+    boot = Bench(drive, fake_robot()).run(10.0)
+    assert boot.error is None
+
+
 def test_an_answer_that_comes_late_and_then_again_names_no_second_drive() -> None:
     """The first request of each transfer is lost, so that two were sent, and both are answered in the end."""
 
