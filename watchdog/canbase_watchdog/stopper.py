@@ -212,12 +212,11 @@ class Stopper:
         One that is NMT operational was started by a driver, and has told nothing for as long as SYNCs would take: it
         may have power, and nobody needs its SDO channel. Any other one may be booted within a heartbeat's time.
         """
-        if not self._is_untold(self._axes(view)):
-            return False
         node, config = view.node(self._node_id), self._config
-        if node.operational and now_s >= node.configured_at + config.drive_heartbeat_s:
-            return now_s >= self._resting_since + config.feedback_timeout_s
-        return now_s >= max(self._resting_since, node.configured_at) + config.drive_heartbeat_s
+        booted_s = config.drive_heartbeat_s
+        wait_s = min(config.feedback_timeout_s, booted_s) if node.operational else booted_s
+        is_due = now_s >= self._resting_since + wait_s and now_s >= node.configured_at + booted_s
+        return is_due and self._is_untold(self._axes(view))
 
     def _is_old(self, view: View, now_s: float) -> bool:
         """It sent feedback once, and not recently; and no other client needs its SDO channel."""

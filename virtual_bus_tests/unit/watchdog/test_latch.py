@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from canbase_watchdog import frames
@@ -106,6 +108,13 @@ def test_a_drive_that_may_be_booted_soon_is_read_after_its_heartbeat_time(nmt: i
     assert times[0] == pytest.approx(read_from_s, abs=0.006)
 
 
+def test_a_patience_for_feedback_beyond_the_heartbeat_time_delays_no_reading() -> None:
+    story = abandoned(FakeDrive(1), feedback_timeout_s=0.5)
+    story.run(1.0)
+    times = [at_s for at_s, _ in story.since(0.0, 0x601)]
+    assert times[0] == pytest.approx(0.3, abs=0.006)
+
+
 # 0 s start ── 0.05 s a client reads its identity, and the drive still reports operational ── 0.35 s read
 def test_a_drive_that_is_configured_is_read_after_its_heartbeat_time_although_it_is_operational() -> None:
     story = abandoned(FakeDrive(1))
@@ -116,9 +125,13 @@ def test_a_drive_that_is_configured_is_read_after_its_heartbeat_time_although_it
     assert times[0] == pytest.approx(0.35, abs=0.006)
 
 
-def abandoned(drive: FakeDrive) -> Story:
-    """A watchdog that starts with a latched record beside a drive that has power and turns; driver and filter died."""
+def abandoned(drive: FakeDrive, **changes: float) -> Story:
+    """A watchdog that starts with a latched record beside a drive that has power and turns; driver and filter died.
+
+    `changes`: of its configuration.
+    """
     story = resumed(Past(problem="/x: damaged"), drive, FakeDrive(2, mute=True))
+    story.watchdog = Watchdog(replace(story.config, **changes), 0.0, Past(problem="/x: damaged"))
     story.driver = story.heartbeat = story.sync = story.filter = False
     drive.words[0], drive.target[0], drive.speed[0] = ENABLED, 300, 300.0
     return story
