@@ -11,6 +11,10 @@ from canbase_config.section import MisfitError, Name, NodeName, Section, Topic
 
 OUTPUTS: Final = ("cmd_vel_mux", "cmd_vel")
 """Topics that the chain itself publishes: with such a source the robot would follow its own last command for ever."""
+MEASURED: Final = "joint_states"
+"""Topic of the measured wheel speeds: with this source the robot would follow its own motion for ever."""
+JOINTS: Final = "joint_command"
+"""The type of a source that orders the speed of each wheel."""
 
 
 NEUTRAL_AFTER_S: Final = 2.0
@@ -25,6 +29,10 @@ class MuxSource(Section):
     topic: Annotated[Topic, Field(description="relative to the node's namespace")]
     priority: Annotated[int, Field(ge=0, le=255, description="the highest fresh source is active; each value once")]
     timeout_s: Annotated[float, Field(ge=0.05, le=2.0, description="without a message for longer: not active [s]")]
+    type: Annotated[
+        Literal["twist", "joint_command"],
+        Field(description="twist: velocities of the base; joint_command: JointState, wheel speeds of ros2_control"),
+    ] = "twist"
     stamped: Annotated[bool, Field(description="true: TwistStamped, false: Twist")] = True
     nodes: Annotated[
         tuple[NodeName, ...],
@@ -41,6 +49,23 @@ class MuxSource(Section):
     same_clock: Annotated[
         bool, Field(description="true: its stamps use this computer's clock, so their age is the delay")
     ] = False
+
+    @property
+    def message_type(self) -> str:
+        """The ROS type of its messages."""
+        if self.type == JOINTS:
+            return "sensor_msgs/msg/JointState"
+        return "geometry_msgs/msg/TwistStamped" if self.stamped else "geometry_msgs/msg/Twist"
+
+    @model_validator(mode="after")
+    def _joint_commands(self) -> MuxSource:
+        """Hardware of ros2_control publishes zero while nothing is ordered: a zero can be waited for."""
+        if self.type == JOINTS and not self.stamped:
+            raise MisfitError("a JointState always has a header; leave stamped out", ("stamped",))
+        if self.type == JOINTS and self.neutral_after_s is not None:
+            message = f"a {JOINTS} publishes zero while nothing is ordered; only that may arm it: leave it out"
+            raise MisfitError(message, ("neutral_after_s",))
+        return self
 
 
 class MuxLock(Section):
@@ -95,7 +120,7 @@ class Mux(Section):
             return sources
         return {
             name: {"neutral_after_s": NEUTRAL_AFTER_S, **source}
-            if name in PROGRAMS and isinstance(source, dict)
+            if name in PROGRAMS and isinstance(source, dict) and source.get("type") != JOINTS
             else source
             for name, source in sources.items()
         }
@@ -105,7 +130,7 @@ class Mux(Section):
         for what in ("priority", "topic"):
             self._no_two_alike(what)
         for name, source in self.sources.items():
-            if source.topic.removeprefix("/") in OUTPUTS:
+            if source.topic.removeprefix("/") in (*OUTPUTS, MEASURED):
                 message = f"{source.topic} is an output of this robot; a source needs another topic"
                 raise MisfitError(message, ("sources", name, "topic"))
         for name, lock in self.locks.items():

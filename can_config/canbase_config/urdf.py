@@ -1,4 +1,4 @@
-"""The robot of a robot.yaml as a URDF: base, wheels, scanners. Pure.
+"""The robot of a robot.yaml as a URDF: base, wheels, scanners, and ros2_control where it is a source. Pure.
 
 The frames are those of `odom`, `joint_states` and the scans. robot.yaml has no heights, and no place of a wheel along
 the base: they are chosen so that the picture looks right, and nothing else depends on them. Source of the format:
@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 
 from canbase_config.drive import Drive
 from canbase_config.robot import Robot
+from canbase_config.ros2_control import joint_source, ros2_control_tag
 from canbase_config.safety import Footprint, Scan
 
 WHEEL_WIDTH = 0.4
@@ -32,7 +33,7 @@ def urdf(robot: Robot) -> str:
     """The XML text of the robot; `robot.base.base_frame` is its root, on the floor between the wheels.
 
     A scanner whose pose comes from tf has its own frame there and is left out. Units: m, rad. Raises ValueError when
-    two links would have one name.
+    two links would have one name, and for several sources of type joint_command.
     """
     radius_m = robot.base.wheel_radius_m
     root = ElementTree.Element("robot", name=robot.name)
@@ -48,6 +49,9 @@ def urdf(robot: Robot) -> str:
     for scan in robot.safety.scans:
         if scan.pose == "config":
             _scanner(root, robot.base.base_frame, scan, (0.5 + BODY_HEIGHT) * radius_m)
+    source = joint_source(robot)
+    if source is not None:
+        root.append(ros2_control_tag(robot, source))
     _refuse_twins([link.get("name", "") for link in root.iter("link")])
     ElementTree.indent(root)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"

@@ -16,7 +16,12 @@ CLOCKS_APART_S = 1.0
 """A stamp that is farther from this computer's clock was made with another one."""
 BUSY_S = 10.0
 """Older stamps than that no busy computer explains."""
-TWIST = {True: "geometry_msgs/msg/TwistStamped", False: "geometry_msgs/msg/Twist"}
+FITTING_KEYS = {
+    "geometry_msgs/msg/TwistStamped": "stamped: true",
+    "geometry_msgs/msg/Twist": "stamped: false",
+    "sensor_msgs/msg/JointState": "type: joint_command",
+}
+"""The key of a source that is published with this type."""
 
 
 def zeros_are_ordered(seen: Evidence) -> Check:
@@ -117,15 +122,11 @@ def command_interface(seen: Evidence) -> Check:
     name = "command interface"
     for source, described in seen.robot.mux.sources.items():
         for endpoint in seen.publishers.get(described.topic, ()):
-            if endpoint.type != TWIST[described.stamped]:
-                found = (
-                    f"{endpoint.node} sends {endpoint.type} on {described.topic}, expected {TWIST[described.stamped]}"
-                )
-                return fail(
-                    name,
-                    found,
-                    f"mux.sources.{source}.stamped: {str(not described.stamped).lower()}, or let it send stamped ones",
-                )
+            if endpoint.type != described.message_type:
+                found = f"{endpoint.node} sends {endpoint.type} on {described.topic}, expected {described.message_type}"
+                key = FITTING_KEYS.get(endpoint.type)
+                cure = f"set mux.sources.{source}.{key}, or " if key else ""
+                return fail(name, found, f"{cure}let it send {described.message_type}")
     if not seen.subscribers.get("cmd_vel"):
         return fail(name, "no subscriber on cmd_vel", "start canbase driver, in the same namespace")
     return ok(name, f"{len(seen.robot.mux.sources)} sources with the right type; the driver listens")

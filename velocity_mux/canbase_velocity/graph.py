@@ -7,13 +7,11 @@ from typing import Final
 
 from rclpy.node import Node
 
-from canbase_config.mux import MuxSource
 from canbase_config.robot import Robot
 from canbase_runtime.foreign_text import printable
 from canbase_velocity.unexpected_publishers import Expected, Publisher
 
 STAMPED: Final = "geometry_msgs/msg/TwistStamped"
-PLAIN: Final = "geometry_msgs/msg/Twist"
 SCAN_KIND: Final = "sensor_msgs/msg/LaserScan"
 BUTTON_KIND: Final = "std_msgs/msg/Bool"
 OWNERS: Final = {"cmd_vel_mux": "velocity_mux", "cmd_vel": "safety_filter"}
@@ -30,7 +28,7 @@ def expected(robot: Robot, node: Node) -> tuple[Expected, ...]:
 def heard(robot: Robot) -> dict[str, str]:
     """The topics of sources and locks as robot.yaml has them, each with its message type."""
     locks = {lock.topic: BUTTON_KIND for lock in robot.mux.locks.values()}
-    return {source.topic: kind_of(source) for source in robot.mux.sources.values()} | locks
+    return {source.topic: source.message_type for source in robot.mux.sources.values()} | locks
 
 
 def publishers(node: Node, topic: str) -> list[Publisher]:
@@ -53,7 +51,7 @@ def full_name(name: str, namespace: str) -> str:
 def _of_sources(robot: Robot, node: Node) -> Iterator[Expected]:
     for name, source in robot.mux.sources.items():
         nodes = tuple(full_name(allowed, node.get_namespace()) for allowed in source.nodes)
-        yield Expected(node.resolve_topic_name(source.topic), kind_of(source), name, nodes)
+        yield Expected(node.resolve_topic_name(source.topic), source.message_type, name, nodes)
 
 
 def _of_chain(node: Node) -> Iterator[Expected]:
@@ -61,8 +59,3 @@ def _of_chain(node: Node) -> Iterator[Expected]:
         nodes = (full_name(owner, node.get_namespace()),)
         shown = topic == SHOWN
         yield Expected(node.resolve_topic_name(topic), STAMPED, None, nodes, alone=True, shown=shown)
-
-
-def kind_of(source: MuxSource) -> str:
-    """The message type of a source."""
-    return STAMPED if source.stamped else PLAIN

@@ -94,6 +94,7 @@ class MuxDecision:
         return self.active, sources, tuple(lock.holds for lock in self.locks), self.foreign, self.not_ready
 
 
+NOT_FINITE = "NaN or infinity"
 LATE_S = 1.0
 """A source whose commands arrive late for longer needs a zero before it is followed again."""
 
@@ -108,6 +109,8 @@ class _Source:
         self.at_s: float | None = None
         self.received = 0
         self.refused = 0
+        self.refusal = ""
+        """Why its newest message was refused, for people; empty: it was not."""
         self.arming = Arming(config.neutral_after_s)
         self.delay_s: float | None = None
         self.crowd = ""
@@ -119,6 +122,7 @@ class _Source:
     def take(self, twist: Twist, received: float, sent: Sent | None, now_s: float) -> None:
         """A finite command."""
         self.received += 1
+        self.refusal = ""
         self.twist, self.at_s = twist, received
         self.delay_s = None if sent is None else self._delay.take(sent)
         if sent is not None and self._delay.set_back:
@@ -222,11 +226,18 @@ class Mux:
         source = self._sources[name]
         self._look(now_s)
         if not twist.is_finite:
-            source.refused += 1
+            self.refuse(name, NOT_FINITE)
             return False
         source.take(twist, received, sent, now_s)
         self._look(now_s)
         return True
+
+    def refuse(self, name: str, why: str) -> None:
+        """Counts a message of source `name` that orders no velocity. `why`: for people. Raises KeyError for another
+        name."""
+        source = self._sources[name]
+        source.refused += 1
+        source.refusal = why
 
     def on_driver(self, state: DriverState, cycles: int, received: float) -> None:
         """Takes a motor_driver/status: its state and its counter of cycles."""
@@ -310,13 +321,14 @@ class Mux:
 
     def _view(self, source: _Source, active: _Source | None, held: str, now_s: float) -> SourceView:
         age_s = source.age_s(now_s)
+        refusal = f"; its newest message was refused: {source.refusal}" if source.refusal else ""
         if source is active:
             return source.view(now_s, *source.standing())
         if held:
             return source.view(now_s, SourceStanding.LOCKED, held, locked=True)
         if age_s is None:
-            return source.view(now_s, SourceStanding.NEVER_RECEIVED, "never received")
+            return source.view(now_s, SourceStanding.NEVER_RECEIVED, f"never received{refusal}")
         if active is None or not source.is_fresh(now_s):
-            reason = f"no message for {age_s:.2f} s (timeout {source.config.timeout_s:.2f} s)"
+            reason = f"no message for {age_s:.2f} s (timeout {source.config.timeout_s:.2f} s){refusal}"
             return source.view(now_s, SourceStanding.SILENT, reason)
         return source.view(now_s, SourceStanding.LOWER_PRIORITY, f"{active.name} has priority")

@@ -9,7 +9,8 @@ from __future__ import annotations
 import functools
 import math
 import time
-from typing import Protocol
+from collections.abc import Callable
+from typing import Any, Protocol
 
 from canbase.msg import DriverStatus, MuxState
 from diagnostic_msgs.msg import DiagnosticArray
@@ -17,10 +18,13 @@ from geometry_msgs.msg import Twist as TwistMessage
 from geometry_msgs.msg import TwistStamped
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
+from canbase_config.mux import JOINTS, MuxSource
 from canbase_config.robot import Robot
 from canbase_runtime.driver_state import driver_state
+from canbase_runtime.joint_command import Refusal, base_velocity
 from canbase_runtime.journal import Journal, Voice
 from canbase_runtime.receive_time import ReceiveTimes
 from canbase_runtime.serialized_message import SerializedTwist
@@ -30,7 +34,7 @@ from canbase_velocity.changes import changes
 from canbase_velocity.delay import Sent
 from canbase_velocity.graph import expected, heard, publishers
 from canbase_velocity.messages import sent_at, twist_of
-from canbase_velocity.mux import Mux, MuxDecision
+from canbase_velocity.mux import NOT_FINITE, Mux, MuxDecision
 from canbase_velocity.mux_messages import diagnostics, mux_state
 from canbase_velocity.qos import ANY_COMMAND, COMMAND, DRIVER_STATUS, STATE, listen_closely, loud
 from canbase_velocity.steady import steady_timer
@@ -109,8 +113,7 @@ class MuxNode(Node):
     def _listen(self) -> None:
         self.create_subscription(DriverStatus, "motor_driver/status", self._on_driver, DRIVER_STATUS)
         for name, source in self._robot.mux.sources.items():
-            kind = TwistStamped if source.stamped else TwistMessage
-            callback = self._on_stamped if source.stamped else self._on_plain
+            kind, callback = self._reader(source)
             self.create_subscription(kind, source.topic, functools.partial(callback, name), ANY_COMMAND)
         for name, lock in self._robot.mux.locks.items():
             listen_closely(self, Bool, lock.topic, functools.partial(self._on_lock, name))
@@ -119,16 +122,35 @@ class MuxNode(Node):
                     f"lock {name} is not required (timeout 0): the mux does not detect that its publisher ended"
                 )
 
+    def _reader(self, source: MuxSource) -> tuple[type[Any], Callable[[str, Any], None]]:
+        """The messages of a source, and what takes them in."""
+        if source.type == JOINTS:
+            return JointState, self._on_joints
+        return (TwistStamped, self._on_stamped) if source.stamped else (TwistMessage, self._on_plain)
+
     def _on_stamped(self, name: str, message: TwistStamped) -> None:
         now_s = time.monotonic()
-        self._on_twist(name, message.twist, now_s, sent_at(message.header.stamp, time.time(), now_s))
+        self._on_twist(name, twist_of(message.twist), now_s, sent_at(message.header.stamp, time.time(), now_s))
 
     def _on_plain(self, name: str, message: TwistMessage) -> None:
-        self._on_twist(name, message, time.monotonic(), None)
+        self._on_twist(name, twist_of(message), time.monotonic(), None)
 
-    def _on_twist(self, name: str, message: TwistMessage, now_s: float, sent: Sent | None) -> None:
-        if not self._mux.on_command(name, twist_of(message), self._receive_times.at(now_s), now_s, sent):
-            self.get_logger().warning(f"{name} refused: NaN or infinity", throttle_duration_sec=5.0)
+    def _on_joints(self, name: str, message: JointState) -> None:
+        now_s = time.monotonic()
+        found = base_velocity(message, self._robot)
+        if isinstance(found, Refusal):
+            self._mux.refuse(name, found.why)
+            self._log_refusal(name, found.why)
+            return
+        twist = Twist(found.linear_mps, found.angular_radps)
+        self._on_twist(name, twist, now_s, sent_at(message.header.stamp, time.time(), now_s))
+
+    def _log_refusal(self, name: str, why: str) -> None:
+        self.get_logger().warning(f"{name} refused: {why}", throttle_duration_sec=5.0)
+
+    def _on_twist(self, name: str, twist: Twist, now_s: float, sent: Sent | None) -> None:
+        if not self._mux.on_command(name, twist, self._receive_times.at(now_s), now_s, sent):
+            self._log_refusal(name, NOT_FINITE)
         decision = self._decide(now_s)
         if decision.active == name or decision.active != self._decision.active:
             self._timer.reset()  # a source faster than the timer is not doubled by it

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import math
 import time
+from typing import Any
 
 import pytest
 from geometry_msgs.msg import Twist, TwistStamped
 from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
 
 from canbase_config.load import load_robot, sample
 from canbase_config.mux import MuxSource
+from canbase_config.robot import Robot
 from canbase_driver.ros.source_orders import FASTEST_HZ, SourceOrders
 from canbase_driver.runtime.black_box import EventEntry, Recording
 from support.ros_harness import TestNode
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(60)]
 
-MUX = load_robot(sample("bench")).robot.mux
+ROBOT = load_robot(sample("bench")).robot
 PERIOD_S = 0.02
 LATE_S = 0.05
 """A loaded machine receives within this."""
@@ -43,6 +47,12 @@ def publish(
     return times
 
 
+def with_source(name: str, **keys: Any) -> Robot:
+    """The bench with this source alone."""
+    source = MuxSource(priority=1, timeout_s=0.3, **keys)
+    return ROBOT.model_copy(update={"mux": ROBOT.mux.model_copy(update={"sources": {name: source}})})
+
+
 def speeds(events: list[EventEntry]) -> list[float]:
     return [values["linear_mps"] for _, _, values in events]
 
@@ -50,7 +60,7 @@ def speeds(events: list[EventEntry]) -> list[float]:
 def test_each_order_is_there_with_the_time_at_which_it_came_and_so_it_is_in_the_next_recording(
     test_node: TestNode,
 ) -> None:
-    orders = SourceOrders(test_node.node, MUX, 10.0)
+    orders = SourceOrders(test_node.node, ROBOT, 10.0)
     sent_s = publish(test_node, [0.1, 0.2, 0.3, float("nan")], "cmd_vel_joy", TwistStamped)
     events = list(orders.during(since(0.0)))
     assert [(what, values["source"]) for _, what, values in events] == [("order", "joystick")] * 4
@@ -61,17 +71,32 @@ def test_each_order_is_there_with_the_time_at_which_it_came_and_so_it_is_in_the_
 
 
 def test_a_source_without_a_header_is_heard_as_well(test_node: TestNode) -> None:
-    mux = MUX.model_copy(
-        update={"sources": {"old": MuxSource(topic="cmd_vel_old", priority=1, timeout_s=0.3, stamped=False)}}
-    )
-    orders = SourceOrders(test_node.node, mux, 2.0)
+    orders = SourceOrders(test_node.node, with_source("old", topic="cmd_vel_old", stamped=False), 2.0)
     publish(test_node, [0.25], "cmd_vel_old", Twist)
     (event,) = orders.during(since(0.0))
     assert event[2] == {"source": "old", "linear_mps": 0.25, "angular_radps": 0.0}
 
 
+def test_wheel_speeds_are_kept_as_the_velocity_of_the_base_and_what_the_mux_refuses_as_none(
+    test_node: TestNode,
+) -> None:
+    robot = with_source("control", topic="joint_command", type="joint_command")
+    orders = SourceOrders(test_node.node, robot, 2.0)
+    publisher = test_node.node.create_publisher(JointState, "joint_command", 10)
+    test_node.wait_for(lambda: publisher.get_subscription_count() == 1, 10.0, "the black box")
+    whole = JointState(name=["right_wheel", "left_wheel"], velocity=[3.0, 2.0])
+    whole.header.stamp.sec = 7
+    publisher.publish(whole)
+    publisher.publish(JointState(name=["left_wheel"], velocity=[2.0]))
+    time.sleep(LATE_S)
+    first, second = (values for _, _, values in orders.during(since(0.0)))
+    assert first == {"source": "control", "stamp_s": 7.0, "linear_mps": 0.25, "angular_radps": pytest.approx(0.2)}
+    assert math.isnan(second["linear_mps"])
+    assert math.isnan(second["angular_radps"])
+
+
 def test_what_waits_is_bounded_and_the_newest_is_kept(test_node: TestNode) -> None:
-    orders = SourceOrders(test_node.node, MUX, seconds := 2.0)
+    orders = SourceOrders(test_node.node, ROBOT, seconds := 2.0)
     depth = round(seconds * FASTEST_HZ)
     publisher = test_node.node.create_publisher(TwistStamped, "cmd_vel_joy", depth)
     test_node.wait_for(lambda: publisher.get_subscription_count() == 1, 10.0, "the black box")
@@ -87,7 +112,7 @@ def test_what_waits_is_bounded_and_the_newest_is_kept(test_node: TestNode) -> No
 
 
 def test_bytes_that_are_no_message_are_passed_over(test_node: TestNode) -> None:
-    orders = SourceOrders(test_node.node, MUX, 2.0)
+    orders = SourceOrders(test_node.node, ROBOT, 2.0)
     publisher = test_node.node.create_publisher(TwistStamped, "cmd_vel_joy", 10)
     test_node.wait_for(lambda: publisher.get_subscription_count() == 1, 10.0, "the black box")
     whole = TwistStamped()

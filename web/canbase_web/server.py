@@ -23,6 +23,7 @@ from fastapi.staticfiles import StaticFiles
 from nicegui import ui
 
 from canbase_config.load import Loaded
+from canbase_config.mux import MuxSource
 from canbase_runtime.terminal import FAILED, fail
 from canbase_web import commission_page, drive_page, explained_stop, health_page, now_page, stops_page
 from canbase_web.access import COOKIE, MOST_BODY_BYTES, Access, authority, hosts
@@ -59,7 +60,7 @@ def run(loaded: Loaded, address: Address, ros_args: list[str], namespace: str) -
     """Serves until SIGINT or SIGTERM. Exits with 1 when a part of it has failed."""
     _take_all_descriptors()
     robot = loaded.robot
-    source = SOURCE_NAME if SOURCE_NAME in robot.mux.sources else ""
+    source = SOURCE_NAME if _is_ours(robot.mux.sources.get(SOURCE_NAME)) else ""
     link = RobotLink(robot, source, ros_args)
     hold = Hold(robot.limits.linear_mps, robot.limits.angular_radps)
     socket = HoldSocket(hold, link, source)
@@ -159,6 +160,11 @@ def _end_with(server: _Server, loop: asyncio.Task[None]) -> None:
     if not loop.cancelled() and loop.exception() is not None:
         server.failure = repr(loop.exception())
         server.should_exit = True
+
+
+def _is_ours(source: MuxSource | None) -> bool:
+    """The page publishes velocities of the base, no wheel speeds."""
+    return source is not None and source.type == "twist"
 
 
 async def _drop_silent(server: uvicorn.Server) -> None:

@@ -18,9 +18,12 @@ from geometry_msgs.msg import Twist, TwistStamped
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
 
-from canbase_config.mux import Mux
+from canbase_config.mux import JOINTS, MuxSource
+from canbase_config.robot import Robot
 from canbase_driver.runtime.black_box import EventEntry, Recording
+from canbase_runtime.joint_command import BaseVelocity, base_velocity
 
 NODE = "motor_driver_black_box"
 ORDER = "order"
@@ -36,21 +39,21 @@ _UNREADABLE = (rclpy_implementation.RCLError, UnicodeDecodeError)
 class SourceOrders:
     """Hears each topic of `mux.sources` by a node of its own, in the context of `beside`."""
 
-    def __init__(self, beside: Node, mux: Mux, seconds: float) -> None:
+    def __init__(self, beside: Node, robot: Robot, seconds: float) -> None:
         """`seconds`: how far a recording goes back."""
+        self._robot = robot
         depth = min(MOST_KEPT, math.ceil(seconds * FASTEST_HZ))
         qos = QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
         self._depth = depth
         self._node = rclpy.create_node(
             NODE, context=beside.context, enable_rosout=False, start_parameter_services=False
         )
-        self._kept: dict[str, deque[EventEntry]] = {name: deque(maxlen=depth) for name in mux.sources}
+        self._kept: dict[str, deque[EventEntry]] = {name: deque(maxlen=depth) for name in robot.mux.sources}
         """What was taken for the last recording, which may overlap the next one."""
         self._subscriptions: dict[str, Any] = {}
-        for name, source in mux.sources.items():
-            kind = TwistStamped if source.stamped else Twist
+        for name, source in robot.mux.sources.items():
             try:
-                self._subscriptions[name] = self._node.create_subscription(kind, source.topic, _unused, qos)
+                self._subscriptions[name] = self._node.create_subscription(_kind(source), source.topic, _unused, qos)
             except rclpy_implementation.RCLError as error:  # SROS2 may forbid it; the driver drives all the same
                 beside.get_logger().warning(f"the black box cannot hear {source.topic} of source {name}: {error}")
 
@@ -74,18 +77,33 @@ class SourceOrders:
             if taken is None:
                 return
             message, info = taken
-            kept.append(_event(name, message, info, behind_s))
+            kept.append(_event({"source": name, **_order(message, self._robot)}, info, behind_s))
             yield kept[-1]
 
 
-def _event(name: str, message: Twist | TwistStamped, info: Mapping[str, Any], behind_s: float) -> EventEntry:
+def _kind(source: MuxSource) -> Any:
+    """The class of its messages."""
+    if source.type == JOINTS:
+        return JointState
+    return TwistStamped if source.stamped else Twist
+
+
+def _event(values: dict[str, Any], info: Mapping[str, Any], behind_s: float) -> EventEntry:
     """`behind_s`: of the monotonic clock to the wall clock [s]. Not every middleware has a receive time."""
     at_s = (info["received_timestamp"] or info["source_timestamp"]) * 1e-9 - behind_s
-    values: dict[str, Any] = {"source": name}
+    return at_s, ORDER, values
+
+
+def _order(message: Twist | TwistStamped | JointState, robot: Robot) -> dict[str, float]:
+    """What a message orders. Wheel speeds that the mux refuses are NaN, which it refuses as well."""
+    if isinstance(message, Twist):
+        return {"linear_mps": message.linear.x, "angular_radps": message.angular.z}
+    stamp_s = message.header.stamp.sec + message.header.stamp.nanosec * 1e-9
     if isinstance(message, TwistStamped):
-        values["stamp_s"] = message.header.stamp.sec + message.header.stamp.nanosec * 1e-9
-        message = message.twist
-    return at_s, ORDER, {**values, "linear_mps": message.linear.x, "angular_radps": message.angular.z}
+        return {"stamp_s": stamp_s, **_order(message.twist, robot)}
+    found = base_velocity(message, robot)
+    order = found if isinstance(found, BaseVelocity) else BaseVelocity(math.nan, math.nan)
+    return {"stamp_s": stamp_s, "linear_mps": order.linear_mps, "angular_radps": order.angular_radps}
 
 
 def _unused(message: Any) -> None:

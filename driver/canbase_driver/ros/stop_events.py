@@ -46,7 +46,7 @@ class StopEvents:
         self._robot_name = robot.name
         self._ring = ring
         self._writer = writer
-        self._orders = SourceOrders(node, robot.mux, ring.seconds)
+        self._orders = SourceOrders(node, robot, ring.seconds)
         self._estop_latches = robot.safety.estop.latched
         patience_s = given_up_s(robot) + POWER_OFF_TIMEOUT_S
         self._recorder = StopHistory(patience_s)

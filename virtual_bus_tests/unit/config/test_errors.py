@@ -143,6 +143,27 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
         },
         ":39: mux.sources.b.topic: sources a and b have the same topic; each needs its own",
     ),
+    "wheel speeds without a header": (
+        {END: "mux:\n  sources:\n    a: {topic: x, type: joint_command, priority: 1, timeout_s: 0.1, stamped: false}"},
+        ":38: mux.sources.a.stamped: a JointState always has a header; leave stamped out",
+    ),
+    "wheel speeds that need no zero": (
+        {
+            END: "mux:\n  sources:\n    a: {topic: x, type: joint_command, priority: 1, timeout_s: 0.1, "
+            "neutral_after_s: 2.0}"
+        },
+        ":38: mux.sources.a.neutral_after_s: a joint_command publishes zero while nothing is ordered; only that may "
+        "arm it: leave it out",
+    ),
+    "the measured wheel speeds as a source": (
+        {END: "mux:\n  sources:\n    a: {topic: /joint_states, type: joint_command, priority: 1, timeout_s: 0.1}"},
+        ":38: mux.sources.a.topic: /joint_states is an output of this robot; a source needs another topic",
+    ),
+    "a source of an unknown type": (
+        {END: "mux:\n  sources:\n    a: {topic: x, type: joints, priority: 1, timeout_s: 0.1}"},
+        ':38: mux.sources.a.type: got "joints", expected one of twist, joint_command (twist: velocities of '
+        "the base; joint_command: JointState, wheel speeds of ros2_control)",
+    ),
     "a source with a strange name": (
         {END: "mux:\n  sources:\n    my joystick: {topic: x, priority: 1, timeout_s: 0.1}"},
         ':38: mux.sources.my joystick: got the name "my joystick", expected letters, digits and _, first a letter, '

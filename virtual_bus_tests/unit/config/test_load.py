@@ -178,7 +178,7 @@ def test_given_sources_replace_the_default_ones(tmp_path: Path) -> None:
 
     assert list(loaded.robot.mux.sources) == ["pad"]
     assert {key_path(loc) for loc in loaded.defaults if loc[0] == "mux"} == {
-        "mux.sources.pad.stamped", "mux.sources.pad.nodes", "mux.sources.pad.neutral_after_s",
+        "mux.sources.pad.type", "mux.sources.pad.stamped", "mux.sources.pad.nodes", "mux.sources.pad.neutral_after_s",
         "mux.sources.pad.same_clock", "mux.locks", "mux.foreign_publishers", "mux.twist_mux",
     }  # fmt: skip
 
@@ -190,6 +190,7 @@ def test_given_sources_replace_the_default_ones(tmp_path: Path) -> None:
     ("navigation: {topic: a, priority: 7, timeout_s: 0.1, neutral_after_s: null}", None),
     ("navigation: {topic: a, priority: 7, timeout_s: 0.1, neutral_after_s: 5.0}", 5.0),
     ("joystick: {topic: a, priority: 7, timeout_s: 0.1, neutral_after_s: 1.0}", 1.0),
+    ("navigation: {topic: a, type: joint_command, priority: 7, timeout_s: 0.1}", None),
 ])  # fmt: skip
 def test_programs_may_start_without_a_zero_after_a_silence_unless_their_key_says_otherwise(
     tmp_path: Path, source: str, after_s: float | None

@@ -111,6 +111,8 @@ def make_mux_consistent(mux: Values) -> None:
     mux.pop("twist_mux", None)  # files that would have to exist
     for index, source in enumerate(mux.get("sources", {}).values()):
         source |= {"priority": index, "topic": f"{source['topic'][:100].rstrip('/')}_{index}"}
+        if source.get("type") == "joint_command":
+            source |= {"stamped": True, "neutral_after_s": None}
     for lock in mux.get("locks", {}).values():
         lock |= {"priority": max(lock["priority"], 41), "topic": f"{lock['topic'][:100].rstrip('/')}_lock"}
 

@@ -206,6 +206,8 @@ BROKEN = [
     ("only-in-simulation", but(tf=heard(transforms("laser"))), "tf", "missing"),
     ("only-in-simulation", but(scan=heard(scan(OLD))), "stamps of the sensors", "100.0 s ago"),
     ("only-in-simulation", publishing("cmd_vel_nav", Endpoint("/nav2", BARE)), "command interface", "stamped: false"),
+    ("only-in-simulation", publishing("cmd_vel_nav", Endpoint("/wheels", "sensor_msgs/msg/JointState")),
+     "command interface", "set mux.sources.navigation.type: joint_command, or let it send geometry_msgs/msg/TwistSt"),
     ("only-in-simulation", replace(HEALTHY, subscribers={}), "command interface", "no subscriber on cmd_vel"),
     ("goals-collide", replace(HEALTHY, servers={"/drive_distance": (SERVER, SERVER)}), "one server", "2 servers"),
     ("goals-collide", UNSEEN, "one server", "no server offers"),

@@ -107,6 +107,24 @@ def test_a_command_that_is_not_finite_is_refused_counted_and_keeps_nobody_fresh(
     assert mux.decide(0.31).active is None
 
 
+def test_a_source_whose_messages_are_refused_says_why_until_one_is_valid(mux: Mux) -> None:
+    mux.refuse("navigation", "1 joints instead of 2")
+    never = "never received; its newest message was refused: 1 joints instead of 2"
+    assert reasons(mux.decide(0.0))["navigation"] == never
+    mux.on_command("navigation", SLOW, 0.1)
+    assert mux.decide(0.1).twist == SLOW
+    mux.refuse("navigation", "the speed of left_wheel is nan: NaN or infinity")
+    assert mux.decide(0.6).twist == SLOW  # 0.5 s after the valid one: a refused message does not end it ...
+    decision = mux.decide(0.61)  # ... and does not refresh it
+    assert (decision.active, decision.twist, decision.sources[1].refused) == (None, ZERO, 2)
+    assert reasons(decision)["navigation"] == (
+        "no message for 0.51 s (timeout 0.50 s); its newest message was refused: the speed of left_wheel is nan: "
+        "NaN or infinity"
+    )
+    mux.on_command("navigation", SLOW, 0.7)
+    assert reasons(mux.decide(1.3))["navigation"] == "no message for 0.60 s (timeout 0.50 s)"
+
+
 def test_a_source_that_the_configuration_does_not_name_is_our_own_error(mux: Mux) -> None:
     with pytest.raises(KeyError, match="gamepad"):
         mux.on_command("gamepad", FAST, 0.0)
