@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, field_validator, model_validator
@@ -26,8 +26,11 @@ PROGRAMS: Final = ("navigation", "action")
 class MuxSource(Section):
     """One source of velocity commands."""
 
-    topic: Annotated[Topic, Field(description="relative to the node's namespace")]
-    priority: Annotated[int, Field(ge=0, le=255, description="the highest fresh source is active; each value once")]
+    topic: Annotated[Topic, Field(description="relative to the node's namespace; with a leading / absolute")]
+    priority: Annotated[
+        int,
+        Field(ge=0, le=255, description="the highest fresh source is active; each value once, see equal_priorities"),
+    ]
     timeout_s: Annotated[float, Field(ge=0.05, le=2.0, description="without a message for longer: not active [s]")]
     type: Annotated[
         Literal["twist", "joint_command"],
@@ -71,7 +74,7 @@ class MuxSource(Section):
 class MuxLock(Section):
     """A topic (std_msgs/Bool, true = locked) that holds back every source whose priority is lower than its own."""
 
-    topic: Annotated[Topic, Field(description="relative to the node's namespace")]
+    topic: Annotated[Topic, Field(description="relative to the node's namespace; with a leading / absolute")]
     priority: Annotated[
         int, Field(ge=0, le=255, description="blocks sources with a lower priority, not those with the same one")
     ]
@@ -107,10 +110,22 @@ class Mux(Section):
             description="publishers on sources' topics and cmd_vel that no key names: report, or report and order zero"
         ),
     ] = "report"
+    equal_priorities: Annotated[
+        Literal["refuse", "by_name"],
+        Field(description="sources of one priority: refuse them, or the first by name is active, as in twist_mux"),
+    ] = "refuse"
     twist_mux: Annotated[
         tuple[Annotated[str, Field(min_length=1, max_length=400)], ...],
         Field(min_length=0, max_length=8, strict=False, description="parameter files of twist_mux, added to the above"),
     ] = ()
+    twist_mux_timeout_s: Annotated[
+        float | None,
+        Field(
+            ge=0.05,
+            le=2.0,
+            description="timeout of topics of these files that have timeout 0; null: they are refused [s]",
+        ),
+    ] = None
 
     @field_validator("sources", mode="before")
     @classmethod
@@ -127,26 +142,27 @@ class Mux(Section):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Mux:
-        for what in ("priority", "topic"):
-            self._no_two_alike(what)
+        if self.equal_priorities == "refuse":
+            self._no_two_alike("priority", lambda source: source.priority, ", or set equal_priorities: by_name")
+        self._no_two_alike("topic", lambda source: same_topic(source.topic))
         for name, source in self.sources.items():
-            if source.topic.removeprefix("/") in (*OUTPUTS, MEASURED):
+            if same_topic(source.topic) in (*OUTPUTS, MEASURED):
                 message = f"{source.topic} is an output of this robot; a source needs another topic"
                 raise MisfitError(message, ("sources", name, "topic"))
         for name, lock in self.locks.items():
             self._check_lock(name, lock)
         return self
 
-    def _no_two_alike(self, what: str) -> None:
+    def _no_two_alike(self, what: str, value: Callable[[MuxSource], object], cure: str = "") -> None:
         seen: dict[object, str] = {}
         for name, source in self.sources.items():
-            other = seen.setdefault(getattr(source, what), name)
+            other = seen.setdefault(value(source), name)
             if other != name:
-                message = f"sources {other} and {name} have the same {what}; each needs its own"
+                message = f"sources {other} and {name} have the same {what}; each needs its own{cure}"
                 raise MisfitError(message, ("sources", name, what))
 
     def _check_lock(self, name: str, lock: MuxLock) -> None:
-        if lock.topic in _topics(self.sources.values()):
+        if same_topic(lock.topic) in {same_topic(source.topic) for source in self.sources.values()}:
             message = f"{lock.topic} is the topic of a source too; a lock needs one of its own"
             raise MisfitError(message, ("locks", name, "topic"))
         lowest = min(source.priority for source in self.sources.values())
@@ -155,5 +171,6 @@ class Mux(Section):
             raise MisfitError(message, ("locks", name, "priority"))
 
 
-def _topics(sources: Iterable[MuxSource]) -> set[str]:
-    return {source.topic for source in sources}
+def same_topic(topic: str) -> str:
+    """`joy_vel` for `/joy_vel` too: without a namespace both are one topic, and with one they look like one."""
+    return topic.removeprefix("/")

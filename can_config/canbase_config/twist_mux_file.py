@@ -19,6 +19,8 @@ PARAMETERS: Final = "ros__parameters"
 USE_STAMPED: Final = "use_stamped"
 STAMPED_BY_DEFAULT: Final = True
 """As twist_mux since 4.4; older ones know Twist alone."""
+ENDLESS: Final = "twist_mux_timeout_s"
+"""The key of `mux` with the timeout of topics that have none."""
 FIELDS: Final = {"topic": "topic", "timeout": "timeout_s", "priority": "priority"}
 """Keys of an entry, theirs and ours."""
 GROUPS: Final = {"topics": "sources", "locks": "locks"}
@@ -65,7 +67,7 @@ def _merged(file: YamlFile, mux: Mapping[str, Any], parameters: Mapping[str, Par
         for name, entry in entries.items():
             _refuse_second(file, given, ("mux", ours, name), entry)
             places |= _places(("mux", ours, name), group, entry, stamped)
-        make = _lock if ours == "locks" else partial(_source, stamped=stamped)
+        make = _lock if ours == "locks" else partial(_source, stamped=stamped, endless_s=mux.get(ENDLESS))
         merged[ours] = {**given, **{name: make(entry) for name, entry in entries.items()}}
     lines = {**file.lines, **{loc: place.line for loc, place in places.items() if place.line is not None}}
     return replace(file, values={**file.values, "mux": merged}, lines=lines, places=places)
@@ -122,18 +124,35 @@ def _entries(parameters: Mapping[str, Parameter], group: str) -> dict[str, Entry
     return entries
 
 
-def _source(entry: Entry, stamped: Parameter | None) -> dict[str, Any]:
-    return {**_known(entry), "stamped": STAMPED_BY_DEFAULT if stamped is None else stamped.value}
+def _source(entry: Entry, stamped: Parameter | None, endless_s: Any) -> dict[str, Any]:
+    """A timeout of 0 means in twist_mux that the topic never expires. Here it becomes `endless_s`, or is refused."""
+    values = _known(entry)
+    if _is_zero(values.get("timeout_s")):
+        if endless_s is None:
+            raise ConfigError([_endless(entry["timeout"].place)])
+        values["timeout_s"] = endless_s
+    return {**values, "stamped": STAMPED_BY_DEFAULT if stamped is None else stamped.value}
 
 
 def _lock(entry: Entry) -> dict[str, Any]:
     """A timeout of 0 means in twist_mux that the lock needs no messages."""
     values = _known(entry)
     timeout = values.get("timeout_s")
-    if type(timeout) in (int, float) and timeout == 0:
+    if _is_zero(timeout):
         del values["timeout_s"]
         return {**values, "required": False}
     return {**values, "required": True} if timeout is not None else {"timeout_s": None, **values}
+
+
+def _endless(place: Place) -> Problem:
+    what = "got 0: the last command of this topic would be valid for ever"
+    hint = f"give it a timeout, or set mux.{ENDLESS}: 0.5 in robot.yaml for all topics with timeout 0"
+    return Problem(place.file, place.line, place.key, what, hint=hint)
+
+
+def _is_zero(timeout: Any) -> bool:
+    """No boolean and no text."""
+    return type(timeout) in (int, float) and timeout == 0
 
 
 def _known(entry: Entry) -> dict[str, Any]:

@@ -5,7 +5,8 @@ Rules:
    was late by (delay.py).
 2. A lock holds while its last message is true, and, where it is required, after its timeout. It holds back every source
    whose priority is lower than its own. A foreign publisher may hold back too (unexpected_publishers.py).
-3. The fresh source of the highest priority that is not held back has the base; its last command holds.
+3. The fresh source of the highest priority that is not held back has the base; its last command holds. Of two with
+   one priority (key equal_priorities) it is the first by name.
 4. None is left: the order is zero, explicitly. A source that was taken over does not come back with an old
    command: it drives again only while it is fresh by itself.
 5. A command with NaN or infinity is refused and counted, and does not make its source fresh.
@@ -198,14 +199,14 @@ class Mux:
         foreign_lock: bool = False,
         status_timeout_s: float = STATUS_TIMEOUT_S,
     ) -> None:
-        """Sources and locks by name, no two sources of one priority (canbase_config refuses that). Raises ValueError
+        """Sources and locks by name; of two sources of one priority the first by name comes first. Raises ValueError
         without any source. `foreign_lock`: foreign publishers hold back what they disturb. `status_timeout_s`: how long
         a motor_driver/status counts [s].
         """
         if not sources:
             raise ValueError("the mux needs at least one source, see mux.sources in robot.yaml")
         made = [_Source(name, config) for name, config in sources.items()]
-        self._sources = {source.name: source for source in sorted(made, key=lambda s: -s.config.priority)}
+        self._sources = {source.name: source for source in sorted(made, key=lambda s: (-s.config.priority, s.name))}
         lock_list = [Lock(name, config) for name, config in (locks or {}).items()]
         self._locks = {lock.name: lock for lock in sorted(lock_list, key=lambda lock: -lock.config.priority)}
         self._foreign: tuple[Foreign, ...] = ()

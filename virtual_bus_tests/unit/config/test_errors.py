@@ -134,7 +134,8 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
             END: "mux:\n  sources:\n    a: {topic: x, priority: 1, timeout_s: 0.1}\n"
             "    b: {topic: y, priority: 1, timeout_s: 0.1}"
         },
-        ":39: mux.sources.b.priority: sources a and b have the same priority; each needs its own",
+        ":39: mux.sources.b.priority: sources a and b have the same priority; each needs its own, or set "
+        "equal_priorities: by_name",
     ),
     "two sources on one topic": (
         {
@@ -142,6 +143,20 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
             "    b: {topic: x, priority: 2, timeout_s: 0.1}"
         },
         ":39: mux.sources.b.topic: sources a and b have the same topic; each needs its own",
+    ),
+    "two sources on one topic, once with a slash": (
+        {
+            END: "mux:\n  sources:\n    a: {topic: x, priority: 1, timeout_s: 0.1}\n"
+            "    b: {topic: /x, priority: 2, timeout_s: 0.1}"
+        },
+        ":39: mux.sources.b.topic: sources a and b have the same topic; each needs its own",
+    ),
+    "a lock on the topic of a source, once with a slash": (
+        {
+            END: "mux:\n  sources:\n    a: {topic: /x, priority: 1, timeout_s: 0.1}\n"
+            "  locks:\n    b: {topic: x, priority: 2}"
+        },
+        ":40: mux.locks.b.topic: x is the topic of a source too; a lock needs one of its own",
     ),
     "wheel speeds without a header": (
         {END: "mux:\n  sources:\n    a: {topic: x, type: joint_command, priority: 1, timeout_s: 0.1, stamped: false}"},

@@ -10,6 +10,8 @@ from canbase_config.effective import effective
 from canbase_config.errors import ConfigError
 from canbase_config.load import load_robot
 from canbase_config.mux import NEUTRAL_AFTER_S, Mux, MuxLock, MuxSource
+from canbase_velocity.twist import ZERO, Twist
+from support.mux_world import rested
 from support.robot_files import LAST_LINE, write
 
 END = LAST_LINE + 1
@@ -123,12 +125,13 @@ def test_the_effective_configuration_spells_them_out_and_loads_without_the_files
     ("old", "new", "text"),
     [
         ("priority: 100", "priority: 10", "mux0.yaml:13: topics.joystick.priority: sources navigation and joystick have"
-         " the same priority; each needs its own"),
+         " the same priority; each needs its own, or set equal_priorities: by_name"),
         ("priority: 100", "priority: 256", "mux0.yaml:13: topics.joystick.priority: got 256, expected a whole number"
-         " >= 0 and <= 255 (the highest fresh source is active; each value once)"),
+         " >= 0 and <= 255 (the highest fresh source is active; each value once, see"),
         ("priority: 100", "priorty: 100", "mux0.yaml:11: topics.joystick.priority: missing, expected a whole number"),
         ("timeout : 0.5\n        priority: 10\n", "timeout : 0.0\n        priority: 10\n", "mux0.yaml:8:"
-         " topics.navigation.timeout: got 0.0, expected a number >= 0.05 and <= 2 (without a message"),
+         " topics.navigation.timeout: got 0: the last command of this topic would be valid for ever\n    give it a"
+         " timeout, or set mux.twist_mux_timeout_s: 0.5 in robot.yaml for all topics with timeout 0"),
         ("timeout : 0.5\n        priority: 100", "timeout : fast\n        priority: 100", 'mux0.yaml:12:'
          ' topics.joystick.timeout: got "fast", expected a number'),
         ("joy_vel", "cmd_vel", "mux0.yaml:11: topics.joystick.topic: cmd_vel is an output of this robot"),
@@ -143,6 +146,67 @@ def test_the_effective_configuration_spells_them_out_and_loads_without_the_files
 def test_what_is_wrong_is_told_with_the_files_own_line_and_key(tmp_path: Path, old: str, new: str, text: str) -> None:
     assert old in TOPICS
     assert text in refusal(tmp_path, TOPICS.replace(old, new))
+
+
+ORIGINAL = """\
+twist_mux:
+  ros__parameters:
+    topics:
+      navigation: {topic: nav_vel, timeout: 0.5, priority: 10}
+      joystick: {topic: joy_vel, timeout: 0.5, priority: 100}
+      keyboard: {topic: key_vel, timeout: 0.5, priority: 90}
+      tablet: {topic: tab_vel, timeout: 0.5, priority: 100}
+"""
+"""The topics of twist_mux 4.3.0's own sample: two with priority 100."""
+
+
+def test_equal_priorities_are_accepted_by_a_key_and_the_first_by_name_is_active(tmp_path: Path) -> None:
+    assert "sources joystick and tablet have the same priority" in refusal(tmp_path, ORIGINAL)
+    reordered = ORIGINAL.replace("joystick", "zjoystick")
+    for text, first, second in ((ORIGINAL, "joystick", "tablet"), (reordered, "tablet", "zjoystick")):
+        mux = rested(mux_of(tmp_path, text, also="  equal_priorities: by_name\n").sources)
+        mux.on_command(second, Twist(0.2, 0.0), 1.0)
+        assert mux.decide(1.0).active == second
+        mux.on_command(first, Twist(0.1, 0.0), 1.0)
+        assert (mux.decide(1.0).active, mux.decide(1.0).twist.linear_mps) == (first, 0.1)
+        mux.on_command(second, Twist(0.2, 0.0), 1.6)  # the first one is silent for more than its 0.5 s
+        assert mux.decide(1.6).active == second
+
+
+def test_a_topic_without_timeout_gets_that_of_a_key_and_moves_nothing_after_it(tmp_path: Path) -> None:
+    endless = ORIGINAL.replace("tab_vel, timeout: 0.5, priority: 100", "tab_vel, timeout: 0.0, priority: 95")
+    assert "mux0.yaml:7: topics.tablet.timeout: got 0" in refusal(tmp_path, endless)
+    sources = mux_of(tmp_path, endless, also="  twist_mux_timeout_s: 0.4\n").sources
+    assert {name: source.timeout_s for name, source in sources.items()} == {
+        "navigation": 0.5, "joystick": 0.5, "keyboard": 0.5, "tablet": 0.4,
+    }  # fmt: skip
+    mux = rested(sources)
+    mux.on_command("tablet", Twist(0.2, 0.0), 1.0)  # once, as a page that has only buttons does
+    assert mux.decide(1.4).twist.linear_mps == 0.2
+    assert (mux.decide(1.41).active, mux.decide(1.41).twist) == (None, ZERO)
+    mux.on_command("navigation", Twist(0.1, 0.0), 1.5)
+    assert mux.decide(1.5).active == "navigation"  # a topic that is silent blocks nobody
+
+
+@pytest.mark.parametrize("timeout_s", ["0", "0.04", "2.1", ".inf", "true"])
+def test_no_topic_gets_a_timeout_that_is_none(tmp_path: Path, timeout_s: str) -> None:
+    endless = ORIGINAL.replace("tab_vel, timeout: 0.5, priority: 100", "tab_vel, timeout: 0, priority: 95")
+    assert "mux.twist_mux_timeout_s: got" in refusal(tmp_path, endless, also=f"  twist_mux_timeout_s: {timeout_s}\n")
+
+
+def test_the_effective_configuration_of_such_a_file_loads_without_it(tmp_path: Path) -> None:
+    endless = ORIGINAL.replace("tab_vel, timeout: 0.5", "tab_vel, timeout: 0.0")
+    mux = mux_of(tmp_path, endless, also="  twist_mux_timeout_s: 0.4\n  equal_priorities: by_name\n")
+    (tmp_path / "effective.yaml").write_text(effective(load_robot(tmp_path / "robot.yaml")), encoding="utf-8")
+    (tmp_path / "mux0.yaml").unlink()
+    assert load_robot(tmp_path / "effective.yaml").robot.mux == mux
+
+
+def test_a_topic_that_is_written_with_and_without_a_slash_is_one_topic(tmp_path: Path) -> None:
+    text = refusal(tmp_path, TOPICS.replace("joy_vel", "/nav_vel"))
+    assert "mux0.yaml:11: topics.joystick.topic: sources navigation and joystick have the same topic" in text
+    text = refusal(tmp_path, TOPICS, LOCKS.replace("pause_navigation", "/nav_vel"))
+    assert "mux1.yaml:5: locks.pause.topic: /nav_vel is the topic of a source too" in text
 
 
 def test_a_lock_that_can_hold_nobody_back_is_refused(tmp_path: Path) -> None:
