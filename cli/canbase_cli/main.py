@@ -22,6 +22,7 @@ from canbase_cli import (
     install,
     jog,
     monitor,
+    nav2,
     qualify,
     record,
     replay,
@@ -91,6 +92,7 @@ app.command("init", epilog=init.EPILOG, rich_help_panel=_SET_UP)(init.init)
 app.command("sample", rich_help_panel=_SET_UP)(sample.sample)
 app.add_typer(config.app, name="config", rich_help_panel=_SET_UP)
 app.command("urdf", rich_help_panel=_SET_UP)(urdf.urdf)
+app.command("nav2", rich_help_panel=_SET_UP)(nav2.nav2)
 app.command("qualify", epilog=qualify.EPILOG, rich_help_panel=_SET_UP)(qualify.qualify)
 app.command("scan", epilog=scan.EPILOG, rich_help_panel=_SET_UP)(scan.scan)
 app.add_typer(sdo.app, name="sdo", rich_help_panel=_SET_UP)

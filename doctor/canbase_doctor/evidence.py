@@ -56,6 +56,14 @@ class Endpoint:
 
 
 @dataclass(frozen=True, slots=True)
+class VelocityTopic:
+    """Who publishes and who reads a topic of Twist or TwistStamped."""
+
+    publishers: tuple[Endpoint, ...] = ()
+    subscribers: tuple[Endpoint, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Goal:
     """A goal as the server's status topic reports it; `status` as in action_msgs/GoalStatus."""
 
@@ -132,6 +140,10 @@ class Evidence:
     """The servers of an action, by its whole name; in every namespace."""
     publishers: Mapping[str, tuple[Endpoint, ...]] = field(default_factory=dict)
     subscribers: Mapping[str, tuple[Endpoint, ...]] = field(default_factory=dict)
+    velocities: Mapping[str, VelocityTopic] = field(default_factory=dict)
+    """By whole name, in every namespace."""
+    nav2_values: Mapping[tuple[str, str], tuple[float, ...]] = field(default_factory=dict)
+    """Parameters that Nav2's nodes answered, by node and name; the numbers of a list, or one."""
     goals: tuple[Goal, ...] = ()
     processes: tuple[ServerProcess, ...] = ()
     environment: Mapping[str, str] = field(default_factory=dict)

@@ -26,7 +26,8 @@ from canbase_action_server.inputs import Inputs
 from canbase_action_server.preconditions import action_source
 from canbase_config.load import Loaded
 from canbase_config.robot import Robot
-from canbase_doctor.evidence import ACTIONS, DOCTOR, Endpoint, Evidence, Goal, Heard, LoggedStep
+from canbase_doctor.evidence import ACTIONS, DOCTOR, Endpoint, Evidence, Goal, Heard, LoggedStep, VelocityTopic
+from canbase_doctor.nav2_probe import Nav2Prober
 from canbase_doctor.overload import Overload, load_per_core
 from canbase_doctor.probes import SERVER, TYPES, Prober
 from canbase_doctor.server_processes import server_processes, talks_by
@@ -46,6 +47,7 @@ STATES: Final = ("motor_driver/status", "safety_filter/state", "velocity_mux/sta
 DISCOVERY_S: Final = 5.0
 """The time for discovery: first messages and the first answer of the action server take this long [s]."""
 STATUS: Final = "/_action/status"
+VELOCITY_TYPES: Final = frozenset({"geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"})
 
 
 def topics(robot: Robot) -> dict[str, tuple[type, QoSProfile]]:
@@ -106,7 +108,7 @@ def observe(loaded: Loaded, ros_args: list[str], seconds: float) -> Evidence:
     rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = rclpy.create_node(DOCTOR, enable_rosout=False)
-        listener, prober = Listener(node, loaded.robot), Prober(node)
+        listener, prober, nav2 = Listener(node, loaded.robot), Prober(node), Nav2Prober(node)
         until, late_s = time.monotonic() + DISCOVERY_S + seconds, 0.0
         while (left_s := until - time.monotonic()) > 0.0:
             began_s = time.monotonic()
@@ -114,7 +116,9 @@ def observe(loaded: Loaded, ros_args: list[str], seconds: float) -> Evidence:
             late_s = max(late_s, time.monotonic() - began_s - SLICE_S)
             until = min(until, max(listener.found_s, prober.first_answer_s) + seconds)
             prober.step(listener.goals())
-        return replace(_evidence(loaded, node, listener, prober), overload=Overload(late_s, load_per_core()))
+            nav2.step()
+        evidence = replace(_evidence(loaded, node, listener, prober), nav2_values=nav2.values())
+        return replace(evidence, overload=Overload(late_s, load_per_core()))
     finally:
         rclpy.try_shutdown()
 
@@ -134,6 +138,7 @@ def _evidence(loaded: Loaded, node: Node, listener: Listener, prober: Prober) ->
         servers=_servers(node),
         publishers={name: _endpoints(node.get_publishers_info_by_topic(name)) for name in names},
         subscribers={name: _endpoints(node.get_subscriptions_info_by_topic(name)) for name in names},
+        velocities=_velocities(node),
         goals=listener.goals(),
         processes=server_processes(),
         environment=talks_by("self"),
@@ -171,6 +176,16 @@ def _servers(node: Node) -> dict[str, tuple[Endpoint, ...]]:
     names = [name for name, _ in node.get_topic_names_and_types() if name.endswith(STATUS)]
     found = {name.removesuffix(STATUS): _endpoints(node.get_publishers_info_by_topic(name)) for name in names}
     return {name: endpoints for name, endpoints in found.items() if endpoints}
+
+
+def _velocities(node: Node) -> dict[str, VelocityTopic]:
+    names = [name for name, types in node.get_topic_names_and_types() if not VELOCITY_TYPES.isdisjoint(types)]
+    return {
+        name: VelocityTopic(
+            _endpoints(node.get_publishers_info_by_topic(name)), _endpoints(node.get_subscriptions_info_by_topic(name))
+        )
+        for name in names
+    }
 
 
 def _endpoints(infos: Any) -> tuple[Endpoint, ...]:

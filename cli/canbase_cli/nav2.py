@@ -1,0 +1,66 @@
+"""`canbase nav2`: the parameters and remappings that Nav2 needs on the base of a robot.yaml."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from canbase_cli.options import ConfigOption, NamespaceOption
+from canbase_runtime.terminal import WRONG_INPUT, fail, load_config
+
+ParamsOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--params", "-p", metavar="FILE", help="A parameter file of Nav2 to lay them into.", show_default=False
+    ),
+]
+LaunchOption = Annotated[bool, typer.Option("--launch", help="Print a launch file with the remappings instead.")]
+
+
+def nav2(
+    file: Annotated[
+        Path | None, typer.Argument(metavar="[FILE]", help="The same as --config FILE.", show_default=False)
+    ] = None,
+    config: ConfigOption = None,
+    params: ParamsOption = None,
+    launch: LaunchOption = False,
+    namespace: NamespaceOption = "",
+) -> None:
+    """Print what Nav2 needs for this robot: parameters (limits, footprint, frames, topics), or a launch file.
+
+    For example: canbase nav2 robot.yaml --params nav2_params.yaml > nav2.yaml
+
+    The launch file includes Nav2's own and adds remappings, so that Nav2's velocities reach the mux, and never the
+    driver. What is missing in robot.yaml is reported on stderr. canbase doctor checks the running system.
+
+    Exit codes: 0 printed, 2 the robot.yaml or FILE cannot be used.
+    """
+    from canbase_config.errors import ConfigError
+    from canbase_config.nav2_chain import chain
+    from canbase_config.nav2_params import parameters, speeds
+    from canbase_config.nav2_text import launch_file, merged_file, other_controller, parameter_file
+
+    if file is not None and config is not None:
+        raise typer.BadParameter("give the robot.yaml once: --config FILE, or FILE alone")
+    if launch and params is not None:
+        raise typer.BadParameter(
+            "--launch prints no parameters: call canbase nav2 once with --params, once with --launch"
+        )
+    robot = load_config(config or file, quiet=True).robot
+    try:
+        wiring, values = chain(robot, namespace), parameters(robot, namespace)
+        notes, known = list(wiring.notes), True
+        if launch:
+            text = launch_file(robot.name, wiring, namespace)
+        elif params is None:
+            text = parameter_file(robot.name, values, wiring)
+        else:
+            text, known = merged_file(robot.name, values, wiring, params)
+    except (ValueError, ConfigError) as error:
+        fail(str(error), WRONG_INPUT)
+    notes += [] if known else [other_controller(speeds(robot))]
+    for note in notes:
+        typer.echo(f"note: {note}", err=True)
+    typer.echo(text, nl=False)
