@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -39,7 +40,7 @@ class Tally:
             self.violations += [(outcome, violation) for violation in outcome.violations]
             for stop in outcome.stops:
                 before = self.worst.get(stop.fault)
-                if before is None or stop.way_m > before[0].way_m:
+                if before is None or _badness(stop) > _badness(before[0]):
                     self.worst[stop.fault] = stop, outcome.seed
 
     @property
@@ -50,14 +51,18 @@ class Tally:
         return f"{len(self.violations)} violations{stop}"
 
 
+def _badness(stop: MeasuredStop) -> tuple[bool, float]:
+    """What never stops is worse than any distance."""
+    return not math.isfinite(stop.time_s), stop.way_m
+
+
 def lines(tally: Tally, file: str, load: Load) -> Iterator[str]:
     """The end of a qualification, for people."""
     runs = tally.runs
     yield f"{runs[STOP]} stops, {runs[SCENARIO]} scenarios, {runs[DRIVING]} drives without a failure"
-    longest = sorted(tally.worst.values(), key=lambda each: -each[0].way_m)[:LONGEST]
+    longest = sorted(tally.worst.values(), key=lambda each: _badness(each[0]), reverse=True)[:LONGEST]
     for stop, seed in longest:
-        name, cause = stop.fault or "ordinary stop", f" ({stop.cause})" if stop.cause else ""
-        yield f"  {stop.way_m:.2f} m, {stop.time_s:.2f} s from {stop.speed_mps:.2f} m/s: {name}{cause}; --stop {seed}"
+        yield f"  {_words(stop)}; --stop {seed}"
     if not tally.violations:
         yield "Every property held in every run. Simulation, no certificate."
         return
@@ -70,6 +75,12 @@ def lines(tally: Tally, file: str, load: Load) -> Iterator[str]:
         yield f"    {command(outcome, file, load)}"
     if len(tally.violations) > SHOWN:
         yield f"  … and {len(tally.violations) - SHOWN} more"
+
+
+def _words(stop: MeasuredStop) -> str:
+    name, cause = stop.fault or "ordinary stop", f" ({stop.cause})" if stop.cause else ""
+    ends = f"{stop.time_s:.2f} s" if math.isfinite(stop.time_s) else "and it goes on,"
+    return f"{stop.way_m:.2f} m, {ends} from {stop.speed_mps:.2f} m/s: {name}{cause}"
 
 
 def command(outcome: Outcome, file: str, load: Load) -> str:

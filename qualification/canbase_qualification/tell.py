@@ -27,8 +27,8 @@ def tell_stop(job: Job, seed: int, say: Say, *, frames: bool) -> bool:
     cruise = Cruise(failure.by, full_mps(job, failure.by), drawn)
     tell(cruise.world, frames, lambda at_s, text: say(f"{at_s:8.4f} {text}"))
     run = cruise.run(failure, seed)
-    say(
-        f"from {run.speed_mps:.3f} m/s at a stand after {run.time_s:.3f} s and {run.distance_m:.3f} m; no power after "
-        f"{run.power_off_s:.3f} s; stopped by: {run.cause or 'its source, or by nobody who reports it'}"
-    )
-    return math.isfinite(run.time_s)
+    stood = math.isfinite(run.time_s)
+    ends = f"at a stand after {run.time_s:.3f} s" if stood else "it goes on"
+    power = f"without power after {run.power_off_s:.3f} s" if math.isfinite(run.power_off_s) else "with power"
+    say(f"from {run.speed_mps:.3f} m/s: {ends}, {run.distance_m:.3f} m, {power}; {run.cause or 'no part stopped it'}")
+    return stood

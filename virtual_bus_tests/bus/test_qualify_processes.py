@@ -1,0 +1,185 @@
+"""`canbase qualify` with its real processes: killed, broken off, resumed, and on a dask cluster of this computer."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+
+from canbase_config.load import sample
+from canbase_qualification.results_file import read
+
+pytestmark = [pytest.mark.bus, pytest.mark.timeout(600)]
+FEW = ("--seed", "24", "--scenarios", "3", "--stops", "0", "--drives", "0")
+"""Two bodies: seed 24 has another one than 25 and 26."""
+BATCHES_S = 240.0
+
+
+def command(folder: Path, *arguments: str, file: Path | None = None) -> list[str]:
+    robot = str(file or sample("bench"))
+    return [sys.executable, "-m", "canbase_cli", "qualify", robot, "--out", str(folder), *arguments]
+
+
+def run(folder: Path, *arguments: str, file: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command(folder, *arguments, file=file), capture_output=True, text=True, timeout=BATCHES_S)
+
+
+def results(folder: Path) -> bytes:
+    return (folder / "results.jsonl").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def few(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """FEW by one worker."""
+    folder = tmp_path_factory.mktemp("few")
+    done = run(folder, *FEW, "--workers", "1")
+    assert done.returncode == 0, done.stderr
+    assert "Every property held in every run" in done.stdout
+    return folder
+
+
+def wait_for(what: str, condition: object, seconds: float = BATCHES_S) -> None:
+    end = time.monotonic() + seconds
+    while not condition():  # type: ignore[operator]
+        assert time.monotonic() < end, what
+        time.sleep(0.05)
+
+
+def children(pid: int, module: str) -> list[int]:
+    """Processes of a module below this one."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            status, line = (entry / "status").read_text(), (entry / "cmdline").read_text()
+        except OSError:
+            continue
+        parent = int(next(row.split()[1] for row in status.splitlines() if row.startswith("PPid:")))
+        if parent == pid and module in line:
+            found.append(int(entry.name))
+    return found
+
+
+def test_the_folder_has_what_was_run_and_assumed(few: Path) -> None:
+    about = json.loads((few / "qualification.json").read_text())
+    assert about["amount"] == {"scenarios": 3, "stops": 0, "drives": 0, "first": 24}
+    assert about["full_mps"] == 0.8
+    assert any("no scanner is required" in sentence for sentence in about["not_judged"])
+    assert (few / "robot.yaml").read_bytes() == sample("bench").read_bytes()
+    assert [outcome.seed for outcome in read(few / "results.jsonl")] == [24, 25, 26]
+
+
+def test_any_number_of_workers_gives_the_same_file_also_when_one_is_killed(few: Path, tmp_path: Path) -> None:
+    qualify = subprocess.Popen(command(tmp_path / "q", *FEW, "--workers", "2"), stdout=subprocess.DEVNULL)
+    worker: list[int] = []
+
+    def runs_one() -> bool:
+        worker[:] = children(qualify.pid, "canbase_qualification.carry_out")
+        return len(worker) == 2
+
+    wait_for("two workers", runs_one)
+    os.kill(worker[0], signal.SIGKILL)
+    assert qualify.wait(BATCHES_S) == 0
+    assert results(tmp_path / "q") == results(few)
+
+
+def test_ctrl_c_keeps_what_is_done_and_resume_goes_on_as_if_nothing_had_been(few: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "q"
+    begun = subprocess.Popen(
+        command(folder, *FEW, "--workers", "1"), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    wait_for("a result", lambda: (folder / "results.jsonl").exists() and results(folder))
+    begun.send_signal(signal.SIGINT)
+    out, err = begun.communicate(timeout=30)
+    assert begun.returncode == 130, err
+    assert "1 scenarios" in out
+    assert "--resume goes on" in err
+    assert children(begun.pid, "carry_out") == []
+    with (folder / "results.jsonl").open("ab") as file:
+        file.write(b'{"kind": "scen')  # as a computer leaves it that lost its power
+    again = run(folder, "--resume", "--workers", "1")
+    assert again.returncode == 0, again.stderr
+    assert results(folder) == results(few)
+
+
+def test_resume_refuses_another_load_and_another_robot(few: Path, tmp_path: Path) -> None:
+    other = tmp_path / "robot.yaml"
+    other.write_text(sample("bench").read_text().replace("linear_mps: 0.8", "linear_mps: 0.7"))
+    before = results(few)
+    for arguments, file, words in (
+        (("--slope", "0.05"), None, "has --payload 0.5..2 --slope 0.03; now it is --payload 0.5..2 --slope 0.05"),
+        ((), other, "is about another configuration"),
+    ):
+        refused = run(few, "--resume", *arguments, file=file)
+        assert refused.returncode == 2
+        assert words in refused.stderr
+    assert results(few) == before
+
+
+@contextmanager
+def cluster(folder: Path, workers: int) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """A scheduler and workers of one thread each, on the loopback interface."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
+    host, port = "127.0.0.1", address.rpartition(":")[2]
+    with ExitStack() as stack:
+
+        def start(name: str, *arguments: str) -> subprocess.Popen[bytes]:
+            log = stack.enter_context((folder / f"{name}.log").open("wb"))
+            line = [sys.executable, "-m", "dask", *arguments]
+            process = subprocess.Popen(line, stdout=log, stderr=log, start_new_session=True, cwd=folder)
+            stack.callback(end, process)
+            return process
+
+        start("scheduler", "scheduler", "--host", host, "--port", port, "--no-dashboard")
+        limits = ("--nthreads", "1", "--no-dashboard", "--no-nanny")
+        yield (
+            address,
+            [
+                start(f"worker{number}", "worker", address, *limits, "--local-directory", str(folder / str(number)))
+                for number in range(workers)
+            ],
+        )
+
+
+def end(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    process.wait()
+
+
+def test_a_cluster_gives_the_same_file_also_when_a_worker_is_killed_in_the_middle(few: Path, tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    with cluster(tmp_path, 2) as (address, workers):
+        line = command(tmp_path / "q", *FEW, "--scheduler", address)
+        qualify = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        busy: list[subprocess.Popen[bytes]] = []
+
+        def is_busy() -> bool:
+            assert qualify.poll() is None, qualify.communicate()
+            busy[:] = [each for each in workers if children(each.pid, "canbase_qualification.carry_out")]
+            return bool(busy)
+
+        wait_for("a busy worker", is_busy)
+        (carries_out,) = children(busy[0].pid, "canbase_qualification.carry_out")
+        end(busy[0])
+        _, err = qualify.communicate(timeout=BATCHES_S)
+        assert qualify.returncode == 0, err
+        assert results(tmp_path / "q") == results(few)
+        wait_for("the process of the killed worker ends", lambda: not Path(f"/proc/{carries_out}").exists(), 30.0)
+
+
+def test_a_scheduler_that_is_not_there_is_named(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    refused = run(tmp_path / "q", *FEW, "--scheduler", "tcp://127.0.0.1:9")
+    assert refused.returncode == 1
+    assert "--scheduler tcp://127.0.0.1:9: no dask scheduler answers there" in refused.stderr
+    assert "--resume goes on" in refused.stderr
