@@ -202,8 +202,9 @@ class _Qualify:
 
     def _prepared(self, *, resume: bool) -> tuple[Job, About]:
         """The folder is ready: it says what is run."""
+        from canbase_config.fingerprint import configuration_sha256
         from canbase_qualification import folder
-        from canbase_qualification.job import Amount, mark
+        from canbase_qualification.job import Amount
         from canbase_qualification.software import software
 
         before = folder.read_about(self._folder) if resume else None
@@ -214,8 +215,8 @@ class _Qualify:
         amount: Amount = replace(before.amount if before else Amount(), **self._amount)
         speed_mps, slower = self._trial(job, amount.first)
         about = folder.About(
-            self._loaded.robot.name, str(self._loaded.path), mark(self._loaded.robot, load), software(), load, amount,
-            round(speed_mps, 3), (*assumed, *slower), not_judged,
+            self._loaded.robot.name, str(self._loaded.path), configuration_sha256(self._loaded.robot), software(), load,
+            amount, round(speed_mps, 3), (*assumed, *slower), not_judged,
         )  # fmt: skip
         if before is not None:
             folder.check_same(self._folder, before, about)

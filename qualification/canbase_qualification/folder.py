@@ -16,6 +16,8 @@ from canbase_qualification.software import Software
 
 NAME: Final = "qualification.json"
 ROBOT: Final = "robot.yaml"
+DIGITS: Final = 12
+"""Of a hash, that people compare."""
 
 
 class FolderError(ValueError):
@@ -24,13 +26,14 @@ class FolderError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """Of one qualification. `mark`: of the configuration and the load, see job.mark."""
+    """Of one qualification."""
 
     robot: str
     """Name in robot.yaml."""
     file: str
     """robot.yaml as it was named on the command line."""
-    mark: str
+    configuration_sha256: str
+    """Of canbase_config.fingerprint."""
     software: Software
     load: Load
     amount: Amount
@@ -83,10 +86,15 @@ def check_same(folder: Path, before: About, now: About) -> None:
         )
     if before.load != now.load:
         raise FolderError(f"{folder} has {_words(before.load)}; now it is {_words(now.load)}. Choose another --out")
-    if before.mark != now.mark:
+    check_robot(folder, before, now.file, now.configuration_sha256)
+
+
+def check_robot(folder: Path, before: About, file: str, sha256: str) -> None:
+    """FolderError: the results are about another configuration than that of `file`."""
+    if before.configuration_sha256 != sha256:
         raise FolderError(
-            f"{folder} is about another configuration: mark {before.mark}, and {now.file} has {now.mark}. Compare it "
-            f"with {folder / ROBOT}, or begin again with another --out"
+            f"{folder} is about another configuration: SHA-256 {before.configuration_sha256[:DIGITS]}…, and {file} has "
+            f"{sha256[:DIGITS]}…. Compare it with {folder / ROBOT}, or choose another --out"
         )
 
 

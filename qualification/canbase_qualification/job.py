@@ -1,4 +1,4 @@
-"""What a qualification runs, as plain values that any process or computer can carry out, and its marks. Pure.
+"""What a qualification runs, as plain values that any process or computer can carry out. Pure.
 
 It is cut into batches: each has one body, and comes out the same wherever it runs. A stop has the seed
 `number of the body × number of failures + place of the failure`, a scenario and a drive have seeds of their own.
@@ -6,8 +6,6 @@ It is cut into batches: each has one body, and comes out the same wherever it ru
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
@@ -83,10 +81,3 @@ def batches(job: Job, amount: Amount) -> Iterator[Batch]:
         yield Batch(SCENARIO, body, tuple(seeds))
     for seed in range(first, first + amount.drives):
         yield Batch(DRIVING, seed, (seed,))
-
-
-def mark(robot: Robot, load: Load) -> str:
-    """Of a configuration: what differs in any value, also of a drive profile, has another one."""
-    kinds = [drive.kind.model_dump(mode="json") for drive in robot.drives]
-    values = [robot.model_dump(mode="json"), kinds, load.payloads, load.slope]
-    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]

@@ -1,6 +1,6 @@
 """Makes the report of a folder of results, and writes it there: report.html, report.md, report.json.
 
-The robot is that of the command line: its mark says whether the results are about it.
+The robot is that of the command line: its SHA-256 says whether the results are about it.
 """
 
 from __future__ import annotations
@@ -17,9 +17,8 @@ from canbase_config.fingerprint import configuration_sha256
 from canbase_config.load import Loaded
 from canbase_hazards import catalogue
 from canbase_qualification import results_file
-from canbase_qualification.folder import About, FolderError, read_about
+from canbase_qualification.folder import About, check_robot, read_about
 from canbase_qualification.hazard_figures import Collected
-from canbase_qualification.job import mark
 from canbase_qualification.outcome import DRIVING, SCENARIO, STOP, Outcome
 from canbase_qualification.qualified import Setup
 from canbase_qualification.report import Report, report
@@ -58,21 +57,12 @@ def write_report(folder: Path, loaded: Loaded) -> tuple[Report, list[Path]]:
 def read_report(folder: Path, loaded: Loaded) -> Report:
     """What the results in `folder` come to, for the robot that they are about."""
     about = read_about(folder)
-    _check(folder, about, loaded)
+    check_robot(folder, about, str(loaded.path), configuration_sha256(loaded.robot))
     path = folder / results_file.NAME
     collected, problems = Collected(catalogue.load()), list(_problems(path))
     for outcome in _outcomes(path):
         collected.add(outcome)
     return report(_setup(about, loaded, tuple(problems)), collected)
-
-
-def _check(folder: Path, about: About, loaded: Loaded) -> None:
-    now = mark(loaded.robot, about.load)
-    if now != about.mark:
-        raise FolderError(
-            f"{folder} is about another configuration: mark {about.mark}, and {loaded.path} has {now}. "
-            f"{folder / 'robot.yaml'} is the file that it is about"
-        )
 
 
 def _outcomes(path: Path) -> Iterator[Outcome]:

@@ -53,7 +53,10 @@ def test_a_folder_without_one_is_named(tmp_path: Path) -> None:
             replace(ABOUT, load=Load((0.5, 3.0), 0.03)),
             r"--payload 0\.5\.\.2 --slope 0\.03; now it is --payload 0\.5\.\.3",
         ),
-        (replace(ABOUT, mark="def"), r"another configuration: mark abc, and my/robot\.yaml has def"),
+        (
+            replace(ABOUT, configuration_sha256="def"),
+            r"configuration: SHA-256 abc…, and my/robot\.yaml has def",
+        ),
     ],
 )
 def test_results_of_something_else_do_not_belong_to_it(tmp_path: Path, now: About, words: str) -> None:

@@ -1,4 +1,4 @@
-"""What is run: which seeds, in which batches, with which body; and marks of a configuration."""
+"""What is run: which seeds, in which batches, and with which body."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from itertools import chain
 
 from canbase_campaign.robots import rolls_out
 from canbase_config.load import load_robot, sample
-from canbase_qualification.job import A_BODY, FAILURES, Amount, Batch, Job, Load, batches, mark
+from canbase_qualification.job import A_BODY, FAILURES, Amount, Batch, Job, Load, batches
 from canbase_qualification.outcome import DRIVING, SCENARIO, STOP
 from canbase_qualification.qualification import job_of, missing
 from canbase_qualification.runs import body
@@ -64,14 +64,3 @@ def test_the_same_number_gives_the_same_body_with_a_load_on_a_slope_as_given() -
     assert max(slopes) > 0.059
     assert min(slopes) < -0.059
     assert all(rolls_out(drawn)[0] > 0.0 for drawn in bodies), "without power it comes to a stand"
-
-
-def test_a_mark_differs_with_each_value_that_decides() -> None:
-    marks = {
-        mark(ROBOT, Load()),
-        mark(ROBOT, Load((0.5, 2.1))),
-        mark(ROBOT, Load(slope=0.04)),
-        mark(ROBOT.model_copy(update={"limits": ROBOT.limits.model_copy(update={"linear_mps": 0.7})}), Load()),
-    }
-    assert len(marks) == 4
-    assert mark(load_robot(sample("bench")).robot, Load()) in marks

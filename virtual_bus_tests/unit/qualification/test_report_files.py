@@ -13,7 +13,7 @@ from canbase_cli.main import app
 from canbase_config.fingerprint import configuration_sha256
 from canbase_config.load import Loaded, load_robot, sample
 from canbase_qualification import folder, results_file
-from canbase_qualification.job import Amount, Load, mark
+from canbase_qualification.job import Amount, Load
 from canbase_qualification.outcome import Outcome
 from canbase_qualification.report_files import read_report, write_report
 from canbase_qualification.simulated_robot import simulated
@@ -32,7 +32,7 @@ def made(path: Path, outcomes: list[Outcome], *, amount: Amount | None = None, l
     about = folder.About(
         loaded.robot.name,
         str(loaded.path),
-        mark(loaded.robot, Load()),
+        configuration_sha256(loaded.robot),
         software,
         Load(),
         amount,
@@ -94,7 +94,7 @@ def test_another_configuration_is_refused(tmp_path: Path) -> None:
 def test_a_line_in_the_middle_that_is_no_outcome_is_named(tmp_path: Path) -> None:
     path = made(tmp_path, passed()) / results_file.NAME
     path.write_text("{}\n" + path.read_text(encoding="utf-8"), encoding="utf-8")
-    with pytest.raises(results_file.ResultsError, match="line 1"):
+    with pytest.raises(results_file.ResultsError, match=r"results\.jsonl:1: "):
         read_report(tmp_path, BENCH)
 
 
