@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -125,7 +126,7 @@ def test_a_drive_that_is_configured_is_read_after_its_heartbeat_time_although_it
     assert times[0] == pytest.approx(0.35, abs=0.006)
 
 
-def abandoned(drive: FakeDrive, **changes: float) -> Story:
+def abandoned(drive: FakeDrive, **changes: Any) -> Story:
     """A watchdog that starts with a latched record beside a drive that has power and turns; driver and filter died.
 
     `changes`: of its configuration.
