@@ -22,6 +22,8 @@ NO_CERTIFICATE: Final = (
 )
 NOT_LOOKED_AT: Final = (
     "real drives, firmware, gears, brakes, tyres and cables: measure stops on the robot, first with the wheels up",
+    "stops from turns or backward: the measured ones begin on a straight line, forward, at full speed",
+    "the corners of a base that turns while it stops: distances are those of its middle, from begin to end, straight",
     "wheels that slip or lift, tilting, loads that shift, trailers",
     "a safety relay or STO that takes the power off all drives at once: the wheels then coast, and no software brakes",
     "the real computer: Linux, DDS and Python are modelled as delays and pauses; `canbase benchmark` measures them",
@@ -67,8 +69,8 @@ def _few(report: Report) -> Iterator[str]:
         needed = runs_covering(ENOUGH)
         yield (
             f"**Few runs**: some hazards were measured {least.runs:,} times only. With 95 % confidence their worst "
-            f"values cover {share(least.time_s.covered_share)} of such runs; {needed:,} runs each cover {ENOUGH:.0%} "
-            f"(`--stops {needed}`)."
+            f"values cover {share(least.time_s.covered_share)} of such runs; {needed:,} runs each "
+            f"cover {100.0 * ENOUGH:.0f} % (`--stops {needed}`)."
         )
 
 

@@ -70,8 +70,10 @@ def stopping_distances(collected: Collected, robot: Robot) -> list[StoppingDista
 
 def _distance(name: str, figures: StopFigures, worst: Run, robot: Robot) -> StoppingDistance:
     speed_mps = max(robot.limits.linear_mps, figures.fastest_mps)
-    of = f"{worst.stop.fault or 'ordinary stop'}, the worst of {figures.runs} runs, from {worst.stop.speed_mps:.2f} m/s"
     time_s = max(value for value in figures.time_s.values if math.isfinite(value))
+    slower = "" if worst.stop.time_s == time_s else "; the longest time is that of another run"
+    failure = worst.stop.fault or "ordinary stop"
+    of = f"{failure}, the worst of {figures.runs:,} runs, from {worst.stop.speed_mps:.2f} m/s{slower}"
     measured = Term("measured stop, reaction of canbase included", time_s, worst.stop.way_m, of)
     return StoppingDistance(name, speed_mps, figures, (measured, *_before(robot, speed_mps)))
 

@@ -27,6 +27,7 @@ def test_each_term_and_the_sum() -> None:
     assert ordered.approach_m == pytest.approx(1.6 * (0.6 + 0.3 + period_s))
     assert failing.terms[0].distance_m == 0.42
     assert KILLED in failing.terms[0].source
+    assert ["another run" in case.terms[0].source for case in (ordered, failing)] == [True, False]
 
 
 def test_a_filter_that_waits_for_a_second_scan_adds_it() -> None:
