@@ -16,7 +16,7 @@ from canbase_qualification.qualified import Setup
 from canbase_qualification.report import Report, report
 
 KILLED, PRESSED, ALL_KILLED, STRANGE = (
-    "motor_driver: SIGKILL", "emergency stop: pressed", "all processes: are killed", "drive: STO opens",
+    "motor_driver: SIGKILL", "emergency stop: pressed", "all processes: are killed", "gear: breaks",
 )  # fmt: skip
 """Of rows of the catalogue; the last one is of none."""
 CATALOGUE: Final = load()

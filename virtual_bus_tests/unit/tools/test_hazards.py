@@ -17,7 +17,7 @@ from support.marked_page import rewritten
 CATALOGUE = load()
 ROBOT = page.sample_robot()
 WITHOUT_A_ROW = {
-    "drive_sto", "frame_duplication", "lease_garbage", "orders_shuffled", "orders_twice", "resets_too_early",
+    "frame_duplication", "lease_garbage", "orders_shuffled", "orders_twice", "resets_too_early",
     "status_lost", "two_hands",
 }  # fmt: skip
 """Faults of the campaign that are no failure of a part, or that the catalogue does not have."""
