@@ -100,6 +100,12 @@ UNIT = $(TESTS)/unit
 DECIDES = $(UNIT)/watchdog $(patsubst %,$(UNIT)/driver/test_%.py,cia402 axis stall state_machine state_machine_way_down fault_reset standstill braking) \
   $(UNIT)/chain/test_layouts_agree.py $(UNIT)/runtime/test_latch_record.py
 
+.PHONY: evidence-tests
+evidence-tests: $(VENV)/ready ## all tests that hazards.yaml names, into build/evidence_tests.xml for canbase evidence --tests; about an hour
+	mkdir -p build
+	pytest --numprocesses auto --timeout 600 --junitxml build/evidence_tests_own_time.xml $(addprefix $(TESTS)/,unit campaign)
+	CANBASE_EXIT_MATRIX=all pytest --junitxml build/evidence_tests_real_time.xml $(addprefix $(TESTS)/,bus ros)
+
 .PHONY: coverage
 coverage: $(VENV)/ready ## units of what decides about stops, with their branch coverage: all of it, or it fails
 	rm -f $(VENV)/coverage*
@@ -128,10 +134,10 @@ else
 endif
 
 .PHONY: pictures
-pictures: $(VENV)/ready ## the pictures of docs/web.md, docs/explain.md and docs/qualify.md, from the tests in a real browser
+pictures: $(VENV)/ready ## the pictures of docs/web.md, explain.md, qualify.md and evidence.md, from the tests in a real browser
 	@mkdir -p build/pictures docs/pictures
-	CANBASE_PICTURES=$(CURDIR)/build/pictures pytest -q $(TESTS)/bus/test_explain_page.py $(TESTS)/bus/test_qualification_page.py $(TESTS)/ros/test_web.py
-	for picture in $$(grep -ho '\(web\|explain\|qualify\)_[a-z_]*\.png' docs/web.md docs/explain.md docs/qualify.md); do cp build/pictures/$$picture docs/pictures; done
+	CANBASE_PICTURES=$(CURDIR)/build/pictures pytest -q $(TESTS)/bus/test_explain_page.py $(TESTS)/bus/test_qualification_page.py $(TESTS)/bus/test_evidence_page.py $(TESTS)/ros/test_web.py
+	for picture in $$(grep -ho '\(web\|explain\|qualify\|evidence\)_[a-z_]*\.png' docs/web.md docs/explain.md docs/qualify.md docs/evidence.md); do cp build/pictures/$$picture docs/pictures; done
 
 .PHONY: hazards
 hazards: $(VENV)/ready ## checks hazards.yaml and writes the tables of docs/safety.md

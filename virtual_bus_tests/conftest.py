@@ -10,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, Phase, settings
 
 from hazards.skipped import pytest_runtest_makereport as pytest_runtest_makereport
+from hazards.tested import pytest_collection_modifyitems as pytest_collection_modifyitems
 
 # The same examples each time, on a slow machine too: a run judges the change before it, and says what failed as it was
 # drawn. HYPOTHESIS_PROFILE=default looks for new examples and makes a failing one as short as it can.

@@ -14,6 +14,7 @@ from canbase_cli import (
     doctor,
     drive,
     dump,
+    evidence,
     explain,
     export,
     fibonacci,
@@ -86,6 +87,7 @@ app.command("explain", epilog=explain.EPILOG, rich_help_panel=_LOOK)(explain.exp
 app.command("dump", epilog=dump.EPILOG, rich_help_panel=_LOOK)(dump.dump)
 app.command("export", epilog=export.EPILOG, rich_help_panel=_LOOK)(export.export)
 app.command("replay", epilog=replay.EPILOG, rich_help_panel=_LOOK)(replay.replay)
+app.command("evidence", epilog=evidence.EPILOG, rich_help_panel=_LOOK)(evidence.evidence)
 app.command("support-bundle", rich_help_panel=_LOOK)(support_bundle.support_bundle)
 
 app.command("init", epilog=init.EPILOG, rich_help_panel=_SET_UP)(init.init)

@@ -21,7 +21,9 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
+from canbase_evidence.installed_code import COMPILED, code_sha256  # noqa: E402
 from vm.guest.main import ALL, PLAN, names, shared_out  # noqa: E402 - needs the path
+from vm.junit import junit  # noqa: E402
 from vm.overlay import overlay, ramdisk  # noqa: E402
 from vm.patience import Patience  # noqa: E402
 from vm.qmp import Monitor  # noqa: E402
@@ -142,6 +144,8 @@ def main(wanted: Sequence[str]) -> int:
     found = [result for job in jobs for result in results(job, jobs[job], ended[job])]
     for job in [job for job in jobs if not (job / "code").exists()]:
         print(last_words(job), file=sys.stderr)
+    code = code_sha256() + (COMPILED if os.environ.get("COMPILED") else "")
+    (BUILD / "evidence_tests.xml").write_text(junit(found, code), encoding="utf-8")
     write(PAGE, found, list(ALL), time.strftime("%Y-%m-%d", time.gmtime()))
     return report(found, time.monotonic() - begun)
 

@@ -1,0 +1,147 @@
+"""`canbase evidence`: what is known about the stops of a robot, in one folder; and whether that folder was changed."""
+
+from __future__ import annotations
+
+import os
+import time
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config
+
+if TYPE_CHECKING:
+    from canbase_evidence.evidence import Evidence
+    from canbase_evidence.gather import Sources
+
+INCOMPLETE: Final = 3
+"""Exit code: the folder is written, and something is missing, has failed or does not belong to this robot."""
+EPILOG: Final = (
+    "Examples:  \ncanbase evidence robot.yaml --qualification qualification/ --tests tests.xml --recordings ~/stops  \n"
+    "canbase evidence --check evidence-robot-20261124-201500"
+)
+
+
+def evidence(
+    config: Annotated[Path | None, typer.Argument(metavar="ROBOT.YAML", help="The robot.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="FOLDER", help="New folder to write.", show_default="evidence-ROBOT-DATE-TIME here"
+        ),
+    ] = None,
+    qualification: Annotated[
+        Path | None, typer.Option("--qualification", metavar="FOLDER", help="Results of canbase qualify.")
+    ] = None,
+    tests: Annotated[
+        list[Path] | None,
+        typer.Option("--tests", metavar="FILE", help="JUnit XML of canbase's tests (pytest --junitxml); repeatable."),
+    ] = None,
+    recordings: Annotated[
+        list[Path] | None,
+        typer.Option("--recordings", metavar="PATH", help="Folder of black boxes, or one .asc file; repeatable."),
+    ] = None,
+    commissioning: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--commissioning",
+            metavar="FILE",
+            help="Report of canbase commission; repeatable.",
+            show_default="those beside ROBOT.YAML",
+        ),
+    ] = None,
+    scan: Annotated[
+        Path | None,
+        typer.Option("--scan", metavar="FILE", help="Output of canbase scan --json: the drives that are wired now."),
+    ] = None,
+    check: Annotated[
+        Path | None, typer.Option("--check", metavar="FOLDER", help="Find files that were changed, added or removed.")
+    ] = None,
+) -> None:
+    """Gather the evidence for the stops of a robot in one folder, with a page that opens offline and SHA-256 hashes.
+
+    Hazards with their tests, qualification in simulation, commissioning, drives, recorded stops, software. What is
+    missing, failed, or belongs to another configuration, robot or version is named first, and never counted. It is no
+    certificate. It reads files only: no bus, no robot. The same input gives the same bytes; SOURCE_DATE_EPOCH sets the
+    time that the page states.
+
+    Exit codes: 0 written, and nothing is missing (--check: unchanged), 1 not written (--check: changed), 2 wrong
+    command line or robot.yaml, 3 written, and something is missing, has failed or does not count.
+    """
+    if check is not None:
+        if config is not None:
+            fail("--check takes no ROBOT.YAML: it compares a folder with its own list", WRONG_INPUT)
+        _check(check)
+        return
+    if config is None:
+        fail("name a robot.yaml, or --check FOLDER", WRONG_INPUT)
+    from canbase_evidence.gather import Sources
+
+    sources = Sources(qualification, tests or (), recordings or (), commissioning or (), scan)
+    _gather(config, sources, out)
+
+
+def _gather(config: Path, sources: Sources, out: Path | None) -> None:
+    from dataclasses import replace
+
+    from canbase_evidence.gather import gather, reports_beside
+    from canbase_evidence.new_folder import GatherError
+    from canbase_evidence.software import software
+
+    loaded = load_config(config, quiet=True)
+    made_s = _made_s()
+    stamp = datetime.fromtimestamp(made_s, timezone.utc)
+    out = out or Path(f"evidence-{loaded.robot.name}-{stamp:%Y%m%d-%H%M%S}")
+    if out.is_symlink() or (out.exists() and not (out.is_dir() and not any(out.iterdir()))):
+        fail(f"{out} exists; evidence is never overwritten: name another --out", WRONG_INPUT)
+    if not sources.commissioning:
+        sources = replace(sources, commissioning=reports_beside(loaded))
+    try:
+        found = gather(loaded, sources, software(), f"{stamp:%Y-%m-%dT%H:%M:%SZ}", out)
+    except GatherError as error:
+        fail(str(error), WRONG_INPUT)
+    except OSError as error:
+        fail(f"{out} cannot be written: {error.strerror or error}", FAILED)
+    _tell(found, out)
+
+
+def _tell(found: Evidence, out: Path) -> None:
+    from canbase_evidence.check_folder import list_sha256
+
+    for each in found.open:
+        typer.echo(f"{each.standing.value}: {each.part.value}: {each.sentence}")
+        if each.cure:
+            typer.echo(f"    to add it: {each.cure}")
+    typer.echo(f"written: {out / 'index.html'}. It is no certificate.")
+    typer.echo(f"SHA-256 of the list of hashes, to be kept elsewhere: {list_sha256(out)}")
+    if not found.is_complete:
+        raise typer.Exit(INCOMPLETE)
+
+
+def _check(folder: Path) -> None:
+    from canbase_evidence.check_folder import check, list_sha256
+    from canbase_evidence.hash_list import NAME, HashListError
+
+    try:
+        differences, digest = check(folder), list_sha256(folder)
+    except HashListError as error:
+        fail(f"{folder / NAME}: {error}", FAILED)
+    except OSError as error:
+        fail(f"{error.filename or folder}: {error.strerror or error}", FAILED)
+    for each in differences:
+        typer.echo(f"{each.what}: {each.name!r}")
+    if differences:
+        fail(f"{folder} is not as it was written: {len(differences)} differences", FAILED)
+    typer.echo(f"unchanged since its list of hashes was written. SHA-256 of the list: {digest}")
+
+
+def _made_s() -> float:
+    """Now, or the time of reproducible-builds.org's SOURCE_DATE_EPOCH [s since 1970]."""
+    given = os.environ.get("SOURCE_DATE_EPOCH", "")
+    if not given:
+        return time.time()
+    if not given.isascii() or not given.isdigit() or int(given) > 253402300799:
+        fail(f"SOURCE_DATE_EPOCH={given[:40]!r}: expected seconds since 1970, as a whole number", WRONG_INPUT)
+    return float(given)
