@@ -110,6 +110,12 @@ class CanopenNode:
         does not show that, and it may obey its PDOs still. Until its boot begins, which stops it by SDO."""
         return self.has_pdos or self._owed_stop
 
+    @property
+    def _sends_pdos(self) -> bool:
+        """Of one that was lost in any other NMT state than operational none can come (CiA 301): a device with the same
+        node id sends them, and shows nothing of this drive's motion."""
+        return self.has_pdos or (self._owed_stop and self.nmt_state in (None, NmtState.OPERATIONAL))
+
     def is_off(self, now_s: float) -> bool:
         """Every axis reports, in a fresh statusword, that it has no torque."""
         fresh_s = self._robot.timeouts.feedback_s
@@ -291,11 +297,11 @@ class CanopenNode:
 
     def on_status(self, axis: Axis, frame: Frame, now_s: float) -> bool:
         """Take 6041h and 6064h of one of its axes. False: not understood."""
-        return not self.takes_pdos or axis.on_status(frame.data, now_s)
+        return not self._sends_pdos or axis.on_status(frame.data, now_s)
 
     def on_velocity(self, axis: Axis, frame: Frame, now_s: float) -> bool:
         """Take 606Ch of one of its axes. False: not understood."""
-        return not self.takes_pdos or axis.on_velocity(frame.data, now_s)
+        return not self._sends_pdos or axis.on_velocity(frame.data, now_s)
 
     def on_emcy(self, frame: Frame, _now: float) -> bool:
         """Take a frame 080h + id. False: not an emergency message. It informs; only the statusword stops anything."""

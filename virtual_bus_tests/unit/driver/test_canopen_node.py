@@ -129,6 +129,17 @@ def test_a_restart_while_it_waits_for_the_others_is_noticed_at_once() -> None:
     assert story.node.absent() == "node 1 (left_wheel) restarted (boot-up message)"
 
 
+@pytest.mark.parametrize(("state", "counts"), [(PRE_OPERATIONAL, False), (BOOT_UP, False), (OPERATIONAL, True)])
+def test_feedback_with_the_id_of_a_drive_that_is_not_operational_is_not_its_own(state: int, counts: bool) -> None:
+    """It had power when it was lost. A drive with the same node id is at standstill and answers each SYNC."""
+    story = Story().ready()
+    story.heartbeat(PRE_OPERATIONAL)
+    story.heartbeat(state)
+    assert story.node.presence is GONE
+    story.status()
+    assert (story.axis.status_at > NEVER, story.axis.velocity_at > NEVER) == (counts, counts)
+
+
 def test_a_drive_that_is_not_there_keeps_nobody_waiting() -> None:
     story = Story(drive=FakeDrive(powered=False))
     story.node.begin_boot(story.now_s)
@@ -301,9 +312,10 @@ def test_ready_ends_with_any_other_nmt_state(state: int, why: str) -> None:
 
 
 def test_a_place_that_was_heard_before_the_nmt_start_is_no_reference() -> None:
-    """Drives send no PDOs before it: a second drive with this node id told that place."""
+    """Drives send no PDOs before it: a second drive with this node id, which is operational, told that place."""
     story = Story().ready()
     story.heartbeat(PRE_OPERATIONAL)
+    story.heartbeat(OPERATIONAL)
     assert story.status()
     assert story.axis.travel.referenced
     story.wait(0.3)
