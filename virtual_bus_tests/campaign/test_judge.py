@@ -35,6 +35,8 @@ SETPOINT = struct.Struct("<Hi")
 STARTS_S, ENDS_S, SPEED_MPS = 1.6, 4.0, 0.4
 WATCHES_NOTHING = 7
 """A robot whose drives do not stop by themselves."""
+TWO_MOTORS_A_SIDE = 420
+"""A robot with two motors on each side."""
 Break = Callable[[World], None]
 
 
@@ -193,6 +195,10 @@ STORIES = (
     Story("a watchdog that gets its processor now and then, and looks at nothing",
           plan(fault("driver_dies", 1.0, 4.0), fault("watchdog_starved", 0.9, 4.0, share=0.9), segments=LONG),
           "envelope", None, "watchdog:all", WATCHES_NOTHING),
+    Story("a motor that brakes with all its force beside one with a reversed encoder, and drives without masters",
+          plan(fault("encoder_reversed", 0.8, 4.0, wheel=2), replace(CUT, start_s=0.85),
+               segments=(stick(0.4, 0.0, 0.0, 9.0),)),
+          "heartbeat", no_masters, "drives:heartbeat_consumer", TWO_MOTORS_A_SIDE),
 )  # fmt: skip
 
 

@@ -40,6 +40,8 @@ EXCUSES = {
     "be found, all such times of one stop together (held)",
     "cut off": "one drive of several is cut off and turns the base on until its own watch stops it, or, reached again, "
     "a later rung does (held)",
+    "overpowered": "a motor that brakes with all its force cannot stop a side that an unreachable drive turns on "
+    "(heartbeat: its time counts from when it can)",
     "deaf watchdog": "it cannot keep a standing base from starting; driver and drives miss it within T_react from the "
     "begin on (held)",
     "reset by a stranger": "a drive that another master has reset has forgotten 1016h, until its power is off "

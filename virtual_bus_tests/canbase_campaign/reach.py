@@ -18,6 +18,7 @@ from canbase_sim.cia402.axis import Axis
 from canbase_sim.cia402.states import State
 from canbase_sim.node import SimulatedNode
 from canbase_sim.personality import GENERIC, PERSONALITIES
+from canbase_sim.plant.motor import Motor
 from canbase_watchdog.ladder import RUNGS, Step
 
 RESETS_S = 0.2
@@ -43,6 +44,7 @@ class Reach:
         self.fastest_mps = 0.0
         """The fastest wheel since the base last stood."""
         self.lost_at = dict.fromkeys(world.drives.bench.nodes, -math.inf)
+        """When each drive was lost last, or braked in vain against a motor of its side that is."""
         self._cut_at = dict.fromkeys(world.drives.bench.nodes, -math.inf)
         """When no process reached each drive last: one that does again has its rungs ahead."""
         self._weak: set[int] = set()
@@ -73,7 +75,7 @@ class Reach:
         self.lost = bool(lost)
         self.was_lost = self.lost or (self.was_lost and not stands)
         if lost:
-            self.lost_at |= dict.fromkeys(lost, now_s)
+            self.lost_at |= dict.fromkeys(lost | self._overpowered(lost), now_s)
         for node in powered:
             if not self._reached(node.node_id):
                 self._cut_at[node.node_id] = now_s
@@ -131,6 +133,21 @@ class Reach:
         self._reacts_since.pop(node_id, None)
         waits = not self.personality.heeds_heartbeats and now_s <= self.heard(node_id) + self.alone_s
         return (waits or not self.stops_alone(node_id)) and not self._reached(node_id)
+
+    def _overpowered(self, lost: set[int]) -> set[int]:
+        """Nodes with a motor that stops with all its force, beside one of a lost node that drives the same side on."""
+        nodes = self._world.drives.bench.nodes
+        axes = [(node_id, side, nodes[node_id].axes[axis]) for node_id, axis, side in self._wheels]
+        driven = {side for node_id, side, axis in axes if node_id in lost and self._pushes(axis)}
+        return {node_id for node_id, side, axis in axes if side in driven and self._brakes_fully(axis.motor)}
+
+    @staticmethod
+    def _pushes(axis: Axis) -> bool:
+        return axis.motor.powered and not axis.encoder.closes_loop
+
+    @staticmethod
+    def _brakes_fully(motor: Motor) -> bool:
+        return motor.saturated and motor.goal_mps == 0.0 and motor.force_n * motor.speed_mps < 0.0
 
     def _reached(self, node_id: int) -> bool:
         """A driver or a watchdog that is there, and that behaves, has a line to it."""
