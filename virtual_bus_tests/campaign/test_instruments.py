@@ -180,20 +180,26 @@ def test_what_is_within_the_tolerance_counts_as_standing() -> None:
     assert moving_s(robot, 0.0, -1.24) == pytest.approx(1.0 / robot.limits.angular_deceleration_radps2)
 
 
+def order(wishes: Wishes, topic: str, twist: Twist, at: float) -> None:
+    """Sent and received at once."""
+    wishes.take(topic, twist, at)
+    wishes.arrive(topic, twist, at)
+
+
 def test_who_orders_motion_over_a_reset_counts_from_its_next_zero_on() -> None:
     """t   0 joystick and navigation order; 0.1 reset; joystick goes on; 0.3 zero; 0.35 it orders again"""
     robot = campaign_robot()
     wishes, forward = Wishes(robot, 0.0), Twist(0.4, 0.0)
     for at in (0.0, 0.05):
-        wishes.take("cmd_vel_joy", forward, at)
+        order(wishes, "cmd_vel_joy", forward, at)
     wishes.on_reset(0.1)
-    wishes.take("cmd_vel_joy", forward, 0.2)
+    order(wishes, "cmd_vel_joy", forward, 0.2)
     assert wishes.greatest_s(0.2) == 0.0
-    wishes.take("cmd_vel_nav", forward, 0.25)
+    order(wishes, "cmd_vel_nav", forward, 0.25)
     assert wishes.greatest_s(0.25) > 0.0, "navigation had ordered nothing when the reset was done"
-    wishes.take("cmd_vel_nav", ZERO, 0.26)
-    wishes.take("cmd_vel_joy", ZERO, 0.3)
-    wishes.take("cmd_vel_joy", forward, 0.35)
+    order(wishes, "cmd_vel_nav", ZERO, 0.26)
+    order(wishes, "cmd_vel_joy", ZERO, 0.3)
+    order(wishes, "cmd_vel_joy", forward, 0.35)
     assert wishes.greatest_s(0.35) == pytest.approx(0.4 / robot.limits.deceleration_mps2)
 
 
@@ -201,10 +207,22 @@ def test_a_program_that_was_silent_for_its_time_counts_again_a_joystick_does_not
     robot = campaign_robot()
     for topic, counts in (("cmd_vel_nav", True), ("cmd_vel_joy", False)):
         wishes = Wishes(robot, 0.0)
-        wishes.take(topic, Twist(0.4, 0.0), 0.0)
+        order(wishes, topic, Twist(0.4, 0.0), 0.0)
         wishes.on_reset(0.1)
-        wishes.take(topic, Twist(0.4, 0.0), 5.0)
+        order(wishes, topic, Twist(0.4, 0.0), 5.0)
         assert (wishes.greatest_s(5.0) > 0.0) is counts
+
+
+def test_a_command_that_is_on_its_way_over_a_reset_was_not_held_by_what_anybody_knows() -> None:
+    """t   0 navigation orders motion, which arrives at 0.4; 0.1 reset; 0.5 another reset"""
+    wishes = Wishes(campaign_robot(), 0.0)
+    for at in (0.0, 0.1, 0.4):
+        wishes.take("cmd_vel_nav", Twist(0.4, 0.0), at)
+    wishes.on_reset(0.1)
+    assert wishes.greatest_s(0.4) > 0.0
+    wishes.arrive("cmd_vel_nav", Twist(0.4, 0.0), 0.4)
+    wishes.on_reset(0.5)
+    assert wishes.greatest_s(0.5) == 0.0
 
 
 def test_a_fault_that_was_added_leaves_the_scenarios_without_it_as_they_were(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -108,6 +108,7 @@ class Judge:
         world.on_lease = self._on_lease
         world.on_goal_end = self._on_goal_end
         world.topics.watch = self._on_message
+        world.topics.arrivals |= {source.topic: self._on_arrival for source in world.robot.mux.sources.values()}
         self._step()
 
     @property
@@ -160,6 +161,9 @@ class Judge:
         self._wishes.take(topic, message, now_s)
         if topic == "cmd_vel_mux" and message.is_zero and not self._around.pressed:
             self._awaits_zero = False
+
+    def _on_arrival(self, topic: str, message: Twist) -> None:
+        self._wishes.arrive(topic, message, self._world.clock.now_s)
 
     def _step(self) -> None:
         now_s = self._world.clock.now_s

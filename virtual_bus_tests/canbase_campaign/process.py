@@ -127,7 +127,9 @@ class Topics:
         self.twice: set[str] = set()
         """Topics whose messages arrive a second time."""
         self.watch: Callable[[str, Any], None] | None = None
-        """Receives every message with its topic."""
+        """Receives every message with its topic, when it is sent."""
+        self.arrivals: dict[str, Callable[[str, Any], None]] = {}
+        """By topic: receives each message that is not lost, when it arrives."""
 
     def loses(self, topic: str) -> bool:
         """Whether this message on `topic` gets lost."""
@@ -145,9 +147,14 @@ class Topics:
             if self.loses(topic):
                 continue
             arrival = self._arrival(topic)
-            self._clock.at(arrival, process.receive, topic, 1, do, message)
+            self._deliver(arrival, process, topic, do, message)
             if topic in self.twice:
-                self._clock.at(arrival + self.AGAIN_S, process.receive, topic, 1, do, message)
+                self._deliver(arrival + self.AGAIN_S, process, topic, do, message)
+
+    def _deliver(self, at: float, process: Process, topic: str, do: Callable[[Any], None], message: Any) -> None:
+        if topic in self.arrivals:
+            self._clock.at(at, self.arrivals[topic], topic, message)
+        self._clock.at(at, process.receive, topic, 1, do, message)
 
     def _arrival(self, topic: str) -> float:
         arrival = self._clock.now_s + self.FASTEST_S + self._random.random() * self._jitter_s

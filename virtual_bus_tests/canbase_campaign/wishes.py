@@ -13,7 +13,7 @@ class Wishes:
     """Each source's last command holds for its timeout in robot.yaml.
 
     One that orders motion while a reset is done does not count from then on, until it orders zero or was absent for its
-    neutral_after_s.
+    neutral_after_s. By what has arrived: no part knows a command that is still on its way.
     """
 
     def __init__(self, robot: Robot, now_s: float) -> None:
@@ -22,24 +22,31 @@ class Wishes:
         self._neutral_after = {source.topic: source.neutral_after_s for source in robot.mux.sources.values()}
         self._held: set[str] = set()
         self._last: dict[str, tuple[float, float]] = dict.fromkeys(self._timeouts, (0.0, now_s))
+        self._arrived = dict(self._last)
         self._before = dict(self._last)
         """The greatest one of RECENT_S before it: a reader of one of two hands on a joystick may take the other."""
 
     def take(self, topic: str, twist: Twist, now_s: float) -> None:
-        """A message on any topic; only sources count, and only finite commands."""
+        """A message was sent on any topic; only sources count, and only finite commands."""
+        if topic not in self._timeouts or not twist.is_finite:
+            return
+        before = self._last[topic], self._before[topic]
+        self._before[topic] = max((each for each in before if now_s <= each[1] + RECENT_S), default=(0.0, now_s))
+        self._last[topic] = self._tau_s(twist), now_s
+
+    def arrive(self, topic: str, twist: Twist, now_s: float) -> None:
+        """The message has arrived at the mux."""
         if topic not in self._timeouts or not twist.is_finite:
             return
         patience_s = self._neutral_after[topic]
-        if twist.is_zero or (patience_s and now_s > self._last[topic][1] + patience_s):
+        if twist.is_zero or (patience_s and now_s > self._arrived[topic][1] + patience_s):
             self._held.discard(topic)
-        before = self._last[topic], self._before[topic]
-        self._before[topic] = max((each for each in before if now_s <= each[1] + RECENT_S), default=(0.0, now_s))
-        self._last[topic] = braking_s(self._robot, twist.linear_mps, twist.angular_radps), now_s
+        self._arrived[topic] = self._tau_s(twist), now_s
 
     def on_reset(self, now_s: float) -> None:
         """A reset is done: a source that orders motion now was held over it. Its last command tells: of two hands one
         has shown zero since the motion of the other."""
-        self._held = {topic for topic in self._last if self._last_s(topic, now_s) > 0.0}
+        self._held = {topic for topic in self._arrived if self._holds_s(topic, self._arrived[topic], now_s) > 0.0}
 
     def greatest_s(self, now_s: float) -> float:
         """τ of the greatest command that holds [s]."""
@@ -48,8 +55,11 @@ class Wishes:
     def _orders_s(self, topic: str, now_s: float) -> float:
         before_s, before_at = self._before[topic]
         recent_s = before_s if now_s <= before_at + RECENT_S else 0.0
-        return max(self._last_s(topic, now_s), recent_s)
+        return max(self._holds_s(topic, self._last[topic], now_s), recent_s)
 
-    def _last_s(self, topic: str, now_s: float) -> float:
-        tau_s, at = self._last[topic]
+    def _holds_s(self, topic: str, command: tuple[float, float], now_s: float) -> float:
+        tau_s, at = command
         return tau_s if now_s <= at + self._timeouts[topic] else 0.0
+
+    def _tau_s(self, twist: Twist) -> float:
+        return braking_s(self._robot, twist.linear_mps, twist.angular_radps)

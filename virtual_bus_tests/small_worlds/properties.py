@@ -96,6 +96,7 @@ class Properties:
     def _on_message(self, topic: str, message: object) -> None:
         if isinstance(message, Twist):
             self._wishes.take(topic, message, self._world.clock.now_s)
+            self._wishes.arrive(topic, message, self._world.clock.now_s)
             if topic == "cmd_vel_joy" and message.is_zero:
                 self._neutral = None
 
