@@ -138,6 +138,17 @@ def test_an_order_holds_then_the_base_has_its_time_to_react_and_then_it_must_bra
     assert envelope.bound_s(0.0, 0.41) <= 0.5
 
 
+def test_of_two_sources_on_one_topic_each_order_counts_whichever_came_last() -> None:
+    """every 10 ms an order of 0.5 s of braking, and 5 ms later, just before the judge looks, one of 0.1 s"""
+    envelope = Envelope(react_s=0.0, now_s=0.0)
+    for step in range(1, 50):
+        now_s = step * 0.01
+        envelope.order(0.5, now_s - 0.006)
+        envelope.order(0.1, now_s - 0.001)
+        assert envelope.bound_s(0.5, now_s) >= 0.5
+    assert envelope.bound_s(0.0, 0.52) < 0.5
+
+
 def test_a_base_that_brakes_with_its_order_is_never_beyond_it() -> None:
     envelope = Envelope(react_s=0.0, now_s=0.0)
     envelope.order(0.4, 0.0)

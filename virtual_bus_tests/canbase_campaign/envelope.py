@@ -105,6 +105,8 @@ class Envelope:
         """`coasting`: of `coasting_share`; 0.2: of the sample robot."""
         self._react_s, self._coasting = react_s, coasting
         self._order_s, self._ordered_at = 0.0, -math.inf
+        self._most_s = 0.0
+        """The greatest order since the last look: of two sources on one topic the driver may take either."""
         self._ordered_bound_s = self._peak_s = 0.0
         self._beyond_s, self._was_beyond = 0.0, False
         self._at = now_s
@@ -112,6 +114,7 @@ class Envelope:
     def order(self, tau_s: float, now_s: float) -> None:
         """An order with this τ is given."""
         self._order_s, self._ordered_at = tau_s, now_s
+        self._most_s = max(self._most_s, tau_s)
 
     def bound_s(self, tau_s: float, now_s: float, coasting: bool = False, lost: bool = False) -> float:
         """The greatest τ allowed now, when the base has `tau_s`. To be called again and again.
@@ -122,7 +125,8 @@ class Envelope:
         elapsed_s, self._at = now_s - self._at, now_s
         fades_s = elapsed_s * (self._coasting if coasting else 1.0)
         ordered_s = self._order_s if now_s <= self._ordered_at + ORDER_S else 0.0
-        self._ordered_bound_s = max(ordered_s, self._ordered_bound_s - fades_s)
+        self._ordered_bound_s = max(ordered_s, self._most_s, self._ordered_bound_s - fades_s)
+        self._most_s = 0.0
         if tau_s <= self._ordered_bound_s + ROUNDING_S:
             self._was_beyond, self._peak_s = False, 0.0
             self._beyond_s = 0.0 if ordered_s > 0.0 else self._beyond_s
