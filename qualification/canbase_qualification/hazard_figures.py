@@ -13,7 +13,7 @@ from canbase_config.robot import Robot
 from canbase_hazards.catalogue import Catalogue, Row
 from canbase_hazards.formula import FormulaError, evaluate
 from canbase_qualification.outcome import DRIVING, SCENARIO, Ages, MeasuredStop, Outcome, Violation
-from canbase_qualification.statistics import Distribution
+from canbase_qualification.statistics import Distribution, covered_share
 
 MATRIX: Final = "matrix: "
 """A test of a row with this prefix names a failure of the exit matrix, and of `MeasuredStop.fault`."""
@@ -47,11 +47,18 @@ class StopFigures:
     """Of those that came to standstill; None: there is none."""
     fastest_mps: float
     """The highest speed at which one of the failures began."""
+    bodies: int
+    """How many different bodies had them: runs of one body are alike, so these are the independent draws."""
 
     @property
     def runs(self) -> int:
         """How many there are."""
         return len(self.time_s.values)
+
+    @property
+    def covered_share(self) -> float:
+        """With 95 % confidence, at least this share of all such bodies is not beyond the greatest values."""
+        return covered_share(self.bodies)
 
     @property
     def never(self) -> int:
@@ -87,7 +94,7 @@ class HazardFigures:
 
 
 class Collected:
-    """Takes the outcomes one by one, in bounded memory for each: 16 bytes a stop."""
+    """Takes the outcomes one by one, in bounded memory: 16 bytes a stop, and the text of each body."""
 
     def __init__(self, catalogue: Catalogue) -> None:
         self.catalogue = catalogue
@@ -185,10 +192,12 @@ class _Stops:
         self._farthest: Run | None = None
         self._farthest_ended: Run | None = None
         self._fastest_mps = 0.0
+        self._bodies: set[str] = set()
 
     def add(self, run: Run) -> None:
         self._times.append(run.stop.time_s)
         self._ways.append(run.distance_m)
+        self._bodies.add(run.outcome.robot)
         self._keep(run)
 
     def _keep(self, run: Run) -> None:
@@ -210,6 +219,7 @@ class _Stops:
                 if run is not None:
                     whole._keep(run)
             whole._fastest_mps = max(whole._fastest_mps, each._fastest_mps)
+            whole._bodies |= each._bodies
             whole._times.extend(each._times)
             whole._ways.extend(each._ways)
         return whole
@@ -218,7 +228,9 @@ class _Stops:
         if self._slowest is None or self._farthest is None:
             return None
         times, ways = Distribution.of(self._times), Distribution.of(self._ways)
-        return StopFigures(times, ways, self._slowest, self._farthest, self._farthest_ended, self._fastest_mps)
+        return StopFigures(
+            times, ways, self._slowest, self._farthest, self._farthest_ended, self._fastest_mps, len(self._bodies)
+        )
 
 
 def _widened(span: tuple[float, float], value: float) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from canbase_qualification.stopping_distance import StoppingDistance
 from canbase_qualification.verdict import counted
 
 ENOUGH: Final = 0.99
-"""With 95 % confidence the worst run of each hazard covers so many of all such runs, or the first screen says so."""
+"""With 95 % confidence the worst run of each hazard covers so many of all such bodies, or the first screen says so."""
 NO_CERTIFICATE: Final = (
     "This is a simulation in virtual time: the real decisions of canbase, with simulated drives, body, floor, bus and "
     "processes. It is no certificate, no proof of a performance level or SIL, and replaces no measurement on the robot."
@@ -64,18 +64,18 @@ def first_screen(report: Report) -> Section:
 def _few(report: Report) -> Iterator[str]:
     """Quantiles and worst values of a few runs are little evidence, whatever the verdict is."""
     found = [figures.stops for figures in report.hazards if figures.stops]
-    least = min(found, key=lambda stops: stops.runs, default=None)
-    if least is not None and least.time_s.covered_share < ENOUGH:
+    least = min(found, key=lambda stops: stops.bodies, default=None)
+    if least is not None and least.covered_share < ENOUGH:
         needed = runs_covering(ENOUGH)
         yield (
-            f"**Few runs**: some hazards were measured {least.runs:,} times only. With 95 % confidence their worst "
-            f"values cover {share(least.time_s.covered_share)} of such runs; {needed:,} runs each "
-            f"cover {100.0 * ENOUGH:.0f} % (`--stops {needed}`)."
+            f"**Few runs**: some hazards were measured with {least.bodies:,} drawn bodies only. With 95 % confidence "
+            f"their worst values cover {share(least.covered_share)} of such bodies; {needed:,} cover "
+            f"{100.0 * ENOUGH:.0f} % (`--stops {needed}`)."
         )
 
 
 def _in_short(report: Report) -> Table:
-    rows = [(f"stopping distance: {each.name}", _planned(each)) for each in report.distances]
+    rows = [(f"distance for scanner fields: {each.name}", _planned(each)) for each in report.distances]
     tight = min(report.collected.ages.values(), key=lambda age: age.limit_s - age.longest_s, default=None)
     if tight is not None:
         room_s = tight.limit_s - tight.longest_s

@@ -75,9 +75,10 @@ def _stops(stops: StopFigures | None) -> dict[str, Any] | None:
     return {
         "runs": stops.runs,
         "never": stops.never,
+        "bodies": stops.bodies,
         "time_s": _distribution(stops.time_s),
         "distance_m": _distribution(stops.distance_m),
-        "covered_share": stops.time_s.covered_share,
+        "covered_share": stops.covered_share,
         "confidence": CONFIDENCE,
         "slowest": _run(stops.slowest),
         "farthest": _run(stops.farthest),

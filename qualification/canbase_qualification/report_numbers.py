@@ -100,7 +100,7 @@ def _own_stops(report: Report) -> Section:
     drives = tuple((own.joint, str(own.node_id), own.title, own.stops.value, own.why) for own in report.own_stops)
     rows = tuple(
         (plain(name), f"{stops.runs:,}", f"{stops.never:,}", seconds(stops.time_s.greatest),
-         metres(stops.distance_m.greatest), share(stops.time_s.covered_share))
+         metres(stops.distance_m.greatest), share(stops.covered_share))
         for name, stops in report.masters_die
     )  # fmt: skip
     tables = [Table("By their profiles", ("joint", "node", "drive", "stops by itself", "why"), drives)]

@@ -59,7 +59,11 @@ def _violations(report: Report) -> Section:
 
 def _measured(report: Report) -> Section:
     setup = report.setup
-    rows = [_row(each.row.failure, each.stops, setup, each) for each in measured(report) if each.stops]
+    rows = [
+        _row(f"{plain(each.row.id)}: {each.row.failure}", each.stops, setup, each)
+        for each in measured(report)
+        if each.stops
+    ]
     rows += [_row(f"{plain(name)} (no row of the catalogue)", stops, setup) for name, stops in report.unlisted if stops]
     if report.ordinary_stops is not None:
         rows.append(_row("Ordinary stop: zero is ordered, nothing fails.", report.ordinary_stops, setup))
@@ -70,8 +74,9 @@ def _measured(report: Report) -> Section:
     about = (
         "From the failure to the lasting standstill, by the ground truth of the simulation. *acts within* is what the "
         "catalogue states for this robot.yaml: the time until a part acts, without braking.",
-        "*max covers*: with 95 % confidence, at least this share of all such runs of this simulation is not beyond the "
-        "greatest value found. A quantile of too few runs is a dash, with the number of runs that it needs.",
+        "*max covers*: with 95 % confidence, at least this share of all bodies that may be drawn is not beyond the "
+        "greatest value found (runs of one body are alike, and count once). A quantile of too few runs is a dash, with "
+        "the number of runs that it needs.",
     )
     if not rows:
         return Section("stops", "Time and distance of each hazard", ("No stop was measured.",))
@@ -96,7 +101,7 @@ def _row(name: str, stops: StopFigures, setup: Setup, figures: HazardFigures | N
         seconds(stops.time_s.greatest),
         *(quantile_text(stops.distance_m, each, "distance") for each in SHARES),
         metres(stops.distance_m.greatest),
-        share(stops.time_s.covered_share),
+        share(stops.covered_share),
         run(stops.farthest),
         told_by(setup, stops.farthest.outcome),
     )

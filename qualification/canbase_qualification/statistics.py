@@ -35,13 +35,13 @@ class Distribution:
         """One of SHARES; None: there are fewer runs than `runs_needed`, and the greatest value would stand for it."""
         return quantile(self.values, SHARES[name]) if len(self.values) >= runs_needed(SHARES[name]) else None
 
-    @property
-    def covered_share(self) -> float:
-        """With CONFIDENCE, at least this share of all such runs is not beyond the greatest one of these.
 
-        The one-sided tolerance limit without an assumed distribution (Wilks 1941): 1 - confidence = share ** runs.
-        """
-        return math.pow(1.0 - CONFIDENCE, 1.0 / len(self.values))
+def covered_share(draws: int) -> float:
+    """With CONFIDENCE, at least this share of all such draws is not beyond the greatest one of `draws` ones.
+
+    The one-sided tolerance limit without an assumed distribution (Wilks 1941): 1 - confidence = share ** draws.
+    """
+    return math.pow(1.0 - CONFIDENCE, 1.0 / draws)
 
 
 def quantile(ordered: Sequence[float], share: float) -> float:
@@ -55,7 +55,7 @@ def runs_needed(share: float) -> int:
 
 
 def runs_covering(share: float) -> int:
-    """From so many runs on the greatest value covers this share with CONFIDENCE: 299 for 99 %."""
+    """From so many independent runs on the greatest one covers this share with CONFIDENCE: 299 for 99 %."""
     return math.ceil(math.log(1.0 - CONFIDENCE) / math.log(share))
 
 

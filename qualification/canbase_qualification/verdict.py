@@ -40,7 +40,11 @@ def verdict_of(setup: Setup, collected: Collected, stops: StopFigures | None) ->
     if missing or setup.problems:
         parts = ", ".join(f"{collected.runs[kind]:,} of {counted(kind, setup.asked[kind])}" for kind in missing)
         return Grade.INCOMPLETE, f"INCOMPLETE: {parts or setup.problems[0]}; no violation so far."
-    worst = f", at worst after {stops.time_s.greatest:.2f} s and {stops.distance_m.greatest:.2f} m" if stops else ""
+    worst = (
+        f", at most {stops.time_s.greatest:.2f} s and {stops.distance_m.greatest:.2f} m after the failure"
+        if stops
+        else ""
+    )
     return Grade.PASSED, f"No violation in {done}: every measured stop ended in standstill{worst}."
 
 

@@ -26,7 +26,17 @@ BODY = "60 kg × 1.00, slope +0.0%"
 def stop(fault: str, seed: int, time_s: float, way_m: float, speed_mps: float = 0.8) -> Outcome:
     """A run with one measured stop."""
     measured = MeasuredStop(fault, "watchdog: driver silent", speed_mps, time_s, way_m, time_s + 0.1)
-    return Outcome(STOP, seed, BODY, 1.0, 0.0, (fault,) if fault else (), stops=(measured,), virtual_s=2.0, moved_m=1.0)
+    return Outcome(
+        STOP,
+        seed,
+        f"{BODY}, body {seed}",
+        1.0,
+        0.0,
+        (fault,) if fault else (),
+        stops=(measured,),
+        virtual_s=2.0,
+        moved_m=1.0,
+    )
 
 
 def stops(fault: str, runs: int, first: int = 0) -> list[Outcome]:

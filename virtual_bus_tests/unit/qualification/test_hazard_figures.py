@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -67,6 +68,14 @@ def test_stops_of_several_failures_are_one_row() -> None:
     assert found.time_s.values == (0.2, 0.4)
     assert found.farthest.outcome.seed == 1
     assert collected([]).figures([KILLED]) is None
+
+
+def test_runs_of_one_body_are_one_draw() -> None:
+    alike = [replace(outcome, robot="60 kg") for outcome in stops(KILLED, 50)]
+    found = collected([*alike, *stops(PRESSED, 4, 100)]).figures([KILLED, PRESSED])
+    assert found is not None
+    assert (found.runs, found.bodies) == (54, 5)
+    assert found.covered_share == pytest.approx(0.05 ** (1 / 5))
 
 
 def test_a_scenario_counts_once_for_a_row_that_two_of_its_failures_are() -> None:

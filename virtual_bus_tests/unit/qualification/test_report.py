@@ -34,7 +34,7 @@ def test_all_is_well() -> None:
     assert report.grade is Grade.PASSED
     assert report.verdict == (
         "No violation in 1,135 stops, 30 scenarios and 2 runs without a failure of bench: every measured stop ended in "
-        "standstill, at worst after 1.00 s and 0.10 m."
+        "standstill, at most 1.00 s and 0.10 m after the failure."
     )
 
 
@@ -80,7 +80,7 @@ def test_the_first_screen_says_what_it_is_not() -> None:
 
 def test_few_runs_are_told_on_the_first_screen() -> None:
     few = sections(made(stops(KILLED, 20)))[0].paragraphs[1]
-    assert "measured 20 times only" in few
+    assert "with 20 drawn bodies only" in few
     assert "values cover 86.0 %" in few
     assert "`--stops 299`" in few
     assert not any("Few runs" in text for text in sections(made(stops(KILLED, 299)))[0].paragraphs)
@@ -88,7 +88,7 @@ def test_few_runs_are_told_on_the_first_screen() -> None:
 
 def test_each_hazard_with_stops_has_its_line_and_its_command() -> None:
     rows = {row[0]: row for row in table(made(passed()), "stops").rows}
-    killed = rows["motor_driver is killed or hangs."]
+    killed = rows["driver killed or hung: motor_driver is killed or hangs."]
     assert killed[1:7] == ("1,000", "0.30 s", "0.50 s", "0.99 s", "1.00 s", "1.00 s")
     assert killed[11] == "99.7 %"
     assert killed[-1] == "`canbase qualify robot.yaml --stop 1000`"

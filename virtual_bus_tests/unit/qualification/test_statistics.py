@@ -6,7 +6,15 @@ import math
 
 import pytest
 
-from canbase_qualification.statistics import SHARES, Distribution, quantile, runs_covering, runs_needed, thinned
+from canbase_qualification.statistics import (
+    SHARES,
+    Distribution,
+    covered_share,
+    quantile,
+    runs_covering,
+    runs_needed,
+    thinned,
+)
 
 
 @pytest.mark.parametrize(("share", "runs"), [(0.5, 2), (0.99, 100), (0.999, 1000)])
@@ -39,8 +47,8 @@ def test_what_never_ends_is_the_greatest() -> None:
 
 def test_how_much_the_greatest_value_covers() -> None:
     # Wilks: 299 runs for 99 % with 95 % confidence, and 2,995 for 99.9 %.
-    assert Distribution.of([0.0] * 298).covered_share < 0.99 <= Distribution.of([0.0] * 299).covered_share
-    assert Distribution.of([0.0] * 2994).covered_share < 0.999 <= Distribution.of([0.0] * 2995).covered_share
+    assert covered_share(298) < 0.99 <= covered_share(299)
+    assert covered_share(2994) < 0.999 <= covered_share(2995)
 
 
 def test_runs_for_a_share() -> None:
