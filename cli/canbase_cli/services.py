@@ -24,9 +24,9 @@ from canbase_cli.options import (
 from canbase_cli.raise_priority import raise_priority
 from canbase_runtime.latch_file import latch_folder
 from canbase_runtime.own_modules import module_command
-from canbase_runtime.sim_time import SimTimeError
 from canbase_runtime.single_instance import TakenError
 from canbase_runtime.terminal import FAILED, fail, load_config
+from canbase_runtime.wrong_start import WrongStartError
 
 if TYPE_CHECKING:
     from canbase_config.robot import Robot
@@ -63,7 +63,7 @@ def driver(
     with ros_needed():
         from canbase_driver.runtime.main import run
     leave_stop_file(robot, stop_file)
-    with _real_time():
+    with _right_start():
         raise typer.Exit(run(robot, ros_arguments(ctx, namespace), claim, autostart, partial(raise_priority, "driver")))
 
 
@@ -86,7 +86,7 @@ def velocity(ctx: typer.Context, config: ConfigOption = None, namespace: Namespa
     robot = load_config(config).robot
     with ros_needed():
         from canbase_velocity.main import run
-    with _real_time():
+    with _right_start():
         raise typer.Exit(run(robot, ros_arguments(ctx, namespace), partial(raise_priority, "velocity")))
 
 
@@ -98,16 +98,16 @@ def action_server(ctx: typer.Context, config: ConfigOption = None, namespace: Na
     robot = load_config(config).robot
     with ros_needed():
         from canbase_action_server.main import run
-    with _real_time():
+    with _right_start():
         raise typer.Exit(run(robot, ros_arguments(ctx, namespace), partial(raise_priority, "action-server")))
 
 
 @contextmanager
-def _real_time() -> Iterator[None]:
-    """A wrong command line: use_sim_time."""
+def _right_start() -> Iterator[None]:
+    """A wrong command line: use_sim_time, or a namespace with which a source is the robot's own output."""
     try:
         yield
-    except SimTimeError as error:
+    except WrongStartError as error:
         fail(str(error), WRONG_COMMAND_LINE)
 
 

@@ -21,7 +21,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
-from canbase_config.mux import JOINTS, MuxSource
+from canbase_config.mux import JOINTS, MEASURED, OUTPUTS, MuxSource
 from canbase_config.robot import Robot
 from canbase_runtime.driver_state import driver_state
 from canbase_runtime.joint_command import Refusal, base_velocity
@@ -29,6 +29,7 @@ from canbase_runtime.journal import Journal, Voice
 from canbase_runtime.receive_time import ReceiveTimes
 from canbase_runtime.serialized_message import SerializedTwist
 from canbase_runtime.sim_time import refuse_sim_time
+from canbase_runtime.wrong_start import WrongStartError
 from canbase_velocity.base_ready import status_timeout_s
 from canbase_velocity.changes import changes
 from canbase_velocity.delay import Sent
@@ -36,6 +37,7 @@ from canbase_velocity.graph import expected, heard, publishers
 from canbase_velocity.messages import sent_at, twist_of
 from canbase_velocity.mux import NOT_FINITE, Mux, MuxDecision
 from canbase_velocity.mux_messages import diagnostics, mux_state
+from canbase_velocity.own_topics import wrong_topic
 from canbase_velocity.qos import ANY_COMMAND, COMMAND, DRIVER_STATUS, STATE, listen_closely, loud
 from canbase_velocity.steady import steady_timer
 from canbase_velocity.twist import Twist
@@ -68,6 +70,7 @@ class MuxNode(Node):
         super().__init__("velocity_mux")
         refuse_sim_time(self, SetParametersResult)
         self._robot = robot
+        self._refuse_own_topics()
         self._follower: Follower | None = None
         self._voice = Voice(self.get_logger(), Journal("velocity_mux"))
         self._receive_times = ReceiveTimes()
@@ -121,6 +124,12 @@ class MuxNode(Node):
                 self.get_logger().warning(
                     f"lock {name} is not required (timeout 0): the mux does not detect that its publisher ended"
                 )
+
+    def _refuse_own_topics(self) -> None:
+        topics = {name: self.resolve_topic_name(source.topic) for name, source in self._robot.mux.sources.items()}
+        problem = wrong_topic(topics, [self.resolve_topic_name(output) for output in (*OUTPUTS, MEASURED)])
+        if problem:
+            raise WrongStartError(f"{self.get_fully_qualified_name()}: {problem}")
 
     def _reader(self, source: MuxSource) -> tuple[type[Any], Callable[[str, Any], None]]:
         """The messages of a source, and what takes them in."""

@@ -297,6 +297,18 @@ def test_a_start_with_simulation_time_is_refused_with_a_sentence(
     assert "Traceback" not in process.log()
 
 
+def test_in_its_namespace_a_source_is_no_output_of_the_robot(
+    spawn: Callable[..., Process], make_robot: Callable[[Mapping[str, Any]], Path]
+) -> None:
+    loop = {"loop": {"topic": "/robot1/cmd_vel", "priority": 9, "timeout_s": 0.3}}
+    path = make_robot({**FREE, "mux": {"sources": loop}})
+    words = ["velocity", "--config", str(path), "--namespace", "robot1"]
+    process = spawn([sys.executable, "-m", "canbase_cli", *words])
+    assert process.wait(START_S) == 2
+    assert "mux.sources.loop: its topic is /robot1/cmd_vel here, an output of this robot" in process.log()
+    assert "Traceback" not in process.log()
+
+
 def test_a_publisher_of_the_other_message_type_is_told(start: Callable[[Mapping[str, Any]], Velocity]) -> None:
     velocity = start({})
     velocity.node.node.create_publisher(Twist, "cmd_vel_joy", 1)
