@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from canbase.msg import MuxSource, MuxState
 from geometry_msgs.msg import TwistStamped
+from sensor_msgs.msg import JointState
 
 from support.ros_harness import Recorder, TestNode
 from support.running_robot import LATCHED, PATIENT, RESTS_M, RunningRobot, own_domain, robot_on
@@ -119,6 +121,29 @@ def test_a_controller_that_begins_with_a_speed_is_followed_after_zero(
     wait_followed(robot, mux)
     hardware.set(1.0, 1.0)
     robot.wait_speed(0.09)
+
+
+def test_hardware_with_its_default_threshold_shows_no_zero_and_moves_nothing(
+    robot: RunningRobot, mux: Recorder[MuxState], hardware: TopicHardware
+) -> None:
+    hardware.threshold = 1e-5  # canbase urdf writes -1
+    robot.node.spin_for(1.0)
+    sent = hardware.sent
+    robot.node.spin_for(0.5)
+    assert hardware.sent == sent  # at rest it publishes nothing: no zero arms the source after its next restart
+    hardware.publisher = restarted(robot, hardware)
+    hardware.set(1.0, 1.0)
+    robot.node.wait_for(lambda: control(mux).standing == MuxSource.UNARMED, 10.0, f"not followed: {mux.last}")
+    assert robot.moved_since(time.monotonic(), 0.5) < RESTS_M
+
+
+def restarted(robot: RunningRobot, hardware: TopicHardware) -> Any:
+    """The publisher of a new controller manager, when the mux has seen that the one before is gone."""
+    robot.node.node.destroy_publisher(hardware.publisher)
+    robot.node.spin_for(1.2)
+    publisher = robot.node.node.create_publisher(JointState, TOPIC, 1)
+    robot.node.wait_for_subscriber(publisher)
+    return publisher
 
 
 def test_two_controller_managers_on_the_topic_stop_the_base(

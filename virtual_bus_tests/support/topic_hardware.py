@@ -27,7 +27,7 @@ class TopicHardware:
         self.states = dict.fromkeys(joints, math.nan)
         self.alive = True
         self.sent = 0
-        self._threshold = threshold
+        self.threshold = threshold
         self._node = node
         self.publisher = node.create_publisher(JointState, topic, 1)
         node.create_subscription(JointState, "joint_states", self._read, qos_profile_sensor_data)
@@ -45,7 +45,7 @@ class TopicHardware:
 
     def _write(self) -> None:
         apart = sum(abs(self.states[joint] - command) for joint, command in self.commands.items())
-        if not self.alive or apart <= self._threshold:
+        if not self.alive or apart <= self.threshold:
             return
         message = JointState(name=list(self.commands), velocity=list(self.commands.values()))
         message.header.stamp = self._node.get_clock().now().to_msg()
