@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from canbase_action_server.preconditions import action_source
+from canbase_config.mux import MEASURED
 from canbase_doctor.check import Check, fail, ok, too_slow, warn
 from canbase_doctor.evidence import Evidence
 from canbase_runtime.watchdog_view import WatchdogView, watchdog_view
@@ -16,6 +17,11 @@ CLOCKS_APART_S = 1.0
 """A stamp that is farther from this computer's clock was made with another one."""
 BUSY_S = 10.0
 """Older stamps than that no busy computer explains."""
+SHARED_TOPICS = {
+    "odom": "let motor_driver alone publish it: rename the topic of the other node",
+    MEASURED: "let motor_driver alone publish it: end joint_state_broadcaster (docs/ros2_control.md)",
+}
+"""What else publishes there in a robot with ros2_control, and what helps."""
 FITTING_KEYS = {
     "geometry_msgs/msg/TwistStamped": "stamped: true",
     "geometry_msgs/msg/Twist": "stamped: false",
@@ -70,7 +76,7 @@ def driver_watchdog(seen: Evidence) -> Check:
 
 
 def odometry(seen: Evidence) -> Check:
-    """Is it there, often enough, in the right frames, by this clock?"""
+    """Is it there, from one node, often enough, in the right frames, by this clock?"""
     name, heard, base = "odometry", seen.on("odom"), seen.robot.base
     if heard.last is None:
         return fail(name, "nothing on odom", "is motor_driver running, and do the drives send feedback?")
@@ -81,6 +87,10 @@ def odometry(seen: Evidence) -> Check:
             f"from {frames[0]!r} to {frames[1]!r}",
             f"expected {base.odom_frame} to {base.base_frame}: another publisher?",
         )
+    for topic, advice in SHARED_TOPICS.items():
+        nodes = [endpoint.node for endpoint in seen.publishers.get(topic, ())]
+        if len(nodes) > 1:
+            return fail(name, f"{topic} is published by {', '.join(nodes)}", advice)
     apart_s = seen.wall_s - _stamp_s(heard.last)
     if abs(apart_s) > CLOCKS_APART_S:
         advice = "clocks differ: use_sim_time on a real robot, or no chrony"

@@ -25,6 +25,7 @@ from canbase_action_server.goal_step import goal_step
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.preconditions import action_source
 from canbase_config.load import Loaded
+from canbase_config.mux import MEASURED
 from canbase_config.robot import Robot
 from canbase_doctor.evidence import ACTIONS, DOCTOR, Endpoint, Evidence, Goal, Heard, LoggedStep, VelocityTopic
 from canbase_doctor.nav2_probe import Nav2Prober
@@ -125,7 +126,8 @@ def observe(loaded: Loaded, ros_args: list[str], seconds: float) -> Evidence:
 
 def _evidence(loaded: Loaded, node: Node, listener: Listener, prober: Prober) -> Evidence:
     heard = listener.heard()
-    names = {*topics(loaded.robot), *(source.topic for source in loaded.robot.mux.sources.values()), "cmd_vel_mux"}
+    sources = {source.topic for source in loaded.robot.mux.sources.values()}
+    names = {*topics(loaded.robot), *sources, "cmd_vel_mux", MEASURED}
     return Evidence(
         robot=loaded.robot,
         source=str(loaded.path),

@@ -165,6 +165,7 @@ ELSEWHERE = replace(HEALTHY, servers={"/robot2/drive_distance": (SERVER,)})
 OTHER_DOMAIN = replace(HEALTHY, servers={}, processes=(ServerProcess(7, {"ROS_DOMAIN_ID": "5"}),))
 UNSEEN = replace(HEALTHY, servers={})
 STAMPED, BARE = "geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/Twist"
+JOINT_STATE = "sensor_msgs/msg/JointState"
 OLD = Time(sec=WALL_S - 100)
 NOT_ASKED = replace(HEALTHY, answers=Answers())
 
@@ -202,11 +203,15 @@ BROKEN = [
     ("moves-after-cancel", driver(watchdog="missing"), "driver and watchdog", "missing"),
     ("only-in-simulation", but(odom=Heard()), "odometry", "nothing on odom"),
     ("only-in-simulation", but(odom=heard(odometry(OLD))), "odometry", "100.0 s old"),
+    ("only-in-simulation", publishing("joint_states", Endpoint("/motor_driver", JOINT_STATE),
+     Endpoint("/joint_state_broadcaster", JOINT_STATE)), "odometry", "end joint_state_broadcaster"),
+    ("only-in-simulation", publishing("odom", Endpoint("/motor_driver", "nav_msgs/msg/Odometry"),
+     Endpoint("/ekf", "nav_msgs/msg/Odometry")), "odometry", "odom is published by /motor_driver, /ekf"),
     ("only-in-simulation", but(odom=heard(odometry(child="base_footprint"))), "odometry", "base_footprint"),
     ("only-in-simulation", but(tf=heard(transforms("laser"))), "tf", "missing"),
     ("only-in-simulation", but(scan=heard(scan(OLD))), "stamps of the sensors", "100.0 s ago"),
     ("only-in-simulation", publishing("cmd_vel_nav", Endpoint("/nav2", BARE)), "command interface", "stamped: false"),
-    ("only-in-simulation", publishing("cmd_vel_nav", Endpoint("/wheels", "sensor_msgs/msg/JointState")),
+    ("only-in-simulation", publishing("cmd_vel_nav", Endpoint("/wheels", JOINT_STATE)),
      "command interface", "set mux.sources.navigation.type: joint_command, or let it send geometry_msgs/msg/TwistSt"),
     ("only-in-simulation", replace(HEALTHY, subscribers={}), "command interface", "no subscriber on cmd_vel"),
     ("goals-collide", replace(HEALTHY, servers={"/drive_distance": (SERVER, SERVER)}), "one server", "2 servers"),
