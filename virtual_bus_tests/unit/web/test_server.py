@@ -6,7 +6,8 @@ import asyncio
 
 import uvicorn
 
-from canbase_web.server import _end_with, _Server
+from canbase_config.mux import MuxSource
+from canbase_web.server import _end_with, _is_ours, _Server
 
 
 def test_a_loop_that_fails_ends_the_process_with_its_error_and_one_that_is_canceled_does_not() -> None:
@@ -26,3 +27,9 @@ def test_a_loop_that_fails_ends_the_process_with_its_error_and_one_that_is_cance
         return found[0], found[1]
 
     assert asyncio.run(story()) == ((False, ""), (True, "RuntimeError('the publisher is gone')"))
+
+
+def test_the_page_publishes_velocities_of_the_base_and_no_wheel_speeds() -> None:
+    assert _is_ours(MuxSource(topic="cmd_vel_web", priority=1, timeout_s=0.3))
+    assert not _is_ours(MuxSource(topic="cmd_vel_web", type="joint_command", priority=1, timeout_s=0.3))
+    assert not _is_ours(None)
