@@ -180,7 +180,7 @@ clean: ## remove what make and the tools created
 
 # ---- the environment -------------------------------------------------------------------------------------------------
 
-INTERFACES := $(wildcard interfaces/*/*.action interfaces/*/*.msg interfaces/*/*/*.msg)
+INTERFACES := $(wildcard interfaces/*/*.action interfaces/*/*.msg interfaces/*/*/*.msg interfaces/*/*/*.action)
 
 $(VENV)/made:
 	@missing=$$(.ci/missing $(PYTHON)); [[ -z $$missing ]] \

@@ -61,7 +61,7 @@ def test_every_import_rule_knows_all_python_packages() -> None:
     assert sorted(pyproject()["tool"]["importlinter"]["root_packages"]) == packages
 
 
-@pytest.mark.parametrize("name", ["package.xml", "interfaces/tf2_msgs/package.xml"])
+@pytest.mark.parametrize("name", ["package.xml", "interfaces/tf2_msgs/package.xml", "interfaces/nav2_msgs/package.xml"])
 def test_ros_tools_see_an_ament_cmake_package_with_interfaces(name: str) -> None:
     package = package_xml(name)
 
