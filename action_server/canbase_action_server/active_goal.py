@@ -5,7 +5,7 @@ Who may take it, and when, is decided in `goal_queue.py`. After `fail` the goal 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from canbase_action_server.goal import GoalPhase, GoalRun, Order
 from canbase_action_server.goal_request import Request
@@ -35,6 +35,7 @@ class ActiveGoal:
         self._robot = robot
         self._goal: GoalRun | None = None
         self._failure: Failure | None = None
+        self._began = 0.0
         self._silent_from = -1.0
 
     @property
@@ -51,8 +52,9 @@ class ActiveGoal:
         """The base now belongs to this goal. RuntimeError when it has an owner, or was never seen."""
         if self.busy or inputs.odometry is None:
             raise RuntimeError("a goal took a base that is not free, or of which no odometry was received")
-        start = inputs.odometry
-        self._goal = GoalRun(self._robot, request.motion(self._robot, start), start, now_s)
+        start, motion = inputs.odometry, request.motion(self._robot, inputs.odometry)
+        self._goal = GoalRun(self._robot, motion, start, now_s, request.terms.time_allowance_s)
+        self._began = now_s
 
     def tick(self, inputs: Inputs, now_s: float) -> Order | None:
         """One control cycle. None: nothing is ordered, the source publishes nothing."""
@@ -62,9 +64,10 @@ class ActiveGoal:
             order = self._goal.tick(inputs, now_s)
         else:
             order = self._end_failed(self._failure, self._goal.traveled_m, inputs, now_s)
-        if order.end is not None:
-            self._release(now_s)
-        return order
+        if order.end is None:
+            return order
+        self._release(now_s)
+        return replace(order, end=self._timed(order.end, now_s))
 
     def fail(self, error: Exception, now_s: float) -> None:
         """Something in the server broke: from now on the goal only stops. The first failure stays."""
@@ -79,7 +82,10 @@ class ActiveGoal:
             return None
         traveled_m = self._goal.traveled_m
         self._release(now_s)
-        return Order(STOP, end=Outcome(code, traveled_m, 0.0, message))
+        return Order(STOP, end=self._timed(Outcome(code, traveled_m, 0.0, message), now_s))
+
+    def _timed(self, end: Outcome, now_s: float) -> Outcome:
+        return replace(end, duration_s=now_s - self._began)
 
     def _end_failed(self, failure: Failure, traveled_m: float, inputs: Inputs, now_s: float) -> Order:
         verdict = failure.standstill.judge(inputs, now_s)

@@ -10,6 +10,8 @@ from canbase_action_server.goal import Feedback
 from canbase_action_server.goal_request import Request
 from canbase_action_server.outcome import Outcome
 
+DEFECT = "defect in the action server, see its log"
+
 
 @dataclass(frozen=True, slots=True)
 class Binding:
@@ -20,3 +22,5 @@ class Binding:
     request: Callable[[Any], Request]
     feedback: Callable[[Feedback], Any]
     result: Callable[[Outcome], Any]
+    defect: Any
+    """The result of a goal whose own one cannot be made."""

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from canbase.action import DriveDistance
 
-from canbase_action_server.binding import Binding
+from canbase_action_server.binding import DEFECT, Binding
 from canbase_action_server.goal import Feedback
 from canbase_action_server.goal_request import DriveRequest
-from canbase_action_server.outcome import Outcome
+from canbase_action_server.outcome import ErrorCode, Outcome
 
 
 def drive_binding() -> Binding:
     """For the server."""
-    return Binding("drive_distance", DriveDistance, _request, _feedback, _result)
+    defect = DriveDistance.Result(error_code=int(ErrorCode.INTERNAL), message=DEFECT)
+    return Binding("drive_distance", DriveDistance, _request, _feedback, _result, defect)
 
 
 def _request(goal: DriveDistance.Goal) -> DriveRequest:

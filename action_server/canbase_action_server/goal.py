@@ -6,6 +6,7 @@ that comes to stand short of its goal goes on. `causes.py`: why a goal ends; `st
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -59,12 +60,15 @@ class Order:
 class GoalRun:
     """A goal that owns the base. `tick` once per control cycle until it gives an end."""
 
-    def __init__(self, robot: Robot, motion: Motion, start: Odometry, now_s: float) -> None:
-        """`motion` begins at `start`."""
+    def __init__(
+        self, robot: Robot, motion: Motion, start: Odometry, now_s: float, time_allowance_s: float = math.inf
+    ) -> None:
+        """`motion` begins at `start`. `time_allowance_s`: the client's own limit of the overall time."""
         self._robot = robot
         self._motion = motion
         self._own_source = action_source(robot)
-        self._overall_s = robot.action.overall_factor * self._motion.ideal_s + robot.action.overall_extra_s
+        overall_s = robot.action.overall_factor * self._motion.ideal_s + robot.action.overall_extra_s
+        self._overall_s = min(overall_s, time_allowance_s)
         self._started = self._ticked_at = now_s
         self._gap_s = 0.0
         self._phase = GoalPhase.DRIVING

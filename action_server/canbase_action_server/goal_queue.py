@@ -11,6 +11,10 @@ Rules.
 5. With `require_client_lease` a goal begins once a lease of its client arrived after its acceptance. It ends with
    CLIENT_LOST when no lease arrived for `client_lease_s`.
 6. Each goal that was admitted ends exactly once.
+7. A goal with `terms.release_s` waits for so long until a program releases the base and the base is at standstill: the
+   last commands of Nav2's controller are still fresh then. It does not wait for anything else that speaks against it.
+8. A goal with `terms.reports_invalid` and invalid numbers is admitted at any time, ends at once with INVALID_GOAL, and
+   preempts nobody.
 """
 
 from __future__ import annotations
@@ -25,7 +29,7 @@ from canbase_action_server.goal_request import Request
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.outcome import ErrorCode, Outcome
-from canbase_action_server.preconditions import state_reason
+from canbase_action_server.preconditions import commanding_program, is_moving, state_reason
 from canbase_config.robot import Robot
 
 
@@ -55,12 +59,15 @@ class Admitted:
 
     key: str
     request: Request
+    admitted: float
     heard: float
     """When its client gave the last sign of life; until the first one, when it was admitted."""
     alive: bool = False
     """Its client has given one since then: it knows that the goal was accepted."""
     canceled: bool = False
     preempted: bool = False
+    invalid: str | None = None
+    """Why its numbers are invalid; None: they are good."""
 
 
 class GoalQueue:
@@ -90,7 +97,10 @@ class GoalQueue:
 
     def refusal(self, request: Request, inputs: Inputs, now_s: float) -> str | None:
         """Why a goal with these numbers is rejected; None: it may be admitted."""
-        return request.range_reason(self._robot) or self._no_place() or state_reason(self._robot, inputs, now_s)
+        terms, invalid = request.terms, request.range_reason(self._robot)
+        if invalid is not None:
+            return None if terms.reports_invalid else invalid
+        return self._no_place() or state_reason(self._robot, inputs, now_s, terms.release_s > 0.0)
 
     def admit(self, key: str, request: Request, now_s: float) -> None:
         """From now on the goal waits for the base. RuntimeError when its numbers are out of range or there is no place.
@@ -98,13 +108,15 @@ class GoalQueue:
         `refusal` has judged the state of the robot. The answer to the client can take 0.1 s (DDS waits for a client
         that it does not know yet): a message that became too old meanwhile ends the goal, and is no defect.
         """
-        reason = request.range_reason(self._robot) or self._no_place()
+        invalid = request.range_reason(self._robot)
+        reported = request.terms.reports_invalid and invalid is not None
+        reason = None if reported else invalid or self._no_place()
         if reason is not None or key in (goal.key for goal in self._goals()):
             raise RuntimeError(f"goal {key} was admitted, but it is known already, or refused: {reason}")
-        if self._robot.action.goal_policy == "preempt":
+        if self._robot.action.goal_policy == "preempt" and not reported:
             for goal in self._goals():
                 goal.preempted = True
-        self._waiting.append(Admitted(key, request, now_s))
+        self._waiting.append(Admitted(key, request, now_s, now_s, invalid=invalid))
 
     def cancel(self, key: str) -> bool:
         """A client wants the goal to end. False: no such goal runs or waits."""
@@ -169,6 +181,8 @@ class GoalQueue:
     def _against_waiting(self, goal: Admitted, inputs: Inputs, now_s: float) -> EndCause | None:
         if self._failed:
             return EndCause(ErrorCode.INTERNAL, "defect in the action server, see its log")
+        if goal.invalid is not None:
+            return EndCause(ErrorCode.INVALID_GOAL, goal.invalid)
         if goal.canceled:
             return EndCause(ErrorCode.CANCELED, "canceled by request")
         if goal.preempted:
@@ -183,9 +197,17 @@ class GoalQueue:
         goal = self._waiting[0]
         if self._robot.action.require_client_lease and not goal.alive:
             return None
+        if self._waits_for_release(goal, inputs, now_s):
+            return None
         self._owner.take(goal.request, inputs, now_s)
         self._running = self._waiting.popleft()
         return goal.key
+
+    def _waits_for_release(self, goal: Admitted, inputs: Inputs, now_s: float) -> bool:
+        held = commanding_program(self._robot, inputs) or is_moving(self._robot, inputs)
+        if not held or now_s - goal.admitted >= goal.request.terms.release_s:
+            return False
+        return state_reason(self._robot, inputs, now_s, waits_for_program=True) is None
 
     def _ended(self, order: Order) -> tuple[End, ...]:
         """The end of the running goal, if this is one, and of those that may not follow it."""

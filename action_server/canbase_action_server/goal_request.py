@@ -15,8 +15,24 @@ from canbase_config.action import Action
 from canbase_config.robot import Robot
 
 
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """What holds for a goal besides its motion. The defaults are those of canbase's own actions."""
+
+    time_allowance_s: float = math.inf
+    """From the start of its motion: not finished after that, TIMEOUT. The overall time of robot.yaml holds as well."""
+    release_s: float = 0.0
+    """It waits for so long until a program (not an operator) that commands the base stops to do so."""
+    reports_invalid: bool = False
+    """With invalid numbers it is accepted, and ends with INVALID_GOAL; else it is rejected."""
+
+
 class Request(Protocol):
     """A goal of any action of this server."""
+
+    @property
+    def terms(self) -> Terms:
+        """What holds for it besides its motion."""
 
     def range_reason(self, robot: Robot) -> str | None:
         """Why its numbers are refused; None: they are good."""
@@ -31,6 +47,11 @@ class DriveRequest:
 
     distance_m: float
     max_speed_mps: float
+
+    @property
+    def terms(self) -> Terms:
+        """The defaults."""
+        return Terms()
 
     def range_reason(self, robot: Robot) -> str | None:
         """Why its numbers are refused; None: they are good."""
@@ -50,6 +71,11 @@ class RotateRequest:
 
     angle_rad: float
     max_speed_radps: float
+
+    @property
+    def terms(self) -> Terms:
+        """The defaults."""
+        return Terms()
 
     def range_reason(self, robot: Robot) -> str | None:
         """Why its numbers are refused; None: they are good."""

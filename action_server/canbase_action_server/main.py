@@ -30,11 +30,16 @@ SLICE_S = 0.1
 def run(robot: Robot, ros_args: list[str], when_ready: Callable[[], None] = lambda: None) -> int:
     """Serve until SIGINT or SIGTERM; 0 after an orderly end, 1 after a defect. `ros_args` as for rclpy.init;
     `when_ready`: called when all is made and nothing runs yet."""
+    bindings = [drive_binding(), rotate_binding(robot)]
+    if robot.action.nav2_behaviors:
+        from canbase_action_server.nav2_messages import nav2_bindings  # nav2_msgs may be missing
+
+        bindings += nav2_bindings(robot)
     guard_keys(os.environ)
     never_wait(os.environ)
     rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)
     executor = EventsExecutor()
-    node = DriveDistanceServer(robot, [drive_binding(), rotate_binding(robot)])
+    node = DriveDistanceServer(robot, bindings)
     executor.add_node(node)
     asked_to_end = _catch_signals()
     when_ready()

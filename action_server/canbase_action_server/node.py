@@ -29,6 +29,7 @@ from rclpy.serialization import deserialize_message
 from unique_identifier_msgs.msg import UUID
 
 from canbase_action_server import messages
+from canbase_action_server.action_servers import other_servers
 from canbase_action_server.binding import Binding
 from canbase_action_server.goal import GoalPhase
 from canbase_action_server.goal_client import REJECTION_QOS, SERVICE_QOS
@@ -36,7 +37,7 @@ from canbase_action_server.goal_queue import Cycle, GoalQueue
 from canbase_action_server.goal_step import GoalStep
 from canbase_action_server.inputs import Inputs, Odometry
 from canbase_action_server.motion import STOP, Twist
-from canbase_action_server.open_goal import OpenGoal, defect, numbers, rejection, uuid_of
+from canbase_action_server.open_goal import OpenGoal, goal_numbers, rejection, result_numbers, uuid_of
 from canbase_action_server.outcome import ErrorCode, Outcome, Status
 from canbase_action_server.preconditions import action_source
 from canbase_config.robot import Robot
@@ -52,6 +53,8 @@ LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 KEEPALIVE_QOS = QoSProfile(depth=100)
 """Deep enough for all goals that may wait."""
 OLD = "the goal may be old, because the action server did not run before it; send it again"
+
+TWO_SERVERS = "a goal reaches both; end one of them (of Nav2: take it out of behavior_plugins of behavior_server)"
 
 T = TypeVar("T")
 
@@ -187,20 +190,30 @@ class DriveDistanceServer(Node):
     def _on_goal(self, binding: Binding, goal: Any) -> GoalResponse:
         now_s = time.monotonic()
         old = OLD if self._request_times.waited(now_s) else None
-        reason = old or self._goal_queue.refusal(binding.request(goal), self._look(), now_s)
+        reason = (
+            old or self._second_server(binding) or self._goal_queue.refusal(binding.request(goal), self._look(), now_s)
+        )
         if reason is None:
             return GoalResponse.ACCEPT
         # rclpy does not give the UUID of a goal that is not accepted yet.
-        self._log(GoalStep.REJECTED, None, action=binding.name, reason=reason, **numbers(goal))
+        self._log(GoalStep.REJECTED, None, action=binding.name, reason=reason, **goal_numbers(goal))
         self._rejections[binding.name].publish(rejection(binding.name, goal, reason))
         return GoalResponse.REJECT
+
+    def _second_server(self, binding: Binding) -> str | None:
+        """Why no goal of this action is accepted: a client's goal reaches both servers, and both would drive."""
+        name = self.resolve_topic_name(binding.name)
+        if self.count_services(f"{name}/_action/send_goal") <= 1:
+            return None
+        others = other_servers(self, name)
+        return f"{', '.join(others)} serves {name} too: {TWO_SERVERS}" if others else None
 
     def _on_accepted(self, binding: Binding, handle: ServerGoalHandle) -> None:
         goal, now_s, uuid = handle.request, time.monotonic(), uuid_of(handle)
         self._goal_queue.admit(uuid, binding.request(goal), now_s)
         self._open[uuid] = OpenGoal(handle, binding, now_s)
         self._timer.reset()
-        self._log(GoalStep.ACCEPTED, uuid, action=binding.name, **numbers(goal))
+        self._log(GoalStep.ACCEPTED, uuid, action=binding.name, **goal_numbers(goal))
 
     def _on_cancel(self, handle: ServerGoalHandle) -> CancelResponse:
         self._log(GoalStep.CANCEL_REQUESTED, uuid_of(handle))
@@ -209,7 +222,7 @@ class DriveDistanceServer(Node):
     def _finish(self, binding: Binding, handle: ServerGoalHandle) -> Any:
         """The execute callback of rclpy, called when a goal has ended: its status is set, its result goes out."""
         uuid = uuid_of(handle)
-        result = defect(binding)
+        result = binding.defect
         try:
             goal = self._open.pop(uuid)
             outcome, result = goal.finish()
@@ -264,7 +277,7 @@ class DriveDistanceServer(Node):
         fields = {
             "status": outcome.status.name,
             "error_code": outcome.code.name,
-            **numbers(result),
+            **result_numbers(result),
             "duration_s": round(time.monotonic() - goal.accepted, 3),
             "message": outcome.message,
         }

@@ -10,7 +10,7 @@ from rclpy.action.server import GoalEvent, ServerGoalHandle
 
 from canbase_action_server.binding import Binding
 from canbase_action_server.goal import Feedback
-from canbase_action_server.outcome import ErrorCode, Outcome, Status
+from canbase_action_server.outcome import Outcome, Status
 from canbase_action_server.rejection import as_texts
 
 
@@ -20,8 +20,13 @@ def uuid_of(handle: ServerGoalHandle) -> str:
 
 
 def exact(goal: Any) -> dict[str, float]:
-    """The numbers of a goal by name, not rounded."""
-    return {name: float(getattr(goal, name)) for name in goal.get_fields_and_field_types()}
+    """The numbers of a goal by name, not rounded; those of a message in it as "target.x"."""
+    found: dict[str, float] = {}
+    for name in goal.get_fields_and_field_types():
+        value = getattr(goal, name)
+        inner = exact(value) if hasattr(value, "get_fields_and_field_types") else None
+        found |= {name: float(value)} if inner is None else {f"{name}.{key}": each for key, each in inner.items()}
+    return found
 
 
 def rejection(name: str, goal: Any, reason: str) -> DiagnosticStatus:
@@ -30,16 +35,15 @@ def rejection(name: str, goal: Any, reason: str) -> DiagnosticStatus:
     return DiagnosticStatus(level=DiagnosticStatus.WARN, name=f"{name}: goal rejected", message=reason, values=values)
 
 
-def numbers(message: Any) -> dict[str, float]:
-    """The numbers of a goal or a result by name, for the log."""
-    values = {name: getattr(message, name) for name in message.get_fields_and_field_types()}
+def goal_numbers(goal: Any) -> dict[str, float]:
+    """As `exact`, rounded for the log."""
+    return {name: round(value, 5) for name, value in exact(goal).items()}
+
+
+def result_numbers(result: Any) -> dict[str, float]:
+    """The measured numbers of a result by name, for the log."""
+    values = {name: getattr(result, name) for name in result.get_fields_and_field_types()}
     return {name: round(value, 5) for name, value in values.items() if isinstance(value, float)}
-
-
-def defect(binding: Binding) -> Any:
-    """The result of a goal whose own one cannot be made. rclpy sets its status: aborted."""
-    kind: Any = binding.type
-    return kind.Result(error_code=int(ErrorCode.INTERNAL), message="defect in the action server, see its log")
 
 
 @dataclass(slots=True)

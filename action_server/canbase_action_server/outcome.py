@@ -33,6 +33,7 @@ class ErrorCode(IntEnum):
     CANCELED = 13
     INTERNAL = 14
     OVERSHOOT = 15
+    INVALID_GOAL = 16
 
     @property
     def status(self) -> Status:
@@ -56,6 +57,8 @@ class Outcome:
     message: str
     stands: bool = field(default=False, compare=False)
     """The base was seen standing at the end; for the log."""
+    duration_s: float = field(default=0.0, compare=False)
+    """From the start of the motion; 0: it never started."""
 
     @property
     def status(self) -> Status:

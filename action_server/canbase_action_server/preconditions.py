@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from canbase_action_server.inputs import Inputs, age_s
 from canbase_config.robot import Robot
 from canbase_runtime.driver_state import DriverState
@@ -22,12 +24,31 @@ def action_source(robot: Robot) -> str:
     return next((name for name, source in sources if source.topic == "cmd_vel_action" and source.stamped), "")
 
 
-def state_reason(robot: Robot, inputs: Inputs, now_s: float) -> str | None:
-    """Why the robot cannot start a goal now; None: it can."""
+def commanding_program(robot: Robot, inputs: Inputs) -> str:
+    """Name of the source that has the base, if it is a program (neutral_after_s) and not of the goals; else empty."""
+    active = inputs.mux.active if inputs.mux else ""
+    source = robot.mux.sources.get(active)
+    is_program = source is not None and source.neutral_after_s is not None
+    return active if is_program and active != action_source(robot) else ""
+
+
+def is_moving(robot: Robot, inputs: Inputs) -> bool:
+    """By the newest odometry, as `standstill.py` sees it."""
+    odometry = inputs.odometry
+    if odometry is None:
+        return False
+    rim_mps = abs(odometry.angular_radps) * robot.base.track_m / 2.0
+    return max(abs(odometry.linear_mps), rim_mps) > robot.base.standstill_mps
+
+
+def state_reason(robot: Robot, inputs: Inputs, now_s: float, waits_for_program: bool = False) -> str | None:
+    """Why the robot cannot start a goal now; None: it can. `waits_for_program`: a program may have the base still."""
     if inputs.shutdown:
         return "the action server is shutting down"
     if not action_source(robot):
         return NO_SOURCE
+    if waits_for_program and inputs.mux is not None and commanding_program(robot, inputs):
+        inputs = replace(inputs, mux=replace(inputs.mux, active=""))
     return _silence(robot, inputs, now_s) or _condition(robot, inputs)
 
 

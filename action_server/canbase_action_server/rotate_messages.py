@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from canbase.action import RotateAngle
 
-from canbase_action_server.binding import Binding
+from canbase_action_server.binding import DEFECT, Binding
 from canbase_action_server.goal import Feedback
 from canbase_action_server.goal_request import RotateRequest
 from canbase_action_server.motion_limits import lever_m
-from canbase_action_server.outcome import Outcome
+from canbase_action_server.outcome import ErrorCode, Outcome
 from canbase_config.robot import Robot
 
 
@@ -27,7 +27,8 @@ def rotate_binding(robot: Robot) -> Binding:
             message=outcome.message,
         )
 
-    return Binding("rotate_angle", RotateAngle, _request, feedback_out, result_out)
+    defect = RotateAngle.Result(error_code=int(ErrorCode.INTERNAL), message=DEFECT)
+    return Binding("rotate_angle", RotateAngle, _request, feedback_out, result_out, defect)
 
 
 def _request(goal: RotateAngle.Goal) -> RotateRequest:

@@ -1,4 +1,4 @@
-"""The keys of robot.yaml below `action`: drive_distance and rotate_angle."""
+"""The keys of robot.yaml below `action`: drive_distance, rotate_angle, and the behaviours of Nav2."""
 
 from __future__ import annotations
 
@@ -72,12 +72,29 @@ class Action(Section):
         Field(ge=1.1, le=100.0, description="overall timeout = factor × the ideal time of the goal + overall_extra_s"),
     ] = 2.0
     overall_extra_s: Annotated[float, Field(ge=0.5, le=600.0, description="[s]")] = 5.0
+    nav2_behaviors: Annotated[
+        bool,
+        Field(
+            description="true: also serves drive_on_heading, backup and spin of Nav2, whose behavior_server must not"
+        ),
+    ] = False
+    spin_speed_radps: Annotated[
+        float, Field(gt=0.0, le=20.0, description="of Nav2's spin; max_speed_radps where that is lower [rad/s]")
+    ] = 1.0
 
     @model_validator(mode="after")
     def _ordered(self) -> Action:
+        if self.spin_speed_radps < self.min_speed_radps:
+            message = (
+                f"spin_speed_radps ({self.spin_speed_radps}) must not be below min_speed_radps ({self.min_speed_radps})"
+            )
+            raise MisfitError(message, ("spin_speed_radps",), ("min_speed_radps",))
         for quantity in ("distance_m", "speed_mps", "angle_rad", "speed_radps"):
             low, high = f"min_{quantity}", f"max_{quantity}"
             if getattr(self, low) >= getattr(self, high):
                 message = f"{high} ({getattr(self, high)}) must be greater than {low} ({getattr(self, low)})"
                 raise MisfitError(message, (high,), (low,))
+        if self.nav2_behaviors and self.require_client_lease:
+            message = "behaviour trees send no keepalives: each of their goals would end with CLIENT_LOST"
+            raise MisfitError(message, ("nav2_behaviors",), ("require_client_lease",))
         return self

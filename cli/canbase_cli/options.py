@@ -112,6 +112,8 @@ def ros_needed() -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError as error:
+        if str(error.name).partition(".")[0] == "nav2_msgs":
+            fail("action.nav2_behaviors needs nav2_msgs: install ros-<distro>-nav2-msgs, or set it to false", FAILED)
         if str(error.name).partition(".")[0] not in ("rclpy", "canbase"):
             raise
         fail("ROS 2 is not found: source its setup.bash, or install canbase[ros] from PyPI", FAILED)

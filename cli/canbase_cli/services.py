@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -91,13 +92,16 @@ def velocity(ctx: typer.Context, config: ConfigOption = None, namespace: Namespa
 
 
 def action_server(ctx: typer.Context, config: ConfigOption = None, namespace: NamespaceOption = "") -> None:
-    """Run the server of the actions drive_distance and rotate_angle.
+    """Run the server of the actions drive_distance and rotate_angle, and of Nav2's behaviours (action.nav2_behaviors).
 
     Arguments after --ros-args go to rclpy.
     """
     robot = load_config(config).robot
     with ros_needed():
         from canbase_action_server.main import run
+
+        if robot.action.nav2_behaviors:
+            import_module("canbase_action_server.nav2_messages")  # its messages may be missing
     with _right_start():
         raise typer.Exit(run(robot, ros_arguments(ctx, namespace), partial(raise_priority, "action-server")))
 

@@ -6,13 +6,16 @@ Pure: from `Evidence` to one `Check` each. symptoms.py has the symptom that each
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from canbase_action_server.goal_request import DriveRequest, Request, RotateRequest
 from canbase_action_server.goal_step import GoalStep
+from canbase_action_server.nav2_request import Target, back_up, drive_on_heading, spin
 from canbase_action_server.preconditions import state_reason
+from canbase_config.robot import Robot
 from canbase_doctor.check import Check, fail, ok, too_slow, warn
-from canbase_doctor.evidence import Evidence, Goal, LoggedStep
+from canbase_doctor.evidence import Evidence, Goal, LoggedStep, served_actions
 
 ACTION = "drive_distance"
 SLOW_ANSWER_S = 0.1
@@ -220,18 +223,18 @@ def goals_are_driven(seen: Evidence) -> Check:
 
 
 def one_server(seen: Evidence) -> Check:
-    """Is there one server for the base?"""
-    name, wanted = "one server", seen.whole_name(ACTION)
-    nodes = [endpoint.node for endpoint in seen.servers.get(wanted, ())]
-    if len(nodes) == 1:
-        return ok(name, nodes[0])
-    if not nodes:
-        return fail(name, f"no server offers {wanted}", "canbase doctor --symptom not-listed")
-    return fail(
-        name,
-        f"{len(nodes)} servers offer {wanted}: {', '.join(nodes)}",
-        "end all but one; a second robot needs a namespace",
-    )
+    """Is there one server for each action of the base?"""
+    name, nodes = "one server", [""]
+    for wanted in map(seen.whole_name, served_actions(seen.robot)):
+        nodes = [endpoint.node for endpoint in seen.servers.get(wanted, ())]
+        if not nodes:
+            return fail(name, f"no server offers {wanted}", "canbase doctor --symptom not-listed")
+        if len(nodes) > 1:
+            found = f"{len(nodes)} servers offer {wanted}: {', '.join(nodes)}"
+            return fail(
+                name, found, "end all but one (of Nav2: its behavior_plugins); a second robot needs a namespace"
+            )
+    return ok(name, nodes[0])
 
 
 def goal_policy(seen: Evidence) -> Check:
@@ -258,7 +261,17 @@ def _last_rejected(seen: Evidence) -> Request | None:
     last = rejected[-1]
     if "distance_m" in last:
         return DriveRequest(last["distance_m"], last["max_speed_mps"])
-    return RotateRequest(last["angle_rad"], last["max_speed_radps"])
+    if "angle_rad" in last:
+        return RotateRequest(last["angle_rad"], last["max_speed_radps"])
+    return _behavior(seen.robot, last)
+
+
+def _behavior(robot: Robot, goal: Mapping[str, Any]) -> DriveRequest | RotateRequest:
+    """Of an action of Nav2: what it drives. Its numbers are in range: other goals are not rejected, but end at once."""
+    if goal["action"] == "spin":
+        return spin(robot, goal["target_yaw"], 0.0).motion_request
+    behavior = back_up if goal["action"] == "backup" else drive_on_heading
+    return behavior(robot, Target(goal["target.x"]), goal["speed"], 0.0).motion_request
 
 
 def _finite(goal: Any) -> bool:

@@ -11,12 +11,19 @@ from typing import Any
 
 from canbase_action_server.goal_step import GoalStep
 from canbase_action_server.inputs import Inputs
+from canbase_action_server.nav2_request import BEHAVIORS
 from canbase_config.robot import Robot
 from canbase_doctor.overload import Overload
 
 ACTIONS = ("drive_distance", "rotate_angle")
+"""Of every robot; `served_actions` has those of one robot."""
 DOCTOR = "canbase_doctor"
 """Name of doctor's own node; what belongs to it is not seen."""
+
+
+def served_actions(robot: Robot) -> tuple[str, ...]:
+    """Names of the actions that the action server of this robot has."""
+    return (*ACTIONS, *BEHAVIORS) if robot.action.nav2_behaviors else ACTIONS
 
 
 @dataclass(frozen=True, slots=True)

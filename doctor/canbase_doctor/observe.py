@@ -27,10 +27,10 @@ from canbase_action_server.preconditions import action_source
 from canbase_config.load import Loaded
 from canbase_config.mux import MEASURED
 from canbase_config.robot import Robot
-from canbase_doctor.evidence import ACTIONS, DOCTOR, Endpoint, Evidence, Goal, Heard, LoggedStep, VelocityTopic
+from canbase_doctor.evidence import DOCTOR, Endpoint, Evidence, Goal, Heard, LoggedStep, VelocityTopic
 from canbase_doctor.nav2_probe import Nav2Prober
 from canbase_doctor.overload import Overload, load_per_core
-from canbase_doctor.probes import SERVER, TYPES, Prober
+from canbase_doctor.probes import SERVER, Prober, action_types
 from canbase_doctor.server_processes import server_processes, talks_by
 from canbase_runtime.foreign_text import clean
 
@@ -63,7 +63,7 @@ def topics(robot: Robot) -> dict[str, tuple[type, QoSProfile]]:
         robot.safety.scan.topic: (LaserScan, BEST_EFFORT),
         "/rosout": (Log, LATCHED),
     }
-    for action, kind in TYPES.items():
+    for action, kind in action_types(robot).items():
         found[f"{action}{STATUS}"] = (GoalStatusArray, LATCHED)
         found[f"{action}/_action/feedback"] = (kind.Impl.FeedbackMessage, BEST_EFFORT)
     return found if TFMessage is None else found | {"tf": (TFMessage, BEST_EFFORT)}
@@ -73,6 +73,7 @@ class Listener:
     """Keeps what comes on the topics."""
 
     def __init__(self, node: Node, robot: Robot) -> None:
+        self._actions = tuple(action_types(robot))
         self._kept: dict[str, list[tuple[float, Any]]] = {}
         for topic, (kind, qos) in topics(robot).items():
             self._kept[topic] = []
@@ -92,7 +93,7 @@ class Listener:
 
     def goals(self) -> tuple[Goal, ...]:
         """As each action reported them last."""
-        last = {action: self._kept[f"{action}{STATUS}"][-1:] for action in ACTIONS}
+        last = {action: self._kept[f"{action}{STATUS}"][-1:] for action in self._actions}
         return tuple(
             Goal(action, bytes(each.goal_info.goal_id.uuid).hex(), each.status)
             for action, kept in last.items()
@@ -109,7 +110,8 @@ def observe(loaded: Loaded, ros_args: list[str], seconds: float) -> Evidence:
     rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = rclpy.create_node(DOCTOR, enable_rosout=False)
-        listener, prober, nav2 = Listener(node, loaded.robot), Prober(node), Nav2Prober(node)
+        listener, nav2 = Listener(node, loaded.robot), Nav2Prober(node)
+        prober = Prober(node, action_types(loaded.robot))
         until, late_s = time.monotonic() + DISCOVERY_S + seconds, 0.0
         while (left_s := until - time.monotonic()) > 0.0:
             began_s = time.monotonic()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import time
 import uuid
+from collections.abc import Mapping
 from typing import Any, Final
 
 from action_msgs.srv import CancelGoal
@@ -18,6 +19,8 @@ from rclpy.client import Client
 from rclpy.node import Node
 from unique_identifier_msgs.msg import UUID
 
+from canbase_action_server.nav2_request import BEHAVIORS
+from canbase_config.robot import Robot
 from canbase_doctor.evidence import Answers, Goal
 
 SERVER: Final = "drive_distance_server"
@@ -25,6 +28,17 @@ TYPES: Final[dict[str, Any]] = {"drive_distance": DriveDistance, "rotate_angle":
 LOST_S: Final = 1.0
 """An answer that takes longer is none."""
 MOST_RESULTS: Final = 5
+
+
+def action_types(robot: Robot) -> dict[str, Any]:
+    """Of the actions that this robot serves. Where nav2_msgs is missing, it cannot serve those of Nav2."""
+    if not robot.action.nav2_behaviors:
+        return TYPES
+    try:
+        from nav2_msgs import action as nav2
+    except ModuleNotFoundError:
+        return TYPES
+    return TYPES | dict(zip(BEHAVIORS, (nav2.DriveOnHeading, nav2.BackUp, nav2.Spin), strict=True))
 
 
 class Series:
@@ -61,8 +75,9 @@ class Series:
 class Prober:
     """Makes all calls, one after the other."""
 
-    def __init__(self, node: Node) -> None:
-        self._node = node
+    def __init__(self, node: Node, types: Mapping[str, Any]) -> None:
+        """`types`: of the actions, by name."""
+        self._node, self._types = node, types
         nobody = CancelGoal.Request()
         nobody.goal_info.goal_id = UUID(uuid=list(uuid.uuid4().bytes))  # all zeros would mean: cancel every goal
         self._question = Series(
@@ -73,7 +88,7 @@ class Prober:
         self._results: dict[str, Any] = {}
         self._clients = {
             action: node.create_client(kind.Impl.GetResultService, f"{action}/_action/get_result")
-            for action, kind in TYPES.items()
+            for action, kind in types.items()
         }
 
     @property
@@ -88,7 +103,7 @@ class Prober:
         for goal in goals[-MOST_RESULTS:]:
             client = self._clients[goal.action]
             if goal.ended and goal.uuid not in self._results and client.service_is_ready():
-                request = TYPES[goal.action].Impl.GetResultService.Request()
+                request = self._types[goal.action].Impl.GetResultService.Request()
                 request.goal_id = UUID(uuid=list(bytes.fromhex(goal.uuid)))
                 self._results[goal.uuid] = client.call_async(request)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
@@ -36,6 +37,8 @@ class Told:
     began: float | None = None
     ends: list[Outcome] = field(default_factory=list)
     ended: float = 0.0
+    began_at: tuple[Pose, float] = (Pose(0.0, 0.0, 0.0), 0.0)
+    """Where the base was when it began, and how far it had turned since the beginning of the world."""
 
 
 class GoalQueueWorld:
@@ -45,7 +48,8 @@ class GoalQueueWorld:
         self.robot = robot
         self.goal_queue = GoalQueue(robot)
         self.now_s = 0.0
-        self.x_m = self.mps = 0.0
+        self.x_m = self.y_m = self.turned_rad = 0.0
+        self.mps = self.radps = 0.0
         self.goals: dict[str, Told] = {}
         self.refusals: list[str] = []
         self.change: Callable[[Inputs], Inputs] = lambda inputs: inputs
@@ -54,7 +58,12 @@ class GoalQueueWorld:
     @property
     def inputs(self) -> Inputs:
         """Of this moment."""
-        return self.change(good_inputs(Odometry(self.now_s, Pose(self.x_m, 0.0, 0.0), self.mps, 0.0)))
+        return self.change(good_inputs(Odometry(self.now_s, self.pose, self.mps, self.radps)))
+
+    @property
+    def pose(self) -> Pose:
+        """Of the base, truly."""
+        return Pose(self.x_m, self.y_m, math.remainder(self.turned_rad, 2.0 * math.pi))
 
     def ask(self, request: Request) -> str | None:
         """A client sends a goal: its key, None when it is refused."""
@@ -99,8 +108,10 @@ class GoalQueueWorld:
         if cycle.began is not None:
             assert self._owner is None, "two goals own the base"
             assert self.goals[cycle.began].began is None, "a goal began twice"
-            assert abs(self.mps) <= self.robot.base.standstill_mps, "a goal began on a base that moves"
+            rim_mps = abs(self.radps) * self.robot.base.track_m / 2.0
+            assert max(abs(self.mps), rim_mps) <= self.robot.base.standstill_mps, "a goal began on a base that moves"
             self.goals[cycle.began].began = self.now_s
+            self.goals[cycle.began].began_at = self.pose, self.turned_rad
             self._owner = cycle.began
         if self._owner is None:
             assert cycle.twist in (None, STOP), "nobody owns the base, and it was ordered to move"
@@ -110,7 +121,15 @@ class GoalQueueWorld:
             self.goals[end.key].ended = self.now_s
             if end.key == self._owner:
                 self._owner = None
-        wanted_mps = cycle.twist.linear_mps if cycle.twist else 0.0
-        most_mps = PERIOD_S * self.robot.limits.deceleration_mps2
-        self.mps += max(-most_mps, min(most_mps, wanted_mps - self.mps))
-        self.x_m += self.mps * PERIOD_S
+        safety, limits = self.inputs.safety, self.robot.limits
+        wanted = STOP if cycle.twist is None or (safety and safety.stops) else cycle.twist
+        self.mps = _ramped(self.mps, wanted.linear_mps, limits.deceleration_mps2)
+        self.radps = _ramped(self.radps, wanted.angular_radps, limits.angular_deceleration_radps2)
+        self.turned_rad += self.radps * PERIOD_S
+        self.x_m += self.mps * math.cos(self.turned_rad) * PERIOD_S
+        self.y_m += self.mps * math.sin(self.turned_rad) * PERIOD_S
+
+
+def _ramped(speed: float, wanted: float, slope: float) -> float:
+    """One period later."""
+    return speed + max(-slope * PERIOD_S, min(slope * PERIOD_S, wanted - speed))

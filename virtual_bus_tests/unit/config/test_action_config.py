@@ -31,3 +31,17 @@ def test_an_unknown_policy_is_refused() -> None:
 def test_a_queue_is_bounded(length: float) -> None:
     with pytest.raises(ValidationError, match="queue_length"):
         Action.model_validate({"queue_length": length})
+
+
+def test_nav2_has_its_behaviours_for_itself_by_default() -> None:
+    assert not Action().nav2_behaviors
+
+
+def test_behaviours_of_nav2_are_refused_where_each_client_has_to_send_keepalives() -> None:
+    with pytest.raises(ValidationError, match="behaviour trees send no keepalives"):
+        Action.model_validate({"nav2_behaviors": True, "require_client_lease": True})
+
+
+def test_a_spin_is_not_slower_than_a_turn_may_be() -> None:
+    with pytest.raises(ValidationError, match=r"spin_speed_radps \(0.05\) must not be below min_speed_radps \(0.1\)"):
+        Action.model_validate({"spin_speed_radps": 0.05})

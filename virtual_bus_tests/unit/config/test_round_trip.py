@@ -89,6 +89,8 @@ def made_consistent(values: Values) -> Values:
     for what in ("distance_m", "speed_mps", "angle_rad", "speed_radps"):
         action.pop(f"max_{what}", None)
         action[f"min_{what}"] = min(action.get(f"min_{what}", 0.01), 0.4)
+    action["spin_speed_radps"] = max(action.get("spin_speed_radps", 1.0), 0.4)
+    action.pop("require_client_lease", None)  # not together with nav2_behaviors
     least_s = CYCLES_PER_TIMEOUT / values.get("rates", {}).get("control_hz", 100.0)
     timeouts = values.setdefault("timeouts", {})
     timeouts.pop("standstill_s", None)

@@ -105,7 +105,7 @@ HEALTHY = Evidence(
         step("stopping", WALL_S - 3.0),
         step("standstill", WALL_S - 2.6),
     ),
-    servers={"/drive_distance": (SERVER,)},
+    servers={"/drive_distance": (SERVER,), "/rotate_angle": (SERVER,)},
     publishers={"cmd_vel_action": (SENDER,), "cmd_vel": (SENDER,), "cmd_vel_mux": (SENDER,)},
     subscribers={FEEDBACK: (CLIENT,), "cmd_vel": (SENDER,)},
     goals=(ENDED,),
@@ -252,6 +252,32 @@ def test_a_required_scan_that_is_silent_fails_and_one_that_is_not_required_does_
     failed = first_failure(walk("only-in-simulation", replace(silent, robot=robot_with("safety", scan=required))))
     assert failed is not None
     assert "nothing on scan" in failed.found
+
+
+def test_with_nav2s_behaviours_each_of_their_names_has_one_server_too() -> None:
+    names = ("/drive_distance", "/rotate_angle", "/drive_on_heading", "/backup", "/spin")
+    seen = replace(HEALTHY, robot=robot_with("action", nav2_behaviors=True), servers=dict.fromkeys(names, (SERVER,)))
+    assert first_failure(walk("goals-collide", seen)) is None
+    nav2 = Endpoint("/behavior_server", "nav2_msgs/action/Spin")
+    failed = first_failure(walk("goals-collide", replace(seen, servers={**seen.servers, "/spin": (SERVER, nav2)})))
+    assert failed is not None
+    assert "2 servers offer /spin" in failed.found
+    assert "behavior_plugins" in failed.advice
+
+
+@pytest.mark.parametrize(
+    "goal",
+    [
+        {"action": "spin", "target_yaw": 1.57},
+        {"action": "backup", "target.x": 0.3, "speed": 0.15},
+        {"action": "drive_on_heading", "target.x": -0.3, "speed": -0.15},
+    ],
+)
+def test_a_rejected_goal_of_nav2_is_in_range_and_the_robot_has_the_reason(goal: Mapping[str, Any]) -> None:
+    seen = replace(HEALTHY, steps=(step("rejected", uuid=None, **goal),), inputs=Inputs())
+    failed = first_failure(walk("rejected", seen))
+    assert failed is not None
+    assert failed.name == "busy, or not safe to start"
 
 
 @pytest.mark.parametrize(("length", "busy"), [(1, True), (2, False)])
