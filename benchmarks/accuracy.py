@@ -167,7 +167,9 @@ def main() -> int:
     results = {name: [drive(robot, case, way) for case in chosen] for name, way in WAYS.items()}
     print(table(results))
     if arguments.write:
-        (arguments.write / "accuracy.md").write_text(report(results), encoding="utf-8")
+        page = arguments.write / "accuracy.md"
+        _, heading, behaviors = page.read_text(encoding="utf-8").partition("\n## ")
+        page.write_text(report(results) + heading + behaviors, encoding="utf-8")  # behaviors.py writes that section
         plot(results, arguments.write / "accuracy.png")
     ours = results["canbase"]
     kept = all(quantile([abs(v) for v in values], 0.99) <= 0.003 for values in (

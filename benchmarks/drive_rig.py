@@ -59,6 +59,11 @@ class Rig:
         """By encoder, signed."""
         return (self.base.travel_left_m + self.base.travel_right_m) / 2.0
 
+    @property
+    def turned_rad(self) -> float:
+        """By encoder, signed, not wrapped."""
+        return (self.base.travel_right_m - self.base.travel_left_m) / self._robot.base.track_m
+
     def order(self, twist: Twist, now_s: float) -> None:
         """A velocity order enters the chain."""
         self._pipe.append((now_s + self._case.chain_s * self._chance.uniform(0.3, 1.0), twist))

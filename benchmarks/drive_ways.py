@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from canbase_action_server.goal_queue import GoalQueue
-from canbase_action_server.goal_request import DriveRequest
+from canbase_action_server.goal_request import DriveRequest, Request
 from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
 from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.outcome import ErrorCode
@@ -36,10 +36,9 @@ class Controller(Protocol):
 class Ours:
     """canbase."""
 
-    def __init__(self, robot: Robot, case: Case, start: Odometry) -> None:
+    def __init__(self, robot: Robot, start: Odometry, request: Request) -> None:
         self.period_s = 1.0 / robot.action.control_hz
         self._goal_queue = GoalQueue(robot)
-        request = DriveRequest(case.distance_m, case.speed_mps)
         self._goal_queue.admit("goal", request, start.received)
 
     def cycle(self, odometry: Odometry, now_s: float) -> tuple[Twist, bool]:
@@ -104,7 +103,7 @@ class FastStopProfile(StopProfile):
 
 
 WAYS: dict[str, Callable[[Robot, Case, Odometry], Controller]] = {
-    "canbase": Ours,
+    "canbase": lambda robot, case, start: Ours(robot, start, DriveRequest(case.distance_m, case.speed_mps)),
     "lecture": Lecture,
     "v² = 2as": StopProfile,
     "v² = 2as, 50 Hz": FastStopProfile,
