@@ -18,6 +18,7 @@ from canbase_action_server.client import DriveClient
 from ros.conftest import MakeRobot, Spawn
 from support.fake_base import FakeBase, server_code
 from support.ros_harness import Process, TestNode
+from support.sros2_policy import allowed, present
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(90)]
 
@@ -173,6 +174,12 @@ def test_all_actions_share_one_base(stage: Stage) -> None:
     drive = drives.send(0.1, 0.2).wait(10.0)
     assert drive is not None
     assert drive.status == GoalStatus.STATUS_SUCCEEDED
+
+
+def test_the_shipped_sros2_policy_allows_all_that_the_server_has(stage: Stage) -> None:
+    has, may = present(stage.node.node, "drive_distance_server"), allowed("drive_distance_server")
+    assert "/spin/_action/send_goal" in has["reply"]
+    assert {way: names - may[way] for way, names in has.items()} == {way: set() for way in has}
 
 
 def test_while_another_node_serves_the_same_name_no_goal_is_driven(stage: Stage) -> None:
