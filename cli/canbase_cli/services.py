@@ -108,7 +108,7 @@ def action_server(ctx: typer.Context, config: ConfigOption = None, namespace: Na
 
 @contextmanager
 def _right_start() -> Iterator[None]:
-    """A wrong command line: use_sim_time, or a namespace with which a source is the robot's own output."""
+    """A wrong command line: use_sim_time, a speed limit that cannot be, or a source that is the robot's own output."""
     try:
         yield
     except WrongStartError as error:

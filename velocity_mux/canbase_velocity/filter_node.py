@@ -36,9 +36,11 @@ from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.graph import BUTTON_KIND, SCAN_KIND, publishers
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.lease_sender import LeaseSender
+from canbase_velocity.parameters import Parameters
 from canbase_velocity.placement import HeldPlacement, Placement, PlacementError, Transform, placed_by_tf
 from canbase_velocity.qos import COMMAND, SCAN, STATE, STATIC_TF, listen_closely
 from canbase_velocity.safety_filter import FilterConfig
+from canbase_velocity.speed_limit import SpeedLimits
 from canbase_velocity.steady import steady_timer
 from canbase_velocity.twist import Twist
 from canbase_velocity.unexpected_publishers import UNKNOWN
@@ -81,6 +83,7 @@ class FilterNode(Node):
         self.create_service(Trigger, "safety_filter/reset", self._on_reset)
         steady_timer(self, GRAPH_PERIOD_S, self._count_buttons)
         self._timer = steady_timer(self, 1.0 / robot.rates.command_hz, self._tick)
+        self._ros_parameters = Parameters(self, robot, self._on_speed_limit, self._refuse)
 
     def shut_down(self) -> None:
         """Orders zero, with its lease, and publishes that in the state; from here on nothing else is ordered. Called
@@ -138,6 +141,17 @@ class FilterNode(Node):
         self._filter.on_command(twist, self._receive_times.at(now_s))
         self._timer.reset()  # a mux faster than the timer is not doubled by it
         self._issue(self._filter.decide(now_s), now_s)
+
+    def _on_speed_limit(self, limits: SpeedLimits, how: str) -> None:
+        """A change is ordered at once, so the next lease tells the watchdog."""
+        now_s, limit = time.monotonic(), limits.effective
+        fields = {"linear_mps": f"{limit.linear_mps:g}", "angular_radps": f"{limit.angular_radps:g}"}
+        self._voice.tell(f"speed limit {limit}, {how}", Priority.NOTICE, robot=self._robot.name, **fields)
+        self._filter.on_speed_limit(limit, limits.by)
+        self._issue(self._filter.decide(now_s), now_s)
+
+    def _refuse(self, why: str) -> None:
+        self._voice.tell(why, Priority.WARNING, robot=self._robot.name)
 
     def _on_estop(self, message: Bool) -> None:
         now_s = time.monotonic()

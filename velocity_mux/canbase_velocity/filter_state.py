@@ -23,6 +23,7 @@ from canbase_velocity.placement import Placement
 from canbase_velocity.safety_filter import SHUTDOWN, FilterConfig, Inputs, ScanState, brakes_hard, decide
 from canbase_velocity.scan import Scan, ScanError
 from canbase_velocity.sole_publisher import SolePublisher
+from canbase_velocity.speed_limit import NO_LIMIT, SpeedLimit
 from canbase_velocity.sweep import Floats
 from canbase_velocity.twist import ZERO, Twist
 
@@ -144,6 +145,7 @@ class SafetyFilter:
         self._motion = ExpectedMotion(config.limits, longest_s)
         self._previous, self._previous_at_s = ZERO, -math.inf
         self._braking_hard = False
+        self._speed_limit, self._speed_limit_by = NO_LIMIT, ""
         self._ending = False
         self._no_scan_from = math.inf
         self.without_scans = ""
@@ -171,6 +173,10 @@ class SafetyFilter:
     def end(self) -> None:
         """An orderly end is complete, but for messages of the emergency stop that still come."""
         self._estop.end()
+
+    def on_speed_limit(self, limit: SpeedLimit, by: str) -> None:
+        """Takes a speed limit that holds from now on, and who has set it."""
+        self._speed_limit, self._speed_limit_by = limit, by
 
     def on_command(self, twist: Twist, now_s: float) -> None:
         """Takes a command of cmd_vel_mux, also one with NaN: that stops."""
@@ -251,6 +257,8 @@ class SafetyFilter:
             estop_crowd=self._estop_unheard or self.estop_crowd,
             estop_unarmed=self._estop.unarmed,
             braking_hard=self._braking_hard,
+            speed_limit=self._speed_limit,
+            speed_limit_by=self._speed_limit_by,
         )
 
     def clearances(self, now_s: float) -> Clearances | None:

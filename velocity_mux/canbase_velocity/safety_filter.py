@@ -5,8 +5,8 @@ Rules, in the order of their precedence:
    Its memory is estop.py.
 2. No recent command, or one with NaN or infinity: stop.
 3. A required scan not recent, frozen, not usable, or of a scanner whose place is unknown: stop.
-4. Faster than the limits, the ceiling, the speed of a robot that is not commissioned, a limit zone with something in
-   it, or the speed for where no scanner looks or has a reading: slower, on the same curve.
+4. Faster than the limits, the ceiling, a speed limit of run time, the speed of a robot that is not commissioned, a
+   limit zone with something in it, or the speed for where no scanner looks or has a reading: slower, on the same curve.
 5. Growing faster than the ceiling: slower. What falls is never held up.
 6. Obstacle where the footprint will be: slower, on the same curve, so that the base can stop before the stop distance;
    there it stops. Driving away from an obstacle is free. See obstacle.py.
@@ -32,6 +32,7 @@ from canbase_velocity.decision import PASSED, Action, Decision, Finding, stop
 from canbase_velocity.estop import EstopState
 from canbase_velocity.obstacle import Geometry, Sight
 from canbase_velocity.ramp import Moving
+from canbase_velocity.speed_limit import NO_LIMIT, SpeedLimit
 from canbase_velocity.sweep import fastest_mps, first_touch
 from canbase_velocity.twist import ZERO, Twist
 
@@ -118,6 +119,10 @@ class Inputs:
     """A press would not outlive this process: why; empty: it would."""
     braking_hard: bool = False
     """The last order was to brake hard. It holds until the base is expected to be at standstill."""
+    speed_limit: SpeedLimit = NO_LIMIT
+    """Set while the robot runs."""
+    speed_limit_by: str = ""
+    """Who has set it."""
 
 
 def decide(inputs: Inputs, config: FilterConfig) -> Decision:
@@ -129,7 +134,8 @@ def decide(inputs: Inputs, config: FilterConfig) -> Decision:
     if inputs.command.is_zero:
         return Decision(Action.PASS, StopCause.NONE, "", "", ZERO, emergency)
     slowest = min(_slower(inputs, config), key=lambda finding: finding.factor)
-    limited = _within(inputs.command.scaled(slowest.factor), config.limits)
+    most = SpeedLimit(config.limits.linear_mps, config.limits.angular_radps).lower_of(inputs.speed_limit)
+    limited = _within(inputs.command.scaled(slowest.factor), most)
     grown, growth = _growth(limited, inputs, config.safety.ceiling)
     judged = _too_late(inputs, config) if emergency else _obstacle(grown, inputs, config)
     worst = max(slowest, growth, judged, key=lambda finding: finding.action)
@@ -198,6 +204,7 @@ def _slower(inputs: Inputs, config: FilterConfig) -> list[Finding]:
     found = [
         _limit(command, obstacle.speed_factor(command, linear_mps, angular_radps), StopCause.SPEED, "a slower command")
     ]
+    found.append(_lowered(inputs))
     if config.uncommissioned:
         found.append(_corners(command, config.safety.uncommissioned_mps, config, StopCause.SPEED, *_commission(config)))
     for zone in config.safety.limit_zones:
@@ -249,6 +256,12 @@ def _blind(command: Twist, cause: StopCause, why: str, clears_on: str, config: F
     return _corners(command, blind_mps, config, cause, why, clears_on)
 
 
+def _lowered(inputs: Inputs) -> Finding:
+    limit, command = inputs.speed_limit, inputs.command
+    found = _limit(command, limit.share(command), StopCause.SPEED, "a slower command, or a higher speed_limit")
+    return found if found is PASSED else replace(found, detail=f"{inputs.speed_limit_by}: {found.detail}")
+
+
 def _commission(config: FilterConfig) -> tuple[str, str]:
     return f"{config.uncommissioned}, see safety.uncommissioned_mps", "canbase commission"
 
@@ -260,7 +273,7 @@ def _corners(command: Twist, mps: float, config: FilterConfig, cause: StopCause,
     return limited if limited is PASSED else replace(limited, detail=f"{why}: {limited.detail}")
 
 
-def _within(twist: Twist, limits: Limits) -> Twist:
+def _within(twist: Twist, limits: SpeedLimit) -> Twist:
     """`twist`, without what the rounding of a scaled number left above the limits."""
     return Twist(
         math.copysign(min(abs(twist.linear_mps), limits.linear_mps), twist.linear_mps),

@@ -1,0 +1,125 @@
+"""Parameters of safety_filter over DDS, as `ros2 param` uses them: read robot.yaml, lower the speed while it drives."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from canbase.msg import SafetyState
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
+from rclpy.parameter import Parameter, parameter_value_to_python
+
+from support.ros_harness import Process, TestNode
+from support.velocity_chain import Chain, drive
+
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(60)]
+ANSWER_S = 10.0
+LINEAR, ANGULAR = "speed_limit.linear_mps", "speed_limit.angular_radps"
+
+
+def call(chain: Chain, kind: Any, name: str, request: Any) -> Any:
+    """The answer of a service of safety_filter."""
+    client = chain.node.node.create_client(kind, f"safety_filter/{name}")
+    chain.node.wait_for(client.service_is_ready, ANSWER_S, name)
+    answer = client.call_async(request)
+    chain.node.wait_for(answer.done, ANSWER_S, "an answer")
+    return answer.result()
+
+
+def put(chain: Chain, **values: Any) -> SetParametersResult:
+    """`ros2 param set`; dots are written __."""
+    parameters = [Parameter(name.replace("__", "."), value=value).to_parameter_msg() for name, value in values.items()]
+    return call(chain, SetParameters, "set_parameters", SetParameters.Request(parameters=parameters)).results[0]
+
+
+def get(chain: Chain, *names: str) -> list[Any]:
+    values = call(chain, GetParameters, "get_parameters", GetParameters.Request(names=names)).values
+    return [parameter_value_to_python(value) for value in values]
+
+
+def leased_mps(chain: Chain, since: int) -> set[float]:
+    """What the watchdog was told from lease number `since` on."""
+    chain.drain()
+    return {lease[3] for lease in chain.leases[since:]}
+
+
+def test_rates_frames_and_limits_of_robot_yaml_can_be_read_and_not_changed(chain: Chain) -> None:
+    names = call(chain, ListParameters, "list_parameters", ListParameters.Request()).result.names
+    assert {"rates.control_hz", "base.base_frame", "base.odom_frame", "limits.linear_mps", LINEAR} <= set(names)
+    assert get(chain, "limits.linear_mps", "base.base_frame", "rates.control_hz") == [1.0, "base_link", 100.0]
+    result = put(chain, limits__linear_mps=9.0)
+    assert not result.successful
+    assert "limits.linear_mps is a key of robot.yaml" in result.reason
+    assert LINEAR in result.reason
+    assert get(chain, "limits.linear_mps") == [1.0]
+
+
+def test_the_speed_is_lowered_in_motion_and_the_watchdog_is_told_with_every_lease(chain: Chain) -> None:
+    chain.joystick.message = drive(0.8, 0.4)
+    chain.wait_for_order(0.8)
+    assert put(chain, speed_limit__linear_mps=0.2).successful
+    chain.wait_for_order(0.2)
+    assert chain.ordered == pytest.approx((0.2, 0.1))
+    chain.wait_for_cause(SafetyState.CAUSE_SPEED, "the parameters speed_limit of safety_filter: 0.80 m/s")
+    chain.drain()
+    told = len(chain.leases)
+    chain.node.spin_for(0.5)
+    assert leased_mps(chain, told) == {chain.ordered[0]}
+    assert chain.ordered[0] <= 0.2
+    assert "speed limit 0.2 m/s, 2 rad/s, set by a parameter" in chain.process.log()
+    assert put(chain, speed_limit__linear_mps=1.0).successful
+    chain.wait_for_order(0.8)
+
+
+@pytest.mark.parametrize("value", [1.01, -0.1, float("nan"), float("inf")])
+def test_a_limit_above_robot_yaml_or_none_at_all_is_refused_and_the_one_before_stays(
+    chain: Chain, value: float
+) -> None:
+    assert put(chain, speed_limit__linear_mps=0.2).successful
+    result = put(chain, speed_limit__linear_mps=value)
+    assert not result.successful
+    assert "expected 0 to 1" in result.reason
+    assert get(chain, LINEAR) == [0.2]
+    chain.joystick.message = drive(0.8)
+    chain.wait_for_order(0.2)
+
+
+def test_a_limit_of_another_type_is_refused(chain: Chain) -> None:
+    assert not put(chain, speed_limit__linear_mps="slow").successful
+    assert get(chain, LINEAR) == [1.0]
+
+
+@pytest.mark.parametrize(("given", "code"), [("0.2", None), ("3.0", 2), ("fast", 2)])
+def test_a_limit_at_the_start(
+    spawn: Callable[..., Process],
+    make_robot: Callable[[Mapping[str, Any]], Path],
+    test_node: TestNode,
+    given: str,
+    code: int | None,
+) -> None:
+    words = ["velocity", "--config", str(make_robot({})), "--ros-args", "-p", f"{LINEAR}:={given}"]
+    process = spawn([sys.executable, "-m", "canbase_cli", *words])
+    told = "speed limit 0.2 m/s" if code is None else LINEAR
+    test_node.wait_for(lambda: told in process.log(), 30.0, "a line about it")
+    if code is not None:
+        test_node.wait_for(lambda: process.exit_code is not None, 30.0, "its end")
+    assert process.exit_code == code
+    assert "Traceback" not in process.log()
+
+
+def test_nav2_lowers_the_speed_by_its_own_message(chain: Chain) -> None:
+    kind = pytest.importorskip("nav2_msgs.msg", reason="nav2_msgs is not on PyPI").SpeedLimit
+    publisher = chain.node.node.create_publisher(kind, "speed_limit", 10)
+    chain.node.wait_for_subscriber(publisher)
+    chain.joystick.message = drive(0.8)
+    publisher.publish(kind(percentage=True, speed_limit=30.0))
+    chain.wait_for_order(0.3)
+    publisher.publish(kind(percentage=False, speed_limit=float("nan")))
+    chain.node.spin_for(0.5)
+    assert chain.ordered[0] == pytest.approx(0.3)
+    publisher.publish(kind(percentage=False, speed_limit=0.0))
+    chain.wait_for_order(0.8)
