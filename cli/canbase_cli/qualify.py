@@ -220,8 +220,11 @@ class _Qualify:
         )  # fmt: skip
         if before is not None:
             folder.check_same(self._folder, before, about)
-        self._folder.mkdir(parents=True, exist_ok=True)
-        folder.write(self._folder, about, self._loaded.path.read_bytes())
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            folder.write(self._folder, about, self._loaded.path.read_bytes())
+        except OSError as error:
+            fail(f"--out {self._folder} cannot be written: {error.strerror}", WRONG_INPUT)
         return job, about
 
     def _trial(self, job: Job, body: int) -> tuple[float, tuple[str, ...]]:

@@ -8,6 +8,7 @@ loses its input and ends; dask hands the batch to another worker. A batch comes 
 from __future__ import annotations
 
 import atexit
+import logging
 import threading
 from collections.abc import Iterable, Iterator
 from itertools import islice
@@ -27,6 +28,8 @@ AHEAD: Final = 3
 CONNECT_S: Final = 10.0
 WORKERS_S: Final = 30.0
 """A cluster without a worker is refused after this time."""
+LOGGERS: Final = ("distributed", "asyncio", "tornado")
+"""What they log of a cluster that fails is raised here as well, without tracebacks."""
 _of_thread = threading.local()
 
 
@@ -56,6 +59,8 @@ class DaskCrew:
         """`address`: of the scheduler, `tcp://host:8786`. CrewError: nobody answers there, or its canbase differs."""
         from distributed import Client
 
+        for name in LOGGERS:
+            logging.getLogger(name).setLevel(logging.CRITICAL)
         try:
             self._client: Client = Client(address, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:

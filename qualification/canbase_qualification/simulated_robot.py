@@ -11,6 +11,7 @@ from typing import Final
 
 from canbase_action_server.preconditions import action_source
 from canbase_campaign.faults import FAULTS
+from canbase_campaign.outside import publishes_s
 from canbase_campaign.robots import commissioned
 from canbase_campaign.scanner import LIES
 from canbase_campaign.twins import SERVER
@@ -64,11 +65,12 @@ def simulated(robot: Robot) -> Simulated:
     without |= set() if robot.safety.estop.required else NO_BUTTON
     without |= ONE_HAND if len(hands) < len(HANDS) else set()
     without |= {name for name in FAULTS if name.startswith("action_")} if not own_action else set()
+    changed = _changed(robot, hands, own_action, has_scanner)
     return Simulated(
-        _changed(robot, hands, own_action, has_scanner),
+        changed,
         tuple(sorted(FAULTS.keys() - without)),
         tuple(_failures(frozenset(without), has_goals=bool(own_action))),
-        tuple(_assumed(robot, hands, has_scanner)),
+        tuple(_assumed(robot, changed, hands, has_scanner)),
         (
             *_sources_not_judged(robot, hands, own_action),
             *_sensors_not_judged(robot, has_scanner),
@@ -147,16 +149,17 @@ def _slowest_scan(robot: Robot) -> Scan:
     return max(scans, key=lambda scan: scan.timeout_s + scan.frozen_s)
 
 
-def _assumed(robot: Robot, hands: tuple[str, ...], has_scanner: bool) -> Iterator[str]:
+def _assumed(robot: Robot, changed: Robot, hands: tuple[str, ...], has_scanner: bool) -> Iterator[str]:
     if uncommissioned(robot):
         slow = robot.safety.uncommissioned_mps
         yield f"The robot is commissioned: the speeds of `limits` count, not safety.uncommissioned_mps ({slow:g} m/s)."
     if robot.bus.is_virtual:
         yield f"The bus has {robot.bus.bitrate} bit/s (bus.bitrate; {robot.bus.interface} ignores the key)."
     yield f"{' and '.join(hands)} order motion, as a joystick and a planner do; a joystick is at 50 Hz."
+    scan_s, button_s = publishes_s(changed)
     if has_scanner:
-        yield "One scanner in the middle of the base sees all around, ten times a second, up to 5 m."
-    yield "The emergency stop button publishes ten times a second."
+        yield f"One scanner in the middle of the base sees all around, {1.0 / scan_s:.0f} times a second, up to 5 m."
+    yield f"The emergency stop button publishes {1.0 / button_s:.0f} times a second."
     if robot.mux.locks:
         yield f"mux.locks: {', '.join(robot.mux.locks)}: open, and their topics never missing."
     if robot.action.require_client_lease:

@@ -126,7 +126,7 @@ def test_resume_refuses_another_load_and_another_robot(few: Path, tmp_path: Path
 
 @contextmanager
 def cluster(folder: Path, workers: int) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """A scheduler and workers of one thread each, on the loopback interface."""
+    """A scheduler and then workers of one thread each, on the loopback interface."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
@@ -140,15 +140,13 @@ def cluster(folder: Path, workers: int) -> Iterator[tuple[str, list[subprocess.P
             stack.callback(end, process)
             return process
 
-        start("scheduler", "scheduler", "--host", host, "--port", port, "--no-dashboard")
+        scheduler = start("scheduler", "scheduler", "--host", host, "--port", port, "--no-dashboard")
         limits = ("--nthreads", "1", "--no-dashboard", "--no-nanny")
-        yield (
-            address,
-            [
-                start(f"worker{number}", "worker", address, *limits, "--local-directory", str(folder / str(number)))
-                for number in range(workers)
-            ],
-        )
+        started = [
+            start(f"worker{number}", "worker", address, *limits, "--local-directory", str(folder / str(number)))
+            for number in range(workers)
+        ]
+        yield address, [scheduler, *started]
 
 
 def end(process: subprocess.Popen[bytes]) -> None:
@@ -158,7 +156,7 @@ def end(process: subprocess.Popen[bytes]) -> None:
 
 def test_a_cluster_gives_the_same_file_also_when_a_worker_is_killed_in_the_middle(few: Path, tmp_path: Path) -> None:
     pytest.importorskip("distributed")
-    with cluster(tmp_path, 2) as (address, workers):
+    with cluster(tmp_path, 2) as (address, (_, *workers)):
         line = command(tmp_path / "q", *FEW, "--scheduler", address)
         qualify = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         busy: list[subprocess.Popen[bytes]] = []
@@ -175,6 +173,19 @@ def test_a_cluster_gives_the_same_file_also_when_a_worker_is_killed_in_the_middl
         assert qualify.returncode == 0, err
         assert results(tmp_path / "q") == results(few)
         wait_for("the process of the killed worker ends", lambda: not Path(f"/proc/{carries_out}").exists(), 30.0)
+
+
+def test_a_scheduler_that_dies_ends_it_with_a_sentence(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    with cluster(tmp_path, 1) as (address, (scheduler, worker)):
+        line = command(tmp_path / "q", *FEW, "--scheduler", address)
+        qualify = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        wait_for("a busy worker", lambda: children(worker.pid, "canbase_qualification.carry_out"))
+        end(scheduler)
+        _, err = qualify.communicate(timeout=BATCHES_S)
+    assert qualify.returncode == 1, err
+    assert "the scheduler of the cluster has ended, or cannot be reached any more. What was done is kept" in err
+    assert "Traceback" not in err
 
 
 def test_a_scheduler_that_is_not_there_is_named(tmp_path: Path) -> None:

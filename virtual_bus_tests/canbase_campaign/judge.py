@@ -82,7 +82,7 @@ class Judge:
         self._envelope = Envelope(self.react_s, now_s, self._coasting)
         self._wishes = Wishes(world.robot, now_s)
         self._wish = Envelope(self.react_s + world.robot.safety.command_timeout_s, now_s, self._coasting)
-        sees_s = world.robot.safety.scan.timeout_s + 2.0 * around.SCAN_S + longest_lag_s(world.robot)
+        sees_s = world.robot.safety.scan.timeout_s + 2.0 * around.scan_s + longest_lag_s(world.robot)
         self._blind = Envelope(sees_s + (self.react_s if len(plan.faults) > 1 else 0.0), now_s, self._coasting)
         self._touched = False
         self._leased, self._leased_at = ZERO, -math.inf

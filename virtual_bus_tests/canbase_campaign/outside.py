@@ -11,6 +11,7 @@ from canbase_campaign.envelope import react_s
 from canbase_campaign.plan import GoalRequest, Plan, Segment
 from canbase_campaign.scanner import Scanner
 from canbase_campaign.world import World
+from canbase_config.robot import Robot
 from canbase_driver.supervision.fault_reset import Outcome
 from canbase_velocity.clearance import NOWHERE, Points
 from canbase_velocity.twist import Twist
@@ -19,6 +20,8 @@ SPEEDING_UP_MPS = 0.2
 """By so much the base may become faster until the wall is noticed."""
 NAN = Twist(math.nan, 0.3)
 BEAMS = 360
+PERIOD_S, ROOM = 0.1, 2.5
+"""Scanner and stop button publish so often, or more often where robot.yaml misses them sooner."""
 
 
 class Outside:
@@ -70,15 +73,19 @@ class Outside:
         return Twist(0.0, 0.0) if segment.kind == "zero" else whole
 
 
+def publishes_s(robot: Robot) -> tuple[float, float]:
+    """Periods of scanner and stop button [s]: PERIOD_S, or what leaves their timeouts room for a lost message."""
+    safety = robot.safety
+    return min(PERIOD_S, safety.scan.timeout_s / ROOM), min(PERIOD_S, safety.estop.timeout_s / ROOM)
+
+
 class Surroundings:
     """Scanner and stop button. `wall_m`: free way ahead and behind at the time of `put_wall`; None: nothing there."""
-
-    SCAN_S = 0.1
-    BUTTON_S = 0.1
 
     def __init__(self, world: World, has_scanner: bool = True) -> None:
         """`has_scanner`: of a robot without one nothing is known about walls."""
         self._world = world
+        self.scan_s, self._button_s = publishes_s(world.robot)
         self.pressed = False
         self.scans, self.speaks = has_scanner, True
         """The scanner sends, the stop button sends."""
@@ -106,7 +113,7 @@ class Surroundings:
         limits, safety = robot.limits, robot.safety
         gentlest = limits.linear_mps**2 / (2.0 * (safety.slow_distance_m - safety.stop_distance_m))
         braking_m = base.v_mps**2 / (2.0 * min(gentlest, limits.deceleration_mps2))
-        sees_s = react_s(robot, layers=2) + self.SCAN_S
+        sees_s = react_s(robot, layers=2) + self.scan_s
         if self.scanner is not None and self.scanner.lies:
             sees_s = max(sees_s, react_s(robot, layers=1) + safety.scan.frozen_s + safety.scan.timeout_s)
         noticing_m = (abs(base.v_mps) + SPEEDING_UP_MPS) * sees_s
@@ -155,8 +162,8 @@ class Surroundings:
                 "scan",
                 self._seen() if self.scanner is None else self.scanner.scan(*self.free_m, self._world.clock.now_s),
             )
-        self._world.clock.after(self.SCAN_S, self._scan)
+        self._world.clock.after(self.scan_s, self._scan)
 
     def _speak(self) -> None:
         self._tell()
-        self._world.clock.after(self.BUTTON_S, self._speak)
+        self._world.clock.after(self._button_s, self._speak)

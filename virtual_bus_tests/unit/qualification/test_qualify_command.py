@@ -59,6 +59,12 @@ def test_results_that_are_there_are_kept_and_nothing_to_resume_is_refused(tmp_pa
     assert (code, "is no folder of canbase qualify" in text) == (2, True)
 
 
+def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    code, text = called(str(sample("bench")), "--out", str(tmp_path / "file" / "q"))
+    assert (code, "cannot be written: Not a directory" in text) == (2, True)
+
+
 def test_workers_of_a_cluster_are_not_started_here() -> None:
     code, text = called(str(sample("bench")), "--scheduler", "tcp://127.0.0.1:1", "--workers", "2")
     assert (code, "dask worker" in text) == (2, True)

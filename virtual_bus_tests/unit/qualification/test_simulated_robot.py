@@ -81,6 +81,15 @@ def test_one_scanner_stands_for_several_and_it_is_the_one_that_is_missed_last() 
     assert any("one scanner stood for all 2" in sentence for sentence in found.not_judged)
 
 
+def test_a_scanner_that_is_missed_soon_is_fast_enough() -> None:
+    scan = EXAMPLE.safety.scan.model_copy(update={"timeout_s": 0.05})
+    estop = EXAMPLE.safety.estop.model_copy(update={"timeout_s": 0.1})
+    sentences = " ".join(simulated(changed(safety={"scan": scan, "estop": estop})).assumed)
+    assert "sees all around, 50 times a second" in sentences
+    assert "button publishes 25 times a second" in sentences
+    assert "sees all around, 10 times a second" in " ".join(simulated(EXAMPLE).assumed)
+
+
 def test_a_robot_without_goals_is_not_tried_with_their_failures() -> None:
     sources = {name: source for name, source in EXAMPLE.mux.sources.items() if name != "action"}
     found = simulated(changed(mux={"sources": sources}))
