@@ -59,8 +59,9 @@ class DaskCrew:
         """`address`: of the scheduler, `tcp://host:8786`. CrewError: nobody answers there, or its canbase differs."""
         from distributed import Client
 
-        for name in LOGGERS:
-            logging.getLogger(name).setLevel(logging.CRITICAL)
+        for name in [*logging.root.manager.loggerDict]:
+            if name.partition(".")[0] in LOGGERS:
+                logging.getLogger(name).setLevel(logging.CRITICAL)
         try:
             self._client: Client = Client(address, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
