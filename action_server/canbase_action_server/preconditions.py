@@ -20,8 +20,9 @@ NO_SOURCE = (
 
 def action_source(robot: Robot) -> str:
     """Name under mux.sources of the source on topic cmd_vel_action; empty when there is none."""
+    ours = ("cmd_vel_action", "geometry_msgs/msg/TwistStamped")
     sources = robot.mux.sources.items()
-    return next((name for name, source in sources if source.topic == "cmd_vel_action" and source.stamped), "")
+    return next((name for name, source in sources if (source.topic, source.message_type) == ours), "")
 
 
 def commanding_program(robot: Robot, inputs: Inputs) -> str:

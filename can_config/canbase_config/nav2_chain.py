@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from canbase_config.mux import NEUTRAL_AFTER_S
+from canbase_config.mux import JOINTS, NEUTRAL_AFTER_S
 from canbase_config.robot import Robot
 
 VELOCITY: Final = "cmd_vel"
@@ -84,6 +84,11 @@ def chain(robot: Robot, namespace: str = "") -> Chain:
     if NAVIGATION not in sources:
         raise ValueError(
             f"mux.sources has no source called {NAVIGATION}, only {', '.join(sources)}: give Nav2's source that name"
+        )
+    if sources[NAVIGATION].type == JOINTS:
+        raise ValueError(
+            f"mux.sources.{NAVIGATION} has the type {JOINTS}, wheel speeds, which Nav2 does not publish: rename it, "
+            f"and add a source {NAVIGATION} of type twist, or let Nav2 publish to the controller (docs/ros2_control.md)"
         )
     taken = {full_name(source.topic, namespace): name for name, source in sources.items()}
     if name := taken.get(full_name(SMOOTHED, namespace)):

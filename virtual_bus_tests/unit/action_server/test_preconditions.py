@@ -84,6 +84,7 @@ def test_old_messages_are_no_messages() -> None:
     [
         MuxSource(topic="cmd_vel_joy", priority=1, timeout_s=0.3),
         MuxSource(topic="cmd_vel_action", priority=1, timeout_s=0.3, stamped=False),  # it would hear no TwistStamped
+        MuxSource(topic="cmd_vel_action", type="joint_command", priority=1, timeout_s=0.3),
     ],
 )
 def test_where_the_mux_does_not_hear_the_action_server_every_goal_is_refused(source: MuxSource) -> None:

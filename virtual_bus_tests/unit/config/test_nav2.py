@@ -112,6 +112,10 @@ def test_docking_has_the_topic_and_type_of_its_source_and_a_note_without_one() -
     ("sources", "told"),
     [
         ({"planner": NAVIGATION}, "no source called navigation, only planner"),
+        (
+            {"navigation": NAVIGATION | {"type": "joint_command"}},
+            "has the type joint_command, wheel speeds, which Nav2",
+        ),
         ({"navigation": NAVIGATION | {"topic": "cmd_vel_smoothed"}}, "drive past collision_monitor"),
     ],
 )
