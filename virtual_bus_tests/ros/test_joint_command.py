@@ -126,21 +126,22 @@ def test_a_controller_that_begins_with_a_speed_is_followed_after_zero(
 def test_hardware_with_its_default_threshold_shows_no_zero_and_moves_nothing(
     robot: RunningRobot, mux: Recorder[MuxState], hardware: TopicHardware
 ) -> None:
+    wait_followed(robot, mux)
     hardware.threshold = 1e-5  # canbase urdf writes -1
-    robot.node.spin_for(1.0)
+    robot.node.wait_for(lambda: control(mux).standing == MuxSource.SILENT, 10.0, f"its silence at rest: {mux.last}")
     sent = hardware.sent
     robot.node.spin_for(0.5)
     assert hardware.sent == sent  # at rest it publishes nothing: no zero arms the source after its next restart
-    hardware.publisher = restarted(robot, hardware)
+    hardware.publisher = restarted(robot, mux, hardware)
     hardware.set(1.0, 1.0)
     robot.node.wait_for(lambda: control(mux).standing == MuxSource.UNARMED, 10.0, f"not followed: {mux.last}")
     assert robot.moved_since(time.monotonic(), 0.5) < RESTS_M
 
 
-def restarted(robot: RunningRobot, hardware: TopicHardware) -> Any:
+def restarted(robot: RunningRobot, mux: Recorder[MuxState], hardware: TopicHardware) -> Any:
     """The publisher of a new controller manager, when the mux has seen that the one before is gone."""
     robot.node.node.destroy_publisher(hardware.publisher)
-    robot.node.spin_for(1.2)
+    robot.node.wait_for(lambda: not control(mux).armed, 10.0, "the mux to see that it is gone")
     publisher = robot.node.node.create_publisher(JointState, TOPIC, 1)
     robot.node.wait_for_subscriber(publisher)
     return publisher
