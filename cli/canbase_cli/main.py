@@ -79,7 +79,9 @@ app.command("reset", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=
 
 app.command("monitor", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_LOOK)(monitor.monitor)
 app.command("web", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_LOOK)(web.web)
-app.command("record", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_LOOK)(record.record)
+app.command("record", cls=RosCommand, options_metavar=ROS_USAGE, epilog=record.EPILOG, rich_help_panel=_LOOK)(
+    record.record
+)
 app.command("doctor", cls=RosCommand, options_metavar=ROS_USAGE, epilog=doctor.EPILOG, rich_help_panel=_LOOK)(
     doctor.doctor
 )

@@ -1,4 +1,7 @@
-"""`canbase record --mcap FILE`: every topic of the ROS graph into one file that Foxglove and PlotJuggler open."""
+"""`canbase record`: the last seconds of the black box, or every topic of the ROS graph as MCAP.
+
+This file records topics; record_black_box.py has the other half.
+"""
 
 from __future__ import annotations
 
@@ -21,26 +24,65 @@ LOOK_S: Final = 1.0
 TURN_S: Final = 0.2
 
 
+EPILOG: Final = (
+    "Examples:  \ncanbase record                    the last seconds, into the folder of the black box  \n"
+    "canbase record --seconds 5 --out turn.asc;  canbase explain turn.asc  \n"
+    "canbase record --mcap run.mcap    every topic until Ctrl-C"
+)
+
+
 def record(
     ctx: typer.Context,
-    mcap: Annotated[Path, typer.Option("--mcap", metavar="FILE", help="The file to write; it must not exist yet.")],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE.asc", help="Copy it there, with its .json; it must not exist yet."),
+    ] = None,
+    mcap: Annotated[
+        Path | None,
+        typer.Option("--mcap", metavar="FILE", help="Record the topics instead; the file must not exist yet."),
+    ] = None,
     seconds: Annotated[
-        float | None, typer.Option("--seconds", min=0.1, help="End after this time.", show_default="until Ctrl-C")
+        float | None,
+        typer.Option("--seconds", min=0.1, help="End after this time.", show_default="now; --mcap: until Ctrl-C"),
     ] = None,
     topics: Annotated[
         list[str] | None,
-        typer.Option("--topic", metavar="TOPIC", help="Record this one; repeatable.", show_default="all topics"),
+        typer.Option("--topic", metavar="TOPIC", help="With --mcap: this one; repeatable.", show_default="all topics"),
     ] = None,
     namespace: NamespaceOption = "",
 ) -> None:
-    """Record the topics of a running robot as MCAP. For example: canbase record --mcap run.mcap
+    """Record a running robot, also while it drives: the bus with all commands and states, or its topics.
 
-    Foxglove and PlotJuggler open the file. It has each message as it came, with the definition of its type. Topics
-    that appear later are recorded from then on. Hidden topics, those of actions, are recorded when --topic names them.
-    Ctrl-C ends the recording; the robot is not affected.
+    Without --mcap the motor driver writes what its black box has of the last seconds (black_box.seconds, 10 by
+    default), as for a stop: an .asc and a .json file that canbase explain, export and replay read. With --seconds it
+    does so after that time, or at Ctrl-C. One recording at a time, at most one in 5 s; the newest black_box.files are
+    kept.
 
-    Exit codes: 0 recorded, 1 nothing was recorded or the file could not be written, 2 wrong command line.
+    With --mcap each topic is recorded as it comes, until Ctrl-C, for Foxglove and PlotJuggler. Topics that appear later
+    are recorded from then on. Hidden topics, those of actions, are recorded when --topic names them.
+
+    The robot is not affected.
+
+    Exit codes: 0 recorded, 1 nothing was recorded or the file could not be written, 2 wrong command line, 6 no motor
+    driver.
     """
+    if mcap is not None and out is not None:
+        fail(
+            "--out belongs to a recording of the black box, --mcap to one of the topics: give one of them", WRONG_INPUT
+        )
+    if mcap is None and topics:
+        fail("--topic selects topics: give --mcap FILE too", WRONG_INPUT)
+    if mcap is None:
+        from canbase_cli.record_black_box import record_black_box
+
+        record_black_box(ctx, seconds, out, namespace)
+    else:
+        _record_topics(ctx, mcap, seconds, topics, namespace)
+
+
+def _record_topics(
+    ctx: typer.Context, mcap: Path, seconds: float | None, topics: list[str] | None, namespace: str
+) -> None:
     with ros_needed():
         import rclpy
         from rclpy.signals import SignalHandlerOptions

@@ -35,7 +35,7 @@ def stop(ctx: typer.Context, wait_s: WaitOption = 5.0, namespace: NamespaceOptio
 
     Exit codes: 0 done, 1 refused, 2 wrong command line, 6 no motor driver.
     """
-    with _Caller(ctx, namespace, wait_s) as caller:
+    with Caller(ctx, namespace, wait_s) as caller:
         _tell(caller.call("motor_driver/stop"))
 
 
@@ -46,7 +46,7 @@ def reset(ctx: typer.Context, wait_s: WaitOption = 5.0, namespace: NamespaceOpti
 
     Exit codes: 0 done, 1 refused, 2 wrong command line, 6 no motor driver.
     """
-    with _Caller(ctx, namespace, wait_s) as caller:
+    with Caller(ctx, namespace, wait_s) as caller:
         caller.need_driver("motor_driver/reset")
         if caller.is_offered("safety_filter/reset", FILTER_S):
             held = caller.estop_holds()
@@ -62,7 +62,7 @@ def _tell(sentence: str) -> None:
     typer.secho(sentence, fg=typer.colors.GREEN, color=colour())
 
 
-class _Caller:
+class Caller:
     """A node for a few calls. Each failure ends the command with its exit code."""
 
     def __init__(self, ctx: typer.Context, namespace: str, wait_s: float) -> None:
@@ -70,7 +70,7 @@ class _Caller:
         self._wait_s = wait_s
         self._node: Node
 
-    def __enter__(self) -> _Caller:
+    def __enter__(self) -> Caller:
         with ros_needed():
             import rclpy
             from rclpy.signals import SignalHandlerOptions

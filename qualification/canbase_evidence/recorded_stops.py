@@ -73,7 +73,7 @@ def _finding(standing: Standing, stops: Sequence[JudgedStop]) -> Finding:
     if standing.counts:
         causes = Counter(stop.stop.cause for stop in stops)
         told = ", ".join(f"{count} {cause}" for cause, count in sorted(causes.items()))
-        return Finding(Part.RECORDINGS, standing, f"{len(stops)} recorded stops of this robot: {told}.")
+        return Finding(Part.RECORDINGS, standing, f"{len(stops)} recordings of this robot: {told}.")
     reasons = Counter(stop.why for stop in stops)
     told = "; ".join(f"{count} {why}" for why, count in sorted(reasons.items()))
     return Finding(Part.RECORDINGS, standing, f"{len(stops)} recordings do not count: {told}.")

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
+from canbase_driver.supervision.stop_history import NOBODY
 from canbase_recording.entry import Note
 from canbase_recording.event import Event, EventKind, Level
 from canbase_recording.notes import CommandNote, DriverNote, FilterNote, MuxNote, TitleNote, parse_note
@@ -43,7 +44,7 @@ class NoteEvents:
         if isinstance(parsed, DriverNote):
             return self._on_driver(parsed)
         if isinstance(parsed, TitleNote):
-            text = f"written for a stop by {parsed.stopped_by}: {parsed.cause} ({parsed.detail})"
+            text = _why_written(parsed)
             return [Event(parsed.at_s, EventKind.TITLE, Level.INFO, "recording", text)]
         return ()
 
@@ -95,3 +96,9 @@ class NoteEvents:
         stops = note.state in STOPPED or (before in POWERED and note.state is not DriverState.ENABLED)
         level = Level.ALARM if stops else Level.INFO
         return [Event(note.at_s, EventKind.DRIVER, level, "motor_driver", text)]
+
+
+def _why_written(title: TitleNote) -> str:
+    if title.stopped_by == NOBODY:
+        return f"written without a stop: {title.cause} ({title.detail})"
+    return f"written for a stop by {title.stopped_by}: {title.cause} ({title.detail})"

@@ -22,6 +22,7 @@ from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.ros import messages
 from canbase_driver.ros.diagnostics import diagnostics_message, unguarded
 from canbase_driver.ros.managed_node import ManagedNode
+from canbase_driver.ros.record_service import RecordService
 from canbase_driver.ros.serialized_motion import SerializedMotion
 from canbase_driver.ros.services import DriverServices
 from canbase_driver.ros.stop_events import StopEvents
@@ -57,6 +58,7 @@ class MotorDriverNode(ManagedNode):
         self.create_subscription(TwistStamped, "cmd_vel", self._on_command, COMMAND_QOS)
         self.create_subscription(SafetyState, "safety_filter/state", self._on_safety, COMMAND_QOS)
         self._stops = StopEvents(self, robot, ring, writer, self.voice)
+        self._records = RecordService(self, self.voice, self._stops.record)
         self._offers = DriverServices(self, loop, robot.base.odom_frame, self.request_times)
         self._motion = SerializedMotion()
         self._previous: DriverSnapshot | None = None
@@ -91,6 +93,10 @@ class MotorDriverNode(ManagedNode):
         """To be called in each turn of the executor's loop: a pause between two of them ages the commands that wait."""
         self._receive_times.at(now_s)
         self.request_times.at(now_s)
+
+    def deliver(self) -> None:
+        """Send the answers for which the black box has done its work; from the executor's thread."""
+        self._records.deliver()
 
     def end(self) -> None:
         """The control thread has ended: report the stops that are still open."""

@@ -6,6 +6,7 @@ waits in a queue until the second one takes it.
 
 from __future__ import annotations
 
+import functools
 import math
 import queue
 import time
@@ -24,10 +25,10 @@ from canbase_driver.ros.messages import stop_event_message
 from canbase_driver.ros.source_orders import SourceOrders
 from canbase_driver.runtime.black_box import Ring
 from canbase_driver.runtime.black_box_notes import command_note, driver_note, filter_note, mux_note
-from canbase_driver.runtime.black_box_writer import BlackBoxWriter
+from canbase_driver.runtime.black_box_writer import BlackBoxWriter, Written
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervision.state_machine import POWER_OFF_TIMEOUT_S
-from canbase_driver.supervision.stop_history import FILTER, StopHistory, StopRecord, StopReport, standstill_text
+from canbase_driver.supervision.stop_history import FILTER, NOBODY, StopHistory, StopRecord, StopReport, standstill_text
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
 from canbase_runtime.journal import Voice
 from canbase_runtime.log_priority import Priority
@@ -123,6 +124,17 @@ class StopEvents:
     def _write(self, report: StopReport, now_s: float) -> str:
         offset_s = time.time() - now_s
         return self._writer.submit(self._ring.cut(now_s, offset_s), report.record, self._orders.during)
+
+    def record(self, done: Written) -> str:
+        """Have the last seconds written though nothing has stopped the base; from the executor's thread.
+
+        Why not now; empty: `done` will be called, from the writer's thread.
+        """
+        now_s = time.monotonic()
+        offset_s = time.time() - now_s
+        record = StopRecord(NOBODY, "recording requested", "the robot was not stopped", False, "", now_s)
+        keep = functools.partial(self._ring.cut_later, now_s, offset_s)
+        return self._writer.request(keep, record, offset_s, self._orders.during, done)
 
     def _on_mux(self, message: MuxState) -> None:
         now_s, active = time.monotonic(), printable(message.active)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import heapq
 import io
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,6 +47,11 @@ class Recording:
         return min([frame[0] for frame in self.frames[:WAITED]] + [note[0] for note in self.notes[:1]], default=0.0)
 
 
+Pace = Callable[[Iterable[Any]], Iterable[Any]]
+"""Gives the same things, with pauses between them or without."""
+Cut = Callable[[Pace], Recording]
+
+
 class Ring:
     """Keeps the newest entries. Any thread may add: appending to a deque is atomic in CPython, and so is copying it."""
 
@@ -76,13 +81,17 @@ class Ring:
 
     def cut(self, now_s: float, wall_offset_s: float) -> Recording:
         """What happened in the last seconds before `now_s`."""
+        return self.cut_later(now_s, wall_offset_s)(iter)
+
+    def cut_later(self, now_s: float, wall_offset_s: float) -> Cut:
+        """The same, kept as it is now and sorted out when it is called: that takes longer than keeping it."""
         since = now_s - self._seconds
         frames, notes, events = self._frames.copy(), self._notes.copy(), self._events.copy()
-        return Recording(
-            tuple(entry for entry in frames if entry[0] >= since),
-            tuple(entry for entry in notes if entry[0] >= since),
+        return lambda pace: Recording(
+            tuple(entry for entry in pace(frames) if entry[0] >= since),
+            tuple(entry for entry in pace(notes) if entry[0] >= since),
             wall_offset_s,
-            tuple(entry for entry in events if entry[0] >= since),
+            tuple(entry for entry in pace(events) if entry[0] >= since),
         )
 
 

@@ -123,6 +123,7 @@ def _spin(
             now_s = time.monotonic()
             node.look_at_the_clock(now_s)
             loop.deliver()
+            node.deliver()
             failure = _failure(threads) or watch.look(loop.cycle_at, now_s)
             if failure is not None:
                 return failure

@@ -18,6 +18,8 @@ from canbase_runtime.driver_state import DriverState
 ORDER_AGE_S = 0.1
 """A source that ordered motion so short before its end was lost; one that ordered zero had ended by itself."""
 FILTER, MUX, DRIVER = "safety_filter", "velocity_mux", "motor_driver"
+NOBODY = "nobody"
+"""In place of them, in a recording that was requested: nothing has stopped the base."""
 STALE, NO_SOURCE = "command_stale", "no_source"
 """Words for people, in a `StopRecord`."""
 

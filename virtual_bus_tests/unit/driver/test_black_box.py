@@ -16,6 +16,7 @@ from canbase_config.black_box import BlackBox
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_config.watchdog import WatchdogConfig
+from canbase_driver.runtime import black_box_writer
 from canbase_driver.runtime.black_box import (
     MAX_EVENTS,
     MAX_FRAMES,
@@ -28,9 +29,9 @@ from canbase_driver.runtime.black_box import (
 )
 from canbase_driver.runtime.black_box_about import about, sha256_of
 from canbase_driver.runtime.black_box_json import json_lines
-from canbase_driver.runtime.black_box_writer import WAITING, BlackBoxWriter, state_folder
+from canbase_driver.runtime.black_box_writer import WAITING, BlackBoxWriter, Written, state_folder
 from canbase_driver.runtime.bus_port import BusPort
-from canbase_driver.supervision.stop_history import StopRecord
+from canbase_driver.supervision.stop_history import NOBODY, StopRecord
 
 WALL_S = 1_700_000_000.0
 SETPOINT = bytes.fromhex("0f 00 10 27 00 00")
@@ -329,3 +330,109 @@ def test_a_defect_in_it_is_kept_for_the_main_thread(box: Box, monkeypatch: pytes
 )
 def test_where_files_go_by_default(environment: dict[str, str], folder: str) -> None:
     assert state_folder(environment, Path("/home/u")) == Path(folder)
+
+
+# ---- recordings on request
+
+
+class Requests:
+    """Requests at a writer, and what became of them."""
+
+    def __init__(self, box: Box) -> None:
+        self.box = box
+        self.told: list[tuple[str, str]] = []
+
+    def at(self, now_s: float, ring: Ring | None = None) -> str:
+        """Why not now; empty: it will be written."""
+        ring = ring or filled_ring()
+        record = StopRecord(NOBODY, "recording requested", "the robot was not stopped", False, "", now_s)
+        done: Written = lambda path, problem: self.told.append((path, problem))  # noqa: E731
+        return self.box.writer.request(lambda: ring.cut_later(now_s, WALL_S), record, WALL_S, lambda _cut: (), done)
+
+
+def filled_ring(frames: int = 5000) -> Ring:
+    ring = Ring(10.0)
+    for number in range(frames):
+        ring.frame(95.0 + number * 0.001, 0x181, bytes(8), True)
+    ring.event(99.0, "cmd_vel", {"linear_mps": 0.1})
+    return ring
+
+
+def test_a_recording_on_request_has_all_that_one_of_a_stop_has(box: Box) -> None:
+    requests = Requests(box)
+    assert requests.at(100.0) == ""
+    box.finish()
+    ((path, problem),) = requests.told
+    assert (path, problem) == (str(box.folder / "record_r1_20231114T221500.000Z.asc"), "")
+    text = Path(path).read_text(encoding="utf-8")
+    assert "// stop by nobody: recording requested (the robot was not stopped)" in text
+    with can.LogReader(path) as reader:
+        assert len(list(reader)) == 5000
+    told = json.loads(Path(path).with_suffix(".json").read_text(encoding="utf-8"))
+    assert (told["stopped_by"], told["at_s"], told["began_s"], len(told["events"])) == ("nobody", 100.0, 95.0, 1)
+
+
+def test_what_comes_after_a_request_is_not_in_it(box: Box) -> None:
+    ring, requests = filled_ring(10), Requests(box)
+    requests.at(100.0, ring)
+    ring.frame(100.1, 0x182, b"", True)
+    box.finish()
+    with can.LogReader(requests.told[0][0]) as reader:
+        assert {message.arbitration_id for message in reader} == {0x181}
+
+
+def test_a_flood_of_requests_writes_one_file_in_five_seconds(box: Box) -> None:
+    requests = Requests(box)
+    refusals = [requests.at(100.0 + k * 0.01) for k in range(100)]
+    assert refusals[0] == ""
+    assert refusals[1] == "a recording was requested less than 5 s ago; again in 5.0 s"
+    assert all(refusals[1:])
+    box.finish()
+    assert len(requests.told) == 1
+
+
+def test_a_request_is_refused_while_another_one_is_written(box: Box) -> None:
+    requests = Requests(box)
+    assert requests.at(100.0) == ""
+    assert requests.at(110.0) == "a recording that was requested before is still being written"
+    box.finish()
+    assert len(requests.told) == 1
+
+
+def test_a_request_takes_no_place_of_a_stop(box: Box) -> None:
+    assert Requests(box).at(100.0) == ""
+    paths = [box.stop(WALL_S + k) for k in range(WAITING + 1)]
+    assert [bool(path) for path in paths] == [True] * WAITING + [False]
+
+
+def test_recordings_on_request_delete_none_of_stops_and_are_bounded_themselves(box: Box) -> None:
+    box.folder.mkdir()
+    stops = [f"stop_r1_20200101T00000{k}.000Z_x.asc" for k in range(3)]
+    older = [f"record_r1_20200101T00000{k}.000Z.asc" for k in range(3)]
+    for name in (*stops, *older):
+        (box.folder / name).touch()
+    Requests(box).at(100.0)
+    box.finish()
+    new = [f"record_r1_20231114T221500.000Z.{kind}" for kind in ("asc", "json")]
+    assert box.files == sorted([*stops, *older[1:], *new])
+
+
+def test_a_request_is_told_that_the_disk_is_full_and_the_next_stop_is_recorded(
+    box: Box, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, failures = black_box_writer.asc_lines, iter([True, False])
+
+    def lines(of: Recording, title: str) -> Iterator[str]:
+        if next(failures):
+            raise OSError(28, "No space left on device")
+        yield from real(of, title)
+
+    monkeypatch.setattr("canbase_driver.runtime.black_box_writer.asc_lines", lines)
+    requests = Requests(box)
+    requests.at(100.0)
+    box.stop()
+    box.finish()
+    ((_path, problem),) = requests.told
+    assert problem == f"the black box cannot write to {box.folder}: No space left on device"
+    assert "stop_r1_20231114T221320.000Z_drive_fault.asc" in box.files
+    assert requests.at(110.0) == "", "the next request is taken"

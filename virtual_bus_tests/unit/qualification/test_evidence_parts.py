@@ -204,6 +204,6 @@ def test_the_sentences_about_recordings() -> None:
     stops = [judged(STOP, WIRED, "0.1.0"), judged(STOP, WIRED, "0.2.0")]
     other, counts = recorded_stops.findings(stops)
     assert (other.standing, counts.standing) == (Standing.OTHER, Standing.PRESENT)
-    assert counts.sentence == "1 recorded stops of this robot: 1 watchdog tripped."
+    assert counts.sentence == "1 recordings of this robot: 1 watchdog tripped."
     (none,) = recorded_stops.findings([])
     assert none.standing is Standing.MISSING
