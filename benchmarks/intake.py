@@ -94,6 +94,7 @@ def driver(robot: Robot, pipe: Connection) -> None:
 def watchdog(robot: Robot, pipe: Connection) -> None:
     """The watchdog's loop."""
     from canbase_watchdog.bus_port import BusPort
+    from canbase_watchdog.input_ring import InputRing
     from canbase_watchdog.lease_socket import LeaseSocket
     from canbase_watchdog.loop import Loop
     from canbase_watchdog.realtime import calm_the_collector
@@ -105,7 +106,8 @@ def watchdog(robot: Robot, pipe: Connection) -> None:
     calm_the_collector()  # as its own process does
     with BusPort(config.bus_arguments) as bus, LeaseSocket(config.lease_socket, 0) as leases:
         pipe.send("ready")
-        Loop(guard, bus, leases).run(pipe.poll)
+        inputs = InputRing(config.recording_s, time.monotonic())
+        Loop(guard, bus, leases, inputs=inputs).run(pipe.poll)
     pipe.send((guard.dropped_frames, time.process_time()))
 
 

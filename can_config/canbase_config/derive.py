@@ -116,6 +116,9 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
         twist_s=watchdog.twist_s,
         relay=RelayLine(watchdog.relay.chip, watchdog.relay.line) if watchdog.relay else None,
         robot=robot.name,
+        recording_folder=robot.black_box.folder,
+        recording_s=robot.black_box.seconds,
+        recordings=robot.black_box.files,
     )
 
 

@@ -150,6 +150,12 @@ class WatchdogConfig:
     """None: there is no such relay."""
     robot: str = "robot"
     """`name` in robot.yaml: whose record of a trip it keeps."""
+    recording_folder: str | None = None
+    """Where the inputs of a trip are written; None: the state folder."""
+    recording_s: float = 10.0
+    """How far they go back [s]."""
+    recordings: int = 20
+    """So many are kept."""
 
     @property
     def heartbeat_period_s(self) -> float:

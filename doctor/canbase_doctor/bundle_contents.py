@@ -71,10 +71,20 @@ def allowed(path: Path) -> bool:
 
 
 def newest_boxes(robot: str, found: Mapping[Path, float]) -> list[Path]:
-    """The last recordings of the robot of this name, of all robots if empty; `found`: files and modification times."""
-    begin = f"stop_{robot}_" if robot else "stop_"
-    mine = [path for path in found if path.suffix == ".asc" and path.name.startswith(begin)]
-    return sorted(mine, key=lambda path: found[path], reverse=True)[:BOXES]
+    """The last recordings of each part of the robot of this name, of all robots if empty; `found`: files and
+    modification times."""
+    newest = sorted(found, key=lambda path: found[path], reverse=True)
+    of_each = ([path for path in newest if _is_of(path, part, suffix, robot)] for part, suffix in RECORDINGS)
+    return [path for mine in of_each for path in mine[:BOXES]]
+
+
+RECORDINGS = (("stop", ".asc"), ("watchdog", ".jsonl"), ("velocity", ".jsonl"))
+"""By whom: how their names begin and end. A .json lies beside an .asc."""
+
+
+def _is_of(path: Path, part: str, suffix: str, robot: str) -> bool:
+    begin = f"{part}_{robot}_" if robot else f"{part}_"
+    return path.suffix == suffix and path.name.startswith(begin)
 
 
 def manifest(taken: Mapping[str, str], missing: Mapping[str, str]) -> str:

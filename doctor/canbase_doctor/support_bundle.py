@@ -176,9 +176,8 @@ def _black_boxes(bundle: Bundle, robot: Robot | None, state: Path) -> None:
     found: dict[Path, float] = {}
     for folder in folders:
         try:
-            found |= {
-                path: modified(path) for path in (folder / file for file in names(folder)) if path.suffix == ".asc"
-            }
+            paths = (folder / file for file in names(folder))
+            found |= {path: modified(path) for path in paths if path.suffix in (".asc", ".jsonl")}
         except OSError:
             continue  # reported below where no folder has any
     newest = support.newest_boxes(robot.name if robot else "", found)

@@ -14,10 +14,12 @@ from collections.abc import Callable
 
 from canbase_watchdog import frames
 from canbase_watchdog.bus_port import BusPort
+from canbase_watchdog.input_ring import END, EXPIRE, FRAME, LEASE, SUSPEND, TICK, Input, InputRing
 from canbase_watchdog.latch_file import Keeper
 from canbase_watchdog.lease_socket import LeaseSocket
 from canbase_watchdog.relay import Relay
 from canbase_watchdog.report import Reporter
+from canbase_watchdog.trip_recorder import TripRecorder
 from canbase_watchdog.watchdog import State, Watchdog
 
 TICK_S = 0.005
@@ -46,14 +48,19 @@ class Loop:
         leases: LeaseSocket,
         relay: Relay | None = None,
         keeper: Keeper | None = None,
+        inputs: InputRing | None = None,
+        recorder: TripRecorder | None = None,
     ) -> None:
         """Owns none of them: the caller opens and closes. `relay`: None where there is none. `keeper`: of the record
-        that the watchdog was made with; None where it was made without."""
+        that the watchdog was made with; None where it was made without. `inputs`, `recorder`: of what the watchdog
+        decides from; None: it is not recorded."""
         self._watchdog = watchdog
         self._bus = bus
         self._leases = leases
         self._relay = relay
         self._keeper = keeper
+        self._recorder = recorder
+        self._note = inputs.note if inputs is not None else _forget
         self._record_problem = ""
         self._reporter = Reporter(watchdog)
         self._bus_has_fd = bus.fileno() is not None
@@ -67,6 +74,7 @@ class Loop:
         while not asked_to_end():
             self._turn()
         now_s = time.monotonic()
+        self._note((END, now_s))
         self._watchdog.end(now_s)
         while not self._at_rest() and time.monotonic() < now_s + END_S:
             self._turn()
@@ -94,8 +102,11 @@ class Loop:
     def _take_leases(self, now_s: float) -> bool:
         """Those that have arrived. True: the last one that counts ran out while a wheel moves; the stop is sent."""
         for datagram, uid, pid in self._leases.receive():
+            self._note((LEASE, now_s, datagram, uid, pid))
             self._watchdog.on_lease(datagram, uid, now_s, pid)
         stop = self._watchdog.expire(now_s)
+        if stop:
+            self._note((EXPIRE, now_s))
         for frame in stop:
             self._bus.send(frame)
         return bool(stop)
@@ -103,8 +114,9 @@ class Loop:
     def _take_frames(self, now_s: float, until: float) -> None:
         """Those that have arrived; what is left at the time `until` waits for the next turn, which comes at once."""
         for cob_id, data, at_s in self._bus.receive(now_s):
-            is_request = cob_id == frames.RESET_REQUEST  # it is judged by what holds now
-            self._watchdog.on_frame(cob_id, data, now_s if is_request else at_s)
+            at_s = now_s if cob_id == frames.RESET_REQUEST else at_s  # a request is judged by what holds now
+            self._note((FRAME, at_s, cob_id, data))
+            self._watchdog.on_frame(cob_id, data, at_s)
             if time.monotonic() >= until:
                 return
 
@@ -114,11 +126,14 @@ class Loop:
         self._watchdog.on_bus(health.failed_since, health.errors)
         if self._keeper is not None:
             self._watchdog.on_record(self._keeper.written, self._keeper.problem)
+        self._note((TICK, now_s, health.failed_since, health.errors))
         for frame in self._watchdog.tick(now_s):
             self._bus.send(frame)
         if self._relay is not None and self._watchdog.keeps_relay:
             self._relay.toggle()
         self._keep_record()
+        if self._recorder is not None:
+            self._recorder.look(self._watchdog, now_s)
         self._check_bus(now_s)
         self._reporter.tick(health, now_s, self._bus.datagrams_dropped)
         self._collect(now_s)
@@ -126,6 +141,7 @@ class Loop:
     def _look_for_a_suspend(self) -> None:
         before_s, self._suspended_s = self._suspended_s, suspended_s()
         if self._suspended_s > before_s + SUSPENDED_S:
+            self._note((SUSPEND, time.monotonic(), self._suspended_s - before_s))
             self._watchdog.on_suspend(self._suspended_s - before_s)
 
     def _keep_record(self) -> None:
@@ -154,6 +170,10 @@ class Loop:
         if now_s >= self._collected_at + COLLECT_S:
             self._collected_at = now_s
             gc.collect()
+
+
+def _forget(_: Input) -> None:
+    """Nobody records it."""
 
 
 def suspended_s() -> float:

@@ -17,12 +17,14 @@ from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog import frames, latch_file, realtime
 from canbase_watchdog import single_instance as sole
 from canbase_watchdog.bus_port import BusError, BusPort
+from canbase_watchdog.input_ring import InputRing
 from canbase_watchdog.latch_file import Keeper
 from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
 from canbase_watchdog.log import Lines, formatter, never_wait
 from canbase_watchdog.loop import BusDeadError, Loop
 from canbase_watchdog.relay import Relay, RelayError
 from canbase_watchdog.sd_notify import notify
+from canbase_watchdog.trip_recorder import TripRecorder, folder_of
 from canbase_watchdog.watchdog import Watchdog
 
 LISTEN_S = 0.16
@@ -73,15 +75,19 @@ def _serve(config: WatchdogConfig) -> int:
         leases = stack.enter_context(LeaseSocket(config.lease_socket, uid))
         relay = stack.enter_context(Relay(config.relay)) if config.relay else None
         keeper = Keeper(record, config.robot)
-        watchdog = Watchdog(config, time.monotonic(), keeper.past)
+        started_s = time.monotonic()
+        watchdog = Watchdog(config, started_s, keeper.past)
+        inputs = InputRing(config.recording_s, started_s)
+        recorder = TripRecorder(inputs, config, keeper.past, folder_of(config, os.environ, Path.home()))
         try:
-            _guard(Loop(watchdog, bus, leases, relay, keeper), keeper, asked)
+            _guard(Loop(watchdog, bus, leases, relay, keeper, inputs, recorder), keeper, recorder, asked)
         except BaseException:
             for frame in watchdog.quick_stops():
                 bus.send(frame)
             raise
         finally:
             keeper.finish(WRITE_S)
+            recorder.finish(WRITE_S, time.monotonic())
     _log.info("ended by %s", signal.Signals(asked[0]).name)
     return 0
 
@@ -99,11 +105,12 @@ def _listen_for_another(bus: BusPort) -> None:
             )
 
 
-def _guard(loop: Loop, keeper: Keeper, asked: list[int]) -> None:
+def _guard(loop: Loop, keeper: Keeper, recorder: TripRecorder, asked: list[int]) -> None:
     complaint = realtime.prepare()
     if complaint is not None:
         _log.warning("%s", complaint)
     keeper.start()  # with the priority of this thread: one below it that holds Python's lock would hold this one up
+    recorder.start()
     notify("READY=1")
     loop.run(lambda: bool(asked))
     notify("STOPPING=1")

@@ -115,6 +115,11 @@ class Watchdog:
         unproven = self._unproven() if self._state is State.TRIPPED else ""
         return Status(self._state, self._verdict, self._step, self._settled, self._reset, assumed, armed, unproven)
 
+    @property
+    def verdict(self) -> Verdict:
+        """Why it is tripped; FINE, the very object, while it is not."""
+        return self._verdict
+
     def _unproven(self) -> str:
         return next((axis.drive.joint for axis in self._view.axes if axis.unproven and not axis.enabled), "")
 
