@@ -13,6 +13,7 @@ from canbase_runtime.terminal import FAILED, fail, load_config
 if TYPE_CHECKING:
     from canbase_config.robot import Robot
     from canbase_recording.recorded_inputs import RecordedInputs
+    from canbase_recording.trip_inputs import TripInputs
 
 EPILOG: Final = (
     "Examples:  \ncanbase replay stop_robot_20261124T201500.000Z_watchdog_tripped.asc  \n"
@@ -22,7 +23,10 @@ EPILOG: Final = (
 
 def replay(
     recording: Annotated[
-        Path, typer.Argument(metavar="FILE", help="The .asc of a black box; its .json lies beside it.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="The .asc of a black box (its .json lies beside it), or a watchdog_….jsonl."
+        ),
     ],
     config: Annotated[
         Path | None,
@@ -40,11 +44,10 @@ def replay(
     robot.yaml.
     """
     from canbase_recording.recorded_inputs import NoInputsError
-    from canbase_recording.replay_file import read_inputs
 
     other = None if config is None else load_config(config, quiet=True).robot
     try:
-        values, lines, agrees = _told(read_inputs(recording), other)
+        values, lines, agrees = _trip(recording, other) if recording.suffix == ".jsonl" else _stop(recording, other)
     except NoInputsError as error:
         fail(str(error), FAILED)
     typer.echo(json.dumps(values, indent=1) if as_json else "\n".join(lines))
@@ -52,13 +55,38 @@ def replay(
         raise typer.Exit(FAILED)
 
 
-def _told(inputs: RecordedInputs, other: Robot | None) -> tuple[dict[str, Any], list[str], bool]:
-    """For JSON, for people, and whether the replay does what was recorded."""
+Told = tuple[dict[str, Any], list[str], bool]
+"""For JSON, for people, and whether the replay does what was recorded."""
+
+
+def _trip(path: Path, other: Robot | None) -> Told:
+    """The inputs of a watchdog's trip alone."""
+    from canbase_recording import replay_text as words
+    from canbase_recording.replay_compare import compare_alone
+    from canbase_recording.replay_file import read_trip
+    from canbase_recording.replay_trip import replay_own, replay_trip
+
+    inputs = read_trip(path)
+    found = replay_own(inputs, path.name)
+    values: dict[str, Any] = {"watchdog": words.watchdog_values(inputs, found)}
+    lines = list(words.watchdog_lines(inputs, found))
+    if other is not None:
+        comparison = compare_alone(inputs.head.config, other, lambda config: replay_trip(inputs, config))
+        values["other_robot_yaml"] = words.comparison_values(inputs, comparison)
+        lines += words.comparison_lines(inputs, comparison)
+    return values, lines, not any(life.differs for life in found.lives)
+
+
+def _stop(path: Path, other: Robot | None) -> Told:
+    """Both files of the driver, and the watchdog's own one where it lies beside them."""
     from canbase_recording import replay_text as words
     from canbase_recording.replay import replay_watchdog
-    from canbase_recording.replay_file import robot_of
+    from canbase_recording.replay_file import read_inputs, robot_of, trip_beside
+    from canbase_recording.replay_trip import replay_own
 
-    found = replay_watchdog(inputs)
+    inputs = read_inputs(path)
+    beside = trip_beside(path, inputs)
+    found = replay_watchdog(inputs) if beside is None else replay_own(beside[1], beside[0])
     chain_values, chain_lines, chain_agrees = _chain(inputs, robot_of(inputs))
     stop = f"stop by {inputs.stopped_by}: {inputs.cause} ({inputs.detail}), at {inputs.at_s - inputs.began_s:.3f} s"
     values: dict[str, Any] = {
@@ -70,7 +98,7 @@ def _told(inputs: RecordedInputs, other: Robot | None) -> tuple[dict[str, Any], 
     }
     lines = [stop, *words.watchdog_lines(inputs, found), *chain_lines, words.NOT_REPLAYED]
     if other is not None:
-        values["other_robot_yaml"], more = _with_other(inputs, other)
+        values["other_robot_yaml"], more = _with_other(inputs, other, beside and beside[1])
         lines += more
     return values, lines, chain_agrees and not any(life.differs for life in found.lives)
 
@@ -87,11 +115,12 @@ def _chain(inputs: RecordedInputs, robot: Robot) -> tuple[dict[str, Any], list[s
     return values, lines, not (sources.differences or setpoints.differences)
 
 
-def _with_other(inputs: RecordedInputs, other: Robot) -> tuple[dict[str, Any], list[str]]:
+def _with_other(inputs: RecordedInputs, other: Robot, own: TripInputs | None) -> tuple[dict[str, Any], list[str]]:
     from canbase_recording import replay_text as words
     from canbase_recording.replay_compare import compare
+    from canbase_recording.replay_trip import replay_trip
 
-    comparison = compare(inputs, other)
+    comparison = compare(inputs, other, None if own is None else lambda config: replay_trip(own, config))
     chain_values, chain_lines, _ = _chain(inputs, other)
     lines = [*words.comparison_lines(inputs, comparison), *(f"  {line}" for line in chain_lines)]
     return words.comparison_values(inputs, comparison) | chain_values, lines

@@ -58,6 +58,8 @@ class Replayed:
     """It trips where the evidence against a sensor has to last one cycle less: the new watchdog began it later."""
     on_edge: bool = False
     """It agrees within the accuracy of the recorded times, EDGE: a limit was reached just so."""
+    whole: bool = False
+    """It had all inputs of the watchdog that ran, from its own file."""
 
     @property
     def cannot(self) -> str:
@@ -67,6 +69,8 @@ class Replayed:
             return self._blind
         if trip.cause is None:
             return "this canbase does not know the cause that was recorded"
+        if self.whole:
+            return self._short
         return NOT_RECORDED.get(trip.cause, "") or self._blind or self._short
 
     @property
@@ -127,10 +131,13 @@ def tolerance_s(inputs: RecordedInputs) -> float:
 
 @dataclass(frozen=True, slots=True)
 class WatchdogReplay:
-    """All lives, and the leases that were taken."""
+    """All lives, and the leases and frames that were taken. `source`: whose recording it is, for people."""
 
     lives: tuple[Replayed, ...]
     leases: Leases
+    lease_count: int
+    frames: int
+    source: str = "of the driver's recording"
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +174,8 @@ def replay_watchdog(inputs: RecordedInputs, config: WatchdogConfig | None = None
     given = _given(inputs)
     after_s = AFTER_S if config is None else 0.0
     config = config or inputs.watchdog
-    return WatchdogReplay(tuple(_life(given, life, config, after_s) for life in given.lives), given.leases)
+    lives = tuple(_life(given, life, config, after_s) for life in given.lives)
+    return WatchdogReplay(lives, given.leases, len(given.leases.leases), len(inputs.frames))
 
 
 def _life(given: _Inputs, life: Life, config: WatchdogConfig, after_s: float) -> Replayed:

@@ -5,14 +5,15 @@ Until the recorded stop alone: what comes after it in the recording is its conse
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 from canbase_config.derive import watchdog_config
 from canbase_config.robot import Robot
-from canbase_config.watchdog import WatchedDrive, WatchedLayout
+from canbase_config.watchdog import WatchdogConfig, WatchedLayout
 from canbase_recording.config_changes import Change, changes, of_the_watchdog
 from canbase_recording.recorded_inputs import NoInputsError, RecordedInputs
 from canbase_recording.recorded_watchdog import Trip
@@ -53,17 +54,23 @@ class Comparison:
     differences: tuple[Difference, ...]
 
 
-def compare(inputs: RecordedInputs, other: Robot) -> Comparison:
-    """Raises NoInputsError where the other robot has other drives: then the frames mean something else."""
+Replay = Callable[[WatchdogConfig], tuple[Replayed, ...]]
+"""The lives of the watchdog that ran, with this configuration."""
+
+
+def compare(inputs: RecordedInputs, other: Robot, replay: Replay | None = None) -> Comparison:
+    """`replay`: None: by the driver's recording alone. Raises NoInputsError where the other robot has other drives:
+    then the frames mean something else."""
+    replay = replay or (lambda config: replay_watchdog(inputs, config).lives)
     config = watchdog_config(other)
-    _refuse_other_drives(inputs, config.drives)
+    refuse_other_drives(inputs.watchdog, config)
     config = replace(config, lease_socket=inputs.watchdog.lease_socket)
     all_changes = changes(inputs.robot_yaml, other.model_dump(mode="json"))
     relevant = of_the_watchdog(inputs.robot_yaml, inputs.watchdog, all_changes)
-    before = replay_watchdog(inputs, inputs.watchdog).lives
-    after = replay_watchdog(inputs, config).lives
+    before = replay(inputs.watchdog)
+    after = replay(config)
     tried = {
-        change: replay_watchdog(inputs, alone).lives
+        change: replay(alone)
         for change, alone in list(relevant.items())[:MOST_TRIED]
         if any(not _same(one.trip, two.trip) for one, two in zip(before, after, strict=True))
     }
@@ -74,9 +81,23 @@ def compare(inputs: RecordedInputs, other: Robot) -> Comparison:
     return Comparison(tuple(all_changes), tuple(relevant), found)
 
 
-def _refuse_other_drives(inputs: RecordedInputs, drives: Sequence[WatchedDrive]) -> None:
-    recorded = [(drive.node_id, drive.axis, drive.layout) for drive in inputs.watchdog.drives]
-    given = [(drive.node_id, drive.axis, drive.layout) for drive in drives]
+def compare_alone(recorded: WatchdogConfig, other: Robot, replay: Replay) -> Comparison:
+    """Where the recorded robot.yaml is unknown: the keys are those of the watchdog's own configuration."""
+    config = replace(watchdog_config(other), lease_socket=recorded.lease_socket, lease_uid=recorded.lease_uid)
+    refuse_other_drives(recorded, config)
+    before, after = dataclasses.asdict(recorded), dataclasses.asdict(config)
+    found = tuple(each for each in changes(before, after) if each.loc[0] not in _OF_NO_MATTER)
+    lives = zip(replay(recorded), replay(config), strict=True)
+    return Comparison(found, found, tuple(Difference(one, two, ()) for one, two in lives))
+
+
+_OF_NO_MATTER: Final = ("bus_arguments", "lease_uid", "recording_folder", "recording_s", "recordings", "relay", "robot")
+
+
+def refuse_other_drives(before: WatchdogConfig, after: WatchdogConfig) -> None:
+    """Raises NoInputsError."""
+    recorded = [(drive.node_id, drive.axis, drive.layout) for drive in before.drives]
+    given = [(drive.node_id, drive.axis, drive.layout) for drive in after.drives]
     if recorded != given:
         raise NoInputsError(
             f"the drives differ: recorded {_nodes(recorded)}, in the other robot.yaml {_nodes(given)}; "

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TextIO
 
 import can
 from pydantic import ValidationError
@@ -14,6 +15,7 @@ from pydantic import ValidationError
 from canbase_config.robot import Robot
 from canbase_recording.entry import Entry, FrameKind, RecordedFrame
 from canbase_recording.recorded_inputs import NoInputsError, RecordedInputs, recorded_inputs
+from canbase_recording.trip_inputs import LINE_BYTES, TripHead, TripInputs, trip_head, trip_inputs
 
 MOST_BYTES: Final = 64_000_000
 """Of the .json file: canbase writes a few MB."""
@@ -27,6 +29,56 @@ def read_inputs(path: Path) -> RecordedInputs:
         return recorded_inputs(_entries(path.with_suffix(".asc")), told)
     except NoInputsError as error:
         raise NoInputsError(f"{beside}: {error}") from error
+
+
+TRIP_SUFFIX: Final = ".jsonl"
+MOST_BESIDE: Final = 200
+"""Files of trips that are looked at to find the one of a stop."""
+AFTER_S: Final = 5.0
+"""A trip so long after the stop still belongs to it [s]."""
+CLOCK_S: Final = 3600.0
+"""The wall clock was set by less between the two files of one stop [s]."""
+
+
+def read_trip(path: Path) -> TripInputs:
+    """The inputs of a watchdog's trip. Raises NoInputsError."""
+    try:
+        with path.open(encoding="utf-8", errors="replace") as file:
+            return trip_inputs(_bounded(file))
+    except OSError as error:
+        raise NoInputsError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except NoInputsError as error:
+        raise NoInputsError(f"{path}: {error}") from error
+
+
+def trip_beside(path: Path, inputs: RecordedInputs) -> tuple[str, TripInputs] | None:
+    """The watchdog's own file of the stop in `path`, and its name. None: there is none, or none that can be read."""
+    robot = str(inputs.robot_yaml.get("name", ""))
+    for each in sorted(path.parent.glob(f"watchdog_*{TRIP_SUFFIX}"), reverse=True)[:MOST_BESIDE]:
+        with contextlib.suppress(NoInputsError):
+            head = trip_head(_first_line(each))
+            if head.robot == robot and _belongs(head, inputs):
+                return each.name, read_trip(each)
+    return None
+
+
+def _belongs(head: TripHead, inputs: RecordedInputs) -> bool:
+    near = inputs.began_s <= head.trip.at_s <= inputs.at_s + AFTER_S
+    return near and abs(head.wall_offset_s - inputs.wall_offset_s) < CLOCK_S
+
+
+def _first_line(path: Path) -> str:
+    try:
+        with path.open(encoding="utf-8", errors="replace") as file:
+            return file.readline(LINE_BYTES + 1)
+    except OSError as error:
+        raise NoInputsError(f"{path}: cannot be read: {error.strerror or error}") from error
+
+
+def _bounded(file: TextIO) -> Iterator[str]:
+    """No line is read beyond what is refused anyway."""
+    while line := file.readline(LINE_BYTES + 1):
+        yield line
 
 
 def _entries(path: Path) -> list[Entry]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from canbase_driver.supervision.watchdog_link import CAUSES
 from canbase_recording.recorded_inputs import RecordedInputs
@@ -18,9 +18,17 @@ MOST_LINES: Final = 20
 NOT_REPLAYED: Final = "safety filter: not replayed, since scans, estop_state and locks are not recorded"
 
 
-def watchdog_lines(inputs: RecordedInputs, found: WatchdogReplay) -> Iterator[str]:
+class Begun(Protocol):
+    """A recording. Its first moment is the zero of all times here."""
+
+    @property
+    def began_s(self) -> float:
+        """Monotonic time [s]."""
+
+
+def watchdog_lines(inputs: Begun, found: WatchdogReplay) -> Iterator[str]:
     """The watchdog: what was recorded, and beside it what a new one does."""
-    yield f"watchdog: {len(found.leases.leases)} leases, {len(inputs.frames)} frames"
+    yield f"watchdog: {found.lease_count} leases, {found.frames} frames {found.source}"
     yield from (f"  note: {sentence}" for sentence in lease_notes(found))
     if not found.lives:
         yield "  no state frame 1FEh of a watchdog that was not tripped: nothing to compare with"
@@ -42,7 +50,7 @@ def lease_notes(found: WatchdogReplay) -> Iterator[str]:
         yield f"{leases.unheard} leases have no cmd_vel in the recording: they count with the velocity before them"
 
 
-def _life_lines(inputs: RecordedInputs, life: Replayed) -> Iterator[str]:
+def _life_lines(inputs: Begun, life: Replayed) -> Iterator[str]:
     since, until = _at(inputs, life.life.from_s), _at(inputs, life.life.until_s)
     yield f"from {since} to {until}:"
     yield f"  recorded: {trip_text(inputs, life.life.trip)}"
@@ -84,7 +92,7 @@ def _later(late_s: float) -> str:
     return "later" if late_s > 0.0 else "earlier"
 
 
-def trip_text(inputs: RecordedInputs, trip: Trip | None) -> str:
+def trip_text(inputs: Begun, trip: Trip | None) -> str:
     """One trip in words."""
     if trip is None:
         return "no trip"
@@ -93,7 +101,7 @@ def trip_text(inputs: RecordedInputs, trip: Trip | None) -> str:
     return f"{_at(inputs, trip.at_s)} trips: {cause}{node}" + (f" ({trip.detail})" if trip.detail else "")
 
 
-def comparison_lines(inputs: RecordedInputs, found: Comparison) -> Iterator[str]:
+def comparison_lines(inputs: Begun, found: Comparison) -> Iterator[str]:
     """What the other robot.yaml changes."""
     shown = ", ".join(map(str, found.of_the_watchdog)) or "none"
     yield f"with the other robot.yaml: {len(found.changes)} keys differ; of the watchdog: {shown}"
@@ -101,7 +109,7 @@ def comparison_lines(inputs: RecordedInputs, found: Comparison) -> Iterator[str]
         yield f"  from {_at(inputs, difference.recorded.life.from_s)}: {difference_text(inputs, difference)}"
 
 
-def difference_text(inputs: RecordedInputs, found: Difference) -> str:
+def difference_text(inputs: Begun, found: Difference) -> str:
     """The same, or when and why it trips instead."""
     why = ": " + " or ".join(map(str, found.by)) if found.by else ""
     before, after = found.recorded.trip, found.other.trip
@@ -174,17 +182,18 @@ def setpoint_values(inputs: RecordedInputs, found: SetpointReplay) -> dict[str, 
     }
 
 
-def watchdog_values(inputs: RecordedInputs, found: WatchdogReplay) -> dict[str, Any]:
+def watchdog_values(inputs: Begun, found: WatchdogReplay) -> dict[str, Any]:
     """The same as `watchdog_lines`, for JSON."""
     return {
-        "leases": len(found.leases.leases),
-        "frames": len(inputs.frames),
+        "source": found.source,
+        "leases": found.lease_count,
+        "frames": found.frames,
         "notes": list(lease_notes(found)),
         "lives": [_life_values(inputs, life) for life in found.lives],
     }
 
 
-def _life_values(inputs: RecordedInputs, life: Replayed) -> dict[str, Any]:
+def _life_values(inputs: Begun, life: Replayed) -> dict[str, Any]:
     return {
         "from_s": life.life.from_s - inputs.began_s,
         "until_s": life.life.until_s - inputs.began_s,
@@ -200,7 +209,7 @@ def _life_values(inputs: RecordedInputs, life: Replayed) -> dict[str, Any]:
     }
 
 
-def comparison_values(inputs: RecordedInputs, found: Comparison) -> dict[str, Any]:
+def comparison_values(inputs: Begun, found: Comparison) -> dict[str, Any]:
     """The same as `comparison_lines`, for JSON."""
     return {
         "changes": [_change_values(change) for change in found.changes],
@@ -222,12 +231,12 @@ def _change_values(change: Any) -> dict[str, Any]:
     return {"key": change.key, "before": change.before, "after": change.after}
 
 
-def _trip_values(inputs: RecordedInputs, trip: Trip | None) -> dict[str, Any] | None:
+def _trip_values(inputs: Begun, trip: Trip | None) -> dict[str, Any] | None:
     if trip is None:
         return None
     cause = None if trip.cause is None else trip.cause.name
     return {"at_s": trip.at_s - inputs.began_s, "cause": cause, "node_id": trip.node_id, "detail": trip.detail}
 
 
-def _at(inputs: RecordedInputs, at_s: float) -> str:
+def _at(inputs: Begun, at_s: float) -> str:
     return f"{at_s - inputs.began_s:.3f} s"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -15,49 +14,13 @@ from pathlib import Path
 import pytest
 
 from canbase_watchdog.frames import Frame
-from support.ros_harness import clear_records
-from support.udp_port import free_udp_port
-from support.watchdog_live import LiveRobot
 from support.watchdog_story import config
+from support.watched_process import Watched
 from unit.runtime.test_output import full_pipe
 
 pytestmark = pytest.mark.bus
 
 QUICK_STOP = Frame(0x501, bytes.fromhex("02 00"))
-
-
-class Watched:
-    """The process, the robot, and a stand-in for systemd's notify socket."""
-
-    def __init__(self, folder: Path, stderr: int = subprocess.PIPE) -> None:
-        bus = {"interface": "udp_multicast", "channel": "239.74.163.2", "port": free_udp_port(), "hop_limit": 0}
-        self.config = replace(config(), bus_arguments=bus, lease_socket=str(folder / "run" / "lease"))
-        self.systemd = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        self.systemd.bind(str(folder / "notify"))
-        self.systemd.setblocking(False)
-        self.robot = LiveRobot(bus, self.config.lease_socket)
-        self.state = clear_records(folder, self.config.robot)
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "canbase_watchdog", "--config-json", self.config.to_json()],
-            env=os.environ
-            | {"NOTIFY_SOCKET": str(folder / "notify"), "_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"}
-            | self.state,
-            stderr=stderr,
-            text=True,
-        )
-
-    def notified(self) -> list[str]:
-        lines = []
-        while True:
-            try:
-                lines.append(self.systemd.recv(1024).decode())
-            except BlockingIOError:
-                return lines
-
-    def end(self, number: signal.Signals) -> tuple[int, str]:
-        self.process.send_signal(number)
-        _, log = self.process.communicate(timeout=5.0)
-        return self.process.returncode, log
 
 
 @pytest.fixture

@@ -8,15 +8,18 @@ control cycle apart.
 from __future__ import annotations
 
 import argparse
+import json
+import math
 import os
 import pickle
 import sys
 import tempfile
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
+from typing import Final
 
 from rich.console import Console
 from rich.table import Table
@@ -25,8 +28,10 @@ from canbase_campaign.plan import Plan, draw_plan
 from canbase_campaign.runner import start_of
 from canbase_campaign.world import World
 from canbase_recording.replay import Replayed, replay_watchdog
-from canbase_recording.replay_file import read_inputs
+from canbase_recording.replay_file import read_inputs, read_trip
 from canbase_recording.replay_text import trip_text, verdict
+from canbase_recording.replay_trip import replay_trip
+from canbase_watchdog.trip_cause import TripCause
 from support.recorded_stops import record_in_a_copy
 
 STOPS = 100
@@ -59,14 +64,31 @@ def replayed(seed: int, folder: Path) -> list[Outcome]:
         start.run(plan)
 
     record_in_a_copy(start.world, run, path, plan.bitrate)
+    trips = [(at_s, TripCause(cause)) for at_s, cause in json.loads(path.with_suffix(".trips").read_text())]
     inputs = read_inputs(path)
-    for suffix in (".asc", ".json"):
-        path.with_suffix(suffix).unlink()
+    own = [life for file in folder.glob("watchdog_*.jsonl") for life in replay_trip(read_trip(file))]
+    for file in folder.iterdir():
+        file.unlink()
+    heard = replay_watchdog(inputs).lives
     faults = tuple(fault.name for fault in plan.faults)
+    lives = [*(_life_of(at_s, own, heard) for at_s, _ in trips), *(life for life in heard if life.life.trip is None)]
+    causes = [cause for _, cause in trips]
     return [
         _outcome(seed, faults, life, f"{verdict(life)}; {trip_text(inputs, life.trip)}")
-        for life in replay_watchdog(inputs).lives
+        if life is not None
+        else Outcome(seed, faults, causes[number].name.lower().replace("_", " "), CANNOT, LOST, math.nan)
+        for number, life in enumerate(lives)
     ]
+
+
+LOST: Final = "the watchdog's process ended before it wrote the inputs of this trip, and the driver recorded none"
+NEAR_S: Final = 0.02
+
+
+def _life_of(at_s: float, own: Sequence[Replayed], heard: Sequence[Replayed]) -> Replayed | None:
+    """By the watchdog's own file, as `canbase replay` does it; else by the driver's recording."""
+    ends = [life for life in (*own, *heard) if life.life.trip is not None and abs(life.life.trip.at_s - at_s) < NEAR_S]
+    return ends[0] if ends else None
 
 
 def _outcome(seed: int, faults: tuple[str, ...], life: Replayed, said: str) -> Outcome:

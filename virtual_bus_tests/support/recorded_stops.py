@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 import os
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,10 +21,82 @@ from canbase_driver.supervision.stop_history import StopRecord
 from canbase_velocity.decision import Decision
 from canbase_velocity.mux import MuxDecision
 from canbase_velocity.twist import Twist
+from canbase_watchdog import input_ring
+from canbase_watchdog.input_ring import InputRing, TripWatch
 
 WALL_S = 1_790_000_000.0
 """Of the monotonic clock to the wall clock."""
 WARM_UP_S = 2.0
+RECORDED_S = 10.0
+"""`black_box.seconds` by default."""
+
+
+class WatchdogBox:
+    """The inputs of each trip of a world's watchdog, noted and cut as its loop does it. One that starts again begins
+    with nothing; what it had not written when it died is lost."""
+
+    def __init__(self, world: World, seconds: float = RECORDED_S) -> None:
+        self._watchdog: Any = world.watchdog
+        self._clock, self._seconds = world.clock, seconds
+        self.files: list[tuple[input_ring.Trip, list[str]]] = []
+        self.trips: list[input_ring.Trip] = []
+        """All of them; of some there is no file."""
+        it: Any = self._watchdog
+        self._lease, it._on_lease = it._on_lease, self._on_lease
+        self._frame, it._on_frame = it._on_frame, self._on_frame
+        self._begin, it.begin = it.begin, self._on_begin
+        self._tick = it._on_tick
+        self._end, it.end = it.end, self._on_end
+        self._ring = InputRing(seconds, -math.inf)  # it began to run long before
+        self._watch = TripWatch(self._ring, it.disk.past())
+        self._past = it.disk.past()
+        it._on_tick = self._on_tick
+        it._life += 1
+        it.every(it._tick_s, self._on_tick, phase_s=it._tick_s)
+
+    def _on_begin(self) -> None:
+        self._past = self._watchdog.disk.past()
+        self._ring = InputRing(self._seconds, self._clock.now_s)
+        self._watch = TripWatch(self._ring, self._past)
+        self._begin()
+
+    def _on_lease(self, datagram: bytes) -> None:
+        self._ring.note((input_ring.LEASE, self._clock.now_s, datagram, None, None))
+        self._lease(datagram)
+
+    def _on_frame(self, cob_id: int, data: bytes) -> None:
+        if not self._watchdog.is_deaf:
+            self._ring.note((input_ring.FRAME, self._clock.now_s, cob_id, data))
+        self._frame(cob_id, data)
+
+    def _on_end(self) -> None:
+        self._ring.note((input_ring.END, self._clock.now_s))
+        self._end()
+
+    def _on_tick(self) -> None:
+        now_s = self._clock.now_s
+        self._ring.note((input_ring.TICK, now_s, self._watchdog._failed_since, 0))
+        self._tick()
+        due = self._watch.look(self._watchdog.core, now_s)
+        trip = due or self._watch.open
+        if trip is not None and trip not in self.trips[-1:]:
+            self.trips.append(trip)
+        if due is not None:
+            self._cut(due)
+
+    def _cut(self, trip: input_ring.Trip) -> None:
+        head = input_ring.head(self._watchdog._config, self._past, trip, WALL_S)
+        self.files.append((trip, list(input_ring.lines(head, self._ring.cut(self._clock.now_s)))))
+
+    def write(self, path: Path) -> None:
+        """Beside the driver's files; what happened to a trip that has none is known in virtual time alone: `.trips`."""
+        if self._watch.open is not None and self._watchdog.alive:
+            self._cut(self._watch.open)
+        for number, (_, lines) in enumerate(self.files):
+            file = path.with_name(f"watchdog_{path.stem}_{number}.jsonl")
+            file.write_text("".join(lines), encoding="utf-8")
+        trips = [(trip.at_s, trip.cause) for trip in self.trips]
+        path.with_suffix(".trips").write_text(json.dumps(trips), encoding="utf-8")
 
 
 class DriverBox:
@@ -157,10 +231,11 @@ def record_in_a_copy(world: World, run: Callable[[], object], path: Path, bitrat
     if pid == 0:
         status = 1
         try:
-            box = DriverBox(world, bitrate)
+            box, watchdog_box = DriverBox(world, bitrate), WatchdogBox(world)
             world.clock.run_until(world.clock.now_s + WARM_UP_S)
             run()
             box.write(path)
+            watchdog_box.write(path)
             status = 0
         finally:
             os._exit(status)

@@ -1,0 +1,111 @@
+"""Trips of the real watchdog process, and the file of its inputs: a new watchdog does the same at the same tick."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import can
+import pytest
+
+from canbase_recording.replay import Replayed
+from canbase_recording.replay_file import read_trip
+from canbase_recording.replay_trip import replay_trip
+from canbase_watchdog.trip_cause import TripCause
+from support.watchdog_story import FAULT
+from support.watched_process import Watched
+
+pytestmark = pytest.mark.bus
+
+WRITTEN_S = 8.0
+
+
+@pytest.fixture
+def watched(tmp_path: Path) -> Iterator[Watched]:
+    it = Watched(tmp_path)
+    try:
+        with it.robot:
+            it.robot.first(0x1FE, 0.0, timeout_s=10.0)
+            yield it
+    finally:
+        it.process.kill()
+        it.process.communicate()
+        it.systemd.close()
+
+
+def sent_by_another(watched: Watched, cob_id: int, data: str) -> None:
+    """A frame of somebody else on the bus, ten times."""
+    with can.Bus(**watched.config.bus_arguments) as bus:
+        for _ in range(10):
+            bus.send(can.Message(arbitration_id=cob_id, data=bytes.fromhex(data), is_extended_id=False))
+            time.sleep(0.01)
+
+
+def hangs(watched: Watched) -> None:
+    watched.process.send_signal(signal.SIGSTOP)
+    time.sleep(0.2)
+    watched.process.send_signal(signal.SIGCONT)
+
+
+def killed(watched: Watched) -> None:
+    watched.process.kill()
+    watched.process.communicate()
+    watched.start()
+
+
+def torn(watched: Watched) -> None:
+    record = next(Path(watched.state["XDG_STATE_HOME"]).rglob("watchdog.latch"))
+    watched.process.kill()
+    watched.process.communicate()
+    record.write_bytes(b"torn")
+    watched.start()
+
+
+def wheel_shows(watched: Watched, bits: int) -> None:
+    watched.robot.drives[0].shows = bits
+
+
+def wheel_pushed(watched: Watched) -> None:
+    """From outside: it cannot brake, and is faster than its setpoint."""
+    drive = watched.robot.drives[0]
+    drive.brakes, drive.speed[0] = False, 500.0
+
+
+FAILURES: dict[TripCause, Callable[[Watched], object]] = {
+    TripCause.LEASE_LOST: lambda watched: setattr(watched.robot, "filter", False),
+    TripCause.DRIVER_SILENT: lambda watched: setattr(watched.robot, "driver", False),
+    TripCause.DRIVE_SILENT: lambda watched: setattr(watched.robot.drives[0], "mute", True),
+    TripCause.DRIVE_DOWN: lambda watched: watched.robot.drives[0].words.update({0: FAULT}),
+    TripCause.FEEDBACK_IMPLAUSIBLE: lambda watched: wheel_shows(watched, 100),
+    TripCause.MOTION_OUTSIDE: wheel_pushed,
+    TripCause.FOREIGN_MASTER: lambda watched: sent_by_another(watched, 0x000, "80 01"),
+    TripCause.DRIVE_RESTARTED: lambda watched: sent_by_another(watched, 0x701, "00"),
+    TripCause.LOOP_LATE: hangs,
+    TripCause.ENDED: lambda watched: watched.end(signal.SIGTERM),
+    TripCause.POWER_AT_END: killed,
+    TripCause.RECORD_UNUSABLE: torn,
+}
+"""What happens at 0.3 m/s, by the cause that the watchdog reports."""
+
+
+def replayed(watched: Watched) -> Replayed:
+    """The last life in the file of the last trip, which is written once the drives stand."""
+    folder, end = Path(watched.state["XDG_STATE_HOME"]) / "canbase", time.monotonic() + WRITTEN_S
+    while not (files := sorted(folder.glob("watchdog_robot_*.jsonl"))):
+        assert time.monotonic() < end, f"no file in {folder}"
+        time.sleep(0.05)
+    return replay_trip(read_trip(files[-1]))[-1]
+
+
+# 0.3 m/s ── something fails ── the watchdog trips ── its inputs into a new one: the same cause in the same tick
+@pytest.mark.parametrize("cause", FAILURES, ids=lambda cause: cause.name.lower())
+def test_a_recorded_trip_comes_out_the_same(watched: Watched, cause: TripCause) -> None:
+    watched.robot.drive_at(300)
+    FAILURES[cause](watched)
+    life = replayed(watched)
+    assert life.life.trip is not None
+    assert life.life.trip.cause is cause, life.life.trip
+    assert life.trip == life.life.trip
+    assert (life.agrees, life.late_s, life.starts) == (True, 0.0, 0)

@@ -1,0 +1,197 @@
+"""The watchdog's own file of a trip: replayed call by call; one that is damaged or from elsewhere is refused."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+
+import pytest
+from typer.testing import CliRunner
+
+from canbase_campaign.cruise import Cruise
+from canbase_campaign.faults import FAULTS
+from canbase_campaign.twins import JOYSTICK
+from canbase_cli.main import app
+from canbase_recording.recorded_inputs import NoInputsError
+from canbase_recording.replay_file import read_inputs, read_trip, trip_beside
+from canbase_recording.replay_text import verdict
+from canbase_recording.replay_trip import replay_trip
+from canbase_recording.trip_inputs import TripInputs, trip_inputs
+from canbase_watchdog.trip_cause import TripCause
+from support.recorded_stops import record_in_a_copy
+
+FAULT_S, AFTER_S = 1.0, 1.5
+CASES = {
+    "velocity_dies": TripCause.LEASE_LOST,
+    "driver_hangs": TripCause.DRIVER_SILENT,
+    "watchdog_hangs": TripCause.LOOP_LATE,
+    "watchdog_bus_problem": TripCause.BUS_FAILED,
+    "watchdog_dies": TripCause.POWER_AT_END,
+    "is requested to end": TripCause.ENDED,
+}
+"""Faults of the campaign, of a robot that drives at 0.3 m/s. Four of them no other process can know of."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Files of the driver, `FAULT.asc` and `.json`, and beside them `watchdog_FAULT_0.jsonl`."""
+    folder = tmp_path_factory.mktemp("recordings")
+    cruise = Cruise(JOYSTICK, 0.3)
+    for name in CASES:
+        record_in_a_copy(cruise.world, lambda name=name: _go_wrong(cruise, name), folder / f"{name}.asc")  # type: ignore[misc]
+    return folder
+
+
+def _go_wrong(cruise: Cruise, name: str) -> None:
+    clock, fault = cruise.world.clock, FAULTS.get(name)
+    clock.run_until(clock.now_s + FAULT_S)
+    if fault is None:
+        cruise.world.watchdog.end()
+    else:
+        fault.begin(cruise.world, cruise.around, fault.draw(Random(1)))
+    clock.run_until(clock.now_s + AFTER_S)
+    if fault is not None:
+        fault.end(cruise.world, cruise.around, fault.draw(Random(1)))
+    clock.run_until(clock.now_s + AFTER_S)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_same_cause_in_the_same_tick(folder: Path, name: str) -> None:
+    (life, *_) = replay_trip(read_trip(folder / f"watchdog_{name}_0.jsonl"))
+    assert life.trip is not None
+    assert life.trip.cause is CASES[name]
+    assert life.trip == life.life.trip
+    assert verdict(life) == "the same cause, 0.0 ms earlier"
+
+
+def test_without_its_leases_it_trips_elsewhere(folder: Path) -> None:
+    """The replay can tell."""
+    inputs = read_trip(folder / "watchdog_driver_hangs_0.jsonl")
+    without = replace(inputs, calls=tuple(call for call in inputs.calls if call[0] != "lease"))
+    (life,) = replay_trip(without)
+    assert life.trip is not None
+    assert life.trip.cause is TripCause.LEASE_LOST
+    assert verdict(life) == "DIFFERS: another cause"
+
+
+def test_another_configuration_trips_earlier_by_the_difference(folder: Path) -> None:
+    inputs = read_trip(folder / "watchdog_velocity_dies_0.jsonl")
+    config = inputs.head.config
+    (before,) = replay_trip(inputs)
+    (after,) = replay_trip(inputs, replace(config, lease_timeout_s=config.lease_timeout_s - 0.1))
+    assert before.trip is not None
+    assert after.trip is not None
+    assert before.trip.at_s - after.trip.at_s == pytest.approx(0.1, abs=0.006)
+
+
+def run(*arguments: object) -> tuple[int, str]:
+    found = CliRunner().invoke(app, ["replay", *map(str, arguments)])
+    return found.exit_code, " ".join(found.output.split())
+
+
+def test_the_command_replays_it_alone(folder: Path) -> None:
+    code, output = run(folder / "watchdog_watchdog_hangs_0.jsonl")
+    assert code == 0
+    assert "of its own file watchdog_watchdog_hangs_0.jsonl" in output
+    assert "replayed: 4.500 s trips: own loop late (own loop did not run for 1.5" in output
+
+
+def test_the_command_compares_it_with_another_robot(folder: Path, tmp_path: Path) -> None:
+    values = json.loads((folder / "velocity_dies.json").read_text())["robot_yaml"]
+    values["timeouts"]["lease_s"] -= 0.1
+    other = tmp_path / "other.yaml"
+    other.write_text(json.dumps(values))
+    code, output = run(folder / "watchdog_velocity_dies_0.jsonl", "--config", other)
+    assert code == 0
+    assert "of the watchdog: lease_timeout_s" in output
+    assert "trips 0.100 s earlier" in output or "trips 0.099 s earlier" in output or "trips 0.101 s earlier" in output
+
+
+# driver's recording alone: "the watchdog's own loop was late, which the recording does not show"
+def test_the_file_beside_a_stop_is_found_and_replayed_in_its_place(folder: Path, tmp_path: Path) -> None:
+    stop = folder / "watchdog_hangs.asc"
+    beside = trip_beside(stop, read_inputs(stop))
+    assert beside is not None
+    assert beside[0] == "watchdog_watchdog_hangs_0.jsonl"
+    code, output = run(stop)
+    assert (code, "the same cause, 0.0 ms" in output) == (0, True)
+    for suffix in (".asc", ".json"):
+        (tmp_path / f"alone{suffix}").write_bytes(stop.with_suffix(suffix).read_bytes())
+    assert "cannot be replayed: the watchdog's own loop was late" in run(tmp_path / "alone.asc")[1]
+
+
+def test_the_file_of_another_stop_is_not_taken(folder: Path) -> None:
+    stop = folder / "watchdog_hangs.asc"
+    inputs = read_inputs(stop)
+    assert trip_beside(stop, replace(inputs, began_s=inputs.began_s + 500.0, at_s=inputs.at_s + 500.0)) is None
+    assert trip_beside(stop, replace(inputs, wall_offset_s=inputs.wall_offset_s + 86_400.0)) is None
+    assert trip_beside(stop, replace(inputs, robot_yaml={"name": "another"})) is None
+
+
+def _changed(number: int, text: str) -> Callable[[list[str]], list[str]]:
+    return lambda lines: [*lines[: number - 1], text, *lines[number:]]
+
+
+def _head(before: str, after: str) -> Callable[[list[str]], list[str]]:
+    return lambda lines: [lines[0].replace(before, after), *lines[1:]]
+
+
+BAD = "line 9: no input of a watchdog"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda lines: [], "line 1: no JSON"),
+        (lambda lines: ["{}"], "line 1: it is no file of the inputs of a watchdog's trip"),
+        (_head('"format": 1', '"format": 7'), "format '7', expected 1"),
+        (_head('"track_m"', '"wide_m"'), "line 1: a value is not"),
+        (_head('"trip"', '"stop"'), "line 1: the key 'trip' is missing"),
+        (_changed(9, '["frame", 1.0, 385, "27'), "line 9: no JSON"),
+        (_changed(9, "[" * 100_000), "line 9: no JSON"),
+        (_changed(9, "3" * 300_000), "line 9: longer than 200 kB"),
+        (_changed(9, '["frame", 1.0, 4096, "00"]'), f"{BAD} (4096 is no 11-bit"),
+        (_changed(9, '["frame", 1.0, 385, "000102030405060708"]'), f"{BAD} (9 bytes"),
+        (_changed(9, '["frame", NaN, 385, "00"]'), f"{BAD} (nan is no time"),
+        (_changed(9, '["os.system", 1.0]'), f"{BAD} ('os.system')"),
+        (_changed(9, '["tick", 1.0]'), BAD),
+        (_changed(9, '{"tick": 1.0}'), BAD),
+        (lambda lines: lines + [lines[1]] * 80_001, "canbase writes no more than 80000"),
+    ],
+)
+def test_what_is_no_such_file_is_refused_with_its_line(
+    folder: Path, change: Callable[[list[str]], list[str]], said: str
+) -> None:
+    lines = (folder / "watchdog_velocity_dies_0.jsonl").read_text().splitlines()
+    with pytest.raises(NoInputsError) as error:
+        trip_inputs(change(lines))
+    assert said in str(error.value)
+    assert len(str(error.value)) < 400
+
+
+def test_a_foreign_file_ends_the_command_with_one_sentence(tmp_path: Path) -> None:
+    file = tmp_path / "notes.jsonl"
+    file.write_bytes(bytes(range(256)) * 10)
+    code, output = run(file)
+    assert code == 1
+    assert "notes.jsonl: line 1: no JSON" in output
+    assert "Traceback" not in output
+
+
+def test_values_at_their_limits_do_not_raise(folder: Path) -> None:
+    """Garbage that has the right form is the watchdog's business: it drops and counts it."""
+    inputs = read_trip(folder / "watchdog_velocity_dies_0.jsonl")
+    random, calls = Random(1), list(inputs.calls)
+    for at in range(0, len(calls), 7):
+        calls[at] = ("frame", calls[at][1], random.randrange(0x800), random.randbytes(random.randrange(9)))
+    assert replay_trip(replace(inputs, calls=tuple(calls)))
+    assert isinstance(replay_trip(_backward(inputs)), tuple)
+
+
+def _backward(inputs: TripInputs) -> TripInputs:
+    """The clock went back: of another computer, or edited."""
+    later = [(what, at_s - 5.0, *rest) for what, at_s, *rest in inputs.calls[2000:]]
+    return replace(inputs, calls=(*inputs.calls[:2000], *later))
