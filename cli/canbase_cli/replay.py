@@ -13,7 +13,9 @@ from canbase_runtime.terminal import FAILED, fail, load_config
 if TYPE_CHECKING:
     from canbase_config.robot import Robot
     from canbase_recording.recorded_inputs import RecordedInputs
+    from canbase_recording.replay_text import Begun
     from canbase_recording.trip_inputs import TripInputs
+    from canbase_recording.velocity_inputs import VelocityInputs
 
 EPILOG: Final = (
     "Examples:  \ncanbase replay stop_robot_20261124T201500.000Z_watchdog_tripped.asc  \n"
@@ -25,7 +27,8 @@ def replay(
     recording: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", help="The .asc of a black box (its .json lies beside it), or a watchdog_….jsonl."
+            metavar="FILE",
+            help="The .asc of a black box (its .json lies beside it), a watchdog_….jsonl or a velocity_….jsonl.",
         ),
     ],
     config: Annotated[
@@ -36,7 +39,7 @@ def replay(
 ) -> None:
     """Feed a recorded stop to the real watchdog: would it have tripped, when, and why, beside what was recorded.
 
-    Also the mux (which source has the base) and the driver's limiter (setpoints). With --config, what another
+    Also mux and safety filter (each decision) and the driver's limiter (setpoints). With --config, what another
     configuration would have changed. Nothing is sent and no robot is needed. What a recording does not contain is not
     replayed, and reported.
 
@@ -47,7 +50,7 @@ def replay(
 
     other = None if config is None else load_config(config, quiet=True).robot
     try:
-        values, lines, agrees = _trip(recording, other) if recording.suffix == ".jsonl" else _stop(recording, other)
+        values, lines, agrees = _replayed(recording, other)
     except NoInputsError as error:
         fail(str(error), FAILED)
     typer.echo(json.dumps(values, indent=1) if as_json else "\n".join(lines))
@@ -57,6 +60,36 @@ def replay(
 
 Told = tuple[dict[str, Any], list[str], bool]
 """For JSON, for people, and whether the replay does what was recorded."""
+
+
+def _replayed(path: Path, other: Robot | None) -> Told:
+    if path.suffix != ".jsonl":
+        return _stop(path, other)
+    from canbase_recording.replay_file import part_of
+
+    return _velocity(path, other) if part_of(path) == "velocity" else _trip(path, other)
+
+
+def _velocity(path: Path, other: Robot | None) -> Told:
+    """The inputs of mux and filter alone."""
+    from canbase_recording.replay_file import read_velocity
+
+    inputs = read_velocity(path)
+    return _mux_and_filter(inputs, path.name, inputs, other)
+
+
+def _mux_and_filter(inputs: VelocityInputs, name: str, zero: Begun, other: Robot | None) -> Told:
+    from canbase_recording import replay_velocity_text as words
+    from canbase_recording.replay_velocity import replay_velocity
+
+    found = replay_velocity(inputs)
+    values: dict[str, Any] = {"velocity": words.velocity_values(zero, name, found)}
+    lines = list(words.velocity_lines(zero, name, found))
+    if other is not None:
+        changed = replay_velocity(inputs, other)
+        values["velocity"]["other_robot_yaml"] = words.velocity_values(zero, name, changed)
+        lines += words.changed_lines(zero, changed)
+    return values, lines, found.agrees
 
 
 def _trip(path: Path, other: Robot | None) -> Told:
@@ -78,41 +111,68 @@ def _trip(path: Path, other: Robot | None) -> Told:
 
 
 def _stop(path: Path, other: Robot | None) -> Told:
-    """Both files of the driver, and the watchdog's own one where it lies beside them."""
+    """Both files of the driver, and those of watchdog, mux and filter where they lie beside them."""
     from canbase_recording import replay_text as words
     from canbase_recording.replay import replay_watchdog
-    from canbase_recording.replay_file import read_inputs, robot_of, trip_beside
+    from canbase_recording.replay_file import read_inputs, robot_of, trip_beside, velocity_beside
     from canbase_recording.replay_trip import replay_own
 
     inputs = read_inputs(path)
-    beside = trip_beside(path, inputs)
+    beside, velocity = trip_beside(path, inputs), velocity_beside(path, inputs)
     found = replay_watchdog(inputs) if beside is None else replay_own(beside[1], beside[0])
-    chain_values, chain_lines, chain_agrees = _chain(inputs, robot_of(inputs))
+    driver_values, driver_lines, driver_agrees = _setpoints(inputs, robot_of(inputs))
+    if velocity is None:
+        chain_values, chain_lines, chain_agrees = _sources(inputs, robot_of(inputs))
+    else:
+        chain_values, chain_lines, chain_agrees = _beside(velocity[1], velocity[0], inputs, other)
     stop = f"stop by {inputs.stopped_by}: {inputs.cause} ({inputs.detail}), at {inputs.at_s - inputs.began_s:.3f} s"
     values: dict[str, Any] = {
         "stop": {"by": inputs.stopped_by, "cause": inputs.cause, "at_s": inputs.at_s - inputs.began_s},
         "versions": dict(inputs.versions),
         "watchdog": words.watchdog_values(inputs, found),
+        **driver_values,
         **chain_values,
-        "not_replayed": words.NOT_REPLAYED,
     }
-    lines = [stop, *words.watchdog_lines(inputs, found), *chain_lines, words.NOT_REPLAYED]
+    lines = [stop, *words.watchdog_lines(inputs, found), *chain_lines, *driver_lines]
     if other is not None:
         values["other_robot_yaml"], more = _with_other(inputs, other, beside and beside[1])
         lines += more
-    return values, lines, chain_agrees and not any(life.differs for life in found.lives)
+    if other is not None and velocity is None:
+        mux_values, mux_lines, _ = _sources(inputs, other)
+        values["other_robot_yaml"] |= mux_values
+        lines += (f"  {line}" for line in mux_lines)
+    agrees = driver_agrees and chain_agrees and not any(life.differs for life in found.lives)
+    return values, lines, agrees
 
 
-def _chain(inputs: RecordedInputs, robot: Robot) -> tuple[dict[str, Any], list[str], bool]:
-    """Mux and driver; whether they do what was recorded."""
+def _beside(own: VelocityInputs, name: str, inputs: RecordedInputs, other: Robot | None) -> Told:
+    """A file of another version is no reason not to replay the rest."""
+    from canbase_recording.recorded_inputs import NoInputsError
+
+    try:
+        return _mux_and_filter(own, name, inputs, other)
+    except NoInputsError as error:
+        told = f"mux and filter: cannot tell, {name}: {error}"
+        return {"not_replayed": told}, [told], True
+
+
+def _sources(inputs: RecordedInputs, robot: Robot) -> Told:
+    """Of the mux what the driver's recording shows; the filter is not replayed without its own file."""
     from canbase_recording import replay_text as words
-    from canbase_recording.replay_setpoints import replay_setpoints
     from canbase_recording.replay_sources import replay_sources
 
-    setpoints, sources = replay_setpoints(inputs, robot), replay_sources(inputs, robot)
-    values = {"mux": words.source_values(inputs, sources), "driver": words.setpoint_values(inputs, setpoints)}
-    lines = [*words.source_lines(inputs, sources), *words.setpoint_lines(inputs, setpoints)]
-    return values, lines, not (sources.differences or setpoints.differences)
+    sources = replay_sources(inputs, robot)
+    values = {"mux": words.source_values(inputs, sources), "not_replayed": words.NOT_REPLAYED}
+    return values, [*words.source_lines(inputs, sources), words.NOT_REPLAYED], not sources.differences
+
+
+def _setpoints(inputs: RecordedInputs, robot: Robot) -> Told:
+    from canbase_recording import replay_text as words
+    from canbase_recording.replay_setpoints import replay_setpoints
+
+    setpoints = replay_setpoints(inputs, robot)
+    values = {"driver": words.setpoint_values(inputs, setpoints)}
+    return values, list(words.setpoint_lines(inputs, setpoints)), not setpoints.differences
 
 
 def _with_other(inputs: RecordedInputs, other: Robot, own: TripInputs | None) -> tuple[dict[str, Any], list[str]]:
@@ -121,6 +181,6 @@ def _with_other(inputs: RecordedInputs, other: Robot, own: TripInputs | None) ->
     from canbase_recording.replay_trip import replay_trip
 
     comparison = compare(inputs, other, None if own is None else lambda config: replay_trip(own, config))
-    chain_values, chain_lines, _ = _chain(inputs, other)
-    lines = [*words.comparison_lines(inputs, comparison), *(f"  {line}" for line in chain_lines)]
-    return words.comparison_values(inputs, comparison) | chain_values, lines
+    values, told, _ = _setpoints(inputs, other)
+    lines = [*words.comparison_lines(inputs, comparison), *(f"  {line}" for line in told)]
+    return words.comparison_values(inputs, comparison) | values, lines

@@ -15,7 +15,7 @@ from canbase_recording.replay_setpoints import SetpointReplay
 from canbase_recording.replay_sources import NOBODY, SourceReplay
 
 MOST_LINES: Final = 20
-NOT_REPLAYED: Final = "safety filter: not replayed, since scans, estop_state and locks are not recorded"
+NOT_REPLAYED: Final = "safety filter: cannot tell, since the file of the inputs of mux and filter is not beside it"
 
 
 class Begun(Protocol):
@@ -81,6 +81,8 @@ def verdict(life: Replayed) -> str:
 def _same(life: Replayed) -> str:
     if life.trip is None:
         return "the same: no trip"
+    if life.late_s == 0.0 and life.whole:
+        return "the same cause, in the same tick"
     if life.lacks_a_cycle:
         return "the same cause, where the evidence lasts one cycle of the driver less: a new watchdog began it later"
     edge = ", within the accuracy of the recorded times: a limit was reached just so" if life.on_edge else ""

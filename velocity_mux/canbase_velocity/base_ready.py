@@ -24,7 +24,8 @@ class BaseReady:
 
     def __init__(self, timeout_s: float = STATUS_TIMEOUT_S) -> None:
         self._timeout_s = timeout_s
-        self._state = DriverState.OFFLINE
+        self.state = DriverState.OFFLINE
+        """In the last motor_driver/status."""
         self._at_s: float | None = None
         self._cycles = 0
         self._estop_free = False
@@ -32,7 +33,7 @@ class BaseReady:
     def on_driver(self, state: DriverState, cycles: int, received: float) -> bool:
         """Takes a motor_driver/status: its state and cycle counter. True: the driver was restarted."""
         restarted = self._at_s is not None and cycles < self._cycles
-        self._state, self._cycles, self._at_s = state, cycles, received
+        self.state, self._cycles, self._at_s = state, cycles, received
         return restarted
 
     def on_estop(self, free: bool) -> None:
@@ -45,6 +46,6 @@ class BaseReady:
             return "nothing received on motor_driver/status yet"
         if now_s - self._at_s > self._timeout_s:
             return "no recent message on motor_driver/status"
-        if self._state is not DriverState.ENABLED:
-            return f"motor_driver is {self._state.name}"
+        if self.state is not DriverState.ENABLED:
+            return f"motor_driver is {self.state.name}"
         return "" if self._estop_free else ESTOP_HOLDS

@@ -10,6 +10,7 @@ import functools
 import math
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 
 from canbase.msg import SafetyState
 from geometry_msgs.msg import TwistStamped
@@ -24,6 +25,7 @@ from canbase_config.safety import Scan as ScanConfig
 from canbase_config.stopping import ramp
 from canbase_runtime.journal import Journal, Voice
 from canbase_runtime.latch_file import LatchKeeper
+from canbase_runtime.latch_record import Record
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.receive_time import ReceiveTimes
 from canbase_runtime.serialized_message import SerializedTwist
@@ -34,6 +36,7 @@ from canbase_velocity.decision import Action, Decision
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.graph import BUTTON_KIND, SCAN_KIND, publishers
+from canbase_velocity.input_ring import Note, filter_entry, forget
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.lease_sender import LeaseSender
 from canbase_velocity.parameters import Parameters
@@ -57,17 +60,26 @@ class FilterNode(Node):
     `moving_sources`: names of all sources that order a velocity now, also without the base; read before a reset.
     """
 
-    def __init__(self, robot: Robot, moving_sources: MovingSources = tuple, keeper: LatchKeeper | None = None) -> None:
-        """`keeper`: of the record of the emergency stop; None: for a test of the node alone."""
+    def __init__(
+        self,
+        robot: Robot,
+        moving_sources: MovingSources = tuple,
+        keeper: LatchKeeper | None = None,
+        note: Note = forget,
+    ) -> None:
+        """`keeper`: of the record of the emergency stop; None: for a test of the node alone. `note`: takes each input
+        of the core, and each decision."""
         super().__init__("safety_filter")
         refuse_sim_time(self, SetParametersResult)
         self._robot = robot
         self._voice = Voice(self.get_logger(), Journal("safety_filter"))
         self._receive_times = ReceiveTimes()
         self._request_times = ReceiveTimes.of_requests()
-        self._moving_sources = moving_sources
+        self._moving_sources, self._note = moving_sources, note
         self._keeper = keeper
-        self._filter = SafetyFilter(FilterConfig.of(robot), keeper.found if keeper else None)
+        self.config = FilterConfig.of(robot)
+        self._filter = SafetyFilter(self.config, keeper.found if keeper else None)
+        self._noted: tuple[Record | None, str] = None, ""
         self._drops = DropTeller()
         self._transforms: dict[str, Transform] = {}
         self._leases = LeaseSender(robot.lease.socket)
@@ -90,16 +102,24 @@ class FilterNode(Node):
         several times: one message may be lost.
         """
         now_s = time.monotonic()
-        self._issue(self._filter.shut_down(now_s), now_s)
+        decision = self._filter.shut_down(now_s)
+        self._note(*filter_entry("shut_down", now_s, decision))
+        self._issue(decision, now_s)
 
     def end(self) -> bool:
         """The base is at standstill in an orderly end: a free emergency stop leaves nothing behind for the next start.
 
         Call until it is True: that is on disk. A press that arrives afterwards is recorded all the same.
         """
+        self._note("end", time.monotonic())
         self._filter.end()
         self._keep_record()
         return self._keeper is None or self._filter.record_is_on_disk
+
+    @property
+    def core(self) -> SafetyFilter:
+        """What decides."""
+        return self._filter
 
     @property
     def stands_from_s(self) -> float:
@@ -138,9 +158,11 @@ class FilterNode(Node):
 
     def obey(self, twist: Twist, now_s: float) -> None:
         """Takes the order of the mux at `now_s` [s, time.monotonic], and issues it as far as it may."""
-        self._filter.on_command(twist, self._receive_times.at(now_s))
+        received = self._receive_times.at(now_s)
+        self._note("obey", now_s, received)
+        self._filter.on_command(twist, received)
         self._timer.reset()  # a mux faster than the timer is not doubled by it
-        self._issue(self._filter.decide(now_s), now_s)
+        self._decide(now_s)
 
     def _on_speed_limit(self, limits: SpeedLimits, how: str) -> None:
         """A change is ordered at once, so the next lease tells the watchdog."""
@@ -155,16 +177,20 @@ class FilterNode(Node):
 
     def _on_estop(self, message: Bool) -> None:
         now_s = time.monotonic()
-        self._filter.on_estop(message.data, self._receive_times.at(now_s))
+        received = self._receive_times.at(now_s)
+        self._note("estop", now_s, message.data, received)
+        self._filter.on_estop(message.data, received)
         if message.data:
-            self._issue(self._filter.decide(now_s), now_s)
+            self._decide(now_s)
 
     def _count_buttons(self) -> None:
         before, topic = self._filter.estop_crowd, self.resolve_topic_name(self._robot.safety.estop.topic)
         found = publishers(self, topic)
         other = (each for each in found if each.kind != BUTTON_KIND)
         unheard = (f"{each.node or UNKNOWN} publishes it as {each.kind}, which is not received" for each in other)
-        self._filter.on_estop_publishers(sum(each.kind == BUTTON_KIND for each in found), next(unheard, ""))
+        count, why = sum(each.kind == BUTTON_KIND for each in found), next(unheard, "")
+        self._note("buttons", time.monotonic(), count, why)
+        self._filter.on_estop_publishers(count, why)
         crowd = self._filter.estop_crowd
         if crowd and crowd != before:
             self._voice.tell(crowd, Priority.ERROR, robot=self._robot.name)
@@ -180,9 +206,12 @@ class FilterNode(Node):
             else:
                 placement = Placement.of(config)
         except PlacementError as error:
+            self._note("unplaced", now_s, config.topic, str(error))
             self._filter.on_unplaced_scan(config.topic, str(error))
             return
-        self._filter.on_laser_scan(config.topic, messages.scan_of(message), placement, now_s)
+        scan = messages.scan_of(message)
+        self._note("scan", now_s, config.topic, scan, placement if config.pose == "tf" else None)
+        self._filter.on_laser_scan(config.topic, scan, placement, now_s)
 
     def _look_for_scanners(self) -> None:
         """Into the ROS graph: a message does not contain its publisher."""
@@ -190,6 +219,7 @@ class FilterNode(Node):
         for scan in self._robot.safety.scans:
             found = publishers(self, self.resolve_topic_name(scan.topic))
             nodes = [each.node or "a node without a name" for each in found if each.kind == SCAN_KIND]
+            self._note("scanners", now_s, scan.topic, nodes)
             self._filter.on_scan_publishers(scan.topic, nodes, now_s)
 
     def _on_tf_static(self, message: messages.TFMessage) -> None:
@@ -200,7 +230,9 @@ class FilterNode(Node):
         if self._request_times.waited(now_s):  # the caller may have given up, and be near the base
             response.success, response.message = False, OLD
         else:
-            response.success, response.message = self._filter.reset(self._moving_sources(), now_s)
+            moving = list(self._moving_sources())
+            self._note("reset", now_s, moving)
+            response.success, response.message = self._filter.reset(moving, now_s)
         self._voice.tell(f"reset: {response.message}", Priority.NOTICE, robot=self._robot.name)
         return response
 
@@ -208,17 +240,22 @@ class FilterNode(Node):
         """Nothing was issued for a period: decides again, for ages have grown and scans have come."""
         now_s = time.monotonic()
         self._receive_times.at(now_s)
-        self._issue(self._filter.decide(now_s), now_s)
+        self._decide(now_s)
+
+    def _decide(self, now_s: float) -> None:
+        decision = self._filter.decide(now_s)
+        self._note(*filter_entry("decide", now_s, decision))
+        self._issue(decision, now_s)
 
     def _issue(self, decision: Decision, now_s: float) -> None:
         """The lease goes first: the watchdog knows what is allowed before a wheel can move."""
         self._request_times.at(now_s)
         self._send_lease(decision)
         stamp = self.get_clock().now().to_msg()
-        order = decision.twist
-        self._commands.publish(self._serialized.pack(order.linear_mps, order.angular_radps, stamp))
-        if not order.is_zero:
-            self._stands_from_s = now_s + ramp(self._robot.limits, order.linear_mps, order.angular_radps).time_s
+        twist = decision.twist
+        self._commands.publish(self._serialized.pack(twist.linear_mps, twist.angular_radps, stamp))
+        if not twist.is_zero:
+            self._stands_from_s = now_s + ramp(self._robot.limits, twist.linear_mps, twist.angular_radps).time_s
         self._tell(decision, now_s)
         self._decision = decision
         self._keep_record()
@@ -229,7 +266,11 @@ class FilterNode(Node):
             return
         if self._keeper.failure is not None:
             raise self._keeper.failure
-        self._filter.on_record(self._keeper.written, self._keeper.problem)
+        found = self._keeper.written, self._keeper.problem
+        if found != self._noted:
+            self._noted = found
+            self._note("record", time.monotonic(), found[0] and asdict(found[0]), found[1])
+        self._filter.on_record(*found)
         self._keeper.want(self._filter.record)
 
     def _send_lease(self, decision: Decision) -> None:

@@ -25,7 +25,9 @@ from canbase_runtime.private_process import guard_keys
 from canbase_runtime.sd_notify import Service
 from canbase_runtime.single_instance import TakenError, take
 from canbase_velocity.filter_node import FilterNode
+from canbase_velocity.input_ring import InputRing
 from canbase_velocity.mux_node import MuxNode
+from canbase_velocity.stop_recorder import StopRecorder
 
 SHUTDOWN_CYCLES = 5
 """At least this many zeros go out at the end, one per command period."""
@@ -60,9 +62,11 @@ def run(robot: Robot, ros_args: Sequence[str], when_ready: Callable[[], None] = 
 
 
 def _run_nodes(robot: Robot, folder: Path, received: list[int], when_ready: Callable[[], None]) -> None:
-    mux = MuxNode(robot)
+    inputs = InputRing(robot.black_box.seconds)
+    mux = MuxNode(robot, inputs.note)
     keeper = LatchKeeper(LatchFile(folder, "velocity", robot.name))
-    safety = FilterNode(robot, mux.moving_sources, keeper)
+    safety = FilterNode(robot, mux.moving_sources, keeper, inputs.note)
+    recorder = StopRecorder(robot, inputs, mux, safety)
     mux.lead(safety)
     executor = EventsExecutor()
     executor.add_node(mux)
@@ -70,9 +74,11 @@ def _run_nodes(robot: Robot, folder: Path, received: list[int], when_ready: Call
     period_s, service = 1.0 / robot.rates.command_hz, Service()
     when_ready()
     keeper.start()
+    recorder.start()
     try:
         while not received:
             executor.spin_once(timeout_sec=WAKE_S)
+            recorder.look(time.monotonic())
             service.alive(safety.state_text, time.monotonic())
         service.stopping()
         patience_s = time.monotonic() + standstill_s(robot)
@@ -84,6 +90,7 @@ def _run_nodes(robot: Robot, folder: Path, received: list[int], when_ready: Call
         raise
     finally:
         keeper.finish(WRITE_S)
+        recorder.finish(WRITE_S)
         executor.shutdown()
         safety.destroy_node()
         mux.destroy_node()

@@ -240,6 +240,11 @@ class Mux:
         source.refused += 1
         source.refusal = why
 
+    @property
+    def driver_state(self) -> DriverState:
+        """Of the last motor_driver/status."""
+        return self._base.state
+
     def on_driver(self, state: DriverState, cycles: int, received: float) -> None:
         """Takes a motor_driver/status: its state and its counter of cycles."""
         if self._base.on_driver(state, cycles, received):

@@ -10,6 +10,7 @@ import functools
 import math
 import time
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any, Protocol
 
 from canbase.msg import DriverStatus, MuxState
@@ -34,6 +35,7 @@ from canbase_velocity.base_ready import status_timeout_s
 from canbase_velocity.changes import changes
 from canbase_velocity.delay import Sent
 from canbase_velocity.graph import expected, heard, publishers
+from canbase_velocity.input_ring import Note, forget, mux_entry
 from canbase_velocity.messages import sent_at, twist_of
 from canbase_velocity.mux import NOT_FINITE, Mux, MuxDecision
 from canbase_velocity.mux_messages import diagnostics, mux_state
@@ -66,11 +68,13 @@ class Follower(Protocol):
 class MuxNode(Node):
     """Publishes at once the command of the source that has the base, and repeats it while that source is fresh."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, note: Note = forget) -> None:
+        """`note`: takes each input of the core, and each decision."""
         super().__init__("velocity_mux")
         refuse_sim_time(self, SetParametersResult)
         self._robot = robot
         self._refuse_own_topics()
+        self._note = note
         self._follower: Follower | None = None
         self._voice = Voice(self.get_logger(), Journal("velocity_mux"))
         self._receive_times = ReceiveTimes()
@@ -96,6 +100,11 @@ class MuxNode(Node):
         self._timer = steady_timer(self, 1.0 / robot.rates.command_hz, self._tick)
         steady_timer(self, GRAPH_PERIOD_S, self._look)
         steady_timer(self, DIAGNOSTICS_PERIOD_S, self._diagnose)
+
+    @property
+    def core(self) -> Mux:
+        """What decides."""
+        return self._mux
 
     def lead(self, follower: Follower) -> None:
         """From now on orders go to the safety filter too, and its emergency stop counts."""
@@ -158,7 +167,9 @@ class MuxNode(Node):
         self.get_logger().warning(f"{name} refused: {why}", throttle_duration_sec=5.0)
 
     def _on_twist(self, name: str, twist: Twist, now_s: float, sent: Sent | None) -> None:
-        if not self._mux.on_command(name, twist, self._receive_times.at(now_s), now_s, sent):
+        received, times = self._receive_times.at(now_s), None if sent is None else (sent.stamp_s, sent.wall_s)
+        self._note("command", now_s, name, twist.linear_mps, twist.angular_radps, received, times)
+        if not self._mux.on_command(name, twist, received, now_s, sent):
             self._log_refusal(name, NOT_FINITE)
         decision = self._decide(now_s)
         if decision.active == name or decision.active != self._decision.active:
@@ -167,12 +178,16 @@ class MuxNode(Node):
 
     def _on_driver(self, message: DriverStatus) -> None:
         now_s = time.monotonic()
-        self._mux.on_driver(driver_state(message.state), message.cycles, self._receive_times.at(now_s))
+        state, received = driver_state(message.state), self._receive_times.at(now_s)
+        self._note("driver", now_s, int(state), message.cycles, received)
+        self._mux.on_driver(state, message.cycles, received)
         self._send_if_changed(now_s)
 
     def _on_lock(self, name: str, message: Bool) -> None:
         now_s = time.monotonic()
-        self._mux.on_lock(name, message.data, self._receive_times.at(now_s))
+        received = self._receive_times.at(now_s)
+        self._note("lock", now_s, name, message.data, received)
+        self._mux.on_lock(name, message.data, received)
         self._send_if_changed(now_s)
 
     def _look(self) -> None:
@@ -187,10 +202,13 @@ class MuxNode(Node):
             if found not in before:
                 told = {"topic": found.topic, "node": found.node}
                 self._voice.tell(found.sentence, found.priority, robot=self._robot.name, **told)
+        self._note("foreign", now_s, [asdict(found) for found in foreign])
         self._mux.on_foreign(foreign)
         for topic, kind in self._heard.items():
             there = [found for found in graph[heard_at[topic]] if found.kind == kind]
-            self._mux.on_publishers(topic, [found.node for found in there], [found.key for found in there])
+            nodes, keys = [found.node for found in there], [found.key for found in there]
+            self._note("publishers", now_s, topic, nodes, keys)
+            self._mux.on_publishers(topic, nodes, keys)
         self._send_if_changed(now_s)
 
     def _send_if_changed(self, now_s: float) -> None:
@@ -208,7 +226,9 @@ class MuxNode(Node):
         if self._follower is not None:
             self._mux.on_estop(self._follower.estop_free)
             self._mux.on_scans(self._follower.without_scans)
-        return self._mux.shutdown(now_s) if self._ending else self._mux.decide(now_s)
+        decision = self._mux.shutdown(now_s) if self._ending else self._mux.decide(now_s)
+        self._note(*mux_entry("mux_shutdown" if self._ending else "mux", now_s, decision))
+        return decision
 
     def _send(self, decision: MuxDecision, now_s: float) -> None:
         """The filter first: what is published afterwards is for people."""

@@ -28,9 +28,10 @@ from canbase_campaign.plan import Plan, draw_plan
 from canbase_campaign.runner import start_of
 from canbase_campaign.world import World
 from canbase_recording.replay import Replayed, replay_watchdog
-from canbase_recording.replay_file import read_inputs, read_trip
+from canbase_recording.replay_file import read_inputs, read_trip, read_velocity
 from canbase_recording.replay_text import trip_text, verdict
 from canbase_recording.replay_trip import replay_trip
+from canbase_recording.replay_velocity import VelocityReplay, causes, replay_velocity
 from canbase_watchdog.trip_cause import TripCause
 from support.recorded_stops import record_in_a_copy
 
@@ -38,6 +39,7 @@ STOPS = 100
 AGREE = 0.9
 STUFFING = (0.9, 1.05)
 """A frame has more or fewer stuff bits than the typical one: else everything lies on one grid, and on its limits."""
+WATCHDOG, FILTER = "watchdog", "mux and filter"
 SAME, CYCLE, CANNOT, DIFFERS = "same within a tick", "a cycle apart", "cannot be replayed", "differs"
 
 
@@ -52,6 +54,7 @@ class Outcome:
     result: str
     said: str
     late_s: float
+    part: str = WATCHDOG
 
 
 def replayed(seed: int, folder: Path) -> list[Outcome]:
@@ -67,17 +70,34 @@ def replayed(seed: int, folder: Path) -> list[Outcome]:
     trips = [(at_s, TripCause(cause)) for at_s, cause in json.loads(path.with_suffix(".trips").read_text())]
     inputs = read_inputs(path)
     own = [life for file in folder.glob("watchdog_*.jsonl") for life in replay_trip(read_trip(file))]
+    decided = [replay_velocity(read_velocity(file)) for file in sorted(folder.glob("velocity_*.jsonl"))]
     for file in folder.iterdir():
         file.unlink()
     heard = replay_watchdog(inputs).lives
     faults = tuple(fault.name for fault in plan.faults)
     lives = [*(_life_of(at_s, own, heard) for at_s, _ in trips), *(life for life in heard if life.life.trip is None)]
     causes = [cause for _, cause in trips]
-    return [
+    return _filter_outcomes(seed, faults, decided) + [
         _outcome(seed, faults, life, f"{verdict(life)}; {trip_text(inputs, life.trip)}")
         if life is not None
         else Outcome(seed, faults, causes[number].name.lower().replace("_", " "), CANNOT, LOST, math.nan)
         for number, life in enumerate(lives)
+    ]
+
+
+def _filter_outcomes(seed: int, faults: tuple[str, ...], decided: Sequence[VelocityReplay]) -> list[Outcome]:
+    """Each stop of the filter once, though two files may have it; and the other decisions of mux and filter."""
+    stops = {recorded.at_s: (recorded, now) for found in decided for recorded, now in causes(found)}
+    told = [
+        Outcome(
+            seed, faults, f"filter: {recorded.cause}", SAME if recorded.is_as(now) else DIFFERS, f"{now}", 0.0, FILTER
+        )
+        for recorded, now in stops.values()
+    ]
+    wrong = [found for found in decided if not found.agrees]
+    return told + [
+        Outcome(seed, faults, "filter and mux: others", DIFFERS, f"{found.different} decisions", 0.0, FILTER)
+        for found in wrong
     ]
 
 
@@ -112,7 +132,7 @@ def drawn(stops: int, first: int = 0) -> Iterator[Outcome]:
     with tempfile.TemporaryDirectory(prefix="canbase-replays-") as folder:
         while tripped < stops:
             for outcome in in_a_copy(seed, Path(folder)):
-                tripped += outcome.cause != "none"
+                tripped += outcome.part == WATCHDOG and outcome.cause != "none"
                 yield outcome
             seed += 1
 
@@ -162,14 +182,18 @@ def main() -> int:
             told = f"seed {outcome.seed} ({', '.join(outcome.faults)}): recorded {outcome.cause}; {outcome.said}"
             out.print(told, highlight=False, markup=False, soft_wrap=True)
     out.print(table(outcomes))
-    known = [outcome for outcome in outcomes if outcome.cause != "none" and outcome.result != CANNOT]
+    mine = [outcome for outcome in outcomes if outcome.part == WATCHDOG]
+    known = [outcome for outcome in mine if outcome.cause != "none" and outcome.result != CANNOT]
     late_ms = sorted(1000.0 * outcome.late_s for outcome in known if outcome.result == SAME)
     if late_ms:
         out.print(f"replayed minus recorded: {late_ms[0]:.1f} to {late_ms[-1]:.1f} ms", highlight=False)
     same, near = (sum(outcome.result == result for outcome in known) for result in (SAME, CYCLE))
     told = f"of {len(known)} trips that a recording can explain {same} are the same within a tick, {near} a cycle apart"
     out.print(told, highlight=False)
-    return 0 if same + near >= AGREE * len(known) else 1
+    filtered = [outcome for outcome in outcomes if outcome.part == FILTER]
+    agree = sum(outcome.result == SAME for outcome in filtered)
+    out.print(f"of {len(filtered)} stops of the safety filter {agree} are the same at the same time", highlight=False)
+    return 0 if same + near >= AGREE * len(known) and agree == len(filtered) else 1
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import asdict
 from functools import partial
 
 from canbase_campaign.clock import FINE, Clock, Pace
@@ -17,6 +18,7 @@ from canbase_velocity.clearance import Points
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
+from canbase_velocity.input_ring import Note, filter_entry, forget, mux_entry
 from canbase_velocity.lease import lease_datagram
 from canbase_velocity.mux import Mux, MuxDecision
 from canbase_velocity.placement import Placement
@@ -53,6 +55,8 @@ class VelocityProcess(Process):
         topics.subscribe(robot.safety.estop.topic, self, self._on_estop)
         topics.subscribe("lock", self, self._on_lock)
         topics.subscribe("publishers", self, self._on_publishers)
+        self.note: Note = forget
+        """Takes each input of the cores and each decision, as in `input_ring.py`."""
         self.disk = StopDisk("velocity")
         """Its record of the emergency stop, which outlives it."""
         self.begin()
@@ -76,8 +80,9 @@ class VelocityProcess(Process):
     def end(self) -> None:
         """It orders zero until the base stands."""
         self._ending = True
+        self.note("end", self.clock.now_s)
         self.filter.end()
-        self._issue(self.filter.shut_down(self.clock.now_s))
+        self._issue(self._shut_down(self.clock.now_s))
 
     def _on_timer(self) -> None:
         """Two timers that each message restarts, at a quarter of their period's resolution."""
@@ -85,21 +90,37 @@ class VelocityProcess(Process):
         if now_s >= self._mux_due:
             self._send(self._decide())
         if now_s >= self._filter_due:
-            self._issue(self.filter.decide(now_s))
+            self._issue(self._filter_decides(now_s))
+
+    def _shut_down(self, now_s: float) -> Decision:
+        decision = self.filter.shut_down(now_s)
+        self.note(*filter_entry("shut_down", now_s, decision))
+        return decision
+
+    def _filter_decides(self, now_s: float) -> Decision:
+        decision = self.filter.decide(now_s)
+        self.note(*filter_entry("decide", now_s, decision))
+        return decision
 
     def _on_source(self, name: str, twist: Twist) -> None:
-        self.mux.on_command(name, twist, self.clock.now_s)
+        now_s = self.clock.now_s
+        self.note("command", now_s, name, twist.linear_mps, twist.angular_radps, now_s, None)
+        self.mux.on_command(name, twist, now_s)
         decision = self._decide()
         if decision.active == name or decision.active != self._active:
             self._send(decision)
 
     def _on_driver(self, snapshot: DriverSnapshot) -> None:
-        self.mux.on_driver(snapshot.state, snapshot.cycle.cycles, self.clock.now_s)
+        now_s = self.clock.now_s
+        self.note("driver", now_s, int(snapshot.state), snapshot.cycle.cycles, now_s)
+        self.mux.on_driver(snapshot.state, snapshot.cycle.cycles, now_s)
 
     def _decide(self) -> MuxDecision:
         self.mux.on_estop(self.filter.estop is EstopState.FREE)
         self.mux.on_scans(self.filter.without_scans)
-        return self.mux.decide(self.clock.now_s)
+        decision = self.mux.decide(self.clock.now_s)
+        self.note(*mux_entry("mux", self.clock.now_s, decision))
+        return decision
 
     def _send(self, decision: MuxDecision) -> None:
         """As mux_node.py: the filter first; the topic is for people."""
@@ -107,8 +128,9 @@ class VelocityProcess(Process):
         self._mux_due, self._active = now_s + self._period_s, decision.active
         self._topics.publish("cmd_vel_mux", decision.twist)
         if not self._topics.loses("cmd_vel_mux"):
+            self.note("obey", now_s, now_s)
             self.filter.on_command(decision.twist, now_s)
-            self._issue(self.filter.decide(now_s))
+            self._issue(self._filter_decides(now_s))
         told = decision.essence
         if told != self._mux_told or now_s - self._mux_state_at >= MUX_STATE_PERIOD_S:
             self._mux_told, self._mux_state_at = told, now_s
@@ -117,31 +139,39 @@ class VelocityProcess(Process):
     def reset(self) -> None:
         """The operator resets the emergency stop; a process that is dead or hangs does not receive it."""
         if self.alive:
-            self.filter.reset(self.mux.moving(self.clock.now_s), self.clock.now_s)
+            moving = self.mux.moving(self.clock.now_s)
+            self.note("reset", self.clock.now_s, list(moving))
+            self.filter.reset(moving, self.clock.now_s)
 
     def _on_scan(self, seen: Points | Scan) -> None:
         scan = self._robot.safety.scan
         if isinstance(seen, Scan):
+            self.note("scan", self.clock.now_s, scan.topic, seen, None)
             self.filter.on_laser_scan(scan.topic, seen, Placement.of(scan), self.clock.now_s)
         else:
+            self.note("points", self.clock.now_s, scan.topic, seen)
             self.filter.on_points(scan.topic, seen, None, self.clock.now_s)
 
     def _on_lock(self, locked: bool) -> None:
+        self.note("lock", self.clock.now_s, "lock", locked, self.clock.now_s)
         self.mux.on_lock("lock", locked, self.clock.now_s)
 
     def _on_publishers(self, found: tuple[str, tuple[str, ...]]) -> None:
         """A look into the ROS graph: a topic, and the nodes that publish on it."""
+        self.note("publishers", self.clock.now_s, found[0], list(found[1]), list(found[1]))
         self.mux.on_publishers(*found)
 
     def _on_estop(self, pressed: bool) -> None:
-        self.filter.on_estop(pressed, self.clock.now_s)
+        now_s = self.clock.now_s
+        self.note("estop", now_s, pressed, now_s)
+        self.filter.on_estop(pressed, now_s)
         if pressed:
-            self._issue(self.filter.decide(self.clock.now_s))
+            self._issue(self._filter_decides(now_s))
 
     def _issue(self, decision: Decision) -> None:
         now_s = self.clock.now_s
         if self._ending:
-            decision = self.filter.shut_down(now_s)
+            decision = self._shut_down(now_s)
         self._filter_due, self.decision = now_s + self._period_s, decision
         self._sequence += 1
         stops = decision.action is Action.STOP
@@ -152,4 +182,6 @@ class VelocityProcess(Process):
         if told != self._told or now_s - self._state_at >= STATE_PERIOD_S:
             self._told, self._state_at = told, now_s
             self._topics.publish("safety_filter/state", decision)
-        self.filter.on_record(*self.disk.write(self.filter.record))
+        written, problem = self.disk.write(self.filter.record)
+        self.note("record", now_s, written and asdict(written), problem)
+        self.filter.on_record(written, problem)

@@ -12,17 +12,23 @@ from pathlib import Path
 from typing import Any
 
 from canbase_campaign.process import FRAMES_HELD
+from canbase_campaign.velocity_process import LOCKS
 from canbase_campaign.world import World
 from canbase_config.robot import Robot
 from canbase_driver.runtime.black_box import Ring, asc_lines
 from canbase_driver.runtime.black_box_about import about
 from canbase_driver.runtime.black_box_json import json_lines
 from canbase_driver.supervision.stop_history import StopRecord
+from canbase_runtime.driver_state import DriverState
+from canbase_velocity import input_ring as velocity_ring
 from canbase_velocity.decision import Decision
+from canbase_velocity.estop import EstopState
+from canbase_velocity.input_ring import InputRing
 from canbase_velocity.mux import MuxDecision
+from canbase_velocity.safety_filter import FilterConfig
 from canbase_velocity.twist import Twist
 from canbase_watchdog import input_ring
-from canbase_watchdog.input_ring import InputRing, TripWatch
+from canbase_watchdog.input_ring import TripWatch
 
 WALL_S = 1_790_000_000.0
 """Of the monotonic clock to the wall clock."""
@@ -47,7 +53,7 @@ class WatchdogBox:
         self._begin, it.begin = it.begin, self._on_begin
         self._tick = it._on_tick
         self._end, it.end = it.end, self._on_end
-        self._ring = InputRing(seconds, -math.inf)  # it began to run long before
+        self._ring = input_ring.InputRing(seconds, -math.inf)  # it began to run long before
         self._watch = TripWatch(self._ring, it.disk.past())
         self._past = it.disk.past()
         it._on_tick = self._on_tick
@@ -56,7 +62,7 @@ class WatchdogBox:
 
     def _on_begin(self) -> None:
         self._past = self._watchdog.disk.past()
-        self._ring = InputRing(self._seconds, self._clock.now_s)
+        self._ring = input_ring.InputRing(self._seconds, self._clock.now_s)
         self._watch = TripWatch(self._ring, self._past)
         self._begin()
 
@@ -97,6 +103,52 @@ class WatchdogBox:
             file.write_text("".join(lines), encoding="utf-8")
         trips = [(trip.at_s, trip.cause) for trip in self.trips]
         path.with_suffix(".trips").write_text(json.dumps(trips), encoding="utf-8")
+
+
+class VelocityBox:
+    """The inputs of mux and filter of a world, noted and cut as their process does it. One that starts again begins
+    with nothing."""
+
+    LOOK_S = 0.02
+
+    def __init__(self, world: World, seconds: float = RECORDED_S) -> None:
+        self._world, self._seconds = world, seconds
+        self.files: list[list[str]] = []
+        it: Any = world.velocity
+        self._begin, it.begin = it.begin, self._on_begin
+        self._renew()
+        self._look()
+
+    def _renew(self) -> None:
+        self._ring, self._watch = InputRing(self._seconds), velocity_ring.StopWatch()
+        self._world.velocity.note = self._ring.note
+        self._driver = DriverState.OFFLINE
+
+    def _on_begin(self) -> None:
+        self._begin()
+        self._renew()
+
+    def _look(self) -> None:
+        velocity, now_s = self._world.velocity, self._world.clock.now_s
+        if velocity.running:
+            self._ring.look(velocity.mux, velocity.filter, now_s)
+            due = self._watch.look(velocity.mux.driver_state, velocity.filter.estop is EstopState.FREE, now_s)
+            if due is not None:
+                self._cut(due)
+        self._world.clock.after(self.LOOK_S, self._look)
+
+    def _cut(self, stop: velocity_ring.Stop) -> None:
+        robot = self._world.robot
+        mux = robot.mux.model_copy(update={"locks": LOCKS})
+        head = velocity_ring.head(robot.model_copy(update={"mux": mux}), FilterConfig.of(robot), stop, WALL_S)
+        self.files.append(list(velocity_ring.lines(head, self._ring.cut())))
+
+    def write(self, path: Path) -> None:
+        """Beside the driver's files; a stop that is not over too."""
+        if self._watch.open is not None and self._world.velocity.alive:
+            self._cut(self._watch.open)
+        for number, lines in enumerate(self.files):
+            path.with_name(f"velocity_{path.stem}_{number}.jsonl").write_text("".join(lines), encoding="utf-8")
 
 
 class DriverBox:
@@ -231,11 +283,12 @@ def record_in_a_copy(world: World, run: Callable[[], object], path: Path, bitrat
     if pid == 0:
         status = 1
         try:
-            box, watchdog_box = DriverBox(world, bitrate), WatchdogBox(world)
+            box, watchdog_box, velocity_box = DriverBox(world, bitrate), WatchdogBox(world), VelocityBox(world)
             world.clock.run_until(world.clock.now_s + WARM_UP_S)
             run()
             box.write(path)
             watchdog_box.write(path)
+            velocity_box.write(path)
             status = 0
         finally:
             os._exit(status)
