@@ -31,9 +31,9 @@ def _story(story: Story) -> dict[str, Any]:
     return {
         "cause": story.cause.value, "at_s": story.found.at_s, "node": story.found.node_id, "text": story.found.text,
         "reaction_s": story.scene.reaction_s, "caught_by": story.caught_by, "reported": story.reported,
-        "advice": story.advice, "standstill_s": story.standstill.stood_s, "distance_m": story.standstill.way_m,
+        "advice": story.advice, "standstill_s": story.standstill.stood_s, "distance_m": story.standstill.distance_m,
         "wheels": [
-            {"name": w.name, "stood_s": w.stood_s, "way": w.way, "unit": w.unit, "why_not": w.why_not}
+            {"name": w.name, "stood_s": w.stood_s, "distance": w.distance, "unit": w.unit, "why_not": w.why_not}
             for w in story.standstill.wheels
         ],
         "also": [{"cause": cause.value, "at_s": found.at_s, "text": found.text} for cause, found in story.also],

@@ -80,17 +80,17 @@ def _story(number: int, count: int, story: Story) -> Iterator[str]:
 def standstill_sentence(story: Story) -> str:
     """When and after how far the wheels stood, from the first cause on."""
     if not story.standstill.wheels:
-        return "cannot tell: the recording has no position (6064h)"
+        return "unknown: the recording has no position (6064h)"
     return "; ".join(_wheel(wheel) for wheel in story.standstill.wheels)
 
 
 def _wheel(wheel: WheelStop) -> str:
     if wheel.stood_s is None:
-        return f"{wheel.name} cannot tell, {wheel.why_not}"
-    if wheel.way is None:
+        return f"{wheel.name}: unknown, {wheel.why_not}"
+    if wheel.distance is None:
         return f"{wheel.name} after {wheel.stood_s:.2f} s"
-    way = f"{wheel.way:.3f} m" if wheel.unit == "m" else f"{wheel.way:.0f} increments"
-    return f"{wheel.name} after {wheel.stood_s:.2f} s and {way}"
+    distance = f"{wheel.distance:.3f} m" if wheel.unit == "m" else f"{wheel.distance:.0f} increments"
+    return f"{wheel.name} after {wheel.stood_s:.2f} s and {distance}"
 
 
 def collapsed(events: Iterable[Event]) -> list[tuple[Event, int]]:

@@ -1,4 +1,4 @@
-"""A recording on disk, entry by entry, by python-can's readers: ASC, candump, BLF, TRC, and MCAP of `canbase export`.
+"""A recording on disk, entry by entry, by python-can's readers: ASC, candump, BLF, TRC; MCAP and a watchdog's inputs.
 
 The shell of this package. Memory does not grow with the file. Whatever is broken is counted, and what can be read is
 given: nothing in a file raises but a file that is no recording at all.
@@ -7,6 +7,7 @@ given: nothing in a file raises but a file that is no recording at all.
 from __future__ import annotations
 
 import contextlib
+import json
 import math
 import re
 import struct
@@ -35,6 +36,8 @@ GAP_S: Final = 60.0
 """A pause of this length is worth a remark."""
 MOST_RESTARTS: Final = 1_000_000
 HEAD_BYTES: Final = 4_096
+WATCHDOGS: Final = b'{"format": 1, "part": "watchdog"'
+LINE_BYTES: Final = 200_000
 _SCREEN: Final = re.compile(
     r"\s*\((?P<at>\d+\.\d+)\)\s+(?P<channel>\S+)\s+(?:(?P<way>TX|RX)\s+[-BE ]+\s+)?"
     r"(?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[(?P<length>\d+)\]\s*(?P<data>(?:[0-9A-Fa-f]{2}\s*)*|remote request)"
@@ -148,10 +151,13 @@ class RecordingFile:
         self._file.seek(0)
         text = head.decode("utf-8", errors="replace")
         first = next((line for line in text.splitlines() if line.strip()), "")
-        if head.startswith(b"LOGG"):
-            return "BLF", self._binary
-        if head.startswith(b"\x89MCAP"):
-            return "MCAP", self._mcap
+        for begin, name, read in (
+            (b"LOGG", "BLF", self._binary),
+            (b"\x89MCAP", "MCAP", self._mcap),
+            (WATCHDOGS, "inputs of a watchdog", self._inputs),
+        ):
+            if head.startswith(begin):
+                return name, read
         if self.path.suffix.lower() == ".trc" or first.startswith(";$FILEVERSION"):
             return "TRC", lambda: self._by_lines(can.TRCReader, is_asc=False)
         if _SCREEN.match(first):
@@ -164,7 +170,8 @@ class RecordingFile:
             return "ASC", lambda: self._by_lines(can.ASCReader, is_asc=True)
         what = "it is empty" if not head else f"it begins with {first[:40]!r}"
         raise NoRecordingError(
-            f"{self.path}: no recording that is known here (ASC, candump -L, BLF, TRC, MCAP of canbase export): {what}"
+            f"{self.path}: no recording that is known here (ASC, candump -L, BLF, TRC, MCAP of canbase export, "
+            f"watchdog_….jsonl): {what}"
         )
 
     def _by_lines(self, reader: Callable[..., Iterable[can.Message]], *, is_asc: bool) -> Iterator[can.Message]:
@@ -213,6 +220,25 @@ class RecordingFile:
         from canbase_recording.mcap_import import messages
 
         yield from messages(self._file, self.problems)
+
+    def _inputs(self) -> Iterator[can.Message]:
+        """The frames that a watchdog received: of a stop in which the driver died with its own recording."""
+        offset_s = 0.0
+        while line := self._file.readline(LINE_BYTES):
+            if not line.endswith(b"\n"):
+                self.problems.truncated = "its last line is cut off"
+                return
+            try:
+                told = json.loads(line)
+                if isinstance(told, dict):
+                    offset_s = float(told["wall_offset_s"])
+                elif told[0] == "frame":
+                    _, at_s, cob_id, data = told
+                    yield can.Message(
+                        offset_s + at_s, cob_id, is_extended_id=False, data=bytes.fromhex(data), check=True
+                    )
+            except (*_BROKEN, RecursionError):
+                self.problems.broken += 1
 
     def _notes(self) -> Iterator[Note]:
         while self._lines is not None and self._lines.notes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -21,6 +22,10 @@ from canbase_recording.velocity_inputs import VelocityHead, VelocityInputs, velo
 
 T = TypeVar("T")
 
+END: Final = b"End TriggerBlock"
+"""The last line of an ASC file."""
+MOST_FRAMES: Final = 100_000
+"""Of the .asc file: canbase writes 80,000."""
 MOST_BYTES: Final = 64_000_000
 """Of the .json file: canbase writes a few MB."""
 
@@ -128,11 +133,29 @@ def _entries(path: Path) -> list[Entry]:
     """The frames of the .asc file: canbase wrote it whole, or not at all."""
     if not path.is_file():
         raise NoInputsError(f"there is no {path.name} beside it")
+    _refuse_cut_off(path)
     try:
         with can.ASCReader(path) as reader:
-            return [_entry(message) for message in reader]
+            found = [_entry(message) for message in itertools.islice(reader, MOST_FRAMES + 1)]
     except (ValueError, IndexError, KeyError, OSError, can.CanError) as error:
         raise NoInputsError(f"{path.name} beside it is no recording of canbase: {error}") from error
+    if len(found) > MOST_FRAMES:
+        raise NoInputsError(
+            f"{path.name} has more than {MOST_FRAMES} frames: canbase writes fewer; try canbase explain"
+        )
+    return list(found)
+
+
+def _refuse_cut_off(path: Path) -> None:
+    """What is missing at its end may be the stop."""
+    try:
+        with path.open("rb") as file:
+            file.seek(max(0, path.stat().st_size - len(END) - 4))
+            end = file.read()
+    except OSError as error:
+        raise NoInputsError(f"{path.name} cannot be read: {error.strerror or error}") from error
+    if END not in end:
+        raise NoInputsError(f"{path.name} is cut off: its last line is not {END.decode()!r}. Copy it again, whole")
 
 
 def _entry(message: can.Message) -> RecordedFrame:

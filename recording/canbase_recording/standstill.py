@@ -1,4 +1,4 @@
-"""When the wheels stood after a stop, and how far they went, by the encoders. "Cannot tell" is an answer. Pure."""
+"""When the wheels stood after a stop, and how far they went, by the encoders. "Unknown" is an answer. Pure."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ CONTRADICTS: Final = 3.0
 
 @dataclass(frozen=True, slots=True)
 class WheelStop:
-    """One wheel. `stood_s`: seconds from the first cause; `way`: until then, m or increments; None: cannot tell."""
+    """One wheel. `stood_s`: seconds from the first cause; `distance`: until then, m or increments; None: unknown."""
 
     name: str
     stood_s: float | None
-    way: float | None
+    distance: float | None
     unit: str
     why_not: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Standstill:
-    """All wheels. `stood_s` and `way_m` of the one that took longest; None: cannot tell, or not in the recording."""
+    """All wheels. `stood_s` and `distance_m` of the one that took longest; None: unknown, or not in the recording."""
 
     wheels: tuple[WheelStop, ...]
 
@@ -38,10 +38,10 @@ class Standstill:
         return max((t for t in times if t is not None), default=None) if times and None not in times else None
 
     @property
-    def way_m(self) -> float | None:
-        """Longest way of a wheel [m]; None without robot.yaml."""
-        ways = [wheel.way if wheel.unit == "m" else None for wheel in self.wheels]
-        return max((w for w in ways if w is not None), default=None) if ways and None not in ways else None
+    def distance_m(self) -> float | None:
+        """Longest distance of a wheel [m]; None without robot.yaml."""
+        found = [wheel.distance if wheel.unit == "m" else None for wheel in self.wheels]
+        return max((each for each in found if each is not None), default=None) if found and None not in found else None
 
 
 def standstill_of(scene: Scene, since_s: float) -> Standstill:

@@ -91,7 +91,7 @@ def test_a_latched_stop_has_its_time_its_way_and_a_file_that_python_can_reads(ro
     story = told.stories[-1]
     assert (story.cause, story.caught_by) == (Cause.STOP_REQUESTED, "motor_driver")
     assert story.standstill.stood_s == pytest.approx(truth.after_s, abs=0.1)
-    assert story.standstill.way_m == pytest.approx(truth.way_m, abs=0.02)
+    assert story.standstill.distance_m == pytest.approx(truth.way_m, abs=0.02)
 
 
 def tells_all_that_was_ordered_and_what_became_of_it(events: list[dict[str, Any]]) -> None:

@@ -196,3 +196,33 @@ def _backward(inputs: TripInputs) -> TripInputs:
     """The clock went back: of another computer, or edited."""
     later = [(what, at_s - 5.0, *rest) for what, at_s, *rest in inputs.calls[2000:]]
     return replace(inputs, calls=(*inputs.calls[:2000], *later))
+
+
+# the driver hangs or dies with its recording ── the watchdog's file has the frames
+def test_the_file_of_a_watchdog_explains_a_stop_without_the_driver(folder: Path, tmp_path: Path) -> None:
+    file = folder / "driver_hangs" / "watchdog_driver_hangs_0.jsonl"
+    shown = CliRunner().invoke(app, ["explain", str(file)])
+    assert "inputs of a watchdog" in shown.output
+    assert "first cause:  driver or master silent" in shown.output
+    cut_off = tmp_path / "cut.jsonl"
+    text = file.read_text()
+    cut_off.write_text(text[: text.index("\n", 100_000) + 20])
+    again = CliRunner().invoke(app, ["explain", str(cut_off)])
+    assert "the file ends early: its last line is cut off" in again.output
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda frames: frames[: len(frames) // 2], "is cut off: its last line is not 'End TriggerBlock'"),
+        (lambda frames: f"{frames * 40}End TriggerBlock\n", "has more than 100000 frames"),
+    ],
+)
+def test_a_recording_that_is_cut_off_or_too_long_is_refused_and_never_the_same(
+    folder: Path, tmp_path: Path, change: Callable[[str], str], said: str
+) -> None:
+    stop = folder / "driver_hangs" / "driver_hangs.asc"
+    (tmp_path / "stop.json").write_bytes(stop.with_suffix(".json").read_bytes())
+    (tmp_path / "stop.asc").write_text(change(stop.read_text().removesuffix("End TriggerBlock\n")))
+    code, output = run(tmp_path / "stop.asc")
+    assert (code, said in output) == (1, True), output

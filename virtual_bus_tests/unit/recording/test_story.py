@@ -159,7 +159,7 @@ def test_who_caught_it_how_late_and_how_far_the_wheels_went() -> None:
     assert story.found.at_s == pytest.approx(1.03, abs=0.02)
     assert "7305h encoder" in story.found.text
     assert story.standstill.stood_s == pytest.approx(0.21, abs=0.05)
-    assert story.standstill.way_m == pytest.approx(0.047, abs=0.01)
+    assert story.standstill.distance_m == pytest.approx(0.047, abs=0.01)
     whats = [f"{event.who}: {event.text}" for event in story.chain]
     fault = next(i for i, text in enumerate(whats) if "fault reaction active" in text)
     stopping = next(i for i, text in enumerate(whats) if text.startswith("motor_driver: STOPPING: drive fault"))
