@@ -10,8 +10,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
-import pickle
 import sys
 import tempfile
 from collections import Counter, defaultdict
@@ -24,6 +22,7 @@ from typing import Final
 from rich.console import Console
 from rich.table import Table
 
+from canbase_campaign import forked
 from canbase_campaign.plan import Plan, draw_plan
 from canbase_campaign.runner import start_of
 from canbase_campaign.world import World
@@ -140,21 +139,9 @@ def drawn(stops: int, first: int = 0) -> Iterator[Outcome]:
 def in_a_copy(seed: int, folder: Path) -> list[Outcome]:
     """The replay is for every scenario the first thing that its process does: nothing is left of the one before."""
     start_of(seed)
-    reader, writer = os.pipe()
-    pid = os.fork()
-    if pid == 0:
-        try:
-            with os.fdopen(writer, "wb") as pipe:
-                pipe.write(pickle.dumps(replayed(seed, folder)))
-        finally:
-            os._exit(0)
-    os.close(writer)
-    with os.fdopen(reader, "rb") as pipe:
-        told = pipe.read()
-    os.waitpid(pid, 0)
-    if not told:
+    found = forked.in_a_copy(lambda: replayed(seed, folder))
+    if found is None:
         raise RuntimeError(f"the replay of seed {seed} failed")
-    found: list[Outcome] = pickle.loads(told)
     return found
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import zlib
 from random import Random
 
 import pytest
 
 from canbase_campaign.faults import FAULTS
+from canbase_campaign.forked import in_a_copy
 from canbase_campaign.scenario import Start
 from canbase_campaign.world import World
 from canbase_sim.cia402.states import State
@@ -67,19 +67,9 @@ def test_without_a_fault_nothing_changes(start: Start, undisturbed: dict[str, in
 
 def digest(start: Start, by: str, *faults: str) -> int:
     """Checksum of every frame and every message of a drive with these faults, in a copy of this process."""
-    reader, writer = os.pipe()
-    pid = os.fork()
-    if pid == 0:
-        try:
-            os.write(writer, _drive(start, by, *faults).to_bytes(4, "big"))
-        finally:
-            os._exit(0)
-    os.close(writer)
-    with os.fdopen(reader, "rb") as pipe:
-        told = pipe.read()
-    os.waitpid(pid, 0)
-    assert told, "the drive ended with an exception"
-    return int.from_bytes(told, "big")
+    found = in_a_copy(lambda: _drive(start, by, *faults))
+    assert found is not None, "the drive ended with an exception"
+    return found
 
 
 def _drive(start: Start, by: str, *faults: str) -> int:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import os
-import pickle
 import traceback
 from dataclasses import dataclass
 from random import Random
 
+from canbase_campaign.forked import in_a_copy
 from canbase_campaign.robots import DrawnRobot, rolls_out
 from canbase_campaign.scenario import Start
 from canbase_campaign.twins import GOAL, JOYSTICK, SPEED_MPS, Twin
@@ -78,18 +77,7 @@ class Cruise:
 
     def fork(self, twin: Twin, seed: int) -> Run:
         """One run in a copy of this process: the base goes on driving here. RunError: it raised, with its traceback."""
-        reader, writer = os.pipe()
-        pid = os.fork()
-        if pid == 0:
-            try:
-                os.write(writer, pickle.dumps(self._run_or_error(twin, seed)))
-            finally:
-                os._exit(0)
-        os.close(writer)
-        with os.fdopen(reader, "rb") as pipe:
-            told = pipe.read()
-        os.waitpid(pid, 0)
-        run = pickle.loads(told) if told else "the process of the run died"
+        run = in_a_copy(lambda: self._run_or_error(twin, seed)) or "the process of the run died"
         if not isinstance(run, Run):
             raise RunError(str(run))
         return run

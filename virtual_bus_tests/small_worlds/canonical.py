@@ -46,7 +46,7 @@ UNSEEN = frozenset((
     # what never changes
     "_robot", "robot", "_config", "config", "drive", "layout", "scale", "personality", "_geometry", "dictionary",
     "_timeouts", "clock", "_member", "_topics", "_late", "_kept", "_life", "_random", "_routes", "_heeds", "_handlers",
-    "_values",
+    "_values", "note",
     # only encoders that come and go, or jump, look at it
     "_time_s",
     # a bound on when a heartbeat can be missed: of the times that are seen anyway

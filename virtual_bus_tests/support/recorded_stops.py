@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from canbase_campaign.forked import in_a_copy
 from canbase_campaign.process import FRAMES_HELD
 from canbase_campaign.velocity_process import LOCKS
 from canbase_campaign.world import World
@@ -279,17 +279,13 @@ def record_in_a_copy(world: World, run: Callable[[], object], path: Path, bitrat
 
     The recording begins WARM_UP_S before: a watchdog that is replayed from its begin has seen the robot by then.
     """
-    pid = os.fork()
-    if pid == 0:
-        status = 1
-        try:
-            box, watchdog_box, velocity_box = DriverBox(world, bitrate), WatchdogBox(world), VelocityBox(world)
-            world.clock.run_until(world.clock.now_s + WARM_UP_S)
-            run()
+
+    def record() -> bool:
+        boxes = DriverBox(world, bitrate), WatchdogBox(world), VelocityBox(world)
+        world.clock.run_until(world.clock.now_s + WARM_UP_S)
+        run()
+        for box in boxes:
             box.write(path)
-            watchdog_box.write(path)
-            velocity_box.write(path)
-            status = 0
-        finally:
-            os._exit(status)
-    assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
+        return True
+
+    assert in_a_copy(record), "the recording ended with an exception"
