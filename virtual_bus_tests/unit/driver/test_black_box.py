@@ -16,7 +16,6 @@ from canbase_config.black_box import BlackBox
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_config.watchdog import WatchdogConfig
-from canbase_driver.runtime import black_box_writer
 from canbase_driver.runtime.black_box import (
     MAX_EVENTS,
     MAX_FRAMES,
@@ -420,7 +419,7 @@ def test_recordings_on_request_delete_none_of_stops_and_are_bounded_themselves(b
 def test_a_request_is_told_that_the_disk_is_full_and_the_next_stop_is_recorded(
     box: Box, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real, failures = black_box_writer.asc_lines, iter([True, False])
+    real, failures = asc_lines, iter([True, False])
 
     def lines(of: Recording, title: str) -> Iterator[str]:
         if next(failures):
