@@ -28,6 +28,8 @@ AGAIN_S = 0.5
 """A stopped node that sends nothing is read again after this time, while no master configures it ..."""
 FRESH_S = 1.5
 """... and a reset needs a look at it that is no older: two motors take 0.3 s."""
+DRIVER_MISSED = 0.5
+"""Of drive_heartbeat_s, in which a driver sends three heartbeats: without one for this long none is there."""
 SEEK_PERIOD_S = 0.5
 """A node of which nothing is known after the start is read this seldom: tools find the SDO channel free."""
 
@@ -210,13 +212,15 @@ class Stopper:
         """Since the start it has not told its state, and no driver boots it: it may turn as it did before the start.
 
         One that is NMT operational was started by a driver, and has told nothing for as long as SYNCs would take: it
-        may have power, and nobody needs its SDO channel. Any other one may be booted within a heartbeat's time.
+        may have power, and nobody needs its SDO channel. Nor where no driver sends heartbeats. Any other one may be
+        booted within a heartbeat's time.
         """
-        node, config = view.node(self._node_id), self._config
-        booted_s = config.drive_heartbeat_s
-        wait_s = min(config.feedback_timeout_s, booted_s) if node.operational else booted_s
-        is_due = now_s >= self._resting_since + wait_s and now_s >= node.configured_at + booted_s
-        return is_due and self._is_untold(self._axes(view))
+        node, since, booted_s = view.node(self._node_id), self._resting_since, self._config.drive_heartbeat_s
+        if now_s < node.configured_at + booted_s or not self._is_untold(self._axes(view)):
+            return False
+        waits_s = min(self._config.feedback_timeout_s, booted_s) if node.operational else booted_s
+        is_alone = now_s >= max(since, view.bus.driver_at) + DRIVER_MISSED * booted_s
+        return is_alone or now_s >= since + waits_s
 
     def _is_old(self, view: View, now_s: float) -> bool:
         """It sent feedback once, and not recently; and no other client needs its SDO channel."""

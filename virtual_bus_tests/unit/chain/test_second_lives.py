@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from canbase_config.robot import Robot
 from canbase_runtime.driver_state import DriverState
 from canbase_sim.faults import apply
 from canbase_watchdog.frames import Frame
@@ -37,6 +38,22 @@ def test_a_watchdog_alone_stops_drives_that_went_on_without_their_masters(kind: 
     assert not any(world.powered)
     status = watchdog_of(world).status
     assert (status.state, status.verdict.cause) == (State.TRIPPED, TripCause.POWER_AT_END)
+
+
+# 0 s both die ── 0.65 s an encoder freezes ── 0.7 s the drives miss them: quick stop, pre-operational; one runs away
+# ── 0.75 s the watchdog starts ── 1.1 s no heartbeat of a driver: it reads the drive ── 1.17 s power off
+def test_a_drive_that_left_operational_by_itself_and_runs_away_is_read_when_no_driver_can_boot_it() -> None:
+    values = robot_with("generic").model_dump()
+    values["timeouts"]["drive_heartbeat_s"] = 0.7
+    world = World(Robot.model_validate(values), keeps=True)
+    world.drive(FORWARD, 0.4)
+    world.driver = world.watchdog = None
+    world.run(0.65)
+    apply(world.bench.nodes, 1, "encoder_frozen", world.now_s, {})
+    world.run(0.1)
+    world.start_watchdog()
+    assert world.powered[0]
+    assert world.run(0.45, lambda: not any(world.powered))
 
 
 def test_it_leaves_the_sdo_channel_to_a_driver_that_is_there() -> None:
