@@ -37,6 +37,8 @@ WATCHES_NOTHING = 7
 """A robot whose drives do not stop by themselves."""
 TWO_MOTORS_A_SIDE = 420
 """A robot with two motors on each side."""
+LOADED = 1031
+"""A robot with twice its load, whose velocity loops swing after a stop."""
 Break = Callable[[World], None]
 
 
@@ -199,6 +201,9 @@ STORIES = (
           plan(fault("encoder_reversed", 0.8, 4.0, wheel=2), replace(CUT, start_s=0.85),
                segments=(stick(0.4, 0.0, 0.0, 9.0),)),
           "heartbeat", no_masters, "drives:heartbeat_consumer", TWO_MOTORS_A_SIDE),
+    Story("a loaded base that swings back after its drives' own stop, and drives without masters",
+          plan(replace(CUT, start_s=2.0), segments=(stick(1.1, 0.0, 0.0, 9.0),)), "heartbeat", no_masters,
+          "drives:heartbeat_consumer", LOADED),
 )  # fmt: skip
 
 

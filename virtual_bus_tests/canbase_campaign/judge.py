@@ -352,7 +352,8 @@ class Judge:
         brakes_s = fastest_mps / robot.limits.emergency_deceleration_mps2 if turning else 0.0
         for node_id, axis in turning:
             alone_s = now_s - max(self._reach.heard(node_id), self._reach.lost_at[node_id])
-            if alone_s > self._reach.alone_s + brakes_s + 0.1 and self._reach.stops_alone(node_id):
+            swings_s = SWING_S * self._reach.ramp_has_ended(node_id, axis)
+            if alone_s > self._reach.alone_s + brakes_s + swings_s + 0.1 and self._reach.stops_alone(node_id):
                 self._violate("heartbeat", f"drive {node_id}.{axis} turns, {alone_s:.2f} s without its masters")
 
     def _check_stop_button(self, tau_s: float, coasting: bool, now_s: float) -> None:

@@ -42,6 +42,8 @@ EXCUSES = {
     "a later rung does (held)",
     "overpowered": "a motor that brakes with all its force cannot stop a side that an unreachable drive turns on "
     "(heartbeat: its time counts from when it can)",
+    "swing": "a loaded base swings back with the velocity loops of its drives, after the ramp of a stop has ended "
+    "(heartbeat, held: SWING_S)",
     "deaf watchdog": "it cannot keep a standing base from starting; driver and drives miss it within T_react from the "
     "begin on (held)",
     "reset by a stranger": "a drive that another master has reset has forgotten 1016h, until its power is off "

@@ -90,6 +90,11 @@ class Reach:
         able = node_id not in self._weak and not self._lies(node)
         return self.alone_s < math.inf and able and not forgot
 
+    def ramp_has_ended(self, node_id: int, axis: int) -> bool:
+        """It orders no speed of its motor any more: what is left swings with its velocity loop."""
+        motor = self._world.drives.bench.nodes[node_id].axes[axis].motor
+        return motor.goal_mps == 0.0 == motor.demand_mps
+
     def turning(self) -> list[tuple[int, int]]:
         """Node id and axis of each wheel that turns with power."""
         base, nodes = self._world.drives.bench.base, self._world.drives.bench.nodes
