@@ -6,7 +6,7 @@ import math
 from array import array
 from collections import Counter, defaultdict
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from canbase_config.robot import Robot
@@ -18,7 +18,7 @@ from canbase_qualification.statistics import Distribution, covered_share
 MATRIX: Final = "matrix: "
 """A test of a row with this prefix names a failure of the exit matrix, and of `MeasuredStop.fault`."""
 MOST_VIOLATIONS: Final = 100
-"""So many are kept with their details; all are counted."""
+"""So many kinds of them are kept with their first run; all are counted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,10 +68,11 @@ class StopFigures:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """One property that did not hold in one run."""
+    """One property that did not hold after the same failures; `violation` and `outcome` are of the first run."""
 
     violation: Violation
     outcome: Outcome
+    runs: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +114,7 @@ class Collected:
         """Runs in which at least one property did not hold."""
         self.ages: dict[str, Ages] = {}
         """By key of robot.yaml: the longest one of all runs without a failure."""
-        self.violations: list[Found] = []
+        self._found: dict[tuple[str, tuple[str, ...]], Found] = {}
         self.properties: Counter[str] = Counter()
         """How often each property did not hold."""
         self._rows: dict[str, list[str]] = {}
@@ -145,12 +146,29 @@ class Collected:
             self._violated.update(rows)
         for violation in outcome.violations:
             self.properties[violation.property] += 1
-            if len(self.violations) < MOST_VIOLATIONS:
-                self.violations.append(Found(violation, outcome))
+            self._find(violation, outcome)
         for age in outcome.ages:
             self.ages[age.key] = max(self.ages.get(age.key, age), age, key=lambda each: each.longest_s)
         for stop in outcome.stops:
             self._stops[stop.fault].add(Run(stop, outcome))
+
+    def _find(self, violation: Violation, outcome: Outcome) -> None:
+        kind = violation.property, outcome.faults
+        before = self._found.get(kind)
+        if before is not None:
+            self._found[kind] = replace(before, runs=before.runs + 1)
+        elif len(self._found) < MOST_VIOLATIONS:
+            self._found[kind] = Found(violation, outcome)
+
+    @property
+    def violations(self) -> list[Found]:
+        """One for each property and failures after which it did not hold, in the order of the results."""
+        return list(self._found.values())
+
+    @property
+    def never_stood(self) -> list[str]:
+        """Failures after which a base did not come to standstill."""
+        return [name for name in self._stops if any(math.isinf(time_s) for time_s in self._stops[name].times)]
 
     @property
     def faults(self) -> frozenset[str]:
@@ -187,7 +205,7 @@ class _Stops:
     """The stops of one failure, as numbers; and the two worst ones."""
 
     def __init__(self) -> None:
-        self._times, self._ways = array("d"), array("d")
+        self.times, self._ways = array("d"), array("d")
         self._slowest: Run | None = None
         self._farthest: Run | None = None
         self._farthest_ended: Run | None = None
@@ -195,7 +213,7 @@ class _Stops:
         self._bodies: set[str] = set()
 
     def add(self, run: Run) -> None:
-        self._times.append(run.stop.time_s)
+        self.times.append(run.stop.time_s)
         self._ways.append(run.distance_m)
         self._bodies.add(run.outcome.robot)
         self._keep(run)
@@ -220,14 +238,14 @@ class _Stops:
                     whole._keep(run)
             whole._fastest_mps = max(whole._fastest_mps, each._fastest_mps)
             whole._bodies |= each._bodies
-            whole._times.extend(each._times)
+            whole.times.extend(each.times)
             whole._ways.extend(each._ways)
         return whole
 
     def figures(self) -> StopFigures | None:
         if self._slowest is None or self._farthest is None:
             return None
-        times, ways = Distribution.of(self._times), Distribution.of(self._ways)
+        times, ways = Distribution.of(self.times), Distribution.of(self._ways)
         return StopFigures(
             times, ways, self._slowest, self._farthest, self._farthest_ended, self._fastest_mps, len(self._bodies)
         )

@@ -102,8 +102,8 @@ def _run(run: Run) -> dict[str, Any]:
 def _found(found: Found) -> dict[str, Any]:
     violation, outcome = found.violation, found.outcome
     return {
-        "property": violation.property, "at_s": violation.at_s, "detail": violation.detail, "kind": outcome.kind,
-        "seed": outcome.seed, "faults": list(outcome.faults), "robot": outcome.robot,
+        "property": violation.property, "at_s": violation.at_s, "detail": violation.detail, "runs": found.runs,
+        "kind": outcome.kind, "seed": outcome.seed, "faults": list(outcome.faults), "robot": outcome.robot,
     }  # fmt: skip
 
 

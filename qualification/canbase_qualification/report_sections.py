@@ -43,6 +43,7 @@ def _violations(report: Report) -> Section:
     rows = tuple(
         (
             found.violation.property,
+            f"{found.runs:,}",
             f"{found.violation.at_s:.2f} s",
             found.violation.detail,
             ", ".join(map(plain, found.outcome.faults)),
@@ -51,9 +52,15 @@ def _violations(report: Report) -> Section:
         )
         for found in collected.violations
     )
-    one_by_one = Table("One by one", ("property", "at", "what", "failures", "robot", "replay"), rows)
-    cut = collected.properties.total() - len(rows)
-    notes = (f"The first {MOST_VIOLATIONS} are listed; {cut:,} more are in results.jsonl.",) if cut > 0 else ()
+    one_by_one = Table(
+        "Each with its first run", ("property", "runs", "at", "what", "failures", "robot", "replay"), rows
+    )
+    cut = collected.properties.total() - sum(found.runs for found in collected.violations)
+    notes = (
+        (f"The first {MOST_VIOLATIONS} kinds are listed; {cut:,} more violations are in results.jsonl.",)
+        if cut > 0
+        else ()
+    )
     return Section("violations", "Violations", notes, tables=(counted, one_by_one))
 
 

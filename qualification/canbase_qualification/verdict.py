@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import Enum
+from typing import Final
 
 from canbase_qualification.hazard_figures import Collected, StopFigures
 from canbase_qualification.outcome import DRIVING, KINDS, SCENARIO, STOP
@@ -14,6 +15,10 @@ NAMES = {
     DRIVING: ("run without a failure", "runs without a failure"),
 }
 """One run of each kind, and several."""
+STOPS: Final = "stops"
+"""The property of a single failure that the base comes to a stand: runs.OWN_PROPERTIES."""
+SHOWN: Final = 4
+"""Failures by name."""
 
 
 class Grade(Enum):
@@ -32,7 +37,7 @@ def verdict_of(setup: Setup, collected: Collected, stops: StopFigures | None) ->
         return Grade.INCOMPLETE, "Nothing was measured: there is no result of any run."
     failed = [
         *_violated(collected),
-        *([f"{never:,} of {stops.runs:,} stops did not end in standstill"] if stops and never else []),
+        *([_never(collected, never, stops.runs)] if stops and never else []),
     ]
     done = f"{_runs(collected)} of {setup.robot.name}"
     if failed:
@@ -48,12 +53,16 @@ def verdict_of(setup: Setup, collected: Collected, stops: StopFigures | None) ->
     return Grade.PASSED, f"No violation in {done}: every measured stop ended in standstill{worst}."
 
 
+def _never(collected: Collected, never: int, of: int) -> str:
+    names = [name or "ordinary stop" for name in collected.never_stood]
+    more = f"; {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+    return f"{never:,} of {of:,} stops did not end in standstill ({'; '.join(names[:SHOWN])}{more})"
+
+
 def _violated(collected: Collected) -> list[str]:
-    if not collected.violated:
-        return []
-    names = ", ".join(f"{name} {count}" for name, count in collected.properties.most_common())
-    runs = "run" if collected.violated == 1 else "runs"
-    return [f"a property did not hold in {collected.violated:,} {runs} ({names})"]
+    """Of a stop that never ended more is told elsewhere."""
+    names = [f"{name} {count:,}" for name, count in collected.properties.most_common() if name != STOPS]
+    return [f"properties did not hold ({', '.join(names)})"] if names else []
 
 
 def _runs(collected: Collected) -> str:

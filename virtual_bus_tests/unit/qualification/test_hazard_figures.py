@@ -95,9 +95,18 @@ def test_a_violation_is_counted_for_every_failure_that_took_part() -> None:
 
 def test_all_violations_are_counted_and_some_are_kept() -> None:
     held = Violation("held", 0.71, "too fast")
-    found = collected(scenario(seed, "driver_dies", violations=(held, held)) for seed in range(MOST_VIOLATIONS))
-    assert found.properties["held"] == 2 * MOST_VIOLATIONS
-    assert (len(found.violations), found.violated) == (MOST_VIOLATIONS, MOST_VIOLATIONS)
+    found = collected(scenario(seed, f"fault {seed}", violations=(held,)) for seed in range(MOST_VIOLATIONS + 5))
+    assert found.properties["held"] == MOST_VIOLATIONS + 5
+    assert (len(found.violations), found.violated) == (MOST_VIOLATIONS, MOST_VIOLATIONS + 5)
+
+
+def test_many_alike_hide_no_other_one() -> None:
+    held, stopped = Violation("held", 0.71, "too fast"), Violation("stops", 0.0, "goes on")
+    many = [replace(never(KILLED, seed), violations=(stopped,)) for seed in range(3 * MOST_VIOLATIONS)]
+    found = collected([*many, scenario(7, "driver_dies", violations=(held,))])
+    assert [(each.violation.property, each.runs) for each in found.violations] == [("stops", 300), ("held", 1)]
+    assert found.violations[0].outcome.seed == 0
+    assert found.never_stood == [KILLED]
 
 
 def test_rows_without_a_run_are_kept() -> None:

@@ -51,7 +51,7 @@ def test_text_of_others_stays_text() -> None:
     told = markdown("bench", sections(report))
     assert "<img" not in told
     row = next(line for line in told.splitlines() if "onerror" in line and line.startswith("| held"))
-    assert row.count("|") == 7
+    assert row.count("|") == 8
 
 
 def test_nothing_measured_is_a_page_too() -> None:
