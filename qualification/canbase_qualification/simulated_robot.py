@@ -17,7 +17,7 @@ from canbase_campaign.scanner import LIES
 from canbase_campaign.twins import SERVER
 from canbase_config import bus_load
 from canbase_config.commissioned import uncommissioned
-from canbase_config.mux import MuxSource
+from canbase_config.mux import JOINTS, MuxSource
 from canbase_config.robot import Robot
 from canbase_config.safety import Scan
 from canbase_qualification.job import FAILURES
@@ -121,7 +121,7 @@ def _locks_all(robot: Robot) -> bool:
 def _changed(robot: Robot, hands: tuple[str, ...], own_action: str, has_scanner: bool) -> Robot:
     """Names and topics are those of the campaign; every limit, timeout, rate and tolerance is the file's."""
     sources: dict[str, MuxSource] = {
-        role: robot.mux.sources[name].model_copy(update={"topic": topic})
+        role: robot.mux.sources[name].model_copy(update={"topic": topic, "type": "twist", "stamped": True})
         for name, (role, topic) in zip(hands, HANDS.items(), strict=False)
     }
     if own_action:
@@ -173,7 +173,13 @@ def _sources_not_judged(robot: Robot, hands: tuple[str, ...], own_action: str) -
     silent = [name for name in robot.mux.sources if name not in (*hands, own_action)]
     if silent:
         yield f"mux.sources: {', '.join(silent)}: never ordered motion; {' and '.join(hands)} have higher priorities."
-    if not own_action:
+    joints = [name for name in hands if robot.mux.sources[name].type == JOINTS]
+    if joints:
+        yield f"mux.sources: {', '.join(joints)}: ordered velocities of the base, not speeds of its wheels."
+    if own_action:
+        nav2 = ", and Nav2's behaviours" if robot.action.nav2_behaviors else ""
+        yield f"action: goals of drive_distance alone; rotate_angle{nav2} got none."
+    else:
         yield "action: mux.sources has no stamped source on cmd_vel_action, so no goal was sent."
     if robot.mux.locks:
         yield "mux.locks: closing them" + (", but for two publishers on one." if _locks_all(robot) else ".")

@@ -54,6 +54,17 @@ def test_the_two_sources_with_the_highest_priority_drive_under_the_names_of_the_
     assert any("web: never ordered motion" in sentence for sentence in found.not_judged)
 
 
+def test_a_source_of_wheel_speeds_orders_velocities_and_that_is_said() -> None:
+    sources = {
+        **EXAMPLE.mux.sources,
+        "base": MuxSource(topic="joints", priority=200, timeout_s=0.2, type="joint_command"),
+    }
+    found = simulated(changed(mux={"sources": sources}))
+    assert found.robot.mux.sources["joystick"].type == "twist"
+    assert found.robot.mux.sources["joystick"].timeout_s == 0.2
+    assert any("base: ordered velocities of the base" in sentence for sentence in found.not_judged)
+
+
 def test_a_robot_with_scanner_and_button_is_tried_with_every_fault_but_those_of_locks() -> None:
     found = simulated(EXAMPLE)
     assert FAULTS.keys() - set(found.faults) == {"two_on_a_lock"}
