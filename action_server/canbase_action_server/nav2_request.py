@@ -16,8 +16,6 @@ from canbase_action_server.inputs import Odometry
 from canbase_action_server.motion import Motion
 from canbase_config.robot import Robot
 
-BEHAVIORS = ("drive_on_heading", "backup", "spin")
-"""Names of the actions, as Nav2's behavior_server has them."""
 RELEASE_S = 3.0
 """A behaviour follows directly on a goal of the controller. Its last commands keep the base for up to 1.5 s by default:
 velocity_smoother's velocity_timeout of 1.0 s, then timeout_s of the mux's source."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from canbase_config.section import MisfitError, Section
+
+BEHAVIORS: Final = ("drive_on_heading", "backup", "spin")
+"""Actions of Nav2 that the action server has with `nav2_behaviors`, under the names that behavior_server gives them."""
 
 
 def _no_parallel(policy: object) -> object:

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from canbase_config.action import BEHAVIORS
 from canbase_config.commissioned import uncommissioned
 from canbase_config.nav2_chain import NODES, SMOOTHED, Chain, chain, full_name
 from canbase_config.robot import Robot
@@ -22,6 +23,8 @@ CONTROLLER: Final = "FollowPath"
 MPPI: Final = "nav2_mppi_controller::MPPIController"
 """The controller of Nav2's own parameter file; the names of its limits are known here, those of others are not."""
 ODOM: Final = "odom"
+PLUGINS: Final = ("spin", "backup", "drive_on_heading", "assisted_teleop", "wait")
+"""behavior_plugins of Nav2's own parameter file."""
 CELL_M: Final = 0.05
 """Lengths of the costmap are rounded up to its resolution."""
 
@@ -38,6 +41,19 @@ class Bounded:
         """What is `given` in Nav2's file, or the usual value, within the limits."""
         number = given if isinstance(given, (int, float)) and not isinstance(given, bool) else self.usual
         return _tidy(min(max(float(number), self.low), self.high))
+
+
+@dataclass(frozen=True, slots=True)
+class Without:
+    """A list of names that Nav2 chooses, without those that canbase serves. `usual`: without a file of Nav2."""
+
+    usual: tuple[str, ...]
+    names: tuple[str, ...]
+
+    def of(self, given: object) -> list[str]:
+        """What is `given` in Nav2's file, or the usual list, without `names`."""
+        chosen = given if isinstance(given, list) else self.usual
+        return [name for name in chosen if name not in self.names]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +75,7 @@ def speeds(robot: Robot) -> Speeds:
 
 
 def parameters(robot: Robot, namespace: str = "") -> dict[Path, Any]:
-    """Path in a parameter file of Nav2 → value; a `Bounded` where Nav2's own value stays, within limits.
+    """Path in a parameter file of Nav2 → value; a `Bounded` or `Without` where Nav2's own value stays, within limits.
 
     Raises ValueError as `chain` does.
     """
@@ -131,7 +147,8 @@ def _costmap_scan(scan: Scan, namespace: str) -> dict[str, Any]:
 def _behaviors(robot: Robot) -> dict[str, Any]:
     turning_radps, limits = speeds(robot).angular_radps, robot.limits
     turning_radps2 = min(limits.angular_acceleration_radps2, limits.angular_deceleration_radps2)
-    return {
+    served = {"behavior_plugins": Without(PLUGINS, BEHAVIORS)} if robot.action.nav2_behaviors else {}
+    return served | {
         "local_frame": robot.base.odom_frame,
         "robot_base_frame": robot.base.base_frame,
         "max_rotational_vel": Bounded(1.0, high=turning_radps),

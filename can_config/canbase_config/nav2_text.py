@@ -11,7 +11,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from canbase_config.nav2_chain import NODES, Chain
-from canbase_config.nav2_params import CONTROLLER, MPPI, ROS, Bounded, Path, Speeds
+from canbase_config.nav2_params import CONTROLLER, MPPI, ROS, Bounded, Path, Speeds, Without
 from canbase_config.yaml_file import read_yaml
 
 _PLUGIN: Final = ("controller_server", ROS, CONTROLLER, "plugin")
@@ -106,7 +106,7 @@ def _printed(robot: str, how: str, tree: Any, wiring: Chain) -> str:
 def _laid(tree: Any, values: Mapping[Path, Any]) -> Any:
     for path, value in values.items():
         given = _get(tree, path)
-        _set(tree, path, value.of(given) if isinstance(value, Bounded) else value)
+        _set(tree, path, value.of(given) if isinstance(value, (Bounded, Without)) else value)
     return tree
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from canbase_action_server.goal_step import GoalStep
 from canbase_action_server.inputs import Inputs
-from canbase_action_server.nav2_request import BEHAVIORS
+from canbase_config.action import BEHAVIORS
 from canbase_config.robot import Robot
 from canbase_doctor.overload import Overload
 

@@ -19,7 +19,7 @@ from rclpy.client import Client
 from rclpy.node import Node
 from unique_identifier_msgs.msg import UUID
 
-from canbase_action_server.nav2_request import BEHAVIORS
+from canbase_config.action import BEHAVIORS
 from canbase_config.robot import Robot
 from canbase_doctor.evidence import Answers, Goal
 

@@ -16,6 +16,7 @@ from canbase_cli.main import app
 from canbase_config.load import load_robot, sample
 from canbase_config.nav2_chain import chain
 from canbase_config.nav2_params import ROS, Bounded, parameters, speeds
+from canbase_config.nav2_text import merged_file
 from canbase_config.robot import Robot
 
 NAVIGATION = {"topic": "cmd_vel_nav", "priority": 50, "timeout_s": 0.5}
@@ -145,6 +146,22 @@ def test_a_number_of_nav2_stays_within_what_robot_yaml_permits() -> None:
     assert Bounded(-0.35, low=-0.2).of(None) == -0.2
     assert Bounded(1.0, high=2.0).of("fast") == 1.0
     assert Bounded(1.0, high=2.0).of(True) == 1.0
+
+
+def test_behaviours_that_canbase_serves_are_taken_out_of_behavior_server_and_no_others() -> None:
+    place = ("behavior_server", ROS, "behavior_plugins")
+    assert place not in parameters(robot())
+    plugins = parameters(robot(action__nav2_behaviors=True))[place]
+    assert plugins.of(["backup", "my_dance", "spin", "wait"]) == ["my_dance", "wait"]
+    assert plugins.of(None) == ["assisted_teleop", "wait"]
+
+
+def test_a_file_of_nav2_keeps_its_other_behaviours(tmp_path: Path) -> None:
+    given = tmp_path / "given.yaml"
+    given.write_text('behavior_server: {ros__parameters: {behavior_plugins: ["spin", "my_dance"]}}\n', encoding="utf-8")
+    serving = robot(action__nav2_behaviors=True)
+    text, _ = merged_file(serving.name, parameters(serving), chain(serving), given)
+    assert yaml.safe_load(text)["behavior_server"][ROS]["behavior_plugins"] == ["my_dance"]
 
 
 def test_parameters_alone_are_those_of_the_bench() -> None:
