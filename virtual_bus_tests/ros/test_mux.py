@@ -223,15 +223,17 @@ def test_a_foreign_publisher_locks_its_source_when_the_configuration_says_so(
     )
     joystick.message = drive(0.1)
     velocity.wait_for_order(0.1)
+
+    def on_the_output() -> bool:
+        return any(foreign.topic == "/cmd_vel" for foreign in velocity.state.foreign)
+
     with TestNode("intruder") as other:
         other.node.create_publisher(TwistStamped, "cmd_vel", 1)
+        velocity.node.wait_for(on_the_output, 5.0, "the intruder")
         velocity.wait_for_order(0.0, 5.0)
         assert velocity.ordered_for(0.3) == {0.0}
 
-    def is_gone() -> bool:
-        return all(foreign.topic != "/cmd_vel" for foreign in velocity.state.foreign)
-
-    velocity.node.wait_for(is_gone, 5.0, "the end of the intruder")
+    velocity.node.wait_for(lambda: not on_the_output(), 5.0, "the end of the intruder")
     assert velocity.ordered_for(0.3) == {0.0}  # the stick is still held
     velocity.node.release(joystick)
     joystick.message = drive(0.1)
