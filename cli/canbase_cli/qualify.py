@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import re
 import signal
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -103,11 +104,20 @@ def qualify(
     folder = out or Path(f"qualification_{loaded.robot.name}")
     if report:
         write_and_exit(folder, loaded)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     if scheduler is not None and workers is not None:
         raise typer.BadParameter("the workers of a cluster are started there: dask worker", param_hint="--workers")
     crew = partial(_crew, scheduler, workers or os.cpu_count() or 1)
-    _Qualify(loaded, folder, amount, payloads, slope).run(crew, resume=resume)
+    with _sigterm_as_ctrl_c():
+        _Qualify(loaded, folder, amount, payloads, slope).run(crew, resume=resume)
+
+
+@contextmanager
+def _sigterm_as_ctrl_c() -> Iterator[None]:
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _crew(scheduler: str | None, workers: int) -> AnyCrew:
