@@ -30,7 +30,7 @@ from canbase_evidence.standing import Finding, Part, Standing
 from canbase_hazards import catalogue
 from canbase_qualification.software import software as qualification_software
 from canbase_recording.recorded_inputs import NoInputsError
-from canbase_recording.replay_file import robot_beside
+from canbase_recording.replay_file import INPUTS_SUFFIX, robot_beside
 from canbase_runtime.version import installed_version
 
 INDEX: Final = "index.html"
@@ -190,7 +190,16 @@ def _recordings(folder: Folder, paths: Sequence[Path]) -> list[recorded.Recorded
     files = [file for path in paths for file in _asc_files(path)]
     if len(files) > MOST_RECORDINGS:
         raise GatherError(f"--recordings: {len(files)} recordings, {MOST_RECORDINGS} at most")
+    for path in paths:
+        _copy_inputs(folder, path)
     return sorted((_recording(folder, file) for file in files), key=lambda stop: (stop.at_unix_s, stop.file))
+
+
+def _copy_inputs(folder: Folder, path: Path) -> None:
+    """What watchdog, mux and filter recorded of their own inputs: `canbase replay` finds it beside the stops."""
+    for name in names(path) if path.is_dir() else ():
+        if name.endswith(INPUTS_SUFFIX):
+            folder.copy("recordings", path / name)
 
 
 def _asc_files(path: Path) -> list[Path]:

@@ -226,6 +226,15 @@ def test_recordings_of_the_same_name_are_kept_apart_each_with_its_json_file(tmp_
     }
 
 
+def test_what_watchdog_and_filter_recorded_of_a_stop_is_kept_for_a_replay(tmp_path: Path, robot_yaml: Path) -> None:
+    recording(tmp_path / "stops", robot_yaml)
+    (tmp_path / "stops" / "watchdog_canbase_1.jsonl").write_text("{}\n")
+    (tmp_path / "stops" / "other.txt").write_text("no recording")
+    run(robot_yaml, "--recordings", tmp_path / "stops", "--out", tmp_path / "evidence")
+    kept = {path.name for path in (tmp_path / "evidence" / "recordings").iterdir()}
+    assert kept == {"stop_a.asc", "stop_a.json", "watchdog_canbase_1.jsonl"}
+
+
 class Reader(HTMLParser):
     """Collects the text in order, and the tags."""
 
