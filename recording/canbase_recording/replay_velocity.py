@@ -26,6 +26,7 @@ from canbase_velocity.mux import Mux
 from canbase_velocity.obstacle import Geometry
 from canbase_velocity.placement import Placement
 from canbase_velocity.safety_filter import FilterConfig
+from canbase_velocity.speed_limit import SpeedLimit
 from canbase_velocity.twist import ZERO, Twist
 from canbase_velocity.unexpected_publishers import Foreign
 
@@ -141,6 +142,7 @@ class _Replayer:
             "points": lambda at_s, topic, points: self._seen(topic, safety.on_points, points, None, at_s),
             "unplaced": lambda at_s, topic, why: self._seen(topic, safety.on_unplaced_scan, why),
             "scanners": lambda at_s, topic, nodes: self._seen(topic, safety.on_scan_publishers, nodes, at_s),
+            "speed_limit": lambda at_s, v, w, by: safety.on_speed_limit(SpeedLimit(v, w), by),
             "reset": lambda at_s, moving: safety.reset(moving, at_s),
             "record": self._record,
             "end": lambda at_s: safety.end(),

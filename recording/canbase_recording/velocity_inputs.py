@@ -200,6 +200,7 @@ _READ: Final[Mapping[str, Callable[..., Call]]] = {
     "points": _points,
     "unplaced": lambda topic, why: (str(topic), str(why)),
     "scanners": lambda topic, nodes: (str(topic), _names(nodes)),
+    "speed_limit": lambda v, w, by: (float(v), float(w), str(by)),
     "reset": lambda moving: (_names(moving),),
     "record": lambda record, problem: (None if record is None else dict(record), str(problem)),
     "end": lambda: (),

@@ -169,8 +169,9 @@ class FilterNode(Node):
         now_s, limit = time.monotonic(), limits.effective
         fields = {"linear_mps": f"{limit.linear_mps:g}", "angular_radps": f"{limit.angular_radps:g}"}
         self._voice.tell(f"speed limit {limit}, {how}", Priority.NOTICE, robot=self._robot.name, **fields)
+        self._note("speed_limit", now_s, limit.linear_mps, limit.angular_radps, limits.by)
         self._filter.on_speed_limit(limit, limits.by)
-        self._issue(self._filter.decide(now_s), now_s)
+        self._decide(now_s)
 
     def _refuse(self, why: str) -> None:
         self._voice.tell(why, Priority.WARNING, robot=self._robot.name)

@@ -8,11 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import rclpy
 from canbase.msg import SafetyState
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.parameter import Parameter, parameter_value_to_python
 
+from canbase_config.robot import Robot
+from canbase_velocity.filter_node import FilterNode
 from support.ros_harness import Process, TestNode
 from support.velocity_chain import Chain, drive
 
@@ -109,6 +112,21 @@ def test_a_limit_at_the_start(
         test_node.wait_for(lambda: process.exit_code is not None, 30.0, "its end")
     assert process.exit_code == code
     assert "Traceback" not in process.log()
+
+
+@pytest.mark.usefixtures("domain_id")
+def test_a_change_and_what_is_decided_then_are_among_the_recorded_inputs(robot: Robot) -> None:
+    """Otherwise a replay would be of a faster robot."""
+    noted: list[tuple[Any, ...]] = []
+    rclpy.init(args=[])
+    try:
+        node = FilterNode(robot, note=lambda *entry: noted.append(entry))
+        noted.clear()
+        node.set_parameters([Parameter(LINEAR, value=0.2), Parameter(LINEAR, value=0.2)])
+    finally:
+        rclpy.shutdown()
+    assert [(entry[0], *entry[2:4]) for entry in noted if entry[0] != "decide"] == [("speed_limit", 0.2, 2.0)]
+    assert [entry[0] for entry in noted] == ["speed_limit", "decide"], "what does not change decides nothing"
 
 
 def test_nav2_lowers_the_speed_by_its_own_message(chain: Chain) -> None:

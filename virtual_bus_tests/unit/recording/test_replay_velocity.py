@@ -96,6 +96,18 @@ def test_a_lower_limit_would_have_limited(folder: Path, estop: VelocityInputs) -
     assert replayed.linear_mps == pytest.approx(0.2)
 
 
+def test_a_speed_limit_of_run_time_is_replayed(estop: VelocityInputs) -> None:
+    """The recorded filter had none: from this call on the replayed one limits."""
+    half = len(estop.calls) // 2
+    limit = ("speed_limit", estop.calls[half][1], 0.1, 2.0, "a test")
+    found = replay_velocity(replace(estop, calls=(*estop.calls[:half], limit, *estop.calls[half:])))
+    recorded, replayed = found.filter_differences[0]
+    assert recorded.at_s >= limit[1]
+    assert (recorded.action, replayed.cause) == ("PASS", "speed_ceiling")
+    assert replayed.linear_mps == pytest.approx(0.1)
+    assert replayed.detail.startswith("a test: ")
+
+
 def slower(folder: Path) -> Robot:
     robot = robot_of(folder)
     return robot.model_copy(update={"limits": robot.limits.model_copy(update={"linear_mps": 0.2})})
