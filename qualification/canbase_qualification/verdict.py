@@ -45,12 +45,14 @@ def verdict_of(setup: Setup, collected: Collected, stops: StopFigures | None) ->
     if missing or setup.problems:
         parts = ", ".join(f"{collected.runs[kind]:,} of {counted(kind, setup.asked[kind])}" for kind in missing)
         return Grade.INCOMPLETE, f"INCOMPLETE: {parts or setup.problems[0]}; no violation so far."
-    worst = (
-        f", at most {stops.time_s.greatest:.2f} s and {stops.distance_m.greatest:.2f} m after the failure"
-        if stops
-        else ""
-    )
-    return Grade.PASSED, f"No violation in {done}: every measured stop ended in standstill{worst}."
+    return Grade.PASSED, f"No violation in {done}: {_stood(stops)}."
+
+
+def _stood(stops: StopFigures | None) -> str:
+    if stops is None:
+        return "no stop was measured"
+    time_s, distance_m = stops.time_s.greatest, stops.distance_m.greatest
+    return f"every measured stop ended in standstill, at most {time_s:.2f} s and {distance_m:.2f} m after the failure"
 
 
 def _never(collected: Collected, never: int, of: int) -> str:

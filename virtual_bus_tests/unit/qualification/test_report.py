@@ -50,6 +50,11 @@ def test_all_is_well() -> None:
     )
 
 
+def test_without_a_stop_none_is_said_to_have_ended() -> None:
+    report = made([scenario(0, "driver_dies")], asked={"scenario": 1})
+    assert report.verdict == "No violation in 1 scenario of bench: no stop was measured."
+
+
 def test_one_violation_is_enough() -> None:
     report = made([*passed(), scenario(7, "driver_dies", violations=(HELD,))])
     assert report.grade is Grade.FAILED
