@@ -63,6 +63,6 @@ def test_it_stops_latches_and_drives_again_after_a_reset(
     again = driver.heard_again()
     assert again.bus.failures >= 1
     assert again.state is DriverState.LATCHED
-    driver.reset()
+    driver.reset(5.0)
     driver.driving()
     assert driver.loop.is_alive()

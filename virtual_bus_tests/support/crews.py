@@ -42,8 +42,10 @@ def simulated_crews(kind: str | None) -> list[Crew]:
 
 
 def _patient(robot: Robot) -> Robot:
-    """Driver, watchdog and drives share one process there: on a loaded computer the watchdog's turn comes late."""
-    return robot.model_copy(update={"watchdog": robot.watchdog.model_copy(update={"loop_late_s": 0.3})})
+    """Driver, watchdog and drives share one process there: on a loaded computer the turns of all of them come late."""
+    watchdog = robot.watchdog.model_copy(update={"loop_late_s": 0.3})
+    timeouts = robot.timeouts.model_copy(update={"feedback_s": 0.3})
+    return robot.model_copy(update={"watchdog": watchdog, "timeouts": timeouts})
 
 
 def real_crew(bus: Mapping[str, Any], kind: str | None, file: Path | None) -> Crew:

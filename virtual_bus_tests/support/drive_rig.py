@@ -138,7 +138,8 @@ class Driver:
                 self.seen = snapshot
                 if until(snapshot):
                     return snapshot
-        raise AssertionError(f"not within {within_s} s: {self.seen}")
+        told = self.seen and (self.seen.state, self.seen.finding, self.seen.cycle, self.seen.odometry.twist)
+        raise AssertionError(f"not within {within_s} s: {told}")
 
     def enabled(self) -> DriverSnapshot:
         """Wait until it is, and has seen zero commands since."""
