@@ -18,7 +18,7 @@ from mypyc.build import mypycify
 
 from compiled import finder
 from compiled.copies import copies
-from compiled.modules import BUILD, hot_modules
+from compiled.modules import BUILD, SOURCES, hot_modules
 
 MYPY = (
     "--config-file=",
@@ -37,7 +37,10 @@ def path_of(module: str) -> Path:
 
 
 def copy() -> None:
-    """All packages. What has not changed keeps its time."""
+    """All packages. What has not changed keeps its time; a package that is no more would hide the one of its name."""
+    for left in BUILD.glob("*/*.py"):
+        if left.parent.name not in SOURCES:
+            shutil.rmtree(left.parent, ignore_errors=True)
     for path, data in copies():
         if not path.exists() or path.read_bytes() != data:
             path.parent.mkdir(parents=True, exist_ok=True)
