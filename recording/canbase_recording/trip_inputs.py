@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from canbase_config.watchdog import WatchdogConfig
+from canbase_recording.input_lines import finite, head_of, json_line
 from canbase_recording.recorded_inputs import NoInputsError
 from canbase_watchdog.input_ring import END, EXPIRE, FORMAT, FRAME, LEASE, MAX_INPUTS, START, SUSPEND, TICK, VERDICT
 from canbase_watchdog.latch import Entry, Mark, Past
@@ -81,7 +82,7 @@ def trip_inputs(lines: Iterable[str]) -> TripInputs:
     for number, line in numbered:
         if number > MAX_INPUTS + 1:
             raise NoInputsError(f"line {number}: canbase writes no more than {MAX_INPUTS}")
-        call = _call(_json(line, number), number)
+        call = _call(json_line(line, number, LINE_BYTES), number)
         if call[0] == VERDICT:
             verdicts.append(RecordedVerdict(*call[1:]))
         else:
@@ -91,20 +92,15 @@ def trip_inputs(lines: Iterable[str]) -> TripInputs:
 
 def trip_head(line: str) -> TripHead:
     """Of the first line. Raises NoInputsError."""
-    head = _json(line, 1)
-    if not isinstance(head, dict) or head.get("part") != "watchdog":
-        raise NoInputsError("line 1: it is no file of the inputs of a watchdog's trip")
-    if head.get("format") != FORMAT:
-        found = str(head.get("format"))[:20]
-        raise NoInputsError(f"format {found!r}, expected {FORMAT}: of another version of canbase?")
+    head = head_of(line, LINE_BYTES, "watchdog", FORMAT, "a watchdog's trip")
     try:
         trip, past = head["trip"], head["past"]
         return TripHead(
             robot=str(head["robot"]),
             config=WatchdogConfig.from_json(json.dumps(head["config"])),
             past=None if past is None else _past(past),
-            trip=RecordedVerdict(_finite(trip["at_s"]), int(trip["cause"]), int(trip["node_id"]), str(trip["detail"])),
-            wall_offset_s=_finite(head["wall_offset_s"]),
+            trip=RecordedVerdict(finite(trip["at_s"]), int(trip["cause"]), int(trip["node_id"]), str(trip["detail"])),
+            wall_offset_s=finite(head["wall_offset_s"]),
         )
     except KeyError as error:
         raise NoInputsError(f"line 1: the key {error} is missing") from error
@@ -117,29 +113,13 @@ def _past(values: Mapping[str, Any]) -> Past:
     return Past(Entry(**{**entry, "mark": Mark(entry["mark"])}), str(values["problem"]), int(values["sequence"]))
 
 
-def _json(line: str, number: int) -> Any:
-    if len(line) > LINE_BYTES:
-        raise NoInputsError(f"line {number}: longer than {LINE_BYTES // 1000} kB")
-    try:
-        return json.loads(line)
-    except (ValueError, RecursionError) as error:
-        raise NoInputsError(f"line {number}: no JSON ({error}); was the file cut off?") from error
-
-
 def _call(values: Any, number: int) -> Call:
     try:
         what, at_s, *rest = values
-        call = what, _finite(at_s), *_READ[what](rest)
+        call = what, finite(at_s), *_READ[what](rest)
     except (KeyError, TypeError, ValueError) as error:
         raise NoInputsError(f"line {number}: no input of a watchdog ({str(error)[:80]})") from error
     return call
-
-
-def _finite(value: Any) -> float:
-    number = float(value)
-    if not math.isfinite(number):
-        raise ValueError(f"{number} is no time")
-    return number
 
 
 def _bytes(text: Any, most: int) -> bytes:
@@ -163,7 +143,7 @@ def _lease(values: list[Any]) -> Call:
 
 def _tick(values: list[Any]) -> Call:
     failed_since, errors = values
-    return math.inf if failed_since is None else _finite(failed_since), int(errors)
+    return math.inf if failed_since is None else finite(failed_since), int(errors)
 
 
 def _verdict(values: list[Any]) -> Call:
@@ -183,7 +163,7 @@ _READ: Final[Mapping[str, Callable[[list[Any]], Call]]] = {
     LEASE: _lease,
     TICK: _tick,
     EXPIRE: _nothing,
-    SUSPEND: lambda values: (_finite(values[0]),),
+    SUSPEND: lambda values: (finite(values[0]),),
     END: _nothing,
     VERDICT: _verdict,
 }

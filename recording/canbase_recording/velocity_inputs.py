@@ -5,8 +5,6 @@ canbase_velocity.input_ring writes it. It may come from anybody: each value is c
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -18,6 +16,7 @@ from canbase_config.mux import Mux as MuxSection
 from canbase_config.robot import Base, Limits, Rates
 from canbase_config.safety import Safety
 from canbase_recording.core_state import array
+from canbase_recording.input_lines import finite, head_of, json_line
 from canbase_recording.recorded_inputs import NoInputsError
 from canbase_velocity.clearance import Points
 from canbase_velocity.input_ring import FORMAT, MAX_INPUTS
@@ -79,7 +78,7 @@ def velocity_inputs(lines: Iterable[str]) -> VelocityInputs:
     for number, line in numbered:
         if number > MAX_INPUTS + 2:
             raise NoInputsError(f"line {number}: canbase writes no more than {MAX_INPUTS}")
-        values = _json(line, number)
+        values = json_line(line, number, LINE_BYTES)
         if number == 2 and isinstance(values, list) and values[:1] == ["state"]:
             state = values[2] if len(values) == 3 else None
             continue
@@ -89,12 +88,7 @@ def velocity_inputs(lines: Iterable[str]) -> VelocityInputs:
 
 def velocity_head(line: str) -> VelocityHead:
     """Of the first line. Raises NoInputsError."""
-    head = _json(line, 1)
-    if not isinstance(head, dict) or head.get("part") != "velocity":
-        raise NoInputsError("line 1: it is no file of the inputs of mux and filter")
-    if head.get("format") != FORMAT:
-        found = str(head.get("format"))[:20]
-        raise NoInputsError(f"format {found!r}, expected {FORMAT}: of another version of canbase?")
+    head = head_of(line, LINE_BYTES, "velocity", FORMAT, "mux and filter")
     try:
         told = head["robot_yaml"]
         config = VelocityConfig(
@@ -107,7 +101,7 @@ def velocity_head(line: str) -> VelocityHead:
         )
         stop = head["stop"]
         return VelocityHead(
-            str(head["robot"]), config, _finite(stop["at_s"]), str(stop["cause"]), _finite(head["wall_offset_s"])
+            str(head["robot"]), config, finite(stop["at_s"]), str(stop["cause"]), finite(head["wall_offset_s"])
         )
     except KeyError as error:
         raise NoInputsError(f"line 1: the key {error} is missing") from error
@@ -119,28 +113,12 @@ def velocity_head(line: str) -> VelocityHead:
         raise NoInputsError(f"line 1: a value is not what it must be: {str(error)[:200]}") from error
 
 
-def _json(line: str, number: int) -> Any:
-    if len(line) > LINE_BYTES:
-        raise NoInputsError(f"line {number}: longer than {LINE_BYTES // 1_000_000} MB")
-    try:
-        return json.loads(line)
-    except (ValueError, RecursionError) as error:
-        raise NoInputsError(f"line {number}: no JSON ({error}); was the file cut off?") from error
-
-
 def _call(values: Any, number: int) -> Call:
     try:
         what, at_s, *rest = values
-        return what, _finite(at_s), *_READ[what](*rest)
+        return what, finite(at_s), *_READ[what](*rest)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise NoInputsError(f"line {number}: no input of mux or filter ({str(error)[:80]})") from error
-
-
-def _finite(value: Any) -> float:
-    number = float(value)
-    if not math.isfinite(number):
-        raise ValueError(f"{number} is no time")
-    return number
 
 
 def _names(values: Any) -> list[str]:
