@@ -80,9 +80,15 @@ def qualify(
     report: Annotated[
         bool, typer.Option("--report", help="Run nothing: make the report of the results in the folder again.")
     ] = False,
-    scenario: Annotated[int | None, typer.Option(min=0, metavar="SEED", help="Tell this scenario as a log.")] = None,
-    stop: Annotated[int | None, typer.Option(min=0, metavar="SEED", help="Tell this stop as a log.")] = None,
-    frames: Annotated[bool, typer.Option("--frames", help="In a log: every frame on the bus as well.")] = False,
+    scenario: Annotated[
+        int | None, typer.Option(min=0, metavar="SEED", help="Print this scenario step by step, and run nothing else.")
+    ] = None,
+    stop: Annotated[
+        int | None, typer.Option(min=0, metavar="SEED", help="Print this stop step by step, and run nothing else.")
+    ] = None,
+    frames: Annotated[
+        bool, typer.Option("--frames", help="With --scenario or --stop: every frame on the bus too.")
+    ] = False,
 ) -> None:
     """Try thousands of failures on your robot in virtual time: stop times, stopping distances, and what does not hold.
 
@@ -98,7 +104,7 @@ def qualify(
     payloads = None if payload is None else payload_range(payload)
     loaded = load_config(config, quiet=True)
     if scenario is not None or stop is not None:
-        _tell(loaded, _load(payloads, slope), scenario, stop, frames=frames)
+        _print_run(loaded, _load(payloads, slope), scenario, stop, frames=frames)
     given = {"scenarios": scenarios, "stops": stops, "drives": drives, "first": seed}
     amount = {name: value for name, value in given.items() if value is not None}
     folder = out or Path(f"qualification_{loaded.robot.name}")
@@ -158,14 +164,14 @@ def _unfit(loaded: Loaded, error: Exception) -> NoReturn:
     fail(f"{loaded.path} cannot be qualified: {error}", WRONG_INPUT)
 
 
-def _tell(loaded: Loaded, load: Load, scenario: int | None, stop: int | None, *, frames: bool) -> NoReturn:
-    from canbase_qualification.tell import tell_scenario, tell_stop
+def _print_run(loaded: Loaded, load: Load, scenario: int | None, stop: int | None, *, frames: bool) -> NoReturn:
+    from canbase_qualification.run_log import log_scenario, log_stop
 
     job, _, _ = _job(loaded, load)
     if scenario is not None:
-        held = tell_scenario(job, scenario, typer.echo, frames=frames)
+        held = log_scenario(job, scenario, typer.echo, frames=frames)
     else:
-        held = tell_stop(job, stop or 0, typer.echo, frames=frames)
+        held = log_stop(job, stop or 0, typer.echo, frames=frames)
     raise typer.Exit(0 if held else FAILED)
 
 

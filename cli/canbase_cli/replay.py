@@ -58,11 +58,11 @@ def replay(
         raise typer.Exit(FAILED)
 
 
-Told = tuple[dict[str, Any], list[str], bool]
-"""For JSON, for people, and whether the replay does what was recorded."""
+Replay = tuple[dict[str, Any], list[str], bool]
+"""What one replay found: values for --json, lines for people, and whether it does what was recorded."""
 
 
-def _replayed(path: Path, other: Robot | None) -> Told:
+def _replayed(path: Path, other: Robot | None) -> Replay:
     if path.suffix != ".jsonl":
         return _stop(path, other)
     from canbase_recording.replay_file import part_of
@@ -70,7 +70,7 @@ def _replayed(path: Path, other: Robot | None) -> Told:
     return _velocity(path, other) if part_of(path) == "velocity" else _trip(path, other)
 
 
-def _velocity(path: Path, other: Robot | None) -> Told:
+def _velocity(path: Path, other: Robot | None) -> Replay:
     """The inputs of mux and filter alone."""
     from canbase_recording.replay_file import read_velocity
 
@@ -78,7 +78,7 @@ def _velocity(path: Path, other: Robot | None) -> Told:
     return _mux_and_filter(inputs, path.name, inputs, other)
 
 
-def _mux_and_filter(inputs: VelocityInputs, name: str, zero: Begun, other: Robot | None) -> Told:
+def _mux_and_filter(inputs: VelocityInputs, name: str, zero: Begun, other: Robot | None) -> Replay:
     from canbase_recording import replay_velocity_text as words
     from canbase_recording.replay_velocity import replay_velocity
 
@@ -92,7 +92,7 @@ def _mux_and_filter(inputs: VelocityInputs, name: str, zero: Begun, other: Robot
     return values, lines, found.agrees
 
 
-def _trip(path: Path, other: Robot | None) -> Told:
+def _trip(path: Path, other: Robot | None) -> Replay:
     """The inputs of a watchdog's trip alone."""
     from canbase_recording import replay_text as words
     from canbase_recording.replay_compare import compare_alone
@@ -110,7 +110,7 @@ def _trip(path: Path, other: Robot | None) -> Told:
     return values, lines, not any(life.differs for life in found.lives)
 
 
-def _stop(path: Path, other: Robot | None) -> Told:
+def _stop(path: Path, other: Robot | None) -> Replay:
     """Both files of the driver, and those of watchdog, mux and filter where they lie beside them."""
     from canbase_recording import replay_text as words
     from canbase_recording.replay import replay_watchdog
@@ -145,7 +145,7 @@ def _stop(path: Path, other: Robot | None) -> Told:
     return values, lines, agrees
 
 
-def _beside(own: VelocityInputs, name: str, inputs: RecordedInputs, other: Robot | None) -> Told:
+def _beside(own: VelocityInputs, name: str, inputs: RecordedInputs, other: Robot | None) -> Replay:
     """A file of another version is no reason not to replay the rest."""
     from canbase_recording.recorded_inputs import NoInputsError
 
@@ -156,7 +156,7 @@ def _beside(own: VelocityInputs, name: str, inputs: RecordedInputs, other: Robot
         return {"not_replayed": told}, [told], True
 
 
-def _sources(inputs: RecordedInputs, robot: Robot) -> Told:
+def _sources(inputs: RecordedInputs, robot: Robot) -> Replay:
     """Of the mux what the driver's recording shows; the filter is not replayed without its own file."""
     from canbase_recording import replay_text as words
     from canbase_recording.replay_sources import replay_sources
@@ -166,7 +166,7 @@ def _sources(inputs: RecordedInputs, robot: Robot) -> Told:
     return values, [*words.source_lines(inputs, sources), words.NOT_REPLAYED], not sources.differences
 
 
-def _setpoints(inputs: RecordedInputs, robot: Robot) -> Told:
+def _setpoints(inputs: RecordedInputs, robot: Robot) -> Replay:
     from canbase_recording import replay_text as words
     from canbase_recording.replay_setpoints import replay_setpoints
 

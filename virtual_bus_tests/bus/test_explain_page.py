@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import pytest
 from typer.testing import CliRunner
 
 from canbase_cli.main import app
 from canbase_config.load import sample
-from support.browser import NEEDS_CHROMIUM, browser
+from support.browser import NEEDS_CHROMIUM, browser, offline_page
 
 pytestmark = [pytest.mark.bus, pytest.mark.timeout(120), NEEDS_CHROMIUM]
 DATA: Final = Path(__file__).parent.parent / "unit" / "recording" / "data"
+DRAWN: Final = "#plot1 .bars .point"
 PICTURES: Final = os.environ.get("CANBASE_PICTURES")
 
 
@@ -23,20 +24,6 @@ def page_of(recording: str, folder: Path) -> Path:
     words = ["explain", str(DATA / recording), "--config", str(sample("bench")), "--html", str(target)]
     assert CliRunner().invoke(app, words, catch_exceptions=False).exit_code == 0
     return target
-
-
-def opened(player: Any, page: Path, *, width: int, height: int, dark: bool) -> tuple[Any, list[str]]:
-    """Offline; and all that the browser complains about or asks a network for."""
-    context = player.new_context(
-        viewport={"width": width, "height": height}, color_scheme="dark" if dark else "light", offline=True
-    )
-    shown, complaints = context.new_page(), []
-    shown.on("console", lambda message: complaints.append(message.text))
-    shown.on("pageerror", lambda error: complaints.append(str(error)))
-    shown.on("request", lambda request: complaints.append(request.url) if not request.url.startswith("file:") else None)
-    shown.goto(page.as_uri())
-    shown.wait_for_selector("#plot1 .bars .point")
-    return shown, [text for text in complaints if not text.startswith(("data:", "blob:"))]
 
 
 @pytest.mark.parametrize(
@@ -49,8 +36,9 @@ def opened(player: Any, page: Path, *, width: int, height: int, dark: bool) -> t
 def test_plots_tables_and_filter(
     recording: str, picture: str, width: int, height: int, dark: bool, tmp_path: Path
 ) -> None:
+    page = page_of(recording, tmp_path)
     with browser() as player:
-        shown, complaints = opened(player, page_of(recording, tmp_path), width=width, height=height, dark=dark)
+        shown, complaints = offline_page(player, page, DRAWN, width=width, height=height, dark=dark)
         assert shown.evaluate("document.documentElement.scrollWidth") <= width
         assert shown.locator("#plot1 .scatterlayer .trace").count() >= 6
         assert shown.locator("#load .scatterlayer .trace").count() == 1

@@ -13,25 +13,12 @@ import pytest
 from canbase_config.load import sample
 from canbase_qualification.report_page import page
 from canbase_qualification.report_sections import sections
-from support.browser import NEEDS_CHROMIUM, browser
+from support.browser import NEEDS_CHROMIUM, browser, offline_page
 from support.made_results import made, passed
 
 pytestmark = [pytest.mark.bus, pytest.mark.timeout(120), NEEDS_CHROMIUM]
+DRAWN: Final = "#curve .scatterlayer .trace"
 PICTURES: Final = os.environ.get("CANBASE_PICTURES")
-
-
-def opened(player: Any, file: Path, *, width: int, height: int, dark: bool) -> tuple[Any, list[str]]:
-    """Offline; and all that the browser complains about or asks a network for."""
-    context = player.new_context(
-        viewport={"width": width, "height": height}, color_scheme="dark" if dark else "light", offline=True
-    )
-    shown, complaints = context.new_page(), []
-    shown.on("console", lambda message: complaints.append(message.text))
-    shown.on("pageerror", lambda error: complaints.append(str(error)))
-    shown.on("request", lambda request: complaints.append(request.url) if not request.url.startswith("file:") else None)
-    shown.goto(file.as_uri())
-    shown.wait_for_selector("#curve .scatterlayer .trace")
-    return shown, complaints
 
 
 def ticks(shown: Any) -> str:
@@ -45,7 +32,7 @@ def test_plots_choices_and_tables(width: int, height: int, dark: bool, tmp_path:
     file = tmp_path / "report.html"
     file.write_text(page("canbase qualify: bench", report, sections(report)), encoding="utf-8")
     with browser() as player:
-        shown, complaints = opened(player, file, width=width, height=height, dark=dark)
+        shown, complaints = offline_page(player, file, DRAWN, width=width, height=height, dark=dark)
         assert shown.evaluate("document.documentElement.scrollWidth") <= width
         assert shown.locator(".verdict").inner_text().startswith("No violation in 1,135 stops")
         assert shown.locator("#overview .scatterlayer .trace").count() == 5
@@ -71,7 +58,9 @@ def test_the_picture_of_the_docs_is_of_a_real_run(tmp_path: Path) -> None:
     run = subprocess.run([sys.executable, "-P", "-m", "canbase_cli", *words], cwd=tmp_path, check=False, timeout=500)
     assert run.returncode == 0
     with browser() as player:
-        shown, complaints = opened(player, tmp_path / "out" / "report.html", width=1100, height=900, dark=False)
+        shown, complaints = offline_page(
+            player, tmp_path / "out" / "report.html", DRAWN, width=1100, height=900, dark=False
+        )
         shown.screenshot(path=str(Path(str(PICTURES)) / "qualify_report.png"))
         shown.locator("#stops").scroll_into_view_if_needed()
         shown.locator("#overview").screenshot(path=str(Path(str(PICTURES)) / "qualify_hazards.png"))

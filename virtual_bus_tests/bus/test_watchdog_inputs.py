@@ -15,7 +15,7 @@ from canbase_recording.replay_file import read_trip
 from canbase_recording.replay_trip import replay_trip
 from canbase_watchdog.trip_cause import TripCause
 from support.watchdog_story import FAULT
-from support.watched_process import Watched
+from support.watched_process import Watched, watched_process
 
 pytestmark = pytest.mark.bus
 
@@ -24,15 +24,8 @@ WRITTEN_S = 8.0
 
 @pytest.fixture
 def watched(tmp_path: Path) -> Iterator[Watched]:
-    it = Watched(tmp_path)
-    try:
-        with it.robot:
-            it.robot.first(0x1FE, 0.0, timeout_s=10.0)
-            yield it
-    finally:
-        it.process.kill()
-        it.process.communicate()
-        it.systemd.close()
+    with watched_process(tmp_path) as it:
+        yield it
 
 
 def sent_by_another(watched: Watched, cob_id: int, data: str) -> None:

@@ -15,7 +15,7 @@ import pytest
 
 from canbase_watchdog.frames import Frame
 from support.watchdog_story import config
-from support.watched_process import Watched
+from support.watched_process import Watched, watched_process
 from unit.runtime.test_output import full_pipe
 
 pytestmark = pytest.mark.bus
@@ -25,15 +25,8 @@ QUICK_STOP = Frame(0x501, bytes.fromhex("02 00"))
 
 @pytest.fixture
 def watched(tmp_path: Path) -> Iterator[Watched]:
-    it = Watched(tmp_path)
-    try:
-        with it.robot:
-            it.robot.first(0x1FE, 0.0, timeout_s=10.0)
-            yield it
-    finally:
-        it.process.kill()
-        it.process.communicate()
-        it.systemd.close()
+    with watched_process(tmp_path) as it:
+        yield it
 
 
 # last lease ── 0.25 s ── quick stop on the bus

@@ -1,4 +1,4 @@
-"""Debian's chromium, driven by playwright: for the tests of `canbase web`."""
+"""Debian's chromium, driven by playwright: for the tests of pages."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import shutil
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Final
 
 import pytest
@@ -23,6 +24,22 @@ def browser() -> Iterator[Any]:
         launched = player.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         yield launched
         launched.close()
+
+
+def offline_page(player: Any, file: Path, drawn: str, *, width: int, height: int, dark: bool) -> tuple[Any, list[str]]:
+    """A page from a file without a network, once the selector `drawn` is there; and what the browser complains about or
+    asks a network for."""
+    context = player.new_context(
+        viewport={"width": width, "height": height}, color_scheme="dark" if dark else "light", offline=True
+    )
+    shown, complaints = context.new_page(), []
+    shown.on("console", lambda message: complaints.append(message.text))
+    shown.on("pageerror", lambda error: complaints.append(str(error)))
+    inside = ("file:", "data:", "blob:")
+    shown.on("request", lambda asked: None if asked.url.startswith(inside) else complaints.append(asked.url))
+    shown.goto(file.as_uri())
+    shown.wait_for_selector(drawn)
+    return shown, complaints
 
 
 def free_tcp_port() -> int:

@@ -7,6 +7,8 @@ import signal
 import socket
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -55,3 +57,17 @@ class Watched:
         self.process.send_signal(number)
         _, log = self.process.communicate(timeout=5.0)
         return self.process.returncode, log
+
+
+@contextmanager
+def watched_process(folder: Path) -> Iterator[Watched]:
+    """From the process' first state frame on; killed at the end."""
+    it = Watched(folder)
+    try:
+        with it.robot:
+            it.robot.first(0x1FE, 0.0, timeout_s=10.0)
+            yield it
+    finally:
+        it.process.kill()
+        it.process.communicate()
+        it.systemd.close()

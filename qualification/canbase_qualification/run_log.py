@@ -13,12 +13,12 @@ from canbase_qualification.runs import body, by_joystick, full_mps, scenario_pla
 Say = Callable[[str], None]
 
 
-def tell_scenario(job: Job, seed: int, say: Say, *, frames: bool) -> bool:
+def log_scenario(job: Job, seed: int, say: Say, *, frames: bool) -> bool:
     """Whether every property held."""
     return not replay(body(job, seed // A_BODY), scenario_plan(job, seed), frames, say).violations
 
 
-def tell_stop(job: Job, seed: int, say: Say, *, frames: bool) -> bool:
+def log_stop(job: Job, seed: int, say: Say, *, frames: bool) -> bool:
     """Whether the base came to a stand. Times count from when the base drove steadily."""
     number, place = divmod(seed, len(FAILURES))
     failure, drawn = by_joystick(FAILURES[place]), body(job, number)
