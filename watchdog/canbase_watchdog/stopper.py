@@ -31,7 +31,9 @@ FRESH_S = 1.5
 DRIVER_MISSED = 0.5
 """Of drive_heartbeat_s, in which a driver sends three heartbeats: without one for this long none is there."""
 SEEK_PERIOD_S = 0.5
-"""A node of which nothing is known after the start is read this seldom: tools find the SDO channel free."""
+"""A node of which nothing is known after the start is read this seldom: tools find the SDO channel free ..."""
+SOUGHT_OFTEN = 20
+"""... but for the first readings of one that is NMT operational: a second of them, some may be lost."""
 
 _WORD_BY_STEP = {
     Step.PRE_OPERATIONAL: frames.QUICK_STOP_WORD,
@@ -196,7 +198,7 @@ class Stopper:
             return []
         rests = self.climb.stopped and not defied
         seeks = rests and self._is_unknown(view, now_s)
-        seldom = seeks and not view.node(self._node_id).operational
+        seldom = seeks and (not view.node(self._node_id).operational or self._sdo_turn >= SOUGHT_OFTEN)
         stopped_s = SEEK_PERIOD_S if seldom else IDLE_SDO_PERIOD_S
         period_s = stopped_s if self.climb.stopped else SDO_PERIOD_S
         if now_s < self._sdo_at + period_s or (rests and not seeks and not self._is_old(view, now_s)):

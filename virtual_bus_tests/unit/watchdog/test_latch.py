@@ -117,6 +117,16 @@ def test_a_drive_that_a_driver_may_boot_is_read_after_its_heartbeat_time(
     assert times[0] == pytest.approx(read_from_s, abs=0.006)
 
 
+# 0.1 s each 50 ms ── 1.1 s no answer yet ── each 0.5 s: the SDO channel is free for a tool
+def test_a_drive_that_answers_no_reading_is_read_seldom_after_a_second() -> None:
+    story = abandoned(FakeDrive(1, hears_sdo=False))
+    story.run(5.0)
+    times = [at_s for at_s, _ in story.since(0.0, 0x601)]
+    assert times[0] == pytest.approx(0.1, abs=0.006)
+    assert len([at_s for at_s in times if at_s < 1.2]) == 20
+    assert len([at_s for at_s in times if at_s >= 1.2]) in (7, 8)
+
+
 def test_a_patience_for_feedback_beyond_the_heartbeat_time_delays_no_reading() -> None:
     story = abandoned(FakeDrive(1), feedback_timeout_s=0.5)
     for _ in range(10):
