@@ -133,7 +133,8 @@ def _check(folder: Path) -> None:
     for each in differences:
         typer.echo(f"{each.what}: {each.name!r}")
     if differences:
-        fail(f"{folder} is not as it was written: {len(differences)} differences", FAILED)
+        count = f"{len(differences)} difference{'s' * (len(differences) > 1)}"
+        fail(f"{folder} is not as it was written: {count}", FAILED)
     typer.echo(f"unchanged since its list of hashes was written. SHA-256 of the list: {digest}")
 
 
