@@ -42,7 +42,7 @@ test-own-time: coverage ## tests that bring their own time: pure units, campaign
 .PHONY: test-real-time
 test-real-time: $(VENV)/ready ## tests in real time; WORKERS=2 two robots at a time; ONLY=bus simulated drives on a bus, ONLY=ros processes over DDS
 	@echo "about 30 minutes, mostly waiting; half of that with WORKERS=2"
-	pytest $(if $(WORKERS),--numprocesses $(WORKERS) --dist loadfile) $(addprefix $(TESTS)/,$(or $(ONLY),bus ros))
+	pytest --reruns 1 $(if $(WORKERS),--numprocesses $(WORKERS) --dist loadfile) $(addprefix $(TESTS)/,$(or $(ONLY),bus ros))
 
 # COMPILED=1: campaign, stops and soak run with their hot modules compiled, several times as fast, frame by frame the same.
 WORLD := $(if $(COMPILED),$(CURDIR)/build/compiled:)$(CURDIR)/virtual_bus_tests

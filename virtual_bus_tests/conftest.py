@@ -11,6 +11,8 @@ from hypothesis import HealthCheck, Phase, settings
 
 from hazards.skipped import pytest_runtest_makereport as pytest_runtest_makereport
 from hazards.tested import pytest_collection_modifyitems as pytest_collection_modifyitems
+from support.second_run import pytest_sessionfinish as pytest_sessionfinish
+from support.second_run import pytest_terminal_summary as pytest_terminal_summary
 
 # The same examples each time, on a slow machine too: a run judges the change before it, and says what failed as it was
 # drawn. HYPOTHESIS_PROFILE=default looks for new examples and makes a failing one as short as it can.

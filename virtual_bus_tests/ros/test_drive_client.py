@@ -216,7 +216,7 @@ def test_a_goal_that_waited_in_a_server_that_stood_still_never_starts(stage: Sta
     assert "did not run before it" in stage.server.log()
     stage.node.spin_for(4.0)  # RESENT_S: until then no goal is taken for a new one
     assert set(stage.base.orders_since(resumed_s)) <= {0.0}
-    again = stage.canbase_drive("0.1", "--speed", "0.3")  # the server is well
+    again = stage.canbase_drive("0.1", "--speed", "0.1")  # the server is well
     assert stage.exit_code(again) == 0, again.log()
 
 
