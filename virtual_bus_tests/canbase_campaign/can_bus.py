@@ -16,8 +16,10 @@ FRAME_BITS = 50
 """Of a data frame without data and without stuff bits, with the pause after it (11-bit identifier)."""
 STUFFED = 1.1
 """Typical growth by stuff bits."""
-NOTHING = 0x800
-"""No identifier: above all of eleven bits."""
+REMOTE = 0x800
+"""Above an identifier: a remote frame, which requests the frame with it. Every data frame goes before it."""
+NOTHING = 0x1000
+"""No identifier: above all of eleven bits, and above all requests."""
 QUEUE = 100
 """Frames that wait in one member's adapter; further ones are dropped, as a full transmit buffer does."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from canbase_campaign.can_bus import CanBus
+from canbase_campaign.can_bus import REMOTE, CanBus
 from canbase_campaign.clock import FINE, Pace
 from canbase_campaign.disk import StopDisk
 from canbase_campaign.process import FRAMES_HELD, Process, Topics
@@ -97,7 +97,9 @@ class DriverProcess(Process):
             self.asked = "end"
 
     def hear(self, cob_id: int, data: bytes) -> None:
-        """A frame on the bus."""
+        """A frame on the bus. The requests of the watchdog are none for it."""
+        if cob_id >= REMOTE:
+            return
         if self.running:
             self._on_frame(cob_id, data)
         else:

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
-from canbase_campaign.can_bus import NOTHING, CanBus, Receiver
+from canbase_campaign.can_bus import NOTHING, REMOTE, CanBus, Receiver
 from canbase_campaign.clock import FINE, Pace
 from canbase_campaign.robots import DrawnRobot
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID
 from canbase_sim.axis_parts import StateChange
 from canbase_sim.cia402.axis import Axis
 from canbase_sim.node import SimulatedNode
+from canbase_sim.odd.draw import OddDrive
 from canbase_sim.world.bench import Bench, BenchParameters
 
 HEARTBEATS = {0x700 + DRIVER_NODE_ID: "driver", 0x700 + WATCHDOG_NODE_ID: "watchdog"}
+GUARD = 0x700
 ROLLS_SHARE = 0.02
 """Of its greatest force: less neither brakes nor drives a wheel."""
 
@@ -32,12 +35,15 @@ class _Port(Receiver):
 class Drives:
     """`bench` is the simulated world. `heard`: when each node last received the heartbeat of driver and watchdog."""
 
-    def __init__(self, drawn: DrawnRobot, bus: CanBus, pace: Pace = FINE) -> None:
+    def __init__(
+        self, drawn: DrawnRobot, bus: CanBus, pace: Pace = FINE, odd: Mapping[int, OddDrive] = MappingProxyType({})
+    ) -> None:
+        """`odd`: drives of the kind `odd`, by node id."""
         self._bus, self._clock, self._poll_s = bus, bus.clock, pace.drives_poll_s
         self._robot = drawn.robot
         bandwidth_radps = min(drawn.body.bandwidth_radps, pace.bandwidth_radps)
         body = replace(drawn.body, step_s=pace.plant_step_s, bandwidth_radps=bandwidth_radps)
-        self.bench = Bench(drawn.robot, bus.clock.now_s, body, BenchParameters(sdo_delay_s=pace.sdo_delay_s))
+        self.bench = Bench(drawn.robot, bus.clock.now_s, body, BenchParameters(sdo_delay_s=pace.sdo_delay_s), odd)
         self.bench.base.push_n = drawn.push_n
         self.measured: Callable[[int, bytes], bytes] = lambda cob_id, data: data
         """What becomes of a drive's frame before it is sent: sensors with noise."""
@@ -49,6 +55,8 @@ class Drives:
         self._urgent = [cob_id in urgent for cob_id in range(NOTHING)]
         """By identifier: the world moves before the frame is taken."""
         self.heard = dict.fromkeys(self.bench.nodes, bus.clock.now_s)
+        self.guarded = dict.fromkeys(self.bench.nodes, bus.clock.now_s)
+        """When each node was last requested to report its state."""
         self.ordered = dict.fromkeys(self.bench.nodes, bus.clock.now_s)
         """When each node last received a setpoint of its own."""
         axes = [self.axis(wheel) for wheel in range(len(drawn.robot.drives))]
@@ -103,12 +111,23 @@ class Drives:
                 self._clock.after(0.0, self._answer)
             return
         now_s = self._clock.now_s
-        if node.takes(cob_id):
+        if cob_id >= REMOTE:
+            self._request(node_id, node, cob_id & ~REMOTE)
+        elif node.takes(cob_id):
             node.on_frame(cob_id, data, now_s)
             if cob_id in HEARTBEATS and node.line.hears:
                 self.heard[node_id] = now_s
         if cob_id & 0x7F == node_id and 0x200 <= cob_id < 0x500 and not cob_id & 0x80:
             self.ordered[node_id] = now_s
+
+    def _request(self, node_id: int, node: SimulatedNode, cob_id: int) -> None:
+        """Node guarding: its answer does not wait for the world."""
+        node.on_request(cob_id, self._clock.now_s)
+        if cob_id == GUARD + node_id and node.line.hears:
+            self.guarded[node_id] = self._clock.now_s
+            if not self._answers:
+                self._answers = True
+                self._clock.after(0.0, self._answer)
 
     def _answer(self) -> None:
         """All nodes have received the frame."""

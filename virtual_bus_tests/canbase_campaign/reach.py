@@ -14,6 +14,7 @@ from canbase_campaign.envelope import tolerance_mps
 from canbase_campaign.world import World
 from canbase_config.stopping import BRAKING_SHARE
 from canbase_sim.cia301.dictionary import key
+from canbase_sim.cia301.life_guarding import Life
 from canbase_sim.cia402.axis import Axis
 from canbase_sim.cia402.states import State
 from canbase_sim.node import SimulatedNode
@@ -86,7 +87,7 @@ class Reach:
         """The drive stops when it receives nothing: it monitors its masters, it brakes, and its sensors are right."""
         node = self._world.drives.bench.nodes[node_id]
         was_reset = self._world.intruder.resets_at > self._power_from.get(node_id, math.inf)
-        forgot = self.personality.heeds_heartbeats and was_reset and not self._knows_masters(node)
+        forgot = self.personality.heeds_masters and was_reset and not self._knows_masters(node)
         able = node_id not in self._weak and not self._lies(node)
         return self.alone_s < math.inf and able and not forgot
 
@@ -107,8 +108,10 @@ class Reach:
         return [(node_id, axis) for node_id, axis in turn if nodes[node_id].axes[axis].motor.powered]
 
     def heard(self, node_id: int) -> float:
-        """When the drive last received what it monitors: heartbeats, or setpoints."""
+        """When the drive last received what it monitors: heartbeats, requests that guard it, or setpoints."""
         drives = self._world.drives
+        if self.personality.heeds_guarding:
+            return drives.guarded[node_id]
         heard = drives.heard if self.personality.heeds_heartbeats else drives.ordered
         return heard[node_id]
 
@@ -136,7 +139,7 @@ class Reach:
                 self._reacts_since[node_id] = now_s
             return now_s <= since + self._reset_s
         self._reacts_since.pop(node_id, None)
-        waits = not self.personality.heeds_heartbeats and now_s <= self.heard(node_id) + self.alone_s
+        waits = not self.personality.heeds_masters and now_s <= self.heard(node_id) + self.alone_s
         return (waits or not self.stops_alone(node_id)) and not self._reached(node_id)
 
     def _overpowered(self, lost: set[int]) -> set[int]:
@@ -198,5 +201,7 @@ class Reach:
         return any(not axis.encoder.closes_loop for axis in node.axes)
 
     def _knows_masters(self, node: SimulatedNode) -> bool:
+        if self.personality.heeds_guarding:
+            return node.guarding.life is Life.GUARDED and node.guarding.life_s > 0.0
         subs = range(1, self.personality.heartbeat_entries + 1)
         return any(node.dictionary.values[key(0x1016, sub)] for sub in subs)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from canbase_campaign.can_bus import REMOTE
 from canbase_campaign.plan import Plan
 from canbase_campaign.robots import DrawnRobot
 from canbase_campaign.scenario import Result, Start
@@ -53,7 +54,7 @@ def tell(world: World, frames: bool, note: Callable[[float, str], None]) -> None
 def _watch(world: World, frames: bool) -> None:
     if frames:
         world.bus.watch = lambda sender, cob_id, data: world.note(
-            f"    {sender:9} {cob_id:03X} {data.hex(' ').upper()}"
+            f"    {sender:9} {cob_id & ~REMOTE:03X} {'request' if cob_id >= REMOTE else data.hex(' ').upper()}"
         )
     _Teller(world)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from canbase_campaign.can_bus import CanBus
+from canbase_campaign.can_bus import REMOTE, CanBus
 from canbase_campaign.clock import FINE, Pace
 from canbase_campaign.disk import WatchdogDisk
 from canbase_campaign.process import FRAMES_HELD, Process
@@ -66,5 +66,5 @@ class WatchdogProcess(Process):
         self.core.on_bus(self._failed_since, 0)
         for frame in self.core.tick(self.clock.now_s):
             if self._failed_since == math.inf:
-                self._member.send(frame.cob_id, frame.data)
+                self._member.send(frame.cob_id | REMOTE if frame.remote else frame.cob_id, frame.data)
         self.core.on_record(*self.disk.write(self.core.record))

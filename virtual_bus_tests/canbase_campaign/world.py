@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from random import Random
+from types import MappingProxyType
 
 from canbase_campaign.action_process import ActionProcess, Goal
 from canbase_campaign.can_bus import CanBus
@@ -19,6 +20,7 @@ from canbase_campaign.watchdog_process import WatchdogProcess
 from canbase_config.derive import watchdog_config
 from canbase_config.robot import Robot
 from canbase_runtime.driver_state import DriverState
+from canbase_sim.odd.draw import OddDrive
 from canbase_sim.plant.base import PlantParameters
 from canbase_velocity.twist import Twist
 
@@ -30,9 +32,17 @@ class World:
     """`note` logs what happens; `on_lease` receives every order whose lease reaches the watchdog's socket."""
 
     def __init__(
-        self, robot: Robot | None = None, seed: int = 0, pace: Pace = FINE, drawn: DrawnRobot | None = None
+        self,
+        robot: Robot | None = None,
+        seed: int = 0,
+        pace: Pace = FINE,
+        drawn: DrawnRobot | None = None,
+        odd: Mapping[int, OddDrive] = MappingProxyType({}),
     ) -> None:
-        """`drawn`: a robot with its body and its floor; None: `robot`, or the sample, on a level floor."""
+        """`drawn`: a robot with its body and its floor; None: `robot`, or the sample, on a level floor.
+
+        `odd`: drives of the kind `odd`, by node id.
+        """
         self.drawn = drawn or DrawnRobot(0, robot or campaign_robot(), PlantParameters())
         self.robot = self.drawn.robot
         self.random = Random(seed)
@@ -48,7 +58,7 @@ class World:
         """Every lease comes with a mangled copy of it."""
         self.bus = CanBus(clock, self.random, self.robot.bus.bitrate)
         self.topics = Topics(clock, self.random, pace.topic_jitter_s)
-        self.drives = Drives(self.drawn, self.bus, pace)
+        self.drives = Drives(self.drawn, self.bus, pace, odd)
         self.driver = DriverProcess(self.robot, self.bus, self.topics, pace)
         self.watchdog = WatchdogProcess(watchdog_config(self.robot), self.bus, pace)
         self.velocity = VelocityProcess(self.robot, clock, self.topics, self._lease, pace)

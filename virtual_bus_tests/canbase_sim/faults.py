@@ -99,6 +99,14 @@ def _short_emcy(node: SimulatedNode, now_s: float) -> None:
     node.line.short_emcy = True
 
 
+def _guard_stuck(node: SimulatedNode, now_s: float) -> None:
+    node.guarding.stuck = True
+
+
+def _no_requests(node: SimulatedNode, now_s: float) -> None:
+    node.line.answers_requests = False
+
+
 def _aliases(node: SimulatedNode, now_s: float) -> None:
     node.line.aliases = True
 
@@ -125,6 +133,7 @@ def _no_mains(node: SimulatedNode, now_s: float, axis: int = 0) -> None:
 
 def _heal(node: SimulatedNode, now_s: float) -> None:
     node.line.heal()
+    node.guarding.stuck = False
     for number, axis in enumerate(node.axes):
         axis.heal()
         node.heal(number)
@@ -158,6 +167,8 @@ KINDS: Mapping[str, tuple[Callable[..., None], frozenset[str]]] = {
     "mute_boot": (_mute_boot, frozenset()),
     "short_emcy": (_short_emcy, frozenset()),
     "aliases": (_aliases, frozenset()),
+    "guard_stuck": (_guard_stuck, frozenset()),
+    "no_requests": (_no_requests, frozenset()),
     "extra_boot_up": (_extra_boot_up, frozenset()),
     "bus_off": (_bus_off, frozenset({"off_s"})),
     "reset_node": (_reset_node, frozenset()),
@@ -176,6 +187,7 @@ in turn, each `every_s`. scaled: it counts `factor` times the motion, 0.5 by def
 intermittent: nothing for `off_s`, everything for `on_s` (0: as long), in turn.
 rpdo_lost: setpoints of one axis do not reach it, or every n-th does. tpdo_lost: the feedback PDOs of one axis are lost.
 mute_boot: its boot-up messages are lost. short_emcy: three bytes. aliases: 29-bit frames that look like its own.
+guard_stuck: its answers to node guarding keep their toggle bit. no_requests: remote frames do not reach it.
 extra_boot_up: one boot-up message too many. bus_off: its controller leaves the bus for `off_s`. reset_node: as by NMT.
 sto: no torque, it stays in switch on disabled. no_mains: it does not get beyond ready to switch on.
 heal: all of them are over; a drive fault still needs its reset."""

@@ -14,7 +14,7 @@ MAX_LENGTH = 8
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One classic CAN data frame; `extended`: its identifier has 29 bits.
+    """One classic CAN frame; `extended`: its identifier has 29 bits. `remote`: it requests that frame, without data.
 
     Raises ValueError for an identifier outside 0..7FFh (1FFFFFFFh) or more than eight bytes.
     """
@@ -22,6 +22,7 @@ class Frame:
     cob_id: int
     data: bytes = b""
     extended: bool = False
+    remote: bool = False
 
     def __post_init__(self) -> None:
         highest = MAX_EXTENDED_ID if self.extended else MAX_COB_ID

@@ -27,6 +27,8 @@ class Line:
         """Its boot-up messages are lost."""
         self.short_emcy = False
         """Its emergency messages have three bytes."""
+        self.answers_requests = True
+        """False: neither its controller nor its adapter passes remote frames."""
         self.aliases = False
         """Beside each frame there is one of 29 bits whose lower eleven are the same, with all its bytes turned over."""
         self._answer_delay_s = answer_delay_s
@@ -83,3 +85,4 @@ class Line:
     def heal(self) -> None:
         """Nothing is wrong any more."""
         self.silent = self.deaf = self.cut = self.mute_boot = self.short_emcy = self.aliases = False
+        self.answers_requests = True

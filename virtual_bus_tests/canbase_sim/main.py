@@ -15,20 +15,20 @@ from types import FrameType
 import can
 
 from canbase_config.robot import Robot
-from canbase_runtime.local_frames import keep_to_this_computer
 from canbase_sim.control import ControlError, control_path
 from canbase_sim.control_server import ControlServer
 from canbase_sim.loop import Loop
-from canbase_sim.world.bench import Bench
+from canbase_sim.rated_bus import RatedBus
+from canbase_sim.world.bench import Bench, BenchParameters
 from canbase_sim.world.trace import Trace
 
 log = logging.getLogger(__name__)
 
 
-def run(robot: Robot, control: str | None = None, *, quiet: bool = False) -> int:
+def run(robot: Robot, control: str | None = None, *, quiet: bool = False, factory_fresh: bool = False) -> int:
     """Simulate the drives of `robot` on its bus, with the control socket at `control` (default `control_path(robot)`).
 
-    `quiet`: warnings alone are logged.
+    `quiet`: warnings alone are logged. `factory_fresh`: every drive has node id 1 and 125 kbit/s.
     Returns the exit code: 0 after SIGINT or SIGTERM, 1 when the bus or the control socket cannot be used.
     """
     logging.basicConfig(
@@ -41,7 +41,7 @@ def run(robot: Robot, control: str | None = None, *, quiet: bool = False) -> int
     path = Path(control) if control else control_path(robot)
     with _stop_signals() as stop:
         try:
-            _simulate(robot, path, stop)
+            _simulate(robot, path, stop, BenchParameters(factory_fresh=factory_fresh))
         except (can.CanError, OSError) as error:
             log.error("CAN bus %s %s: %s; check `bus` in robot.yaml", robot.bus.interface, robot.bus.channel, error)
             return 1
@@ -51,15 +51,14 @@ def run(robot: Robot, control: str | None = None, *, quiet: bool = False) -> int
     return 0
 
 
-def _simulate(robot: Robot, path: Path, stop: Event) -> None:
-    with can.Bus(**robot.bus.arguments()) as bus:
-        keep_to_this_computer(robot.bus.arguments(), bus)
+def _simulate(robot: Robot, path: Path, stop: Event, parameters: BenchParameters) -> None:
+    with closing(RatedBus(robot.bus)) as bus:
         now_s = time.monotonic()
-        bench = Bench(robot, now_s)
+        bench = Bench(robot, now_s, parameters=parameters)
         trace = Trace(bench, now_s)
         with closing(ControlServer(path, bench, trace)) as server:
             log.info("drives %s on %s %s", sorted(bench.nodes), robot.bus.interface, robot.bus.channel)
-            Loop(bus, bench, trace, server).run(stop.is_set)
+            Loop(bus, robot.bus.bitrate, bench, trace, server).run(stop.is_set)
 
 
 @contextmanager

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -12,11 +13,13 @@ from functools import partial
 from canopen import SdoAbortedError
 
 from canbase_sim.axis_parts import AxisParts, StateChange
-from canbase_sim.cia301 import abort, emcy, heartbeat, nmt, sdo_server, store
+from canbase_sim.cia301 import abort, emcy, heartbeat, life_guarding, nmt, sdo_server, store
 from canbase_sim.cia301.dictionary import AXIS_STRIDE, FIRST_AXIS, Dictionary, key
 from canbase_sim.cia301.nmt import NmtCommand, NmtState
 from canbase_sim.cia301.rpdo import Rpdo
 from canbase_sim.cia301.tpdo import Tpdo
+from canbase_sim.cia305 import lss_slave
+from canbase_sim.cia305.lss_slave import LssSlave
 from canbase_sim.cia402.axis import Axis
 from canbase_sim.cia402.states import POWERED, State, Transition
 from canbase_sim.command_watch import CommandWatch
@@ -28,6 +31,8 @@ from canbase_sim.plant.encoder import Encoder
 
 COMMUNICATION_FAULT = 0x7500
 """603Fh when NMT stop or a reset meets an axis with 6007h = 1."""
+GUARD = 0
+"""In the place of a node id: the master whose requests guard the node."""
 RESET_S = 0.01
 """From NMT reset communication to the boot-up message [s]."""
 OFFSET_STEP = 1_000_003
@@ -51,15 +56,18 @@ class SimulatedNode:
         personality: Personality = GENERIC,
         sdo_delay_s: float = 0.0,
         supply_v: Callable[[], float] = _unloaded,
+        bitrate: int = 500_000,
     ) -> None:
-        """`supply_v`: what feeds its power stage [V]."""
+        """`supply_v`: what feeds its power stage [V]. `node_id` and `bitrate` [bit/s] are stored in it; LSS
+        sets both."""
         self.node_id, self.personality = node_id, personality
         self.boot_delay_s = boot_delay_s if personality.boot_delay_s is None else personality.boot_delay_s
-        self.line = Line(sdo_delay_s if personality.sdo_delay_s is None else personality.sdo_delay_s)
+        self.line = self._make_line(sdo_delay_s if personality.sdo_delay_s is None else personality.sdo_delay_s)
         self.state = NmtState.INITIALISING
         self.changes: deque[StateChange] = deque(maxlen=1000)
         self.lost_producers: deque[int] = deque(maxlen=100)
-        """Node ids whose heartbeat this node has missed; the reader that reports them empties it."""
+        """Node ids whose heartbeat this node has missed, GUARD for a master that guarded it; the reader that reports
+        them empties it."""
         self._now = now_s
         self._bus_on_at: float | None = None
         d = self.dictionary = Dictionary(node_id, len(axes), fixed, personality)
@@ -71,9 +79,13 @@ class SimulatedNode:
         ]
         d.before_read = self._measure
         self.emcy = emcy.EmcyService(d, self._send_emcy)
-        self.sdo = sdo_server.SdoService(node_id, d, lambda frame: self.line.answer(frame, self._now))
+        self.sdo = self._make_sdo(lambda frame: self.line.answer(frame, self._now))
+        self.lss = LssSlave(
+            lambda sub: d.values[key(0x1018, sub)], node_id, bitrate, self.line.say, self._apply_node_id
+        )
         self._producer = heartbeat.HeartbeatProducer(d)
         self._consumer = heartbeat.HeartbeatConsumer(d, self._on_lost, self._on_alive)
+        self.guarding = life_guarding.LifeGuarding(d, partial(self._on_lost, GUARD), partial(self._on_alive, GUARD))
         self.axes = tuple(self._axis(number, parts) for number, parts in enumerate(axes))
         self._rpdos = [Rpdo(n, d, self.emcy, self._operational, self._on_deadline) for n in range(1, 5)]
         self._tpdos = [Tpdo(n, d, self.line.say, self._operational) for n in range(1, 5)]
@@ -89,6 +101,11 @@ class SimulatedNode:
 
     # The bus
 
+    @property
+    def bitrate(self) -> int:
+        """At which it sends and receives [bit/s]; 0: it does neither, as the rate is being changed."""
+        return self.lss.bitrate if self.lss.is_on_bus else 0
+
     def on_frame(self, cob_id: int, data: bytes, now_s: float) -> None:
         """One frame from the bus, at `now_s`. What the node does not understand is ignored."""
         if not self.line.hears:
@@ -100,6 +117,16 @@ class SimulatedNode:
         elif cob_id > heartbeat.COB_ID and self.state is not NmtState.INITIALISING:
             self._consumer.receive(cob_id - heartbeat.COB_ID, data, now_s)
 
+    def on_request(self, cob_id: int, now_s: float) -> None:
+        """A remote frame: a request for the frame with this COB-ID. Node guarding alone uses it."""
+        guarded = cob_id == heartbeat.COB_ID + self.node_id and key(0x100C) in self.dictionary.entries
+        if not (guarded and self.line.hears and self.line.answers_requests) or self.state is NmtState.INITIALISING:
+            return
+        self._now = now_s
+        answer = self.guarding.answer(self.state, now_s)
+        if answer is not None:
+            self.line.say(Frame(cob_id, answer))
+
     def takes(self, cob_id: int) -> bool:
         """Whether a frame with this COB-ID may mean anything to the node as it is now; most are feedback of others."""
         return cob_id > heartbeat.COB_ID or self._heeds[cob_id]
@@ -110,6 +137,8 @@ class SimulatedNode:
         self.line.say_late_answers(now_s)
         if self._bus_on_at is not None and now_s >= self._bus_on_at:
             self._recover_from_bus_off()
+        if self.lss.switch_at is not None:
+            self.lss.tick(now_s)
         if self.state is not NmtState.INITIALISING:
             self._tick_watches(now_s)
         elif now_s >= self._boot_at:
@@ -196,6 +225,10 @@ class SimulatedNode:
         self._route()
 
     def _boot(self) -> None:
+        if self.lss.is_unconfigured:
+            self._boot_at = math.inf
+            self._route()
+            return
         if self._loader_s:
             self.say_boot_up()
             self._boot_at, self._loader_s = self._boot_at + self._loader_s, 0.0
@@ -208,7 +241,12 @@ class SimulatedNode:
         if self.personality.starts_operational:
             self._enter(NmtState.OPERATIONAL)
 
+    def _apply_node_id(self) -> None:
+        """LSS has given the node its first id: it starts by itself."""
+        self._reset_communication(self._now + RESET_S)
+
     def _power_up(self, now_s: float, off_s: float) -> None:
+        self.lss.power_on()
         self.dictionary.reset(0x2000, 0x9FFF)
         for axis in self.axes:
             axis.restart()
@@ -217,24 +255,38 @@ class SimulatedNode:
     def _reset_communication(self, boot_at: float, loader_s: float = 0.0) -> None:
         self._enter(NmtState.INITIALISING)
         self.line.forget()
+        self.lss.reset_communication()
+        if self.lss.node_id != self.node_id:
+            self._renumber(self.lss.node_id)
         self.dictionary.reset(0x1000, 0x1FFF)
         self.emcy.reset()
         self.sdo.reset()
         self._consumer.configure()
+        self.guarding.reset()
         for axis in self.axes:
             axis.causes.discard(emcy.HEARTBEAT_LOST)
         self._boot_at, self._loader_s = boot_at, loader_s
         self._route()
+
+    def _renumber(self, node_id: int) -> None:
+        """Another node id, or 255: none."""
+        self.node_id = node_id
+        if not self.lss.is_unconfigured:
+            self.dictionary.renumber(node_id)
+            self.sdo.renumber(node_id)
 
     def _route(self) -> None:
         """What listens to which COB-ID in this NMT state."""
         self._routes: dict[int, Callable[[bytes, float], None]] = {}
         if self.state is not NmtState.INITIALISING:
             self._add_routes()
+        if self.state is not NmtState.INITIALISING or self._boot_at == math.inf:
+            self._routes[lss_slave.REQUEST] = self.lss.on_frame
         self._heeds = [False] * (heartbeat.COB_ID + 1)
         """By identifier: it has a route."""
         for cob_id in self._routes:
-            self._heeds[cob_id] = True
+            if cob_id <= heartbeat.COB_ID:
+                self._heeds[cob_id] = True
 
     def _add_routes(self) -> None:
         if self.state is NmtState.OPERATIONAL:
@@ -263,6 +315,7 @@ class SimulatedNode:
 
     def _tick_watches(self, now_s: float) -> None:
         self._consumer.tick(now_s)
+        self.guarding.tick(now_s)
         if self._command_watch.ran_out(now_s):
             for axis in self.axes:
                 axis.starve()
@@ -295,7 +348,7 @@ class SimulatedNode:
     # Loss of the connection
 
     def _on_lost(self, producer: int) -> None:
-        """A heartbeat is gone: EMCY 8130h."""
+        """A heartbeat, or the guard, is gone: EMCY 8130h."""
         self.lost_producers.append(producer)
         self.emcy.raise_error(emcy.HEARTBEAT_LOST, producer)
         for axis in self.axes:
@@ -318,7 +371,8 @@ class SimulatedNode:
     def _on_alive(self, producer: int) -> None:
         self.emcy.clear_error(emcy.HEARTBEAT_LOST, producer)
         needs_reset = self.personality.heartbeat_fault_needs_communication_reset
-        if not (self._consumer.any_lost or needs_reset):
+        lost = self._consumer.any_lost or self.guarding.life is life_guarding.Life.LOST
+        if not (lost or needs_reset):
             for axis in self.axes:
                 axis.causes.discard(emcy.HEARTBEAT_LOST)
 
@@ -337,6 +391,14 @@ class SimulatedNode:
             axis.abort_connection(code)
 
     # Wiring
+
+    def _make_line(self, answer_delay_s: float) -> Line:
+        """Its end of the bus."""
+        return Line(answer_delay_s)
+
+    def _make_sdo(self, send: Callable[[Frame], None]) -> sdo_server.SdoService:
+        """Its SDO server."""
+        return sdo_server.SdoService(self.node_id, self.dictionary, send)
 
     def _axis(self, number: int, parts: AxisParts) -> Axis:
         def on_change(before: State, transition: Transition) -> None:

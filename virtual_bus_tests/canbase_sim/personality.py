@@ -39,6 +39,8 @@ class Personality:
     """Entries that show the supply, and the volts of one bit; CiA 402-2: 6079h in mV. Read by SDO alone."""
     defaults: Mapping[int, int] = field(default_factory=dict)
     """Values after power on that are not those of our EDS."""
+    widths: Mapping[int, str] = field(default_factory=dict)
+    """`struct` letters of objects, by index, that have another width than in our EDS."""
     heartbeat_entries: int = 2
     """1016h:0."""
     sets_no_rtr: bool = False
@@ -64,6 +66,8 @@ class Personality:
     """Goes to OPERATIONAL by itself after its boot-up."""
     sdo_delay_s: float | None = None
     """From a request to its answer [s]; None: from the bench."""
+    block_transfers: bool = True
+    """Whether it has SDO block transfers; False: refused with 0504 0001h."""
     shows_mode_without_power: bool = True
     """False: 6061h is 0 before OPERATION ENABLED."""
     locked_with_power: frozenset[int] = frozenset()
@@ -76,16 +80,27 @@ class Personality:
     """The entry that sets it in ms (0: off), where the bus can."""
 
     @property
+    def heeds_guarding(self) -> bool:
+        """It monitors node guarding, and no heartbeat: it stops when a master that guarded it stays away."""
+        return self.heartbeat_entries == 0 and not self.missing & {0x100C, 0x6007}
+
+    @property
     def heeds_heartbeats(self) -> bool:
         """It watches its masters' heartbeats, and stops when one stays away."""
         return self.heartbeat_entries > 0 and 0x6007 not in self.missing
 
+    @property
+    def heeds_masters(self) -> bool:
+        """It stops when one of its masters stays away, whatever else they send: setpoints of another one count for
+        nothing."""
+        return self.heeds_heartbeats or self.heeds_guarding
+
     def alone_s(self, configured_s: float) -> float:
-        """From the last frame of its masters, who set every time limit to `configured_s`, to its own stop [s].
+        """From the last frame of its masters, who set every time limit to `configured_s`, to its own stop at most [s].
 
         Infinity: it goes on turning.
         """
-        if self.heeds_heartbeats or self.command_timeout_object is not None:
+        if self.heeds_masters or self.command_timeout_object is not None:
             return configured_s
         return math.inf if self.command_timeout_s is None else self.command_timeout_s
 
@@ -93,6 +108,7 @@ class Personality:
 _NO_REACTION: dict[int, int] = {_key(0x6007): 0}
 """What a drive without 6007h does with its motors when the connection is lost: nothing, which is the worst case."""
 _NO_SYNC_COUNTER = frozenset({0x1019})
+_NO_GUARDING = frozenset({0x100C, 0x100D})
 _LACKS_SELF_STOP = frozenset({0x1016, 0x1029, 0x6007})
 _RPDO_TIMERS = frozenset({_key(index, 5) for index in range(0x1400, 0x1404)})
 
@@ -101,7 +117,7 @@ GENERIC = Personality()
 PERSONALITIES: Mapping[str, Personality] = {
     "generic": GENERIC,
     "epos4": Personality(
-        missing=_NO_SYNC_COUNTER | {0x6078, 0x6079},  # EDS
+        missing=_NO_SYNC_COUNTER | _NO_GUARDING | {0x6078, 0x6079},  # EDS
         missing_subs=_RPDO_TIMERS,  # EDS: no 1400h:5
         sets_no_rtr=True,  # EDS
         defaults={_key(0x6007): 3, _key(0x605A): 6, _key(0x1029, 1): 0},  # EDS
@@ -138,7 +154,9 @@ PERSONALITIES: Mapping[str, Personality] = {
         command_timeout_s=1.0,  # RWD; then the earlier speed comes back with the next command
     ),
     "zlac8015d": Personality(
+        block_transfers=False,  # assumed: no source has them
         missing=_NO_SYNC_COUNTER
+        | _NO_GUARDING  # manual of ZLAC8030L: heartbeat producer alone
         | _LACKS_SELF_STOP
         | {0x1010, 0x1011, 0x605A, 0x605B, 0x605C, 0x605D, 0x605E, 0x60C2, 0x606B, 0x606D, 0x6078, 0x6079},
         missing_subs=_RPDO_TIMERS,  # the EDS has them; no source shows that the firmware heeds them
@@ -163,7 +181,7 @@ PERSONALITIES: Mapping[str, Personality] = {
         second_boot_up_s=0.3,  # boot loader and firmware; the time is assumed
     ),
     "elmo_gold": Personality(
-        missing=_NO_SYNC_COUNTER,  # DCF
+        missing=_NO_SYNC_COUNTER | _NO_GUARDING,  # DCF
         missing_subs=_RPDO_TIMERS,  # DCF
         defaults={_key(0x6007): 1, _key(0x1029, 1): 1, _key(0x605A): 2, _key(0x605E): 2},  # DCF
         extras={_key(0x22A2): Extra("H", 38)},  # DCF

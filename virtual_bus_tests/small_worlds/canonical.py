@@ -51,6 +51,8 @@ UNSEEN = frozenset((
     "_time_s",
     # a bound on when a heartbeat can be missed: of the times that are seen anyway
     "_none_before",
+    # when an SDO was requested last: only how late an answer is depends on it, and none is late
+    "_requests",
     # of the records on the disk what was written last counts
     "file", "_owner", "_cycles", "reset",
 ))  # fmt: skip

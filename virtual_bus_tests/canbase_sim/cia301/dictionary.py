@@ -29,6 +29,8 @@ FIRST_AXIS = range(0x6000, 0x6000 + AXIS_STRIDE)
 NO_RTR = 1 << 30
 """Bit 30 of a PDO's COB-ID: no remote requests."""
 
+MOST_TEXT = 1_000
+"""Bytes of a text that the bus may write."""
 VOLATILE = frozenset({0x1003, 0x6040, 0x60FF, 0x6840, 0x68FF})
 """Writable objects that 1010h does not keep: error history, controlwords and targets."""
 
@@ -135,6 +137,8 @@ def visible(node_id: int, axes: int, personality: Personality) -> Mapping[int, E
         late = index == 0x1016 and k & 0xFF > personality.heartbeat_entries
         if first in personality.missing or k in personality.missing_subs or late:
             del entries[k]
+    for k in [k for k in entries if k >> 8 in personality.widths]:
+        entries[k] = replace(entries[k], code=personality.widths[k >> 8])
     for subindex in range(3, personality.heartbeat_entries + 1):
         k = key(0x1016, subindex)
         entries[k] = replace(entries[key(0x1016, 1)], default=0, places=(k,))
@@ -177,8 +181,12 @@ class Dictionary:
     ) -> None:
         self.personality = personality
         self.entries: Mapping[int, Entry] = MappingProxyType(visible(node_id, axes, personality))
-        self._factory = _factory(node_id, axes, personality) | dict(fixed or {})
+        self._axes, self._fixed = axes, dict(fixed or {})
+        self._factory = _factory(node_id, axes, personality) | self._fixed
         self._saved: dict[int, int] = {}
+        self.texts: dict[int, bytes] = {}
+        """What was written in place of the texts of the EDS."""
+        self._saved_texts: dict[int, bytes] = {}
         self.values: dict[int, int] = dict(self._factory)
         self.before_read: Callable[[], None] = _nothing
         self._indexes = {k >> 8 for k in self.entries}
@@ -202,20 +210,27 @@ class Dictionary:
         """Call `reaction` after each write from the bus to `index`."""
         self._reactions[index] = reaction
 
+    def renumber(self, node_id: int) -> None:
+        """COB-IDs after the next reset are those of another node id; saved ones stay as they are (CiA 301)."""
+        self._factory = _factory(node_id, self._axes, self.personality) | self._fixed
+
     def reset(self, first: int, last: int) -> None:
         """Give the indexes from `first` to `last` their saved values (1010h), else those of the EDS."""
         for k, value in self._factory.items():
             if first <= k >> 8 <= last:
                 self.values[k] = self._saved.get(k, value)
+        others = {k: text for k, text in self.texts.items() if not first <= k >> 8 <= last}
+        self.texts = others | {k: text for k, text in self._saved_texts.items() if first <= k >> 8 <= last}
 
     def save(self) -> None:
         """Keep the writable values over resets and power cycles, as 1010h:1 orders."""
         kept = {place for entry in self.entries.values() if entry.writable for place in entry.places}
         self._saved = {k: v for k, v in self.values.items() if k in kept and k >> 8 not in VOLATILE}
+        self._saved_texts = dict(self.texts)
 
     def forget(self) -> None:
         """Drop what was saved, as 1011h:1 orders; it counts from the next reset."""
-        self._saved = {}
+        self._saved, self._saved_texts = {}, {}
 
     def get_data(self, index: int, subindex: int, check_readable: bool = False) -> bytes:
         """The bytes of one value for an SDO upload. Raises SdoAbortedError."""
@@ -223,7 +238,7 @@ class Dictionary:
         if check_readable and not entry.readable:
             raise SdoAbortedError(abort.WRITE_ONLY)
         if isinstance(entry.default, bytes):
-            return entry.default
+            return self.texts.get(entry.place, entry.default)
         self.before_read()
         return struct.pack(f"<{entry.code}", self.values[entry.place])
 
@@ -232,6 +247,9 @@ class Dictionary:
         entry = self._find(index, subindex)
         if check_writable and not entry.writable:
             raise SdoAbortedError(abort.READ_ONLY)
+        if entry.code is None:
+            self._take_text(entry, data)
+            return
         if len(data) != entry.size:
             raise SdoAbortedError(abort.LENGTH)
         (value,) = struct.unpack(f"<{entry.code}", data)
@@ -263,6 +281,11 @@ class Dictionary:
         if entry is None:
             raise SdoAbortedError(abort.NO_SUBINDEX)
         return entry
+
+    def _take_text(self, entry: Entry, data: bytes) -> None:
+        if len(data) > MOST_TEXT:
+            raise SdoAbortedError(abort.TOO_LONG)
+        self.texts[entry.place] = data
 
     def _take(self, address: int, value: int) -> None:
         entry = self.entries[address]

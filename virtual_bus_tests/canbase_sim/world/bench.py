@@ -5,17 +5,21 @@ Works in virtual time (call `on_frame` and `tick` with any rising `now_s`) and i
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from types import MappingProxyType
 
 from canbase_config.drive import Drive
 from canbase_config.robot import Robot
 from canbase_sim.axis_parts import AxisParts, StateChange
 from canbase_sim.cia301.dictionary import AXIS_STRIDE, key
+from canbase_sim.cia305.bit_timing import FACTORY_BITRATE, FACTORY_NODE_ID
 from canbase_sim.cia402.raw_units import Scale
 from canbase_sim.frame import Frame
 from canbase_sim.node import SimulatedNode
+from canbase_sim.odd.draw import OddDrive
+from canbase_sim.odd.odd_node import OddNode
 from canbase_sim.personality import GENERIC, PERSONALITIES, Personality
 from canbase_sim.plant.base import Base, MountedWheel, PlantParameters
 from canbase_sim.plant.battery import Battery
@@ -34,6 +38,8 @@ class BenchParameters:
     """From an SDO request to its answer [s]. Below 1 ms: an STM32 with CANopenNode; 30 ms: Lenze 9400 (its manual)."""
     encoder_offset: int = 123_456
     """6064h at the start; each further axis is at a multiple of it."""
+    factory_fresh: bool = False
+    """Every drive has node id 1 and 125 kbit/s, as many makers deliver them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +63,10 @@ class Truth:
 
 
 class Bench:
-    """Simulated nodes, axes and body of `robot`. `nodes` (by node id) and `base` are open to tests and faults."""
+    """Simulated nodes, axes and body of `robot`. `nodes` and `base` are open to tests and faults.
+
+    `nodes` is by the node ids of robot.yaml, whatever id LSS has given the node meanwhile.
+    """
 
     def __init__(
         self,
@@ -65,8 +74,10 @@ class Bench:
         now_s: float = 0.0,
         body: PlantParameters = DEFAULT_BODY,
         parameters: BenchParameters | None = None,
+        odd: Mapping[int, OddDrive] = MappingProxyType({}),
     ) -> None:
-        self._robot, self._parameters = robot, parameters or BenchParameters()
+        """`odd`: drives of the kind `odd`, by node id."""
+        self._robot, self._odd, self._parameters = robot, odd, parameters or BenchParameters()
         self._start, self._steps, self._h = now_s, 0, body.step_s
         self._motors = [body.motor(len(robot.drives)) for _ in robot.drives]
         self.battery = Battery(self._motors)
@@ -86,12 +97,21 @@ class Bench:
         """A frame from the bus: the world moves up to `now_s`, then every node receives it."""
         self._advance(now_s)
         for node in self._all_nodes:
-            node.on_frame(frame.cob_id, frame.data, now_s)
+            if frame.remote:
+                node.on_request(frame.cob_id, now_s)
+            else:
+                node.on_frame(frame.cob_id, frame.data, now_s)
 
     def tick(self, now_s: float) -> list[Frame]:
         """The world moves up to `now_s`; the frames that the nodes send, in order."""
         self._advance(now_s)
         return [frame for node in self._all_nodes for frame in node.tick(now_s)]
+
+    def tick_rated(self, now_s: float) -> list[tuple[int, Frame]]:
+        """As `tick`; each frame with the bit rate of its node [bit/s]. A node that is changing it sends none."""
+        self._advance(now_s)
+        sent = [(node.bitrate, frame) for node in self._all_nodes for frame in node.tick(now_s)]
+        return [(bitrate, frame) for bitrate, frame in sent if bitrate]
 
     def truth(self, now_s: float) -> Truth:
         """The state of the world at `now_s`."""
@@ -119,7 +139,8 @@ class Bench:
         return changes
 
     def lost_heartbeats(self) -> list[tuple[int, int]]:
-        """Each heartbeat that a node has missed since the last call: the node, and the watched one (node ids)."""
+        """Each heartbeat that a node has missed since the last call: the node, and the watched one (node ids; 0: the
+        master that guarded it)."""
         lost = [(node.node_id, producer) for node in self._all_nodes for producer in node.lost_producers]
         for node in self._all_nodes:
             node.lost_producers.clear()
@@ -149,16 +170,30 @@ class Bench:
             drive = self._robot.drives[i]
             fixed[key(0x608F + axis * AXIS_STRIDE, 1)] = drive.counts_per_motor_rev
             fixed |= _identity(drive)
-        delays = self._parameters
+        of = self._parameters
+        if node_id in self._odd:
+            odd = self._odd[node_id]
+            return OddNode(
+                node_id,
+                parts,
+                now_s,
+                odd.manner,
+                odd.seed,
+                of.boot_delay_s,
+                fixed,
+                of.sdo_delay_s,
+                lambda: self.battery.voltage_v,
+            )
         return SimulatedNode(
-            node_id,
+            FACTORY_NODE_ID if of.factory_fresh else node_id,
             parts,
             now_s,
-            delays.boot_delay_s,
+            of.boot_delay_s,
             fixed,
             personality,
-            delays.sdo_delay_s,
+            of.sdo_delay_s,
             lambda: self.battery.voltage_v,
+            FACTORY_BITRATE if of.factory_fresh else self._robot.bus.bitrate,
         )
 
     def _axis(self, i: int | None) -> AxisParts:
@@ -184,7 +219,7 @@ def _personality(drive: Drive) -> Personality:
 
 
 def _scale_of(robot: Robot, drive: Drive) -> Scale:
-    return Scale.of(drive, robot.base.wheel_radius_m, _personality(drive))
+    return Scale.of(drive, robot.base.radius_m(drive.side), _personality(drive))
 
 
 def _identity(drive: Drive) -> dict[int, int]:

@@ -1,0 +1,78 @@
+"""What a message of the driver tells a person to do, as a person reads it: keys, objects, nodes, the maker's tool."""
+
+from __future__ import annotations
+
+import json
+import re
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from canbase_config.profile import Profile
+from canbase_config.robot import Robot
+from canbase_config.section import Section
+
+_OBJECT = re.compile(r"\b([1-9A-F][0-9A-F]{3})h\b")
+_NODE = re.compile(r"\bnode (\d+)\b")
+_LITERAL = re.compile(r"`([a-z_]+(?:\.[a-z_0-9]+)*): ([^`]+)`")
+_KEY = re.compile(r"\b[a-z_]+(?:\.[a-z_0-9]+)+\b")
+_MODE = re.compile(r"`mode`")
+MAKERS_TOOL, UNUSABLE = "maker's tool", "cannot be used"
+WITHOUT_OBJECT = ("boot-up message", "SDO requests", "SDO transfers", "NMT reset")
+"""What a message may be about that has no object."""
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """What a message says. `keys`: of a drive profile or robot.yaml, with the value where the message has one."""
+
+    text: str
+    nodes: tuple[int, ...]
+    objects: tuple[int, ...]
+    keys: dict[str, Any]
+
+    @property
+    def names_a_thing(self) -> bool:
+        """It is about an object, or about a service that has none."""
+        return bool(self.objects) or any(word in self.text for word in WITHOUT_OBJECT)
+
+    @property
+    def by_tool(self) -> bool:
+        """An object is to be set with the maker's tool."""
+        return MAKERS_TOOL in self.text
+
+    @property
+    def gives_up(self) -> bool:
+        """The drive cannot be used."""
+        return UNUSABLE in self.text
+
+
+def read_advice(text: str) -> Advice:
+    """What the message says."""
+    keys: dict[str, Any] = {key: None for key in _KEY.findall(text) if is_key(key)}
+    keys |= {"mode": None} if _MODE.search(text) else {}
+    keys |= {key: _value(value) for key, value in _LITERAL.findall(text) if is_key(key) or key == "mode"}
+    objects = tuple(dict.fromkeys(int(index, 16) for index in _OBJECT.findall(text)))
+    return Advice(text, tuple(dict.fromkeys(map(int, _NODE.findall(text)))), objects, keys)
+
+
+def _value(text: str) -> Any:
+    with suppress(json.JSONDecodeError):
+        return json.loads(text)
+    return text
+
+
+def is_key(path: str) -> bool:
+    """Whether it is a key of a drive profile or of robot.yaml."""
+    return has_key(Profile, path) or has_key(Robot, path)
+
+
+def has_key(model: type[Section], path: str) -> bool:
+    """Whether this model has it, in sections below sections."""
+    section: Any = model
+    for name in path.split("."):
+        fields = getattr(section, "model_fields", {})
+        if name not in fields:
+            return False
+        section = fields[name].annotation
+    return True

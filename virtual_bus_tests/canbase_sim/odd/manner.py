@@ -1,0 +1,62 @@
+"""What an odd drive does that others do not: what it refuses, how it answers, what it adds to its frames. Only data.
+
+All of it is legal: oddities.py has the clause for each. What a kind of drive lacks or has elsewhere is its personality.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from canbase_sim.personality import GENERIC, Personality
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """Values that an entry takes: from `low` to `high`, in steps. `code`: how it aborts others; 0: it takes the nearest
+    of its own in their place."""
+
+    low: int
+    high: int
+    step: int = 1
+    code: int = 0
+
+    def nearest(self, value: int) -> int:
+        """What it takes in place of `value`."""
+        inside = min(max(value, self.low), self.high)
+        return self.low + (inside - self.low) // self.step * self.step
+
+
+@dataclass(frozen=True, slots=True)
+class Manner:
+    """How one odd drive behaves. Entries are `index << 8 | sub-index`."""
+
+    personality: Personality = GENERIC
+    refused_reads: Mapping[int, int] = field(default_factory=dict)
+    """Abort codes of entries that cannot be read."""
+    refused_writes: Mapping[int, int] = field(default_factory=dict)
+    bounds: Mapping[int, Bounds] = field(default_factory=dict)
+    answers_sized: bool = True
+    """False: expedited uploads have neither e's count of bytes nor the size bit, and always four bytes."""
+    answers_expedited: bool = True
+    """False: each upload takes segments, however short the object is."""
+    answer_jitter_s: float = 0.0
+    """Each SDO answer may come so much later [s]."""
+    answers_lost: float = 0.0
+    """Share of its SDO requests that it never answers."""
+    frames_twice: float = 0.0
+    """Share of its frames that are on the bus twice."""
+    pdo_late_s: float = 0.0
+    """Its synchronous TPDOs come up to so much after the SYNC [s]."""
+    reset_s: float = 0.0
+    """From NMT reset communication to the boot-up message, beyond what others need [s]."""
+    boot_ups: bool = True
+    """False: it sends no boot-up message."""
+    status_bits: int = 0
+    """Bits that come and go in its statusword."""
+    velocity_noise: int = 0
+    """606Ch is up to so many bits beside the speed."""
+    emcy_every_s: float = 0.0
+    """An emergency message of the maker's, followed by "no error", so often [s]; 0: none."""
+    start_count: int | None = None
+    """6064h after power on."""

@@ -1,0 +1,66 @@
+"""An odd drive's end of the bus: answers that are late, lost or doubled, and TPDOs that come a little after SYNC."""
+
+from __future__ import annotations
+
+from collections import deque
+from random import Random
+
+from canbase_sim.frame import Frame
+from canbase_sim.line import Line
+from canbase_sim.odd.manner import Manner
+
+TPDOS = range(0x180, 0x580)
+
+
+class OddLine(Line):
+    """`random` decides about each frame."""
+
+    def __init__(self, answer_delay_s: float, manner: Manner, random: Random) -> None:
+        super().__init__(answer_delay_s)
+        self._manner, self._random = manner, random
+        self._late_pdos: deque[tuple[float, Frame]] = deque()
+        self.now_s = 0.0
+
+    def say(self, frame: Frame) -> None:
+        """Send it, twice now and then: a CAN controller repeats a frame whose last bit was disturbed (ISO 11898-1)."""
+        super().say(frame)
+        if self._manner.frames_twice and self._random.random() < self._manner.frames_twice:
+            super().say(frame)
+
+    def say_boot_up(self, frame: Frame) -> None:
+        """A boot-up message, where it has one."""
+        if self._manner.boot_ups:
+            super().say_boot_up(frame)
+
+    def say_pdo(self, frame: Frame) -> None:
+        """A TPDO, after its time."""
+        late_s = self._manner.pdo_late_s * self._random.random()
+        if not late_s:
+            self.say(frame)
+            return
+        last = self._late_pdos[-1][0] if self._late_pdos else 0.0
+        self._late_pdos.append((max(last, self.now_s + late_s), frame))
+
+    def answer(self, frame: Frame, now_s: float) -> None:
+        """An SDO answer: late, or never."""
+        manner = self._manner
+        if manner.answers_lost and self._random.random() < manner.answers_lost:
+            return
+        late_s = self._answer_delay_s + manner.answer_jitter_s * self._random.random()
+        if not late_s:
+            self.say(frame)
+            return
+        last = self._answers[-1][0] if self._answers else 0.0
+        self._answers.append((max(last, now_s + late_s), frame))
+
+    def say_late_answers(self, now_s: float) -> None:
+        """And late TPDOs."""
+        self.now_s = now_s
+        super().say_late_answers(now_s)
+        while self._late_pdos and now_s >= self._late_pdos[0][0]:
+            self.say(self._late_pdos.popleft()[1])
+
+    def forget(self) -> None:
+        """What waits is never sent."""
+        super().forget()
+        self._late_pdos.clear()
