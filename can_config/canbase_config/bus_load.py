@@ -18,7 +18,7 @@ from canbase_config.object_map import (
     VELOCITY_ACTUAL,
     place,
 )
-from canbase_config.watchdog import HEARTBEATS_PER_TIMEOUT
+from canbase_config.watchdog import GUARDS_PER_TIMEOUT, HEARTBEATS_PER_TIMEOUT
 
 if TYPE_CHECKING:
     from canbase_config.drive import Drive
@@ -41,6 +41,11 @@ OVERHEAD_BITS, STUFFED_BITS = 47, 34
 def frame_bits(data_bytes: int) -> int:
     """Length of a data frame on the wire with as many stuff bits as there can be, and the gap behind it [bit]."""
     return OVERHEAD_BITS + 8 * data_bytes + (STUFFED_BITS + 8 * data_bytes - 1) // 4
+
+
+def traffic_bits(frames: int, data_bytes: int) -> int:
+    """The same for so many frames with so many bytes of data in all [bit]; a 29-bit frame counts as an 11-bit one."""
+    return frames * frame_bits(0) + data_bytes * (frame_bits(1) - frame_bits(0))
 
 
 def cyclic_load(robot: Robot, bitrate: int | None = None) -> float:
@@ -101,7 +106,10 @@ def _mapped_bits(drive: Drive, index: int) -> int:
 
 
 def _slow_bits_per_s(robot: Robot) -> float:
-    """Heartbeats of every node, the driver's and the watchdog's, and the watchdog's state frames."""
-    nodes = len({drive.node_id for drive in robot.drives}) + 2
-    beats_hz = nodes * HEARTBEATS_PER_TIMEOUT / robot.timeouts.drive_heartbeat_s
-    return beats_hz * frame_bits(1) + (STATE_HZ + COUNTERS_HZ) * frame_bits(8)
+    """Heartbeats of every node, the driver's and the watchdog's, and the watchdog's state frames. A guarded node
+    answers requests, frames without data, in place of heartbeats."""
+    guarded = {drive.node_id for drive in robot.drives if drive.kind.self_stop.node_guarding}
+    beating = {drive.node_id for drive in robot.drives} - guarded
+    beats = (len(beating) + 2) * HEARTBEATS_PER_TIMEOUT * frame_bits(1)
+    guards = len(guarded) * GUARDS_PER_TIMEOUT * (frame_bits(0) + frame_bits(1))
+    return (beats + guards) / robot.timeouts.drive_heartbeat_s + (STATE_HZ + COUNTERS_HZ) * frame_bits(8)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Step = Literal["directions", "scale", "proof", "floor"]
 STEPS: Final[tuple[Step, ...]] = ("directions", "scale", "proof", "floor")
 DIGITS: Final = 12
-Mark = Annotated[str, Field(pattern=rf"^[dspf][0-9a-f]{{{DIGITS}}}$", max_length=1 + DIGITS)]
+Mark = Annotated[str, Field(pattern=rf"^[dspfi][0-9a-f]{{{DIGITS}}}$", max_length=1 + DIGITS)]
 
 
 class Commissioned(Section):
@@ -33,12 +33,61 @@ class Commissioned(Section):
     scale: Annotated[Mark | None, Field(description="how far each wheel turns")] = None
     proof: Annotated[Mark | None, Field(description="that each drive stops by itself")] = None
     floor: Annotated[Mark | None, Field(description="wheel radius and track, by a measured drive")] = None
+    identities: Annotated[Mark | None, Field(description="the drives of which `proof` holds, by 1018h")] = None
 
 
 def mark(robot: Robot, step: Step) -> str:
     """The value of `commissioned` when this step has proven the values of `robot`."""
-    shown = json.dumps(_shown(robot, step), sort_keys=True)
-    return step[0] + hashlib.sha256(shown.encode()).hexdigest()[:DIGITS]  # the letter: never a number in YAML
+    return _hashed(step[0], _shown(robot, step))
+
+
+def identities(robot: Robot) -> str:
+    """The value of `commissioned.identities` for the drives that robot.yaml names by `identity`."""
+    return _hashed("i", [[drive.node_id, *_numbers(drive)] for drive in robot.drives])
+
+
+def without_proof(robot: Robot) -> str:
+    """Why not every drive is proven to stop by itself, with the command that proves it; empty: all are, or the bus has
+    no wire.
+
+    A proof is about these drives alone: the driver boots no other ones, as `identity` in robot.yaml has their 1018h.
+    """
+    if robot.bus.is_virtual:
+        return ""
+    why = _why_not_proven(robot)
+    joints = ", ".join(drive.joint for drive in robot.drives)
+    return f"{joints}: {why}. With the wheels up: canbase commission --steps proof" if why else ""
+
+
+def is_proven(robot: Robot) -> bool:
+    """Whether each drive, by its 1018h, was seen to stop by itself. No simulated one was."""
+    return not robot.bus.is_virtual and not _why_not_proven(robot)
+
+
+def _why_not_proven(robot: Robot) -> str:
+    done, nameless = robot.commissioned, [drive.joint for drive in robot.drives if not any(_numbers(drive))]
+    if done.proof is None:
+        return "no proof that each drive stops by itself when this computer fails"
+    if done.proof != mark(robot, "proof"):
+        return "profile, node ids or timeouts.drive_heartbeat_s have changed since the proof that each drive stops"
+    if nameless:
+        return f"`identity` of {', '.join(nameless)} is not given, so the proof may be about another drive"
+    if done.identities is None:
+        return "the proof that each drive stops does not say with which drives it was made"
+    if done.identities != identities(robot):
+        return "`identity` has changed since the proof that each drive stops: it was made with other drives"
+    return ""
+
+
+def _hashed(letter: str, shown: list[Any]) -> str:
+    """The letter: never a number in YAML."""
+    return letter + hashlib.sha256(json.dumps(shown, sort_keys=True).encode()).hexdigest()[:DIGITS]
+
+
+def _numbers(drive: Drive) -> tuple[int | None, ...]:
+    """1018h, as far as it is known."""
+    known = drive.identity
+    return known.vendor_id, known.product_code, known.revision, known.serial
 
 
 def uncommissioned(robot: Robot) -> str:
@@ -55,7 +104,9 @@ def uncommissioned(robot: Robot) -> str:
 def _shown(robot: Robot, step: Step) -> list[Any]:
     drives = [_DRIVE[step](drive) for drive in robot.drives]
     if step == "floor":
-        return [drives, robot.base.wheel_radius_m, robot.base.track_m]
+        base = robot.base
+        ratio = [] if base.wheel_ratio == 1.0 else [base.wheel_ratio]  # marks from before this key stay valid
+        return [drives, base.wheel_radius_m, base.track_m, *ratio]
     return [drives, robot.timeouts.drive_heartbeat_s] if step == "proof" else drives
 
 
@@ -70,7 +121,9 @@ def _scale(drive: Drive) -> list[Any]:
 
 def _kind(drive: Drive) -> list[Any]:
     """A profile of the user's own by its name: robot.yaml moves when it is installed, and the profile with it."""
-    return [drive.node_id, drive.axis, Path(drive.profile).name, drive.kind.self_stop.model_dump()]
+    own = drive.kind.self_stop
+    younger = {"node_guarding"} if not own.node_guarding else None  # a mark from before that key stays valid
+    return [drive.node_id, drive.axis, Path(drive.profile).name, own.model_dump(exclude=younger)]
 
 
 _DRIVE = {

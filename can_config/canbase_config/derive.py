@@ -30,9 +30,9 @@ SLOWEST_RAMP_SHARE = 0.25
 
 def speed_noise_mps(robot: Robot) -> float:
     """How far one value of 606Ch may be from the speed of the rim [m/s]: base.standstill_mps, or one coarse bit."""
-    radius_m = robot.base.wheel_radius_m
-    bits = (mps_per_bit(drive, radius_m) * velocity_scale(drive) for drive in robot.drives)
-    return max(robot.base.standstill_mps, *map(abs, bits))
+    base = robot.base
+    bits = (mps_per_bit(drive, base.radius_m(drive.side)) * velocity_scale(drive) for drive in robot.drives)
+    return max(base.standstill_mps, *map(abs, bits))
 
 
 def slope_window_s(robot: Robot) -> float:
@@ -66,7 +66,7 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
     return WatchdogConfig(
         bus_arguments=robot.bus_arguments(),
         drives=tuple(
-            watched_drive(drive, robot.base.wheel_radius_m, hardest_braking_mps2(robot, drive))
+            watched_drive(drive, robot.base.radius_m(drive.side), hardest_braking_mps2(robot, drive))
             for drive in robot.drives
         ),
         track_m=robot.base.track_m,
@@ -135,6 +135,7 @@ def watched_drive(drive: Drive, wheel_radius_m: float, hardest_mps2: float) -> W
         answers_sync=drive.kind.pdo.synchronous,
         layout=_layout(drive.kind.layout),
         hardest_braking_mps2=hardest_mps2,
+        guarded=drive.kind.self_stop.node_guarding,
     )
 
 

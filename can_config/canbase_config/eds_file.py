@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -19,6 +19,11 @@ MAX_NOTES: Final = 1_000
 _ENCODINGS: Final = ("utf-8", "cp1252", "latin-1")
 _OBJECT: Final = re.compile(r"([0-9a-f]{4})(?:sub([0-9a-f]{1,2}))?", re.IGNORECASE)
 _NODE_ID: Final = re.compile(r"\$?NODEID", re.IGNORECASE)
+_UNSIGNED8: Final = 0x05
+_SIGNED_BITS: Final = {0x02: 8, 0x03: 16, 0x04: 32, 0x10: 24, 0x15: 64}
+"""Bits of the signed data types (CiA 301)."""
+MAX_COMPACT: Final = 254
+"""Sub-indexes of an array."""
 _ACCESS: Final = frozenset(("ro", "wo", "rw", "rwr", "rww", "const"))
 
 
@@ -28,7 +33,11 @@ class EdsError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class EdsObject:
-    """One object or sub-object. `default`: its number as the drive comes up, node id 0; None: none is given."""
+    """One object or sub-object. `default`: its number as the drive comes up, node id 0; None: none is given.
+
+    `low`, `high`: the range of its value; None: none is given, or it is no number. `text`: the value as the file has
+    it, of a DCF its ParameterValue (then `is_set`), else the DefaultValue.
+    """
 
     index: int
     sub: int
@@ -37,6 +46,12 @@ class EdsObject:
     data_type: int | None
     access: str
     default: int | None
+    low: int | None = None
+    high: int | None = None
+    text: str = ""
+    is_set: bool = False
+    has_node_id: bool = False
+    """Whether the node id is added to its value, or to its default."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +64,12 @@ class Eds:
     info: Mapping[str, str]
     notes: tuple[str, ...]
     """What is odd, a sentence each, with its line."""
+    names: Mapping[int, str]
+    """Of each index that has a section of its own: the name of a whole array or record."""
+    compact: Mapping[int, int]
+    """Arrays that the file does not spell out (CompactSubObj): how many sub-indexes follow sub-index 0."""
+    sections: Mapping[str, Mapping[str, str]]
+    """The sections that describe no object: by name and key, both in lower case."""
 
     def has(self, index: int, sub: int | None = None) -> bool:
         """Whether the object is described; any sub-index of it when `sub` is None."""
@@ -71,10 +92,11 @@ class _Section:
 def read_eds(path: str | Path) -> Eds:
     """The EDS or DCF file at `path`. Raises EdsError when nothing in it describes a CANopen device."""
     path = Path(path)
-    text, encoding = _text(path)
+    text, encoding = read_text(path)
     notes: list[str] = [] if encoding == "utf-8" else [f"read as {encoding}: it is no UTF-8"]
     sections = _sections(text, notes)
-    objects = {(found.index, found.sub): found for found in _objects(sections, notes)}
+    compact = dict(_compact(sections))
+    objects = {(found.index, found.sub): found for found in _objects(sections, compact, notes)}
     if not objects:
         first = next((line for line in text.splitlines() if line.strip()), "")
         raise EdsError(f"{path}:1: no section describes an object ([1000], [6040], …); it begins with {first[:40]!r}")
@@ -82,8 +104,14 @@ def read_eds(path: str | Path) -> Eds:
     if info is None:
         notes.append("it has no section [DeviceInfo]")
     notes += _lists(sections, objects)
-    values = {key: value for key, (value, _) in info.values.items()} if info else {}
-    return Eds(path, encoding, objects, values, tuple(notes[:MAX_NOTES]))
+    others = {name: _plain(section) for name, section in sections.items() if not _OBJECT.fullmatch(name)}
+    names = {int(name, 16): _plain(section).get("parametername", "") for name, section in _whole(sections)}
+    return Eds(path, encoding, objects, others.get("deviceinfo", {}), tuple(notes[:MAX_NOTES]), names, compact, others)
+
+
+def adds_node_id(text: str) -> bool:
+    """Whether the value has a $NODEID, to which the node id belongs."""
+    return bool(_NODE_ID.search(text[:MAX_NUMBER]))
 
 
 def number(text: str) -> int | None:
@@ -104,7 +132,8 @@ def _term(text: str) -> int | None:
     return int(text) if re.fullmatch(r"[-+]?\d+", text) else None
 
 
-def _text(path: Path) -> tuple[str, str]:
+def read_text(path: Path) -> tuple[str, str]:
+    """The content of an EDS file with its line ends, and its encoding. Raises EdsError."""
     try:
         with path.open("rb") as file:
             data = file.read(MAX_BYTES + 1)
@@ -158,12 +187,45 @@ def _take(section: _Section, line: str, at: int, notes: list[str]) -> None:
     section.values[lower] = (value.strip(), at)
 
 
-def _objects(sections: Mapping[str, _Section], notes: list[str]) -> Iterator[EdsObject]:
+def _plain(section: _Section) -> dict[str, str]:
+    return {key: value for key, (value, _) in section.values.items()}
+
+
+def _whole(sections: Mapping[str, _Section]) -> Iterator[tuple[str, _Section]]:
+    """The sections of whole objects: by index alone."""
+    return ((name, section) for name, section in sections.items() if re.fullmatch("[0-9a-f]{4}", name))
+
+
+def _compact(sections: Mapping[str, _Section]) -> Iterator[tuple[int, int]]:
+    for name, section in _whole(sections):
+        count = number(section.values.get("compactsubobj", ("", 0))[0]) or 0
+        if 0 < count <= MAX_COMPACT and name + "sub0" not in sections:
+            yield int(name, 16), count
+
+
+def _objects(sections: Mapping[str, _Section], compact: Mapping[int, int], notes: list[str]) -> Iterator[EdsObject]:
     for name, section in sections.items():
         match = _OBJECT.fullmatch(name)
         if match is None or (match[2] is None and name + "sub0" in sections):
             continue
-        yield _object(section, int(match[1], 16), int(match[2] or "0", 16), notes)
+        index = int(match[1], 16)
+        if match[2] is None and index in compact:
+            yield from _array(section, index, compact[index], sections, notes)
+        else:
+            yield _object(section, index, int(match[2] or "0", 16), notes)
+
+
+def _array(
+    section: _Section, index: int, count: int, sections: Mapping[str, _Section], notes: list[str]
+) -> Iterator[EdsObject]:
+    """An array with CompactSubObj: all sub-indexes are like its own section; a DCF has their values in [IIIIValue]."""
+    yield EdsObject(index, 0, "Number of entries", section.line, _UNSIGNED8, "ro", count, text=str(count))
+    values = sections.get(f"{section.name.lower()}value")
+    alike = _object(section, index, 1, notes)
+    for sub in range(1, count + 1):
+        text, _ = values.values.get(str(sub), ("", 0)) if values else ("", 0)
+        own = replace(alike, sub=sub, name=f"{alike.name} {sub}")
+        yield replace(own, text=text, is_set=True, default=number(text)) if text else own
 
 
 def _object(section: _Section, index: int, sub: int, notes: list[str]) -> EdsObject:
@@ -175,9 +237,23 @@ def _object(section: _Section, index: int, sub: int, notes: list[str]) -> EdsObj
         if access:
             notes.append(f"line {section.line}: [{section.name}] has the access type {access!r}; rw is assumed")
         access = "rw"
+    is_set = bool(value("parametervalue"))
+    kind = number(value("datatype"))
     return EdsObject(
-        index, sub, value("parametername"), section.line, number(value("datatype")), access, _default(section, notes)
-    )
+        index, sub, value("parametername"), section.line, kind, access, _default(section, notes),
+        low=_limit(value("lowlimit"), kind), high=_limit(value("highlimit"), kind),
+        text=value("parametervalue") if is_set else value("defaultvalue"), is_set=is_set,
+        has_node_id=adds_node_id(value("parametervalue")) or adds_node_id(value("defaultvalue")),
+    )  # fmt: skip
+
+
+def _limit(text: str, kind: int | None) -> int | None:
+    """LowLimit or HighLimit. Of a signed number many files have the bit pattern: 0x8000 of sixteen bits is -32768."""
+    limit = number(text)
+    bits = _SIGNED_BITS.get(kind or 0)
+    if limit is None or bits is None or limit >> (bits - 1) != 1:
+        return limit
+    return limit - (1 << bits)
 
 
 def _default(section: _Section, notes: list[str]) -> int | None:

@@ -82,13 +82,16 @@ def self_stop_sentence(eds: Eds) -> str:
     if eds.has(0x1016) and eds.has(0x6007):
         how = "it watches heartbeats (1016h) and has 6007h for what to do then"
         return f"It can stop by itself when the computer dies: {how}. Prove it with the wheels up."
+    if _can_be_guarded(eds):
+        how = "it knows node guarding (100Ch, 100Dh), which its master must do, and has 6007h for what to do then"
+        return f"It can stop by itself when the computer dies: {how}. Prove it with the wheels up."
     if eds.has(0x1400, 5):
         how = "it has a deadline for setpoints (1400h:5), but the EDS does not show what it does when that expires"
         return f"It may stop by itself when the computer dies: {how}. Prove it with the wheels up."
     if eds.has(0x1016):
         how = "it monitors heartbeats (1016h), but has no 6007h: whether the motor stops is unknown"
         return f"Do not count on it to stop by itself when the computer dies: {how}. Prove it with the wheels up."
-    how = "it watches no heartbeat (no 1016h) and no setpoints (no 1400h:5)"
+    how = "it watches no heartbeat (no 1016h), no setpoints (no 1400h:5), and no guard (no 100Ch, or no 6007h)"
     return f"It will NOT stop by itself when the computer dies: {how}. Look for a watchdog of its maker; wire STO."
 
 
@@ -160,8 +163,15 @@ def _self_stop(eds: Eds, out: _Lines) -> None:
     out.put("heartbeat_entries", subs if entries is None else entries, "1016h")
     for key, index in (("abort_connection", 0x6007), ("error_behaviour", 0x1029)):
         out.put(key, *_presence(eds, index))
+    if not eds.has(0x1016):
+        out.put("node_guarding", _can_be_guarded(eds), "100Ch, 100Dh, 6007h")
     has_timer = eds.has(0x1400, 5)
     out.put("rpdo_timer", "yes" if has_timer else "no", "1400h:5", proven=not has_timer)
+
+
+def _can_be_guarded(eds: Eds) -> bool:
+    """It monitors node guarding and no heartbeat, and can be told to stop then."""
+    return not eds.has(0x1016) and all(eds.has(index) for index in (0x100C, 0x100D, 0x6007))
 
 
 def _options(eds: Eds, out: _Lines) -> None:

@@ -131,7 +131,21 @@ class SelfStop(Section):
     abort_connection_code: Annotated[int, Field(ge=-32768, le=32767, description="value of 6007h that stops")] = 3
     error_behaviour: Annotated[Presence, Field(description="1029h:1")] = "probe"
     rpdo_timer: Annotated[Presence, Field(description="1400h:5, deadline of the setpoints")] = "no"
+    node_guarding: Annotated[
+        bool,
+        Field(
+            description="true: the watchdog guards the node (100Ch, 100Dh, remote frames), which then sends no "
+            "heartbeat; for a drive without 1016h"
+        ),
+    ] = False
     vendor_watchdog: VendorWatchdog | None = None
+
+    @model_validator(mode="after")
+    def _guarding_excludes_heartbeats(self) -> SelfStop:
+        if self.node_guarding and self.heartbeat_entries != 0:
+            message = "node guarding excludes heartbeats (CiA 301): it needs heartbeat_entries: 0"
+            raise MisfitError(message, ("node_guarding",), ("heartbeat_entries",))
+        return self
 
 
 class Options(Section):

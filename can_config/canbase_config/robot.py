@@ -17,6 +17,7 @@ from canbase_config.commissioned import Commissioned
 from canbase_config.drive import Drive
 from canbase_config.health import Battery, Health
 from canbase_config.mux import Mux
+from canbase_config.odometry import OdometrySettings
 from canbase_config.safety import Safety
 from canbase_config.section import MisfitError, Name, Section
 from canbase_config.watchdog_section import Watchdog
@@ -24,6 +25,8 @@ from canbase_config.watchdog_section import Watchdog
 BROADCAST = 0
 """Lower seven bits of the identifiers of NMT, SYNC and TIME."""
 NODE_ID_BITS = 0x7F
+REMOTE = 0x4000_0000
+"""linux/can.h, CAN_RTR_FLAG: above an identifier, in a filter of the kernel."""
 DRIVER_NODE_ID = 127
 """CANopen node id of the motor driver: its heartbeat is COB-ID 77Fh."""
 CYCLES_PER_TIMEOUT = 4
@@ -81,12 +84,21 @@ class Base(Section):
     """The two-wheeled base."""
 
     wheel_radius_m: Annotated[float, Field(gt=0.005, le=1.0, description="[m]")]
+    wheel_ratio: Annotated[
+        float,
+        Field(ge=0.9, le=1.1, description="radius of the right wheels / of the left ones; wheel_radius_m is the mean"),
+    ] = 1.0
     track_m: Annotated[float, Field(gt=0.02, le=5.0, description="distance between the wheels' contact points [m]")]
     odom_frame: Annotated[str, Field(min_length=1, description="REP 105")] = "odom"
     base_frame: Annotated[str, Field(min_length=1, description="REP 105")] = "base_link"
     standstill_mps: Annotated[
         float, Field(gt=0.0, le=0.05, description="a wheel whose rim is slower is at standstill [m/s]")
     ] = 0.005
+
+    def radius_m(self, side: str) -> float:
+        """Wheel radius of one side, `left` or `right` [m]. Their mean is wheel_radius_m."""
+        left_m = 2.0 * self.wheel_radius_m / (1.0 + self.wheel_ratio)
+        return left_m * self.wheel_ratio if side == "right" else left_m
 
 
 class Limits(Section):
@@ -190,6 +202,7 @@ class Robot(Section):
     ]
     base: Base
     limits: Limits
+    odometry: OdometrySettings = OdometrySettings()
     rates: Rates = Rates()
     timeouts: Timeouts = Timeouts()
     mux: Mux = Mux()
@@ -205,12 +218,13 @@ class Robot(Section):
     def bus_arguments(self) -> dict[str, Any]:
         """Keyword arguments for `can.Bus` of the driver and the watchdog. On SocketCAN the kernel passes the frames of
         this robot alone, so that a sensor on the same bus wakes neither: broadcast ones (NMT, SYNC), and all 11-bit
-        identifiers whose lower seven bits are the node id of a drive, the driver or the watchdog (CiA 301, 7.3.5).
+        identifiers whose lower seven bits are the node id of a drive, the driver or the watchdog (CiA 301, 7.3.5). None
+        is a remote frame: those are requests of the watchdog to drives.
         """
         if self.bus.interface != "socketcan":
             return self.bus.arguments()
         nodes = [BROADCAST, *sorted({drive.node_id for drive in self.drives}), WATCHDOG_NODE_ID, DRIVER_NODE_ID]
-        filters = [{"can_id": node_id, "can_mask": NODE_ID_BITS, "extended": False} for node_id in nodes]
+        filters = [{"can_id": node_id, "can_mask": REMOTE | NODE_ID_BITS, "extended": False} for node_id in nodes]
         return {"can_filters": filters} | self.bus.arguments()
 
     @model_validator(mode="after")

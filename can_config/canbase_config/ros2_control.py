@@ -88,6 +88,8 @@ def controllers(robot: Robot) -> str:
         right=", ".join(map(json.dumps, right)),
         track_m=float(base.track_m),
         radius_m=float(base.wheel_radius_m),
+        left_share=round(base.radius_m("left") / base.wheel_radius_m, 6),
+        right_share=round(base.radius_m("right") / base.wheel_radius_m, 6),
         odom_frame=json.dumps(base.odom_frame),
         base_frame=json.dumps(base.base_frame),
         timeout_s=TIMEOUT_S,
@@ -112,8 +114,10 @@ controller_manager:
   ros__parameters:
     left_wheel_names: [{left}]
     right_wheel_names: [{right}]
-    wheel_separation: {track_m}            # base.track_m; leave every multiplier at 1.0
+    wheel_separation: {track_m}            # base.track_m; leave its multiplier at 1.0
     wheel_radius: {radius_m}                # base.wheel_radius_m
+    left_wheel_radius_multiplier: {left_share}   # both by base.wheel_ratio
+    right_wheel_radius_multiplier: {right_share}
     odom_frame_id: {odom_frame}
     base_frame_id: {base_frame}
     enable_odom_tf: false            # canbase publishes this transform

@@ -112,6 +112,13 @@ class Safety(Section):
     uncommissioned_mps: Annotated[
         float, Field(ge=0.02, le=5.0, description="speed limit until canbase commission has finished all steps [m/s]")
     ] = 0.3
+    require_self_stop: Annotated[
+        bool,
+        Field(
+            description="true: no power before canbase commission has proven, with these drives, that each one stops "
+            "by itself when this computer fails; false: STO has to stop those that do not"
+        ),
+    ] = False
     usable_share: Annotated[
         float,
         Field(ge=0.5, le=1.0, description="least share of usable readings, of the directions that scanners cover"),

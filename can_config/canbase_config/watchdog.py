@@ -9,6 +9,16 @@ from typing import Any
 
 HEARTBEATS_PER_TIMEOUT = 3
 """Driver and watchdog send their heartbeats this often in the time that the drives allow for one."""
+GUARDS_PER_TIMEOUT = 5
+"""Node guarding requests in the same time. An answer that is lost costs two of them, as the one after it has the toggle
+bit of the one before."""
+LIFE_TIME_FACTOR = 4
+"""100Dh: a guarded drive stops when so many requests in a row are missing, before others miss its answers."""
+
+
+def guard_time_ms(drive_heartbeat_s: float) -> int:
+    """100Ch of a guarded drive [ms]: from one request to the next."""
+    return int(1000.0 * drive_heartbeat_s + 1e-6) // GUARDS_PER_TIMEOUT
 
 
 @dataclass(frozen=True)
@@ -47,6 +57,8 @@ class WatchedDrive:
     layout: WatchedLayout = WatchedLayout()
     hardest_braking_mps2: float = 8.0
     """With power it brakes its wheel no harder."""
+    guarded: bool = False
+    """It sends no heartbeat: the watchdog requests its state (node guarding), and it stops when no request comes."""
 
     @property
     def velocity_mps_per_bit(self) -> float:
@@ -161,6 +173,11 @@ class WatchdogConfig:
     def heartbeat_period_s(self) -> float:
         """From one heartbeat of driver or watchdog to the next [s]."""
         return self.drive_heartbeat_s / HEARTBEATS_PER_TIMEOUT
+
+    @property
+    def guard_period_s(self) -> float:
+        """From one node guarding request to the next, of each guarded drive [s]."""
+        return guard_time_ms(self.drive_heartbeat_s) / 1000.0
 
     def to_json(self) -> str:
         """One line of JSON that `from_json` reads back."""

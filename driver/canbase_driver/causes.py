@@ -23,6 +23,8 @@ class Cause(Enum):
     NOT_STANDING = "not standing"
     DRIVE_NOT_READY = "drive not ready"
     DRIVE_MISSING = "drive missing"
+    STOP_UNPROVEN = "stop unproven"
+    """A drive is not proven to stop by itself, and safety.require_self_stop is true."""
     BUS_FAILED = "bus failed"
     WATCHDOG_TRIPPED = "watchdog tripped"
     WATCHDOG_MISSING = "watchdog missing"

@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Callable
 
 from canbase_config import stopping
+from canbase_config.commissioned import without_proof
 from canbase_config.robot import DRIVER_NODE_ID, Robot
 from canbase_config.watchdog import HEARTBEATS_PER_TIMEOUT
 from canbase_driver.causes import Cause, Finding
@@ -83,12 +84,14 @@ class DriverCore:
         self._record = PowerRecord(found)
         self._let_go = LetGo(robot)
         self._limiter = Limiter(robot.limits, robot.base.track_m)
-        self._feed = OdometryFeed(self._drives, robot.base)
+        self._feed = OdometryFeed(self._drives, robot)
         self._command = Command(robot.timeouts.command_s)
         self._stats = CycleStats(self._period_s)
         self._motion = MotionState.AT_REST
         self._eased_at = math.inf
         """When motion was last ordered, or standstill measured; infinity before the first standstill."""
+        self._needs_proof = robot.safety.require_self_stop and not robot.bus.is_virtual
+        self._unproven = without_proof(robot) if self._needs_proof else ""
         self._reset = ResetRun(self._watchdog, self._period_s, robot.timeouts.boot_s)
         self._bus_problem = ""
         self._stop_requested = self._shutdown_requested = False
@@ -329,6 +332,7 @@ class DriverCore:
             watchdog_detail=watchdog_detail,
             watchdog_about_drive=self._watchdog.about_drive,
             commanded=self._command.motion(now_s) if with_motion else "",
+            unproven="" if enabled else self._without_self_stop(),
             stalled=drives.stalled(),
             overdue=self._overdue(now_s),
             standstill=stand,
@@ -345,6 +349,10 @@ class DriverCore:
             stop_requested=self._stop_requested,
             shutdown_requested=self._shutdown_requested,
         )
+
+    def _without_self_stop(self) -> str:
+        """Why no drive may have power: one is not proven to stop by itself, or was not set up for it by its boot."""
+        return self._unproven or (self._drives.without_self_stop() if self._needs_proof else "")
 
     def _overdue(self, now_s: float) -> str:
         elapsed_s = now_s - self._eased_at

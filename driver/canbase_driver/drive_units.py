@@ -20,7 +20,8 @@ class AxisUnits:
     """Conversions of one axis. Speeds and distances are those of the rim of its wheel."""
 
     def __init__(self, drive: Drive, base: Base) -> None:
-        rim_m_per_motor_rev = m_per_motor_rev(drive, base.wheel_radius_m)
+        self.radius_m = base.radius_m(drive.side)
+        rim_m_per_motor_rev = m_per_motor_rev(drive, self.radius_m)
         counts = drive.counts_per_motor_rev
         target_rev_per_s = motor_rev_per_s(drive.target_unit, counts)
         self._drive = drive

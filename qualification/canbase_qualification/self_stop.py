@@ -43,10 +43,20 @@ def own_stops(robot: Robot) -> tuple[OwnStop, ...]:
 
 
 def _own_stop(drive: Drive) -> OwnStop:
-    stops, why = _by_heartbeat(drive)
+    stops, why = _by_guarding(drive) if drive.kind.self_stop.node_guarding else _by_heartbeat(drive)
     if stops is not StopsItself.YES:
         stops, why = _by_vendor(drive, stops, why)
     return OwnStop(drive.joint, drive.node_id, drive.kind.title, stops, why)
+
+
+def _by_guarding(drive: Drive) -> tuple[StopsItself, str]:
+    if drive.kind.self_stop.abort_connection == "no":
+        return (
+            StopsItself.NO,
+            "it monitors node guarding (100Ch) and has no 6007h: what its motor does then is not known",
+        )
+    keys = ("node_guarding", "abort_connection", "abort_connection_code")
+    return _with_6007h(drive, "the watchdog guards it (100Ch, 100Dh)", keys)
 
 
 def _by_heartbeat(drive: Drive) -> tuple[StopsItself, str]:
@@ -55,14 +65,18 @@ def _by_heartbeat(drive: Drive) -> tuple[StopsItself, str]:
         return StopsItself.NO, "it monitors no heartbeat (no 1016h)"
     if own.abort_connection == "no":
         return StopsItself.NO, "it monitors heartbeats (1016h) and has no 6007h: what its motor does then is not known"
-    open_keys = [key for key in ("heartbeat_entries", "abort_connection", "abort_connection_code") if _open(drive, key)]
+    keys = ("heartbeat_entries", "abort_connection", "abort_connection_code")
+    return _with_6007h(drive, "it monitors heartbeats (1016h)", keys)
+
+
+def _with_6007h(drive: Drive, monitors: str, keys: tuple[str, ...]) -> tuple[StopsItself, str]:
+    """What it does when it misses a master; `keys`: of self_stop, that this depends on."""
+    open_keys = [key for key in keys if _open(drive, key)]
     if open_keys:
-        return (
-            StopsItself.UNPROVEN,
-            f"1016h with 6007h; its profile does not know {', '.join(open_keys)}, or has no source for it",
-        )
-    coasts = ", and coasts (6007h = 2)" if own.abort_connection_code == DISABLE_VOLTAGE else ""
-    return StopsItself.YES, f"it monitors heartbeats (1016h) and stops by 6007h{coasts}"
+        missing = f"its profile does not know {', '.join(open_keys)}, or has no source for it"
+        return StopsItself.UNPROVEN, f"{monitors}, with 6007h; {missing}"
+    coasts = ", and coasts (6007h = 2)" if drive.kind.self_stop.abort_connection_code == DISABLE_VOLTAGE else ""
+    return StopsItself.YES, f"{monitors} and stops by 6007h{coasts}"
 
 
 def _open(drive: Drive, key: str) -> bool:

@@ -16,7 +16,7 @@ from canbase_campaign.robots import commissioned
 from canbase_campaign.scanner import LIES
 from canbase_campaign.twins import SERVER
 from canbase_config import bus_load
-from canbase_config.commissioned import uncommissioned
+from canbase_config.commissioned import uncommissioned, without_proof
 from canbase_config.mux import JOINTS, MuxSource
 from canbase_config.robot import Robot
 from canbase_config.safety import Scan
@@ -135,6 +135,7 @@ def _changed(robot: Robot, hands: tuple[str, ...], own_action: str, has_scanner:
             update={
                 "scan": scan,
                 "more_scans": (),
+                "require_self_stop": False,
                 "estop": safety.estop.model_copy(update={"topic": "estop_state"}),
             }
         ),
@@ -153,6 +154,8 @@ def _assumed(robot: Robot, changed: Robot, hands: tuple[str, ...], has_scanner: 
     if uncommissioned(robot):
         slow = robot.safety.uncommissioned_mps
         yield f"The robot is commissioned: the speeds of `limits` count, not safety.uncommissioned_mps ({slow:g} m/s)."
+    if robot.safety.require_self_stop and without_proof(robot):
+        yield "Drives get power without the proof that safety.require_self_stop demands."
     if robot.bus.is_virtual:
         yield f"The bus has {robot.bus.bitrate} bit/s (bus.bitrate; {robot.bus.interface} ignores the key)."
     yield f"{' and '.join(hands)} order motion, as a joystick and a planner do; a joystick is at 50 Hz."

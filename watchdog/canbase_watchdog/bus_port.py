@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -14,6 +15,8 @@ from canbase_watchdog.frames import Frame
 
 SEND_TIMEOUT_S = 0.001
 """What the bus does not take within this time is dropped: each turn of the loop repeats what still matters."""
+REQUESTED_BYTES = 1
+"""Of the answer to a guard request: a remote frame has the length of what it requests (ISO 11898-1)."""
 BATCH = 256
 """Frames taken in before the loop looks at the clock again."""
 _ERRORS = (can.CanError, OSError, ValueError)
@@ -25,10 +28,11 @@ class BusError(Exception):
 
 
 class BusPort:
-    """Sends and receives data frames with 11-bit identifiers on one bus. Use it in a `with` statement."""
+    """Sends frames with 11-bit identifiers on one bus, and receives the data frames. Use it in a `with` statement."""
 
-    def __init__(self, arguments: dict[str, Any]) -> None:
-        """Opens `can.Bus(**arguments)`. Raises BusError with what to look at."""
+    def __init__(self, arguments: dict[str, Any], *, after_loss: bool = False) -> None:
+        """Opens `can.Bus(**arguments)`. Raises BusError with what to look at. `after_loss`: it failed before, and
+        counts as failed until it takes a frame: an interface that is down can be opened too."""
         try:
             self._bus = open_bus(arguments)
         except (*_ERRORS, TypeError, ImportError, NotImplementedError) as error:
@@ -39,6 +43,10 @@ class BusPort:
         self._waiting: Received | None = None
         self._received_until = time.monotonic()
         self.health = BusHealth()
+        if after_loss:
+            self.health.on_send_error(self._received_until)
+        self.request_problem = ""
+        """Why the adapter did not take the last remote frame; empty: it took it, or there was none."""
         self.datagrams_dropped = 0
         """Those that were no CAN frame. The bus is as good as before."""
 
@@ -46,7 +54,8 @@ class BusPort:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._bus.close()
+        with contextlib.suppress(*_ERRORS):  # an adapter that is gone
+            self._bus.close()
 
     def fileno(self) -> int | None:
         """What to wait on with select, or None for a bus that has no such thing (`virtual`)."""
@@ -84,12 +93,26 @@ class BusPort:
 
     def send(self, frame: Frame) -> None:
         """Send now or never: a frame that the bus does not take at once is counted and dropped."""
+        if frame.remote:
+            self._request(frame.cob_id)
+            return
         try:
             self._bus.write(frame.cob_id, frame.data, SEND_TIMEOUT_S)
         except _ERRORS:
             self.health.on_send_error(time.monotonic())
         else:
             self.health.on_sent()
+
+    def _request(self, cob_id: int) -> None:
+        """Not every adapter has remote frames: one that refuses them alone is no failed bus."""
+        try:
+            self._bus.request(cob_id, REQUESTED_BYTES, SEND_TIMEOUT_S)
+        except (*_ERRORS, NotImplementedError) as error:
+            self.health.send_errors += 1
+            self.request_problem = str(error) or type(error).__name__
+        else:
+            self.health.on_sent()
+            self.request_problem = ""
 
     def _take(self, timeout_s: float) -> Received | None:
         try:

@@ -38,6 +38,8 @@ PRE_OPERATIONAL_COMMAND, RESET_NODE_COMMAND = 0x80, 0x81
 BOOT_UP = b"\x00"
 """What a node sends in place of its heartbeat when it starts."""
 OPERATIONAL = 5
+TOGGLE = 0x80
+"""Bit of an answer to a guard request: it alternates from one answer to the next."""
 NMT_COMMANDS = (0x01, 0x02, 0x80, 0x81, 0x82)
 
 CONTROLWORD = 0x6040
@@ -69,10 +71,11 @@ _COUNTERS = struct.Struct("<HHHBB")
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """A data frame with an 11-bit identifier."""
+    """A frame with an 11-bit identifier. `remote`: without data, it requests the frame with that identifier."""
 
     cob_id: int
     data: bytes
+    remote: bool = False
 
 
 class DriveState(enum.Enum):
@@ -199,6 +202,21 @@ def decode_reset_request(data: bytes) -> int | None:
 def heartbeat() -> Frame:
     """The watchdog's own heartbeat: operational."""
     return Frame(WATCHDOG_HEARTBEAT, bytes([OPERATIONAL]))
+
+
+def guard_request(node_id: int) -> Frame:
+    """Node guarding: requests the NMT state of a node (CiA 301, 7.2.8.2.2)."""
+    return Frame(HEARTBEAT + node_id, b"", remote=True)
+
+
+def decode_guard_answer(data: bytes) -> tuple[bytes, int] | None:
+    """What a heartbeat would contain, and the toggle bit, of an answer to a guard request or a boot-up; None: neither.
+
+    A boot-up has no toggle bit, and no node in that state answers.
+    """
+    if len(data) != 1 or data[0] == TOGGLE:
+        return None
+    return bytes([data[0] & ~TOGGLE]), data[0] & TOGGLE
 
 
 def state(

@@ -73,11 +73,15 @@ class Keeper(threading.Thread):
             self._wanted = entry
             self._inbox.put(entry)
 
-    def finish(self, timeout_s: float) -> None:
-        """Write what is wanted, for at most this long [s], and end."""
+    def finish(self, timeout_s: float) -> bool:
+        """Write what is wanted, for at most this long [s], and end. Whether all of it is on disk."""
         self._inbox.put(None)
         if self.is_alive():
             self.join(timeout_s)
+        if self.is_alive():
+            return False
+        self._close()
+        return self.failure is None and not self.problem
 
     def run(self) -> None:
         """The thread's body."""

@@ -24,12 +24,18 @@ from canbase_watchdog.watchdog import State, Watchdog
 
 TICK_S = 0.005
 BUS_DEAD_S = 1.0
-"""Without one sent frame for this long the process gives up [s]: systemd starts it again."""
+"""Without one sent frame for this long the bus is lost [s]: it is opened again, and another life begins."""
 END_S = 1.0
 """How long it goes on stopping the drives after the request to end [s]."""
 COLLECT_S = 10.0
 SUSPENDED_S = 0.02
 """CLOCK_BOOTTIME goes on in a suspend and CLOCK_MONOTONIC does not: so much between two turns is no lateness."""
+
+NO_REQUESTS = (
+    "the CAN adapter sends no remote frames (%s), and node guarding needs them: no guarded drive gets power. "
+    "Use another adapter; or set self_stop.node_guarding: false in the drive profile, and no drive stops when this "
+    "computer fails"
+)
 
 _log = logging.getLogger("canbase.watchdog")
 
@@ -61,9 +67,11 @@ class Loop:
         self._keeper = keeper
         self._recorder = recorder
         self._note = inputs.note if inputs is not None else _forget
-        self._record_problem = ""
+        self._record_problem = self._request_problem = ""
         self._reporter = Reporter(watchdog)
         self._bus_has_fd = bus.fileno() is not None
+        self._lost = not bus.health.takes_frames
+        """The bus failed before this life, and has taken no frame since."""
         self._due = self._sent_at = self._collected_at = time.monotonic()
         self._suspended_s = suspended_s()
         self._acted_at = self._due
@@ -129,12 +137,13 @@ class Loop:
         self._note((TICK, now_s, health.failed_since, health.errors))
         for frame in self._watchdog.tick(now_s):
             self._bus.send(frame)
-        if self._relay is not None and self._watchdog.keeps_relay:
+        if self._relay is not None and self._watchdog.keeps_relay and not self._lost:
             self._relay.toggle()
         self._keep_record()
         if self._recorder is not None:
             self._recorder.look(self._watchdog, now_s)
         self._check_bus(now_s)
+        self._check_requests()
         self._reporter.tick(health, now_s, self._bus.datagrams_dropped)
         self._collect(now_s)
 
@@ -158,8 +167,21 @@ class Loop:
     def _check_bus(self, now_s: float) -> None:
         if self._bus.health.takes_frames:
             self._sent_at = now_s
+            self._tell_found()
         elif now_s >= self._sent_at + BUS_DEAD_S:
             raise BusDeadError(f"no frame could be sent for {BUS_DEAD_S:.1f} s. Is the interface up, the cable in?")
+
+    def _tell_found(self) -> None:
+        if self._lost:
+            self._lost = False
+            _log.info("the bus takes frames again")
+
+    def _check_requests(self) -> None:
+        """Each reason of an adapter that refuses remote frames is reported once."""
+        problem = self._bus.request_problem
+        if problem and problem != self._request_problem and self._bus.health.takes_frames:
+            self._request_problem = problem
+            _log.error(NO_REQUESTS, problem)
 
     def _at_rest(self) -> bool:
         status = self._watchdog.status

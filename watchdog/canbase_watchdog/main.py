@@ -1,4 +1,8 @@
-"""Command line of the watchdog process: `python -m canbase_watchdog --config-json JSON`."""
+"""Command line of the watchdog process: `python -m canbase_watchdog --config-json JSON`.
+
+A bus that cannot be opened, or takes no frames, is opened again every RETRY_S, for as long as it takes. Meanwhile the
+process sends nothing, so no drive gets power: the driver needs its state frame.
+"""
 
 from __future__ import annotations
 
@@ -14,29 +18,27 @@ from pathlib import Path
 from types import FrameType
 
 from canbase_config.watchdog import WatchdogConfig
-from canbase_watchdog import frames, latch_file, realtime
+from canbase_watchdog import latch_file
 from canbase_watchdog import single_instance as sole
-from canbase_watchdog.bus_port import BusError, BusPort
-from canbase_watchdog.input_ring import InputRing
-from canbase_watchdog.latch_file import Keeper
-from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
+from canbase_watchdog.bus_port import BusError
+from canbase_watchdog.lease_socket import LeaseSocketError
+from canbase_watchdog.life import RecordError, live
 from canbase_watchdog.log import Lines, formatter, never_wait
-from canbase_watchdog.loop import BusDeadError, Loop
-from canbase_watchdog.relay import Relay, RelayError
+from canbase_watchdog.loop import BusDeadError
+from canbase_watchdog.relay import RelayError
+from canbase_watchdog.report import ALIVE_PERIOD_S
 from canbase_watchdog.sd_notify import notify
-from canbase_watchdog.trip_recorder import TripRecorder, folder_of
-from canbase_watchdog.watchdog import Watchdog
 
-LISTEN_S = 0.16
-"""Three periods of a watchdog's state frame."""
-WRITE_S = 1.0
-"""For the record at the end."""
+RETRY_S = 1.0
+WORKED_S = 3.0
+"""A life that was longer had a bus: its loss is reported, also where the reason is that of the last loss."""
 
 _log = logging.getLogger("canbase.watchdog")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run until SIGINT or SIGTERM. Exit code 0: by a signal; 1: bus, socket or relay failed; 2: bad configuration."""
+    """Run until SIGINT or SIGTERM. Exit code 0: by a signal; 1: socket, relay or record failed, or another watchdog is
+    there; 2: bad configuration."""
     never_wait(os.environ)
     handler = Lines()
     handler.setFormatter(formatter(os.environ, os.fstat(2)))
@@ -51,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     try:
         return _serve(config)
-    except (BusError, LeaseSocketError, BusDeadError, RelayError, sole.TakenError) as error:
+    except (LeaseSocketError, RelayError, RecordError, sole.TakenError) as error:
         _log.error("%s", error)
         return 1
 
@@ -70,47 +72,32 @@ def _serve(config: WatchdogConfig) -> int:
         stack.enter_context(sole.take(config.bus_arguments))
         record = latch_file.path_of(os.environ, Path.home(), config.robot)
         stack.enter_context(sole.take_record(record))
-        bus = stack.enter_context(BusPort(config.bus_arguments))
-        _listen_for_another(bus)
-        leases = stack.enter_context(LeaseSocket(config.lease_socket, uid))
-        relay = stack.enter_context(Relay(config.relay)) if config.relay else None
-        keeper = Keeper(record, config.robot)
-        started_s = time.monotonic()
-        watchdog = Watchdog(config, started_s, keeper.past)
-        inputs = InputRing(config.recording_s, started_s)
-        recorder = TripRecorder(inputs, config, keeper.past, folder_of(config, os.environ, Path.home()))
-        try:
-            _guard(Loop(watchdog, bus, leases, relay, keeper, inputs, recorder), keeper, recorder, asked)
-        except BaseException:
-            for frame in watchdog.quick_stops():
-                bus.send(frame)
-            raise
-        finally:
-            keeper.finish(WRITE_S)
-            recorder.finish(WRITE_S, time.monotonic())
+        _lives(config, record, asked)
     _log.info("ended by %s", signal.Signals(asked[0]).name)
     return 0
 
 
-def _listen_for_another(bus: BusPort) -> None:
-    """A watchdog on another computer: its frames come before the first frame of this one. Raises sole.TakenError."""
-    end = time.monotonic() + LISTEN_S
-    while (left_s := end - time.monotonic()) > 0.0:
-        bus.wait(left_s)
-        received = bus.receive(time.monotonic())
-        if any(cob_id in (frames.STATE, frames.WATCHDOG_HEARTBEAT) for cob_id, _, _ in received):
-            raise sole.TakenError(
-                f"another watchdog is on the bus: its heartbeat or state frame came within {LISTEN_S} s. "
-                "Only one may run; end it first, on the computer that it runs on"
-            )
+def _lives(config: WatchdogConfig, record: Path, asked: list[int]) -> None:
+    """One after the other, until a signal is in `asked`. Another watchdog on the bus is an error at the start alone:
+    what was cut off may have got another one meanwhile, and takes its place again when that one has ended."""
+    problem = ""
+    while not asked:
+        began_s = time.monotonic()
+        try:
+            live(config, record, asked, after_loss=bool(problem))
+        except (BusError, BusDeadError, sole.TakenError) as error:
+            if isinstance(error, sole.TakenError) and not problem:
+                raise
+            if str(error) != problem or time.monotonic() > began_s + WORKED_S:
+                _log.warning("%s Trying again every %.0f s; meanwhile no drive gets power", error, RETRY_S)
+            problem = str(error)
+            _wait(problem, asked)
 
 
-def _guard(loop: Loop, keeper: Keeper, recorder: TripRecorder, asked: list[int]) -> None:
-    complaint = realtime.prepare()
-    if complaint is not None:
-        _log.warning("%s", complaint)
-    keeper.start()  # with the priority of this thread: one below it that holds Python's lock would hold this one up
-    recorder.start()
-    notify("READY=1")
-    loop.run(lambda: bool(asked))
-    notify("STOPPING=1")
+def _wait(problem: str, asked: list[int]) -> None:
+    """For RETRY_S. The process is ready: it does all that it can without a bus, and nothing depends on more."""
+    notify(f"READY=1\nSTATUS=no bus, trying again: {problem}")
+    end_s = time.monotonic() + RETRY_S
+    while not asked and time.monotonic() < end_s:
+        notify("WATCHDOG=1")
+        time.sleep(ALIVE_PERIOD_S)

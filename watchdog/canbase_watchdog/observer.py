@@ -11,6 +11,7 @@ from collections.abc import Callable
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 from canbase_watchdog import frames
 from canbase_watchdog.frames import DriveState
+from canbase_watchdog.guarding import GuardAnswers
 from canbase_watchdog.plausibility import Plausibility
 from canbase_watchdog.second_master import Foreign
 from canbase_watchdog.standing import StandWatch
@@ -120,6 +121,7 @@ class Observer:
         self._heard_at, self._boot_up_at = dict(self._heartbeat_at), dict(self._heartbeat_at)
         self._configured_at = dict(self._heartbeat_at)
         self._operational = dict.fromkeys(self._heartbeat_at, False)
+        self._answers = {drive.node_id: GuardAnswers() for drive in config.drives if drive.guarded}
         self._foreign = Foreign(config)
         self._driver_at = self._sync_at = self._sync_since = NEVER
         self._routes: dict[int, Callable[[bytes, float], bool]] = {}
@@ -185,7 +187,8 @@ class Observer:
 
     def _add_node_routes(self, node_id: int) -> None:
         routes = self._routes
-        routes[frames.HEARTBEAT + node_id] = lambda data, now_s: self._on_heartbeat(node_id, data, now_s)
+        beats = self._on_guard_answer if node_id in self._answers else self._on_heartbeat
+        routes[frames.HEARTBEAT + node_id] = lambda data, now_s: beats(node_id, data, now_s)
         routes[frames.SDO_ANSWER + node_id] = lambda data, now_s: self._on_sdo_answer(node_id, data, now_s)
         routes[frames.SDO_REQUEST + node_id] = lambda data, now_s: self._on_sdo_request(node_id, data, now_s)
         routes[frames.QUICK_STOP_RPDO + node_id] = lambda data, now_s: self._on_quick_stop(node_id, data, now_s)
@@ -228,6 +231,10 @@ class Observer:
         if data == frames.BOOT_UP and self._is_enabled(node_id, now_s):
             self._boot_up_at[node_id] = now_s
         return True
+
+    def _on_guard_answer(self, node_id: int, data: bytes, now_s: float) -> bool:
+        state = self._answers[node_id].take(data)
+        return state is not None and self._on_heartbeat(node_id, state, now_s)
 
     def _is_enabled(self, node_id: int, now_s: float) -> bool:
         """A TPDO of the last moments showed it."""

@@ -41,7 +41,9 @@ def raise_priority() -> str | None:
 
 
 def calm_the_collector() -> None:
-    """What exists now is never collected again, and nothing else without a call of ours: no pause in the loop."""
+    """What exists now is not collected until the next call, and nothing else without a call of ours: no pause in the
+    loop. What was left of an earlier life is collected first."""
+    gc.unfreeze()
     gc.collect()
     gc.freeze()
     gc.disable()

@@ -33,7 +33,7 @@ class Reporter:
         self._counters_due = self._alive_due = 0.0
 
     def tick(self, health: BusHealth, now_s: float, datagrams_dropped: int = 0) -> None:
-        """Report what changed. systemd learns that the loop turns; on a dead bus that ends by itself (loop.py)."""
+        """Report what changed. systemd learns that the loop turns, also on a bus that takes no frames."""
         if self._watchdog.status != self._status:
             self._tell_status(self._watchdog.status)
         if now_s >= self._alive_due:

@@ -11,6 +11,7 @@ from canbase_watchdog import frames, policy
 from canbase_watchdog.creep import CreepWatch
 from canbase_watchdog.envelope import Envelope
 from canbase_watchdog.frames import Frame
+from canbase_watchdog.guarding import GuardRequests
 from canbase_watchdog.halt import HaltWatch
 from canbase_watchdog.ladder import Step
 from canbase_watchdog.latch import Entry, Ledger, Mark, Past
@@ -96,6 +97,7 @@ class Watchdog:
         self._reset = (0, Answer.NONE)
         self._reset_at = -math.inf
         self._heartbeat_due = self._state_due = self._counters_due = now_s
+        self._guard = GuardRequests(config, now_s)
         self._told: Status | None = None
         self._longest_gap_s = 0.0
         self._ledger = Ledger(past)
@@ -139,7 +141,7 @@ class Watchdog:
 
     @property
     def _beats(self) -> bool:
-        """False on the last two rungs: then the own heartbeat is withheld."""
+        """False on the last two rungs: then the own heartbeat is withheld, and the guard requests with it."""
         return self._step < Step.HEARTBEAT_WITHHELD
 
     @property
@@ -297,6 +299,8 @@ class Watchdog:
         if now_s >= self._heartbeat_due and self._beats:
             self._heartbeat_due = max(self._heartbeat_due, now_s - period_s) + period_s
             out.append(frames.heartbeat())
+        if self._beats:
+            out += self._guard.tick(now_s)
         status = self.status
         if now_s >= self._state_due or status != self._told:
             self._state_due = max(self._state_due, now_s - STATE_PERIOD_S) + STATE_PERIOD_S

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from canbase_config.drive import Drive
 from canbase_config.profile import Sdo
 from canbase_config.robot import Robot
 from canbase_driver.boot.sequence import BootReport, boot
-from canbase_driver.boot.steps import BootError, Pause, Quiet, SendNmt, Step, WaitBootUp
+from canbase_driver.boot.steps import NO_PATIENCE, BootError, Patience, Pause, Quiet, SendNmt, Step, WaitBootUp
 from canbase_driver.cia301.frame import Frame
-from canbase_driver.cia301.nmt import NmtState, nmt, parse_heartbeat
-from canbase_driver.cia301.sdo_client import Read, SdoClient, SdoError, Write
+from canbase_driver.cia301.nmt import NmtCommand, NmtState, nmt, parse_heartbeat
+from canbase_driver.cia301.sdo_client import LONGEST_TIMEOUT_S, Read, SdoClient, SdoError, Write
 
 DUPLICATES = 3
 """After this many requests that were sent once and answered twice, one may be an answer to another client."""
+RESETS = (NmtCommand.RESET_COMMUNICATION, NmtCommand.RESET_NODE)
 SLOW_S = 0.05
 """A request without an answer for this long: the drive is slow or gone, and nobody else waits for it [s]."""
 
@@ -28,16 +30,24 @@ class NodeBoot:
     """
 
     def __init__(
-        self, node_id: int, drives: tuple[Drive, ...], robot: Robot, settle_s: float = 0.0, *, identify: bool = True
+        self,
+        node_id: int,
+        drives: tuple[Drive, ...],
+        robot: Robot,
+        patience: Patience = NO_PATIENCE,
+        *,
+        identify: bool = True,
     ) -> None:
-        """`settle_s`, `identify`: see `boot`."""
+        """`patience`, `identify`: see `boot`."""
         self.node_id = node_id
         self.boot_up_at = -math.inf
         """When the boot-up message came that answered the NMT reset [s]; minus infinity: none did."""
+        self.reset_at = -math.inf
+        """When the NMT reset was sent [s]; minus infinity: none was, or something has answered since."""
         self.report: BootReport | None = None
         self.error: BootError | None = None
         self._name = f"node {node_id} ({', '.join(drive.joint for drive in drives)})"
-        self._sequence = boot(node_id, drives, robot, settle_s, identify=identify)
+        self._sequence = boot(node_id, drives, robot, patience, identify=identify)
         self._client = sdo_client(node_id, drives[0].kind.sdo, robot.timeouts.sdo_s)
         self._gap_s = drives[0].kind.sdo.gap_s
         self._held: Read | Write | None = None
@@ -105,13 +115,16 @@ class NodeBoot:
 
     def _on_boot_up(self, now_s: float) -> None:
         if isinstance(self._step, WaitBootUp):
-            self.boot_up_at = now_s
+            self.boot_up_at, self.reset_at = now_s, -math.inf
             self._advance(True, now_s)
         elif isinstance(self._step, Quiet):
             self._wake_at = now_s + self._step.duration_s
         elif self._was_reset:
             problem = f"it started anew while it was being configured ({_awaited(self._step)} was due)"
             hint = "The boot begins again and waits for a second boot-up message (start.settle_s of its drive profile)"
+            if self.reset_at > -math.inf:
+                problem = f"its boot-up message came {now_s - self.reset_at:.1f} s after the NMT reset"
+                hint = "The boot begins again and waits as long (start.boot_up_s of its drive profile)"
             self._end(error=BootError(self.node_id, problem, f"{hint}; if this goes on, check its supply voltage"))
         elif self._client.busy:
             self._outbox.append(self._client.again(now_s))
@@ -119,7 +132,7 @@ class NodeBoot:
     def _take_answer(self, now_s: float) -> None:
         if self._client.duplicates >= DUPLICATES:
             problem = "each request is answered twice: two devices on the bus have this node id"
-            self._end(error=BootError(self.node_id, problem, "Give each drive a node id of its own (canbase scan)"))
+            self._end(error=BootError(self.node_id, problem, "Give each drive a node id of its own (canbase adopt)"))
         if self._client.busy or self.done:
             return
         try:
@@ -127,7 +140,7 @@ class NodeBoot:
         except SdoError as error:
             self._advance(error, now_s)
         else:
-            self.heard = True
+            self.heard, self.reset_at = True, -math.inf
             self._advance(answer, now_s)
 
     def _advance(self, answer: bytes | bool | SdoError | None, now_s: float) -> None:
@@ -151,14 +164,26 @@ class NodeBoot:
         elif isinstance(step, Read | Write):
             self._outbox.append(self._client.start(step, now_s))
         elif isinstance(step, SendNmt):
+            self.reset_at = now_s if step.command in RESETS else self.reset_at
             self._outbox.append(nmt(step.command, self.node_id))
             self._advance(None, now_s)
         else:
             self._wake_at = now_s + (step.timeout_s if isinstance(step, WaitBootUp) else step.duration_s)
 
     def _end(self, report: BootReport | None = None, error: BootError | None = None) -> None:
-        self.report, self.error = report, error
+        late = self.slow_answers
+        self.report = replace(report, notes=(*report.notes, late)) if report is not None and late else report
+        self.error = BootError(self.node_id, error.problem, f"{error.hint}; {late}") if error and late else error
         self._step = None
+
+    @property
+    def slow_answers(self) -> str:
+        """How late it answers, and the key for it; empty: in time."""
+        late_s = self._client.late_s
+        if not late_s:
+            return ""
+        timeout_s = min(math.ceil(20.0 * late_s) / 10.0, LONGEST_TIMEOUT_S)
+        return f"it answers SDO requests after {late_s:.2f} s: set `sdo.timeout_s: {timeout_s:g}` in its drive profile"
 
 
 def sdo_client(node_id: int, sdo: Sdo, timeout_s: float) -> SdoClient:

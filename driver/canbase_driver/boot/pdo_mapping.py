@@ -4,15 +4,26 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from canbase_driver.boot.steps import BootError, NodeAccess, Steps, unsigned
-from canbase_driver.cia301.pdo import AT_ONCE, NodeLayout, Pdo
-from canbase_driver.cia301.sdo_client import Read, SdoAborted, Write
+from canbase_config.object_map import AXIS_OFFSET as SECOND_AXIS
+from canbase_driver.boot.steps import OTHER_STATE, BootError, NodeAccess, Steps, unsigned
+from canbase_driver.cia301.pdo import AT_ONCE, AT_ONCE_TOO, NodeLayout, Pdo
+from canbase_driver.cia301.sdo_client import DEVICE_STATE, Read, SdoAborted, Write
 
 PDO_OFF = 1 << 31
 """Bit 31 of 1400h:1 and 1800h:1: the PDO is not valid."""
+FIRST_RPDO, FIRST_TPDO = 0x1400, 0x1800
 PREDEFINED = 4
 """RPDO1…4 and TPDO1…4 may have gaps; further ones are looked for until one is missing."""
 MAX_PDO_NUMBER = 64
+EVENT_TYPES = (AT_ONCE, AT_ONCE_TOO)
+TYPE = 2
+"""Sub-index of 1400h and 1800h: the transmission type."""
+WIDTH_KEYS = {
+    0x60FF: "set `layout.target_bits: {}` in its drive profile",
+    0x606C: "set `layout.velocity_bits: {}` in its drive profile",
+    0x6041: "a drive that has one motor behind it cannot be used; one with two: `layout.statusword` of its profile",
+}
+"""First-axis index → what to do about an object that goes into a PDO in another width than its profile has."""
 
 
 def configure_pdos(node: NodeAccess, layout: NodeLayout) -> Steps[None]:
@@ -22,12 +33,8 @@ def configure_pdos(node: NodeAccess, layout: NodeLayout) -> Steps[None]:
     keep what is written to them.
     """
     layout = yield from _with_what_it_has(node, layout)
-    wanted = {pdo.communication: pdo for pdo in layout.pdos()}
     cob_ids = yield from _cob_ids(node)
-    for pdo in wanted.values():
-        if pdo.communication not in cob_ids:
-            problem = f"it has no {pdo.name} ({pdo.communication:04X}h)"
-            raise BootError(node.node_id, problem, "canbase cannot do without, see docs/bus.md")
+    wanted = {pdo.communication: pdo for pdo in _in_what_it_has(node, layout, cob_ids)}
     for index, cob_id in cob_ids.items():
         if index not in wanted:
             yield from _switch_off(node, index, cob_id)
@@ -42,6 +49,26 @@ def _with_what_it_has(node: NodeAccess, layout: NodeLayout) -> Steps[NodeLayout]
             _note_no_torque(node, f"the drive has no {index:04X}h:{sub}")
             return replace(layout, with_torque=False)
     return layout
+
+
+def _in_what_it_has(node: NodeAccess, layout: NodeLayout, cob_ids: dict[int, int]) -> list[Pdo]:
+    """The watchdog's quick stop takes the last RPDO of a drive that has fewer than its profile: its COB-ID counts, and
+    not its number."""
+    pdos = [pdo for pdo in layout.pdos() if pdo.communication in cob_ids]
+    for pdo in layout.pdos():
+        if pdo.communication in cob_ids:
+            continue
+        used = [each.communication for each in pdos]
+        free = [index for index in cob_ids if index < FIRST_TPDO and index not in used]
+        if pdo.is_heard or pdo.number <= len(layout.axes) or not free:
+            rpdos = sum(index < FIRST_TPDO for index in cob_ids)
+            problem = (
+                f"it has no {pdo.name} ({pdo.communication:04X}h), but {rpdos} RPDOs, {len(cob_ids) - rpdos} TPDOs"
+            )
+            needs = "canbase needs one RPDO and two TPDOs for each motor, and one more RPDO for the watchdog"
+            raise BootError(node.node_id, problem, f"{needs} (docs/drives.md): without them the drive cannot be used")
+        pdos.append(replace(pdo, number=max(free) - FIRST_RPDO + 1))
+    return pdos
 
 
 def _cob_ids(node: NodeAccess) -> Steps[dict[int, int]]:
@@ -63,14 +90,16 @@ def _switch_off(node: NodeAccess, index: int, cob_id: int) -> Steps[None]:
         yield from node.set_if_present(Write(index, 1, cob_id | PDO_OFF, 4), known=cob_id)
 
 
-def _suspend(node: NodeAccess, index: int, cob_id: int) -> Steps[None]:
-    """Off while it is changed. Not read back: a drive that left it on refuses the mapping."""
+def _suspend(node: NodeAccess, index: int, cob_id: int) -> Steps[str]:
+    """Off while it is changed. Not read back: a drive that left it on refuses the mapping. Why it refused, or empty."""
     if not cob_id & PDO_OFF:
         off = Write(index, 1, cob_id | PDO_OFF, 4)
         try:
             yield off
         except SdoAborted as refused:
             node.notes.append(f"{off}: {refused.text}")
+            return f"{off}: {refused.text}"
+    return ""
 
 
 def _times(pdo: Pdo) -> list[Write]:
@@ -83,11 +112,19 @@ def _make_right(node: NodeAccess, pdo: Pdo, found: int, cob_id: int) -> Steps[No
     mapped = yield from _other_mapping(pdo)
     if mapped is None and found == cob_id and (yield from _is_timed(node, pdo)):
         return
-    yield from _suspend(node, pdo.communication, found)
-    if mapped is not None:
-        yield from _map_what_it_takes(node, pdo, mapped)
-    unread = mapped is not None and pdo.transmission_type != AT_ONCE
-    yield from node.set(_type(pdo), unread=unread)
+    stays_on = yield from _suspend(node, pdo.communication, found)
+    try:
+        if mapped is not None:
+            yield from _map_what_it_takes(node, pdo, mapped)
+    except (SdoAborted, BootError) as refused:
+        if not stays_on:
+            raise
+        why = refused.text if isinstance(refused, SdoAborted) else refused.problem
+        problem = f"{pdo.name} cannot be switched off ({stays_on}), nor mapped while it is on ({why})"
+        raise BootError(
+            node.node_id, problem, "Set its COB-ID and mapping of docs/bus.md with the maker's tool"
+        ) from refused
+    yield from _set_type(node, pdo, unread=mapped is not None and pdo.transmission_type != AT_ONCE)
     for time in _times(pdo):
         yield from node.set_if_present(time)
     # that a TPDO is on shows by itself: a node without every one of its layout does not become ready
@@ -96,14 +133,48 @@ def _make_right(node: NodeAccess, pdo: Pdo, found: int, cob_id: int) -> Steps[No
 
 
 def _is_timed(node: NodeAccess, pdo: Pdo) -> Steps[bool]:
-    for write in (_type(pdo), *_times(pdo)):
+    if (yield from node.read_if_present(pdo.communication, TYPE)) not in _types(pdo):
+        return False
+    for write in _times(pdo):
         if (yield from node.read_if_present(write.index, write.sub)) != write.value:
             return False
     return True
 
 
-def _type(pdo: Pdo) -> Write:
-    return Write(pdo.communication, 2, pdo.transmission_type, 1)
+def _set_type(node: NodeAccess, pdo: Pdo, *, unread: bool) -> Steps[None]:
+    """Where a drive refuses one of the two event-driven types, it may take the other one."""
+    why, is_fixed = "", False
+    for value in _types(pdo):
+        try:
+            yield from node.set(Write(pdo.communication, TYPE, value, 1), unread=unread)
+        except SdoAborted as refused:
+            if refused.code == DEVICE_STATE:
+                raise
+            why = why or f"{pdo.communication:04X}h:{TYPE}: {refused.text}"
+        except BootError as other:
+            why, is_fixed = why or other.problem, True
+        else:
+            return
+    found = yield from node.read_if_present(pdo.communication, TYPE)
+    problem = f"{why}, {pdo.name} does not take type {_types(pdo)[0]}"
+    raise BootError(node.node_id, problem, _about_type(pdo, is_fixed=is_fixed and found not in EVENT_TYPES))
+
+
+def _types(pdo: Pdo) -> tuple[int, ...]:
+    return EVENT_TYPES if pdo.transmission_type == AT_ONCE else (pdo.transmission_type,)
+
+
+def _about_type(pdo: Pdo, *, is_fixed: bool) -> str:
+    if pdo.transmission_type != AT_ONCE and not is_fixed:
+        return "The drive takes no PDO that waits for SYNC: set `pdo.synchronous: false` in its drive profile"
+    if pdo.transmission_type != AT_ONCE:
+        return f"Its type is fixed: set it to {pdo.transmission_type} with the maker's tool"
+    if pdo.event_timer_ms is not None:
+        return "The drive takes no event-driven PDO: set `pdo.synchronous: true` in its drive profile"
+    return (
+        "The watchdog's quick stop cannot wait for a SYNC: where the maker's tool cannot set an event-driven type "
+        "either, the drive cannot be used"
+    )
 
 
 def _map_what_it_takes(node: NodeAccess, pdo: Pdo, mapped: int) -> Steps[None]:
@@ -114,7 +185,7 @@ def _map_what_it_takes(node: NodeAccess, pdo: Pdo, mapped: int) -> Steps[None]:
     except (SdoAborted, BootError) as refused:
         if not pdo.optional:
             raise
-        _note_no_torque(node, f"{pdo.name} does not take it ({refused})")
+        _note_no_torque(node, refused.problem if isinstance(refused, BootError) else str(refused))
         less = replace(pdo, mapping=pdo.mapping[: -pdo.optional], optional=0)
         left = yield from _other_mapping(less)
         if left is not None:
@@ -129,13 +200,53 @@ def _map(node: NodeAccess, pdo: Pdo, mapped: int) -> Steps[None]:
     """In place of the `mapped` objects that it carries now. The number in a PDO that is heard shows in its length."""
     node.changes.append(f"{pdo.name}: mapped anew, {len(pdo.mapping)} objects")
     if mapped:
-        yield Write(pdo.mapping_object, 0, 0, 1)
+        yield from _write_count(node, pdo, 0)
     for sub, entry in enumerate(pdo.mapping, start=1):
-        yield Write(pdo.mapping_object, sub, entry, 4)
-    yield Write(pdo.mapping_object, 0, len(pdo.mapping), 1)
+        try:
+            yield Write(pdo.mapping_object, sub, entry, 4)
+        except SdoAborted as refused:
+            yield from _look_for_width(node, pdo, sub, refused)
+            raise _unmapped(node, pdo, sub, _named(entry), refused) from refused
+    yield from _write_count(node, pdo, len(pdo.mapping))
     if not (yield from (_holds(pdo) if pdo.is_heard else _is_mapped(pdo))):
         problem = f"{pdo.name} reads back another mapping than was written to {pdo.mapping_object:04X}h"
         raise BootError(node.node_id, problem, "Look up in the manual what this PDO can carry")
+
+
+def _write_count(node: NodeAccess, pdo: Pdo, count: int) -> Steps[None]:
+    """How many objects are mapped; 0 before they are changed."""
+    try:
+        yield Write(pdo.mapping_object, 0, count, 1)
+    except SdoAborted as refused:
+        raise _unmapped(node, pdo, 0, "another mapping", refused) from refused
+
+
+def _unmapped(node: NodeAccess, pdo: Pdo, sub: int, what: str, refused: SdoAborted) -> BootError:
+    """The drive does not take `what` into this PDO."""
+    problem = f"{pdo.name} does not take {what} ({pdo.mapping_object:04X}h:{sub}: {refused.text})"
+    if refused.code == DEVICE_STATE:
+        return BootError(node.node_id, problem, OTHER_STATE)
+    needed = ", ".join(_named(entry) for entry in pdo.mapping[: len(pdo.mapping) - pdo.optional])
+    tool = f"Let {pdo.name} carry {needed} with the maker's tool"
+    return BootError(node.node_id, problem, f"{tool}; where that cannot be done, the drive cannot be used")
+
+
+def _named(entry: int) -> str:
+    return f"{entry >> 16:04X}h:{entry >> 8 & 0xFF}"
+
+
+def _look_for_width(node: NodeAccess, pdo: Pdo, sub: int, refused: SdoAborted) -> Steps[None]:
+    """Raises BootError when the drive maps the object in another width: 16 bits for 32, or 32 for 16."""
+    entry = pdo.mapping[sub - 1]
+    index, bits = entry >> 16, entry & 0xFF
+    other = 48 - bits
+    cure = WIDTH_KEYS.get(index - SECOND_AXIS * (index >= 0x6000 + SECOND_AXIS))
+    if cure is None or not (yield from node.tries(Write(pdo.mapping_object, sub, entry ^ bits ^ other, 4))):
+        return
+    problem = (
+        f"{pdo.name} takes {index:04X}h:{entry >> 8 & 0xFF} with {other} bits, and not with {bits} ({refused.text})"
+    )
+    raise BootError(node.node_id, problem, f"The drive has another width than its profile: {cure.format(other)}")
 
 
 def _other_mapping(pdo: Pdo) -> Steps[int | None]:

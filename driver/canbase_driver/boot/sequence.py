@@ -25,8 +25,10 @@ from canbase_driver.boot.settings import (
     write_at,
 )
 from canbase_driver.boot.steps import (
+    NO_PATIENCE,
     BootError,
     NodeAccess,
+    Patience,
     Pause,
     Quiet,
     SendNmt,
@@ -75,16 +77,15 @@ class BootReport:
 
 
 def boot(
-    node_id: int, drives: tuple[Drive, ...], robot: Robot, settle_s: float = 0.0, *, identify: bool = True
+    node_id: int, drives: tuple[Drive, ...], robot: Robot, patience: Patience = NO_PATIENCE, *, identify: bool = True
 ) -> Steps[BootReport]:
     """All steps for one node, its used axes being `drives`. Raises ValueError when they are not one or two axes.
 
-    `settle_s`: quiet after a boot-up message [s] where the profile has less (start.settle_s): learnt from a drive that
-    sent a second one. `identify`: read all of 1018h, not just what `identity` in robot.yaml expects.
+    `identify`: read all of 1018h, not just what `identity` in robot.yaml expects.
 
     The steps end with the report, or raise BootError when the node cannot be made ready.
     """
-    return _explained(_Boot(node_id, drives, robot, settle_s, identify).run())
+    return _explained(_Boot(node_id, drives, robot, patience, identify).run())
 
 
 def _explained(steps: Steps[BootReport]) -> Steps[BootReport]:
@@ -95,8 +96,10 @@ def _explained(steps: Steps[BootReport]) -> Steps[BootReport]:
 
 
 class _Boot:
-    def __init__(self, node_id: int, drives: tuple[Drive, ...], robot: Robot, settle_s: float, identify: bool) -> None:
-        self._settle_s, self._identify = settle_s, identify
+    def __init__(
+        self, node_id: int, drives: tuple[Drive, ...], robot: Robot, patience: Patience, identify: bool
+    ) -> None:
+        self._patience, self._identify = patience, identify
         self._drives = tuple(sorted(drives, key=lambda drive: drive.axis))
         self._layout = node_layout(node_id, self._drives, robot)
         self._kind = drives[0].kind
@@ -121,14 +124,17 @@ class _Boot:
     # -- what is there
 
     def _wait_for_the_drive(self) -> Steps[None]:
-        """For ever. A node in NMT stopped does not answer, so it is sent to pre-operational."""
+        """For ever. A node in NMT stopped does not answer, so it is sent to pre-operational. A refusal is an answer."""
+        device_type: int | None = None
         while True:
             try:
-                device_type = unsigned((yield Read(DEVICE_TYPE)))
+                device_type = yield from self._node.read_if_present(DEVICE_TYPE)
                 break
             except SdoTimeout:
                 yield SendNmt(NmtCommand.ENTER_PRE_OPERATIONAL)
-        if device_type & 0xFFFF != PROFILE_402:
+        if device_type is None:
+            self._node.notes.append("it has no 1000h, as every CANopen device should")
+        elif device_type & 0xFFFF != PROFILE_402:
             # Some real drives report another profile or none, so this alone is no reason to refuse.
             self._node.notes.append(f"1000h:0 is {device_type:08X}h, not the profile 402 (0192h) of a motor drive")
 
@@ -205,23 +211,26 @@ class _Boot:
 
     def _forget_earlier_masters(self) -> Steps[None]:
         """What they set goes with an NMT reset. Some drives keep a fault for a lost heartbeat until then."""
-        start = self._kind.start
-        command = _RESETS.get(start.reset)
+        command = _RESETS.get(self._kind.start.reset)
         if command is not None:
             yield from self._make_reset_harmless()
             yield SendNmt(command)
-            self._node.was_reset = yield WaitBootUp(start.boot_up_s)
-            if not self._node.was_reset:
-                name = command.name.lower().replace("_", " ")
-                self._node.notes.append(f"no boot-up message within {start.boot_up_s:g} s of NMT {name}")
-            if self._settle_s > start.settle_s:
-                self._node.notes.append(
-                    f"it sends two boot-up messages; the boot waits {self._settle_s:.1f} s for the second one: "
-                    f"set start.settle_s in its drive profile"
-                )
-            if settle_s := max(start.settle_s, self._settle_s):
-                yield Quiet(settle_s)
+            yield from self._wait_for_boot_up(command)
         yield SendNmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+
+    def _wait_for_boot_up(self, command: NmtCommand) -> Steps[None]:
+        start, patience, notes = self._kind.start, self._patience, self._node.notes
+        boot_up_s, settle_s = max(start.boot_up_s, patience.boot_up_s), max(start.settle_s, patience.settle_s)
+        self._node.was_reset = yield WaitBootUp(boot_up_s)
+        if not self._node.was_reset:
+            name = command.name.lower().replace("_", " ")
+            notes.append(f"no boot-up message within {boot_up_s:g} s of NMT {name}")
+        if boot_up_s > start.boot_up_s:
+            notes.append(f"it needs long for an NMT reset: set `start.boot_up_s: {boot_up_s:.1f}` in its drive profile")
+        if settle_s > start.settle_s:
+            notes.append(f"it sends two boot-up messages: set `start.settle_s: {settle_s:.1f}` in its drive profile")
+        if settle_s:
+            yield Quiet(settle_s)
 
     def _make_reset_harmless(self) -> Steps[None]:
         for drive in self._drives:

@@ -5,17 +5,21 @@ Which of the objects exist, where and in which unit, is in the drive's profile. 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
+from canbase_config.commissioned import is_proven
 from canbase_config.drive import Drive
 from canbase_config.object_map import MODE, MODE_DISPLAY, TARGET_VELOCITY, place
 from canbase_config.profile import Profile, SdoWrite
 from canbase_config.robot import CYCLIC, DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
-from canbase_driver.boot.steps import BootError, NodeAccess, Steps
+from canbase_config.watchdog import LIFE_TIME_FACTOR, guard_time_ms
+from canbase_driver.boot.steps import GUARDING_ALONE, BootError, NodeAccess, Steps
 from canbase_driver.cia301.sdo_client import VALUE_INVALID, VALUE_TOO_HIGH, VALUE_TOO_LOW, Read, SdoAborted, Write
 from canbase_driver.drive_units import AxisUnits
 
+GUARD_TIME, LIFE_TIME = 0x100C, 0x100D
 HEARTBEAT_CONSUMER, HEARTBEAT_PRODUCER, SYNC_COUNTER, ERROR_BEHAVIOUR = 0x1016, 0x1017, 0x1019, 0x1029
 ABORT_CONNECTION_OPTION, QUICK_STOP_OPTION, FAULT_REACTION_OPTION = 0x6007, 0x605A, 0x605E
 PROFILE_ACCELERATION, PROFILE_DECELERATION, QUICK_STOP_DECELERATION = 0x6083, 0x6084, 0x6085
@@ -48,7 +52,9 @@ class StopsBy(Enum):
 
     NOTHING = "nothing"
     WATCHDOG_HEARTBEAT = "heartbeat of the watchdog"
+    NODE_GUARDING = "node guarding by the watchdog"
     OWN_TIMEOUT = "the drive's own command timeout"
+    AS_PROVEN = "as canbase commission has proven"
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +85,12 @@ def configure_motion(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None
 def configure_self_stop(node: NodeAccess, drives: tuple[Drive, ...], robot: Robot) -> Steps[SelfStopSet]:
     """Sets and reads back what makes the drive stop by itself."""
     kind, timeout_ms = drives[0].kind, round(1000 * robot.timeouts.drive_heartbeat_s)
-    yield from _produce_heartbeat(node, timeout_ms)
-    stops = yield from _watch_heartbeats(node, kind, timeout_ms)
+    guarded = kind.self_stop.node_guarding
+    if guarded:
+        stops = yield from _be_guarded(node, robot.timeouts.drive_heartbeat_s)
+    else:
+        yield from _produce_heartbeat(node, timeout_ms)
+        stops = yield from _watch_heartbeats(node, kind, timeout_ms)
     enters = Write(ERROR_BEHAVIOUR, 1, ENTER_PRE_OPERATIONAL_ON_LOSS, 1)
     yield from node.set_if_present(enters, kind.self_stop.error_behaviour)
     options = kind.options
@@ -92,10 +102,14 @@ def configure_self_stop(node: NodeAccess, drives: tuple[Drive, ...], robot: Robo
             yield from _refuse_coasting(node, drive)
         reaction = write_at(drive, FAULT_REACTION_OPTION, options.fault_reaction_code)
         yield from node.set_if_present(reaction, options.fault_reaction)
-    by_vendor = yield from _set_vendor_watchdog(node, kind, robot.timeouts.drive_heartbeat_s)
+    by_vendor = yield from _set_vendor_watchdog(node, kind, robot)
+    if stops and guarded:
+        return SelfStopSet(StopsBy.NODE_GUARDING, "node guarding by the watchdog (100Ch, 100Dh, 6007h)")
     if stops:
         return SelfStopSet(StopsBy.WATCHDOG_HEARTBEAT, "heartbeat of the watchdog (1016h, 6007h)")
-    return SelfStopSet(StopsBy.OWN_TIMEOUT, by_vendor) if by_vendor else STOPS_BY_NOTHING
+    if by_vendor:
+        return SelfStopSet(StopsBy.OWN_TIMEOUT, by_vendor)
+    return (yield from _as_proven(node, drives, robot))
 
 
 def configure_sync(node: NodeAccess, kind: Profile, counter: int | None) -> Steps[None]:
@@ -148,7 +162,8 @@ def _configure_ramps(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None
             continue
         kept = units.acceleration_mps2(raw)
         problem = f"{write.index:04X}h:{write.sub} stays at {raw}: {drive.joint} brakes with {kept:.3g} m/s² by it"
-        hint = f"Lower limits.{key} ({needed:g}) to that in robot.yaml, or set the object with the maker's tool"
+        slower = f"set `limits.{key}: {math.floor(1000.0 * kept) / 1000.0:g}` in robot.yaml, where it is {needed:g}"
+        hint = f"Set the object with the maker's tool, or {slower}"
         raise BootError(node.node_id, problem, hint)
 
 
@@ -187,22 +202,42 @@ def _produce_heartbeat(node: NodeAccess, timeout_ms: int) -> Steps[None]:
         try:
             yield from node.set(Write(HEARTBEAT_PRODUCER, 0, period_ms, 2), unread=True)
         except SdoAborted as refused:
-            refusal = f"1017h:0: {refused.text}"
+            refusal = refusal or f"1017h:0: {refused.text}"
             if refused.code not in VALUE_REFUSED:
-                node.notes.append(refusal)
+                node.notes.append(f"1017h:0: {refused.text}")
                 return
         except BootError as other:
-            refusal = other.problem
+            refusal = refusal or other.problem
             if 0 < ((yield from node.read_if_present(HEARTBEAT_PRODUCER)) or 0) <= longest:
-                node.notes.append(f"{refusal}: that is short enough")
+                node.notes.append(f"{other.problem}: that is short enough")
                 return
         else:
             if period_ms != wanted:
                 node.notes.append(f"1017h:0: heartbeat every {period_ms} ms, {wanted} ms was refused")
             return
-    problem = f"it takes no heartbeat period of at most {longest} ms ({refusal})"
-    hint = "Raise timeouts.drive_heartbeat_s in robot.yaml to twice the shortest period of the drive, 1017h"
-    raise BootError(node.node_id, problem, hint)
+    yield from _refuse_heartbeat(node, longest, refusal)
+
+
+def _refuse_heartbeat(node: NodeAccess, longest_ms: int, refusal: str) -> Steps[None]:
+    """Raises BootError: it may take a longer period, which timeouts.drive_heartbeat_s allows."""
+    problem = f"it takes no heartbeat period of at most {longest_ms} ms ({refusal})"
+    for period_ms in HEARTBEAT_PERIODS_MS:
+        if period_ms > longest_ms and (yield from node.tries(Write(HEARTBEAT_PRODUCER, 0, period_ms, 2))):
+            key = f"`timeouts.drive_heartbeat_s: {HEARTBEATS_NEEDED * period_ms / 1000:g}`"
+            raise BootError(node.node_id, problem, f"It takes {period_ms} ms: set {key} in robot.yaml")
+    none = f"Nor any up to {HEARTBEAT_PERIODS_MS[-1]} ms: {GUARDING_ALONE}; without either it cannot be used"
+    raise BootError(node.node_id, problem, none)
+
+
+def _be_guarded(node: NodeAccess, timeout_s: float) -> Steps[bool]:
+    """100Ch, 100Dh: the drive monitors the requests of the watchdog. Monitoring begins with the first one (CiA 301).
+
+    A node that produces heartbeats does not answer them. Raises BootError when the drive keeps other values.
+    """
+    yield from node.set_if_present(Write(HEARTBEAT_PRODUCER, 0, 0, 2))
+    yield from node.set(Write(GUARD_TIME, 0, guard_time_ms(timeout_s), 2), unread=True)
+    yield from node.set(Write(LIFE_TIME, 0, LIFE_TIME_FACTOR, 1), unread=True)
+    return True
 
 
 def _watch_heartbeats(node: NodeAccess, kind: Profile, timeout_ms: int) -> Steps[bool]:
@@ -243,9 +278,30 @@ def _takes(node: NodeAccess, *entries: int) -> Steps[bool]:
     return True
 
 
-def _set_vendor_watchdog(node: NodeAccess, kind: Profile, timeout_s: float) -> Steps[str]:
+def _as_proven(node: NodeAccess, drives: tuple[Drive, ...], robot: Robot) -> Steps[SelfStopSet]:
+    """What commissioning has seen these drives do, where the boot cannot set or read what makes them stop.
+
+    What it can set, and was refused, made no drive stop: then the proof was about another state of the drive.
+    """
+    own = drives[0].kind.self_stop
+    is_ours = own.node_guarding or (own.vendor_watchdog is not None and own.vendor_watchdog.index is not None)
+    if is_ours or not is_proven(robot) or (yield from _could_watch(node, drives[0])):
+        return STOPS_BY_NOTHING
+    return SelfStopSet(StopsBy.AS_PROVEN, StopsBy.AS_PROVEN.value)
+
+
+def _could_watch(node: NodeAccess, drive: Drive) -> Steps[bool]:
+    """It has both objects that make it stop for a lost heartbeat: one of them was refused."""
+    own, option = drive.kind.self_stop, on_loss(drive)
+    if own.heartbeat_entries == 0 or own.abort_connection == "no":
+        return False
+    entries = yield from node.read_if_present(HEARTBEAT_CONSUMER)
+    return bool(entries) and (yield from node.read_if_present(option.index, option.sub)) is not None
+
+
+def _set_vendor_watchdog(node: NodeAccess, kind: Profile, robot: Robot) -> Steps[str]:
     """The maker's own command timeout; what is not proven to stop the motor is only noted."""
-    watchdog = kind.self_stop.vendor_watchdog
+    watchdog, timeout_s = kind.self_stop.vendor_watchdog, robot.timeouts.drive_heartbeat_s
     if watchdog is None:
         return ""
     if watchdog.index is None:
@@ -254,7 +310,7 @@ def _set_vendor_watchdog(node: NodeAccess, kind: Profile, timeout_s: float) -> S
     write = Write(watchdog.index, watchdog.sub, round(watchdog.per_s * timeout_s), watchdog.bits // 8)
     if not (yield from node.set_if_present(write)):
         return ""
-    if kind.is_unproven("self_stop.vendor_watchdog"):
+    if kind.is_unproven("self_stop.vendor_watchdog") and not is_proven(robot):
         node.notes.append(f"{write}: {watchdog.text} is set, but not proven to stop the motor")
         return ""
     return f"{watchdog.text} ({write})"

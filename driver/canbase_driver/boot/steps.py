@@ -58,6 +58,19 @@ class Quiet:
     duration_s: float
 
 
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """What earlier boots of a node have shown, where its profile has less."""
+
+    settle_s: float = 0.0
+    """Quiet after a boot-up message [s], in which a second one may come (start.settle_s)."""
+    boot_up_s: float = 0.0
+    """From an NMT reset to its boot-up message [s] (start.boot_up_s)."""
+
+
+NO_PATIENCE = Patience()
+
+
 Step = Read | Write | SendNmt | WaitBootUp | Pause | Quiet
 T = TypeVar("T")
 Steps = Generator[Step, Any, T]
@@ -80,6 +93,7 @@ def boot_error(error: SdoError) -> BootError:
 
 
 PROFILE_KEYS: tuple[tuple[range, str], ...] = (
+    (range(0x100C, 0x100E), "self_stop.node_guarding"),
     (range(0x1016, 0x1017), "self_stop.heartbeat_entries"),
     (range(0x1017, 0x1018), "timeouts.drive_heartbeat_s of robot.yaml: a third of it is the period"),
     (range(0x1019, 0x101A), "options.sync_counter"),
@@ -100,6 +114,11 @@ PROFILE_KEYS: tuple[tuple[range, str], ...] = (
 """Object → the key of a drive profile (docs/drives.md) for whether, where or how wide the drive has it."""
 TRANSMISSION_TYPE = 2
 """Sub-index of 1400h… and 1800h…."""
+GUARDING_ALONE = (
+    "where it has node guarding alone, set `self_stop.node_guarding: true` and `self_stop.heartbeat_entries: 0` in its "
+    "drive profile"
+)
+OTHER_STATE = "Switch the drive off and on again, and let no other master control it"
 WIDTHS = (LENGTH_WRONG, TOO_LONG, TOO_SHORT)
 
 
@@ -107,24 +126,32 @@ def profile_key(index: int, sub: int = 0) -> str:
     """The key of a drive profile that an object belongs to; empty: none. The second axis is at + 800h."""
     if (0x1400 <= index < 0x1600 or 0x1800 <= index < 0x1A00) and sub == TRANSMISSION_TYPE:
         return "pdo.synchronous"
-    first_axis = index - 0x800 if 0x6800 <= index < 0x7000 else index
+    first_axis = _first_axis(index)
     return next((key for objects, key in PROFILE_KEYS if first_axis in objects), "")
+
+
+def _first_axis(index: int) -> int:
+    return index - 0x800 if 0x6800 <= index < 0x7000 else index
+
+
+OF_AN_AXIS = frozenset((0x6040, 0x6041, 0x6060, 0x6064, 0x606C, 0x60FF))
+"""What every axis of a CiA 402 drive has, by the index of the first one."""
 
 
 def _hint(error: SdoError) -> str:
     if isinstance(error, SdoTimeout):
         return "Check power, cable and bit rate, and that no other program uses the SDO channel of this node"
-    key = profile_key(error.index, error.sub)
-    if key == "pdo.synchronous":
-        return "The drive takes no PDO that waits for SYNC: set `pdo.synchronous: false` in its drive profile"
-    code = error.code if isinstance(error, SdoAborted) else None
+    code = error.code if isinstance(error, SdoAborted) else 0
+    key, index = profile_key(error.index, error.sub), _first_axis(error.index)
     if code == DEVICE_STATE:
-        return "Switch the drive off and on again, and let no other master control it"
-    if code in WIDTHS:
-        where = f": see `{key}` of its drive profile" if key.startswith("layout") else ""
-        return f"The drive has this object in another width than CiA 402 and its profile say{where}"
-    if error.index in (0x6060, 0x6860):
+        return OTHER_STATE
+    if code in (NO_OBJECT, NO_SUB_INDEX) and index in OF_AN_AXIS:
+        return "Every axis of a CiA 402 drive has it: check `axis` in robot.yaml, and that the drive is set to CiA 402"
+    if index == 0x6060 and code not in WIDTHS:
         return "The drive must support `mode` of robot.yaml, see 6502h: bit 2 is mode 3, bit 8 is mode 9"
+    if code in WIDTHS:
+        where = f"see `{key}` of its drive profile" if key.startswith("layout.") else "such a drive cannot be used"
+        return f"The drive has this object in another width than CiA 402 and its profile: {where}"
     needed = "canbase needs this object as docs/bus.md has it; look it up in the manual of the drive"
     return needed + (f", and see `{key}` of its drive profile" if key else "")
 
@@ -164,7 +191,7 @@ class NodeAccess:
         if unread and self.was_reset:
             yield from self.overwrite(step, "?")
             return
-        before = (yield from self._read(step)) if known is None else _as_bytes(known, step.size)
+        before = (yield from self._look(step)) if known is None else _as_bytes(known, step.size)
         if before is None or not _same(before, step.data):
             yield from self.overwrite(step, _hex(before) if before else "?", shown_at)
         elif shown_at is not None:
@@ -215,6 +242,15 @@ class NodeAccess:
             return False
         return True
 
+    def tries(self, step: Write) -> Steps[bool]:
+        """Write, and see whether the drive takes it: one of several that may be right. A refusal is no news."""
+        try:
+            yield step
+        except SdoAborted:
+            return False
+        self.note_change(step, "?")
+        return True
+
     def try_to_write(self, step: Write, known: int) -> Steps[None]:
         """Write where it differs from `known`, what is read again later in any case; a refusal earns a note."""
         before = _as_bytes(known, step.size)
@@ -236,6 +272,15 @@ class NodeAccess:
                 raise
             return f" ({refused.text})"
         return ""
+
+    def _look(self, step: Write) -> Steps[bytes | None]:
+        """As `_read`. What cannot be read for now is written all the same, and the refusal stays one."""
+        try:
+            return (yield from self._read(step))
+        except SdoAborted as refused:
+            if refused.code not in (NO_OBJECT, NO_SUB_INDEX) and (yield from self.tries(step)):
+                self.notes.append(f"{step} is written, and cannot be read back")
+            raise
 
     def _read(self, step: Write) -> Steps[bytes | None]:
         """None: the object can only be written."""

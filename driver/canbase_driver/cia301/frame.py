@@ -1,4 +1,4 @@
-"""One CAN frame as the driver's core sees it: classic CAN, 11-bit identifier, data. No bus and no library here."""
+"""One CAN frame as the driver's core sees it: classic CAN, 11-bit identifier. No bus and no library here."""
 
 from __future__ import annotations
 
@@ -12,13 +12,15 @@ MAX_DATA_BYTES = 8
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """A frame that may go onto the bus: `cob_id` 0…7FFh, `data` 0…8 bytes.
+    """A frame that may go onto the bus: `cob_id` 0…7FFh, `data` 0…8 bytes. `remote`: it requests the frame with that
+    identifier, and has no data.
 
     Raises ValueError for anything else, so that a frame that cannot be built never falls back to another identifier.
     """
 
     cob_id: int
     data: bytes = b""
+    remote: bool = False
 
     def __post_init__(self) -> None:
         if not 0 <= self.cob_id <= MAX_COB_ID:
@@ -27,4 +29,4 @@ class Frame:
             raise ValueError(f"{len(self.data)} data bytes in frame {self.cob_id:03X}h; a CAN frame carries 8 at most")
 
     def __str__(self) -> str:
-        return f"{self.cob_id:03X}h [{self.data.hex(' ').upper()}]"
+        return f"{self.cob_id:03X}h [{'remote' if self.remote else self.data.hex(' ').upper()}]"

@@ -1,7 +1,8 @@
 """CiA 301 SDO client for one node, without a bus: frames go in, frames and answers come out, time is an argument.
 
-Expedited and segmented transfers in both directions; no block transfers. One transfer at a time. What does not answer
-the transfer under way is dropped and counted: other clients use the same channel, and answers may come late.
+Expedited and segmented transfers in both directions; block transfers are in `sdo_block.py`. One transfer at a time.
+What does not answer the transfer under way is dropped and counted: other clients use the same channel, and answers may
+come late.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from canbase_driver.cia301.nmt import MAX_NODE_ID, SDO_TO_CLIENT, SDO_TO_SERVER
 
 _ABORT = 0x80
 
+LONGEST_TIMEOUT_S, LATE_FACTOR = 5.0, 2.0
+"""A server has no time limit (CiA 301): after an answer that came late the client waits this many times as long [s]."""
 MAX_UPLOAD_BYTES = 4096
 """A drive that sends more than this for one object is not followed any further."""
 
@@ -23,6 +26,8 @@ OUT_OF_MEMORY, ACCESS_UNSUPPORTED, WRITE_ONLY, READ_ONLY = 0x0504_0005, 0x0601_0
 NO_OBJECT, NO_SUB_INDEX, LENGTH_WRONG, DEVICE_STATE = 0x0602_0000, 0x0609_0011, 0x0607_0010, 0x0800_0022
 TOO_LONG, TOO_SHORT = 0x0607_0012, 0x0607_0013
 VALUE_INVALID, VALUE_TOO_HIGH, VALUE_TOO_LOW = 0x0609_0030, 0x0609_0031, 0x0609_0032
+BLOCK_SIZE_INVALID, SEQUENCE_INVALID, CRC_ERROR = 0x0504_0002, 0x0504_0003, 0x0504_0004
+GENERAL_ERROR = 0x0800_0000
 
 _OF_THE_WATCHDOG = frozenset(
     index + axis * AXIS_OFFSET
@@ -35,9 +40,9 @@ ABORT_TEXTS = {
     TOGGLE_BIT_WRONG: "toggle bit not alternated",
     TIMED_OUT: "SDO protocol timed out",
     COMMAND_UNKNOWN: "command specifier not valid or unknown",
-    0x0504_0002: "block size not valid",
-    0x0504_0003: "sequence number not valid",
-    0x0504_0004: "CRC error",
+    BLOCK_SIZE_INVALID: "block size not valid",
+    SEQUENCE_INVALID: "sequence number not valid",
+    CRC_ERROR: "CRC error",
     OUT_OF_MEMORY: "out of memory",
     ACCESS_UNSUPPORTED: "unsupported access to the object",
     WRITE_ONLY: "the object is write-only",
@@ -57,7 +62,7 @@ ABORT_TEXTS = {
     VALUE_TOO_LOW: "value too low",
     0x0609_0036: "maximum below minimum",
     0x060A_0023: "resource not available",
-    0x0800_0000: "general error",
+    GENERAL_ERROR: "general error",
     0x0800_0020: "data cannot be transferred or stored",
     0x0800_0021: "data cannot be transferred or stored because of local control",
     DEVICE_STATE: "data cannot be transferred or stored in the present state of the device",
@@ -136,7 +141,7 @@ class SdoTimeout(SdoError):  # noqa: N818 - as TimeoutError, but of SDO
 
 
 @dataclass(slots=True)
-class _Transfer:
+class Transfer:
     """The transfer under way. `buffer`: what is still to be sent, or what has come so far."""
 
     step: Read | Write
@@ -148,12 +153,22 @@ class _Transfer:
     announced: int | None = None
 
 
+@dataclass(slots=True)
+class _Requests:
+    """How often one object was requested and answered, and when it was requested last [s]."""
+
+    sent: int = 0
+    answered: int = 0
+    at: float = 0.0
+
+
 class SdoClient:
     """One SDO transfer after the other with one node.
 
     `start` gives the first frame, `on_frame` and `tick` give those that follow; when `busy` ends, `answer()` has it.
     `dropped` counts the frames of this channel that did not belong to the transfer, `duplicates` those among them that
     answer the request before it once more, though that one was sent once, and the watchdog requests no such object.
+    `late_s`: the longest time that an answer took at least [s], where that is longer than the timeout was.
     """
 
     def __init__(self, node_id: int, timeout_s: float, attempts: int) -> None:
@@ -161,11 +176,14 @@ class SdoClient:
             raise ValueError(f"node {node_id}, {timeout_s} s, {attempts} attempts: expected 1…127, more than 0 of each")
         self.node_id = node_id
         self.dropped = self.duplicates = 0
+        self.late_s = 0.0
+        self._requests: dict[bytes, _Requests] = {}
+        """By address."""
         self._answered: bytes | None = None
         """Address of the transfer that ended last, with the first answer to its only request."""
         self._timeout_s = timeout_s
         self._attempts = attempts
-        self._transfer: _Transfer | None = None
+        self._transfer: Transfer | None = None
         self._answer: bytes | SdoError | None = None
 
     @property
@@ -208,8 +226,11 @@ class SdoClient:
         if frame.cob_id != SDO_TO_CLIENT + self.node_id:
             return []
         transfer = self._transfer
+        if len(frame.data) == 8 and (transfer is None or not transfer.initiated):
+            self._note_answer(frame.data[1:4], now_s)
         if len(frame.data) == 8 and frame.data[1:4] == self._answered and not _expects(transfer, frame.data):
-            self.duplicates += 1
+            requests = self._requests.get(frame.data[1:4])
+            self.duplicates += requests is None or requests.answered > requests.sent
             return self._drop()
         if transfer is None or len(frame.data) != 8:
             return self._drop()
@@ -219,23 +240,37 @@ class SdoClient:
             return self._on_segment(transfer, frame.data, now_s)
         return self._on_initiated(transfer, frame.data, now_s)
 
+    def _note_answer(self, address: bytes, now_s: float) -> None:
+        """Answers carry no number: this one came so long after the last request for the object, or later still."""
+        requests = self._requests.get(address)
+        if requests is None:
+            return
+        requests.answered += 1
+        took_s, is_ours = now_s - requests.at, requests.answered <= requests.sent
+        if self._timeout_s < took_s <= LONGEST_TIMEOUT_S and is_ours:
+            self.late_s = max(self.late_s, took_s)
+            self._timeout_s = min(LATE_FACTOR * took_s, LONGEST_TIMEOUT_S)
+
     def _begin(self, step: Read | Write, attempts: int, now_s: float) -> Frame:
         buffer = b"" if isinstance(step, Read) else step.data
-        self._transfer = _Transfer(step, attempts - 1, now_s, buffer)
+        self._transfer = Transfer(step, attempts - 1, now_s, buffer)
+        if step.index not in _OF_THE_WATCHDOG:
+            requests = self._requests.setdefault(address(step), _Requests())
+            requests.sent, requests.at = requests.sent + 1, now_s
         return self._request(self._transfer, _initiate(step), now_s)
 
-    def _request(self, transfer: _Transfer, data: bytes, now_s: float) -> Frame:
+    def _request(self, transfer: Transfer, data: bytes, now_s: float) -> Frame:
         transfer.deadline = now_s + self._timeout_s
         return Frame(SDO_TO_SERVER + self.node_id, data.ljust(8, b"\0"))
 
     def _on_abort(self, step: Read | Write, data: bytes) -> list[Frame]:
-        if data[1:4] != _address(step):
+        if data[1:4] != address(step):
             return self._drop()
         return self._finish(SdoAborted(self.node_id, step, int.from_bytes(data[4:], "little")))
 
-    def _on_initiated(self, transfer: _Transfer, data: bytes, now_s: float) -> list[Frame]:
+    def _on_initiated(self, transfer: Transfer, data: bytes, now_s: float) -> list[Frame]:
         step = transfer.step
-        if data[1:4] != _address(step) or data[0] >> 5 != (2 if isinstance(step, Read) else 3):
+        if data[1:4] != address(step) or data[0] >> 5 != (2 if isinstance(step, Read) else 3):
             return self._drop()
         transfer.initiated = True
         if isinstance(step, Write):
@@ -246,7 +281,7 @@ class SdoClient:
         transfer.announced = int.from_bytes(data[4:], "little") if sized else None
         return [self._request(transfer, b"\x60", now_s)]
 
-    def _on_segment(self, transfer: _Transfer, data: bytes, now_s: float) -> list[Frame]:
+    def _on_segment(self, transfer: Transfer, data: bytes, now_s: float) -> list[Frame]:
         is_read = isinstance(transfer.step, Read)
         if data[0] >> 5 != (0 if is_read else 1):
             return self._drop()
@@ -257,7 +292,7 @@ class SdoClient:
             return self._on_uploaded(transfer, data, now_s)
         return [self._send_segment(transfer, now_s)] if transfer.buffer else self._finish(b"")
 
-    def _on_uploaded(self, transfer: _Transfer, data: bytes, now_s: float) -> list[Frame]:
+    def _on_uploaded(self, transfer: Transfer, data: bytes, now_s: float) -> list[Frame]:
         transfer.buffer += data[1 : 8 - (data[0] >> 1 & 0x07)]
         if len(transfer.buffer) > MAX_UPLOAD_BYTES:
             return self._fail(transfer, OUT_OF_MEMORY, now_s)
@@ -267,19 +302,22 @@ class SdoClient:
             return self._fail(transfer, LENGTH_WRONG, now_s)
         return self._finish(transfer.buffer)
 
-    def _send_segment(self, transfer: _Transfer, now_s: float) -> Frame:
+    def _send_segment(self, transfer: Transfer, now_s: float) -> Frame:
         part, transfer.buffer = transfer.buffer[:7], transfer.buffer[7:]
         is_last = not transfer.buffer
         command = transfer.toggle << 4 | (7 - len(part)) << 1 | is_last
         return self._request(transfer, bytes((command,)) + part, now_s)
 
-    def _fail(self, transfer: _Transfer, code: int, now_s: float) -> list[Frame]:
+    def _fail(self, transfer: Transfer, code: int, now_s: float) -> list[Frame]:
         step = transfer.step
-        abort = Frame(SDO_TO_SERVER + self.node_id, bytes((_ABORT,)) + _address(step) + code.to_bytes(4, "little"))
+        abort = self._abort_frame(step, code)
         if transfer.attempts_left:
             return [abort, self._begin(step, transfer.attempts_left, now_s)]
         self._finish(self._timeout(step) if code == TIMED_OUT else SdoAborted(self.node_id, step, code))
         return [abort]
+
+    def _abort_frame(self, step: Read | Write, code: int) -> Frame:
+        return Frame(SDO_TO_SERVER + self.node_id, bytes((_ABORT,)) + address(step) + code.to_bytes(4, "little"))
 
     def _timeout(self, step: Read | Write) -> SdoTimeout:
         return SdoTimeout(self.node_id, step, f"no answer to {self._attempts} requests, {self._timeout_s:g} s each")
@@ -287,7 +325,7 @@ class SdoClient:
     def _finish(self, answer: bytes | SdoError) -> list[Frame]:
         transfer, self._transfer = self._transfer, None
         step = transfer.step if transfer is not None and transfer.attempts_left == self._attempts - 1 else None
-        self._answered = _address(step) if step is not None and step.index not in _OF_THE_WATCHDOG else None
+        self._answered = address(step) if step is not None and step.index not in _OF_THE_WATCHDOG else None
         self._answer = answer
         return []
 
@@ -296,19 +334,20 @@ class SdoClient:
         return []
 
 
-def _expects(transfer: _Transfer | None, data: bytes) -> bool:
+def _expects(transfer: Transfer | None, data: bytes) -> bool:
     """Whether the transfer under way may be what this frame answers."""
-    return transfer is not None and (transfer.initiated or _address(transfer.step) == data[1:4])
+    return transfer is not None and (transfer.initiated or address(transfer.step) == data[1:4])
 
 
-def _address(step: Read | Write) -> bytes:
+def address(step: Read | Write) -> bytes:
+    """Index and sub-index as they are on the bus."""
     return struct.pack("<HB", step.index, step.sub)
 
 
 def _initiate(step: Read | Write) -> bytes:
     if isinstance(step, Read):
-        return b"\x40" + _address(step)
+        return b"\x40" + address(step)
     data = step.data
     if len(data) <= 4:
-        return bytes((0x23 | (4 - len(data)) << 2,)) + _address(step) + data
-    return b"\x21" + _address(step) + len(data).to_bytes(4, "little")
+        return bytes((0x23 | (4 - len(data)) << 2,)) + address(step) + data
+    return b"\x21" + address(step) + len(data).to_bytes(4, "little")

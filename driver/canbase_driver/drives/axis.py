@@ -48,7 +48,6 @@ class Axis:
         self._feedback_s = robot.timeouts.feedback_s
         self._layout = layout.profile.layout
         self._setpoint_cob_id = layout.setpoint_cob_id(drive.axis)
-        self._wheel_radius_m = robot.base.wheel_radius_m
         self._control_hz = robot.rates.control_hz
         self._restarts = 0
         self._status_is_new = False
@@ -58,7 +57,7 @@ class Axis:
     @property
     def position_rad(self) -> float:
         """Angle of the wheel since its first feedback [rad]."""
-        return self.travel.travel_m / self._wheel_radius_m
+        return self.travel.travel_m / self.units.radius_m
 
     @property
     def losses(self) -> int:

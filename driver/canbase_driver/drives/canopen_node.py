@@ -13,15 +13,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from enum import Enum
 
 from canbase_config.profile import Profile
 from canbase_config.robot import Robot
 from canbase_driver.boot.node_boot import NodeBoot
 from canbase_driver.boot.sequence import BootReport
+from canbase_driver.boot.steps import GUARDING_ALONE, Patience
 from canbase_driver.cia301.emcy import Emcy, parse_emcy
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import ALL_NODES, NmtCommand, NmtState, nmt, parse_heartbeat
+from canbase_driver.cia301.node_guarding import GuardAnswers
 from canbase_driver.cia301.pdo import node_layout
 from canbase_driver.cia402 import DriveState, PowerGoal, common_controlword, next_controlword
 from canbase_driver.drives.axis import Axis
@@ -42,6 +45,16 @@ SECOND_BOOT_UP_S, ALIKE, SETTLE_FACTOR, SETTLE_EXTRA_S = 3.0, 0.3, 1.3, 0.2
 """A boot-up message so soon after the one that answered the NMT reset may be a second one of the same start. When it
 comes again after the next boot, as late but for this share, the boots after that wait for it: that time, times the
 factor, and the extra. Once alone it is a drive that lost its supply."""
+NO_HEARTBEAT = f"no heartbeat (1017h; {GUARDING_ALONE})"
+NO_ANSWER = (
+    "no answer to a node guarding request of the watchdog: start canbase watchdog. If it runs, its CAN adapter or the "
+    "drive has no remote frames (RTR): use another adapter, or set self_stop.node_guarding: false in its drive "
+    "profile, and the drive does not stop when this computer fails"
+)
+RESET_FACTOR, RESET_EXTRA_S, LONGEST_RESET_S = 1.3, 0.5, 30.0
+"""A boot-up message, or a first answer, so long after an NMT reset that a boot did not wait for it [s]: the next boot
+waits that time, times the factor, and the extra. Later it is a drive that lost its supply."""
+NO_TOGGLE = "node guarding answers whose toggle bit never changes: it goes on to send heartbeats (1017h), or hangs"
 BUS_LOST = (0x8120, 0x8130, 0x8140)
 """Emergency codes for a lost bus or heartbeat (CiA 301): error passive, heartbeat or life guarding, bus-off."""
 
@@ -69,6 +82,8 @@ class CanopenNode:
         self.presence = Presence.GONE
         self.nmt_state: NmtState | None = None
         self.heartbeat_at = -math.inf
+        """When its last heartbeat came, or its last answer to a node guarding request that counts."""
+        self._guarded = GuardAnswers() if self.profile.self_stop.node_guarding else None
         self.emcy: Emcy | None = None
         self.report: BootReport | None = None
         """Of the last boot, while the node is there."""
@@ -85,7 +100,9 @@ class CanopenNode:
         self._boot_up_at = -math.inf
         self._second_s = math.inf
         """From the boot-up message of the last boot to a second one [s]; infinity: there was none."""
-        self._settle_s = 0.0
+        self._patience = Patience()
+        self._reset_at = -math.inf
+        """When an NMT reset was sent that nothing has answered yet [s]; minus infinity: there is none."""
         self._since_s = -math.inf
         self._why_gone = "not booted yet"
 
@@ -149,16 +166,36 @@ class CanopenNode:
             unheard = not self._boot.heard and now_s - self._since_s > UNHEARD_S
             cure = "; check its power and its cable" if unheard else ""
             return self._boot.waiting_for + cure + (f" (last try: {self.boot_error})" if self.boot_error else "")
+        if self.presence is Presence.STARTING and self.boot_error and self._awaits_guard:
+            return f"{self.name}: {self.boot_error}"
         if self.presence is Presence.STARTING:
             return f"{self.name}: waiting for its first feedback since {now_s - self._since_s:.1f} s"
         return ""
 
     def missing(self, now_s: float) -> str:
-        """Why it is not ready though it had timeouts.boot_s for it; empty when it is, or has time left."""
-        if self.presence is Presence.READY or now_s - self._ready_at <= self._robot.timeouts.boot_s:
+        """Why it is not ready though it had timeouts.boot_s for it; empty when it is, has time left, or waits for the
+        boots of the others."""
+        in_time = now_s - self._ready_at <= self._robot.timeouts.boot_s
+        is_there = self.has_pdos and not self.boot_error
+        if self.presence is Presence.READY or in_time or self._is_configured or is_there:
             return ""
+        since_s = now_s - self._ready_at
+        if self._boot is not None and self._boot.heard and not self.boot_error:
+            done = f"its boot has done {self._boot.transfers} SDO transfers in {now_s - self._since_s:.0f} s"
+            slow = self._boot.slow_answers
+            return (
+                f"{self.name} is not ready since {since_s:.0f} s: {done}, and goes on; "
+                f"a drive that needs so long: timeouts.boot_s of robot.yaml{'; ' * bool(slow)}{slow}"
+            )
         why = self.boot_error or f"{self._why_gone}; check its power and its cable"
-        return f"{self.name} is missing since {now_s - self._ready_at:.0f} s: {why}"
+        return f"{self.name} is missing since {since_s:.0f} s: {why}"
+
+    def without_self_stop(self) -> str:
+        """A sentence when its boot could not set what makes it stop by itself."""
+        if self.report is None or self.report.stops_by_itself:
+            return ""
+        why = "; ".join(self.report.notes) or "nothing was set that does it"
+        return f"{self.name}: it would not stop by itself when this computer fails, whatever was proven: {why}"
 
     def absent(self) -> str:
         """Why it is gone; empty when it is not."""
@@ -192,7 +229,7 @@ class CanopenNode:
         too_soon = self.boot_error and now_s - self._since_s < RETRY_S
         if self.presence is not Presence.GONE or too_soon or now_s < self._held_until:
             return
-        self._boot = NodeBoot(self.node_id, self._drives, self._robot, self._settle_s, identify=self._identify)
+        self._boot = NodeBoot(self.node_id, self._drives, self._robot, self._patience, identify=self._identify)
         self._boot_up_at = -math.inf
         self._owed_stop = False
         self._go(Presence.BOOTING, now_s)
@@ -260,23 +297,29 @@ class CanopenNode:
         return [common_controlword([axis.state for axis in self.axes], goal)] * len(self.axes)
 
     def on_heartbeat(self, frame: Frame, now_s: float) -> bool:
-        """Take a frame 700h + id. False: not a heartbeat."""
-        parsed = parse_heartbeat(frame)
-        if parsed is None or parsed[1] is None:
+        """Take a frame 700h + id. False: neither a heartbeat nor an answer to node guarding that counts."""
+        heartbeat = frame if self._guarded is None else self._guarded.take(frame)
+        parsed = None if heartbeat is None else parse_heartbeat(heartbeat)
+        if heartbeat is None or parsed is None or parsed[1] is None:
             return False
-        self.nmt_state = parsed[1]
         self.heartbeat_at = now_s
-        if (self.has_pdos or self._is_configured) and self.nmt_state is NmtState.INITIALISING:
+        self._on_nmt_state(parsed[1], heartbeat, now_s)
+        return True
+
+    def _on_nmt_state(self, state: NmtState, heartbeat: Frame, now_s: float) -> None:
+        self.nmt_state = state
+        if (self.has_pdos or self._is_configured) and state is NmtState.INITIALISING:
             self.emcy = None
             self.lose(f"restarted (boot-up message){self._learn_to_settle(now_s)}", now_s)
-        elif self.presence is Presence.READY and self.nmt_state is not NmtState.OPERATIONAL:
-            self.lose(f"left NMT operational ({self.nmt_state.text})", now_s)
+        elif self.presence is Presence.READY and state is not NmtState.OPERATIONAL:
+            self.lose(f"left NMT operational ({state.text})", now_s)
         elif self._boot is not None:
-            self._boot.on_frame(frame, now_s)
-            if self._boot.error is not None and self.nmt_state is NmtState.INITIALISING:
+            self._boot.on_frame(heartbeat, now_s)
+            if self._boot.error is not None and state is NmtState.INITIALISING:
                 self._boot_up_at = self._boot.boot_up_at
                 self._learn_to_settle(now_s)
-        return True
+        if state is NmtState.INITIALISING and self._reset_at > -math.inf:
+            self._learn_to_wait("its boot-up message came", now_s)
 
     def _learn_to_settle(self, now_s: float) -> str:
         """A second boot-up message of one start: the next boot waits for it. What to add to a sentence about it."""
@@ -287,8 +330,18 @@ class CanopenNode:
         told = f", {gap_s:.2f} s after that of its boot"
         if abs(gap_s - before_s) > ALIKE * gap_s:
             return f"{told}; if it does so after each boot, set start.settle_s in its drive profile"
-        self._settle_s = max(self._settle_s, SETTLE_FACTOR * gap_s + SETTLE_EXTRA_S)
+        settle_s = SETTLE_FACTOR * gap_s + SETTLE_EXTRA_S
+        self._patience = replace(self._patience, settle_s=max(self._patience.settle_s, settle_s))
         return f"{told}, again; the next boot waits for it (drive profile: start.settle_s)"
+
+    def _learn_to_wait(self, came: str, now_s: float) -> None:
+        """Something of a node that a boot has reset in vain: the next boot waits for its reset."""
+        took_s, self._reset_at = now_s - self._reset_at, -math.inf
+        if took_s <= LONGEST_RESET_S:
+            boot_up_s = max(self._patience.boot_up_s, RESET_FACTOR * took_s + RESET_EXTRA_S)
+            self._patience = replace(self._patience, boot_up_s=boot_up_s)
+            cure = f"set `start.boot_up_s: {boot_up_s:.1f}` in its drive profile; the next boot waits as long"
+            self.boot_error = f"node {self.node_id}: {came} {took_s:.1f} s after an NMT reset: {cure}"
 
     def on_nmt(self, frame: Frame, now_s: float) -> None:
         """Take an NMT command (000h) that is on the bus: somebody keeps it pre-operational."""
@@ -331,12 +384,23 @@ class CanopenNode:
         if self._boot is None:
             return self._measures.tick(now_s) if self.presence is Presence.READY else []
         frames = self._boot.tick(now_s)
+        if self._boot.heard and self._reset_at > -math.inf:
+            self._learn_to_wait("it answered", now_s)
         if self._boot.error is not None:
+            self._note_reset(self._boot, now_s)
             self.boot_error = str(self._boot.error)
             self.lose(f"could not be booted: {self.boot_error}", now_s)
         elif self._boot.report is not None and self.others_are_configured():
             frames.append(self._start(self._boot.report, now_s))
         return frames
+
+    def _note_reset(self, boot: NodeBoot, now_s: float) -> None:
+        """A boot has failed. That of a node that its NMT reset was too long for waits longer the next time."""
+        if boot.reset_at == -math.inf:
+            return
+        self._reset_at = boot.reset_at
+        if self.nmt_state is NmtState.INITIALISING and self.heartbeat_at > boot.reset_at:
+            self._learn_to_wait("its boot-up message came", self.heartbeat_at)
 
     def _start(self, report: BootReport, now_s: float) -> Frame:
         self._boot_up_at = self._boot.boot_up_at if self._boot is not None else -math.inf
@@ -344,6 +408,7 @@ class CanopenNode:
         self._lost_heartbeat = False
         self._boot = None
         self.nmt_state = None
+        self._guarded = None if self._guarded is None else GuardAnswers()
         for axis in self.axes:
             axis.travel.reset_reference()  # to what came since it was lost: another drive of this id may have sent it
         self._go(Presence.STARTING, now_s)
@@ -351,12 +416,22 @@ class CanopenNode:
 
     def _check_started(self, now_s: float) -> None:
         heard = all(axis.age_s(now_s) <= self._robot.timeouts.feedback_s for axis in self.axes)
-        if heard and self.nmt_state is NmtState.OPERATIONAL:
+        guarded = self._guarded is None or self._guarded.alternates
+        if heard and guarded and self.nmt_state is NmtState.OPERATIONAL:
             self.boot_error = ""
             self._go(Presence.READY, now_s)
         elif now_s - self._since_s > START_TIMEOUT_S:
             self.boot_error = f"within {START_TIMEOUT_S:.1f} s of NMT start it sent {self._not_started(now_s)}"
+            if heard and self._awaits_guard:
+                return  # it sends feedback: another boot would bring no watchdog that sends requests
             self.lose(f"could not be started: {self.boot_error}", now_s)
+
+    @property
+    def _awaits_guard(self) -> bool:
+        """It was started, and lacks nothing but answers to requests."""
+        if self._guarded is None or self._guarded.alternates:
+            return False
+        return self.nmt_state is None or self.nmt_state is NmtState.OPERATIONAL
 
     def _not_started(self, now_s: float) -> str:
         """What a node that was started has not sent, and what that may come from. It has answered SDOs until then."""
@@ -366,9 +441,12 @@ class CanopenNode:
             if axis.age_s(now_s) > self._robot.timeouts.feedback_s
         ]
         if self.nmt_state is None:
-            lacking.append("no heartbeat (1017h; a drive that knows node guarding alone cannot be used)")
+            lacking.append(NO_ANSWER if self._guarded is not None else NO_HEARTBEAT)
         elif self.nmt_state is not NmtState.OPERATIONAL:
-            lacking.append(f"a heartbeat that says {self.nmt_state.text}, not operational")
+            kind = "a heartbeat" if self._guarded is None else "an answer to node guarding"
+            lacking.append(f"{kind} that says {self.nmt_state.text}, not operational")
+        elif self._guarded is not None and not self._guarded.alternates:
+            lacking.append(NO_TOGGLE)
         notes = self.report.notes if self.report else ()
         return " and ".join(lacking) + (f"; its boot noted: {'; '.join(notes)}" if notes else "")
 

@@ -96,6 +96,10 @@ class Drives:
         """Which node could not be booted for timeouts.boot_s, and why."""
         return _first(node.missing(now_s) for node in self.nodes)
 
+    def without_self_stop(self) -> str:
+        """Which node has refused at its boot what makes it stop by itself."""
+        return _first(node.without_self_stop() for node in self.nodes)
+
     def absent(self) -> str:
         """Why a node must be booted again."""
         return _first(node.absent() for node in self.nodes)
@@ -230,7 +234,7 @@ class Drives:
 
     def snapshots(self, now_s: float) -> tuple[DriveSnapshot, ...]:
         """One per axis, in the order of robot.yaml."""
-        return tuple(_snapshot(node, axis, self._robot, now_s) for node, axis in self._with_node)
+        return tuple(_snapshot(node, axis, now_s) for node, axis in self._with_node)
 
     def _turning(self, axis: Axis, now_s: float) -> str:
         if axis.stands(now_s):
@@ -251,8 +255,8 @@ def age_s(now_s: float, then: float) -> float:
     return now_s - then if then > -math.inf else math.nan
 
 
-def _snapshot(node: CanopenNode, axis: Axis, robot: Robot, now_s: float) -> DriveSnapshot:
-    radius_m = robot.base.wheel_radius_m
+def _snapshot(node: CanopenNode, axis: Axis, now_s: float) -> DriveSnapshot:
+    radius_m = axis.units.radius_m
     code = node.emcy.code if node.emcy else 0
     measured = node.measured(axis, now_s)
     share = math.nan if axis.push.share is None else axis.push.share * axis.drive.direction

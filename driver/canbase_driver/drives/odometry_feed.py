@@ -10,13 +10,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from canbase_config.robot import Base
+from canbase_config.robot import Robot
 from canbase_driver.drives.drive_group import Drives
 from canbase_driver.motion.kinematics import Twist2D, base_twist
-from canbase_driver.motion.odometry import Covariance, Odometry, Pose2D
+from canbase_driver.motion.limiter import Limiter
+from canbase_driver.motion.odometry import Odometry, Pose2D
+from canbase_driver.motion.pose_error import Covariance, TwistError
+from canbase_driver.motion.slip import SideSlip
 
 LONGEST_S = 1.0
 """The mean velocity after a longer gap is taken over this time."""
+LOST_MAX_M = 10.0
+"""What a wheel may have rolled while its travel was unknown counts as this at most: the pose is unknown by then."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,11 +58,14 @@ class OdometryReport:
 class OdometryFeed:
     """Owns the odometry of the base. `serial` grows by one with each sample that entered it."""
 
-    def __init__(self, drives: Drives, base: Base) -> None:
-        self._drives, self._base = drives, base
+    def __init__(self, drives: Drives, robot: Robot) -> None:
+        self._drives, self._base = drives, robot.base
         self._taken_at = -math.inf
         self._losses = self._sets = 0
-        self.odometry = Odometry(base.track_m)
+        self._wheel_mps = Limiter(robot.limits, robot.base.track_m).wheel_mps
+        self._left_slip, self._right_slip = (SideSlip(robot.odometry.grip_mps2) for _ in range(2))
+        self._twist_error = TwistError(robot.odometry, robot.base.track_m, 1.0 / robot.rates.odometry_hz)
+        self.odometry = Odometry(robot.base.track_m, robot.odometry)
         self.serial = 0
 
     @property
@@ -72,11 +80,13 @@ class OdometryFeed:
 
     def report(self, now_s: float) -> OdometryReport:
         """All of it at the time `now_s` [s, monotonic]."""
+        twist = base_twist(*self._drives.speeds_mps(), self._base.track_m)
+        slips_mps = self._left_slip.speed_mps, self._right_slip.speed_mps
         return OdometryReport(
             pose=self.odometry.pose,
-            twist=base_twist(*self._drives.speeds_mps(), self._base.track_m),
+            twist=twist,
             pose_covariance=self.odometry.pose_covariance(),
-            twist_covariance=self.odometry.twist_covariance(),
+            twist_covariance=self._twist_error.covariance(twist, *slips_mps),
             valid=self._drives.are_fresh(now_s) and self._drives.have_references(),
             travel_losses=self._drives.losses(),
             pose_resets=self.pose_resets,
@@ -96,10 +106,23 @@ class OdometryFeed:
             self._enter(now_s)
 
     def _enter(self, now_s: float) -> None:
+        gap_s = now_s - self._taken_at
         losses = self._drives.losses()
         if losses != self._losses:
             self._losses = losses
-            self.odometry.lose_reference()
-        self.odometry.update(*self._drives.travel_m(), min(now_s - self._taken_at, LONGEST_S))
+            self._lose(gap_s)
+        dt_s = min(gap_s, LONGEST_S)
+        self.odometry.update(*self._drives.travel_m(), dt_s, *self._slips_m(dt_s))
         self._taken_at = now_s
         self.serial += 1
+
+    def _lose(self, gap_s: float) -> None:
+        """Nothing has measured what a wheel did in this time: as far as its limits allow, it may have rolled."""
+        rolled_m = min(self._wheel_mps * gap_s, LOST_MAX_M) if math.isfinite(gap_s) else 0.0
+        self.odometry.lose_reference(rolled_m)
+        self._left_slip.forget()
+        self._right_slip.forget()
+
+    def _slips_m(self, dt_s: float) -> tuple[float, float]:
+        left, right = ([axis.velocity_mps for axis in side] for side in (self._drives.left, self._drives.right))
+        return self._left_slip.update(left, dt_s), self._right_slip.update(right, dt_s)

@@ -1,4 +1,4 @@
-"""From the drives' 32-bit positions to the pose of the base: unwrapping, travel of a wheel, exact arcs, covariance.
+"""From the drives' 32-bit positions to the pose of the base: unwrapping, travel of a wheel, exact arcs.
 
 A first sample is an offset and never motion. What a wheel cannot have done does not enter the pose. No ROS, no clock.
 Frames and axes are those of REP 103 and REP 105.
@@ -9,10 +9,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from canbase_config.odometry import OdometrySettings
 from canbase_driver.motion.kinematics import Twist2D, base_twist
-
-Covariance = tuple[float, ...]
-"""36 numbers: 6 × 6, row by row, in the order x, y, z, rotation about x, y, z (geometry_msgs, REP 103)."""
+from canbase_driver.motion.pose_error import Covariance, PoseError
 
 RE_REFERENCE_SAMPLES = 3
 """This many samples in a row at a new place, each near the one before: the counter stays there."""
@@ -20,23 +19,6 @@ RE_REFERENCE_SAMPLES = 3
 DOUBTED_CYCLES = 10
 """A place that a counter jumped to is doubted after a gap of this many cycles: a second drive with the same node
 id may have reported it."""
-
-POSE_FLOOR_M2 = 1e-6
-"""Variance of x and of y before any motion [m²]: 1 mm."""
-POSE_FLOOR_RAD2 = 1e-6
-"""Variance of yaw before any motion [rad²]: 1 mrad."""
-POSE_M2_PER_M = 1e-4
-"""Growth of the variance of x and y with the distance [m²/m]: 1 cm after 1 m, 10 cm after 100 m."""
-YAW_RAD2_PER_M = 1e-4
-"""Growth of the variance of yaw with the distance [rad²/m]."""
-YAW_RAD2_PER_RAD = 1e-4
-"""Growth of the variance of yaw with the rotation [rad²/rad]: 1.4° after one turn."""
-TWIST_FLOOR = 1e-6
-"""Variance of a velocity at standstill [m²/s², rad²/s²]: 1 mm/s, 1 mrad/s."""
-TWIST_SHARE = 0.02
-"""Standard deviation of a velocity as a share of it: slip and the radius of the wheels."""
-UNMEASURED = 1e6
-"""Variance of what wheels cannot measure: z, roll and pitch."""
 
 _STRAIGHT_RAD = 1e-4
 _COUNTS = 1 << 32
@@ -165,10 +147,11 @@ class Pose2D:
 class Odometry:
     """Pose of the base by dead reckoning: between two updates each wheel keeps its speed, so the base runs an arc."""
 
-    __slots__ = ("_distance_m", "_last_m", "_pose", "_rotation_rad", "_track_m", "_twist")
+    __slots__ = ("_error", "_last_m", "_pose", "_slips", "_track_m", "_twist")
 
-    def __init__(self, track_m: float) -> None:
+    def __init__(self, track_m: float, settings: OdometrySettings) -> None:
         self._track_m = track_m
+        self._error = PoseError(settings, track_m)
         self._last_m: tuple[float, float] | None = None
         self.reset(Pose2D())
 
@@ -186,15 +169,23 @@ class Odometry:
         """Continue from `pose`, with the covariance of a fresh start. The wheels' travel goes on."""
         self._pose = pose
         self._twist = Twist2D.ZERO
-        self._distance_m = 0.0
-        self._rotation_rad = 0.0
+        self._error.reset(pose.yaw_rad)
+        self._slips = False
 
-    def lose_reference(self) -> None:
-        """The next update is a reference and no motion: what is rolled until then does not enter the pose."""
+    def lose_reference(self, rolled_m: float) -> None:
+        """The next update is a reference and no motion: what is rolled until then does not enter the pose.
+
+        `rolled_m`: so far may each side have rolled meanwhile, either way; it enters the covariance.
+        """
         self._last_m = None
+        self._error.lose(rolled_m)
 
-    def update(self, left_m: float, right_m: float, dt_s: float) -> Twist2D:
+    def update(
+        self, left_m: float, right_m: float, dt_s: float, left_slip_m: float = 0.0, right_slip_m: float = 0.0
+    ) -> Twist2D:
         """Take in the travel of both sides since their start [m]; the mean velocity since the update before.
+
+        `*_slip_m`: so far may that side have slipped since the update before (1 σ), from 0 [m].
 
         The first call, and the first after `lose_reference`, is the reference and no motion. Raises ValueError, with
         nothing changed, for a travel that is not finite and for a `dt_s` that is not positive.
@@ -207,26 +198,20 @@ class Odometry:
         self._last_m = left_m, right_m
         step = base_twist(left_m - last_left_m, right_m - last_right_m, self._track_m)
         self._pose = _along_arc(self._pose, step.linear_mps, step.angular_radps)
-        self._distance_m += abs(step.linear_mps)
-        self._rotation_rad += abs(step.angular_radps)
+        self._note_error(left_m - last_left_m, right_m - last_right_m, left_slip_m, right_slip_m)
         self._twist = Twist2D(step.linear_mps / dt_s, step.angular_radps / dt_s)
         return self._twist
 
     def pose_covariance(self) -> Covariance:
-        """Of `pose`, in the odom frame: x and y grow with the distance, yaw with distance and rotation.
+        """Of `pose`, in the odom frame, since start or `reset`: `PoseError.covariance`."""
+        return self._error.covariance()
 
-        REP 103 order: x, y, z [m²], rotation about x, y, z [rad²]. The base is assumed to stay on the ground: z,
-        roll and pitch are published as 0 and `UNMEASURED`.
-        """
-        xy_m2 = POSE_FLOOR_M2 + POSE_M2_PER_M * self._distance_m
-        yaw_rad2 = POSE_FLOOR_RAD2 + YAW_RAD2_PER_M * self._distance_m + YAW_RAD2_PER_RAD * self._rotation_rad
-        return _diagonal(xy_m2, xy_m2, yaw_rad2)
-
-    def twist_covariance(self) -> Covariance:
-        """Of `twist`, in the base frame, in the same order [m²/s², rad²/s²]. Sideways no wheel rolls: the floor."""
-        linear = TWIST_FLOOR + (TWIST_SHARE * self._twist.linear_mps) ** 2
-        angular = TWIST_FLOOR + (TWIST_SHARE * self._twist.angular_radps) ** 2
-        return _diagonal(linear, TWIST_FLOOR, angular)
+    def _note_error(self, left_m: float, right_m: float, left_slip_m: float, right_slip_m: float) -> None:
+        self._error.roll(left_m, right_m, left_slip_m, right_slip_m)
+        slips = left_slip_m > 0.0 or right_slip_m > 0.0
+        if self._slips and not slips:
+            self._error.end_slip()
+        self._slips = slips
 
 
 def _along_arc(pose: Pose2D, distance_m: float, turn_rad: float) -> Pose2D:
@@ -240,16 +225,3 @@ def _along_arc(pose: Pose2D, distance_m: float, turn_rad: float) -> Pose2D:
         pose.y_m + distance_m * shortening * math.sin(heading_rad),
         pose.yaw_rad + turn_rad,
     )
-
-
-def _diagonal(x: float, y: float, yaw: float) -> Covariance:
-    return (
-        *(x, 0.0, 0.0, 0.0, 0.0, 0.0),
-        *(0.0, y, 0.0, 0.0, 0.0, 0.0),
-        *_NOT_MEASURED,
-        *(0.0, 0.0, 0.0, 0.0, 0.0, yaw),
-    )
-
-
-_NOT_MEASURED = tuple(UNMEASURED if row == column else 0.0 for row in (2, 3, 4) for column in range(6))
-"""z, rotation about x and y."""

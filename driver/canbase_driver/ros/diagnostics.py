@@ -11,6 +11,8 @@ from collections.abc import Mapping, Sequence
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from canbase_config.bus_load import BUSY_LOAD
+from canbase_config.diagnostics import BUS, MOTOR_DRIVER, WATCHDOG, drive_name, entry_name
 from canbase_driver.causes import Cause
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.cia402 import DriveState
@@ -23,6 +25,7 @@ from canbase_runtime.driver_state import DriverState
 from canbase_runtime.watchdog_view import WatchdogView
 
 _FAULTS = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
+BUSY = "little is left for boots and tools; raise the bit rate, or lower rates.control_hz"
 _PAUSE_WARNING_S = 0.05
 """A pause of the watchdog's loop that is worth a look: ten of its turns."""
 
@@ -34,19 +37,23 @@ def diagnostics_message(
     robot: str = "robot",
     previous: DriverSnapshot | None = None,
     warnings: Sequence[Excess] = (),
+    hardware_ids: Mapping[str, str] | None = None,
+    bus_load: float = math.nan,
+    busy_above: float = BUSY_LOAD,
 ) -> DiagnosticArray:
     """One entry for the loop, one for the bus, one for the watchdog, one per drive; `robot` makes their names unique.
 
     `previous` is the snapshot of the message before: a counter that grew since then is a warning, an old one is not.
-    `warnings`: of `health`.
+    `warnings`: of `health`. `hardware_ids`: by joint. `bus_load`: the share of its time that frames took; NaN: unknown.
+    `busy_above`: a greater share is a warning.
     """
     message = DiagnosticArray()
     message.header.stamp = stamp
     message.status = [
         _loop_entry(snapshot, previous or snapshot, robot),
-        _bus_entry(snapshot.bus, (previous or snapshot).bus, robot),
+        _bus_entry(snapshot.bus, (previous or snapshot).bus, robot, bus_load, busy_above),
         _watchdog_entry(snapshot.watchdog, (previous or snapshot).watchdog, robot),
-        *(_drive_entry(drive, snapshot.state, robot, warnings) for drive in snapshot.drives),
+        *(_drive_entry(drive, snapshot.state, robot, warnings, hardware_ids or {}) for drive in snapshot.drives),
     ]
     return message
 
@@ -79,7 +86,7 @@ def _loop_entry(snapshot: DriverSnapshot, previous: DriverSnapshot, robot: str) 
         "greatest lateness [s]": snapshot.cycle.lateness_max_s,
         **_named(events),
     }
-    return _entry(level, f"{robot}: motor_driver", sentence, robot, values)
+    return _entry(level, entry_name(robot, MOTOR_DRIVER), sentence, robot, values)
 
 
 def _loop_events(snapshot: DriverSnapshot) -> dict[str, int]:
@@ -97,16 +104,23 @@ def _driver_state(snapshot: DriverSnapshot) -> tuple[bytes, str]:
     return level, f"{snapshot.state.name.capitalize()} ({snapshot.finding.cause.value}){detail}.{clears}"
 
 
-def _bus_entry(bus: BusReport, previous: BusReport, robot: str) -> DiagnosticStatus:
+def _bus_entry(bus: BusReport, previous: BusReport, robot: str, load: float, busy_above: float) -> DiagnosticStatus:
     if bus.problem:
         level, sentence = DiagnosticStatus.ERROR, f"The bus has failed: {bus.problem.rstrip('.')}."
-    elif bus.controller is ControllerState.ERROR_ACTIVE:
-        level, sentence = DiagnosticStatus.OK, "The bus works."
-    else:
+    elif bus.controller is not ControllerState.ERROR_ACTIVE:
         level, sentence = DiagnosticStatus.WARN, f"The CAN controller is {bus.controller.value}: check the cable."
+    elif load > busy_above:
+        level, sentence = DiagnosticStatus.WARN, f"Frames take {load:.0%} of the bus's time: {BUSY}."
+    else:
+        level, sentence = DiagnosticStatus.OK, "The bus works."
     level, sentence = _with_news(level, sentence, bus.events, previous.events)
-    values = {"problem": bus.problem, "controller": bus.controller.value, **_named(bus.events)}
-    return _entry(level, f"{robot}: bus", sentence, robot, values)
+    values = {
+        "problem": bus.problem,
+        "controller": bus.controller.value,
+        "load [%]": 100.0 * load,
+        **_named(bus.events),
+    }
+    return _entry(level, entry_name(robot, BUS), sentence, robot, values)
 
 
 def _watchdog_entry(watchdog: WatchdogReport, previous: WatchdogReport, robot: str) -> DiagnosticStatus:
@@ -121,7 +135,7 @@ def _watchdog_entry(watchdog: WatchdogReport, previous: WatchdogReport, robot: s
         "longest pause of its loop [s]": watchdog.pause_max_s,
         **_named(events),
     }
-    return _entry(level, f"{robot}: watchdog", sentence, robot, values)
+    return _entry(level, entry_name(robot, WATCHDOG), sentence, robot, values)
 
 
 def _watchdog_state(watchdog: WatchdogReport) -> tuple[bytes, str]:
@@ -150,11 +164,19 @@ def _named(events: Mapping[str, int]) -> dict[str, int]:
     return {name.replace("_", " "): count for name, count in events.items()}
 
 
-def _drive_entry(drive: DriveSnapshot, state: DriverState, robot: str, warnings: Sequence[Excess]) -> DiagnosticStatus:
+def _drive_entry(
+    drive: DriveSnapshot,
+    state: DriverState,
+    robot: str,
+    warnings: Sequence[Excess],
+    hardware_ids: Mapping[str, str],
+) -> DiagnosticStatus:
     level, sentence = _drive_state(drive, state)
     if excesses := [warning.text for warning in warnings if warning.joint == drive.joint]:
         level, sentence = max(level, DiagnosticStatus.WARN), f"{sentence} Measured: {'; '.join(excesses)}."
     values = {
+        "node": drive.node_id,
+        "axis": drive.axis,
         "NMT state": drive.nmt_text,
         "CiA 402 state": drive.state_text,
         "statusword": f"{drive.statusword:04X}h",
@@ -172,8 +194,8 @@ def _drive_entry(drive: DriveSnapshot, state: DriverState, robot: str, warnings:
         "changed by the boot": "; ".join(drive.boot_changes) or "nothing",
         "last boot": drive.boot_problem or "well",
     }
-    place = f"node {drive.node_id} axis {drive.axis}"
-    return _entry(level, f"{robot}: drive {drive.joint}", sentence, f"{robot} {place}", values)
+    hardware_id = hardware_ids.get(drive.joint) or f"{robot} node {drive.node_id} axis {drive.axis}"
+    return _entry(level, drive_name(robot, drive.joint), sentence, hardware_id, values)
 
 
 def _drive_state(drive: DriveSnapshot, state: DriverState) -> tuple[bytes, str]:

@@ -111,10 +111,12 @@ def heard_drives(snapshot: DriverSnapshot) -> list[DriveSnapshot]:
     return [drive for drive in snapshot.drives if not math.isnan(drive.feedback_age_s)]
 
 
-def status_message(snapshot: DriverSnapshot, stamp: Time, warnings: Sequence[Excess] = ()) -> DriverStatus:
+def status_message(
+    snapshot: DriverSnapshot, stamp: Time, warnings: Sequence[Excess] = (), bus_load: float = math.nan
+) -> DriverStatus:
     """Everything that DriverStatus has a field for. Counters go round at 2³² as their type does.
 
-    `warnings`: of `health`.
+    `warnings`: of `health`. `bus_load`: the share of the bus's time that frames took; NaN: unknown.
     """
     watchdog, command, cycle, bus = snapshot.watchdog, snapshot.command, snapshot.cycle, snapshot.bus
     events = command.events | cycle.events | bus.events
@@ -138,6 +140,7 @@ def status_message(snapshot: DriverSnapshot, stamp: Time, warnings: Sequence[Exc
         cycles=_u32(cycle.cycles),
         cycle_lateness_max_s=cycle.lateness_max_s,
         bus_problem=bus.problem,
+        bus_load=bus_load,
         controller=bus.controller.value,
         **{name: _u32(count) for name, count in events.items()},
         drives=[_drive_status(drive, warnings) for drive in snapshot.drives],

@@ -6,6 +6,7 @@ Threads: the executor's (main) takes commands, requests and lifecycle transition
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 
@@ -16,6 +17,8 @@ from nav_msgs.msg import Odometry
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import BatteryState, JointState
 
+from canbase_config.bus_load import BUSY_LOAD
+from canbase_config.diagnostics import PERIOD_S, hardware_id
 from canbase_config.robot import Robot
 from canbase_driver.drives.health import Excess, HealthWatch
 from canbase_driver.motion.kinematics import Twist2D
@@ -29,6 +32,7 @@ from canbase_driver.ros.stop_events import StopEvents
 from canbase_driver.runtime.black_box import Ring
 from canbase_driver.runtime.black_box_notes import state_text
 from canbase_driver.runtime.black_box_writer import BlackBoxWriter
+from canbase_driver.runtime.bus_traffic import MeasuredLoad
 from canbase_driver.runtime.control_thread import ControlLoop
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervision.stop_history import StopRecord
@@ -38,7 +42,6 @@ from canbase_runtime.receive_time import ReceiveTimes
 
 COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 STATE_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
-DIAGNOSTICS_PERIOD_S = 1.0
 
 
 class MotorDriverNode(ManagedNode):
@@ -50,7 +53,8 @@ class MotorDriverNode(ManagedNode):
         self._receive_times = ReceiveTimes()
         self.voice = Voice(self.get_logger(), Journal("motor_driver"))
         self._odom = self.create_publisher(Odometry, "odom", 10)
-        self._tf = self.create_publisher(messages.TFMessage, "tf", 100) if messages.TFMessage is not None else None
+        publishes_tf = robot.odometry.publish_tf and messages.TFMessage is not None
+        self._tf = self.create_publisher(messages.TFMessage, "tf", 100) if publishes_tf else None
         self._joints = self.create_publisher(JointState, "joint_states", 10)
         self._status = self.create_publisher(DriverStatus, "motor_driver/status", STATE_QOS)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
@@ -63,6 +67,8 @@ class MotorDriverNode(ManagedNode):
         self._motion = SerializedMotion()
         self._previous: DriverSnapshot | None = None
         self._diagnosed: DriverSnapshot | None = None
+        self._hardware_ids = {drive.joint: hardware_id(robot.name, drive) for drive in robot.drives}
+        self._bus_load = MeasuredLoad(robot.bus.bitrate)
         self._status_at = 0.0
         self._unguarded: tuple[str, ...] = ()
         self._health = HealthWatch(robot.health)
@@ -71,7 +77,7 @@ class MotorDriverNode(ManagedNode):
         """By joint: why its last boot failed, as it went to the log."""
         self.state_text = "starting"
         """State, cause and what ends it, in words: the last line that went to the log."""
-        if self._tf is None:
+        if messages.TFMessage is None:
             self.get_logger().warning("tf2_msgs is not installed: no transform is published on tf")
 
     def publish(self, snapshot: DriverSnapshot, stops: list[StopRecord]) -> None:
@@ -122,14 +128,27 @@ class MotorDriverNode(ManagedNode):
         if changed or snapshot.time_s - self._status_at >= 1.0 / self._robot.rates.status_hz:
             self._status_at = snapshot.time_s
             self._warn_of_health(snapshot)
-            self._status.publish(messages.status_message(snapshot, stamp, self._warnings))
-        if self._diagnosed is None or snapshot.time_s - self._diagnosed.time_s >= DIAGNOSTICS_PERIOD_S:
-            before, self._diagnosed = self._diagnosed or snapshot, snapshot
-            self._diagnostics.publish(
-                diagnostics_message(snapshot, stamp, robot=self._robot.name, previous=before, warnings=self._warnings)
-            )
-            if self._battery is not None and self._robot.battery is not None:
-                self._battery.publish(messages.battery_message(snapshot, stamp, self._robot.battery))
+            self._status.publish(messages.status_message(snapshot, stamp, self._warnings, self._bus_load.share))
+        if self._diagnosed is None or snapshot.time_s - self._diagnosed.time_s >= PERIOD_S:
+            self._diagnose(snapshot, stamp)
+
+    def _diagnose(self, snapshot: DriverSnapshot, stamp: object) -> None:
+        """Once a second: entries in /diagnostics, the load of the bus since the last time, the battery."""
+        before, self._diagnosed = self._diagnosed or snapshot, snapshot
+        load = self._bus_load.look(self._loop.traffic(), snapshot.time_s)
+        message = diagnostics_message(
+            snapshot,
+            stamp,
+            robot=self._robot.name,
+            previous=before,
+            warnings=self._warnings,
+            hardware_ids=self._hardware_ids,
+            bus_load=load,
+            busy_above=math.inf if self._robot.bus.is_virtual else BUSY_LOAD,
+        )
+        self._diagnostics.publish(message)
+        if self._battery is not None and self._robot.battery is not None:
+            self._battery.publish(messages.battery_message(snapshot, stamp, self._robot.battery))
 
     def _log_change(self, snapshot: DriverSnapshot) -> None:
         previous, finding = self._previous, snapshot.finding

@@ -20,7 +20,8 @@ import can
 from canbase_config.robot import DRIVER_NODE_ID
 from canbase_driver.cia301.frame import MAX_DATA_BYTES, Frame
 from canbase_driver.cia301.nmt import HEARTBEAT, SYNC
-from canbase_driver.runtime.frame_socket import ERROR, ERROR_CLASS, MAX_COB_ID, FrameSocket, open_bus
+from canbase_driver.runtime.bus_traffic import Traffic, interface_traffic
+from canbase_driver.runtime.frame_socket import ERROR, ERROR_CLASS, MAX_COB_ID, REMOTE, FrameSocket, open_bus
 from canbase_driver.supervision.bus_health import BusReport
 
 RETRY_S = 1.0
@@ -34,6 +35,8 @@ LATEST_S = 60.0
 """A frame does not wait longer in a socket [s]."""
 IGNORED_AT_ONCE = 100
 """This many frames that are not ours are passed over in one reception: more than a bus brings in one cycle."""
+REQUESTED_BYTES = 1
+"""Of the answer to a guard request: a remote frame has the length of what it requests (ISO 11898-1)."""
 OPENS_AT_ONCE_S = 0.002
 """Most adapters are open by then; a serial one (slcan) takes 2 s, and the control cycle does not wait for it."""
 BUS_OFF = "the CAN controller is bus-off after too many errors: check cable, termination and bit rate"
@@ -53,6 +56,11 @@ class BusError(Exception):
 def is_of_a_driver(frame: Frame) -> bool:
     """Whether only a driver sends it: docs/bus.md."""
     return frame.cob_id in (SYNC.cob_id, _OWN_HEARTBEAT)
+
+
+def _is_guard_request(can_id: int) -> bool:
+    """Whether it is the watchdog's remote frame to a drive: no frame for the driver, and none to count."""
+    return HEARTBEAT < can_id & ~REMOTE <= MAX_COB_ID and can_id & REMOTE != 0
 
 
 class _Opening(threading.Thread):
@@ -98,9 +106,12 @@ class BusPort:
         self._probe: Frame | None = None
         self.problem = ""
         self.report = BusReport()
+        self._frames = self._data_bytes = 0
+        """Sent and received here."""
+        self._hears_itself = arguments.get("interface") == "udp_multicast"
         self._received_wall_s = 0.0
         """When the kernel received the last frame, by the wall clock; 0.0: unknown."""
-        self._send_failures = self._receive_failures = 0
+        self._send_failures = self._receive_failures = self._passed_over = 0
         self._retry_at = 0.0
         self._opening: _Opening | None = None
         self._bus: FrameSocket | None = self._open()
@@ -116,10 +127,10 @@ class BusPort:
                 time.sleep(max(0.0, min(until, self._retry_at) - time.monotonic()))
                 self._reopen()
                 return None
-            before = self.report
+            before, passed_over = self.report, self._passed_over
             frame = self._receive(self._bus, max(0.0, until - time.monotonic()))
             failed = self.report.receive_errors != before.receive_errors
-            if frame is not None or failed or self.report is before:
+            if frame is not None or failed or (self.report is before and self._passed_over == passed_over):
                 return frame
         return None
 
@@ -131,6 +142,13 @@ class BusPort:
         late_s = time.time() - self._received_wall_s
         return now_s - late_s if 0.0 < late_s < LATEST_S else now_s
 
+    def traffic(self) -> Traffic:
+        """What has passed on the bus; from any thread. On SocketCAN the kernel counts the frames of other devices too,
+        which it does not pass to this process.
+        """
+        counted = interface_traffic(self._arguments) if self._arguments.get("interface") == "socketcan" else None
+        return counted or Traffic(self._frames, self._data_bytes)
+
     def _receive(self, bus: FrameSocket, timeout_s: float) -> Frame | None:
         """None, and `report` grows, for what is no data frame of CANopen."""
         try:
@@ -141,6 +159,8 @@ class BusPort:
         if received is None:
             return None
         can_id, data, self._received_wall_s = received
+        self._frames += 1
+        self._data_bytes += len(data)
         if can_id < 0:
             self._drop()
             return None
@@ -149,7 +169,10 @@ class BusPort:
             return None
         self._on_received()
         if can_id > MAX_COB_ID or len(data) > MAX_DATA_BYTES:
-            self._drop()
+            if _is_guard_request(can_id):
+                self._passed_over += 1
+            else:
+                self._drop()
             return None
         frame = Frame(can_id, data)
         if self._listens and is_of_a_driver(frame):
@@ -161,11 +184,17 @@ class BusPort:
         if self._bus is None or self._is_silent() or (self._listens and frame.cob_id != _OWN_HEARTBEAT):
             return
         try:
-            self._bus.write(frame.cob_id, frame.data, SEND_TIMEOUT_S)
-        except _ERRORS as error:
+            if frame.remote:
+                self._bus.request(frame.cob_id, REQUESTED_BYTES, SEND_TIMEOUT_S)
+            else:
+                self._bus.write(frame.cob_id, frame.data, SEND_TIMEOUT_S)
+        except (*_ERRORS, NotImplementedError) as error:
             self._on_send_error(error)
         else:
             self._send_failures = 0
+            if not self._hears_itself:
+                self._frames += 1
+                self._data_bytes += len(frame.data)
             if not self.report.is_bus_off:  # then the kernel takes frames and drops them
                 self._probe = frame if self._listens else None
                 self._on_passed()

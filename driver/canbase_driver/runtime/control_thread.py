@@ -21,6 +21,7 @@ from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.motion.odometry import Pose2D
 from canbase_driver.runtime.black_box import Ring
 from canbase_driver.runtime.bus_port import BusPort
+from canbase_driver.runtime.bus_traffic import Traffic
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervision.fault_reset import Outcome
 from canbase_driver.supervision.lifecycle import Aim
@@ -82,6 +83,10 @@ class ControlLoop(threading.Thread):
     def request_shutdown(self) -> None:
         """Ramp to a stand, disable, end the thread."""
         self._inbox.put(lambda _now: self._core.request_shutdown())
+
+    def traffic(self) -> Traffic:
+        """What has passed on the bus, from any thread."""
+        return self._bus.traffic()
 
     @property
     def aimed_at(self) -> Aim:

@@ -65,6 +65,10 @@ class FrameSocket(Protocol):
     def write(self, cob_id: int, data: bytes, timeout_s: float) -> None:
         """Send a data frame with an 11-bit identifier. Raises where the bus does not take it in `timeout_s`."""
 
+    def request(self, cob_id: int, length: int, timeout_s: float) -> None:
+        """Send a remote frame for a data frame of this length. Raises like `write`, and NotImplementedError where the
+        adapter has none."""
+
     def close(self) -> None:
         """Close the bus."""
 
@@ -103,6 +107,11 @@ class _Library:
     def write(self, cob_id: int, data: bytes, timeout_s: float) -> None:
         """See FrameSocket."""
         self._bus.send(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False), timeout=timeout_s)
+
+    def request(self, cob_id: int, length: int, timeout_s: float) -> None:
+        """See FrameSocket."""
+        frame = can.Message(arbitration_id=cob_id, dlc=length, is_remote_frame=True, is_extended_id=False)
+        self._bus.send(frame, timeout=timeout_s)
 
     def close(self) -> None:
         """See FrameSocket."""
@@ -148,7 +157,13 @@ class _SocketCan(_Socket):
 
     def write(self, cob_id: int, data: bytes, timeout_s: float) -> None:
         """See FrameSocket."""
-        frame = _CAN_FRAME.pack(cob_id, len(data), data)
+        self._write(_CAN_FRAME.pack(cob_id, len(data), data), timeout_s)
+
+    def request(self, cob_id: int, length: int, timeout_s: float) -> None:
+        """See FrameSocket."""
+        self._write(_CAN_FRAME.pack(cob_id | REMOTE, length, b""), timeout_s)
+
+    def _write(self, frame: bytes, timeout_s: float) -> None:
         try:
             self._socket.send(frame, socket.MSG_DONTWAIT)
         except BlockingIOError:

@@ -14,6 +14,7 @@ class Situation:
     bus: str = ""  # the bus failed
     booting: str = ""  # what is still waited for
     missing: str = ""  # a drive that could not be booted for timeouts.boot_s
+    unproven: str = ""  # a drive is not proven to stop by itself, and must be
     fault: str = ""  # a drive is in fault or fault reaction
     absent: str = ""  # a node restarted, or is not in NMT operational
     silent: str = ""  # statusword or heartbeat too old

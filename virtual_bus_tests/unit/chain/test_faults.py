@@ -187,6 +187,7 @@ def run_beside_a_blind_watchdog(world: World, seconds: float) -> None:
     world.watchdog = None
     for _ in range(round(seconds / 0.05)):
         world.inject(0x77E, "05")
+        world.guard()
         world.inject(0x1FE, "01 00 80 00 14 00 00 00")
         world.run(0.05)
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from types import MappingProxyType
 
 import pytest
 
@@ -91,3 +93,37 @@ def test_a_driver_that_is_started_while_drives_still_turn_brings_them_to_a_stand
     assert world.watchdog is not None
     assert world.watchdog.status.state is not State.TRIPPED, world.watchdog.status.verdict
     assert world.truth.standing_s > 0.3
+
+
+@pytest.mark.parametrize("nodes", [(1,), (2,), (1, 2)])
+def test_a_drive_that_sends_a_boot_up_message_in_motion_is_stopped_by_the_driver_itself(nodes: tuple[int, ...]) -> None:
+    """t   0  0.3 m/s: boot-up messages, though nothing has restarted ── the next cycle: quick stop by RPDO, and SYNC"""
+    world = World()
+    world.drive(Twist2D(0.3, 0.0))
+    world.watchdog, began, from_m = None, world.now_s, world.truth.travel_m
+    for node_id in nodes:
+        world.bench.nodes[node_id].say_boot_up()
+    world.run(0.03)
+    for node_id in (1, 2):
+        assert any(data[0] & 0x86 == 0x02 for data in world.sent(0x200 + node_id, since=began)), "quick stop"
+    assert world.sent(0x080, since=began + 0.02)
+    assert world.stands_after() < 0.3 / world.robot.limits.emergency_deceleration_mps2 + 0.1
+    assert world.truth.travel_m - from_m < 0.05
+
+
+def test_while_latched_status_and_reset_say_why_a_drive_cannot_be_booted() -> None:
+    """It has lost its parameters in a power cycle, and refuses to map now what it mapped before."""
+    world = World()
+    stopped(world)
+    world.node.power_cycle(world.now_s, off_s=0.2)
+    entries = dict(world.node.dictionary.entries)
+    entries[0x606C00] = replace(entries[0x606C00], code="h")
+    world.node.dictionary.entries = MappingProxyType(entries)
+    for tpdo in world.node._tpdos:
+        tpdo._rules._entries = entries
+    world.run(4.0)
+    assert world.core.state is DriverState.LATCHED
+    problem = world.snapshot.drives[0].boot_problem
+    assert "TPDO2 takes 606Ch:0 with 16 bits, and not with 32" in problem
+    assert "set `layout.velocity_bits: 16` in its drive profile" in problem
+    assert problem.rstrip(".") in world.reset().sentence

@@ -15,7 +15,7 @@ from canbase_driver.motion.odometry import Pose2D
 from canbase_runtime.driver_state import DriverState
 from canbase_sim.frame import Frame as BenchFrame
 from canbase_sim.world.bench import BenchParameters
-from support.chain_world import FORWARD, World, robot_of, world_of
+from support.chain_world import FORWARD, World, bench_robot, robot_of, world_of
 
 OVERCURRENT = 0x2310
 TPDOS = range(0x181, 0x500)
@@ -38,13 +38,15 @@ def test_a_drive_that_was_switched_off_and_on_is_booted_again_and_waits_for_a_re
     after = world.snapshot
     assert after.state is DriverState.LATCHED
     assert after.odometry.valid
-    assert after.drives[0].nmt_state is NmtState.OPERATIONAL
+    # a guarded drive reports its NMT state on request alone, and the tripped watchdog withholds its requests
+    assert after.drives[0].nmt_state is (None if world.is_guarded else NmtState.OPERATIONAL)
     assert world.powered == [False, False]
     # its encoder starts anew elsewhere: no jump of the pose, and the way that nobody could measure is reported
     assert (after.odometry.pose.x_m, after.odometry.pose.y_m, after.odometry.pose.yaw_rad) == pytest.approx(
         (before.odometry.pose.x_m, before.odometry.pose.y_m, before.odometry.pose.yaw_rad), abs=1e-3
     )
     assert after.odometry.travel_losses >= 1
+    assert after.odometry.pose_covariance[0] > before.odometry.pose_covariance[0] + 0.1**2
     assert world.recovered()
     assert world.snapshot.odometry.pose.yaw_rad == pytest.approx(before.odometry.pose.yaw_rad, abs=0.01)
 
@@ -148,3 +150,16 @@ def test_the_pose_is_set_at_a_standstill_only_and_the_way_goes_on_from_there() -
     assert snapshot.odometry.pose.x_m == pytest.approx(1.0, abs=0.01)
     assert snapshot.odometry.pose.y_m > 2.15
     assert snapshot.odometry.pose_covariance[0] > fresh.odometry.pose_covariance[0]
+
+
+@pytest.mark.parametrize(("grip_mps2", "slips"), [(4.0, False), (0.5, True)])
+def test_a_stop_that_is_harder_than_the_floor_permits_makes_the_pose_uncertain(grip_mps2: float, slips: bool) -> None:
+    """From 0.5 m/s, by the ordinary ramp."""
+    robot = bench_robot()
+    settings = robot.odometry.model_copy(update={"grip_mps2": grip_mps2, "travel_error_m": 1e-5, "radius_error": 1e-5})
+    world = World(robot.model_copy(update={"odometry": settings}))
+    world.drive(Twist2D(0.5, 0.0), seconds=2.0)
+    world.command = Twist2D.ZERO
+    world.run(2.0)
+    assert (world.snapshot.odometry.pose_covariance[0] > 0.03**2) is slips
+    assert world.snapshot.odometry.twist_covariance[0] < 1e-5  # it has ended

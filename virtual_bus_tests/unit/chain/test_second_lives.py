@@ -29,7 +29,7 @@ def lost_its_computer(kind: str) -> World:
     return world
 
 
-@pytest.mark.parametrize("kind", ["technosoft", "dryve_d1", "tmcm1636"])
+@pytest.mark.parametrize("kind", ["dryve_d1", "tmcm1636"])
 def test_a_watchdog_alone_stops_drives_that_went_on_without_their_masters(kind: str) -> None:
     """They do not stop by themselves, and no SYNC makes them tell anything: they turned on until a driver came."""
     world = lost_its_computer(kind)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 import pytest
 
 from canbase_commissioning.edits import Edit, commissioned_edits, edited, with_edits
-from canbase_config.commissioned import STEPS, Step, mark, uncommissioned
+from canbase_config.commissioned import STEPS, Step, _shown, mark, uncommissioned
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_doctor.check import Verdict, commissioning
@@ -21,6 +22,7 @@ from canbase_sim.world.bench import Bench
 from canbase_velocity.safety_filter import FilterConfig, decide
 from canbase_velocity.twist import Twist
 from support.chain_world import World, bench_robot
+from support.crews import robot_with
 from support.filter_inputs import GOOD
 
 Values = dict[str, Any]
@@ -66,6 +68,12 @@ MISTAKES: dict[str, tuple[Change, tuple[Step, ...], Twist2D]] = {
     "sides swapped": (swap("side"), ("directions", "floor"), Twist2D(0.2, -0.4)),
     "both directions reversed": (swap("direction"), ("directions", "floor"), Twist2D(-0.2, -0.4)),
     "half of the track": (lambda values: values["base"].update(track_m=0.25), ("floor",), Twist2D(0.2, 0.2)),
+    # each side is 2 % from the mean: 0.1 m/s becomes 0.102 on the left, 0.3 becomes 0.294 on the right
+    "a right wheel that is no larger": (
+        lambda values: values["base"].update(wheel_ratio=1.04),
+        ("floor",),
+        Twist2D(0.198, 0.384),
+    ),
 }
 
 
@@ -149,11 +157,19 @@ def test_a_bus_without_a_wire_needs_none() -> None:
 
 
 def test_the_doctor_has_a_row_for_it(tmp_path: Path) -> None:
-    (row,) = commissioning(load_robot(sample("example_can0")))
+    row, _ = commissioning(load_robot(sample("example_can0")))
     assert (row.verdict, "not done: directions, scale, proof, floor" in row.found) == (Verdict.WARN, True)
     robot = load_robot(sample("example_can0")).robot
     file = tmp_path / "robot.yaml"
     text = sample("example_can0").read_text(encoding="utf-8")
     file.write_text(edited(text, commissioned_edits(robot, [], STEPS)), encoding="utf-8")
-    (row,) = commissioning(load_robot(file))
+    row, _ = commissioning(load_robot(file))
     assert (row.verdict, row.found) == (Verdict.OK, "done, and robot.yaml has not changed since")
+
+
+def test_a_proof_from_before_node_guarding_stays_valid_and_a_guarded_drive_has_another() -> None:
+    """The mark of the sample's proof, as the first robots were commissioned with it."""
+    robot = load_robot(sample("example_can0")).robot
+    assert mark(robot, "proof") == "p97562ecf78f0"
+    assert "node_guarding" in json.dumps(_shown(robot_with("technosoft"), "proof"))
+    assert "node_guarding" not in json.dumps(_shown(robot, "proof"))

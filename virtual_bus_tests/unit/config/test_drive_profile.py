@@ -171,3 +171,14 @@ def test_an_unproven_key_must_be_one(tmp_path: Path) -> None:
     file.write_text("title: mine\nunproven: [units.speed]\n")
     with pytest.raises(ConfigError, match=r"units\.speed is no key of a profile"):
         load_profile(str(file))
+
+
+def test_node_guarding_and_heartbeats_exclude_each_other(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("title: mine\nself_stop:\n  node_guarding: true\n  heartbeat_entries: 1\n")
+    with pytest.raises(
+        ConfigError, match=r"node guarding excludes heartbeats \(CiA 301\): it needs heartbeat_entries: 0"
+    ):
+        load_profile(str(file))
+    file.write_text("title: mine\nself_stop:\n  node_guarding: true\n  heartbeat_entries: 0\n")
+    assert load_profile(str(file)).self_stop.node_guarding

@@ -57,6 +57,14 @@ def test_a_mirrored_motor_turns_the_other_way_and_nothing_above_knows() -> None:
     assert mirrored.position_m(-4096) == pytest.approx(0.0314159, rel=1e-5)
 
 
+def test_wheels_of_both_sides_differ_by_their_ratio_about_their_mean() -> None:
+    base = Base(wheel_radius_m=0.1, track_m=0.5, wheel_ratio=1.02)
+    left, right = (AxisUnits(drive().model_copy(update={"side": side}), base) for side in ("left", "right"))
+    assert right.position_m(4096) / left.position_m(4096) == pytest.approx(1.02)
+    assert (right.position_m(4096) + left.position_m(4096)) / 2.0 == pytest.approx(0.0314159, rel=1e-5)
+    assert right.radius_m / left.radius_m == pytest.approx(1.02)
+
+
 def test_one_turn_of_the_wheel() -> None:
     units = AxisUnits(drive(), BASE)
     assert units.position_m(20 * 4096) == pytest.approx(2.0 * math.pi * 0.1)

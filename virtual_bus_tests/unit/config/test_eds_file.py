@@ -54,7 +54,11 @@ def test_what_an_eds_says(tmp_path: Path) -> None:
     eds = read_eds(written(tmp_path, GOOD))
     assert eds.info["vendorname"] == "Maker"
     assert eds.default(0x1000) == 0x20192
-    assert eds.objects[0x1400, 1] == EdsObject(0x1400, 1, "COB-ID", 15, 7, "rw", 0x40000200)
+    text = "$NodeID + 0x40000200"
+    assert eds.objects[0x1400, 1] == EdsObject(
+        0x1400, 1, "COB-ID", 15, 7, "rw", 0x40000200, text=text, has_node_id=True
+    )
+    assert not eds.objects[0x1000, 0].has_node_id
     assert eds.has(0x1400)
     assert not eds.has(0x1400, 2)
     assert eds.default(0x6040) is None
@@ -175,6 +179,11 @@ WHOLE = GOOD + "".join(
     [
         ("[1016sub0]\n[1016sub1]\n[6007]\n", "It can stop by itself when the computer dies: it watches heartbeats"),
         ("[1016sub1]\n", "Do not count on it to stop by itself"),
+        (
+            "[100C]\n[100D]\n[6007]\n",
+            "It can stop by itself when the computer dies: it knows node guarding (100Ch, 100Dh)",
+        ),
+        ("[100C]\n[100D]\n", "It will NOT stop by itself when the computer dies"),
         ("[1400sub5]\n", "It may stop by itself when the computer dies: it has a deadline for setpoints"),
         ("", "It will NOT stop by itself when the computer dies"),
     ],
@@ -199,6 +208,17 @@ def test_a_draft_is_a_profile_that_knows_what_it_does_not_know(tmp_path: Path) -
     assert {"units.target_velocity", "units.acceleration", "modes", "pdo.synchronous"} <= set(profile.unproven)
 
 
+@pytest.mark.parametrize(
+    ("sections", "guarded"),
+    [("[100C]\n[100D]\n[6007]\n", True), ("[100C]\n[100D]\n[1016sub1]\n[6007]\n", False), ("", False)],
+)
+def test_a_drive_that_monitors_no_heartbeat_is_drafted_with_node_guarding(
+    tmp_path: Path, sections: str, guarded: bool
+) -> None:
+    text = draft(read_eds(written(tmp_path, WHOLE + sections))).text
+    assert load_profile(str(written(tmp_path, text, "drafted.yaml"))).self_stop.node_guarding is guarded
+
+
 def test_a_drive_that_lacks_too_much_is_refused_in_words(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["config", "from-eds", str(written(tmp_path, GOOD))])
     assert result.exit_code == 1
@@ -209,6 +229,46 @@ def test_what_is_no_eds_has_exit_code_2(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["config", "from-eds", str(written(tmp_path, "nothing"))])
     assert result.exit_code == 2
     assert "drive.eds:1: no section describes an object" in result.stderr
+
+
+RANGES = """\
+[6007]
+ParameterName=Abort connection option
+DataType=0x0003
+LowLimit=0x8000
+HighLimit=0x7FFF
+[605B]
+ParameterName=Shutdown option
+DataType=0x0003
+LowLimit=-1
+HighLimit=01
+[1003]
+ParameterName=Errors
+ObjectType=0x8
+DataType=0x0007
+AccessType=ro
+CompactSubObj=3
+[1003Value]
+NrOfEntries=1
+2=0x8130
+[1018]
+ParameterName=Identity
+[1018sub0]
+ParameterName=Highest sub-index
+DataType=0x0005
+"""
+
+
+def test_ranges_arrays_that_are_not_spelled_out_and_the_names_of_whole_objects(tmp_path: Path) -> None:
+    eds = read_eds(written(tmp_path, RANGES))
+    assert (eds.objects[0x6007, 0].low, eds.objects[0x6007, 0].high) == (-32768, 32767)  # the bit pattern of -32768
+    assert (eds.objects[0x605B, 0].low, eds.objects[0x605B, 0].high) == (-1, 1)
+    assert eds.compact == {0x1003: 3}
+    assert [eds.objects[0x1003, sub].default for sub in range(4)] == [3, None, 0x8130, None]
+    assert [eds.objects[0x1003, sub].is_set for sub in range(4)] == [False, False, True, False]
+    assert eds.objects[0x1003, 3].name == "Errors 3"
+    assert eds.names[0x1018] == "Identity"
+    assert "1003value" in eds.sections
 
 
 @pytest.mark.skipif(not REAL_FILES, reason="set CANBASE_EDS_FOLDER to a folder with EDS files of real drives")

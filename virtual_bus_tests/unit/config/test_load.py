@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from canbase_config.effective import effective
 from canbase_config.errors import ConfigError, key_path
 from canbase_config.load import Loaded, leaf_keys, load_robot, sample
-from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
+from canbase_config.robot import DRIVER_NODE_ID, REMOTE, WATCHDOG_NODE_ID, Robot
 from support.robot_files import GOOD, LAST_LINE, write
 
 END = LAST_LINE + 1
@@ -68,6 +68,7 @@ def test_on_socketcan_the_kernel_passes_what_this_robot_sends_and_what_reaches_i
     for broadcast in (0x000, 0x080, 0x100):  # NMT, SYNC, TIME
         assert passes(filters, broadcast)
     assert sum(passes(filters, cob_id) for cob_id in range(0x800)) == 16 * (len(robot.drives) + 3)
+    assert not any(passes(filters, REMOTE | cob_id) for cob_id in range(0x800))  # node guarding requests
 
 
 def test_a_bus_without_filters_in_the_kernel_has_none_and_the_integrators_own_go_before() -> None:

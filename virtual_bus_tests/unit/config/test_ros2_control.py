@@ -74,6 +74,14 @@ def parameters(robot: Robot) -> Any:
     return YAML(typ="safe").load(controllers(robot))
 
 
+def test_wheels_of_unequal_radius_are_multipliers_of_the_controller() -> None:
+    base = BENCH.base.model_copy(update={"wheel_ratio": 1.02})
+    drive = parameters(with_sources(BENCH.model_copy(update={"base": base}), control=CONTROL))
+    values = drive["diff_drive_controller"]["ros__parameters"]
+    left, right = values["left_wheel_radius_multiplier"], values["right_wheel_radius_multiplier"]
+    assert (right / left, (left + right) / 2.0) == pytest.approx((1.02, 1.0), rel=1e-5)
+
+
 def test_the_controller_has_wheels_and_limits_of_robot_yaml() -> None:
     found = parameters(with_sources(control=CONTROL))
     plugin = {"type": "diff_drive_controller/DiffDriveController"}
@@ -81,6 +89,7 @@ def test_the_controller_has_wheels_and_limits_of_robot_yaml() -> None:
     drive = found["diff_drive_controller"]["ros__parameters"]
     assert (drive["left_wheel_names"], drive["right_wheel_names"]) == (["left_wheel"], ["right_wheel"])
     assert (drive["wheel_separation"], drive["wheel_radius"]) == (BENCH.base.track_m, BENCH.base.wheel_radius_m)
+    assert (drive["left_wheel_radius_multiplier"], drive["right_wheel_radius_multiplier"]) == (1.0, 1.0)
     limits = BENCH.limits
     assert drive["linear"]["x"] == {
         "max_velocity": limits.linear_mps, "min_velocity": -limits.linear_mps,

@@ -10,6 +10,7 @@ from canbase_driver.cia301.frame import Frame
 from support.fake_drive import (
     DEVICE_STATE,
     INVALID,
+    NO_OBJECT,
     READ_ONLY,
     WRITE_ONLY,
     Bench,
@@ -122,7 +123,7 @@ def test_a_drive_whose_pdo_does_not_take_the_torque_does_without(refused: dict[K
     drive = FakeDrive(refuse=refused)
     drive.objects |= {(0x1A01, 0): u8(1), (0x1A01, 1): u32(0x606C_0020)}
     (note,) = notes_of(boot_one_axis(drive))
-    assert note.startswith("torque unknown: TPDO2 does not take it (")
+    assert note.startswith("torque unknown: TPDO2 does not take ")
     assert note.endswith(NO_TORQUE)
     assert [drive.number(0x1A01, sub) for sub in range(2)] == [1, 0x606C_0020]
     assert drive.number(0x1801, 1) == 0x4000_0281
@@ -161,17 +162,23 @@ def test_a_drive_whose_1016h_cannot_be_read_does_not_stop_by_itself() -> None:
     assert not boot.report.stops_by_itself
 
 
-def heartbeat_of(accepted: Callable[[int], bool], abort: int = INVALID) -> tuple[FakeDrive, NodeBoot]:
-    """A drive that takes only some periods of 1017h, and its boot."""
+def bounded(accepted: dict[Key, Callable[[int], bool]], abort: int = INVALID) -> tuple[FakeDrive, NodeBoot]:
+    """A drive that takes only some values of these objects, and its boot."""
 
     @dataclass
     class Choosy(FakeDrive):
         def _write(self, key: Key, data: bytes) -> int:
-            wrong = key == (0x1017, 0) and not accepted(int.from_bytes(data, "little"))
+            wrong = key in accepted and not accepted[key](int.from_bytes(data, "little"))
             return abort if wrong else super()._write(key, data)
 
     drive = Choosy()
+    drive.objects |= {key: u8(1) for key in accepted if key[1] == 2 and key[0] < 0x1A00}
     return drive, boot_one_axis(drive)
+
+
+def heartbeat_of(accepted: Callable[[int], bool], abort: int = INVALID) -> tuple[FakeDrive, NodeBoot]:
+    """A drive that takes only some periods of 1017h, and its boot."""
+    return bounded({(0x1017, 0): accepted}, abort)
 
 
 @pytest.mark.parametrize(
@@ -193,11 +200,41 @@ def test_where_the_wanted_heartbeat_period_is_refused_the_nearest_allowed_one_is
     assert notes_of(boot) == (said if period_ms != 100 else ())
 
 
-def test_a_drive_that_takes_no_heartbeat_period_that_is_short_enough_cannot_be_used() -> None:
-    _, boot = heartbeat_of(lambda ms: ms >= 1000)
+@pytest.mark.parametrize(
+    ("shortest_ms", "hint"),
+    [
+        (160, "It takes 160 ms: set `timeouts.drive_heartbeat_s: 0.32` in robot.yaml"),
+        (500, "It takes 500 ms: set `timeouts.drive_heartbeat_s: 1` in robot.yaml"),
+        (501, "Nor any up to 500 ms: where it has node guarding alone, set `self_stop.node_guarding: true`"),
+    ],
+)
+def test_a_drive_that_takes_no_heartbeat_period_that_is_short_enough_is_tried_with_longer_ones(
+    shortest_ms: int, hint: str
+) -> None:
+    _, boot = heartbeat_of(lambda ms: ms >= shortest_ms)
     text = error_of(boot)
     assert "it takes no heartbeat period of at most 150 ms (1017h:0: 0609 0030h value not valid)" in text
-    assert "Raise timeouts.drive_heartbeat_s in robot.yaml" in text
+    assert hint in text
+
+
+def test_what_cannot_be_read_is_written_all_the_same_and_proves_nothing() -> None:
+    """Its own 605Ah of 0 would coast: it is set. That it took 6007h no read shows, so nothing relies on it."""
+    drive = FakeDrive(refuse_read={(0x605A, 0): GENERAL_ERROR, (0x6007, 0): GENERAL_ERROR})
+    boot = boot_one_axis(drive)
+    assert drive.number(0x605A) == 2
+    assert drive.number(0x6007) == 3
+    assert "605Ah:0 is written, and cannot be read back" in notes_of(boot)
+    assert boot.report is not None
+    assert not boot.report.stops_by_itself
+
+
+def test_a_pdo_that_cannot_be_switched_off_nor_mapped_is_one_for_the_makers_tool() -> None:
+    drive = FakeDrive(refuse={(0x1400, 1): READ_ONLY})
+    text = error_of(boot_one_axis(drive))
+    assert (
+        "RPDO1 cannot be switched off (1400h:1: 0601 0002h the object is read-only), nor mapped while it is on" in text
+    )
+    assert "maker's tool" in text
 
 
 @pytest.mark.parametrize(("found", "fits"), [(128, True), (150, True), (151, False), (0, False)])
@@ -217,7 +254,7 @@ def test_a_drive_that_takes_no_synchronous_pdo_is_told_the_key_that_cures_it() -
 
 @pytest.mark.parametrize("abort", [0x06070010, 0x06070012, 0x06070013])
 @pytest.mark.parametrize(
-    ("key", "where"), [((0x60FF, 0), "see `layout.target_bits`"), ((0x6060, 0), ""), ((0x1A00, 1), "`layout`")]
+    ("key", "where"), [((0x60FF, 0), "see `layout.target_bits`"), ((0x6060, 0), "such a drive cannot be used")]
 )
 def test_an_object_of_another_width_is_said_to_be_one(key: Key, where: str, abort: int) -> None:
     text = error_of(boot_one_axis(FakeDrive(refuse={key: abort})))
@@ -272,14 +309,41 @@ def test_an_answer_that_comes_late_and_then_again_names_no_second_drive() -> Non
     [
         ((0x6060, 0), INVALID, "6060h:0: 0609 0030h value not valid", "must support `mode`"),
         ((0x60FF, 0), DEVICE_STATE, "60FFh:0: 0800 0022h", "Switch the drive off and on again"),
-        ((0x1600, 2), 0x06040041, "1600h:2: 0604 0041h the object cannot be mapped", "the manual of the drive"),
-        ((0x1A00, 0), READ_ONLY, "1A00h:0: 0601 0002h the object is read-only", "the manual of the drive"),
+        ((0x6041, 0), NO_OBJECT, "6041h:0: 0602 0000h the object does not exist", "check `axis` in robot.yaml"),
+        (
+            (0x1600, 2),
+            0x06040041,
+            "does not take 60FFh:0 (1600h:2: 0604 0041h the object",
+            "Let RPDO1 carry 6040h:0, 60F",
+        ),
+        (
+            (0x1A00, 0),
+            READ_ONLY,
+            "TPDO1 does not take another mapping (1A00h:0: 0601 0002h",
+            "carry 6041h:0, 6064h:0 wi",
+        ),
+        ((0x1600, 1), DEVICE_STATE, "RPDO1 does not take 6040h:0 (1600h:1: 0800 0022h", "Switch the drive off and on"),
+        ((0x1400, 2), DEVICE_STATE, "1400h:2: 0800 0022h", "Switch the drive off and on again"),
+        ((0x1400, 2), READ_ONLY, "RPDO1 does not take type 1", "set `pdo.synchronous: false`"),
     ],
 )
 def test_a_refused_necessity_is_an_error(key: Key, abort: int, problem: str, hint: str) -> None:
-    text = error_of(boot_one_axis(FakeDrive(refuse={key: abort})))
+    refuses = {key: abort}
+    text = error_of(boot_one_axis(FakeDrive(refuse=refuses, refuse_read=refuses if key[0] == 0x6041 else {})))
     assert problem in text
     assert hint in text
+
+
+def test_a_type_of_pdo_that_is_fixed_and_waits_for_another_sync_is_one_for_the_makers_tool() -> None:
+    drive = FakeDrive(refuse={(0x1400, 2): READ_ONLY})
+    drive.objects[0x1400, 2] = u8(10)
+    assert "Its type is fixed: set it to 1 with the maker's tool" in error_of(boot_one_axis(drive))
+
+
+def test_a_drive_that_refuses_1000h_is_there() -> None:
+    for refuse_read in ({(0x1000, 0): GENERAL_ERROR}, {(0x1000, 0): NO_OBJECT}):
+        notes = notes_of(boot_one_axis(FakeDrive(refuse_read=refuse_read)))
+        assert "it has no 1000h, as every CANopen device should" in notes
 
 
 def test_a_target_that_does_not_become_0_is_an_error() -> None:
@@ -346,9 +410,66 @@ def test_entries_that_a_drive_has_stored_the_other_way_round_are_sorted_out() ->
     assert boot.report.stops_by_itself
 
 
-def test_a_missing_pdo_is_an_error() -> None:
-    text = error_of(boot_one_axis(FakeDrive(objects=factory_objects(pdos=3))))
-    assert "it has no RPDO4 (1403h)" in text
+def test_the_quick_stop_of_the_watchdog_takes_the_last_rpdo_of_a_drive_with_few() -> None:
+    """Its profile says four, and the drive has three, or two."""
+    for pdos in (2, 3):
+        drive = FakeDrive(objects=factory_objects(pdos=pdos))
+        assert notes_of(boot_one_axis(drive)) == ()
+        assert drive.number(0x1400 + pdos - 1, 1) == 0x4000_0501
+        assert [drive.number(0x1600 + pdos - 1, sub) for sub in range(2)] == [1, 0x6040_0010]
+        assert drive.number(0x1400, 1) == 0x4000_0201
+
+
+@pytest.mark.parametrize(
+    ("lacks", "text"),
+    [
+        ((0x1401, 0x1402, 0x1403), "it has no RPDO4 (1403h), but 1 RPDOs, 4 TPDOs"),
+        ((0x1801,), "it has no TPDO2 (1801h)"),
+    ],
+)
+def test_a_drive_with_too_few_pdos_cannot_be_used(lacks: tuple[int, ...], text: str) -> None:
+    objects = {key: value for key, value in factory_objects().items() if key[0] not in lacks}
+    said = error_of(boot_one_axis(FakeDrive(objects=objects)))
+    assert text in said
+    assert "cannot be used" in said
+
+
+@pytest.mark.parametrize("only", [254, 255])
+def test_of_the_event_driven_types_a_drive_may_take_one_alone(only: int) -> None:
+    other = {254: 255, 255: 254}[only]
+    drive, boot = bounded({(0x1403, 2): lambda value: value != other})
+    assert boot.error is None, boot.error
+    assert drive.number(0x1403, 2) == only
+
+
+def test_a_drive_that_takes_no_event_driven_rpdo_cannot_be_used_and_is_told_no_key() -> None:
+    """The watchdog's quick stop comes when nobody sends SYNCs any more."""
+    _, boot = bounded({(0x1403, 2): lambda value: value <= 240})
+    text = error_of(boot)
+    assert "1403h:2: 0609 0030h value not valid, RPDO4 does not take type 255" in text
+    assert "cannot be used" in text
+    assert "pdo.synchronous" not in text
+
+
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        ((0x1600, 2), "RPDO1 takes 60FFh:0 with 16 bits, and not with 32 (0604 0041h"),
+        ((0x1A01, 1), "TPDO2 takes 606Ch:0 with 16 bits, and not with 32 (0604 0041h"),
+        ((0x1A00, 1), "TPDO1 takes 6041h:0 with 32 bits, and not with 16 (0604 0041h"),
+    ],
+)
+def test_an_object_that_goes_into_a_pdo_in_another_width_is_named_with_its_key(entry: Key, said: str) -> None:
+    keys = {
+        (0x1600, 2): "set `layout.target_bits: 16`",
+        (0x1A01, 1): "set `layout.velocity_bits: 16`",
+        (0x1A00, 1): "cannot be used",
+    }
+    wanted = {(0x1600, 2): 0x60FF_0010, (0x1A01, 1): 0x606C_0010, (0x1A00, 1): 0x6041_0020}[entry]
+    _, boot = bounded({entry: lambda value: value == wanted}, abort=0x06040041)
+    text = error_of(boot)
+    assert said in text
+    assert keys[entry] in text
 
 
 def test_an_unused_pdo_that_stays_on_is_a_note() -> None:
@@ -386,7 +507,7 @@ def test_a_drive_that_keeps_a_softer_quick_stop_is_refused_with_what_it_can_do()
     drive.refuse[0x6085, 0] = 0x06090031
     problem = str(error_of(boot_one_axis(drive)))
     assert "6085h:0 stays at 286: left brakes with 0.15 m/s² by it" in problem
-    assert "Lower limits.emergency_deceleration_mps2 (1.5) to that in robot.yaml" in problem
+    assert "set `limits.emergency_deceleration_mps2: 0.149` in robot.yaml, where it is 1.5" in problem
 
 
 @pytest.mark.parametrize("kept", [2723, 2865, 9999])
@@ -405,7 +526,7 @@ def test_an_ordinary_ramp_that_is_softer_than_the_driver_brakes_is_refused_too()
     drive = FakeDrive()
     drive.objects[0x6084, 0] = u32(500)
     drive.refuse[0x6084, 0] = 0x06090031
-    assert "Lower limits.deceleration_mps2 (0.5)" in str(error_of(boot_one_axis(drive)))
+    assert "set `limits.deceleration_mps2: " in str(error_of(boot_one_axis(drive)))
 
 
 def test_a_drive_whose_quick_stop_coasts_and_cannot_be_told_otherwise_is_refused() -> None:

@@ -171,8 +171,8 @@ def test_a_drive_without_a_heartbeat_is_said_to_have_none() -> None:
     for _ in range(103):
         story.wait(0.01)
         story.status()
-    said = "sent no heartbeat (1017h; a drive that knows node guarding alone cannot be used)"
-    assert story.node.absent().endswith(said)
+    said = "sent no heartbeat (1017h; where it has node guarding alone, set `self_stop.node_guarding: true` and `self"
+    assert said in story.node.absent()
     assert said in story.node.boot_error
 
 
@@ -210,7 +210,7 @@ def test_a_second_boot_up_message_of_one_start_is_waited_for_in_the_next_boot() 
         story.started()
     assert story.now_s - began > 1.3 * 0.8
     assert story.node.report is not None
-    assert any("set start.settle_s in its drive profile" in note for note in story.node.report.notes)
+    assert any("two boot-up messages: set `start.settle_s: 1.3` in" in note for note in story.node.report.notes)
 
 
 def test_a_boot_up_message_long_after_the_boot_is_a_restart_and_changes_nothing_about_the_next_boot() -> None:
@@ -428,3 +428,72 @@ def test_a_heartbeat_from_before_the_nmt_start_is_no_answer_to_it() -> None:
     story.heartbeat(OPERATIONAL)
     story.wait(0.01)
     assert story.node.presence is READY
+
+
+# -- an NMT reset that takes longer than the profile has it
+
+
+@dataclass
+class SlowReset(FakeDrive):
+    """Each NMT reset communication takes `took_s`; meanwhile it answers nothing."""
+
+    took_s: float = 0.0
+    now_s: float = 0.0
+    back_at: float = NEVER
+
+    def on_frame(self, frame: Frame) -> list[Frame]:
+        if frame == Frame(0x000, b"\x82\x01"):
+            self.back_at = self.now_s + self.took_s
+        return super().on_frame(frame) if self.now_s >= self.back_at else []
+
+
+@pytest.mark.parametrize(("took_s", "shows"), [(5.1, True), (8.0, True), (8.0, False)])
+def test_a_node_that_needs_long_for_its_reset_is_waited_for_in_the_next_boot(took_s: float, shows: bool) -> None:
+    """start.boot_up_s is 5 s. `shows`: by a boot-up message; without one by its first answer."""
+    drive = SlowReset(answers_nmt_reset=False, took_s=took_s)
+    story, errors = Story(drive=drive), []
+    while story.node.presence is not STARTING:
+        assert story.now_s < 60.0, "it never boots"
+        story.node.begin_boot(story.now_s)
+        drive.now_s = round(story.now_s + 0.01, 3)
+        story.wait(0.01)
+        if shows and drive.back_at - 0.005 < story.now_s < drive.back_at + 0.005:
+            story.heartbeat(BOOT_UP)
+        errors.append(story.node.boot_error)
+    assert any("start.boot_up_s" in error for error in errors)
+    assert story.node.report is not None
+    assert any("it needs long for an NMT reset: set `start.boot_up_s: " in note for note in story.node.report.notes)
+
+
+def test_a_boot_that_fails_after_its_reset_was_answered_says_nothing_about_resets() -> None:
+    """The drive sends no boot-up message, so the boot goes on after 5 s, and fails for another reason."""
+    drive = FakeDrive(answers_nmt_reset=False, refuse={(0x6060, 0): 0x06090030})
+    story = Story(drive=drive)
+    story.node.begin_boot(story.now_s)
+    story.wait(7.5)
+    story.node.begin_boot(story.now_s)
+    story.wait(1.0)
+    assert "6060h:0" in story.node.boot_error
+    assert "start.boot_up_s" not in story.node.boot_error
+
+
+def test_a_node_that_is_configured_and_waits_for_another_is_not_missing() -> None:
+    story = Story()
+    story.node.others_are_configured = lambda: False
+    story.booted()
+    story.wait(story.robot.timeouts.boot_s)
+    assert story.node.missing(story.now_s) == ""
+
+
+def test_a_boot_that_takes_longer_than_it_may_goes_on_and_says_how_far_it_is() -> None:
+    class Slow(FakeDrive):
+        def on_frame(self, frame: Frame) -> list[Frame]:
+            return [] if frame.cob_id == 0x601 and self.transfers >= 5 else super().on_frame(frame)
+
+    story = Story(drive=Slow())
+    story.wait(0.01)
+    story.node.begin_boot(story.now_s)
+    story.wait(0.2)
+    told = story.node.missing(story.now_s + story.robot.timeouts.boot_s)
+    assert "node 1 (left_wheel) is not ready since 10 s: its boot has done 5 SDO transfers" in told
+    assert "timeouts.boot_s of robot.yaml" in told

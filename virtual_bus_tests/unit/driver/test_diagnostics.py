@@ -69,6 +69,8 @@ def test_the_values_are_short_and_have_their_units() -> None:
     message = diagnostics_message(left, STAMP)
     drive = {pair.key: pair.value for pair in entry(message, "robot: drive left_wheel_joint").values}
     assert drive == {
+        "node": "1",
+        "axis": "0",
         "NMT state": "operational",
         "CiA 402 state": "operation enabled",
         "statusword": "0637h",
@@ -177,6 +179,23 @@ def test_a_growing_counter_does_not_make_an_error_a_warning() -> None:
 def test_what_the_bus_says(changes: dict[str, Any], level: bytes, sentence: str) -> None:
     bus = entry(diagnostics_message(with_driver(**changes), STAMP), "robot: bus")
     assert (bus.level, bus.message) == (level, sentence)
+
+
+@pytest.mark.parametrize(("load", "level"), [(math.nan, OK), (0.6, OK), (0.61, WARN)])
+def test_a_bus_that_is_nearly_full_is_a_warning(load: float, level: bytes) -> None:
+    bus = entry(diagnostics_message(SNAPSHOT, STAMP, bus_load=load), "robot: bus")
+    assert bus.level == level
+    assert {pair.key: pair.value for pair in bus.values}["load [%]"] == f"{100.0 * load:g}"
+    without_wire = diagnostics_message(SNAPSHOT, STAMP, bus_load=load, busy_above=math.inf)
+    assert entry(without_wire, "robot: bus").level == OK
+
+
+def test_a_drive_has_the_hardware_id_of_its_joint_and_else_its_place() -> None:
+    message = diagnostics_message(
+        SNAPSHOT, STAMP, hardware_ids={"left_wheel_joint": "000002E1:00001001:0000BEEF axis 0"}
+    )
+    left, right = (entry(message, f"robot: drive {side}_wheel_joint") for side in ("left", "right"))
+    assert (left.hardware_id, right.hardware_id) == ("000002E1:00001001:0000BEEF axis 0", "robot node 2 axis 1")
 
 
 @pytest.mark.parametrize(("pause_s", "level"), [(0.05, OK), (0.051, WARN)])

@@ -23,7 +23,7 @@ class Story:
 
     def __init__(self, drives: Drives | None = None) -> None:
         self.drives = drives or Drives(bench_robot())
-        self.feed = OdometryFeed(self.drives, bench_robot().base)
+        self.feed = OdometryFeed(self.drives, bench_robot())
         self.now_s = 10.0
         for node in self.drives.nodes:
             node.presence, node.nmt_state = Presence.READY, NmtState.OPERATIONAL

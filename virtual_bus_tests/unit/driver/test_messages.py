@@ -10,8 +10,11 @@ from canbase.msg import DriverStatus, DriveStatus
 from geometry_msgs.msg import Point, Pose, Quaternion
 from rclpy.serialization import deserialize_message, serialize_message
 
+from canbase_config.odometry import OdometrySettings
 from canbase_driver.causes import Cause, Finding
+from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.motion.odometry import Odometry, Pose2D
+from canbase_driver.motion.pose_error import TwistError
 from canbase_driver.ros import messages
 from canbase_driver.ros.diagnostics import diagnostics_message
 from canbase_driver.supervision.bus_health import BusReport, ControllerState
@@ -45,13 +48,13 @@ def test_odometry_has_rep_105_frames_si_units_and_both_covariances() -> None:
 
 
 def test_the_covariances_of_the_odometry_fit_into_the_message() -> None:
-    odometry = Odometry(0.4)
-    snapshot = with_driver(
-        odometry={"pose_covariance": odometry.pose_covariance(), "twist_covariance": odometry.twist_covariance()}
+    pose = Odometry(0.4, OdometrySettings()).pose_covariance()
+    twist = TwistError(OdometrySettings(), 0.4, 0.02).covariance(Twist2D(0.3, 0.2))
+    message = messages.odometry_message(
+        with_driver(odometry={"pose_covariance": pose, "twist_covariance": twist}), STAMP
     )
-    message = messages.odometry_message(snapshot, STAMP)
-    assert tuple(message.pose.covariance) == odometry.pose_covariance()
-    assert tuple(message.twist.covariance) == odometry.twist_covariance()
+    assert tuple(message.pose.covariance) == pose
+    assert tuple(message.twist.covariance) == twist
 
 
 @pytest.mark.parametrize("turns", [-3, -1, 0, 1, 1000])
@@ -129,6 +132,7 @@ def test_the_status_carries_every_field_of_the_snapshot_that_the_interface_has()
             watchdog=watchdog, bus=bus, odometry={"travel_losses": 31, "pose_resets": 32}, standstill=True,
         ),
         STAMP,
+        bus_load=0.27,
     )  # fmt: skip
     fields = set(message.get_fields_and_field_types()) - {"stamp", "drives"}
     assert {name: getattr(message, name) for name in fields} == {
@@ -138,7 +142,7 @@ def test_the_status_carries_every_field_of_the_snapshot_that_the_interface_has()
         "watchdog_frames_dropped": 12, "watchdog_bus_errors": 13, "watchdog_trips": 14, "watchdog_pause_max_s": 0.015,
         "pose_resets": 32, "standstill": True, "command_age_s": 0.015, "command_fresh": True, "commands_refused": 1,
         "cycles": 12_345, "overruns": 2, "cycle_lateness_max_s": 0.0004, "bus_problem": "network is down",
-        "controller": "error warning", "send_errors": 21, "receive_errors": 22, "error_frames": 23,
+        "bus_load": 0.27, "controller": "error warning", "send_errors": 21, "receive_errors": 22, "error_frames": 23,
         "frames_dropped": 24, "bus_failures": 25,
     }  # fmt: skip
     assert message.stamp == STAMP
@@ -208,9 +212,9 @@ def test_every_message_survives_the_wire() -> None:
         messages.odometry_message(SNAPSHOT, STAMP),
         messages.transform_message(SNAPSHOT, STAMP),
         messages.joint_state_message(SNAPSHOT, STAMP),
-        messages.status_message(MEASURED, STAMP),
+        messages.status_message(MEASURED, STAMP, bus_load=0.27),
         messages.stop_event_message(STOP, STAMP, "/state/stop.asc"),
-        diagnostics_message(SNAPSHOT, STAMP),
+        diagnostics_message(SNAPSHOT, STAMP, bus_load=0.27),
     ):
         assert deserialize_message(serialize_message(message), type(message)) == message
 

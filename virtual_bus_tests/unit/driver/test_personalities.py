@@ -110,7 +110,7 @@ def test_the_driver_says_what_does_not_stop_by_itself(kind: str) -> None:
     world = world_of(kind)
     world.enable()
     told = [drive.stops_by_itself for drive in world.snapshot.drives]
-    assert told == [PERSONALITIES[kind].heeds_heartbeats] * 2
+    assert told == [PERSONALITIES[kind].heeds_masters] * 2
 
 
 def test_a_power_cycle_while_driving_ends_disarmed_and_a_reset_brings_it_back(kind: str) -> None:

@@ -278,3 +278,74 @@ def test_no_answer_of_a_drive_raises(step: Read | Write, drive: list[bytes]) -> 
     sdo.tick(now_s=1.0)
     sdo.tick(now_s=2.0)
     assert not sdo.busy
+
+
+# -- drives that answer late: CiA 301 gives a server no time limit
+
+
+def exchange(sdo: SdoClient, delay_s: float, until_s: float, lost: tuple[int, ...] = ()) -> list[float]:
+    """Reads 1018h:1 to 1018h:4 in turn; the drive answers each request after `delay_s`, but not those `lost`.
+
+    The times at which a transfer ended.
+    """
+    due: list[tuple[float, bytes]] = []
+    ended: list[float] = []
+    requests = 0
+    for now_s in (round(step * 0.01, 2) for step in range(round(until_s / 0.01))):
+        sent = sdo.tick(now_s) if sdo.busy else [sdo.start(Read(0x1018, 1 + len(ended) % 4), now_s)]
+        for frame in sent:
+            if frame.data[0] == 0x40:
+                due += [] if requests in lost else [(now_s + delay_s, frame.data[1:4])]
+                requests += 1
+        while due and due[0][0] <= now_s:
+            sdo.on_frame(Frame(0x585, b"\x43" + due.pop(0)[1] + bytes(4)), now_s)
+        ended += [] if sdo.busy else [now_s]
+    return ended
+
+
+@pytest.mark.parametrize("delay_s", [0.35, 0.6, 1.0, 2.0])
+def test_a_client_learns_how_late_a_drive_answers_and_waits_for_it(delay_s: float) -> None:
+    """t   0  request ── 0.3  again ── delay  an answer to each of them: the last one shows how late it is"""
+    sdo = client(attempts=3)
+    ended = exchange(sdo, delay_s, 30.0)
+    assert 0.5 * delay_s < sdo.late_s <= delay_s + 0.011, "looked at every 10 ms"
+    assert sdo.duplicates == 0, "no second drive with its node id"
+    assert ended[-1] - ended[-2] == pytest.approx(delay_s, abs=0.03), "one request for each transfer"
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.25])
+def test_a_request_that_was_lost_makes_no_drive_a_late_one(delay_s: float) -> None:
+    sdo = client(attempts=3)
+    exchange(sdo, delay_s, 10.0, lost=(0, 3, 4, 7))
+    assert sdo.late_s == 0.0
+
+
+def test_an_answer_that_comes_after_the_last_attempt_is_a_late_one_too() -> None:
+    sdo = client(attempts=1)
+    sdo.start(Read(0x1018, 1), 0.0)
+    sdo.tick(0.3)
+    assert not sdo.busy
+    sdo.on_frame(rx("43 18 10 01 11 11 00 00"), 0.8)
+    assert sdo.late_s == 0.8
+    assert sdo.dropped == 1
+
+
+def test_what_the_watchdog_requests_too_teaches_nothing_about_lateness() -> None:
+    sdo = client(attempts=1)
+    sdo.start(Read(0x6041), 0.0)
+    sdo.tick(0.3)
+    sdo.on_frame(rx("4B 41 60 00 37 06 00 00"), 0.8)
+    assert sdo.late_s == 0.0
+
+
+def test_the_answers_to_two_requests_of_which_one_was_given_up_name_no_second_drive() -> None:
+    """t   0  request ── 0.3  given up ── 0.4  request ── 0.5, 0.6  an answer to each ── 0.7  one more"""
+    sdo = client(attempts=1)
+    sdo.start(Read(0x1018, 1), 0.0)
+    sdo.tick(0.3)
+    sdo.start(Read(0x1018, 1), 0.4)
+    for now_s in (0.5, 0.6):
+        sdo.on_frame(rx("43 18 10 01 11 11 00 00"), now_s)
+    assert sdo.duplicates == 0
+    sdo.on_frame(rx("43 18 10 01 11 11 00 00"), 0.7)
+    assert sdo.duplicates == 1, "one answer more than requests"

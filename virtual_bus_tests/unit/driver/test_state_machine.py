@@ -44,7 +44,8 @@ NOT_YET = {
     "drive restarted": BOOTING,
     "not configured": OFFLINE,
 } | dict.fromkeys(
-    ("drive silent", "watchdog missing", "inactive", "resetting", "command not zero", "not standing"), DISARMED
+    ("stop unproven", "drive silent", "watchdog missing", "inactive", "resetting", "command not zero", "not standing"),
+    DISARMED,
 )
 BEFORE_POWER = [(wrong, state, False) for wrong, state in NOT_YET.items()] + [
     ("drive fault", LATCHED, True),

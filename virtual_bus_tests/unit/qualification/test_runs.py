@@ -77,7 +77,7 @@ def test_a_base_that_goes_on_is_a_violation_and_where_sto_alone_stops_it_that_is
     cruise.fork = lambda twin, seed: going  # type: ignore[method-assign]
     (violation,) = runs._stop(cruise, FAILURES[3], stop("", "")).violations
     assert (violation.property, violation.detail) == ("stops", "it did not come to a stand from 0.80 m/s")
-    drives = tuple(drive.model_copy(update={"profile": "technosoft"}) for drive in ROBOT.drives)
+    drives = tuple(drive.model_copy(update={"profile": "tmcm1636"}) for drive in ROBOT.drives)
     cruise.world.robot = ROBOT.model_copy(update={"drives": drives})
     assert "STO" in runs._stop(cruise, FAILURES[3], stop("", "")).violations[0].detail
 

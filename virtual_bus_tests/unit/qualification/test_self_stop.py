@@ -25,7 +25,7 @@ def first(profile: str) -> OwnStop:
     [
         ("epos4", StopsItself.YES, "6007h"),
         ("elmo_gold", StopsItself.UNPROVEN, "abort_connection_code"),
-        ("technosoft", StopsItself.NO, "no 1016h"),
+        ("technosoft", StopsItself.YES, "the watchdog guards it"),
         ("tmcm1636", StopsItself.NO, "no 6007h"),
         ("dryve_d1", StopsItself.NO, "no 6007h"),
         ("roboteq", StopsItself.NO, "maker's tool"),

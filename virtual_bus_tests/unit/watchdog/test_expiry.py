@@ -31,7 +31,7 @@ class Computer:
 
     def __init__(self, story: Story) -> None:
         self.now_s = story.t
-        self.health, self.datagrams_dropped = BusHealth(), 0
+        self.health, self.datagrams_dropped, self.request_problem = BusHealth(), 0, ""
         self.waiting: list[tuple[Frame, float]] = []
         self.datagrams: list[bytes] = []
         self.sent: list[tuple[float, Frame]] = []
