@@ -16,6 +16,7 @@ from canbase_driver.cia301.emcy import Emcy, parse_emcy
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import (
     EMCY,
+    HEARTBEAT,
     MAX_NODE_ID,
     NMT,
     RPDO,
@@ -25,6 +26,7 @@ from canbase_driver.cia301.nmt import (
     NmtState,
     parse_heartbeat,
 )
+from canbase_driver.cia301.node_guarding import without_toggle
 from canbase_driver.supervision.watchdog_link import (
     RESET_COB_ID,
     WatchdogCounters,
@@ -50,6 +52,7 @@ class HeardNode:
     """Last time of each TPDO, by its COB-ID without node id."""
     sdo_answers: int = 0
     emcy: Emcy | None = None
+    has_sent_emcy: bool = False
 
     @property
     def period_s(self) -> float:
@@ -64,6 +67,11 @@ class HeardNode:
     def pdo_age_s(self, now_s: float) -> float:
         """Seconds since the last TPDO of any kind; NaN: none."""
         return now_s - max(self.pdo_at.values()) if self.pdo_at else math.nan
+
+    @property
+    def sends_nothing(self) -> bool:
+        """It has shown no frame but answers to SDO requests."""
+        return self.nmt_state is None and not self.pdo_at and not self.has_sent_emcy
 
     @property
     def state_text(self) -> str:
@@ -124,7 +132,7 @@ class Listener:
 
     def _on_node(self, frame: Frame, now_s: float) -> None:
         function, node_id = frame.cob_id & 0x780, frame.cob_id & 0x7F
-        parsed = parse_heartbeat(frame)
+        parsed = parse_heartbeat(without_toggle(frame)) if function == HEARTBEAT else None
         if not 1 <= node_id <= MAX_NODE_ID or (function not in (*TPDO, EMCY, SDO_TO_CLIENT) and parsed is None):
             return
         node = self.nodes.setdefault(node_id, HeardNode(node_id))
@@ -135,7 +143,7 @@ class Listener:
         elif function == SDO_TO_CLIENT:
             node.sdo_answers += 1
         else:
-            emcy = parse_emcy(frame)
+            emcy, node.has_sent_emcy = parse_emcy(frame), True
             node.emcy = None if emcy is None or emcy.is_reset else emcy
 
     def _on_heartbeat(self, node: HeardNode, state: NmtState | None, now_s: float) -> None:
@@ -154,18 +162,21 @@ class Listener:
         """Whether canbase's own driver is on this bus."""
         return DRIVER_NODE_ID in self.nodes
 
-    def masters(self, now_s: float) -> list[str]:
-        """A sentence for each sign that somebody else commands this bus."""
+    def masters(self, now_s: float, *, requests: bool = True) -> list[str]:
+        """A sentence for each sign that somebody else commands this bus.
+
+        `requests`: NMT and SDO count too. A tool that sends such frames itself may get them back late (udp_multicast).
+        """
         seconds = max(now_s - self.since, 1e-3)
         signs = [f"heartbeat of node {node_id}, {OURS[node_id]}" for node_id in sorted(OURS) if node_id in self.nodes]
         if self._syncs:
             signs.append(f"SYNC, {self._syncs / seconds:.0f} a second")
-        if self._nmt:
+        if self._nmt and requests:
             whom = ", ".join(f"node {node_id}" if node_id else "all nodes" for node_id in sorted(self._nmt))
             signs.append(f"NMT commands to {whom}")
         if self._setpoints:
             signs.append(f"setpoints (RPDOs) to {_nodes(self._setpoints)}")
-        if self._sdo_requests:
+        if self._sdo_requests and requests:
             signs.append(f"SDO requests to {_nodes(self._sdo_requests)}")
         return signs
 

@@ -11,10 +11,12 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
 from ruamel.yaml.scalarint import HexCapsInt
 
+from canbase_commissioning.calibration import agree
 from canbase_commissioning.floor import FloorFound
 from canbase_commissioning.wheel_direction import WheelFound
-from canbase_config.commissioned import Step, mark
+from canbase_config.commissioned import Step, identities, mark
 from canbase_config.errors import Loc, key_path
+from canbase_config.odometry import OdometrySettings
 from canbase_config.robot import Robot
 from canbase_driver.boot.sequence import NUMBERS, BootReport
 
@@ -22,6 +24,10 @@ DIGITS = 5
 """Significant digits of a measured value: a tape gives four."""
 SAME = 1e-4
 """A share below which a measured value is the one that stood there."""
+
+
+TAPE = OdometrySettings()
+"""How wrong a radius and a track are that a person has measured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,22 +54,28 @@ def wheel_edits(robot: Robot, found: Sequence[WheelFound]) -> list[Edit]:
         drive = robot.drives[i]
         edits.append(Edit(("drives", i, "direction"), drive.direction, wheel.direction))
         if wheel.scale is not None:
-            gear = float(f"{wheel.scale.gear_ratio:.{DIGITS}g}")
-            edits.append(Edit(("drives", i, "gear_ratio"), drive.gear_ratio, gear))
+            edits.append(Edit(("drives", i, "gear_ratio"), drive.gear_ratio, rounded(wheel.scale.gear_ratio)))
             counts = wheel.scale.counts_per_motor_rev
             edits.append(Edit(("drives", i, "counts_per_motor_rev"), drive.counts_per_motor_rev, counts))
             edits.append(Edit(("drives", i, "velocity_unit"), drive.velocity_unit, wheel.scale.velocity_unit))
-    return [edit for edit in edits if _differs(edit)]
+    return [edit for edit in edits if differs(edit)]
 
 
 def floor_edits(robot: Robot, found: FloorFound) -> list[Edit]:
-    """Radius and track."""
-    radius_m, track_m = (float(f"{value:.{DIGITS}g}") for value in (found.wheel_radius_m, found.track_m))
-    edits = [
-        Edit(("base", "wheel_radius_m"), robot.base.wheel_radius_m, radius_m),
-        Edit(("base", "track_m"), robot.base.track_m, track_m),
-    ]
-    return [edit for edit in edits if _differs(edit)]
+    """Radius and track. What `canbase calibrate` has found stays where the tape agrees: it is the more exact one."""
+    base, odometry = robot.base, robot.odometry
+    edits = []
+    for key, before, measured, error, tape in (
+        ("wheel_radius", base.wheel_radius_m, found.wheel_radius_m, odometry.radius_error, TAPE.radius_error),
+        ("track", base.track_m, found.track_m, odometry.track_error, TAPE.track_error),
+    ):
+        calibrated = error < tape
+        if calibrated and agree(before, measured):
+            continue
+        edits.append(Edit(("base", f"{key}_m"), before, rounded(measured)))
+        if calibrated:
+            edits.append(Edit(("odometry", f"{key.removeprefix('wheel_')}_error"), error, tape))
+    return [edit for edit in edits if differs(edit)]
 
 
 def identity_edits(robot: Robot, boots: Mapping[int, BootReport]) -> list[Edit]:
@@ -75,14 +87,16 @@ def identity_edits(robot: Robot, boots: Mapping[int, BootReport]) -> list[Edit]:
             before, after = getattr(drive.identity, name), getattr(found, name)
             if after is not None:
                 edits.append(Edit(("drives", i, "identity", name), before, HexCapsInt(after)))
-    return [edit for edit in edits if _differs(edit)]
+    return [edit for edit in edits if differs(edit)]
 
 
 def commissioned_edits(robot: Robot, edits: Sequence[Edit], done: Collection[Step]) -> list[Edit]:
-    """The marks of the steps that were done, with `edits` in robot.yaml."""
-    after = with_edits(robot, edits)
-    marks = [Edit(("commissioned", step), getattr(robot.commissioned, step), mark(after, step)) for step in done]
-    return [edit for edit in marks if _differs(edit)]
+    """The marks of the steps that were done, with `edits` in robot.yaml; with a proof also that of its drives."""
+    after, before = with_edits(robot, edits), robot.commissioned
+    marks = [Edit(("commissioned", step), getattr(before, step), mark(after, step)) for step in done]
+    if "proof" in done:
+        marks.append(Edit(("commissioned", "identities"), before.identities, identities(after)))
+    return [edit for edit in marks if differs(edit)]
 
 
 def with_edits(robot: Robot, edits: Sequence[Edit]) -> Robot:
@@ -128,7 +142,13 @@ def _add(values: CommentedMap, key: Any, value: Any) -> None:
     values.insert(len(values) - has_comments, key, value)
 
 
-def _differs(edit: Edit) -> bool:
+def rounded(value: float) -> float:
+    """As it is written."""
+    return float(f"{value:.{DIGITS}g}")
+
+
+def differs(edit: Edit) -> bool:
+    """Whether a measured value is another one than what stood there."""
     if isinstance(edit.before, float) and isinstance(edit.after, float):
         return abs(edit.after - edit.before) > SAME * abs(edit.before)
     return bool(edit.before != edit.after)

@@ -87,7 +87,7 @@ def one_of(kind: type[E]) -> Callable[[str], E]:
     return check
 
 
-def _confirm(text: str) -> None:
+def confirm(text: str) -> None:
     """Raises CommissionError for a no or a bare Enter, ValueError for what is neither yes nor no."""
     word = text.strip().lower()
     if word in ("", "n", "no"):
@@ -136,7 +136,7 @@ class Guide(Generic[T]):
         if self.question is None:
             raise RuntimeError("nothing was asked")
         if self.question.confirms:
-            _confirm(text)
+            confirm(text)
         value = self.question.check(text)
         self._go_on(value, self.rig.now_s)
 

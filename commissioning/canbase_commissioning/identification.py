@@ -5,7 +5,7 @@ Names and firmware (1008h, 100Ah) take segmented transfers and are read only whe
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from canbase_commissioning.bus_monitor import Listener
@@ -17,6 +17,8 @@ from canbase_driver.cia301.sdo_client import Read, SdoAborted, SdoClient, SdoTim
 STAGGER_S = 0.002
 """Between the first questions to two node ids: 127 of them at once would fill every transmit buffer."""
 UNHEARD_ATTEMPTS, HEARD_ATTEMPTS = 1, 3
+DUPLICATES = 2
+"""After this many answers that came twice two drives have the node id; one may be an answer to another client."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +41,12 @@ class NodeCard:
         return self.device_type is not None and self.device_type & 0xFFFF == 402
 
 
-def identify(node_id: int, with_texts: bool) -> Steps[NodeCard | bool]:
-    """Reads the identity of one node; False: no node answers at this id."""
+def identify(node_id: int, with_texts: bool, is_twice: Callable[[], bool]) -> Steps[NodeCard | bool]:
+    """Reads the identity of one node; False: no node answers at this id.
+
+    `is_twice`: whether an answer has come twice. Then two drives have this node id: their serial numbers differ, so on
+    a real cable their answers would destroy each other. Serial number and texts are not read.
+    """
     try:
         device_type = yield from _number(0x1000, 0)
     except SdoTimeout:
@@ -48,10 +54,11 @@ def identify(node_id: int, with_texts: bool) -> Steps[NodeCard | bool]:
     vendor_id = yield from _number(0x1018, 1)
     product_code = yield from _number(0x1018, 2)
     revision = yield from _number(0x1018, 3)
-    serial = yield from _number(0x1018, 4)
+    serial = None if is_twice() else (yield from _number(0x1018, 4))
     heartbeat_ms = yield from _number(0x1017, 0)
-    name = (yield from _text(0x1008)) if with_texts else ""
-    firmware = (yield from _text(0x100A)) if with_texts else ""
+    texts = with_texts and not is_twice()
+    name = (yield from _text(0x1008)) if texts else ""
+    firmware = (yield from _text(0x100A)) if texts else ""
     return NodeCard(node_id, device_type, vendor_id, product_code, revision, serial, heartbeat_ms, name, firmware)
 
 
@@ -79,6 +86,7 @@ class Identification:
         self._timeout_s = timeout_s
         self._with_texts = with_texts
         self._tasks: list[NodeTask[NodeCard | bool]] = []
+        self._clients: dict[int, SdoClient] = {}
         self._pending: list[Frame] = []
         self.lost: dict[int, str] = {}
         """Nodes that were there and then failed, with the reason."""
@@ -92,6 +100,11 @@ class Identification:
     def cards(self) -> dict[int, NodeCard]:
         """The nodes that answered."""
         return {task.node_id: task.result for task in self._tasks if isinstance(task.result, NodeCard)}
+
+    @property
+    def twins(self) -> frozenset[int]:
+        """Node ids at which two drives or more answer."""
+        return frozenset(n for n, client in self._clients.items() if client.duplicates >= DUPLICATES)
 
     def on_frame(self, frame: Frame, now_s: float) -> None:
         """Take a frame."""
@@ -112,9 +125,9 @@ class Identification:
 
     def _task(self, node_id: int, not_before: float) -> NodeTask[NodeCard | bool]:
         attempts = HEARD_ATTEMPTS if node_id in self._heard.nodes else UNHEARD_ATTEMPTS
-        client = SdoClient(node_id, self._timeout_s, attempts)
+        client = self._clients[node_id] = SdoClient(node_id, self._timeout_s, attempts)
         return NodeTask(
-            identify(node_id, self._with_texts),
+            identify(node_id, self._with_texts, lambda: client.duplicates > 0),
             client,
             not_before=not_before,
             free=lambda now_s: self._heard.sdo_free(node_id, now_s),

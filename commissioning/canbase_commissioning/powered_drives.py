@@ -12,6 +12,7 @@ from canbase_commissioning.session import NodeTask
 from canbase_commissioning.wheel_probe import Sample
 from canbase_config.object_map import CONTROLWORD, Place, place
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
+from canbase_config.watchdog import guard_time_ms
 from canbase_driver.boot.sequence import BootReport
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import (
@@ -26,6 +27,7 @@ from canbase_driver.cia301.nmt import (
     heartbeat,
     nmt,
 )
+from canbase_driver.cia301.node_guarding import guard_request
 from canbase_driver.cia402 import DriveState, PowerGoal
 from canbase_driver.drives.axis import Axis
 from canbase_driver.drives.canopen_node import CanopenNode, Presence
@@ -57,7 +59,7 @@ class PoweredDrives:
         self.speeds_mps: dict[str, float] = {}
         """What is wanted of each wheel's rim, forward positive; those that are not in here have no power."""
         self.beats = {DRIVER_NODE_ID, WATCHDOG_NODE_ID}
-        """The heartbeats that are sent."""
+        """The heartbeats that are sent; with that of the watchdog the node guarding requests to guarded drives."""
         self.is_mute = False
         """Nothing at all is sent: as if this computer had died."""
         self.has_ended = False
@@ -74,7 +76,9 @@ class PoweredDrives:
         """The first sign of another master."""
         self._sync = SyncProducer(robot.bus.sync_counter)
         self._period_s = 1.0 / robot.rates.control_hz
-        self._cycle_at = self._beat_at = -math.inf
+        self._cycle_at = self._beat_at = self._guard_at = -math.inf
+        self._guarded = [node.node_id for node in self.nodes.values() if node.profile.self_stop.node_guarding]
+        self._guard_s = guard_time_ms(robot.timeouts.drive_heartbeat_s) / 1000.0
         self._targets_mps = dict.fromkeys(self.axes, 0.0)
         self._ramp_mps2 = min(RAMP_MPS2, robot.limits.acceleration_mps2)
         self._marks: dict[str, tuple[float, float]] = {}
@@ -191,7 +195,7 @@ class PoweredDrives:
         frames += [frame for probe in self.probes for frame in probe.tick(now_s)]
         if self.is_mute:
             return frames
-        frames += self._heartbeats(now_s)
+        frames += self._heartbeats(now_s) + self._guard_requests(now_s)
         for node in self.nodes.values():
             frames += node.tick(now_s)
         if now_s - self._cycle_at >= self._period_s:
@@ -206,6 +210,12 @@ class PoweredDrives:
             return []
         self._beat_at = now_s
         return [heartbeat(node_id, NmtState.OPERATIONAL) for node_id in sorted(self.beats)]
+
+    def _guard_requests(self, now_s: float) -> list[Frame]:
+        if WATCHDOG_NODE_ID not in self.beats or now_s - self._guard_at < self._guard_s - self._period_s / 2.0:
+            return []
+        self._guard_at = now_s
+        return [guard_request(node_id) for node_id in self._guarded]
 
     def _cycle(self, dt_s: float) -> list[Frame]:
         self._plan_reset()

@@ -42,7 +42,8 @@ def verdict(results: Results) -> str:
     if failed:
         return (
             f"NOT PROVEN: {', '.join(failed)} did not stop by itself. When this computer dies, it keeps its last "
-            "speed: only STO by a safety relay stops it then."
+            "speed: only STO by a safety relay stops it then. The driver gives no power to these drives while "
+            "safety.require_self_stop in robot.yaml is true."
         )
     slowest = max(outcome.time_s for outcome in results.outcomes)
     late = sorted({outcome.joint for outcome in results.outcomes if outcome.is_late})

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Set
+from dataclasses import dataclass, replace
 
 from canbase_commissioning.bus_monitor import OURS, HeardNode
 from canbase_commissioning.identification import NodeCard
@@ -29,12 +30,47 @@ class ScanRow:
     """Its joints in robot.yaml."""
 
 
-def scan_rows(heard: dict[int, HeardNode], cards: dict[int, NodeCard], robot: Robot | None) -> list[ScanRow]:
-    """A row for each node that sent a frame or answered, by node id; those of robot.yaml that are missing too."""
+def scan_rows(
+    heard: dict[int, HeardNode], cards: dict[int, NodeCard], robot: Robot | None, twins: Set[int] = frozenset()
+) -> list[ScanRow]:
+    """A row for each node that sent a frame or answered, by node id; those of robot.yaml that are missing too.
+
+    `twins`: node ids at which more than one drive answers.
+    """
     wired = {drive.node_id for drive in robot.drives} if robot else set()
-    return [
+    rows = [
         _row(node_id, heard.get(node_id), cards.get(node_id), robot) for node_id in sorted({*heard, *cards, *wired})
     ]
+    return [replace(row, what=f"{TWINS}: {row.what}") if row.node_id in twins else row for row in rows]
+
+
+def twins_advice(twins: Set[int]) -> str:
+    """What to do about node ids that several drives have."""
+    nodes = ", ".join(map(str, sorted(twins)))
+    return f"node {nodes}: two drives or more answer. canbase adopt gives each drive a node id of its own"
+
+
+def silent(heard: dict[int, HeardNode], cards: dict[int, NodeCard]) -> list[str]:
+    """A sentence for the nodes that answer SDO and send nothing by themselves, for each reason."""
+    quiet = [card for node_id, card in sorted(cards.items()) if node_id not in heard or heard[node_id].sends_nothing]
+    by_reason: dict[str, list[int]] = {}
+    for card in quiet:
+        by_reason.setdefault(_why_silent(card), []).append(card.node_id)
+    return [f"node {', '.join(map(str, ids))}: answers SDO and sends nothing; {why}" for why, ids in by_reason.items()]
+
+
+def _why_silent(card: NodeCard) -> str:
+    if card.heartbeat_ms is None:
+        return "it has no heartbeat (1017h); only a drive that can be watched gets power from canbase"
+    if card.heartbeat_ms:
+        return (
+            f"its heartbeat is set to {card.heartbeat_ms} ms and did not come. It may begin when the drive "
+            "restarts; does the cable carry its frames?"
+        )
+    return (
+        "its heartbeat is off (1017h = 0), and in NMT pre-operational no PDOs are sent. That is usual for a new drive; "
+        "canbase's driver switches the heartbeat on at its start"
+    )
 
 
 def missing(rows: list[ScanRow]) -> list[int]:
@@ -43,6 +79,7 @@ def missing(rows: list[ScanRow]) -> list[int]:
 
 
 NOT_HERE = "not on the bus"
+TWINS = "two drives or more"
 
 
 def _row(node_id: int, heard: HeardNode | None, card: NodeCard | None, robot: Robot | None) -> ScanRow:

@@ -61,17 +61,17 @@ class Outcome:
         return f"{after}: {abs(self.way_m) * 1000:.0f} mm{said}"
 
 
-def watches_heartbeat(rig: PoweredDrives, joint: str) -> bool:
-    """Whether the boot could set that the drive watches the watchdog's heartbeat (1016h)."""
+def watches_watchdog(rig: PoweredDrives, joint: str) -> bool:
+    """Whether the boot could set that the drive watches the watchdog's heartbeat (1016h), or its requests (100Ch)."""
     report = rig.report(joint)
-    return report is not None and report.self_stop.by is StopsBy.WATCHDOG_HEARTBEAT
+    return report is not None and report.self_stop.by in (StopsBy.WATCHDOG_HEARTBEAT, StopsBy.NODE_GUARDING)
 
 
 def prove(rig: PoweredDrives, speed_mps: float) -> Script[tuple[Outcome, ...]]:
-    """Both trials; the second one with the drives that watch a heartbeat. Raises CommissionError, RigError."""
+    """Both trials; the second one with the drives that watch the watchdog. Raises CommissionError, RigError."""
     outcomes = yield from _silence(rig, speed_mps)
     yield from recover(rig)
-    beating = [joint for joint in rig.axes if watches_heartbeat(rig, joint)]
+    beating = [joint for joint in rig.axes if watches_watchdog(rig, joint)]
     if beating and all(outcome.stopped for outcome in outcomes):
         outcomes += yield from _without_heartbeat(rig, beating, speed_mps)
         yield from recover(rig)

@@ -90,10 +90,17 @@ class NodeTask(Generic[T]):
         """Whether it has ended, well or not."""
         return self.result is not None or self.error is not None or self.blocked
 
+    @property
+    def duplicates(self) -> int:
+        """Requests that were sent once and answered twice: two drives may have this node id."""
+        return self._client.duplicates
+
     def on_frame(self, frame: Frame, now_s: float) -> list[Frame]:
         """Take a frame from the bus; what to send at once."""
-        if self.done or not self._client.busy:
+        if self.done:
             return []
+        if not self._client.busy:
+            return self._client.on_frame(frame, now_s)  # it counts second answers
         frames = self._client.on_frame(frame, now_s)
         self._take_answer(now_s)
         return frames

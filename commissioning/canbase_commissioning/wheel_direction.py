@@ -84,7 +84,7 @@ def measure_scale(
 
     `again`: AGAIN after a correction.
     """
-    joint, rim_m = drive.joint, 2.0 * math.pi * rig.robot.base.wheel_radius_m
+    joint, rim_m = drive.joint, 2.0 * math.pi * rig.robot.base.radius_m(drive.side)
     confirm = f"Mark the top of {joint} (tape): it will make {revolutions:g} revolutions. Count them. Ready?"
     yield Ask(f"mark.{joint}{again}", confirm, confirms=True)
     axis = rig.axes[joint]

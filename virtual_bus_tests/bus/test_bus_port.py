@@ -24,6 +24,7 @@ from canbase_driver.runtime.bus_port import (
     BusError,
     BusPort,
 )
+from canbase_driver.runtime.bus_traffic import Traffic
 from canbase_driver.supervision.bus_health import ControllerState
 from support.flaky_bus import FlakyBus
 
@@ -160,6 +161,23 @@ def test_what_canopen_does_not_use_is_dropped_and_counted(port: BusPort, other: 
     assert (port.report.dropped, port.report.error_frames, port.problem) == (2, 1, "")
 
 
+def test_node_guarding_requests_of_the_watchdog_are_passed_over_and_hold_up_nothing(
+    port: BusPort, other: VirtualBus
+) -> None:
+    for _ in range(3):
+        other.send(can.Message(arbitration_id=0x701, is_extended_id=False, is_remote_frame=True, dlc=1))
+    other.send(can.Message(arbitration_id=0x181, data=b"\1", is_extended_id=False))
+    assert port.receive(0.05) == Frame(0x181, b"\1")
+    assert (port.report.dropped, port.problem) == (0, "")
+
+
+def test_a_tool_sends_a_request_as_a_remote_frame(port: BusPort, other: VirtualBus) -> None:
+    port.send(Frame(0x701, remote=True))
+    sent = other.recv(1.0)
+    assert sent is not None
+    assert (sent.arbitration_id, sent.is_remote_frame, sent.dlc) == (0x701, True, 1)
+
+
 def test_bus_off_is_a_problem_until_something_is_heard_again(port: BusPort, other: VirtualBus) -> None:
     other.send(error_frame(0x040))
     assert port.receive(0.1) is None
@@ -170,6 +188,20 @@ def test_bus_off_is_a_problem_until_something_is_heard_again(port: BusPort, othe
     other.send(can.Message(arbitration_id=0x701, data=b"\5", is_extended_id=False))
     assert port.receive(0.1) == Frame(0x701, b"\5")
     assert (port.problem, port.report.controller, port.report.failures) == ("", ControllerState.ERROR_ACTIVE, 1)
+
+
+def test_frames_of_both_ways_are_counted_with_their_data(port: BusPort, other: VirtualBus) -> None:
+    assert port.traffic() == Traffic(0, 0)
+    port.send(SYNC)
+    port.send(Frame(0x200, bytes(6)))
+    other.send(can.Message(arbitration_id=0x701, data=b"\5", is_extended_id=False))
+    other.send(can.Message(arbitration_id=0x1234567, data=bytes(8), is_extended_id=True))
+    assert port.receive(0.1) is not None
+    assert port.receive(0.1) is None
+    assert port.traffic() == Traffic(4, 15)
+    FlakyBus.deaf = True
+    port.send(SYNC)
+    assert port.traffic() == Traffic(4, 15)
 
 
 def test_closing_twice_is_once(port: BusPort) -> None:

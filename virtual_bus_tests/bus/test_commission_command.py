@@ -10,7 +10,7 @@ from pathlib import Path
 import can
 import pytest
 
-from canbase_config.commissioned import mark
+from canbase_config.commissioned import identities, mark
 from canbase_config.load import load_robot
 from support.bus_tool import ENVIRONMENT, argv, canbase, drives, write_robot
 from support.udp_port import free_udp_port
@@ -91,6 +91,7 @@ def test_a_wrong_direction_is_corrected_and_the_self_stop_proven(tmp_path: Path)
     assert [drive.identity.serial for drive in commissioned.drives] == [1, 2]
     marks = commissioned.commissioned
     assert (marks.directions, marks.proof) == (mark(commissioned, "directions"), mark(commissioned, "proof"))
+    assert marks.identities == identities(commissioned)
     assert (marks.scale, marks.floor) == (None, None)
     assert {drive.identity.product_code for drive in commissioned.drives} == {0xCB402}
     assert "# mounted mirrored" in config.read_text(encoding="utf-8")

@@ -188,6 +188,28 @@ def test_what_it_writes_is_a_frame_for_python_can(module: ModuleType, udp: dict[
 
 
 @COPIES
+def test_what_it_requests_is_a_remote_frame_for_python_can(module: ModuleType, udp: dict[str, Any]) -> None:
+    writer = module.open_bus(udp)
+    with can.Bus(**udp) as library:
+        writer.request(0x701, 1, 0.1)
+        said = library.recv(1.0)
+        assert said is not None
+        assert (said.arbitration_id, said.dlc, said.is_remote_frame, said.is_extended_id) == (0x701, 1, True, False)
+        assert bytes(said.data) == b""
+    assert writer.read(1.0)[:2] == (module.REMOTE | 0x701, b"")  # each sender hears itself
+    writer.close()
+
+
+@COPIES
+def test_a_request_on_socketcan_has_the_flag_and_the_length_of_the_answer(
+    module: ModuleType, ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus = socketcan(module, ends[0], monkeypatch)
+    bus.request(0x705, 1, 0.1)
+    assert FRAME.unpack(ends[1].recv(100)) == (module.REMOTE | 0x705, 1, bytes(8))
+
+
+@COPIES
 def test_a_socketcan_frame_has_its_flags_its_length_and_the_time_of_the_kernel(
     module: ModuleType, ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -11,9 +11,11 @@ import can
 import pytest
 
 from canbase_config.load import load_robot, sample
+from canbase_config.robot import Bus
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.runtime import bus_port as of_the_driver
 from canbase_sim.loop import Loop
+from canbase_sim.rated_bus import RatedBus
 from canbase_watchdog import bus_port as of_the_watchdog
 from support import garbage
 from support.bus_tool import ENVIRONMENT, argv, canbase, drives, write_robot
@@ -80,11 +82,11 @@ def test_a_bus_that_fails_is_no_garbage(monkeypatch: pytest.MonkeyPatch) -> None
     assert (driver.report.receive_errors, driver.report.dropped) == (1, 0)
     driver.close()
     loop = Loop.__new__(Loop)
-    loop._bus = can.Bus(**arguments(port))
-    monkeypatch.setattr(loop._bus, "recv", _network_is_down)
+    loop._bus = RatedBus(Bus(interface="udp_multicast", channel="239.74.163.2", extra={"port": port}))
+    monkeypatch.setattr(loop._bus, "receive", _network_is_down)
     with pytest.raises(can.CanOperationError):
         loop._receive()
-    loop._bus.shutdown()
+    loop._bus.close()
 
 
 def _network_is_down(_timeout: float) -> None:

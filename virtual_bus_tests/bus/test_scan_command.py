@@ -9,6 +9,8 @@ from pathlib import Path
 import can
 import pytest
 
+from canbase_config.bit_rate import bus_at
+from canbase_config.load import load_robot
 from support.bus_tool import canbase, drives, write_robot
 from support.udp_port import free_udp_port
 
@@ -29,6 +31,27 @@ def test_it_finds_both_drives_and_says_what_they_are(tmp_path: Path) -> None:
     assert rows[0]["heartbeat"] == "off (1017h = 0)"
     assert "canbase simulated drive" in table.stdout
     assert "\x1b[" not in table.stdout
+
+
+def test_two_drives_with_one_node_id_are_named_at_once(tmp_path: Path) -> None:
+    port = free_udp_port()
+    config = write_robot(tmp_path, port)
+    factory = bus_at(load_robot(config).robot.bus, 125_000).extra["port"]
+    at_the_rate_of_the_drives = write_robot(tmp_path, factory, "factory.yaml")
+    with drives(config, "--factory-fresh"):
+        done = canbase("scan", "--config", str(at_the_rate_of_the_drives), "--seconds", "0.3", "--json")
+    assert done.returncode == 1
+    assert "node 1: two drives or more answer. canbase adopt gives each drive a node id of its own" in done.stderr
+    row = json.loads(done.stdout)[0]
+    assert (row["node_id"], row["serial"]) == (1, None)
+
+
+def test_drives_that_answer_and_send_nothing_are_explained(tmp_path: Path) -> None:
+    config = write_robot(tmp_path, free_udp_port())
+    with drives(config):
+        done = canbase("scan", "--config", str(config), "--seconds", "0.3")
+    assert done.returncode == 0
+    assert "node 1, 2: answers SDO and sends nothing; its heartbeat is off (1017h = 0)" in done.stderr
 
 
 def test_a_drive_of_robot_yaml_that_does_not_answer_is_1_and_its_node_is_named(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from importlib.resources import files
 
 import pytest
 
@@ -36,7 +37,7 @@ def test_refusals_name_the_abort_code_in_words_and_what_to_try(config: str) -> N
     assert "0602 0000h the object does not exist; the drive has no such object" in done.stderr
     done = canbase("sdo", "read", "9", "1000", "-c", config, "--sdo-timeout", "0.05")
     assert done.returncode == 1
-    assert "canbase scan shows who answers" in done.stderr
+    assert "Nodes that answer SDO: 1, 2." in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -55,3 +56,30 @@ def test_write_is_refused_while_the_motor_has_power(config: str) -> None:
     assert done.returncode == 1
     assert "6041h:0 reports that a motor has power" in done.stderr
     assert canbase("sdo", "write", "2", "6040", "0", "-c", config, "--force").returncode == 0
+
+
+EDS = str(files("canbase_config").joinpath("eds/canbase_cia402.eds"))
+
+
+def test_objects_have_their_names_from_the_eds_and_a_miss_proposes_the_nearest(config: str) -> None:
+    by_name = canbase("sdo", "read", "1", "axis 0 Profile-Acceleration", "-c", config, "--eds", EDS)
+    assert (by_name.returncode, by_name.stderr) == (0, "")
+    assert by_name.stdout.startswith("node 1, 6083h:0 Axis 0 profile acceleration: 0x")
+    assert by_name.stdout.endswith(" [rw, 1 to 4294967295]\n")
+    assert "1018h:2 Product code: 0x000CB402" in canbase("sdo", "read", "1", "Identity:2", "-c", config).stdout
+    miss = canbase("sdo", "read", "1", "profile accelleration", "-c", config, "--eds", EDS)
+    assert miss.returncode == 2
+    assert "Axis 0 profile acceleration (6083h:0)" in " ".join(miss.stderr.replace("│", " ").split())
+
+
+def test_what_the_eds_denies_is_not_sent(config: str) -> None:
+    for words, why in (
+        (("6041", "0"), "it is read-only by the EDS"),
+        (("605A", "9"), "9 is outside the range of the EDS, 0 to 8"),
+    ):
+        refused = canbase("sdo", "write", "1", *words, "-c", config, "--eds", EDS, "--force")
+        assert refused.returncode == 2
+        assert f"{why}. Nothing was sent" in refused.stderr
+    sent = canbase("sdo", "write", "1", "605A", "9", "-c", config, "--eds", EDS, "--ignore-eds")
+    assert sent.returncode == 1
+    assert "0609 0031h value too high" in sent.stderr  # the drive's own answer

@@ -10,7 +10,6 @@ from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
 
-import can
 import canopen
 import pytest
 from canopen import SdoAbortedError
@@ -19,6 +18,7 @@ from canopen.emcy import EmcyError
 from canbase_sim.control import SimControl
 from canbase_sim.control_server import ControlServer
 from canbase_sim.loop import Loop
+from canbase_sim.rated_bus import RatedBus
 from canbase_sim.world.bench import Bench
 from canbase_sim.world.trace import Trace
 from support.sim_rig import MPS, robot
@@ -62,11 +62,12 @@ class Master:
 def simulator(channel: str, control: Path) -> Iterator[SimControl]:
     """Simulated drives in a thread on a virtual channel; a connection to their control socket."""
     stop = threading.Event()
-    with can.Bus(interface="virtual", channel=channel) as bus:
-        bench = Bench(robot(), time.monotonic())
+    of = robot()
+    with closing(RatedBus(of.bus.model_copy(update={"channel": channel}))) as bus:
+        bench = Bench(of, time.monotonic())
         trace = Trace(bench, time.monotonic())
         with closing(ControlServer(control, bench, trace)) as server:
-            thread = threading.Thread(target=Loop(bus, bench, trace, server).run, args=(stop.is_set,))
+            thread = threading.Thread(target=Loop(bus, of.bus.bitrate, bench, trace, server).run, args=(stop.is_set,))
             thread.start()
             try:
                 with closing(SimControl(control)) as client:

@@ -282,3 +282,39 @@ def test_a_path_that_cannot_be_made_says_so(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(LeaseSocketError, match=r"Check lease\.socket"):
         LeaseSocket(str(tmp_path / "file" / "lease"), 0)
+
+
+class NoRemoteFrames(can.BusABC):
+    """An adapter that has data frames alone."""
+
+    def __init__(self, channel: object = None) -> None:
+        super().__init__(channel="none")
+        self.sent: list[can.Message] = []
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        if msg.is_remote_frame:
+            raise NotImplementedError("this adapter sends no remote frames")
+        self.sent.append(msg)
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        time.sleep(timeout or 0.0)
+        return None, False
+
+
+def test_an_adapter_without_remote_frames_is_reported_once_and_is_no_failed_bus(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    adapter = NoRemoteFrames()
+    monkeypatch.setattr("can.Bus", lambda **arguments: adapter)
+    plain = config()
+    guarded = replace(plain, drives=tuple(replace(drive, guarded=True) for drive in plain.drives))
+    with BusPort({}) as bus, LeaseSocket(str(tmp_path / "lease"), 0) as leases, caplog.at_level(logging.ERROR):
+        turns = iter(range(200))
+        Loop(Watchdog(guarded, time.monotonic()), bus, leases).run(lambda: next(turns, None) is None)
+        assert bus.health.failed_since == math.inf
+        assert bus.health.send_errors > 2
+    told = [record.getMessage() for record in caplog.records if "remote frames" in record.getMessage()]
+    assert len(told) == 1
+    assert "self_stop.node_guarding: false" in told[0]
+    assert "this adapter sends no remote frames" in told[0]
+    assert adapter.sent

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from canbase_watchdog.frames import Frame
+from support.ros_harness import clear_records
 from support.watchdog_story import config
 from support.watched_process import Watched, watched_process
 from unit.runtime.test_output import full_pipe
@@ -145,11 +146,17 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
 
 
-def test_a_bus_that_cannot_be_opened(tmp_path: Path) -> None:
+def test_a_bus_that_cannot_be_opened_is_waited_for_until_the_end(tmp_path: Path) -> None:
     bad = replace(config(), bus_arguments={"interface": "nonsense"}, lease_socket=str(tmp_path / "lease"))
-    done = run("--config-json", bad.to_json())
-    assert (done.returncode, "Check `bus` in robot.yaml" in done.stderr) == (1, True)
-    assert "Traceback" not in done.stderr
+    command = [sys.executable, "-m", "canbase_watchdog", "--config-json", bad.to_json()]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=os.environ | clear_records(tmp_path))
+    assert process.stderr is not None
+    line = process.stderr.readline()
+    process.send_signal(signal.SIGTERM)
+    _, rest = process.communicate(timeout=20.0)
+    assert "Check `bus` in robot.yaml" in line
+    assert "Trying again every 1 s; meanwhile no drive gets power" in line
+    assert (process.returncode, "ended by SIGTERM" in rest, "Traceback" in rest) == (0, True, False)
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"drives": []}', '{"drives": [1]}'])

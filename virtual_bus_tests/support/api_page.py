@@ -12,7 +12,8 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 PAGE = Path(__file__).parents[2] / "docs" / "ros_api.md"
-TRIGGER = "std_srvs/srv/Trigger"
+SERVICES = {"std_srvs/srv/Trigger", "action_msgs/srv/CancelGoal"}
+"""The types of canbase's own services; those of ROS and the hidden ones of actions are not on the page."""
 QOS = ("reliable", "best effort", "latched")
 OF_EVERY_NODE = ("/rosout", "/parameter_events")
 OPTIONAL = {"/tf", "/tf_static", "/battery_state"}
@@ -45,9 +46,14 @@ def _row(way: str, names: str, kind: str, qos: str) -> Iterator[Endpoint]:
 
 
 def present(observer: Node, node: str) -> set[Endpoint]:
-    """The topics, Trigger services and actions of that node in the root namespace, as the graph shows them."""
+    """The topics, services and actions of that node in the root namespace, as the graph shows them."""
     services = observer.get_service_names_and_types_by_node(node, "/")
-    found = {Endpoint("service", name, TRIGGER, frozenset()) for name, types in services if TRIGGER in types}
+    found = {
+        Endpoint("service", name, kind, frozenset())
+        for name, types in services
+        for kind in SERVICES.intersection(types)
+        if "/_action/" not in name
+    }
     for name, types in get_action_server_names_and_types_by_node(observer, node, "/"):
         found |= {Endpoint("action", name, kind, frozenset()) for kind in types}
     for way, topics, of_topic in (

@@ -41,9 +41,9 @@ def write_robot(folder: Path, port: int, name: str = "robot.yaml", **drives: Any
 
 
 @contextmanager
-def drives(config: Path) -> Iterator[SimControl]:
+def drives(config: Path, *options: str) -> Iterator[SimControl]:
     """`canbase sim` as a process, and its control socket."""
-    argv = [sys.executable, "-m", "canbase_sim", str(config)]
+    argv = [sys.executable, "-m", "canbase_sim", str(config), *options]
     process = subprocess.Popen(argv, stderr=subprocess.DEVNULL, env=ENVIRONMENT)
     try:
         with _connect(config.parent / "sim.sock") as control:

@@ -232,6 +232,16 @@ class World:
         """A frame on the bus that none of them sent."""
         self._send([Frame(cob_id, bytes.fromhex(data))])
 
+    @property
+    def is_guarded(self) -> bool:
+        """Its drives report their NMT state on request of a watchdog alone."""
+        return self.robot.drives[0].kind.self_stop.node_guarding
+
+    def guard(self) -> None:
+        """A node guarding request to each guarded drive, as the watchdog sends them."""
+        guarded = {drive.node_id for drive in self.robot.drives if drive.kind.self_stop.node_guarding}
+        self._send([Frame(0x700 + node_id, remote=True) for node_id in sorted(guarded)])
+
     def _step(self) -> None:
         if self.now_s >= self._next_command - STEP_S / 2:
             self._next_command += COMMAND_PERIOD_S
@@ -240,7 +250,7 @@ class World:
             self._next_cycle += 1.0 / self.robot.rates.control_hz
             self._cycle(self.driver)
         if self.watchdog is not None:
-            self._send([Frame(frame.cob_id, frame.data) for frame in self.watchdog.tick(self.now_s)])
+            self._send([Frame(each.cob_id, each.data, each.remote) for each in self.watchdog.tick(self.now_s)])
             if self._keeps:
                 self.watchdog.on_record(*self.watchdog_disk.write(self.watchdog.record))
         self._send([Frame(frame.cob_id, frame.data) for frame in self.bench.tick(self.now_s)])
@@ -269,11 +279,11 @@ class World:
         while waiting:
             frame = waiting.pop(0)
             self.log.append((self.now_s, frame))
-            if self.driver is not None and self.cable:
+            if self.driver is not None and self.cable and not frame.remote:
                 waiting += self.driver.on_frame(frame, self.now_s)
-            if self.watchdog is not None:
+            if self.watchdog is not None and not frame.remote:
                 self.watchdog.on_frame(frame.cob_id, frame.data, self.now_s)
-            self.bench.on_frame(BenchFrame(frame.cob_id, frame.data), self.now_s)
+            self.bench.on_frame(BenchFrame(frame.cob_id, frame.data, remote=frame.remote), self.now_s)
             waiting += [Frame(each.cob_id, each.data) for each in self.bench.tick(self.now_s)]
 
 

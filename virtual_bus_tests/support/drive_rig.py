@@ -73,23 +73,23 @@ class Surroundings(threading.Thread):
                 self._turn(received, time.monotonic())
 
     def _turn(self, received: can.Message | None, now_s: float) -> None:
-        if received is not None and not received.is_extended_id:
+        if received is not None and not received.is_extended_id and not received.is_remote_frame:
             data = bytes(received.data)
             self.heard.append((now_s, received.arbitration_id, data))
             self._to_drives(received.arbitration_id, data, now_s)
             self._watchdog.on_frame(received.arbitration_id, data, now_s)
         self._lease(now_s)
         for frame in self._watchdog.tick(now_s):
-            self._say(frame.cob_id, frame.data)
-            self._to_drives(frame.cob_id, frame.data, now_s)
+            self._say(frame.cob_id, frame.data, remote=frame.remote)
+            self._to_drives(frame.cob_id, frame.data, now_s, remote=frame.remote)
         for answer in self._bench.tick(now_s) if self._bench else ():
-            self._say(answer.cob_id, answer.data, answer.extended)
+            self._say(answer.cob_id, answer.data, extended=answer.extended)
             if not answer.extended:
                 self._watchdog.on_frame(answer.cob_id, answer.data, now_s)
 
-    def _to_drives(self, cob_id: int, data: bytes, now_s: float) -> None:
+    def _to_drives(self, cob_id: int, data: bytes, now_s: float, *, remote: bool = False) -> None:
         if self._bench is not None:
-            self._bench.on_frame(BenchFrame(cob_id, data), now_s)
+            self._bench.on_frame(BenchFrame(cob_id, data, remote=remote), now_s)
 
     def _lease(self, now_s: float) -> None:
         self._leases += 1
@@ -97,8 +97,8 @@ class Surroundings(threading.Thread):
         datagram = lease_datagram(self._leases, round(now_s * 1e9), ordered, stops=False, estop=False)
         self._watchdog.on_lease(datagram, None, now_s)
 
-    def _say(self, cob_id: int, data: bytes, extended: bool = False) -> None:
-        self._bus.send(can.Message(arbitration_id=cob_id, data=data, is_extended_id=extended))
+    def _say(self, cob_id: int, data: bytes, *, extended: bool = False, remote: bool = False) -> None:
+        self._bus.send(can.Message(arbitration_id=cob_id, data=data, is_extended_id=extended, is_remote_frame=remote))
 
 
 class Driver:
@@ -112,6 +112,7 @@ class Driver:
         self.loop = ControlLoop(self.core, self.bus, robot.rates.control_hz, robot.rates.odometry_hz, self.ring)
         self.around = around
         self.forward = Twist2D(crew.speed_mps, 0.0)
+        self._guarded = {drive.joint for drive in robot.drives if drive.kind.self_stop.node_guarding}
         self.seen: DriverSnapshot | None = None
         self.stops: list[StopRecord] = []
         self.snapshots = 0
@@ -161,12 +162,15 @@ class Driver:
         """Wait, with zero commands, until every drive is booted and its encoder known.
 
         That is after the wheels rolled out, and after the watchdog has released them: a boot before it is tried again.
+        A guarded drive sends its feedback then, and its NMT state after the reset: until it, a tripped watchdog
+        withholds its requests.
         """
-        return self.order(
-            Twist2D.ZERO,
-            25.0,
-            lambda s: all(drive.nmt_state is NmtState.OPERATIONAL for drive in s.drives) and s.odometry.valid,
-        )
+
+        def heard(s: DriverSnapshot) -> bool:
+            states = [drive.nmt_state for drive in s.drives if drive.joint not in self._guarded]
+            return states == [NmtState.OPERATIONAL] * len(states) and s.odometry.valid
+
+        return self.order(Twist2D.ZERO, 25.0, heard)
 
     def reset(self, within_s: float = 0.0) -> None:
         """Reset, which must be done; a refusal within this time only means to try again."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from canbase_action_server.along_track import Pose
+from canbase_action_server.goal import Feedback
 from canbase_action_server.goal_queue import Cycle, GoalQueue
 from canbase_action_server.goal_request import DriveRequest, Request
 from canbase_action_server.inputs import Inputs, Odometry
@@ -52,6 +53,8 @@ class GoalQueueWorld:
         self.mps = self.radps = 0.0
         self.goals: dict[str, Told] = {}
         self.refusals: list[str] = []
+        self.feedback: dict[str, list[tuple[float, Feedback]]] = {}
+        """Of each goal, with its time."""
         self.change: Callable[[Inputs], Inputs] = lambda inputs: inputs
         self._owner: str | None = None
 
@@ -115,7 +118,10 @@ class GoalQueueWorld:
             self._owner = cycle.began
         if self._owner is None:
             assert cycle.twist in (None, STOP), "nobody owns the base, and it was ordered to move"
-        assert cycle.feedback is None or cycle.feedback[0] == self._owner
+        waiting = {key for key, goal in self.goals.items() if goal.began is None}
+        assert {key for key, _feedback in cycle.feedback} <= waiting | {self._owner}
+        for key, feedback in cycle.feedback:
+            self.feedback.setdefault(key, []).append((self.now_s, feedback))
         for end in cycle.ends:
             self.goals[end.key].ends.append(end.outcome)
             self.goals[end.key].ended = self.now_s

@@ -31,6 +31,7 @@ WRONG: dict[str, Situation] = {
     "booting": Situation(booting="waiting for node 1"),
     "drive silent": Situation(silent="node 1: no status"),
     "drive missing": Situation(missing="node 1 is missing"),
+    "stop unproven": Situation(unproven="left_wheel: no proof"),
     "watchdog tripped": Situation(watchdog=WatchdogView.TRIPPED, watchdog_detail="lease lost"),
     "watchdog missing": Situation(watchdog=WatchdogView.MISSING, watchdog_detail="not heard yet"),
     "resetting": Situation(resetting=True),

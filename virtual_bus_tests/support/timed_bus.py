@@ -65,7 +65,7 @@ class TimedBus:
         if self._is_due("cycle", 1.0 / self._robot.rates.control_hz):
             self._queue_up(self._driver.tick(self.now_s))
         if self._is_due("watchdog", WATCHDOG_PERIOD_S):
-            self._queue_up([Frame(frame.cob_id, frame.data) for frame in self._watchdog.tick(self.now_s)])
+            self._queue_up([Frame(each.cob_id, each.data, each.remote) for each in self._watchdog.tick(self.now_s)])
         self._queue_up([Frame(frame.cob_id, frame.data) for frame in self._bench.tick(self.now_s)])
 
     def _is_due(self, what: str, period_s: float) -> bool:
@@ -79,6 +79,7 @@ class TimedBus:
 
     def _deliver(self, frame: Frame) -> None:
         self.heard.append((self.now_s, frame))
-        self._queue_up(self._driver.on_frame(frame, self.now_s))
-        self._watchdog.on_frame(frame.cob_id, frame.data, self.now_s)
-        self._bench.on_frame(BenchFrame(frame.cob_id, frame.data), self.now_s)
+        if not frame.remote:
+            self._queue_up(self._driver.on_frame(frame, self.now_s))
+            self._watchdog.on_frame(frame.cob_id, frame.data, self.now_s)
+        self._bench.on_frame(BenchFrame(frame.cob_id, frame.data, remote=frame.remote), self.now_s)

@@ -31,7 +31,7 @@ class LiveRobot:
         self._going = True
         self.drives = (FakeDrive(1), FakeDrive(2))
         self.driver = self.filter = True
-        self.word, self.speed = 0x06, 0
+        self.word, self.speed, self.leased = 0x06, 0, 0
         self.last_lease = self.last_heartbeat = 0.0
         self.heard: list[tuple[float, Frame]] = []
         """What came on the bus from the watchdog, with the monotonic time of its arrival."""
@@ -47,7 +47,9 @@ class LiveRobot:
         self._bus.shutdown()
 
     def drive_at(self, bits: int, timeout_s: float = 5.0) -> None:
-        """Enable, and return when both wheels turn so fast."""
+        """Enable, and return when both wheels turn so fast. The filter orders first, then the driver obeys."""
+        ordered_s, self.leased = time.monotonic(), bits
+        self.wait_for(lambda: self.last_lease > ordered_s, timeout_s)
         self.word, self.speed = 0x0F, bits
         self.wait_for(lambda: all(abs(drive.speed[0] - bits) < 1 for drive in self.drives), timeout_s)
 
@@ -97,7 +99,7 @@ class LiveRobot:
             if frame.cob_id in TO_THE_DRIVES:
                 self._tell_drives(frame)
             if frame.cob_id == 0x1FE and frame.data[0] == TRIPPED:
-                self.word, self.speed = 0x00, 0
+                self.word, self.speed, self.leased = 0x00, 0, 0
 
     def _tell_drives(self, frame: Frame) -> None:
         for drive in self.drives:
@@ -115,7 +117,7 @@ class LiveRobot:
 
     def _lease(self, sequence: int, now_s: float) -> None:
         try:
-            self._socket.sendto(lease(sequence, now_s, self.speed / 1000), self._path)
+            self._socket.sendto(lease(sequence, now_s, self.leased / 1000), self._path)
         except (FileNotFoundError, ConnectionRefusedError, BlockingIOError):
             return
         self.last_lease = now_s

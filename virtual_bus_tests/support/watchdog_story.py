@@ -225,7 +225,8 @@ class Story:
 
     def put(self, frame: Frame) -> None:
         """A frame for all, and what it leads to."""
-        self.watchdog.on_frame(frame.cob_id, frame.data, self.t)
+        if not frame.remote:
+            self.watchdog.on_frame(frame.cob_id, frame.data, self.t)
         for drive in self.drives:
             for answer in drive.on_frame(frame):
                 self.watchdog.on_frame(answer.cob_id, answer.data, self.t)

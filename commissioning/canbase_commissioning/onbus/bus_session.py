@@ -70,6 +70,11 @@ class BusSession:
         """Frames that the bus did not take, since it was opened."""
         return self._port.report.send_errors
 
+    @property
+    def error_frames(self) -> int:
+        """Errors on the wire that the CAN controller has reported since it was opened."""
+        return self._port.report.error_frames
+
     def run(self, session: Session) -> None:
         """Until the session is done."""
         while not session.done:

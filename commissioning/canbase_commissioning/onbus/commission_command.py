@@ -14,7 +14,6 @@ from canbase_commissioning.calibration import CalibrationError
 from canbase_commissioning.edits import (
     Edit,
     commissioned_edits,
-    edited,
     floor_edits,
     identity_edits,
     wheel_edits,
@@ -26,12 +25,12 @@ from canbase_commissioning.onbus.bus_session import BusSession, open_line
 from canbase_commissioning.onbus.moving import refuse_beside_masters, run_script
 from canbase_commissioning.onbus.operator import Operator, Person, Stopped, stopping_signals
 from canbase_commissioning.onbus.remote_operator import RemoteOperator
+from canbase_commissioning.onbus.robot_file import write_edits
 from canbase_commissioning.powered_drives import PoweredDrives, RigError
 from canbase_commissioning.report import Results, markdown, verdict
 from canbase_commissioning.self_stop_test import Outcome, get_ready, prove
 from canbase_commissioning.wheel_direction import AGAIN, WheelFound, find_direction, measure_scale
 from canbase_config.errors import ConfigError
-from canbase_config.load import load_robot
 from canbase_config.robot import Robot
 from canbase_config.units import mps_per_bit
 from canbase_runtime.terminal import FAILED, fail, load_config
@@ -202,13 +201,7 @@ def _change(config: Path, edits: list[Edit], person: Person, *, dry_run: bool) -
         person.tell(Tell(f"{'would change' if dry_run else 'changed'} {edit}"))
     if not edits or dry_run:
         return
-    text = config.read_text(encoding="utf-8")
-    new = config.with_name(f".{config.name}.new.yaml")
     try:
-        new.write_text(edited(text, edits), encoding="utf-8")
-        load_robot(new)
-        config.with_name(f"{config.name}.before").write_text(text, encoding="utf-8")
-        new.replace(config)
+        write_edits(config, edits)
     except (OSError, ConfigError, KeyError) as error:
-        new.unlink(missing_ok=True)
         fail(f"{config} is left as it was; write the values above into it by hand: {error}", FAILED)

@@ -17,6 +17,7 @@ from canbase_commissioning.onbus.moving import refuse_beside_masters
 from canbase_commissioning.onbus.operator import Operator, Person
 from canbase_commissioning.onbus.remote_operator import RemoteOperator
 from canbase_commissioning.robot_draft import Draft, ask_about, robot_yaml
+from canbase_commissioning.scan_rows import twins_advice
 from canbase_commissioning.sdo_session import SdoSession
 from canbase_config.errors import ConfigError
 from canbase_config.load import load_robot, sample
@@ -40,7 +41,8 @@ def run(bus: Bus, output: Path, answers: Path | None, timeout_s: float, *, yes: 
         axes = _axes(line, timeout_s, person)
     if len(axes) < 2:
         fail(
-            "a base needs two motors; check power, cable, termination, bit rate, and that node ids differ",
+            "a base needs two motors; check power, cable, termination, bit rate, and that node ids differ. "
+            "For drives fresh from the box: canbase adopt",
             FAILED,
         )
     try:
@@ -56,6 +58,8 @@ def _axes(line: BusSession, timeout_s: float, person: Person) -> list[FoundAxis]
     node_ids = (node_id for node_id in range(1, MAX_NODE_ID + 1) if node_id not in OURS)
     roster = Identification(node_ids, heard, timeout_s, with_texts=False)
     line.run(roster)
+    if roster.twins:
+        fail(twins_advice(roster.twins), FAILED)
     for reason in roster.lost.values():
         person.tell(Tell(f"lost while it was read: {reason}", is_loud=True))
     profiles = {node_id: profile_of(card) for node_id, card in roster.cards.items()}

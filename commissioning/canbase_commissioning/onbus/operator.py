@@ -13,7 +13,7 @@ from typing import Final, Protocol
 
 import typer
 
-from canbase_commissioning.guide import Ask, CommissionError, Tell
+from canbase_commissioning.guide import Ask, CommissionError, Tell, confirm
 from canbase_config.errors import ConfigError
 from canbase_config.yaml_file import read_yaml
 from canbase_runtime.terminal import WRONG_INPUT, colour, fail
@@ -74,6 +74,21 @@ class Person(Protocol):
 
     def interrupts(self) -> bool:
         """Whether the person wants everything to stop. Raises CommissionError when nobody is there any more."""
+
+
+def answered(person: Person, question: Ask, turn: Callable[[], None]) -> object:
+    """What the answer means, by the question's `check`; asked again until it makes sense.
+
+    Raises CommissionError without a person, and where a confirmation is refused.
+    """
+    while True:
+        try:
+            text = person.ask(question, turn)
+            if question.confirms:
+                confirm(text)
+            return question.check(text)
+        except ValueError as error:
+            person.again(question, error)
 
 
 class Operator:

@@ -12,10 +12,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from canbase_commissioning.bus_monitor import OURS, ListenSession
+from canbase_commissioning.bus_monitor import OURS, Listener, ListenSession
 from canbase_commissioning.identification import Identification
 from canbase_commissioning.onbus.bus_session import BusSession, open_line
-from canbase_commissioning.scan_rows import ScanRow, missing, scan_rows
+from canbase_commissioning.scan_rows import ScanRow, missing, scan_rows, silent, twins_advice
 from canbase_config.robot import Bus, Robot
 from canbase_driver.cia301.nmt import MAX_NODE_ID
 from canbase_runtime.terminal import FAILED, colour, fail
@@ -36,16 +36,32 @@ def run(
         )
         if asks:
             line.run(roster)
-        rows = scan_rows(heard.nodes, roster.cards, robot)
+        rows = scan_rows(heard.nodes, roster.cards, robot, roster.twins)
         problem = _bus_problem(line, rows)
+        errors = line.error_frames
     _print(rows, as_json)
-    for reason in roster.lost.values():
-        typer.echo(f"lost while it was read: {reason}", err=True)
+    _explain(roster, heard, errors)
     absent = missing(rows)
+    if roster.twins:
+        fail(twins_advice(roster.twins), FAILED)
     if problem or len(absent) == len(rows):
-        fail(problem or "no node sends or answers; check power, cable, termination, bit rate", FAILED)
+        fail(
+            problem
+            or "no node sends or answers; check power, cable, termination, bit rate (canbase adopt searches it)",
+            FAILED,
+        )
     if absent:
         fail(f"node {', '.join(map(str, absent))} of robot.yaml is not on the bus: power, cable, node id?", FAILED)
+
+
+def _explain(roster: Identification, heard: Listener, errors: int) -> None:
+    for text in silent(heard.nodes, roster.cards):
+        typer.echo(text, err=True)
+    for reason in roster.lost.values():
+        typer.echo(f"lost while it was read: {reason}", err=True)
+    if errors:
+        advice = "two drives with one node id, cable, termination, or a drive with another bit rate (canbase adopt)"
+        typer.echo(f"{errors} errors on the wire meanwhile: {advice}?", err=True)
 
 
 def _may_ask(masters: list[str], yes: bool) -> bool:

@@ -11,6 +11,9 @@ from typing import Final, TypeVar
 import typer
 
 from canbase_commissioning.bus_monitor import Listener, ListenSession
+from canbase_commissioning.census import ALL, read
+from canbase_commissioning.conversation import Conversation
+from canbase_commissioning.identification import DUPLICATES
 from canbase_commissioning.object_dictionary import (
     ABORT_ADVICE,
     TYPES,
@@ -19,33 +22,40 @@ from canbase_commissioning.object_dictionary import (
     encode,
     known_object,
     meaning,
-    parse_address,
     show,
 )
+from canbase_commissioning.object_names import find_object, limits, why_not_read, why_not_write
 from canbase_commissioning.onbus.bus_session import BusSession, open_line
+from canbase_commissioning.scan_rows import twins_advice
 from canbase_commissioning.sdo_access import Refused, Written, read_object, status_places, write_object
 from canbase_commissioning.sdo_session import SdoSession
-from canbase_config.eds_file import EdsError, read_eds
+from canbase_config.eds_file import EdsError, EdsObject, read_eds
 from canbase_config.robot import Bus, Robot
 from canbase_driver.boot.steps import Steps
 from canbase_driver.cia301.sdo_client import SdoAborted, SdoClient, SdoTimeout
-from canbase_runtime.terminal import FAILED, colour, fail
+from canbase_runtime.terminal import FAILED, WRONG_INPUT, colour, fail
 
 T = TypeVar("T")
 LISTEN_S: Final = 0.4
 """Three heartbeats of canbase's driver: it is received if it is there."""
 ATTEMPTS: Final = 3
+SLOW_BITRATE: Final = 125_000
+"""For how close requests to all nodes follow each other [bit/s]: at a higher one there is more room."""
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """One object of one node, and what is known about it. `kind`: of objects.TYPES; empty: unknown."""
+    """One object of one node, and what is known about it. `kind`: of objects.TYPES; empty: unknown.
+
+    `entry`: what the maker's EDS has about it; None: nothing, or no EDS was given.
+    """
 
     node: int
     at: Address
     kind: str
     name: str
     robot: Robot | None
+    entry: EdsObject | None = None
 
     @classmethod
     def of(cls, node: int, at: str, kind: str | None, eds: Path | None, robot: Robot | None) -> Target:
@@ -55,32 +65,41 @@ class Target:
         drives = [drive for drive in robot.drives if drive.node_id == node] if robot else []
         ours = Path(str(files("canbase_config"))) / "eds" / "canbase_cia402.eds"
         try:
-            address = parse_address(at)
             eds_files = [read_eds(path) for path in (eds, ours) if path is not None]
+            address = find_object(at, eds_files[:1] if eds else eds_files)
         except (ValueError, EdsError) as error:
             raise typer.BadParameter(str(error)) from error
         known = known_object(address, eds_files, drives[0].kind if drives else None)
-        return cls(node, address, kind or known.type, known.name, robot)
+        entry = eds_files[0].objects.get((address.index, address.sub)) if eds else None
+        return cls(node, address, kind or known.type, known.name, robot, entry)
+
+    @property
+    def by_eds(self) -> str:
+        """Access and range of the maker's EDS, in brackets; empty: unknown."""
+        words = [] if self.entry is None else [word for word in (self.entry.access, limits(self.entry)) if word]
+        return f" [{', '.join(words)}]" if words else ""
 
     def __str__(self) -> str:
         return f"node {self.node}, {self.at}{f' {self.name}' if self.name else ''}"
 
 
-def run_read(bus: Bus, target: Target, timeout_s: float, *, raw: bool) -> None:
-    """Reads and prints; exits with 1 when there is nothing to print."""
+def run_read(bus: Bus, target: Target, timeout_s: float, *, raw: bool, ignore_eds: bool) -> None:
+    """Reads and prints; exits with 1 when there is nothing to print, 2 where the EDS denies it."""
+    _allowed_by_eds("" if ignore_eds else why_not_read(target.entry), target)
     with open_line(bus) as line:
         data = _transfer(line, target.node, read_object(target.at), _listen(line), timeout_s)
     if raw:
         typer.echo(decode(data, target.kind))
         return
     words = meaning(target.at, data)
-    typer.echo(f"{target}: {show(data, target.kind)}{f': {words}' if words else ''}")
+    typer.echo(f"{target}: {show(data, target.kind)}{f': {words}' if words else ''}{target.by_eds}")
 
 
-def run_write(bus: Bus, target: Target, value: str, timeout_s: float, *, force: bool) -> None:
+def run_write(bus: Bus, target: Target, value: str, timeout_s: float, *, force: bool, ignore_eds: bool) -> None:
     """Writes, reads back, and prints both; exits with 1 when it was not written, 2 for a value that does not fit."""
     if target.kind:
         _or_wrong_value(lambda: encode(value, target.kind))
+    _allowed_by_eds("" if ignore_eds else why_not_write(target.entry, value, target.kind), target)
     with open_line(bus) as line:
         heard = _listen(line)
         if heard.driver_lives and not force:
@@ -91,6 +110,11 @@ def run_write(bus: Bus, target: Target, value: str, timeout_s: float, *, force: 
     if isinstance(done, Refused):
         fail(f"not written: {done.why}", FAILED)
     _tell(target, done, value)
+
+
+def _allowed_by_eds(why: str, target: Target) -> None:
+    if why:
+        fail(f"{target}: {why}. Nothing was sent; --ignore-eds, if the EDS is wrong", WRONG_INPUT)
 
 
 def _tell(target: Target, done: Written, value: str) -> None:
@@ -115,14 +139,29 @@ def _transfer(line: BusSession, node: int, steps: Steps[T], heard: Listener, tim
     inquiry = SdoSession({node: steps}, heard, lambda node_id: SdoClient(node_id, timeout_s, ATTEMPTS))
     _or_wrong_value(lambda: line.run(inquiry))
     task = inquiry.tasks[node]
+    if task.duplicates >= DUPLICATES:
+        fail(twins_advice({node}), FAILED)
     if isinstance(task.error, SdoAborted):
         advice = ABORT_ADVICE.get(task.error.code, "")
         fail(f"{task.error}{f'; {advice}' if advice else ''}", FAILED)
     if isinstance(task.error, SdoTimeout):
-        fail(f"{task.error}. {line.problem or 'Power, cable, node id? canbase scan shows who answers'}", FAILED)
+        fail(f"{task.error}. {line.problem or _who_answers(line, node, heard)}", FAILED)
     if task.result is None:
         fail(f"another program uses the SDO channel of node {node} all the time (a driver that boots it?)", FAILED)
     return task.result
+
+
+def _who_answers(line: BusSession, node: int, heard: Listener) -> str:
+    """Why `node` may not answer: what it sends, and which others answer."""
+    listened = heard.nodes.get(node)
+    if listened is not None and not listened.sends_nothing:
+        return f"It sends frames ({listened.state_text}): in NMT state stopped a node answers no SDO"
+    question = Conversation(read(ALL, 0x1000, 0, SLOW_BITRATE, attempts=1))
+    line.run(question)
+    if question.result is None:
+        return "Power, cable, node id? canbase scan shows who answers"
+    nodes = ", ".join(map(str, question.result)) or "none"
+    return f"Nodes that answer SDO: {nodes}. Power, cable, node id, bit rate? canbase scan shows more"
 
 
 def _or_wrong_value(do: Callable[[], object]) -> None:

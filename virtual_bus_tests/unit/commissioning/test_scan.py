@@ -8,11 +8,13 @@ import pytest
 
 from canbase_commissioning.bus_monitor import Listener, ListenSession
 from canbase_commissioning.identification import Identification
-from canbase_commissioning.scan_rows import NOT_HERE, missing, scan_rows
+from canbase_commissioning.scan_rows import NOT_HERE, missing, scan_rows, silent, twins_advice
 from canbase_commissioning.session import Echo
 from canbase_config.profile_file import load_profile, profile_names
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import NmtState
+from canbase_sim.cia301.dictionary import key
+from canbase_sim.world.bench import BenchParameters
 from support.session_world import SessionWorld
 from support.sim_rig import robot
 
@@ -149,6 +151,41 @@ def test_a_drive_of_robot_yaml_that_is_not_there_has_a_row_too() -> None:
     assert [(row.node_id, row.in_robot) for row in rows] == [(1, "left"), (2, "right")]
     assert rows[1].what == NOT_HERE
     assert missing(rows) == [2]
+
+
+def test_two_drives_with_one_node_id_are_named_and_their_serial_numbers_are_not_read() -> None:
+    world = SessionWorld(parameters=BenchParameters(factory_fresh=True))
+    roster = scanned(world)
+    assert roster.twins == {1}
+    assert roster.cards[1].serial is None
+    assert [sent for _, sent in world.said if sent.data[:4] == bytes.fromhex("40181004")] == []
+    (row, missing_one) = scan_rows({}, roster.cards, world.robot, roster.twins)
+    assert row.what == "two drives or more: generic CiA 402 drive"
+    assert missing_one.what == NOT_HERE
+    assert twins_advice(roster.twins).startswith("node 1: two drives or more answer. canbase adopt")
+
+
+def test_drives_with_a_node_id_each_are_no_twins() -> None:
+    assert scanned(SessionWorld()).twins == frozenset()
+
+
+def test_a_drive_that_answers_and_sends_nothing_is_named_with_the_reason() -> None:
+    world = SessionWorld()
+    world.bench.nodes[2].dictionary.values[key(0x1017)] = 500
+    world.bench.nodes[2]._producer.due = lambda now_s: False  # type: ignore[method-assign]
+    roster = scanned(world)
+    texts = silent(roster._heard.nodes, roster.cards)
+    assert [text.partition(";")[0] for text in texts] == [f"node {n}: answers SDO and sends nothing" for n in (1, 2)]
+    assert "1017h = 0" in texts[0]
+    assert "its heartbeat is set to 500 ms and did not come" in texts[1]
+
+
+def test_a_drive_with_a_heartbeat_is_not_among_the_silent_ones() -> None:
+    world = SessionWorld()
+    world.bench.nodes[1].dictionary.set_data(0x1017, 0, (100).to_bytes(2, "little"))
+    listening = ListenSession(0.5)
+    world.run(listening)
+    assert [text[:6] for text in silent(listening.heard.nodes, scanned(world).cards)] == ["node 2"]
 
 
 def test_a_request_waits_until_the_other_master_is_quiet_on_that_channel() -> None:

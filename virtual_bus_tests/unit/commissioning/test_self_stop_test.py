@@ -9,7 +9,7 @@ import pytest
 
 from canbase_commissioning.guide import CommissionError, Script
 from canbase_commissioning.powered_drives import PoweredDrives, RigError
-from canbase_commissioning.self_stop_test import HEARTBEAT, SILENCE, Outcome, get_ready, prove, watches_heartbeat
+from canbase_commissioning.self_stop_test import HEARTBEAT, SILENCE, Outcome, get_ready, prove, watches_watchdog
 from canbase_driver.boot.settings import STOPS_BY_NOTHING, SelfStopSet, StopsBy
 from canbase_driver.cia301.frame import Frame
 from canbase_sim.cia402.states import POWERED
@@ -35,22 +35,24 @@ def assert_off(world: GuideWorld) -> None:
 
 BY_HEARTBEAT = ("elmo_gold", "epos4", "generic", "kinco", "nanotec")
 BY_THEIR_OWN_TIMEOUT = ("roboteq", "zlac8015d")
-NEVER = ("dryve_d1", "technosoft", "tmcm1636")
+BY_GUARDING = ("technosoft",)
+NEVER = ("dryve_d1", "tmcm1636")
 
 
 def test_every_kind_of_drive_is_in_one_of_the_lists() -> None:
-    assert sorted((*BY_HEARTBEAT, *BY_THEIR_OWN_TIMEOUT, *NEVER)) == sorted(PERSONALITIES)
+    assert sorted((*BY_HEARTBEAT, *BY_GUARDING, *BY_THEIR_OWN_TIMEOUT, *NEVER)) == sorted(PERSONALITIES)
 
 
-@pytest.mark.parametrize("kind", BY_HEARTBEAT)
-def test_a_drive_that_watches_the_heartbeat_stops_in_both_trials_within_it_and_its_ramp(kind: str) -> None:
-    """0.3 s of 1016h, minus what passed since the last heartbeat (0.1 s), plus 0.05 s of ramp."""
+@pytest.mark.parametrize("kind", [*BY_HEARTBEAT, *BY_GUARDING])
+def test_a_drive_that_watches_the_watchdog_stops_in_both_trials_within_it_and_its_ramp(kind: str) -> None:
+    """0.3 s of 1016h (0.24 s of 100Ch × 100Dh), minus what passed since the last frame (0.1 s, 0.06 s), and 0.05 s of
+    ramp."""
     world = GuideWorld(robot_with(kind))
     outcomes = world.guide(whole)
     assert [(o.trial, o.stopped, o.is_late) for o in outcomes] == [(SILENCE, True, False)] * 2 + [
         (HEARTBEAT, True, False)
     ] * 2
-    assert all(0.2 < outcome.time_s < 0.45 for outcome in outcomes)
+    assert all(0.18 < outcome.time_s < 0.45 for outcome in outcomes)
     assert all("EMCY 8130h" in outcome.sign for outcome in outcomes)
     assert_off(world)
 
@@ -68,6 +70,7 @@ def test_a_drive_with_a_timeout_of_its_own_stops_and_needs_no_heartbeat(kind: st
     ("stop", "watches"),
     [
         (SelfStopSet(StopsBy.WATCHDOG_HEARTBEAT, "1016h watches the watchdog"), True),
+        (SelfStopSet(StopsBy.NODE_GUARDING, "100Ch, 100Dh"), True),
         (SelfStopSet(StopsBy.OWN_TIMEOUT, "heartbeat timeout of the maker (2000h:1)"), False),
         (STOPS_BY_NOTHING, False),
     ],
@@ -75,7 +78,7 @@ def test_a_drive_with_a_timeout_of_its_own_stops_and_needs_no_heartbeat(kind: st
 def test_the_second_trial_goes_by_what_the_boot_set_and_not_by_its_words(stop: SelfStopSet, watches: bool) -> None:
     """A maker may call a command timeout of its own a heartbeat."""
     rig = SimpleNamespace(report=lambda _joint: SimpleNamespace(self_stop=stop))
-    assert watches_heartbeat(cast(PoweredDrives, rig), "left") is watches
+    assert watches_watchdog(cast(PoweredDrives, rig), "left") is watches
 
 
 @pytest.mark.parametrize("kind", NEVER)

@@ -143,6 +143,16 @@ def test_radius_and_track_of_the_real_base_are_found(radius_m: float, track_m: f
     assert corrected.base.wheel_radius_m == pytest.approx(radius_m, rel=0.005)
 
 
+@pytest.mark.parametrize(
+    ("tape_m", "changes"),
+    [(0.1021, []), (0.104, ["base.wheel_radius_m: 0.1 → 0.104", "odometry.radius_error: 0.001 → 0.005"])],
+)
+def test_a_calibrated_radius_stays_where_the_tape_agrees(tape_m: float, changes: list[str]) -> None:
+    before = robot(base={"wheel_radius_m": 0.1, "track_m": 0.5}, odometry={"radius_error": 0.001, "track_error": 0.002})
+    found = FloorFound(tape_m, 0.502, 1.0, 1.0, 360.0, 360.0)
+    assert [str(edit) for edit in floor_edits(before, found)] == changes
+
+
 def test_robot_yaml_keeps_every_comment_and_line_that_is_not_changed(tmp_path: Any) -> None:
     text = sample("example_can0").read_text(encoding="utf-8")
     before = load_robot(sample("example_can0")).robot

@@ -1,0 +1,25 @@
+"""Changes to robot.yaml on disk: the new file takes the place of the old one only when it is good."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from canbase_commissioning.edits import Edit, edited
+from canbase_config.load import load_robot
+
+
+def write_edits(config: Path, edits: Sequence[Edit]) -> None:
+    """Writes `config` with these values; the old file stays beside it as `….before`.
+
+    Raises OSError, ConfigError or KeyError, with `config` as it was.
+    """
+    text = config.read_text(encoding="utf-8")
+    new = config.with_name(f".{config.name}.new.yaml")
+    try:
+        new.write_text(edited(text, edits), encoding="utf-8")
+        load_robot(new)
+        config.with_name(f"{config.name}.before").write_text(text, encoding="utf-8")
+        new.replace(config)
+    finally:
+        new.unlink(missing_ok=True)
