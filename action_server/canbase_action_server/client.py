@@ -1,7 +1,7 @@
-"""A client of drive_distance for applications. Its outcomes and errors: `goal_client.py`.
+"""A client of drive_distance for applications. Its outcomes: `goal_client.py`; its errors: `goal_errors.py`.
 
 drive = DriveClient(node).send(1.0, 0.2)      # raises NoServerError, NoResponseError, RejectedError
-result = drive.wait()                         # read result.status first
+result = drive.wait()                         # read result.status first; raises ServerLostError, FeedbackLostError
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from canbase.action import DriveDistance
 from rclpy.executors import Executor
 from rclpy.node import Node
 
-from canbase_action_server.goal_client import (
+from canbase_action_server.feedback_watch import FEEDBACK_TIMEOUT_S
+from canbase_action_server.goal_client import GoalClient, SentGoal, never
+from canbase_action_server.goal_errors import (
     DriveError,
-    GoalClient,
+    FeedbackLostError,
     InterruptedDriveError,
     NoResponseError,
     NoServerError,
     RejectedError,
-    SentGoal,
     ServerLostError,
-    never,
 )
 from canbase_action_server.outcome import ErrorCode, Status
 
@@ -33,6 +33,7 @@ __all__ = [
     "DriveError",
     "DriveFeedback",
     "DriveResult",
+    "FeedbackLostError",
     "InterruptedDriveError",
     "NoResponseError",
     "NoServerError",
@@ -67,8 +68,14 @@ Drive = SentGoal[DriveResult]
 class DriveClient(GoalClient[DriveResult, DriveFeedback]):
     """Sends goals from `node`. Nothing else may spin it while a method here waits, unless `executor` is its own."""
 
-    def __init__(self, node: Node, executor: Executor | None = None, action: str = "drive_distance") -> None:
-        super().__init__(node, DriveDistance, action, executor, _feedback, _result)
+    def __init__(
+        self,
+        node: Node,
+        executor: Executor | None = None,
+        action: str = "drive_distance",
+        feedback_timeout_s: float = FEEDBACK_TIMEOUT_S,
+    ) -> None:
+        super().__init__(node, DriveDistance, action, executor, _feedback, _result, feedback_timeout_s)
 
     def send(
         self,

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from canbase.action import Fibonacci
 from rclpy.executors import Executor
 from rclpy.node import Node
 
-from canbase_action_server.goal_client import GoalClient, SentGoal
+from canbase_action_server.goal_client import GoalClient, SentGoal, never
 from canbase_action_server.outcome import Status
+
+FEEDBACK_TIMEOUT_S: Final = 30.0
+"""Three times the longest period of the server."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,8 +28,10 @@ class Numbers:
 class FibonacciClient(GoalClient[Numbers, "tuple[int, ...]"]):
     """Sends goals from `node`. Nothing else may spin it while a method here waits, unless `executor` is its own."""
 
-    def __init__(self, node: Node, executor: Executor | None = None) -> None:
-        super().__init__(node, Fibonacci, "fibonacci", executor, _feedback, _result)
+    def __init__(
+        self, node: Node, executor: Executor | None = None, feedback_timeout_s: float = FEEDBACK_TIMEOUT_S
+    ) -> None:
+        super().__init__(node, Fibonacci, "fibonacci", executor, _feedback, _result, feedback_timeout_s)
 
     def send(
         self,
@@ -34,9 +39,10 @@ class FibonacciClient(GoalClient[Numbers, "tuple[int, ...]"]):
         *,
         on_feedback: Callable[[tuple[int, ...]], None] | None = None,
         discovery_timeout_s: float = 5.0,
+        interrupted: Callable[[], bool] = never,
     ) -> SentGoal[Numbers]:
         """Find the server, send the goal once, wait for its acceptance. Raises the subclasses of DriveError."""
-        return self.send_goal(Fibonacci.Goal(order=order), on_feedback, discovery_timeout_s)
+        return self.send_goal(Fibonacci.Goal(order=order), on_feedback, discovery_timeout_s, interrupted=interrupted)
 
 
 def _feedback(message: Any) -> tuple[int, ...]:

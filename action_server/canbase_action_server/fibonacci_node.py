@@ -17,6 +17,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
 
+from canbase_action_server.action_name import action_name
 from canbase_action_server.fibonacci import next_number, refusal
 from canbase_action_server.goal_client import REJECTION_QOS
 from canbase_action_server.open_goal import rejection
@@ -28,11 +29,12 @@ class FibonacciServer(Node):
     def __init__(self, period_s: float) -> None:
         super().__init__("fibonacci_action_server")
         self._period_s = period_s
-        self._rejections = self.create_publisher(DiagnosticStatus, "fibonacci/rejection", REJECTION_QOS)
+        name = action_name("fibonacci", self.resolve_topic_name, self.resolve_service_name)
+        self._rejections = self.create_publisher(DiagnosticStatus, f"{name}/rejection", REJECTION_QOS)
         self._server = ActionServer(
             self,
             Fibonacci,
-            "fibonacci",
+            name,
             execute_callback=self._execute,
             goal_callback=self._on_goal,
             cancel_callback=self._on_cancel,

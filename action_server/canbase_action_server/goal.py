@@ -174,10 +174,7 @@ class GoalRun:
     def _outcome(self, verdict: Verdict) -> Outcome:
         motion, cause = self._motion, self._cause
         if verdict is Verdict.STILL_MOVES and cause.code.leaves_the_base_standing:
-            cause = EndCause(
-                ErrorCode.DRIVE_FAULT,
-                "ordered to stop, but standstill is not confirmed in time; use the emergency stop",
-            )
+            cause = EndCause(ErrorCode.DRIVE_FAULT, self._unconfirmed())
         elif cause.code is ErrorCode.OK and motion.overshoot_m > self._robot.action.tolerance_m:
             cause = EndCause(ErrorCode.OVERSHOOT, "the base rolled past the goal: too fast for its load or the slope")
         elif verdict is not Verdict.STANDS:
@@ -185,6 +182,11 @@ class GoalRun:
         went = motion.report()
         text = f"{cause.message}; {went}" if cause.message else f"{went}; at standstill"
         return Outcome(cause.code, motion.traveled_m, max(0.0, motion.overshoot_m), text, verdict is Verdict.STANDS)
+
+    def _unconfirmed(self) -> str:
+        odometry, limit_mps = self._last_odometry, self._robot.base.standstill_mps
+        shown = f"{odometry.linear_mps:.3f} m/s, {odometry.angular_radps:.3f} rad/s (base.standstill_mps {limit_mps:g})"
+        return f"ordered to stop, but standstill is not confirmed in time: odom has {shown}; use the emergency stop"
 
     def _feedback(self, now_s: float) -> Feedback | None:
         if now_s < self._next_feedback:

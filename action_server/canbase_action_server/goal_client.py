@@ -19,6 +19,16 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from unique_identifier_msgs.msg import UUID
 
+from canbase_action_server.action_name import action_name
+from canbase_action_server.feedback_watch import FEEDBACK_TIMEOUT_S, FeedbackWatch
+from canbase_action_server.goal_errors import (
+    FeedbackLostError,
+    InterruptedDriveError,
+    NoResponseError,
+    NoServerError,
+    RejectedError,
+    ServerLostError,
+)
 from canbase_action_server.open_goal import exact
 from canbase_action_server.outcome import Status
 from canbase_action_server.rejection import Reasons
@@ -43,36 +53,6 @@ ResultT = TypeVar("ResultT")
 FeedbackT = TypeVar("FeedbackT")
 
 
-class DriveError(Exception):
-    """A goal did not come to a result. The subclass gives the step that it reached."""
-
-
-class NoServerError(DriveError):
-    """No action server was found in time; nothing was sent."""
-
-
-class NoResponseError(DriveError):
-    """The server did not answer in time. The goal is canceled if the server accepts it after all."""
-
-
-class RejectedError(DriveError):
-    """The server rejects the goal. `reason`: its sentence; None when none was received: then its log has it."""
-
-    def __init__(self, action: str, reason: str | None) -> None:
-        super().__init__(
-            f"{action} rejects the goal{f': {reason}' if reason else '; the reason is in the log of its server'}"
-        )
-        self.reason = reason
-
-
-class ServerLostError(DriveError):
-    """The server went away during the goal. The result is unknown: do not send the goal again blindly."""
-
-
-class InterruptedDriveError(DriveError):
-    """`interrupted` became true before the goal was accepted. It was canceled if the server accepted it after all."""
-
-
 def never() -> bool:
     """Nothing interrupts."""
     return False
@@ -89,9 +69,11 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         executor: Executor | None,
         read_feedback: Callable[[Any], FeedbackT],
         read_result: Callable[[Status, Any], ResultT],
+        feedback_timeout_s: float = FEEDBACK_TIMEOUT_S,
     ) -> None:
-        # ROS 2 Jazzy remaps topics and services, and no action (ros2/ros2, 1312): the name is resolved here.
-        name = node.resolve_topic_name(action)
+        """`feedback_timeout_s`: as `FeedbackWatch` takes it."""
+        FeedbackWatch(feedback_timeout_s)  # ValueError now, and not when a goal is sent
+        name = action_name(action, node.resolve_topic_name, node.resolve_service_name)
         self._reasons = Reasons()
         # Before the client, so that a server that can receive a goal has found this subscription as well.
         self._rejections = node.create_subscription(
@@ -109,6 +91,7 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         if executor is None:
             self._executor.add_node(node)
             node.context.on_shutdown(self._end)
+        self._feedback_timeout_s = feedback_timeout_s
         self._read_feedback = read_feedback
         self.read_result = read_result
         self.action = action
@@ -161,8 +144,8 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         if interrupted():
             raise InterruptedDriveError("interrupted; nothing was sent")
         self._reasons.expect(exact(goal))
-        uuid = UUID(uuid=list(uuid4().bytes))
-        response = self._client.send_goal_async(goal, self._feedback_to(on_feedback), uuid)
+        uuid, watch = UUID(uuid=list(uuid4().bytes)), FeedbackWatch(self._feedback_timeout_s)
+        response = self._client.send_goal_async(goal, self._feedback_to(watch, on_feedback), uuid)
         self.spin_until(lambda: response.done() or interrupted(), response_timeout_s)
         if not response.done():
             self._give_up(uuid, response)
@@ -174,7 +157,7 @@ class GoalClient(Generic[ResultT, FeedbackT]):
             self.spin_until(lambda: self._reasons.found is not None or interrupted(), REASON_S)
             reason = self._reasons.found
             raise RejectedError(self.action, None if reason is None else printable(reason, SENTENCE_LENGTH))
-        return SentGoal(self, handle, self._watch(handle))
+        return SentGoal(self, handle, self._result_of(handle), watch)
 
     def _on_rejection(self, rejection: DiagnosticStatus) -> None:
         self._reasons.take([(each.key, each.value) for each in rejection.values], rejection.message)
@@ -191,7 +174,7 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         ClientGoalHandle(self._client, uuid, None).cancel_goal_async()
         response.add_done_callback(_cancel_late)
 
-    def _watch(self, handle: ClientGoalHandle) -> Any:
+    def _result_of(self, handle: ClientGoalHandle) -> Any:
         """The future result. Until it is done, this client publishes its lease."""
         result = handle.get_result_async()
         self._alive.append(handle.goal_id)
@@ -203,11 +186,15 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         for goal_id in self._alive:
             self._keepalive.publish(goal_id)
 
-    def _feedback_to(self, on_feedback: Callable[[FeedbackT], None] | None) -> Callable[[Any], None] | None:
-        if on_feedback is None:
-            return None
-        told = on_feedback
-        return lambda message: told(self._read_feedback(message.feedback))
+    def _feedback_to(
+        self, watch: FeedbackWatch, on_feedback: Callable[[FeedbackT], None] | None
+    ) -> Callable[[Any], None]:
+        def heard(message: Any) -> None:
+            watch.heard(time.monotonic())
+            if on_feedback is not None:
+                on_feedback(self._read_feedback(message.feedback))
+
+        return heard
 
 
 def _cancel_late(response: Any) -> None:
@@ -220,10 +207,15 @@ def _cancel_late(response: Any) -> None:
 class SentGoal(Generic[ResultT]):
     """One accepted goal."""
 
-    def __init__(self, client: GoalClient[ResultT, Any], handle: ClientGoalHandle, result: Any) -> None:
+    def __init__(
+        self, client: GoalClient[ResultT, Any], handle: ClientGoalHandle, result: Any, watch: FeedbackWatch
+    ) -> None:
         self._client = client
         self._handle = handle
         self._result = result
+        self._watch: FeedbackWatch | None = watch
+        self._cancel: Any = None
+        """The future answer to the last cancel."""
         self._seen = time.monotonic()
 
     @property
@@ -244,12 +236,15 @@ class SentGoal(Generic[ResultT]):
     def wait(self, timeout_s: float | None = None, until: Callable[[], bool] = never) -> ResultT | None:
         """The result; None when timeout_s [s] is over or `until()` before it came: the goal still runs then.
 
-        ServerLostError when the server goes away.
+        ServerLostError when the server goes away. FeedbackLostError, once for a goal, when feedback is missing: the
+        goal was canceled then, and `wait` may be called again for its end.
         """
         self._seen = time.monotonic()
-        self._client.spin_until(lambda: self._result.done() or until() or self._server_lost(), timeout_s)
-        if not self._result.done() and self._server_lost():
-            raise ServerLostError("the action server has ended; the result is unknown. Check the base first")
+        self._client.spin_until(
+            lambda: self._result.done() or until() or self._server_lost() or self._feedback_lost(), timeout_s
+        )
+        if not self._result.done():
+            self._raise_lost()
         return self.result
 
     def cancel(self, timeout_s: float = 5.0) -> bool:
@@ -257,10 +252,30 @@ class SentGoal(Generic[ResultT]):
 
         NoResponseError when the server does not answer within timeout_s [s].
         """
-        response = self._handle.cancel_goal_async()
-        if not self._client.spin_until(response.done, timeout_s):
+        self._request_cancel()
+        if not self._client.spin_until(self._cancel.done, timeout_s):
             raise NoResponseError(f"no answer to the cancel within {timeout_s} s; the base may still move")
-        return bool(response.result().goals_canceling)
+        return bool(self._cancel.result().goals_canceling)
+
+    def _request_cancel(self) -> None:
+        """Sends one, unless one is under way or was accepted: a goal that is CANCELING accepts no second one."""
+        pending = self._cancel is not None and not self._cancel.done()
+        if not pending and not (self._cancel is not None and self._cancel.result().goals_canceling):
+            self._cancel = self._handle.cancel_goal_async()
+
+    def _raise_lost(self) -> None:
+        if self._server_lost():
+            raise ServerLostError("the action server has ended; the result is unknown. Check the base first")
+        if self._watch is not None and self._feedback_lost():
+            timeout_s, self._watch = self._watch.timeout_s, None
+            self._request_cancel()
+            raise FeedbackLostError(
+                f"no feedback from {self._client.action} for {timeout_s:g} s: its server hangs, has ended or cannot be "
+                "reached; its cancel was sent"
+            )
+
+    def _feedback_lost(self) -> bool:
+        return self._watch is not None and self._watch.missing(time.monotonic())
 
     def _server_lost(self) -> bool:
         now_s = time.monotonic()

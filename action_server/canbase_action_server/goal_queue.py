@@ -15,6 +15,7 @@ Rules.
    last commands of Nav2's controller are still fresh then. It does not wait for anything else that speaks against it.
 8. A goal with `terms.reports_invalid` and invalid numbers is admitted at any time, ends at once with INVALID_GOAL, and
    preempts nobody.
+9. A goal that waits reports feedback too, at `WAITING_FEEDBACK_HZ`: so a client without feedback has no living server.
 """
 
 from __future__ import annotations
@@ -23,14 +24,20 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 from canbase_action_server.active_goal import ActiveGoal
+from canbase_action_server.along_track import Pose
 from canbase_action_server.causes import CLIENT_SILENT, EndCause
 from canbase_action_server.goal import Feedback, GoalPhase, Order
 from canbase_action_server.goal_request import Request
-from canbase_action_server.inputs import Inputs
+from canbase_action_server.inputs import Inputs, Odometry
 from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.outcome import ErrorCode, Outcome
 from canbase_action_server.preconditions import commanding_program, is_moving, state_reason
 from canbase_config.robot import Robot
+
+WAITING_FEEDBACK_HZ = 1.0
+"""Like the slowest `action.feedback_hz`; a hundred goals may wait."""
+NOWHERE = Odometry(0.0, Pose(0.0, 0.0, 0.0), 0.0, 0.0)
+"""The length of a goal does not depend on where it begins."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +56,8 @@ class Cycle:
     """The order for the base; None: nothing is ordered, the source publishes nothing."""
     began: str | None = None
     """Key of the goal that owns the base from now on."""
-    feedback: tuple[str, Feedback] | None = None
+    feedback: tuple[tuple[str, Feedback], ...] = ()
+    """With the key of its goal."""
     ends: tuple[End, ...] = ()
 
 
@@ -68,6 +76,8 @@ class Admitted:
     preempted: bool = False
     invalid: str | None = None
     """Why its numbers are invalid; None: they are good."""
+    next_feedback: float = 0.0
+    """When it next reports that it waits."""
 
 
 class GoalQueue:
@@ -135,17 +145,18 @@ class GoalQueue:
         """One control cycle."""
         ends = self._drop(inputs, now_s)
         began = self._begin(inputs, now_s)
+        waiting = self._waiting_feedback(now_s)
         running = self._running
         if running is not None:
             lost = self._client_lost(running, now_s)
             inputs = replace(inputs, cancel_requested=running.canceled, preempted=running.preempted, client_lost=lost)
         order = self._owner.tick(inputs, now_s)
         if order is None:
-            return Cycle(began=began, ends=ends)
+            return Cycle(began=began, feedback=waiting, ends=ends)
         if running is None:
-            return Cycle(order.twist, began, ends=ends)
-        feedback = (running.key, order.feedback) if order.feedback else None
-        return Cycle(order.twist, began, feedback, ends + self._ended(order))
+            return Cycle(order.twist, began, waiting, ends)
+        feedback = ((running.key, order.feedback),) if order.feedback else ()
+        return Cycle(order.twist, began, feedback + waiting, ends + self._ended(order))
 
     def fail(self, error: Exception, now_s: float) -> None:
         """Something in the server broke: the running goal only stops, all end with INTERNAL."""
@@ -208,6 +219,16 @@ class GoalQueue:
         if not held or now_s - goal.admitted >= goal.request.terms.release_s:
             return False
         return state_reason(self._robot, inputs, now_s, waits_for_program=True) is None
+
+    def _waiting_feedback(self, now_s: float) -> tuple[tuple[str, Feedback], ...]:
+        """Of the goals that wait and are due: nothing traveled, everything remains."""
+        due = [goal for goal in self._waiting if now_s >= goal.next_feedback]
+        for goal in due:
+            goal.next_feedback = now_s + 1.0 / WAITING_FEEDBACK_HZ
+        return tuple((goal.key, Feedback(0.0, self._whole_way_m(goal.request))) for goal in due)
+
+    def _whole_way_m(self, request: Request) -> float:
+        return request.motion(self._robot, NOWHERE).remaining_m
 
     def _ended(self, order: Order) -> tuple[End, ...]:
         """The end of the running goal, if this is one, and of those that may not follow it."""

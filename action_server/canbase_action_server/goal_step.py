@@ -11,6 +11,7 @@ class GoalStep(Enum):
     REJECTED = "rejected"
     ACCEPTED = "accepted"
     STARTED = "started"
+    FEEDBACK = "feedback"
     CANCEL_REQUESTED = "cancel requested"
     STOPPING = "stopping"
     STANDSTILL = "standstill"

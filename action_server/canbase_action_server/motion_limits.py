@@ -51,6 +51,8 @@ def standstill_limits(robot: Robot, deceleration_mps2: float) -> StandstillLimit
     return StandstillLimits(
         linear_mps=robot.base.standstill_mps,
         angular_radps=2.0 * robot.base.standstill_mps / robot.base.track_m,
+        noise_mps=robot.watchdog.motion_tolerance_mps,
+        noise_radps=2.0 * robot.watchdog.motion_tolerance_mps / robot.base.track_m,
         odometry_timeout_s=robot.timeouts.odometry_s,
         deceleration_mps2=deceleration_mps2,
         give_up_s=standstill_s(robot),

@@ -14,6 +14,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
 
+from action_msgs.srv import CancelGoal
 from canbase.msg import DriverStatus, MuxState, SafetyState
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import TwistStamped
@@ -29,15 +30,17 @@ from rclpy.serialization import deserialize_message
 from unique_identifier_msgs.msg import UUID
 
 from canbase_action_server import messages
+from canbase_action_server.action_name import action_name
 from canbase_action_server.action_servers import other_servers
 from canbase_action_server.binding import Binding
+from canbase_action_server.cancel_rule import NO_UUID, meant
 from canbase_action_server.goal import GoalPhase
 from canbase_action_server.goal_client import REJECTION_QOS, SERVICE_QOS
 from canbase_action_server.goal_queue import Cycle, GoalQueue
 from canbase_action_server.goal_step import GoalStep
 from canbase_action_server.inputs import Inputs, Odometry
 from canbase_action_server.motion import STOP, Twist
-from canbase_action_server.open_goal import OpenGoal, goal_numbers, rejection, result_numbers, uuid_of
+from canbase_action_server.open_goal import OpenGoal, goal_numbers, measured_numbers, rejection, uuid_of
 from canbase_action_server.outcome import ErrorCode, Outcome, Status
 from canbase_action_server.preconditions import action_source
 from canbase_config.robot import Robot
@@ -55,6 +58,10 @@ KEEPALIVE_QOS = QoSProfile(depth=100)
 OLD = "the goal may be old, because the action server did not run before it; send it again"
 
 TWO_SERVERS = "a goal reaches both; end one of them (of Nav2: take it out of behavior_plugins of behavior_server)"
+
+CANCEL_GOALS = "drive_distance_server/cancel_goals"
+"""The service that cancels goals of all actions of this server."""
+NOT_CANCELED = CancelGoal.Response(return_code=CancelGoal.Response.ERROR_REJECTED)
 
 T = TypeVar("T")
 
@@ -85,7 +92,10 @@ class DriveDistanceServer(Node):
         self._listen(DriverStatus, "motor_driver/status", STATUS_QOS, self._on_driver)
         self._listen(MuxState, "velocity_mux/state", LATCHED_QOS, self._on_mux)
         self._rejections: dict[str, Publisher] = {}
+        self._names: dict[str, str] = {}
+        """Whole names of the actions, by those of their bindings."""
         self._servers = [self._serve(binding) for binding in bindings]
+        self.create_service(CancelGoal, CANCEL_GOALS, self._guarded(self._on_cancel_goals, NOT_CANCELED))
         # The steady clock: setting the computer's time must not stretch a control cycle.
         period_s = 1.0 / robot.action.control_hz
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -165,8 +175,8 @@ class DriveDistanceServer(Node):
         self._inputs = replace(self._inputs, mux=mux)
 
     def _serve(self, binding: Binding) -> ActionServer:
-        # ROS 2 Jazzy remaps topics and services, and no action (ros2/ros2, 1312): the name is resolved here.
-        name = self.resolve_topic_name(binding.name)
+        name = action_name(binding.name, self.resolve_topic_name, self.resolve_service_name)
+        self._names[binding.name] = name
         self._listen(UUID, f"{name}/keepalive", KEEPALIVE_QOS, self._on_keepalive)
         self._rejections[binding.name] = self.create_publisher(DiagnosticStatus, f"{name}/rejection", REJECTION_QOS)
         return ActionServer(
@@ -202,7 +212,7 @@ class DriveDistanceServer(Node):
 
     def _second_server(self, binding: Binding) -> str | None:
         """Why no goal of this action is accepted: a client's goal reaches both servers, and both would drive."""
-        name = self.resolve_topic_name(binding.name)
+        name = self._names[binding.name]
         if self.count_services(f"{name}/_action/send_goal") <= 1:
             return None
         others = other_servers(self, name)
@@ -218,6 +228,18 @@ class DriveDistanceServer(Node):
     def _on_cancel(self, handle: ServerGoalHandle) -> CancelResponse:
         self._log(GoalStep.CANCEL_REQUESTED, uuid_of(handle))
         return CancelResponse.ACCEPT
+
+    def _on_cancel_goals(self, request: CancelGoal.Request, answer: CancelGoal.Response) -> CancelGoal.Response:
+        """One request over all actions. Its age does not matter: it stops."""
+        wanted = request.goal_info
+        uuid, stamp_ns = bytes(wanted.goal_id.uuid).hex(), wanted.stamp.sec * 1_000_000_000 + wanted.stamp.nanosec
+        for key in meant({key: goal.accepted_ns for key, goal in self._open.items()}, uuid, stamp_ns):
+            if self._open[key].request_cancel():
+                self._log(GoalStep.CANCEL_REQUESTED, key)
+            answer.goals_canceling.append(self._open[key].info)
+        if uuid not in (NO_UUID, *self._open):
+            answer.return_code = CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID
+        return answer
 
     def _finish(self, binding: Binding, handle: ServerGoalHandle) -> Any:
         """The execute callback of rclpy, called when a goal has ended: its status is set, its result goes out."""
@@ -247,11 +269,12 @@ class DriveDistanceServer(Node):
         if cycle.twist is not None:
             self._order(cycle.twist)
         if cycle.began is not None:
-            self._open[cycle.began].execute()
+            self._open[cycle.began].begin(time.monotonic())
             self._log(GoalStep.STARTED, cycle.began)
-        if cycle.feedback is not None:
-            uuid, feedback = cycle.feedback
+        for uuid, feedback in cycle.feedback:
             self._open[uuid].tell(feedback)
+            if self._open[uuid].log_is_due(time.monotonic()):
+                self._log(GoalStep.FEEDBACK, uuid, **self._open[uuid].feedback)
         for end in cycle.ends:
             self._open[end.key].end(end.outcome)
 
@@ -269,7 +292,8 @@ class DriveDistanceServer(Node):
 
     def _log_phase(self, uuid: str | None, before: GoalPhase, cycle: Cycle) -> None:
         if self._goal_queue.phase is GoalPhase.STOPPING:
-            self._log(GoalStep.STOPPING, self._goal_queue.running)
+            goal = self._open.get(uuid or "")
+            self._log(GoalStep.STOPPING, uuid, **(goal.feedback if goal else {}))
         elif before is GoalPhase.STOPPING and any(end.key == uuid and end.outcome.stands for end in cycle.ends):
             self._log(GoalStep.STANDSTILL, uuid)
 
@@ -277,7 +301,7 @@ class DriveDistanceServer(Node):
         fields = {
             "status": outcome.status.name,
             "error_code": outcome.code.name,
-            **result_numbers(result),
+            **measured_numbers(result),
             "duration_s": round(time.monotonic() - goal.accepted, 3),
             "message": outcome.message,
         }

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+from action_msgs.msg import GoalInfo
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.action.server import GoalEvent, ServerGoalHandle
 
@@ -40,10 +42,14 @@ def goal_numbers(goal: Any) -> dict[str, float]:
     return {name: round(value, 5) for name, value in exact(goal).items()}
 
 
-def result_numbers(result: Any) -> dict[str, float]:
-    """The measured numbers of a result by name, for the log."""
-    values = {name: getattr(result, name) for name in result.get_fields_and_field_types()}
+def measured_numbers(message: Any) -> dict[str, float]:
+    """The measured numbers of a result or a feedback by name, for the log."""
+    values = {name: getattr(message, name) for name in message.get_fields_and_field_types()}
     return {name: round(value, 5) for name, value in values.items() if isinstance(value, float)}
+
+
+FEEDBACK_LOG_S = 1.0
+"""Shortest time between two lines of feedback in the log; the client gets `action.feedback_hz`."""
 
 
 @dataclass(slots=True)
@@ -55,6 +61,33 @@ class OpenGoal:
     accepted: float
     executing: bool = False
     outcome: Outcome | None = None
+    feedback: dict[str, float] = field(default_factory=dict)
+    """The numbers of the last feedback, for the log."""
+    feedback_logged: float = 0.0
+    """When a line of the log had them last, or the motion began."""
+
+    @property
+    def info(self) -> GoalInfo:
+        """Its UUID and the time of its acceptance, as the client got them. rclpy has no public name for the time."""
+        return self.handle._goal_info
+
+    @property
+    def accepted_ns(self) -> int:
+        """When ROS accepted it [ns since 1970]."""
+        stamp: Time = self.info.stamp
+        return int(stamp.sec * 1_000_000_000 + stamp.nanosec)
+
+    def request_cancel(self) -> bool:
+        """As the cancel of a client: from now on it is CANCELING. False: it was already."""
+        if self.handle.is_cancel_requested:
+            return False
+        self.handle._update_state(GoalEvent.CANCEL_GOAL)
+        return True
+
+    def begin(self, now_s: float) -> None:
+        """The goal has the base."""
+        self.execute()
+        self.feedback_logged = now_s
 
     def execute(self) -> None:
         """The goal is EXECUTING from now on. Once is enough.
@@ -69,7 +102,16 @@ class OpenGoal:
 
     def tell(self, feedback: Feedback) -> None:
         """To the client."""
-        self.handle.publish_feedback(self.binding.feedback(feedback))
+        message = self.binding.feedback(feedback)
+        self.handle.publish_feedback(message)
+        self.feedback = measured_numbers(message)
+
+    def log_is_due(self, now_s: float) -> bool:
+        """Its feedback belongs into the log now. A goal that waits has none there: nothing changes."""
+        if not self.executing or now_s - self.feedback_logged < FEEDBACK_LOG_S:
+            return False
+        self.feedback_logged = now_s
+        return True
 
     def end(self, outcome: Outcome) -> None:
         """Has the execute callback called. A goal that never ran passes through EXECUTING, as the protocol wants it."""

@@ -7,6 +7,7 @@ from dataclasses import replace
 from canbase_action_server.inputs import Inputs, age_s
 from canbase_config.robot import Robot
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.stop_cause import SCAN_LOST, StopCause
 from canbase_runtime.watchdog_view import WatchdogView
 
 STATE_TIMEOUT_S = 1.5
@@ -71,7 +72,7 @@ def _silence(robot: Robot, inputs: Inputs, now_s: float) -> str | None:
 
 
 def _condition(robot: Robot, inputs: Inputs) -> str | None:
-    safety, driver, mux = inputs.safety, inputs.driver, inputs.mux
+    safety, driver = inputs.safety, inputs.driver
     if safety and (safety.estop or safety.cause.is_estop):
         return f"emergency stop holds: {safety.detail}; release it and reset"
     if driver and driver.watchdog is not WatchdogView.OK:
@@ -80,8 +81,18 @@ def _condition(robot: Robot, inputs: Inputs) -> str | None:
         return f"motor_driver is {driver.state.word}, not enabled: {driver.detail}"
     if driver and not driver.hears_command:
         return "motor_driver receives no cmd_vel; is safety_filter running? After a start try again in a second"
+    return _not_followed(robot, inputs)
+
+
+def _not_followed(robot: Robot, inputs: Inputs) -> str | None:
+    """The drives have power, and the commands of a goal would not reach them."""
+    safety, mux = inputs.safety, inputs.mux
     if mux and mux.active not in ("", action_source(robot)):
         return f"{mux.active} drives now; release it first"
+    if safety and safety.stops and safety.cause in SCAN_LOST:
+        return f"laser scan lost: {safety.detail}; is the scanner running?"
+    if safety and safety.stops and safety.cause is not StopCause.OBSTACLE:  # the way back from one is free
+        return f"the safety filter stops the base ({safety.cause.value}): {safety.detail}"
     if mux and mux.held_back:
         return f"velocity_mux holds {action_source(robot)} back: {mux.held_back}; unlock it first"
     return None

@@ -1,7 +1,7 @@
-"""A client of rotate_angle for applications. Its outcomes and errors: `goal_client.py`.
+"""A client of rotate_angle for applications. Its outcomes: `goal_client.py`; its errors: `goal_errors.py`.
 
 turn = RotateClient(node).send(math.pi, 0.5)  # raises NoServerError, NoResponseError, RejectedError
-result = turn.wait()                          # read result.status first
+result = turn.wait()                          # read result.status first; raises ServerLostError, FeedbackLostError
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from canbase.action import RotateAngle
 from rclpy.executors import Executor
 from rclpy.node import Node
 
+from canbase_action_server.feedback_watch import FEEDBACK_TIMEOUT_S
 from canbase_action_server.goal_client import GoalClient, SentGoal, never
 from canbase_action_server.outcome import ErrorCode, Status
 
@@ -44,8 +45,14 @@ Turn = SentGoal[RotateResult]
 class RotateClient(GoalClient[RotateResult, RotateFeedback]):
     """Sends goals from `node`. Nothing else may spin it while a method here waits, unless `executor` is its own."""
 
-    def __init__(self, node: Node, executor: Executor | None = None, action: str = "rotate_angle") -> None:
-        super().__init__(node, RotateAngle, action, executor, _feedback, _result)
+    def __init__(
+        self,
+        node: Node,
+        executor: Executor | None = None,
+        action: str = "rotate_angle",
+        feedback_timeout_s: float = FEEDBACK_TIMEOUT_S,
+    ) -> None:
+        super().__init__(node, RotateAngle, action, executor, _feedback, _result, feedback_timeout_s)
 
     def send(
         self,

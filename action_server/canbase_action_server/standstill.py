@@ -1,11 +1,13 @@
 """Whether the base is at standstill after the order: by odometry, else by the driver's status, else by waiting.
 
-A sample counts only when it was received after the order had time to reach the wheels: what stood before a motion began
-proves nothing about its end.
+Odometry whose velocity is no more than noise shows no motion where its pose does not move and the driver's status
+reports standstill. A sample counts only when it was received after the order had time to reach the wheels: what stood
+before a motion began proves nothing about its end.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -13,6 +15,8 @@ from canbase_action_server.inputs import Driver, Inputs, Odometry, age_s
 
 HOLD_S = 0.1
 """The base must be seen standing for this long."""
+STILL_S = 0.2
+"""A pose that did not move for this long shows standstill, even if the velocity is noisy."""
 SETTLE_S = 0.15
 """From the order to stand until it must show at the wheels."""
 DRIVER_AGE_S = 0.5
@@ -37,6 +41,8 @@ class StandstillLimits:
 
     linear_mps: float
     angular_radps: float
+    noise_mps: float
+    noise_radps: float
     odometry_timeout_s: float
     deceleration_mps2: float
     give_up_s: float
@@ -51,16 +57,18 @@ class Standstill:
         self._give_up = began + limits.give_up_s
         self._braked = self._counts_from + abs(speed_mps) / limits.deceleration_mps2 + BRAKING_RESERVE_S
         self._standing_since: float | None = None
+        self._anchor: Odometry | None = None
+        """Where the pose has not moved since."""
 
     def judge(self, inputs: Inputs, now_s: float) -> Verdict:
         """Call once per control cycle."""
         odometry, driver = inputs.odometry, inputs.driver
         if odometry and age_s(odometry.received, now_s) <= self._limits.odometry_timeout_s:
-            stands = self._seen_standing(odometry)
-            return self._or_give_up(stands, now_s)
-        self._standing_since = None
+            still = self._is_still(odometry) and self._driver_says_so(driver, now_s)
+            return self._or_give_up(self._seen_standing(odometry) or still, now_s)
+        self._standing_since = self._anchor = None
         if driver and age_s(driver.received, now_s) <= DRIVER_AGE_S:
-            return self._or_give_up(self._driver_says_so(driver), now_s)
+            return self._or_give_up(self._driver_says_so(driver, now_s), now_s)
         return Verdict.NOT_MEASURED if now_s >= self._braked else Verdict.WAIT
 
     def _seen_standing(self, odometry: Odometry) -> bool:
@@ -74,7 +82,19 @@ class Standstill:
             self._standing_since = odometry.received
         return odometry.received - self._standing_since >= HOLD_S
 
-    def _driver_says_so(self, driver: Driver) -> bool:
+    def _is_still(self, odometry: Odometry) -> bool:
+        """Its velocity is noise, by the pose, which comes from the encoders."""
+        limits, anchor = self._limits, self._anchor or odometry
+        moved_m = math.hypot(odometry.pose.x_m - anchor.pose.x_m, odometry.pose.y_m - anchor.pose.y_m)
+        turned_rad = abs(math.remainder(odometry.pose.yaw_rad - anchor.pose.yaw_rad, math.tau))
+        moves = moved_m > limits.linear_mps * STILL_S or turned_rad > limits.angular_radps * STILL_S
+        self._anchor = odometry if moves or odometry.received < self._counts_from else anchor
+        quiet = abs(odometry.linear_mps) <= limits.noise_mps and abs(odometry.angular_radps) <= limits.noise_radps
+        return quiet and odometry.received - self._anchor.received >= STILL_S
+
+    def _driver_says_so(self, driver: Driver | None, now_s: float) -> bool:
+        if driver is None or age_s(driver.received, now_s) > DRIVER_AGE_S:
+            return False
         return driver.standstill and driver.received >= self._counts_from
 
     def _or_give_up(self, stands: bool, now_s: float) -> Verdict:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from canbase.action import DriveDistance
-from canbase.msg import DriverStatus, SafetyState
+from canbase.msg import DriverStatus, MuxSource, SafetyState
 from nav_msgs.msg import Odometry
 from rclpy.action import ActionClient
 from rclpy.serialization import serialize_message
@@ -40,13 +40,14 @@ class Stage:
         test_node.spin_for(0.5)
 
     def rejection(self, distance_m: float, speed_mps: float) -> str:
-        """The reason in the log for the rejection of this goal."""
+        """The reason for the rejection of this goal: in the log, and with the client."""
         before = len(self.steps())
-        with pytest.raises(RejectedError):
+        with pytest.raises(RejectedError) as told:
             self.client.send(distance_m, speed_mps)
         self.node.wait_for(lambda: len(self.steps()) > before, 2.0, "the log line")
         assert self.steps()[-1]["step"] == "rejected"
-        return str(self.steps()[-1]["reason"])
+        assert told.value.reason == self.steps()[-1]["reason"]
+        return str(told.value.reason)
 
     def steps(self) -> list[dict[str, Any]]:
         """The structured lines of the server's log."""
@@ -143,13 +144,20 @@ def ends_at_its_distance(stage: Stage, distance_m: float) -> None:
 
 
 def test_each_step_of_a_goal_is_one_structured_line(stage: Stage) -> None:
-    drive = stage.client.send(0.05, 0.3)
-    stage.end_of(drive)
+    drive = stage.client.send(1.0, 0.3)
+    stage.end_of(drive, 20.0)
     mine = [step for step in stage.steps() if step["uuid"] == drive.uuid]
-    assert [step["step"] for step in mine] == ["accepted", "started", "stopping", "standstill", "ended"]
+    feedback = [step for step in mine if step["step"] == "feedback"]
+    others = [step for step in mine if step not in feedback]
+    assert [step["step"] for step in others] == ["accepted", "started", "stopping", "standstill", "ended"]
     assert (mine[-1]["status"], mine[-1]["error_code"]) == ("SUCCEEDED", "OK")
-    assert mine[-1]["traveled_m"] == pytest.approx(0.05, abs=TOLERANCE_M)
-    assert 0.1 < mine[-1]["duration_s"] < 5.0
+    assert mine[-1]["traveled_m"] == pytest.approx(1.0, abs=TOLERANCE_M)
+    assert 3.0 < mine[-1]["duration_s"] < 15.0
+    assert 2 <= len(feedback) <= mine[-1]["duration_s"]  # the client gets ten times as many
+    for step in (*feedback, others[2]):
+        assert step["traveled_m"] + step["remaining_m"] == pytest.approx(1.0, abs=0.001)
+    traveled = [step["traveled_m"] for step in feedback]
+    assert traveled == sorted(traveled)
 
 
 def test_goals_out_of_range_are_rejected_and_nothing_is_ordered(stage: Stage) -> None:
@@ -188,6 +196,10 @@ def joystick(base: FakeBase) -> None:
     base.mux.active = "joystick"
 
 
+def lock(base: FakeBase) -> None:
+    base.mux.sources = [MuxSource(name="action", locked=True, reason="locked: pause holds")]
+
+
 def no_odometry(base: FakeBase) -> None:
     base.silent.add("odom")
 
@@ -206,6 +218,9 @@ def test_a_robot_that_cannot_drive_rejects_a_goal(stage: Stage) -> None:
         (fault, "not enabled"),
         (trip, "watchdog"),
         (joystick, "joystick"),
+        (stop_for(SafetyState.CAUSE_SCAN_STALE), "laser scan lost: as the test says"),
+        (stop_for(SafetyState.CAUSE_COMMAND_STALE), "stops the base (command_stale)"),
+        (lock, "velocity_mux holds action back: locked: pause holds; unlock it first"),
         (no_odometry, "no message on odom"),
     ):
         change(stage.base)

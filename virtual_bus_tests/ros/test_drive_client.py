@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from canbase.action import DriveDistance
 from canbase.msg import DriverStatus
 from rclpy.action import ActionClient
 
+from canbase_action_server.action_servers import actions_of
 from canbase_action_server.client import DriveClient, NoResponseError, NoServerError, RejectedError, ServerLostError
 from ros.conftest import MakeRobot, Spawn
 from support.fake_base import FakeBase, server_code
@@ -163,7 +165,8 @@ def test_a_server_that_dies_is_told_and_the_goal_is_not_sent_again(
     profile = tmp_path / "short_lease.xml"
     profile.write_text(SHORT_LEASE, encoding="utf-8")
     stage = Stage(test_node, spawn, make_robot, FASTRTPS_DEFAULT_PROFILES_FILE=str(profile))
-    drive = stage.client.send(2.0, 0.3)
+    client = DriveClient(test_node.node, test_node.executor, feedback_timeout_s=60.0)
+    drive = client.send(2.0, 0.3)
     stage.wait_until_moving()
     stage.server.kill()
     with pytest.raises(ServerLostError):
@@ -280,6 +283,47 @@ def test_remaps_of_the_action_on_both_sides_meet(test_node: TestNode, spawn: Spa
     test_node.wait_for(lambda: drive.exit_code is not None, 20.0, "its end")
     assert drive.exit_code == 0, drive.log()  # a lease that is not kept beside the action would have ended it
     assert base.x_m == pytest.approx(0.5, abs=0.005)
+
+
+PARTS = ("send_goal", "cancel_goal", "get_result", "feedback", "status")
+
+
+def test_the_server_with_another_node_name_and_all_five_parts_remapped_serves_under_the_new_name(
+    test_node: TestNode, spawn: Spawn, make_robot: MakeRobot
+) -> None:
+    parts = [("-r", f"drive_distance/_action/{part}:=/far/go/_action/{part}") for part in PARTS]
+    rules = ("-r", "__node:=goals", "-r", "goals:rotate_angle:=turn", *(word for rule in parts for word in rule))
+    robot = make_robot({"timeouts": {"odometry_s": 0.5}})
+    spawn([sys.executable, "-c", server_code(robot), "--ros-args", *rules])
+    base = FakeBase(test_node)
+    test_node.wait_for(lambda: base.heard, 20.0, "the server to listen")
+    expected = {"/far/go", "/turn"}
+    test_node.wait_for(lambda: actions_of(test_node.node, "goals", "/") == expected, 20.0, "both names")
+    services = {name for name, _types in test_node.node.get_service_names_and_types_by_node("goals", "/")}
+    assert "/drive_distance_server/cancel_goals" in services
+    assert actions_of(test_node.node, "nobody", "/") == set()  # a node that has just ended is no error
+    goals = (("drive", "0.2", "drive_distance:=/far/go"), ("rotate", "0.5", "rotate_angle:=turn"))
+    for command, goal, remap in goals:
+        sent = spawn([*CANBASE, command, goal, "--wait", "20", "--ros-args", "-r", remap])
+        test_node.wait_for(partial(_has_ended, sent), 40.0, "its end")
+        assert sent.exit_code == 0, sent.log()
+
+
+def _has_ended(process: Process) -> bool:
+    return process.exit_code is not None
+
+
+def test_rules_that_would_tear_an_action_apart_end_server_and_client_with_a_message(
+    spawn: Spawn, make_robot: MakeRobot
+) -> None:
+    config = str(make_robot({}))
+    one, half = "drive_distance/_action/status:=state", "rosservice://drive_distance:=go"
+    for rule, words in ((one, "/drive_distance/_action/status to /state"), (half, "one rule for both")):
+        for command in (("action-server", "--config", config), ("drive", "1")):
+            process = spawn([*CANBASE, *command, "--ros-args", "-r", rule])
+            assert process.wait(40.0) == 2, process.log()
+            assert words in process.log()
+            assert "Traceback" not in process.log()
 
 
 def test_the_flow_of_a_client_with_callbacks(stage: Stage) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from canbase_action_server.fibonacci import next_number, refusal
 from canbase_action_server.fibonacci_client import FibonacciClient
-from canbase_action_server.goal_client import RejectedError
+from canbase_action_server.goal_errors import RejectedError
 from canbase_action_server.outcome import Status
 from ros.conftest import Spawn
 from support.ros_harness import TestNode
@@ -70,3 +70,46 @@ def test_the_command_shows_each_step_and_ends_with_its_code(test_node: TestNode,
     assert "cancel accepted" in canceled.log()
     assert spawn([*COMMAND, "send", "0", "--namespace", "school"]).wait(20.0) == 5
     assert not client.server_ready  # there is none outside the namespace
+
+
+def test_ctrl_c_cancels_waits_for_the_end_and_a_second_one_stops_waiting(test_node: TestNode, spawn: Spawn) -> None:
+    server = spawn([*COMMAND, "serve", "--period", "0.5"])
+    sent = spawn([*COMMAND, "send", "1000", "--wait", "20"])
+    test_node.wait_for(lambda: "feedback: 0 1 1" in sent.log(), 40.0, "feedback")
+    sent.interrupt()
+    assert sent.wait(20.0) == 3, sent.log()
+    accepted, result = sent.log().strip().splitlines()[-2:]
+    assert accepted == "cancel accepted: that is no result yet either"
+    assert result.startswith("CANCELED: 0 1 1")
+    assert "cancel requested" in server.log()
+    assert "Traceback" not in server.log() + sent.log()
+
+    hasty = spawn([*COMMAND, "send", "1000", "--wait", "20"])
+    test_node.wait_for(lambda: "feedback: 0 1 1" in hasty.log(), 40.0, "feedback")
+    server.stop()
+    hasty.interrupt()
+    hasty.interrupt()  # one of both may be lost on the way: signals do not queue
+    test_node.spin_for(1.0)
+    hasty.interrupt()
+    assert hasty.wait(20.0) in (1, 6), hasty.log()
+    server.resume()
+
+
+def test_ctrl_c_before_a_server_is_found_ends_the_command(test_node: TestNode, spawn: Spawn) -> None:
+    sent = spawn([*COMMAND, "send", "10", "--wait", "60"])
+    found = test_node.node.get_node_names
+    test_node.wait_for(lambda: "canbase_fibonacci" in found(), 40.0, "the command to look for it")
+    sent.interrupt()
+    assert sent.wait(20.0) == 3
+    assert "nothing was sent" in sent.log()
+
+
+def test_both_sides_can_be_remapped_and_half_a_remap_is_an_error(test_node: TestNode, spawn: Spawn) -> None:
+    spawn([*COMMAND, "serve", "--period", "0.05", "--ros-args", "-r", "fibonacci:=numbers"])
+    sent = spawn([*COMMAND, "send", "10", "--wait", "20", "--ros-args", "-r", "fibonacci:=/numbers"])
+    assert sent.wait(40.0) == 0, sent.log()
+    for command in (["serve"], ["send", "3"]):
+        torn = spawn([*COMMAND, *command, "--ros-args", "-r", "fibonacci/_action/feedback:=elsewhere"])
+        assert torn.wait(40.0) == 2
+        assert "/fibonacci/_action/feedback to /elsewhere" in torn.log()
+        assert "-r fibonacci:=NAME" in torn.log()

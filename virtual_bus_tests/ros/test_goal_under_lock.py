@@ -40,9 +40,11 @@ def paused() -> Iterator[Paused]:
 
 def test_a_goal_under_a_lock_is_rejected(paused: Paused) -> None:
     paused.hold(True)
-    with pytest.raises(RejectedError):
+    with pytest.raises(RejectedError, match="velocity_mux holds action back: locked: pause holds"):
         paused.robot.client.send(0.5, 0.3)
-    assert "holds action back: locked: pause holds" in paused.robot.logs()
+    drive = paused.robot.command("drive", "0.5")
+    assert paused.robot.exit_code(drive) == 5
+    assert "velocity_mux holds action back: locked: pause holds; unlock it first" in drive.log()
     paused.hold(False)
     assert paused.robot.driven(0.05)
 

@@ -17,6 +17,7 @@ from std_srvs.srv import Trigger
 
 from canbase_action_server.client import Drive, DriveResult
 from canbase_action_server.outcome import ErrorCode
+from canbase_config.bus_load import cyclic_load
 from support import api_page
 from support.ros_harness import merged
 from support.running_robot import PATIENT, RESTS_M, own_domain, robot_on
@@ -141,14 +142,30 @@ def test_doctor_finds_a_scanner_that_stamps_nothing(world: World) -> None:
 
 def test_diagnostics_have_an_entry_for_each_part_and_none_is_an_error(world: World) -> None:
     recorder = world.node.record(DiagnosticArray, "/diagnostics")
-    parts = {"motor_driver", "bus", "watchdog", "drive left_wheel", "drive right_wheel", "velocity_mux"}
+    parts = {
+        "motor_driver",
+        "bus",
+        "watchdog",
+        "drive left_wheel",
+        "drive right_wheel",
+        "velocity_mux",
+        "safety_filter",
+    }
 
     def told() -> dict[str, DiagnosticStatus]:
         return {entry.name: entry for message in recorder.messages for entry in message.status}
 
-    world.node.wait_for(lambda: len(told()) >= len(parts), 10.0, "/diagnostics of each part")
+    def is_well() -> bool:
+        return len(told()) >= len(parts) and all(entry.level != DiagnosticStatus.ERROR for entry in told().values())
+
+    world.node.wait_for(is_well, 20.0, "/diagnostics of each part, and none an error")
     assert set(told()) == {f"bench: {part}" for part in parts}
-    assert [entry.message for entry in told().values() if entry.level == DiagnosticStatus.ERROR] == []
+
+
+def test_the_load_of_the_bus_is_measured_and_near_the_planned_one(world: World) -> None:
+    planned = cyclic_load(world.robot.robot)
+    told = world.robot.status
+    world.node.wait_for(lambda: 0.5 * planned < told.messages[-1].bus_load < 1.5 * planned, 20.0, "the load")
 
 
 def test_a_joystick_drives_and_its_silence_stops(world: World) -> None:

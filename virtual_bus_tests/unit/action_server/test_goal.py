@@ -140,7 +140,9 @@ def test_a_base_that_does_not_stop_is_not_called_canceled() -> None:
     story = drive(Plant(), 3.0, 0.3, at={2.0: runaway})
     end = story.run()
     assert end.code is ErrorCode.DRIVE_FAULT
-    assert "standstill is not confirmed" in end.message
+    assert "standstill is not confirmed in time: odom has 0.300 m/s, 0.000 rad/s (base.standstill_mps 0.005)" in (
+        end.message
+    )
     assert story.ended_at == pytest.approx(2.0 + standstill_s(bench_robot()), abs=0.05)
 
 
@@ -287,7 +289,13 @@ def test_feedback_comes_at_its_rate() -> None:
 
 
 STILL = StandstillLimits(
-    linear_mps=0.005, angular_radps=0.02, odometry_timeout_s=0.2, deceleration_mps2=1.0, give_up_s=3.0
+    linear_mps=0.005,
+    angular_radps=0.02,
+    noise_mps=0.05,
+    noise_radps=0.2,
+    odometry_timeout_s=0.2,
+    deceleration_mps2=1.0,
+    give_up_s=3.0,
 )
 
 
@@ -310,8 +318,44 @@ def test_turning_is_not_standing() -> None:
     assert watch.judge(moving_at(3.0, 0.0, 0.03), 3.0) is Verdict.STILL_MOVES
 
 
+STANDS = Driver(0.1, DriverState.ENABLED, "none", "", WatchdogView.OK, "none", standstill=True, hears_command=True)
+"""The driver's status, received at 0.1 s."""
+
+
+@pytest.mark.parametrize(
+    ("linear_mps", "angular_radps", "seen"),
+    [(0.02, 0.0, True), (-0.02, 0.15, True), (0.051, 0.0, False), (0.0, 0.21, False)],
+)
+def test_noise_is_no_motion_where_the_driver_reports_standstill(
+    linear_mps: float, angular_radps: float, seen: bool
+) -> None:
+    """t   0  ordered to stop ── 0.2  the pose is still, odom shows some speed ── 0.4  status: standstill"""
+    noisy, told = moving_at(0.2, linear_mps, angular_radps), replace(STANDS, received=0.41)
+    after_a_moment = replace(moving_at(0.41, linear_mps, angular_radps), driver=told)
+
+    def judged(*samples: Inputs) -> Verdict:
+        watch = Standstill(STILL, began=0.0, speed_mps=0.3)
+        return [watch.judge(each, each.odometry.received) for each in samples if each.odometry][-1]
+
+    assert judged(after_a_moment) is Verdict.WAIT, "a pose alone shows no motion"
+    assert judged(noisy, replace(after_a_moment, driver=STANDS)) is Verdict.WAIT, "of before the order could act"
+    assert judged(noisy, replace(after_a_moment, driver=replace(told, standstill=False))) is Verdict.WAIT
+    assert judged(noisy, replace(after_a_moment, driver=None)) is Verdict.WAIT
+    assert (judged(noisy, after_a_moment) is Verdict.STANDS) is seen
+
+
+@pytest.mark.parametrize("moved", [Pose(0.0011, 0.0, 0.0), Pose(0.0, -0.0011, 0.0), Pose(0.0, 0.0, 0.0041)])
+def test_a_pose_that_moves_is_no_noise(moved: Pose) -> None:
+    watch = Standstill(STILL, began=0.0, speed_mps=0.3)
+    before, after = moving_at(0.2, 0.02), replace(moving_at(0.41, 0.02), driver=replace(STANDS, received=0.41))
+    assert before.odometry is not None
+    assert after.odometry is not None
+    watch.judge(replace(before, odometry=replace(before.odometry, pose=Pose(0.0, 0.0, 0.0))), 0.2)
+    assert watch.judge(replace(after, odometry=replace(after.odometry, pose=moved)), 0.41) is Verdict.WAIT
+
+
 def test_an_old_word_of_the_driver_is_no_word() -> None:
-    told = Driver(0.1, DriverState.ENABLED, "none", "", WatchdogView.OK, "none", standstill=True, hears_command=True)
+    told = STANDS
     watch = Standstill(STILL, began=0.0, speed_mps=0.1)
     assert watch.judge(Inputs(driver=told), 0.5) is Verdict.WAIT  # received before the order could act
     assert watch.judge(Inputs(driver=replace(told, received=0.4)), 0.5) is Verdict.STANDS

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import random
 from dataclasses import replace
 
 import pytest
 
-from canbase_action_server.goal_request import DriveRequest
+from canbase_action_server.goal_request import DriveRequest, RotateRequest
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.motion import STOP
+from canbase_action_server.motion_limits import lever_m
 from canbase_action_server.outcome import ErrorCode
 from support.action_plant import GOOD_SAFETY, replaced
 from support.goal_queue_world import GoalQueueWorld, Policy, Told, robot_with
@@ -69,6 +72,27 @@ def test_a_queue_runs_in_order_and_the_base_stands_in_between() -> None:
     assert world.x_m == pytest.approx(0.2, abs=0.005)
     times = [time for key in keys for time in (world.goals[key].began, world.goals[key].ended)]
     assert times == sorted(times, key=lambda time: time or 0.0)
+
+
+def test_a_goal_that_waits_reports_once_a_second_that_everything_remains() -> None:
+    world = GoalQueueWorld(robot_with("queue"))
+    first = world.ask_way(2.0, 0.2)  # some 10 s
+    second = world.ask_way(-0.5)
+    third = world.ask(RotateRequest(math.pi, 0.5))
+    world.run(9.0)
+    assert third is not None
+    for key, remains_m in ((second, 0.5), (third, math.pi * lever_m(world.robot))):
+        times = [at_s for at_s, _feedback in world.feedback[key]]
+        assert times[0] < 0.1
+        assert max(after - before for before, after in itertools.pairwise([*times, 9.0])) < 1.05
+        assert {feedback.traveled_m for _at_s, feedback in world.feedback[key]} == {0.0}
+        assert [feedback.remaining_m for _at_s, feedback in world.feedback[key]] == pytest.approx(
+            [remains_m] * len(times)
+        )
+    assert len(world.feedback[second]) == 9
+    world.run_out()
+    assert world.feedback[second][-1][1].traveled_m == pytest.approx(-0.5, abs=0.005)
+    assert [world.code(key) for key in (first, second, third)] == [ErrorCode.OK] * 3
 
 
 def test_a_queue_has_its_length() -> None:

@@ -6,15 +6,22 @@ from dataclasses import replace
 import pytest
 
 from canbase_action_server.goal_request import DriveRequest
-from canbase_action_server.inputs import Inputs
+from canbase_action_server.inputs import Inputs, Safety
 from canbase_action_server.preconditions import NO_SOURCE, STATE_TIMEOUT_S, action_source, state_reason
 from canbase_config.mux import Mux, MuxSource
 from canbase_runtime.driver_state import DriverState
-from canbase_runtime.stop_cause import StopCause
+from canbase_runtime.stop_cause import SCAN_LOST, StopCause
 from canbase_runtime.watchdog_view import WatchdogView
 from support.action_plant import GOOD_DRIVER, GOOD_MUX, GOOD_SAFETY, Plant, bench_robot, replaced
 
 ROBOT = bench_robot()  # action.*: 0.01 to 5 m, 0.02 to 0.5 m/s
+
+
+def stopped(cause: StopCause) -> Safety:
+    """The safety filter stops the base."""
+    return replace(GOOD_SAFETY, stops=True, cause=cause, detail="as the test says")
+
+
 READY = Inputs(Plant().odometry(0.0), GOOD_SAFETY, GOOD_DRIVER, GOOD_MUX)
 
 
@@ -65,10 +72,56 @@ def test_a_robot_that_is_ready_has_no_reason_against_it() -> None:
         ({"driver": replace(GOOD_DRIVER, hears_command=False)}, "receives no cmd_vel"),
         ({"mux": replace(GOOD_MUX, active="joystick")}, "joystick drives"),
         ({"mux": replace(GOOD_MUX, held_back="locked: pause holds")}, "holds action back: locked: pause holds"),
+        ({"safety": stopped(StopCause.SHUTDOWN)}, "stops the base (shutdown): as the test says"),
+        ({"safety": stopped(StopCause.COMMAND_STALE)}, "stops the base (command_stale): as the test says"),
+        ({"safety": stopped(StopCause.UNKNOWN)}, "stops the base (unknown): as the test says"),
+        *(({"safety": stopped(cause)}, "laser scan lost: as the test says") for cause in sorted(SCAN_LOST, key=str)),
     ],
 )
 def test_each_thing_that_is_missing_is_named(changes: dict[str, object], reason: str) -> None:
     assert reason in str(state_reason(ROBOT, replaced(READY, **changes), 0.0))
+
+
+@pytest.mark.parametrize("state", [state for state in DriverState if state is not DriverState.ENABLED])
+def test_every_state_of_the_driver_without_power_is_named_with_its_detail(state: DriverState) -> None:
+    driver = replace(GOOD_DRIVER, state=state, detail="left_wheel: 0x2310")
+    assert state_reason(ROBOT, replaced(READY, driver=driver), 0.0) == (
+        f"motor_driver is {state.word}, not enabled: left_wheel: 0x2310"
+    )
+
+
+@pytest.mark.parametrize("view", [view for view in WatchdogView if view is not WatchdogView.OK])
+def test_every_state_of_the_watchdog_but_ok_is_named_with_its_cause(view: WatchdogView) -> None:
+    driver = replace(GOOD_DRIVER, watchdog=view, watchdog_cause="lease lost", state=DriverState.LATCHED)
+    expected = f"watchdog is {view.value} (cause lease lost); start or reset it"
+    assert state_reason(ROBOT, replaced(READY, driver=driver), 0.0) == expected
+
+
+def test_of_several_causes_the_one_that_explains_the_others_is_named() -> None:
+    everything = replaced(
+        READY,
+        safety=replace(stopped(StopCause.ESTOP), estop=True),
+        driver=replace(GOOD_DRIVER, state=DriverState.LATCHED, watchdog=WatchdogView.TRIPPED, hears_command=False),
+        mux=replace(GOOD_MUX, active="joystick", held_back="locked: pause holds"),
+    )
+    order = []
+    for cure in (
+        {"safety": stopped(StopCause.SCAN_STALE)},
+        {"driver": replace(GOOD_DRIVER, state=DriverState.LATCHED, hears_command=False)},
+        {"driver": replace(GOOD_DRIVER, hears_command=False)},
+        {"driver": GOOD_DRIVER},
+        {"mux": replace(GOOD_MUX, held_back="locked: pause holds")},
+        {"safety": GOOD_SAFETY},
+        {"mux": GOOD_MUX},
+    ):
+        order.append(str(state_reason(ROBOT, everything, 0.0)).split(" ")[0])
+        everything = replaced(everything, **cure)
+    assert order == ["emergency", "watchdog", "motor_driver", "motor_driver", "joystick", "laser", "velocity_mux"]
+    assert state_reason(ROBOT, everything, 0.0) is None
+
+
+def test_an_obstacle_before_the_base_refuses_no_goal() -> None:
+    assert state_reason(ROBOT, replaced(READY, safety=stopped(StopCause.OBSTACLE)), 0.0) is None
 
 
 def test_old_messages_are_no_messages() -> None:
