@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
 from canbase.msg import SafetyState
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistStamped
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
@@ -20,6 +21,7 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
+from canbase_config.diagnostics import PERIOD_S as DIAGNOSTICS_PERIOD_S
 from canbase_config.robot import Robot
 from canbase_config.safety import Scan as ScanConfig
 from canbase_config.stopping import ramp
@@ -34,6 +36,7 @@ from canbase_velocity import messages
 from canbase_velocity.changes import DropTeller, changed_order, is_told
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.estop import EstopState
+from canbase_velocity.filter_diagnostics import diagnostics
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.graph import BUTTON_KIND, SCAN_KIND, publishers
 from canbase_velocity.input_ring import Note, filter_entry, forget
@@ -42,7 +45,7 @@ from canbase_velocity.lease_sender import LeaseSender
 from canbase_velocity.parameters import Parameters
 from canbase_velocity.placement import HeldPlacement, Placement, PlacementError, Transform, placed_by_tf
 from canbase_velocity.qos import COMMAND, SCAN, STATE, STATIC_TF, listen_closely
-from canbase_velocity.safety_filter import FilterConfig
+from canbase_velocity.safety_filter import FilterConfig, Inputs
 from canbase_velocity.speed_limit import SpeedLimits
 from canbase_velocity.steady import steady_timer
 from canbase_velocity.twist import Twist
@@ -83,9 +86,11 @@ class FilterNode(Node):
         self._drops = DropTeller()
         self._transforms: dict[str, Transform] = {}
         self._leases = LeaseSender(robot.lease.socket)
-        self._lease_sequence = 0
+        self._lease_sequence = self._lease_errors_before = 0
         self._decision = self._filter.decide(time.monotonic())
         self._state_at_s = -math.inf
+        self._told: Inputs | None = None
+        """What the last state was made of."""
         self._stands_from_s = -math.inf
         self._serialized = SerializedTwist(robot.base.base_frame)
         self._commands = self.create_publisher(TwistStamped, "cmd_vel", COMMAND)
@@ -94,6 +99,8 @@ class FilterNode(Node):
         self._watch_scans(robot.safety.scans)
         self.create_service(Trigger, "safety_filter/reset", self._on_reset)
         steady_timer(self, GRAPH_PERIOD_S, self._count_buttons)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        steady_timer(self, DIAGNOSTICS_PERIOD_S, self._diagnose)
         self._timer = steady_timer(self, 1.0 / robot.rates.command_hz, self._tick)
         self._ros_parameters = Parameters(self, robot, self._on_speed_limit, self._refuse)
 
@@ -274,6 +281,15 @@ class FilterNode(Node):
         self._filter.on_record(*found)
         self._keeper.want(self._filter.record)
 
+    def _diagnose(self) -> None:
+        """Once a second, for people and aggregators. The core is not queried here: that would move its motion on, and
+        a recording knows of decisions alone."""
+        errors = self._leases.errors
+        new, self._lease_errors_before = errors - self._lease_errors_before, errors
+        if self._told is not None:
+            stamp = self.get_clock().now().to_msg()
+            self._diagnostics.publish(diagnostics(self._decision, self._told, self._robot.name, errors, new, stamp))
+
     def _send_lease(self, decision: Decision) -> None:
         self._lease_sequence += 1
         report = self._leases.send(
@@ -296,7 +312,7 @@ class FilterNode(Node):
         changed = decision.essence != before.essence
         if not changed and now_s - self._state_at_s < STATE_PERIOD_S:
             return
-        inputs = self._filter.inputs(now_s)
+        inputs = self._told = self._filter.inputs(now_s)
         for sentence, priority, fields in self._drops.news(inputs.scans, now_s):
             self._voice.tell(sentence, priority, robot=self._robot.name, **fields)
         message = messages.safety_state(

@@ -8,6 +8,7 @@ from builtin_interfaces.msg import Time
 from canbase.msg import ForeignPublisher, MuxLock, MuxSource, MuxState
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from canbase_config.diagnostics import VELOCITY_MUX, entry_name
 from canbase_runtime.source_standing import IGNORED
 from canbase_velocity.lock import LockView
 from canbase_velocity.mux import MuxDecision, SourceView
@@ -39,7 +40,7 @@ def diagnostics(decision: MuxDecision, robot: str, deaf: tuple[str, ...], stamp:
     values |= {f"foreign publisher {number}": foreign.sentence for number, foreign in enumerate(decision.foreign, 1)}
     status = DiagnosticStatus(
         level=DiagnosticStatus.WARN if problems or ignored else DiagnosticStatus.OK,
-        name=f"{robot}: velocity_mux",
+        name=entry_name(robot, VELOCITY_MUX),
         message="; ".join([decision.sentence, *held, *problems]),
         hardware_id=robot,
         values=[KeyValue(key=key, value=value) for key, value in values.items()],

@@ -22,6 +22,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
+from canbase_config.diagnostics import PERIOD_S as DIAGNOSTICS_PERIOD_S
 from canbase_config.mux import JOINTS, MEASURED, OUTPUTS, MuxSource
 from canbase_config.robot import Robot
 from canbase_runtime.driver_state import driver_state
@@ -47,7 +48,6 @@ from canbase_velocity.unexpected_publishers import ForeignWatch
 
 STATE_PERIOD_S = 0.5
 GRAPH_PERIOD_S = 0.5
-DIAGNOSTICS_PERIOD_S = 1.0
 
 
 class Follower(Protocol):

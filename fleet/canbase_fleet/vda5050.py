@@ -1,0 +1,39 @@
+"""The part of the VDA 5050 state message that canbase knows, version 2.1.0: safetyState, errors, driving. Pure.
+
+Source: VDA 5050 V 2.1.0, section 6.10, and json_schemas/state.schema, github.com/VDA5050/VDA5050. Orders, nodes, the
+map and the battery's charge are those of the fleet client, which sends the whole message and takes these keys in.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any, Final
+
+from canbase_config.robot import Robot
+from canbase_fleet.robot_view import RobotView
+from canbase_fleet.safety_state import driving, estop, field_violation
+from canbase_fleet.vda_errors import errors
+
+VERSION: Final = "2.1.0"
+
+
+def state(view: RobotView, robot: Robot, timestamp: str) -> dict[str, Any]:
+    """Keys of the state message. `timestamp`: of now, UTC, ISO 8601 as VDA 5050 has it."""
+    return {
+        "timestamp": timestamp,
+        "version": VERSION,
+        "driving": driving(view),
+        "errors": [error.as_json() for error in errors(view, robot)],
+        "safetyState": {"eStop": estop(view, robot).value, "fieldViolation": field_violation(view, robot)},
+    }
+
+
+def essence(view: RobotView, robot: Robot) -> tuple[object, ...]:
+    """What makes two states differ for a fleet: not the numbers in their sentences."""
+    keys = tuple(error.key for error in errors(view, robot))
+    return driving(view), keys, estop(view, robot), field_violation(view, robot)
+
+
+def line(message: dict[str, Any]) -> str:
+    """On one line."""
+    return json.dumps(message, ensure_ascii=False, separators=(",", ":"))
