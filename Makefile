@@ -84,9 +84,17 @@ teeth: $(VENV)/ready ## takes one safeguard out after the other; the campaign ha
 stops: $(WORLD_READY) ## p50, p99 and max of each stop and each lie in virtual time: docs/stop_times.md; ONLY=encoder runs some
 	PYTHONPATH=$(WORLD) python -m campaign.stops --write docs/stop_times.md --only '$(ONLY)'
 
+.PHONY: kinds
+kinds: $(WORLD_READY) ## each kind of drive without its masters, in virtual time: docs/stop_times.md
+	PYTHONPATH=$(WORLD) python -m campaign.kinds --write docs/stop_times.md
+
 .PHONY: soak
 soak: $(WORLD_READY) ## HOURS=20 of ordinary driving of random robots in virtual time: nothing may trip; SEED=7 tells one; LOADED=1 double payload on slopes
 	PYTHONPATH=$(WORLD) python -m campaign.soak $(if $(SEED),--seed $(SEED)) $(if $(HOURS),--hours $(HOURS)) $(if $(FIRST),--first $(FIRST)) $(if $(LOADED),--loaded)
+
+.PHONY: odd
+odd: $(WORLD_READY) ## N=2000 robots with odd but legal drives: each drives 1 m, or what its message names cures it; SEED=7 tells one
+	PYTHONPATH=$(WORLD) python -m campaign.odd $(if $(SEED),--seed $(SEED)) $(if $(N),--robots $(N)) $(if $(FIRST),--first $(FIRST))
 
 .PHONY: small-worlds
 small-worlds: $(VENV)/ready ## every failure with every action of an operator in small worlds; FAULTS=2 deeper, EVERY=1 denser
@@ -142,6 +150,10 @@ pictures: $(VENV)/ready ## the pictures of docs/web.md, explain.md, qualify.md a
 .PHONY: hazards
 hazards: $(VENV)/ready ## checks hazards.yaml and writes the tables of docs/safety.md
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m hazards
+
+.PHONY: refusals
+refusals: $(VENV)/ready ## the table of docs/refusals.md: what the boot says when a drive refuses an object
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.refusals
 
 .PHONY: structure
 structure: $(VENV)/ready ## writes what each file is for into docs/architecture.md

@@ -29,6 +29,27 @@ def node_ids(ctx: typer.Context, incomplete: str) -> list[tuple[str, str]]:
     return [(node_id, ", ".join(names)) for node_id, names in found.items() if node_id.startswith(incomplete)]
 
 
+def objects(ctx: typer.Context, incomplete: str) -> list[tuple[str, str]]:
+    """Indexes of the EDS that the line names, or of ours, each with the name of its object."""
+    from importlib.resources import files
+
+    from canbase_config.eds_file import EdsError, read_eds
+
+    ours = str(files("canbase_config").joinpath("eds/canbase_cia402.eds"))
+    try:
+        names = read_eds(ctx.params.get("eds") or ours).names
+    except EdsError:
+        return []
+    begun = incomplete.upper()
+    return [(f"{index:04X}", name) for index, name in sorted(names.items()) if f"{index:04X}".startswith(begun)]
+
+
+def node_ids_or_all(ctx: typer.Context, incomplete: str) -> list[tuple[str, str]]:
+    """Node ids of the drives, and all of them."""
+    found = node_ids(ctx, incomplete)
+    return [*found, ("all", "every node")] if "all".startswith(incomplete) else found
+
+
 def one_more_of(words: tuple[str, ...], incomplete: str) -> list[str]:
     """For a list that is joined by commas: what may follow, without what stands in it."""
     head, comma, begun = incomplete.rpartition(",")

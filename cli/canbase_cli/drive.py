@@ -6,8 +6,16 @@ from typing import Annotated
 
 import typer
 
-from canbase_cli.goal import CancelAfterOption, Interrupts, JsonOption, WaitOption, run_goal
-from canbase_cli.options import NamespaceOption, ros_arguments, ros_needed
+from canbase_action_server.feedback_watch import FEEDBACK_TIMEOUT_S
+from canbase_cli.goal import (
+    CancelAfterOption,
+    FeedbackTimeoutOption,
+    Interrupts,
+    JsonOption,
+    WaitOption,
+    run_goal,
+)
+from canbase_cli.options import NamespaceOption, right_start, ros_arguments, ros_needed
 
 
 def drive(
@@ -16,6 +24,7 @@ def drive(
     speed_mps: Annotated[float, typer.Option("--speed", "-s", metavar="SPEED", help="highest speed, m/s")] = 0.2,
     cancel_after_s: CancelAfterOption = None,
     wait_s: WaitOption = 5.0,
+    feedback_timeout_s: FeedbackTimeoutOption = FEEDBACK_TIMEOUT_S,
     as_json: JsonOption = False,
     namespace: NamespaceOption = "",
 ) -> None:
@@ -24,7 +33,7 @@ def drive(
     Ctrl-C cancels the goal and waits for standstill; a second Ctrl-C stops waiting.
 
     Exit codes: 0 succeeded, 1 other failures, 2 wrong command line, 3 canceled, 4 aborted, 5 rejected, 6 the server is
-    not found, has ended, or does not answer.
+    not found, has ended, or does not answer, 7 canceled because no feedback arrived.
     """
     with ros_needed():
         import rclpy
@@ -35,8 +44,9 @@ def drive(
     rclpy.init(args=ros_arguments(ctx, namespace), signal_handler_options=SignalHandlerOptions.NO)
     interrupts = Interrupts()
     try:
-        with interrupts.caught():
-            client = DriveClient(rclpy.create_node("canbase_drive", enable_rosout=False))
+        with interrupts.caught(), right_start():
+            node = rclpy.create_node("canbase_drive", enable_rosout=False)
+            client = DriveClient(node, feedback_timeout_s=feedback_timeout_s)
             run_goal(
                 lambda show, interrupted: client.send(
                     distance_m,

@@ -14,6 +14,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from canbase_action_server.feedback_watch import MAX_TIMEOUT_S
 from canbase_action_server.outcome import Status
 from canbase_cli.options import RosCommand
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
@@ -26,6 +27,7 @@ CANCELED: Final = 3
 ABORTED: Final = 4
 REJECTED: Final = 5
 NO_SERVER: Final = 6
+NO_FEEDBACK: Final = 7
 CANCEL_PATIENCE_S: Final = 10.0
 """After a cancel the final status has this long to come."""
 
@@ -42,7 +44,22 @@ CancelAfterOption = Annotated[
 WaitOption = Annotated[
     float, typer.Option("--wait", metavar="SECONDS", min=0.1, help="How long to look for the server.")
 ]
+FeedbackTimeoutOption = Annotated[
+    float,
+    typer.Option(
+        "--feedback-timeout",
+        metavar="SECONDS",
+        min=0.5,
+        max=MAX_TIMEOUT_S,
+        help="Cancel the goal after this time without feedback.",
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as one line of JSON.")]
+
+WITHOUT_SERVER: Final = (
+    "without a server nothing is published on cmd_vel_action, and the base stops after the timeout of that source "
+    "(mux.sources, 0.3 s by default). If only this computer is cut off, the goal goes on: `canbase stop`"
+)
 
 Show = Callable[[float, float], None]
 """Called with what is done (signed) and what is left, in the goal's unit."""
@@ -83,15 +100,14 @@ def run_goal(
     interrupts: Interrupts,
 ) -> None:
     """Send the goal, wait for its end, print it, and exit with its code. `send` gets `Show` and `interrupted`."""
-    from canbase_action_server.goal_client import DriveError, InterruptedDriveError, RejectedError
+    from canbase_action_server.goal_errors import DriveError, InterruptedDriveError, RejectedError
 
     def interrupted() -> bool:
         return interrupts.count > 0
 
     try:
         with _shown(way, unit, as_json) as show:
-            goal = send(show, interrupted)
-            result = goal.wait(cancel_after_s, until=interrupted) or _cancel(goal, interrupts)
+            result, feedback_lost = _end_of(send(show, interrupted), cancel_after_s, interrupts)
     except RejectedError as error:
         fail(str(error), REJECTED)
     except InterruptedDriveError as error:
@@ -99,18 +115,37 @@ def run_goal(
     except DriveError as error:
         fail(str(error), NO_SERVER)
     _print_result(result, as_json)
-    raise typer.Exit(exit_code(result.status))
+    raise typer.Exit(exit_code(result.status, feedback_lost))
 
 
-def exit_code(status: Status) -> int:
-    """Of a goal that ended: 0 for success alone."""
-    return {Status.SUCCEEDED: 0, Status.CANCELED: CANCELED, Status.ABORTED: ABORTED}[status]
+def exit_code(status: Status, feedback_lost: bool = False) -> int:
+    """Of a goal that ended: 0 for success alone. `feedback_lost`: this command canceled it for that."""
+    canceled = NO_FEEDBACK if feedback_lost else CANCELED
+    return {Status.SUCCEEDED: 0, Status.CANCELED: canceled, Status.ABORTED: ABORTED}[status]
 
 
-def _cancel(goal: SentGoal[Any], interrupts: Interrupts) -> Any:
+def _end_of(goal: SentGoal[Any], cancel_after_s: float | None, interrupts: Interrupts) -> tuple[Any, bool]:
+    """Its result, and whether it was canceled because no feedback arrived."""
+    from canbase_action_server.goal_errors import FeedbackLostError
+
+    try:
+        return goal.wait(cancel_after_s, until=lambda: interrupts.count > 0) or _cancel(goal, interrupts), False
+    except FeedbackLostError as error:
+        typer.echo(str(error), err=True)
+        return _cancel(goal, interrupts, WITHOUT_SERVER), True
+
+
+def _cancel(goal: SentGoal[Any], interrupts: Interrupts, unanswered: str = "") -> Any:
+    """Requests it and waits for the end. `unanswered`: what to add when the server does not answer."""
+    from canbase_action_server.goal_errors import NoResponseError
+
     seen = interrupts.count
     typer.echo("canceling; waiting for standstill", err=True)
-    if goal.cancel():
+    try:
+        accepted = goal.cancel()
+    except NoResponseError as error:
+        fail(f"{error}; {unanswered}" if unanswered else str(error), NO_SERVER)
+    if accepted:
         typer.echo("the server accepts the cancel", err=True)
     else:
         typer.echo("the server does not accept the cancel: the goal is about to end", err=True)

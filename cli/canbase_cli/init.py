@@ -44,7 +44,8 @@ def init(
 
     It listens first, and ends if another master is on the bus. Then it reads identity, encoder resolution and gear
     ratio of every drive by SDO, which changes nothing. It asks for what no drive reports: sides, wheels, edges, speed.
-    A bare Enter takes the proposed answer. The file passes `canbase config check`; an existing file is kept.
+    A bare Enter takes the proposed answer. The file passes `canbase config check`; an existing file is kept. Drives
+    fresh from the box often have one node id all, or another bit rate: `canbase adopt` comes first for them.
 
     Exit codes: 0 written, 1 no drives, another master or values that do not fit, 2 wrong command line.
     """

@@ -6,11 +6,14 @@ import os
 import sys
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, colour, fail, load_config
+
+if TYPE_CHECKING:
+    from canbase_config.load import Loaded
 
 
 class Network(str, Enum):
@@ -68,14 +71,22 @@ def install(
         neighbours,
         refuse_keystore,
         refuse_others,
+        refuse_running,
         rehearse,
         sourced,
         templates,
     )
     from canbase_deploy.owner import owner_paths
-    from canbase_deploy.plan import InstallError, Request, install_plan, network_warning, next_step
+    from canbase_deploy.plan import (
+        InstallError,
+        Request,
+        install_plan,
+        left_interfaces,
+        network_warning,
+        next_step,
+    )
 
-    loaded = load_config(config or prefix / owner_paths(name or "robot")[0].relative_to("/"))
+    loaded = load_config(config) if config else _installed(prefix / owner_paths(name or "robot")[0].relative_to("/"))
     try:
         request = Request(
             name=name or loaded.robot.name,
@@ -94,8 +105,10 @@ def install(
             files={} if config is None else named_texts(loaded.files),
         )
         installed = manifests(prefix)
-        plan = install_plan(request, installed, neighbours(prefix, request.name, installed))
+        others = neighbours(prefix, request.name, installed)
+        plan = install_plan(request, installed, others)
         if prefix == Path("/"):
+            refuse_running(request.name, left_interfaces(request, installed, others))
             if sros2:
                 refuse_keystore()
             outside = [name for name in loaded.files if Path(name).is_absolute()]
@@ -112,6 +125,19 @@ def install(
         typer.secho(warning, err=True, fg=typer.colors.YELLOW, color=colour())
     if not dry_run and prefix == Path("/"):
         typer.echo(next_step(request, executor.changed, upgrade=request.name in installed))
+
+
+def _installed(path: Path) -> Loaded:
+    """The robot that is installed. Ends the command where this version cannot use it, such as for want of a key."""
+    from canbase_deploy.host import UNCHANGED
+
+    try:
+        return load_config(path)
+    except typer.Exit:
+        if path.is_file():
+            advice = f"Write into a copy of {path} what is missing, then: sudo canbase install --config COPY."
+            typer.echo(f"{UNCHANGED} {advice}", err=True)
+        raise
 
 
 def uninstall(

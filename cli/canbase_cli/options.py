@@ -16,8 +16,10 @@ from typer.core import TyperCommand
 from canbase_cli.log_format import readable_times
 from canbase_cli.middleware import prefer_udp, stay_on_this_computer, take_no_profile_from_here
 from canbase_runtime.terminal import FAILED, fail
+from canbase_runtime.wrong_start import WrongStartError
 
 ROS_USAGE: Final = "[OPTIONS] [--ros-args …]"
+WRONG_COMMAND_LINE: Final = 2
 _ROS_FLAG: Final = "--ros-args"
 _GENERATOR: Final = "rosidl_generator_py.generate_py_impl"
 """The messages' package imports the generator of their Python code, a parser with it, wherever that can be imported.
@@ -99,6 +101,16 @@ def _check_ros_arguments(given: list[str]) -> None:
     except rclpy_implementation.RCLError as error:
         raise typer.BadParameter(f"behind {_ROS_FLAG}: {str(error).partition(', at /')[0]}") from error
     context.try_shutdown()
+
+
+@contextmanager
+def right_start() -> Iterator[None]:
+    """A wrong command line: use_sim_time, a speed limit that cannot be, a source that is the robot's own output, or
+    remap rules that tear an action apart."""
+    try:
+        yield
+    except WrongStartError as error:
+        fail(str(error), WRONG_COMMAND_LINE)
 
 
 @contextmanager

@@ -7,8 +7,16 @@ from typing import Annotated
 
 import typer
 
-from canbase_cli.goal import CancelAfterOption, Interrupts, JsonOption, WaitOption, run_goal
-from canbase_cli.options import NamespaceOption, ros_arguments, ros_needed
+from canbase_action_server.feedback_watch import FEEDBACK_TIMEOUT_S
+from canbase_cli.goal import (
+    CancelAfterOption,
+    FeedbackTimeoutOption,
+    Interrupts,
+    JsonOption,
+    WaitOption,
+    run_goal,
+)
+from canbase_cli.options import NamespaceOption, right_start, ros_arguments, ros_needed
 
 
 def rotate(
@@ -18,6 +26,7 @@ def rotate(
     degrees: Annotated[bool, typer.Option("--degrees", "-d", help="ANGLE is in degrees.")] = False,
     cancel_after_s: CancelAfterOption = None,
     wait_s: WaitOption = 5.0,
+    feedback_timeout_s: FeedbackTimeoutOption = FEEDBACK_TIMEOUT_S,
     as_json: JsonOption = False,
     namespace: NamespaceOption = "",
 ) -> None:
@@ -26,7 +35,7 @@ def rotate(
     Ctrl-C cancels the goal and waits for standstill; a second Ctrl-C stops waiting.
 
     Exit codes: 0 succeeded, 1 other failures, 2 wrong command line, 3 canceled, 4 aborted, 5 rejected, 6 the server is
-    not found, has ended, or does not answer.
+    not found, has ended, or does not answer, 7 canceled because no feedback arrived.
     """
     with ros_needed():
         import rclpy
@@ -38,8 +47,9 @@ def rotate(
     angle_rad = math.radians(angle) if degrees else angle
     interrupts = Interrupts()
     try:
-        with interrupts.caught():
-            client = RotateClient(rclpy.create_node("canbase_rotate", enable_rosout=False))
+        with interrupts.caught(), right_start():
+            node = rclpy.create_node("canbase_rotate", enable_rosout=False)
+            client = RotateClient(node, feedback_timeout_s=feedback_timeout_s)
             run_goal(
                 lambda show, interrupted: client.send(
                     angle_rad,

@@ -37,8 +37,10 @@ def scan(
 
     It listens first. Then it reads the identity of every node id by SDO, which changes nothing. If another master is on
     the bus, it reports that and asks you first. A node in NMT state stopped that sends no heartbeat cannot be found.
+    It names node ids that several drives have, and drives that answer and send nothing, with the reason.
 
-    Exit codes: 0 nodes found, and all nodes of --config, 1 none or not all, 2 wrong command line or robot.yaml.
+    Exit codes: 0 nodes found, and all nodes of --config, 1 none, not all, or several drives with one node id, 2 wrong
+    command line or robot.yaml.
     """
     from canbase_commissioning.onbus.bus_session import choose_bus, robot_if_given
     from canbase_commissioning.onbus.scan_command import run

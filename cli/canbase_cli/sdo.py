@@ -15,11 +15,12 @@ app = typer.Typer(help="Read or write one object of a node.", no_args_is_help=Tr
 
 READ_EPILOG: Final = (
     "Examples:  \ncanbase sdo read 1 6041 --channel can0  \ncanbase sdo read 2 1018:4 --config robot.yaml  \n"
-    "canbase sdo read 1 0x2000:0 --type u16 --raw"
+    "canbase sdo read 1 0x2000:0 --type u16 --raw  \ncanbase sdo read 1 'Target velocity' --eds maker.eds  \n"
+    "canbase sdo read 1 Identity.Vendor-ID --channel can0"
 )
 WRITE_EPILOG: Final = (
     "Examples:  \ncanbase sdo write 1 1017 100 --channel can0  \ncanbase sdo write 1 605A 0x2 --config robot.yaml  \n"
-    "canbase sdo write 1 1010:1 0x65766173      (store: the drive keeps its settings)"
+    "canbase sdo write 1 'Profile acceleration' 2000 --eds maker.eds"
 )
 
 NodeArgument = Annotated[
@@ -29,13 +30,22 @@ NodeArgument = Annotated[
     ),
 ]
 ObjectArgument = Annotated[
-    str, typer.Argument(metavar="INDEX[:SUB]", help="INDEX is hexadecimal: 6041, 0x1018:4.", show_default=False)
+    str,
+    typer.Argument(
+        metavar="OBJECT",
+        help="INDEX or INDEX:SUB, the index hexadecimal: 6041, 0x1018:4; or a name from the EDS.",
+        show_default=False,
+        autocompletion=completion.objects,
+    ),
 ]
 TypeOption = Annotated[
     str | None,
     typer.Option("--type", metavar="TYPE", help="u8 … i64, f32, str, hex.", show_default="from EDS or profile"),
 ]
 EdsOption = Annotated[Path | None, typer.Option("--eds", metavar="FILE", help="The maker's EDS file: types, names.")]
+IgnoreEdsOption = Annotated[
+    bool, typer.Option("--ignore-eds", help="Even against access or range of --eds, where that file is wrong.")
+]
 TimeoutOption = Annotated[
     float,
     typer.Option("--sdo-timeout", metavar="SECONDS", min=0.02, max=10.0, help="How long to wait for an SDO answer."),
@@ -58,9 +68,10 @@ def read(
     kind: TypeOption = None,
     eds: EdsOption = None,
     timeout_s: TimeoutOption = 0.5,
+    ignore_eds: IgnoreEdsOption = False,
     raw: Annotated[bool, typer.Option("--raw", help="Print the value alone, for scripts.")] = False,
 ) -> None:
-    """Read one object: name, value in hexadecimal and decimal, meaning.
+    """Read one object: name, value in hexadecimal and decimal, meaning; with --eds also its access and range.
 
     Exit codes: 0 read, 1 refused by the drive or no answer, 2 wrong command line or robot.yaml.
     """
@@ -68,7 +79,7 @@ def read(
     from canbase_commissioning.onbus.sdo_command import Target, run_read
 
     target = Target.of(node, at, kind, eds, robot_if_given(config))
-    run_read(choose_bus(config, interface, channel, bitrate), target, timeout_s, raw=raw)
+    run_read(choose_bus(config, interface, channel, bitrate), target, timeout_s, raw=raw, ignore_eds=ignore_eds)
 
 
 @app.command("write", epilog=WRITE_EPILOG, context_settings={"ignore_unknown_options": True})
@@ -83,6 +94,7 @@ def write(
     kind: TypeOption = None,
     eds: EdsOption = None,
     timeout_s: TimeoutOption = 0.5,
+    ignore_eds: IgnoreEdsOption = False,
     force: Annotated[
         bool, typer.Option("--force", help="Even while a motor has power, or canbase's driver runs.")
     ] = False,
@@ -90,7 +102,8 @@ def write(
     """Write one object, and read it back.
 
     Refused while a motor of this node has power, and while canbase's driver runs on this bus: the driver would not know
-    of the change, and the watchdog stops the robot when another master writes controlword, mode or target.
+    of the change, and the watchdog stops the robot when another master writes controlword, mode or target. With --eds,
+    a read-only object and a value out of range are refused before anything is sent; --force does not change that.
 
     Exit codes: 0 written and read back, 1 refused or no answer, 2 wrong command line, value or robot.yaml.
     """
@@ -98,4 +111,6 @@ def write(
     from canbase_commissioning.onbus.sdo_command import Target, run_write
 
     target = Target.of(node, at, kind, eds, robot_if_given(config))
-    run_write(choose_bus(config, interface, channel, bitrate), target, value, timeout_s, force=force)
+    run_write(
+        choose_bus(config, interface, channel, bitrate), target, value, timeout_s, force=force, ignore_eds=ignore_eds
+    )

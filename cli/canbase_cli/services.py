@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -19,6 +17,7 @@ from canbase_cli.options import (
     NamespaceOption,
     RosCommand,
     UnusedNamespaceOption,
+    right_start,
     ros_arguments,
     ros_needed,
 )
@@ -27,13 +26,11 @@ from canbase_runtime.latch_file import latch_folder
 from canbase_runtime.own_modules import module_command
 from canbase_runtime.single_instance import TakenError
 from canbase_runtime.terminal import FAILED, fail, load_config
-from canbase_runtime.wrong_start import WrongStartError
 
 if TYPE_CHECKING:
     from canbase_config.robot import Robot
     from canbase_driver.runtime.claim import Claim
 
-WRONG_COMMAND_LINE: Final = 2
 SERVICES: Final = ("driver", "velocity", "action-server", "watchdog", "sim")
 """Names of the commands here."""
 _PANEL: Final = "Services: one process each, as `canbase up` starts them"
@@ -64,7 +61,7 @@ def driver(
     with ros_needed():
         from canbase_driver.runtime.main import run
     leave_stop_file(robot, stop_file)
-    with _right_start():
+    with right_start():
         raise typer.Exit(run(robot, ros_arguments(ctx, namespace), claim, autostart, partial(raise_priority, "driver")))
 
 
@@ -87,7 +84,7 @@ def velocity(ctx: typer.Context, config: ConfigOption = None, namespace: Namespa
     robot = load_config(config).robot
     with ros_needed():
         from canbase_velocity.main import run
-    with _right_start():
+    with right_start():
         raise typer.Exit(run(robot, ros_arguments(ctx, namespace), partial(raise_priority, "velocity")))
 
 
@@ -102,17 +99,8 @@ def action_server(ctx: typer.Context, config: ConfigOption = None, namespace: Na
 
         if robot.action.nav2_behaviors:
             import_module("canbase_action_server.nav2_messages")  # its messages may be missing
-    with _right_start():
+    with right_start():
         raise typer.Exit(run(robot, ros_arguments(ctx, namespace), partial(raise_priority, "action-server")))
-
-
-@contextmanager
-def _right_start() -> Iterator[None]:
-    """A wrong command line: use_sim_time, a speed limit that cannot be, or a source that is the robot's own output."""
-    try:
-        yield
-    except WrongStartError as error:
-        fail(str(error), WRONG_COMMAND_LINE)
 
 
 def sim(
@@ -122,13 +110,17 @@ def sim(
         Path | None, typer.Option("--control", metavar="PATH", help="Unix socket that controls the simulation.")
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print warnings only.")] = False,
+    factory_fresh: Annotated[
+        bool, typer.Option("--factory-fresh", help="Every drive has node id 1 and 125 kbit/s: for canbase adopt.")
+    ] = False,
 ) -> None:
     """Run simulated drives on the robot's bus, in place of the real ones."""
     from canbase_sim.main import run
 
     robot = load_config(config).robot
     raise_priority("sim")
-    raise typer.Exit(run(robot, None if control is None else str(control), quiet=quiet))
+    path = None if control is None else str(control)
+    raise typer.Exit(run(robot, path, quiet=quiet, factory_fresh=factory_fresh))
 
 
 def watchdog(

@@ -1,4 +1,4 @@
-"""`canbase stop` and `canbase reset`: call services of the robot and print their answers."""
+"""`canbase stop` and `canbase reset`: call services of the robot and print their answers. `cancel.py` too."""
 
 from __future__ import annotations
 
@@ -21,6 +21,8 @@ FILTER_S: Final = 1.0
 """Beside a motor driver that is found, the safety filter is as well within this time, or there is none."""
 STATE_S: Final = 1.0
 """motor_driver/status and safety_filter/state come ten times a second."""
+STANDSTILL_S: Final = 2.0
+"""The action server knows a standstill from odom, the driver from its drives: one may see it a little later."""
 SLICE_S: Final = 0.1
 """Ctrl-C takes effect after this at the latest [s]."""
 WaitOption = Annotated[
@@ -69,6 +71,7 @@ class Caller:
         self._ros_args = ros_arguments(ctx, namespace)
         self._wait_s = wait_s
         self._node: Node
+        self._clients: dict[str, Any] = {}
 
     def __enter__(self) -> Caller:
         with ros_needed():
@@ -100,14 +103,22 @@ class Caller:
         from std_srvs.srv import Trigger
 
         self.need_driver(service)
-        future = self._client(service).call_async(Trigger.Request())
-        self._spin_until(future.done, ANSWER_S)
-        answer = future.result() if future.done() else None
+        answer = self.answer(Trigger, service, Trigger.Request(), ANSWER_S)
         if answer is None:
             fail(f"{service} did not answer within {ANSWER_S:.0f} s; look at its log", FAILED)
         if not answer.success:
             fail(printable(answer.message, SENTENCE_LENGTH), FAILED)
         return printable(answer.message, SENTENCE_LENGTH)
+
+    def offers(self, kind: Any, service: str) -> bool:
+        """Somebody offers the service within the time of `--wait`."""
+        return bool(self._client(service, kind).wait_for_service(self._wait_s))
+
+    def answer(self, kind: Any, service: str, request: Any, within_s: float) -> Any:
+        """The response; None: it did not come in time."""
+        future = self._client(service, kind).call_async(request)
+        self._spin_until(future.done, within_s)
+        return future.result() if future.done() else None
 
     def estop_holds(self) -> bool:
         """The emergency stop holds the base, or waits for its reset."""
@@ -123,6 +134,15 @@ class Caller:
         status = self._newest(DriverStatus, "motor_driver/status")
         return status is not None and status.state == DriverStatus.ENABLED
 
+    def is_at_standstill(self) -> bool:
+        """By the motor driver, within a moment; False also when it reports nothing."""
+        from canbase.msg import DriverStatus
+
+        heard: list[Any] = []
+        self._node.create_subscription(DriverStatus, "motor_driver/status", heard.append, 1)
+        self._spin_until(lambda: bool(heard) and heard[-1].standstill, STANDSTILL_S)
+        return bool(heard) and bool(heard[-1].standstill)
+
     def _newest(self, kind: Any, topic: str) -> Any:
         """The next message on a topic that is published ten times a second; None: it did not come."""
         heard: list[Any] = []
@@ -130,10 +150,13 @@ class Caller:
         self._spin_until(lambda: bool(heard), STATE_S)
         return heard[-1] if heard else None
 
-    def _client(self, service: str) -> Any:
+    def _client(self, service: str, kind: Any = None) -> Any:
+        """`kind` None: Trigger. One client for each service, as long as the command runs."""
         from std_srvs.srv import Trigger
 
-        return self._node.create_client(Trigger, service)
+        if service not in self._clients:
+            self._clients[service] = self._node.create_client(kind or Trigger, service)
+        return self._clients[service]
 
     def _spin_until(self, done: Any, within_s: float) -> None:
         import rclpy

@@ -6,7 +6,7 @@ import importlib.util
 import os
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -16,7 +16,7 @@ from canbase_deploy.keystore import KEYS, found_in, refusals
 from canbase_deploy.neighbours import Neighbour
 from canbase_deploy.owner import ETC, owner_paths
 from canbase_deploy.ownership import faults, refusal
-from canbase_deploy.plan import InstallError
+from canbase_deploy.plan import PARTS, InstallError, service
 from canbase_runtime.environment_file import variables
 
 PATHS: Final = ("AMENT_PREFIX_PATH", "PYTHONPATH", "LD_LIBRARY_PATH")
@@ -27,6 +27,7 @@ CHOSEN: Final = ("ROS_DOMAIN_ID", "RMW_IMPLEMENTATION")
 
 HIDDEN: Final = ("/home/", "/root/", "/run/user/", "/tmp/", "/var/tmp/")
 """What the units cannot see, by ProtectHome and PrivateTmp."""
+UNCHANGED: Final = "Nothing was changed: what is installed goes on as it is."
 REHEARSAL_S: Final = 120.0
 """A small computer imports ROS 2 from a cold memory card in some ten seconds."""
 _USES: Final = """
@@ -161,11 +162,21 @@ def neighbours(prefix: Path, name: str, installed: Iterable[str]) -> list[Neighb
             loaded = load_robot(path)
         except ConfigError as error:
             raise InstallError(
-                f"the robot {other} is installed too, and nobody knows on which bus: {path} cannot be used. Mend it "
-                f"(`canbase config check --config {path}` says what is wrong), or `sudo canbase uninstall {other}`"
+                f"{error}\nthe robot {other} is installed too, and this version cannot use its {path}. Mend it "
+                f"(`canbase config check --config {path}`), or `sudo canbase uninstall {other}`. {UNCHANGED}"
             ) from error
         found.append(Neighbour(other, loaded.robot, named_texts(loaded.files)))
     return found
+
+
+def refuse_running(name: str, interfaces: Sequence[str]) -> None:
+    """Raises InstallError where a part of the robot runs that would lose one of these interfaces."""
+    units = [service(part, name) for part in PARTS]
+    if interfaces and subprocess.run(["systemctl", "is-active", "--quiet", *units], check=False).returncode == 0:
+        raise InstallError(
+            f"{name} runs, and robot.yaml no longer names its CAN interface: {' '.join(interfaces)} would be stopped "
+            f"under it. First, with the robot at standstill: sudo systemctl stop canbase@{name}.target"
+        )
 
 
 def manifests(prefix: Path) -> dict[str, str]:

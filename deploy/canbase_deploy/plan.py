@@ -24,6 +24,8 @@ STATE: Final = PurePosixPath("/var/lib/canbase")
 PARTS: Final = ("watchdog", "driver", "velocity", "action-server")
 WITH_ROS: Final = PARTS[1:]
 ON_THE_BUS: Final = PARTS[:2]
+METRICS: Final = "metrics"
+"""Its unit is installed and not started: nothing of the robot needs it."""
 DOMAIN: Final = "0"
 """ROS_DOMAIN_ID where nobody has chosen one: what ROS 2 takes then, said aloud."""
 REACH: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
@@ -42,6 +44,11 @@ _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _CPUS: Final = re.compile(r"\d+(-\d+)?(,\d+(-\d+)?)*")
 _ADAPTER: Final = re.compile(r"[A-Z_]+=\S+")
 _PYTHON: Final = "@PYTHON@"
+HARDENING: Final = "canbase-hardening.conf"
+"""The sandbox of all parts: one file, a drop-in of each of their units. In `canbase-.service.d` it would be one of the
+integrator's own units too, whatever they need."""
+ONLINE: Final = "network-online.target"
+"""DDS looks at the network interfaces as a node starts, and uses no other ones."""
 
 
 class InstallError(ValueError):
@@ -91,6 +98,7 @@ def install_plan(request: Request, manifests: Mapping[str, str], neighbours: Seq
     stale = [path for path in _own(request.name, manifests) if path not in listed]
     return [
         ACCOUNT,
+        *(Run(("systemctl", "stop", unit), True) for unit in left_interfaces(request, manifests, neighbours)),
         Run(("systemd-sysusers", str(ACCOUNT.path))),
         FirstRecords(STATE / request.name, request.robot.name, USER),
         *files,
@@ -101,6 +109,15 @@ def install_plan(request: Request, manifests: Mapping[str, str], neighbours: Seq
         *([APPLY] if request.robot.watchdog.relay else []),
         Run(("systemctl", "daemon-reload")),
     ]
+
+
+def left_interfaces(request: Request, manifests: Mapping[str, str], neighbours: Sequence[Neighbour] = ()) -> list[str]:
+    """Units of the CAN interfaces that this robot was installed with and that no robot.yaml names any more.
+
+    They are brought down before their files go. Not while the robot runs: it would lose its bus.
+    """
+    used = {_can_env(robot.bus.channel) for robot in (request.robot, *(other.robot for other in neighbours))}
+    return _interfaces(path for path in _own(request.name, manifests) if path not in used)
 
 
 def next_step(request: Request, changed: Collection[PurePosixPath], *, upgrade: bool) -> str:
@@ -222,13 +239,22 @@ def _check_places(request: Request, manifests: Mapping[str, str]) -> None:
 
 def _files(request: Request) -> list[WriteFile | Link]:
     return [
-        *(_unit(name, text, request.python) for name, text in sorted(request.templates.items())),
+        *(
+            Link(UNITS / f"canbase-{part}@.service.d" / "00-hardening.conf", f"../{HARDENING}")
+            for part in (*PARTS, METRICS)
+        ),
+        *(_unit(name, text, request.python) for name, text in sorted(request.templates.items(), key=_hardening_first)),
         MODES,
         *_of_the_owner(request),
         *_can(request),
         *_tuning(request),
         Link(UNITS / "multi-user.target.wants" / f"canbase@{request.name}.target", "../canbase@.target"),
     ]
+
+
+def _hardening_first(template: tuple[str, str]) -> tuple[bool, str]:
+    """An installation that is cut off leaves no unit without its sandbox."""
+    return template[0] != HARDENING, template[0]
 
 
 def _unit(name: str, text: str, python: str) -> WriteFile:
@@ -281,9 +307,10 @@ def _can(request: Request) -> list[WriteFile | Link]:
 def _tuning(request: Request) -> list[WriteFile]:
     files: list[WriteFile] = []
     if request.sourced:
-        files += [_drop_in(part, request.name, "05-ros", _environment(request.sourced)) for part in PARTS]
+        files += [_drop_in(part, request.name, "05-ros", _environment(request.sourced)) for part in (*PARTS, METRICS)]
     if request.network == "lan":
-        files += [_drop_in(part, request.name, "20-lan", "[Service]\nIPAddressAllow=any\n") for part in WITH_ROS]
+        text = f"[Unit]\nWants={ONLINE}\nAfter={ONLINE}\n\n[Service]\nIPAddressAllow=any\n"
+        files += [_drop_in(part, request.name, "20-lan", text) for part in (*WITH_ROS, METRICS)]
     if request.cpus:
         text = f"[Service]\nCPUAffinity={request.cpus}\n"
         files += [_drop_in(part, request.name, "30-cpus", text) for part in PARTS]

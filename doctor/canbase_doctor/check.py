@@ -84,11 +84,23 @@ def commissioning(loaded: Loaded) -> list[Check]:
         return []
     why = uncommissioned(loaded.robot)
     if not why:
-        return [ok("commissioning", "done, and robot.yaml has not changed since")]
+        return [ok("commissioning", "done, and robot.yaml has not changed since"), *_self_stop_proof(loaded)]
     slow = f"no faster than safety.uncommissioned_mps, {loaded.robot.safety.uncommissioned_mps:g} m/s"
-    return [
-        warn("commissioning", f"{why}; {slow}", "canbase commission: wrong signs and scales show on the floor alone")
-    ]
+    cure = "canbase commission: wrong signs and scales show on the floor alone"
+    return [warn("commissioning", f"{why}; {slow}", cure), *_self_stop_proof(loaded)]
+
+
+def _self_stop_proof(loaded: Loaded) -> list[Check]:
+    """Whether the driver gives power to these drives; nothing where robot.yaml does not ask for a proof."""
+    from canbase_config.commissioned import without_proof
+
+    if not loaded.robot.safety.require_self_stop:
+        return []
+    why = without_proof(loaded.robot)
+    if not why:
+        return [ok("self-stop proof", "each drive is proven to stop by itself (safety.require_self_stop)")]
+    cure = "prove it; or wire STO, and set safety.require_self_stop: false"
+    return [fail("self-stop proof", f"no drive gets power: {why}", cure)]
 
 
 def first_failure(checks: Sequence[Check]) -> Check | None:

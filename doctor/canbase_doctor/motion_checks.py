@@ -17,6 +17,9 @@ CLOCKS_APART_S = 1.0
 """A stamp that is farther from this computer's clock was made with another one."""
 BUSY_S = 10.0
 """Older stamps than that no busy computer explains."""
+TWICE = 1.4
+"""So many times as many transforms as odom messages come from two nodes; one or the other message is lost."""
+FEW = 5
 SHARED_TOPICS = {
     "odom": "let motor_driver alone publish it: rename the topic of the other node",
     MEASURED: "let motor_driver alone publish it: end joint_state_broadcaster (docs/ros2_control.md)",
@@ -99,16 +102,35 @@ def odometry(seen: Evidence) -> Check:
 
 
 def transform(seen: Evidence) -> Check:
-    """Does tf carry odom → base_link?"""
-    name, base, heard = "tf", seen.robot.base, seen.on("tf")
+    """Does tf carry odom → base_link, from one node?"""
+    name, base, publishes = "tf", seen.robot.base, seen.robot.odometry.publish_tf
     if "tf" not in seen.heard:
         return warn(name, "this ROS 2 has no tf2_msgs: not looked at", "install ros-<distro>-tf2-msgs")
-    pairs = {(each.header.frame_id, each.child_frame_id) for message in heard.messages for each in message.transforms}
-    if (base.odom_frame, base.base_frame) in pairs:
-        return ok(name, f"{base.odom_frame} → {base.base_frame}")
-    return fail(
-        name, f"{base.odom_frame} → {base.base_frame} is missing", "is motor_driver running? Does a node remap tf?"
-    )
+    poses = _poses(seen)
+    if not poses:
+        found = f"{base.odom_frame} → {base.base_frame} is missing"
+        if publishes:
+            return fail(name, found, "is motor_driver running? Does a node remap tf?")
+        return fail(name, found, "odometry.publish_tf is false: start the filter that publishes it, or set it to true")
+    others = [each.node for each in seen.publishers.get("tf", ()) if each.node.split("/")[-1] != "motor_driver"]
+    if publishes and others and _alternate(poses, len(seen.on("odom").messages)):
+        found = f"{base.odom_frame} → {base.base_frame} comes from motor_driver and from one of {', '.join(others)}"
+        return fail(name, found, "let one publish it: odometry.publish_tf: false in robot.yaml, or its own publish_tf")
+    return ok(name, f"{base.odom_frame} → {base.base_frame}")
+
+
+def _poses(seen: Evidence) -> list[Any]:
+    """Each odom → base_link that came."""
+    wanted = (seen.robot.base.odom_frame, seen.robot.base.base_frame)
+    each = [transform for message in seen.on("tf").messages for transform in message.transforms]
+    return [one for one in each if (one.header.frame_id, one.child_frame_id) == wanted]
+
+
+def _alternate(poses: list[Any], odom_messages: int) -> bool:
+    """motor_driver publishes one with each odom: more of them, or two poses with one stamp, come from two nodes."""
+    first: dict[float, Any] = {}
+    differ = any(first.setdefault(_stamp_s(one), one.transform) != one.transform for one in poses)
+    return differ or len(poses) > TWICE * max(odom_messages, FEW)
 
 
 def sensors(seen: Evidence) -> Check:

@@ -40,11 +40,11 @@ class WheelStates:
         if layout is None or not layout.fits(len(frame.data)):
             return False, False
         measured = ordered = False
-        radius_m = self.robot.base.wheel_radius_m if self.robot else 1.0
         for mapped in layout.mapped:
             fallback = f"node{layout.node_id}" + (f"_axis{mapped.axis}" if mapped.axis else "")
             known = self._units.get((layout.node_id, mapped.axis))
             name, scale = known if known is not None else (fallback, None)
+            radius_m = scale.radius_m if scale else 1.0
             value = mapped.value(frame.data)
             if mapped.base == POSITION_ACTUAL:
                 step = wrapped(value - self._counts.get(name, value))

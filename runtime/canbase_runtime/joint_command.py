@@ -89,11 +89,12 @@ def _of_sides(left: Mapping[str, float], right: Mapping[str, float], robot: Robo
             return Refusal(f"the speed of {joint} is {radps:g}: NaN or infinity")
     base = robot.base
     for side, speeds in (("left", left), ("right", right)):
-        if (max(speeds.values()) - min(speeds.values())) * base.wheel_radius_m > base.standstill_mps:
+        if (max(speeds.values()) - min(speeds.values())) * base.radius_m(side) > base.standstill_mps:
             each = ", ".join(f"{joint} {radps:.3f}" for joint, radps in speeds.items())
-            limit = f"base.standstill_mps allows {base.standstill_mps / base.wheel_radius_m:.3f} rad/s"
+            limit = f"base.standstill_mps allows {base.standstill_mps / base.radius_m(side):.3f} rad/s"
             return Refusal(f"the wheels on the {side} differ: {each} rad/s ({limit}); a side has one speed")
-    left_mps, right_mps = (max(speeds.values(), key=abs) * base.wheel_radius_m for speeds in (left, right))
+    left_mps = max(left.values(), key=abs) * base.radius_m("left")
+    right_mps = max(right.values(), key=abs) * base.radius_m("right")
     velocity = BaseVelocity((left_mps + right_mps) / 2.0, (right_mps - left_mps) / base.track_m)
     if not (math.isfinite(velocity.linear_mps) and math.isfinite(velocity.angular_radps)):
         return Refusal("its speeds are too great for a number: infinity")

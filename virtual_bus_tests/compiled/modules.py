@@ -21,13 +21,13 @@ HOT = {
     "canbase_config": "watchdog",
     "canbase_runtime": "driver_state latch_record source_standing stop_cause watchdog_view",
     "canbase_watchdog": (
-        "bus_health counts creep envelope frames halt ladder latch lease motion_evidence observer overshoot pair "
-        "plausibility policy power_and_motion second_master slowing standing stopper stopping_distance tally torque "
-        "trip_cause twist view watchdog"
+        "bus_health counts creep envelope frames guarding halt ladder latch lease motion_evidence observer overshoot "
+        "pair plausibility policy power_and_motion second_master slowing standing stopper stopping_distance tally "
+        "torque trip_cause twist view watchdog"
     ),
     "canbase_driver": (
         "causes cia402 core drive_units snapshot boot.node_boot boot.sdo_budget cia301.emcy cia301.frame cia301.nmt "
-        "cia301.pdo cia301.sdo_client drives.axis "
+        "cia301.node_guarding cia301.pdo cia301.sdo_client drives.axis "
         "drives.canopen_node drives.drive_group drives.drive_snapshot drives.let_go drives.odometry_feed "
         "drives.sdo_stop drives.stall drives.standstill drives.stopping_distance drives.telemetry "
         "motion.braking motion.kinematics motion.limiter motion.odometry motion.velocity_command "
@@ -46,8 +46,9 @@ HOT = {
     ),
     "canbase_sim": (
         "axis_parts command_watch frame line node cia301.dictionary cia301.emcy cia301.heartbeat cia301.nmt "
-        "cia301.pdo_rules cia301.rpdo cia301.tpdo cia402.axis cia402.states cia402.raw_units plant.base plant.battery "
-        "plant.encoder plant.motor world.bench"
+        "cia301.life_guarding "
+        "cia301.pdo_rules cia301.rpdo cia301.tpdo cia402.axis cia402.states cia402.raw_units odd.odd_line odd.odd_node "
+        "plant.base plant.battery plant.encoder plant.motor world.bench"
     ),
     "canbase_campaign": (
         "action_process can_bus clock disk process driver_process watchdog_process velocity_process drives envelope "

@@ -14,7 +14,7 @@ NAMES: Final = {
     "action-server": "drive_distance_server",
 }
 TRIPPED: Final = re.compile(r"tripped: ([a-z ]+?)(?:, node \d+)?:")
-BEAT_LOST: Final = re.compile(r"heartbeat of node \d+ lost")
+BEAT_LOST: Final = re.compile(r"(?:heartbeat of node \d+|life guarding) lost")
 INJECTED: Final = "InjectedError"
 
 Catch = tuple[str, str]

@@ -20,7 +20,7 @@ from typing import Final
 
 from std_msgs.msg import Bool
 
-from canbase_action_server.goal_client import DriveError
+from canbase_action_server.goal_errors import DriveError
 from canbase_campaign.twins import SPEED_MPS
 from canbase_sim.control import ControlError
 from exit_matrix.driven_robot import CHANGES, Scene, sabotaged

@@ -22,7 +22,7 @@ from sensor_msgs.msg import JointState, LaserScan
 from std_srvs.srv import Trigger
 
 from canbase_action_server.client import DriveClient, DriveResult
-from canbase_action_server.goal_client import DriveError
+from canbase_action_server.goal_errors import DriveError
 from canbase_config.robot import Robot as RobotConfig
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, clean, printable
 from canbase_runtime.last_message import NOT_RECEIVED, LastMessage

@@ -9,9 +9,10 @@ import pytest
 from canbase_config.load import load_robot
 from canbase_config.robot import Robot
 from canbase_config.watchdog import RelayLine
-from canbase_deploy.actions import Existing, Link, Run, WriteFile
+from canbase_deploy.actions import Existing, Link, Remove, Run, WriteFile
 from canbase_deploy.host import manifests
-from canbase_deploy.plan import PARTS, InstallError, Request, install_plan
+from canbase_deploy.neighbours import Neighbour
+from canbase_deploy.plan import HARDENING, METRICS, PARTS, InstallError, Request, install_plan, left_interfaces
 from support.install_plans import EXAMPLE, TEMPLATES, UNITS, carried_out, changed, on_bus, request, texts
 
 
@@ -25,10 +26,34 @@ def test_no_placeholder_is_left_in_a_unit() -> None:
 def test_a_robot_starts_at_boot_and_its_interface_with_the_adapter() -> None:
     links = {str(action.path) for action in install_plan(request(), {}) if isinstance(action, Link)}
 
-    assert links == {
+    assert links - hardening_links() == {
         f"{UNITS}/multi-user.target.wants/canbase@example.target",
         f"{UNITS}/sys-subsystem-net-devices-can0.device.wants/canbase-can@can0.service",
     }
+
+
+def hardening_links() -> set[str]:
+    return {f"{UNITS}/canbase-{part}@.service.d/00-hardening.conf" for part in (*PARTS, METRICS)}
+
+
+def test_every_part_has_the_one_sandbox_before_it_has_a_unit(tmp_path: Path) -> None:
+    plan = install_plan(request(), {})
+    paths = [str(action.path) for action in plan if isinstance(action, WriteFile | Link)]
+    links = [place for place, path in enumerate(paths) if path in hardening_links()]
+    units = [place for place, path in enumerate(paths) if path.startswith(UNITS) and path.endswith("@.service")]
+
+    assert len(links) == len(PARTS) + 1
+    assert max(*links, paths.index(f"{UNITS}/{HARDENING}")) < min(units)
+    carried_out(tmp_path, plan)
+    for part in (*PARTS, METRICS):
+        drop_in = tmp_path / f"etc/systemd/system/canbase-{part}@.service.d/00-hardening.conf"
+        assert drop_in.read_text() == TEMPLATES.joinpath(HARDENING).read_text()
+
+
+def test_no_unit_of_the_integrators_own_gets_the_sandbox() -> None:
+    paths = {str(action.path) for action in install_plan(request(), {}) if isinstance(action, WriteFile | Link)}
+
+    assert [path for path in paths if f"{UNITS}/canbase-.service.d" in path or f"{UNITS}/service.d" in path] == []
 
 
 def test_the_user_is_made_before_a_file_belongs_to_it() -> None:
@@ -54,8 +79,8 @@ def test_by_default_nothing_is_heard_from_outside_this_computer() -> None:
     assert "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST\nROS_DOMAIN_ID=0\n" in files["/etc/canbase/example.env"]
     for part in ("driver", "velocity", "action-server"):
         unit = files[f"{UNITS}/canbase-{part}@.service"]
-        assert "\nIPAddressDeny=any\n" in unit
         assert "\nIPAddressAllow=localhost\n" in unit
+    assert "\nIPAddressDeny=any\n" in files[f"{UNITS}/{HARDENING}"]
     assert "IPAddressAllow" not in files[f"{UNITS}/canbase-watchdog@.service"]
 
 
@@ -88,8 +113,46 @@ def test_a_network_that_is_opened_is_opened_on_purpose() -> None:
     assert "ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET\n" in files["/etc/canbase/example.env"]
     opened = [path for path, text in files.items() if "IPAddressAllow=any" in text]
     assert opened == [
-        f"{UNITS}/canbase-{part}@example.service.d/20-lan.conf" for part in ("driver", "velocity", "action-server")
+        f"{UNITS}/canbase-{part}@example.service.d/20-lan.conf"
+        for part in ("driver", "velocity", "action-server", "metrics")
     ]
+
+
+def test_only_an_open_network_is_waited_for() -> None:
+    assert [path for path, text in texts(install_plan(request(), {})).items() if "network-online" in text] == []
+    files = texts(install_plan(request(network="lan"), {}))
+
+    opened = {path: text for path, text in files.items() if path.endswith("/20-lan.conf")}
+    waits = "[Unit]\nWants=network-online.target\nAfter=network-online.target\n"
+    assert [text.startswith(waits) for text in opened.values()] == [True] * 4
+
+
+# installed on can0 ── robot.yaml has can7 now ── can0 is brought down while its environment is still there
+def test_an_interface_that_no_robot_uses_any_more_is_stopped(tmp_path: Path) -> None:
+    carried_out(tmp_path, install_plan(request(), {}))
+
+    plan = install_plan(request(robot=on_bus(channel="can7")), manifests(tmp_path))
+
+    stop = Run(("systemctl", "stop", "canbase-can@can0.service"), True)
+    gone = [action for action in plan if isinstance(action, Remove)]
+    assert {str(action.path) for action in gone} >= {
+        "/etc/canbase/can/can0.env",
+        f"{UNITS}/sys-subsystem-net-devices-can0.device.wants/canbase-can@can0.service",
+    }
+    assert plan.index(stop) < min(plan.index(action) for action in gone)
+
+
+def test_an_interface_that_is_still_used_is_not_stopped(tmp_path: Path) -> None:
+    carried_out(tmp_path, install_plan(request(), {}))
+    installed = manifests(tmp_path)
+    other = Neighbour("other", on_bus(channel="can0"), {})
+
+    assert left_interfaces(request(), installed) == []
+    assert left_interfaces(request(bring_up_can=False), installed) == []  # somebody else brings the same one up
+    moved = request(robot=on_bus(channel="can7"))
+    assert left_interfaces(moved, installed) == ["canbase-can@can0.service"]
+    assert left_interfaces(moved, installed, [other]) == []
+    assert left_interfaces(moved, {"somebody": "/etc/canbase/can/can0.env\n"}) == []
 
 
 def test_the_interface_gets_the_bit_rate_of_robot_yaml() -> None:

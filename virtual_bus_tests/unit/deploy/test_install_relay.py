@@ -12,7 +12,7 @@ from canbase_config.watchdog_section import Relay
 from canbase_deploy import host
 from canbase_deploy.actions import Action, Remove, Run, WriteFile
 from canbase_deploy.host import read_templates, rehearse
-from canbase_deploy.plan import PARTS, InstallError, Request, install_plan
+from canbase_deploy.plan import HARDENING, InstallError, Request, install_plan
 
 TEMPLATES = Path(__file__).parents[3] / "deploy" / "systemd"
 RULE = PurePosixPath("/etc/udev/rules.d/80-canbase-example-relay.rules")
@@ -59,7 +59,7 @@ def test_of_the_services_the_watchdog_alone_sees_it() -> None:
     assert [
         path.parent.name for path, text in files.items() if "DeviceAllow" in text or "PrivateDevices=no" in text
     ] == ["canbase-watchdog@example.service.d"]
-    assert all("\nPrivateDevices=yes\n" in files[folder / f"canbase-{part}@.service"] for part in PARTS)
+    assert "\nPrivateDevices=yes\n" in files[folder / HARDENING]
     assert "\nGroup=canbase\n" in files[folder / "canbase-watchdog@.service"]
 
 

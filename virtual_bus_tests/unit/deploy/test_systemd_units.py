@@ -17,15 +17,15 @@ import pytest
 from canbase_config.load import load_robot, sample
 from canbase_deploy.execute import Executor
 from canbase_deploy.host import read_templates
-from canbase_deploy.plan import PARTS, Request, install_plan
-from canbase_watchdog.loop import BUS_DEAD_S
+from canbase_deploy.plan import HARDENING, PARTS, Request, install_plan
 
 TEMPLATES = Path(__file__).parents[3] / "deploy" / "systemd"
 ANALYZE = shutil.which("systemd-analyze")
 needs_systemd = pytest.mark.skipif(
     ANALYZE is None, reason="NOT CHECKED: no systemd-analyze here (apt-get install systemd): unit files go unverified"
 )
-EXPOSURE = {"can": 1.8, "watchdog": 1.2, "driver": 1.4, "velocity": 1.3, "action-server": 1.3}
+UNITS_OF_THE_ROBOT = [f"canbase-{part}@.service" for part in PARTS]
+EXPOSURE = {"can": 1.8, "watchdog": 1.2, "driver": 1.4, "velocity": 1.3, "action-server": 1.3, "metrics": 1.4}
 """`systemd-analyze security`, from 0 (nothing to be had) to 10: what a unit may have at most."""
 
 
@@ -36,7 +36,14 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = sample("example_can0")
     templates, ros = read_templates(TEMPLATES), {"PYTHONPATH": '/opt/my ros/100% "x":/opt/ws'}
     request = Request(
-        "example", load_robot(path).robot, path.read_text(), sys.executable, templates, sourced=ros, sros2=True
+        "example",
+        load_robot(path).robot,
+        path.read_text(),
+        sys.executable,
+        templates,
+        sourced=ros,
+        sros2=True,
+        network="lan",
     )
     Executor(root, lambda line: None).carry_out(install_plan(request, {}))
     return root
@@ -51,7 +58,11 @@ def analyze(*words: str, units: Path) -> subprocess.CompletedProcess[str]:
 @needs_systemd
 @pytest.mark.parametrize(
     "unit",
-    ["canbase@example.target", "canbase-can@can0.service", *(f"canbase-{part}@example.service" for part in PARTS)],
+    [
+        "canbase@example.target",
+        "canbase-can@can0.service",
+        *(f"canbase-{part}@example.service" for part in (*PARTS, "metrics")),
+    ],
 )
 def test_systemd_understands_every_line(installed: Path, unit: str) -> None:
     said = analyze("verify", "--man=no", unit, units=installed / "etc/systemd/system")
@@ -83,7 +94,8 @@ def test_a_unit_is_as_tight_as_stated(installed: Path, part: str, least: float) 
 
 def directives(part: str) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
-    for line in (TEMPLATES / f"canbase-{part}@.service").read_text().splitlines():
+    unit, sandbox = TEMPLATES / f"canbase-{part}@.service", TEMPLATES / HARDENING
+    for line in [*unit.read_text().splitlines(), *(sandbox.read_text().splitlines() if part in PARTS else [])]:
         key, equals, value = line.partition("=")
         if equals and not line.startswith("#"):
             found.setdefault(key, []).append(value)
@@ -105,6 +117,15 @@ def test_a_loop_that_hangs_is_found_and_a_dead_process_comes_back(part: str) -> 
     assert unit["RestartPreventExitStatus"] == ["2"]
 
 
+def test_metrics_are_no_part_of_the_robot_and_come_last() -> None:
+    """Nothing needs it or waits for it, and only its owner starts it; what it can take from the robot is bounded."""
+    assert all("metrics" not in (TEMPLATES / unit).read_text() for unit in ("canbase@.target", *UNITS_OF_THE_ROBOT))
+    unit = directives("metrics")
+    assert unit["Nice"] == ["10"]
+    assert {"CPUQuota", "MemoryMax", "TasksMax"} <= unit.keys()
+    assert "LimitRTPRIO" not in unit
+
+
 def cycle_s(part: str) -> float:
     """From one start to the next: a part whose starts follow each other faster, for the whole interval, is given up."""
     unit = directives(part)
@@ -115,7 +136,7 @@ def pause_s(part: str) -> float:
     return float(directives(part)["RestartSec"][0])
 
 
-@pytest.mark.parametrize("part", ["driver", "velocity", "action-server"])
+@pytest.mark.parametrize("part", PARTS)
 def test_a_part_that_dies_at_every_start_is_given_up_on_a_slow_computer_too(part: str) -> None:
     assert cycle_s(part) >= pause_s(part) + 5.0
 
@@ -123,15 +144,6 @@ def test_a_part_that_dies_at_every_start_is_given_up_on_a_slow_computer_too(part
 @pytest.mark.parametrize("part", PARTS)
 def test_a_part_that_dies_every_ten_seconds_is_never_given_up(part: str) -> None:
     assert cycle_s(part) < 10.0
-
-
-def test_a_watchdog_that_cannot_begin_is_given_up() -> None:
-    assert cycle_s("watchdog") >= pause_s("watchdog") + 1.0  # Python starts in 0.35 s, and the stop frames after it
-
-
-def test_a_watchdog_whose_bus_is_dead_is_never_given_up() -> None:
-    """Drives without power acknowledge nothing, for hours; their watchdog must be there when they come back."""
-    assert cycle_s("watchdog") <= BUS_DEAD_S + pause_s("watchdog")
 
 
 @pytest.mark.parametrize("part", ["watchdog", "driver"])
@@ -166,6 +178,25 @@ def test_an_adapter_without_restart_after_bus_off_comes_up_too() -> None:
 @pytest.mark.parametrize("part", ["driver", "watchdog", "velocity"])
 def test_recordings_and_records_of_latched_stops_have_a_folder(part: str) -> None:
     assert directives(part)["StateDirectory"] == ["canbase canbase/%i"]
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_a_unit_that_loses_its_sandbox_is_still_punctual_and_not_root(part: str) -> None:
+    text = (TEMPLATES / f"canbase-{part}@.service").read_text()
+
+    for line in ("User=canbase", "LimitRTPRIO=45", "LimitRTTIME=2s", "LimitMEMLOCK=infinity", "OOMScoreAdjust=-900"):
+        assert f"\n{line}\n" in text
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_no_line_of_the_sandbox_is_repeated_in_a_unit(part: str) -> None:
+    """It would be without effect: a drop-in comes after its unit."""
+    sandbox = {line for line in (TEMPLATES / HARDENING).read_text().splitlines() if "=" in line}
+    keys = {line.partition("=")[0] for line in sandbox}
+    unit = (TEMPLATES / f"canbase-{part}@.service").read_text().splitlines()
+
+    assert len(sandbox) == 28
+    assert [line for line in unit if line.partition("=")[0] in keys] == []
 
 
 @pytest.mark.parametrize("part", PARTS)

@@ -117,5 +117,5 @@ def test_state_error_code_and_a_wrong_identity() -> None:
 def test_a_drive_with_too_few_pdos_is_a_problem_in_words() -> None:
     world = SessionWorld()
     dictionary: Any = world.bench.nodes[1].dictionary
-    dictionary.entries = {key: entry for key, entry in dictionary.entries.items() if key >> 8 != 0x1403}
-    assert "it has no RPDO4 (1403h)" in inspected(world)[1].pdos.problem
+    dictionary.entries = {key: entry for key, entry in dictionary.entries.items() if key >> 8 != 0x1801}
+    assert "it has no TPDO2 (1801h), but 4 RPDOs, 3 TPDOs" in inspected(world)[1].pdos.problem

@@ -65,9 +65,10 @@ def scan(stamp: Time = NOW) -> LaserScan:
     return message
 
 
-def transforms(child: str = "base_link") -> TFMessage:
+def transforms(child: str = "base_link", x_m: float = 0.0) -> TFMessage:
     transform = TransformStamped(child_frame_id=child)
     transform.header.frame_id = "odom"
+    transform.transform.translation.x = x_m
     return TFMessage(transforms=[transform])
 
 
@@ -124,6 +125,13 @@ RUNNING = replace(but(cmd_vel_action=heard(*[twist(0.2)] * 20, every_s=0.02)), g
 
 def publishing(topic: str, *endpoints: Endpoint) -> Evidence:
     return replace(HEALTHY, publishers={**HEALTHY.publishers, topic: endpoints})
+
+
+TF = "tf2_msgs/msg/TFMessage"
+
+
+def two_on_tf(tf: Heard) -> Evidence:
+    return but(publishing("tf", Endpoint("/motor_driver", TF), Endpoint("/ekf_filter_node", TF)), tf=tf)
 
 
 def rejected(**numbers: float) -> Evidence:
@@ -209,6 +217,10 @@ BROKEN = [
      Endpoint("/ekf", "nav_msgs/msg/Odometry")), "odometry", "odom is published by /motor_driver, /ekf"),
     ("only-in-simulation", but(odom=heard(odometry(child="base_footprint"))), "odometry", "base_footprint"),
     ("only-in-simulation", but(tf=heard(transforms("laser"))), "tf", "missing"),
+    ("only-in-simulation", two_on_tf(heard(transforms(), transforms(x_m=0.1))), "tf", "from one of /ekf_filter_node"),
+    ("only-in-simulation", two_on_tf(heard(*[transforms()] * 40)), "tf", "odometry.publish_tf: false"),
+    ("only-in-simulation", replace(but(tf=heard()), robot=robot_with("odometry", publish_tf=False)),
+     "tf", "start the filter"),
     ("only-in-simulation", but(scan=heard(scan(OLD))), "stamps of the sensors", "100.0 s ago"),
     ("only-in-simulation", publishing("cmd_vel_nav", Endpoint("/nav2", BARE)), "command interface", "stamped: false"),
     ("only-in-simulation", publishing("cmd_vel_nav", Endpoint("/wheels", JOINT_STATE)),

@@ -10,6 +10,7 @@ from pathlib import Path
 import can
 import pytest
 
+from canbase_config.load import load_robot
 from vm import table
 from vm.guest.joystick import order_of
 from vm.guest.main import ALL, FIRST, SECOND, SHORT, bounded, names, shared_out
@@ -208,6 +209,13 @@ def test_robot_and_drives_are_on_two_controllers() -> None:
     assert "channel: can0" in robot
     assert "channel: can1" in drives
     assert "required: true" not in robot
+
+
+def test_the_guests_robot_gets_power_although_nobody_commissions_it(tmp_path: Path) -> None:
+    path = tmp_path / "robot.yaml"
+    path.write_text(robot_yaml("can0", "/run/canbase/robot/lease.sock"))
+
+    assert not load_robot(path).robot.safety.require_self_stop
 
 
 def test_words_choose_scenarios_in_the_order_of_the_table() -> None:

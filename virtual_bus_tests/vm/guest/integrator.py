@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import sys
 import tarfile
@@ -16,7 +17,7 @@ from canbase_commissioning.can_interface import parse_link
 from canbase_driver.supervision.bus_health import ControllerState
 from vm.guest.robot import Robot
 from vm.guest.scenario import Row
-from vm.guest.system import PARTS, ROBOT_YAML, TARGET, BrokenPromiseError, run, show, unit
+from vm.guest.system import PARTS, ROBOT_YAML, TARGET, BrokenPromiseError, pids, run, show, unit
 
 CANBASE: Final = (sys.executable, "-m", "canbase_cli")
 STOP: Final = ("env", "_ROS_WHEELS_BOOTSTRAP_COMPLETE=1", sys.executable, "-m", "canbase_watchdog.post_stop")
@@ -32,6 +33,19 @@ KEPT: Final = {ROBOT_YAML, ROBOT_YAML.with_suffix(".env")}
 """The owner's own files, which `canbase uninstall` leaves: docs/install.md."""
 OPTIONS: Final = ("--hardware-watchdog", "5")
 """overlay.py installs with them."""
+
+SANDBOX: Final = {
+    "NoNewPrivileges": "yes",
+    "PrivateTmp": "yes",
+    "ProtectHome": "yes",
+    "ProtectSystem": "strict",
+    "RemoveIPC": "yes",
+    "CapabilityBoundingSet": "",
+}
+LOCKED_KB: Final = 5_000
+"""Of its memory a watchdog that could lock it has at least so much in place."""
+EXPOSURE: Final = 1.2
+"""Of the watchdog, as before there was one drop-in."""
 
 Entry = dict[str, Any]
 
@@ -75,20 +89,36 @@ def support_bundle(robot: Robot) -> Row:
 def installed_again(robot: Robot) -> Row:
     """`canbase install` with nothing new changes nothing; `canbase uninstall` leaves the owner's files alone."""
     robot.make_ready()
-    pids = _pids()
+    before = pids()
     for _ in range(2):
         told = run(*CANBASE, "install", "--config", str(ROBOT_YAML), *OPTIONS)
         changed = [line for line in told.splitlines() if line.split()[0] in ("wrote", "replaced", "linked", "removed")]
         if changed:
             raise BrokenPromiseError(f"installed a second time it changes: {changed}")
     robot.spin(0.5)
-    if _pids() != pids or robot.state != DriverStatus.ENABLED:
+    if pids() != before or robot.state != DriverStatus.ENABLED:
         raise BrokenPromiseError(f"the robot noticed a second installation: {robot.told()}")
+    sandboxed()
     _uninstalled()
     run(*CANBASE, "install", "--config", str(ROBOT_YAML), *OPTIONS)
     run("systemctl", "start", TARGET)
     robot.make_ready()
     return Row("canbase install", "twice; uninstall; install", then="nothing changed; nothing left; drives enabled")
+
+
+def sandboxed() -> None:
+    """The one drop-in is in force for every part, and leaves the watchdog its punctuality."""
+    for part in PARTS:
+        found = show(unit(part), "User", *SANDBOX)
+        if found != ["canbase", *SANDBOX.values()]:
+            raise BrokenPromiseError(f"{unit(part)} is not in its sandbox: {found}")
+    (pid,) = show(unit("watchdog"), "MainPID")
+    locked = re.search(r"VmLck:\s*(\d+)", Path(f"/proc/{pid}/status").read_text())
+    if os.sched_getscheduler(int(pid)) != os.SCHED_FIFO or locked is None or int(locked[1]) < LOCKED_KB:
+        raise BrokenPromiseError(f"the watchdog is not punctual: policy {os.sched_getscheduler(int(pid))}, {locked}")
+    exposed = run("systemd-analyze", "security", "--no-pager", unit("watchdog")).splitlines()[-1]
+    if not (level := re.search(r"level for .*: ([\d.]+)", exposed)) or float(level[1]) > EXPOSURE:
+        raise BrokenPromiseError(f"systemd-analyze security: {exposed}")
 
 
 def _trip(robot: Robot) -> None:
@@ -110,10 +140,6 @@ def _uninstalled() -> None:
     listed = run("systemctl", "list-units", "--all", "--plain", "--no-legend", "canbase*@robot*").splitlines()
     if loaded := [line for line in listed if line.split()[1] != "not-found"]:
         raise BrokenPromiseError(f"canbase uninstall leaves units: {loaded}")
-
-
-def _pids() -> list[str]:
-    return [show(unit(part), "MainPID")[0] for part in PARTS]
 
 
 def _entries(*match: str) -> list[Entry]:

@@ -1,6 +1,7 @@
 """The joystick of the scenarios: a process above the robot's own, so that no busy processor makes it fall silent.
 
-Standard input: a velocity [m/s] a line, repeated on cmd_vel_joy until the next one; `none` lets go. Ends with it.
+Its argument is the topic. Standard input: a velocity [m/s] a line, repeated until the next one; `none` lets go. It ends
+with that.
 """
 
 from __future__ import annotations
@@ -35,8 +36,9 @@ def order_of(line: str) -> float | None:
 def main() -> None:
     """Until standard input ends."""
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # a reboot ends this process at once
-    node = rclpy.create_node("joystick", enable_rosout=False, start_parameter_services=False)
-    publisher = node.create_publisher(TwistStamped, "cmd_vel_joy", 1)
+    topic = sys.argv[1]
+    node = rclpy.create_node(topic.replace("/", "_"), enable_rosout=False, start_parameter_services=False)
+    publisher = node.create_publisher(TwistStamped, topic, 1)
     set_priority(os.getpid(), PRIORITY)  # not before: its start would hold up the robot
     print("ready", flush=True)
     order_mps: float | None = None

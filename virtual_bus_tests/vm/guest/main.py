@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from types import FrameType
 
-from vm.guest import bus_failures, computer_failures, integrator, processor, unit_failures
+from vm.guest import bus_failures, computer_failures, integrator, processor, two_robots, unit_failures, upgrade
 from vm.guest.robot import Robot
 from vm.guest.scenario import Row, Scenario
 from vm.guest.shutdown_trace import FOLDER
@@ -44,6 +44,8 @@ FIRST: dict[str, Scenario] = {
     "journal": integrator.journal,
     "full disk": computer_failures.full_disk,
     "installed again": integrator.installed_again,
+    "upgrade": upgrade.upgraded,
+    "two robots": two_robots.two_robots,
 }
 SECOND: dict[str, Scenario] = {
     **unit_failures.ORDERLY,
@@ -65,12 +67,13 @@ SHORT = (
     "unplugged",
     "masked",
     "journal",
+    "two robots",
     "restart driver",
     "error passive",
     "bus-off",
     "reboot",
 )
-"""For a look of ten minutes: ways to end, by kind. Left out are those that cost most: freeze, full disk, the target."""
+"""For a look of ten minutes: ways to end, by kind. Left out are those that cost most: freeze, upgrade, the target."""
 GROUPS: dict[str, Sequence[str]] = {"first": tuple(FIRST), "second": tuple(SECOND), "short": SHORT}
 
 

@@ -17,6 +17,7 @@ prefer_udp(os.environ)
 import rclpy  # noqa: E402 - reads the environment
 from canbase.msg import DriverStatus  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from rclpy.node import Node  # noqa: E402
 from rclpy.signals import SignalHandlerOptions  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
@@ -24,7 +25,7 @@ from canbase_action_server.client import Drive, DriveClient, RejectedError  # no
 from canbase_config.load import load_robot  # noqa: E402
 from vm.guest.evidence import Evidence  # noqa: E402
 from vm.guest.standstill import Standstill, standstill  # noqa: E402
-from vm.guest.stick import Stick  # noqa: E402
+from vm.guest.stick import TOPIC, Stick  # noqa: E402
 from vm.guest.system import ROBOT_YAML, BrokenPromiseError, show, unit  # noqa: E402
 
 SPEED_MPS = 0.3
@@ -38,21 +39,22 @@ T = TypeVar("T")
 class Robot:
     """One connection to everything, for all scenarios of a boot: a new ROS node costs all others much time."""
 
-    def __init__(self) -> None:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # a reboot ends this process at once
-        self.node = rclpy.create_node("scenarios", enable_rosout=False)
-        self.executor = SingleThreadedExecutor()
-        self.executor.add_node(self.node)
+    def __init__(self, namespace: str = "", beside: Robot | None = None, control: str = "/run/sim.sock") -> None:
+        """`beside`: another robot, whose ROS node this one uses too; this one has a namespace, such as `robot2/`.
+        `control`: the socket of its simulated drives."""
+        self.node: Node
+        self.executor: SingleThreadedExecutor
+        self.node, self.executor = _node() if beside is None else (beside.node, beside.executor)
         self.status: DriverStatus | None = None
         self.status_at = -math.inf
-        self.node.create_subscription(DriverStatus, "motor_driver/status", self._on_status, 10)
-        self._stick = Stick()
-        self._reset = self.node.create_client(Trigger, "motor_driver/reset")
-        self._filter_reset = self.node.create_client(Trigger, "safety_filter/reset")
-        self.evidence = Evidence(self.node)
+        self.node.create_subscription(DriverStatus, f"{namespace}motor_driver/status", self._on_status, 10)
+        self._stick = Stick(f"{namespace}{TOPIC}")
+        self._reset = self.node.create_client(Trigger, f"{namespace}motor_driver/reset")
+        self._filter_reset = self.node.create_client(Trigger, f"{namespace}safety_filter/reset")
         self.config = load_robot(ROBOT_YAML).robot
-        self.client = DriveClient(self.node, self.executor)
-        self.sim = SimControl("/run/sim.sock", timeout_s=20.0)
+        self.evidence: Evidence = Evidence(self.node) if beside is None else beside.evidence
+        self.client: DriveClient = DriveClient(self.node, self.executor) if beside is None else beside.client
+        self.sim = SimControl(control, timeout_s=20.0)
 
     def _on_status(self, message: DriverStatus) -> None:
         self.status, self.status_at = message, time.monotonic()
@@ -198,3 +200,11 @@ class Robot:
             if now_s > until_s:
                 raise BrokenPromiseError(f"{part} was not started again in {WAIT_S:.0f} s: {state}")
             self.spin(0.4)
+
+
+def _node() -> tuple[Node, SingleThreadedExecutor]:
+    """The one ROS node of the scenarios."""
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # a reboot ends this process at once
+    node, executor = rclpy.create_node("scenarios", enable_rosout=False), SingleThreadedExecutor()
+    executor.add_node(node)
+    return node, executor

@@ -8,13 +8,14 @@ import sys
 from vm.guest.system import BrokenPromiseError
 
 NONE = "none"
+TOPIC = "cmd_vel_joy"
 
 
 class Stick:
     """One joystick, for all scenarios of a boot. It ends with this process."""
 
-    def __init__(self) -> None:
-        words = [sys.executable, "-m", "vm.guest.joystick"]
+    def __init__(self, topic: str = TOPIC) -> None:
+        words = [sys.executable, "-m", "vm.guest.joystick", topic]
         self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         assert self._process.stdout is not None
         if not self._process.stdout.readline():

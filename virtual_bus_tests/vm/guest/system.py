@@ -20,9 +20,14 @@ class BrokenPromiseError(AssertionError):
     """What a scenario promised did not come true."""
 
 
-def unit(part: str) -> str:
+def unit(part: str, robot: str = "robot") -> str:
     """Name of a part's unit."""
-    return f"canbase-{part}@robot.service"
+    return f"canbase-{part}@{robot}.service"
+
+
+def pids(robot: str = "robot") -> list[str]:
+    """Main processes of the parts, in the order of PARTS; "0": it does not run."""
+    return [show(unit(part, robot), "MainPID")[0] for part in PARTS]
 
 
 def run(*words: str, check: bool = True) -> str:
