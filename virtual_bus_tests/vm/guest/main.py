@@ -67,13 +67,12 @@ SHORT = (
     "unplugged",
     "masked",
     "journal",
-    "two robots",
     "restart driver",
     "error passive",
     "bus-off",
     "reboot",
 )
-"""For a look of ten minutes: ways to end, by kind. Left out are those that cost most: freeze, upgrade, the target."""
+"""For a look of ten minutes: ways to end, by kind. Left out are those that cost most: freeze, upgrade, two robots, the target."""
 GROUPS: dict[str, Sequence[str]] = {"first": tuple(FIRST), "second": tuple(SECOND), "short": SHORT}
 
 

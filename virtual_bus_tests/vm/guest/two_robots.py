@@ -27,9 +27,11 @@ def two_robots(robot: Robot) -> Row:
     """One is stopped by its watchdog, then uninstalled, while the other one drives on."""
     robot.make_ready()
     _second_is_installed()
+    _say("the second is installed")
     try:
         second = Robot(f"{NAME}/", robot, CONTROL)
         second.make_ready()
+        _say("both are ready")
         robot.make_ready()
         first = pids()
         for each in (robot, second):
@@ -37,6 +39,7 @@ def two_robots(robot: Robot) -> Row:
         robot.spin(1.0)
         _drive_on(robot, second)
         moment_s = time.monotonic()
+        _say("both drive")
         run(*STOP, f"/run/canbase/{NAME}/stop.json")
         second.stands(moment_s)
         robot.spin(1.0)
@@ -45,7 +48,9 @@ def two_robots(robot: Robot) -> Row:
         second.order(None)
         second.make_ready()
         second.drive()
+        _say("the second drives again")
         run(*CANBASE, "uninstall", NAME, "--purge")
+        _say("the second is uninstalled")
         _drive_on(robot)
         _is_gone(robot)
         if pids() != first:
@@ -71,6 +76,11 @@ def _second_is_installed() -> None:
     with Path(f"/etc/canbase/{NAME}.env").open("a") as file:
         file.write(f"CANBASE_OPTIONS=--namespace {NAME}\n")
     run("systemctl", "start", f"canbase@{NAME}.target")
+
+
+def _say(what: str) -> None:
+    """The host takes a guest that is silent for long for dead, and no scenario takes longer than this one."""
+    print(what, flush=True)
 
 
 def _drive_on(*robots: Robot) -> None:
