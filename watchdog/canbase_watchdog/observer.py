@@ -331,7 +331,7 @@ class Observer:
     def _on_sdo_request(self, node_id: int, data: bytes, now_s: float) -> bool:
         written = frames.decode_sdo_download(data)
         stops = written is not None and written % frames.AXIS_OFFSET == _CONTROLWORD and frames.takes_power_away(data)
-        if written is not None and written % frames.AXIS_OFFSET in _COMMANDS and not stops:
+        if written is not None and not stops and (written % frames.AXIS_OFFSET in _COMMANDS or _is_of_a_stop(written)):
             self._note_foreign(node_id, f"an SDO that writes {written:04X}h", now_s)
         if not frames.concerns_motion(data):
             self._configured_at[node_id] = now_s
@@ -344,4 +344,12 @@ class Observer:
 
 
 _CONTROLWORD = frames.CONTROLWORD % frames.AXIS_OFFSET
+
+
+def _is_of_a_stop(index: int) -> bool:
+    """The object decides whether, or how, a drive stops: by itself, or by the watchdog's quick stop PDO."""
+    return index in _STOPS or index in frames.RPDO_PARAMETERS
+
+
+_STOPS = frozenset((*frames.SELF_STOP, *frames.BRAKING, *(index + frames.AXIS_OFFSET for index in frames.BRAKING)))
 _COMMANDS = frozenset(index % frames.AXIS_OFFSET for index in (frames.CONTROLWORD, frames.MODE, frames.TARGET))

@@ -6,7 +6,8 @@ Signs, each while a drive that it concerns is enabled or at any time where that 
    SYNC whose setpoints are missing keeps the beat;
 2. more SYNCs or driver's heartbeats than half as many again as configured. Counted over a window that is long against
    any burst: a loaded machine delivers late, yet not more;
-3. once: an NMT command to an enabled drive, a quick stop PDO, or an SDO that writes its controlword, target or mode.
+3. once: an NMT command to an enabled drive, a quick stop PDO, or an SDO that writes its controlword, target or mode,
+   or one of the objects that decide how it stops (1016h, 6007h, the RPDOs, ...).
    The driver does none of them there. The watchdog does, but only after a trip, when signs are not looked for.
 """
 
