@@ -72,13 +72,14 @@ class Watchdog:
     TRIPPED from the first cause on, latched: only an accepted reset request leads back to WATCHING, over restarts too.
     """
 
-    def __init__(self, config: WatchdogConfig, now_s: float, past: Past | None = None) -> None:
+    def __init__(self, config: WatchdogConfig, now_s: float, past: Past | None = None, *, echo: bool = True) -> None:
         """`config.lease_uid` None: leases of any user count, so the caller puts in its own.
 
-        `past`: the record of its last life; None: no record is kept, which is for virtual time alone.
+        `past`: the record of its last life; None: no record is kept, which is for virtual time alone. `echo`: what
+        it sends comes back to it.
         """
         self._config = config
-        self._observer = Observer(config, now_s)
+        self._observer = Observer(config, now_s, echo=echo)
         self._envelope = Envelope(config, now_s)
         self._pair = PairWatch(config)
         self._twist = TwistWatch(config, now_s)

@@ -231,6 +231,11 @@ def second_driver_beats(world: World) -> EachStep:
     return each(world, 0.1, lambda: world.inject(0x77F, "05"))
 
 
+def another_device_has_the_watchdogs_node_id(world: World) -> EachStep:
+    """Its heartbeat would keep drives alive that monitor one entry (1016h), when this computer fails."""
+    return each(world, 0.1, lambda: world.inject(0x77E, "05"))
+
+
 def one_drive_is_disabled_and_the_driver_does_not_mind(world: World) -> EachStep:
     lies(world, lambda cob_id, target: target, parrot=True)
     world.node.axes[0].fail(0x2310)
@@ -259,6 +264,7 @@ CASES: list[tuple[Callable[[World], EachStep], TripCause, float]] = [
     (master_ends_the_heartbeat_monitoring_of_a_node, TripCause.FOREIGN_MASTER, 0.002),
     (master_uses_the_quick_stop_pdo_to_enable, TripCause.FOREIGN_MASTER, 0.002),
     (second_driver_beats, TripCause.FOREIGN_MASTER, 1.1),
+    (another_device_has_the_watchdogs_node_id, TripCause.FOREIGN_MASTER, 1.1),
     (one_drive_is_disabled_and_the_driver_does_not_mind, TripCause.DRIVE_DOWN, 0.13),
 ]
 """Who lies, what the watchdog calls it, and until when it must have tripped [s]."""
