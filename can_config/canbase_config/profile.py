@@ -177,6 +177,18 @@ class SdoWrite(Section):
     optional: Annotated[bool, Field(description="true: a refusal is only a note")] = False
 
 
+STOPPED_BY: dict[int, str] = {
+    0x100C: "self_stop.node_guarding",
+    0x100D: "self_stop.node_guarding",
+    0x1016: "self_stop.heartbeat_entries",
+    0x1029: "self_stop.error_behaviour",
+    0x6007: "self_stop.abort_connection_code",
+    0x605A: "options.quick_stop_code",
+    0x605E: "options.fault_reaction_code",
+}
+"""Objects by which the boot makes a drive stop, and the keys for them; those of the second axis are at + 800h."""
+
+
 class Writes(Section):
     """What the boot writes besides the standard objects, in order."""
 
@@ -242,6 +254,20 @@ class Profile(Section):
     ] = Field(default_factory=dict)
     notes: Annotated[tuple[str, ...], Field(strict=False, description="notes for the first motion")] = ()
     unproven: Annotated[tuple[str, ...], Field(strict=False, description="keys above without a source; test them")] = ()
+
+    @model_validator(mode="after")
+    def _nothing_undoes_its_stop(self) -> Profile:
+        """The last writes come after the boot has read back what makes the drive stop by itself."""
+        own = self.self_stop.vendor_watchdog
+        for position, write in enumerate(self.writes.after_mapping):
+            first_axis = write.index - 0x800 if 0x6800 <= write.index < 0x7000 else write.index
+            key = STOPPED_BY.get(first_axis, "")
+            if own is not None and write.index == own.index:
+                key = "self_stop.vendor_watchdog"
+            if key:
+                message = f"{write.index:04X}h decides how the drive stops: set {key} instead"
+                raise MisfitError(message, ("writes", "after_mapping", position, "index"))
+        return self
 
     @model_validator(mode="after")
     def _unproven_keys_exist(self) -> Profile:

@@ -179,6 +179,11 @@ class WatchdogConfig:
         """From one node guarding request to the next, of each guarded drive [s]."""
         return guard_time_ms(self.drive_heartbeat_s) / 1000.0
 
+    @property
+    def hears_itself(self) -> bool:
+        """A multicast bus gives its frames back to their sender; SocketCAN and other adapters do not."""
+        return self.bus_arguments.get("interface") == "udp_multicast"
+
     def to_json(self) -> str:
         """One line of JSON that `from_json` reads back."""
         return json.dumps(dataclasses.asdict(self))

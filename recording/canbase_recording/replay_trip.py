@@ -94,7 +94,7 @@ def _verdicts(
     inputs: TripInputs, config: WatchdogConfig, from_s: float, past: Any, until_s: float = float("inf")
 ) -> Iterator[Trip]:
     """The trips of a watchdog that is fed from `from_s` on."""
-    watchdog = Watchdog(config, from_s, past)
+    watchdog = Watchdog(config, from_s, past, echo=config.hears_itself)
     verdict = FINE
     for call in inputs.calls:
         if not from_s <= call[1] <= until_s:

@@ -223,6 +223,21 @@ def test_what_was_cut_off_waits_while_another_watchdog_is_there(rig: Rig) -> Non
     rig.robot.first(0x77E, time.monotonic(), LONG_S)
 
 
+# driving ── a device with node id 126 is connected: its heartbeats could keep drives alive ── trip
+def test_on_a_bus_that_gives_no_frame_back_another_77e_is_a_trip(rig: Rig) -> None:
+    rig.thread.start()
+    rig.watches(0.0)
+    rig.robot.drive_at(300, LONG_S)
+    with VirtualBus(rig.config.bus_arguments["channel"]) as bus:
+        for _ in range(3):
+            bus.send(can.Message(arbitration_id=frames.WATCHDOG_HEARTBEAT, data=b"\x05", is_extended_id=False))
+            time.sleep(0.2)
+        rig.robot.wait_for(lambda: any(data[0] == State.TRIPPED for data in rig.states(0.0)), LONG_S)
+    tripped = next(data for data in rig.states(0.0) if data[0] == State.TRIPPED)
+    assert tripped[1] == TripCause.FOREIGN_MASTER
+    rig.robot.wait_until_still(LONG_S)
+
+
 def test_another_watchdog_at_the_start_ends_this_one(rig: Rig) -> None:
     other = Other(rig.config.bus_arguments["channel"])
     other.start()
@@ -266,8 +281,8 @@ def test_lives_leave_nothing_behind(rig: Rig, monkeypatch: pytest.MonkeyPatch) -
     """A dead bus for a night is thousands of them."""
     observers: list[weakref.ref[Observer]] = []
 
-    def noted(*arguments: Any) -> Watchdog:
-        made = Watchdog(*arguments)
+    def noted(*arguments: Any, **named: Any) -> Watchdog:
+        made = Watchdog(*arguments, **named)
         observers.append(weakref.ref(made._observer))  # a ring of references, which the collector alone breaks
         return made
 

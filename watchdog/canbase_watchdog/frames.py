@@ -49,6 +49,14 @@ POSITION = 0x6064
 VELOCITY = 0x606C
 TARGET = 0x60FF
 AXIS_OFFSET = 0x800
+SELF_STOP = (0x100C, 0x100D, 0x1016, 0x1029)
+"""What a drive monitors of its masters, and what it does without them: guard and life time, heartbeats, error
+behaviour."""
+BRAKING = (0x6007, 0x605A, 0x605E, 0x6084, 0x6085)
+"""How an axis stops: for a lost master, by a quick stop, in a fault, and its ramps. Those of the second one are at +
+AXIS_OFFSET."""
+RPDO_PARAMETERS = range(0x1400, 0x1800)
+"""Which PDOs a drive obeys, and what they contain."""
 QUICK_STOP_WORD = 0x0002
 DISABLE_VOLTAGE_WORD = 0x0000
 

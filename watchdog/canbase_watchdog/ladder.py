@@ -125,6 +125,11 @@ class Climb:
     off_since: float = math.inf
     """Since when its feedback shows that it has no power; infinity: it does not."""
 
+    @property
+    def defied(self) -> bool:
+        """It has shown that it does not brake, or that it keeps its power: nothing but a relay is left."""
+        return self.runaway or self.step is Step.RESET_NODE
+
 
 def first(look: Look, now_s: float) -> Climb:
     """The foot of the ladder."""

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 
 PAGE = 4096
 LENGTH = 2 * PAGE
+_OPENED, _NODE = 0x8000, 0x7F
+"""In the code, above the cause: `opened`, and the node id."""
 PART = "watchdog"
 
 _FIELDS = struct.Struct("<8sHBxHxxQ32s64s512s")
@@ -33,7 +35,8 @@ class Mark(enum.IntEnum):
 class Entry:
     """What is, or shall be, on disk: the cause of the trip (its number in the state frame), its node and sentence.
 
-    `number`: which request of this life it is; not on disk.
+    `number`: which request of this life it is; not on disk. `opened`: the relay opened in it for a drive that kept its
+    power.
     """
 
     mark: Mark = Mark.CLEAR
@@ -41,6 +44,7 @@ class Entry:
     node_id: int = 0
     detail: str = ""
     number: int = 0
+    opened: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +69,7 @@ def owner(robot: str, machine: str) -> bytes:
 def page(entry: Entry, sequence: int, whose: bytes) -> bytes:
     """One of the two pages of the file: odd sequences in the first, even ones in the second."""
     detail = entry.detail.encode(errors="replace")[:512].decode(errors="ignore").encode()
-    code = entry.cause | entry.node_id << 8
+    code = entry.cause | entry.node_id << 8 | (_OPENED if entry.opened else 0)
     head = _FIELDS.pack(b"CBLATCH\0", 1, entry.mark, code, sequence, whose, b"", detail)
     body = head + bytes(_CHECKED - len(head))
     return body + struct.pack("<I", zlib.crc32(body))
@@ -94,7 +98,8 @@ def _decode_page(data: bytes, whose: bytes) -> Past:
     if mark > Mark.LATCHED:
         return Past(problem="it is damaged")
     text = detail.rstrip(b"\0").decode(errors="replace")
-    return Past(Entry(Mark(mark), code & 0xFF, code >> 8, text), sequence=sequence)
+    entry = Entry(Mark(mark), code & 0xFF, code >> 8 & _NODE, text, opened=bool(code & _OPENED))
+    return Past(entry, sequence=sequence)
 
 
 class Ledger:
@@ -109,11 +114,12 @@ class Ledger:
         self._written: Entry | None = self.wanted if past is None or not past.problem else None
         self.problem = ""
 
-    def want(self, mark: Mark, cause: int = 0, node_id: int = 0, detail: str = "") -> None:
+    def want(self, mark: Mark, cause: int = 0, node_id: int = 0, detail: str = "", *, opened: bool = False) -> None:
         """From now on this."""
         old = self.wanted
-        if mark is not old.mark or cause != old.cause or node_id != old.node_id or detail != old.detail:
-            self.wanted = Entry(mark, cause, node_id, detail, old.number + 1)
+        same = mark is old.mark and opened is old.opened
+        if not same or cause != old.cause or node_id != old.node_id or detail != old.detail:
+            self.wanted = Entry(mark, cause, node_id, detail, old.number + 1, opened)
         if not self._kept:
             self._written = self.wanted
 

@@ -13,7 +13,7 @@ from canbase_watchdog import frames
 from canbase_watchdog.frames import DriveState
 from canbase_watchdog.guarding import GuardAnswers
 from canbase_watchdog.plausibility import Plausibility
-from canbase_watchdog.second_master import Foreign
+from canbase_watchdog.second_master import Foreign, guard_pace
 from canbase_watchdog.standing import StandWatch
 from canbase_watchdog.tally import Tally
 from canbase_watchdog.torque import PushWatch
@@ -111,8 +111,9 @@ class _Record:
 class Observer:
     """Keeps the last values of everything on the bus that concerns the configured drives."""
 
-    def __init__(self, config: WatchdogConfig, now_s: float) -> None:
-        """Listens for the drives in `config`; the lower axis number of a node uses the PDOs of its first axis."""
+    def __init__(self, config: WatchdogConfig, now_s: float, *, echo: bool = True) -> None:
+        """Listens for the drives in `config`; the lower axis number of a node uses the PDOs of its first axis. `echo`:
+        what this watchdog sends comes back to it."""
         self._gap_s = config.feedback_timeout_s
         self._still_mps = config.motion_tolerance_mps
         self._records = {(drive.node_id, drive.axis): _Record(drive, config, now_s) for drive in config.drives}
@@ -122,7 +123,9 @@ class Observer:
         self._configured_at = dict(self._heartbeat_at)
         self._operational = dict.fromkeys(self._heartbeat_at, False)
         self._answers = {drive.node_id: GuardAnswers() for drive in config.drives if drive.guarded}
-        self._foreign = Foreign(config)
+        self._guards = {node_id: guard_pace(config) for node_id in self._answers}
+        self._guard_period_s = config.guard_period_s
+        self._foreign = Foreign(config, echo=echo)
         self._driver_at = self._sync_at = self._sync_since = NEVER
         self._routes: dict[int, Callable[[bytes, float], bool]] = {}
         self._view: BusView | None = None
@@ -180,6 +183,7 @@ class Observer:
         self._routes[frames.NMT] = self._on_nmt
         self._routes[frames.SYNC] = self._on_sync
         self._routes[frames.DRIVER_HEARTBEAT] = self._on_driver_heartbeat
+        self._routes[frames.WATCHDOG_HEARTBEAT] = self._on_watchdog_heartbeat
         for node_id in self._heard_at:
             self._add_node_routes(node_id)
             for place, key in enumerate(sorted(key for key in self._records if key[0] == node_id)):
@@ -223,6 +227,10 @@ class Observer:
         self._driver_at = now_s
         return True
 
+    def _on_watchdog_heartbeat(self, data: bytes, now_s: float) -> bool:
+        self._foreign.on_watchdog_heartbeat(now_s)
+        return True
+
     def _on_heartbeat(self, node_id: int, data: bytes, now_s: float) -> bool:
         if len(data) != 1:
             return False
@@ -234,6 +242,10 @@ class Observer:
 
     def _on_guard_answer(self, node_id: int, data: bytes, now_s: float) -> bool:
         state = self._answers[node_id].take(data)
+        if data != frames.BOOT_UP and self._guards[node_id].too_fast(now_s):
+            period_s = self._guard_period_s
+            often = f"more answers to node guarding than one each {period_s:.3f} s (heartbeats, 1017h, count too)"
+            self._note_foreign(node_id, often, now_s)
         return state is not None and self._on_heartbeat(node_id, state, now_s)
 
     def _is_enabled(self, node_id: int, now_s: float) -> bool:
@@ -331,7 +343,7 @@ class Observer:
     def _on_sdo_request(self, node_id: int, data: bytes, now_s: float) -> bool:
         written = frames.decode_sdo_download(data)
         stops = written is not None and written % frames.AXIS_OFFSET == _CONTROLWORD and frames.takes_power_away(data)
-        if written is not None and written % frames.AXIS_OFFSET in _COMMANDS and not stops:
+        if written is not None and not stops and (written % frames.AXIS_OFFSET in _COMMANDS or _is_of_a_stop(written)):
             self._note_foreign(node_id, f"an SDO that writes {written:04X}h", now_s)
         if not frames.concerns_motion(data):
             self._configured_at[node_id] = now_s
@@ -344,4 +356,12 @@ class Observer:
 
 
 _CONTROLWORD = frames.CONTROLWORD % frames.AXIS_OFFSET
+
+
+def _is_of_a_stop(index: int) -> bool:
+    """The object decides whether, or how, a drive stops: by itself, or by the watchdog's quick stop PDO."""
+    return index in _STOPS or index in frames.RPDO_PARAMETERS
+
+
+_STOPS = frozenset((*frames.SELF_STOP, *frames.BRAKING, *(index + frames.AXIS_OFFSET for index in frames.BRAKING)))
 _COMMANDS = frozenset(index % frames.AXIS_OFFSET for index in (frames.CONTROLWORD, frames.MODE, frames.TARGET))

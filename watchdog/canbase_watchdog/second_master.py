@@ -4,9 +4,11 @@ Signs, each while a drive that it concerns is enabled or at any time where that 
 1. two different setpoints for one axis in one period, or a SYNC off the beat without any setpoint before it: three
    times in 1 s. Frames that get lost look otherwise: where a SYNC is missing the last one is two periods old, and a
    SYNC whose setpoints are missing keeps the beat;
-2. more SYNCs or driver's heartbeats than half as many again as configured. Counted over a window that is long against
-   any burst: a loaded machine delivers late, yet not more;
-3. once: an NMT command to an enabled drive, a quick stop PDO, or an SDO that writes its controlword, target or mode.
+2. more SYNCs or driver's heartbeats than half as many again as configured; more heartbeats of the watchdog's node, or
+   answers to node guarding, than its own: by them somebody else could keep a drive alive when this computer fails.
+   Counted over a window that is long against any burst: a loaded machine delivers late, yet not more;
+3. once: an NMT command to an enabled drive, a quick stop PDO, or an SDO that writes its controlword, target or mode,
+   or one of the objects that decide how it stops (1016h, 6007h, the RPDOs, ...).
    The driver does none of them there. The watchdog does, but only after a trip, when signs are not looked for.
 """
 
@@ -24,6 +26,14 @@ SYNC_LOST, OFF_BEAT = 1.5, 0.75
 EXCESS = 1.5
 SYNC_WINDOW_S = 0.5
 HEARTBEAT_PERIODS = 10
+BEATS, BEAT_TIMEOUTS = 3, 2.5
+"""So many heartbeats of this watchdog's node in so many times that a drive allows without one: where own frames do not
+come back, none is its own."""
+GUARD_PERIODS, GUARD_EXCESS = 60, 1.15
+"""Requests that keep a drive alive add a quarter to its answers. Over this window a burst of late ones is less."""
+
+
+NOT_OURS = "heartbeats 77Eh that this watchdog has not sent: another device has its node id, 126; give it another one"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,16 +60,21 @@ class Pace:
         return len(times) == times.maxlen and now_s - times[0] < self._window_s
 
 
+def guard_pace(config: WatchdogConfig) -> Pace:
+    """Fires when a drive answers more node guarding requests than this watchdog sends."""
+    return Pace(math.ceil(GUARD_EXCESS * GUARD_PERIODS) + 1, GUARD_PERIODS * config.guard_period_s)
+
+
 class Foreign:
     """Remembers the last sign of another master."""
 
-    def __init__(self, config: WatchdogConfig) -> None:
-        """Knows from `config` how often the driver sends what."""
+    def __init__(self, config: WatchdogConfig, *, echo: bool = True) -> None:
+        """Knows from `config` how often the driver sends what. `echo`: the frames of this watchdog come back to it."""
         period_s = config.heartbeat_period_s
+        too_many = math.ceil(EXCESS * HEARTBEAT_PERIODS) + 1, HEARTBEAT_PERIODS * period_s
+        self._beats = Pace(*too_many) if echo else Pace(BEATS, BEAT_TIMEOUTS * config.drive_heartbeat_s)
         self._syncs = Pace(math.ceil(EXCESS * SYNC_WINDOW_S * config.control_hz) + 1, SYNC_WINDOW_S)
-        self._heartbeats = Pace(
-            math.ceil(EXCESS * HEARTBEAT_PERIODS) + 1, HEARTBEAT_PERIODS * config.heartbeat_period_s
-        )
+        self._heartbeats = Pace(*too_many)
         self._disorder = Pace(DISORDER_COUNT, DISORDER_S)
         self._control_hz, self._period_s = config.control_hz, period_s
         self._lost_s, self._off_beat_s = SYNC_LOST / config.control_hz, OFF_BEAT / config.control_hz
@@ -90,6 +105,11 @@ class Foreign:
         """A heartbeat of the driver's node, or of another one that uses its number."""
         if self._heartbeats.too_fast(now_s):
             self.note(0, f"more heartbeats 77Fh than one each {self._period_s:.3f} s", now_s)
+
+    def on_watchdog_heartbeat(self, now_s: float) -> None:
+        """A heartbeat of this watchdog's own node that was received."""
+        if self._beats.too_fast(now_s):
+            self.note(0, NOT_OURS, now_s)
 
     def note(self, node_id: int, detail: str, now_s: float) -> None:
         """A sign of which once is enough."""

@@ -72,13 +72,14 @@ class Watchdog:
     TRIPPED from the first cause on, latched: only an accepted reset request leads back to WATCHING, over restarts too.
     """
 
-    def __init__(self, config: WatchdogConfig, now_s: float, past: Past | None = None) -> None:
+    def __init__(self, config: WatchdogConfig, now_s: float, past: Past | None = None, *, echo: bool = True) -> None:
         """`config.lease_uid` None: leases of any user count, so the caller puts in its own.
 
-        `past`: the record of its last life; None: no record is kept, which is for virtual time alone.
+        `past`: the record of its last life; None: no record is kept, which is for virtual time alone. `echo`: what
+        it sends comes back to it.
         """
         self._config = config
-        self._observer = Observer(config, now_s)
+        self._observer = Observer(config, now_s, echo=echo)
         self._envelope = Envelope(config, now_s)
         self._pair = PairWatch(config)
         self._twist = TwistWatch(config, now_s)
@@ -94,6 +95,8 @@ class Watchdog:
         self._expired = FINE
         """LEASE_LOST between `expire` and the next tick."""
         self._stoppers: list[Stopper] = []
+        self._opened = past is not None and past.entry.opened
+        """The relay has opened for a drive that kept its power, in any life, and no reset was accepted since."""
         self._reset = (0, Answer.NONE)
         self._reset_at = -math.inf
         self._heartbeat_due = self._state_due = self._counters_due = now_s
@@ -136,8 +139,10 @@ class Watchdog:
 
     @property
     def keeps_relay(self) -> bool:
-        """False on the last two rungs, and for a wheel that was seen not to brake: then a safety relay opens."""
-        return self._beats and not any(stopper.climb.runaway for stopper in self._stoppers)
+        """False on the last two rungs, and for a wheel that was seen not to brake: then a safety relay opens. Where a
+        drive has shown that it keeps its power, it stays open until a reset, over restarts too."""
+        runaway = any(stopper.climb.runaway for stopper in self._stoppers)
+        return self._beats and not runaway and not self._opened
 
     @property
     def _beats(self) -> bool:
@@ -270,7 +275,8 @@ class Watchdog:
         """LIVE before there is power, and until all of it was seen to be off."""
         verdict = self._verdict
         if self._state is State.TRIPPED:
-            self._ledger.want(Mark.LATCHED, verdict.cause, verdict.node_id, verdict.detail)
+            self._opened = self._opened or any(stopper.climb.defied for stopper in self._stoppers)
+            self._ledger.want(Mark.LATCHED, verdict.cause, verdict.node_id, verdict.detail, opened=self._opened)
         elif self._are_off(now_s):
             self._ledger.want(Mark.CLEAR)
         elif self._ledger.wanted.mark is not Mark.CLEAR or any(near_power(axis) for axis in self._view.axes):
@@ -336,13 +342,16 @@ class Watchdog:
             return Answer.NOT_TRIPPED
         view = self._look(now_s)
         fresh = all(stopper.is_fresh(now_s) for stopper in self._stoppers)
-        if not self._settled or not fresh or policy.stands(self._verdict, view, self._config, now_s):
+        unsupplied = self._opened and self._verdict.cause is TripCause.DRIVE_SILENT  # the relay may feed it
+        stands = not unsupplied and policy.stands(self._verdict, view, self._config, now_s)
+        if not self._settled or not fresh or stands:
             return Answer.CAUSE_STANDS
         if velocity_ordered(view, self._config, now_s):
             return Answer.VELOCITY_ORDERED
         self._state = State.WATCHING
         self._verdict = FINE
         self._stoppers = []
+        self._opened = False
         self._observer.ours_since = math.inf
         self._observer.trust()
         return Answer.DONE

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import replace
 
 from canbase_config.drive import Drive
@@ -175,6 +176,11 @@ class NodeBoot:
         self.report = replace(report, notes=(*report.notes, late)) if report is not None and late else report
         self.error = BootError(self.node_id, error.problem, f"{error.hint}; {late}") if error and late else error
         self._step = None
+
+    @property
+    def unanswered(self) -> Counter[bytes]:
+        """How many answers of its SDO server may still come, by address."""
+        return self._client.unanswered
 
     @property
     def slow_answers(self) -> str:

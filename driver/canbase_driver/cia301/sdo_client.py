@@ -8,6 +8,7 @@ come late.
 from __future__ import annotations
 
 import struct
+from collections import Counter
 from dataclasses import dataclass
 
 from canbase_config.object_map import AXIS_OFFSET, CONTROLWORD, POSITION_ACTUAL, STATUSWORD, VELOCITY_ACTUAL
@@ -190,6 +191,13 @@ class SdoClient:
     def busy(self) -> bool:
         """Whether a transfer is under way."""
         return self._transfer is not None
+
+    @property
+    def unanswered(self) -> Counter[bytes]:
+        """How many answers may still come, by address: those to requests that were sent again."""
+        return Counter(
+            {at: each.sent - each.answered for at, each in self._requests.items() if each.sent > each.answered}
+        )
 
     def start(self, step: Read | Write, now_s: float) -> Frame:
         """Begin a transfer. Raises RuntimeError while another is under way."""

@@ -12,6 +12,7 @@ Frames of a node before it is STARTING come from an earlier life, with a layout 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from enum import Enum
@@ -28,6 +29,7 @@ from canbase_driver.cia301.node_guarding import GuardAnswers
 from canbase_driver.cia301.pdo import node_layout
 from canbase_driver.cia402 import DriveState, PowerGoal, common_controlword, next_controlword
 from canbase_driver.drives.axis import Axis
+from canbase_driver.drives.foreign_writes import ForeignWrites
 from canbase_driver.drives.sdo_stop import SdoStop
 from canbase_driver.drives.telemetry import Measures, Values
 
@@ -92,6 +94,9 @@ class CanopenNode:
         """Whether no other node is in the middle of its boot; set by the drive group."""
         self._measures = Measures(node_id, self._drives, robot.timeouts.sdo_s)
         self._sdo_stop = SdoStop(node_id, self._drives)
+        self._foreign = ForeignWrites(self.profile, Counter())
+        self._written = ""
+        """What another client has written since the boot; empty: nothing of what the boot sets."""
         self._lost_heartbeat = self._owed_stop = False
         self._held_until = -math.inf
         self._ready_at = math.inf
@@ -232,6 +237,7 @@ class CanopenNode:
         self._boot = NodeBoot(self.node_id, self._drives, self._robot, self._patience, identify=self._identify)
         self._boot_up_at = -math.inf
         self._owed_stop = False
+        self._written = ""
         self._go(Presence.BOOTING, now_s)
 
     def seek(self, now_s: float, sync_since: float) -> None:
@@ -369,7 +375,9 @@ class CanopenNode:
         """Take an SDO answer; one without a request of ours is another client's (a tool's) and fine."""
         if self._boot is not None:
             self._boot.on_frame(frame, now_s)
-        elif self.presence is Presence.READY:
+            return True
+        self._written = self._foreign.take(frame) or self._written
+        if self.presence is Presence.READY:
             self._measures.on_frame(frame, now_s)
         elif (speed := self._sdo_stop.speed(frame)) is not None:
             self.axes[speed[0]].on_speed(speed[1], now_s)
@@ -381,6 +389,8 @@ class CanopenNode:
             self._ready_at = now_s
         if self.presence is Presence.STARTING:
             self._check_started(now_s)
+        if self._written and self.has_pdos and self.is_off(now_s):
+            self.lose(f"is configured anew: another client has written its {self._written}", now_s)
         if self._boot is None:
             return self._measures.tick(now_s) if self.presence is Presence.READY else []
         frames = self._boot.tick(now_s)
@@ -406,6 +416,8 @@ class CanopenNode:
         self._boot_up_at = self._boot.boot_up_at if self._boot is not None else -math.inf
         self.report = report
         self._lost_heartbeat = False
+        if self._boot is not None:
+            self._foreign = ForeignWrites(self.profile, self._boot.unanswered)
         self._boot = None
         self.nmt_state = None
         self._guarded = None if self._guarded is None else GuardAnswers()

@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from random import Random
 
 import pytest
 
@@ -16,6 +17,8 @@ from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
 from canbase_sim.cia301.life_guarding import Life
 from canbase_sim.faults import apply
+from canbase_watchdog.trip_cause import TripCause
+from canbase_watchdog.watchdog import State
 from support.chain_world import World, world_of
 
 FAST = Twist2D(0.4, 0.0)
@@ -167,3 +170,40 @@ def test_an_absent_100ch_is_explained_by_the_key_of_the_profile() -> None:
     world.run(3.0)
     errors = [node.boot_error for node in world.core._drives.nodes if node.boot_error]
     assert "self_stop.node_guarding" in errors[0]
+
+
+# 0.3 m/s ── somebody else guards the drives too, as seldom as keeps them alive ── each answers once more ── trip
+@pytest.mark.parametrize("period_s", [0.05, 0.1, 0.235])
+def test_requests_of_another_master_would_keep_the_drives_alive_and_are_a_trip(period_s: float) -> None:
+    world = world_of("technosoft")
+    world.drive(FAST, 1.2)
+    due = world.now_s
+
+    def another() -> bool:
+        nonlocal due
+        if world.now_s >= due:
+            due += period_s
+            world.guard()
+        assert world.watchdog is not None
+        return world.watchdog.status.state is State.TRIPPED
+
+    assert world.run(4.0, another), "nobody noticed"
+    assert world.watchdog is not None
+    verdict = world.watchdog.status.verdict
+    assert verdict.cause is TripCause.FOREIGN_MASTER
+    assert "more answers to node guarding than one each 0.060 s" in verdict.detail
+    world.command = None
+    assert world.stands_after(2.0) < 1.0
+
+
+def test_answers_that_come_late_in_bursts_or_get_lost_are_no_sign_of_another_master() -> None:
+    world = world_of("technosoft")
+    world.drive(FAST, 1.2)
+    assert world.watchdog is not None
+    foreign = world.watchdog._observer._guards[1]
+    random, at_s, held_s = Random(4), world.now_s, 0.0
+    for _ in range(20000):
+        at_s += 0.06
+        held_s = max(held_s, at_s + random.choice((0.0,) * 50 + (0.1,)))
+        if random.random() > 0.05:
+            assert not foreign.too_fast(max(at_s, held_s))

@@ -12,6 +12,7 @@ from canbase_commissioning.powered_drives import PoweredDrives, RigError
 from canbase_commissioning.self_stop_test import HEARTBEAT, SILENCE, Outcome, get_ready, prove, watches_watchdog
 from canbase_driver.boot.settings import STOPS_BY_NOTHING, SelfStopSet, StopsBy
 from canbase_driver.cia301.frame import Frame
+from canbase_sim.cia301.dictionary import key
 from canbase_sim.cia402.states import POWERED
 from canbase_sim.frame import Frame as BenchFrame
 from canbase_sim.personality import PERSONALITIES
@@ -91,19 +92,30 @@ def test_a_drive_that_does_not_stop_by_itself_is_told_loudly_and_stopped_at_once
 
 
 def test_one_drive_of_two_that_lost_its_1016h_is_the_one_that_is_named() -> None:
-    """Somebody clears the entry between the boot and the trial: what was set is not what counts."""
+    """Its firmware clears the entries between the boot and the trial: what was set is not what counts."""
     world = GuideWorld()
 
     def sabotaged(rig: PoweredDrives) -> Script[tuple[Outcome, ...]]:
         yield from get_ready(rig)
-        request = "23 16 10 01 00 00 00 00"
-        world.bench.on_frame(BenchFrame(0x602, bytes.fromhex(request)), world.now_s)
-        request = "23 16 10 02 00 00 00 00"
-        world.bench.on_frame(BenchFrame(0x602, bytes.fromhex(request)), world.now_s)
+        world.bench.nodes[2].dictionary.values.update({key(0x1016, 1): 0, key(0x1016, 2): 0})
+        world.bench.nodes[2]._consumer.configure()
         return (yield from prove(rig, SPEED_MPS))
 
     outcomes = world.guide(sabotaged)
     assert [(outcome.joint, outcome.stopped) for outcome in outcomes] == [("left", True), ("right", False)]
+    assert_off(world)
+
+
+def test_another_client_that_writes_1016h_meanwhile_ends_it() -> None:
+    world = GuideWorld()
+
+    def sabotaged(rig: PoweredDrives) -> Script[tuple[Outcome, ...]]:
+        yield from get_ready(rig)
+        world.bench.on_frame(BenchFrame(0x602, bytes.fromhex("23 16 10 01 00 00 00 00")), world.now_s)
+        return (yield from prove(rig, SPEED_MPS))
+
+    with pytest.raises(RigError, match="is configured anew: another client has written its 1016h:1"):
+        world.guide(sabotaged)
     assert_off(world)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -182,3 +183,32 @@ def test_node_guarding_and_heartbeats_exclude_each_other(tmp_path: Path) -> None
         load_profile(str(file))
     file.write_text("title: mine\nself_stop:\n  node_guarding: true\n  heartbeat_entries: 0\n")
     assert load_profile(str(file)).self_stop.node_guarding
+
+
+@pytest.mark.parametrize(
+    ("index", "key"),
+    [
+        (0x1016, "self_stop.heartbeat_entries"),
+        (0x100C, "self_stop.node_guarding"),
+        (0x100D, "self_stop.node_guarding"),
+        (0x1029, "self_stop.error_behaviour"),
+        (0x6007, "self_stop.abort_connection_code"),
+        (0x6807, "self_stop.abort_connection_code"),
+        (0x605A, "options.quick_stop_code"),
+        (0x685A, "options.quick_stop_code"),
+        (0x605E, "options.fault_reaction_code"),
+        (0x2000, "self_stop.vendor_watchdog"),
+    ],
+)
+def test_a_write_at_the_end_of_the_boot_cannot_undo_what_makes_the_drive_stop(
+    tmp_path: Path, index: int, key: str
+) -> None:
+    """The boot has read it back before, and reports that the drive stops by itself; a proof stays valid as well."""
+    own = "self_stop: {vendor_watchdog: {index: 0x2000, text: its own}}\n"
+    entry = f"{{index: {index:#06x}, value: 0, bits: 16}}"
+    file = tmp_path / "own.yaml"
+    file.write_text(f"title: own\n{own}writes: {{after_mapping: [{entry}]}}\n")
+    with pytest.raises(ConfigError, match=re.escape(f"{index:04X}h decides how the drive stops: set {key} instead")):
+        load_profile(str(file))
+    file.write_text(f"title: own\n{own}writes: {{before_mapping: [{entry}]}}\n")
+    load_profile(str(file))

@@ -121,18 +121,21 @@ def test_garbage_never_raises_and_is_latched(data: bytes) -> None:
 
 @given(
     mark=st.sampled_from(Mark), cause=st.integers(0, 255), node=st.integers(0, 127), detail=st.text(max_size=600),
-    sequence=st.integers(1, 2**64 - 2),
+    sequence=st.integers(1, 2**64 - 2), opened=st.booleans(),
 )  # fmt: skip
-def test_the_watchdogs_layout_is_the_same(mark: Mark, cause: int, node: int, detail: str, sequence: int) -> None:
+def test_the_watchdogs_layout_is_the_same(
+    mark: Mark, cause: int, node: int, detail: str, sequence: int, opened: bool
+) -> None:
     owner = owner_of("watchdog", "carl", "machine")
     assert latch.owner("carl", "machine") == owner
-    entry = latch.Entry(latch.Mark(mark), cause, node, detail)
-    record = Record(mark, cause | node << 8, "", detail)
+    entry = latch.Entry(latch.Mark(mark), cause, node, detail, opened=opened)
+    record = Record(mark, cause | node << 8 | opened << 15, "", detail)
     assert latch.page(entry, sequence, owner) == slot(record, sequence, owner)
     pages = sorted((sequence, sequence + 1), key=lambda each: each % 2 == 0)
     data = b"".join(latch.page(entry, each, owner) for each in pages)
     past, found = latch.decode(data, owner), read(data, owner)
     assert (int(past.entry.mark), past.entry.cause, past.entry.node_id) == (int(mark), cause, node)
+    assert past.entry.opened is opened
     assert (past.entry.detail, past.sequence) == (found.record.detail, found.sequence)
 
 

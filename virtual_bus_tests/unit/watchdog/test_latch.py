@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from canbase_watchdog import frames
-from canbase_watchdog.latch import Entry, Mark, Past
+from canbase_watchdog.latch import Entry, Mark, Past, decode, page
 from canbase_watchdog.trip_cause import FINE, TripCause, before_the_start
 from canbase_watchdog.watchdog import Answer, State, Watchdog
 from support.watchdog_story import ENABLED, FakeDrive, Story
@@ -248,3 +248,44 @@ def test_a_trip_at_the_end_is_written() -> None:
 
 def test_a_readable_clear_record_is_no_cause() -> None:
     assert before_the_start(Past()) is FINE
+
+
+# 0 s a wheel does not brake ── 0.3 s power off, relay open ── killed ── its next life: the relay stays open
+def test_a_relay_that_a_runaway_wheel_has_opened_stays_open_until_the_reset_over_a_restart() -> None:
+    drive = FakeDrive(1)
+    story = driving(drive)
+    drive.brakes = story.filter = story.obedient = False
+    until_tripped(story)
+    assert not story.watchdog.record.opened
+    story.run(0.5)
+    assert not story.watchdog.keeps_relay
+    owner = b"carl".ljust(32)
+    data = b"".join(page(story.watchdog.record, sequence, owner) for sequence in (1, 2))
+    next_life = resumed(decode(data, owner))
+    assert not next_life.watchdog.keeps_relay
+    next_life.run(2.0)
+    assert not next_life.watchdog.keeps_relay
+    assert next_life.watchdog.record.opened, "a third life must know it too"
+    assert next_life.reset(1) == Answer.DONE
+    next_life.run(0.1)
+    assert next_life.watchdog.keeps_relay
+    assert not next_life.watchdog.record.opened
+
+
+def test_a_trip_that_did_not_open_the_relay_leaves_it_closed_over_a_restart() -> None:
+    """A drive may need its supply to report, before a reset, that it has no power."""
+    story = driving(FakeDrive(1))
+    story.filter = False
+    until_tripped(story)
+    story.run(2.0)
+    assert story.watchdog.keeps_relay
+    assert resumed(Past(story.watchdog.record)).watchdog.keeps_relay
+
+
+# a drive is silent, another one does not brake, and the relay feeds both ── restart ── neither answers ── reset: done
+def test_a_drive_that_an_open_relay_leaves_without_supply_keeps_no_reset_away() -> None:
+    silent = Entry(Mark.LATCHED, int(TripCause.DRIVE_SILENT), 1, "no feedback", opened=True)
+    for past, answer in ((Past(silent), Answer.DONE), (Past(replace(silent, opened=False)), Answer.CAUSE_STANDS)):
+        story = resumed(past, FakeDrive(1, mute=True), FakeDrive(2, mute=True))
+        story.run(1.0)
+        assert story.reset(1) == answer

@@ -216,6 +216,12 @@ def master_writes_the_target_by_sdo(world: World) -> EachStep:
     return truthful
 
 
+def master_ends_the_heartbeat_monitoring_of_a_node(world: World) -> EachStep:
+    """From then on this drive turns on with its last setpoint when the computer fails (1016h:1 = 0)."""
+    world.inject(0x601, "23 16 10 01 00 00 00 00")
+    return truthful
+
+
 def master_uses_the_quick_stop_pdo_to_enable(world: World) -> EachStep:
     world.inject(0x501, "0f 00")
     return truthful
@@ -223,6 +229,11 @@ def master_uses_the_quick_stop_pdo_to_enable(world: World) -> EachStep:
 
 def second_driver_beats(world: World) -> EachStep:
     return each(world, 0.1, lambda: world.inject(0x77F, "05"))
+
+
+def another_device_has_the_watchdogs_node_id(world: World) -> EachStep:
+    """Its heartbeat would keep drives alive that monitor one entry (1016h), when this computer fails."""
+    return each(world, 0.1, lambda: world.inject(0x77E, "05"))
 
 
 def one_drive_is_disabled_and_the_driver_does_not_mind(world: World) -> EachStep:
@@ -250,8 +261,10 @@ CASES: list[tuple[Callable[[World], EachStep], TripCause, float]] = [
     (master_sends_syncs, TripCause.FOREIGN_MASTER, 0.05),
     (master_resets_a_node, TripCause.FOREIGN_MASTER, 0.002),
     (master_writes_the_target_by_sdo, TripCause.FOREIGN_MASTER, 0.002),
+    (master_ends_the_heartbeat_monitoring_of_a_node, TripCause.FOREIGN_MASTER, 0.002),
     (master_uses_the_quick_stop_pdo_to_enable, TripCause.FOREIGN_MASTER, 0.002),
     (second_driver_beats, TripCause.FOREIGN_MASTER, 1.1),
+    (another_device_has_the_watchdogs_node_id, TripCause.FOREIGN_MASTER, 1.1),
     (one_drive_is_disabled_and_the_driver_does_not_mind, TripCause.DRIVE_DOWN, 0.13),
 ]
 """Who lies, what the watchdog calls it, and until when it must have tripped [s]."""

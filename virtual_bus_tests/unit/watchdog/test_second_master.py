@@ -355,3 +355,55 @@ def test_commands_that_make_no_sense_are_counted() -> None:
     for data in ("", "80", "80 01 00", "03 01"):
         it.on_frame(0x000, bytes.fromhex(data), 2.0)
     assert it.dropped == 4
+
+
+@pytest.mark.parametrize(
+    ("data", "index"),
+    [
+        ("2b 0c 10 00 00 00 00 00", "100C"),  # node guarding
+        ("2f 0d 10 00 00 00 00 00", "100D"),
+        ("23 16 10 01 00 00 00 00", "1016"),  # heartbeats that the drive monitors
+        ("2f 29 10 01 01 00 00 00", "1029"),
+        ("23 03 14 01 01 05 00 80", "1403"),  # the RPDO of the watchdog's quick stop
+        ("2f 03 16 00 00 00 00 00", "1603"),
+        ("2b 07 60 00 00 00 00 00", "6007"),
+        ("2b 5a 60 00 00 00 00 00", "605A"),
+        ("2b 5e 68 00 00 00 00 00", "685E"),  # of the second axis
+        ("23 84 60 00 01 00 00 00", "6084"),
+        ("23 85 68 00 01 00 00 00", "6885"),
+    ],
+)
+def test_an_sdo_that_changes_how_an_enabled_drive_stops(data: str, index: str) -> None:
+    """Afterwards it would turn on with a dead computer, and nobody would know."""
+    assert after(0x601, data) == Sign(2.0, 1, f"an SDO that writes {index}h, while it is enabled")
+    assert after(0x602, data) is None  # node 2 has no power: a boot does that
+    assert after(0x601, "40" + data[2:]) is None  # reads
+
+
+# --- heartbeats of the watchdog's node: 10 own ones each second where they come back, none where they do not
+
+
+@pytest.mark.parametrize(("period_s", "sign"), [(0.1, True), (0.3, True), (0.4, False), (1.0, False)])
+def test_where_own_frames_do_not_come_back_any_77e_that_could_keep_a_drive_alive_is_a_sign(
+    period_s: float, sign: bool
+) -> None:
+    """The drives allow 0.3 s without one."""
+    foreign = Foreign(CONFIG, echo=False)
+    for n in range(20):
+        foreign.on_watchdog_heartbeat(n * period_s)
+    assert (foreign.last is not None) is sign
+    if foreign.last:
+        assert foreign.last.detail == (
+            "heartbeats 77Eh that this watchdog has not sent: another device has its node id, 126; give it another one"
+        )
+
+
+def test_where_own_frames_come_back_they_are_no_sign_and_more_of_them_are() -> None:
+    one, two = Foreign(CONFIG), Foreign(CONFIG)
+    for n in range(600):
+        one.on_watchdog_heartbeat(n * 0.1 + (0.09 if n % 7 == 0 else 0.0))
+    for n in range(60):
+        two.on_watchdog_heartbeat(n * 0.1)
+        two.on_watchdog_heartbeat(n * 0.1 + 0.02)
+    assert one.last is None
+    assert two.last is not None

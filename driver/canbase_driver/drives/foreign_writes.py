@@ -1,0 +1,44 @@
+"""Writes of another client to what the boot of a node has set: a tool, another master. CiA 301.
+
+An SDO answer goes to all that listen. One that confirms a write which the boot did not make shows such a client.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Final
+
+from canbase_config.object_map import AXIS_OFFSET
+from canbase_config.profile import STOPPED_BY, Profile
+from canbase_driver.cia301.frame import Frame
+
+PDOS: Final = range(0x1400, 0x1C00)
+"""Which PDOs the drive obeys and sends, and what they contain."""
+RAMPS: Final = (0x6083, 0x6084, 0x6085)
+_WRITTEN: Final = 3 << 5
+"""First byte of the answer to a Write (CiA 301, SDO download)."""
+_COMMAND: Final = 7 << 5
+
+
+class ForeignWrites:
+    """Looks at the SDO answers of one node after its boot."""
+
+    def __init__(self, kind: Profile, late: Counter[bytes]) -> None:
+        """`late`: answers that the boot is still owed, by address: none of them is another client's."""
+        own = kind.self_stop.vendor_watchdog
+        axis = (*RAMPS, *(index for index in STOPPED_BY if index >= 0x6000))
+        self._watched = {*STOPPED_BY, *axis, *(index + AXIS_OFFSET for index in axis)}
+        if own is not None and own.index is not None:
+            self._watched.add(own.index)
+        self._late = late
+
+    def take(self, frame: Frame) -> str:
+        """The object that another client has written, as "1016h:1"; empty: this answer shows none."""
+        data = frame.data
+        if len(data) != 8 or data[0] & _COMMAND != _WRITTEN:
+            return ""
+        if self._late[data[1:4]] > 0:
+            self._late[data[1:4]] -= 1
+            return ""
+        index = int.from_bytes(data[1:3], "little")
+        return f"{index:04X}h:{data[3]}" if index in self._watched or index in PDOS else ""

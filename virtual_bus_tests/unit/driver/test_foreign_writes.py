@@ -1,0 +1,52 @@
+"""Which SDO answers show that another client has changed what the boot of a drive has set."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+
+from canbase_config.profile import Profile
+from canbase_config.profile_file import load_profile
+from canbase_driver.cia301.frame import Frame
+from canbase_driver.drives.foreign_writes import ForeignWrites
+
+GENERIC = load_profile("generic")
+
+
+def taken(data: str, kind: Profile = GENERIC, late: Counter[bytes] | None = None) -> str:
+    return ForeignWrites(kind, Counter() if late is None else late).take(Frame(0x581, bytes.fromhex(data)))
+
+
+@pytest.mark.parametrize(
+    ("data", "shown"),
+    [
+        ("60 16 10 01 00 00 00 00", "1016h:1"),
+        ("60 0C 10 00 00 00 00 00", "100Ch:0"),
+        ("60 03 14 01 00 00 00 00", "1403h:1"),  # the PDO of the watchdog's quick stop
+        ("60 00 1A 00 00 00 00 00", "1A00h:0"),
+        ("60 07 60 00 00 00 00 00", "6007h:0"),
+        ("60 5A 68 00 00 00 00 00", "685Ah:0"),  # of the second axis
+        ("60 85 60 00 00 00 00 00", "6085h:0"),
+        ("60 40 60 00 00 00 00 00", ""),  # the watchdog stops by it
+        ("60 F9 60 01 00 00 00 00", ""),  # a gain
+        ("4B 16 10 01 00 00 00 00", ""),  # read
+        ("80 16 10 01 00 00 00 08", ""),  # refused
+        ("60 16 10", ""),
+    ],
+)
+def test_the_object_is_named_that_decides_how_the_drive_stops(data: str, shown: str) -> None:
+    assert taken(data) == shown
+
+
+def test_the_makers_own_watchdog_is_one_where_the_profile_names_it() -> None:
+    assert taken("60 00 20 00 00 00 00 00") == ""
+    assert taken("60 00 20 00 00 00 00 00", load_profile("zlac8015d")) == "2000h:0"
+
+
+# the boot asked twice, the first answer was slow ── the second one comes after the boot ── a third one is foreign
+def test_an_answer_that_the_boot_is_owed_is_nobody_elses() -> None:
+    late = Counter({bytes.fromhex("16 10 01"): 1})
+    writes = ForeignWrites(GENERIC, late)
+    answer = Frame(0x581, bytes.fromhex("60 16 10 01 00 00 00 00"))
+    assert [writes.take(answer), writes.take(answer)] == ["", "1016h:1"]
