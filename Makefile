@@ -155,6 +155,10 @@ hazards: $(VENV)/ready ## checks hazards.yaml and writes the tables of docs/safe
 refusals: $(VENV)/ready ## the table of docs/refusals.md: what the boot says when a drive refuses an object
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.refusals
 
+.PHONY: drive-pages
+drive-pages: $(VENV)/ready ## docs/drives/KIND.md: what the boot writes, how each kind of drive stops, and values without a source
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.drive_pages
+
 .PHONY: structure
 structure: $(VENV)/ready ## writes what each file is for into docs/architecture.md
 	PYTHONPATH=$(CURDIR)/docs:$(CURDIR)/virtual_bus_tests python -m site_builder

@@ -227,6 +227,7 @@ PERSONALITIES: Mapping[str, Personality] = {
         sets_no_rtr=True,  # EDS
         defaults=_NO_REACTION,
         heartbeat_entries=1,  # EDS
+        modes=(3,),  # operating manual: 6060h takes 1, 3, 6 and 8
     ),
 }
 """By the name that the drive's profile has in robot.yaml."""
