@@ -102,7 +102,7 @@ def _axis_bits(drive: Drive) -> int:
 
 
 def _mapped_bits(drive: Drive, index: int) -> int:
-    return place(drive.kind.layout, index, drive.axis).bits
+    return place(drive.kind, index, drive.axis).bits
 
 
 def _slow_bits_per_s(robot: Robot) -> float:

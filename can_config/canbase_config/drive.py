@@ -54,7 +54,12 @@ class Drive(Section):
     ] = "generic"
     mode: (
         Annotated[
-            int, Field(ge=-128, le=127, description="6060h: 3 profile velocity, 9 cyclic; default: the profile's first")
+            int,
+            Field(
+                ge=-128,
+                le=127,
+                description="6060h: 3 profile velocity, 9 cyclic, 2 vl (inverters); default: the profile's first",
+            ),
         ]
         | None
     ) = None

@@ -35,6 +35,8 @@ class WatchedLayout:
     """Width of 60FFh."""
     velocity_bits: int = 32
     """Width of 606Ch."""
+    vl: bool = False
+    """Mode 2: target and actual velocity are 6042h and 6044h."""
 
 
 @dataclass(frozen=True)

@@ -308,7 +308,7 @@ class Observer:
         if place == frames.place_of(frames.STATUSWORD, drive.axis, drive.layout):
             return self._note_state(record, frames.own_statusword(value, drive.layout, drive.axis), now_s)
         if place == frames.place_of(frames.VELOCITY, drive.axis, drive.layout):
-            self._note_velocity(record, value, now_s)
+            self._note_velocity(record, frames.own_velocity(value, drive.layout), now_s)
         if place == frames.place_of(frames.POSITION, drive.axis, drive.layout):
             record.stand.on_position(value, now_s)
         return True
@@ -344,4 +344,5 @@ class Observer:
 
 
 _CONTROLWORD = frames.CONTROLWORD % frames.AXIS_OFFSET
-_COMMANDS = frozenset(index % frames.AXIS_OFFSET for index in (frames.CONTROLWORD, frames.MODE, frames.TARGET))
+_COMMAND_INDEXES = (frames.CONTROLWORD, frames.MODE, frames.TARGET, frames.VL_TARGET)
+_COMMANDS = frozenset(index % frames.AXIS_OFFSET for index in _COMMAND_INDEXES)

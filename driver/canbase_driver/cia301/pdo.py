@@ -125,7 +125,7 @@ class NodeLayout:
 
     def torque_places(self) -> tuple[tuple[int, int], ...]:
         """Index and sub-index of the torque of each axis."""
-        places = [place(self.profile.layout, index, axis) for index in self.torque_objects for axis in self.axes]
+        places = [place(self.profile, index, axis) for index in self.torque_objects for axis in self.axes]
         return tuple((at.index, at.sub) for at in places)
 
     def pdos(self) -> tuple[Pdo, ...]:
@@ -170,7 +170,7 @@ class NodeLayout:
         return Pdo("TPDO", number, cob_id, AT_ONCE, mapping, optional, inhibit_100us=10 * ms, event_timer_ms=ms)
 
     def _entries(self, axis: int, *indexes: int) -> tuple[int, ...]:
-        return tuple(place(self.profile.layout, index, axis).mapping_entry for index in indexes)
+        return tuple(place(self.profile, index, axis).mapping_entry for index in indexes)
 
 
 def node_layout(node_id: int, drives: tuple[Drive, ...], robot: Robot) -> NodeLayout:
