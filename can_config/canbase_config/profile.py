@@ -91,7 +91,11 @@ class Pdos(Section):
         int, Field(ge=0, le=0x7FFF_FFFF, description="bits of 1400h:1 and 1800h:1 that keep their value")
     ] = 0x4000_0000
     synchronous: Annotated[
-        bool, Field(description="true: transmission type 1; false: RPDOs act at once, TPDOs go by their event timer")
+        bool,
+        Field(
+            description="true: transmission type 1, or without SYNC where the drive refuses it; false: RPDOs act at "
+            "once, TPDOs go by their event timer"
+        ),
     ] = True
 
 

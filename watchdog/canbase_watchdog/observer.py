@@ -95,10 +95,14 @@ class _Record:
         return self.setpoint_mps == 0.0 and abs(self.velocity_mps) <= still_mps
 
     def on_sync(self, now_s: float) -> None:
-        """What came before it counts from now on; each SYNC wants one setpoint, and one answer from one drive."""
+        """What came before it counts from now on; each SYNC wants one setpoint, and one answer from one drive.
+
+        One that takes no synchronous PDO has been set to the same pace: its answers come by its own timer.
+        """
         if self.state is ENABLED:
             self.misses.count(not self.fresh)
-            self.doubles.count(self.drive.answers_sync and self.answers > 1)
+            if self.drive.answers_sync:
+                self.doubles.balance(self.answers)
         else:
             self.misses.clear()
             self.doubles.clear()

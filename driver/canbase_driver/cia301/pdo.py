@@ -6,8 +6,9 @@ The layout of the quick stop PDO is the watchdog's; its sender is too.
 
 from __future__ import annotations
 
+import math
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from canbase_config.drive import Drive
 from canbase_config.object_map import (
@@ -38,6 +39,8 @@ _STATUS = {False: struct.Struct("<Hi"), True: struct.Struct("<Ii")}
 _VELOCITY = {16: struct.Struct("<h"), 32: struct.Struct("<i")}
 _TORQUE = struct.Struct("<h")
 TORQUE_BYTES = 2
+ROUNDING_MS = 1e-6
+"""A cycle of 10 ms is one of 10.000000000000002 ms too."""
 RATED = 1000.0
 """6077h and 6078h at rated torque (CiA 402-2)."""
 
@@ -163,11 +166,15 @@ class NodeLayout:
         return pdos
 
     def _tpdo(self, number: int, cob_id: int, mapping: tuple[int, ...], optional: int = 0) -> Pdo:
-        """Without SYNC it goes by its timer, and never more often than once in a cycle."""
-        if self.profile.pdo.synchronous:
-            return Pdo("TPDO", number, cob_id, mapping=mapping, optional=optional)
-        ms = max(1, round(1000 * self.timing.cycle_s))
-        return Pdo("TPDO", number, cob_id, AT_ONCE, mapping, optional, inhibit_100us=10 * ms, event_timer_ms=ms)
+        pdo = Pdo("TPDO", number, cob_id, mapping=mapping, optional=optional)
+        return pdo if self.profile.pdo.synchronous else self.by_event(pdo)
+
+    def by_event(self, pdo: Pdo) -> Pdo:
+        """The same PDO without SYNC: an RPDO acts when it arrives, a TPDO goes by its timer, once in a cycle."""
+        if pdo.kind == "RPDO":
+            return replace(pdo, transmission_type=AT_ONCE)
+        ms = max(1, math.ceil(1000.0 * self.timing.cycle_s - ROUNDING_MS))
+        return replace(pdo, transmission_type=AT_ONCE, inhibit_100us=10 * ms, event_timer_ms=ms)
 
     def _entries(self, axis: int, *indexes: int) -> tuple[int, ...]:
         return tuple(place(self.profile, index, axis).mapping_entry for index in indexes)
