@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from canbase_config.drive_values import FIRST_SPARE_TPDO
 from canbase_config.object_map import AXIS_OFFSET as SECOND_AXIS
 from canbase_driver.boot.steps import OTHER_STATE, BootError, NodeAccess, Steps, unsigned
 from canbase_driver.cia301.pdo import AT_ONCE, AT_ONCE_TOO, NodeLayout, Pdo
@@ -35,12 +36,34 @@ def configure_pdos(node: NodeAccess, layout: NodeLayout) -> Steps[None]:
     layout = yield from _with_what_it_has(node, layout)
     cob_ids = yield from _cob_ids(node)
     wanted = {pdo.communication: pdo for pdo in _in_what_it_has(node, layout, cob_ids)}
+    spare = {pdo.communication: pdo for pdo in layout.value_pdos() if pdo.communication not in wanted}
     for index, cob_id in cob_ids.items():
-        if index not in wanted:
+        if index not in wanted and index not in spare:
             yield from _switch_off(node, index, cob_id)
     for index, pdo in wanted.items():
         found = cob_ids[index]
         yield from _make_right(node, layout, pdo, found, found & layout.profile.pdo.fixed_cob_id_bits | pdo.cob_id)
+
+    for index, pdo in spare.items():
+        yield from _publish_what_it_maps(node, layout, pdo, cob_ids.get(index))
+
+
+def _publish_what_it_maps(node: NodeAccess, layout: NodeLayout, pdo: Pdo, found: int | None) -> Steps[None]:
+    """A spare TPDO with named values; `found`: its present COB-ID, None: it has none. Nothing that stops the robot
+    depends on it: a refusal is a note, and the PDO is off."""
+    why = "the drive has no such PDO"
+    if found is not None:
+        try:
+            yield from _make_right(node, layout, pdo, found, found & layout.profile.pdo.fixed_cob_id_bits | pdo.cob_id)
+        except BootError as refused:
+            why = refused.problem
+        except SdoAborted as refused:
+            why = str(refused)
+        else:
+            return
+        yield from node.set_if_present(Write(pdo.communication, 1, found | PDO_OFF, 4))
+    names = ", ".join(value.name for value in layout.values[pdo.number - FIRST_SPARE_TPDO].values)
+    node.notes.append(f"{names}: not published, {pdo.name}: {why}; see `values` of its drive in robot.yaml")
 
 
 def _with_what_it_has(node: NodeAccess, layout: NodeLayout) -> Steps[NodeLayout]:
