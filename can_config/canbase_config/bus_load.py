@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
+from canbase_config.drive_values import ValuePdo, value_pdos
 from canbase_config.object_map import (
     CONTROLWORD,
     POSITION_ACTUAL,
@@ -53,9 +54,33 @@ def cyclic_load(robot: Robot, bitrate: int | None = None) -> float:
     return (_cycle_bits(robot) * robot.rates.control_hz + _slow_bits_per_s(robot)) / (bitrate or robot.bus.bitrate)
 
 
+def values_bits_per_s(robot: Robot) -> float:
+    """The part of named values."""
+    return sum(frame_bits(pdo.data_bytes) * robot.rates.control_hz / pdo.every for pdo in _value_pdos(robot))
+
+
 def full(robot: Robot) -> str:
     """Why the bus cannot carry its frames, with the way out; empty: it can, or has no wire."""
-    return _sentence(robot, "too much to rely on") if _is_above(robot, FULL_LOAD) else ""
+    return _sentence(robot, "too much to rely on") if _is_above(robot, FULL_LOAD) else _crowded(robot)
+
+
+def _crowded(robot: Robot) -> str:
+    """Named values come all at the same SYNC, now and then. They go before the watchdog's quick stop (500h + id): the
+    cycle in which they come must carry everything, too."""
+    pdos = _value_pdos(robot)
+    all_at_once = sum(frame_bits(pdo.data_bytes) * (1.0 - 1.0 / pdo.every) for pdo in pdos) * robot.rates.control_hz
+    peak = cyclic_load(robot) + all_at_once / robot.bus.bitrate
+    if robot.bus.is_virtual or not pdos or peak <= FULL_LOAD:
+        return ""
+    return (
+        f"the control cycle in which all `values` of the drives are sent ({len(pdos)} PDOs) takes up to {peak:.0%} of "
+        f"its time at rates.control_hz {robot.rates.control_hz:g} and {robot.bus.bitrate} bit/s, the limit is "
+        f"{FULL_LOAD:.0%}: take values out, lower control_hz, or raise the bit rate of the bus and all drives"
+    )
+
+
+def _value_pdos(robot: Robot) -> list[ValuePdo]:
+    return [pdo for drive in robot.drives for pdo in value_pdos(drive.values, robot.rates.control_hz)]
 
 
 def busy(robot: Robot) -> str:
@@ -102,14 +127,20 @@ def _axis_bits(drive: Drive) -> int:
 
 
 def _mapped_bits(drive: Drive, index: int) -> int:
-    return place(drive.kind.layout, index, drive.axis).bits
+    return place(drive.kind, index, drive.axis).bits
 
 
 def _slow_bits_per_s(robot: Robot) -> float:
-    """Heartbeats of every node, the driver's and the watchdog's, and the watchdog's state frames. A guarded node
-    answers requests, frames without data, in place of heartbeats."""
+    """Heartbeats of every node, the driver's and the watchdog's, the watchdog's state frames, and named values.
+
+    A guarded node answers requests, frames without data, in place of heartbeats.
+    """
     guarded = {drive.node_id for drive in robot.drives if drive.kind.self_stop.node_guarding}
     beating = {drive.node_id for drive in robot.drives} - guarded
     beats = (len(beating) + 2) * HEARTBEATS_PER_TIMEOUT * frame_bits(1)
     guards = len(guarded) * GUARDS_PER_TIMEOUT * (frame_bits(0) + frame_bits(1))
-    return (beats + guards) / robot.timeouts.drive_heartbeat_s + (STATE_HZ + COUNTERS_HZ) * frame_bits(8)
+    return (
+        (beats + guards) / robot.timeouts.drive_heartbeat_s
+        + (STATE_HZ + COUNTERS_HZ) * frame_bits(8)
+        + values_bits_per_s(robot)
+    )

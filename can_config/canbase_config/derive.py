@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from canbase_config.drive import Drive
-from canbase_config.profile import Layout
+from canbase_config.profile import Profile
 from canbase_config.robot import Robot
 from canbase_config.stopping import (
     BRAKING_SHARE,
@@ -133,17 +133,19 @@ def watched_drive(drive: Drive, wheel_radius_m: float, hardest_mps2: float) -> W
         m_per_count=m_per_count(drive, wheel_radius_m),
         velocity_scale=velocity_scale(drive),
         answers_sync=drive.kind.pdo.synchronous,
-        layout=_layout(drive.kind.layout),
+        layout=_layout(drive.kind),
         hardest_braking_mps2=hardest_mps2,
         guarded=drive.kind.self_stop.node_guarding,
     )
 
 
-def _layout(layout: Layout) -> WatchedLayout:
+def _layout(profile: Profile) -> WatchedLayout:
+    layout = profile.layout
     return WatchedLayout(
         sub_index=layout.second_axis == "sub_index",
         shared_controlword=layout.controlword == "shared",
         packed_statusword=layout.statusword == "packed",
         target_bits=layout.target_bits,
         velocity_bits=layout.velocity_bits,
+        vl=profile.is_vl,
     )

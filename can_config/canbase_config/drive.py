@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from canbase_config.drive_values import DriveValue
 from canbase_config.errors import ConfigError
 from canbase_config.profile import Profile, VelocityUnit
 from canbase_config.profile_file import load_profile
@@ -54,7 +55,12 @@ class Drive(Section):
     ] = "generic"
     mode: (
         Annotated[
-            int, Field(ge=-128, le=127, description="6060h: 3 profile velocity, 9 cyclic; default: the profile's first")
+            int,
+            Field(
+                ge=-128,
+                le=127,
+                description="6060h: 3 profile velocity, 9 cyclic, 2 vl (inverters); default: the profile's first",
+            ),
         ]
         | None
     ) = None
@@ -65,6 +71,10 @@ class Drive(Section):
         | None
     ) = None
     identity: Identity = Identity()
+    values: Annotated[
+        tuple[DriveValue, ...],
+        Field(strict=False, description="objects that are published as named values, in spare TPDOs"),
+    ] = ()
 
     @property
     def kind(self) -> Profile:

@@ -10,6 +10,8 @@ from canbase_config.errors import printable
 
 NEEDED: Final = (0x6040, 0x6041, 0x6060, 0x6064, 0x606C, 0x60FF, 0x1400, 0x1600, 0x1800, 0x1A00)
 """What canbase cannot do without."""
+NEEDED_OF_VL: Final = (*(index for index in NEEDED if index not in (0x606C, 0x60FF)), 0x6042, 0x6044)
+"""The same of an inverter, in mode 2."""
 SI_RPM: Final = 0x00B4_4700
 """60A9h: revolutions per minute."""
 INTEGER16, UNSIGNED32 = 0x03, 0x07
@@ -61,7 +63,7 @@ class _Lines:
 def draft(eds: Eds) -> Draft:
     """The profile that follows from the EDS, as a draft: units and everything that only a manual gives stay open."""
     out = _Lines()
-    missing = tuple(f"{index:04X}h" for index in NEEDED if not eds.has(index))
+    missing = tuple(f"{index:04X}h" for index in (NEEDED_OF_VL if _is_vl(eds) else NEEDED) if not eds.has(index))
     _identity(eds, out)
     _layout(eds, out)
     _units(eds, out)
@@ -75,6 +77,11 @@ def draft(eds: Eds) -> Draft:
     head = f"# Drafted from {eds.path.name} by `canbase config from-eds`: a draft, not proven. See docs/drives.md.\n\n"
     tail = ["unproven:", *(f"  - {path}" for path in out.unproven)]
     return Draft(head + "\n".join(out.lines + tail) + "\n", missing, self_stop_sentence(eds), UNKNOWN_TO_ANY_EDS)
+
+
+def _is_vl(eds: Eds) -> bool:
+    """It has the target of mode 2, and not that of modes 3 and 9."""
+    return eds.has(0x6042) and not eds.has(0x60FF)
 
 
 def self_stop_sentence(eds: Eds) -> str:
@@ -111,6 +118,12 @@ def _identity(eds: Eds, out: _Lines) -> None:
 
 def _layout(eds: Eds, out: _Lines) -> None:
     out.section("layout")
+    if _is_vl(eds):
+        axes = 2 if eds.has(0x6842) else 1
+        out.put("axes", axes, "has 6842h" if axes == 2 else "no 6842h")
+        out.put("target_bits", 16, "6042h of mode 2")
+        out.put("velocity_bits", 16, "6044h of mode 2")
+        return
     by_sub = eds.has(0x60FF, 2)
     axes = 2 if eds.has(0x68FF) or by_sub else 1
     out.put("axes", axes, "has 68FFh" if eds.has(0x68FF) else "has 60FFh:2" if by_sub else "no 68FFh")
@@ -129,6 +142,10 @@ def _layout(eds: Eds, out: _Lines) -> None:
 
 def _units(eds: Eds, out: _Lines) -> None:
     out.section("units")
+    if _is_vl(eds):
+        for key in ("target_velocity", "actual_velocity"):
+            out.put(key, "rpm", "604Ch = 1/1", proven=False)
+        return
     is_rpm = eds.default(0x60A9) == SI_RPM
     unit, source = ("rpm", "60A9h = 00B44700h") if is_rpm else (None, "not in an EDS; see the manual")
     out.put("target_velocity", unit, source, proven=is_rpm)
@@ -138,6 +155,9 @@ def _units(eds: Eds, out: _Lines) -> None:
 
 def _modes(eds: Eds, out: _Lines) -> None:
     out.top()
+    if _is_vl(eds):
+        out.put("modes", "[2]", "has 6042h, and no 60FFh")
+        return
     supported = eds.default(0x6502)
     if not supported:
         out.put("modes", "[3]", "6502h has no default", proven=False)
@@ -180,7 +200,7 @@ def _options(eds: Eds, out: _Lines) -> None:
         "quick_stop": 0x605A,
         "fault_reaction": 0x605E,
         "mode_display": 0x6061,
-        "ramps": 0x6083,
+        "ramps": 0x6048 if _is_vl(eds) else 0x6083,
         "interpolation": 0x60C2,
         "sync_counter": 0x1019,
         "store": 0x1010,

@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from canbase_config.profile import Layout
+from canbase_config.profile import Profile
 
 AXIS_OFFSET: Final = 0x800
 """The objects of the second axis are at 6800h (CiA 402-2)."""
 CONTROLWORD, STATUSWORD, MODE, MODE_DISPLAY = 0x6040, 0x6041, 0x6060, 0x6061
 POSITION_ACTUAL, VELOCITY_ACTUAL, TARGET_VELOCITY = 0x6064, 0x606C, 0x60FF
+VL_TARGET_VELOCITY, VL_VELOCITY_ACTUAL = 0x6042, 0x6044
+VL_OBJECTS: Final = {TARGET_VELOCITY: VL_TARGET_VELOCITY, VELOCITY_ACTUAL: VL_VELOCITY_ACTUAL}
+"""In mode 2 (vl, velocity mode of inverters) these are used in place of the others; 16 bits (CiA 402-2)."""
 TORQUE_ACTUAL, CURRENT_ACTUAL = 0x6077, 0x6078
 TORQUE_OBJECTS: Final = {"6077h": TORQUE_ACTUAL, "probe": TORQUE_ACTUAL, "6078h": CURRENT_ACTUAL}
 """By `options.torque` of a profile; what is not here has none."""
@@ -54,14 +57,18 @@ class Place:
         return self.index << 16 | self.sub << 8 | self.bits
 
 
-def place(layout: Layout, index: int, axis: int) -> Place:
+def place(profile: Profile, index: int, axis: int) -> Place:
     """Where object `index` (as of the first axis, 6000h…67FFh) of axis 0 or 1 is.
 
+    A profile of mode 2 has its own target and actual velocity in place of 60FFh and 606Ch.
     Raises ValueError for an axis that the layout does not have, and for an index that canbase does not use.
     """
+    layout = profile.layout
     if index not in _BITS or not 0 <= axis < layout.axes:
         raise ValueError(f"{index:04X}h of axis {axis}: expected an axis below {layout.axes} and an object in use")
     bits = {TARGET_VELOCITY: layout.target_bits, VELOCITY_ACTUAL: layout.velocity_bits}.get(index, _BITS[index])
+    if profile.is_vl:
+        index = VL_OBJECTS.get(index, index)
     if layout.second_axis == "offset":
         return Place(index + AXIS_OFFSET * axis, 0, bits)
     if index == STATUSWORD and layout.statusword == "packed":

@@ -27,6 +27,8 @@ AccelerationUnit = Literal[
     "velocity/s", "rpm/s", "0.1rpm/s", "10counts/s2", "counts/ms2/16384", "counts/ms2/65536", "ms"
 ]
 """One bit of 6083h–6085h. `velocity/s`: the unit of 60FFh per second; `ms`: time from stand to `full_speed_rpm`."""
+VL_MODE = 2
+"""6060h: velocity mode (vl) of inverters, by 6042h (CiA 402-2)."""
 Presence = Literal["yes", "no", "probe"]
 """Whether the drive has an object; `probe`: unknown, the boot tries."""
 
@@ -53,8 +55,8 @@ class Layout(Section):
     statusword: Annotated[
         Literal["own", "packed"], Field(description="packed: 6041h has 32 bits, the second axis in the upper half")
     ] = "own"
-    target_bits: Annotated[Literal[16, 32], Field(description="width of 60FFh")] = 32
-    velocity_bits: Annotated[Literal[16, 32], Field(description="width of 606Ch")] = 32
+    target_bits: Annotated[Literal[16, 32], Field(description="width of 60FFh; 16 for 6042h of mode 2")] = 32
+    velocity_bits: Annotated[Literal[16, 32], Field(description="width of 606Ch; 16 for 6044h of mode 2")] = 32
 
     @model_validator(mode="after")
     def _shared_needs_sub_index(self) -> Layout:
@@ -68,7 +70,9 @@ class Units(Section):
 
     target_velocity: Annotated[VelocityUnit, Field(description="60FFh")] | None = "rpm"
     actual_velocity: Annotated[VelocityUnit, Field(description="606Ch")] | None = "rpm"
-    acceleration: Annotated[AccelerationUnit, Field(description="6083h, 6084h, 6085h")] = "velocity/s"
+    acceleration: Annotated[AccelerationUnit, Field(description="6083h, 6084h, 6085h; of mode 2: velocity/s")] = (
+        "velocity/s"
+    )
     full_speed_rpm: Annotated[float, Field(gt=0.0, description="of the unit ms [rpm]")] | None = None
 
     @model_validator(mode="after")
@@ -87,7 +91,11 @@ class Pdos(Section):
         int, Field(ge=0, le=0x7FFF_FFFF, description="bits of 1400h:1 and 1800h:1 that keep their value")
     ] = 0x4000_0000
     synchronous: Annotated[
-        bool, Field(description="true: transmission type 1; false: RPDOs act at once, TPDOs go by their event timer")
+        bool,
+        Field(
+            description="true: transmission type 1, or without SYNC where the drive refuses it; false: RPDOs act at "
+            "once, TPDOs go by their event timer"
+        ),
     ] = True
 
 
@@ -235,7 +243,11 @@ class Profile(Section):
     units: Units = Units()
     modes: Annotated[
         tuple[Annotated[int, Field(ge=-128, le=127)], ...],
-        Field(min_length=1, strict=False, description="values of 6060h that take 60FFh, the preferred one first"),
+        Field(
+            min_length=1,
+            strict=False,
+            description="values of 6060h that take 60FFh, the preferred one first; or 2 alone: 6042h and 6044h",
+        ),
     ] = (3, 9)
     pdo: Pdos = Pdos()
     sdo: Sdo = Sdo()
@@ -254,6 +266,30 @@ class Profile(Section):
     ] = Field(default_factory=dict)
     notes: Annotated[tuple[str, ...], Field(strict=False, description="notes for the first motion")] = ()
     unproven: Annotated[tuple[str, ...], Field(strict=False, description="keys above without a source; test them")] = ()
+
+    @property
+    def is_vl(self) -> bool:
+        """Its velocities are 6042h and 6044h, its ramps 6048h, 6049h and 604Ah, in place of those of modes 3 and 9."""
+        return VL_MODE in self.modes
+
+    @model_validator(mode="after")
+    def _vl_has_objects_of_its_own(self) -> Profile:
+        layout = self.layout
+        if not self.is_vl:
+            return self
+        if len(self.modes) > 1:
+            raise MisfitError("mode 2 has objects and units of its own: it is the only one of a profile", ("modes",))
+        for key, bits in (("target_bits", layout.target_bits), ("velocity_bits", layout.velocity_bits)):
+            if bits != 16:
+                raise MisfitError(
+                    "6042h and 6044h of mode 2 have 16 bits (CiA 402-2): set 16", ("layout", key), ("modes",)
+                )
+        if layout.second_axis != "offset" and layout.axes > 1:
+            raise MisfitError("in mode 2 the second axis is at + 800h", ("layout", "second_axis"), ("modes",))
+        if self.units.acceleration != "velocity/s":
+            message = "ramps of mode 2 are in the unit of 6042h per second: set velocity/s"
+            raise MisfitError(message, ("units", "acceleration"), ("modes",))
+        return self
 
     @model_validator(mode="after")
     def _nothing_undoes_its_stop(self) -> Profile:

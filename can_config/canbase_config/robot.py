@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
 
-from canbase_config import bus_load, stopping
+from canbase_config import bus_load, drive_values, stopping
 from canbase_config.action import Action
 from canbase_config.black_box import BlackBox
 from canbase_config.commissioned import Commissioned
@@ -292,6 +292,8 @@ class Robot(Section):
             if pdo.rpdos < axes + 1 or pdo.tpdos < 2 * axes:
                 message = f"{axes} motor(s) need {axes + 1} RPDOs and {2 * axes} TPDOs; {drive.kind.title} has fewer"
                 raise MisfitError(message, ("drives", i, "profile"), ("drives", i, "node_id"))
+            if why := drive_values.misfit(drive.values, self.rates.control_hz, axes, pdo.tpdos):
+                raise MisfitError(f"values of {drive.joint}: {why}", ("drives", i, "values"))
             if self.bus.sync_counter is not None and drive.kind.options.sync_counter == "no":
                 message = f"{drive.kind.title} knows no counter in SYNC (1019h)"
                 raise MisfitError(message, ("bus", "sync_counter"))

@@ -35,6 +35,8 @@ class WatchedLayout:
     """Width of 60FFh."""
     velocity_bits: int = 32
     """Width of 606Ch."""
+    vl: bool = False
+    """Mode 2: target and actual velocity are 6042h and 6044h."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class WatchedDrive:
     m_per_count: float
     velocity_scale: float = 1.0
     answers_sync: bool = True
-    """Its feedback PDOs are sent once for each SYNC, and not by its own clock."""
+    """Its feedback PDOs are sent once for each SYNC, or as often by its own clock; False: more often than that."""
     layout: WatchedLayout = WatchedLayout()
     hardest_braking_mps2: float = 8.0
     """With power it brakes its wheel no harder."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from canbase_commissioning.identification import NodeCard
 from canbase_config.object_map import AXIS_OFFSET, STATUSWORD, place
-from canbase_config.profile import Layout
+from canbase_config.profile import Profile
 from canbase_config.profile_file import guess, load_profile
 from canbase_driver.boot.steps import Steps, unsigned
 from canbase_driver.cia301.sdo_client import Read, SdoAborted
@@ -49,10 +49,11 @@ def profile_of(card: NodeCard) -> str:
 
 def survey(node_id: int, profile: str) -> Steps[tuple[FoundAxis, ...]]:
     """Reads one drive. Raises SdoTimeout when it stops answering."""
-    layout = load_profile(profile).layout
+    kind = load_profile(profile)
+    layout = kind.layout
     axes = []
     for axis in range(layout.axes):
-        if axis and not (yield from _has(layout, axis)):
+        if axis and not (yield from _has(kind, axis)):
             break
         # Drives whose axes are sub-indexes have these objects once, or not at all.
         offset = AXIS_OFFSET * axis if layout.second_axis == "offset" else 0
@@ -70,9 +71,9 @@ def survey(node_id: int, profile: str) -> Steps[tuple[FoundAxis, ...]]:
     return tuple(axes)
 
 
-def _has(layout: Layout, axis: int) -> Steps[bool]:
+def _has(kind: Profile, axis: int) -> Steps[bool]:
     """Whether the axis has a statusword."""
-    at = place(layout, STATUSWORD, axis)
+    at = place(kind, STATUSWORD, axis)
     return (yield from _number(at.index, at.sub)) is not None
 
 

@@ -117,7 +117,7 @@ _OF_AXIS: Final = (
 def _of_layout(at: Address, profile: Profile) -> str | None:
     for axis in range(profile.layout.axes):
         for index in _OF_AXIS:
-            found = place(profile.layout, index, axis)
+            found = place(profile, index, axis)
             if (found.index, found.sub) == (at.index, at.sub):
                 return f"{'i' if index in _SIGNED else 'u'}{found.bits}"
     return None

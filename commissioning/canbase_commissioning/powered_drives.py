@@ -312,7 +312,7 @@ class PoweredDrives:
 
     def _controlword_places(self) -> list[tuple[int, Place]]:
         drives = [axis.drive for axis in self.axes.values()]
-        found = [(drive.node_id, place(drive.kind.layout, CONTROLWORD, drive.axis)) for drive in drives]
+        found = [(drive.node_id, place(drive.kind, CONTROLWORD, drive.axis)) for drive in drives]
         return list(dict.fromkeys(found))
 
 

@@ -56,7 +56,7 @@ def status_places(node_id: int, robot: Robot | None) -> tuple[Address, ...]:
     drives = [drive for drive in robot.drives if drive.node_id == node_id] if robot else []
     if not drives:
         return Address(STATUSWORD), Address(STATUSWORD + AXIS_OFFSET)
-    places = (place(drive.kind.layout, STATUSWORD, drive.axis) for drive in drives)
+    places = (place(drive.kind, STATUSWORD, drive.axis) for drive in drives)
     return tuple(dict.fromkeys(Address(at.index, at.sub) for at in places))
 
 

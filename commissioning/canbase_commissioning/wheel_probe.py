@@ -26,12 +26,12 @@ class Sample:
 
 def look(drive: Drive, robot: Robot) -> Steps[Sample]:
     """Reads 6041h, 606Ch and 6064h of one axis."""
-    units, layout = AxisUnits(drive, robot.base), drive.kind.layout
-    at = place(layout, STATUSWORD, drive.axis)
+    units, kind = AxisUnits(drive, robot.base), drive.kind
+    at = place(kind, STATUSWORD, drive.axis)
     word = unsigned((yield Read(at.index, at.sub))) >> at.shift & 0xFFFF
-    at = place(layout, VELOCITY_ACTUAL, drive.axis)
+    at = place(kind, VELOCITY_ACTUAL, drive.axis)
     velocity = _signed((yield Read(at.index, at.sub)), at.bits)
-    at = place(layout, POSITION_ACTUAL, drive.axis)
+    at = place(kind, POSITION_ACTUAL, drive.axis)
     counts = _signed((yield Read(at.index, at.sub)), at.bits)
     return Sample(decode_statusword(word), units.velocity_mps(velocity), counts)
 

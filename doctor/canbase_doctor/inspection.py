@@ -131,7 +131,7 @@ def _settings(access: NodeAccess, drives: tuple[Drive, ...], robot: Robot) -> St
         yield from configure_motion(access, drive, robot)
     yield from configure_sync(access, kind, robot.bus.sync_counter)
     yield from write_all(access, kind.writes.after_mapping)
-    moving = [place(kind.layout, index, drive.axis) for index in COMMANDS for drive in drives]
+    moving = [place(kind, index, drive.axis) for index in COMMANDS for drive in drives]
     own = tuple(f"{at.index:04X}h:{at.sub}: " for at in moving)
     access.changes = [change for change in access.changes if not change.startswith(own)]
 
@@ -159,7 +159,7 @@ def _compare(found: Identity, drives: tuple[Drive, ...]) -> str:
 
 
 def _state(drive: Drive) -> Steps[DriveState | None]:
-    at = place(drive.kind.layout, STATUSWORD, drive.axis)
+    at = place(drive.kind, STATUSWORD, drive.axis)
     return decode_statusword(unsigned((yield Read(at.index, at.sub))) >> at.shift & 0xFFFF)
 
 

@@ -95,6 +95,11 @@ class Command(Enum):
     FAULT_RESET = 0x80
 
 
+VL_RAMP = 0x70
+"""Bits 4 to 6 of 6040h in mode 2 (vl): the ramp runs, is not locked, and leads to the target. With one of them 0 the
+motor does not follow 6042h; a locked ramp keeps its speed. Enabled they are all 1, in all other words 0."""
+
+
 class PowerGoal(Enum):
     """Where one axis is to be taken. The rules are at the head of this file."""
 

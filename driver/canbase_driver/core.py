@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 
 from canbase_config import stopping
 from canbase_config.commissioned import without_proof
@@ -395,6 +396,8 @@ class DriverCore:
                 status, velocity = self._feedback_handlers(node, axis)
                 table[node.layout.status_cob_id(axis.drive.axis)] = (status, None)
                 table[node.layout.velocity_cob_id(axis.drive.axis)] = (velocity, None)
+            for number, pdo in enumerate(node.layout.value_pdos()):
+                table[pdo.cob_id] = (partial(node.on_values, number), None)
         return table
 
     def _feedback_handlers(self, node: CanopenNode, axis: Axis) -> tuple[Handler, Handler]:

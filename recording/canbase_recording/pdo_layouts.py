@@ -232,7 +232,7 @@ def _of_robot(node: NodeLayout) -> list[tuple[int, PdoLayout]]:
         (at.index, at.sub): (base, axis, at.shift)
         for axis in reversed(node.axes)
         for base in (CONTROLWORD, STATUSWORD, POSITION_ACTUAL, VELOCITY_ACTUAL, TARGET_VELOCITY, *node.torque_objects)
-        for at in (place(node.profile.layout, base, axis),)
+        for at in (place(node.profile, base, axis),)
     }
     found = []
     for pdo in node.pdos():

@@ -28,13 +28,21 @@ FOLDER: Final = DOCS / "drives"
 BOOT, STOP, UNPROVEN = (f"make drive-pages, {part}" for part in ("boot", "stops", "unproven"))
 """Names the parts of a page that are generated."""
 EDS = read_eds(profile_path("generic").parents[1] / "eds" / "canbase_cia402.eds")
-OWN_NAMES = {0x2000: "communication offline time", 0x200F: "targets of both motors"}
-"""Objects of makers, which our EDS does not have."""
+OWN_NAMES = {
+    0x2000: "communication offline time",
+    0x200F: "targets of both motors",
+    0x6046: "vl velocity min max amount",
+    0x6048: "vl velocity acceleration",
+    0x6049: "vl velocity deceleration",
+    0x604A: "vl velocity quick stop",
+    0x604C: "vl dimension factor",
+}
+"""Objects of makers and of mode 2, which our EDS does not have."""
 MEANINGS: dict[int, dict[int, str]] = {
     0x6007: {0: "nothing", 1: "fault", 2: "disable voltage", 3: "quick stop"},
     0x605A: {2: "stop by the quick stop ramp, then without power"},
     0x605E: {2: "stop by the quick stop ramp"},
-    0x6060: {3: "profile velocity", 9: "cyclic synchronous velocity", -3: "velocity at once"},
+    0x6060: {2: "velocity (vl)", 3: "profile velocity", 9: "cyclic synchronous velocity", -3: "velocity at once"},
     0x1029: {0: "pre-operational when a heartbeat is lost"},
     0x200F: {0: "apart"},
 }

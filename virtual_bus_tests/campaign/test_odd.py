@@ -20,7 +20,6 @@ from canbase_sim.odd.oddities import ALIKE, ODDITIES
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(600)]
 NEEDS_A_CURE = {
-    "no_synchronous_pdos",
     "narrow_target",
     "narrow_velocity",
     "cyclic_alone",

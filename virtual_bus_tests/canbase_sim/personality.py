@@ -49,6 +49,8 @@ class Personality:
     """A COB-ID of a PDO without bit 30 is refused."""
     motors_by_sub_index: bool = False
     """True: both motors behind one 6040h, 6041h and 6060h, their values at sub-index 1 and 2."""
+    vl: bool = False
+    """An inverter of mode 2: its velocities are 6042h and 6044h with 16 bits, its ramps 6048h, 6049h and 604Ah."""
     modes: tuple[int, ...] = (3, 9)
     """Values of 6060h that it takes, besides 0."""
     target_unit: str | None = None
@@ -221,6 +223,15 @@ PERSONALITIES: Mapping[str, Personality] = {
         target_unit="rpm",
         actual_unit="rpm",
         acceleration_unit="rpm/s",
+    ),
+    "inverter": Personality(
+        missing=frozenset({0x606B, 0x606D, 0x606F, 0x6079}),  # assumed
+        missing_subs=_RPDO_TIMERS,  # assumed
+        vl=True,
+        modes=(2,),
+        target_unit="rpm",
+        actual_unit="rpm",
+        defaults={_key(0x6046, 1): 30, _key(0x6046, 2): 1500, _key(0x604C, 1): 1, _key(0x604C, 2): 1},  # assumed
     ),
     "dryve_d1": Personality(
         missing=_NO_SYNC_COUNTER | {0x1011, 0x1029, 0x6007, 0x605A, 0x605E, 0x6077, 0x6079},  # EDS

@@ -6,6 +6,7 @@ import itertools
 import math
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from canbase.msg import DriverStatus
@@ -19,17 +20,20 @@ from canbase_action_server.client import Drive, DriveResult
 from canbase_action_server.outcome import ErrorCode
 from canbase_config.bus_load import cyclic_load
 from support import api_page
-from support.ros_harness import merged
+from support.ros_harness import merged, robot_values
 from support.running_robot import PATIENT, RESTS_M, own_domain, robot_on
 from support.sros2_policy import allowed, present
 from support.surroundings import BLOCKED_M, World, scan
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 
+DRIVES = robot_values(Path())["drives"]
+SUPPLY = {"name": "dc_link", "index": 0x6079, "bits": 32, "scale": 0.001, "unit": "V", "period_s": 0.1}
 WATCHES_OUT = merged(
     PATIENT,
     {
         "safety": {"scan": {"required": True, "timeout_s": 1.0}},
+        "drives": [DRIVES[0] | {"values": [SUPPLY]}, DRIVES[1]],
         "battery": {"full_v": 27.0, "empty_v": 22.0, "design_capacity_ah": 20.0},
     },
 )
@@ -86,6 +90,20 @@ def test_a_battery_whose_voltage_no_drive_measures_is_published_as_not_present(w
     assert not battery.present
     assert math.isnan(battery.voltage)
     assert battery.design_capacity == 20.0
+
+
+def test_named_values_of_a_drive_come_ten_times_a_second_with_their_unit(world: World) -> None:
+    values = world.node.record(DiagnosticArray, "motor_driver/values")
+    diagnostics = world.node.record(DiagnosticArray, "/diagnostics")
+    world.node.spin_for(2.0)
+    assert 15 <= len(values.messages) <= 25
+    (left,) = values.messages[-1].status
+    assert left.name.endswith("drive left_wheel")
+    (only,) = left.values
+    assert only.key == "dc_link [V]"
+    assert 20.0 < float(only.value) < 30.0
+    shown = {each.key for array in diagnostics.messages for status in array.status for each in status.values}
+    assert "dc_link [V]" in shown
 
 
 def test_tf_says_what_odom_says(world: World) -> None:

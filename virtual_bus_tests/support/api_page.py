@@ -16,8 +16,9 @@ SERVICES = {"std_srvs/srv/Trigger", "action_msgs/srv/CancelGoal"}
 """The types of canbase's own services; those of ROS and the hidden ones of actions are not on the page."""
 QOS = ("reliable", "best effort", "latched")
 OF_EVERY_NODE = ("/rosout", "/parameter_events")
-OPTIONAL = {"/tf", "/tf_static", "/battery_state"}
-"""Without tf2_msgs, without a scanner with `pose: tf`, or without `battery` in robot.yaml, there are none."""
+OPTIONAL = {"/tf", "/tf_static", "/battery_state", "/motor_driver/values"}
+"""Without tf2_msgs, without a scanner with `pose: tf`, or without `battery` or `values` in robot.yaml, there are
+none."""
 
 
 class Endpoint(NamedTuple):

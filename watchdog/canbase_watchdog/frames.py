@@ -48,11 +48,13 @@ MODE = 0x6060
 POSITION = 0x6064
 VELOCITY = 0x606C
 TARGET = 0x60FF
+VL_TARGET, VL_VELOCITY = 0x6042, 0x6044
+"""Those of mode 2 (CiA 402-2)."""
 AXIS_OFFSET = 0x800
 SELF_STOP = (0x100C, 0x100D, 0x1016, 0x1029)
 """What a drive monitors of its masters, and what it does without them: guard and life time, heartbeats, error
 behaviour."""
-BRAKING = (0x6007, 0x605A, 0x605E, 0x6084, 0x6085)
+BRAKING = (0x6007, 0x6049, 0x604A, 0x605A, 0x605E, 0x6084, 0x6085)
 """How an axis stops: for a lost master, by a quick stop, in a fault, and its ramps. Those of the second one are at +
 AXIS_OFFSET."""
 RPDO_PARAMETERS = range(0x1400, 0x1800)
@@ -154,6 +156,12 @@ def decode_torque(data: bytes, layout: WatchedLayout = CIA_402) -> float | None:
     return _TORQUE.unpack_from(data, size)[0] / RATED if len(data) == size + TORQUE_BYTES else None
 
 
+def own_velocity(value: int, layout: WatchedLayout = CIA_402) -> int:
+    """606Ch or 6044h out of an SDO answer, which may leave its size out: then it has four bytes (CiA 301)."""
+    half = 1 << layout.velocity_bits - 1
+    return (value + half) % (2 * half) - half
+
+
 def decode_setpoint(data: bytes, layout: WatchedLayout = CIA_402) -> tuple[int, int] | None:
     """Controlword 6040h and target 60FFh of the driver's RPDO, in the drive's own unit; None: of another length."""
     form = _SETPOINT[layout.target_bits]
@@ -172,7 +180,7 @@ def decode_sdo(data: bytes) -> tuple[tuple[int, int], int] | None:
     return (index, sub_index), int.from_bytes(data[4 : 4 + size], "little", signed=True)
 
 
-_OF_MOTION = frozenset(index % AXIS_OFFSET for index in (CONTROLWORD, STATUSWORD, POSITION, VELOCITY))
+_OF_MOTION = frozenset(index % AXIS_OFFSET for index in (CONTROLWORD, STATUSWORD, POSITION, VELOCITY, VL_VELOCITY))
 
 
 def decode_sdo_download(data: bytes) -> int | None:
@@ -183,7 +191,8 @@ def decode_sdo_download(data: bytes) -> int | None:
 
 
 def concerns_motion(data: bytes) -> bool:
-    """True for an SDO request as the watchdog sends them: it begins to read or write 6040h, 6041h, 6064h or 606Ch."""
+    """True for an SDO request as the watchdog sends them: it begins to read or write 6040h, 6041h, 6064h, 606Ch
+    or 6044h."""
     return len(data) == 8 and data[0] >> 5 in (1, 2) and _SDO_HEAD.unpack_from(data)[1] % AXIS_OFFSET in _OF_MOTION
 
 
@@ -269,7 +278,9 @@ def reset_node(node_id: int) -> Frame:
 
 
 def place_of(index: int, axis: int, layout: WatchedLayout = CIA_402) -> tuple[int, int]:
-    """Index and sub-index of 6040h, 6041h, 6064h or 606Ch of an axis."""
+    """Index and sub-index of 6040h, 6041h, 6064h or 606Ch of an axis; 6044h in place of 606Ch in mode 2."""
+    if index == VELOCITY and layout.vl:
+        index = VL_VELOCITY
     if not layout.sub_index:
         return index + axis * AXIS_OFFSET, 0
     is_common = (index == CONTROLWORD and layout.shared_controlword) or (

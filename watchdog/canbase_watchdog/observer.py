@@ -95,10 +95,14 @@ class _Record:
         return self.setpoint_mps == 0.0 and abs(self.velocity_mps) <= still_mps
 
     def on_sync(self, now_s: float) -> None:
-        """What came before it counts from now on; each SYNC wants one setpoint, and one answer from one drive."""
+        """What came before it counts from now on; each SYNC wants one setpoint, and one answer from one drive.
+
+        One that takes no synchronous PDO has been set to the same pace: its answers come by its own timer.
+        """
         if self.state is ENABLED:
             self.misses.count(not self.fresh)
-            self.doubles.count(self.drive.answers_sync and self.answers > 1)
+            if self.drive.answers_sync:
+                self.doubles.balance(self.answers)
         else:
             self.misses.clear()
             self.doubles.clear()
@@ -320,7 +324,7 @@ class Observer:
         if place == frames.place_of(frames.STATUSWORD, drive.axis, drive.layout):
             return self._note_state(record, frames.own_statusword(value, drive.layout, drive.axis), now_s)
         if place == frames.place_of(frames.VELOCITY, drive.axis, drive.layout):
-            self._note_velocity(record, value, now_s)
+            self._note_velocity(record, frames.own_velocity(value, drive.layout), now_s)
         if place == frames.place_of(frames.POSITION, drive.axis, drive.layout):
             record.stand.on_position(value, now_s)
         return True
@@ -364,4 +368,5 @@ def _is_of_a_stop(index: int) -> bool:
 
 
 _STOPS = frozenset((*frames.SELF_STOP, *frames.BRAKING, *(index + frames.AXIS_OFFSET for index in frames.BRAKING)))
-_COMMANDS = frozenset(index % frames.AXIS_OFFSET for index in (frames.CONTROLWORD, frames.MODE, frames.TARGET))
+_COMMAND_INDEXES = (frames.CONTROLWORD, frames.MODE, frames.TARGET, frames.VL_TARGET)
+_COMMANDS = frozenset(index % frames.AXIS_OFFSET for index in _COMMAND_INDEXES)

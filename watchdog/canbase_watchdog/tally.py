@@ -20,6 +20,17 @@ class Tally:
         elif self.value:
             self.value = max(0.0, self.value - FORGIVEN)
 
+    def balance(self, came: int) -> None:
+        """One more cycle, in which `came` frames came where one is due: a second one is bad, and makes up for none.
+
+        A drive that sends by its own timer drifts along the SYNCs: a cycle with two of its frames goes with one
+        without. Two drives send two in each.
+        """
+        if came == 0:
+            self.value = max(0.0, self.value - 1.0)
+        else:
+            self.count(came > 1)
+
     def clear(self) -> None:
         """Start again."""
         self.value = 0.0

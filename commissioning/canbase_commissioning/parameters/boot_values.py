@@ -41,7 +41,7 @@ def boot_values(saved: Parameters, eds: Eds, drives: tuple[Drive, ...], robot: R
     node_id = drives[0].node_id
     paper = _PaperDrive(saved.for_node(node_id, eds), eds, node_id)
     for drive in drives:
-        at = place(drive.kind.layout, STATUSWORD, drive.axis)
+        at = place(drive.kind, STATUSWORD, drive.axis)
         paper.values[Address(at.index, at.sub)] = NO_POWER.to_bytes(2, "little") * (at.bits // 16)
     before = dict(paper.values)
     notes, problem = _run(paper, drives, robot)
@@ -57,7 +57,7 @@ def boot_values(saved: Parameters, eds: Eds, drives: tuple[Drive, ...], robot: R
 
 def _commands(drive: Drive) -> list[Address]:
     """What a driver that drives changes all the time."""
-    places = (place(drive.kind.layout, index, drive.axis) for index in (CONTROLWORD, TARGET_VELOCITY))
+    places = (place(drive.kind, index, drive.axis) for index in (CONTROLWORD, TARGET_VELOCITY))
     return [Address(at.index, at.sub) for at in places]
 
 

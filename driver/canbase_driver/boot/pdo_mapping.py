@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from canbase_config.drive_values import FIRST_SPARE_TPDO
 from canbase_config.object_map import AXIS_OFFSET as SECOND_AXIS
 from canbase_driver.boot.steps import OTHER_STATE, BootError, NodeAccess, Steps, unsigned
 from canbase_driver.cia301.pdo import AT_ONCE, AT_ONCE_TOO, NodeLayout, Pdo
@@ -35,12 +36,34 @@ def configure_pdos(node: NodeAccess, layout: NodeLayout) -> Steps[None]:
     layout = yield from _with_what_it_has(node, layout)
     cob_ids = yield from _cob_ids(node)
     wanted = {pdo.communication: pdo for pdo in _in_what_it_has(node, layout, cob_ids)}
+    spare = {pdo.communication: pdo for pdo in layout.value_pdos() if pdo.communication not in wanted}
     for index, cob_id in cob_ids.items():
-        if index not in wanted:
+        if index not in wanted and index not in spare:
             yield from _switch_off(node, index, cob_id)
     for index, pdo in wanted.items():
         found = cob_ids[index]
-        yield from _make_right(node, pdo, found, found & layout.profile.pdo.fixed_cob_id_bits | pdo.cob_id)
+        yield from _make_right(node, layout, pdo, found, found & layout.profile.pdo.fixed_cob_id_bits | pdo.cob_id)
+
+    for index, pdo in spare.items():
+        yield from _publish_what_it_maps(node, layout, pdo, cob_ids.get(index))
+
+
+def _publish_what_it_maps(node: NodeAccess, layout: NodeLayout, pdo: Pdo, found: int | None) -> Steps[None]:
+    """A spare TPDO with named values; `found`: its present COB-ID, None: it has none. Nothing that stops the robot
+    depends on it: a refusal is a note, and the PDO is off."""
+    why = "the drive has no such PDO"
+    if found is not None:
+        try:
+            yield from _make_right(node, layout, pdo, found, found & layout.profile.pdo.fixed_cob_id_bits | pdo.cob_id)
+        except BootError as refused:
+            why = refused.problem
+        except SdoAborted as refused:
+            why = str(refused)
+        else:
+            return
+        yield from node.set_if_present(Write(pdo.communication, 1, found | PDO_OFF, 4))
+    names = ", ".join(value.name for value in layout.values[pdo.number - FIRST_SPARE_TPDO].values)
+    node.notes.append(f"{names}: not published, {pdo.name}: {why}; see `values` of its drive in robot.yaml")
 
 
 def _with_what_it_has(node: NodeAccess, layout: NodeLayout) -> Steps[NodeLayout]:
@@ -107,7 +130,7 @@ def _times(pdo: Pdo) -> list[Write]:
     return [Write(pdo.communication, sub, value, 2) for sub, value in values if value is not None]
 
 
-def _make_right(node: NodeAccess, pdo: Pdo, found: int, cob_id: int) -> Steps[None]:
+def _make_right(node: NodeAccess, layout: NodeLayout, pdo: Pdo, found: int, cob_id: int) -> Steps[None]:
     """`found`: its present COB-ID. The mapping is looked at first: a drive out of its box has another one."""
     mapped = yield from _other_mapping(pdo)
     if mapped is None and found == cob_id and (yield from _is_timed(node, pdo)):
@@ -124,9 +147,13 @@ def _make_right(node: NodeAccess, pdo: Pdo, found: int, cob_id: int) -> Steps[No
         raise BootError(
             node.node_id, problem, "Set its COB-ID and mapping of docs/bus.md with the maker's tool"
         ) from refused
-    yield from _set_type(node, pdo, unread=mapped is not None and pdo.transmission_type != AT_ONCE)
-    for time in _times(pdo):
-        yield from node.set_if_present(time)
+    try:
+        yield from _set_type(node, pdo, unread=mapped is not None and pdo.transmission_type != AT_ONCE)
+    except BootError as refused:
+        yield from _set_by_event(node, layout, pdo, refused)
+    else:
+        for time in _times(pdo):
+            yield from node.set_if_present(time)
     # that a TPDO is on shows by itself: a node without every one of its layout does not become ready
     on = Write(pdo.communication, 1, cob_id, 4)
     yield from node.overwrite(on, f"{found:08X}h", read_back=not pdo.is_heard)
@@ -160,13 +187,39 @@ def _set_type(node: NodeAccess, pdo: Pdo, *, unread: bool) -> Steps[None]:
     raise BootError(node.node_id, problem, _about_type(pdo, is_fixed=is_fixed and found not in EVENT_TYPES))
 
 
+def _set_by_event(node: NodeAccess, layout: NodeLayout, pdo: Pdo, refused: BootError) -> Steps[None]:
+    """Without SYNC, where the drive takes no synchronous type.
+
+    A TPDO must then keep the pace of the SYNCs by its own times: it proves life as often, and the watchdog counts more
+    than one in a cycle as those of a second drive. Raises `refused` where the drive takes no event-driven type either.
+    """
+    if pdo.transmission_type == AT_ONCE:
+        raise refused
+    own = layout.by_event(pdo)
+    try:
+        yield from _set_type(node, own, unread=True)
+    except BootError:
+        raise refused from None
+    for time in _times(own):
+        if not (yield from node.set_if_present(time)) and pdo.is_heard:
+            raise BootError(
+                node.node_id,
+                f"{refused.problem}, nor {time}",
+                f"Without SYNC it must come every {own.event_timer_ms} ms: set this with the maker's tool; "
+                "where that cannot be done, the drive cannot be used",
+            )
+    how = f"it is sent every {own.event_timer_ms} ms by its timer" if pdo.is_heard else "it acts when it arrives"
+    node.notes.append(f"{refused.problem}: {how} (type 255 or 254)")
+
+
 def _types(pdo: Pdo) -> tuple[int, ...]:
     return EVENT_TYPES if pdo.transmission_type == AT_ONCE else (pdo.transmission_type,)
 
 
 def _about_type(pdo: Pdo, *, is_fixed: bool) -> str:
     if pdo.transmission_type != AT_ONCE and not is_fixed:
-        return "The drive takes no PDO that waits for SYNC: set `pdo.synchronous: false` in its drive profile"
+        tool = f"set it to {pdo.transmission_type} with the maker's tool"
+        return f"It takes no event-driven type either: {tool}; where that cannot be done, the drive cannot be used"
     if pdo.transmission_type != AT_ONCE:
         return f"Its type is fixed: set it to {pdo.transmission_type} with the maker's tool"
     if pdo.event_timer_ms is not None:

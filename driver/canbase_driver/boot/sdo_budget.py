@@ -32,8 +32,9 @@ class SdoBudget:
     A virtual bus has no bit rate, and no end of requests.
     """
 
-    def __init__(self, bus: Bus, cycle_s: float) -> None:
-        self._bits = math.inf if bus.is_virtual else SHARE * bus.bitrate * cycle_s
+    def __init__(self, bus: Bus, cycle_s: float, values_bits: float = 0.0) -> None:
+        """`values_bits`: of named values in a cycle, in the mean [bit]."""
+        self._bits = math.inf if bus.is_virtual else SHARE * bus.bitrate * cycle_s - values_bits
         self._all = self._share = 0.0
         self._left: dict[int, float] = {}
 

@@ -243,7 +243,7 @@ class _Boot:
 
 
 def _state(drive: Drive) -> Steps[DriveState | None]:
-    at = place(drive.kind.layout, STATUSWORD, drive.axis)
+    at = place(drive.kind, STATUSWORD, drive.axis)
     return decode_statusword(unsigned((yield _read(drive, STATUSWORD))) >> at.shift & 0xFFFF)
 
 
@@ -252,7 +252,7 @@ def _has_torque(state: DriveState | None) -> bool:
 
 
 def _read(drive: Drive, index: int) -> Read:
-    at = place(drive.kind.layout, index, drive.axis)
+    at = place(drive.kind, index, drive.axis)
     return Read(at.index, at.sub)
 
 

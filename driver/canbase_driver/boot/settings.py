@@ -16,6 +16,7 @@ from canbase_config.profile import Profile, SdoWrite
 from canbase_config.robot import CYCLIC, DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
 from canbase_config.watchdog import LIFE_TIME_FACTOR, guard_time_ms
 from canbase_driver.boot.steps import GUARDING_ALONE, BootError, NodeAccess, Steps
+from canbase_driver.boot.vl_settings import KeptRamp, configure_vl, set_vl_ramp
 from canbase_driver.cia301.sdo_client import VALUE_INVALID, VALUE_TOO_HIGH, VALUE_TOO_LOW, Read, SdoAborted, Write
 from canbase_driver.drive_units import AxisUnits
 
@@ -71,13 +72,15 @@ STOPS_BY_NOTHING = SelfStopSet(StopsBy.NOTHING, "")
 def configure_motion(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None]:
     """Mode, ramps, and no target: one of an earlier life would move the drive as soon as it is enabled."""
     kind, mode = drive.kind, drive.used_mode
-    at = place(kind.layout, MODE_DISPLAY, drive.axis)
+    at = place(kind, MODE_DISPLAY, drive.axis)
     shown_at = Read(at.index, at.sub) if kind.options.mode_display in ("yes", "probe") else None
     yield from node.set(write_at(drive, MODE, mode), shown_at=shown_at)
     if mode == CYCLIC:
         cycle_ms = round(1000.0 / robot.rates.control_hz)
         yield from node.set_if_present(Write(INTERPOLATION, 1, cycle_ms, 1), kind.options.interpolation)
         yield from node.set_if_present(Write(INTERPOLATION, 2, MILLISECONDS, 1), kind.options.interpolation)
+    if kind.is_vl:
+        yield from configure_vl(node, drive, robot)
     yield from node.set(write_at(drive, TARGET_VELOCITY, 0))
     yield from _configure_ramps(node, drive, robot)
 
@@ -143,33 +146,43 @@ def harmless_on_loss(drive: Drive) -> Write:
 
 def write_at(drive: Drive, index: int, value: int) -> Write:
     """A write to object `index` of the drive's axis."""
-    at = place(drive.kind.layout, index, drive.axis)
+    at = place(drive.kind, index, drive.axis)
     return Write(at.index, at.sub, value, at.bits // 8)
 
 
 def _configure_ramps(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None]:
     """Raises BootError when the drive keeps a softer stop: its way would be longer than all others count with."""
-    units, presence = AxisUnits(drive, robot.base), drive.kind.options.ramps
     for index, mps2 in _ramps_mps2(robot).items():
-        write = write_at(drive, index, units.acceleration_raw(mps2))
-        took = yield from node.set_if_present(write, presence)
-        if took or presence == "no" or index not in STOPPING_LIMITS:
+        set_ramp = set_vl_ramp if drive.kind.is_vl else _set_ramp
+        kept = yield from set_ramp(node, drive, robot, index, mps2)
+        key = STOPPING_LIMITS.get(index)
+        if kept is None or key is None:
             continue
-        raw = yield from node.read_if_present(write.index, write.sub)
-        key = STOPPING_LIMITS[index]
-        needed = getattr(robot.limits, key)
-        if raw is None or units.acceleration_mps2(raw) >= KEPT_SHARE * needed:
+        needed, has = getattr(robot.limits, key), kept.mps2
+        if has >= KEPT_SHARE * needed:
             continue
-        kept = units.acceleration_mps2(raw)
-        problem = f"{write.index:04X}h:{write.sub} stays at {raw}: {drive.joint} brakes with {kept:.3g} m/s² by it"
-        slower = f"set `limits.{key}: {math.floor(1000.0 * kept) / 1000.0:g}` in robot.yaml, where it is {needed:g}"
+        problem = f"{kept.what}: {drive.joint} brakes with {has:.3g} m/s² by it"
+        slower = f"set `limits.{key}: {math.floor(1000.0 * has) / 1000.0:g}` in robot.yaml, where it is {needed:g}"
         hint = f"Set the object with the maker's tool, or {slower}"
         raise BootError(node.node_id, problem, hint)
 
 
+def _set_ramp(node: NodeAccess, drive: Drive, robot: Robot, index: int, mps2: float) -> Steps[KeptRamp | None]:
+    """Returns what the drive keeps where it does not take it; None: it took it, or does not show what it has."""
+    units, presence = AxisUnits(drive, robot.base), drive.kind.options.ramps
+    write = write_at(drive, index, units.acceleration_raw(mps2))
+    if (yield from node.set_if_present(write, presence)):
+        return None
+    if presence == "no" or index not in STOPPING_LIMITS:
+        return None
+    raw = yield from node.read_if_present(write.index, write.sub)
+    kept = f"{write.index:04X}h:{write.sub} stays at {raw}"
+    return None if raw is None else KeptRamp(kept, units.acceleration_mps2(raw))
+
+
 def _refuse_coasting(node: NodeAccess, drive: Drive) -> Steps[None]:
     """605Ah of 0 that the drive keeps: a quick stop takes the power away, and the wheel rolls out."""
-    at = place(drive.kind.layout, QUICK_STOP_OPTION, drive.axis)
+    at = place(drive.kind, QUICK_STOP_OPTION, drive.axis)
     if drive.kind.options.quick_stop == "no" or (yield from node.read_if_present(at.index, at.sub)) != COASTS:
         return
     problem = f"{at.index:04X}h:{at.sub} stays at 0: a quick stop lets {drive.joint} coast"

@@ -101,6 +101,10 @@ PROFILE_KEYS: tuple[tuple[range, str], ...] = (
     (range(0x1600, 0x1800), "layout"),
     (range(0x1A00, 0x1C00), "layout"),
     (range(0x6007, 0x6008), "self_stop.abort_connection"),
+    (range(0x6042, 0x6045), "modes"),
+    (range(0x6046, 0x6047), "modes"),
+    (range(0x6048, 0x604B), "options.ramps"),
+    (range(0x604C, 0x604D), "units.target_velocity"),
     (range(0x605A, 0x605B), "options.quick_stop"),
     (range(0x605E, 0x605F), "options.fault_reaction"),
     (range(0x6060, 0x6061), "modes"),
@@ -148,7 +152,9 @@ def _hint(error: SdoError) -> str:
     if code in (NO_OBJECT, NO_SUB_INDEX) and index in OF_AN_AXIS:
         return "Every axis of a CiA 402 drive has it: check `axis` in robot.yaml, and that the drive is set to CiA 402"
     if index == 0x6060 and code not in WIDTHS:
-        return "The drive must support `mode` of robot.yaml, see 6502h: bit 2 is mode 3, bit 8 is mode 9"
+        return (
+            "The drive must support `mode` of robot.yaml, see 6502h: bit 2 is mode 3, bit 8 is mode 9, bit 1 is mode 2"
+        )
     if code in WIDTHS:
         where = f"see `{key}` of its drive profile" if key.startswith("layout.") else "such a drive cannot be used"
         return f"The drive has this object in another width than CiA 402 and its profile: {where}"

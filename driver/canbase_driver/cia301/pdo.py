@@ -6,10 +6,12 @@ The layout of the quick stop PDO is the watchdog's; its sender is too.
 
 from __future__ import annotations
 
+import math
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from canbase_config.drive import Drive
+from canbase_config.drive_values import FIRST_SPARE_TPDO, ValuePdo, value_pdos
 from canbase_config.object_map import (
     CONTROLWORD,
     POSITION_ACTUAL,
@@ -38,6 +40,10 @@ _STATUS = {False: struct.Struct("<Hi"), True: struct.Struct("<Ii")}
 _VELOCITY = {16: struct.Struct("<h"), 32: struct.Struct("<i")}
 _TORQUE = struct.Struct("<h")
 TORQUE_BYTES = 2
+LONGEST_INHIBIT = 0xFFFF
+"""1800h:3 has 16 bits: 6.5 s."""
+ROUNDING_MS = 1e-6
+"""A cycle of 10 ms is one of 10.000000000000002 ms too."""
 RATED = 1000.0
 """6077h and 6078h at rated torque (CiA 402-2)."""
 
@@ -100,6 +106,8 @@ class NodeLayout:
     timing: Timing = Timing()
     with_torque: bool = True
     """False: the drive refuses to map its torque."""
+    values: tuple[ValuePdo, ...] = ()
+    """Named values that its spare TPDOs carry."""
 
     def __post_init__(self) -> None:
         if self.axes not in ((0,), (1,), (0, 1)):
@@ -125,12 +133,22 @@ class NodeLayout:
 
     def torque_places(self) -> tuple[tuple[int, int], ...]:
         """Index and sub-index of the torque of each axis."""
-        places = [place(self.profile.layout, index, axis) for index in self.torque_objects for axis in self.axes]
+        places = [place(self.profile, index, axis) for index in self.torque_objects for axis in self.axes]
         return tuple((at.index, at.sub) for at in places)
 
     def pdos(self) -> tuple[Pdo, ...]:
         """Every PDO in use, as docs/bus.md has them."""
         return (*self._setpoints(), self._quick_stop(), *self._feedback())
+
+    def value_pdos(self) -> tuple[Pdo, ...]:
+        """The spare TPDOs with named values, in the order of `values`. The node does without those that it refuses."""
+        pdos = []
+        for i, carried in enumerate(self.values):
+            number = FIRST_SPARE_TPDO + i
+            entries = tuple(value.index << 16 | value.sub << 8 | value.bits for value in carried.values)
+            pdo = Pdo("TPDO", number, TPDO[number - 1] + self.node_id, carried.every, entries)
+            pdos.append(pdo if self.profile.pdo.synchronous else self.by_event(pdo))
+        return tuple(pdos)
 
     def _setpoints(self) -> list[Pdo]:
         has_deadline = self.profile.self_stop.rpdo_timer != "no"
@@ -163,14 +181,18 @@ class NodeLayout:
         return pdos
 
     def _tpdo(self, number: int, cob_id: int, mapping: tuple[int, ...], optional: int = 0) -> Pdo:
-        """Without SYNC it goes by its timer, and never more often than once in a cycle."""
-        if self.profile.pdo.synchronous:
-            return Pdo("TPDO", number, cob_id, mapping=mapping, optional=optional)
-        ms = max(1, round(1000 * self.timing.cycle_s))
-        return Pdo("TPDO", number, cob_id, AT_ONCE, mapping, optional, inhibit_100us=10 * ms, event_timer_ms=ms)
+        pdo = Pdo("TPDO", number, cob_id, mapping=mapping, optional=optional)
+        return pdo if self.profile.pdo.synchronous else self.by_event(pdo)
+
+    def by_event(self, pdo: Pdo) -> Pdo:
+        """The same PDO without SYNC: an RPDO acts when it arrives, a TPDO goes by its timer, as often as by SYNC."""
+        if pdo.kind == "RPDO":
+            return replace(pdo, transmission_type=AT_ONCE)
+        ms = max(1, math.ceil(1000.0 * self.timing.cycle_s * pdo.transmission_type - ROUNDING_MS))
+        return replace(pdo, transmission_type=AT_ONCE, inhibit_100us=min(10 * ms, LONGEST_INHIBIT), event_timer_ms=ms)
 
     def _entries(self, axis: int, *indexes: int) -> tuple[int, ...]:
-        return tuple(place(self.profile.layout, index, axis).mapping_entry for index in indexes)
+        return tuple(place(self.profile, index, axis).mapping_entry for index in indexes)
 
 
 def node_layout(node_id: int, drives: tuple[Drive, ...], robot: Robot) -> NodeLayout:
@@ -178,7 +200,9 @@ def node_layout(node_id: int, drives: tuple[Drive, ...], robot: Robot) -> NodeLa
     if not drives:
         raise ValueError(f"node {node_id} has no axes")
     timing = Timing(1.0 / robot.rates.control_hz, robot.timeouts.drive_heartbeat_s)
-    return NodeLayout(node_id, tuple(sorted(drive.axis for drive in drives)), drives[0].kind, timing)
+    axes = tuple(sorted(drive.axis for drive in drives))
+    values = value_pdos(drives[0].values, robot.rates.control_hz) if len(drives) == 1 else ()
+    return NodeLayout(node_id, axes, drives[0].kind, timing, values=values)
 
 
 def pack_setpoint(controlword: int, target_raw: int, layout: Layout = GENERIC) -> bytes:

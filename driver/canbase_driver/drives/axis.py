@@ -8,7 +8,7 @@ from canbase_config.drive import Drive
 from canbase_config.robot import Robot
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.pdo import NodeLayout, pack_setpoint, unpack_status, unpack_torque, unpack_velocity
-from canbase_driver.cia402 import DriveState, PowerGoal, decode_statusword
+from canbase_driver.cia402 import VL_RAMP, Command, DriveState, PowerGoal, decode_statusword
 from canbase_driver.drive_units import AxisUnits
 from canbase_driver.drives.let_go import Push
 from canbase_driver.drives.stall import Stall, StallLimits
@@ -22,6 +22,9 @@ LETS_GO_SHARE = 0.75
 """Of watchdog.stand_impulse_s: the watchdog counts from signs of life of its own, and must not be first."""
 GAP_MAX_S = 60.0
 """A gap in the feedback counts as this long at most: what a wheel can have done in it stays far from a wrap."""
+
+
+_ENABLE = Command.ENABLE_OPERATION.value
 
 
 class Axis:
@@ -47,6 +50,7 @@ class Axis:
         self.stall = Stall(StallLimits.of(robot))
         self._feedback_s = robot.timeouts.feedback_s
         self._layout = layout.profile.layout
+        self._with_enable = VL_RAMP if layout.profile.is_vl else 0
         self._setpoint_cob_id = layout.setpoint_cob_id(drive.axis)
         self._control_hz = robot.rates.control_hz
         self._restarts = 0
@@ -155,7 +159,9 @@ class Axis:
         self._status_is_new = self.has_new_sample = False
 
     def setpoint(self, goal: PowerGoal, rim_mps: float, controlword: int) -> Frame:
-        """The frame with 6040h and 60FFh; the target is zero unless the goal is ON."""
+        """The frame with 6040h and 60FFh (6042h in mode 2); the target is zero unless the goal is ON."""
         target_raw = self.units.velocity_raw(rim_mps) if goal is PowerGoal.ON else 0
         self.target_mps = rim_mps if target_raw else 0.0
+        if controlword == _ENABLE:
+            controlword |= self._with_enable
         return Frame(self._setpoint_cob_id, pack_setpoint(controlword, target_raw, self._layout))

@@ -29,6 +29,7 @@ from canbase_driver.cia301.node_guarding import GuardAnswers
 from canbase_driver.cia301.pdo import node_layout
 from canbase_driver.cia402 import DriveState, PowerGoal, common_controlword, next_controlword
 from canbase_driver.drives.axis import Axis
+from canbase_driver.drives.drive_values import DriveValues, NamedValue
 from canbase_driver.drives.foreign_writes import ForeignWrites
 from canbase_driver.drives.sdo_stop import SdoStop
 from canbase_driver.drives.telemetry import Measures, Values
@@ -93,6 +94,7 @@ class CanopenNode:
         self.others_are_configured: Callable[[], bool] = lambda: True
         """Whether no other node is in the middle of its boot; set by the drive group."""
         self._measures = Measures(node_id, self._drives, robot.timeouts.sdo_s)
+        self._values = DriveValues(self.layout.values, self.layout.timing.cycle_s)
         self._sdo_stop = SdoStop(node_id, self._drives)
         self._foreign = ForeignWrites(self.profile, Counter())
         self._written = ""
@@ -257,6 +259,7 @@ class CanopenNode:
         self._owed_stop = had_power or self._owed_stop
         for axis in self.axes:
             axis.forget()
+        self._values.forget()
         self._why_gone = why
         self._boot = self.report = None
         self._go(Presence.GONE, now_s)
@@ -280,6 +283,14 @@ class CanopenNode:
     def measured(self, axis: Axis, now_s: float) -> Values:
         """Voltage, current and temperature of one of its axes."""
         return self._measures.values(axis.drive.axis, now_s)
+
+    def named_values(self, now_s: float) -> tuple[NamedValue, ...]:
+        """What robot.yaml wants published of it."""
+        return self._values.values(now_s)
+
+    def on_values(self, number: int, frame: Frame, now_s: float) -> bool:
+        """Take a spare TPDO, counted from 0. False: not understood."""
+        return not self.has_pdos or self._values.on_frame(number, frame.data, now_s)
 
     def emcy_text(self) -> str:
         """Its last emergency message in words; empty: none."""

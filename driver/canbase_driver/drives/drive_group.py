@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterable
 from functools import partial
 
+from canbase_config.bus_load import values_bits_per_s
 from canbase_config.robot import Robot
 from canbase_driver.boot.sdo_budget import SdoBudget
 from canbase_driver.cia301.emcy import emcy_text
@@ -26,7 +27,8 @@ class Drives:
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self.nodes = tuple(CanopenNode(node_id, robot) for node_id in sorted({drive.node_id for drive in robot.drives}))
-        self._budget = SdoBudget(robot.bus, 1.0 / robot.rates.control_hz)
+        values_bits = values_bits_per_s(robot) / robot.rates.control_hz
+        self._budget = SdoBudget(robot.bus, 1.0 / robot.rates.control_hz, values_bits)
         self._first = 0
         for node in self.nodes:
             node.others_are_configured = partial(self._are_configured_without, node)
@@ -283,6 +285,7 @@ def _snapshot(node: CanopenNode, axis: Axis, now_s: float) -> DriveSnapshot:
         effort_nm=share * (axis.drive.rated_torque_nm or math.nan) * axis.drive.gear_ratio,
         current_a=measured.current_a,
         temperature_c=measured.temperature_c,
+        values=node.named_values(now_s),
         boot_notes=node.report.notes if node.report else (),
         boot_problem=node.boot_error,
         configured=node.report is not None,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.cia402 import DriveState
+from canbase_driver.drives.drive_values import NamedValue
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,6 +58,8 @@ class DriveSnapshot:
     """Of the motor [A], with the sign that the drive gives it; NaN: not measured."""
     temperature_c: float = math.nan
     """Of the drive [°C]; NaN: not measured."""
+    values: tuple[NamedValue, ...] = ()
+    """What robot.yaml wants published of it."""
     boot_notes: tuple[str, ...] = ()
     """What it lacked or refused in its last boot."""
     boot_changes: tuple[str, ...] = ()

@@ -15,6 +15,8 @@ from canbase_driver.cia301.frame import Frame
 PDOS: Final = range(0x1400, 0x1C00)
 """Which PDOs the drive obeys and sends, and what they contain."""
 RAMPS: Final = (0x6083, 0x6084, 0x6085)
+VL: Final = (0x6046, 0x6048, 0x6049, 0x604A, 0x604C)
+"""Limits, ramps and unit of mode 2."""
 _WRITTEN: Final = 3 << 5
 """First byte of the answer to a Write (CiA 301, SDO download)."""
 _COMMAND: Final = 7 << 5
@@ -26,7 +28,7 @@ class ForeignWrites:
     def __init__(self, kind: Profile, late: Counter[bytes]) -> None:
         """`late`: answers that the boot is still owed, by address: none of them is another client's."""
         own = kind.self_stop.vendor_watchdog
-        axis = (*RAMPS, *(index for index in STOPPED_BY if index >= 0x6000))
+        axis = (*RAMPS, *VL, *(index for index in STOPPED_BY if index >= 0x6000))
         self._watched = {*STOPPED_BY, *axis, *(index + AXIS_OFFSET for index in axis)}
         if own is not None and own.index is not None:
             self._watched.add(own.index)

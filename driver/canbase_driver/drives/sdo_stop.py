@@ -31,7 +31,7 @@ class SdoStop:
     def __init__(self, node_id: int, drives: Sequence[Drive]) -> None:
         """`drives`: its axes, in the order of the controlwords."""
         self._node_id, self._drives = node_id, drives
-        speeds = [place(drive.kind.layout, VELOCITY_ACTUAL, drive.axis) for drive in drives]
+        speeds = [place(drive.kind, VELOCITY_ACTUAL, drive.axis) for drive in drives]
         self._reads = [Read(at.index, at.sub) for at in speeds]
         self._sizes = [at.bits // 8 for at in speeds]
         self._sent_at = -math.inf

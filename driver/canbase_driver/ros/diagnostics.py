@@ -190,6 +190,7 @@ def _drive_entry(
         "warning (bit 7)": drive.warning,
         "internal limit (bit 11)": drive.internal_limit,
         **_measured(drive),
+        **named_values(drive),
         "lacking or refused": "; ".join(drive.boot_notes) or "nothing",
         "changed by the boot": "; ".join(drive.boot_changes) or "nothing",
         "last boot": drive.boot_problem or "well",
@@ -223,6 +224,29 @@ def _measured(drive: DriveSnapshot) -> dict[str, float]:
         "temperature [°C]": drive.temperature_c,
     }
     return {name: value for name, value in values.items() if not math.isnan(value)}
+
+
+def named_values(drive: DriveSnapshot) -> dict[str, float]:
+    """What robot.yaml wants published of the drive, by name and unit; NaN: it is not known now."""
+    return {f"{each.name} [{each.unit}]" if each.unit else each.name: each.value for each in drive.values}
+
+
+def values_message(snapshot: DriverSnapshot, stamp: Time, robot: str) -> DiagnosticArray:
+    """motor_driver/values: one entry for each drive with named values, in the form that plotting tools read."""
+    message = DiagnosticArray()
+    message.header.stamp = stamp
+    message.status = [
+        _entry(
+            DiagnosticStatus.STALE if any(math.isnan(each.value) for each in drive.values) else DiagnosticStatus.OK,
+            drive_name(robot, drive.joint),
+            "",
+            f"{robot} node {drive.node_id} axis {drive.axis}",
+            named_values(drive),
+        )
+        for drive in snapshot.drives
+        if drive.values
+    ]
+    return message
 
 
 def _heard(age_s: float) -> str:

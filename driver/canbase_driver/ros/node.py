@@ -23,7 +23,7 @@ from canbase_config.robot import Robot
 from canbase_driver.drives.health import Excess, HealthWatch
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.ros import messages
-from canbase_driver.ros.diagnostics import diagnostics_message, unguarded
+from canbase_driver.ros.diagnostics import diagnostics_message, unguarded, values_message
 from canbase_driver.ros.managed_node import ManagedNode
 from canbase_driver.ros.record_service import RecordService
 from canbase_driver.ros.serialized_motion import SerializedMotion
@@ -58,6 +58,9 @@ class MotorDriverNode(ManagedNode):
         self._joints = self.create_publisher(JointState, "joint_states", 10)
         self._status = self.create_publisher(DriverStatus, "motor_driver/status", STATE_QOS)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        has_values = any(drive.values for drive in robot.drives)
+        self._values = self.create_publisher(DiagnosticArray, "motor_driver/values", 10) if has_values else None
+        self._values_at = -math.inf
         self._battery = self.create_publisher(BatteryState, "battery_state", 10) if robot.battery else None
         self.create_subscription(TwistStamped, "cmd_vel", self._on_command, COMMAND_QOS)
         self.create_subscription(SafetyState, "safety_filter/state", self._on_safety, COMMAND_QOS)
@@ -90,6 +93,7 @@ class MotorDriverNode(ManagedNode):
             if self._tf is not None:
                 self._tf.publish(self._motion.transform(snapshot, stamp))
         self._publish_status(snapshot, stamp)
+        self._publish_values(snapshot, stamp)
         self._log_change(snapshot)
         self._warn_of_unguarded(snapshot)
         self._warn_of_boots(snapshot)
@@ -131,6 +135,15 @@ class MotorDriverNode(ManagedNode):
             self._status.publish(messages.status_message(snapshot, stamp, self._warnings, self._bus_load.share))
         if self._diagnosed is None or snapshot.time_s - self._diagnosed.time_s >= PERIOD_S:
             self._diagnose(snapshot, stamp)
+
+    def _publish_values(self, snapshot: DriverSnapshot, stamp: object) -> None:
+        """When a new named value has come."""
+        if self._values is None:
+            return
+        newest = max((value.at for drive in snapshot.drives for value in drive.values), default=-math.inf)
+        if newest > self._values_at:
+            self._values_at = newest
+            self._values.publish(values_message(snapshot, stamp, self._robot.name))
 
     def _diagnose(self, snapshot: DriverSnapshot, stamp: object) -> None:
         """Once a second: entries in /diagnostics, the load of the bus since the last time, the battery."""

@@ -131,6 +131,8 @@ def visible(node_id: int, axes: int, personality: Personality) -> Mapping[int, E
     entries = dict(read_eds(node_id, axes))
     if personality.motors_by_sub_index:
         entries = _by_sub_index(entries, axes)
+    if personality.vl:
+        entries = _as_vl(entries)
     for k in list(entries):
         index = k >> 8
         first = index - AXIS_STRIDE if index - AXIS_STRIDE in FIRST_AXIS else index
@@ -158,6 +160,30 @@ def _by_sub_index(entries: Mapping[int, Entry], axes: int) -> dict[int, Entry]:
         shown[key(index)] = replace(shown[key(index)], places=(key(index), key(index + second))[:axes])
     for index in PACKED:
         shown[key(index)] = replace(shown[key(index)], code="I", places=(key(index, PAIR),))
+    return shown
+
+
+VL_PLACES = {0x6042: 0x60FF, 0x6044: 0x606C}
+"""Velocities of mode 2, and where the motor has them."""
+VL_PAIRS: Mapping[int, tuple[str, str, int, int]] = {
+    0x6046: ("I", "I", 0, 30_000),
+    0x6048: ("I", "H", 100, 1),
+    0x6049: ("I", "H", 100, 1),
+    0x604A: ("I", "H", 100, 1),
+    0x604C: ("i", "i", 1, 1),
+}
+"""What mode 2 has at sub-index 1 and 2: `struct` letters, and soft values after power on."""
+
+
+def _as_vl(entries: Mapping[int, Entry]) -> dict[int, Entry]:
+    """The objects of mode 2 in place of those of modes 3 and 9 (CiA 402-2)."""
+    shown = {k: entry for k, entry in entries.items() if k >> 8 not in (0x60FF, 0x606C, *range(0x6083, 0x6086), 0x60C2)}
+    for index, place in VL_PLACES.items():
+        shown[key(index)] = replace(entries[key(place)], code="h")
+    for index, (first, second, *defaults) in VL_PAIRS.items():
+        shown[key(index)] = Entry("B", True, False, False, None, None, 2, (key(index),))
+        for sub, code in ((1, first), (2, second)):
+            shown[key(index, sub)] = Entry(code, True, True, False, None, None, defaults[sub - 1], (key(index, sub),))
     return shown
 
 

@@ -13,6 +13,8 @@ from canbase_sim.frame import Frame
 
 COMMUNICATION, MAPPING = 0x1800, 0x1A00
 """First indexes of the TPDO parameters."""
+ROUNDING_S = 1e-9
+"""Times are sums of steps: a timer that is due at a step is due at it, and not at the next one."""
 INHIBIT_UNIT = 1e-4
 """1800h:3 counts in 100 µs."""
 
@@ -68,7 +70,7 @@ class Tpdo:
 
     def tick(self, now_s: float) -> None:
         """Types 254 and 255: when the data changed, not more often than the inhibit time; and by the event timer."""
-        elapsed = now_s - self._last_time
+        elapsed = now_s - self._last_time + ROUNDING_S
         if elapsed < self._inhibit:
             return
         data = self._mapped()

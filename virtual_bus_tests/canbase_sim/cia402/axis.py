@@ -1,4 +1,4 @@
-"""One axis of a simulated drive: controlword, option codes, modes 3 and 9, statusword (CiA 402-2)."""
+"""One axis of a simulated drive: controlword, option codes, modes 2, 3 and 9, statusword (CiA 402-2)."""
 
 from __future__ import annotations
 
@@ -35,8 +35,12 @@ class Supply(Enum):
     NO_TORQUE = "STO open: it stays in SWITCH ON DISABLED"
 
 
-PROFILE_VELOCITY, CYCLIC_VELOCITY, NO_MODE = 3, 9, 0
+VL, PROFILE_VELOCITY, CYCLIC_VELOCITY, NO_MODE = 2, 3, 9, 0
 """6060h. Without a mode the drive does not enable."""
+VL_RUNS, VL_UNLOCKED, VL_FOLLOWS = 0x10, 0x20, 0x40
+"""Controlword in mode 2: the ramp generator runs, is not locked, and has the target as its input."""
+VL_RAMPS = {0x83: 0x48, 0x84: 0x49, 0x85: 0x4A}
+"""Ramps of modes 3 and 9 → those of mode 2, each a speed and a time in s."""
 _ENABLED = State.OPERATION_ENABLED
 _ALWAYS = int(Bit.VOLTAGE_ENABLED | Bit.REMOTE)
 _SATURATED, _REACHED, _SPECIFIC = int(Bit.INTERNAL_LIMIT), int(Bit.TARGET_REACHED), int(Bit.MODE_SPECIFIC)
@@ -196,7 +200,7 @@ class Axis:
     @property
     def stated_mps2(self) -> float:
         """Of 6084h and 6085h, the gentler slope [m/s²]."""
-        return min(self.scale.slope(self._value(offset)) for offset in (0x84, 0x85))
+        return min(self._slope(offset) for offset in (0x84, 0x85))
 
     def position(self) -> int:
         """6064h as the encoder has it."""
@@ -231,6 +235,8 @@ class Axis:
         halted = bool(self._controlword & Bit.HALT)
         if halted is not self._halted:
             self._halted = halted
+            self._steer()
+        elif self.personality.vl:
             self._steer()
 
     def _command(self, command: Command) -> bool:
@@ -296,14 +302,20 @@ class Axis:
             return
         if self._halted:
             self._stop(self._value(0x5D), _stay)
-        elif self.faults.ignores_setpoints:
+        elif self.faults.ignores_setpoints or self._ramp_is_locked():
             return
-        elif self._value(0x60) == PROFILE_VELOCITY:
-            slope = self.scale.slope
-            up = min(self.ramp_up_mps2, slope(self._value(0x83)))
-            self.motor.run(self._goal_mps(), up, slope(self._value(0x84)))
+        elif self._value(0x60) in (VL, PROFILE_VELOCITY):
+            up = min(self.ramp_up_mps2, self._slope(0x83))
+            self.motor.run(self._goal_mps(), up, self._slope(0x84))
         else:
             self.motor.run(self._goal_mps(), AT_ONCE, AT_ONCE)
+
+    def _slope(self, offset: int) -> float:
+        """Of 6083h, 6084h, 6085h, or what mode 2 has in their place [m/s²]."""
+        if not self.personality.vl:
+            return self.scale.slope(self._value(offset))
+        speed, seconds = self._entry(VL_RAMPS[offset], 1), self._entry(VL_RAMPS[offset], 2)
+        return self.scale.slope(speed) * self._vl_factor() / seconds if seconds else AT_ONCE
 
     def _quick_stop(self) -> None:
         option = self._value(0x5A)
@@ -315,8 +327,8 @@ class Axis:
             self.motor.power_off()
             then()
             return
-        ramps = {1: self._value(0x84), 2: self._value(0x85)}
-        slope = self.scale.slope(ramps[option]) if option in ramps else AT_ONCE
+        ramps = {1: 0x84, 2: 0x85}
+        slope = self._slope(ramps[option]) if option in ramps else AT_ONCE
         self.motor.stop(slope * self.faults.stop_share if self.faults.stop_share else 0.0, then)
 
     # What the bus sees
@@ -357,7 +369,23 @@ class Axis:
         self._put(0x61, NO_MODE if hidden else self._value(0x60))
 
     def _target_mps(self) -> float:
-        return self._value(0xFF) * self.scale.target_mps
+        raw = self._vl_target() if self.personality.vl else self._value(0xFF)
+        return raw * self.scale.target_mps
+
+    def _ramp_is_locked(self) -> bool:
+        """Mode 2, bit 5 is 0: the motor keeps its speed."""
+        return self._value(0x60) == VL and not self._controlword & VL_UNLOCKED
+
+    def _vl_target(self) -> float:
+        """6042h within 6046h, in rpm: a speed below the least one becomes the least one, zero stays zero."""
+        follows = VL_RUNS | VL_FOLLOWS
+        raw = self._value(0xFF) if self._controlword & follows == follows else 0
+        amount = min(max(abs(raw), self._entry(0x46, 1)), self._entry(0x46, 2)) if raw else 0
+        return (amount if raw > 0 else -amount) * self._vl_factor()
+
+    def _vl_factor(self) -> float:
+        """604Ch: what one bit is worth in rpm."""
+        return self._entry(0x4C, 1) / self._entry(0x4C, 2)
 
     def _goal_mps(self) -> float:
         return self.faults.setpoint_share * self._target_mps()
@@ -365,6 +393,10 @@ class Axis:
     def _put(self, offset: int, value: int) -> None:
         """Set object 60xxh of this axis."""
         self.dictionary.values[(self._base + offset) << 8] = value
+
+    def _entry(self, offset: int, subindex: int) -> int:
+        """An entry of object 60xxh of this axis."""
+        return self.dictionary.values[(self._base + offset) << 8 | subindex]
 
     def _value(self, offset: int) -> int:
         """The value of object 60xxh of this axis."""

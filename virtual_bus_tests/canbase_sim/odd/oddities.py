@@ -159,13 +159,12 @@ def _guarding_alone(random: Random) -> Drawn:
 
 
 def _no_synchronous_pdos(random: Random) -> Drawn:
-    keys: Mapping[str, object] = {"pdo.synchronous": False}
     code = random.choice(RANGES)
     if random.random() < 0.3:
         missing = with_personality(missing=frozenset((0x1005, 0x1019)))
-        return Drawn("has no 1005h, and no synchronous PDOs", missing, keys)
+        return Drawn("has no 1005h, and no synchronous PDOs", missing)
     bounds = dict.fromkeys(TYPES, Bounds(254, 255, 1, code))
-    return Drawn(f"PDO types below 254 are refused with {code:08X}h", with_manner(bounds=bounds), keys)
+    return Drawn(f"PDO types below 254 are refused with {code:08X}h", with_manner(bounds=bounds))
 
 
 def _one_event_type(random: Random) -> Drawn:

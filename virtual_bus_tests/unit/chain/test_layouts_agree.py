@@ -133,6 +133,13 @@ def test_the_words_that_stop_are_the_same() -> None:
     ]
 
 
+def test_the_watchdog_sees_the_enable_of_mode_2_and_that_none_of_its_stops_follows_a_target() -> None:
+    """Bits 4 to 6: the ramp of mode 2."""
+    assert frames.asks_for_power(cia402.Command.ENABLE_OPERATION.value | cia402.VL_RAMP)
+    stops = [command for command in cia402.Command if command is not cia402.Command.ENABLE_OPERATION]
+    assert not any(frames.asks_for_power(command.value | cia402.VL_RAMP) for command in stops)
+
+
 @pytest.mark.parametrize("name", profile_names())
 def test_both_sides_read_and_write_every_kind_of_drive_alike(name: str) -> None:
     """The driver by the profile, the watchdog by what it is told of it."""
@@ -148,7 +155,7 @@ def test_both_sides_read_and_write_every_kind_of_drive_alike(name: str) -> None:
         velocity = (-300).to_bytes(layout.velocity_bits // 8, "little", signed=True)
         assert frames.decode_velocity(velocity, watched.layout) == pdo.unpack_velocity(velocity, layout) == -300
         for index in (0x6040, 0x6041, 0x606C):
-            at = place(layout, index, axis)
+            at = place(profile, index, axis)
             assert frames.place_of(index, axis, watched.layout) == (at.index, at.sub)
         units = AxisUnits(drive, BENCH.base)
         assert watched.mps_per_bit * units.velocity_raw(0.5) == pytest.approx(0.5, abs=abs(watched.mps_per_bit))

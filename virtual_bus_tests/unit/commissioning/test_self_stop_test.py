@@ -34,7 +34,7 @@ def assert_off(world: GuideWorld) -> None:
     assert world.speeds == (0.0, 0.0)
 
 
-BY_HEARTBEAT = ("elmo_gold", "epos4", "generic", "kinco", "nanotec")
+BY_HEARTBEAT = ("elmo_gold", "epos4", "generic", "inverter", "kinco", "nanotec")
 BY_THEIR_OWN_TIMEOUT = ("roboteq", "zlac8015d")
 BY_GUARDING = ("technosoft",)
 NEVER = ("dryve_d1", "tmcm1636")

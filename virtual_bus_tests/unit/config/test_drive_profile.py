@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
+from pydantic import ValidationError
 
 from canbase_config.errors import ConfigError, Loc
 from canbase_config.load import leaf_keys, load_robot
@@ -28,8 +30,8 @@ def rows(file: YamlFile) -> dict[Loc, str]:
     return {loc: text[(file.line(loc) or 1) - 1] for loc in leaves}
 
 
-def test_all_ten_kinds_of_drives_come_with_canbase() -> None:
-    kinds = "dryve_d1 elmo_gold epos4 generic kinco nanotec roboteq technosoft tmcm1636 zlac8015d"
+def test_all_eleven_kinds_of_drives_come_with_canbase() -> None:
+    kinds = "dryve_d1 elmo_gold epos4 generic inverter kinco nanotec roboteq technosoft tmcm1636 zlac8015d"
     assert tuple(kinds.split()) == NAMES
 
 
@@ -77,12 +79,14 @@ def test_a_profile_is_guessed_by_vendor_and_product(vendor: int | None, product:
     assert guess(vendor, product) == name
 
 
-OFFSET = Layout()
-ARRAYS = load_profile("zlac8015d").layout
+OFFSET = Profile(title="offset")
+ARRAYS = load_profile("zlac8015d")
+VL = load_profile("inverter")
+NARROW = Profile(title="narrow", layout=Layout(target_bits=16))
 
 
 @pytest.mark.parametrize(
-    ("layout", "index", "axis", "expected"),
+    ("profile", "index", "axis", "expected"),
     [
         (OFFSET, 0x60FF, 0, Place(0x60FF, 0, 32)),
         (OFFSET, 0x60FF, 1, Place(0x68FF, 0, 32)),
@@ -94,11 +98,33 @@ ARRAYS = load_profile("zlac8015d").layout
         (ARRAYS, 0x6041, 0, Place(0x6041, 0, 32, 0)),
         (ARRAYS, 0x6041, 1, Place(0x6041, 0, 32, 16)),
         (ARRAYS, 0x6060, 1, Place(0x6060, 0, 8)),
-        (Layout(target_bits=16), 0x60FF, 0, Place(0x60FF, 0, 16)),
+        (NARROW, 0x60FF, 0, Place(0x60FF, 0, 16)),
+        (VL, 0x60FF, 0, Place(0x6042, 0, 16)),
+        (VL, 0x606C, 0, Place(0x6044, 0, 16)),
+        (VL, 0x6064, 0, Place(0x6064, 0, 32)),
     ],
 )
-def test_where_an_object_is(layout: Layout, index: int, axis: int, expected: Place) -> None:
-    assert place(layout, index, axis) == expected
+def test_where_an_object_is(profile: Profile, index: int, axis: int, expected: Place) -> None:
+    assert place(profile, index, axis) == expected
+
+
+VL_KEYS: dict[str, Any] = {"title": "vl", "modes": [2], "layout": {"target_bits": 16, "velocity_bits": 16}}
+
+
+@pytest.mark.parametrize(
+    ("keys", "why"),
+    [
+        ({"modes": [2, 3]}, "it is the only one of a profile"),
+        ({"layout": {"velocity_bits": 16}}, "6042h and 6044h of mode 2 have 16 bits"),
+        ({"layout": {"target_bits": 16}}, "6042h and 6044h of mode 2 have 16 bits"),
+        ({"layout": VL_KEYS["layout"] | {"second_axis": "sub_index"}}, "the second axis is at \\+ 800h"),
+        ({"units": {"acceleration": "rpm/s"}}, "ramps of mode 2 are in the unit of 6042h per second"),
+    ],
+)
+def test_mode_2_has_objects_widths_and_ramps_of_its_own(keys: dict[str, Any], why: str) -> None:
+    assert Profile.model_validate(VL_KEYS).is_vl
+    with pytest.raises(ValidationError, match=why):
+        Profile.model_validate(VL_KEYS | keys)
 
 
 def test_a_mapping_entry_has_index_sub_index_and_length() -> None:

@@ -219,6 +219,15 @@ def test_a_drive_that_monitors_no_heartbeat_is_drafted_with_node_guarding(
     assert load_profile(str(written(tmp_path, text, "drafted.yaml"))).self_stop.node_guarding is guarded
 
 
+def test_an_inverter_without_60ffh_is_drafted_in_mode_2(tmp_path: Path) -> None:
+    text = WHOLE.replace("[60FF]", "[6042]").replace("[606C]", "[6044]")
+    found = draft(read_eds(written(tmp_path, text)))
+    kind = load_profile(str(written(tmp_path, found.text, "drafted.yaml")))
+    assert found.missing == ()
+    assert (kind.modes, kind.layout.target_bits, kind.layout.velocity_bits) == ((2,), 16, 16)
+    assert {"units.target_velocity", "units.actual_velocity"} <= set(kind.unproven)
+
+
 def test_a_drive_that_lacks_too_much_is_refused_in_words(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["config", "from-eds", str(written(tmp_path, GOOD))])
     assert result.exit_code == 1

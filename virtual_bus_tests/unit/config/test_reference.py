@@ -42,7 +42,7 @@ def test_every_key_has_a_row_and_a_meaning(file: str) -> None:
         "| `side` | one of left, right | **must be given** | side of the base |",
         "| `sources` | section | joystick, navigation, action | velocity sources, by name |",
         "| `modes` | a list of 1 to any number of entries | 3, 9 |"
-        " values of 6060h that take 60FFh, the preferred one first |",
+        " values of 6060h that take 60FFh, the preferred one first; or 2 alone: 6042h and 6044h |",
     ],
 )
 def test_a_row_says_what_may_stand_there_and_what_stands_there_by_default(row: str) -> None:

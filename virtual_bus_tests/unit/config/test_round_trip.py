@@ -76,6 +76,8 @@ def made_consistent(values: Values) -> Values:
     for index, drive in enumerate(values["drives"]):
         drive |= {"joint": f"{drive['joint'][:60]}_{index}", "node_id": index + 1, "side": ("left", "right")[index % 2]}
         drive |= {"profile": ("generic", "roboteq")[index % 2], "mode": (3, None)[index // 2 % 2]}
+        one_of_few = [each | {"bits": 8} for each in drive.get("values", [])[:1]]  # TPDOs and names are shared
+        drive["values"] = one_of_few if index == 0 else []
     values["bus"].pop("sync_counter", None)
     values["bus"]["bitrate"] = 1_000_000 - values["bus"].get("bitrate", 0) % 300_000  # for eight drives at 200 Hz
     limits, safety, action = values["limits"], values["safety"], values.get("action", {})

@@ -122,6 +122,57 @@ def test_mode_9_has_its_period_in_60c2h() -> None:
     assert (drive.number(0x6060), drive.number(0x60C2, 1), drive.number(0x60C2, 2)) == (9, 10, 0xFD)
 
 
+def inverter(**pairs: int) -> FakeDrive:
+    """A drive of mode 2 alone. `pairs`: `min`, `max`, `numerator`, `seconds` after power on."""
+    gone = (0x606C, 0x6083, 0x6084, 0x6085, 0x60FF)
+    objects = {key: value for key, value in factory_objects().items() if key[0] not in gone}
+    objects |= {(0x6042, 0): u16(7), (0x6044, 0): u16(0), (0x6046, 1): u32(pairs.get("min", 30))}
+    objects |= {(0x6046, 2): u32(pairs.get("max", 1500)), (0x604C, 2): u32(1)}
+    objects |= {(0x604C, 1): u32(pairs.get("numerator", 10))}
+    ramps = (0x6048, 0x6049, 0x604A)
+    objects |= {(index, 1): u32(100) for index in ramps} | {(index, 2): u16(pairs.get("seconds", 5)) for index in ramps}
+    return FakeDrive(objects=objects)
+
+
+def test_mode_2_has_its_own_target_ramps_limits_and_unit() -> None:
+    drive = inverter()
+    boot, _ = booted(drive, of_kind("inverter"))
+    assert boot.report is not None
+    assert [drive.number(0x1600, sub) for sub in range(3)] == [2, 0x6040_0010, 0x6042_0010]
+    assert [drive.number(0x1A01, sub) for sub in range(3)] == [2, 0x6044_0010, 0x6077_0010]
+    assert (drive.number(0x6060), drive.number(0x6042), drive.number(0x6046, 1)) == (2, 0, 0)
+    assert (drive.number(0x604C, 1), drive.number(0x604C, 2)) == (1, 1)
+    # 1.5 m/s² at the rim are 47.7 rev/s² of the motor, 2865 rpm in 1 s; in a curve a wheel brakes with 2 m/s²
+    assert [drive.number(index, sub) for index in (0x6049, 0x604A) for sub in (1, 2)] == [3820, 1, 2865, 1]
+    assert not [index for index, _, _ in drive.writes if index in (0x60FF, 0x6083, 0x6084, 0x6085)]
+
+
+def test_a_ramp_of_mode_2_whose_time_is_fixed_gets_the_speed_for_that_time() -> None:
+    drive = inverter(seconds=5)
+    drive.refuse |= {(index, 2): 0x0601_0002 for index in (0x6048, 0x6049, 0x604A)}
+    boot, _ = booted(drive, of_kind("inverter"))
+    assert boot.report is not None
+    assert (drive.number(0x604A, 1), drive.number(0x604A, 2)) == (14324, 5)
+
+
+@pytest.mark.parametrize(
+    ("refused", "pairs", "told"),
+    [
+        ((0x604A, 1), {}, "604Ah stays at 100 in 1 s: left brakes with 0.0524 m/s² by it"),
+        ((0x6046, 1), {}, "6046h:1 stays at 30: left turns at 0.0157 m/s where less is ordered"),
+        ((0x6046, 2), {"max": 900}, "6046h:2 stays at 900: left turns at 0.471 m/s at most"),
+        ((0x604C, 1), {}, "604Ch:1 stays at 10: one bit of 6042h is not 1 rpm"),
+    ],
+)
+def test_a_drive_of_mode_2_that_would_turn_or_brake_otherwise_than_ordered_is_refused(
+    refused: Key, pairs: dict[str, int], told: str
+) -> None:
+    drive = inverter(**pairs)
+    drive.refuse[refused] = 0x0601_0002
+    boot, _ = booted(drive, of_kind("inverter"))
+    assert told in str(error_of(boot))
+
+
 def test_a_mode_that_is_not_taken_is_told() -> None:
     drive = FakeDrive(objects=factory_objects() | {(0x6061, 0): u8(0)})
     boot, _ = booted(drive, of_kind("epos4"))

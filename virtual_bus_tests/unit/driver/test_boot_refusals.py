@@ -162,8 +162,10 @@ def test_a_drive_whose_1016h_cannot_be_read_does_not_stop_by_itself() -> None:
     assert not boot.report.stops_by_itself
 
 
-def bounded(accepted: dict[Key, Callable[[int], bool]], abort: int = INVALID) -> tuple[FakeDrive, NodeBoot]:
-    """A drive that takes only some values of these objects, and its boot."""
+def bounded(
+    accepted: dict[Key, Callable[[int], bool]], abort: int = INVALID, lacks: tuple[Key, ...] = ()
+) -> tuple[FakeDrive, NodeBoot]:
+    """A drive that takes only some values of these objects, and has no `lacks`; and its boot."""
 
     @dataclass
     class Choosy(FakeDrive):
@@ -173,6 +175,8 @@ def bounded(accepted: dict[Key, Callable[[int], bool]], abort: int = INVALID) ->
 
     drive = Choosy()
     drive.objects |= {key: u8(1) for key in accepted if key[1] == 2 and key[0] < 0x1A00}
+    times = {(index, sub): u16(0) for index, _ in accepted if 0x1800 <= index < 0x1A00 for sub in (3, 5)}
+    drive.objects |= {key: value for key, value in times.items() if key not in lacks}
     return drive, boot_one_axis(drive)
 
 
@@ -246,10 +250,44 @@ def test_a_period_that_the_drive_rounds_is_taken_when_it_is_short_enough(found: 
     assert (boot.error is None) is fits
 
 
-def test_a_drive_that_takes_no_synchronous_pdo_is_told_the_key_that_cures_it() -> None:
+def without_sync(**missing: Key) -> tuple[FakeDrive, NodeBoot]:
+    """A drive that takes event-driven PDOs alone. `missing`: a time that it lacks."""
+    types = {(base + n, 2): lambda value: value in (254, 255) for base in (0x1400, 0x1800) for n in range(2)}
+    drive, boot = bounded(types, lacks=tuple(missing.values()))
+    return drive, boot
+
+
+def test_a_drive_that_takes_no_synchronous_pdo_sends_by_its_timer_once_in_a_cycle() -> None:
+    drive, boot = without_sync()
+    assert boot.error is None, boot.error
+    assert [drive.number(index, 2) for index in (0x1400, 0x1800, 0x1801)] == [255] * 3
+    assert [drive.number(index, sub) for index in (0x1800, 0x1801) for sub in (3, 5)] == [100, 10, 100, 10]
+    notes = "; ".join(notes_of(boot))
+    assert "RPDO1 does not take type 1: it acts when it arrives" in notes
+    assert "TPDO1 does not take type 1: it is sent every 10 ms by its timer" in notes
+
+
+@pytest.mark.parametrize("sub", [3, 5])
+def test_without_sync_and_without_its_times_a_drive_cannot_be_used(sub: int) -> None:
+    """At standstill nothing would change, and nothing would come; or it would come as often as from two drives."""
+    _, boot = without_sync(time=(0x1800, sub))
+    text = error_of(boot)
+    assert f"1800h:2: 0609 0030h value not valid, TPDO1 does not take type 1, nor 1800h:{sub}" in text
+    assert "Without SYNC it must come every 10 ms" in text
+
+
+def test_a_fixed_event_driven_type_is_taken_as_it_is() -> None:
+    drive = FakeDrive(refuse={(0x1400, 2): READ_ONLY})
+    drive.objects[0x1400, 2] = u8(254)
+    (note,) = notes_of(boot_one_axis(drive))
+    assert note.startswith("1400h:2 is FEh, expected 01h")
+    assert note.endswith("RPDO1 does not take type 1: it acts when it arrives (type 255 or 254)")
+
+
+def test_a_drive_that_takes_neither_type_is_one_for_the_makers_tool() -> None:
     text = error_of(boot_one_axis(FakeDrive(refuse={(0x1400, 2): INVALID})))
     assert "1400h:2: 0609 0030h value not valid" in text
-    assert "set `pdo.synchronous: false` in its drive profile" in text
+    assert "It takes no event-driven type either: set it to 1 with the maker's tool" in text
 
 
 @pytest.mark.parametrize("abort", [0x06070010, 0x06070012, 0x06070013])
@@ -324,7 +362,6 @@ def test_an_answer_that_comes_late_and_then_again_names_no_second_drive() -> Non
         ),
         ((0x1600, 1), DEVICE_STATE, "RPDO1 does not take 6040h:0 (1600h:1: 0800 0022h", "Switch the drive off and on"),
         ((0x1400, 2), DEVICE_STATE, "1400h:2: 0800 0022h", "Switch the drive off and on again"),
-        ((0x1400, 2), READ_ONLY, "RPDO1 does not take type 1", "set `pdo.synchronous: false`"),
     ],
 )
 def test_a_refused_necessity_is_an_error(key: Key, abort: int, problem: str, hint: str) -> None:

@@ -12,8 +12,9 @@ from canbase_config.health import Health
 from canbase_driver.causes import Cause, Finding
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.cia402 import DriveState
+from canbase_driver.drives.drive_values import NamedValue
 from canbase_driver.drives.health import HealthWatch
-from canbase_driver.ros.diagnostics import diagnostics_message, unguarded
+from canbase_driver.ros.diagnostics import diagnostics_message, unguarded, values_message
 from canbase_driver.supervision.bus_health import ControllerState
 from canbase_driver.supervision.watchdog_link import WatchdogCounters
 from canbase_runtime.driver_state import DriverState
@@ -48,6 +49,19 @@ def test_a_healthy_robot_is_ok_in_every_entry() -> None:
         "Operation enabled, operational.",
     ]
     assert entry(message, "r1: drive right_wheel_joint").hardware_id == "r1 node 2 axis 1"
+
+
+def test_named_values_are_in_the_entry_of_their_drive_and_in_a_message_of_their_own() -> None:
+    values = (NamedValue("dc_link", "V", 24.05, 1.0), NamedValue("last_error", "", math.nan, -math.inf))
+    snapshot = with_left(values=values)
+    message = values_message(snapshot, STAMP, "r1")
+    (own,) = message.status
+    assert (message.header.stamp, own.name) == (STAMP, "r1: drive left_wheel_joint")
+    assert [(each.key, each.value) for each in own.values] == [("dc_link [V]", "24.05"), ("last_error", "nan")]
+    assert own.level == DiagnosticStatus.STALE
+    shown = entry(diagnostics_message(snapshot, STAMP, robot="r1"), "r1: drive left_wheel_joint")
+    assert ("dc_link [V]", "24.05") in [(each.key, each.value) for each in shown.values]
+    assert shown.level == OK
 
 
 def test_a_standstill_that_no_sensor_has_shown_is_named_as_assumed() -> None:

@@ -28,6 +28,8 @@ def taken(data: str, kind: Profile = GENERIC, late: Counter[bytes] | None = None
         ("60 07 60 00 00 00 00 00", "6007h:0"),
         ("60 5A 68 00 00 00 00 00", "685Ah:0"),  # of the second axis
         ("60 85 60 00 00 00 00 00", "6085h:0"),
+        ("60 4C 60 01 00 00 00 00", "604Ch:1"),  # the unit of the speeds of mode 2
+        ("60 4A 60 01 00 00 00 00", "604Ah:1"),
         ("60 40 60 00 00 00 00 00", ""),  # the watchdog stops by it
         ("60 F9 60 01 00 00 00 00", ""),  # a gain
         ("4B 16 10 01 00 00 00 00", ""),  # read

@@ -44,7 +44,7 @@ def fall_silent(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_there_are_kinds_of_both_sorts() -> None:
-    assert (WATCHES_BOTH, WATCHES_ONE) == (["elmo_gold", "epos4", "generic"], ["kinco", "nanotec"])
+    assert (WATCHES_BOTH, WATCHES_ONE) == (["elmo_gold", "epos4", "generic", "inverter"], ["kinco", "nanotec"])
 
 
 @pytest.mark.parametrize("kind", WATCHES_BOTH)

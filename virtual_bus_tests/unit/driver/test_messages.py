@@ -149,7 +149,7 @@ def test_the_status_carries_every_field_of_the_snapshot_that_the_interface_has()
 
 
 DIAGNOSTICS_ALONE = {
-    *("self_stop", "warning", "internal_limit", "boot_notes", "boot_changes", "configured", "effort_nm"),
+    *("self_stop", "warning", "internal_limit", "boot_notes", "boot_changes", "configured", "effort_nm", "values"),
 }
 """What is in /diagnostics and not in the status."""
 

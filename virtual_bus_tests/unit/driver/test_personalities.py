@@ -82,6 +82,25 @@ def test_in_mode_9_the_ramp_is_the_drivers_own_and_60c2h_its_cycle(kind: str) ->
     assert world.core.state is DriverState.ENABLED
 
 
+def test_an_inverter_follows_its_target_only_while_all_three_bits_of_its_ramp_are_set() -> None:
+    world = world_of("inverter")
+    world.drive(seconds=1.0)
+    setpoints = world.sent(0x201)
+    assert {len(data) for data in setpoints} == {4}
+    assert setpoints[-1][:2] == bytes((0x7F, 0x00))
+    world.command = Twist2D.ZERO
+    assert world.stands_after(1.5) < 0.6
+
+
+def test_an_inverter_that_loses_all_its_masters_stops_by_its_own_ramp() -> None:
+    """Driver and watchdog end at 0.3 m/s: heartbeats are missed after 0.3 s, then 604Ah brakes with 2 m/s²."""
+    world = world_of("inverter")
+    world.drive()
+    world.kill_driver()
+    world.watchdog = None
+    assert 0.3 < world.stands_after(2.0) < 0.6
+
+
 COUNTING_KINDS = [kind for kind in KINDS if load_profile(kind).options.sync_counter != "no"]
 
 

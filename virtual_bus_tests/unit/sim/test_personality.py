@@ -110,6 +110,29 @@ def test_roboteq_motors_stop_1_s_after_the_last_command_and_go_on_with_the_next(
     assert rig.axis.motor.speed_mps > 0.1
 
 
+def test_an_inverter_follows_6042h_with_all_three_bits_of_its_ramp_and_within_6046h() -> None:
+    rig = rig_with("inverter")
+    for index, sub, value in ((0x6060, 0, 2), (0x6048, 1, 1000), (0x6049, 1, 1000), (0x6042, 0, 200)):
+        assert rig.write(index, value, sub=sub) == "ok"
+    for word in (0x06, 0x07, 0x0F):
+        assert rig.write(0x6040, word) == "ok"
+    rig.wait(1.0)
+    assert rig.read(0x6044) == 0  # bits 4 to 6 are 0
+    assert rig.write(0x6040, 0x7F) == "ok"
+    rig.wait(1.0)
+    assert rig.read(0x6044) == 200
+    assert rig.write(0x6040, 0x5F) == "ok"
+    assert rig.write(0x6042, 0) == "ok"
+    rig.wait(1.0)
+    assert rig.read(0x6044) == 200  # bit 5 is 0: the ramp is locked
+    assert rig.write(0x6040, 0x7F) == "ok"
+    for target, shown in ((0, 0), (-10, -30), (9000, 1500)):  # 6046h: 30 to 1500 rpm
+        assert rig.write(0x6042, target) == "ok"
+        rig.wait(3.0)
+        assert rig.read(0x6044) == shown
+    assert rig.tx("601 40 FF 60 00 00 00 00 00") == ["581 80 FF 60 00 00 00 02 06"]
+
+
 def test_zlac_shows_both_motors_behind_one_controlword() -> None:
     rig = rig_with("zlac8015d")
     for index, sub, value in ((0x6083, 1, 500), (0x6083, 2, 500), (0x6060, 0, 3), (0x60FF, 1, 20), (0x60FF, 2, -30)):

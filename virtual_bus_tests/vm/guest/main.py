@@ -72,7 +72,8 @@ SHORT = (
     "bus-off",
     "reboot",
 )
-"""For a look of ten minutes: ways to end, by kind. Left out are those that cost most: freeze, upgrade, two robots, the target."""
+"""For a look of ten minutes: ways to end, by kind. Left out are those that cost most: freeze, upgrade, two robots,
+the target."""
 GROUPS: dict[str, Sequence[str]] = {"first": tuple(FIRST), "second": tuple(SECOND), "short": SHORT}
 
 
