@@ -295,6 +295,6 @@ def world_of(kind: str, **changes: object) -> World:
 def setpoints(frames: list[Frame]) -> Iterator[tuple[int, int]]:
     """Controlword and target of each setpoint (RPDO1 and RPDO2) among these frames."""
     for frame in frames:
-        if frame.cob_id & 0x780 in (0x200, 0x300) and len(frame.data) == 6:
+        if frame.cob_id & 0x780 in (0x200, 0x300) and len(frame.data) in (4, 6):
             word, target = frame.data[:2], frame.data[2:]
             yield int.from_bytes(word, "little"), int.from_bytes(target, "little", signed=True)
