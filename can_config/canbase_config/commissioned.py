@@ -59,6 +59,20 @@ def without_proof(robot: Robot) -> str:
     return f"{joints}: {why}. With the wheels up: canbase commission --steps proof" if why else ""
 
 
+def kind_alone(robot: Robot) -> str:
+    """Which drives another one of their kind could replace without a new proof, as a sentence; empty: none.
+
+    `identity` has no serial number of them, or 0, which makers write where they do not number their drives.
+    """
+    joints = [drive.joint for drive in robot.drives if not drive.identity.serial]
+    if robot.bus.is_virtual or _why_not_proven(robot) or not joints:
+        return ""
+    return (
+        f"{', '.join(joints)}: 1018h:4 has no serial number, so the proof that it stops by itself is about its kind: "
+        "after each exchange of a drive repeat canbase commission --steps proof"
+    )
+
+
 def is_proven(robot: Robot) -> bool:
     """Whether each drive, by its 1018h, was seen to stop by itself. No simulated one was."""
     return not robot.bus.is_virtual and not _why_not_proven(robot)

@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from canbase_config import bus_load
-from canbase_config.commissioned import uncommissioned, without_proof
+from canbase_config.commissioned import kind_alone, uncommissioned, without_proof
 from canbase_config.errors import ConfigError, Loc, Problem
 from canbase_config.robot import Robot
 from canbase_config.ros_params import plain
@@ -79,6 +79,9 @@ def _warnings(robot: Robot, file: YamlFile) -> Iterator[Problem]:
     if robot.safety.require_self_stop and (why := without_proof(robot)):
         place = file.place(("safety", "require_self_stop"))
         yield Problem(place.file, place.line, place.key, f"no drive gets power: {why}")
+    elif robot.safety.require_self_stop and (why := kind_alone(robot)):
+        place = file.place(("safety", "require_self_stop"))
+        yield Problem(place.file, place.line, place.key, why)
     for loc, sentence in uncertain_stops(robot):
         place = file.place(loc if loc in file.lines else loc[:-1])
         yield Problem(place.file, place.line, place.key, sentence)

@@ -92,11 +92,13 @@ def commissioning(loaded: Loaded) -> list[Check]:
 
 def _self_stop_proof(loaded: Loaded) -> list[Check]:
     """Whether the driver gives power to these drives; nothing where robot.yaml does not ask for a proof."""
-    from canbase_config.commissioned import without_proof
+    from canbase_config.commissioned import kind_alone, without_proof
 
     if not loaded.robot.safety.require_self_stop:
         return []
     why = without_proof(loaded.robot)
+    if not why and (unnumbered := kind_alone(loaded.robot)):
+        return [warn("self-stop proof", unnumbered, "note each exchange of a drive, and prove it")]
     if not why:
         return [ok("self-stop proof", "each drive is proven to stop by itself (safety.require_self_stop)")]
     cure = "prove it; or wire STO, and set safety.require_self_stop: false"

@@ -10,7 +10,7 @@ import pytest
 from canopen import SdoAbortedError
 
 from canbase_commissioning.edits import Edit, commissioned_edits, edited, identity_edits
-from canbase_config.commissioned import STEPS, Step, identities, is_proven, mark, without_proof
+from canbase_config.commissioned import STEPS, Step, identities, is_proven, kind_alone, mark, without_proof
 from canbase_config.drive import Identity
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
@@ -238,3 +238,24 @@ def test_a_drive_that_refuses_what_the_proof_relied_on_gets_no_power(kind: str, 
 def test_simulated_drives_prove_nothing_about_real_ones() -> None:
     assert not is_proven(robot_with("generic"))
     assert is_proven(proven("generic"))
+
+
+# proven ── the left drive reports serial number 0, as each of its kind ── another one in its place has the same 1018h
+@pytest.mark.parametrize("serial", [0, None])
+def test_a_proof_of_drives_without_a_serial_number_is_about_their_kind_and_that_is_reported(
+    file: File, serial: int | None
+) -> None:
+    file.prove()
+    assert kind_alone(file.robot) == ""
+    kind = Edit(("drives", 0, "identity", "vendor_id"), None, 0x1234)
+    file.edit(kind, Edit(("drives", 0, "identity", "serial"), None, serial))
+    file.edit(*commissioned_edits(file.robot, (), PROOF))
+    why = (
+        "left_wheel: 1018h:4 has no serial number, so the proof that it stops by itself is about its kind: after each "
+        "exchange of a drive repeat canbase commission --steps proof"
+    )
+    assert without_proof(file.robot) == ""
+    assert kind_alone(file.robot) == why
+    assert why in [warning.what for warning in load_robot(file.path).warnings]
+    row = commissioning(load_robot(file.path))[-1]
+    assert (row.verdict, row.found) == (Verdict.WARN, why)
