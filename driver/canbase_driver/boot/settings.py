@@ -158,7 +158,11 @@ def _configure_ramps(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None
         raw = yield from node.read_if_present(write.index, write.sub)
         key = STOPPING_LIMITS[index]
         needed = getattr(robot.limits, key)
-        if raw is None or units.acceleration_mps2(raw) >= KEPT_SHARE * needed:
+        if raw is None:
+            least = f"{needed:g} m/s² (limits.{key}), a value of {units.acceleration_raw(needed)}"
+            node.notes.append(f"how hard {drive.joint} brakes is unknown: it must be at least {least}")
+            continue
+        if units.acceleration_mps2(raw) >= KEPT_SHARE * needed:
             continue
         kept = units.acceleration_mps2(raw)
         problem = f"{write.index:04X}h:{write.sub} stays at {raw}: {drive.joint} brakes with {kept:.3g} m/s² by it"
@@ -170,7 +174,12 @@ def _configure_ramps(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None
 def _refuse_coasting(node: NodeAccess, drive: Drive) -> Steps[None]:
     """605Ah of 0 that the drive keeps: a quick stop takes the power away, and the wheel rolls out."""
     at = place(drive.kind.layout, QUICK_STOP_OPTION, drive.axis)
-    if drive.kind.options.quick_stop == "no" or (yield from node.read_if_present(at.index, at.sub)) != COASTS:
+    if drive.kind.options.quick_stop == "no":
+        return
+    found = yield from node.read_if_present(at.index, at.sub)
+    if found is None:
+        node.notes.append(f"how a quick stop ends is unknown: it must brake {drive.joint} and not let it coast")
+    if found != COASTS:
         return
     problem = f"{at.index:04X}h:{at.sub} stays at 0: a quick stop lets {drive.joint} coast"
     hint = "Set it to 2 with the maker's tool; where rolling out is right, options.quick_stop: no in its drive profile"
@@ -204,7 +213,7 @@ def _produce_heartbeat(node: NodeAccess, timeout_ms: int) -> Steps[None]:
         except SdoAborted as refused:
             refusal = refusal or f"1017h:0: {refused.text}"
             if refused.code not in VALUE_REFUSED:
-                node.notes.append(f"1017h:0: {refused.text}")
+                node.notes.append(f"1017h:0: {refused.text}; so its heartbeat must come by itself, within {longest} ms")
                 return
         except BootError as other:
             refusal = refusal or other.problem
@@ -225,7 +234,10 @@ def _refuse_heartbeat(node: NodeAccess, longest_ms: int, refusal: str) -> Steps[
         if period_ms > longest_ms and (yield from node.tries(Write(HEARTBEAT_PRODUCER, 0, period_ms, 2))):
             key = f"`timeouts.drive_heartbeat_s: {HEARTBEATS_NEEDED * period_ms / 1000:g}`"
             raise BootError(node.node_id, problem, f"It takes {period_ms} ms: set {key} in robot.yaml")
-    none = f"Nor any up to {HEARTBEAT_PERIODS_MS[-1]} ms: {GUARDING_ALONE}; without either it cannot be used"
+    tool = f"set 1017h:0 to 1 to {longest_ms} with the maker's tool"
+    none = (
+        f"Nor any up to {HEARTBEAT_PERIODS_MS[-1]} ms: {tool}, or, {GUARDING_ALONE}; without either it cannot be used"
+    )
     raise BootError(node.node_id, problem, none)
 
 
@@ -249,7 +261,8 @@ def _watch_heartbeats(node: NodeAccess, kind: Profile, timeout_ms: int) -> Steps
     known = kind.self_stop.heartbeat_entries
     entries = 0 if known == 0 else (yield from node.read_if_present(HEARTBEAT_CONSUMER)) or 0
     if entries == 0:
-        node.notes.append("1016h: the drive watches no heartbeat, it will not stop by it")
+        guarding = "where it has node guarding, set `self_stop.node_guarding: true` in its drive profile"
+        node.notes.append(f"1016h: the drive monitors no heartbeat, and none stops it; {guarding}")
         return False
     watchdog, driver = (node_id << 16 | timeout_ms for node_id in (WATCHDOG_NODE_ID, DRIVER_NODE_ID))
     if entries == 2 and node.was_reset and (yield from _takes(node, watchdog, driver)):

@@ -14,6 +14,7 @@ from canbase_driver.cia301.nmt import NmtCommand
 from canbase_driver.cia301.sdo_client import (
     ACCESS_UNSUPPORTED,
     DEVICE_STATE,
+    GENERAL_ERROR,
     LENGTH_WRONG,
     NO_OBJECT,
     NO_SUB_INDEX,
@@ -112,6 +113,13 @@ PROFILE_KEYS: tuple[tuple[range, str], ...] = (
     (range(0x60FF, 0x6100), "layout.target_bits"),
 )
 """Object → the key of a drive profile (docs/drives.md) for whether, where or how wide the drive has it."""
+LACKS = {
+    "self_stop.heartbeat_entries": "0",
+    "self_stop.node_guarding": "false",
+    "options.torque": "none",
+    "options.ramps": "",  # it is about three objects, and a drive has the others
+}
+"""Key → its value for a drive without the object; no elsewhere."""
 TRANSMISSION_TYPE = 2
 """Sub-index of 1400h… and 1800h…."""
 GUARDING_ALONE = (
@@ -119,6 +127,14 @@ GUARDING_ALONE = (
     "drive profile"
 )
 OTHER_STATE = "Switch the drive off and on again, and let no other master control it"
+ELSE_UNUSABLE = "where that cannot be done, the drive cannot be used"
+WITHOUT = {
+    (0x1016, 1): "it does not stop by the watchdog's heartbeat",
+    (0x6007, 0): "no lost heartbeat or node guarding stops the motor",
+    (0x605E, 0): "a fault may take the power away and let the wheel coast",
+}
+"""What it means that the drive does not take its value, by the object of the first axis."""
+FOR_SELF_STOP = (0x1016, 0x6007)
 WIDTHS = (LENGTH_WRONG, TOO_LONG, TOO_SHORT)
 
 
@@ -145,14 +161,26 @@ def _hint(error: SdoError) -> str:
     key, index = profile_key(error.index, error.sub), _first_axis(error.index)
     if code == DEVICE_STATE:
         return OTHER_STATE
-    if code in (NO_OBJECT, NO_SUB_INDEX) and index in OF_AN_AXIS:
-        return "Every axis of a CiA 402 drive has it: check `axis` in robot.yaml, and that the drive is set to CiA 402"
-    if index == 0x6060 and code not in WIDTHS:
-        return "The drive must support `mode` of robot.yaml, see 6502h: bit 2 is mode 3, bit 8 is mode 9"
+    if index == 0x6060 and code not in (NO_OBJECT, NO_SUB_INDEX, *WIDTHS):
+        return (
+            "Set `mode` in robot.yaml to one that the drive has, see 6502h: bit 2 is mode 3, bit 8 is mode 9; "
+            "with neither of them the drive cannot be used"
+        )
+    if code in (NO_OBJECT, NO_SUB_INDEX, GENERAL_ERROR) and index in OF_AN_AXIS:
+        return (
+            "Every axis of a CiA 402 drive has it: check `axis` in robot.yaml, and with the maker's tool that the "
+            "drive is set to CiA 402 and takes its commands from the bus"
+        )
     if code in WIDTHS:
-        where = f"see `{key}` of its drive profile" if key.startswith("layout.") else "such a drive cannot be used"
+        width = f"set `{key}` in its drive profile to that of its manual, 16 or 32"
+        where = width if key.startswith("layout.") else "such a drive cannot be used"
         return f"The drive has this object in another width than CiA 402 and its profile: {where}"
-    needed = "canbase needs this object as docs/bus.md has it; look it up in the manual of the drive"
+    if index == 0x60FF:
+        return (
+            "canbase sets it to 0 before there is power: let the drive take its commands from the bus, with the "
+            f"maker's tool; {ELSE_UNUSABLE}"
+        )
+    needed = "canbase needs this object: look it up in the manual of the drive"
     return needed + (f", and see `{key}` of its drive profile" if key else "")
 
 
@@ -208,7 +236,8 @@ class NodeAccess:
         found = None if needs_no_look else (yield from self._read(step))
         if found is not None and not _same(found, step.data):
             problem = f"{step} is {_hex(found)}, expected {_hex(step.data)}{refusal}"
-            raise BootError(self.node_id, problem, "Set it with the maker's tool, or look for what sets it otherwise")
+            other = "find what else sets it: another master, an input, a program in the drive"
+            raise BootError(self.node_id, problem, f"Set it with the maker's tool, or {other}")
         self.note_change(step, before)
 
     def _shows(self, shown_at: Read, step: Write) -> Steps[bool]:
@@ -235,10 +264,11 @@ class NodeAccess:
         try:
             yield from self.set(step, known, unread=unread)
         except SdoAborted as refused:
-            self.notes.append(f"{step}: {refused.text}")
+            lacks_it = refused.code in (NO_OBJECT, NO_SUB_INDEX)
+            self.notes.append(f"{step}: {refused.text}{_without(step, lacks_it=lacks_it)}")
             return False
         except BootError as other:
-            self.notes.append(other.problem)
+            self.notes.append(f"{other.problem}{_without(step)}")
             return False
         return True
 
@@ -294,8 +324,22 @@ class NodeAccess:
 
 
 def _see(index: int, sub: int) -> str:
+    """The key that spares the boot the question, where the drive has no such object at all."""
     key = profile_key(index, sub)
-    return f" (drive profile: {key})" if key else ""
+    lacks = LACKS.get(key, "no") if key.startswith(("options.", "self_stop.")) else ""
+    return f"; where the drive does not have it, `{key}: {lacks}` in its drive profile" if lacks else ""
+
+
+def _without(step: Write, *, lacks_it: bool = False) -> str:
+    """What it means for the robot, and what helps: a proof by `canbase commission` counts where the drive lacks it."""
+    index = _first_axis(step.index)
+    meaning = WITHOUT.get((index, step.sub)) if step.value else None
+    if not meaning:
+        return ""
+    cure = "canbase commission shows whether it stops in another way" if lacks_it else "set it with the maker's tool"
+    if index in FOR_SELF_STOP:
+        return f"; so {meaning}: {cure}, else only a wired STO does"
+    return f"; so {meaning}" if lacks_it else f"; so {meaning}: {cure}"
 
 
 def _same(found: bytes, wanted: bytes) -> bool:
