@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from canbase_config.object_map import AXIS_OFFSET as SECOND_AXIS
-from canbase_driver.boot.steps import ELSE_UNUSABLE, OTHER_STATE, BootError, NodeAccess, Steps, unsigned
+from canbase_driver.boot.advice import ELSE_UNUSABLE, OTHER_STATE
+from canbase_driver.boot.steps import BootError, NodeAccess, Steps, unsigned
 from canbase_driver.cia301.pdo import AT_ONCE, AT_ONCE_TOO, EVERY_SYNC, NodeLayout, Pdo
 from canbase_driver.cia301.sdo_client import DEVICE_STATE, Read, SdoAborted, Write
 

@@ -15,7 +15,8 @@ from canbase_config.object_map import MODE, MODE_DISPLAY, TARGET_VELOCITY, place
 from canbase_config.profile import Profile, SdoWrite
 from canbase_config.robot import CYCLIC, DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
 from canbase_config.watchdog import LIFE_TIME_FACTOR, guard_time_ms
-from canbase_driver.boot.steps import GUARDING_ALONE, BootError, NodeAccess, Steps
+from canbase_driver.boot.advice import GUARDING_ALONE
+from canbase_driver.boot.steps import BootError, NodeAccess, Steps
 from canbase_driver.cia301.sdo_client import VALUE_INVALID, VALUE_TOO_HIGH, VALUE_TOO_LOW, Read, SdoAborted, Write
 from canbase_driver.drive_units import AxisUnits
 
