@@ -85,8 +85,9 @@ stops: $(WORLD_READY) ## p50, p99 and max of each stop and each lie in virtual t
 	PYTHONPATH=$(WORLD) python -m campaign.stops --write docs/stop_times.md --only '$(ONLY)'
 
 .PHONY: kinds
-kinds: $(WORLD_READY) ## each kind of drive without its masters, in virtual time: docs/stop_times.md
+kinds: $(WORLD_READY) ## each kind of drive without its masters, in virtual time: docs/stop_times.md, docs/drives/
 	PYTHONPATH=$(WORLD) python -m campaign.kinds --write docs/stop_times.md
+	PYTHONPATH=$(WORLD) python -m campaign.drive_pages
 
 .PHONY: soak
 soak: $(WORLD_READY) ## HOURS=20 of ordinary driving of random robots in virtual time: nothing may trip; SEED=7 tells one; LOADED=1 double payload on slopes

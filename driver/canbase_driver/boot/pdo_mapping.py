@@ -6,8 +6,9 @@ from dataclasses import replace
 
 from canbase_config.drive_values import FIRST_SPARE_TPDO
 from canbase_config.object_map import AXIS_OFFSET as SECOND_AXIS
-from canbase_driver.boot.steps import OTHER_STATE, BootError, NodeAccess, Steps, unsigned
-from canbase_driver.cia301.pdo import AT_ONCE, AT_ONCE_TOO, NodeLayout, Pdo
+from canbase_driver.boot.advice import ELSE_UNUSABLE, OTHER_STATE
+from canbase_driver.boot.steps import BootError, NodeAccess, Steps, unsigned
+from canbase_driver.cia301.pdo import AT_ONCE, AT_ONCE_TOO, EVERY_SYNC, NodeLayout, Pdo
 from canbase_driver.cia301.sdo_client import DEVICE_STATE, Read, SdoAborted, Write
 
 PDO_OFF = 1 << 31
@@ -113,16 +114,16 @@ def _switch_off(node: NodeAccess, index: int, cob_id: int) -> Steps[None]:
         yield from node.set_if_present(Write(index, 1, cob_id | PDO_OFF, 4), known=cob_id)
 
 
-def _suspend(node: NodeAccess, index: int, cob_id: int) -> Steps[str]:
-    """Off while it is changed. Not read back: a drive that left it on refuses the mapping. Why it refused, or empty."""
+def _suspend(node: NodeAccess, index: int, cob_id: int) -> Steps[SdoAborted | None]:
+    """Off while it is changed. Not read back: a drive that left it on refuses the mapping. Its refusal, or None."""
     if not cob_id & PDO_OFF:
         off = Write(index, 1, cob_id | PDO_OFF, 4)
         try:
             yield off
         except SdoAborted as refused:
             node.notes.append(f"{off}: {refused.text}")
-            return f"{off}: {refused.text}"
-    return ""
+            return refused
+    return None
 
 
 def _times(pdo: Pdo) -> list[Write]:
@@ -140,13 +141,15 @@ def _make_right(node: NodeAccess, layout: NodeLayout, pdo: Pdo, found: int, cob_
         if mapped is not None:
             yield from _map_what_it_takes(node, pdo, mapped)
     except (SdoAborted, BootError) as refused:
-        if not stays_on:
+        if stays_on is None:
             raise
         why = refused.text if isinstance(refused, SdoAborted) else refused.problem
-        problem = f"{pdo.name} cannot be switched off ({stays_on}), nor mapped while it is on ({why})"
-        raise BootError(
-            node.node_id, problem, "Set its COB-ID and mapping of docs/bus.md with the maker's tool"
-        ) from refused
+        off = f"{pdo.communication:04X}h:1: {stays_on.text}"
+        problem = f"{pdo.name} cannot be switched off ({off}), nor mapped while it is on ({why})"
+        tool = (
+            f"Let {pdo.name} carry {_needed(pdo)} with COB-ID {pdo.cob_id:03X}h, by the maker's tool; {ELSE_UNUSABLE}"
+        )
+        raise BootError(node.node_id, problem, OTHER_STATE if stays_on.code == DEVICE_STATE else tool) from refused
     try:
         yield from _set_type(node, pdo, unread=mapped is not None and pdo.transmission_type != AT_ONCE)
     except BootError as refused:
@@ -170,7 +173,7 @@ def _is_timed(node: NodeAccess, pdo: Pdo) -> Steps[bool]:
 
 def _set_type(node: NodeAccess, pdo: Pdo, *, unread: bool) -> Steps[None]:
     """Where a drive refuses one of the two event-driven types, it may take the other one."""
-    why, is_fixed = "", False
+    why = ""
     for value in _types(pdo):
         try:
             yield from node.set(Write(pdo.communication, TYPE, value, 1), unread=unread)
@@ -179,12 +182,12 @@ def _set_type(node: NodeAccess, pdo: Pdo, *, unread: bool) -> Steps[None]:
                 raise
             why = why or f"{pdo.communication:04X}h:{TYPE}: {refused.text}"
         except BootError as other:
-            why, is_fixed = why or other.problem, True
+            why = why or other.problem
         else:
             return
     found = yield from node.read_if_present(pdo.communication, TYPE)
     problem = f"{why}, {pdo.name} does not take type {_types(pdo)[0]}"
-    raise BootError(node.node_id, problem, _about_type(pdo, is_fixed=is_fixed and found not in EVENT_TYPES))
+    raise BootError(node.node_id, problem, (yield from _about_type(node, pdo, found)))
 
 
 def _set_by_event(node: NodeAccess, layout: NodeLayout, pdo: Pdo, refused: BootError) -> Steps[None]:
@@ -206,7 +209,7 @@ def _set_by_event(node: NodeAccess, layout: NodeLayout, pdo: Pdo, refused: BootE
                 node.node_id,
                 f"{refused.problem}, nor {time}",
                 f"Without SYNC it must come every {own.event_timer_ms} ms: set this with the maker's tool; "
-                "where that cannot be done, the drive cannot be used",
+                f"{ELSE_UNUSABLE}",
             )
     how = f"it is sent every {own.event_timer_ms} ms by its timer" if pdo.is_heard else "it acts when it arrives"
     node.notes.append(f"{refused.problem}: {how} (type 255 or 254)")
@@ -216,18 +219,16 @@ def _types(pdo: Pdo) -> tuple[int, ...]:
     return EVENT_TYPES if pdo.transmission_type == AT_ONCE else (pdo.transmission_type,)
 
 
-def _about_type(pdo: Pdo, *, is_fixed: bool) -> str:
-    if pdo.transmission_type != AT_ONCE and not is_fixed:
-        tool = f"set it to {pdo.transmission_type} with the maker's tool"
-        return f"It takes no event-driven type either: {tool}; where that cannot be done, the drive cannot be used"
-    if pdo.transmission_type != AT_ONCE:
-        return f"Its type is fixed: set it to {pdo.transmission_type} with the maker's tool"
-    if pdo.event_timer_ms is not None:
+def _about_type(node: NodeAccess, pdo: Pdo, found: int | None) -> Steps[str]:
+    """What cures it. The key of the profile, only where the drive takes the type that this key leads to."""
+    tool = f"Set {pdo.communication:04X}h:{TYPE} to {pdo.transmission_type} with the maker's tool"
+    if pdo.transmission_type == AT_ONCE and pdo.event_timer_ms is None:
+        return f"{tool}: the watchdog's quick stop cannot wait for a SYNC; {ELSE_UNUSABLE}"
+    if pdo.transmission_type == AT_ONCE and (
+        found == EVERY_SYNC or (yield from node.tries(Write(pdo.communication, TYPE, EVERY_SYNC, 1)))
+    ):
         return "The drive takes no event-driven PDO: set `pdo.synchronous: true` in its drive profile"
-    return (
-        "The watchdog's quick stop cannot wait for a SYNC: where the maker's tool cannot set an event-driven type "
-        "either, the drive cannot be used"
-    )
+    return f"It takes no other type either. {tool}; {ELSE_UNUSABLE}"
 
 
 def _map_what_it_takes(node: NodeAccess, pdo: Pdo, mapped: int) -> Steps[None]:
@@ -246,7 +247,10 @@ def _map_what_it_takes(node: NodeAccess, pdo: Pdo, mapped: int) -> Steps[None]:
 
 
 def _note_no_torque(node: NodeAccess, why: str) -> None:
-    node.notes.append(f"torque unknown: {why}; see options.torque of its drive profile, watchdog.stand_proof")
+    node.notes.append(
+        f"torque unknown: {why}. In its drive profile, options.torque names another object or none; without torque the "
+        "power goes off for a moment at each standstill (watchdog.stand_proof)"
+    )
 
 
 def _map(node: NodeAccess, pdo: Pdo, mapped: int) -> Steps[None]:
@@ -279,9 +283,12 @@ def _unmapped(node: NodeAccess, pdo: Pdo, sub: int, what: str, refused: SdoAbort
     problem = f"{pdo.name} does not take {what} ({pdo.mapping_object:04X}h:{sub}: {refused.text})"
     if refused.code == DEVICE_STATE:
         return BootError(node.node_id, problem, OTHER_STATE)
-    needed = ", ".join(_named(entry) for entry in pdo.mapping[: len(pdo.mapping) - pdo.optional])
-    tool = f"Let {pdo.name} carry {needed} with the maker's tool"
-    return BootError(node.node_id, problem, f"{tool}; where that cannot be done, the drive cannot be used")
+    tool = f"Let {pdo.name} carry {_needed(pdo)} with the maker's tool"
+    return BootError(node.node_id, problem, f"{tool}; {ELSE_UNUSABLE}")
+
+
+def _needed(pdo: Pdo) -> str:
+    return ", ".join(_named(entry) for entry in pdo.mapping[: len(pdo.mapping) - pdo.optional])
 
 
 def _named(entry: int) -> str:

@@ -126,15 +126,16 @@ class _Boot:
     def _wait_for_the_drive(self) -> Steps[None]:
         """For ever. A node in NMT stopped does not answer, so it is sent to pre-operational. A refusal is an answer."""
         device_type: int | None = None
+        known = len(self._node.notes)
         while True:
             try:
                 device_type = yield from self._node.read_if_present(DEVICE_TYPE)
                 break
             except SdoTimeout:
                 yield SendNmt(NmtCommand.ENTER_PRE_OPERATIONAL)
-        if device_type is None:
-            self._node.notes.append("it has no 1000h, as every CANopen device should")
-        elif device_type & 0xFFFF != PROFILE_402:
+        if device_type is None and len(self._node.notes) == known:
+            self._node.notes.append("it has no 1000h, which CiA 301 requires of every device")
+        elif device_type is not None and device_type & 0xFFFF != PROFILE_402:
             # Some real drives report another profile or none, so this alone is no reason to refuse.
             self._node.notes.append(f"1000h:0 is {device_type:08X}h, not the profile 402 (0192h) of a motor drive")
 

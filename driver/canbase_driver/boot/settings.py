@@ -15,7 +15,8 @@ from canbase_config.object_map import MODE, MODE_DISPLAY, TARGET_VELOCITY, place
 from canbase_config.profile import Profile, SdoWrite
 from canbase_config.robot import CYCLIC, DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
 from canbase_config.watchdog import LIFE_TIME_FACTOR, guard_time_ms
-from canbase_driver.boot.steps import GUARDING_ALONE, BootError, NodeAccess, Steps
+from canbase_driver.boot.advice import GUARDING_ALONE
+from canbase_driver.boot.steps import BootError, NodeAccess, Steps
 from canbase_driver.boot.vl_settings import KeptRamp, configure_vl, set_vl_ramp
 from canbase_driver.cia301.sdo_client import VALUE_INVALID, VALUE_TOO_HIGH, VALUE_TOO_LOW, Read, SdoAborted, Write
 from canbase_driver.drive_units import AxisUnits
@@ -159,6 +160,11 @@ def _configure_ramps(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None
         if kept is None or key is None:
             continue
         needed, has = getattr(robot.limits, key), kept.mps2
+        if has is None:
+            value = AxisUnits(drive, robot.base).acceleration_raw(needed)
+            least = f"{needed:g} m/s² (limits.{key}), a value of {value}"
+            node.notes.append(f"how hard {drive.joint} brakes is unknown: it must be at least {least}{kept.what}")
+            continue
         if has >= KEPT_SHARE * needed:
             continue
         problem = f"{kept.what}: {drive.joint} brakes with {has:.3g} m/s² by it"
@@ -168,7 +174,7 @@ def _configure_ramps(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None
 
 
 def _set_ramp(node: NodeAccess, drive: Drive, robot: Robot, index: int, mps2: float) -> Steps[KeptRamp | None]:
-    """Returns what the drive keeps where it does not take it; None: it took it, or does not show what it has."""
+    """Returns what the drive keeps where it does not take it; None: it took it, or its profile says it has none."""
     units, presence = AxisUnits(drive, robot.base), drive.kind.options.ramps
     write = write_at(drive, index, units.acceleration_raw(mps2))
     if (yield from node.set_if_present(write, presence)):
@@ -176,14 +182,20 @@ def _set_ramp(node: NodeAccess, drive: Drive, robot: Robot, index: int, mps2: fl
     if presence == "no" or index not in STOPPING_LIMITS:
         return None
     raw = yield from node.read_if_present(write.index, write.sub)
-    kept = f"{write.index:04X}h:{write.sub} stays at {raw}"
-    return None if raw is None else KeptRamp(kept, units.acceleration_mps2(raw))
+    if raw is None:
+        return KeptRamp()
+    return KeptRamp(f"{write.index:04X}h:{write.sub} stays at {raw}", units.acceleration_mps2(raw))
 
 
 def _refuse_coasting(node: NodeAccess, drive: Drive) -> Steps[None]:
     """605Ah of 0 that the drive keeps: a quick stop takes the power away, and the wheel rolls out."""
     at = place(drive.kind, QUICK_STOP_OPTION, drive.axis)
-    if drive.kind.options.quick_stop == "no" or (yield from node.read_if_present(at.index, at.sub)) != COASTS:
+    if drive.kind.options.quick_stop == "no":
+        return
+    found = yield from node.read_if_present(at.index, at.sub)
+    if found is None:
+        node.notes.append(f"how a quick stop ends is unknown: it must brake {drive.joint} and not let it coast")
+    if found != COASTS:
         return
     problem = f"{at.index:04X}h:{at.sub} stays at 0: a quick stop lets {drive.joint} coast"
     hint = "Set it to 2 with the maker's tool; where rolling out is right, options.quick_stop: no in its drive profile"
@@ -217,7 +229,7 @@ def _produce_heartbeat(node: NodeAccess, timeout_ms: int) -> Steps[None]:
         except SdoAborted as refused:
             refusal = refusal or f"1017h:0: {refused.text}"
             if refused.code not in VALUE_REFUSED:
-                node.notes.append(f"1017h:0: {refused.text}")
+                node.notes.append(f"1017h:0: {refused.text}; so its heartbeat must come by itself, within {longest} ms")
                 return
         except BootError as other:
             refusal = refusal or other.problem
@@ -238,7 +250,10 @@ def _refuse_heartbeat(node: NodeAccess, longest_ms: int, refusal: str) -> Steps[
         if period_ms > longest_ms and (yield from node.tries(Write(HEARTBEAT_PRODUCER, 0, period_ms, 2))):
             key = f"`timeouts.drive_heartbeat_s: {HEARTBEATS_NEEDED * period_ms / 1000:g}`"
             raise BootError(node.node_id, problem, f"It takes {period_ms} ms: set {key} in robot.yaml")
-    none = f"Nor any up to {HEARTBEAT_PERIODS_MS[-1]} ms: {GUARDING_ALONE}; without either it cannot be used"
+    tool = f"set 1017h:0 to 1 to {longest_ms} with the maker's tool"
+    none = (
+        f"Nor any up to {HEARTBEAT_PERIODS_MS[-1]} ms: {tool}, or, {GUARDING_ALONE}; without either it cannot be used"
+    )
     raise BootError(node.node_id, problem, none)
 
 
@@ -262,7 +277,8 @@ def _watch_heartbeats(node: NodeAccess, kind: Profile, timeout_ms: int) -> Steps
     known = kind.self_stop.heartbeat_entries
     entries = 0 if known == 0 else (yield from node.read_if_present(HEARTBEAT_CONSUMER)) or 0
     if entries == 0:
-        node.notes.append("1016h: the drive watches no heartbeat, it will not stop by it")
+        guarding = "where it has node guarding, set `self_stop.node_guarding: true` in its drive profile"
+        node.notes.append(f"1016h: the drive monitors no heartbeat, and none stops it; {guarding}")
         return False
     watchdog, driver = (node_id << 16 | timeout_ms for node_id in (WATCHDOG_NODE_ID, DRIVER_NODE_ID))
     if entries == 2 and node.was_reset and (yield from _takes(node, watchdog, driver)):

@@ -10,21 +10,17 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from canbase_config.profile import Presence
+from canbase_driver.boot.advice import hint, see, without
 from canbase_driver.cia301.nmt import NmtCommand
 from canbase_driver.cia301.sdo_client import (
     ACCESS_UNSUPPORTED,
-    DEVICE_STATE,
-    LENGTH_WRONG,
     NO_OBJECT,
     NO_SUB_INDEX,
     READ_ONLY,
-    TOO_LONG,
-    TOO_SHORT,
     WRITE_ONLY,
     Read,
     SdoAborted,
     SdoError,
-    SdoTimeout,
     Write,
 )
 
@@ -89,77 +85,7 @@ class BootError(Exception):
 
 def boot_error(error: SdoError) -> BootError:
     """The message for the person at the machine about a transfer that failed after all its tries."""
-    return BootError(error.node_id, f"{error.index:04X}h:{error.sub}: {error.text}", _hint(error))
-
-
-PROFILE_KEYS: tuple[tuple[range, str], ...] = (
-    (range(0x100C, 0x100E), "self_stop.node_guarding"),
-    (range(0x1016, 0x1017), "self_stop.heartbeat_entries"),
-    (range(0x1017, 0x1018), "timeouts.drive_heartbeat_s of robot.yaml: a third of it is the period"),
-    (range(0x1019, 0x101A), "options.sync_counter"),
-    (range(0x1029, 0x102A), "self_stop.error_behaviour"),
-    (range(0x1600, 0x1800), "layout"),
-    (range(0x1A00, 0x1C00), "layout"),
-    (range(0x6007, 0x6008), "self_stop.abort_connection"),
-    (range(0x6042, 0x6045), "modes"),
-    (range(0x6046, 0x6047), "modes"),
-    (range(0x6048, 0x604B), "options.ramps"),
-    (range(0x604C, 0x604D), "units.target_velocity"),
-    (range(0x605A, 0x605B), "options.quick_stop"),
-    (range(0x605E, 0x605F), "options.fault_reaction"),
-    (range(0x6060, 0x6061), "modes"),
-    (range(0x6061, 0x6062), "options.mode_display"),
-    (range(0x606C, 0x606D), "layout.velocity_bits"),
-    (range(0x6077, 0x6079), "options.torque"),
-    (range(0x6083, 0x6086), "options.ramps"),
-    (range(0x60C2, 0x60C3), "options.interpolation"),
-    (range(0x60FF, 0x6100), "layout.target_bits"),
-)
-"""Object → the key of a drive profile (docs/drives.md) for whether, where or how wide the drive has it."""
-TRANSMISSION_TYPE = 2
-"""Sub-index of 1400h… and 1800h…."""
-GUARDING_ALONE = (
-    "where it has node guarding alone, set `self_stop.node_guarding: true` and `self_stop.heartbeat_entries: 0` in its "
-    "drive profile"
-)
-OTHER_STATE = "Switch the drive off and on again, and let no other master control it"
-WIDTHS = (LENGTH_WRONG, TOO_LONG, TOO_SHORT)
-
-
-def profile_key(index: int, sub: int = 0) -> str:
-    """The key of a drive profile that an object belongs to; empty: none. The second axis is at + 800h."""
-    if (0x1400 <= index < 0x1600 or 0x1800 <= index < 0x1A00) and sub == TRANSMISSION_TYPE:
-        return "pdo.synchronous"
-    first_axis = _first_axis(index)
-    return next((key for objects, key in PROFILE_KEYS if first_axis in objects), "")
-
-
-def _first_axis(index: int) -> int:
-    return index - 0x800 if 0x6800 <= index < 0x7000 else index
-
-
-OF_AN_AXIS = frozenset((0x6040, 0x6041, 0x6060, 0x6064, 0x606C, 0x60FF))
-"""What every axis of a CiA 402 drive has, by the index of the first one."""
-
-
-def _hint(error: SdoError) -> str:
-    if isinstance(error, SdoTimeout):
-        return "Check power, cable and bit rate, and that no other program uses the SDO channel of this node"
-    code = error.code if isinstance(error, SdoAborted) else 0
-    key, index = profile_key(error.index, error.sub), _first_axis(error.index)
-    if code == DEVICE_STATE:
-        return OTHER_STATE
-    if code in (NO_OBJECT, NO_SUB_INDEX) and index in OF_AN_AXIS:
-        return "Every axis of a CiA 402 drive has it: check `axis` in robot.yaml, and that the drive is set to CiA 402"
-    if index == 0x6060 and code not in WIDTHS:
-        return (
-            "The drive must support `mode` of robot.yaml, see 6502h: bit 2 is mode 3, bit 8 is mode 9, bit 1 is mode 2"
-        )
-    if code in WIDTHS:
-        where = f"see `{key}` of its drive profile" if key.startswith("layout.") else "such a drive cannot be used"
-        return f"The drive has this object in another width than CiA 402 and its profile: {where}"
-    needed = "canbase needs this object as docs/bus.md has it; look it up in the manual of the drive"
-    return needed + (f", and see `{key}` of its drive profile" if key else "")
+    return BootError(error.node_id, f"{error.index:04X}h:{error.sub}: {error.text}", hint(error))
 
 
 class NodeAccess:
@@ -182,7 +108,7 @@ class NodeAccess:
             return unsigned((yield Read(index, sub)))
         except SdoAborted as refused:
             if refused.code not in (NO_OBJECT, NO_SUB_INDEX):
-                self.notes.append(f"{index:04X}h:{sub} cannot be read: {refused.text}{_see(index, sub)}")
+                self.notes.append(f"{index:04X}h:{sub} cannot be read: {refused.text}{see(index, sub)}")
             return None
 
     def set(
@@ -214,7 +140,8 @@ class NodeAccess:
         found = None if needs_no_look else (yield from self._read(step))
         if found is not None and not _same(found, step.data):
             problem = f"{step} is {_hex(found)}, expected {_hex(step.data)}{refusal}"
-            raise BootError(self.node_id, problem, "Set it with the maker's tool, or look for what sets it otherwise")
+            other = "find what else sets it: another master, an input, a program in the drive"
+            raise BootError(self.node_id, problem, f"Set it with the maker's tool, or {other}")
         self.note_change(step, before)
 
     def _shows(self, shown_at: Read, step: Write) -> Steps[bool]:
@@ -241,10 +168,11 @@ class NodeAccess:
         try:
             yield from self.set(step, known, unread=unread)
         except SdoAborted as refused:
-            self.notes.append(f"{step}: {refused.text}")
+            lacks_it = refused.code in (NO_OBJECT, NO_SUB_INDEX)
+            self.notes.append(f"{step}: {refused.text}{without(step, lacks_it=lacks_it)}")
             return False
         except BootError as other:
-            self.notes.append(other.problem)
+            self.notes.append(f"{other.problem}{without(step)}")
             return False
         return True
 
@@ -297,11 +225,6 @@ class NodeAccess:
                 raise
             return None
         return found
-
-
-def _see(index: int, sub: int) -> str:
-    key = profile_key(index, sub)
-    return f" (drive profile: {key})" if key else ""
 
 
 def _same(found: bytes, wanted: bytes) -> bool:

@@ -29,9 +29,9 @@ SPEED, SECONDS = 1, 2
 class KeptRamp:
     """A ramp that a drive does not let others set. `what`: the object and its value, a sentence without its end."""
 
-    what: str
-    mps2: float
-    """At the rim of the wheel."""
+    what: str = ""
+    mps2: float | None = None
+    """At the rim of the wheel; None: the drive does not show it, and `what` has the unit of its value."""
 
 
 def configure_vl(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None]:
@@ -61,20 +61,22 @@ def configure_vl(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None]:
 
 def set_vl_ramp(node: NodeAccess, drive: Drive, robot: Robot, index: int, mps2: float) -> Steps[KeptRamp | None]:
     """The ramp that mode 2 has in place of `index` (6083h to 6085h). Returns what the drive keeps where it does not
-    take it; None: it took it, or does not show what it has."""
+    take it; None: it took it, or its profile says it has none."""
     units, presence = AxisUnits(drive, robot.base), drive.kind.options.ramps
     at = RAMPS[index] + AXIS_OFFSET * drive.axis
     seconds: int | None = 1
     if not (yield from node.set_if_present(Write(at, SECONDS, 1, 2), presence)):
-        seconds = None if presence == "no" else (yield from node.read_if_present(at, SECONDS))
+        if presence == "no":
+            return None
+        seconds = yield from node.read_if_present(at, SECONDS)
     if seconds is None:
-        return None
+        return KeptRamp(f" in 1 s in {at:04X}h")
     speed = units.acceleration_raw(mps2 * max(seconds, 1))
     if (yield from node.set_if_present(Write(at, SPEED, speed, 4), presence)):
         return None
     kept = yield from node.read_if_present(at, SPEED)
     if kept is None:
-        return None
+        return KeptRamp(f" in {seconds} s in {at:04X}h")
     has = units.acceleration_mps2(kept) / seconds if seconds else math.inf
     return KeptRamp(f"{at:04X}h stays at {kept} in {seconds} s", has)
 

@@ -19,9 +19,10 @@ from enum import Enum
 
 from canbase_config.profile import Profile
 from canbase_config.robot import Robot
+from canbase_driver.boot.advice import GUARDING_ALONE
 from canbase_driver.boot.node_boot import NodeBoot
 from canbase_driver.boot.sequence import BootReport
-from canbase_driver.boot.steps import GUARDING_ALONE, Patience
+from canbase_driver.boot.steps import Patience
 from canbase_driver.cia301.emcy import Emcy, parse_emcy
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import ALL_NODES, NmtCommand, NmtState, nmt, parse_heartbeat

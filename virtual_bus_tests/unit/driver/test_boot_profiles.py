@@ -44,7 +44,8 @@ def test_two_hub_motors_on_one_controlword() -> None:
     drive = FakeDrive(objects=hub_motors())
     boot, _ = booted(drive, of_kind("zlac8015d"))
     assert notes_of(boot) == (
-        "1016h: the drive watches no heartbeat, it will not stop by it",
+        "1016h: the drive monitors no heartbeat, and none stops it; where it has node guarding, set "
+        "`self_stop.node_guarding: true` in its drive profile",
         "2000h:0: communication offline time is set, but not proven to stop the motor",
     )
     assert boot.report is not None

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import pytest
 
+from canbase_config.robot import Robot
 from canbase_driver.boot.node_boot import NodeBoot
 from canbase_driver.cia301.frame import Frame
 from support.fake_drive import (
@@ -26,15 +27,28 @@ from support.fake_drive import (
 )
 from support.fake_drive import robot as fake_robot
 
+BY_HAND = "set it with the maker's tool"
+NO_SELF_STOP = (
+    "or node guarding stops the motor: canbase commission shows whether it stops in another way, "
+    "else only a wired STO does"
+)
+
 
 @pytest.mark.parametrize(
     ("index", "sub", "note"),
     [
-        (0x1017, 0, "1017h:0: 0602 0000h the object does not exist"),  # it may send one all the same
+        (
+            0x1017,
+            0,
+            "1017h:0: 0602 0000h the object does not exist; so its heartbeat must come by itself, within 150 ms",
+        ),
         (0x1029, 1, "1029h:1: 0602 0000h the object does not exist"),
-        (0x605A, 0, "605Ah:0: 0602 0000h the object does not exist"),
-        (0x605E, 0, "605Eh:0: 0602 0000h the object does not exist"),
-        (0x6084, 0, "6084h:0: 0602 0000h the object does not exist"),
+        (
+            0x605E,
+            0,
+            "605Eh:0: 0602 0000h the object does not exist; so a fault may take the power away and let the wheel coast",
+        ),
+        (0x6083, 0, "6083h:0: 0602 0000h the object does not exist"),
     ],
 )
 def test_a_missing_option_is_a_note(index: int, sub: int, note: str) -> None:
@@ -46,11 +60,51 @@ def test_a_missing_option_is_a_note(index: int, sub: int, note: str) -> None:
     assert boot.report.stops_by_itself
 
 
+@pytest.mark.parametrize(
+    ("index", "unknown"),
+    [
+        (0x605A, "how a quick stop ends is unknown: it must brake left and not let it coast"),
+        (
+            0x6084,
+            "how hard left brakes is unknown: it must be at least 0.5 m/s² (limits.deceleration_mps2), a value of 955",
+        ),
+        (
+            0x6085,
+            "how hard left brakes is unknown: it must be at least 1.5 m/s² (limits.emergency_deceleration_mps2), a "
+            "value of 2865",
+        ),
+    ],
+)
+def test_a_stop_that_cannot_be_set_nor_read_is_named_with_the_value_that_it_needs(index: int, unknown: str) -> None:
+    drive = FakeDrive()
+    del drive.objects[index, 0]
+    boot = boot_one_axis(drive)
+    assert notes_of(boot) == (f"{index:04X}h:0: 0602 0000h the object does not exist", unknown)
+    assert boot.report is not None
+    assert boot.report.stops_by_itself
+
+
 def test_a_drive_without_6007h_does_not_stop_by_itself() -> None:
     drive = FakeDrive()
     del drive.objects[0x6007, 0]
     boot = boot_one_axis(drive)
-    assert notes_of(boot) == ("6007h:0: 0602 0000h the object does not exist",)
+    assert notes_of(boot) == ("6007h:0: 0602 0000h the object does not exist; so no lost heartbeat " + NO_SELF_STOP,)
+    assert boot.report is not None
+    assert not boot.report.stops_by_itself
+
+
+@pytest.mark.parametrize(
+    ("key", "so"),
+    [
+        ((0x1016, 1), "so it does not stop by the watchdog's heartbeat"),
+        ((0x6007, 0), "so no lost heartbeat or node guarding stops the motor"),
+    ],
+)
+def test_what_a_drive_refuses_of_its_self_stop_is_named_with_what_that_means(key: Key, so: str) -> None:
+    """A proof by commissioning would not count: the drive has both objects, so it is not offered."""
+    boot = boot_one_axis(FakeDrive(refuse={key: INVALID}))
+    assert any(f"{so}: {BY_HAND}, else only a wired STO does" in note for note in notes_of(boot))
+    assert "canbase commission" not in str(notes_of(boot))
     assert boot.report is not None
     assert not boot.report.stops_by_itself
 
@@ -60,7 +114,10 @@ def test_a_drive_without_1016h_does_not_stop_by_itself() -> None:
     for sub in range(3):
         del drive.objects[0x1016, sub]
     boot = boot_one_axis(drive)
-    assert notes_of(boot) == ("1016h: the drive watches no heartbeat, it will not stop by it",)
+    assert notes_of(boot) == (
+        "1016h: the drive monitors no heartbeat, and none stops it; where it has node guarding, set "
+        "`self_stop.node_guarding: true` in its drive profile",
+    )
     assert boot.report is not None
     assert not boot.report.stops_by_itself
 
@@ -93,7 +150,10 @@ def test_an_option_that_the_drive_changes_is_a_note() -> None:
 def test_a_read_only_option_passes_when_it_is_right_and_is_a_note_when_not() -> None:
     drive = FakeDrive(refuse={(0x605A, 0): READ_ONLY, (0x605E, 0): READ_ONLY})
     drive.objects[0x605A, 0] = u16(2)
-    assert notes_of(boot_one_axis(drive)) == ("605Eh:0 is 0000h, expected 0002h (0601 0002h the object is read-only)",)
+    assert notes_of(boot_one_axis(drive)) == (
+        "605Eh:0 is 0000h, expected 0002h (0601 0002h the object is read-only); so a fault may take the power away and "
+        "let the wheel coast: " + BY_HAND,
+    )
 
 
 def test_a_mode_that_can_only_be_written_is_believed() -> None:
@@ -107,13 +167,16 @@ def test_a_fixed_mapping_that_is_right_is_left_alone() -> None:
     assert notes_of(boot_one_axis(drive)) == ()
 
 
-NO_TORQUE = "see options.torque of its drive profile, watchdog.stand_proof"
+NO_TORQUE = (
+    "In its drive profile, options.torque names another object or none; without torque the power goes off for a moment "
+    "at each standstill (watchdog.stand_proof)"
+)
 
 
 def test_a_drive_without_torque_does_without() -> None:
     drive = FakeDrive()
     del drive.objects[0x6077, 0]
-    notes = ("torque unknown: the drive has no 6077h:0; " + NO_TORQUE,)
+    notes = ("torque unknown: the drive has no 6077h:0. " + NO_TORQUE,)
     assert notes_of(boot_one_axis(drive)) == notes
     assert [drive.number(0x1A01, sub) for sub in range(2)] == [1, 0x606C_0020]
 
@@ -209,7 +272,11 @@ def test_where_the_wanted_heartbeat_period_is_refused_the_nearest_allowed_one_is
     [
         (160, "It takes 160 ms: set `timeouts.drive_heartbeat_s: 0.32` in robot.yaml"),
         (500, "It takes 500 ms: set `timeouts.drive_heartbeat_s: 1` in robot.yaml"),
-        (501, "Nor any up to 500 ms: where it has node guarding alone, set `self_stop.node_guarding: true`"),
+        (
+            501,
+            "Nor any up to 500 ms: set 1017h:0 to 1 to 150 with the maker's tool, or, where it has node guarding alone",
+        ),
+        (501, "set `self_stop.node_guarding: true` and `self_stop.heartbeat_entries: 0` in its drive profile"),
     ],
 )
 def test_a_drive_that_takes_no_heartbeat_period_that_is_short_enough_is_tried_with_longer_ones(
@@ -292,7 +359,11 @@ def test_a_drive_that_takes_neither_type_is_one_for_the_makers_tool() -> None:
 
 @pytest.mark.parametrize("abort", [0x06070010, 0x06070012, 0x06070013])
 @pytest.mark.parametrize(
-    ("key", "where"), [((0x60FF, 0), "see `layout.target_bits`"), ((0x6060, 0), "such a drive cannot be used")]
+    ("key", "where"),
+    [
+        ((0x60FF, 0), "set `layout.target_bits` in its drive profile to that of its manual, 16"),
+        ((0x6060, 0), "such a drive cannot be used"),
+    ],
 )
 def test_an_object_of_another_width_is_said_to_be_one(key: Key, where: str, abort: int) -> None:
     text = error_of(boot_one_axis(FakeDrive(refuse={key: abort})))
@@ -345,7 +416,16 @@ def test_an_answer_that_comes_late_and_then_again_names_no_second_drive() -> Non
 @pytest.mark.parametrize(
     ("key", "abort", "problem", "hint"),
     [
-        ((0x6060, 0), INVALID, "6060h:0: 0609 0030h value not valid", "must support `mode`"),
+        (
+            (0x6060, 0),
+            INVALID,
+            "6060h:0: 0609 0030h value not valid",
+            "Set `mode` in robot.yaml to one that the drive has, see 6502h",
+        ),
+        ((0x60FF, 0), INVALID, "60FFh:0: 0609 0030h", "let the drive take its commands from the bus"),
+        ((0x60FF, 0), GENERAL_ERROR, "60FFh:0: 0800 0000h", "check `axis` in robot.yaml"),
+        ((0x6041, 0), GENERAL_ERROR, "6041h:0: 0800 0000h", "check `axis` in robot.yaml"),
+        ((0x1400, 1), DEVICE_STATE, "RPDO1 cannot be switched off (1400h:1: 0800 0022h", "Switch the drive off and on"),
         ((0x60FF, 0), DEVICE_STATE, "60FFh:0: 0800 0022h", "Switch the drive off and on again"),
         ((0x6041, 0), NO_OBJECT, "6041h:0: 0602 0000h the object does not exist", "check `axis` in robot.yaml"),
         (
@@ -374,13 +454,56 @@ def test_a_refused_necessity_is_an_error(key: Key, abort: int, problem: str, hin
 def test_a_type_of_pdo_that_is_fixed_and_waits_for_another_sync_is_one_for_the_makers_tool() -> None:
     drive = FakeDrive(refuse={(0x1400, 2): READ_ONLY})
     drive.objects[0x1400, 2] = u8(10)
-    assert "Its type is fixed: set it to 1 with the maker's tool" in error_of(boot_one_axis(drive))
+    text = error_of(boot_one_axis(drive))
+    assert "It takes no other type either. Set 1400h:2 to 1 with the maker's tool; where that cannot be done" in text
+    assert "pdo.synchronous" not in text
+
+
+class Choosy(FakeDrive):
+    """It takes these values of one object alone."""
+
+    at: Key = (0, 0)
+    takes: frozenset[int] = frozenset()
+
+    def _write(self, key: Key, data: bytes) -> int:
+        return INVALID if key == self.at and data[0] not in self.takes else super()._write(key, data)
+
+
+@pytest.mark.parametrize(("takes", "key_helps"), [({254}, True), ({255}, True), ({0}, False), ({10}, False)])
+def test_the_key_for_pdos_without_sync_is_named_only_where_the_drive_takes_what_it_leads_to(
+    takes: set[int], key_helps: bool
+) -> None:
+    drive = Choosy()
+    drive.objects[0x1400, 2] = u8(0)
+    drive.at, drive.takes = (0x1400, 2), frozenset(takes)
+    text = error_of(boot_one_axis(drive))
+    assert ("set `pdo.synchronous: false`" in text) is key_helps
+    assert ("It takes no other type either. Set 1400h:2 to 1 with the maker's tool" in text) is not key_helps
+
+
+@pytest.mark.parametrize(("takes", "key_helps"), [({1}, True), ({0}, False)])
+def test_the_key_for_synchronous_pdos_is_named_only_where_the_drive_takes_them(
+    takes: set[int], key_helps: bool
+) -> None:
+    """The profile of Roboteq has `pdo.synchronous: false`."""
+    drive = Choosy(objects=factory_objects(axes=(0, 1)))
+    drive.objects |= {(0x1800 + i, sub): u16(0) for i in range(4) for sub in (3, 5)} | {(0x1800, 2): u8(0)}
+    drive.at, drive.takes = (0x1800, 2), frozenset(takes)
+    values = fake_robot().model_dump()
+    values["drives"] = [each | {"profile": "roboteq"} for each in values["drives"]]
+    base = Robot.model_validate(values)
+    text = error_of(Bench(drive, base, base.drives).run())
+    assert ("set `pdo.synchronous: true` in its drive profile" in text) is key_helps
+    assert ("It takes no other type either. Set 1800h:2 to 255" in text) is not key_helps
 
 
 def test_a_drive_that_refuses_1000h_is_there() -> None:
-    for refuse_read in ({(0x1000, 0): GENERAL_ERROR}, {(0x1000, 0): NO_OBJECT}):
+    for refuse_read, said in (
+        ({(0x1000, 0): GENERAL_ERROR}, "1000h:0 cannot be read: 0800 0000h general error"),
+        ({(0x1000, 0): NO_OBJECT}, "it has no 1000h, which CiA 301 requires of every device"),
+    ):
         notes = notes_of(boot_one_axis(FakeDrive(refuse_read=refuse_read)))
-        assert "it has no 1000h, as every CANopen device should" in notes
+        assert notes == (said,)
 
 
 def test_a_target_that_does_not_become_0_is_an_error() -> None:
