@@ -16,9 +16,10 @@ OPEN_UNIT = "0.1rpm"
 KINDS_TOGETHER = (
     ("epos4", "roboteq", "elmo_gold"),
     ("zlac8015d", "nanotec", "kinco"),
-    ("technosoft", "tmcm1636", "dryve_d1", "generic"),
+    ("technosoft", "tmcm1636", "dryve_d1", "inverter"),
 )
-"""Four axes a robot: they boot beside each other, turn together, and all stop for the fault of one."""
+"""Four axes a robot: they boot beside each other, turn together, and all stop for the fault of one. `generic` is the
+drive of most other tests on a bus."""
 REAL_SPEED_MPS = 0.05
 """Rim speed on a real bus: about the pace of a hand, with the wheels up."""
 

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from vm import independent_stacks
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 SLOW = "rates: {control_hz: 50.0, odometry_hz: 25.0, command_hz: 25.0}\naction: {control_hz: 20.0}\n"
@@ -40,6 +42,7 @@ def overlay(folder: Path) -> None:
     shutil.copytree(HERE / "guest", ours / "vm/guest", ignore=ignored)
     shutil.copytree(HERE.parent / "exit_matrix", ours / "exit_matrix", ignore=ignored)
     (ours / "support").mkdir()
+    independent_stacks.copy_to(independent_stacks.folder(), ours / "stacks")
     shutil.copy(HERE.parent / "support/bare_node.py", ours / "support")
 
 

@@ -56,12 +56,15 @@ def _failed(name: str, failure: str) -> Result:
     return {"name": name, "failure": failure, "took_s": 0.0, "row": None}
 
 
-def report(found: Sequence[Result], took_s: float) -> int:
-    """Print it. Exit code 0: every scenario came out as promised."""
+def report(found: Sequence[Result], took_s: float, skipped: Mapping[str, str]) -> int:
+    """Print it. Exit code 0: every scenario that ran came out as promised, and one did run. `skipped`: by name, why."""
     for result in found:
         print(f"{result['name']}: {result['failure'] or _told(result['row'])} [{result['took_s']:.0f} s in the guest]")
+    for name, why in skipped.items():
+        print(f"SKIPPED, nothing is known of it: {name}: {why}")
     bad = [result for result in found if result["failure"]]
-    print(f"{len(found)} scenarios, {len(bad)} failed, {took_s / 60.0:.1f} minutes", file=sys.stderr)
+    counts = f"{len(found)} scenarios, {len(bad)} failed, {len(skipped)} skipped"
+    print(f"{counts}, {took_s / 60.0:.1f} minutes", file=sys.stderr)
     return int(bool(bad) or not found)
 
 

@@ -1,7 +1,8 @@
 """From drives as they come out of their boxes to drives with node ids and a bit rate of their own: the steps. Pure.
 
 1. `discover`: every drive loses its node id until its next power cycle, and fastscan finds them one after the other.
-   What drives answer meanwhile is the same for all of them, so two with one node id do not disturb each other.
+   What drives answer meanwhile is the same for all of them, so two with one node id do not disturb each other. A drive
+   that was found gets a node id for the time being: so it leaves the scan.
 2. `master.set_up_all`: each takes its node id and the bit rate. Neither is in use, and nothing is stored.
 3. `master.change_rate`: all change their bit rate at once.
 4. `master.keep_all`: at the new rate, each proves that it is there, and stores. A drive that is lost before this step
@@ -53,7 +54,7 @@ def discover(census: Census, bitrate: int) -> Talk[list[Identity]]:
     elif not (yield from _unconfigured(WAITS_S[-1])):
         raise ConversationError(NO_LSS)
     likely = tuple(Identity(*kind, 0) for kind in sorted(census.kinds))
-    found = yield from scan_for_all(bitrate, likely)
+    found = yield from scan_for_all(bitrate, likely, census.node_ids)
     yield say(protocol.switch_all(configuration=False), wait_s=master.SETTLE_S)
     remaining = yield from read(census.node_ids, 0x1000, 0, bitrate, attempts=1)
     if remaining:

@@ -8,11 +8,14 @@ with longer waits.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Final
 
-from canbase_commissioning.conversation import ConversationError, Exchange, Progress, Talk
+from canbase_commissioning.conversation import ConversationError, Exchange, Progress, Talk, say
 from canbase_commissioning.lss import protocol
-from canbase_commissioning.lss.protocol import IDENTIFIED, Identity, is_answer
+from canbase_commissioning.lss.assignment import MAX_DRIVE_ID
+from canbase_commissioning.lss.master import ATTEMPTS, SETTLE_S
+from canbase_commissioning.lss.protocol import IDENTIFIED, SET_NODE_ID, Identity, is_answer
 from canbase_driver.cia301.frame import Frame
 
 WAITS_S: Final = (0.02, 0.06, 0.25)
@@ -24,12 +27,14 @@ GUESSES: Final = 8
 """More identities to try first would take longer than to scan."""
 
 
-def scan_for_all(bitrate: int, likely: tuple[Identity, ...] = ()) -> Talk[list[Identity]]:
-    """Every drive without a node id, by identity; afterwards they are in LSS configuration.
+def scan_for_all(bitrate: int, likely: tuple[Identity, ...] = (), taken: Collection[int] = ()) -> Talk[list[Identity]]:
+    """Every drive without a node id, by identity. Each has one afterwards, until its next power cycle: the highest that
+    is free of `taken`.
 
     `likely`: drives of these kinds come first to mind: their vendor, product and revision are tried as a whole.
     Raises ConversationError when drives answer and cannot be told apart.
     """
+    free = (node_id for node_id in range(MAX_DRIVE_ID, 0, -1) if node_id not in taken)
     found: list[Identity] = []
     while True:
         one = yield from _scan_patiently(bitrate, likely, len(found))
@@ -40,15 +45,25 @@ def scan_for_all(bitrate: int, likely: tuple[Identity, ...] = ()) -> Talk[list[I
                 f"two drives have the same identity, {one}, or it does not leave the scan: connect one at a time"
             )
         found.append(one)
+        yield from _leave(next(free))
         likely = (one, *likely)[:GUESSES]
+
+
+def _leave(node_id: int) -> Talk[None]:
+    """The drive that was found is alone in LSS configuration. It takes a node id and restarts with it, unstored.
+
+    Configuration alone is not enough: the LSS slave of CANopenNode (commit 9b8beed, CO_LSSslave.c) answers every
+    fastscan request there, and so hides the bits of all other drives.
+    """
+    yield Exchange((protocol.set_node_id(node_id),), is_answer(SET_NODE_ID), WAITS_S[-1])
+    yield say(protocol.switch_all(configuration=False), wait_s=SETTLE_S)
 
 
 def _scan_patiently(bitrate: int, likely: tuple[Identity, ...], number: int) -> Talk[Identity | None]:
     """None: nobody answers any more."""
     for wait_s in WAITS_S:
         pause_s = wait_s + FRAMES_BITS / bitrate
-        anybody = yield from _matches(protocol.scan_again(), WAITS_S[-1] if wait_s > WAITS_S[0] else 5 * pause_s)
-        if not anybody:
+        if not (yield from _is_anybody_left()):
             return None
         parts = yield from _scan(pause_s, likely, number)
         if parts is not None:
@@ -57,6 +72,14 @@ def _scan_patiently(bitrate: int, likely: tuple[Identity, ...], number: int) -> 
         "a drive without a node id answers fastscan, and its identity cannot be read: is the bus disturbed, or do two "
         "drives have the same serial number? Connect one drive at a time"
     )
+
+
+def _is_anybody_left() -> Talk[bool]:
+    """One lost frame must not end the scan: a drive that was found restarts meanwhile."""
+    for _ in range(ATTEMPTS):
+        if (yield from _matches(protocol.scan_again(), WAITS_S[-1])):
+            return True
+    return False
 
 
 def _scan(wait_s: float, likely: tuple[Identity, ...], number: int) -> Talk[tuple[int, int, int, int] | None]:

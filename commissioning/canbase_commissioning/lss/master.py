@@ -41,7 +41,7 @@ def select(identity: Identity, attempts: int = ATTEMPTS) -> Talk[None]:
 
 def set_up(identity: Identity, node_id: int, bitrate: int | None) -> Talk[None]:
     """The drive takes node id and bit rate [bit/s], None: keeps it; neither is in use yet. Raises ConversationError."""
-    yield from select(identity)
+    yield from select(identity, PATIENT)
     yield from _set(protocol.set_node_id(node_id), f"{identity}, node id {node_id}")
     if bitrate is not None:
         yield from _set(protocol.set_bit_rate(bitrate), f"{identity}, {bitrate} bit/s")

@@ -48,6 +48,7 @@ class LssSlave:
     """`send` takes the answers; `apply` is called when a pending node id is to become active by itself.
 
     `node_id` and `bitrate` [bit/s] are the active ones. `memory_fails`: a fault, STORE is refused.
+    `answers_every_scan`: in LSS configuration it answers each fastscan request, as that of CANopenNode does.
     """
 
     def __init__(
@@ -61,7 +62,7 @@ class LssSlave:
         """`identity`: of sub-indexes 1 to 4 of 1018h. Both settings are what is stored when the drive is new."""
         self._identity, self._send, self._apply = identity, send, apply
         self._stored = (node_id, bitrate)
-        self.memory_fails = False
+        self.memory_fails = self.answers_every_scan = False
         self.power_on()
 
     def power_on(self) -> None:
@@ -161,6 +162,8 @@ class LssSlave:
             self._answer(command, struct.pack("<I", self._identity(INQUIRE.index(command) + 1)))
         elif command == INQUIRE_NODE_ID:
             self._answer(command, bytes((self.node_id,)))
+        elif command == FASTSCAN and self.answers_every_scan:
+            self._answer(IDENTIFIED)
 
     def _set_node_id(self, node_id: int) -> None:
         fits = 1 <= node_id <= MAX_NODE_ID or node_id == UNCONFIGURED

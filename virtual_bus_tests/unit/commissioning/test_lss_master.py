@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from canbase_commissioning.conversation import Conversation
@@ -57,6 +59,42 @@ def test_one_late_answer_at_the_last_bit_confirms_no_wrong_serial_number() -> No
     assert found(world) == [FIRST, SECOND]
 
 
+def test_drives_that_answer_every_scan_in_configuration_are_found_with_their_right_serial_numbers() -> None:
+    """So does the LSS slave of CANopenNode: it has to be out of configuration before the next drive is looked for."""
+    world = RatedWorld()
+    for node in world.nodes:
+        node.lss.answers_every_scan = True
+    assert found(world) == [FIRST, SECOND]
+    assert [node_id for node_id, _ in world.settings] == [125, 124]
+    world.power_cycle()
+    assert [node_id for node_id, _ in world.settings] == [1, 1]
+
+
+def test_a_lost_frame_between_two_drives_does_not_hide_the_second_one() -> None:
+    world = RatedWorld()
+    lss = world.nodes[1].lss
+    on_frame = lss.on_frame
+    lost: list[bytes] = []
+
+    def loses_one(data: bytes, now_s: float) -> None:
+        if data[0] == 0x51 and data[5] == 0x80 and world.nodes[0].lss.node_id == 125 and not lost:
+            lost.append(data)
+            return
+        on_frame(data, now_s)
+
+    lss.on_frame = loses_one  # type: ignore[method-assign]
+    world.nodes[1]._route()
+    assert found(world) == [FIRST, SECOND]
+    assert len(lost) == 1
+
+
+def test_the_node_id_for_the_time_being_is_none_of_a_device_that_takes_no_lss() -> None:
+    world = RatedWorld(factory_fresh=False, bitrate=500_000)
+    census = world.talk(look(500_000))
+    world.talk(discover(replace(census, node_ids=(*census.node_ids, 125)), 500_000))
+    assert [node_id for node_id, _ in world.settings] == [124, 123]
+
+
 def test_two_drives_with_the_same_serial_number_are_not_set() -> None:
     world = RatedWorld()
     world.nodes[1].dictionary._fixed[key(0x1018, 4)] = FIRST.serial
@@ -96,7 +134,7 @@ def test_a_drive_with_another_identity_than_was_selected_is_not_set() -> None:
     lss._configure = lies  # type: ignore[method-assign]
     why = world.why(master.set_up_all({FIRST: 1}, None))
     assert "1018h:3 is 9h by LSS, 10000h was selected; nothing is set" in why
-    assert lss.pending_node_id == 255
+    assert lss.pending_node_id == 125
 
 
 def test_a_drive_that_was_unplugged_is_missed() -> None:
@@ -104,7 +142,7 @@ def test_a_drive_that_was_unplugged_is_missed() -> None:
     found(world)
     world.nodes[1].line.cut = True
     why = world.why(master.set_up_all({FIRST: 1, SECOND: 2}, None))
-    assert why == "serial 1A2Ch (0:CB402:10000): no answer to LSS 44h, 3 requests. Is it still connected?"
+    assert why == "serial 1A2Ch (0:CB402:10000): no answer to LSS 44h, 12 requests. Is it still connected?"
 
 
 def test_in_use_each_node_id_is_one_drive_with_the_identity_that_belongs_to_it() -> None:

@@ -93,9 +93,10 @@ def test_scenarios_of_the_virtual_robot_come_from_its_own_file() -> None:
         {"name": "driver SIGKILL", "failure": "", "took_s": 12.0, "row": None},
         {"name": "link down", "failure": "moved 0.4 m", "took_s": 9.0, "row": None},
     ]
-    cases = read_cases(junit(found, CODE))
+    cases = read_cases(junit(found, CODE, {"two robots": "not here"}))
     assert proof("virtual robot: driver SIGKILL", *cases).result is Result.PASSED
     assert proof("virtual robot: link down", *cases).result is Result.FAILED
+    assert proof("virtual robot: two robots", *cases).result is Result.SKIPPED
     assert proof("virtual robot: masked", *cases).result is Result.NOT_RUN
 
 

@@ -11,7 +11,8 @@ import can
 import pytest
 
 from canbase_config.load import load_robot
-from vm import table
+from vm import independent_stacks, table
+from vm.guest.candump import samples, speed
 from vm.guest.joystick import order_of
 from vm.guest.main import ALL, FIRST, SECOND, SHORT, bounded, names, shared_out
 from vm.guest.slcan_adapter import frame_of, line_of
@@ -100,14 +101,14 @@ def test_results_are_read_from_the_live_output(tmp_path: Path) -> None:
 
 
 def test_all_as_promised_is_success() -> None:
-    assert table.report([told("goal"), told("freeze")], 60.0) == 0
+    assert table.report([told("goal"), told("freeze")], 60.0, {}) == 0
 
 
 @pytest.mark.parametrize(("lines", "alive"), [([told("goal", "stood too late")], True), ([told("goal")], False)])
 def test_a_scenario_that_failed_and_a_guest_that_died_are_failures(
     tmp_path: Path, lines: list[table.Result], alive: bool
 ) -> None:
-    assert table.report(left(tmp_path / "job", *map(json.dumps, lines), alive=alive), 60.0) == 1
+    assert table.report(left(tmp_path / "job", *map(json.dumps, lines), alive=alive), 60.0, {}) == 1
 
 
 def test_a_scenario_that_came_to_no_end_is_a_failure_and_so_is_one_that_was_never_reached(tmp_path: Path) -> None:
@@ -153,7 +154,7 @@ def test_a_guest_that_talks_for_ever_is_not_waited_for_either() -> None:
 
 
 def test_no_result_is_no_success() -> None:
-    assert table.report([], 60.0) == 1
+    assert table.report([], 60.0, {}) == 1
 
 
 @pytest.fixture
@@ -234,6 +235,79 @@ def test_a_name_means_itself_alone() -> None:
 def test_no_word_means_all_of_them() -> None:
     assert names([]) == list(ALL)
     assert names(["first"]) + names(["second"]) == list(ALL)
+
+
+DUMP = """(10.000000) vcan0 080#
+(10.000100) vcan0 181#2706E8030000
+(10.000200) vcan0 182#27060000FFFF
+(10.000300) vcan0 281#10270000
+(10.500100) vcan0 181#2706E0070000
+(11.000100) vcan0 181#3702E00B0000
+(11.000100) vcan0 181#37
+(11."""
+
+
+def test_positions_of_a_drive_are_read_from_what_candump_has_written_so_far() -> None:
+    found = samples(DUMP.splitlines(), 1)
+
+    assert [(sample.time_s, sample.status, sample.position) for sample in found] == [
+        (10.0001, 0x0627, 1000),
+        (10.5001, 0x0627, 2016),
+        (11.0001, 0x0237, 3040),
+    ]
+    assert [sample.position for sample in samples(DUMP.splitlines(), 2)] == [-65536]
+
+
+def test_the_speed_of_a_drive_is_that_of_the_last_samples() -> None:
+    found = samples(DUMP.splitlines(), 1)
+
+    assert speed(found, 1.0) == pytest.approx(2040.0)
+    assert speed(found, 0.6) == pytest.approx(2048.0)
+    assert speed(found, 0.1) == speed(found[:1], 1.0) == speed([], 1.0) == 0.0
+
+
+def test_scenarios_with_programs_of_other_authors_are_skipped_with_the_remedy_where_nobody_provides_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    skipped = independent_stacks.skipped(names(["CANopenNode", "goal"]), None)
+
+    assert list(skipped) == ["CANopenNode"]
+    assert table.report([told("goal")], 60.0, skipped) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == (
+        "SKIPPED, nothing is known of it: CANopenNode: CANBASE_INDEPENDENT_STACKS names no folder with "
+        "canopend: docs/independent_stacks.md"
+    )
+
+
+def test_a_folder_without_one_of_the_programs_is_told_which_one(tmp_path: Path) -> None:
+    (tmp_path / "cia402_slave").touch()
+
+    skipped = independent_stacks.skipped(ALL, tmp_path)
+
+    assert skipped["drives of ros2_canopen"] == f"{tmp_path} has no cia402_slave.eds: docs/independent_stacks.md"
+
+
+def test_programs_of_other_authors_that_are_there_go_into_the_guest_and_nothing_else_does(tmp_path: Path) -> None:
+    programs = tmp_path / "programs"
+    programs.mkdir()
+    for name in ("canopend", "a_core_dump"):
+        (programs / name).write_text(name)
+
+    independent_stacks.copy_to(programs, tmp_path / "guest")
+
+    assert "CANopenNode" not in independent_stacks.skipped(ALL, programs)
+    assert [path.name for path in (tmp_path / "guest").iterdir()] == ["canopend"]
+
+
+def test_only_skipped_scenarios_boot_no_guest_and_are_no_success() -> None:
+    skipped = {"CANopenNode": "nobody provides it"}
+
+    assert shared_out([], 1) == shared_out([], 2) == []
+    assert table.report([], 0.0, skipped) == 1
+
+
+def test_every_scenario_that_needs_such_a_program_is_one() -> None:
+    assert set(independent_stacks.FILES) <= set(ALL)
 
 
 def test_a_word_that_means_none_is_told_what_there_is() -> None:

@@ -14,7 +14,17 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from types import FrameType
 
-from vm.guest import bus_failures, computer_failures, integrator, processor, two_robots, unit_failures, upgrade
+from vm.guest import (
+    bus_failures,
+    canopennode,
+    computer_failures,
+    integrator,
+    processor,
+    ros2_canopen,
+    two_robots,
+    unit_failures,
+    upgrade,
+)
 from vm.guest.robot import Robot
 from vm.guest.scenario import Row, Scenario
 from vm.guest.shutdown_trace import FOLDER
@@ -46,6 +56,8 @@ FIRST: dict[str, Scenario] = {
     "installed again": integrator.installed_again,
     "upgrade": upgrade.upgraded,
     "two robots": two_robots.two_robots,
+    "CANopenNode": canopennode.canopennode,
+    "drives of ros2_canopen": ros2_canopen.drives_of_ros2_canopen,
 }
 SECOND: dict[str, Scenario] = {
     **unit_failures.ORDERLY,
@@ -102,7 +114,7 @@ def names(words: Sequence[str]) -> list[str]:
 def shared_out(chosen: Sequence[str], guests: int) -> list[list[str]]:
     """Among guests that run side by side."""
     halves = [[name for name in chosen if name in half] for half in (FIRST, SECOND)]
-    return [half for half in halves if half] if guests > 1 else [list(chosen)]
+    return [part for part in (halves if guests > 1 else [list(chosen)]) if part]
 
 
 def _meant(word: str) -> list[str]:

@@ -6,6 +6,7 @@ import math
 import os
 import time
 from collections.abc import Callable
+from functools import cached_property
 from typing import TypeVar
 
 from canbase_cli.middleware import prefer_udp
@@ -54,10 +55,15 @@ class Robot:
         self.config = load_robot(ROBOT_YAML).robot
         self.evidence: Evidence = Evidence(self.node) if beside is None else beside.evidence
         self.client: DriveClient = DriveClient(self.node, self.executor) if beside is None else beside.client
-        self.sim = SimControl(control, timeout_s=20.0)
+        self._control = control
 
     def _on_status(self, message: DriverStatus) -> None:
         self.status, self.status_at = message, time.monotonic()
+
+    @cached_property
+    def sim(self) -> SimControl:
+        """Its simulated drives, connected at the first use: drives of another author have no control socket."""
+        return SimControl(self._control, timeout_s=20.0)
 
     def order(self, speed_mps: float | None) -> None:
         """By joystick, again and again; None: let go of it."""

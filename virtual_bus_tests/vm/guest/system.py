@@ -6,12 +6,16 @@ import os
 import signal
 import subprocess
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
 PARTS: Final = ("watchdog", "driver", "velocity", "action-server")
 TARGET: Final = "canbase@robot.target"
 ROBOT_YAML: Final = Path("/etc/canbase/robot.yaml")
+STACKS: Final = Path("/usr/lib/canbase-vm/stacks")
+"""Programs of other authors, where somebody provides them: vm/independent_stacks.py."""
 LIMIT_S: Final = 90.0
 """For a command."""
 
@@ -38,6 +42,28 @@ def run(*words: str, check: bool = True) -> str:
     return done.stdout.strip()
 
 
+@contextmanager
+def virtual_interface(name: str) -> Iterator[None]:
+    """A CAN interface without a controller."""
+    run("ip", "link", "add", name, "type", "vcan")
+    try:
+        run("ip", "link", "set", name, "up")
+        yield
+    finally:
+        run("ip", "link", "del", name, check=False)
+
+
+@contextmanager
+def background(name: str, *command: str) -> Iterator[None]:
+    """The command as a unit without a file, until it is left; what it prints is in the journal."""
+    environment = ("--setenv=_ROS_WHEELS_BOOTSTRAP_COMPLETE=1", "--setenv=PYTHONUNBUFFERED=1")
+    run("systemd-run", "--collect", f"--unit={name}", "--working-directory=/run", *environment, *command)
+    try:
+        yield
+    finally:
+        run("systemctl", "stop", name, check=False)
+
+
 def show(name: str, *properties: str) -> list[str]:
     """Properties of a unit, in that order: one call of systemctl, which costs this processor 20 ms."""
     lines = run("systemctl", "show", f"--property={','.join(properties)}", name).splitlines()
@@ -45,9 +71,9 @@ def show(name: str, *properties: str) -> list[str]:
     return [values[each] for each in properties]
 
 
-def send_signal(part: str, number: signal.Signals) -> tuple[float, str]:
+def send_signal(part: str, number: signal.Signals, robot: str = "robot") -> tuple[float, str]:
     """A signal to a part's main process: when it was sent [s, monotonic], and the process."""
-    (pid,) = show(unit(part), "MainPID")
+    (pid,) = show(unit(part, robot), "MainPID")
     now_s = time.monotonic()
     os.kill(int(pid), number)
     return now_s, pid
