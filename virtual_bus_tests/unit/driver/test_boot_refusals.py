@@ -354,7 +354,7 @@ def test_a_fixed_event_driven_type_is_taken_as_it_is() -> None:
 def test_a_drive_that_takes_neither_type_is_one_for_the_makers_tool() -> None:
     text = error_of(boot_one_axis(FakeDrive(refuse={(0x1400, 2): INVALID})))
     assert "1400h:2: 0609 0030h value not valid" in text
-    assert "It takes no event-driven type either: set it to 1 with the maker's tool" in text
+    assert "It takes no other type either. Set 1400h:2 to 1 with the maker's tool" in text
 
 
 @pytest.mark.parametrize("abort", [0x06070010, 0x06070012, 0x06070013])
@@ -469,16 +469,19 @@ class Choosy(FakeDrive):
         return INVALID if key == self.at and data[0] not in self.takes else super()._write(key, data)
 
 
-@pytest.mark.parametrize(("takes", "key_helps"), [({254}, True), ({255}, True), ({0}, False), ({10}, False)])
-def test_the_key_for_pdos_without_sync_is_named_only_where_the_drive_takes_what_it_leads_to(
-    takes: set[int], key_helps: bool
+@pytest.mark.parametrize(("takes", "is_usable"), [({254}, True), ({255}, True), ({0}, False), ({10}, False)])
+def test_a_drive_without_synchronous_setpoints_is_one_for_the_makers_tool_where_it_takes_no_event_either(
+    takes: set[int], is_usable: bool
 ) -> None:
     drive = Choosy()
     drive.objects[0x1400, 2] = u8(0)
     drive.at, drive.takes = (0x1400, 2), frozenset(takes)
-    text = error_of(boot_one_axis(drive))
-    assert ("set `pdo.synchronous: false`" in text) is key_helps
-    assert ("It takes no other type either. Set 1400h:2 to 1 with the maker's tool" in text) is not key_helps
+    boot = boot_one_axis(drive)
+    if is_usable:
+        assert boot.report is not None
+        assert any("it acts when it arrives (type 255 or 254)" in note for note in boot.report.notes)
+    else:
+        assert "It takes no other type either. Set 1400h:2 to 1 with the maker's tool" in error_of(boot)
 
 
 @pytest.mark.parametrize(("takes", "key_helps"), [({1}, True), ({0}, False)])
