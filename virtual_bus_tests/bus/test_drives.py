@@ -143,6 +143,8 @@ def test_a_defect_in_the_core_sends_quick_stops_ends_the_thread_and_is_kept(
     for drive in crew.robot.drives:
         node = tuple(each for each in crew.robot.drives if each.node_id == drive.node_id)
         cob_id = node_layout(drive.node_id, node, crew.robot).setpoint_cob_id(drive.axis)
-        assert [data[:6] for _, heard, data in around.heard if heard == cob_id][-3:] == [b"\x02\0\0\0\0\0"] * 3
+        last = [data for _, heard, data in around.heard if heard == cob_id][-3:]
+        assert [data[:2] for data in last] == [b"\x02\0"] * 3
+        assert not any(any(data[2:]) for data in last)
     assert around.truth.standing_s > 0.3
     assert driver.try_reset().sentence == "refused: the control loop has ended"

@@ -153,6 +153,20 @@ def test_one_answer_that_is_lost_trips_nothing() -> None:
     assert story.watchdog.status.state is State.WATCHING
 
 
+# 0 s another master requests node 1 too, as often: the drive would turn on without us ── 1 s foreign master
+def test_answers_to_requests_of_another_master_trip() -> None:
+    story = GuardedStory()
+    story.drive_at(400)
+    since = story.t
+    while story.watchdog.status.state is State.WATCHING and story.t < since + 3.0:
+        story.run(GUARDED_S)
+        story.watchdog.on_frame(0x701, bytes([story.left.toggle | story.left.nmt]), story.t)
+    verdict = story.watchdog.status.verdict
+    assert (verdict.cause.name, verdict.node_id) == ("FOREIGN_MASTER", 1)
+    assert "more answers to node guarding than one each 0.060 s" in verdict.detail
+    assert story.t - since < 2.0
+
+
 def test_its_requests_go_on_after_a_trip_and_are_withheld_with_its_heartbeat() -> None:
     story = GuardedStory()
     story.drive_at(400)
