@@ -23,20 +23,20 @@ class FeedbackWatch:
         if not 0.0 < timeout_s <= MAX_TIMEOUT_S:
             raise ValueError(f"the feedback timeout is {timeout_s} s; expected more than 0 and up to {MAX_TIMEOUT_S} s")
         self.timeout_s = timeout_s
-        self._heard_s = 0.0
+        self._received_s = 0.0
         self._looked_s: float | None = None
 
     def begin(self, now_s: float) -> None:
         """The client waits from now on."""
-        self._heard_s = self._looked_s = now_s
+        self._received_s = self._looked_s = now_s
 
-    def heard(self, now_s: float) -> None:
+    def received(self, now_s: float) -> None:
         """Feedback was read."""
-        self._heard_s = now_s
+        self._received_s = now_s
 
     def missing(self, now_s: float) -> bool:
         """No feedback for longer than the timeout."""
         if self._looked_s is None or now_s - self._looked_s > PAUSE_S:
             self.begin(now_s)
         self._looked_s = now_s
-        return now_s - self._heard_s > self.timeout_s
+        return now_s - self._received_s > self.timeout_s

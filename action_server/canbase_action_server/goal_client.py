@@ -189,12 +189,12 @@ class GoalClient(Generic[ResultT, FeedbackT]):
     def _feedback_to(
         self, watch: FeedbackWatch, on_feedback: Callable[[FeedbackT], None] | None
     ) -> Callable[[Any], None]:
-        def heard(message: Any) -> None:
-            watch.heard(time.monotonic())
+        def received(message: Any) -> None:
+            watch.received(time.monotonic())
             if on_feedback is not None:
                 on_feedback(self._read_feedback(message.feedback))
 
-        return heard
+        return received
 
 
 def _cancel_late(response: Any) -> None:

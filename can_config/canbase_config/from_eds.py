@@ -190,7 +190,7 @@ def _self_stop(eds: Eds, out: _Lines) -> None:
 
 
 def _can_be_guarded(eds: Eds) -> bool:
-    """It monitors node guarding and no heartbeat, and can be told to stop then."""
+    """It monitors node guarding and no heartbeat, and has 6007h, which can make it stop then."""
     return not eds.has(0x1016) and all(eds.has(index) for index in (0x100C, 0x100D, 0x6007))
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import copy
-import subprocess
 from typing import Final
 
 from canbase_commissioning.bus_monitor import Listener, ListenSession
-from canbase_commissioning.can_interface import Link, parse_link
+from canbase_commissioning.can_interface import Link
 from canbase_commissioning.onbus.bus_session import BusSession
+from canbase_commissioning.onbus.cable import read_link
 from canbase_commissioning.sdo_session import SdoSession
 from canbase_config.robot import Robot
 from canbase_doctor.bus_checks import BusEvidence
@@ -20,7 +20,6 @@ LISTEN_S: Final = 1.2
 """Long enough for heartbeats of a second."""
 GAP_S: Final = 0.01
 """Between two questions to a node beside a running driver: its own come first."""
-IP_S: Final = 5.0
 
 
 def look(robot: Robot) -> BusEvidence:
@@ -62,13 +61,3 @@ def evidence(
     }
     found = {node_id: task.result for node_id, task in inquiry.tasks.items() if task.result is not None}
     return BusEvidence(robot, heard, now_s, problem, link, found, unread)
-
-
-def read_link(channel: str) -> Link | None:
-    """The report of `ip` about an interface; None where there is none."""
-    words = ["ip", "-details", "-statistics", "-json", "link", "show", channel]
-    try:
-        done = subprocess.run(words, capture_output=True, text=True, timeout=IP_S, check=False)
-    except (OSError, subprocess.TimeoutExpired):
-        return None
-    return parse_link(done.stdout)

@@ -29,7 +29,7 @@ class Cable:
     def __init__(self, bus: Bus, person: Person, *, sets_link: bool) -> None:
         """`sets_link`: the command may call `ip link`; otherwise the person does. Exits with 1 where it cannot."""
         self.bus, self._person, self._sets_link = bus, person, sets_link
-        self.link = _read_link(bus.channel) if bus.interface == "socketcan" else None
+        self.link = read_link(bus.channel) if bus.interface == "socketcan" else None
         self.is_kept = False
         """The bit rate that it has now is the right one: it is not set back at the end."""
         self._rate = self.link.bitrate if self.link else 0
@@ -76,7 +76,7 @@ class Cable:
         else:
             text = f"The interface needs {bitrate} bit/s. In another terminal:\n{as_text(lines)}\nDone?"
             answered(self._person, Ask("link", text, confirms=True), lambda: time.sleep(THINKING_S))
-        there = _read_link(link.name)
+        there = read_link(link.name)
         if there is None or not there.is_up or there.bitrate != bitrate:
             found = "is not there" if there is None else f"has {there.bitrate} bit/s" if there.is_up else "is down"
             raise CommissionError(f"{link.name} {found}, {bitrate} bit/s is needed")
@@ -92,7 +92,8 @@ def _run(words: tuple[str, ...]) -> None:
         fail(f"{' '.join(words)}: {done.stderr.strip()}", FAILED)
 
 
-def _read_link(channel: str) -> Link | None:
+def read_link(channel: str) -> Link | None:
+    """What `ip` reports about an interface; None where there is none."""
     words = ["ip", "-details", "-statistics", "-json", "link", "show", channel]
     try:
         done = subprocess.run(words, capture_output=True, text=True, timeout=IP_S, check=False)

@@ -26,14 +26,14 @@ def test_feedback_is_missing_after_the_timeout_and_not_before() -> None:
 def test_feedback_once_a_second_is_enough() -> None:
     watch = FeedbackWatch(3.0)
     for second in range(60):
-        watch.heard(float(second))
+        watch.received(float(second))
         assert looks(watch, second + 0.1, second + 0.9) == []
 
 
 def test_after_the_last_feedback_the_timeout_begins() -> None:
     watch = FeedbackWatch(3.0)
     looks(watch, 0.0, 2.0)
-    watch.heard(2.0)
+    watch.received(2.0)
     assert looks(watch, 2.1, 6.0)[0] == pytest.approx(5.1, abs=0.05)
 
 

@@ -25,7 +25,7 @@ class Ip:
         self.link = Link("can0", kind, is_up=True, bitrate=500_000, restart_ms=100, queue_length=10)
         self.said: list[str] = []
         self.deaf = False
-        monkeypatch.setattr(cable, "_read_link", lambda channel: self.link)
+        monkeypatch.setattr(cable, "read_link", lambda channel: self.link)
         monkeypatch.setattr(cable, "_run", self._run)
         monkeypatch.setattr(cable, "open_line", self._open)
         monkeypatch.setattr("os.geteuid", lambda: 0)
