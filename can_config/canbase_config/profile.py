@@ -58,6 +58,15 @@ class Layout(Section):
     target_bits: Annotated[Literal[16, 32], Field(description="width of 60FFh; 16 for 6042h of mode 2")] = 32
     velocity_bits: Annotated[Literal[16, 32], Field(description="width of 606Ch; 16 for 6044h of mode 2")] = 32
 
+    @property
+    def fits_one_tpdo(self) -> bool:
+        """6041h, 6064h and the velocity have eight bytes together: one TPDO can carry all that canbase needs."""
+        return self.statusword == "own" and self.velocity_bits == 16
+
+    def tpdos(self, axes: int) -> int:
+        """How many TPDOs so many motors of one node need."""
+        return axes if self.fits_one_tpdo else 2 * axes
+
     @model_validator(mode="after")
     def _shared_needs_sub_index(self) -> Layout:
         if self.second_axis == "offset" and (self.controlword, self.statusword) != ("own", "own"):

@@ -289,8 +289,9 @@ class Robot(Section):
                 message = f"both motors of node {drive.node_id} need the same profile and mode"
                 raise MisfitError(message, ("drives", i, "profile"), ("drives", i, "node_id"))
             axes, pdo = sum(other.node_id == drive.node_id for other in self.drives), drive.kind.pdo
-            if pdo.rpdos < axes + 1 or pdo.tpdos < 2 * axes:
-                message = f"{axes} motor(s) need {axes + 1} RPDOs and {2 * axes} TPDOs; {drive.kind.title} has fewer"
+            tpdos = drive.kind.layout.tpdos(axes)
+            if pdo.rpdos < axes + 1 or pdo.tpdos < tpdos:
+                message = f"{axes} motor(s) need {axes + 1} RPDOs and {tpdos} TPDOs; {drive.kind.title} has fewer"
                 raise MisfitError(message, ("drives", i, "profile"), ("drives", i, "node_id"))
             if why := drive_values.misfit(drive.values, self.rates.control_hz, axes, pdo.tpdos):
                 raise MisfitError(f"values of {drive.joint}: {why}", ("drives", i, "values"))

@@ -365,7 +365,10 @@ class DriverCore:
         )
 
     def _on_status(self, node: CanopenNode, axis: Axis, frame: Frame, now_s: float) -> bool:
-        return self._answers_last_sync(now_s) and node.on_status(axis, frame, now_s)
+        understood = self._answers_last_sync(now_s) and node.on_status(axis, frame, now_s)
+        if axis.has_new_sample:  # its velocity came with it
+            self._feed.update(now_s)
+        return understood
 
     def _on_velocity(self, node: CanopenNode, axis: Axis, frame: Frame, now_s: float) -> bool:
         understood = self._answers_last_sync(now_s) and node.on_velocity(axis, frame, now_s)

@@ -7,7 +7,7 @@ recording with canbase's watchdog; the default mapping of CiA 402-2, where the l
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Final
 
@@ -227,7 +227,7 @@ _DEFAULT: Final = (
 
 
 def _of_robot(node: NodeLayout) -> list[tuple[int, PdoLayout]]:
-    """The PDOs of a node of robot.yaml; those that may be shorter in each length."""
+    """The PDOs of a node of robot.yaml, in each length that its boot can choose."""
     where = {
         (at.index, at.sub): (base, axis, at.shift)
         for axis in reversed(node.axes)
@@ -241,6 +241,9 @@ def _of_robot(node: NodeLayout) -> list[tuple[int, PdoLayout]]:
             axis = node.axes[min((pdo.number - 1) // 2, len(node.axes) - 1)] if pdo.kind == "TPDO" else node.axes[0]
             layout = _layout(pdo.name, node.node_id, entries, Source.ROBOT, where=where, packed_axis=axis)
             found.append((pdo.cob_id, layout))
+    if node.profile.layout.fits_one_tpdo and not node.joins_velocity:
+        joined = _of_robot(replace(node, joins_velocity=True))
+        found += [(cob_id, layout) for cob_id, layout in joined if layout.name.startswith("TPDO")]
     return found
 
 

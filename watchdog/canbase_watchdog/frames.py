@@ -24,7 +24,7 @@ DRIVER_HEARTBEAT = 0x77F
 WATCHDOG_HEARTBEAT = 0x77E
 
 STATUS_TPDO = (0x180, 0x380)
-"""6041h u16, 6064h i32 of the node's first and second axis."""
+"""6041h u16, 6064h i32 of the node's first and second axis; then 606Ch or 6044h i16 where it has no TPDO of its own."""
 VELOCITY_TPDO = (0x280, 0x480)
 """606Ch i32 of the node's first and second axis, and 6077h or 6078h i16 of a drive that reports its torque."""
 RATED = 1000.0
@@ -71,6 +71,7 @@ _STATUS = {False: struct.Struct("<Hi"), True: struct.Struct("<Ii")}
 """By whether the statusword is packed."""
 _SETPOINT = {16: struct.Struct("<Hh"), 32: struct.Struct("<Hi")}
 _VELOCITY = {16: struct.Struct("<h"), 32: struct.Struct("<i")}
+_JOINED = struct.Struct("<Hih")
 _TORQUE = struct.Struct("<h")
 TORQUE_BYTES = 2
 _U16 = struct.Struct("<H")
@@ -128,12 +129,20 @@ def asks_for_power(controlword: int) -> bool:
 
 
 def decode_status(data: bytes, layout: WatchedLayout = CIA_402, axis: int = 0) -> tuple[int, int] | None:
-    """Statusword 6041h of an axis and position 6064h of a status TPDO; None: of another length."""
+    """Statusword 6041h of an axis and position 6064h of a status TPDO, with a velocity behind it or not; None: of
+    another length."""
     form = _STATUS[layout.packed_statusword]
-    if len(data) != form.size:
+    if len(data) != form.size and decode_joined_velocity(data, layout) is None:
         return None
-    statusword, counts = form.unpack(data)
+    statusword, counts = form.unpack_from(data)
     return own_statusword(statusword, layout, axis), counts
+
+
+def decode_joined_velocity(data: bytes, layout: WatchedLayout = CIA_402) -> int | None:
+    """Velocity 606Ch or 6044h behind the position of a status TPDO; None: there is none in it. It must have 16 bits."""
+    if len(data) != _JOINED.size or layout.packed_statusword or layout.velocity_bits != 16:
+        return None
+    return int(_JOINED.unpack(data)[2])
 
 
 def own_statusword(value: int, layout: WatchedLayout, axis: int) -> int:

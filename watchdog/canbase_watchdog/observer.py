@@ -265,6 +265,9 @@ class Observer:
         record.feedback.on_position(status[1])
         record.push.on_position(status[1])
         record.stand.on_position(status[1], now_s)
+        bits = frames.decode_joined_velocity(data, record.drive.layout)
+        if bits is not None:
+            self._take_velocity(record, bits, None, now_s)
         return True
 
     def _note_state(self, record: _Record, statusword: int, now_s: float) -> bool:
@@ -283,15 +286,19 @@ class Observer:
         bits = frames.decode_velocity(data, record.drive.layout)
         if bits is None:
             return False
+        self._take_velocity(record, bits, frames.decode_torque(data, record.drive.layout), now_s)
+        return True
+
+    def _take_velocity(self, record: _Record, bits: int, torque: float | None, now_s: float) -> None:
+        """Out of a TPDO, behind the position of the same SYNC."""
         self._note_velocity(record, bits, now_s)
         record.fed_velocity_at = now_s
         record.answers += 1
         enabled, powered = record.state is ENABLED, frames.is_powered(record.state)
-        record.push.on_sample(frames.decode_torque(data, record.drive.layout), powered, now_s)
+        record.push.on_sample(torque, powered, now_s)
         record.feedback.on_velocity(record.velocity_mps, powered, enabled, now_s, record.push.last.share)
         if record.push.lies:
             record.feedback.evidence.doubt()
-        return True
 
     def _note_velocity(self, record: _Record, bits: int, now_s: float) -> None:
         record.velocity_mps, record.velocity_at = bits * record.drive.velocity_mps_per_bit, now_s

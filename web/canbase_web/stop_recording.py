@@ -8,7 +8,7 @@ from typing import Final
 
 from canbase_config.profile import Layout
 from canbase_config.robot import Robot
-from canbase_driver.cia301.pdo import node_layout, unpack_velocity
+from canbase_driver.cia301.pdo import joined_velocity, node_layout, unpack_velocity
 from canbase_driver.drive_units import AxisUnits
 
 MOST_FRAMES: Final = 100_000
@@ -32,13 +32,13 @@ class WheelSpeeds:
 def wheel_speeds(robot: Robot, frames: Iterable[FrameAt]) -> list[WheelSpeeds]:
     """In the order of robot.yaml; forward is positive. Frames that do not fit the layout are passed over."""
     found = [WheelSpeeds(drive.joint) for drive in robot.drives]
-    ordered, measured = {}, {}
+    ordered, measured, joined = {}, {}, {}
     for drive, speeds in zip(robot.drives, found, strict=True):
         same_node = tuple(each for each in robot.drives if each.node_id == drive.node_id)
         layout = node_layout(drive.node_id, same_node, robot)
         wheel = drive, AxisUnits(drive, robot.base), speeds
         ordered[layout.setpoint_cob_id(drive.axis)] = wheel
-        measured[layout.velocity_cob_id(drive.axis)] = wheel
+        measured[layout.velocity_cob_id(drive.axis)] = joined[layout.status_cob_id(drive.axis)] = wheel
     for at_s, cob_id, data in frames:
         if cob_id in ordered:
             drive, units, speeds = ordered[cob_id]
@@ -46,6 +46,10 @@ def wheel_speeds(robot: Robot, frames: Iterable[FrameAt]) -> list[WheelSpeeds]:
         if cob_id in measured:
             drive, units, speeds = measured[cob_id]
             _add(speeds.measured, at_s, unpack_velocity(data, drive.kind.layout), units)
+        if cob_id in joined:
+            drive, units, speeds = joined[cob_id]
+            velocity = unpack_velocity(joined_velocity(data, drive.kind.layout), drive.kind.layout)
+            _add(speeds.measured, at_s, velocity, units)
     for speeds in found:
         speeds.ordered, speeds.measured = _thinned(speeds.ordered), _thinned(speeds.measured)
     return found

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from canbase_config.drive_values import FIRST_SPARE_TPDO
 from canbase_config.object_map import AXIS_OFFSET as SECOND_AXIS
+from canbase_config.object_map import VELOCITY_ACTUAL, place
 from canbase_driver.boot.advice import ELSE_UNUSABLE, OTHER_STATE
 from canbase_driver.boot.steps import BootError, NodeAccess, Steps, unsigned
 from canbase_driver.cia301.pdo import AT_ONCE, AT_ONCE_TOO, EVERY_SYNC, NodeLayout, Pdo
@@ -26,6 +27,9 @@ WIDTH_KEYS = {
     0x6041: "a drive that has one motor behind it cannot be used; one with two: `layout.statusword` of its profile",
 }
 """First-axis index → what to do about an object that goes into a PDO in another width than its profile has."""
+NARROW_BYTES = 2
+"""Length of a 606Ch with 16 bits, as an SDO answer has it."""
+_WITHOUT_TORQUE = "without torque the power goes off for a moment at each standstill (watchdog.stand_proof)"
 
 
 def configure_pdos(node: NodeAccess, layout: NodeLayout) -> Steps[None]:
@@ -34,9 +38,9 @@ def configure_pdos(node: NodeAccess, layout: NodeLayout) -> Steps[None]:
     A drive that has no torque, or maps none, does without. Raises BootError when it has not these PDOs, or does not
     keep what is written to them.
     """
-    layout = yield from _with_what_it_has(node, layout)
     cob_ids = yield from _cob_ids(node)
-    wanted = {pdo.communication: pdo for pdo in _in_what_it_has(node, layout, cob_ids)}
+    layout = yield from _with_torque_it_has(node, _with_tpdos_it_has(node, layout, cob_ids))
+    wanted = {pdo.communication: pdo for pdo in (yield from _in_what_it_has(node, layout, cob_ids))}
     spare = {pdo.communication: pdo for pdo in layout.value_pdos() if pdo.communication not in wanted}
     for index, cob_id in cob_ids.items():
         if index not in wanted and index not in spare:
@@ -67,7 +71,18 @@ def _publish_what_it_maps(node: NodeAccess, layout: NodeLayout, pdo: Pdo, found:
     node.notes.append(f"{names}: not published, {pdo.name}: {why}; see `values` of its drive in robot.yaml")
 
 
-def _with_what_it_has(node: NodeAccess, layout: NodeLayout) -> Steps[NodeLayout]:
+def _with_tpdos_it_has(node: NodeAccess, layout: NodeLayout, cob_ids: dict[int, int]) -> NodeLayout:
+    """One TPDO for each motor, where it has no more, and the velocity has room in it."""
+    missing = [pdo for pdo in layout.pdos() if pdo.is_heard and pdo.communication not in cob_ids]
+    if layout.profile.layout.fits_one_tpdo and missing and not layout.joins_velocity:
+        layout = replace(layout, joins_velocity=True)
+        node.notes.append(f"the drive has no {missing[0].name}: TPDO1 carries the velocity behind the position")
+    if layout.joins_velocity and layout.profile.options.torque != "none":
+        node.notes.append(f"torque unknown: one TPDO for each motor has no room for it; {_WITHOUT_TORQUE}")
+    return layout
+
+
+def _with_torque_it_has(node: NodeAccess, layout: NodeLayout) -> Steps[NodeLayout]:
     for index, sub in layout.torque_places():
         if (yield from node.read_if_present(index, sub)) is None:
             _note_no_torque(node, f"the drive has no {index:04X}h:{sub}")
@@ -75,7 +90,7 @@ def _with_what_it_has(node: NodeAccess, layout: NodeLayout) -> Steps[NodeLayout]
     return layout
 
 
-def _in_what_it_has(node: NodeAccess, layout: NodeLayout, cob_ids: dict[int, int]) -> list[Pdo]:
+def _in_what_it_has(node: NodeAccess, layout: NodeLayout, cob_ids: dict[int, int]) -> Steps[list[Pdo]]:
     """The watchdog's quick stop takes the last RPDO of a drive that has fewer than its profile: its COB-ID counts, and
     not its number."""
     pdos = [pdo for pdo in layout.pdos() if pdo.communication in cob_ids]
@@ -89,10 +104,33 @@ def _in_what_it_has(node: NodeAccess, layout: NodeLayout, cob_ids: dict[int, int
             problem = (
                 f"it has no {pdo.name} ({pdo.communication:04X}h), but {rpdos} RPDOs, {len(cob_ids) - rpdos} TPDOs"
             )
-            needs = "canbase needs one RPDO and two TPDOs for each motor, and one more RPDO for the watchdog"
-            raise BootError(node.node_id, problem, f"{needs} (docs/drives.md): without them the drive cannot be used")
+            raise BootError(node.node_id, problem, (yield from _about_pdos(node, layout, pdo)))
         pdos.append(replace(pdo, number=max(free) - FIRST_RPDO + 1))
     return pdos
+
+
+def _about_pdos(node: NodeAccess, layout: NodeLayout, missing: Pdo) -> Steps[str]:
+    """What cures it: its velocity may be narrower than its profile says, and have room in its only TPDO."""
+    if missing.is_heard and layout.profile.layout.statusword == "own" and not layout.joins_velocity:
+        at = place(layout.profile, VELOCITY_ACTUAL, layout.axes[0])
+        if (yield from _size(Read(at.index, at.sub))) == NARROW_BYTES:
+            return (
+                f"{at.index:04X}h has 16 bits, and one TPDO is enough for such a drive: set `layout.velocity_bits: 16` "
+                "in its drive profile"
+            )
+    return (
+        "canbase needs one RPDO and two TPDOs for each motor (one, where its velocity has 16 bits: "
+        "`layout.velocity_bits`), and one more RPDO for the watchdog (docs/drives.md): without them the drive cannot "
+        "be used"
+    )
+
+
+def _size(read: Read) -> Steps[int]:
+    """Bytes of an object; 0: the drive refuses to read it."""
+    try:
+        return len((yield read))
+    except SdoAborted:
+        return 0
 
 
 def _cob_ids(node: NodeAccess) -> Steps[dict[int, int]]:
@@ -248,8 +286,7 @@ def _map_what_it_takes(node: NodeAccess, pdo: Pdo, mapped: int) -> Steps[None]:
 
 def _note_no_torque(node: NodeAccess, why: str) -> None:
     node.notes.append(
-        f"torque unknown: {why}. In its drive profile, options.torque names another object or none; without torque the "
-        "power goes off for a moment at each standstill (watchdog.stand_proof)"
+        f"torque unknown: {why}. In its drive profile, options.torque names another object or none; {_WITHOUT_TORQUE}"
     )
 
 

@@ -37,6 +37,7 @@ GENERIC = GENERIC_PROFILE.layout
 _SETPOINT = {16: struct.Struct("<Hh"), 32: struct.Struct("<Hi")}
 _STATUS = {False: struct.Struct("<Hi"), True: struct.Struct("<Ii")}
 """By whether the statuswords of two axes are packed into one object."""
+_STATUS_BYTES, _WITH_VELOCITY_BYTES = 6, 8
 _VELOCITY = {16: struct.Struct("<h"), 32: struct.Struct("<i")}
 _TORQUE = struct.Struct("<h")
 TORQUE_BYTES = 2
@@ -101,11 +102,14 @@ class NodeLayout:
 
     node_id: int
     axes: tuple[int, ...]
-    """Used axes in rising order; the first has RPDO1, TPDO1 and TPDO2, the second RPDO2, TPDO3 and TPDO4."""
+    """Used axes in rising order; the first has RPDO1, TPDO1 and TPDO2, the second RPDO2, TPDO3 and TPDO4 (TPDO2 alone
+    where the velocity is joined)."""
     profile: Profile = GENERIC_PROFILE
     timing: Timing = Timing()
     with_torque: bool = True
     """False: the drive refuses to map its torque."""
+    joins_velocity: bool = False
+    """True: the node has no velocity TPDO, its status TPDO carries the velocity too. Only where `fits_one_tpdo`."""
     values: tuple[ValuePdo, ...] = ()
     """Named values that its spare TPDOs carry."""
 
@@ -129,7 +133,7 @@ class NodeLayout:
     def torque_objects(self) -> tuple[int, ...]:
         """6077h or 6078h where the velocity TPDO carries it behind 606Ch, else nothing."""
         index = TORQUE_OBJECTS.get(self.profile.options.torque)
-        return () if index is None or not self.with_torque else (index,)
+        return () if index is None or not self.with_torque or self.joins_velocity else (index,)
 
     def torque_places(self) -> tuple[tuple[int, int], ...]:
         """Index and sub-index of the torque of each axis."""
@@ -174,6 +178,10 @@ class NodeLayout:
     def _feedback(self) -> list[Pdo]:
         pdos = []
         for i, axis in enumerate(self.axes):
+            if self.joins_velocity:
+                joined = self._entries(axis, STATUSWORD, POSITION_ACTUAL, VELOCITY_ACTUAL)
+                pdos.append(self._tpdo(i + 1, self.status_cob_id(axis), joined))
+                continue
             status = self._entries(axis, STATUSWORD, POSITION_ACTUAL)
             velocity = self._entries(axis, VELOCITY_ACTUAL, *self.torque_objects)
             pdos.append(self._tpdo(2 * i + 1, self.status_cob_id(axis), status))
@@ -202,7 +210,9 @@ def node_layout(node_id: int, drives: tuple[Drive, ...], robot: Robot) -> NodeLa
     timing = Timing(1.0 / robot.rates.control_hz, robot.timeouts.drive_heartbeat_s)
     axes = tuple(sorted(drive.axis for drive in drives))
     values = value_pdos(drives[0].values, robot.rates.control_hz) if len(drives) == 1 else ()
-    return NodeLayout(node_id, axes, drives[0].kind, timing, values=values)
+    profile = drives[0].kind
+    joins = profile.layout.fits_one_tpdo and profile.pdo.tpdos < 2 * len(axes)
+    return NodeLayout(node_id, axes, profile, timing, joins_velocity=joins, values=values)
 
 
 def pack_setpoint(controlword: int, target_raw: int, layout: Layout = GENERIC) -> bytes:
@@ -211,16 +221,22 @@ def pack_setpoint(controlword: int, target_raw: int, layout: Layout = GENERIC) -
 
 
 def unpack_status(data: bytes, layout: Layout = GENERIC, axis: int = 0) -> tuple[int, int] | None:
-    """Statusword 6041h of an axis and position 6064h [increments].
+    """Statusword 6041h of an axis and position 6064h [increments], with or without a velocity behind them.
 
     None when the length is wrong: to be dropped and counted.
     """
     is_packed = layout.statusword == "packed"
     form = _STATUS[is_packed]
-    if len(data) != form.size:
+    if len(data) != form.size and not joined_velocity(data, layout):
         return None
-    statusword, position = form.unpack(data)
+    statusword, position = form.unpack_from(data)
     return (statusword >> 16 * axis & 0xFFFF if is_packed else statusword), position
+
+
+def joined_velocity(data: bytes, layout: Layout = GENERIC) -> bytes:
+    """The part of a status TPDO for `unpack_velocity`; empty: the velocity has a TPDO of its own."""
+    joins = len(data) == _WITH_VELOCITY_BYTES and layout.fits_one_tpdo
+    return data[_STATUS_BYTES:] if joins else b""
 
 
 def unpack_velocity(data: bytes, layout: Layout = GENERIC) -> int | None:

@@ -7,7 +7,14 @@ import math
 from canbase_config.drive import Drive
 from canbase_config.robot import Robot
 from canbase_driver.cia301.frame import Frame
-from canbase_driver.cia301.pdo import NodeLayout, pack_setpoint, unpack_status, unpack_torque, unpack_velocity
+from canbase_driver.cia301.pdo import (
+    NodeLayout,
+    joined_velocity,
+    pack_setpoint,
+    unpack_status,
+    unpack_torque,
+    unpack_velocity,
+)
 from canbase_driver.cia402 import VL_RAMP, Command, DriveState, PowerGoal, decode_statusword
 from canbase_driver.drive_units import AxisUnits
 from canbase_driver.drives.let_go import Push
@@ -70,7 +77,7 @@ class Axis:
 
     @property
     def fed_at(self) -> float:
-        """When the older one of its values came: 6041h with 6064h, and 606Ch, come in frames of their own."""
+        """When the older one of its values came: 6041h with 6064h, and 606Ch, mostly come in frames of their own."""
         return min(self.status_at, self.velocity_at)
 
     def age_s(self, now_s: float) -> float:
@@ -99,7 +106,7 @@ class Axis:
         self._status_is_new = self.has_new_sample = False
 
     def on_status(self, data: bytes, now_s: float) -> bool:
-        """Take 6041h and 6064h. False: wrong length, to be dropped and counted."""
+        """Take 6041h and 6064h, and 606Ch where it is behind them. False: wrong length, to be dropped and counted."""
         status = unpack_status(data, self._layout, self.drive.axis)
         if status is None:
             return False
@@ -111,7 +118,8 @@ class Axis:
         self._status_is_new = True
         self.has_torque = self.state is None or self.state.has_torque
         self.stillness.on_power(self.has_torque, now_s, self.state is DriveState.OPERATION_ENABLED)
-        return True
+        velocity = joined_velocity(data, self._layout)
+        return not velocity or self.on_velocity(velocity, now_s)
 
     def on_velocity(self, data: bytes, now_s: float) -> bool:
         """Take 606Ch, which follows the status of the same SYNC. False: wrong length, to be dropped and counted."""

@@ -367,7 +367,7 @@ class CanopenNode:
             self._held_until = now_s + HOLD_S
 
     def on_status(self, axis: Axis, frame: Frame, now_s: float) -> bool:
-        """Take 6041h and 6064h of one of its axes. False: not understood."""
+        """Take 6041h and 6064h of one of its axes, and 606Ch where it is behind them. False: not understood."""
         return not self._sends_pdos or axis.on_status(frame.data, now_s)
 
     def on_velocity(self, axis: Axis, frame: Frame, now_s: float) -> bool:

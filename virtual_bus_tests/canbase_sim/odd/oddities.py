@@ -192,6 +192,16 @@ def _few_pdos(random: Random) -> Drawn:
     return Drawn(f"has {number} RPDOs and {number} TPDOs", change, {"pdo.rpdos": number, "pdo.tpdos": number})
 
 
+def _one_tpdo(random: Random) -> Drawn:
+    """With 606Ch of 16 bits it has room for all that canbase needs."""
+    narrow = random.random() < 0.75
+    gone = frozenset(base + n for base in (0x1800, 0x1A00) for n in range(1, 4))
+    off = {key(0x1800 + n, 1): 1 << 31 for n in range(1, 4)}
+    change = with_personality(missing=gone, defaults=off, widths={0x606C: "h"} if narrow else {})
+    text = f"has one TPDO, and 606Ch with {16 if narrow else 32} bits"
+    return Drawn(text, change, {"layout.velocity_bits": 16, "pdo.tpdos": 1} if narrow else {}, unusable=not narrow)
+
+
 def _fixed_cob_ids(_random: Random) -> Drawn:
     """Those of the predefined connection set."""
     change = with_manner(refused_writes={key(base, 1): 0x0601_0002 for base in (0x1402, 0x1802, 0x1803)})
@@ -284,7 +294,8 @@ def _sets_bit_30(_random: Random) -> Drawn:
 
 
 ALIKE = (
-    frozenset(("few_pdos", "fixed_cob_ids")),
+    frozenset(("few_pdos", "fixed_cob_ids", "one_tpdo")),
+    frozenset(("narrow_velocity", "one_tpdo")),
     frozenset(("no_synchronous_pdos", "one_event_type", "synchronous_alone")),
     frozenset(("heartbeat_steps", "slow_heartbeat", "guarding_alone")),
     frozenset(("guarding_alone", "stored_values")),
@@ -320,6 +331,7 @@ ODDITIES: Mapping[str, Oddity] = {
     "keeps_no_rtr": Oddity("CiA 301, 1400h:1 bit 30", "a reserved bit must stay as it is", _keeps_no_rtr),
     "sets_bit_30": Oddity("CiA 301, 1400h:1 bit 30: do not care", "a reserved bit is set", _sets_bit_30),
     "few_pdos": Oddity("CiA 301: up to 512 PDOs", "two or three PDOs in each direction", _few_pdos),
+    "one_tpdo": Oddity("CiA 301: up to 512 PDOs", "one TPDO", _one_tpdo),
     "fixed_cob_ids": Oddity("CiA 301, 1400h:1: rw or const", "COB-IDs that cannot be written", _fixed_cob_ids),
     "narrow_target": Oddity("seen: drives with 16-bit velocities", "60FFh of 16 bits", _narrow_target),
     "narrow_velocity": Oddity("seen: Sevcon Gen4", "606Ch of 16 bits", _narrow_velocity),

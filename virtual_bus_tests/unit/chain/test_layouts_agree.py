@@ -154,6 +154,11 @@ def test_both_sides_read_and_write_every_kind_of_drive_alike(name: str) -> None:
         assert frames.decode_status(status, watched.layout, axis) == pdo.unpack_status(status, layout, axis)
         velocity = (-300).to_bytes(layout.velocity_bits // 8, "little", signed=True)
         assert frames.decode_velocity(velocity, watched.layout) == pdo.unpack_velocity(velocity, layout) == -300
+        joined = bytes.fromhex("37 02 fe ff ff ff d4 fe")
+        own = pdo.unpack_velocity(pdo.joined_velocity(joined, layout), layout)
+        assert frames.decode_joined_velocity(joined, watched.layout) == own
+        assert (own == -300) == layout.fits_one_tpdo
+        assert frames.decode_status(joined, watched.layout, axis) == pdo.unpack_status(joined, layout, axis)
         for index in (0x6040, 0x6041, 0x606C):
             at = place(profile, index, axis)
             assert frames.place_of(index, axis, watched.layout) == (at.index, at.sub)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -146,6 +148,37 @@ def test_mode_2_has_its_own_target_ramps_limits_and_unit() -> None:
     # 1.5 m/s² at the rim are 47.7 rev/s² of the motor, 2865 rpm in 1 s; in a curve a wheel brakes with 2 m/s²
     assert [drive.number(index, sub) for index in (0x6049, 0x604A) for sub in (1, 2)] == [3820, 1, 2865, 1]
     assert not [index for index, _, _ in drive.writes if index in (0x60FF, 0x6083, 0x6084, 0x6085)]
+
+
+@pytest.mark.parametrize("torque", ["probe", "none"])
+def test_an_inverter_with_one_tpdo_sends_its_velocity_behind_the_position(torque: str, tmp_path: Path) -> None:
+    drive = inverter()
+    drive.objects = {key: value for key, value in drive.objects.items() if key[0] not in range(0x1801, 0x1804)}
+    keys = load_profile("inverter").model_dump(mode="json", exclude_unset=True) | {"options": {"torque": torque}}
+    (tmp_path / "own.yaml").write_text(json.dumps(keys, indent=1))
+    boot, _ = booted(drive, of_kind(str(tmp_path / "own.yaml")))
+    assert boot.report is not None
+    assert [drive.number(0x1A00, sub) for sub in range(4)] == [3, 0x6041_0010, 0x6064_0020, 0x6044_0010]
+    assert drive.number(0x1800, 1) & 0x7FF == 0x181
+    said = any("torque unknown: one TPDO for each motor has no room for it" in note for note in boot.report.notes)
+    assert said == (torque == "probe")
+
+
+@pytest.mark.parametrize(
+    ("size", "cure"),
+    [
+        (2, "606Ch has 16 bits, and one TPDO is enough for such a drive: set `layout.velocity_bits: 16` in its drive"),
+        (4, "(one, where its velocity has 16 bits: `layout.velocity_bits`)"),
+    ],
+)
+def test_a_drive_with_one_tpdo_is_told_from_one_whose_velocity_is_narrower_than_its_profile(
+    size: int, cure: str
+) -> None:
+    objects = {key: value for key, value in factory_objects().items() if key[0] not in range(0x1801, 0x1804)}
+    boot, _ = booted(FakeDrive(objects=objects | {(0x606C, 0): bytes(size)}), of_kind("nanotec", velocity_unit="rpm"))
+    assert boot.error is not None
+    assert "it has no TPDO2 (1801h), but 4 RPDOs, 1 TPDOs" in str(boot.error)
+    assert cure in str(boot.error)
 
 
 def test_a_ramp_of_mode_2_whose_time_is_fixed_gets_the_speed_for_that_time() -> None:

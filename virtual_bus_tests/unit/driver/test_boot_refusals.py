@@ -588,6 +588,7 @@ def test_the_quick_stop_of_the_watchdog_takes_the_last_rpdo_of_a_drive_with_few(
     [
         ((0x1401, 0x1402, 0x1403), "it has no RPDO4 (1403h), but 1 RPDOs, 4 TPDOs"),
         ((0x1801,), "it has no TPDO2 (1801h)"),
+        ((0x1801, 0x606C), "it has no TPDO2 (1801h)"),
     ],
 )
 def test_a_drive_with_too_few_pdos_cannot_be_used(lacks: tuple[int, ...], text: str) -> None:

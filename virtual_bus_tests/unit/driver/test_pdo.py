@@ -6,7 +6,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canbase_driver.cia301.pdo import NodeLayout, Pdo, pack_setpoint, unpack_status, unpack_torque, unpack_velocity
+from canbase_config.profile import Layout, Profile
+from canbase_driver.cia301.pdo import (
+    NodeLayout,
+    Pdo,
+    joined_velocity,
+    pack_setpoint,
+    unpack_status,
+    unpack_torque,
+    unpack_velocity,
+)
+
+NARROW = Profile(title="narrow", layout=Layout(velocity_bits=16))
+"""Its velocity has room behind the position."""
 
 
 def test_one_axis() -> None:
@@ -28,6 +40,15 @@ def test_two_axes_on_one_node() -> None:
         Pdo("TPDO", 3, 0x385, 1, (0x6841_00_10, 0x6864_00_20)),
         Pdo("TPDO", 4, 0x485, 1, (0x686C_00_20, 0x6877_00_10), 1),
     )
+
+
+def test_two_axes_with_one_tpdo_each() -> None:
+    layout = NodeLayout(5, (0, 1), NARROW, joins_velocity=True)
+    assert [pdo for pdo in layout.pdos() if pdo.is_heard] == [
+        Pdo("TPDO", 1, 0x185, 1, (0x6041_00_10, 0x6064_00_20, 0x606C_00_10)),
+        Pdo("TPDO", 2, 0x385, 1, (0x6841_00_10, 0x6864_00_20, 0x686C_00_10)),
+    ]
+    assert layout.torque_objects == ()
 
 
 def test_the_first_axis_is_the_lowest_in_use() -> None:
@@ -83,6 +104,22 @@ def test_bytes_of_the_feedback() -> None:
     #                                   606Ch       6077h = -500: half of the rated torque
     with_torque = bytes.fromhex("00 00 00 80 0C FE")
     assert (unpack_velocity(with_torque), unpack_torque(with_torque)) == (-(2**31), -0.5)
+
+
+@pytest.mark.parametrize(
+    ("layout", "joins"),
+    [
+        (Layout(), False),
+        (Layout(velocity_bits=16), True),
+        (Layout(second_axis="sub_index", statusword="packed", velocity_bits=16), False),
+    ],
+)
+def test_a_velocity_is_behind_the_position_where_both_have_room(layout: Layout, joins: bool) -> None:
+    data = bytes.fromhex("37 02 fe ff ff ff 0c fe")
+    assert joined_velocity(data, layout) == (data[6:] if joins else b"")
+    assert joined_velocity(data[:6], layout) == joined_velocity(data + b"0", layout) == b""
+    assert (unpack_status(data, layout) == (0x0237, -2)) == joins
+    assert layout.tpdos(2) == (2 if joins else 4)
 
 
 @given(st.binary(max_size=8))

@@ -199,3 +199,21 @@ def test_velocities_of_16_bits() -> None:
     assert frames.decode_torque(bytes.fromhex("00 00 00 00")) is None
     assert frames.decode_setpoint(bytes.fromhex("0f 00 0c fe"), narrow) == (0x0F, -500)
     assert frames.decode_setpoint(bytes.fromhex("0f 00 0c fe ff ff"), narrow) is None
+
+
+def test_a_velocity_of_16_bits_behind_the_position() -> None:
+    joined, narrow = bytes.fromhex("37 02 fe ff ff ff 0c fe"), WatchedLayout(target_bits=16, velocity_bits=16)
+    assert frames.decode_status(joined, narrow) == (0x0237, -2)
+    assert frames.decode_joined_velocity(joined, narrow) == -500
+    for length in range(10):
+        data = (joined + joined)[:length]
+        assert (frames.decode_joined_velocity(data, narrow) is not None) == (length == 8)
+        assert (frames.decode_status(data, narrow) is not None) == (length in (6, 8))
+
+
+@pytest.mark.parametrize(
+    "layout", [WatchedLayout(), WatchedLayout(packed_statusword=True, sub_index=True, velocity_bits=16)]
+)
+def test_no_velocity_is_read_out_of_a_status_that_has_no_room_for_it(layout: WatchedLayout) -> None:
+    """A wide one has a TPDO of its own; the status of two motors has eight bytes itself."""
+    assert frames.decode_joined_velocity(bytes.fromhex("37 02 fe ff ff ff 0c fe"), layout) is None
