@@ -175,9 +175,13 @@ VL_PAIRS: Mapping[int, tuple[str, str, int, int]] = {
 """What mode 2 has at sub-index 1 and 2: `struct` letters, and soft values after power on."""
 
 
+NOT_OF_VL = frozenset((0x606C, 0x6083, 0x6084, 0x6085, 0x60C2, 0x60FF))
+"""What mode 2 has no use for."""
+
+
 def _as_vl(entries: Mapping[int, Entry]) -> dict[int, Entry]:
     """The objects of mode 2 in place of those of modes 3 and 9 (CiA 402-2)."""
-    shown = {k: entry for k, entry in entries.items() if k >> 8 not in (0x60FF, 0x606C, *range(0x6083, 0x6086), 0x60C2)}
+    shown = {k: entry for k, entry in entries.items() if k >> 8 not in NOT_OF_VL}
     for index, place in VL_PLACES.items():
         shown[key(index)] = replace(entries[key(place)], code="h")
     for index, (first, second, *defaults) in VL_PAIRS.items():
