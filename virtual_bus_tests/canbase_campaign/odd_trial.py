@@ -170,9 +170,14 @@ class _Start:
         return (bool(advice.keys) or advice.gives_up or advice.by_tool) and GOES_ON not in advice.text
 
     def _told(self) -> str:
-        """What state, status and diagnostics tell a person."""
+        """What state, status and diagnostics tell a person. In /diagnostics each drive has an entry of its own."""
         snapshot = self.world.driver.core.snapshot(self.world.clock.now_s)
-        problems = dict.fromkeys(drive.boot_problem for drive in snapshot.drives if drive.boot_problem)
+        node_ids = {drive.joint: drive.node_id for drive in self.world.robot.drives}
+        problems = dict.fromkeys(
+            f"node {node_ids[drive.joint]}: {drive.boot_problem.removeprefix(f'node {node_ids[drive.joint]}: ')}"
+            for drive in snapshot.drives
+            if drive.boot_problem
+        )
         finding = snapshot.finding
         watchdog = self.world.watchdog.core.status.verdict
         tripped = f"watchdog: {watchdog.cause.name}: {watchdog.detail}" if watchdog.cause.value else ""
