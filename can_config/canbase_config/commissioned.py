@@ -140,9 +140,15 @@ def _kind(drive: Drive) -> list[Any]:
     return [drive.node_id, drive.axis, Path(drive.profile).name, own.model_dump(exclude=younger)]
 
 
+def _scale_and_objects(drive: Drive) -> list[Any]:
+    """Without `expects`, as long as there are none: marks from before that key stay valid."""
+    noted = sorted([each.index, each.sub, each.value] for each in drive.expects)
+    return [*_scale(drive), *([noted] if noted else [])]
+
+
 _DRIVE = {
     "directions": _place,
-    "scale": _scale,
+    "scale": _scale_and_objects,
     "proof": _kind,
     "floor": lambda drive: [_place(drive), _scale(drive)],
 }

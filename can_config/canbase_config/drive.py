@@ -11,6 +11,7 @@ from canbase_config.drive_values import DriveValue
 from canbase_config.errors import ConfigError
 from canbase_config.profile import Profile, VelocityUnit
 from canbase_config.profile_file import load_profile
+from canbase_config.scale_objects import Expected
 from canbase_config.section import MisfitError, Name, Section
 
 
@@ -71,6 +72,15 @@ class Drive(Section):
         | None
     ) = None
     identity: Identity = Identity()
+    expects: Annotated[
+        tuple[Expected, ...],
+        Field(
+            strict=False,
+            max_length=64,
+            description="objects that each boot compares; `canbase commission` notes here what units and polarity the "
+            "drive has",
+        ),
+    ] = ()
     values: Annotated[
         tuple[DriveValue, ...],
         Field(strict=False, description="objects that are published as named values, in spare TPDOs"),

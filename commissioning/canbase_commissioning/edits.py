@@ -18,6 +18,7 @@ from canbase_config.commissioned import Step, identities, mark
 from canbase_config.errors import Loc, key_path
 from canbase_config.odometry import OdometrySettings
 from canbase_config.robot import Robot
+from canbase_config.scale_objects import Expected
 from canbase_driver.boot.sequence import NUMBERS, BootReport
 
 DIGITS = 5
@@ -42,6 +43,8 @@ class Edit:
         return f"{key_path(self.loc)}: {self._shown(self.before)} → {self._shown(self.after)}"
 
     def _shown(self, value: Any) -> str:
+        if isinstance(value, list | tuple):
+            return ", ".join(str(Expected.model_validate(each)) for each in value) or "none"
         in_hex = isinstance(self.after, HexCapsInt) and value is not None
         return f"0x{value:X}" if in_hex else str(value)
 
@@ -88,6 +91,25 @@ def identity_edits(robot: Robot, boots: Mapping[int, BootReport]) -> list[Edit]:
             if after is not None:
                 edits.append(Edit(("drives", i, "identity", name), before, HexCapsInt(after)))
     return [edit for edit in edits if differs(edit)]
+
+
+def expects_edits(robot: Robot, boots: Mapping[int, BootReport]) -> list[Edit]:
+    """Units and polarity that the drives had while their wheels were measured; later boots compare with them. Entries
+    of other objects stay."""
+    edits = []
+    for i, drive in enumerate(robot.drives):
+        boot = boots.get(drive.node_id)
+        scale = () if boot is None else boot.scale.get(drive.joint, ())
+        after = {(each.index, each.sub): each for each in (*drive.expects, *scale)}
+        if scale and tuple(after.values()) != drive.expects:
+            edits.append(Edit(("drives", i, "expects"), drive.expects, [_expected(each) for each in after.values()]))
+    return edits
+
+
+def _expected(each: Expected) -> CommentedMap:
+    entry = CommentedMap({"index": HexCapsInt(each.index), "sub": each.sub, "value": each.value})
+    entry.fa.set_flow_style()
+    return entry
 
 
 def commissioned_edits(robot: Robot, edits: Sequence[Edit], done: Collection[Step]) -> list[Edit]:

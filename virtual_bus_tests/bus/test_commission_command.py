@@ -12,6 +12,7 @@ import pytest
 
 from canbase_config.commissioned import identities, mark
 from canbase_config.load import load_robot
+from canbase_config.scale_objects import Expected
 from support.bus_tool import ENVIRONMENT, argv, canbase, drives, write_robot
 from support.udp_port import free_udp_port
 
@@ -48,6 +49,27 @@ def test_a_wrong_count_is_measured_again_and_changes_nothing(tmp_path: Path) -> 
     assert "trial 1" not in done.stdout  # no proof with a scale in doubt
     assert config.read_text(encoding="utf-8") == before
     assert "the second measurement contradicts the first" in only_report(tmp_path)
+
+
+def test_what_the_numbers_of_each_drive_mean_is_noted_for_later_boots(tmp_path: Path) -> None:
+    config = write_robot(tmp_path, free_udp_port())
+    answers = write_answers(
+        tmp_path,
+        direction__left_wheel="forward",
+        direction__right_wheel="forward",
+        revolutions__left_wheel="0.3",
+        revolutions__right_wheel="0.3",
+    )
+    options = ("--answers", answers, "--yes", "--steps", "directions,scale", "--revolutions", "0.3")
+    with drives(config):
+        done = canbase("commission", "-c", str(config), *options, timeout_s=120.0)
+    assert done.returncode == 0, done.stdout + done.stderr
+    robot = load_robot(config).robot
+    for drive in robot.drives:
+        counts = Expected(index=0x608F, sub=1, value=drive.counts_per_motor_rev)
+        assert drive.expects == (counts, Expected(index=0x608F, sub=2, value=1))
+    assert f"changed drives[0].expects: none → {counts}, 608Fh:2 = 1" in done.stdout
+    assert robot.commissioned.scale == mark(robot, "scale")
 
 
 def test_a_report_is_never_overwritten(tmp_path: Path) -> None:

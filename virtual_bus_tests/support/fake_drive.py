@@ -126,8 +126,11 @@ class FakeDrive:
 class Bench:
     """One node's boot and its drive, joined by a wire without delay; the clock moves in steps of 10 ms."""
 
-    def __init__(self, drive: FakeDrive, robot: Robot, drives: tuple[Drive, ...] | None = None) -> None:
-        self.boot = NodeBoot(drive.node_id, drives or robot.drives[:1], robot)
+    def __init__(
+        self, drive: FakeDrive, robot: Robot, drives: tuple[Drive, ...] | None = None, *, identify: bool = True
+    ) -> None:
+        """`identify`: False: the boot of a driver, which reads what it compares."""
+        self.boot = NodeBoot(drive.node_id, drives or robot.drives[:1], robot, identify=identify)
         self.drive = drive
         self.now_s = 100.0
 

@@ -57,6 +57,8 @@ behaviour."""
 BRAKING = (0x6007, 0x6049, 0x604A, 0x605A, 0x605E, 0x6084, 0x6085)
 """How an axis stops: for a lost master, by a quick stop, in a fault, and its ramps. Those of the second one are at +
 AXIS_OFFSET."""
+SCALE = (0x604C, 0x607E, *range(0x6089, 0x6098), 0x60A8, 0x60A9, 0x60AA)
+"""What one bit of a velocity, a position or a ramp means, and which way is positive: units, factors, polarity."""
 RPDO_PARAMETERS = range(0x1400, 0x1800)
 """Which PDOs a drive obeys, and what they contain."""
 QUICK_STOP_WORD = 0x0002

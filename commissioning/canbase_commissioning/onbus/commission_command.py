@@ -14,6 +14,7 @@ from canbase_commissioning.calibration import CalibrationError
 from canbase_commissioning.edits import (
     Edit,
     commissioned_edits,
+    expects_edits,
     floor_edits,
     identity_edits,
     wheel_edits,
@@ -66,6 +67,8 @@ def run(config: Path, plan: Plan, answers: Path | None, *, yes: bool, dry_run: b
         try:
             _go(line, robot, plan, person, results)
             results.edits += identity_edits(robot, results.boots)
+            if {"directions", "scale"} <= results.done:
+                results.edits += expects_edits(robot, results.boots)
         except (CommissionError, RigError, CalibrationError, ValidationError) as error:
             results.ended_by = str(error)
         except Stopped as stopped:

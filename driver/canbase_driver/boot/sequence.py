@@ -7,13 +7,16 @@ elsewhere. `node_boot.py` runs it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from canbase_config.drive import Drive, Identity
 from canbase_config.object_map import CONTROLWORD, STATUSWORD, VELOCITY_ACTUAL, place
 from canbase_config.robot import Robot
+from canbase_config.scale_objects import Expected
 from canbase_config.stopping import standstill_s
 from canbase_driver.boot.pdo_mapping import configure_pdos
+from canbase_driver.boot.scale_check import check_expected, read_scale
 from canbase_driver.boot.settings import (
     SelfStopSet,
     StopsBy,
@@ -69,6 +72,8 @@ class BootReport:
     notes: tuple[str, ...]
     changes: tuple[str, ...] = ()
     """Every object that had another value than wanted: the old one and the new one."""
+    scale: Mapping[str, tuple[Expected, ...]] = field(default_factory=dict)
+    """By joint, where it was asked for: what its numbers mean."""
 
     @property
     def stops_by_itself(self) -> bool:
@@ -81,7 +86,7 @@ def boot(
 ) -> Steps[BootReport]:
     """All steps for one node, its used axes being `drives`. Raises ValueError when they are not one or two axes.
 
-    `identify`: read all of 1018h, not just what `identity` in robot.yaml expects.
+    `identify`: read all of 1018h, not just what `identity` in robot.yaml expects, and all units, not just `expects`.
 
     The steps end with the report, or raise BootError when the node cannot be made ready.
     """
@@ -118,8 +123,13 @@ class _Boot:
         yield from configure_sync(self._node, self._kind, self._robot.bus.sync_counter)
         yield from configure_pdos(self._node, self._layout)
         yield from write_all(self._node, self._kind.writes.after_mapping)
+        scale = {}
+        for drive in self._drives:
+            yield from check_expected(self._node, drive)
+            if self._identify:
+                scale[drive.joint] = yield from read_scale(drive)
         notes = tuple(dict.fromkeys(self._node.notes))
-        return BootReport(self._node.node_id, identity, self_stop, notes, tuple(self._node.changes))
+        return BootReport(self._node.node_id, identity, self_stop, notes, tuple(self._node.changes), scale)
 
     # -- what is there
 

@@ -97,7 +97,7 @@ class CanopenNode:
         self._measures = Measures(node_id, self._drives, robot.timeouts.sdo_s)
         self._values = DriveValues(self.layout.values, self.layout.timing.cycle_s)
         self._sdo_stop = SdoStop(node_id, self._drives)
-        self._foreign = ForeignWrites(self.profile, Counter())
+        self._foreign = ForeignWrites(self._drives, Counter())
         self._written = ""
         """What another client has written since the boot; empty: nothing of what the boot sets."""
         self._lost_heartbeat = self._owed_stop = False
@@ -429,7 +429,7 @@ class CanopenNode:
         self.report = report
         self._lost_heartbeat = False
         if self._boot is not None:
-            self._foreign = ForeignWrites(self.profile, self._boot.unanswered)
+            self._foreign = ForeignWrites(self._drives, self._boot.unanswered)
         self._boot = None
         self.nmt_state = None
         self._guarded = None if self._guarded is None else GuardAnswers()

@@ -6,17 +6,20 @@ An SDO answer goes to all that listen. One that confirms a write which the boot 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import Final
 
+from canbase_config.drive import Drive
 from canbase_config.object_map import AXIS_OFFSET
-from canbase_config.profile import STOPPED_BY, Profile
+from canbase_config.profile import STOPPED_BY
+from canbase_config.scale_objects import SCALE_OBJECTS
 from canbase_driver.cia301.frame import Frame
 
 PDOS: Final = range(0x1400, 0x1C00)
 """Which PDOs the drive obeys and sends, and what they contain."""
 RAMPS: Final = (0x6083, 0x6084, 0x6085)
-VL: Final = (0x6046, 0x6048, 0x6049, 0x604A, 0x604C)
-"""Limits, ramps and unit of mode 2."""
+VL: Final = (0x6046, 0x6048, 0x6049, 0x604A)
+"""Limits and ramps of mode 2."""
 _WRITTEN: Final = 3 << 5
 """First byte of the answer to a Write (CiA 301, SDO download)."""
 _COMMAND: Final = 7 << 5
@@ -25,11 +28,13 @@ _COMMAND: Final = 7 << 5
 class ForeignWrites:
     """Looks at the SDO answers of one node after its boot."""
 
-    def __init__(self, kind: Profile, late: Counter[bytes]) -> None:
-        """`late`: answers that the boot is still owed, by address: none of them is another client's."""
-        own = kind.self_stop.vendor_watchdog
-        axis = (*RAMPS, *VL, *(index for index in STOPPED_BY if index >= 0x6000))
+    def __init__(self, drives: Sequence[Drive], late: Counter[bytes]) -> None:
+        """`drives`: of this node, all of one kind. `late`: answers that the boot is still owed, by address: none of
+        them is another client's."""
+        own = drives[0].kind.self_stop.vendor_watchdog
+        axis = (*RAMPS, *VL, *SCALE_OBJECTS, *(index for index in STOPPED_BY if index >= 0x6000))
         self._watched = {*STOPPED_BY, *axis, *(index + AXIS_OFFSET for index in axis)}
+        self._watched |= {each.index for drive in drives for each in drive.expects}
         if own is not None and own.index is not None:
             self._watched.add(own.index)
         self._late = late

@@ -41,6 +41,8 @@ VL_RUNS, VL_UNLOCKED, VL_FOLLOWS = 0x10, 0x20, 0x40
 """Controlword in mode 2: the ramp generator runs, is not locked, and has the target as its input."""
 VL_RAMPS = {0x83: 0x48, 0x84: 0x49, 0x85: 0x4A}
 """Ramps of modes 3 and 9 → those of mode 2, each a speed and a time in s."""
+POSITION_POLARITY, VELOCITY_POLARITY = 0x80, 0x40
+"""607Eh: what is set counts the other way."""
 _ENABLED = State.OPERATION_ENABLED
 _ALWAYS = int(Bit.VOLTAGE_ENABLED | Bit.REMOTE)
 _SATURATED, _REACHED, _SPECIFIC = int(Bit.INTERNAL_LIMIT), int(Bit.TARGET_REACHED), int(Bit.MODE_SPECIFIC)
@@ -100,6 +102,7 @@ class Axis:
     _pending: Transition | None = field(default=None, init=False)
     _halted: bool = field(default=False, init=False)
     _controlword: int = field(default=0, init=False)
+    _polarity: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:
         self._base = 0x6000 + AXIS_STRIDE * self.number
@@ -108,6 +111,7 @@ class Axis:
         for offset in (0xFF, 0x83, 0x84):
             d.on_write(at + offset, lambda subindex, value: self._steer())
         d.on_write(at + 0x72, lambda subindex, value: self._limit_force())
+        d.on_write(at + 0x7E, lambda subindex, value: self._take_polarity())
         d.guard(at + 0x60, self._check_mode)
         d.on_write(at + 0x60, lambda subindex, value: self._show_mode())
         for index in self.personality.locked_with_power:
@@ -123,6 +127,7 @@ class Axis:
         """Transition 0, power on or NMT reset node: power stage off, everything forgotten."""
         self.motor.power_off()
         self._limit_force()
+        self._take_polarity()
         self._go(Transition(0, State.NOT_READY_TO_SWITCH_ON))
         self._pending, self._controlword, self._halted = None, 0, False
         self._show_mode()
@@ -194,7 +199,7 @@ class Axis:
         values[base + 0x6400] = self.position() if position is None else position
         values[base + 0x6C00] = actual
         values[base + 0x4100] = self._statusword(actual)
-        values[base + 0x6B00] = self.scale.raw(motor.demand_mps)
+        values[base + 0x6B00] = self._turned(self.scale.raw(motor.demand_mps))
         values[base + 0x7700] = values[base + 0x7800] = int(1000.0 * motor.force_n / motor.peak_force_n)
 
     @property
@@ -204,11 +209,12 @@ class Axis:
 
     def position(self) -> int:
         """6064h as the encoder has it."""
-        return self.scale.counts(self.encoder.travel_m, self.encoder_offset)
+        travel_m = self.encoder.travel_m
+        return self.scale.counts(-travel_m if self._polarity & POSITION_POLARITY else travel_m, self.encoder_offset)
 
     def velocity(self) -> int:
         """606Ch as the drive measures it."""
-        return self.scale.raw(self.motor.speed_mps)
+        return self._turned(self.scale.raw(self.motor.speed_mps))
 
     # The state machine
 
@@ -351,7 +357,7 @@ class Axis:
         """Bit 10: the target is reached; in a halt and in QUICK STOP ACTIVE the target is zero."""
         if self.state is State.QUICK_STOP_ACTIVE or self._halted:
             return abs(actual) <= self._value(0x6F)
-        target = self.scale.raw(self._target_mps())
+        target = self._turned(self.scale.raw(self._target_mps()))
         return self.state is _ENABLED and abs(actual - target) <= self._value(0x6D)
 
     def _check_mode(self, subindex: int, value: int) -> None:
@@ -370,7 +376,14 @@ class Axis:
 
     def _target_mps(self) -> float:
         raw = self._vl_target() if self.personality.vl else self._value(0xFF)
-        return raw * self.scale.target_mps
+        return (-raw if self._polarity & VELOCITY_POLARITY else raw) * self.scale.target_mps
+
+    def _take_polarity(self) -> None:
+        """607Eh, of a drive that has it."""
+        self._polarity = self.dictionary.values.get(self._base << 8 | 0x7E00, 0)
+
+    def _turned(self, raw: int) -> int:
+        return -raw if self._polarity & VELOCITY_POLARITY else raw
 
     def _ramp_is_locked(self) -> bool:
         """Mode 2, bit 5 is 0: the motor keeps its speed."""

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 import pytest
 
-from canbase_config.profile import Profile
-from canbase_config.profile_file import load_profile
+from canbase_config.drive import Drive
+from canbase_config.scale_objects import Expected
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.drives.foreign_writes import ForeignWrites
+from support.crews import robot_with
 
-GENERIC = load_profile("generic")
+GENERIC = robot_with("generic").drives[:1]
 
 
-def taken(data: str, kind: Profile = GENERIC, late: Counter[bytes] | None = None) -> str:
-    return ForeignWrites(kind, Counter() if late is None else late).take(Frame(0x581, bytes.fromhex(data)))
+def taken(data: str, drives: Sequence[Drive] = GENERIC, late: Counter[bytes] | None = None) -> str:
+    return ForeignWrites(drives, Counter() if late is None else late).take(Frame(0x581, bytes.fromhex(data)))
 
 
 @pytest.mark.parametrize(
@@ -30,6 +32,8 @@ def taken(data: str, kind: Profile = GENERIC, late: Counter[bytes] | None = None
         ("60 85 60 00 00 00 00 00", "6085h:0"),
         ("60 4C 60 01 00 00 00 00", "604Ch:1"),  # the unit of the speeds of mode 2
         ("60 4A 60 01 00 00 00 00", "604Ah:1"),
+        ("60 7E 60 00 00 00 00 00", "607Eh:0"),  # which way is positive
+        ("60 91 68 01 00 00 00 00", "6891h:1"),  # how far one bit goes
         ("60 40 60 00 00 00 00 00", ""),  # the watchdog stops by it
         ("60 F9 60 01 00 00 00 00", ""),  # a gain
         ("4B 16 10 01 00 00 00 00", ""),  # read
@@ -43,7 +47,13 @@ def test_the_object_is_named_that_decides_how_the_drive_stops(data: str, shown: 
 
 def test_the_makers_own_watchdog_is_one_where_the_profile_names_it() -> None:
     assert taken("60 00 20 00 00 00 00 00") == ""
-    assert taken("60 00 20 00 00 00 00 00", load_profile("zlac8015d")) == "2000h:0"
+    assert taken("60 00 20 00 00 00 00 00", robot_with("zlac8015d").drives) == "2000h:0"
+
+
+def test_an_object_that_robot_yaml_expects_is_one_too() -> None:
+    (drive,) = GENERIC
+    noted = drive.model_copy(update={"expects": (Expected(index=0x2010, value=1),)})
+    assert (taken("60 10 20 00 00 00 00 00"), taken("60 10 20 00 00 00 00 00", [noted])) == ("", "2010h:0")
 
 
 # the boot asked twice, the first answer was slow ── the second one comes after the boot ── a third one is foreign

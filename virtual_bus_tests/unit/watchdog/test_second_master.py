@@ -373,6 +373,12 @@ def test_commands_that_make_no_sense_are_counted() -> None:
         ("2b 5e 68 00 00 00 00 00", "685E"),  # of the second axis
         ("23 84 60 00 01 00 00 00", "6084"),
         ("23 85 68 00 01 00 00 00", "6885"),
+        ("2f 7e 60 00 c0 00 00 00", "607E"),  # which way is positive
+        ("23 89 60 00 00 00 00 00", "6089"),
+        ("23 91 68 01 01 00 00 00", "6891"),  # how far one bit goes
+        ("23 97 60 01 01 00 00 00", "6097"),
+        ("23 a8 60 00 00 00 00 00", "60A8"),
+        ("23 aa 60 00 00 00 00 00", "60AA"),
     ],
 )
 def test_an_sdo_that_changes_how_an_enabled_drive_stops(data: str, index: str) -> None:
