@@ -24,7 +24,9 @@ from canbase_config.watchdog_section import Watchdog
 
 BROADCAST = 0
 """Lower seven bits of the identifiers of NMT, SYNC and TIME."""
-NODE_ID_BITS = 0x7F
+NODE_ID_BITS, COB_ID_BITS = 0x7F, 0x7FF
+LSS_REQUEST = 0x7E5
+"""CiA 305: node ids and bit rates."""
 REMOTE = 0x4000_0000
 """linux/can.h, CAN_RTR_FLAG: above an identifier, in a filter of the kernel."""
 DRIVER_NODE_ID = 127
@@ -218,13 +220,14 @@ class Robot(Section):
     def bus_arguments(self) -> dict[str, Any]:
         """Keyword arguments for `can.Bus` of the driver and the watchdog. On SocketCAN the kernel passes the frames of
         this robot alone, so that a sensor on the same bus wakes neither: broadcast ones (NMT, SYNC), and all 11-bit
-        identifiers whose lower seven bits are the node id of a drive, the driver or the watchdog (CiA 301, 7.3.5). None
-        is a remote frame: those are requests of the watchdog to drives.
+        identifiers whose lower seven bits are the node id of a drive, the driver or the watchdog (CiA 301, 7.3.5), and
+        LSS requests. None is a remote frame: those are requests of the watchdog to drives.
         """
         if self.bus.interface != "socketcan":
             return self.bus.arguments()
         nodes = [BROADCAST, *sorted({drive.node_id for drive in self.drives}), WATCHDOG_NODE_ID, DRIVER_NODE_ID]
         filters = [{"can_id": node_id, "can_mask": REMOTE | NODE_ID_BITS, "extended": False} for node_id in nodes]
+        filters.append({"can_id": LSS_REQUEST, "can_mask": REMOTE | COB_ID_BITS, "extended": False})
         return {"can_filters": filters} | self.bus.arguments()
 
     @model_validator(mode="after")

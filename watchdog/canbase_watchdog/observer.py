@@ -188,6 +188,7 @@ class Observer:
         self._routes[frames.SYNC] = self._on_sync
         self._routes[frames.DRIVER_HEARTBEAT] = self._on_driver_heartbeat
         self._routes[frames.WATCHDOG_HEARTBEAT] = self._on_watchdog_heartbeat
+        self._routes[frames.LSS_REQUEST] = self._on_lss
         for node_id in self._heard_at:
             self._add_node_routes(node_id)
             for place, key in enumerate(sorted(key for key in self._records if key[0] == node_id)):
@@ -343,6 +344,11 @@ class Observer:
         for node_id in self._heard_at:
             if command[1] in (0, node_id):
                 self._note_foreign(node_id, f"NMT command {command[0]} for node {command[1]}", now_s)
+        return True
+
+    def _on_lss(self, data: bytes, now_s: float) -> bool:
+        for node_id in self._heard_at:
+            self._note_foreign(node_id, f"an LSS request {data.hex(' ')} (CiA 305: node ids, bit rate)", now_s)
         return True
 
     def _on_quick_stop(self, node_id: int, data: bytes, now_s: float) -> bool:

@@ -67,7 +67,8 @@ def test_on_socketcan_the_kernel_passes_what_this_robot_sends_and_what_reaches_i
         assert all(passes(filters, function << 7 | node_id) for function in range(16))
     for broadcast in (0x000, 0x080, 0x100):  # NMT, SYNC, TIME
         assert passes(filters, broadcast)
-    assert sum(passes(filters, cob_id) for cob_id in range(0x800)) == 16 * (len(robot.drives) + 3)
+    assert passes(filters, 0x7E5)  # LSS requests
+    assert sum(passes(filters, cob_id) for cob_id in range(0x800)) == 16 * (len(robot.drives) + 3) + 1
     assert not any(passes(filters, REMOTE | cob_id) for cob_id in range(0x800))  # node guarding requests
 
 
