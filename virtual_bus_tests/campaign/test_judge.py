@@ -33,7 +33,7 @@ UP = {Drive.SWITCH_ON_DISABLED: 0x06, Drive.READY_TO_SWITCH_ON: 0x07, Drive.QUIC
 """Controlwords on the way to operation enabled; 0Fh in all other states."""
 SETPOINT = struct.Struct("<Hi")
 STARTS_S, ENDS_S, SPEED_MPS = 1.6, 4.0, 0.4
-WATCHES_NOTHING = 7
+WATCHES_NOTHING = 29
 """A robot whose drives do not stop by themselves."""
 TWO_MOTORS_A_SIDE = 420
 """A robot with two motors on each side."""

@@ -26,6 +26,7 @@ NEEDS_A_CURE = {
     "coasts",
     "soft_stop",
     "guarding_alone",
+    "one_tpdo",
 }
 UNUSABLE = {"synchronous_alone", "wide_status"}
 TOGETHER = range(8)

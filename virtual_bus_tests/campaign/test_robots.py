@@ -40,7 +40,7 @@ def test_a_seed_has_its_robot_and_the_first_ones_have_the_sample() -> None:
     assert robot_of(25) is robot_of(49) is draw_robot(1)
     robots = [draw_robot(number).robot for number in range(1, 60)]
     assert {len(robot.drives) for robot in robots} == {2, 4, 6, 8}
-    assert len({robot.drives[0].profile for robot in robots}) == 10
+    assert len({robot.drives[0].profile for robot in robots}) == 11
 
 
 @pytest.fixture

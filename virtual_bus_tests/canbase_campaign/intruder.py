@@ -13,7 +13,9 @@ from canbase_velocity.twist import Twist
 ENABLE = 0x000F
 NMT_RESETS = (0x81, 0x82)
 """Reset node, reset communication."""
-SETPOINT = struct.Struct("<Hi")
+SETPOINT = {16: struct.Struct("<Hh"), 32: struct.Struct("<Hi")}
+VL_RAMP = 0x70
+"""Bits 4 to 6 of the controlword: in mode 2 the ramp runs, is not locked, and has the target as its input."""
 TWIN_STATUS = struct.pack("<Hi", 0x0637, 0)
 """Operation enabled; position 0."""
 
@@ -49,7 +51,9 @@ class Intruder:
         if self.setpoints_mps:
             for drive in self._robot.drives:
                 bits = round(self.setpoints_mps / mps_per_bit(drive, self._robot.base.wheel_radius_m))
-                self._member.send(0x200 + 0x100 * drive.axis + drive.node_id, SETPOINT.pack(ENABLE, bits))
+                word = ENABLE | (VL_RAMP if drive.kind.is_vl else 0)
+                data = SETPOINT[drive.kind.layout.target_bits].pack(word, bits)
+                self._member.send(0x200 + 0x100 * drive.axis + drive.node_id, data)
             self.moves_at = now_s
         if self.setpoints_mps or self.syncs:
             self._member.send(0x080, b"")

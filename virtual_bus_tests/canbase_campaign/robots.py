@@ -35,9 +35,9 @@ CREEP_SHARE = 0.45
 """Of the rated torque: friction and slope take no more of a wheel that just turns. docs/bus.md demands half."""
 TRIES = 100
 BITRATES = (125_000, 250_000, 500_000, 1_000_000)
-STOP_THEMSELVES = ("generic", "epos4", "nanotec", "elmo_gold", "kinco")
-"""Kinds whose drives stop when their masters die: 1016h with 6007h."""
-RELY_ON_OTHERS = ("roboteq", "zlac8015d", "technosoft", "tmcm1636", "dryve_d1")
+STOP_THEMSELVES = ("generic", "epos4", "nanotec", "elmo_gold", "kinco", "technosoft", "inverter")
+"""Kinds whose drives stop when their masters die: 1016h or node guarding, with 6007h."""
+RELY_ON_OTHERS = ("roboteq", "zlac8015d", "tmcm1636", "dryve_d1")
 ANY_UNIT = ("0.1rpm", "0.001rpm", "0.001rev/s", "counts/s")
 
 
