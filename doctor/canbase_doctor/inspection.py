@@ -14,6 +14,7 @@ from canbase_config.object_map import CONTROLWORD, STATUSWORD, TARGET_VELOCITY, 
 from canbase_config.profile_file import guess
 from canbase_config.robot import Robot
 from canbase_driver.boot.pdo_mapping import configure_pdos
+from canbase_driver.boot.scale_check import check_expected
 from canbase_driver.boot.sequence import IDENTITY, NUMBERS
 from canbase_driver.boot.settings import configure_motion, configure_self_stop, configure_sync, write_all
 from canbase_driver.boot.steps import BootError, NodeAccess, Steps, WaitBootUp, unsigned
@@ -131,6 +132,8 @@ def _settings(access: NodeAccess, drives: tuple[Drive, ...], robot: Robot) -> St
         yield from configure_motion(access, drive, robot)
     yield from configure_sync(access, kind, robot.bus.sync_counter)
     yield from write_all(access, kind.writes.after_mapping)
+    for drive in drives:
+        yield from check_expected(access, drive)
     moving = [place(kind, index, drive.axis) for index in COMMANDS for drive in drives]
     own = tuple(f"{at.index:04X}h:{at.sub}: " for at in moving)
     access.changes = [change for change in access.changes if not change.startswith(own)]

@@ -119,3 +119,11 @@ def test_a_drive_with_too_few_pdos_is_a_problem_in_words() -> None:
     dictionary: Any = world.bench.nodes[1].dictionary
     dictionary.entries = {key: entry for key, entry in dictionary.entries.items() if key >> 8 != 0x1801}
     assert "it has no TPDO2 (1801h), but 4 RPDOs, 3 TPDOs" in inspected(world)[1].pdos.problem
+
+
+def test_a_drive_that_means_something_else_by_its_numbers_is_a_problem_before_the_boot_says_it() -> None:
+    left = {"joint": "left", "node_id": 1, "side": "left", "expects": ({"index": 0x608F, "sub": 1, "value": 1000},)}
+    found = inspected(SessionWorld(robot(left, {"joint": "right", "node_id": 2, "side": "right"})))
+    problem = "608Fh:1 (position encoder resolution) of left is 4096, and was 1000 when its wheel was measured"
+    assert problem in found[1].settings.problem
+    assert found[2].settings.problem == ""
