@@ -73,7 +73,7 @@ def test_it_boots_drives_and_stops_with_one_frame_of_feedback_in_each_cycle(worl
     world.drive(seconds=1.0)
     assert world.truth.linear_mps == pytest.approx(FORWARD.linear_mps, rel=0.02)
     notes = " ".join(world.snapshot.drives[0].boot_notes)
-    assert "the drive has no TPDO2: TPDO1 carries the velocity behind the position" in notes
+    assert "the drive has no TPDO2: one TPDO for each motor carries the velocity behind the position" in notes
     assert "torque unknown: one TPDO for each motor has no room for it" in notes
     before = len(world.sent(STATUS))
     world.run(1.0)
