@@ -22,16 +22,24 @@ _WRITTEN: Final = 3 << 5
 _COMMAND: Final = 7 << 5
 
 
+def set_by_boot(index: int, kind: Profile) -> bool:
+    """Whether another client's write to this object makes the driver boot a node of this kind anew."""
+    return index in PDOS or index in _stopping(kind)
+
+
+def _stopping(kind: Profile) -> frozenset[int]:
+    own = kind.self_stop.vendor_watchdog
+    axis = (*RAMPS, *VL, *(index for index in STOPPED_BY if index >= 0x6000))
+    makers = () if own is None or own.index is None else (own.index,)
+    return frozenset({*STOPPED_BY, *axis, *(index + AXIS_OFFSET for index in axis), *makers})
+
+
 class ForeignWrites:
     """Looks at the SDO answers of one node after its boot."""
 
     def __init__(self, kind: Profile, late: Counter[bytes]) -> None:
         """`late`: answers that the boot is still owed, by address: none of them is another client's."""
-        own = kind.self_stop.vendor_watchdog
-        axis = (*RAMPS, *VL, *(index for index in STOPPED_BY if index >= 0x6000))
-        self._watched = {*STOPPED_BY, *axis, *(index + AXIS_OFFSET for index in axis)}
-        if own is not None and own.index is not None:
-            self._watched.add(own.index)
+        self._stopping = _stopping(kind)
         self._late = late
 
     def take(self, frame: Frame) -> str:
@@ -43,4 +51,4 @@ class ForeignWrites:
             self._late[data[1:4]] -= 1
             return ""
         index = int.from_bytes(data[1:3], "little")
-        return f"{index:04X}h:{data[3]}" if index in self._watched or index in PDOS else ""
+        return f"{index:04X}h:{data[3]}" if index in self._stopping or index in PDOS else ""
