@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from canbase_cli.options import ConfigOption
-from canbase_runtime.terminal import colour, load_config, warn
+from canbase_runtime.terminal import FAILED, colour, fail, load_config, warn
 
 if TYPE_CHECKING:
     from canbase_config.robot import Bus
@@ -70,17 +70,20 @@ def keys() -> None:
 def from_eds(file: Annotated[Path, typer.Argument(metavar="FILE", help="The EDS or DCF file of a drive.")]) -> None:
     """Draft a drive profile from an EDS file. The profile goes to stdout, notes about it to stderr.
 
-    Exit codes: 0 a draft for `profile` in robot.yaml, 1 the drive lacks what canbase needs, 2 FILE cannot be read.
+    Exit codes: 0 a draft for `profile` in robot.yaml, 1 no CiA 402 drive, or it lacks what canbase needs, 2 FILE cannot
+    be read.
     """
     from canbase_config.eds_file import EdsError, read_eds
     from canbase_config.errors import MOST_TOLD, printable
-    from canbase_config.from_eds import draft
+    from canbase_config.from_eds import draft, why_no_drive
 
     try:
         eds = read_eds(file)
     except EdsError as error:
         typer.secho(f"canbase: {error}", err=True, fg=typer.colors.RED, color=colour())
         raise typer.Exit(2) from error
+    if why := why_no_drive(eds):
+        fail(f"{file}: {why}. A drive needs the EDS file of its maker for this very type", FAILED)
     found = draft(eds)
     typer.echo(found.text, nl=False)
     lines = [f"{file}: {len(eds.objects)} objects, read as {eds.encoding}"]

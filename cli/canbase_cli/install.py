@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from canbase_cli.options import NamespaceOption
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, colour, fail, load_config
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ def install(
     adapter: Annotated[
         str, typer.Option(metavar="PROPERTY=VALUE", help="udev property of the adapter that gets the channel's name.")
     ] = "",
+    namespace: NamespaceOption = "",
     cpus: Annotated[str, typer.Option(metavar="LIST", help="CPUs for the services, such as 2,3.")] = "",
     sros2: Annotated[bool, typer.Option("--sros2", help="Enforce SROS2, with /etc/canbase/keys.")] = False,
     hardware_watchdog: Annotated[
@@ -103,6 +105,8 @@ def install(
             hardware_watchdog_s=hardware_watchdog,
             sros2=sros2,
             files={} if config is None else named_texts(loaded.files),
+            namespace=namespace,
+            kept=environment(prefix, name or loaded.robot.name),
         )
         installed = manifests(prefix)
         others = neighbours(prefix, request.name, installed)

@@ -75,6 +75,19 @@ class RosCommand(TyperCommand):
         ctx.meta[_ROS_FLAG] = args[at + 1 :]
         return super().parse_args(ctx, args[:at])
 
+    def invoke(self, ctx: Any) -> Any:
+        """Runs it. A parameter of another type than its node declares (use_sim_time:=3) is a wrong command line.
+
+        ROS looks at types only when a node begins.
+        """
+        try:
+            return super().invoke(ctx)
+        except Exception as error:
+            exceptions = sys.modules.get("rclpy.exceptions")
+            if exceptions is None or not isinstance(error, exceptions.InvalidParameterTypeException):
+                raise
+            raise typer.BadParameter(f"behind {_ROS_FLAG}: {error}") from error
+
 
 def ros_arguments(ctx: typer.Context, namespace: str) -> list[str]:
     """Arguments for `rclpy.init`: the namespace, then what the user wrote behind `--ros-args`; empty without both.
@@ -97,7 +110,8 @@ def _check_ros_arguments(given: list[str]) -> None:
     try:
         context.init([_ROS_FLAG, *given])
     except rclpy_implementation.UnknownROSArgsError as error:
-        raise typer.BadParameter(f"ROS does not know {error} behind {_ROS_FLAG}") from error
+        words = str(error).strip("[]").replace("'", "")
+        raise typer.BadParameter(f"ROS does not know {words} behind {_ROS_FLAG}") from error
     except rclpy_implementation.RCLError as error:
         raise typer.BadParameter(f"behind {_ROS_FLAG}: {str(error).partition(', at /')[0]}") from error
     context.try_shutdown()

@@ -3,13 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 from canbase_commissioning.object_dictionary import Address, encode, statuswords
-from canbase_config.object_map import AXIS_OFFSET, STATUSWORD, place
+from canbase_config.object_map import (
+    AXIS_OFFSET,
+    CONTROLWORD,
+    MODE,
+    STATUSWORD,
+    TARGET_VELOCITY,
+    VL_TARGET_VELOCITY,
+    place,
+)
+from canbase_config.profile_file import load_profile
 from canbase_config.robot import Robot
 from canbase_driver.boot.steps import Steps
 from canbase_driver.cia301.sdo_client import WRITE_ONLY, Read, SdoAborted, Write
 from canbase_driver.cia402 import decode_statusword
+from canbase_driver.drives.foreign_writes import set_by_boot
+
+COMMANDS: Final = frozenset((CONTROLWORD, MODE, TARGET_VELOCITY, VL_TARGET_VELOCITY))
+"""What the driver orders in each cycle; of the first axis."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +63,24 @@ def write_object(
     data = encode(text, kind or f"u{8 * len(before or b'')}")
     yield Write(at.index, at.sub, data)
     return Written(before, (yield from _read(at)))
+
+
+def beside_driver(node_id: int, at: Address, robot: Robot | None) -> str:
+    """What becomes of a write to `at` of a node while canbase's driver runs on the bus.
+
+    `robot`: None: not known; the generic profile counts.
+    """
+    drives = [drive for drive in robot.drives if drive.node_id == node_id] if robot else []
+    if robot is not None and not drives:
+        return f"Node {node_id} is no drive of robot.yaml, and the driver does not notice the write"
+    if at.index in COMMANDS or at.index - AXIS_OFFSET in COMMANDS:
+        return f"The driver sends {at} itself; while the motor has power, the watchdog stops the robot for such a write"
+    if set_by_boot(at.index, drives[0].kind if drives else load_profile("generic"), drives):
+        return (
+            f"The driver undoes a write to {at}: it boots node {node_id} anew as soon as no motor of it has power. "
+            "Until then the watchdog may stop the robot, because the write is a sign of another master"
+        )
+    return f"The driver does not notice a write to {at}, until the next boot of node {node_id} writes its own value"
 
 
 def status_places(node_id: int, robot: Robot | None) -> tuple[Address, ...]:

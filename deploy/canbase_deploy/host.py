@@ -165,7 +165,7 @@ def neighbours(prefix: Path, name: str, installed: Iterable[str]) -> list[Neighb
                 f"{error}\nthe robot {other} is installed too, and this version cannot use its {path}. Mend it "
                 f"(`canbase config check --config {path}`), or `sudo canbase uninstall {other}`. {UNCHANGED}"
             ) from error
-        found.append(Neighbour(other, loaded.robot, named_texts(loaded.files)))
+        found.append(Neighbour(other, loaded.robot, named_texts(loaded.files), environment(prefix, other)))
     return found
 
 

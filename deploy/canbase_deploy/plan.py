@@ -14,7 +14,7 @@ from typing import Final, Literal
 from canbase_config.robot import Robot
 from canbase_deploy.actions import Action, Existing, FirstRecords, Link, Remove, Run, WriteFile
 from canbase_deploy.keystore import KEYS, SERVICES, view
-from canbase_deploy.neighbours import Neighbour, clash
+from canbase_deploy.neighbours import DOMAIN, Neighbour, clash, namespace
 from canbase_deploy.owner import ETC, USER, is_the_owners, misplaced, modes, old, owner_paths, place
 from canbase_deploy.relay import APPLY, drop_in_text, udev_rule, wrong_chip
 
@@ -26,8 +26,6 @@ WITH_ROS: Final = PARTS[1:]
 ON_THE_BUS: Final = PARTS[:2]
 METRICS: Final = "metrics"
 """Its unit is installed and not started: nothing of the robot needs it."""
-DOMAIN: Final = "0"
-"""ROS_DOMAIN_ID where nobody has chosen one: what ROS 2 takes then, said aloud."""
 REACH: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
 ACCOUNT: Final = WriteFile(
@@ -63,6 +61,8 @@ class Request:
     paths, by these. `adapter`: a udev property, `ID_PATH=…`, that names
     the adapter which is to get the interface's name. `cpus`: for CPUAffinity. `hardware_watchdog_s`: 0 leaves it alone.
     `environment`: what the owner chose of ROS; `sourced`: what a sourced ROS 2 set, by which the services find it.
+    `namespace`: of its nodes, "/robot2"; empty: none. `kept`: what its environment file sets that is there already,
+    which is kept; empty: there is none.
     """
 
     name: str
@@ -79,6 +79,13 @@ class Request:
     hardware_watchdog_s: int = 0
     sros2: bool = False
     files: Mapping[str, str] = field(default_factory=dict)
+    namespace: str = ""
+    kept: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def services_environment(self) -> dict[str, str]:
+        """What the environment file sets after the installation."""
+        return dict(self.kept) or _environment_values(self)
 
 
 def install_plan(request: Request, manifests: Mapping[str, str], neighbours: Sequence[Neighbour] = ()) -> list[Action]:
@@ -87,9 +94,11 @@ def install_plan(request: Request, manifests: Mapping[str, str], neighbours: Seq
     Raises InstallError for a robot that services cannot run, or not beside its `neighbours`.
     """
     _check(request)
+    _check_namespace(request)
     _check_places(request, manifests)
+    own = Neighbour(request.name, request.robot, request.files, request.services_environment)
     for other in neighbours:
-        if wrong := clash(request.name, request.robot, request.files, other):
+        if wrong := clash(own, other):
             raise InstallError(wrong)
     before = [PurePosixPath(path) for path in manifests.get(request.name, "").splitlines()]
     named = dict.fromkeys([*map(place, request.files), *filter(is_the_owners, before)])
@@ -220,6 +229,14 @@ def _check(request: Request) -> None:
         raise InstallError(wrong)
 
 
+def _check_namespace(request: Request) -> None:
+    if request.namespace and request.kept and namespace(request.kept) != request.namespace:
+        raise InstallError(
+            f"--namespace {request.namespace}: {owner_paths(request.name)[1]} is kept and has the namespace "
+            f"{namespace(request.kept)}: set CANBASE_OPTIONS=--namespace {request.namespace} there"
+        )
+
+
 def _check_places(request: Request, manifests: Mapping[str, str]) -> None:
     """No robot's robot.yaml takes the place of a file that robot.yaml names, nor the other way."""
     robots = {owner_paths(name)[0] for name in (request.name, *manifests)}
@@ -263,10 +280,8 @@ def _unit(name: str, text: str, python: str) -> WriteFile:
 
 def _of_the_owner(request: Request) -> list[WriteFile]:
     yaml_path, env_path = owner_paths(request.name)
-    reach = "LOCALHOST" if request.network == "localhost" else "SUBNET"
-    values = {REACH: reach, "ROS_DOMAIN_ID": DOMAIN, **request.environment}
     env = "# Environment of the services of this robot. Kept by upgrades.\n"
-    env += "".join(f"{key}={value}\n" for key, value in values.items())
+    env += "".join(f"{key}={value}\n" for key, value in _environment_values(request).items())
     env += "# CANBASE_OPTIONS=--namespace robot1\n# CANBASE_ROS_ARGS=-r scan:=front/scan\n"
     files = [WriteFile(env_path, env, 0o640, USER, Existing.KEEP)]
     for reference, text in request.files.items():
@@ -274,6 +289,13 @@ def _of_the_owner(request: Request) -> list[WriteFile]:
     if request.yaml is not None:
         files.append(WriteFile(yaml_path, request.yaml, 0o640, USER, Existing.BACK_UP))
     return files
+
+
+def _environment_values(request: Request) -> dict[str, str]:
+    """Of a new environment file; the domain is said aloud even where nobody has chosen one."""
+    reach = "LOCALHOST" if request.network == "localhost" else "SUBNET"
+    options = {"CANBASE_OPTIONS": f"--namespace {request.namespace}"} if request.namespace else {}
+    return {REACH: reach, "ROS_DOMAIN_ID": DOMAIN, **request.environment, **options}
 
 
 def _modes_of(name: str, named: Iterable[PurePosixPath]) -> list[WriteFile]:

@@ -13,6 +13,7 @@ from canbase.msg import DriverStatus, SafetyState
 
 from canbase_doctor.check import Check, fail, ok, warn
 from canbase_doctor.evidence import Evidence
+from canbase_doctor.metrics_check import metrics
 from canbase_doctor.nav2_checks import nav2_checks
 from canbase_driver.supervision.watchdog_link import RUNGS
 from canbase_runtime.driver_state import DriverState, driver_state
@@ -206,6 +207,7 @@ CHECKS: tuple[Callable[[Evidence], list[Check]], ...] = (
     scanners,
     velocity_mux,
     nav2_checks,
+    metrics,
 )
 
 

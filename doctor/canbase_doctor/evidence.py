@@ -156,6 +156,8 @@ class Evidence:
     environment: Mapping[str, str] = field(default_factory=dict)
     """Of doctor itself."""
     answers: Answers = Answers()
+    metrics_unit: str = ""
+    """The unit that starts `canbase metrics` with the robot; empty: none is enabled on this computer."""
     overload: Overload = field(default_factory=Overload)
     """Of this computer, while doctor listened."""
 

@@ -28,6 +28,7 @@ from canbase_config.load import Loaded
 from canbase_config.mux import MEASURED
 from canbase_config.robot import Robot
 from canbase_doctor.evidence import DOCTOR, Endpoint, Evidence, Goal, Heard, LoggedStep, VelocityTopic
+from canbase_doctor.metrics_check import enabled_unit
 from canbase_doctor.nav2_probe import Nav2Prober
 from canbase_doctor.overload import Overload, load_per_core
 from canbase_doctor.probes import SERVER, Prober, action_types
@@ -147,6 +148,7 @@ def _evidence(loaded: Loaded, node: Node, listener: Listener, prober: Prober) ->
         processes=server_processes(),
         environment=talks_by("self"),
         answers=prober.answers(),
+        metrics_unit=enabled_unit(loaded.path, loaded.robot.name),
     )
 
 

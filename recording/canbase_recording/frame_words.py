@@ -180,6 +180,9 @@ class Decoder:
 
     def _mapped(self, layout: PdoLayout, mapped: Mapped, data: bytes) -> str:
         value = mapped.value(data)
+        if mapped.named is not None:
+            unit = f" {mapped.named.unit}" if mapped.named.unit else ""
+            return f"{mapped.named.name} {value * mapped.named.scale:g}{unit}"
         axis = f" axis {mapped.axis}" if mapped.axis else ""
         if mapped.base == STATUSWORD:
             state = decode_statusword(value)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Final
 
+from canbase_config.drive_values import DriveValue, ValuePdo
 from canbase_config.object_map import (
     AXIS_OFFSET,
     CONTROLWORD,
@@ -58,7 +59,10 @@ class Source(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Mapped:
-    """One object in a PDO. `base`: the object of the first axis that it is, of `axis`; bits from the first one on."""
+    """One object in a PDO. `base`: the object of the first axis that it is, of `axis`; bits from the first one on.
+
+    `named`: one of `values` of its drive in robot.yaml. Its `base` is 0: it is evidence of no command and no motion.
+    """
 
     index: int
     sub: int
@@ -66,11 +70,13 @@ class Mapped:
     axis: int
     first_bit: int
     bits: int
+    named: DriveValue | None = None
 
     def value(self, data: bytes) -> int:
         """Out of the PDO's bytes, which must be long enough."""
         raw = int.from_bytes(data, "little") >> self.first_bit & (1 << self.bits) - 1
-        negative = self.base in SIGNED and self.bits > 1 and raw >> (self.bits - 1)
+        signed = self.named.signed if self.named else self.base in SIGNED
+        negative = signed and self.bits > 1 and raw >> (self.bits - 1)
         return raw - (1 << self.bits) if negative else raw
 
 
@@ -241,10 +247,20 @@ def _of_robot(node: NodeLayout) -> list[tuple[int, PdoLayout]]:
             axis = node.axes[min((pdo.number - 1) // 2, len(node.axes) - 1)] if pdo.kind == "TPDO" else node.axes[0]
             layout = _layout(pdo.name, node.node_id, entries, Source.ROBOT, where=where, packed_axis=axis)
             found.append((pdo.cob_id, layout))
+    for pdo, carried in zip(node.value_pdos(), node.values, strict=True):
+        found.append((pdo.cob_id, _of_values(pdo.name, node.node_id, carried)))
     if node.profile.layout.fits_one_tpdo and not node.joins_velocity:
-        joined = _of_robot(replace(node, joins_velocity=True))
+        joined = _of_robot(replace(node, joins_velocity=True, values=()))
         found += [(cob_id, layout) for cob_id, layout in joined if layout.name.startswith("TPDO")]
     return found
+
+
+def _of_values(name: str, node_id: int, carried: ValuePdo) -> PdoLayout:
+    mapped, bit = [], 0
+    for value in carried.values:
+        mapped.append(Mapped(value.index, value.sub, 0, 0, bit, value.bits, value))
+        bit += value.bits
+    return PdoLayout(name, node_id, tuple(mapped), bit, Source.ROBOT)
 
 
 def _layout(

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from importlib.resources import files
+from pathlib import Path
 
+import can
 import pytest
 
+from canbase_config.load import load_robot
 from support.bus_tool import canbase, drives, write_robot
 from support.udp_port import free_udp_port
 
@@ -83,3 +86,13 @@ def test_what_the_eds_denies_is_not_sent(config: str) -> None:
     sent = canbase("sdo", "write", "1", "605A", "9", "-c", config, "--eds", EDS, "--ignore-eds")
     assert sent.returncode == 1
     assert "0609 0031h value too high" in sent.stderr  # the drive's own answer
+
+
+def test_beside_a_driver_nothing_is_written_and_the_sentence_says_what_would_become_of_it(config: str) -> None:
+    with can.Bus(**load_robot(Path(config)).robot.bus.arguments()) as bus:
+        bus.send_periodic(can.Message(arbitration_id=0x77F, data=[5], is_extended_id=False), 0.05)
+        done = canbase("sdo", "write", "1", "1016:1", "0", "-c", config)
+    assert done.returncode == 1
+    said = " ".join(done.stderr.split())
+    assert "canbase's driver runs on this bus. The driver undoes a write to 1016h:1: it boots node 1 anew" in said
+    assert said.endswith("End it first, or --force")

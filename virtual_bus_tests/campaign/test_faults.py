@@ -9,6 +9,8 @@ import pytest
 
 from canbase_campaign.faults import FAULTS
 from canbase_campaign.forked import in_a_copy
+from canbase_campaign.plan import draw_plan
+from canbase_campaign.robots import SCENARIOS, draw_robot
 from canbase_campaign.scenario import Start
 from canbase_campaign.world import World
 from canbase_sim.cia402.states import State
@@ -59,6 +61,29 @@ def test_a_driver_that_never_lets_go_leaves_the_power_on_after_a_touch(holds: bo
     world.clock.run_until(world.clock.now_s + 0.4)
     without_power = [change for change in world.drives.changes() if change.after is State.SWITCHED_ON]
     assert bool(without_power) is not holds
+
+
+ALONE = {
+    "frame_duplication": {"foreign_master"}, "lease_garbage": set(), "orders_shuffled": set(), "orders_twice": set(),
+    "resets_too_early": set(), "status_lost": set(), "two_hands": set(),
+}  # fmt: skip
+"""Faults with a row of their own in hazards.yaml, and what the watchdog may trip on."""
+ROBOT, PLANS = 0, 4
+
+
+@pytest.fixture(scope="module")
+def drawn() -> Start:
+    return Start(draw_robot(ROBOT))
+
+
+@pytest.mark.parametrize("fault", sorted(ALONE))
+def test_alone_it_breaks_no_property_and_trips_only_where_it_looks_like_another_master(
+    drawn: Start, fault: str
+) -> None:
+    results = [drawn.fork(draw_plan(SCENARIOS * ROBOT + number, (fault,))) for number in range(PLANS)]
+    assert [violation for result in results for violation in result.violations] == []
+    assert {trip for result in results for trip in result.trips} == ALONE[fault]
+    assert sum(result.moved_m for result in results) > 0.5
 
 
 def test_without_a_fault_nothing_changes(start: Start, undisturbed: dict[str, int]) -> None:

@@ -114,6 +114,17 @@ def test_a_limit_at_the_start(
     assert "Traceback" not in process.log()
 
 
+def test_a_parameter_of_another_type_ends_the_start_with_a_sentence(
+    spawn: Callable[..., Process], make_robot: Callable[[Mapping[str, Any]], Path], test_node: TestNode
+) -> None:
+    words = ["velocity", "--config", str(make_robot({})), "--ros-args", "-p", "use_sim_time:=3"]
+    process = spawn([sys.executable, "-m", "canbase_cli", *words])
+    test_node.wait_for(lambda: process.exit_code is not None, 30.0, "its end")
+    assert process.exit_code == 2
+    assert "use_sim_time" in process.log()
+    assert "Traceback" not in process.log()
+
+
 @pytest.mark.usefixtures("domain_id")
 def test_a_change_and_what_is_decided_then_are_among_the_recorded_inputs(robot: Robot) -> None:
     """Otherwise a replay would be of a faster robot."""

@@ -27,7 +27,7 @@ from canbase_commissioning.object_dictionary import (
 from canbase_commissioning.object_names import find_object, limits, why_not_read, why_not_write
 from canbase_commissioning.onbus.bus_session import BusSession, open_line
 from canbase_commissioning.scan_rows import twins_advice
-from canbase_commissioning.sdo_access import Refused, Written, read_object, status_places, write_object
+from canbase_commissioning.sdo_access import Refused, Written, beside_driver, read_object, status_places, write_object
 from canbase_commissioning.sdo_session import SdoSession
 from canbase_config.eds_file import EdsError, EdsObject, read_eds
 from canbase_config.robot import Bus, Robot
@@ -103,7 +103,8 @@ def run_write(bus: Bus, target: Target, value: str, timeout_s: float, *, force: 
     with open_line(bus) as line:
         heard = _listen(line)
         if heard.driver_lives and not force:
-            fail("canbase's driver runs on this bus and would not know of the change: end it first, or --force", FAILED)
+            becomes = beside_driver(target.node, target.at, target.robot)
+            fail(f"not written: canbase's driver runs on this bus. {becomes}. End it first, or --force", FAILED)
         status_at = status_places(target.node, target.robot)
         steps = write_object(target.at, value, target.kind, status_at, force=force)
         done = _transfer(line, target.node, steps, heard, timeout_s)

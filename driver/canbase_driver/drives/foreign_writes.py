@@ -1,4 +1,4 @@
-"""Writes of another client to what the boot of a node has set: a tool, another master. CiA 301.
+"""Writes of another client to what the boot of a node has set or compared: a tool, another master. CiA 301.
 
 An SDO answer goes to all that listen. One that confirms a write which the boot did not make shows such a client.
 """
@@ -11,7 +11,7 @@ from typing import Final
 
 from canbase_config.drive import Drive
 from canbase_config.object_map import AXIS_OFFSET
-from canbase_config.profile import STOPPED_BY
+from canbase_config.profile import STOPPED_BY, Profile
 from canbase_config.scale_objects import SCALE_OBJECTS
 from canbase_driver.cia301.frame import Frame
 
@@ -25,18 +25,29 @@ _WRITTEN: Final = 3 << 5
 _COMMAND: Final = 7 << 5
 
 
+def set_by_boot(index: int, kind: Profile, drives: Sequence[Drive] = ()) -> bool:
+    """Whether another client's write to this object makes the driver boot a node of this kind anew.
+
+    `drives`: of that node, whose `expects` count too.
+    """
+    return index in PDOS or index in _objects(kind, drives)
+
+
+def _objects(kind: Profile, drives: Sequence[Drive]) -> frozenset[int]:
+    own = kind.self_stop.vendor_watchdog
+    axis = (*RAMPS, *VL, *SCALE_OBJECTS, *(index for index in STOPPED_BY if index >= 0x6000))
+    makers = () if own is None or own.index is None else (own.index,)
+    noted = (each.index for drive in drives for each in drive.expects)
+    return frozenset({*STOPPED_BY, *axis, *(index + AXIS_OFFSET for index in axis), *makers, *noted})
+
+
 class ForeignWrites:
     """Looks at the SDO answers of one node after its boot."""
 
     def __init__(self, drives: Sequence[Drive], late: Counter[bytes]) -> None:
         """`drives`: of this node, all of one kind. `late`: answers that the boot is still owed, by address: none of
         them is another client's."""
-        own = drives[0].kind.self_stop.vendor_watchdog
-        axis = (*RAMPS, *VL, *SCALE_OBJECTS, *(index for index in STOPPED_BY if index >= 0x6000))
-        self._watched = {*STOPPED_BY, *axis, *(index + AXIS_OFFSET for index in axis)}
-        self._watched |= {each.index for drive in drives for each in drive.expects}
-        if own is not None and own.index is not None:
-            self._watched.add(own.index)
+        self._watched = _objects(drives[0].kind, drives)
         self._late = late
 
     def take(self, frame: Frame) -> str:

@@ -15,7 +15,7 @@ import typer
 from typer.testing import CliRunner
 
 from canbase_cli.main import app
-from canbase_cli.options import ros_needed
+from canbase_cli.options import RosCommand, ros_needed
 from canbase_config.derive import watchdog_config
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
@@ -270,6 +270,7 @@ def test_in_a_colcon_workspace_the_version_comes_from_package_xml(
         (["-r", "foo"], "remap rule: '-r foo'"),
         (["--params-file", "/none.yaml"], "Error opening YAML file"),
         (["--log-level", "nonsense"], "valid severity level"),
+        (["words", "--without", "a-rule"], "ROS does not know words, --without, a-rule behind --ros-args"),
     ],
 )
 def test_what_ros_does_not_take_is_a_wrong_command_line_in_words(given: list[str], told: str) -> None:
@@ -277,3 +278,26 @@ def test_what_ros_does_not_take_is_a_wrong_command_line_in_words(given: list[str
     assert result.exit_code == 2
     assert told in " ".join(result.output.split())
     assert "Traceback" not in result.output
+
+
+def test_a_parameter_of_another_type_than_its_node_declares_is_a_wrong_command_line_too() -> None:
+    def begin() -> None:
+        from rclpy.exceptions import InvalidParameterTypeException
+        from rclpy.parameter import Parameter
+
+        raise InvalidParameterTypeException(Parameter("use_sim_time", value=3), Parameter.Type.BOOL)
+
+    ros_app = typer.Typer()
+    ros_app.command(cls=RosCommand)(begin)
+    result = CliRunner().invoke(ros_app, ["--ros-args", "-p", "use_sim_time:=3"], env={"COLUMNS": "300"})
+    assert result.exit_code == 2
+    assert "behind --ros-args: Trying to set parameter 'use_sim_time' to '3'" in " ".join(result.output.split())
+
+
+def test_any_other_error_of_a_ros_command_is_its_own() -> None:
+    def begin() -> None:
+        raise ValueError("a defect")
+
+    ros_app = typer.Typer()
+    ros_app.command(cls=RosCommand)(begin)
+    assert isinstance(CliRunner().invoke(ros_app, []).exception, ValueError)

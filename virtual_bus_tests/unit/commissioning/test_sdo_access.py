@@ -8,7 +8,7 @@ import pytest
 
 from canbase_commissioning.bus_monitor import Listener
 from canbase_commissioning.object_dictionary import Address
-from canbase_commissioning.sdo_access import Refused, Written, read_object, status_places, write_object
+from canbase_commissioning.sdo_access import Refused, Written, beside_driver, read_object, status_places, write_object
 from canbase_commissioning.sdo_session import SdoSession
 from canbase_commissioning.session import NodeTask
 from canbase_driver.boot.steps import Steps
@@ -81,6 +81,34 @@ def test_the_statuswords_are_where_the_profile_has_them() -> None:
     assert status_places(1, of) == (Address(0x6041),)
     assert status_places(1, robot()) == (Address(0x6041),)
     assert status_places(9, robot()) == STATUS
+
+
+@pytest.mark.parametrize(
+    ("at", "becomes"),
+    [
+        (Address(0x1016, 1), "The driver undoes a write to 1016h:1: it boots node 1 anew"),
+        (Address(0x6885), "The driver undoes a write to 6885h:0"),
+        (Address(0x1A01), "The driver undoes a write to 1A01h:0"),
+        (Address(0x60F9, 1), "The driver does not notice a write to 60F9h:1"),
+        (Address(0x60FF), "the watchdog stops the robot"),
+        (Address(0x6840), "The driver sends 6840h:0 itself"),
+    ],
+)
+def test_beside_the_driver_a_write_is_undone_or_noticed_by_the_watchdog_or_by_nobody(at: Address, becomes: str) -> None:
+    assert becomes in beside_driver(1, at, robot())
+    assert becomes in beside_driver(1, at, None)
+
+
+def test_the_makers_watchdog_is_undone_by_the_profile_in_robot_yaml_and_a_node_that_is_no_drive_is_not_looked_at() -> (
+    None
+):
+    zlac = {"joint": "left", "side": "left", "node_id": 1, "profile": "zlac8015d", "velocity_unit": None}
+    of = robot(zlac, zlac | {"joint": "right", "side": "right", "axis": 1})
+    assert "undoes a write to 2000h:0" in beside_driver(1, Address(0x2000), of)
+    assert "does not notice a write to 2000h:0" in beside_driver(1, Address(0x2000), robot())
+    assert beside_driver(9, Address(0x1016, 1), robot()) == (
+        "Node 9 is no drive of robot.yaml, and the driver does not notice the write"
+    )
 
 
 def test_a_channel_that_others_use_all_the_time_is_left_to_them_for_five_seconds_and_then_given_up() -> None:

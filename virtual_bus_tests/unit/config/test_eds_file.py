@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from canbase_cli.main import app
 from canbase_config.eds_file import EdsError, EdsObject, number, read_eds
-from canbase_config.from_eds import draft
+from canbase_config.from_eds import draft, why_no_drive
 from canbase_config.load import sample
 from canbase_config.profile_file import load_profile
 
@@ -280,11 +280,40 @@ def test_ranges_arrays_that_are_not_spelled_out_and_the_names_of_whole_objects(t
     assert "1003value" in eds.sections
 
 
+@pytest.mark.parametrize(
+    ("device_type", "says"),
+    [
+        ("DefaultValue=0x30191", "1000h has the device profile 401, not 402"),  # inputs and outputs
+        ("DefaultValue=0x10196", "1000h has the device profile 406, not 402"),  # an encoder
+        ("DefaultValue=0x0", "1000h has the device profile 0, not 402"),  # an example without a profile
+        ("", "1000h has no value"),
+    ],
+)
+def test_a_device_that_is_no_drive_is_named_and_gives_no_profile(tmp_path: Path, device_type: str, says: str) -> None:
+    file = written(tmp_path, GOOD.replace("DefaultValue=0x20192", device_type))
+    result = CliRunner().invoke(app, ["config", "from-eds", str(file)])
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert "this is no CiA 402 drive: it has neither 6040h nor 6041h" in result.stderr
+    assert says in result.stderr
+
+
+@pytest.mark.parametrize("text", [GOOD, WHOLE, WHOLE.replace("DefaultValue=0x20192", "DefaultValue=0x0")])
+def test_a_drive_is_known_by_its_controlword_or_by_1000h(tmp_path: Path, text: str) -> None:
+    assert why_no_drive(read_eds(written(tmp_path, text))) == ""
+
+
 @pytest.mark.skipif(not REAL_FILES, reason="set CANBASE_EDS_FOLDER to a folder with EDS files of real drives")
 @pytest.mark.parametrize("file", REAL_FILES, ids=lambda file: file.name)
 def test_files_of_real_drives_are_read_and_give_a_profile(file: Path, tmp_path: Path) -> None:
     eds = read_eds(file)
     assert eds.has(0x1000)
+    if why := why_no_drive(
+        eds
+    ):  # an encoder, inputs and outputs, an example: the command names it and gives no profile
+        result = CliRunner().invoke(app, ["config", "from-eds", str(file)])
+        assert (result.exit_code, result.stdout) == (1, "")
+        assert why in result.stderr
+        return
     found = draft(eds)
     profile = load_profile(str(written(tmp_path, found.text, f"{file.stem}.yaml")))
     assert profile.layout.axes in (1, 2)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import struct
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from canbase_config.load import load_robot, sample
+from canbase_config.robot import Robot
 from canbase_recording.entry import FrameKind, RecordedFrame
 from canbase_recording.explain_file import known_objects
 from canbase_recording.frame_words import Decoder, controlword_text
@@ -90,6 +92,38 @@ def test_a_frame_of_another_length_than_robot_yaml_gives_is_not_decoded_in_anoth
 )  # fmt: skip
 def test_controlwords(word: int, text: str) -> None:
     assert controlword_text(word) == text
+
+
+SUPPLY = {"name": "dc_link", "index": 0x6079, "bits": 32, "scale": 0.001, "unit": "V"}
+LOAD = {"name": "load", "index": 0x6077, "bits": 16, "signed": True}
+RARE = {"name": "target_echo", "index": 0x60FF, "bits": 32, "period_s": 1.0}
+
+
+def with_values(*values: dict[str, Any]) -> Robot:
+    drives = [drive.model_dump(exclude_unset=True) for drive in BENCH.drives]
+    drives[0]["values"] = values
+    return Robot.model_validate(BENCH.model_dump(exclude_unset=True) | {"drives": tuple(drives)})
+
+
+def test_named_values_of_robot_yaml_have_their_names_units_and_signs() -> None:
+    robot = with_values(SUPPLY, LOAD, RARE)
+    decoder = Decoder(PdoLayouts(robot), robot, EDS)
+
+    def text(cob_id: int, data: bytes) -> str:
+        return decoder.words(RecordedFrame(0.0, cob_id, data)).text
+
+    assert text(0x381, struct.pack("<Ih", 48_200, -3)) == "TPDO3 dc_link 48.2 V, load -3"
+    assert text(0x481, struct.pack("<I", 7)) == "TPDO4 target_echo 7"
+    assert text(0x381, bytes(5)) == "TPDO3, 5 bytes: its mapping is not known"
+    assert text(0x382, bytes(6)) == "TPDO3, 6 bytes: its mapping is not known"  # the other drive has none
+
+
+def test_a_named_value_is_no_order_and_no_motion() -> None:
+    """An echo of the target in a value PDO would be taken for a setpoint of the master."""
+    layouts = PdoLayouts(with_values(RARE))
+    found = layouts.of(0x381, 4)
+    assert found is not None
+    assert [each.base for each in found.mapped] == [0]
 
 
 KINDS = st.sampled_from(list(FrameKind))

@@ -153,6 +153,43 @@ def test_the_same_stamp_again_and_again_grows_old() -> None:
     assert mux.decide(0.95).sources[0].reason == "delayed by 0.95 s (limit 0.30 s)"
 
 
+# 1.00 forward ── 1.05 forward, late ── 1.10 the stick is released ── 1.11 the zero arrives ── 1.12 the forward of 1.05
+def test_a_command_that_a_newer_one_has_overtaken_is_not_followed_before_the_next_zero() -> None:
+    link = Link()
+    link.send(ZERO, 0.0, 0.5)
+    assert link.send(FORWARD, 0.0, 0.5).twist == FORWARD
+    for twist, sent_s, now_s in ((ZERO, 1.10, 1.11), (FORWARD, 1.05, 1.12)):
+        link.mux.on_command("joystick", twist, now_s, sent=Sent(sent_s + APART_S, 5e8 + now_s, now_s))
+    decision = link.mux.decide(1.12)
+    assert decision.twist == ZERO
+    assert decision.sources[0].reason.startswith("waiting for zero")
+    link.sent_s = 1.10
+    assert link.send(FORWARD, 0.02, 0.2).twist == ZERO
+    link.send(ZERO, 0.02)
+    assert link.send(FORWARD, 0.02).twist == FORWARD
+
+
+@pytest.mark.parametrize("again_s", [0.0, 0.01, 0.04])
+def test_a_command_that_arrives_twice_holds_no_longer_than_once(again_s: float) -> None:
+    once, twice = rested(), rested()
+    for step in range(20):
+        twist, at_s = (FORWARD if step < 10 else ZERO), PERIOD_S * step
+        for mux, arrivals in ((once, (at_s,)), (twice, (at_s, at_s + again_s))):
+            for now_s in arrivals:
+                mux.on_command("joystick", twist, now_s, sent=Sent(APART_S + at_s, 0.0, now_s))
+        assert twice.decide(at_s + again_s).twist == once.decide(at_s + again_s).twist == twist
+    last_s = PERIOD_S * 20
+    for mux, arrivals in ((once, (last_s,)), (twice, (last_s, last_s + again_s))):
+        for now_s in arrivals:
+            mux.on_command("joystick", FORWARD, now_s, sent=Sent(APART_S + last_s, 0.0, now_s))
+    for age_s in (0.29, 0.31):
+        assert (
+            twice.decide(last_s + age_s).twist
+            == once.decide(last_s + age_s).twist
+            == (FORWARD if age_s < 0.3 else ZERO)
+        )
+
+
 def test_without_a_stamp_nothing_is_known_of_the_delay() -> None:
     mux = rested()
     mux.on_command("joystick", FORWARD, 0.0)

@@ -107,10 +107,8 @@ def _slave(node_id: int) -> str:
 
 @contextmanager
 def _installed() -> Iterator[None]:
-    run(*CANBASE, "install", "--config", str(CONFIG), "--no-can")
+    run(*CANBASE, "install", "--config", str(CONFIG), "--no-can", "--namespace", NAME)
     try:
-        with Path(f"/etc/canbase/{NAME}.env").open("a") as file:
-            file.write(f"CANBASE_OPTIONS=--namespace {NAME}\n")
         run("systemctl", "start", f"canbase@{NAME}.target")
         yield
     finally:

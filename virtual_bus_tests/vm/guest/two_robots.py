@@ -72,9 +72,7 @@ def _second_is_installed() -> None:
     environment = ("--setenv=_ROS_WHEELS_BOOTSTRAP_COMPLETE=1", "--setenv=PYTHONUNBUFFERED=1")
     sim = (*CANBASE, "sim", "--config", str(CONFIG), "--control", CONTROL)
     run("systemd-run", f"--unit={DRIVES}", *fifo, *environment, *sim)
-    run(*CANBASE, "install", "--config", str(CONFIG), "--no-can")
-    with Path(f"/etc/canbase/{NAME}.env").open("a") as file:
-        file.write(f"CANBASE_OPTIONS=--namespace {NAME}\n")
+    run(*CANBASE, "install", "--config", str(CONFIG), "--no-can", "--namespace", NAME)
     run("systemctl", "start", f"canbase@{NAME}.target")
 
 
