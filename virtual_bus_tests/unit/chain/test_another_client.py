@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
 from canbase_sim.cia301.dictionary import key
@@ -67,6 +69,20 @@ def test_the_factor_of_the_speeds_of_mode_2_is_nobody_elses() -> None:
     assert world.watchdog is not None
     assert world.watchdog.status.verdict.cause is TripCause.FOREIGN_MASTER
     assert "an SDO that writes 604Ch" in world.watchdog.status.verdict.detail
+
+
+# power on ── 1016h:1 is set ── the boot goes on, 1016h:1 = 0 from elsewhere ── booted anew before there is any power
+@pytest.mark.parametrize("later_s", [0.01, 0.05])
+def test_a_write_during_the_boot_is_undone_before_there_is_power(later_s: float) -> None:
+    world = World()
+    assert world.run(3.0, lambda: monitored(world) != 0)
+    before = monitored(world)
+    world.run(later_s)
+    assert not world.core.snapshot(world.now_s).drives[0].configured
+    world.inject(0x601, UNMONITORED)
+    assert monitored(world) == 0
+    assert not world.run(3.0, lambda: any(world.powered) and monitored(world) == 0)
+    assert (world.core.state, monitored(world)) == (DriverState.ENABLED, before)
 
 
 # latched, no power ── 1016h:1 = 0 from elsewhere: no trip, nothing has power ── booted anew ── reset ── monitored again
