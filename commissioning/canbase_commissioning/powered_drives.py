@@ -39,7 +39,8 @@ RUNAWAY_FACTOR, RUNAWAY_MPS = 2.0, 0.1
 """A wheel faster than factor × the order + this does not follow its order."""
 STEP_MAX_S = 0.05
 SILENT_CYCLES = 30
-"""SYNCs without an answer; cycles are counted and not seconds, so that a pause of this computer is not the drive's."""
+"""SYNCs without all of 6041h, 6064h and 606Ch (6044h in mode 2). Cycles are counted and not seconds, so that a pause of
+this computer is not the drive's."""
 WINDOW_S = 0.2
 """Speed by the encoder is taken over this time [s]."""
 RESET_CYCLES = 5
@@ -113,9 +114,14 @@ class PoweredDrives:
 
     @property
     def standing(self) -> bool:
-        """Whether no wheel turns, as far as is known."""
+        """Whether no wheel turns, as far as is known. A wheel that gives no feedback any more may turn."""
         still = self.robot.base.standstill_mps
-        return all(abs(axis.velocity_mps) < still for axis in self.axes.values())
+        return not self._silent and all(abs(axis.velocity_mps) < still for axis in self.axes.values())
+
+    @property
+    def _silent(self) -> list[str]:
+        """Wheels whose status or velocity no longer comes, or is too short to be read."""
+        return [joint for joint, count in self._unanswered.items() if count > SILENT_CYCLES]
 
     @property
     def faults(self) -> list[str]:
@@ -140,6 +146,7 @@ class PoweredDrives:
         self.on_trial = False
         self.probes.clear()
         self._targets_mps = dict.fromkeys(self.axes, 0.0)
+        self._unanswered = dict.fromkeys(self.axes, 0)
         self._marks = {}
         for node in self.nodes.values():
             node.lose("is booted anew", self.now_s)
@@ -182,9 +189,11 @@ class PoweredDrives:
         for axis in node.axes:
             if frame.cob_id == node.layout.status_cob_id(axis.drive.axis):
                 node.on_status(axis, frame, now_s)
-                self._unanswered[axis.drive.joint] = 0
             elif frame.cob_id == node.layout.velocity_cob_id(axis.drive.axis):
                 node.on_velocity(axis, frame, now_s)
+            if axis.has_new_sample:
+                axis.sample_taken()
+                self._unanswered[axis.drive.joint] = 0
 
     def tick(self, now_s: float) -> list[Frame]:
         """The frames that are due. Raises RigError when a wheel runs away, or at a frame of another master."""
@@ -257,9 +266,8 @@ class PoweredDrives:
             raise RigError(f"{self.foreign}: end it, these tools must be alone on the bus")
         if self.on_trial:
             return
-        silent = [joint for joint, count in self._unanswered.items() if count > SILENT_CYCLES]
-        if self.speeds_mps and silent:
-            raise RigError(f"{', '.join(silent)}: no status to {SILENT_CYCLES} SYNCs: power, cable?")
+        if self.speeds_mps and self._silent:
+            raise RigError(f"{', '.join(self._silent)}: no status and velocity to {SILENT_CYCLES} SYNCs: power, cable?")
         if self.speeds_mps and (self.faults or not self.ready):
             raise RigError("; ".join([*self.faults, *filter(None, [self.waiting_for()])]) or "a drive is gone")
         limit_mps = RUNAWAY_FACTOR * max(map(abs, self._targets_mps.values())) + RUNAWAY_MPS

@@ -56,9 +56,9 @@ AXIS_OFFSET = 0x800
 SELF_STOP = (0x100C, 0x100D, 0x1016, 0x1029)
 """What a drive monitors of its masters, and what it does without them: guard and life time, heartbeats, error
 behaviour."""
-BRAKING = (0x6007, 0x6049, 0x604A, 0x605A, 0x605E, 0x6084, 0x6085)
-"""How an axis stops: for a lost master, by a quick stop, in a fault, and its ramps. Those of the second one are at +
-AXIS_OFFSET."""
+BRAKING = (0x6007, 0x6046, 0x6049, 0x604A, 0x605A, 0x605E, 0x6084, 0x6085)
+"""How an axis stops: for a lost master, by a quick stop, in a fault, its ramps; in mode 2 its least speed. Those of the
+second one are at + AXIS_OFFSET."""
 SCALE = (0x604C, 0x607E, *range(0x6089, 0x6098), 0x60A8, 0x60A9, 0x60AA)
 """What one bit of a velocity, a position or a ramp means, and which way is positive: units, factors, polarity."""
 RPDO_PARAMETERS = range(0x1400, 0x1800)
@@ -197,8 +197,9 @@ _OF_MOTION = frozenset(index % AXIS_OFFSET for index in (CONTROLWORD, STATUSWORD
 
 
 def decode_sdo_download(data: bytes) -> int | None:
-    """Index that an SDO request begins to write (CiA 301: initiate download, byte 0 = 001xxxxx), else None."""
-    if len(data) != 8 or data[0] & 0xE0 != 0x20:
+    """Index that an SDO request begins to write (CiA 301: initiate download, byte 0 = 001xxxxx, or initiate block
+    download, 11000xx0), else None."""
+    if len(data) != 8 or (data[0] & 0xE0 != 0x20 and data[0] & 0xF9 != 0xC0):
         return None
     return int(_SDO_HEAD.unpack_from(data)[1])
 
@@ -210,9 +211,10 @@ def concerns_motion(data: bytes) -> bool:
 
 
 def takes_power_away(data: bytes) -> bool:
-    """True for an SDO request that writes "disable voltage" or "quick stop" (6040h bits 2, 1 are not both set)."""
+    """True for an SDO request that writes "disable voltage" or "quick stop" (6040h bits 2, 1 are not both set), with
+    the value in this frame (expedited)."""
     size = 4 - (data[0] >> 2 & 3) if data[0] & 0x03 == 0x03 else 4
-    return data[0] & 0x02 != 0 and int.from_bytes(data[4 : 4 + min(size, 2)], "little") & 0x06 != 0x06
+    return data[0] & 0xE2 == 0x22 and int.from_bytes(data[4 : 4 + min(size, 2)], "little") & 0x06 != 0x06
 
 
 def decode_nmt(data: bytes) -> tuple[int, int] | None:

@@ -32,6 +32,7 @@ class _Record:
         "asks_for_power",
         "command_at",
         "disabled_since",
+        "double_statuses",
         "doubles",
         "drive",
         "enabled_since",
@@ -46,6 +47,7 @@ class _Record:
         "stand",
         "state",
         "status_at",
+        "statuses",
         "target_mps",
         "velocity_at",
         "velocity_mps",
@@ -62,7 +64,8 @@ class _Record:
         self.target_mps, self.command_at = 0.0, NEVER
         self.setpoint_mps, self.setpoint_at = 0.0, NEVER
         self.asks_for_power = self.fresh = False
-        self.misses, self.doubles, self.answers = Tally(), Tally(), 0
+        self.misses, self.doubles, self.double_statuses = Tally(), Tally(), Tally()
+        self.answers = self.statuses = 0
 
     def axis(self) -> Axis:
         return Axis(
@@ -84,7 +87,7 @@ class _Record:
             self.stand.stands,
             self.stand.position_at,
             self.misses.value,
-            self.doubles.value,
+            max(self.doubles.value, self.double_statuses.value),
             self.push.last,
             self.stand.sudden,
             self.stand.unproven,
@@ -95,7 +98,8 @@ class _Record:
         return self.setpoint_mps == 0.0 and abs(self.velocity_mps) <= still_mps
 
     def on_sync(self, now_s: float) -> None:
-        """What came before it counts from now on; each SYNC wants one setpoint, and one answer from one drive.
+        """What came before it counts from now on; each SYNC wants one setpoint, and one status and one velocity from
+        one drive. They count apart: the timers of two TPDOs drift along the SYNCs at different moments.
 
         One that takes no synchronous PDO has been set to the same pace: its answers come by its own timer.
         """
@@ -103,10 +107,12 @@ class _Record:
             self.misses.count(not self.fresh)
             if self.drive.answers_sync:
                 self.doubles.balance(self.answers)
+                self.double_statuses.balance(self.statuses)
         else:
             self.misses.clear()
             self.doubles.clear()
-        self.answers = 0
+            self.double_statuses.clear()
+        self.answers = self.statuses = 0
         if self.fresh:
             self.setpoint_mps, self.setpoint_at, self.fresh = self.target_mps, now_s, False
             self.feedback.evidence.on_setpoint(self.setpoint_mps, now_s)
@@ -263,6 +269,7 @@ class Observer:
         if status is None or not self._note_state(record, status[0], now_s):
             return False
         record.fed_status_at = now_s
+        record.statuses += 1
         record.feedback.on_position(status[1])
         record.push.on_position(status[1])
         record.stand.on_position(status[1], now_s)

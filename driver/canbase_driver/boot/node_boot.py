@@ -177,6 +177,10 @@ class NodeBoot:
         self.error = BootError(self.node_id, error.problem, f"{error.hint}; {late}") if error and late else error
         self._step = None
 
+    def owes_none(self, frame: Frame) -> bool:
+        """Whether this SDO answer, not taken in yet, is another client's: it has dealt with that object before."""
+        return self._client.owes_none(frame)
+
     @property
     def unanswered(self) -> Counter[bytes]:
         """How many answers of its SDO server may still come, by address."""

@@ -199,6 +199,13 @@ class SdoClient:
             {at: each.sent - each.answered for at, each in self._requests.items() if each.sent > each.answered}
         )
 
+    def owes_none(self, frame: Frame) -> bool:
+        """Whether this answer, not taken in yet, is about an object that was requested and answered as often before,
+        and not in the transfer that ended last: another client has requested it."""
+        at = frame.data[1:4]
+        requests = self._requests.get(at)
+        return requests is not None and requests.answered >= requests.sent and at != self._answered
+
     def start(self, step: Read | Write, now_s: float) -> Frame:
         """Begin a transfer. Raises RuntimeError while another is under way."""
         if self._transfer is not None:

@@ -99,7 +99,7 @@ class CanopenNode:
         self._sdo_stop = SdoStop(node_id, self._drives)
         self._foreign = ForeignWrites(self._drives, Counter())
         self._written = ""
-        """What another client has written since the boot; empty: nothing of what the boot sets."""
+        """What another client has written since the boot has dealt with it; empty: nothing of what the boot sets."""
         self._lost_heartbeat = self._owed_stop = False
         self._held_until = -math.inf
         self._ready_at = math.inf
@@ -386,6 +386,8 @@ class CanopenNode:
     def on_sdo(self, frame: Frame, now_s: float) -> bool:
         """Take an SDO answer; one without a request of ours is another client's (a tool's) and fine."""
         if self._boot is not None:
+            if self._boot.owes_none(frame):
+                self._written = ForeignWrites(self._drives, Counter()).take(frame) or self._written
             self._boot.on_frame(frame, now_s)
             return True
         self._written = self._foreign.take(frame) or self._written

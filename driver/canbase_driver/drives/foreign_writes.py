@@ -23,6 +23,8 @@ VL: Final = (0x6046, 0x6048, 0x6049, 0x604A)
 _WRITTEN: Final = 3 << 5
 """First byte of the answer to a Write (CiA 301, SDO download)."""
 _COMMAND: Final = 7 << 5
+_BLOCK: Final = (0xA0, 0xA4)
+"""The same where it writes a block, without and with a checksum."""
 
 
 def set_by_boot(index: int, kind: Profile, drives: Sequence[Drive] = ()) -> bool:
@@ -53,7 +55,7 @@ class ForeignWrites:
     def take(self, frame: Frame) -> str:
         """The object that another client has written, as "1016h:1"; empty: this answer shows none."""
         data = frame.data
-        if len(data) != 8 or data[0] & _COMMAND != _WRITTEN:
+        if len(data) != 8 or (data[0] & _COMMAND != _WRITTEN and data[0] not in _BLOCK):
             return ""
         if self._late[data[1:4]] > 0:
             self._late[data[1:4]] -= 1

@@ -135,6 +135,23 @@ def test_a_second_drive_with_its_node_id_trips(world: World) -> None:
     assert cause(world) is TripCause.ANSWERED_TWICE
 
 
+# two drives with node id 1: one has a single TPDO, and the boot has believed the other one, that it has two
+def test_a_second_drive_with_its_node_id_that_sends_its_status_alone_trips(world: World) -> None:
+    """Six bytes without a velocity go before each frame: of that drive nothing else is ever seen."""
+    world.drive()
+    tick = world.bench.tick
+
+    def with_another(now_s: float) -> list[BenchFrame]:
+        said = tick(now_s)
+        return [BenchFrame(STATUS, frame.data[:6]) for frame in said if frame.cob_id == STATUS] + said
+
+    world.bench.tick = with_another  # type: ignore[method-assign]
+    start = world.now_s
+    assert world.run(1.0, lambda: cause(world) is not TripCause.NONE)
+    assert cause(world) is TripCause.ANSWERED_TWICE
+    assert world.now_s - start <= world.robot.timeouts.feedback_s + 0.03
+
+
 def test_a_frozen_velocity_beside_a_position_that_runs_trips(world: World) -> None:
     """The encoder's counts say one thing, the last two bytes another."""
     world.drive()

@@ -10,6 +10,7 @@ from canbase_commissioning.powered_drives import PoweredDrives, RigError
 from canbase_commissioning.safe_stop import SafeStop
 from canbase_commissioning.self_stop_test import get_ready
 from canbase_sim.cia402.states import POWERED
+from canbase_sim.frame import Frame as BenchFrame
 from support.guide_world import GuideWorld
 
 UP = "\x1b[A"
@@ -133,5 +134,39 @@ def test_a_drive_that_falls_silent_while_it_turns_ends_it() -> None:
     world = Holding()
     world.hold("w", 1.0)
     world.bench.nodes[1].line.silent = True
-    with pytest.raises(RigError, match="left: no status to 30 SYNCs"):
+    with pytest.raises(RigError, match="left: no status and velocity to 30 SYNCs"):
         world.hold("w", 0.5)
+
+
+def cut(world: Holding, cob_id: int, kept_bytes: int) -> None:
+    """From now on this PDO of the drives is too short, as after another client has mapped it."""
+    tick = world.bench.tick
+
+    def shorter(now_s: float) -> list[BenchFrame]:
+        return [
+            BenchFrame(frame.cob_id, frame.data[:kept_bytes]) if frame.cob_id == cob_id else frame
+            for frame in tick(now_s)
+        ]
+
+    world.bench.tick = shorter  # type: ignore[method-assign]
+
+
+# 0.05 m/s ── 6041h with 6064h, or 606Ch, becomes too short ── 0.3 s: it ends ── quick stop, until nothing is known 2 s
+@pytest.mark.parametrize(("cob_id", "kept_bytes"), [(0x181, 5), (0x281, 3), (0x281, 0)])
+def test_a_drive_whose_feedback_has_become_too_short_to_read_ends_it(cob_id: int, kept_bytes: int) -> None:
+    world = Holding()
+    world.hold("w", 1.0)
+    cut(world, cob_id, kept_bytes)
+    with pytest.raises(RigError, match="left: no status and velocity to 30 SYNCs"):
+        world.hold("w", 0.5)
+
+
+# standstill ── 606Ch becomes too short, its last value is 0 ── the key turns the wheel ── it ends, and brakes the wheel
+def test_a_wheel_whose_last_velocity_is_old_is_not_at_standstill_for_the_farewell() -> None:
+    world = Holding()
+    world.hold("w", 0.02)
+    cut(world, 0x281, 3)
+    with pytest.raises(RigError, match="left: no status and velocity"):
+        world.hold("w", 0.5)
+    assert world.rig.axes["left"].velocity_mps == 0.0
+    assert not world.rig.standing

@@ -34,6 +34,11 @@ def taken(data: str, drives: Sequence[Drive] = GENERIC, late: Counter[bytes] | N
         ("60 4A 60 01 00 00 00 00", "604Ah:1"),
         ("60 7E 60 00 00 00 00 00", "607Eh:0"),  # which way is positive
         ("60 91 68 01 00 00 00 00", "6891h:1"),  # how far one bit goes
+        ("A4 16 10 01 20 00 00 00", "1016h:1"),  # a block is accepted, with and without checksum
+        ("A0 16 10 01 20 00 00 00", "1016h:1"),
+        ("A2 16 10 01 00 00 00 00", ""),  # an answer inside a block
+        ("A1 00 00 00 00 00 00 00", ""),
+        ("C4 16 10 01 04 00 00 00", ""),  # read in a block
         ("60 40 60 00 00 00 00 00", ""),  # the watchdog stops by it
         ("60 F9 60 01 00 00 00 00", ""),  # a gain
         ("4B 16 10 01 00 00 00 00", ""),  # read

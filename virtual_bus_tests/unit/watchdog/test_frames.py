@@ -126,6 +126,10 @@ def test_reset_requests(data: str, number: int | None) -> None:
         ("23 ff 68 00 01 00 00 00", 0x68FF),
         ("21 40 60 00 02 00 00 00", 0x6040),  # segmented
         ("3f 40 60 00 00 00 00 00", 0x6040),
+        ("c0 40 60 00 00 00 00 00", 0x6040),  # block
+        ("c6 16 10 01 04 00 00 00", 0x1016),  # block, with size and checksum
+        ("c1 16 10 01 04 00 00 00", None),  # the end of a block
+        ("a0 16 10 01 04 00 00 00", None),  # begins to read a block
         ("40 40 60 00 00 00 00 00", None),
         ("1f 40 60 00 00 00 00 00", None),
         ("60 40 60 00 00 00 00 00", None),

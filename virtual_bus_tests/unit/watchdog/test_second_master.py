@@ -334,6 +334,12 @@ def test_a_segmented_write_of_the_controlword_is_a_sign() -> None:
     assert after(0x601, "21 40 60 00 02 00 00 00") is not None
 
 
+@pytest.mark.parametrize("size", ["02", "04"])
+def test_a_write_of_the_controlword_in_a_block_is_a_sign(size: str) -> None:
+    """Its first frame has the size where others have the value."""
+    assert after(0x601, f"c2 40 60 00 {size} 00 00 00") is not None
+
+
 @pytest.mark.parametrize(("cob_id", "data"), [(0x000, "80 01"), (0x501, "02 00"), (0x601, "2b 40 60 00 0f 00 00 00")])
 def test_our_own_commands_that_come_back_are_none(cob_id: int, data: str) -> None:
     it = enabled()
@@ -379,6 +385,9 @@ def test_commands_that_make_no_sense_are_counted() -> None:
         ("23 97 60 01 01 00 00 00", "6097"),
         ("23 a8 60 00 00 00 00 00", "60A8"),
         ("23 aa 60 00 00 00 00 00", "60AA"),
+        ("23 46 60 01 e8 03 00 00", "6046"),  # of mode 2: the least speed, and the factor of all speeds and ramps
+        ("2b 4c 60 01 0a 00 00 00", "604C"),
+        ("c2 16 10 01 04 00 00 00", "1016"),  # block
     ],
 )
 def test_an_sdo_that_changes_how_an_enabled_drive_stops(data: str, index: str) -> None:
