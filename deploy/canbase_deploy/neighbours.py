@@ -1,5 +1,4 @@
-"""What the robots on one computer must not share: a CAN bus, a lease socket, a name, a place in ROS, a file with two
-contents. Pure."""
+"""What robots on one computer must not share: bus, lease socket, name, place in ROS, a file with two contents. Pure."""
 
 from __future__ import annotations
 

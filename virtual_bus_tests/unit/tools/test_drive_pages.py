@@ -7,6 +7,7 @@ import re
 import pytest
 
 from campaign.drive_pages import BOOT, FOLDER, STOP, UNPROVEN, boot_section, page, stop_section, unproven_section
+from canbase_config.load import load_robot, sample
 from canbase_config.profile_file import load_profile, profile_names
 from canbase_driver.cia301.nmt import NmtCommand
 from support.boot_record import Written, boot_record
@@ -67,6 +68,15 @@ def test_no_drive_is_called_tested_on_hardware_while_the_table_of_such_tests_is_
     table = drives.partition("## Hardware-tested by")[2].partition("\n## ")[0]
     assert len(re.findall(r"^\|", table, re.MULTILINE)) == 2, "a row: name its kind on the page of the drive, and here"
     assert all("hardware: no." in read(kind) for kind in profile_names())
+
+
+def test_the_page_of_the_kind_that_independent_stacks_have_driven_says_so_and_no_other_one() -> None:
+    """The robot of the Linux guest, which drives slaves of ros2_canopen, has the drives of the sample."""
+    yes = "[Independent CANopen stacks](../independent_stacks.md): yes."
+    named = {kind for kind in profile_names() if yes in read(kind)}
+    assert named == {drive.profile for drive in load_robot(sample("example_can0")).robot.drives}
+    others = set(profile_names()) - named
+    assert all("independent CANopen stack, hardware: no." in read(kind) for kind in others)
 
 
 def test_the_boot_of_a_record_is_that_of_the_drive() -> None:
