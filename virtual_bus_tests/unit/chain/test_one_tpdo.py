@@ -184,10 +184,36 @@ def test_a_profile_can_say_it_before_the_boot(tmp_path: Path) -> None:
         Robot.model_validate({**bench_robot().model_dump(), "drives": [{**each, "profile": wide} for each in drives]})
 
 
-def profile_of(folder: Path, kind: str, tpdos: int) -> str:
+# 0.1 rpm a bit, gear 20: 16 bits end at 1.72 m/s of the wheel ── 606Ch must show 1.2 times the fastest wheel, too
+@pytest.mark.parametrize(
+    ("narrow", "linear_mps", "problem"),
+    [
+        ("velocity_bits", 1.42, ""),
+        ("velocity_bits", 1.44, r"606Ch of left_wheel has 16 bits of 0.1rpm: up to 1.72 m/s at its wheel. 1.73 m/s"),
+        ("target_bits", 1.71, ""),
+        ("target_bits", 1.72, r"60FFh of left_wheel has 16 bits of 0.1rpm: up to 1.72 m/s at its wheel. 1.72 m/s"),
+    ],
+)
+def test_a_speed_that_its_objects_cannot_hold_is_refused(
+    tmp_path: Path, narrow: str, linear_mps: float, problem: str
+) -> None:
+    """606Ch would go from 1.72 to -1.72 m/s there."""
+    profile = profile_of(tmp_path, "generic", tpdos=4, layout={narrow: 16})
+    robot = robot_with("generic").model_dump()
+    robot["limits"] |= {"linear_mps": linear_mps, "angular_radps": 0.01}
+    for drive in robot["drives"]:
+        drive |= {"profile": profile, "velocity_unit": "0.1rpm"}
+    if not problem:
+        assert Robot.model_validate(robot).limits.linear_mps == linear_mps
+        return
+    with pytest.raises(ValidationError, match=problem):
+        Robot.model_validate(robot)
+
+
+def profile_of(folder: Path, kind: str, tpdos: int, **sections: dict[str, int]) -> str:
     keys = load_profile(kind).model_dump(mode="json", exclude_unset=True)
     file = folder / f"{kind}.yaml"
-    file.write_text(json.dumps({**keys, "pdo": {**keys.get("pdo", {}), "tpdos": tpdos}}, indent=1))
+    file.write_text(json.dumps({**keys, **sections, "pdo": {**keys.get("pdo", {}), "tpdos": tpdos}}, indent=1))
     return str(file)
 
 
