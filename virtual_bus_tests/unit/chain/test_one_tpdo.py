@@ -28,6 +28,8 @@ from support.crews import robot_with
 
 STATUS, VELOCITY = 0x181, 0x281
 """TPDOs of the left drive."""
+SECOND_STATUS = 0x381
+"""Of the second motor, where node 1 has two."""
 OTHER_PDOS = frozenset(base + n for base in (0x1800, 0x1A00) for n in (1, 2, 3))
 
 
@@ -57,13 +59,13 @@ def cause(world: World) -> TripCause:
     return watchdog(world).status.verdict.cause
 
 
-def falsify(world: World, change: Callable[[bytes], bytes]) -> None:
-    """From now on the data of the left drive's TPDO are changed on their way."""
+def falsify(world: World, change: Callable[[bytes], bytes], cob_id: int = STATUS) -> None:
+    """From now on the data of this TPDO are changed on their way."""
     tick = world.bench.tick
 
     def changed(now_s: float) -> list[BenchFrame]:
         return [
-            BenchFrame(frame.cob_id, change(frame.data)) if frame.cob_id == STATUS else frame for frame in tick(now_s)
+            BenchFrame(frame.cob_id, change(frame.data)) if frame.cob_id == cob_id else frame for frame in tick(now_s)
         ]
 
     world.bench.tick = changed  # type: ignore[method-assign]
@@ -133,6 +135,29 @@ def test_a_second_drive_with_its_node_id_trips(world: World) -> None:
     world.bench.tick = twice  # type: ignore[method-assign]
     assert world.run(1.0, lambda: cause(world) is not TripCause.NONE)
     assert cause(world) is TripCause.ANSWERED_TWICE
+
+
+# one node, two motors, two TPDOs: 181h and 381h ── 0.3 m/s ── 381h loses its last two bytes ── stop within 0.13 s
+def test_two_motors_of_one_node_send_a_frame_each_and_each_is_missed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    profile = profile_of(tmp_path, "generic", tpdos=4, layout={"axes": 2, "velocity_bits": 16})
+    gone = frozenset(base + n for base in (0x1800, 0x1A00) for n in (2, 3))
+    off = {key(0x1800 + n, 1): 1 << 31 for n in (2, 3)}
+    kind = Personality(missing=gone, defaults=off, widths={0x606C: "h", 0x686C: "h"})
+    monkeypatch.setitem(personalities(), profile, kind)
+    robot = robot_with("generic").model_dump()
+    for axis, drive in enumerate(robot["drives"]):
+        drive |= {"profile": profile, "node_id": 1, "axis": axis}
+    world = World(Robot.model_validate(robot))
+    world.drive(seconds=1.0)
+    assert world.truth.linear_mps == pytest.approx(FORWARD.linear_mps, rel=0.02)
+    assert "the drive has no TPDO3: TPDO1 and TPDO2 carry" in world.snapshot.drives[0].boot_notes[0]
+    assert [len(world.sent(cob_id)[-1]) for cob_id in (STATUS, SECOND_STATUS)] == [8, 8]
+    falsify(world, lambda data: data[:6], SECOND_STATUS)
+    start = world.now_s
+    assert world.run(1.0, lambda: cause(world) is not TripCause.NONE or world.core.state is not DriverState.ENABLED)
+    assert world.now_s - start <= world.robot.timeouts.feedback_s + 0.03
 
 
 # two drives with node id 1: one has a single TPDO, and the boot has believed the other one, that it has two
