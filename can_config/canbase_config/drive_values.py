@@ -75,6 +75,8 @@ def misfit(values: Sequence[DriveValue], control_hz: float, motors: int, tpdos: 
     if motors > 1:
         return "its node turns two motors, which use all four TPDOs: take the values out"
     spare = min(SPARE_TPDOS, tpdos - FIRST_SPARE_TPDO + 1)
+    if spare < 1:
+        return f"its drive has {tpdos} TPDOs (pdo.tpdos of its profile), and none of them is spare: take the values out"
     pdos = value_pdos(values, control_hz)
     if len(pdos) <= spare:
         return ""
@@ -82,6 +84,6 @@ def misfit(values: Sequence[DriveValue], control_hz: float, motors: int, tpdos: 
     total = sum(pdo.data_bytes for pdo in pdos)
     return (
         f"{len(values)} values with {periods} different period_s and {total} bytes need {len(pdos)} TPDOs of "
-        f"{PDO_BYTES} bytes, one period each; {max(spare, 0)} of the {tpdos} TPDOs (pdo.tpdos of its profile) "
+        f"{PDO_BYTES} bytes, one period each; {spare} of the {tpdos} TPDOs (pdo.tpdos of its profile) "
         "are spare: give them the same period_s, or take values out"
     )

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
 
-from canbase_config import bus_load, drive_values, stopping
+from canbase_config import bus_load, drive_values, stopping, units
 from canbase_config.action import Action
 from canbase_config.black_box import BlackBox
 from canbase_config.commissioned import Commissioned
@@ -275,6 +275,29 @@ class Robot(Section):
         if given_s is None and stopping.standstill_s(self) > LONGEST_STOP_S:
             message = f"{figures}: more than can be supervised; raise jerk_mps3 or deceleration_mps2"
             raise MisfitError(message, ("limits", "jerk_mps3"), ("limits", "deceleration_mps2"))
+        return self
+
+    @model_validator(mode="after")
+    def _objects_hold_its_speeds(self) -> Robot:
+        """Beyond its greatest number 60FFh would order less than was meant, and 606Ch would wrap."""
+        fastest_mps = stopping.max_wheel_mps(self)
+        too_fast_mps = self.watchdog.overspeed_factor * fastest_mps
+        for i, drive in enumerate(self.drives):
+            layout, vl = drive.kind.layout, drive.kind.is_vl
+            bit_mps = abs(units.mps_per_bit(drive, self.base.radius_m(drive.side)))
+            actual_mps = bit_mps * units.velocity_scale(drive)
+            for name, bits, unit, one_mps, needed_mps in (
+                ("6042h" if vl else "60FFh", layout.target_bits, drive.target_unit, bit_mps, fastest_mps),
+                ("6044h" if vl else "606Ch", layout.velocity_bits, drive.actual_unit, actual_mps, too_fast_mps),
+            ):
+                most_mps = ((1 << bits - 1) - 1) * one_mps
+                if needed_mps > most_mps:
+                    message = (
+                        f"{name} of {drive.joint} has {bits} bits of {unit}: up to {most_mps:.3g} m/s at its wheel. "
+                        f"{needed_mps:.3g} m/s are needed for limits.linear_mps, limits.angular_radps and "
+                        "watchdog.overspeed_factor: lower the limits, or set a coarser unit in the drive and here"
+                    )
+                    raise MisfitError(message, ("limits", "linear_mps"), ("drives", i, "velocity_unit"), ("drives", i))
         return self
 
     @model_validator(mode="after")

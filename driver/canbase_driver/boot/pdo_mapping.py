@@ -76,9 +76,8 @@ def _with_tpdos_it_has(node: NodeAccess, layout: NodeLayout, cob_ids: dict[int, 
     missing = [pdo for pdo in layout.pdos() if pdo.is_heard and pdo.communication not in cob_ids]
     if layout.profile.layout.fits_one_tpdo and missing and not layout.joins_velocity:
         layout = replace(layout, joins_velocity=True)
-        node.notes.append(
-            f"the drive has no {missing[0].name}: one TPDO for each motor carries the velocity behind the position"
-        )
+        carry = "TPDO1 carries" if len(layout.axes) == 1 else "TPDO1 and TPDO2 carry"
+        node.notes.append(f"the drive has no {missing[0].name}: {carry} the velocity behind the position")
     if layout.joins_velocity and layout.profile.options.torque != "none":
         node.notes.append(f"torque unknown: one TPDO for each motor has no room for it; {_WITHOUT_TORQUE}")
     return layout

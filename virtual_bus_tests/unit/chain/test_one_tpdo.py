@@ -28,6 +28,8 @@ from support.crews import robot_with
 
 STATUS, VELOCITY = 0x181, 0x281
 """TPDOs of the left drive."""
+SECOND_STATUS = 0x381
+"""Of the second motor, where node 1 has two."""
 OTHER_PDOS = frozenset(base + n for base in (0x1800, 0x1A00) for n in (1, 2, 3))
 
 
@@ -57,13 +59,13 @@ def cause(world: World) -> TripCause:
     return watchdog(world).status.verdict.cause
 
 
-def falsify(world: World, change: Callable[[bytes], bytes]) -> None:
-    """From now on the data of the left drive's TPDO are changed on their way."""
+def falsify(world: World, change: Callable[[bytes], bytes], cob_id: int = STATUS) -> None:
+    """From now on the data of this TPDO are changed on their way."""
     tick = world.bench.tick
 
     def changed(now_s: float) -> list[BenchFrame]:
         return [
-            BenchFrame(frame.cob_id, change(frame.data)) if frame.cob_id == STATUS else frame for frame in tick(now_s)
+            BenchFrame(frame.cob_id, change(frame.data)) if frame.cob_id == cob_id else frame for frame in tick(now_s)
         ]
 
     world.bench.tick = changed  # type: ignore[method-assign]
@@ -73,7 +75,7 @@ def test_it_boots_drives_and_stops_with_one_frame_of_feedback_in_each_cycle(worl
     world.drive(seconds=1.0)
     assert world.truth.linear_mps == pytest.approx(FORWARD.linear_mps, rel=0.02)
     notes = " ".join(world.snapshot.drives[0].boot_notes)
-    assert "the drive has no TPDO2: one TPDO for each motor carries the velocity behind the position" in notes
+    assert "the drive has no TPDO2: TPDO1 carries the velocity behind the position" in notes
     assert "torque unknown: one TPDO for each motor has no room for it" in notes
     before = len(world.sent(STATUS))
     world.run(1.0)
@@ -135,6 +137,29 @@ def test_a_second_drive_with_its_node_id_trips(world: World) -> None:
     assert cause(world) is TripCause.ANSWERED_TWICE
 
 
+# one node, two motors, two TPDOs: 181h and 381h ── 0.3 m/s ── 381h loses its last two bytes ── stop within 0.13 s
+def test_two_motors_of_one_node_send_a_frame_each_and_each_is_missed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    profile = profile_of(tmp_path, "generic", tpdos=4, layout={"axes": 2, "velocity_bits": 16})
+    gone = frozenset(base + n for base in (0x1800, 0x1A00) for n in (2, 3))
+    off = {key(0x1800 + n, 1): 1 << 31 for n in (2, 3)}
+    kind = Personality(missing=gone, defaults=off, widths={0x606C: "h", 0x686C: "h"})
+    monkeypatch.setitem(personalities(), profile, kind)
+    robot = robot_with("generic").model_dump()
+    for axis, drive in enumerate(robot["drives"]):
+        drive |= {"profile": profile, "node_id": 1, "axis": axis}
+    world = World(Robot.model_validate(robot))
+    world.drive(seconds=1.0)
+    assert world.truth.linear_mps == pytest.approx(FORWARD.linear_mps, rel=0.02)
+    assert "the drive has no TPDO3: TPDO1 and TPDO2 carry" in world.snapshot.drives[0].boot_notes[0]
+    assert [len(world.sent(cob_id)[-1]) for cob_id in (STATUS, SECOND_STATUS)] == [8, 8]
+    falsify(world, lambda data: data[:6], SECOND_STATUS)
+    start = world.now_s
+    assert world.run(1.0, lambda: cause(world) is not TripCause.NONE or world.core.state is not DriverState.ENABLED)
+    assert world.now_s - start <= world.robot.timeouts.feedback_s + 0.03
+
+
 # two drives with node id 1: one has a single TPDO, and the boot has believed the other one, that it has two
 def test_a_second_drive_with_its_node_id_that_sends_its_status_alone_trips(world: World) -> None:
     """Six bytes without a velocity go before each frame: of that drive nothing else is ever seen."""
@@ -184,10 +209,36 @@ def test_a_profile_can_say_it_before_the_boot(tmp_path: Path) -> None:
         Robot.model_validate({**bench_robot().model_dump(), "drives": [{**each, "profile": wide} for each in drives]})
 
 
-def profile_of(folder: Path, kind: str, tpdos: int) -> str:
+# 0.1 rpm a bit, gear 20: 16 bits end at 1.72 m/s of the wheel ── 606Ch must show 1.2 times the fastest wheel, too
+@pytest.mark.parametrize(
+    ("narrow", "linear_mps", "problem"),
+    [
+        ("velocity_bits", 1.42, ""),
+        ("velocity_bits", 1.44, r"606Ch of left_wheel has 16 bits of 0.1rpm: up to 1.72 m/s at its wheel. 1.73 m/s"),
+        ("target_bits", 1.71, ""),
+        ("target_bits", 1.72, r"60FFh of left_wheel has 16 bits of 0.1rpm: up to 1.72 m/s at its wheel. 1.72 m/s"),
+    ],
+)
+def test_a_speed_that_its_objects_cannot_hold_is_refused(
+    tmp_path: Path, narrow: str, linear_mps: float, problem: str
+) -> None:
+    """606Ch would go from 1.72 to -1.72 m/s there."""
+    profile = profile_of(tmp_path, "generic", tpdos=4, layout={narrow: 16})
+    robot = robot_with("generic").model_dump()
+    robot["limits"] |= {"linear_mps": linear_mps, "angular_radps": 0.01}
+    for drive in robot["drives"]:
+        drive |= {"profile": profile, "velocity_unit": "0.1rpm"}
+    if not problem:
+        assert Robot.model_validate(robot).limits.linear_mps == linear_mps
+        return
+    with pytest.raises(ValidationError, match=problem):
+        Robot.model_validate(robot)
+
+
+def profile_of(folder: Path, kind: str, tpdos: int, **sections: dict[str, int]) -> str:
     keys = load_profile(kind).model_dump(mode="json", exclude_unset=True)
     file = folder / f"{kind}.yaml"
-    file.write_text(json.dumps({**keys, "pdo": {**keys.get("pdo", {}), "tpdos": tpdos}}, indent=1))
+    file.write_text(json.dumps({**keys, **sections, "pdo": {**keys.get("pdo", {}), "tpdos": tpdos}}, indent=1))
     return str(file)
 
 

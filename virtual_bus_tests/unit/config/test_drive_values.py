@@ -8,7 +8,7 @@ import pytest
 from pydantic import ValidationError
 
 from canbase_config.bus_load import cyclic_load
-from canbase_config.drive_values import DriveValue, value_pdos
+from canbase_config.drive_values import DriveValue, misfit, value_pdos
 from canbase_config.robot import Robot
 from support.chain_world import robot_of
 from support.crews import robot_with
@@ -51,6 +51,13 @@ def test_a_period_of_more_than_240_cycles_is_one_of_240() -> None:
 def test_what_does_not_fit_names_the_limit(values: tuple[dict[str, Any], ...], why: str) -> None:
     with pytest.raises(ValidationError, match=why):
         robot(*values)
+
+
+@pytest.mark.parametrize("tpdos", [1, 2])
+def test_where_no_tpdo_is_spare_no_other_period_helps(tpdos: int) -> None:
+    why = misfit([DriveValue.model_validate(value("a"))], 100.0, motors=1, tpdos=tpdos)
+    assert why.startswith(f"its drive has {tpdos} TPDOs")
+    assert why.endswith("none of them is spare: take the values out")
 
 
 def test_a_node_with_two_motors_has_no_spare_tpdos() -> None:

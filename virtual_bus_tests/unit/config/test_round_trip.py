@@ -76,6 +76,7 @@ def made_consistent(values: Values) -> Values:
     for index, drive in enumerate(values["drives"]):
         drive |= {"joint": f"{drive['joint'][:60]}_{index}", "node_id": index + 1, "side": ("left", "right")[index % 2]}
         drive |= {"profile": ("generic", "roboteq")[index % 2], "mode": (3, None)[index // 2 % 2]}
+        drive["velocity_unit"] = "rpm"  # 32 bits hold every speed in it
         one_of_few = [each | {"bits": 8} for each in drive.get("values", [])[:1]]  # TPDOs and names are shared
         drive["values"] = one_of_few if index == 0 else []
     values["bus"].pop("sync_counter", None)
