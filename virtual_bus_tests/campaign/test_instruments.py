@@ -15,6 +15,7 @@ from canbase_campaign.faults import ADDED, FAULTS
 from canbase_campaign.process import Process, Topics
 from canbase_campaign.robots import campaign_robot
 from canbase_campaign.wishes import Wishes
+from canbase_campaign.world import World
 from canbase_velocity.twist import ZERO, Twist
 
 pytestmark = pytest.mark.campaign
@@ -243,3 +244,16 @@ def test_a_fault_that_was_added_leaves_the_scenarios_without_it_as_they_were(mon
     without = {seed for seed, each in plans.items() if "stop_requested" not in {fault.name for fault in each.faults}}
     assert 50 < len(without) < 60
     assert {seed: plan.draw_plan(seed) for seed in without} == {seed: plans[seed] for seed in without}
+
+
+def test_two_orders_of_one_moment_are_two_leases_as_on_a_computer() -> None:
+    """Virtual time stands still between them; two stamps of a filter never do."""
+    world = World(campaign_robot(), seed=1)
+    world.clock.run_until(world.clock.now_s + 2.0)
+    before = dict(world.watchdog.core._leases.refused)
+    decision = world.velocity.decision
+    assert decision is not None
+    for _ in range(2):
+        world.velocity._issue(decision)
+    world.clock.run_until(world.clock.now_s + 0.1)
+    assert dict(world.watchdog.core._leases.refused) == before

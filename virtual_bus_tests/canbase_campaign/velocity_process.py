@@ -66,7 +66,7 @@ class VelocityProcess(Process):
         now_s = self.clock.now_s
         self.mux = Mux(self._robot.mux.sources, LOCKS, status_timeout_s=status_timeout_s(self._robot.rates.status_hz))
         self.filter = SafetyFilter(FilterConfig.of(self._robot), self.disk.found())
-        self._sequence, self._ending = 0, False
+        self._sequence, self._stamp_ns, self._ending = 0, 0, False
         self.decision: Decision | None = None
         """The last order."""
         self._mux_told: tuple[object, ...] = ()
@@ -174,8 +174,9 @@ class VelocityProcess(Process):
             decision = self._shut_down(now_s)
         self._filter_due, self.decision = now_s + self._period_s, decision
         self._sequence += 1
+        self._stamp_ns = max(round(now_s * 1e9), self._stamp_ns + 1)  # no computer does two things in one nanosecond
         stops = decision.action is Action.STOP
-        datagram = lease_datagram(self._sequence, round(now_s * 1e9), decision.twist, stops=stops, estop=False)
+        datagram = lease_datagram(self._sequence, self._stamp_ns, decision.twist, stops=stops, estop=False)
         self._send_lease(datagram, decision.twist)
         self._topics.publish("cmd_vel", decision.twist)
         told = (decision.action, decision.cause, decision.emergency)
