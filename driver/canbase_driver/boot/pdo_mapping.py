@@ -10,7 +10,7 @@ from canbase_config.object_map import VELOCITY_ACTUAL, place
 from canbase_driver.boot.advice import ELSE_UNUSABLE, OTHER_STATE
 from canbase_driver.boot.steps import BootError, NodeAccess, Steps, unsigned
 from canbase_driver.cia301.pdo import AT_ONCE, AT_ONCE_TOO, EVERY_SYNC, NodeLayout, Pdo
-from canbase_driver.cia301.sdo_client import DEVICE_STATE, Read, SdoAborted, Write
+from canbase_driver.cia301.sdo_client import DEVICE_STATE, NO_OBJECT, NO_SUB_INDEX, Read, SdoAborted, Write
 
 PDO_OFF = 1 << 31
 """Bit 31 of 1400h:1 and 1800h:1: the PDO is not valid."""
@@ -39,7 +39,8 @@ def configure_pdos(node: NodeAccess, layout: NodeLayout) -> Steps[None]:
     keep what is written to them.
     """
     cob_ids = yield from _cob_ids(node)
-    layout = yield from _with_torque_it_has(node, _with_tpdos_it_has(node, layout, cob_ids))
+    layout = yield from _with_tpdos_it_has(node, layout, cob_ids)
+    layout = yield from _with_torque_it_has(node, layout)
     wanted = {pdo.communication: pdo for pdo in (yield from _in_what_it_has(node, layout, cob_ids))}
     spare = {pdo.communication: pdo for pdo in layout.value_pdos() if pdo.communication not in wanted}
     for index, cob_id in cob_ids.items():
@@ -71,16 +72,28 @@ def _publish_what_it_maps(node: NodeAccess, layout: NodeLayout, pdo: Pdo, found:
     node.notes.append(f"{names}: not published, {pdo.name}: {why}; see `values` of its drive in robot.yaml")
 
 
-def _with_tpdos_it_has(node: NodeAccess, layout: NodeLayout, cob_ids: dict[int, int]) -> NodeLayout:
+def _with_tpdos_it_has(node: NodeAccess, layout: NodeLayout, cob_ids: dict[int, int]) -> Steps[NodeLayout]:
     """One TPDO for each motor, where it has no more, and the velocity has room in it."""
     missing = [pdo for pdo in layout.pdos() if pdo.is_heard and pdo.communication not in cob_ids]
     if layout.profile.layout.fits_one_tpdo and missing and not layout.joins_velocity:
+        for pdo in missing:
+            if not (yield from _lacks(pdo)):
+                return layout
         layout = replace(layout, joins_velocity=True)
         carry = "TPDO1 carries" if len(layout.axes) == 1 else "TPDO1 and TPDO2 carry"
         node.notes.append(f"the drive has no {missing[0].name}: {carry} the velocity behind the position")
     if layout.joins_velocity and layout.profile.options.torque != "none":
         node.notes.append(f"torque unknown: one TPDO for each motor has no room for it; {_WITHOUT_TORQUE}")
     return layout
+
+
+def _lacks(pdo: Pdo) -> Steps[bool]:
+    """The drive says that it does not exist. Another refusal may be one of this moment: then it would stay on."""
+    try:
+        yield Read(pdo.communication, 1)
+    except SdoAborted as refused:
+        return refused.code in (NO_OBJECT, NO_SUB_INDEX)
+    return False
 
 
 def _with_torque_it_has(node: NodeAccess, layout: NodeLayout) -> Steps[NodeLayout]:
@@ -112,6 +125,11 @@ def _in_what_it_has(node: NodeAccess, layout: NodeLayout, cob_ids: dict[int, int
 
 def _about_pdos(node: NodeAccess, layout: NodeLayout, missing: Pdo) -> Steps[str]:
     """What cures it: its velocity may be narrower than its profile says, and have room in its only TPDO."""
+    if missing.is_heard and layout.profile.layout.fits_one_tpdo and not layout.joins_velocity:
+        return (
+            f"It does not say that {missing.communication:04X}h does not exist: reset it. If it has one TPDO for each "
+            f"motor by its manual, set `pdo.tpdos: {len(layout.axes)}` in its drive profile"
+        )
     if missing.is_heard and layout.profile.layout.statusword == "own" and not layout.joins_velocity:
         at = place(layout.profile, VELOCITY_ACTUAL, layout.axes[0])
         if (yield from _size(Read(at.index, at.sub))) == NARROW_BYTES:

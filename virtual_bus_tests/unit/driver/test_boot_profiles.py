@@ -164,6 +164,16 @@ def test_an_inverter_with_one_tpdo_sends_its_velocity_behind_the_position(torque
     assert said == (torque == "probe")
 
 
+def test_a_tpdo_that_an_inverter_refuses_to_show_may_be_there_and_on() -> None:
+    """A refusal of this moment is no proof that it has one TPDO alone."""
+    drive = inverter()
+    drive.refuse_read[0x1801, 1] = 0x0800_0000
+    boot, _ = booted(drive, of_kind("inverter"))
+    assert boot.report is None
+    assert "It does not say that 1801h does not exist: reset it." in str(boot.error)
+    assert "set `pdo.tpdos: 1` in its drive profile" in str(boot.error)
+
+
 @pytest.mark.parametrize(
     ("size", "cure"),
     [
