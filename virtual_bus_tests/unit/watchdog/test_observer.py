@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from canbase_config.watchdog import WatchedLayout
 from canbase_watchdog.frames import DriveState
 from canbase_watchdog.lease import Refusal
 from canbase_watchdog.observer import Observer
@@ -64,6 +65,20 @@ def test_status_velocity_and_setpoint_of_a_single_axis() -> None:
     assert axis.fed_at == 1.0
     assert node(it, 1).heard_at == 2.0
     assert node(it, 2).heard_at == NEVER
+
+
+def test_a_velocity_of_16_bits_comes_with_the_status_where_both_have_room_in_one_frame() -> None:
+    """At 1 s with its velocity, at 2 s without it: then only the status is new."""
+    layout = WatchedLayout(target_bits=16, velocity_bits=16)
+    watched = config()
+    it = Observer(replace(watched, drives=tuple(replace(drive, layout=layout) for drive in watched.drives)), 0.0)
+    axis = rx(it, 0x181, "37 02 10 00 00 00 d4 fe", 1.0)
+    assert (axis.state, axis.status_at, axis.velocity_at, axis.fed_at) == (DriveState.OPERATION_ENABLED, 1.0, 1.0, 1.0)
+    assert axis.velocity_mps == pytest.approx(-0.3)
+    axis = rx(it, 0x181, "37 02 10 00 00 00", 2.0)
+    assert (axis.status_at, axis.velocity_at, axis.fed_at) == (2.0, 1.0, 1.0)
+    rx(it, 0x181, "37 02 10 00 00 00 d4 fe 00", 3.0)
+    assert (it.dropped, it.look().axes[0].status_at) == (1, 2.0)
 
 
 def test_the_second_axis_of_a_node_has_pdos_of_its_own() -> None:
