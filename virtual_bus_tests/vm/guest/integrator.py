@@ -80,7 +80,7 @@ def support_bundle(robot: Robot) -> Row:
         raise BrokenPromiseError(f"not collected: {files['MANIFEST.txt']}")
     _says("\n".join(files), "black_box/stop_robot_")
     _link_is_read(files["can/interfaces.json"])
-    _says(files["doctor.txt"], "bit rate", "500000 bit/s", "ERROR-ACTIVE", "restart-ms 100, txqueuelen 64")
+    _says(files["doctor.txt"], "bit rate", "500000 bit/s", "error active", "restart-ms 100, txqueuelen 64")
     _says(files["units/status.txt"], *(unit(part) for part in PARTS), "active (running)")
     _says(files["journal/canbase.json"], '"CANBASE_STATE":"ENABLED"')
     return Row("canbase support-bundle", "after a trip", then=f"{len(files)} files; doctor reads can0")
