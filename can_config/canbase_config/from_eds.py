@@ -7,6 +7,7 @@ from typing import Final
 
 from canbase_config.eds_file import Eds, number
 from canbase_config.errors import printable
+from canbase_config.object_map import PROFILE_402
 
 NEEDED: Final = (0x6040, 0x6041, 0x6060, 0x6064, 0x606C, 0x60FF, 0x1400, 0x1600, 0x1800, 0x1A00)
 """What canbase cannot do without."""
@@ -14,8 +15,6 @@ NEEDED_OF_VL: Final = (*(index for index in NEEDED if index not in (0x606C, 0x60
 """The same of an inverter, in mode 2."""
 SI_RPM: Final = 0x00B4_4700
 """60A9h: revolutions per minute."""
-DRIVES: Final = 402
-"""Device profile in the low word of 1000h (CiA 301)."""
 INTEGER16, UNSIGNED32 = 0x03, 0x07
 _MODE_BITS: Final = {3: 2, 9: 8}
 """Bit of 6502h for each mode that takes 60FFh (CiA 402-2)."""
@@ -66,9 +65,9 @@ def why_no_drive(eds: Eds) -> str:
     """Why the EDS is not that of a CiA 402 drive, in a sentence; empty: it is, or claims to be."""
     device_type = eds.default(0x1000)
     profile = None if device_type is None else device_type & 0xFFFF
-    if eds.has(0x6040) or eds.has(0x6041) or profile == DRIVES:
+    if eds.has(0x6040) or eds.has(0x6041) or profile == PROFILE_402:
         return ""
-    shown = "has no value" if profile is None else f"has the device profile {profile}, not {DRIVES}"
+    shown = "has no value" if profile is None else f"has the device profile {profile}, not {PROFILE_402}"
     return f"this is no CiA 402 drive: it has neither 6040h nor 6041h, and 1000h {shown}"
 
 

@@ -7,6 +7,8 @@ from typing import Final
 
 from canbase_config.profile import Profile
 
+PROFILE_402: Final = 402
+"""Device profile of motor drives, in the lower half of 1000h (CiA 301, CiA 402-1)."""
 AXIS_OFFSET: Final = 0x800
 """The objects of the second axis are at 6800h (CiA 402-2)."""
 CONTROLWORD, STATUSWORD, MODE, MODE_DISPLAY = 0x6040, 0x6041, 0x6060, 0x6061

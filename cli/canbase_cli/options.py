@@ -82,7 +82,7 @@ class RosCommand(TyperCommand):
         """
         try:
             return super().invoke(ctx)
-        except Exception as error:
+        except Exception as error:  # its class is that of rclpy, which many commands never import; others go on
             exceptions = sys.modules.get("rclpy.exceptions")
             if exceptions is None or not isinstance(error, exceptions.InvalidParameterTypeException):
                 raise

@@ -20,7 +20,7 @@ from canbase_config.robot import Robot
 from canbase_driver.boot.steps import Steps
 from canbase_driver.cia301.sdo_client import WRITE_ONLY, Read, SdoAborted, Write
 from canbase_driver.cia402 import decode_statusword
-from canbase_driver.drives.foreign_writes import set_by_boot
+from canbase_driver.drives.foreign_writes import is_of_scale, set_by_boot
 
 COMMANDS: Final = frozenset((CONTROLWORD, MODE, TARGET_VELOCITY, VL_TARGET_VELOCITY))
 """What the driver orders in each cycle; of the first axis."""
@@ -75,6 +75,12 @@ def beside_driver(node_id: int, at: Address, robot: Robot | None) -> str:
         return f"Node {node_id} is no drive of robot.yaml, and the driver does not notice the write"
     if at.index in COMMANDS or at.index - AXIS_OFFSET in COMMANDS:
         return f"The driver sends {at} itself; while the motor has power, the watchdog stops the robot for such a write"
+    if is_of_scale(at.index, drives):
+        return (
+            f"After a write to {at} the driver boots node {node_id} anew, as soon as no motor of it has power. It gets "
+            "no power where `expects` in robot.yaml has another value; without an entry there the new value counts. "
+            "Until then the watchdog may stop the robot, because the write is a sign of another master"
+        )
     if set_by_boot(at.index, drives[0].kind if drives else load_profile("generic"), drives):
         return (
             f"The driver undoes a write to {at}: it boots node {node_id} anew as soon as no motor of it has power. "

@@ -13,7 +13,7 @@ from canbase_commissioning.object_dictionary import Address, Known, known_object
 from canbase_config.eds_file import Eds
 from canbase_config.object_map import CONTROLWORD, MODE, MODE_DISPLAY, STATUSWORD
 from canbase_config.profile import Profile
-from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
+from canbase_config.robot import DRIVER_NODE_ID, LSS_REQUEST, WATCHDOG_NODE_ID, Robot
 from canbase_driver.cia301.emcy import emcy_text
 from canbase_driver.cia301.frame import MAX_COB_ID, Frame
 from canbase_driver.cia301.nmt import EMCY, HEARTBEAT, NMT, RPDO, SDO_TO_CLIENT, SDO_TO_SERVER, TPDO, NmtState
@@ -38,7 +38,7 @@ from canbase_recording.sdo_words import sdo_address, sdo_words
 
 SYNC: Final = 0x080
 TIME: Final = 0x100
-LSS_ANSWER, LSS_REQUEST = 0x7E4, 0x7E5
+LSS_ANSWER: Final = 0x7E4
 NMT_COMMANDS: Final = {
     0x01: "start", 0x02: "stop", 0x80: "enter pre-operational", 0x81: "reset node", 0x82: "reset communication",
 }  # fmt: skip

@@ -170,7 +170,8 @@ class _Start:
         return (bool(advice.keys) or advice.gives_up or advice.by_tool) and GOES_ON not in advice.text
 
     def _told(self) -> str:
-        """What state, status and diagnostics tell a person. In /diagnostics each drive has an entry of its own."""
+        """The text that a person reads: state and cause of the driver, the boot problem of each drive (its own entry of
+        /diagnostics), and the trip of the watchdog."""
         snapshot = self.world.driver.core.snapshot(self.world.clock.now_s)
         node_ids = {drive.joint: drive.node_id for drive in self.world.robot.drives}
         problems = dict.fromkeys(

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
+from canbase_config.robot import LSS_REQUEST
 from canbase_driver.cia301.frame import Frame
 
-REQUEST: Final = 0x7E5
+REQUEST: Final = LSS_REQUEST
 ANSWER: Final = 0x7E4
 UNCONFIGURED: Final = 255
 """Node id of a drive that has none. It answers LSS alone; fastscan finds only such drives."""

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from canbase_config.drive import Drive, Identity
-from canbase_config.object_map import CONTROLWORD, STATUSWORD, VELOCITY_ACTUAL, place
+from canbase_config.object_map import CONTROLWORD, PROFILE_402, STATUSWORD, VELOCITY_ACTUAL, place
 from canbase_config.robot import Robot
 from canbase_config.scale_objects import Expected
 from canbase_config.stopping import standstill_s
@@ -50,7 +50,6 @@ from canbase_driver.motion.braking import Braking
 DEVICE_TYPE, SOFTWARE, IDENTITY = 0x1000, 0x100A, 0x1018
 NUMBERS = ("vendor_id", "product_code", "revision", "serial")
 """1018h:1 to 1018h:4."""
-PROFILE_402 = 0x0192
 
 POLL_S = 0.02
 STANDING_POLLS = 5

@@ -13,6 +13,7 @@ from canbase_config.drive import Drive
 from canbase_config.object_map import AXIS_OFFSET
 from canbase_config.profile import STOPPED_BY, Profile
 from canbase_config.scale_objects import SCALE_OBJECTS
+from canbase_driver.boot.vl_settings import FACTOR
 from canbase_driver.cia301.frame import Frame
 
 PDOS: Final = range(0x1400, 0x1C00)
@@ -25,6 +26,13 @@ _WRITTEN: Final = 3 << 5
 _COMMAND: Final = 7 << 5
 _BLOCK: Final = (0xA0, 0xA4)
 """The same where it writes a block, without and with a checksum."""
+
+
+def is_of_scale(index: int, drives: Sequence[Drive] = ()) -> bool:
+    """Whether the boot only compares this object, with `expects` of these drives, and does not set it as 604Ch."""
+    noted = {each.index for drive in drives for each in drive.expects}
+    of_an_axis = SCALE_OBJECTS.keys() - {FACTOR}
+    return index in of_an_axis or index - AXIS_OFFSET in of_an_axis or index in noted
 
 
 def set_by_boot(index: int, kind: Profile, drives: Sequence[Drive] = ()) -> bool:

@@ -10,14 +10,13 @@ import pytest
 from canbase_config.robot import Robot
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
-from canbase_sim.personality import PERSONALITIES, Personality
 from support.chain_world import World
 from support.crews import robot_with
+from support.personalities import NO_SYNC, set_personality
 
 SUPPLY = {"name": "dc_link", "index": 0x6079, "bits": 32, "scale": 0.001, "unit": "V", "period_s": 0.1}
 LAST_ERROR = {"name": "last_error", "index": 0x603F, "bits": 16, "period_s": 0.1}
 TORQUE = {"name": "torque", "index": 0x6077, "bits": 16, "signed": True, "scale": 0.1, "unit": "%", "period_s": 0.02}
-NO_SYNC = Personality(missing=frozenset((0x1005, 0x1019)))
 
 
 def robot(*values: dict[str, Any]) -> Robot:
@@ -37,8 +36,7 @@ def test_they_come_by_name_in_their_unit_as_often_as_their_period_says(
 ) -> None:
     """TPDO3 each 0.1 s, TPDO4 each 0.02 s; also by a drive that refuses PDOs that wait for SYNC."""
     if not synchronous:
-        assert isinstance(PERSONALITIES, dict)
-        monkeypatch.setitem(PERSONALITIES, "generic", NO_SYNC)
+        set_personality(monkeypatch, "generic", NO_SYNC)
     world = World(robot(SUPPLY, LAST_ERROR, TORQUE))
     world.drive(seconds=0.5)
     counted = len(world.sent(0x381)), len(world.sent(0x481))

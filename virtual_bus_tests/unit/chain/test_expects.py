@@ -23,6 +23,7 @@ from canbase_sim.cia301.dictionary import key
 from canbase_sim.personality import PERSONALITIES, Extra, Personality
 from canbase_watchdog.trip_cause import TripCause
 from support.chain_world import FORWARD, World, bench_robot
+from support.personalities import set_personality
 
 POLARITY = key(0x607E)
 REVERSED = 0xC0
@@ -33,11 +34,10 @@ IT_IS = Expected(index=0x607E, value=0)
 
 def after_power_on(monkeypatch: pytest.MonkeyPatch, value: int, notation: Extra | None = None) -> None:
     """All drives have 607Eh with this value; `notation`: and 6089h."""
-    assert isinstance(PERSONALITIES, dict)
     found = PERSONALITIES.get("generic", Personality())
     extras = {**found.extras, POLARITY: Extra("B", value, writable=True)}
     extras |= {} if notation is None else {key(0x6089): notation}
-    monkeypatch.setitem(PERSONALITIES, "generic", replace(found, extras=extras))
+    set_personality(monkeypatch, "generic", replace(found, extras=extras))
 
 
 def robot(*expected: Expected) -> Robot:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,8 +15,6 @@ from canbase_driver.cia301.pdo import node_layout
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_recording.pdo_layouts import PdoLayouts
 from canbase_runtime.driver_state import DriverState
-from canbase_sim.cia301.dictionary import key
-from canbase_sim.faults import KINDS
 from canbase_sim.frame import Frame as BenchFrame
 from canbase_sim.personality import PERSONALITIES, Personality
 from canbase_watchdog.trip_cause import TripCause
@@ -25,28 +22,17 @@ from canbase_watchdog.watchdog import Watchdog
 from canbase_web.stop_recording import wheel_speeds
 from support.chain_world import FORWARD, World, bench_robot, world_of
 from support.crews import robot_with
+from support.personalities import set_personality, with_tpdos
 
 STATUS, VELOCITY = 0x181, 0x281
 """TPDOs of the left drive."""
 SECOND_STATUS = 0x381
 """Of the second motor, where node 1 has two."""
-OTHER_PDOS = frozenset(base + n for base in (0x1800, 0x1A00) for n in (1, 2, 3))
-
-
-def personalities() -> dict[str, Personality]:
-    assert isinstance(PERSONALITIES, dict)
-    return PERSONALITIES
-
-
-def with_one_tpdo(kind: str) -> Personality:
-    found = PERSONALITIES[kind]
-    off = {key(0x1800 + n, 1): 1 << 31 for n in (1, 2, 3)}
-    return replace(found, missing=found.missing | OTHER_PDOS, defaults={**found.defaults, **off})
 
 
 @pytest.fixture
 def world(monkeypatch: pytest.MonkeyPatch) -> World:
-    monkeypatch.setitem(personalities(), "inverter", with_one_tpdo("inverter"))
+    set_personality(monkeypatch, "inverter", with_tpdos(PERSONALITIES["inverter"], 1))
     return world_of("inverter")
 
 
@@ -116,14 +102,6 @@ def test_a_frame_without_its_velocity_counts_for_nothing_and_the_base_stops(worl
     assert world.stands_after(1.5) < 0.8
 
 
-def test_when_its_tpdo_stops_the_base_stops(world: World) -> None:
-    world.drive()
-    KINDS["tpdo_lost"][0](world.node, world.now_s)
-    start = world.now_s
-    assert world.run(1.0, lambda: cause(world) is not TripCause.NONE or world.core.state is not DriverState.ENABLED)
-    assert world.now_s - start <= world.robot.timeouts.feedback_s + 0.03
-
-
 def test_a_second_drive_with_its_node_id_trips(world: World) -> None:
     world.drive()
     tick = world.bench.tick
@@ -142,10 +120,8 @@ def test_two_motors_of_one_node_send_a_frame_each_and_each_is_missed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     profile = profile_of(tmp_path, "generic", tpdos=4, layout={"axes": 2, "velocity_bits": 16})
-    gone = frozenset(base + n for base in (0x1800, 0x1A00) for n in (2, 3))
-    off = {key(0x1800 + n, 1): 1 << 31 for n in (2, 3)}
-    kind = Personality(missing=gone, defaults=off, widths={0x606C: "h", 0x686C: "h"})
-    monkeypatch.setitem(personalities(), profile, kind)
+    kind = with_tpdos(Personality(widths={0x606C: "h", 0x686C: "h"}), 2)
+    set_personality(monkeypatch, profile, kind)
     robot = robot_with("generic").model_dump()
     for axis, drive in enumerate(robot["drives"]):
         drive |= {"profile": profile, "node_id": 1, "axis": axis}
@@ -183,19 +159,6 @@ def test_a_frozen_velocity_beside_a_position_that_runs_trips(world: World) -> No
     falsify(world, lambda data: data[:6] + bytes(2))
     assert world.run(2.0, lambda: cause(world) is not TripCause.NONE)
     assert world.stands_after(2.0) < 1.0
-
-
-def test_when_the_driver_dies_the_watchdog_stops_it(world: World) -> None:
-    world.drive()
-    world.kill_driver()
-    assert world.stands_after(1.0) < 0.6
-
-
-def test_when_the_computer_dies_it_stops_by_itself(world: World) -> None:
-    world.drive()
-    world.kill_driver()
-    world.watchdog = None
-    assert world.stands_after(2.0) < 0.8
 
 
 def test_a_profile_can_say_it_before_the_boot(tmp_path: Path) -> None:
@@ -243,7 +206,7 @@ def profile_of(folder: Path, kind: str, tpdos: int, **sections: dict[str, int]) 
 
 
 def test_a_drive_with_one_tpdo_and_a_wide_velocity_cannot_be_used(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(personalities(), "generic", with_one_tpdo("generic"))
+    set_personality(monkeypatch, "generic", with_tpdos(PERSONALITIES["generic"], 1))
     world = world_of("generic")
     world.run(3.0)
     assert world.core.state is not DriverState.ENABLED

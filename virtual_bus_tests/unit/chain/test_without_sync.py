@@ -6,12 +6,11 @@ import pytest
 
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
-from canbase_sim.faults import KINDS
 from canbase_sim.frame import Frame as BenchFrame
-from canbase_sim.personality import PERSONALITIES, Personality
 from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import Watchdog
 from support.chain_world import FORWARD, World, world_of
+from support.personalities import NO_SYNC, set_personality
 
 CYCLE_S = 0.01
 
@@ -19,13 +18,8 @@ CYCLE_S = 0.01
 @pytest.fixture
 def world(monkeypatch: pytest.MonkeyPatch) -> World:
     """Both drives have no 1005h: they heed no SYNC, and refuse types 1 to 240 (CiA 301)."""
-    monkeypatch.setitem(dict_of_kinds(), "generic", Personality(missing=frozenset((0x1005, 0x1019))))
+    set_personality(monkeypatch, "generic", NO_SYNC)
     return world_of("generic")
-
-
-def dict_of_kinds() -> dict[str, Personality]:
-    assert isinstance(PERSONALITIES, dict)
-    return PERSONALITIES
 
 
 def watchdog(world: World) -> Watchdog:
@@ -107,24 +101,3 @@ def test_a_second_drive_with_its_node_id_trips(world: World, late_cycles: float)
     assert world.run(1.0, lambda: tripped(world))
     assert watchdog(world).status.verdict.cause is TripCause.ANSWERED_TWICE
     assert world.now_s - start <= world.robot.timeouts.feedback_s + 0.05
-
-
-def test_when_its_tpdos_stop_the_base_stops_in_the_same_time_as_with_sync(world: World) -> None:
-    world.drive()
-    KINDS["tpdo_lost"][0](world.node, world.now_s)
-    start = world.now_s
-    assert world.run(1.0, lambda: tripped(world) or world.core.state is not DriverState.ENABLED)
-    assert world.now_s - start <= world.robot.timeouts.feedback_s + 0.03
-
-
-def test_when_the_driver_dies_the_watchdog_stops_it(world: World) -> None:
-    world.drive()
-    world.kill_driver()
-    assert world.stands_after(1.0) < 0.6
-
-
-def test_when_the_computer_dies_it_stops_by_itself(world: World) -> None:
-    world.drive()
-    world.kill_driver()
-    world.watchdog = None
-    assert world.stands_after(2.0) < 0.8

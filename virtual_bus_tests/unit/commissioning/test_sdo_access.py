@@ -99,6 +99,14 @@ def test_beside_the_driver_a_write_is_undone_or_noticed_by_the_watchdog_or_by_no
     assert becomes in beside_driver(1, at, None)
 
 
+def test_what_the_boot_only_compares_is_not_undone() -> None:
+    noted = {"joint": "left", "node_id": 1, "side": "left", "expects": ({"index": 0x2010, "value": 1},)}
+    of = robot(noted, {"joint": "right", "node_id": 2, "side": "right"})
+    for at in (Address(0x607E), Address(0x6891, 1), Address(0x2010)):
+        assert "no power where `expects` in robot.yaml has another value" in beside_driver(1, at, of)
+    assert "does not notice a write to 2010h:0" in beside_driver(1, Address(0x2010), robot())
+
+
 def test_the_makers_watchdog_is_undone_by_the_profile_in_robot_yaml_and_a_node_that_is_no_drive_is_not_looked_at() -> (
     None
 ):

@@ -398,7 +398,7 @@ def test_an_sdo_that_changes_how_an_enabled_drive_stops(data: str, index: str) -
 
 
 def test_an_lss_request_while_a_drive_is_enabled() -> None:
-    """Its master gives nodes another id or bit rate: afterwards nobody would hear them."""
+    """An LSS master can give a drive another node id or bit rate; the watchdog then receives none of its frames."""
     sign = "an LSS request 04 01 (CiA 305: node ids, bit rate), while it is enabled"
     assert after(0x7E5, "04 01") == Sign(2.0, 1, sign)
     assert after(0x7E4, "04 01") is None  # an answer
