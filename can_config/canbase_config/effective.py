@@ -11,6 +11,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.nodes import ScalarNode
 from ruamel.yaml.representer import RoundTripRepresenter
+from ruamel.yaml.scalarint import HexCapsInt
 
 from canbase_config.errors import Loc
 from canbase_config.load import Loaded
@@ -18,6 +19,8 @@ from canbase_config.load import Loaded
 DEFAULT_MARK: Final = "default"
 """The comment behind a value that the file does not give."""
 _MARK_COLUMN: Final = 44
+_IN_HEX: Final = frozenset(("index", "vendor_id", "product_code", "revision", "serial"))
+"""Keys whose numbers are those of a manual, an EDS or 1018h: hexadecimal, as `canbase commission` writes them."""
 
 
 class _Representer(RoundTripRepresenter):
@@ -51,6 +54,8 @@ def _marked(value: Any, loc: Loc, defaults: frozenset[Loc]) -> Any:
         return _in_one_line(value)
     if isinstance(value, (list, tuple)):
         return [_marked(inner, (*loc, index), defaults) for index, inner in enumerate(value)]
+    if isinstance(value, int) and loc[-1] in _IN_HEX:
+        return HexCapsInt(value)
     if not isinstance(value, dict) or not value:
         return value
     marked = CommentedMap()

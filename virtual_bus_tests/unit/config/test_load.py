@@ -53,6 +53,20 @@ def test_the_example_for_a_real_bus_demands_scanner_and_stop_button() -> None:
     assert robot.lease.socket == "/run/canbase/lease.sock"
 
 
+def test_object_indexes_and_identities_are_shown_in_hexadecimal_as_in_a_manual(tmp_path: Path) -> None:
+    text = sample("bench").read_text(encoding="utf-8")
+    added = "    expects: [{index: 24721, sub: 1, value: 20}]\n    identity: {vendor_id: 251}\n"
+    file = tmp_path / "robot.yaml"
+    file.write_text(re.sub(r"(  - joint: left_wheel.*\n)", rf"\1{added}", text), encoding="utf-8")
+    loaded = load_robot(file)
+    shown = effective(loaded)
+    assert "- index: 0x6091" in shown
+    assert "vendor_id: 0xFB" in shown
+    assert "value: 20" in shown
+    file.write_text(shown, encoding="utf-8")
+    assert load_robot(file).robot == loaded.robot
+
+
 def passes(filters: list[dict[str, int]], cob_id: int) -> bool:
     """Whether the kernel hands on a frame with this 11-bit identifier (linux/can/raw.h, CAN_RAW_FILTER)."""
     return any(cob_id & one["can_mask"] == one["can_id"] & one["can_mask"] for one in filters)
