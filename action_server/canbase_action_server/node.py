@@ -36,12 +36,12 @@ from canbase_action_server.binding import Binding
 from canbase_action_server.cancel_rule import NO_UUID, meant
 from canbase_action_server.goal import GoalPhase
 from canbase_action_server.goal_client import REJECTION_QOS, SERVICE_QOS
-from canbase_action_server.goal_queue import Cycle, GoalQueue
+from canbase_action_server.goal_queue import Cycle, End, GoalQueue
 from canbase_action_server.goal_step import GoalStep
 from canbase_action_server.inputs import Inputs, Odometry
 from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.open_goal import OpenGoal, goal_numbers, measured_numbers, rejection, uuid_of
-from canbase_action_server.outcome import ErrorCode, Outcome, Status
+from canbase_action_server.outcome import ErrorCode, Status
 from canbase_action_server.preconditions import action_source
 from canbase_config.robot import Robot
 from canbase_runtime.journal import Journal, Voice
@@ -243,15 +243,11 @@ class DriveDistanceServer(Node):
 
     def _finish(self, binding: Binding, handle: ServerGoalHandle) -> Any:
         """The execute callback of rclpy, called when a goal has ended: its status is set, its result goes out."""
-        uuid = uuid_of(handle)
-        result = binding.defect
         try:
-            goal = self._open.pop(uuid)
-            outcome, result = goal.finish()
-            self._log_end(uuid, goal, outcome, result)
+            return self._open.pop(uuid_of(handle)).finish()
         except Exception as error:  # noqa: BLE001  rclpy would log it, leave the base moving, and send error code 0: OK
             self.fail(error)
-        return result
+        return binding.defect
 
     def _on_timer(self) -> None:
         for uuid, goal in self._open.items():
@@ -277,6 +273,8 @@ class DriveDistanceServer(Node):
                 self._log(GoalStep.FEEDBACK, uuid, **self._open[uuid].feedback)
         for end in cycle.ends:
             self._open[end.key].end(end.outcome)
+        for end in cycle.ends:
+            self._log_end(self._open[end.key], end)
 
     def _order(self, twist: Twist) -> None:
         stamp = self.get_clock().now().to_msg()
@@ -297,16 +295,18 @@ class DriveDistanceServer(Node):
         elif before is GoalPhase.STOPPING and any(end.key == uuid and end.outcome.stands for end in cycle.ends):
             self._log(GoalStep.STANDSTILL, uuid)
 
-    def _log_end(self, uuid: str, goal: OpenGoal, outcome: Outcome, result: Any) -> None:
+    def _log_end(self, goal: OpenGoal, end: End) -> None:
+        """Here and not in `_finish`, which a busy computer may call after the next goal has begun."""
+        outcome = end.outcome
         fields = {
             "status": outcome.status.name,
             "error_code": outcome.code.name,
-            **measured_numbers(result),
+            **measured_numbers(goal.result()),
             "duration_s": round(time.monotonic() - goal.accepted, 3),
             "message": outcome.message,
         }
         priority = Priority.INFO if outcome.status is Status.SUCCEEDED else Priority.NOTICE
-        self._write_log(GoalStep.ENDED, uuid, fields, priority)
+        self._write_log(GoalStep.ENDED, end.key, fields, priority)
 
 
 def _odometry_from(serialized: bytes, received: float) -> Odometry | None:

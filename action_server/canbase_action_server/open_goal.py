@@ -119,10 +119,15 @@ class OpenGoal:
         self.outcome = outcome
         self.handle._action_server.notify_execute(self.handle, None)
 
-    def finish(self) -> tuple[Outcome, Any]:
-        """Sets the final status; how the goal ended, and the result for the client, which is made before that."""
-        assert self.outcome is not None  # `end` was called before
-        result = self.binding.result(self.outcome)
+    def result(self) -> Any:
+        """The message for the client, after `end`."""
+        assert self.outcome is not None
+        return self.binding.result(self.outcome)
+
+    def finish(self) -> Any:
+        """Sets the final status; the result for the client, which is made before that."""
+        assert self.outcome is not None
+        result = self.result()
         match self.outcome.status:
             case Status.SUCCEEDED:
                 self.handle.succeed()
@@ -130,4 +135,4 @@ class OpenGoal:
                 self.handle.canceled()
             case Status.ABORTED:
                 self.handle.abort()
-        return self.outcome, result
+        return result

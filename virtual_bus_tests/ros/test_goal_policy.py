@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import random
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -13,10 +11,11 @@ from canbase.action import DriveDistance
 from rclpy.action import ActionClient
 
 from canbase_action_server.client import DriveClient
+from canbase_action_server.goal_client import SERVICE_QOS
 from canbase_action_server.outcome import ErrorCode, Status
 from ros.conftest import MakeRobot, Spawn
 from support.fake_base import FakeBase, server_code
-from support.ros_harness import Process, TestNode, reserve_domain
+from support.ros_harness import Process, TestNode
 
 pytestmark = pytest.mark.ros
 
@@ -24,17 +23,17 @@ pytestmark = pytest.mark.ros
 class Crowd:
     """A server, its base, and several clients that neither wait nor ask twice."""
 
-    def __init__(
-        self, node: TestNode, spawn: Spawn, make_robot: MakeRobot, domain: int | None = None, **action: Any
-    ) -> None:
-        """`domain` None: that of the test."""
+    def __init__(self, node: TestNode, spawn: Spawn, make_robot: MakeRobot, **action: Any) -> None:
         self.node = node
         # A loaded test machine may hold the test's base up for longer than the 0.2 s of a robot.
         robot = make_robot({"timeouts": {"odometry_s": 1.0}, "action": {"progress_timeout_s": 5.0, **action}})
-        environment = {} if domain is None else {"ROS_DOMAIN_ID": str(domain)}
-        self.server: Process = spawn(server_code(robot), environment)
+        self.server: Process = spawn(server_code(robot))
         self.base = FakeBase(node)
-        self.clients = [ActionClient(node.node, DriveDistance, "drive_distance") for _ in range(4)]
+        self.clients = [
+            ActionClient(node.node, DriveDistance, "drive_distance", goal_service_qos_profile=SERVICE_QOS,
+                         result_service_qos_profile=SERVICE_QOS, cancel_service_qos_profile=SERVICE_QOS)
+            for _ in range(4)
+        ]  # fmt: skip
         DriveClient(node.node, node.executor).wait_for_server(20.0)
         node.wait_for(lambda: all(client.server_is_ready() for client in self.clients), 10.0, "all clients")
         node.wait_for(lambda: self.base.heard, 20.0, "the server to listen")
@@ -79,24 +78,11 @@ class Crowd:
             result.add_done_callback(lambda done: self.results.setdefault(uuid, []).append(done.result()))
 
 
-@pytest.mark.timeout(120)
+@pytest.mark.parametrize("policy", ["reject", "queue", "preempt"])
 def test_200_goals_and_cancels_of_several_clients_each_end_once_and_rightly(
-    spawn: Spawn, make_robot: MakeRobot
+    test_node: TestNode, spawn: Spawn, make_robot: MakeRobot, policy: str
 ) -> None:
-    """Three robots side by side, each in a domain of its own."""
-
-    def crowd_of(policy: str) -> None:
-        domain, holder = reserve_domain(os.getpid())
-        with holder, TestNode(domain_id=domain) as node:
-            crowd = Crowd(node, spawn, make_robot, domain, goal_policy=policy, queue_length=3)
-            they_end_once_and_rightly(crowd, policy)
-
-    with ThreadPoolExecutor() as robots:
-        assert list(robots.map(crowd_of, ("reject", "queue", "preempt"))) == [None] * 3
-
-
-def they_end_once_and_rightly(crowd: Crowd, policy: str) -> None:
-    """200 goals with cancels among them, to their end. `policy`: the server's."""
+    crowd = Crowd(test_node, spawn, make_robot, goal_policy=policy, queue_length=3)
     chance, canceled = random.Random(1), set()
     for _ in range(200):
         way_m = chance.choice((-1, 1)) * chance.uniform(0.01, 0.1)
@@ -112,7 +98,8 @@ def they_end_once_and_rightly(crowd: Crowd, policy: str) -> None:
         (Status.CANCELED, ErrorCode.CANCELED): canceled,
         (Status.ABORTED, ErrorCode.PREEMPTED): set(crowd.handles) if policy == "preempt" else set(),
     }
-    assert [uuid for uuid in crowd.handles if uuid not in allowed.get(crowd.end(uuid), set())] == []
+    ends = {uuid: crowd.end(uuid) for uuid in crowd.handles}
+    assert {uuid: end for uuid, end in ends.items() if uuid not in allowed.get(end, set())} == {}
     assert one_at_a_time(crowd.steps())
     assert len(crowd.handles) > 10
     assert crowd.node.node.count_publishers("cmd_vel_action") == 1
