@@ -10,6 +10,7 @@ from typing import Any
 import can
 
 from canbase_watchdog.bus_health import BusHealth
+from canbase_watchdog.carrier import is_without_carrier
 from canbase_watchdog.frame_socket import ERROR, ERROR_CLASS, MAX_COB_ID, Received, open_bus
 from canbase_watchdog.frames import Frame
 
@@ -45,6 +46,8 @@ class BusPort:
         self.health = BusHealth()
         if after_loss:
             self.health.on_send_error(self._received_until)
+        if is_without_carrier(arguments):
+            self.health.on_trouble(self._received_until)
         self.request_problem = ""
         """Why the adapter did not take the last remote frame; empty: it took it, or there was none."""
         self.datagrams_dropped = 0
