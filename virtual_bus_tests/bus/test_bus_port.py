@@ -207,6 +207,10 @@ def test_a_controller_that_was_bus_off_before_is_a_problem_until_something_is_he
         reopened(port)
         port.send(SYNC)
         assert (port.problem, port.report.controller) == (BUS_OFF, ControllerState.BUS_OFF)
+    other.send(can.Message(arbitration_id=0x77E, data=b"\5", is_extended_id=False))  # the watchdog, on this computer
+    assert port.receive(0.1) == Frame(0x77E, b"\5")
+    assert (port.problem, port.report.controller) == (BUS_OFF, ControllerState.BUS_OFF)
+    off[0] = False
     other.send(can.Message(arbitration_id=0x701, data=b"\5", is_extended_id=False))
     assert port.receive(0.1) == Frame(0x701, b"\5")
     assert (port.problem, port.report.controller, port.report.failures) == ("", ControllerState.ERROR_ACTIVE, 1)

@@ -41,6 +41,7 @@ class BusPort:
                 f"the CAN bus {arguments} cannot be opened: {error}. "
                 "Check `bus` in robot.yaml, and that the interface is up (ip -details link show)."
             ) from error
+        self._arguments = arguments
         self._waiting: Received | None = None
         self._received_until = time.monotonic()
         self.health = BusHealth()
@@ -88,11 +89,16 @@ class BusPort:
             elif can_id > MAX_COB_ID and can_id & ERROR:
                 self.health.on_error_frame(can_id & ERROR_CLASS, data, time.monotonic())
             else:
-                self.health.on_data()
+                self._on_data()
                 if can_id <= MAX_COB_ID:
                     at_s = wall_s - behind_s
                     self._received_until = at_s if self._received_until <= at_s <= now_s else now_s
                     yield can_id, data, self._received_until
+
+    def _on_data(self) -> None:
+        """While it is bus-off, some interfaces (slcan) still bring the driver's frames to this process."""
+        if self.health.works or not is_without_carrier(self._arguments):
+            self.health.on_data()
 
     def send(self, frame: Frame) -> None:
         """Send now or never: a frame that the bus does not take at once is counted and dropped."""

@@ -223,11 +223,13 @@ class BusPort:
         return without_carrier
 
     def _on_received(self) -> None:
-        """The bus works."""
+        """The bus works. While it is bus-off, some interfaces (slcan) still bring this computer's own frames."""
         self._receive_failures = 0
-        self._on_passed()
         if self.report.is_bus_off:
+            if is_without_carrier(self._arguments):
+                return
             self.report = replace(self.report, controller=BusReport().controller)
+        self._on_passed()
 
     def _on_passed(self) -> None:
         """A frame went out or came in. After a failure the listening begins, and the problem stays until it is over."""
