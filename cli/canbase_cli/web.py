@@ -46,9 +46,10 @@ def web(
         if str(error.name).partition(".")[0] not in ("nicegui", "fastapi", "uvicorn", "starlette"):
             raise
         fail(f"canbase web needs the Python package {error.name}: pip install 'nicegui>=3.18,<4'", WRONG_INPUT)
+    arguments = ros_arguments(ctx, namespace)
     token = secrets.token_urlsafe(24) if token_file is None else _token(token_file)
     _need_port(host, port)
-    run(loaded, Address(host, port, token), ros_arguments(ctx, namespace), namespace)
+    run(loaded, Address(host, port, token), arguments, namespace)
 
 
 def _token(file: Path) -> str:
