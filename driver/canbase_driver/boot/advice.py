@@ -56,7 +56,19 @@ GUARDING_ALONE = (
     "where it has node guarding alone, set `self_stop.node_guarding: true` and `self_stop.heartbeat_entries: 0` in its "
     "drive profile"
 )
-OTHER_STATE = "Switch the drive off and on again, and let no other master control it"
+OTHER_STATE = (
+    "The state of the drive forbids it, and the boot is tried again each second. If this goes on, switch the drive off "
+    "and on again, and let no other master control it"
+)
+NOT_AN_AXIS = (
+    "Every axis of a CiA 402 drive has it: check `axis` in robot.yaml, and with the maker's tool that the drive is set "
+    "to CiA 402 and takes its commands from the bus"
+)
+UNANSWERED = (
+    "It answered before, so its node id and the bit rate are right, and the boot is tried again each second. If this "
+    "goes on, check its supply and its cable, and let no other program use its SDO channel (canbase sdo, the maker's "
+    "tool)"
+)
 ELSE_UNUSABLE = "where that cannot be done, the drive cannot be used"
 WITHOUT = {
     (0x1016, 1): "it does not stop by the watchdog's heartbeat",
@@ -87,7 +99,7 @@ OF_AN_AXIS = frozenset((0x6040, 0x6041, 0x6060, 0x6064, 0x606C, 0x60FF))
 def hint(error: SdoError) -> str:
     """What to try about a transfer that failed after all its tries."""
     if isinstance(error, SdoTimeout):
-        return "Check power, cable and bit rate, and that no other program uses the SDO channel of this node"
+        return UNANSWERED
     code = error.code if isinstance(error, SdoAborted) else 0
     key, index = profile_key(error.index, error.sub), _first_axis(error.index)
     if code == DEVICE_STATE:
@@ -98,10 +110,7 @@ def hint(error: SdoError) -> str:
             "bit 1 is mode 2, with `modes: [2]` in its drive profile; with none of them the drive cannot be used"
         )
     if code in (NO_OBJECT, NO_SUB_INDEX, GENERAL_ERROR) and index in OF_AN_AXIS:
-        return (
-            "Every axis of a CiA 402 drive has it: check `axis` in robot.yaml, and with the maker's tool that the "
-            "drive is set to CiA 402 and takes its commands from the bus"
-        )
+        return NOT_AN_AXIS
     if code in WIDTHS:
         width = f"set `{key}` in its drive profile to that of its manual, 16 or 32"
         where = width if key.startswith("layout.") else "such a drive cannot be used"

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from canbase_config.profile import Presence
-from canbase_driver.boot.advice import hint, see, without
+from canbase_driver.boot.advice import NOT_AN_AXIS, OTHER_STATE, UNANSWERED, hint, see, without
 from canbase_driver.cia301.nmt import NmtCommand
 from canbase_driver.cia301.sdo_client import (
     ACCESS_UNSUPPORTED,
@@ -81,6 +81,11 @@ class BootError(Exception):
         self.node_id = node_id
         self.problem = problem
         self.hint = hint
+
+    @property
+    def may_pass(self) -> bool:
+        """A drive that still starts does this too, and no longer when it has started."""
+        return self.hint.startswith((OTHER_STATE, UNANSWERED, NOT_AN_AXIS))
 
 
 def boot_error(error: SdoError) -> BootError:

@@ -425,8 +425,8 @@ def test_an_answer_that_comes_late_and_then_again_names_no_second_drive() -> Non
         ((0x60FF, 0), INVALID, "60FFh:0: 0609 0030h", "let the drive take its commands from the bus"),
         ((0x60FF, 0), GENERAL_ERROR, "60FFh:0: 0800 0000h", "check `axis` in robot.yaml"),
         ((0x6041, 0), GENERAL_ERROR, "6041h:0: 0800 0000h", "check `axis` in robot.yaml"),
-        ((0x1400, 1), DEVICE_STATE, "RPDO1 cannot be switched off (1400h:1: 0800 0022h", "Switch the drive off and on"),
-        ((0x60FF, 0), DEVICE_STATE, "60FFh:0: 0800 0022h", "Switch the drive off and on again"),
+        ((0x1400, 1), DEVICE_STATE, "RPDO1 cannot be switched off (1400h:1: 0800 0022h", "switch the drive off and on"),
+        ((0x60FF, 0), DEVICE_STATE, "60FFh:0: 0800 0022h", "switch the drive off and on again"),
         ((0x6041, 0), NO_OBJECT, "6041h:0: 0602 0000h the object does not exist", "check `axis` in robot.yaml"),
         (
             (0x1600, 2),
@@ -440,8 +440,8 @@ def test_an_answer_that_comes_late_and_then_again_names_no_second_drive() -> Non
             "TPDO1 does not take another mapping (1A00h:0: 0601 0002h",
             "carry 6041h:0, 6064h:0 wi",
         ),
-        ((0x1600, 1), DEVICE_STATE, "RPDO1 does not take 6040h:0 (1600h:1: 0800 0022h", "Switch the drive off and on"),
-        ((0x1400, 2), DEVICE_STATE, "1400h:2: 0800 0022h", "Switch the drive off and on again"),
+        ((0x1600, 1), DEVICE_STATE, "RPDO1 does not take 6040h:0 (1600h:1: 0800 0022h", "switch the drive off and on"),
+        ((0x1400, 2), DEVICE_STATE, "1400h:2: 0800 0022h", "switch the drive off and on again"),
     ],
 )
 def test_a_refused_necessity_is_an_error(key: Key, abort: int, problem: str, hint: str) -> None:
