@@ -10,6 +10,9 @@ Signs, each while a drive that it concerns is enabled or at any time where that 
 3. once: an NMT command to an enabled drive, a quick stop PDO, or an SDO that writes its controlword, target or mode,
    or one of the objects that decide how it stops (1016h, 6007h, the RPDOs, ...).
    The driver does none of them there. The watchdog does, but only after a trip, when signs are not looked for.
+
+A gateway or bridge that sends frames again gives the signs of 2, and of 1 the SYNCs: each Sign has whether copies of
+frames came, which `copies.py` finds.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from collections import deque
 from dataclasses import dataclass
 
 from canbase_config.watchdog import WatchdogConfig
+from canbase_watchdog.copies import Copies
 
 DISORDER_COUNT, DISORDER_S = 3, 1.0
 SYNC_LOST, OFF_BEAT = 1.5, 0.75
@@ -31,9 +35,10 @@ BEATS, BEAT_TIMEOUTS = 3, 2.5
 come back, none is its own."""
 GUARD_PERIODS, GUARD_EXCESS = 60, 1.15
 """Requests that keep a drive alive add a quarter to its answers. Over this window a burst of late ones is less."""
+COPIES_S = 10.0
+"""A copy of so long ago still shows that frames are sent again, where an adapter does it with a few of them [s]."""
 
-
-NOT_OURS = "heartbeats 77Eh that this watchdog has not sent: another device has its node id, 126; give it another one"
+NOT_OURS = "heartbeats 77Eh that this watchdog has not sent; a device with its node id, 126, needs another one"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +48,8 @@ class Sign:
     at: float
     node_id: int
     detail: str
+    copied: bool | None = None
+    """Whether copies of SYNCs and of own frames have come; None: frames that are sent again give no such sign."""
 
 
 class Pace:
@@ -79,12 +86,20 @@ class Foreign:
         self._control_hz, self._period_s = config.control_hz, period_s
         self._lost_s, self._off_beat_s = SYNC_LOST / config.control_hz, OFF_BEAT / config.control_hz
         self._sync_at = math.inf
+        self._copies = Copies(), Copies()
+        """Of the SYNCs; and, where they come back, of this watchdog's own heartbeats."""
+        self._setpoint_copies: dict[int, Copies] = {}
+        self._echo = echo
         self._setpoints: dict[int, bytes] = {}
         """COB-ID and data of the setpoints since the last SYNC."""
         self.last: Sign | None = None
 
     def on_setpoint(self, cob_id: int, node_id: int, data: bytes, now_s: float) -> None:
         """An RPDO of the driver, or of somebody else."""
+        copies = self._setpoint_copies.get(cob_id)
+        if copies is None:
+            copies = self._setpoint_copies[cob_id] = Copies()
+        copies.take(data, now_s)
         other = self._setpoints.setdefault(cob_id, data)
         if other != data:
             self._setpoints[cob_id] = data
@@ -93,24 +108,36 @@ class Foreign:
 
     def on_sync(self, now_s: float) -> None:
         """A SYNC of the driver, or of somebody else."""
+        self._copies[0].take(b"", now_s)
         off_beat = now_s - self._sync_at < self._off_beat_s
         if not self._setpoints and off_beat and self._disorder.too_fast(now_s):
-            self.note(0, "SYNCs without setpoints", now_s)
+            self.note_too_many(0, "SYNCs without setpoints", now_s)
         self._setpoints.clear()
         self._sync_at = now_s
         if self._syncs.too_fast(now_s):
-            self.note(0, f"more SYNCs than the driver's {self._control_hz:g} per second", now_s)
+            self.note_too_many(0, f"more SYNCs than the driver's {self._control_hz:g} per second", now_s)
 
     def on_heartbeat(self, now_s: float) -> None:
         """A heartbeat of the driver's node, or of another one that uses its number."""
         if self._heartbeats.too_fast(now_s):
-            self.note(0, f"more heartbeats 77Fh than one each {self._period_s:.3f} s", now_s)
+            self.note_too_many(0, f"more heartbeats 77Fh than one each {self._period_s:.3f} s", now_s)
 
     def on_watchdog_heartbeat(self, now_s: float) -> None:
         """A heartbeat of this watchdog's own node that was received."""
+        self._copies[1].take(b"", now_s)
         if self._beats.too_fast(now_s):
-            self.note(0, NOT_OURS, now_s)
+            self.note_too_many(0, NOT_OURS, now_s)
 
     def note(self, node_id: int, detail: str, now_s: float) -> None:
         """A sign of which once is enough."""
         self.last = Sign(now_s, node_id, detail)
+
+    def note_too_many(self, node_id: int, detail: str, now_s: float) -> None:
+        """A sign that frames which are sent again give as well."""
+        self.last = Sign(now_s, node_id, detail, self._are_copied(now_s))
+
+    def _are_copied(self, now_s: float) -> bool:
+        """SYNCs have come with copies, and own heartbeats; where those do not come back, the setpoints of each axis."""
+        syncs, own = self._copies
+        others = (own,) if self._echo else tuple(self._setpoint_copies.values())
+        return all(now_s - copies.at <= COPIES_S for copies in (syncs, *others))

@@ -377,7 +377,11 @@ def test_two_drives_with_one_node_id_are_named() -> None:
             return super().on_frame(frame) * 2
 
     text = error_of(boot_one_axis(Twins()))
-    assert text.startswith("node 1: each request is answered twice: two devices on the bus have this node id.")
+    assert text.startswith(
+        "node 1: each request is answered twice: two devices on the bus have this node id, or a gatew"
+    )
+    assert "canbase adopt" in text
+    assert "If one drive alone has it, take out the gateway" in text
 
 
 def test_a_watchdog_that_stops_the_drive_meanwhile_is_no_second_drive() -> None:
