@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from canbase_config.profile import Presence
-from canbase_driver.boot.advice import NOT_AN_AXIS, OTHER_STATE, UNANSWERED, hint, see, without
+from canbase_driver.boot.advice import NOT_AN_AXIS, OTHER_STATE, UNANSWERED, hint, in_digits, see, without
 from canbase_driver.cia301.nmt import NmtCommand
 from canbase_driver.cia301.sdo_client import (
     ACCESS_UNSUPPORTED,
@@ -146,7 +146,7 @@ class NodeAccess:
         if found is not None and not _same(found, step.data):
             problem = f"{step} is {_hex(found)}, expected {_hex(step.data)}{refusal}"
             other = "find what else sets it: another master, an input, a program in the drive"
-            raise BootError(self.node_id, problem, f"Set it with the maker's tool, or {other}")
+            raise BootError(self.node_id, problem, f"Set {in_digits(step)} with the maker's tool, or {other}")
         self.note_change(step, before)
 
     def _shows(self, shown_at: Read, step: Write) -> Steps[bool]:
