@@ -298,6 +298,23 @@ def test_a_word_that_ros_does_not_know_ends_a_process_before_it_opens_the_bus_or
     assert "ROS does not know --bogus behind --ros-args" in " ".join(result.output.split())
 
 
+@pytest.mark.parametrize(
+    ("command", "opens"),
+    [("up", "up._refuse_twice"), ("web", "web._need_port"), ("web", "web._token"), ("record", "record.end_signals")],
+)
+def test_a_word_that_ros_does_not_know_ends_a_command_before_it_takes_a_name_or_a_port(
+    command: str, opens: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[Any] = []
+    monkeypatch.setattr(f"canbase_cli.{opens}", lambda *given: opened.append(given))
+    words = {"web": ["--token-file", "/none"], "record": ["--mcap", str(tmp_path / "run.mcap")]}.get(command, [])
+
+    result = CliRunner().invoke(app, [command, *words, "--ros-args", "--bogus"], env={"COLUMNS": "300"})
+
+    assert (result.exit_code, opened) == (2, [])
+    assert "ROS does not know --bogus behind --ros-args" in " ".join(result.output.split())
+
+
 def test_without_ros_the_words_for_it_keep_no_watchdog_from_starting(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing can check them there, and they have no effect on a process without a node."""
     started: list[Any] = []
