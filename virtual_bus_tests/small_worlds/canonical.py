@@ -40,7 +40,7 @@ UNSEEN = frozenset((
     "dropped", "serial", "stops", "trips", "counters", "lease_age_ms", "stamp_ns", "seen", "detail", "snapshot",
     "_status_at", "_mux_state_at", "_state_at", "_counters_due", "_longest_gap_s", "_request", "answered", "_reset_at",
     "_sdo_turn", "_stamp_ns", "changes", "lost_producers", "_measures", "report", "copies", "_copies",
-    "_setpoint_copies", "copied", "copied_at", "_signs",
+    "copied", "copied_at", "_signs",
     # where the base is: no decision of these parts looks at it; that of the scanner sees nothing
     "_feed", "travel", "travel_m", "_travel_m", "_anchor_m", "_counts", "_counts_before", "_poses", "encoder_offset",
     "_seen_m", "_from_m", "_restarts",

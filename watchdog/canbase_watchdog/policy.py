@@ -315,13 +315,13 @@ def _foreign_master(view: View, config: WatchdogConfig, now_s: float) -> Verdict
 _OF_A_SIGN = {
     None: "another master is on the bus: {}",
     False: (
-        "another master is on the bus, or frames are sent again: {}. No copies of own frames came: find the other "
+        "another master is on the bus, or frames are sent again: {}. They are no copies of our frames: find the other "
         "master (canbase scan) and stop it. If there is none, take out the gateway, the bridge or the second interface "
         "that sends frames again"
     ),
     True: (
-        "frames come twice, or another master is on the bus: {}. Copies of SYNCs and of own frames came within 2 ms: "
-        "take out the gateway, the bridge or the second interface that sends frames again (candump shows "
+        "frames come twice, or another master is on the bus: {}. SYNCs and other frames of ours come again "
+        "within 2 ms: take out the gateway, the bridge or the second interface that sends frames again (candump shows "
         "them twice). If there is none, stop the other master"
     ),
 }

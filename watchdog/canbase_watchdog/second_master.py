@@ -22,7 +22,7 @@ from collections import deque
 from dataclasses import dataclass
 
 from canbase_config.watchdog import WatchdogConfig
-from canbase_watchdog.copies import Copies
+from canbase_watchdog.copies import SentAgain
 
 DISORDER_COUNT, DISORDER_S = 3, 1.0
 SYNC_LOST, OFF_BEAT = 1.5, 0.75
@@ -35,8 +35,6 @@ BEATS, BEAT_TIMEOUTS = 3, 2.5
 come back, none is its own."""
 GUARD_PERIODS, GUARD_EXCESS = 60, 1.15
 """Requests that keep a drive alive add a quarter to its answers. Over this window a burst of late ones is less."""
-COPIES_S = 10.0
-"""A copy of so long ago still shows that frames are sent again, where an adapter does it with a few of them [s]."""
 
 NOT_OURS = "heartbeats 77Eh that this watchdog has not sent; a device with its node id, 126, needs another one"
 
@@ -49,7 +47,7 @@ class Sign:
     node_id: int
     detail: str
     copied: bool | None = None
-    """Whether copies of SYNCs and of own frames have come; None: frames that are sent again give no such sign."""
+    """Whether frames are likelier to be sent again; None: frames that are sent again give no such sign."""
 
 
 class Pace:
@@ -86,20 +84,14 @@ class Foreign:
         self._control_hz, self._period_s = config.control_hz, period_s
         self._lost_s, self._off_beat_s = SYNC_LOST / config.control_hz, OFF_BEAT / config.control_hz
         self._sync_at = math.inf
-        self._copies = Copies(), Copies()
-        """Of the SYNCs; and, where they come back, of this watchdog's own heartbeats."""
-        self._setpoint_copies: dict[int, Copies] = {}
-        self._echo = echo
+        self._copies = SentAgain(echo=echo)
         self._setpoints: dict[int, bytes] = {}
         """COB-ID and data of the setpoints since the last SYNC."""
         self.last: Sign | None = None
 
     def on_setpoint(self, cob_id: int, node_id: int, data: bytes, now_s: float) -> None:
         """An RPDO of the driver, or of somebody else."""
-        copies = self._setpoint_copies.get(cob_id)
-        if copies is None:
-            copies = self._setpoint_copies[cob_id] = Copies()
-        copies.take(data, now_s)
+        self._copies.on_setpoint(cob_id, data, now_s)
         other = self._setpoints.setdefault(cob_id, data)
         if other != data:
             self._setpoints[cob_id] = data
@@ -108,7 +100,7 @@ class Foreign:
 
     def on_sync(self, now_s: float) -> None:
         """A SYNC of the driver, or of somebody else."""
-        self._copies[0].take(b"", now_s)
+        self._copies.on_sync(now_s)
         off_beat = now_s - self._sync_at < self._off_beat_s
         if not self._setpoints and off_beat and self._disorder.too_fast(now_s):
             self.note_too_many(0, "SYNCs without setpoints", now_s)
@@ -124,7 +116,7 @@ class Foreign:
 
     def on_watchdog_heartbeat(self, now_s: float) -> None:
         """A heartbeat of this watchdog's own node that was received."""
-        self._copies[1].take(b"", now_s)
+        self._copies.on_own(now_s)
         if self._beats.too_fast(now_s):
             self.note_too_many(0, NOT_OURS, now_s)
 
@@ -134,10 +126,4 @@ class Foreign:
 
     def note_too_many(self, node_id: int, detail: str, now_s: float) -> None:
         """A sign that frames which are sent again give as well."""
-        self.last = Sign(now_s, node_id, detail, self._are_copied(now_s))
-
-    def _are_copied(self, now_s: float) -> bool:
-        """SYNCs have come with copies, and own heartbeats; where those do not come back, the setpoints of each axis."""
-        syncs, own = self._copies
-        others = (own,) if self._echo else tuple(self._setpoint_copies.values())
-        return all(now_s - copies.at <= COPIES_S for copies in (syncs, *others))
+        self.last = Sign(now_s, node_id, detail, self._copies.is_likely(now_s))
