@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 
 import pytest
@@ -16,8 +15,8 @@ from support.crews import robot_with
 GENERIC = robot_with("generic").drives[:1]
 
 
-def taken(data: str, drives: Sequence[Drive] = GENERIC, late: Counter[bytes] | None = None) -> str:
-    return ForeignWrites(drives, Counter() if late is None else late).take(Frame(0x581, bytes.fromhex(data)))
+def taken(data: str, drives: Sequence[Drive] = GENERIC) -> str:
+    return ForeignWrites(drives).take(Frame(0x581, bytes.fromhex(data)))
 
 
 @pytest.mark.parametrize(
@@ -59,11 +58,3 @@ def test_an_object_that_robot_yaml_expects_is_one_too() -> None:
     (drive,) = GENERIC
     noted = drive.model_copy(update={"expects": (Expected(index=0x2010, value=1),)})
     assert (taken("60 10 20 00 00 00 00 00"), taken("60 10 20 00 00 00 00 00", [noted])) == ("", "2010h:0")
-
-
-# the boot asked twice, the first answer was slow ── the second one comes after the boot ── a third one is foreign
-def test_an_answer_that_the_boot_is_owed_is_nobody_elses() -> None:
-    late = Counter({bytes.fromhex("16 10 01"): 1})
-    writes = ForeignWrites(GENERIC, late)
-    answer = Frame(0x581, bytes.fromhex("60 16 10 01 00 00 00 00"))
-    assert [writes.take(answer), writes.take(answer)] == ["", "1016h:1"]
