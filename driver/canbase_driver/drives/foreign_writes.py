@@ -10,7 +10,7 @@ from typing import Final
 
 from canbase_config.drive import Drive
 from canbase_config.object_map import AXIS_OFFSET
-from canbase_config.profile import STOPPED_BY, Profile
+from canbase_config.profile import SDO_SERVERS, STOPPED_BY, Profile
 from canbase_config.scale_objects import SCALE_OBJECTS
 from canbase_driver.boot.node_boot import NodeBoot
 from canbase_driver.boot.vl_settings import FACTOR
@@ -40,7 +40,7 @@ def set_by_boot(index: int, kind: Profile, drives: Sequence[Drive] = ()) -> bool
 
     `drives`: of that node, whose `expects` count too.
     """
-    return index in PDOS or index in _objects(kind, drives)
+    return index in PDOS or index in SDO_SERVERS or index in _objects(kind, drives)
 
 
 def _objects(kind: Profile, drives: Sequence[Drive]) -> frozenset[int]:
@@ -64,7 +64,8 @@ class ForeignWrites:
         if len(data) != 8 or (data[0] & _COMMAND != _WRITTEN and data[0] not in _BLOCK):
             return ""
         index = int.from_bytes(data[1:3], "little")
-        return f"{index:04X}h:{data[3]}" if index in self._watched or index in PDOS else ""
+        is_watched = index in self._watched or index in PDOS or index in SDO_SERVERS
+        return f"{index:04X}h:{data[3]}" if is_watched else ""
 
 
 class WritesInBoot:

@@ -16,7 +16,6 @@ UNMONITORED = "23 16 10 01 00 00 00 00"
 FORWARD = Twist2D(0.3, 0.0)
 
 
-
 def writes_of(world: World, address: str) -> int:
     """How many requests of node 1 have begun to write this object."""
     return sum(data[1:4] == bytes.fromhex(address) and data[0] >> 5 == 1 for data in world.sent(0x601))
@@ -108,7 +107,7 @@ def test_a_request_that_the_boot_had_to_repeat_hides_no_foreign_write(later_s: f
     assert (world.core.state, monitored(world)) == (DriverState.ENABLED, before)
 
 
-# 1st answer after 0.4 s, later than the boot waits: each request is repeated, and answered twice ── booted once, enabled
+# answers after 0.4 s, later than the boot waits: requests are repeated, and answered twice ── booted once, enabled
 def test_answers_that_come_late_are_no_foreign_writes() -> None:
     world = World(parameters=BenchParameters(sdo_delay_s=0.4))
     assert world.run(120.0, lambda: world.core.state is DriverState.ENABLED)

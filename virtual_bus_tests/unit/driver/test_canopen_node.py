@@ -470,7 +470,7 @@ def test_a_refusal_of_that_one_more_object_is_an_answer_and_silence_is_none(sile
         assert START in story.sent
 
 
-# the boot begins ── a foreign write of 100Ch, which this boot never sets ── booted anew once it is known to have no power
+# the boot begins ── a foreign write of 100Ch, which this boot never sets ── booted anew once it has no power
 @pytest.mark.parametrize(
     ("written", "why"),
     [

@@ -31,6 +31,9 @@ def taken(data: str, drives: Sequence[Drive] = GENERIC) -> str:
         ("60 85 60 00 00 00 00 00", "6085h:0"),
         ("60 4C 60 01 00 00 00 00", "604Ch:1"),  # the unit of the speeds of mode 2
         ("60 4A 60 01 00 00 00 00", "604Ah:1"),
+        ("60 01 12 01 00 00 00 00", "1201h:1"),  # a further SDO channel
+        ("60 7F 12 02 00 00 00 00", "127Fh:2"),
+        ("60 80 12 01 00 00 00 00", ""),  # of the drive as a client
         ("60 7E 60 00 00 00 00 00", "607Eh:0"),  # which way is positive
         ("60 91 68 01 00 00 00 00", "6891h:1"),  # how far one bit goes
         ("A4 16 10 01 20 00 00 00", "1016h:1"),  # a block is accepted, with and without checksum

@@ -370,7 +370,7 @@ def repeated() -> SdoClient:
 
 
 def test_a_second_answer_to_a_write_that_was_repeated_may_come_until_the_next_transfer_is_answered() -> None:
-    """t   0.4  an answer to one of two requests ── 0.5  the next transfer ── 0.6  its answer: a drive keeps the order"""
+    """t   0.4  an answer to one of two requests ── 0.5  the next transfer ── 0.6  its answer: they come in order"""
     sdo = repeated()
     assert (sdo.may_confirm(AT), sdo.owes_confirmation) == (True, True)
     sdo.start(Read(0x1018, 1), 0.5)
