@@ -47,8 +47,9 @@ def _objects(kind: Profile, drives: Sequence[Drive]) -> frozenset[int]:
     own = kind.self_stop.vendor_watchdog
     axis = (*RAMPS, *VL, *SCALE_OBJECTS, *(index for index in STOPPED_BY if index >= 0x6000))
     makers = () if own is None or own.index is None else (own.index,)
+    besides = (each.index for each in (*kind.writes.before_mapping, *kind.writes.after_mapping))
     noted = (each.index for drive in drives for each in drive.expects)
-    return frozenset({*STOPPED_BY, *axis, *(index + AXIS_OFFSET for index in axis), *makers, *noted})
+    return frozenset({*STOPPED_BY, *axis, *(index + AXIS_OFFSET for index in axis), *makers, *besides, *noted})
 
 
 class ForeignWrites:

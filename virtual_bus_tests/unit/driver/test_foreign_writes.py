@@ -57,6 +57,11 @@ def test_the_makers_own_watchdog_is_one_where_the_profile_names_it() -> None:
     assert taken("60 00 20 00 00 00 00 00", robot_with("zlac8015d").drives) == "2000h:0"
 
 
+def test_what_the_boot_writes_besides_is_one_where_the_profile_names_it() -> None:
+    assert taken("60 0F 20 00 00 00 00 00") == ""
+    assert taken("60 0F 20 00 00 00 00 00", robot_with("zlac8015d").drives) == "200Fh:0"
+
+
 def test_an_object_that_robot_yaml_expects_is_one_too() -> None:
     (drive,) = GENERIC
     noted = drive.model_copy(update={"expects": (Expected(index=0x2010, value=1),)})
