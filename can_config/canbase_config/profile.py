@@ -181,6 +181,7 @@ class Options(Section):
         TorqueObject, Field(description="torque or current actual value that a PDO can take, in 0.1 % of the rated one")
     ] = "probe"
     sync_counter: Annotated[Presence, Field(description="1019h")] = "probe"
+    sdo_channels: Annotated[Presence, Field(description="1201h to 127Fh, which the boot closes")] = "probe"
     store: Annotated[Presence, Field(description="1010h")] = "probe"
 
 
@@ -194,6 +195,8 @@ class SdoWrite(Section):
     optional: Annotated[bool, Field(description="true: a refusal is only a note")] = False
 
 
+SDO_SERVERS = range(0x1200, 0x1280)
+"""By which identifiers a drive takes SDO requests: the default channel first (CiA 301)."""
 STOPPED_BY: dict[int, str] = {
     0x100C: "self_stop.node_guarding",
     0x100D: "self_stop.node_guarding",
@@ -312,6 +315,19 @@ class Profile(Section):
             if key:
                 message = f"{write.index:04X}h decides how the drive stops: set {key} instead"
                 raise MisfitError(message, ("writes", "after_mapping", position, "index"))
+        return self
+
+    @model_validator(mode="after")
+    def _opens_no_sdo_channel(self) -> Profile:
+        """What comes by another one than the default channel is seen by nobody."""
+        for name, writes in (
+            ("before_mapping", self.writes.before_mapping),
+            ("after_mapping", self.writes.after_mapping),
+        ):
+            for position, write in enumerate(writes):
+                if write.index in SDO_SERVERS:
+                    message = f"{write.index:04X}h is an SDO channel: the boot closes all but the default one"
+                    raise MisfitError(message, ("writes", name, position, "index"))
         return self
 
     @model_validator(mode="after")

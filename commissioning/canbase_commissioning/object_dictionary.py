@@ -13,7 +13,7 @@ from typing import Final
 
 from canbase_config.eds_file import Eds, EdsObject
 from canbase_config.object_map import AXIS_OFFSET, place
-from canbase_config.profile import Profile
+from canbase_config.profile import SDO_SERVERS, Profile
 from canbase_driver.cia301.emcy import emcy_text
 from canbase_driver.cia402 import decode_statusword
 
@@ -181,6 +181,9 @@ def meaning(at: Address, data: bytes) -> str:
         return emcy_text(value & 0xFFFF)
     if index == 0x1016 and at.sub:
         return f"watches node {value >> 16 & 0x7F}, {value & 0xFFFF} ms" if value & 0xFFFF else "not used"
+    if index in SDO_SERVERS and at.sub in (1, 2):
+        way = "requests" if at.sub == 1 else "answers"
+        return f"{'closed' if value >> 31 else 'open'}, {way} by {value & 0x7FF:03X}h"
     if (0x1400 <= index < 0x1600 or 0x1800 <= index < 0x1A00) and at.sub == 1:
         return f"{'off' if value >> 31 else 'on'}, COB-ID {value & 0x7FF:03X}h"
     if (0x1600 <= index < 0x1800 or 0x1A00 <= index < 0x1C00) and at.sub:

@@ -15,6 +15,7 @@ from canbase_config.profile_file import guess
 from canbase_config.robot import Robot
 from canbase_driver.boot.pdo_mapping import configure_pdos
 from canbase_driver.boot.scale_check import check_expected
+from canbase_driver.boot.sdo_channels import close_sdo_channels
 from canbase_driver.boot.sequence import IDENTITY, NUMBERS
 from canbase_driver.boot.settings import configure_motion, configure_self_stop, configure_sync, write_all
 from canbase_driver.boot.steps import BootError, NodeAccess, Steps, WaitBootUp, unsigned
@@ -127,6 +128,7 @@ def _part(node_id: int, steps: Any) -> Steps[Part]:
 
 def _settings(access: NodeAccess, drives: tuple[Drive, ...], robot: Robot) -> Steps[None]:
     kind = drives[0].kind
+    yield from close_sdo_channels(access, kind)
     yield from write_all(access, kind.writes.before_mapping)
     for drive in drives:
         yield from configure_motion(access, drive, robot)

@@ -28,6 +28,7 @@ CLASSES = {
 ALL = tuple(CLASSES)
 WRITES = tuple(name for name in CLASSES if name not in ("does not exist", "cannot be mapped"))
 MAPS = tuple(name for name in CLASSES if name not in ("takes no such value", "does not exist"))
+CHANNEL = tuple(name for name in CLASSES if name not in ("does not exist", "cannot be mapped", "has another width"))
 READS = ("does not exist", "general error")
 BEGIN, END = "<!-- make refusals: begin -->", "<!-- make refusals: end -->"
 COLUMNS = "| object | the drive's answer | the boot |\n|---|---|---|\n"
@@ -52,6 +53,8 @@ REFUSALS = (
     Refusal((0x1018, 1), "vendor", READS),
     Refusal((0x1019, 0), "counter in SYNC", READS),
     Refusal((0x1029, 1), "behaviour without masters"),
+    Refusal((0x1201, 1), "COB-ID of a second SDO channel, open", READS),
+    Refusal((0x1201, 1), "COB-ID of a second SDO channel, open", CHANNEL, reads=False),
     Refusal((0x1400, 1), "COB-ID of the setpoints", WRITES, reads=False),
     Refusal((0x1400, 2), "type of the setpoints", WRITES, reads=False),
     Refusal((0x1403, 1), "COB-ID of the watchdog's quick stop", ("does not exist",)),
@@ -102,6 +105,9 @@ def outcome(refusal: Refusal, code: int) -> str:
         drive.objects[key] = value
     drive.objects.setdefault((0x6061, 0), u8(3))
     drive.objects[0x605A, 0] = u16(6)
+    if refusal.key[0] == 0x1201:
+        drive.objects |= {(0x1201, 1): u32(0x6A1), (0x1201, 2): u32(0x6C1)}
+        drive.refuse[0x1201, 2] = code
     if code == CLASSES["does not exist"]:
         drive.objects.pop(refusal.key, None)
     if refusal.reads and code != CLASSES["is read-only"]:

@@ -17,6 +17,7 @@ from canbase_sim.cia301 import abort, emcy, heartbeat, life_guarding, nmt, sdo_s
 from canbase_sim.cia301.dictionary import AXIS_STRIDE, FIRST_AXIS, Dictionary, key
 from canbase_sim.cia301.nmt import NmtCommand, NmtState
 from canbase_sim.cia301.rpdo import Rpdo
+from canbase_sim.cia301.sdo_channels import SdoChannels
 from canbase_sim.cia301.tpdo import Tpdo
 from canbase_sim.cia305 import lss_slave
 from canbase_sim.cia305.lss_slave import LssSlave
@@ -80,6 +81,7 @@ class SimulatedNode:
         d.before_read = self._measure
         self.emcy = emcy.EmcyService(d, self._send_emcy)
         self.sdo = self._make_sdo(lambda frame: self.line.answer(frame, self._now))
+        self.channels = SdoChannels(d, lambda frame: self.line.answer(frame, self._now), lambda: self._route())
         self.lss = LssSlave(
             lambda sub: d.values[key(0x1018, sub)], node_id, bitrate, self.line.say, self._apply_node_id
         )
@@ -261,6 +263,7 @@ class SimulatedNode:
         self.dictionary.reset(0x1000, 0x1FFF)
         self.emcy.reset()
         self.sdo.reset()
+        self.channels.reset()
         self._consumer.configure()
         self.guarding.reset()
         for axis in self.axes:
@@ -293,6 +296,7 @@ class SimulatedNode:
             self._routes |= {r.cob_id: r.receive for r in self._active_rpdos if r.cob_id is not None}
         if self.state in nmt.HAS_SDO:
             self._routes[self.sdo.rx_cobid] = lambda data, now_s: self.sdo.receive(data)
+            self._routes |= self.channels.routes()
             if key(0x1005) in self.dictionary.entries:
                 self._routes[self.dictionary.values[key(0x1005)] & 0x7FF] = self._on_sync
         self._routes[nmt.COB_ID] = self._on_nmt

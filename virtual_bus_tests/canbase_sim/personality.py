@@ -112,6 +112,14 @@ _NO_REACTION: dict[int, int] = {_key(0x6007): 0}
 _NO_SYNC_COUNTER = frozenset({0x1019})
 _NO_GUARDING = frozenset({0x100C, 0x100D})
 _LACKS_SELF_STOP = frozenset({0x1016, 0x1029, 0x6007})
+
+
+def sdo_channel(index: int, requests: int = 0x8000_0000, answers: int = 0x8000_0000) -> dict[int, Extra]:
+    """A further SDO server, 1201h to 127Fh, with its COB-IDs after power on; bit 31: closed (CiA 301)."""
+    cob_ids = {_key(index, 1): Extra("I", requests, writable=True), _key(index, 2): Extra("I", answers, writable=True)}
+    return {_key(index): Extra("B", 2), **cob_ids}
+
+
 _RPDO_TIMERS = frozenset({_key(index, 5) for index in range(0x1400, 0x1404)})
 
 GENERIC = Personality()
@@ -226,6 +234,7 @@ PERSONALITIES: Mapping[str, Personality] = {
     ),
     "inverter": Personality(
         missing=frozenset({0x606B, 0x606D, 0x606F, 0x6079}),  # assumed
+        extras=sdo_channel(0x1201),  # Lenze 8400, manual: closed as delivered
         missing_subs=_RPDO_TIMERS,  # assumed
         vl=True,
         modes=(2,),

@@ -61,6 +61,8 @@ BRAKING = (0x6007, 0x6046, 0x6049, 0x604A, 0x605A, 0x605E, 0x6084, 0x6085)
 second one are at + AXIS_OFFSET."""
 SCALE = (0x604C, 0x607E, *range(0x6089, 0x6098), 0x60A8, 0x60A9, 0x60AA)
 """What one bit of a velocity, a position or a ramp means, and which way is positive: units, factors, polarity."""
+SDO_SERVERS = range(0x1200, 0x1280)
+"""By which identifiers a drive takes SDO requests: those of a further channel are seen by nobody."""
 RPDO_PARAMETERS = range(0x1400, 0x1800)
 """Which PDOs a drive obeys, and what they contain."""
 QUICK_STOP_WORD = 0x0002

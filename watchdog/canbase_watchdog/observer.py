@@ -391,8 +391,8 @@ _CONTROLWORD = frames.CONTROLWORD % frames.AXIS_OFFSET
 
 def _must_stay(index: int) -> bool:
     """The object decides whether, or how, a drive stops: by itself, or by the watchdog's quick stop PDO; or what its
-    numbers mean."""
-    return index in _FIXED or index in frames.RPDO_PARAMETERS
+    numbers mean; or who else may write all that."""
+    return index in _FIXED or index in frames.RPDO_PARAMETERS or index in frames.SDO_SERVERS
 
 
 _OF_AN_AXIS = (*frames.BRAKING, *frames.SCALE)

@@ -25,6 +25,7 @@ PROFILE_KEYS: tuple[tuple[range, str], ...] = (
     (range(0x1017, 0x1018), "timeouts.drive_heartbeat_s of robot.yaml: a third of it is the period"),
     (range(0x1019, 0x101A), "options.sync_counter"),
     (range(0x1029, 0x102A), "self_stop.error_behaviour"),
+    (range(0x1201, 0x1280), "options.sdo_channels"),
     (range(0x1600, 0x1800), "layout"),
     (range(0x1A00, 0x1C00), "layout"),
     (range(0x6007, 0x6008), "self_stop.abort_connection"),

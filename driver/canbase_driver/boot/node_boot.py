@@ -3,17 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from dataclasses import replace
 
 from canbase_config.drive import Drive
 from canbase_config.profile import Sdo
 from canbase_config.robot import Robot
-from canbase_driver.boot.sequence import BootReport, boot
-from canbase_driver.boot.steps import NO_PATIENCE, BootError, Patience, Pause, Quiet, SendNmt, Step, WaitBootUp
+from canbase_driver.boot.sequence import DEVICE_TYPE, BootReport, boot
+from canbase_driver.boot.steps import (
+    NO_PATIENCE,
+    BootError,
+    Patience,
+    Pause,
+    Quiet,
+    SendNmt,
+    Step,
+    Steps,
+    WaitBootUp,
+    boot_error,
+)
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import NmtCommand, NmtState, nmt, parse_heartbeat
-from canbase_driver.cia301.sdo_client import LONGEST_TIMEOUT_S, Read, SdoClient, SdoError, Write
+from canbase_driver.cia301.sdo_client import (
+    LONGEST_TIMEOUT_S,
+    Read,
+    SdoAborted,
+    SdoClient,
+    SdoError,
+    SdoTimeout,
+    Write,
+)
 
 DUPLICATES = 3
 """After this many requests that were sent once and answered twice, one may be an answer to another client."""
@@ -155,11 +173,19 @@ class NodeBoot:
         try:
             step = self._sequence.throw(answer) if isinstance(answer, SdoError) else self._sequence.send(answer)
         except StopIteration as end:
-            self._end(report=end.value)
+            self._finish(end.value, now_s)
         except BootError as error:
             self._end(error=error)
         else:
             self._begin(step, now_s)
+
+    def _finish(self, report: BootReport, now_s: float) -> None:
+        """After a last write that was requested twice, one more object is read: its answer comes behind all others."""
+        if self._client.owes_confirmation:
+            self._sequence = _one_more(report)
+            self._begin(next(self._sequence), now_s)
+        else:
+            self._end(report=report)
 
     def _begin(self, step: Step, now_s: float) -> None:
         self._step = step
@@ -183,14 +209,13 @@ class NodeBoot:
         self.error = BootError(self.node_id, error.problem, f"{error.hint}; {late}") if error and late else error
         self._step = None
 
-    def owes_none(self, frame: Frame) -> bool:
-        """Whether this SDO answer, not taken in yet, is another client's: it has dealt with that object before."""
-        return self._client.owes_none(frame)
+    def may_confirm(self, at: bytes) -> bool:
+        """Whether an answer that confirms a write to this address may be one to a request of this boot."""
+        return self._client.may_confirm(at)
 
-    @property
-    def unanswered(self) -> Counter[bytes]:
-        """How many answers of its SDO server may still come, by address."""
-        return self._client.unanswered
+    def has_requested(self, at: bytes) -> bool:
+        """Whether it has dealt with the object that has this address."""
+        return self._client.has_requested(at)
 
     @property
     def slow_answers(self) -> str:
@@ -205,6 +230,16 @@ class NodeBoot:
 def sdo_client(node_id: int, sdo: Sdo, timeout_s: float) -> SdoClient:
     """A client with the settings of the profile; `timeout_s` [s] where the profile has none."""
     return SdoClient(node_id, sdo.timeout_s or timeout_s, sdo.attempts)
+
+
+def _one_more(report: BootReport) -> Steps[BootReport]:
+    try:
+        yield Read(DEVICE_TYPE)
+    except SdoTimeout as silent:
+        raise boot_error(silent) from silent
+    except SdoAborted:
+        pass  # an answer as well
+    return report
 
 
 def _awaited(step: Step | None) -> str:

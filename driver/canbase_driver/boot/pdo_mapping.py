@@ -167,8 +167,14 @@ def _cob_ids(node: NodeAccess) -> Steps[dict[int, int]]:
 
 
 def _switch_off(node: NodeAccess, index: int, cob_id: int) -> Steps[None]:
-    if not cob_id & PDO_OFF:
-        yield from node.set_if_present(Write(index, 1, cob_id | PDO_OFF, 4), known=cob_id)
+    """What a TPDO keeps is not read back: it would be a note alone, and one that stays on shows by its frames."""
+    off = Write(index, 1, cob_id | PDO_OFF, 4)
+    if cob_id & PDO_OFF:
+        return
+    if index < FIRST_TPDO:
+        yield from node.set_if_present(off, known=cob_id)
+    else:
+        yield from node.try_to_write(off, known=cob_id)
 
 
 def _suspend(node: NodeAccess, index: int, cob_id: int) -> Steps[SdoAborted | None]:

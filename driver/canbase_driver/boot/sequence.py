@@ -17,6 +17,7 @@ from canbase_config.scale_objects import Expected
 from canbase_config.stopping import standstill_s
 from canbase_driver.boot.pdo_mapping import configure_pdos
 from canbase_driver.boot.scale_check import check_expected, read_scale
+from canbase_driver.boot.sdo_channels import close_sdo_channels
 from canbase_driver.boot.settings import (
     SelfStopSet,
     StopsBy,
@@ -115,6 +116,7 @@ class _Boot:
         identity = yield from self._check_identity()
         yield from self._bring_to_a_stand()
         yield from self._forget_earlier_masters()
+        yield from close_sdo_channels(self._node, self._kind)
         yield from write_all(self._node, self._kind.writes.before_mapping)
         for drive in self._drives:
             yield from configure_motion(self._node, drive, self._robot)

@@ -191,7 +191,7 @@ class NodeAccess:
         return True
 
     def try_to_write(self, step: Write, known: int) -> Steps[None]:
-        """Write where it differs from `known`, what is read again later in any case; a refusal earns a note."""
+        """Write where it differs from `known`, what is read again later or matters little; a refusal earns a note."""
         before = _as_bytes(known, step.size)
         if _same(before, step.data):
             return

@@ -8,7 +8,6 @@ come late.
 from __future__ import annotations
 
 import struct
-from collections import Counter
 from dataclasses import dataclass
 
 from canbase_config.object_map import AXIS_OFFSET, CONTROLWORD, POSITION_ACTUAL, STATUSWORD, VELOCITY_ACTUAL
@@ -182,6 +181,10 @@ class SdoClient:
         """By address."""
         self._answered: bytes | None = None
         """Address of the transfer that ended last, with the first answer to its only request."""
+        self._addresses: set[bytes] = set()
+        self._unconfirmed: set[bytes] = set()
+        """Addresses that were written, and whose last confirmation may not have come yet."""
+        self._repeated = False
         self._timeout_s = timeout_s
         self._attempts = attempts
         self._transfer: Transfer | None = None
@@ -192,31 +195,39 @@ class SdoClient:
         """Whether a transfer is under way."""
         return self._transfer is not None
 
-    @property
-    def unanswered(self) -> Counter[bytes]:
-        """How many answers may still come, by address: those to requests that were sent again."""
-        return Counter(
-            {at: each.sent - each.answered for at, each in self._requests.items() if each.sent > each.answered}
-        )
+    def has_requested(self, at: bytes) -> bool:
+        """Whether any request was about the object with this address."""
+        return at in self._addresses
 
-    def owes_none(self, frame: Frame) -> bool:
-        """Whether this answer, not taken in yet, is about an object that was requested and answered as often before,
-        and not in the transfer that ended last: another client has requested it."""
-        at = frame.data[1:4]
-        requests = self._requests.get(at)
-        return requests is not None and requests.answered >= requests.sent and at != self._answered
+    def may_confirm(self, at: bytes) -> bool:
+        """Whether an answer that confirms a write to this address, not taken in yet, may be one to our own request.
+
+        A server answers in the order of the requests (CiA 301): what was written before a request that has its answer
+        is confirmed by then, however often it was requested.
+        """
+        return at in self._unconfirmed
+
+    @property
+    def owes_confirmation(self) -> bool:
+        """Whether the transfer that ended last was a write with more than one request: another answer may come."""
+        return self._repeated and bool(self._unconfirmed)
 
     def start(self, step: Read | Write, now_s: float) -> Frame:
         """Begin a transfer. Raises RuntimeError while another is under way."""
         if self._transfer is not None:
             raise RuntimeError(f"node {self.node_id}: {self._transfer.step} is under way; wait for its answer")
         self._answer = None
+        self._repeated = False
+        self._addresses.add(address(step))
+        if isinstance(step, Write):
+            self._unconfirmed.add(address(step))
         return self._begin(step, self._attempts, now_s)
 
     def again(self, now_s: float) -> Frame:
         """Restart the transfer under way: the drive has just started. Raises RuntimeError when there is none."""
         if self._transfer is None:
             raise RuntimeError(f"node {self.node_id}: no transfer is under way")
+        self._repeated = True
         return self._begin(self._transfer.step, self._attempts, now_s)
 
     def answer(self) -> bytes:
@@ -255,6 +266,12 @@ class SdoClient:
             return self._on_segment(transfer, frame.data, now_s)
         return self._on_initiated(transfer, frame.data, now_s)
 
+    def _settle(self, step: Read | Write) -> None:
+        """The drive has answered: everything that was written before is confirmed. The watchdog may have requested its
+        own objects before us."""
+        if step.index not in _OF_THE_WATCHDOG:
+            self._unconfirmed &= {address(step)} if isinstance(step, Write) else set()
+
     def _note_answer(self, address: bytes, now_s: float) -> None:
         """Answers carry no number: this one came so long after the last request for the object, or later still."""
         requests = self._requests.get(address)
@@ -281,6 +298,7 @@ class SdoClient:
     def _on_abort(self, step: Read | Write, data: bytes) -> list[Frame]:
         if data[1:4] != address(step):
             return self._drop()
+        self._settle(step)
         return self._finish(SdoAborted(self.node_id, step, int.from_bytes(data[4:], "little")))
 
     def _on_initiated(self, transfer: Transfer, data: bytes, now_s: float) -> list[Frame]:
@@ -288,6 +306,7 @@ class SdoClient:
         if data[1:4] != address(step) or data[0] >> 5 != (2 if isinstance(step, Read) else 3):
             return self._drop()
         transfer.initiated = True
+        self._settle(step)
         if isinstance(step, Write):
             return self._finish(b"") if len(step.data) <= 4 else [self._send_segment(transfer, now_s)]
         expedited, sized = data[0] & 0x02, data[0] & 0x01
@@ -327,6 +346,7 @@ class SdoClient:
         step = transfer.step
         abort = self._abort_frame(step, code)
         if transfer.attempts_left:
+            self._repeated = True
             return [abort, self._begin(step, transfer.attempts_left, now_s)]
         self._finish(self._timeout(step) if code == TIMED_OUT else SdoAborted(self.node_id, step, code))
         return [abort]

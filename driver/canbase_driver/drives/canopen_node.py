@@ -12,7 +12,6 @@ Frames of a node before it is STARTING come from an earlier life, with a layout 
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from enum import Enum
@@ -31,7 +30,7 @@ from canbase_driver.cia301.pdo import node_layout
 from canbase_driver.cia402 import DriveState, PowerGoal, common_controlword, next_controlword
 from canbase_driver.drives.axis import Axis
 from canbase_driver.drives.drive_values import DriveValues, NamedValue
-from canbase_driver.drives.foreign_writes import ForeignWrites
+from canbase_driver.drives.foreign_writes import ForeignWrites, WritesInBoot
 from canbase_driver.drives.sdo_stop import SdoStop
 from canbase_driver.drives.signs_of_life import SignsOfLife
 from canbase_driver.drives.telemetry import Measures, Values
@@ -98,7 +97,8 @@ class CanopenNode:
         self._measures = Measures(node_id, self._drives, robot.timeouts.sdo_s)
         self._values = DriveValues(self.layout.values, self.layout.timing.cycle_s)
         self._sdo_stop = SdoStop(node_id, self._drives)
-        self._foreign = ForeignWrites(self._drives, Counter())
+        self._foreign = ForeignWrites(self._drives)
+        self._in_boot = WritesInBoot(self._foreign)
         self._signs = SignsOfLife()
         self._written = ""
         """What another client has written since the boot has dealt with it; empty: nothing of what the boot sets."""
@@ -247,7 +247,7 @@ class CanopenNode:
         self._boot = NodeBoot(self.node_id, self._drives, self._robot, self._patience, identify=self._identify)
         self._boot_up_at = -math.inf
         self._owed_stop = False
-        self._written = ""
+        self._written, self._in_boot = "", WritesInBoot(self._foreign)
         self._go(Presence.BOOTING, now_s)
 
     def seek(self, now_s: float, sync_since: float) -> None:
@@ -397,8 +397,7 @@ class CanopenNode:
         """Take an SDO answer; one without a request of ours is another client's (a tool's) and fine."""
         self._signs.on_sdo(frame, now_s)
         if self._boot is not None:
-            if self._boot.owes_none(frame):
-                self._written = ForeignWrites(self._drives, Counter()).take(frame) or self._written
+            self._in_boot.take(frame, self._boot)
             self._boot.on_frame(frame, now_s)
             return True
         self._written = self._foreign.take(frame) or self._written
@@ -455,7 +454,7 @@ class CanopenNode:
         self.report = report
         self._lost_heartbeat = False
         if self._boot is not None:
-            self._foreign = ForeignWrites(self._drives, self._boot.unanswered)
+            self._written = self._in_boot.left_by(self._boot)
         self._boot = None
         self.nmt_state = None
         self._guarded = None if self._guarded is None else GuardAnswers()

@@ -11,6 +11,7 @@ from random import Random
 from canbase_sim.cia301.dictionary import NO_RTR, key
 from canbase_sim.odd.manner import Bounds
 from canbase_sim.odd.oddity import Drawn, Oddity, both, with_manner, with_personality
+from canbase_sim.personality import Extra, sdo_channel
 
 ABORT_CODES = (
     0x0504_0005, 0x0601_0000, 0x0601_0001, 0x0601_0002, 0x0602_0000, 0x0604_0043, 0x0604_0047, 0x0606_0000,
@@ -293,6 +294,19 @@ def _sets_bit_30(_random: Random) -> Drawn:
     return Drawn("bit 30 of RPDO COB-IDs is set", with_personality(sets_no_rtr=bool(off)))
 
 
+def _sdo_channels(random: Random) -> Drawn:
+    """Closed or open as delivered, some of them for good."""
+    number, is_open, is_fixed = random.choice((1, 2)), random.random() < 0.7, random.random() < 0.3
+    off = 0 if is_open else 1 << 31
+    extras: dict[int, Extra] = {}
+    for n in range(number):
+        extras |= sdo_channel(0x1201 + n, off | 0x6A0 + n, off | 0x6C0 + n)
+    codes = {place: random.choice((0x0601_0002, GENERAL_ERROR, 0x0609_0030)) for place in extras if place & 0xFF}
+    change = both(with_personality(extras=extras), with_manner(refused_writes=codes if is_fixed else {}))
+    text = f"has {number} more SDO channels, {'open' if is_open else 'closed'}{', read-only' if is_fixed else ''}"
+    return Drawn(text, change, tool=frozenset((0x1201,)) if is_open and is_fixed else frozenset())
+
+
 ALIKE = (
     frozenset(("few_pdos", "fixed_cob_ids", "one_tpdo")),
     frozenset(("narrow_velocity", "one_tpdo")),
@@ -312,6 +326,7 @@ ODDITIES: Mapping[str, Oddity] = {
     "jittery_answers": Oddity("CiA 301, SDO", "SDO answers take their time now and then", _jittery_answers),
     "lost_answers": Oddity("CiA 301, SDO: the client's timeout", "requests are lost in a full buffer", _lost_answers),
     "sizeless": Oddity("CiA 301, SDO upload, s = 0", "the size of an object is not indicated", _sizeless),
+    "sdo_channels": Oddity("CiA 301, 1201h to 127Fh", "it takes SDO requests by other identifiers too", _sdo_channels),
     "segmented": Oddity("CiA 301, SDO upload, e = 0", "short objects come in segments", _segmented),
     "doubled": Oddity("ISO 11898-1, error in the last bit of EOF", "a frame is received twice", _doubled),
     "late_pdos": Oddity("CiA 301, 1007h", "TPDOs come at the end of the synchronous window", _late_pdos),

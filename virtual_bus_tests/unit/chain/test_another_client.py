@@ -7,12 +7,18 @@ import pytest
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
 from canbase_sim.cia301.dictionary import key
+from canbase_sim.world.bench import BenchParameters
 from canbase_watchdog.trip_cause import TripCause
 from support.chain_world import World, world_of
 
 MONITORED = key(0x1016, 1)
 UNMONITORED = "23 16 10 01 00 00 00 00"
 FORWARD = Twist2D(0.3, 0.0)
+
+
+def writes_of(world: World, address: str) -> int:
+    """How many requests of node 1 have begun to write this object."""
+    return sum(data[1:4] == bytes.fromhex(address) and data[0] >> 5 == 1 for data in world.sent(0x601))
 
 
 def monitored(world: World) -> int:
@@ -83,6 +89,29 @@ def test_a_write_during_the_boot_is_undone_before_there_is_power(later_s: float)
     assert monitored(world) == 0
     assert not world.run(3.0, lambda: any(world.powered) and monitored(world) == 0)
     assert (world.core.state, monitored(world)) == (DriverState.ENABLED, before)
+
+
+# power on ── 1016h:1 is set, and the answer gets lost ── requested again ── 1016h:1 = 0 from elsewhere ── booted anew
+@pytest.mark.parametrize("later_s", [0.01, 0.05])
+def test_a_request_that_the_boot_had_to_repeat_hides_no_foreign_write(later_s: float) -> None:
+    world = World()
+    assert world.run(3.0, lambda: monitored(world) != 0)
+    before, requests = monitored(world), writes_of(world, "16 10 01")
+    world.node.line.forget()
+    assert world.run(1.0, lambda: writes_of(world, "16 10 01") > requests), "requested again"
+    world.run(later_s)
+    assert not world.core.snapshot(world.now_s).drives[0].configured
+    world.inject(0x601, UNMONITORED)
+    assert monitored(world) == 0
+    assert not world.run(3.0, lambda: any(world.powered) and monitored(world) == 0)
+    assert (world.core.state, monitored(world)) == (DriverState.ENABLED, before)
+
+
+# answers after 0.4 s, later than the boot waits: requests are repeated, and answered twice ── booted once, enabled
+def test_answers_that_come_late_are_no_foreign_writes() -> None:
+    world = World(parameters=BenchParameters(sdo_delay_s=0.4))
+    assert world.run(120.0, lambda: world.core.state is DriverState.ENABLED)
+    assert len(world.sent(0x000)) == len(set(world.sent(0x000))), "one NMT reset and one start of each drive"
 
 
 # latched, no power ── 1016h:1 = 0 from elsewhere: no trip, nothing has power ── booted anew ── reset ── monitored again

@@ -114,6 +114,8 @@ def test_a_value_is_shown_with_the_width_that_the_drive_has(data: str, kind: str
         ("603F", "10 23", "over-current"),
         ("1016:1", "2C 01 7E 00", "watches node 126, 300 ms"),
         ("1016:2", "00 00 00 00", "not used"),
+        ("1201:1", "A1 06 00 80", "closed, requests by 6A1h"),
+        ("1201:2", "C1 06 00 00", "open, answers by 6C1h"),
         ("1400:1", "01 02 00 C0", "off, COB-ID 201h"),
         ("1600:1", "20 00 FF 60", "60FFh:0, 32 bits"),
         ("6064", "00 00 00 00", ""),

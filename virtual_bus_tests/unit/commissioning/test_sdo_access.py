@@ -87,6 +87,7 @@ def test_the_statuswords_are_where_the_profile_has_them() -> None:
     ("at", "becomes"),
     [
         (Address(0x1016, 1), "The driver undoes a write to 1016h:1: it boots node 1 anew"),
+        (Address(0x1201, 1), "The driver undoes a write to 1201h:1"),
         (Address(0x6885), "The driver undoes a write to 6885h:0"),
         (Address(0x1A01), "The driver undoes a write to 1A01h:0"),
         (Address(0x60F9, 1), "The driver does not notice a write to 60F9h:1"),

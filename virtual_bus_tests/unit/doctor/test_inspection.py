@@ -127,3 +127,11 @@ def test_a_drive_that_means_something_else_by_its_numbers_is_a_problem_before_th
     problem = "608Fh:1 (position encoder resolution) of left is 4096, and was 1000 when its wheel was measured"
     assert problem in found[1].settings.problem
     assert found[2].settings.problem == ""
+
+
+def test_an_open_sdo_channel_is_a_difference() -> None:
+    world = SessionWorld(robot_with("inverter"))
+    world.run(BootSession(world.robot))
+    world.bench.nodes[2].dictionary.values |= {0x1201 << 8 | 1: 0x642, 0x1201 << 8 | 2: 0x5C2}
+    found = inspected(world)
+    assert (found[1].settings.changes, found[2].settings.changes) == ((), ("1201h:1: 00000642h → 80000642h",))

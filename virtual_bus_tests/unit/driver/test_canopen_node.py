@@ -408,6 +408,89 @@ def test_sdo_answers_without_a_boot_are_somebody_elses_and_fine() -> None:
     assert Story().node.on_sdo(Frame(0x581, bytes(8)), 10.0)
 
 
+LAST = bytes.fromhex("01 18 01")
+"""1801h:1, the COB-ID of the velocity: what the boot of this drive writes last."""
+
+
+class Forgetful(FakeDrive):
+    """It never sends its first answer to the last write of the boot."""
+
+    forgets = True
+
+    def on_frame(self, frame: Frame) -> list[Frame]:
+        answers = super().on_frame(frame)
+        is_last = frame.data[1:4] == LAST and frame.data[0] >> 5 == 1 and not frame.data[7] & 0x80
+        if is_last and self.forgets:
+            self.forgets = False
+            return []
+        return answers
+
+
+def waiting_for_the_others(drive: FakeDrive, seconds: float = 1.0) -> Story:
+    """Its boot has ended, and that of another drive goes on."""
+    story = Story(drive=drive)
+    story.node.others_are_configured = lambda: False
+    story.node.begin_boot(story.now_s)
+    story.wait(seconds)
+    assert story.node.waiting_for(story.now_s).endswith("configured, waits for the boots of the others")
+    return story
+
+
+def written_anew(story: Story) -> str:
+    """Why it is booted anew, once the others are ready and it shows that it has no power."""
+    story.node.others_are_configured = lambda: True
+    story.wait(0.01)
+    story.node.on_status(story.axis, Frame(0x181, bytes.fromhex("40 02 00 00 00 00")), story.now_s)
+    story.wait(0.01)
+    return story.node.absent()
+
+
+# the answer to the last write of the boot gets lost ── 0.3 s: written again ── one more object is read ── foreign write
+def test_the_last_write_of_a_boot_hides_no_foreign_one_though_it_was_requested_twice() -> None:
+    story = waiting_for_the_others(Forgetful())
+    assert [frame.data[1:4] for frame in story.sent if frame.cob_id == 0x601][-2:] == [LAST, bytes.fromhex("00 10 00")]
+    story.node.on_sdo(Frame(0x581, b"\x60" + LAST + bytes(4)), story.now_s)
+    assert written_anew(story).endswith("is configured anew: another client has written its 1801h:1")
+
+
+# the same, and the drive refuses 1000h ── the same, and it answers nothing more: the boot has failed
+@pytest.mark.parametrize("silent", [False, True])
+def test_a_refusal_of_that_one_more_object_is_an_answer_and_silence_is_none(silent: bool) -> None:
+    class Odd(Forgetful):
+        def on_frame(self, frame: Frame) -> list[Frame]:
+            self.powered = self.powered and not (silent and not self.forgets and frame.data[1:4] == b"\x00\x10\x00")
+            return super().on_frame(frame)
+
+    story = Story(drive=Odd(refuse_read={} if silent else {(0x1000, 0): 0x08000000}))
+    story.node.begin_boot(story.now_s)
+    story.wait(3.0)
+    if silent:
+        assert "no answer to 3 requests" in story.node.absent()
+    else:
+        assert START in story.sent
+
+
+# the boot begins ── a foreign write of 100Ch, which this boot never sets ── booted anew once it has no power
+@pytest.mark.parametrize(
+    ("written", "why"),
+    [
+        ("60 0C 10 00 00 00 00 00", "is configured anew: another client has written its 100Ch:0"),
+        ("60 16 10 01 00 00 00 00", ""),  # the boot sets it later
+        ("60 F9 60 01 00 00 00 00", ""),  # a gain
+    ],
+)
+def test_what_another_client_writes_early_in_a_boot_counts_where_the_boot_does_not_set_it(
+    written: str, why: str
+) -> None:
+    story = Story()
+    story.node.begin_boot(story.now_s)
+    story.node.on_sdo(Frame(0x581, bytes.fromhex(written)), story.now_s)
+    story.node.others_are_configured = lambda: False
+    story.wait(1.0)
+    assert written_anew(story).endswith(why)
+    assert (story.node.presence is GONE) == bool(why)
+
+
 def test_a_boot_up_before_the_boot_is_no_loss() -> None:
     story = Story()
     story.heartbeat(BOOT_UP)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 
 import pytest
@@ -16,8 +15,8 @@ from support.crews import robot_with
 GENERIC = robot_with("generic").drives[:1]
 
 
-def taken(data: str, drives: Sequence[Drive] = GENERIC, late: Counter[bytes] | None = None) -> str:
-    return ForeignWrites(drives, Counter() if late is None else late).take(Frame(0x581, bytes.fromhex(data)))
+def taken(data: str, drives: Sequence[Drive] = GENERIC) -> str:
+    return ForeignWrites(drives).take(Frame(0x581, bytes.fromhex(data)))
 
 
 @pytest.mark.parametrize(
@@ -32,6 +31,9 @@ def taken(data: str, drives: Sequence[Drive] = GENERIC, late: Counter[bytes] | N
         ("60 85 60 00 00 00 00 00", "6085h:0"),
         ("60 4C 60 01 00 00 00 00", "604Ch:1"),  # the unit of the speeds of mode 2
         ("60 4A 60 01 00 00 00 00", "604Ah:1"),
+        ("60 01 12 01 00 00 00 00", "1201h:1"),  # a further SDO channel
+        ("60 7F 12 02 00 00 00 00", "127Fh:2"),
+        ("60 80 12 01 00 00 00 00", ""),  # of the drive as a client
         ("60 7E 60 00 00 00 00 00", "607Eh:0"),  # which way is positive
         ("60 91 68 01 00 00 00 00", "6891h:1"),  # how far one bit goes
         ("A4 16 10 01 20 00 00 00", "1016h:1"),  # a block is accepted, with and without checksum
@@ -55,15 +57,12 @@ def test_the_makers_own_watchdog_is_one_where_the_profile_names_it() -> None:
     assert taken("60 00 20 00 00 00 00 00", robot_with("zlac8015d").drives) == "2000h:0"
 
 
+def test_what_the_boot_writes_besides_is_one_where_the_profile_names_it() -> None:
+    assert taken("60 0F 20 00 00 00 00 00") == ""
+    assert taken("60 0F 20 00 00 00 00 00", robot_with("zlac8015d").drives) == "200Fh:0"
+
+
 def test_an_object_that_robot_yaml_expects_is_one_too() -> None:
     (drive,) = GENERIC
     noted = drive.model_copy(update={"expects": (Expected(index=0x2010, value=1),)})
     assert (taken("60 10 20 00 00 00 00 00"), taken("60 10 20 00 00 00 00 00", [noted])) == ("", "2010h:0")
-
-
-# the boot asked twice, the first answer was slow ── the second one comes after the boot ── a third one is foreign
-def test_an_answer_that_the_boot_is_owed_is_nobody_elses() -> None:
-    late = Counter({bytes.fromhex("16 10 01"): 1})
-    writes = ForeignWrites(GENERIC, late)
-    answer = Frame(0x581, bytes.fromhex("60 16 10 01 00 00 00 00"))
-    assert [writes.take(answer), writes.take(answer)] == ["", "1016h:1"]

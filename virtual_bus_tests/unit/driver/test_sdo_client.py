@@ -349,3 +349,72 @@ def test_the_answers_to_two_requests_of_which_one_was_given_up_name_no_second_dr
     assert sdo.duplicates == 0
     sdo.on_frame(rx("43 18 10 01 11 11 00 00"), 0.7)
     assert sdo.duplicates == 1, "one answer more than requests"
+
+
+# -- whose confirmation it is
+
+
+MONITORED = Write(0x1016, 1, 0x007E_012C, 4)
+CONFIRMED = "60 16 10 01 00 00 00 00"
+AT = bytes.fromhex("16 10 01")
+
+
+def repeated() -> SdoClient:
+    """t   0  write ── 0.3  no answer: requested again ── 0.4  an answer"""
+    sdo = client(attempts=3)
+    sdo.start(MONITORED, 0.0)
+    sdo.tick(0.3)
+    sdo.on_frame(rx(CONFIRMED), 0.4)
+    assert not sdo.busy
+    return sdo
+
+
+def test_a_second_answer_to_a_write_that_was_repeated_may_come_until_the_next_transfer_is_answered() -> None:
+    """t   0.4  an answer to one of two requests ── 0.5  the next transfer ── 0.6  its answer: they come in order"""
+    sdo = repeated()
+    assert (sdo.may_confirm(AT), sdo.owes_confirmation) == (True, True)
+    sdo.start(Read(0x1018, 1), 0.5)
+    assert sdo.may_confirm(AT)
+    sdo.on_frame(rx("43 18 10 01 11 11 00 00"), 0.6)
+    assert (sdo.may_confirm(AT), sdo.owes_confirmation, sdo.has_requested(AT)) == (False, False, True)
+
+
+def test_a_refusal_is_an_answer_that_settles_what_was_written_before_and_no_answer_settles_nothing() -> None:
+    sdo = repeated()
+    sdo.start(Read(0x1018, 1), 0.5)
+    for now_s in (3.0, 6.0, 9.0):
+        sdo.tick(now_s)
+    assert not sdo.busy
+    assert sdo.may_confirm(AT), "it was given up"
+    sdo.start(Read(0x1018, 2), 11.0)
+    sdo.on_frame(rx("80 18 10 02 00 00 02 06"), 11.1)
+    assert not sdo.may_confirm(AT)
+
+
+def test_the_value_that_is_read_back_settles_the_write_before_it() -> None:
+    sdo = repeated()
+    sdo.start(Read(0x1016, 1), 0.5)
+    sdo.on_frame(rx("43 16 10 01 2C 01 7E 00"), 0.6)
+    assert not sdo.may_confirm(AT)
+
+
+def test_a_write_once_more_may_be_confirmed_itself() -> None:
+    sdo = repeated()
+    sdo.start(MONITORED, 0.5)
+    sdo.on_frame(rx(CONFIRMED), 0.6)
+    assert (sdo.may_confirm(AT), sdo.owes_confirmation) == (True, False)
+
+
+def test_an_answer_about_an_object_of_the_watchdog_settles_nothing_it_may_have_been_requested_before() -> None:
+    sdo = repeated()
+    sdo.start(Read(0x6041), 0.5)
+    sdo.on_frame(rx("4B 41 60 00 37 06 00 00"), 0.6)
+    assert sdo.may_confirm(AT)
+
+
+def test_a_write_that_a_restart_of_the_drive_has_repeated_is_owed_a_confirmation_too() -> None:
+    sdo = client()
+    sdo.start(MONITORED, 0.0)
+    sdo.again(0.1)
+    sdo.on_frame(rx(CONFIRMED), 0.2)
+    assert sdo.owes_confirmation

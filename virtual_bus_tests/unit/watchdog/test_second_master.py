@@ -388,6 +388,8 @@ def test_commands_that_make_no_sense_are_counted() -> None:
         ("23 aa 60 00 00 00 00 00", "60AA"),
         ("23 46 60 01 e8 03 00 00", "6046"),  # of mode 2: the least speed, and the factor of all speeds and ramps
         ("2b 4c 60 01 0a 00 00 00", "604C"),
+        ("23 00 12 01 41 06 00 00", "1200"),  # SDO channels: who else may write all that
+        ("23 7f 12 02 c1 05 00 00", "127F"),
         ("c2 16 10 01 04 00 00 00", "1016"),  # block
     ],
 )
