@@ -16,7 +16,7 @@ from canbase_campaign.advice import has_key, is_key, read_advice
 from canbase_config.drive import Drive
 from canbase_config.eds_file import read_eds
 from canbase_config.object_map import VL_OBJECTS
-from canbase_config.profile import Profile
+from canbase_config.profile import SDO_SERVERS, Profile
 from canbase_config.profile_file import profile_path
 from canbase_config.robot import Robot
 from canbase_config.scale_objects import SCALE_OBJECTS
@@ -52,8 +52,8 @@ PROSE: Final = frozenset(
 )
 """What follows "canbase" in messages and is no command. A new word that is one too goes here."""
 EDS: Final = read_eds(profile_path("generic").parents[1] / "eds" / "canbase_cia402.eds")
-OBJECTS: Final = frozenset((*EDS.names, *SCALE_OBJECTS, *VL_OBJECTS.values(), MIN_MAX, *RAMPS.values()))
-"""The objects that canbase knows: those of its EDS, those of the units, those of mode 2."""
+OBJECTS: Final = frozenset((*EDS.names, *SCALE_OBJECTS, *VL_OBJECTS.values(), MIN_MAX, *RAMPS.values(), *SDO_SERVERS))
+"""The objects that canbase knows: those of its EDS, those of the units, those of mode 2, SDO channels."""
 BOUNDS: Final = (0x6000,)
 """Where the objects of the first axis begin: no object."""
 _DOTTED: Final = re.compile(r"(?<![\w/.@-])[a-z][a-z_]*(?:\.[a-z_0-9]+)+(?![\w/(-])")
