@@ -18,7 +18,7 @@ from vm.guest.main import ALL, FIRST, SECOND, SHORT, bounded, names, shared_out
 from vm.guest.slcan_adapter import frame_of, line_of
 from vm.guest.standstill import standstill
 from vm.guest.system import BrokenPromiseError
-from vm.overlay import robot_yaml
+from vm.overlay import overlay, robot_yaml
 from vm.patience import Patience
 
 ROW = {
@@ -210,6 +210,17 @@ def test_robot_and_drives_are_on_two_controllers() -> None:
     assert "channel: can0" in robot
     assert "channel: can1" in drives
     assert "required: true" not in robot
+
+
+def test_the_guests_robot_has_the_domain_of_the_scenarios_whatever_the_developer_uses(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", "63")
+
+    overlay(tmp_path)
+
+    installed = (tmp_path / "overlay/etc/canbase/robot.env").read_text()
+    assert "ROS_DOMAIN_ID=0" in installed
 
 
 def test_the_guests_robot_gets_power_although_nobody_commissions_it(tmp_path: Path) -> None:
