@@ -94,8 +94,8 @@ soak: $(WORLD_READY) ## HOURS=20 of ordinary driving of random robots in virtual
 	PYTHONPATH=$(WORLD) python -m campaign.soak $(if $(SEED),--seed $(SEED)) $(if $(HOURS),--hours $(HOURS)) $(if $(FIRST),--first $(FIRST)) $(if $(LOADED),--loaded)
 
 .PHONY: odd
-odd: $(WORLD_READY) ## N=2000 robots with odd but legal drives: each drives 1 m, or what its message names cures it; SEED=7 tells one
-	PYTHONPATH=$(WORLD) python -m campaign.odd $(if $(SEED),--seed $(SEED)) $(if $(N),--robots $(N)) $(if $(FIRST),--first $(FIRST))
+odd: $(WORLD_READY) ## N=2000 robots with odd but legal drives: each drives 1 m, or what its message names cures it; SEED=7 tells one, ONLY=coasts,soft_stop draws from some
+	PYTHONPATH=$(WORLD) python -m campaign.odd $(if $(SEED),--seed $(SEED)) $(if $(N),--robots $(N)) $(if $(FIRST),--first $(FIRST)) $(if $(ONLY),--only $(ONLY))
 
 .PHONY: small-worlds
 small-worlds: $(VENV)/ready ## every failure with every action of an operator in small worlds; FAULTS=2 deeper, EVERY=1 denser

@@ -1,7 +1,10 @@
 """Values of a drive that a robot wants published: `values` below each drive, and the spare TPDOs that carry them.
 
-One motor uses TPDO1 and TPDO2 of its node; TPDO3 and TPDO4 are spare. Two motors use all four. CiA 301: eight bytes a
-PDO. Nothing that stops the robot depends on them: a value that a drive does not map is reported, and not published.
+One motor uses TPDO1 and TPDO2 of its node; TPDO3 and TPDO4 are spare. The feedback of two motors has the identifiers of
+all four, however many TPDOs the drive has. Bytes that a feedback TPDO leaves empty stay empty: driver and watchdog tell
+by its length what it carries, and two bytes more behind 606Ch would be read as a torque, behind 6064h as a velocity.
+CiA 301: eight bytes a PDO. Nothing that stops the robot depends on them: a value that a drive does not map is reported,
+and not published.
 """
 
 from __future__ import annotations
@@ -73,7 +76,12 @@ def misfit(values: Sequence[DriveValue], control_hz: float, motors: int, tpdos: 
     if twice := next((name for name in names if names.count(name) > 1), ""):
         return f"two values are named {twice}: give each its own name"
     if motors > 1:
-        return "its node turns two motors, which use all four TPDOs: take the values out"
+        return (
+            "its node turns two motors, whose feedback has all four TPDO identifiers of a node (180h, 280h, 380h and "
+            "480h + id). Spare bytes behind feedback carry no values: the watchdog would read them as torque or "
+            "velocity. Take the values out, and read one by hand with `canbase sdo read "
+            f"NODE {values[0].index:04X}:{values[0].sub}`"
+        )
     spare = min(SPARE_TPDOS, tpdos - FIRST_SPARE_TPDO + 1)
     if spare < 1:
         return f"its drive has {tpdos} TPDOs (pdo.tpdos of its profile), and none of them is spare: take the values out"

@@ -29,7 +29,7 @@ def metrics(
 
     Exit codes: 0 ended by Ctrl-C or SIGTERM, 1 the port cannot be had, 2 wrong command line or robot.yaml.
     """
-    robot = load_config(config).robot
+    robot, arguments = load_config(config).robot, ros_arguments(ctx, namespace)
     with ros_needed():
         import rclpy  # noqa: F401 - without ROS 2 this ends in advice
     try:
@@ -39,7 +39,7 @@ def metrics(
             raise
         fail(f"canbase metrics needs the Python package prometheus-client: {EXTRA}", WRONG_INPUT)
     try:
-        problem = run(robot, (host, port), ros_arguments(ctx, namespace), lambda where: typer.echo(f"serving {where}"))
+        problem = run(robot, (host, port), arguments, lambda where: typer.echo(f"serving {where}"))
     except OSError as error:
         fail(f"{host}:{port} cannot be had: {error.strerror}; give another --port or --host", FAILED)
     if problem:

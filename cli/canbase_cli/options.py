@@ -7,6 +7,7 @@ import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -92,13 +93,23 @@ class RosCommand(TyperCommand):
 def ros_arguments(ctx: typer.Context, namespace: str) -> list[str]:
     """Arguments for `rclpy.init`: the namespace, then what the user wrote behind `--ros-args`; empty without both.
 
-    Raises typer.BadParameter for what ROS does not take.
+    Raises typer.BadParameter for what ROS does not take: call it before anything is opened.
     """
     given = list(ctx.meta.get(_ROS_FLAG, ()))
     if given:
         _check_ros_arguments(given)
     remap = ["-r", f"__ns:={namespace}"] if namespace else []
     return [_ROS_FLAG, *remap, *given] if remap or given else []
+
+
+def check_unused_ros_arguments(ctx: typer.Context) -> None:
+    """For a process without a ROS node, which launch files start with words for ROS as well: they have no effect.
+
+    Raises typer.BadParameter for what ROS does not take. Without ROS 2 nothing can check them.
+    """
+    given = list(ctx.meta.get(_ROS_FLAG, ()))
+    if given and find_spec("rclpy") is not None:
+        _check_ros_arguments(given)
 
 
 def _check_ros_arguments(given: list[str]) -> None:

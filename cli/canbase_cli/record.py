@@ -83,6 +83,7 @@ def record(
 def _record_topics(
     ctx: typer.Context, mcap: Path, seconds: float | None, topics: list[str] | None, namespace: str
 ) -> None:
+    arguments = ros_arguments(ctx, namespace)
     with ros_needed():
         import rclpy
         from rclpy.signals import SignalHandlerOptions
@@ -91,7 +92,7 @@ def _record_topics(
     except ModuleNotFoundError as error:
         fail(f"canbase record needs the Python package {error.name}: pip install 'mcap>=1.2,<2'", WRONG_INPUT)
     ended = end_signals()
-    rclpy.init(args=ros_arguments(ctx, namespace), signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     try:
         file = McapFile(mcap)
         failure = _record(file, topics, seconds, ended)

@@ -17,6 +17,7 @@ from canbase_cli.options import (
     NamespaceOption,
     RosCommand,
     UnusedNamespaceOption,
+    check_unused_ros_arguments,
     right_start,
     ros_arguments,
     ros_needed,
@@ -56,17 +57,17 @@ def driver(
 
     Arguments after --ros-args go to rclpy.
     """
-    robot = load_config(config).robot
+    robot, arguments = load_config(config).robot, ros_arguments(ctx, namespace)
     claim = _claim(robot)
     with ros_needed():
         from canbase_driver.runtime.main import run
     leave_stop_file(robot, stop_file)
     with right_start():
-        raise typer.Exit(run(robot, ros_arguments(ctx, namespace), claim, autostart, partial(raise_priority, "driver")))
+        raise typer.Exit(run(robot, arguments, claim, autostart, partial(raise_priority, "driver")))
 
 
 def _claim(robot: Robot) -> Claim:
-    """Of the driver, before ROS is imported; ends the command where it cannot be had."""
+    """Of the driver, before its node is imported; ends the command where it cannot be had."""
     from canbase_driver.runtime.bus_port import BusError
     from canbase_driver.runtime.claim import Claim
 
@@ -81,11 +82,11 @@ def velocity(ctx: typer.Context, config: ConfigOption = None, namespace: Namespa
 
     Arguments after --ros-args go to rclpy.
     """
-    robot = load_config(config).robot
+    robot, arguments = load_config(config).robot, ros_arguments(ctx, namespace)
     with ros_needed():
         from canbase_velocity.main import run
     with right_start():
-        raise typer.Exit(run(robot, ros_arguments(ctx, namespace), partial(raise_priority, "velocity")))
+        raise typer.Exit(run(robot, arguments, partial(raise_priority, "velocity")))
 
 
 def action_server(ctx: typer.Context, config: ConfigOption = None, namespace: NamespaceOption = "") -> None:
@@ -93,17 +94,18 @@ def action_server(ctx: typer.Context, config: ConfigOption = None, namespace: Na
 
     Arguments after --ros-args go to rclpy.
     """
-    robot = load_config(config).robot
+    robot, arguments = load_config(config).robot, ros_arguments(ctx, namespace)
     with ros_needed():
         from canbase_action_server.main import run
 
         if robot.action.nav2_behaviors:
             import_module("canbase_action_server.nav2_messages")  # its messages may be missing
     with right_start():
-        raise typer.Exit(run(robot, ros_arguments(ctx, namespace), partial(raise_priority, "action-server")))
+        raise typer.Exit(run(robot, arguments, partial(raise_priority, "action-server")))
 
 
 def sim(
+    ctx: typer.Context,
     config: ConfigOption = None,
     namespace: UnusedNamespaceOption = "",
     control: Annotated[
@@ -118,13 +120,17 @@ def sim(
     from canbase_sim.main import run
 
     robot = load_config(config).robot
+    check_unused_ros_arguments(ctx)
     raise_priority("sim")
     path = None if control is None else str(control)
     raise typer.Exit(run(robot, path, quiet=quiet, factory_fresh=factory_fresh))
 
 
 def watchdog(
-    config: ConfigOption = None, namespace: UnusedNamespaceOption = "", stop_file: StopFileOption = None
+    ctx: typer.Context,
+    config: ConfigOption = None,
+    namespace: UnusedNamespaceOption = "",
+    stop_file: StopFileOption = None,
 ) -> None:
     """Run the watchdog: stops the drives when lease, driver or a drive fails or is implausible.
 
@@ -133,6 +139,7 @@ def watchdog(
     from canbase_config.derive import watchdog_config
 
     robot = load_config(config).robot
+    check_unused_ros_arguments(ctx)
     leave_stop_file(robot, stop_file)
     told = watchdog_config(robot).to_json()
     # The ROS wheels' start-up hook would start every Python of their environment a second time.

@@ -39,13 +39,12 @@ def up(
     Exit codes: 0 every process ended well after Ctrl-C or SIGTERM, 1 a process died, 2 wrong command line or file.
     """
     loaded = load_config(config)
+    for_parts, for_readiness = ros_arguments(ctx, ""), ros_arguments(ctx, namespace)
     with_sim = loaded.robot.bus.interface == "udp_multicast" if sim is None else sim
     _refuse_twice(loaded.robot)
     ended = end_signals()
-    stack = Stack(
-        loaded.path, namespace=namespace, sim=with_sim, ros_args=ros_arguments(ctx, ""), quiet_sim=not verbose
-    )
-    with stack, _reports_when_ready(namespace, ros_arguments(ctx, namespace)):
+    stack = Stack(loaded.path, namespace=namespace, sim=with_sim, ros_args=for_parts, quiet_sim=not verbose)
+    with stack, _reports_when_ready(namespace, for_readiness):
         _say(f"{loaded.robot.name} is starting; Ctrl-C stops the robot and ends it")
         death = _wait(stack, ended)
         _say(f"{death or 'ending'}; stopping the robot")

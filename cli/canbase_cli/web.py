@@ -37,7 +37,7 @@ def web(
 
     Exit codes: 0 ended by Ctrl-C or SIGTERM, 1 the port cannot be had, 2 wrong command line or robot.yaml.
     """
-    loaded = load_config(config)
+    loaded, arguments = load_config(config), ros_arguments(ctx, namespace)
     with ros_needed():
         import rclpy  # noqa: F401 - without ROS 2 this ends in advice
     try:
@@ -48,7 +48,7 @@ def web(
         fail(f"canbase web needs the Python package {error.name}: pip install 'nicegui>=3.18,<4'", WRONG_INPUT)
     token = secrets.token_urlsafe(24) if token_file is None else _token(token_file)
     _need_port(host, port)
-    run(loaded, Address(host, port, token), ros_arguments(ctx, namespace), namespace)
+    run(loaded, Address(host, port, token), arguments, namespace)
 
 
 def _token(file: Path) -> str:

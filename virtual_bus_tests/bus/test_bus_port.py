@@ -190,6 +190,33 @@ def test_bus_off_is_a_problem_until_something_is_heard_again(port: BusPort, othe
     assert (port.problem, port.report.controller, port.report.failures) == ("", ControllerState.ERROR_ACTIVE, 1)
 
 
+@pytest.mark.parametrize("begins_so", [True, False], ids=["at its start", "when it opens again"])
+def test_a_controller_that_was_bus_off_before_is_a_problem_until_something_is_heard(
+    arguments: dict[str, Any], other: VirtualBus, monkeypatch: pytest.MonkeyPatch, begins_so: bool
+) -> None:
+    """Its error frame came when nobody listened, and the kernel takes every frame and drops it."""
+    off = [begins_so]
+    monkeypatch.setattr(bus_port, "is_without_carrier", lambda _: off[0])
+    port = BusPort(arguments)
+    if not begins_so:
+        FlakyBus.broken = True
+        for _ in range(RECEIVE_FAILURES):
+            port.receive(0.0)
+        FlakyBus.broken, off[0] = False, True
+    for _ in range(2):
+        reopened(port)
+        port.send(SYNC)
+        assert (port.problem, port.report.controller) == (BUS_OFF, ControllerState.BUS_OFF)
+    other.send(can.Message(arbitration_id=0x77E, data=b"\5", is_extended_id=False))  # the watchdog, on this computer
+    assert port.receive(0.1) == Frame(0x77E, b"\5")
+    assert (port.problem, port.report.controller) == (BUS_OFF, ControllerState.BUS_OFF)
+    off[0] = False
+    other.send(can.Message(arbitration_id=0x701, data=b"\5", is_extended_id=False))
+    assert port.receive(0.1) == Frame(0x701, b"\5")
+    assert (port.problem, port.report.controller, port.report.failures) == ("", ControllerState.ERROR_ACTIVE, 1)
+    port.close()
+
+
 def test_frames_of_both_ways_are_counted_with_their_data(port: BusPort, other: VirtualBus) -> None:
     assert port.traffic() == Traffic(0, 0)
     port.send(SYNC)

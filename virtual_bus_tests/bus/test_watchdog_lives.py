@@ -19,6 +19,7 @@ from can.interfaces import BACKENDS
 from can.interfaces.virtual import VirtualBus
 
 from canbase_runtime.latch_file import create_first
+from canbase_watchdog import bus_port as watchdog_bus_port
 from canbase_watchdog import frames, life, loop, main, realtime
 from canbase_watchdog.bus_port import BusPort
 from canbase_watchdog.frames import Frame
@@ -329,6 +330,27 @@ def test_a_safety_relay_stays_open_until_the_bus_takes_frames(rig: Rig) -> None:
         FlakyBus.down = False
         thread = threading.Thread(target=turn)
         thread.start()
+        rig.robot.wait_for(lambda: relay.times > 3, LONG_S)
+        asked.set()
+        thread.join(timeout=LONG_S)
+
+
+# bus-off before this life ── the kernel takes frames, no toggle ── the carrier is back, a frame comes ── toggled
+def test_a_safety_relay_stays_open_while_the_controller_is_bus_off(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    relay, asked, off = Toggled(), threading.Event(), [True]
+    monkeypatch.setattr(watchdog_bus_port, "is_without_carrier", lambda _: off[0])
+    alone = {"interface": "virtual", "channel": "off"}
+    with BusPort(alone) as bus, LeaseSocket(rig.config.lease_socket, 0) as leases, VirtualBus("off") as other:
+        assert (bus.health.takes_frames, bus.health.works) == (True, False)
+        watchdog = Watchdog(rig.config, time.monotonic())
+        thread = threading.Thread(target=lambda: Loop(watchdog, bus, leases, cast(Any, relay)).run(asked.is_set))
+        thread.start()
+        assert other.recv(LONG_S) is not None
+        other.send(can.Message(arbitration_id=0x77F, data=b"\5", is_extended_id=False))  # the driver, on this computer
+        time.sleep(0.2)
+        assert (relay.times, bus.health.takes_frames) == (0, True)
+        off[0] = False
+        other.send(can.Message(arbitration_id=0x701, data=b"\5", is_extended_id=False))
         rig.robot.wait_for(lambda: relay.times > 3, LONG_S)
         asked.set()
         thread.join(timeout=LONG_S)

@@ -88,8 +88,10 @@ def _tell(seed: int, violation: Violation, only: list[str]) -> None:
 def _tell_faults(tally: Tally) -> None:
     table = Table("fault", "times", "what happens", title=f"faults in {tally.scenarios} scenarios")
     for name, kind in FAULTS.items():
-        table.add_row(name, str(tally.faults[name]), kind.sentence)
-    out.print(table)
+        if tally.faults[name]:
+            table.add_row(name, str(tally.faults[name]), kind.sentence)
+    if table.row_count:
+        out.print(table)
 
 
 def _tell_sums(tally: Tally) -> None:

@@ -82,8 +82,10 @@ def _tell_sums(out: Console, done: list[Trial], processor_s: float) -> None:
     drawn = Counter(each.name for trial in done for odd in trial.drives.values() for each in odd.drawn)
     table = Table("oddity", "drives", "what is odd", "legal by")
     for name, oddity in ODDITIES.items():
-        table.add_row(name, str(drawn[name]), oddity.sentence, oddity.clause)
-    out.print(table)
+        if drawn[name]:
+            table.add_row(name, str(drawn[name]), oddity.sentence, oddity.clause)
+    if table.row_count:
+        out.print(table)
     ends = ", ".join(f"{count} {end}" for end, count in Counter(trial.ended for trial in done).most_common())
     messages = sum(len(trial.messages) for trial in done)
     virtual_s = sum(trial.virtual_s for trial in done)

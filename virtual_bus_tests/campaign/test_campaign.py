@@ -85,6 +85,8 @@ def test_one_scenario_is_told_from_begin_to_end() -> None:
     )
     assert listed.exit_code == 1, listed.output
     assert "latched in seed" in listed.output
+    drawn = listed.output.partition("faults in")[2].partition("property")[0]
+    assert [name for name in FAULTS if f"│ {name} " in drawn] == ["lease_lost"]
 
 
 def test_ctrl_c_tells_what_was_found_until_then() -> None:

@@ -109,3 +109,5 @@ def test_the_command_tells_one_robot_and_its_sums(
     assert "seed 0: drove after cures" in shown
     assert "done: node 1: layout.target_bits: 16" in shown
     assert "1 robots: 1 drove after cures" in shown
+    assert "60FFh of 16 bits" in shown
+    assert " 0 " not in shown.partition("what is odd")[2].partition("1 robots")[0], "a row of what was not drawn"

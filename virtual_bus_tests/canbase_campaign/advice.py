@@ -6,7 +6,7 @@ import json
 import re
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 from canbase_config.profile import Profile
 from canbase_config.robot import Robot
@@ -71,8 +71,10 @@ def has_key(model: type[Section], path: str) -> bool:
     """Whether this model has it, in sections below sections."""
     section: Any = model
     for name in path.split("."):
-        fields = getattr(section, "model_fields", {})
-        if name not in fields:
+        below = next(
+            (each for each in (section, *get_args(section)) if name in getattr(each, "model_fields", {})), None
+        )
+        if below is None:
             return False
-        section = fields[name].annotation
+        section = below.model_fields[name].annotation
     return True

@@ -21,15 +21,15 @@ HOT = {
     "canbase_config": "watchdog",
     "canbase_runtime": "driver_state latch_record source_standing stop_cause watchdog_view",
     "canbase_watchdog": (
-        "bus_health counts creep envelope frames guarding halt ladder latch lease motion_evidence observer overshoot "
-        "pair plausibility policy power_and_motion second_master slowing standing stopper stopping_distance tally "
-        "torque trip_cause twist view watchdog"
+        "bus_health copies counts creep envelope frames guarding halt ladder latch lease motion_evidence observer "
+        "overshoot pair plausibility policy power_and_motion second_master slowing standing stopper stopping_distance "
+        "tally torque trip_cause twist view watchdog"
     ),
     "canbase_driver": (
         "causes cia402 core drive_units snapshot boot.node_boot boot.sdo_budget cia301.emcy cia301.frame cia301.nmt "
         "cia301.node_guarding cia301.pdo cia301.sdo_client drives.axis "
         "drives.canopen_node drives.drive_group drives.drive_snapshot drives.let_go drives.odometry_feed "
-        "drives.sdo_stop drives.stall drives.standstill drives.stopping_distance drives.telemetry "
+        "drives.sdo_stop drives.signs_of_life drives.stall drives.standstill drives.stopping_distance drives.telemetry "
         "motion.braking motion.kinematics motion.limiter motion.odometry motion.velocity_command "
         "supervision.bus_health supervision.cycle_stats supervision.latch supervision.lifecycle "
         "supervision.phases supervision.hazards supervision.fault_reset supervision.reset_run supervision.situation "

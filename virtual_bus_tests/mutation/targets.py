@@ -70,6 +70,7 @@ TARGETS = (
     _watchdog("twist", then=("watchdog/observer",)),
     _watchdog("tally", then=("watchdog/observer",)),
     _watchdog("pair"),
+    _watchdog("copies", "watchdog/second_master"),
     _watchdog("second_master"),
     _watchdog("lease"),
     _watchdog("ladder"),

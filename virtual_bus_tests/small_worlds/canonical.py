@@ -39,7 +39,8 @@ UNSEEN = frozenset((
     "_stats", "_told", "_mux_told", "_cycle", "_sequence", "sequence", "received", "refused", "frames_dropped",
     "dropped", "serial", "stops", "trips", "counters", "lease_age_ms", "stamp_ns", "seen", "detail", "snapshot",
     "_status_at", "_mux_state_at", "_state_at", "_counters_due", "_longest_gap_s", "_request", "answered", "_reset_at",
-    "_sdo_turn", "_stamp_ns", "changes", "lost_producers", "_measures", "report",
+    "_sdo_turn", "_stamp_ns", "changes", "lost_producers", "_measures", "report", "copies", "_copies",
+    "copied", "copied_at", "_signs",
     # where the base is: no decision of these parts looks at it; that of the scanner sees nothing
     "_feed", "travel", "travel_m", "_travel_m", "_anchor_m", "_counts", "_counts_before", "_poses", "encoder_offset",
     "_seen_m", "_from_m", "_restarts",

@@ -34,6 +34,11 @@ class BusHealth:
         return min(self._unsent_since, self._broken_since)
 
     @property
+    def works(self) -> bool:
+        """There is no trouble of any kind."""
+        return self.failed_since == math.inf
+
+    @property
     def takes_frames(self) -> bool:
         """False from a failed send until the next one that succeeds."""
         return self._unsent_since == math.inf
@@ -55,6 +60,11 @@ class BusHealth:
     def on_receive_error(self, now_s: float) -> None:
         """Reading failed: the interface is down or gone."""
         self.receive_errors += 1
+        self.on_trouble(now_s)
+
+    def on_trouble(self, now_s: float) -> None:
+        """From now on the bus has failed, whatever it takes, until a frame of somebody else comes, or the controller
+        says that it is back."""
         self._broken_since = min(self._broken_since, now_s)
 
     def on_data(self) -> None:
@@ -66,6 +76,6 @@ class BusHealth:
         self.error_frames += 1
         detail = data[1] if error_class & CONTROLLER and len(data) > 1 else 0
         if error_class & (BUS_OFF | TX_TIMEOUT) or detail & PASSIVE:
-            self._broken_since = min(self._broken_since, now_s)
+            self.on_trouble(now_s)
         elif error_class & RESTARTED or detail & ACTIVE:
             self._broken_since = math.inf

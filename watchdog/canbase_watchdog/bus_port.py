@@ -10,6 +10,7 @@ from typing import Any
 import can
 
 from canbase_watchdog.bus_health import BusHealth
+from canbase_watchdog.carrier import is_without_carrier
 from canbase_watchdog.frame_socket import ERROR, ERROR_CLASS, MAX_COB_ID, Received, open_bus
 from canbase_watchdog.frames import Frame
 
@@ -40,11 +41,14 @@ class BusPort:
                 f"the CAN bus {arguments} cannot be opened: {error}. "
                 "Check `bus` in robot.yaml, and that the interface is up (ip -details link show)."
             ) from error
+        self._arguments = arguments
         self._waiting: Received | None = None
         self._received_until = time.monotonic()
         self.health = BusHealth()
         if after_loss:
             self.health.on_send_error(self._received_until)
+        if is_without_carrier(arguments):
+            self.health.on_trouble(self._received_until)
         self.request_problem = ""
         """Why the adapter did not take the last remote frame; empty: it took it, or there was none."""
         self.datagrams_dropped = 0
@@ -85,11 +89,16 @@ class BusPort:
             elif can_id > MAX_COB_ID and can_id & ERROR:
                 self.health.on_error_frame(can_id & ERROR_CLASS, data, time.monotonic())
             else:
-                self.health.on_data()
+                self._on_data()
                 if can_id <= MAX_COB_ID:
                     at_s = wall_s - behind_s
                     self._received_until = at_s if self._received_until <= at_s <= now_s else now_s
                     yield can_id, data, self._received_until
+
+    def _on_data(self) -> None:
+        """While it is bus-off, some interfaces (slcan) still bring the driver's frames to this process."""
+        if self.health.works or not is_without_carrier(self._arguments):
+            self.health.on_data()
 
     def send(self, frame: Frame) -> None:
         """Send now or never: a frame that the bus does not take at once is counted and dropped."""

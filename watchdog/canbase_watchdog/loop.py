@@ -70,8 +70,8 @@ class Loop:
         self._record_problem = self._request_problem = ""
         self._reporter = Reporter(watchdog)
         self._bus_has_fd = bus.fileno() is not None
-        self._lost = not bus.health.takes_frames
-        """The bus failed before this life, and has taken no frame since."""
+        self._lost = not bus.health.works
+        """The bus failed before this life, and has not worked since."""
         self._due = self._sent_at = self._collected_at = time.monotonic()
         self._suspended_s = suspended_s()
         self._acted_at = self._due
@@ -172,7 +172,7 @@ class Loop:
             raise BusDeadError(f"no frame could be sent for {BUS_DEAD_S:.1f} s. Is the interface up, the cable in?")
 
     def _tell_found(self) -> None:
-        if self._lost:
+        if self._lost and self._bus.health.works:
             self._lost = False
             _log.info("the bus takes frames again")
 

@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 from canbase_watchdog import frames
+from canbase_watchdog.copies import Copies
 from canbase_watchdog.frames import DriveState
 from canbase_watchdog.guarding import GuardAnswers
 from canbase_watchdog.plausibility import Plausibility
@@ -31,6 +32,7 @@ class _Record:
         "answers",
         "asks_for_power",
         "command_at",
+        "copies",
         "disabled_since",
         "double_statuses",
         "doubles",
@@ -66,6 +68,7 @@ class _Record:
         self.asks_for_power = self.fresh = False
         self.misses, self.doubles, self.double_statuses = Tally(), Tally(), Tally()
         self.answers = self.statuses = 0
+        self.copies = Copies()
 
     def axis(self) -> Axis:
         return Axis(
@@ -91,6 +94,7 @@ class _Record:
             self.push.last,
             self.stand.sudden,
             self.stand.unproven,
+            self.copies.at,
         )
 
     def rests(self, still_mps: float) -> bool:
@@ -256,7 +260,7 @@ class Observer:
         if data != frames.BOOT_UP and self._guards[node_id].too_fast(now_s):
             period_s = self._guard_period_s
             often = f"more answers to node guarding than one each {period_s:.3f} s (heartbeats, 1017h, count too)"
-            self._note_foreign(node_id, often, now_s)
+            self._note_foreign(node_id, often, now_s, self._foreign.note_too_many)
         return state is not None and self._on_heartbeat(node_id, state, now_s)
 
     def _is_enabled(self, node_id: int, now_s: float) -> bool:
@@ -270,6 +274,7 @@ class Observer:
             return False
         record.fed_status_at = now_s
         record.statuses += 1
+        record.copies.take(data, now_s)
         record.feedback.on_position(status[1])
         record.push.on_position(status[1])
         record.stand.on_position(status[1], now_s)
@@ -373,10 +378,12 @@ class Observer:
             self._configured_at[node_id] = now_s
         return True
 
-    def _note_foreign(self, node_id: int, detail: str, now_s: float) -> None:
+    def _note_foreign(
+        self, node_id: int, detail: str, now_s: float, note: Callable[[int, str, float], None] | None = None
+    ) -> None:
         enabled = any(record.state is ENABLED for key, record in self._records.items() if key[0] == node_id)
         if enabled and now_s < self.ours_since:
-            self._foreign.note(node_id, f"{detail}, while it is enabled", now_s)
+            (note or self._foreign.note)(node_id, f"{detail}, while it is enabled", now_s)
 
 
 _CONTROLWORD = frames.CONTROLWORD % frames.AXIS_OFFSET

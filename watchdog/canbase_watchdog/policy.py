@@ -262,10 +262,22 @@ def _setpoint_missing(view: View, config: WatchdogConfig, now_s: float) -> Verdi
     return FINE
 
 
+_TWO_DRIVES = (
+    "two drives answer as node {0}, that of {1}: give each its own id (canbase scan names them). If there is one "
+    "alone, a gateway, a bridge or a second interface sends its frames again: take it out"
+)
+_COPIED_ANSWERS = (
+    "node {0}, that of {1}, answers twice, with the same data within 2 ms: take out the gateway, the bridge "
+    "or the second interface that sends its frames again. If there is none, two drives have this id (canbase scan "
+    "names them): give each its own"
+)
+
+
 def _answered_twice(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     for axis in view.axes:
         if axis.enabled and axis.double_answers >= _cycles(config):
-            detail = f"two drives answer as node {axis.drive.node_id}, that of {axis.drive.joint}: give each its own id"
+            told = _COPIED_ANSWERS if now_s - axis.copied_at <= config.feedback_timeout_s else _TWO_DRIVES
+            detail = told.format(axis.drive.node_id, axis.drive.joint)
             return Verdict(TripCause.ANSWERED_TWICE, axis.drive.node_id, detail)
     return FINE
 
@@ -297,7 +309,23 @@ def _foreign_master(view: View, config: WatchdogConfig, now_s: float) -> Verdict
     sign = view.bus.foreign
     if sign is None or now_s >= sign.at + SIGN_S or not view.enabled:
         return FINE
-    return Verdict(TripCause.FOREIGN_MASTER, sign.node_id, f"another master is on the bus: {sign.detail}")
+    return Verdict(TripCause.FOREIGN_MASTER, sign.node_id, _OF_A_SIGN[sign.copied].format(sign.detail))
+
+
+_OF_A_SIGN = {
+    None: "another master is on the bus: {}",
+    False: (
+        "another master is on the bus, or frames are sent again: {}. They are no copies of our frames: find the other "
+        "master (canbase scan) and stop it. If there is none, take out the gateway, the bridge or the second interface "
+        "that sends frames again"
+    ),
+    True: (
+        "frames come twice, or another master is on the bus: {}. SYNCs and other frames of ours come again "
+        "within 2 ms: take out the gateway, the bridge or the second interface that sends frames again (candump shows "
+        "them twice). If there is none, stop the other master"
+    ),
+}
+"""By Sign.copied: what it may be, the likelier first, and what to do about each."""
 
 
 def _bus_is_failed(view: View, node_id: int, config: WatchdogConfig, now_s: float) -> bool:
@@ -341,7 +369,7 @@ class Check:
 CHECKS = (
     Check(TripCause.BUS_FAILED, _bus_failed, _bus_is_failed, "the bus takes frames again"),
     Check(TripCause.LOOP_LATE, _loop_late, _over, "nothing else"),
-    Check(TripCause.FOREIGN_MASTER, _foreign_master, _foreign_is_near, "the other master has sent nothing for 1 s"),
+    Check(TripCause.FOREIGN_MASTER, _foreign_master, _foreign_is_near, "no such frame has come for 1 s"),
     Check(
         TripCause.LEASE_LOST,
         lease_lost,
@@ -365,7 +393,7 @@ CHECKS = (
         TripCause.ANSWERED_TWICE,
         _answered_twice,
         _over,
-        "nothing else; give each drive a node id of its own first",
+        "nothing else; end what answers twice first",
         by_bus=True,
     ),
     Check(TripCause.SETPOINT_MISSING, _setpoint_missing, _over, "nothing else", by_bus=True),

@@ -10,6 +10,9 @@ Signs, each while a drive that it concerns is enabled or at any time where that 
 3. once: an NMT command to an enabled drive, a quick stop PDO, or an SDO that writes its controlword, target or mode,
    or one of the objects that decide how it stops (1016h, 6007h, the RPDOs, ...).
    The driver does none of them there. The watchdog does, but only after a trip, when signs are not looked for.
+
+A gateway or bridge that sends frames again gives the signs of 2, and of 1 the SYNCs: each Sign has whether copies of
+frames came, which `copies.py` finds.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from collections import deque
 from dataclasses import dataclass
 
 from canbase_config.watchdog import WatchdogConfig
+from canbase_watchdog.copies import SentAgain
 
 DISORDER_COUNT, DISORDER_S = 3, 1.0
 SYNC_LOST, OFF_BEAT = 1.5, 0.75
@@ -32,8 +36,7 @@ come back, none is its own."""
 GUARD_PERIODS, GUARD_EXCESS = 60, 1.15
 """Requests that keep a drive alive add a quarter to its answers. Over this window a burst of late ones is less."""
 
-
-NOT_OURS = "heartbeats 77Eh that this watchdog has not sent: another device has its node id, 126; give it another one"
+NOT_OURS = "heartbeats 77Eh that this watchdog has not sent; a device with its node id, 126, needs another one"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +46,8 @@ class Sign:
     at: float
     node_id: int
     detail: str
+    copied: bool | None = None
+    """Whether frames are likelier to be sent again; None: frames that are sent again give no such sign."""
 
 
 class Pace:
@@ -79,12 +84,14 @@ class Foreign:
         self._control_hz, self._period_s = config.control_hz, period_s
         self._lost_s, self._off_beat_s = SYNC_LOST / config.control_hz, OFF_BEAT / config.control_hz
         self._sync_at = math.inf
+        self._copies = SentAgain(echo=echo)
         self._setpoints: dict[int, bytes] = {}
         """COB-ID and data of the setpoints since the last SYNC."""
         self.last: Sign | None = None
 
     def on_setpoint(self, cob_id: int, node_id: int, data: bytes, now_s: float) -> None:
         """An RPDO of the driver, or of somebody else."""
+        self._copies.on_setpoint(cob_id, data, now_s)
         other = self._setpoints.setdefault(cob_id, data)
         if other != data:
             self._setpoints[cob_id] = data
@@ -93,24 +100,30 @@ class Foreign:
 
     def on_sync(self, now_s: float) -> None:
         """A SYNC of the driver, or of somebody else."""
+        self._copies.on_sync(now_s)
         off_beat = now_s - self._sync_at < self._off_beat_s
         if not self._setpoints and off_beat and self._disorder.too_fast(now_s):
-            self.note(0, "SYNCs without setpoints", now_s)
+            self.note_too_many(0, "SYNCs without setpoints", now_s)
         self._setpoints.clear()
         self._sync_at = now_s
         if self._syncs.too_fast(now_s):
-            self.note(0, f"more SYNCs than the driver's {self._control_hz:g} per second", now_s)
+            self.note_too_many(0, f"more SYNCs than the driver's {self._control_hz:g} per second", now_s)
 
     def on_heartbeat(self, now_s: float) -> None:
         """A heartbeat of the driver's node, or of another one that uses its number."""
         if self._heartbeats.too_fast(now_s):
-            self.note(0, f"more heartbeats 77Fh than one each {self._period_s:.3f} s", now_s)
+            self.note_too_many(0, f"more heartbeats 77Fh than one each {self._period_s:.3f} s", now_s)
 
     def on_watchdog_heartbeat(self, now_s: float) -> None:
         """A heartbeat of this watchdog's own node that was received."""
+        self._copies.on_own(now_s)
         if self._beats.too_fast(now_s):
-            self.note(0, NOT_OURS, now_s)
+            self.note_too_many(0, NOT_OURS, now_s)
 
     def note(self, node_id: int, detail: str, now_s: float) -> None:
         """A sign of which once is enough."""
         self.last = Sign(now_s, node_id, detail)
+
+    def note_too_many(self, node_id: int, detail: str, now_s: float) -> None:
+        """A sign that frames which are sent again give as well."""
+        self.last = Sign(now_s, node_id, detail, self._copies.is_likely(now_s))

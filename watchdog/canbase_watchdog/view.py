@@ -53,6 +53,8 @@ class Axis:
     """It stopped as no wheel can, by its last values: standing.py."""
     unproven: bool = False
     """The same, for some samples."""
+    copied_at: float = NEVER
+    """When the last one of its status TPDOs came that has the data of the one just before it: copies.py."""
 
     @property
     def enabled(self) -> bool:

@@ -56,14 +56,37 @@ GUARDING_ALONE = (
     "where it has node guarding alone, set `self_stop.node_guarding: true` and `self_stop.heartbeat_entries: 0` in its "
     "drive profile"
 )
-OTHER_STATE = "Switch the drive off and on again, and let no other master control it"
+OTHER_STATE = (
+    "The state of the drive forbids it, and the boot is tried again each second. If this goes on, switch the drive off "
+    "and on again, and let no other master control it"
+)
+NOT_AN_AXIS = (
+    "Every axis of a CiA 402 drive has it: check `axis` in robot.yaml, and with the maker's tool that the drive is set "
+    "to CiA 402 and takes its commands from the bus"
+)
+UNANSWERED = (
+    "It answered before, so its node id and the bit rate are right, and the boot is tried again each second. If this "
+    "goes on, check its supply and its cable, and let no other program use its SDO channel (canbase sdo, the maker's "
+    "tool)"
+)
 ELSE_UNUSABLE = "where that cannot be done, the drive cannot be used"
 WITHOUT = {
     (0x1016, 1): "it does not stop by the watchdog's heartbeat",
     (0x6007, 0): "no lost heartbeat or node guarding stops the motor",
     (0x605E, 0): "a fault may take the power away and let the wheel coast",
 }
-"""What it means that the drive does not take its value, by the object of the first axis."""
+"""What it means for the stop that the drive does not take its value, by the object of the first axis."""
+BESIDES = {
+    (0x1029, 1): "after a lost heartbeat it may stay operational and take setpoints",
+    (0x605A, 0): "a quick stop may not brake by 6085h, or may leave the motor with power",
+    (0x6083, 0): "it may accelerate more slowly than ordered",
+}
+"""The same of what the proofs and measurements of the stop do not depend on: it can stay so."""
+UNREAD = {
+    0x1000: "; so nothing shows that it is a motor drive; it is used as one",
+    0x1018: "; so another drive with this node id may not be noticed",
+}
+"""What it means that an object cannot be read, where no key spares the boot the question."""
 FOR_SELF_STOP = (0x1016, 0x6007)
 WIDTHS = (LENGTH_WRONG, TOO_LONG, TOO_SHORT)
 
@@ -87,21 +110,19 @@ OF_AN_AXIS = frozenset((0x6040, 0x6041, 0x6060, 0x6064, 0x606C, 0x60FF))
 def hint(error: SdoError) -> str:
     """What to try about a transfer that failed after all its tries."""
     if isinstance(error, SdoTimeout):
-        return "Check power, cable and bit rate, and that no other program uses the SDO channel of this node"
+        return UNANSWERED
     code = error.code if isinstance(error, SdoAborted) else 0
     key, index = profile_key(error.index, error.sub), _first_axis(error.index)
     if code == DEVICE_STATE:
         return OTHER_STATE
     if index == 0x6060 and code not in (NO_OBJECT, NO_SUB_INDEX, *WIDTHS):
         return (
-            "Set `mode` in robot.yaml to one that the drive has, see 6502h: bit 2 is mode 3, bit 8 is mode 9; "
+            "Set `mode` in robot.yaml to one that the drive has: in 6502h (canbase sdo read "
+            f"{error.node_id} 6502), bit 2 is mode 3, bit 8 is mode 9; "
             "bit 1 is mode 2, with `modes: [2]` in its drive profile; with none of them the drive cannot be used"
         )
     if code in (NO_OBJECT, NO_SUB_INDEX, GENERAL_ERROR) and index in OF_AN_AXIS:
-        return (
-            "Every axis of a CiA 402 drive has it: check `axis` in robot.yaml, and with the maker's tool that the "
-            "drive is set to CiA 402 and takes its commands from the bus"
-        )
+        return NOT_AN_AXIS
     if code in WIDTHS:
         width = f"set `{key}` in its drive profile to that of its manual, 16 or 32"
         where = width if key.startswith("layout.") else "such a drive cannot be used"
@@ -119,16 +140,26 @@ def see(index: int, sub: int) -> str:
     """The key that spares the boot the question, where the drive has no such object at all."""
     key = profile_key(index, sub)
     lacks = LACKS.get(key, "no") if key.startswith(("options.", "self_stop.")) else ""
-    return f"; where the drive does not have it, `{key}: {lacks}` in its drive profile" if lacks else ""
+    if not lacks:
+        return UNREAD.get(index, "")
+    return f"; where the drive does not have it, `{key}: {lacks}` in its drive profile"
+
+
+def in_digits(step: Write) -> str:
+    """ "6007h:0 to 0003h": the object and its value, as maker's tools and canbase sdo show it."""
+    return f"{step} to {int.from_bytes(step.data, 'little'):0{2 * len(step.data)}X}h"
 
 
 def without(step: Write, *, lacks_it: bool = False) -> str:
     """What it means for the robot, and what helps: a proof by `canbase commission` counts where the drive lacks it."""
     index = _first_axis(step.index)
+    if beside := BESIDES.get((index, step.sub), ""):
+        return f"; so {beside}" + (f": set {in_digits(step)} with the maker's tool" if not lacks_it else "")
     meaning = WITHOUT.get((index, step.sub)) if step.value else None
     if not meaning:
         return ""
-    cure = "canbase commission shows whether it stops in another way" if lacks_it else "set it with the maker's tool"
+    by_hand = f"set {in_digits(step)} with the maker's tool"
+    cure = "canbase commission shows whether it stops in another way" if lacks_it else by_hand
     if index in FOR_SELF_STOP:
         return f"; so {meaning}: {cure}, else only a wired STO does"
     return f"; so {meaning}" if lacks_it else f"; so {meaning}: {cure}"

@@ -132,8 +132,14 @@ class NodeBoot:
 
     def _take_answer(self, now_s: float) -> None:
         if self._client.duplicates >= DUPLICATES:
-            problem = "each request is answered twice: two devices on the bus have this node id"
-            self._end(error=BootError(self.node_id, problem, "Give each drive a node id of its own (canbase adopt)"))
+            problem = (
+                "each request is answered twice: two devices on the bus have this node id, or a gateway repeats it"
+            )
+            hint = (
+                "Give each drive a node id of its own (canbase scan names them, canbase adopt sets them). If one drive "
+                "alone has it, take out the gateway, the bridge or the second interface that sends frames again"
+            )
+            self._end(error=BootError(self.node_id, problem, hint))
         if self._client.busy or self.done:
             return
         try:

@@ -305,7 +305,8 @@ def _map_what_it_takes(node: NodeAccess, pdo: Pdo, mapped: int) -> Steps[None]:
 
 def _note_no_torque(node: NodeAccess, why: str) -> None:
     node.notes.append(
-        f"torque unknown: {why}. In its drive profile, options.torque names another object or none; {_WITHOUT_TORQUE}"
+        f"torque unknown: {why}. Where it can map the other one of 6077h and 6078h, name that in `options.torque` of "
+        f"its drive profile; {_WITHOUT_TORQUE}"
     )
 
 
@@ -323,7 +324,8 @@ def _map(node: NodeAccess, pdo: Pdo, mapped: int) -> Steps[None]:
     yield from _write_count(node, pdo, len(pdo.mapping))
     if not (yield from (_holds(pdo) if pdo.is_heard else _is_mapped(pdo))):
         problem = f"{pdo.name} reads back another mapping than was written to {pdo.mapping_object:04X}h"
-        raise BootError(node.node_id, problem, "Look up in the manual what this PDO can carry")
+        tool = f"Let {pdo.name} carry {_needed(pdo)} with the maker's tool; {ELSE_UNUSABLE}"
+        raise BootError(node.node_id, problem, tool)
 
 
 def _write_count(node: NodeAccess, pdo: Pdo, count: int) -> Steps[None]:

@@ -162,8 +162,11 @@ def _configure_ramps(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None
         needed, has = getattr(robot.limits, key), kept.mps2
         if has is None:
             value = AxisUnits(drive, robot.base).acceleration_raw(needed)
-            least = f"{needed:g} m/s² (limits.{key}), a value of {value}"
-            node.notes.append(f"how hard {drive.joint} brakes is unknown: it must be at least {least}{kept.what}")
+            at = kept.what or f" in {write_at(drive, index, 0)}"
+            least = f"{needed:g} m/s² (limits.{key}), a value of {value}{at}"
+            node.notes.append(
+                f"how hard {drive.joint} brakes is unknown: it must be at least {least}; set it with the maker's tool"
+            )
             continue
         if has >= KEPT_SHARE * needed:
             continue
@@ -194,7 +197,10 @@ def _refuse_coasting(node: NodeAccess, drive: Drive) -> Steps[None]:
         return
     found = yield from node.read_if_present(at.index, at.sub)
     if found is None:
-        node.notes.append(f"how a quick stop ends is unknown: it must brake {drive.joint} and not let it coast")
+        node.notes.append(
+            f"how a quick stop ends is unknown: it must brake {drive.joint} and not let it coast; make sure by the "
+            "manual, then press the emergency stop once at low speed"
+        )
     if found != COASTS:
         return
     problem = f"{at.index:04X}h:{at.sub} stays at 0: a quick stop lets {drive.joint} coast"
@@ -229,7 +235,10 @@ def _produce_heartbeat(node: NodeAccess, timeout_ms: int) -> Steps[None]:
         except SdoAborted as refused:
             refusal = refusal or f"1017h:0: {refused.text}"
             if refused.code not in VALUE_REFUSED:
-                node.notes.append(f"1017h:0: {refused.text}; so its heartbeat must come by itself, within {longest} ms")
+                node.notes.append(
+                    f"1017h:0: {refused.text}; so its heartbeat must come by itself, within {longest} ms: set that "
+                    f"with the maker's tool; {GUARDING_ALONE}"
+                )
                 return
         except BootError as other:
             refusal = refusal or other.problem
@@ -334,12 +343,17 @@ def _set_vendor_watchdog(node: NodeAccess, kind: Profile, robot: Robot) -> Steps
     if watchdog is None:
         return ""
     if watchdog.index is None:
-        node.notes.append(f"the drive's own watchdog: {watchdog.text}")
+        node.notes.append(
+            f"the drive's own watchdog: {watchdog.text}; it needs {1000 * timeout_s:.0f} ms "
+            "(timeouts.drive_heartbeat_s); canbase commission proves it"
+        )
         return ""
     write = Write(watchdog.index, watchdog.sub, round(watchdog.per_s * timeout_s), watchdog.bits // 8)
     if not (yield from node.set_if_present(write)):
         return ""
     if kind.is_unproven("self_stop.vendor_watchdog") and not is_proven(robot):
-        node.notes.append(f"{write}: {watchdog.text} is set, but not proven to stop the motor")
+        node.notes.append(
+            f"{write}: {watchdog.text} is set, but not proven to stop the motor: canbase commission proves it"
+        )
         return ""
     return f"{watchdog.text} ({write})"

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from canbase_config.profile import Presence
-from canbase_driver.boot.advice import hint, see, without
+from canbase_driver.boot.advice import NOT_AN_AXIS, OTHER_STATE, UNANSWERED, hint, in_digits, see, without
 from canbase_driver.cia301.nmt import NmtCommand
 from canbase_driver.cia301.sdo_client import (
     ACCESS_UNSUPPORTED,
@@ -82,6 +82,11 @@ class BootError(Exception):
         self.problem = problem
         self.hint = hint
 
+    @property
+    def may_pass(self) -> bool:
+        """A drive that still starts does this too, and no longer when it has started."""
+        return self.hint.startswith((OTHER_STATE, UNANSWERED, NOT_AN_AXIS))
+
 
 def boot_error(error: SdoError) -> BootError:
     """The message for the person at the machine about a transfer that failed after all its tries."""
@@ -141,7 +146,7 @@ class NodeAccess:
         if found is not None and not _same(found, step.data):
             problem = f"{step} is {_hex(found)}, expected {_hex(step.data)}{refusal}"
             other = "find what else sets it: another master, an input, a program in the drive"
-            raise BootError(self.node_id, problem, f"Set it with the maker's tool, or {other}")
+            raise BootError(self.node_id, problem, f"Set {in_digits(step)} with the maker's tool, or {other}")
         self.note_change(step, before)
 
     def _shows(self, shown_at: Read, step: Write) -> Steps[bool]:

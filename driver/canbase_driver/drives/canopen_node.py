@@ -33,6 +33,7 @@ from canbase_driver.drives.axis import Axis
 from canbase_driver.drives.drive_values import DriveValues, NamedValue
 from canbase_driver.drives.foreign_writes import ForeignWrites
 from canbase_driver.drives.sdo_stop import SdoStop
+from canbase_driver.drives.signs_of_life import SignsOfLife
 from canbase_driver.drives.telemetry import Measures, Values
 
 START_TIMEOUT_S = 1.0
@@ -42,7 +43,7 @@ HOLD_S = 0.2
 RETRY_S = 1.0
 """Between two boots of a node that failed."""
 UNHEARD_S = 1.0
-"""A node that has answered no request of its boot for this long may have no power or no cable [s]."""
+"""Of a node that has answered no request of its boot for this long, the message names what it sent, and a cure [s]."""
 SEEK_S = 1.0
 """A node without messages for this long while nothing has power is booted again [s]: its boot-up may be lost."""
 SECOND_BOOT_UP_S, ALIKE, SETTLE_FACTOR, SETTLE_EXTRA_S = 3.0, 0.3, 1.3, 0.2
@@ -98,6 +99,7 @@ class CanopenNode:
         self._values = DriveValues(self.layout.values, self.layout.timing.cycle_s)
         self._sdo_stop = SdoStop(node_id, self._drives)
         self._foreign = ForeignWrites(self._drives, Counter())
+        self._signs = SignsOfLife()
         self._written = ""
         """What another client has written since the boot has dealt with it; empty: nothing of what the boot sets."""
         self._lost_heartbeat = self._owed_stop = False
@@ -171,8 +173,7 @@ class CanopenNode:
         if self._is_configured:
             return f"{self.name}: configured, waits for the boots of the others"
         if self.presence is Presence.BOOTING and self._boot is not None:
-            unheard = not self._boot.heard and now_s - self._since_s > UNHEARD_S
-            cure = "; check its power and its cable" if unheard else ""
+            cure = f"; {self._signs.what_to_check(now_s)}" if self._is_unheard(now_s) else ""
             return self._boot.waiting_for + cure + (f" (last try: {self.boot_error})" if self.boot_error else "")
         if self.presence is Presence.STARTING and self.boot_error and self._awaits_guard:
             return f"{self.name}: {self.boot_error}"
@@ -195,8 +196,14 @@ class CanopenNode:
                 f"{self.name} is not ready since {since_s:.0f} s: {done}, and goes on; "
                 f"a drive that needs so long: timeouts.boot_s of robot.yaml{'; ' * bool(slow)}{slow}"
             )
-        why = self.boot_error or f"{self._why_gone}; check its power and its cable"
+        why = self.boot_error or self._why_gone
+        if self._is_unheard(now_s) or not self.boot_error:
+            why = f"{why.removesuffix('.')}; {self._signs.what_to_check(now_s)}"
         return f"{self.name} is missing since {since_s:.0f} s: {why}"
+
+    def _is_unheard(self, now_s: float) -> bool:
+        """Its boot has waited for a first answer for UNHEARD_S."""
+        return self._boot is not None and not self._boot.heard and now_s - self._since_s > UNHEARD_S
 
     def without_self_stop(self) -> str:
         """A sentence when its boot could not set what makes it stop by itself."""
@@ -321,6 +328,8 @@ class CanopenNode:
         if heartbeat is None or parsed is None or parsed[1] is None:
             return False
         self.heartbeat_at = now_s
+        awaited = self._reset_at > -math.inf or (self._boot is not None and self._boot.reset_at > -math.inf)
+        self._signs.on_heartbeat(parsed[1], now_s, of_reset=awaited)
         self._on_nmt_state(parsed[1], heartbeat, now_s)
         return True
 
@@ -374,17 +383,19 @@ class CanopenNode:
         """Take 606Ch of one of its axes. False: not understood."""
         return not self._sends_pdos or axis.on_velocity(frame.data, now_s)
 
-    def on_emcy(self, frame: Frame, _now: float) -> bool:
+    def on_emcy(self, frame: Frame, now_s: float) -> bool:
         """Take a frame 080h + id. False: not an emergency message. It informs; only the statusword stops anything."""
         emcy = parse_emcy(frame)
         if emcy is None:
             return False
+        self._signs.on_emcy(now_s)
         self.emcy = None if emcy.is_reset else emcy
         self._lost_heartbeat |= emcy.code in BUS_LOST  # some take the message back, and stay in fault
         return True
 
     def on_sdo(self, frame: Frame, now_s: float) -> bool:
         """Take an SDO answer; one without a request of ours is another client's (a tool's) and fine."""
+        self._signs.on_sdo(frame, now_s)
         if self._boot is not None:
             if self._boot.owes_none(frame):
                 self._written = ForeignWrites(self._drives, Counter()).take(frame) or self._written
@@ -412,11 +423,24 @@ class CanopenNode:
             self._learn_to_wait("it answered", now_s)
         if self._boot.error is not None:
             self._note_reset(self._boot, now_s)
-            self.boot_error = str(self._boot.error)
+            why_not_yet = self._why_not_yet(self._boot, now_s) if self._boot.error.may_pass else ""
+            self.boot_error = f"{self._boot.error}{why_not_yet}"
             self.lose(f"could not be booted: {self.boot_error}", now_s)
         elif self._boot.report is not None and self.others_are_configured():
             frames.append(self._start(self._boot.report, now_s))
         return frames
+
+    def _why_not_yet(self, boot: NodeBoot, now_s: float) -> str:
+        """A sentence, with a space before it, about a drive that may not have started yet; empty: it has had its time.
+
+        Aborts do not end its NMT reset: a drive may refuse all requests until its boot-up message.
+        """
+        if boot.reset_at == -math.inf:
+            return self._signs.may_be_starting(now_s)
+        return (
+            f" Its NMT reset was {now_s - boot.reset_at:.1f} s ago, and its boot-up message has not come: it may take "
+            "longer, and the boot learns how long (start.boot_up_s of its drive profile)."
+        )
 
     def _note_reset(self, boot: NodeBoot, now_s: float) -> None:
         """A boot has failed. That of a node that its NMT reset was too long for waits longer the next time."""

@@ -21,8 +21,9 @@ from canbase_config.robot import DRIVER_NODE_ID
 from canbase_driver.cia301.frame import MAX_DATA_BYTES, Frame
 from canbase_driver.cia301.nmt import HEARTBEAT, SYNC
 from canbase_driver.runtime.bus_traffic import Traffic, interface_traffic
+from canbase_driver.runtime.carrier import is_without_carrier
 from canbase_driver.runtime.frame_socket import ERROR, ERROR_CLASS, MAX_COB_ID, REMOTE, FrameSocket, open_bus
-from canbase_driver.supervision.bus_health import BusReport
+from canbase_driver.supervision.bus_health import BusReport, ControllerState
 
 RETRY_S = 1.0
 SEND_TIMEOUT_S = 0.002
@@ -115,6 +116,8 @@ class BusPort:
         self._retry_at = 0.0
         self._opening: _Opening | None = None
         self._bus: FrameSocket | None = self._open()
+        if self._is_bus_off():
+            self._fail(BUS_OFF)
 
     def receive(self, timeout_s: float) -> Frame | None:
         """The next data frame with an 11-bit identifier; None when none came in `timeout_s`, or when receiving failed.
@@ -212,12 +215,21 @@ class BusPort:
         if self.report.is_bus_off and not before.is_bus_off:
             self._fail(BUS_OFF)
 
+    def _is_bus_off(self) -> bool:
+        """The controller was bus-off before the bus was opened: it will not say so again, and the report has it now."""
+        without_carrier = is_without_carrier(self._arguments)
+        if without_carrier:
+            self.report = replace(self.report, controller=ControllerState.BUS_OFF)
+        return without_carrier
+
     def _on_received(self) -> None:
-        """The bus works."""
+        """The bus works. While it is bus-off, some interfaces (slcan) still bring this computer's own frames."""
         self._receive_failures = 0
-        self._on_passed()
         if self.report.is_bus_off:
+            if is_without_carrier(self._arguments):
+                return
             self.report = replace(self.report, controller=BusReport().controller)
+        self._on_passed()
 
     def _on_passed(self) -> None:
         """A frame went out or came in. After a failure the listening begins, and the problem stays until it is over."""
@@ -291,5 +303,7 @@ class BusPort:
         if opening.error is not None:
             self.problem = str(opening.error)
             self._retry_at = time.monotonic() + RETRY_S
-        else:
-            self._send_failures = self._receive_failures = 0
+            return
+        self._send_failures = self._receive_failures = 0
+        if self._is_bus_off():
+            self.problem = BUS_OFF

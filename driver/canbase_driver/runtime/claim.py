@@ -1,7 +1,7 @@
 """What one driver alone may have: the bus and the record of its stops. And whether another computer's driver is there.
 
-The bus is opened first of all, before ROS is imported, and a thread listens to it meanwhile: the time for which this
-driver has to listen before it sends its first frame passes.
+The bus is opened as soon as robot.yaml and the command line are found right, before the node is imported, and a thread
+listens to it meanwhile: the time for which this driver has to listen before it sends its first frame passes.
 """
 
 from __future__ import annotations

@@ -43,6 +43,8 @@ class Scale:
     """Increments of 6064h per metre of the rim."""
     full_speed_mps: float | None = None
     """The speed that a ramp's time counts to [m/s]."""
+    largest: int = 2**31 - 1
+    """Of 606Ch, 606Bh and 6044h, in both directions: what is faster is shown as this."""
 
     @classmethod
     def of(cls, drive: Drive, wheel_radius_m: float, personality: Personality = GENERIC) -> Scale:
@@ -52,18 +54,26 @@ class Scale:
         target = metres / velocity[personality.target_unit or drive.target_unit]
         actual = metres / velocity[personality.actual_unit or drive.actual_unit]
         slopes = ACCELERATION_PER_REVOLUTION | {u: steps * counts for u, steps in ACCELERATION_PER_COUNT.items()}
+        narrow = personality.vl or personality.widths.get(0x606C) == "h"
+        largest = 2**15 - 1 if narrow else 2**31 - 1
         unit = personality.acceleration_unit
         if unit == "ms":
-            return cls(target, actual, inf, counts / metres, metres * personality.full_speed_rpm / 60.0)
-        return cls(target, actual, target if unit is None else metres / slopes[unit], counts / metres)
+            full_mps = metres * personality.full_speed_rpm / 60.0
+            return cls(target, actual, inf, counts / metres, full_mps, largest)
+        slope = target if unit is None else metres / slopes[unit]
+        return cls(target, actual, slope, counts / metres, largest=largest)
 
     def counts(self, travel_m: float, offset: int) -> int:
         """6064h after `travel_m` in the motor's positive direction: whole increments, wrapped to 32 bits."""
         return (floor(travel_m * self.counts_per_m) + offset + 2**31) % 2**32 - 2**31
 
     def raw(self, speed_mps: float) -> int:
-        """606Ch and 606Bh: whole steps, limited to 32 bits."""
-        return max(-(2**31), min(2**31 - 1, round(speed_mps / self.actual_mps)))
+        """606Ch, 606Bh and 6044h: whole steps."""
+        return self.limited(round(speed_mps / self.actual_mps))
+
+    def limited(self, raw: int) -> int:
+        """What these objects have room for."""
+        return max(-self.largest, min(self.largest, raw))
 
     def slope(self, raw: int) -> float:
         """Rim acceleration that 6083h to 6085h mean [m/s²]."""

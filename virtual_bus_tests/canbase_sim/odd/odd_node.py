@@ -76,10 +76,11 @@ class OddNode(SimulatedNode):
         super()._refresh()
         self._odd_line.now_s = self._now
         values, manner = self.dictionary.values, self.manner
-        for number in range(len(self.axes)):
+        for number, axis in enumerate(self.axes):
             base = AXIS_STRIDE * number
             if manner.velocity_noise:
                 noise = self._random.randint(-manner.velocity_noise, manner.velocity_noise)
-                values[key(0x606C + base)] += noise
+                velocity = key(0x606C + base)
+                values[velocity] = axis.scale.limited(values[velocity] + noise)
             if manner.status_bits:
                 values[key(0x6041 + base)] |= self._random.getrandbits(16) & manner.status_bits

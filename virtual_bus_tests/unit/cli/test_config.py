@@ -280,6 +280,51 @@ def test_what_ros_does_not_take_is_a_wrong_command_line_in_words(given: list[str
     assert "Traceback" not in result.output
 
 
+@pytest.mark.parametrize("command", ["driver", "velocity", "action-server", "sim", "watchdog"])
+def test_a_word_that_ros_does_not_know_ends_a_process_before_it_opens_the_bus_or_writes_a_file(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = [stand_in(monkeypatch, module) for _, module in [*ROS_COMMANDS, ("sim", "canbase_sim.main")]]
+    opened: list[Any] = []
+    monkeypatch.setattr("canbase_cli.services._claim", opened.append)
+    monkeypatch.setattr(os, "execve", lambda *arguments: opened.append(arguments))
+    stop_file = tmp_path / "stop.json"
+    takes_one = command in ("driver", "watchdog")
+
+    words = [command, *(["--stop-file", str(stop_file)] if takes_one else []), "--ros-args", "--bogus"]
+    result = CliRunner().invoke(app, words, env={"COLUMNS": "300"})
+
+    assert (result.exit_code, opened, calls, stop_file.exists()) == (2, [], [[], [], [], []], False)
+    assert "ROS does not know --bogus behind --ros-args" in " ".join(result.output.split())
+
+
+@pytest.mark.parametrize(
+    ("command", "opens"),
+    [("up", "up._refuse_twice"), ("web", "web._need_port"), ("web", "web._token"), ("record", "record.end_signals")],
+)
+def test_a_word_that_ros_does_not_know_ends_a_command_before_it_takes_a_name_or_a_port(
+    command: str, opens: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[Any] = []
+    monkeypatch.setattr(f"canbase_cli.{opens}", lambda *given: opened.append(given))
+    words = {"web": ["--token-file", "/none"], "record": ["--mcap", str(tmp_path / "run.mcap")]}.get(command, [])
+
+    result = CliRunner().invoke(app, [command, *words, "--ros-args", "--bogus"], env={"COLUMNS": "300"})
+
+    assert (result.exit_code, opened) == (2, [])
+    assert "ROS does not know --bogus behind --ros-args" in " ".join(result.output.split())
+
+
+def test_without_ros_the_words_for_it_keep_no_watchdog_from_starting(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing can check them there, and they have no effect on a process without a node."""
+    started: list[Any] = []
+    monkeypatch.setattr(os, "execve", lambda *arguments: started.append(arguments))
+    monkeypatch.setattr("canbase_cli.options.find_spec", lambda name: None)
+
+    assert CliRunner().invoke(app, ["watchdog", "--ros-args", "--bogus"]).exit_code == 0
+    assert len(started) == 1
+
+
 def test_a_parameter_of_another_type_than_its_node_declares_is_a_wrong_command_line_too() -> None:
     def begin() -> None:
         from rclpy.exceptions import InvalidParameterTypeException

@@ -9,7 +9,11 @@ from pydantic import ValidationError
 
 from canbase_config.bus_load import cyclic_load
 from canbase_config.drive_values import DriveValue, misfit, value_pdos
+from canbase_config.profile import Layout
 from canbase_config.robot import Robot
+from canbase_config.watchdog import WatchedLayout
+from canbase_driver.cia301.pdo import GENERIC_PROFILE, NodeLayout, node_layout
+from canbase_watchdog import frames
 from support.chain_world import robot_of
 from support.crews import robot_with
 from support.timed_bus import on_a_wire
@@ -60,9 +64,43 @@ def test_where_no_tpdo_is_spare_no_other_period_helps(tpdos: int) -> None:
     assert why.endswith("none of them is spare: take the values out")
 
 
-def test_a_node_with_two_motors_has_no_spare_tpdos() -> None:
-    with pytest.raises(ValidationError, match="its node turns two motors, which use all four TPDOs"):
+@pytest.mark.parametrize("tpdos", [2, 3, 4, 8])
+def test_a_node_with_two_motors_has_no_identifier_to_spare_however_many_tpdos_its_drive_has(tpdos: int) -> None:
+    why = misfit([DriveValue.model_validate(value("a"))], 100.0, motors=2, tpdos=tpdos)
+    assert "whose feedback has all four TPDO identifiers of a node (180h, 280h, 380h and 480h + id)" in why
+    assert "the watchdog would read them as torque or velocity" in why
+    assert why.endswith("Take the values out, and read one by hand with `canbase sdo read NODE 2000:0`")
+    with pytest.raises(ValidationError, match="values of left_wheel: its node turns two motors"):
         robot(value("a"), kind="zlac8015d")
+
+
+@pytest.mark.parametrize("joined", [False, True])
+def test_the_watchdog_takes_the_feedback_of_two_motors_from_all_four_identifiers(joined: bool) -> None:
+    """Joined: status and velocity of each motor come in one TPDO, and the watchdog takes the other two all the same."""
+    layout = Layout(velocity_bits=16) if joined else Layout()
+    profile = GENERIC_PROFILE.model_copy(update={"layout": layout})
+    node = NodeLayout(5, (0, 1), profile, joins_velocity=joined)
+    feedback = {cob_id for axis in (0, 1) for cob_id in (node.status_cob_id(axis), node.velocity_cob_id(axis))}
+    assert feedback == {tpdo + 5 for tpdo in (*frames.STATUS_TPDO, *frames.VELOCITY_TPDO)}
+    assert feedback == {0x185, 0x285, 0x385, 0x485}
+
+
+def test_a_value_of_two_bytes_behind_feedback_would_be_read_as_torque_or_as_velocity() -> None:
+    """Why spare bytes of TPDO1 and TPDO2 stay empty: only the length says what a feedback TPDO carries."""
+    narrow, two_bytes = WatchedLayout(velocity_bits=16), bytes((0x39, 0x05))
+    assert frames.decode_torque(bytes(4) + two_bytes) == pytest.approx(1.337)
+    assert frames.decode_joined_velocity(bytes(6) + two_bytes, narrow) == 1337
+
+
+def test_two_drives_of_one_motor_each_have_their_values_both() -> None:
+    given = robot_with("generic").model_dump()
+    for drive, name in zip(given["drives"], ("a", "b"), strict=True):
+        drive["values"] = [value(name)]
+    both = Robot.model_validate(given)
+    pdos = [node_layout(drive.node_id, (drive,), both).value_pdos() for drive in both.drives]
+    assert [[(pdo.number, pdo.cob_id) for pdo in of] for of in pdos] == [
+        [(3, 0x380 + drive.node_id)] for drive in both.drives
+    ]
 
 
 def test_values_count_in_the_load_of_the_bus() -> None:

@@ -193,7 +193,9 @@ def test_a_drive_that_falls_silent_in_the_middle_is_an_error_that_names_the_obje
     boot = boot_one_axis(drive)
     assert error_of(boot) == (
         "node 1: 6061h:0: no answer to 3 requests, 0.3 s each. "
-        "Check power, cable and bit rate, and that no other program uses the SDO channel of this node."
+        "It answered before, so its node id and the bit rate are right, and the boot is tried again each second. If "
+        "this goes on, check its supply and its cable, and let no other program use its SDO channel (canbase sdo, the "
+        "maker's tool)."
     )
 
 

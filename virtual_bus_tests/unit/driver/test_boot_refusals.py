@@ -27,7 +27,7 @@ from support.fake_drive import (
 )
 from support.fake_drive import robot as fake_robot
 
-BY_HAND = "set it with the maker's tool"
+BY_HAND = "with the maker's tool"
 NO_SELF_STOP = (
     "or node guarding stops the motor: canbase commission shows whether it stops in another way, "
     "else only a wired STO does"
@@ -40,15 +40,26 @@ NO_SELF_STOP = (
         (
             0x1017,
             0,
-            "1017h:0: 0602 0000h the object does not exist; so its heartbeat must come by itself, within 150 ms",
+            "1017h:0: 0602 0000h the object does not exist; so its heartbeat must come by itself, within 150 ms: set "
+            "that with the maker's tool; where it has node guarding alone, set `self_stop.node_guarding: true` and "
+            "`self_stop.heartbeat_entries: 0` in its drive profile",
         ),
-        (0x1029, 1, "1029h:1: 0602 0000h the object does not exist"),
+        (
+            0x1029,
+            1,
+            "1029h:1: 0602 0000h the object does not exist; so after a lost heartbeat it may stay operational and take "
+            "setpoints",
+        ),
         (
             0x605E,
             0,
             "605Eh:0: 0602 0000h the object does not exist; so a fault may take the power away and let the wheel coast",
         ),
-        (0x6083, 0, "6083h:0: 0602 0000h the object does not exist"),
+        (
+            0x6083,
+            0,
+            "6083h:0: 0602 0000h the object does not exist; so it may accelerate more slowly than ordered",
+        ),
     ],
 )
 def test_a_missing_option_is_a_note(index: int, sub: int, note: str) -> None:
@@ -63,15 +74,20 @@ def test_a_missing_option_is_a_note(index: int, sub: int, note: str) -> None:
 @pytest.mark.parametrize(
     ("index", "unknown"),
     [
-        (0x605A, "how a quick stop ends is unknown: it must brake left and not let it coast"),
+        (
+            0x605A,
+            "how a quick stop ends is unknown: it must brake left and not let it coast; make sure by the manual, then "
+            "press the emergency stop once at low speed",
+        ),
         (
             0x6084,
-            "how hard left brakes is unknown: it must be at least 0.5 m/s² (limits.deceleration_mps2), a value of 955",
+            "how hard left brakes is unknown: it must be at least 0.5 m/s² (limits.deceleration_mps2), a value of 955 "
+            "in 6084h:0; set it with the maker's tool",
         ),
         (
             0x6085,
             "how hard left brakes is unknown: it must be at least 1.5 m/s² (limits.emergency_deceleration_mps2), a "
-            "value of 2865",
+            "value of 2865 in 6085h:0; set it with the maker's tool",
         ),
     ],
 )
@@ -79,7 +95,9 @@ def test_a_stop_that_cannot_be_set_nor_read_is_named_with_the_value_that_it_need
     drive = FakeDrive()
     del drive.objects[index, 0]
     boot = boot_one_axis(drive)
-    assert notes_of(boot) == (f"{index:04X}h:0: 0602 0000h the object does not exist", unknown)
+    first, second = notes_of(boot)
+    assert first.startswith(f"{index:04X}h:0: 0602 0000h the object does not exist")
+    assert second == unknown
     assert boot.report is not None
     assert boot.report.stops_by_itself
 
@@ -96,14 +114,14 @@ def test_a_drive_without_6007h_does_not_stop_by_itself() -> None:
 @pytest.mark.parametrize(
     ("key", "so"),
     [
-        ((0x1016, 1), "so it does not stop by the watchdog's heartbeat"),
-        ((0x6007, 0), "so no lost heartbeat or node guarding stops the motor"),
+        ((0x1016, 1), "so it does not stop by the watchdog's heartbeat: set 1016h:1 to 007E012Ch"),
+        ((0x6007, 0), "so no lost heartbeat or node guarding stops the motor: set 6007h:0 to 0003h"),
     ],
 )
 def test_what_a_drive_refuses_of_its_self_stop_is_named_with_what_that_means(key: Key, so: str) -> None:
     """A proof by commissioning would not count: the drive has both objects, so it is not offered."""
     boot = boot_one_axis(FakeDrive(refuse={key: INVALID}))
-    assert any(f"{so}: {BY_HAND}, else only a wired STO does" in note for note in notes_of(boot))
+    assert any(f"{so} {BY_HAND}, else only a wired STO does" in note for note in notes_of(boot))
     assert "canbase commission" not in str(notes_of(boot))
     assert boot.report is not None
     assert not boot.report.stops_by_itself
@@ -143,7 +161,8 @@ def test_an_option_that_the_drive_changes_is_a_note() -> None:
         drive.objects[0x6083, 0] = u32(1000)
 
     assert notes_of(boot_one_axis(FakeDrive(on_write={(0x6083, 0): clamp}))) == (
-        "6083h:0 is 000003E8h, expected 00000B31h",
+        "6083h:0 is 000003E8h, expected 00000B31h; so it may accelerate more slowly than ordered: set 6083h:0 to "
+        "00000B31h with the maker's tool",
     )
 
 
@@ -152,7 +171,7 @@ def test_a_read_only_option_passes_when_it_is_right_and_is_a_note_when_not() -> 
     drive.objects[0x605A, 0] = u16(2)
     assert notes_of(boot_one_axis(drive)) == (
         "605Eh:0 is 0000h, expected 0002h (0601 0002h the object is read-only); so a fault may take the power away and "
-        "let the wheel coast: " + BY_HAND,
+        "let the wheel coast: set 605Eh:0 to 0002h " + BY_HAND,
     )
 
 
@@ -168,8 +187,8 @@ def test_a_fixed_mapping_that_is_right_is_left_alone() -> None:
 
 
 NO_TORQUE = (
-    "In its drive profile, options.torque names another object or none; without torque the power goes off for a moment "
-    "at each standstill (watchdog.stand_proof)"
+    "Where it can map the other one of 6077h and 6078h, name that in `options.torque` of its drive profile; without "
+    "torque the power goes off for a moment at each standstill (watchdog.stand_proof)"
 )
 
 
@@ -377,7 +396,11 @@ def test_two_drives_with_one_node_id_are_named() -> None:
             return super().on_frame(frame) * 2
 
     text = error_of(boot_one_axis(Twins()))
-    assert text.startswith("node 1: each request is answered twice: two devices on the bus have this node id.")
+    assert text.startswith(
+        "node 1: each request is answered twice: two devices on the bus have this node id, or a gatew"
+    )
+    assert "canbase adopt" in text
+    assert "If one drive alone has it, take out the gateway" in text
 
 
 def test_a_watchdog_that_stops_the_drive_meanwhile_is_no_second_drive() -> None:
@@ -420,13 +443,13 @@ def test_an_answer_that_comes_late_and_then_again_names_no_second_drive() -> Non
             (0x6060, 0),
             INVALID,
             "6060h:0: 0609 0030h value not valid",
-            "Set `mode` in robot.yaml to one that the drive has, see 6502h",
+            "Set `mode` in robot.yaml to one that the drive has: in 6502h (canbase sdo read 1 6502)",
         ),
         ((0x60FF, 0), INVALID, "60FFh:0: 0609 0030h", "let the drive take its commands from the bus"),
         ((0x60FF, 0), GENERAL_ERROR, "60FFh:0: 0800 0000h", "check `axis` in robot.yaml"),
         ((0x6041, 0), GENERAL_ERROR, "6041h:0: 0800 0000h", "check `axis` in robot.yaml"),
-        ((0x1400, 1), DEVICE_STATE, "RPDO1 cannot be switched off (1400h:1: 0800 0022h", "Switch the drive off and on"),
-        ((0x60FF, 0), DEVICE_STATE, "60FFh:0: 0800 0022h", "Switch the drive off and on again"),
+        ((0x1400, 1), DEVICE_STATE, "RPDO1 cannot be switched off (1400h:1: 0800 0022h", "switch the drive off and on"),
+        ((0x60FF, 0), DEVICE_STATE, "60FFh:0: 0800 0022h", "switch the drive off and on again"),
         ((0x6041, 0), NO_OBJECT, "6041h:0: 0602 0000h the object does not exist", "check `axis` in robot.yaml"),
         (
             (0x1600, 2),
@@ -440,8 +463,8 @@ def test_an_answer_that_comes_late_and_then_again_names_no_second_drive() -> Non
             "TPDO1 does not take another mapping (1A00h:0: 0601 0002h",
             "carry 6041h:0, 6064h:0 wi",
         ),
-        ((0x1600, 1), DEVICE_STATE, "RPDO1 does not take 6040h:0 (1600h:1: 0800 0022h", "Switch the drive off and on"),
-        ((0x1400, 2), DEVICE_STATE, "1400h:2: 0800 0022h", "Switch the drive off and on again"),
+        ((0x1600, 1), DEVICE_STATE, "RPDO1 does not take 6040h:0 (1600h:1: 0800 0022h", "switch the drive off and on"),
+        ((0x1400, 2), DEVICE_STATE, "1400h:2: 0800 0022h", "switch the drive off and on again"),
     ],
 )
 def test_a_refused_necessity_is_an_error(key: Key, abort: int, problem: str, hint: str) -> None:
@@ -502,7 +525,11 @@ def test_the_key_for_synchronous_pdos_is_named_only_where_the_drive_takes_them(
 
 def test_a_drive_that_refuses_1000h_is_there() -> None:
     for refuse_read, said in (
-        ({(0x1000, 0): GENERAL_ERROR}, "1000h:0 cannot be read: 0800 0000h general error"),
+        (
+            {(0x1000, 0): GENERAL_ERROR},
+            "1000h:0 cannot be read: 0800 0000h general error; so nothing shows that it is a motor drive; it is used "
+            "as one",
+        ),
         ({(0x1000, 0): NO_OBJECT}, "it has no 1000h, which CiA 301 requires of every device"),
     ):
         notes = notes_of(boot_one_axis(FakeDrive(refuse_read=refuse_read)))
@@ -707,3 +734,12 @@ def test_a_drive_that_keeps_another_way_to_brake_in_a_quick_stop_is_noted() -> N
     drive.objects[0x605A, 0] = u16(6)
     drive.refuse[0x605A, 0] = READ_ONLY
     assert boot_one_axis(drive).report is not None
+
+
+def test_a_drive_that_reads_back_another_mapping_is_told_what_its_pdo_needs() -> None:
+    def swaps(drive: FakeDrive, _: bytes) -> None:
+        drive.objects[0x1600, 1], drive.objects[0x1600, 2] = drive.objects[0x1600, 2], drive.objects[0x1600, 1]
+
+    text = error_of(boot_one_axis(FakeDrive(on_write={(0x1600, 0): swaps})))
+    assert "RPDO1 reads back another mapping than was written to 1600h" in text
+    assert "Let RPDO1 carry 6040h:0, 60FFh:0 with the maker's tool" in text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 from math import pi
 
 import pytest
@@ -11,6 +12,7 @@ from canbase_sim import faults
 from canbase_sim.cia402.raw_units import Scale
 from canbase_sim.cia402.states import State
 from canbase_sim.frame import Frame
+from canbase_sim.personality import GENERIC, PERSONALITIES, Personality
 from canbase_sim.world.bench import Bench, BenchParameters, Truth
 from canbase_sim.world.trace import Trace
 from support.sim_rig import MPS, Rig, robot
@@ -53,6 +55,22 @@ def test_one_motor_revolution_per_second_in_every_unit(unit: str, raw: int) -> N
     wheel = {"node_id": 1, "side": "left", "velocity_unit": unit}
     drive = robot({"joint": "left", **wheel}, {"joint": "right", "node_id": 2, "side": "right"}).drives[0]
     assert Scale.of(drive, 0.1).raw(2 * pi * 0.1 / 10) == raw
+
+
+@pytest.mark.parametrize(
+    ("kind", "room"),
+    [(GENERIC, 2**31 - 1), (PERSONALITIES["inverter"], 32_767), (replace(GENERIC, widths={0x606C: "h"}), 32_767)],
+    ids=["606Ch", "6044h", "606Ch of 16 bits"],
+)
+def test_a_speed_that_an_object_has_no_room_for_is_shown_as_the_fastest_one(kind: Personality, room: int) -> None:
+    """A jumping encoder shows 1e9 m/s for a moment; the other direction of it has room too."""
+    wheels: list[dict[str, object]] = [
+        {"joint": side, "node_id": node_id, "side": side, "velocity_unit": "rpm"}
+        for node_id, side in ((1, "left"), (2, "right"))
+    ]
+    scale = Scale.of(robot(*wheels).drives[0], 0.1, kind)
+    assert [scale.raw(mps) for mps in (1e9, -1e9, 0.0)] == [room, -room, 0]
+    assert scale.limited(room + 1) == room
 
 
 def test_the_result_does_not_depend_on_when_one_looks() -> None:

@@ -98,6 +98,17 @@ def test_reading_that_fails() -> None:
     assert health.failed_since == math.inf
 
 
+def test_a_bus_in_trouble_takes_frames_and_does_not_work_until_somebody_else_is_heard() -> None:
+    health = BusHealth()
+    assert health.works
+    health.on_trouble(1.0)
+    health.on_trouble(2.0)
+    health.on_sent()
+    assert (health.failed_since, health.takes_frames, health.works) == (1.0, True, False)
+    health.on_data()
+    assert health.works
+
+
 def test_of_two_troubles_the_older_one_counts_and_both_must_end() -> None:
     health = BusHealth()
     health.on_send_error(1.0)

@@ -262,7 +262,13 @@ def test_the_sentences_about_frames_have_the_values() -> None:
         "wheel_1_0 is enabled, and SYNCs come without setpoints for it: the last one is 0.100 s old (allowed 0.100 s)"
     )
     assert detail(replace(AT_REST, double_answers=10.0)) == (
-        "two drives answer as node 1, that of wheel_1_0: give each its own id"
+        "two drives answer as node 1, that of wheel_1_0: give each its own id (canbase scan names them). If there is "
+        "one alone, a gateway, a bridge or a second interface sends its frames again: take it out"
+    )
+    assert detail(replace(AT_REST, double_answers=10.0, copied_at=NOW)) == (
+        "node 1, that of wheel_1_0, answers twice, with the same data within 2 ms: take out the gateway, the "
+        "bridge or the second interface that sends its frames again. If there is none, two drives have this id "
+        "(canbase scan names them): give each its own"
     )
 
 
@@ -315,6 +321,32 @@ def test_the_sign_is_told() -> None:
     assert not stands(verdict, of(OFF), CONFIG, NOW)
 
 
+@pytest.mark.parametrize(
+    ("copied", "first", "then"),
+    [
+        (
+            True,
+            "frames come twice, or another master is on the bus: S. ",
+            "If there is none, stop the other master",
+        ),
+        (
+            False,
+            "another master is on the bus, or frames are sent again: S. ",
+            "If there is none, take out the gateway",
+        ),
+    ],
+)
+def test_frames_that_come_twice_trip_whatever_the_reason_and_the_likelier_one_comes_first(
+    copied: bool, first: str, then: str
+) -> None:
+    verdict = decide(of(AT_REST, foreign=Sign(NOW, 0, "S", copied)), CONFIG, NOW)
+    assert verdict.cause is TripCause.FOREIGN_MASTER
+    assert verdict.detail.startswith(first)
+    assert then in verdict.detail
+    assert "canbase scan" in verdict.detail or "candump" in verdict.detail
+    assert len(verdict.detail) < 450, "the record of a trip keeps 512 bytes"
+
+
 # --- the bus
 
 
@@ -363,7 +395,7 @@ def test_each_cause_says_what_a_reset_needs() -> None:
     words = {check.cause: check.clears_on for check in CHECKS}
     assert {cause: clears_on(Verdict(cause)) for cause in words} == words
     assert clears_on(Verdict(TripCause.ENDED)) == "nothing else"
-    assert words[TripCause.FOREIGN_MASTER] == "the other master has sent nothing for 1 s"
+    assert words[TripCause.FOREIGN_MASTER] == "no such frame has come for 1 s"
     assert words[TripCause.BUS_FAILED] == "the bus takes frames again"
 
 

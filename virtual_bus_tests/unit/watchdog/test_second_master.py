@@ -184,11 +184,11 @@ def test_back_and_forth_each_change_counts() -> None:
 def test_three_syncs_without_setpoints_within_a_second() -> None:
     bus = Bus()
     bus.cycle()
-    bus.sync(0.002)
-    bus.sync(0.004)
+    bus.sync(0.0021)
+    bus.sync(0.0042)
     assert bus.sign is None
-    bus.sync(0.006)
-    assert bus.sign == Sign(0.006, 0, "SYNCs without setpoints")
+    bus.sync(0.0063)
+    assert bus.sign == Sign(0.0063, 0, "SYNCs without setpoints", copied=False)
 
 
 # 0.75 periods after the last one a SYNC keeps the beat: 7.5 ms at 100 Hz
@@ -226,7 +226,8 @@ def test_the_number_of_syncs_goes_with_the_rate(control_hz: float) -> None:
         one.cycle(A, n / control_hz)
         two.cycle(A, n / control_hz / 2)
     assert one.sign is None
-    assert two.sign == Sign(399 / control_hz / 2, 0, f"more SYNCs than the driver's {control_hz:g} per second")
+    told = f"more SYNCs than the driver's {control_hz:g} per second"
+    assert two.sign == Sign(399 / control_hz / 2, 0, told, copied=False)
 
 
 # --- heartbeats: 10 periods of 0.1 s; 15 and one more are too many
@@ -246,7 +247,7 @@ def test_the_sentence_about_heartbeats() -> None:
     bus = Bus(drive_heartbeat_s=0.9)
     for n in range(60):
         bus.foreign.on_heartbeat(n * 0.15)
-    assert bus.sign == Sign(59 * 0.15, 0, "more heartbeats 77Fh than one each 0.300 s")
+    assert bus.sign == Sign(59 * 0.15, 0, "more heartbeats 77Fh than one each 0.300 s", copied=False)
 
 
 # --- commands to an enabled drive: once is enough
@@ -418,7 +419,7 @@ def test_where_own_frames_do_not_come_back_any_77e_that_could_keep_a_drive_alive
     assert (foreign.last is not None) is sign
     if foreign.last:
         assert foreign.last.detail == (
-            "heartbeats 77Eh that this watchdog has not sent: another device has its node id, 126; give it another one"
+            "heartbeats 77Eh that this watchdog has not sent; a device with its node id, 126, needs another one"
         )
 
 
@@ -431,3 +432,92 @@ def test_where_own_frames_come_back_they_are_no_sign_and_more_of_them_are() -> N
         two.on_watchdog_heartbeat(n * 0.1 + 0.02)
     assert one.last is None
     assert two.last is not None
+
+
+# --- frames that are sent again: R R' S S', each copy so long after its frame; own heartbeats too
+
+
+def copied(
+    bus: Bus, copy_s: float = 0.0005, *, own: bool = True, setpoints: bool = True, each: int = 1, cycles: int = 60
+) -> None:
+    """At a ramp: each setpoint is another one. One cycle in `each` is copied, the first four as well: their SYNC, and
+    the setpoint and the own heartbeat, where they are."""
+    for n in range(cycles):
+        at, data, times = n / 100, n.to_bytes(6, "little"), 2 if n % each == 0 or n < 4 else 1
+        for turn in range(times if setpoints else 1):
+            bus.setpoint(data, 0x201, at + turn * copy_s)
+        for turn in range(times):
+            bus.sync(at + 0.004 + turn * copy_s)
+        if n % 10 == 0:
+            for turn in range(times if own else 1):
+                bus.foreign.on_watchdog_heartbeat(at + 0.006 + turn * copy_s)
+
+
+@pytest.mark.parametrize("each", [1, 5, 20])
+@pytest.mark.parametrize(("copy_ms", "is_copy"), [(0.2, True), (1.9, True), (2.1, False)])
+def test_frames_that_come_twice_within_2_ms_are_a_sign_and_said_to_be_copies(
+    copy_ms: float, is_copy: bool, each: int
+) -> None:
+    """All of them by a bridge, or one in five by a defective adapter."""
+    bus = Bus()
+    copied(bus, copy_ms / 1000, each=each)
+    assert bus.sign is not None
+    assert bus.sign.detail.startswith(("SYNCs without setpoints", "more SYNCs"))
+    assert bus.sign.copied is is_copy
+
+
+def test_the_third_sync_that_comes_twice_is_enough_for_the_sign_and_for_the_likelier_reason() -> None:
+    """A bridge is plugged in: no heartbeat of this watchdog has come since."""
+    bus = Bus()
+    copied(bus, cycles=3)
+    assert bus.sign == Sign(0.0245, 0, "SYNCs without setpoints", copied=True)
+
+
+def test_syncs_that_come_just_behind_ours_and_setpoints_that_come_once_are_another_masters() -> None:
+    bus = Bus()
+    copied(bus, setpoints=False, cycles=4)
+    assert bus.sign is not None
+    assert bus.sign.copied is False
+
+
+def test_another_driver_at_rest_sends_the_same_setpoints_and_no_heartbeat_of_this_watchdog() -> None:
+    bus = Bus()
+    copied(bus, own=False)
+    assert bus.sign is not None
+    assert bus.sign.copied is False
+
+
+def test_where_own_frames_do_not_come_back_those_of_the_driver_decide() -> None:
+    bus = Bus()
+    bus.foreign = Foreign(CONFIG, echo=False)
+    copied(bus, own=False)
+    assert bus.sign is not None
+    assert bus.sign.copied is True
+
+
+def test_a_copy_of_ten_seconds_ago_says_nothing_about_now() -> None:
+    bus = Bus()
+    copied(bus)
+    for n in range(1, 80):
+        bus.foreign.on_heartbeat(20.0 + n * 0.05)
+    assert bus.sign is not None
+    assert (bus.sign.detail[:23], bus.sign.copied) == ("more heartbeats 77Fh th", False)
+
+
+def test_the_signs_of_an_nmt_command_an_sdo_or_two_setpoints_need_another_master() -> None:
+    bus = Bus()
+    bus.cycle()
+    for _ in range(3):
+        two_setpoints(bus, 1)
+    assert [sign.copied for sign in (bus.sign, after(0x000, "80 01")) if sign] == [None, None]
+
+
+def test_the_feedback_of_a_drive_that_comes_twice_with_the_same_data_is_known_as_a_copy() -> None:
+    """Two drives with one node id have two positions."""
+    it = Observer(config(), 0.0)
+    for n in range(5):
+        for turn in range(2):
+            at = 1.0 + n / 100 + turn * 0.0005
+            it.on_frame(0x181, bytes.fromhex("37 02") + n.to_bytes(4, "little"), at)
+            it.on_frame(0x182, bytes.fromhex("37 02") + (2 * n + turn).to_bytes(4, "little"), at)
+    assert [axis.copied_at for axis in it.look().axes] == [1.0405, -math.inf]

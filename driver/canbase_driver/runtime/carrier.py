@@ -1,0 +1,28 @@
+"""Whether a CAN interface has a carrier: a controller that is bus-off has none.
+
+The kernel takes what is sent on such an interface, drops it, and reports no error. Its error frame came once, at the
+moment of bus-off: who opens the interface later is told nothing (linux: can_bus_off, net/sched noop_qdisc).
+
+The watchdog has a copy of its own; a test compares both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+INTERFACES = Path("/sys/class/net")
+
+
+def is_without_carrier(arguments: Mapping[str, Any], interfaces: Path = INTERFACES) -> bool:
+    """Whether the kernel says so of the interface of a bus with these arguments of `can.Bus`.
+
+    False where it does not tell: no SocketCAN, or the interface is down, and then sending fails.
+    """
+    if arguments.get("interface") != "socketcan":
+        return False
+    try:
+        return (interfaces / str(arguments.get("channel")) / "carrier").read_text("ascii").strip() == "0"
+    except OSError:
+        return False
