@@ -19,7 +19,7 @@ from rich.progress import Progress
 
 from canbase_campaign.cruise import Cruise, Run
 from canbase_campaign.robots import DrawnRobot, campaign_robot
-from canbase_campaign.twins import GOAL, JOYSTICK, TWINS, Twin
+from canbase_campaign.twins import GOAL, JOYSTICK, MEASURED, Twin
 from canbase_config.robot import Rates
 from canbase_sim.plant.base import PlantParameters
 from exit_matrix.page_table import Key, Row
@@ -52,14 +52,14 @@ def _s(seconds: float) -> str:
 
 
 def measured(
-    runs: int, workers: int, twins: Sequence[Twin] = TWINS, rates: str = "standard"
+    runs: int, workers: int, twins: Sequence[Twin] = MEASURED, rates: str = "standard"
 ) -> Iterator[tuple[Twin, list[Run]]]:
     """Each row in one of `workers` processes, in their order."""
     context = multiprocessing.get_context("spawn")
     with context.Pool(workers, _begin, (rates,)) as pool:
-        indexes = [TWINS.index(twin) for twin in twins]
+        indexes = [MEASURED.index(twin) for twin in twins]
         for index, found in zip(indexes, pool.imap(partial(_measure, runs), indexes), strict=True):
-            yield TWINS[index], found
+            yield MEASURED[index], found
 
 
 def _begin(rates: str) -> None:
@@ -69,7 +69,7 @@ def _begin(rates: str) -> None:
 
 
 def _measure(runs: int, index: int) -> list[Run]:
-    twin = TWINS[index]
+    twin = MEASURED[index]
     return [_cruises[twin.by].fork(twin, seed) for seed in range(runs)]
 
 
@@ -84,7 +84,7 @@ def main() -> int:
     given = parser.parse_args()
     if given.write is not None and given.rates != RATES[0]:
         parser.error(f"the page is about the rates {RATES[0]}")
-    twins = [twin for twin in TWINS if given.only in f"{twin.what}: {twin.how}"]
+    twins = [twin for twin in MEASURED if given.only in f"{twin.what}: {twin.how}"]
     out = Console()
     found: dict[Key, Row] = {}
     stood = True

@@ -8,7 +8,7 @@ import pytest
 
 from campaign.stops import cells, measured, quantile
 from canbase_campaign.cruise import Cruise, Run, longest_stop_s
-from canbase_campaign.twins import JOYSTICK, LIES, STOPS, TWINS, Twin, drive
+from canbase_campaign.twins import DELIVERY, JOYSTICK, LIES, MEASURED, STOPS, Twin, drive
 from exit_matrix.stop_table import VIRTUAL
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(600)]
@@ -44,7 +44,7 @@ def test_the_same_seed_gives_the_same_run() -> None:
 
 
 def test_each_row_has_its_name_once() -> None:
-    assert len({twin.key for twin in TWINS}) == len(STOPS) + len(LIES) == len(TWINS)
+    assert len({twin.key for twin in MEASURED}) == len(STOPS) + len(LIES) + len(DELIVERY) == len(MEASURED)
 
 
 @pytest.mark.parametrize(("share", "value"), [(0.5, 50), (0.99, 99), (1.0, 100), (0.0, 1)])

@@ -161,4 +161,18 @@ LIES: tuple[Twin, ...] = (
 )
 """Something differs from its description."""
 TWINS = (*STOPS, *(replace(twin, lies=True) for twin in LIES))
+"""Those that `canbase qualify` tries too, one by one."""
+
+DELIVERY: tuple[Twin, ...] = (
+    Twin("adapter", "of motor_driver fails", fault("bus_problem")),
+    Twin("adapter", "of the watchdog fails", fault("watchdog_bus_problem")),
+    Twin("velocity_mux", "its orders do not arrive", fault("mux_lossy", share=1.0)),
+    Twin("motor_driver/status", "does not arrive", fault("status_lost")),
+    Twin("joystick", "comes 2 s late, then zero is ordered", fault("orders_delayed", value=2.0), JOYSTICK, ZERO_S),
+    Twin("scan", "repeats its readings with new stamps", fault("scanner_frozen", margin_m=None)),
+    Twin("scan", "repeats three scans by turns", fault("scanner_by_turns", margin_m=None)),
+    Twin("frames", "come twice, one of five", fault("frame_duplication", value=0.2)),
+)
+"""Something is not sent, or arrives late, again or twice."""
+MEASURED = (*TWINS, *DELIVERY)
 """Every row."""

@@ -9,7 +9,9 @@ from canbase_config.robot import Robot
 from canbase_hazards.catalogue import Braking, Catalogue, Hazard, Part, Row
 from canbase_hazards.formula import evaluate
 from canbase_hazards.promise import worst_distance_m
-from hazards.proofs import ROOT
+from exit_matrix.page_table import NOTHING
+from hazards.measured import longest_stop
+from hazards.proofs import ROOT, stops
 
 PAGE = ROOT / "docs" / "safety.md"
 COMMAND = "make hazards"
@@ -20,8 +22,8 @@ BRAKES = {
     Braking.COAST: "coasts",
     Braking.NONE: "–",
 }
-HEAD = """| failure | must hold | component | acts within | braking, distance | reaction | proof |
-|---|---|---|---|---|---|---|"""
+HEAD = """| failure | must hold | component | acts within | braking, distance | measured at 0.4 m/s | reaction | proof |
+|---|---|---|---|---|---|---|---|"""
 
 
 def sample_robot() -> Robot:
@@ -48,6 +50,7 @@ def _line(row: Row, robot: Robot) -> str:
         row.layer,
         _time(row, robot),
         _distance(row, robot),
+        _measured(row),
         f"{row.reaction} {_category(row)}",
         "<br>".join(f"`{name}`" if name.endswith(".py") or "::" in name else name for name in row.tests),
     )
@@ -63,6 +66,11 @@ def _time(row: Row, robot: Robot) -> str:
 def _distance(row: Row, robot: Robot) -> str:
     distance_m = worst_distance_m(row, robot)
     return BRAKES[row.braking] if distance_m is None else f"{BRAKES[row.braking]}, {distance_m:.2f} m"
+
+
+def _measured(row: Row) -> str:
+    stop = longest_stop(row, stops())
+    return NOTHING if stop is None else f"{stop.cell}: {stop.name}, {stop.source}"
 
 
 def _category(row: Row) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from canbase_hazards.catalogue import Catalogue
 from exit_matrix.failures import ROWS
-from exit_matrix.page_table import NOTHING
+from exit_matrix.page_table import NOTHING, Key
 from exit_matrix.stop_table import COMMANDS, REAL_RUN, TABLE
 from support.marked_page import section
 from vm.guest.main import ALL
@@ -46,12 +46,16 @@ def is_proof(node_id: str, names: frozenset[str]) -> bool:
     return path in names or f"{path}::{test.partition('[')[0]}" in names
 
 
+def stops() -> dict[Key, dict[str, str]]:
+    """The stops that docs/stop_times.md has now, by what fails and how."""
+    return TABLE.rows(section(STOP_TIMES.read_text(encoding="utf-8"), COMMANDS))
+
+
 def _matrix_problem(name: str) -> str:
     if name not in {row.name for row in ROWS}:
         return f"{MATRIX}{name}: no such row in exit_matrix/failures.py"
     what, how = name.split(": ", 1)
-    measured = TABLE.rows(section(STOP_TIMES.read_text(encoding="utf-8"), COMMANDS)).get((what, how), {})
-    if measured.get(REAL_RUN, NOTHING) == NOTHING:
+    if stops().get((what, how), {}).get(REAL_RUN, NOTHING) == NOTHING:
         return f"{MATRIX}{name}: docs/stop_times.md has no measurement of it"
     return ""
 

@@ -17,6 +17,8 @@ VARIABLE: Final = "CANBASE_INDEPENDENT_STACKS"
 FILES: Final[Mapping[str, tuple[str, ...]]] = {
     "drives of ros2_canopen": ("cia402_slave", "cia402_slave.eds"),
     "CANopenNode": ("canopend",),
+    "CANopenNode writes a setpoint": ("canopend",),
+    "CANopenNode takes a drive out": ("canopend",),
 }
 """What each scenario needs from the folder."""
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from vm import independent_stacks
@@ -35,7 +37,7 @@ def overlay(folder: Path) -> None:
     tree = folder / "overlay"
     options = ["--python", "/opt/canbase/bin/python", "--hardware-watchdog", str(HARDWARE_WATCHDOG_S)]
     command = [sys.executable, "-m", "canbase_cli", "install", "--config", str(config), "--prefix", str(tree), *options]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=_without_ros(os.environ))
     _drives(tree / "etc")
     _system(tree / "etc")
     ours, ignored = tree / "usr/lib/canbase-vm", shutil.ignore_patterns("__pycache__")
@@ -44,6 +46,12 @@ def overlay(folder: Path) -> None:
     (ours / "support").mkdir()
     independent_stacks.copy_to(independent_stacks.folder(), ours / "stacks")
     shutil.copy(HERE.parent / "support/bare_node.py", ours / "support")
+
+
+def _without_ros(environment: Mapping[str, str]) -> dict[str, str]:
+    """The guest's ROS is its own: `canbase install` would take over the domain of whoever runs this, where the
+    scenarios would not find the robot."""
+    return {name: value for name, value in environment.items() if not name.startswith(("ROS_", "RMW_"))}
 
 
 def _drives(etc: Path) -> None:

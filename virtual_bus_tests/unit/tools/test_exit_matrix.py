@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from canbase_campaign.twins import TWINS
+from canbase_campaign.twins import MEASURED
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from exit_matrix import stop_limits
@@ -92,7 +92,7 @@ def test_real_rows_come_in_their_order_before_those_of_virtual_time_alone() -> N
 
 def test_what_a_twin_in_virtual_time_is_called_is_a_row_of_the_matrix_or_of_none_of_its_names() -> None:
     """A name that is spelt in two ways would make two rows."""
-    names, twins = {(row.what, row.how) for row in ROWS}, {twin.key for twin in TWINS}
+    names, twins = {(row.what, row.how) for row in ROWS}, {twin.key for twin in MEASURED}
     alone = sorted(how for _, how in twins - names)
     assert len(names & twins) >= 35
     assert not [how for how in alone if any(how.lower() == real.lower() for _, real in names)]

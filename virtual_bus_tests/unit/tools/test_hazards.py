@@ -7,11 +7,14 @@ from pydantic import ValidationError
 
 from campaign.removed_safeguards import SAFEGUARDS
 from canbase_campaign.faults import FAULTS
-from canbase_campaign.twins import TWINS
+from canbase_campaign.twins import MEASURED, SPEED_MPS
 from canbase_hazards.catalogue import Braking, Catalogue, Row, load
 from canbase_hazards.formula import FormulaError, evaluate
 from canbase_hazards.promise import worst_distance_m
+from exit_matrix.page_table import Key
+from exit_matrix.stop_limits import ALLOWANCE_S, quick, ramp
 from hazards import page, proofs
+from hazards.measured import longest_stop
 from support.marked_page import rewritten
 
 CATALOGUE = load()
@@ -37,7 +40,7 @@ def test_each_safeguard_can_be_taken_out(row: Row) -> None:
 
 @pytest.mark.parametrize("row", [row for row in CATALOGUE.rows if row.faults], ids=lambda row: row.id)
 def test_each_failure_of_a_row_is_one_of_the_campaign(row: Row) -> None:
-    known = FAULTS.keys() | {": ".join(twin.key) for twin in TWINS}
+    known = FAULTS.keys() | {": ".join(twin.key) for twin in MEASURED}
     assert [name for name in row.faults if name not in known] == []
     assert len(set(row.faults)) == len(row.faults)
 
@@ -45,6 +48,44 @@ def test_each_failure_of_a_row_is_one_of_the_campaign(row: Row) -> None:
 def test_each_failure_of_the_campaign_has_a_row() -> None:
     named = {name for row in CATALOGUE.rows for name in row.faults}
     assert FAULTS.keys() - named == set()
+
+
+BRAKING_S = {Braking.RAMP: ramp, Braking.QUICK_STOP: quick}
+STOPS = proofs.stops()
+PROMISED = [row for row in CATALOGUE.rows if row.within_s and row.braking in BRAKING_S and longest_stop(row, STOPS)]
+
+
+@pytest.mark.parametrize("row", PROMISED, ids=lambda row: row.id)
+def test_no_measured_stop_is_longer_than_its_row_states(row: Row) -> None:
+    stop = longest_stop(row, STOPS)
+    assert stop is not None
+    assert stop.time_s <= evaluate(row.within_s, ROBOT) + BRAKING_S[row.braking](ROBOT, SPEED_MPS) + ALLOWANCE_S
+
+
+def longest(stops: dict[Key, dict[str, str]], *faults: str) -> tuple[str, str, str] | None:
+    """Of a row with these failures."""
+    row = CATALOGUE.rows[0].model_copy(update={"faults": faults, "tests": ("matrix: a: killed",)})
+    stop = longest_stop(row, stops)
+    return None if stop is None else (stop.cell, stop.name, stop.source)
+
+
+def test_the_longest_stop_of_a_row_is_that_of_many_runs_where_there_are_such() -> None:
+    stops: dict[Key, dict[str, str]] = {
+        ("a", "killed"): {"one real run": "0.90 s, 10 mm", "runs": "100", "max": "0.40 s, 90 mm"},
+        ("a", "hung: for ever"): {"one real run": "0.50 s, 20 mm", "runs": "–", "max": "–"},
+        ("b", "killed"): {"one real run": "7.00 s, 1 mm"},
+    }
+    assert longest(stops) == ("0.40 s, 90 mm", "a: killed", "100 runs")
+    assert longest(stops, "hangs", "a: hung: for ever") == ("0.50 s, 20 mm", "a: hung: for ever", "one real run")
+    assert longest({}, "hangs") is None
+
+
+def test_a_base_that_never_stood_took_the_longest() -> None:
+    stops: dict[Key, dict[str, str]] = {
+        ("a", "killed"): {"runs": "9", "max": "0.40 s, 90 mm"},
+        ("b", "c"): {"runs": "9", "max": "never, 3 mm"},
+    }
+    assert longest(stops, "b: c") == ("never, 3 mm", "b: c", "9 runs")
 
 
 def test_the_page_is_up_to_date() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import signal
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,13 +13,13 @@ import pytest
 
 from canbase_config.load import load_robot
 from vm import independent_stacks, table
-from vm.guest.candump import samples, speed
+from vm.guest.candump import boot_s, samples, speed
 from vm.guest.joystick import order_of
 from vm.guest.main import ALL, FIRST, SECOND, SHORT, bounded, names, shared_out
 from vm.guest.slcan_adapter import frame_of, line_of
 from vm.guest.standstill import standstill
 from vm.guest.system import BrokenPromiseError
-from vm.overlay import robot_yaml
+from vm.overlay import overlay, robot_yaml
 from vm.patience import Patience
 
 ROW = {
@@ -212,6 +213,17 @@ def test_robot_and_drives_are_on_two_controllers() -> None:
     assert "required: true" not in robot
 
 
+def test_the_guests_robot_has_the_domain_of_the_scenarios_whatever_the_developer_uses(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", "63")
+
+    overlay(tmp_path)
+
+    installed = (tmp_path / "overlay/etc/canbase/robot.env").read_text()
+    assert "ROS_DOMAIN_ID=0" in installed
+
+
 def test_the_guests_robot_gets_power_although_nobody_commissions_it(tmp_path: Path) -> None:
     path = tmp_path / "robot.yaml"
     path.write_text(robot_yaml("can0", "/run/canbase/robot/lease.sock"))
@@ -264,6 +276,25 @@ def test_the_speed_of_a_drive_is_that_of_the_last_samples() -> None:
     assert speed(found, 1.0) == pytest.approx(2040.0)
     assert speed(found, 0.6) == pytest.approx(2048.0)
     assert speed(found, 0.1) == speed(found[:1], 1.0) == speed([], 1.0) == 0.0
+
+
+BOOT = """(10.000000) vcan0 181#3706E8030000
+(10.100000) vcan0 77F#05
+(10.100300) vcan0 601#4041600000000000
+(10.150000) vcan0 181#5002E8030000
+(10.220000) vcan0 181#3706E8030000
+(10.240000) vcan0 182#270600000000
+(10.300000) vcan0 182#270600000000"""
+
+
+def test_a_boot_takes_from_the_drivers_first_heartbeat_until_the_last_drive_is_enabled() -> None:
+    assert boot_s(BOOT.splitlines(), [1, 2]) == pytest.approx(0.14)
+    assert boot_s(BOOT.splitlines(), [1]) == pytest.approx(0.12)
+
+
+def test_a_drive_that_is_not_enabled_has_no_boot_and_neither_has_a_bus_without_a_driver() -> None:
+    assert boot_s(BOOT.splitlines()[:5], [1, 2]) == math.inf
+    assert boot_s([line for line in BOOT.splitlines() if " 77F#" not in line], [1, 2]) == math.inf
 
 
 def test_scenarios_with_programs_of_other_authors_are_skipped_with_the_remedy_where_nobody_provides_them(

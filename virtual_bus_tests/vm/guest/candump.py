@@ -1,14 +1,19 @@
-"""Positions of drives from what candump (can-utils) has written: the frames of docs/bus.md, read by another program.
-Pure."""
+"""Positions and states of drives from what candump (can-utils) has written: the frames of docs/bus.md, read by another
+program. Pure."""
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 TPDO1: Final = 0x180
+DRIVER_HEARTBEAT: Final = 0x77F
+STATE: Final = 0x6F
+"""The bits of 6041h that are the state (CiA 402)."""
+OPERATION_ENABLED: Final = 0x27
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +38,24 @@ def _sample(line: str, cob_id: int) -> Sample | None:
     if identifier != f"{cob_id:03X}" or len(data) != 12:
         return None
     status, position = struct.unpack("<Hi", bytes.fromhex(data))
-    return Sample(float(words[0].strip("()")), status, position)
+    return Sample(_time(line), status, position)
+
+
+def boot_s(lines: Sequence[str], node_ids: Iterable[int]) -> float:
+    """From the first heartbeat of the driver until the last of these drives reports OPERATION ENABLED [s]; infinity:
+    one of them does not, or there is no driver."""
+    begun_s = next((_time(line) for line in lines if f" {DRIVER_HEARTBEAT:03X}#" in line), math.inf)
+    enabled_s = max(_enabled_s(samples(lines, node_id), begun_s) for node_id in node_ids)
+    return enabled_s - begun_s if enabled_s < math.inf else math.inf
+
+
+def _enabled_s(found: Iterable[Sample], since_s: float) -> float:
+    times = (each.time_s for each in found if each.time_s >= since_s and each.status & STATE == OPERATION_ENABLED)
+    return next(times, math.inf)
+
+
+def _time(line: str) -> float:
+    return float(line.partition(")")[0].strip("("))
 
 
 def speed(found: Sequence[Sample], window_s: float) -> float:

@@ -101,12 +101,12 @@ def canopennode(robot: Robot) -> Row:
     text = ROBOT_YAML.read_text().replace("name: robot", "name: bench").replace("channel: can0", f"channel: {BUS}")
     CONFIG.write_text(text)
     with virtual_interface(BUS):
-        with _drives(robot) as drives, _gateway(robot) as gateway:
+        with _drives(robot) as drives, gateway(robot) as commands:
             for command, answer in READS_AND_REFUSALS:
-                gateway.gets(command, answer)
-            row = _killed_at_speed(robot, drives, gateway)
-        with _drives(robot), _gateway(robot) as gateway:
-            _gives_node_ids(robot, gateway)
+                commands.gets(command, answer)
+            row = _killed_at_speed(robot, drives, commands)
+        with _drives(robot), gateway(robot) as commands:
+            _gives_node_ids(robot, commands)
         _is_adopted(robot)
     return row
 
@@ -123,26 +123,27 @@ def _drives(robot: Robot) -> Iterator[SimControl]:
 
 
 @contextmanager
-def _gateway(robot: Robot) -> Iterator[Gateway]:
-    with background(DEVICE, PROGRAM, BUS, "-i", str(MASTER), "-c", f"local-{COMMANDS}"):
+def gateway(robot: Robot, bus: str = BUS) -> Iterator[Gateway]:
+    """CANopenNode as the master of this interface, until it is left."""
+    with background(DEVICE, PROGRAM, bus, "-i", str(MASTER), "-c", f"local-{COMMANDS}"):
         robot.wait("CANopenNode's gateway", COMMANDS.exists)
-        gateway = Gateway()
+        commands = Gateway()
         try:
-            yield gateway
+            yield commands
         finally:
-            gateway.close()
+            commands.close()
     COMMANDS.unlink(missing_ok=True)
 
 
-def _killed_at_speed(robot: Robot, drives: SimControl, gateway: Gateway) -> Row:
+def _killed_at_speed(robot: Robot, drives: SimControl, commands: Gateway) -> Row:
     config = robot.config
-    gateway.gets(f"{MASTER} w 0x1017 0 u16 {BEAT_MS}", "OK")
+    commands.gets(f"{MASTER} w 0x1017 0 u16 {BEAT_MS}", "OK")
     for command in (command for drive in config.drives for command in _set_up(config, drive.node_id)):
-        gateway.gets(command, "OK")
-    for drive, target in zip(config.drives, _targets(config), strict=True):
-        gateway.gets(f"{drive.node_id} w 0x60FF 0 i32 {target}", "OK")
+        commands.gets(command, "OK")
+    for drive, target in zip(config.drives, targets(config), strict=True):
+        commands.gets(f"{drive.node_id} w 0x60FF 0 i32 {target}", "OK")
     robot.wait("speed", lambda: drives.truth().linear_mps >= 0.97 * SPEED_MPS, 10.0)
-    status = int(gateway.ask("1 r 0x6041 0 u16")[-1])
+    status = int(commands.ask("1 r 0x6041 0 u16")[-1])
     if status & 0x6F != OPERATION_ENABLED:
         raise BrokenPromiseError(f"CANopenNode reads 6041h as {status:04X}h of a drive that turns")
     moment_s = time.monotonic()
@@ -167,20 +168,21 @@ def _set_up(config: Config, node_id: int) -> Iterator[str]:
         yield f"{node_id} w 0x6040 0 u16 {word}"
 
 
-def _targets(config: Config) -> Iterator[int]:
+def targets(config: Config) -> Iterator[int]:
+    """60FFh of each drive at the speed of the scenarios."""
     for drive in config.drives:
         yield round(drive.direction * SPEED_MPS / Scale.of(drive, config.base.wheel_radius_m).target_mps)
 
 
-def _gives_node_ids(robot: Robot, gateway: Gateway) -> None:
+def _gives_node_ids(robot: Robot, commands: Gateway) -> None:
     """By LSS to drives that have none: its fastscan finds both."""
     for command in NODE_IDS_GONE:
-        gateway.gets(command, "OK")
+        commands.gets(command, "OK")
     robot.spin(1.0)  # the drives boot again
-    answer = gateway.ask(f"lss_allnodes {SCAN_STEP_MS}")
+    answer = commands.ask(f"lss_allnodes {SCAN_STEP_MS}")
     if answer != list(FOUND):
         raise BrokenPromiseError(f"CANopenNode's LSS master: {answer}, expected {FOUND}")
-    gateway.gets("3 r 0x1018 4 x32", "0x00000002")
+    commands.gets("3 r 0x1018 4 x32", "0x00000002")
 
 
 def _is_adopted(robot: Robot) -> None:

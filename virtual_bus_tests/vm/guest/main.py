@@ -21,6 +21,7 @@ from vm.guest import (
     integrator,
     processor,
     ros2_canopen,
+    second_master,
     two_robots,
     unit_failures,
     upgrade,
@@ -57,6 +58,8 @@ FIRST: dict[str, Scenario] = {
     "upgrade": upgrade.upgraded,
     "two robots": two_robots.two_robots,
     "CANopenNode": canopennode.canopennode,
+    "CANopenNode writes a setpoint": second_master.writes_a_setpoint,
+    "CANopenNode takes a drive out": second_master.takes_a_drive_out,
     "drives of ros2_canopen": ros2_canopen.drives_of_ros2_canopen,
 }
 SECOND: dict[str, Scenario] = {

@@ -16,7 +16,7 @@ from canbase_sim.world.bench import Truth
 prefer_udp(os.environ)
 
 import rclpy  # noqa: E402 - reads the environment
-from canbase.msg import DriverStatus  # noqa: E402
+from canbase.msg import DriverStatus, MuxSource, MuxState  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.signals import SignalHandlerOptions  # noqa: E402
@@ -49,6 +49,8 @@ class Robot:
         self.status: DriverStatus | None = None
         self.status_at = -math.inf
         self.node.create_subscription(DriverStatus, f"{namespace}motor_driver/status", self._on_status, 10)
+        self._followed_at = -math.inf
+        self.node.create_subscription(MuxState, f"{namespace}velocity_mux/state", self._on_mux, 10)
         self._stick = Stick(f"{namespace}{TOPIC}")
         self._reset = self.node.create_client(Trigger, f"{namespace}motor_driver/reset")
         self._filter_reset = self.node.create_client(Trigger, f"{namespace}safety_filter/reset")
@@ -59,6 +61,10 @@ class Robot:
 
     def _on_status(self, message: DriverStatus) -> None:
         self.status, self.status_at = message, time.monotonic()
+
+    def _on_mux(self, message: MuxState) -> None:
+        if any(source.name == message.active and source.standing == MuxSource.FOLLOWED for source in message.sources):
+            self._followed_at = time.monotonic()
 
     @cached_property
     def sim(self) -> SimControl:
@@ -180,7 +186,8 @@ class Robot:
                 if self.reset():
                     done_s = time.monotonic() - asked_s
             self.spin(0.2)
-        self.spin(0.2)
+        enabled_s = time.monotonic()
+        self.wait("the mux to follow the joystick", lambda: self._followed_at > enabled_s)
         self.order(None)
         self.spin(0.5)  # until the mux has seen that the joystick is silent
         return done_s

@@ -1,0 +1,46 @@
+"""The longest stop that docs/stop_times.md has of a row's failures: the column `measured` of docs/safety.md. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from canbase_hazards.catalogue import Row
+from canbase_qualification.hazard_figures import faults_of
+from exit_matrix.page_table import NOTHING, Key
+from exit_matrix.page_table import Row as Cells
+from exit_matrix.stop_table import REAL_RUN
+
+MAX, RUNS = "max", "runs"
+"""Columns of virtual time: the longest time and distance, and of how many runs."""
+
+
+@dataclass(frozen=True, slots=True)
+class LongestStop:
+    """`cell`: time and distance, as the page has them. `name`: `what: how` of the failure. `source`: of which runs."""
+
+    cell: str
+    name: str
+    source: str
+
+    @property
+    def time_s(self) -> float:
+        """From the failure until standstill [s]; infinity: the base never stood."""
+        return math.inf if self.cell.startswith("never") else float(self.cell.partition(" ")[0])
+
+
+def longest_stop(row: Row, stops: Mapping[Key, Cells]) -> LongestStop | None:
+    """Of all failures of `row`; None: none was measured. Where there are runs in virtual time they count, because they
+    are many; else the one run of real processes does."""
+    measured = [stop for name in faults_of(row) if (stop := _stop(name, stops)) is not None]
+    return max(measured, key=lambda stop: stop.time_s, default=None)
+
+
+def _stop(name: str, stops: Mapping[Key, Cells]) -> LongestStop | None:
+    cells = stops.get(tuple(name.split(": ", 1)), {})
+    if (longest := cells.get(MAX, NOTHING)) != NOTHING:
+        return LongestStop(longest, name, f"{cells[RUNS]} runs")
+    if (once := cells.get(REAL_RUN, NOTHING)) != NOTHING:
+        return LongestStop(once, name, "one real run")
+    return None
