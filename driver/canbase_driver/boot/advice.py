@@ -108,6 +108,16 @@ OF_AN_AXIS = frozenset((0x6040, 0x6041, 0x6060, 0x6064, 0x606C, 0x60FF))
 """What every axis of a CiA 402 drive has, by the index of the first one."""
 
 
+def may_pass(error: SdoError) -> bool:
+    """Whether a drive that still starts fails so too, and no longer when it has started: it answers nothing, its state
+    forbids it, or it does not have its axes yet."""
+    if isinstance(error, SdoTimeout):
+        return True
+    code = error.code if isinstance(error, SdoAborted) else 0
+    without_axis = code in (NO_OBJECT, NO_SUB_INDEX, GENERAL_ERROR) and _first_axis(error.index) in OF_AN_AXIS
+    return code == DEVICE_STATE or without_axis
+
+
 def hint(error: SdoError) -> str:
     """What to try about a transfer that failed after all its tries."""
     if isinstance(error, SdoTimeout):

@@ -7,7 +7,7 @@ from dataclasses import replace
 from canbase_config.drive_values import FIRST_SPARE_TPDO
 from canbase_config.object_map import AXIS_OFFSET as SECOND_AXIS
 from canbase_config.object_map import VELOCITY_ACTUAL, place
-from canbase_driver.boot.advice import ELSE_UNUSABLE, OTHER_STATE
+from canbase_driver.boot.advice import ELSE_UNUSABLE
 from canbase_driver.boot.steps import BootError, NodeAccess, Steps, unsigned
 from canbase_driver.cia301.pdo import AT_ONCE, AT_ONCE_TOO, EVERY_SYNC, NodeLayout, Pdo
 from canbase_driver.cia301.sdo_client import DEVICE_STATE, NO_OBJECT, NO_SUB_INDEX, Read, SdoAborted, Write
@@ -212,7 +212,7 @@ def _make_right(node: NodeAccess, layout: NodeLayout, pdo: Pdo, found: int, cob_
         tool = (
             f"Let {pdo.name} carry {_needed(pdo)} with COB-ID {pdo.cob_id:03X}h, by the maker's tool; {ELSE_UNUSABLE}"
         )
-        raise BootError(node.node_id, problem, OTHER_STATE if stays_on.code == DEVICE_STATE else tool) from refused
+        raise BootError.refused(node.node_id, problem, stays_on.code, tool) from refused
     try:
         yield from _set_type(node, pdo, unread=mapped is not None and pdo.transmission_type != AT_ONCE)
     except BootError as refused:
@@ -345,10 +345,8 @@ def _write_count(node: NodeAccess, pdo: Pdo, count: int) -> Steps[None]:
 def _unmapped(node: NodeAccess, pdo: Pdo, sub: int, what: str, refused: SdoAborted) -> BootError:
     """The drive does not take `what` into this PDO."""
     problem = f"{pdo.name} does not take {what} ({pdo.mapping_object:04X}h:{sub}: {refused.text})"
-    if refused.code == DEVICE_STATE:
-        return BootError(node.node_id, problem, OTHER_STATE)
-    tool = f"Let {pdo.name} carry {_needed(pdo)} with the maker's tool"
-    return BootError(node.node_id, problem, f"{tool}; {ELSE_UNUSABLE}")
+    tool = f"Let {pdo.name} carry {_needed(pdo)} with the maker's tool; {ELSE_UNUSABLE}"
+    return BootError.refused(node.node_id, problem, refused.code, tool)
 
 
 def _needed(pdo: Pdo) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Final
 
 from canbase_config.profile import SDO_SERVERS, Profile
-from canbase_driver.boot.advice import ELSE_UNUSABLE, OTHER_STATE, see
+from canbase_driver.boot.advice import ELSE_UNUSABLE, see
 from canbase_driver.boot.steps import BootError, NodeAccess, Steps, unsigned
 from canbase_driver.cia301.sdo_client import (
     DEVICE_STATE,
@@ -80,8 +80,8 @@ def _stays_open(node: NodeAccess, index: int, requests: int, refusals: list[SdoA
     channel = f"a second SDO channel takes requests by {requests & _IDENTIFIER:03X}h"
     problem = f"{index:04X}h:{REQUESTS} stays at {requests:08X}h{why}: {channel}, where nobody sees what they change"
     tool = f"Close it with the maker's tool (bit 31 of {index:04X}h:{REQUESTS}); {ELSE_UNUSABLE}"
-    is_state = any(refused.code == DEVICE_STATE for refused in refusals)
-    return BootError(node.node_id, problem, OTHER_STATE if is_state else tool)
+    codes = [refused.code for refused in refusals]
+    return BootError.refused(node.node_id, problem, DEVICE_STATE if DEVICE_STATE in codes else 0, tool)
 
 
 def _refusal(step: Write) -> Steps[SdoAborted | None]:

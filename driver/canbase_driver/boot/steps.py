@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from canbase_config.profile import Presence
-from canbase_driver.boot.advice import NOT_AN_AXIS, OTHER_STATE, UNANSWERED, hint, in_digits, see, without
+from canbase_driver.boot.advice import OTHER_STATE, hint, in_digits, may_pass, see, without
 from canbase_driver.cia301.nmt import NmtCommand
 from canbase_driver.cia301.sdo_client import (
     ACCESS_UNSUPPORTED,
+    DEVICE_STATE,
     NO_OBJECT,
     NO_SUB_INDEX,
     READ_ONLY,
@@ -76,21 +77,25 @@ Steps = Generator[Step, Any, T]
 class BootError(Exception):
     """A node cannot be made ready. The text names the object, the reason and what to try."""
 
-    def __init__(self, node_id: int, problem: str, hint: str) -> None:
+    def __init__(self, node_id: int, problem: str, hint: str, *, may_pass: bool = False) -> None:
+        """`may_pass`: a drive that still starts does this too, and no longer when it has started."""
         super().__init__(f"node {node_id}: {problem}. {hint}.")
         self.node_id = node_id
         self.problem = problem
         self.hint = hint
+        self.may_pass = may_pass
 
-    @property
-    def may_pass(self) -> bool:
-        """A drive that still starts does this too, and no longer when it has started."""
-        return self.hint.startswith((OTHER_STATE, UNANSWERED, NOT_AN_AXIS))
+    @classmethod
+    def refused(cls, node_id: int, problem: str, code: int, hint: str) -> BootError:
+        """The drive aborted with this code. `hint`: what to try, unless it is the drive's state that forbids it."""
+        of_state = code == DEVICE_STATE
+        return cls(node_id, problem, OTHER_STATE if of_state else hint, may_pass=of_state)
 
 
 def boot_error(error: SdoError) -> BootError:
     """The message for the person at the machine about a transfer that failed after all its tries."""
-    return BootError(error.node_id, f"{error.index:04X}h:{error.sub}: {error.text}", hint(error))
+    problem = f"{error.index:04X}h:{error.sub}: {error.text}"
+    return BootError(error.node_id, problem, hint(error), may_pass=may_pass(error))
 
 
 class NodeAccess:
