@@ -336,7 +336,9 @@ def test_a_safety_relay_stays_open_until_the_bus_takes_frames(rig: Rig) -> None:
 
 
 # bus-off before this life ── the kernel takes frames, no toggle ── the carrier is back, a frame comes ── toggled
-def test_a_safety_relay_stays_open_while_the_controller_is_bus_off(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_safety_relay_stays_open_while_the_controller_is_bus_off(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     relay, asked, off = Toggled(), threading.Event(), [True]
     monkeypatch.setattr(watchdog_bus_port, "is_without_carrier", lambda _: off[0])
     alone = {"interface": "virtual", "channel": "off"}
@@ -349,6 +351,7 @@ def test_a_safety_relay_stays_open_while_the_controller_is_bus_off(rig: Rig, mon
         other.send(can.Message(arbitration_id=0x77F, data=b"\5", is_extended_id=False))  # the driver, on this computer
         time.sleep(0.2)
         assert (relay.times, bus.health.takes_frames) == (0, True)
+        assert [record.message for record in caplog.records].count(loop.OFF_BEFORE) == 1
         off[0] = False
         other.send(can.Message(arbitration_id=0x701, data=b"\5", is_extended_id=False))
         rig.robot.wait_for(lambda: relay.times > 3, LONG_S)
