@@ -7,6 +7,7 @@ import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -105,11 +106,22 @@ def ros_arguments(ctx: typer.Context, namespace: str) -> list[str]:
 def check_unused_ros_arguments(ctx: typer.Context) -> None:
     """For a process without a ROS node, which launch files start with words for ROS as well: they have no effect.
 
-    Raises typer.BadParameter for what ROS does not take. Without ROS 2 nothing can check them.
+    Raises typer.BadParameter for what ROS does not take. Without ROS 2, or with one that cannot be loaded, nothing can
+    check them: a defect of ROS keeps no watchdog from starting.
     """
     given = list(ctx.meta.get(_ROS_FLAG, ()))
-    if given and find_spec("rclpy") is not None:
+    if given and _has_ros():
         _check_ros_arguments(given)
+
+
+def _has_ros() -> bool:
+    if find_spec("rclpy") is None:
+        return False
+    try:
+        import_module("rclpy.context")
+    except ImportError:  # of a library that is missing or of another version, too
+        return False
+    return True
 
 
 def _check_ros_arguments(given: list[str]) -> None:

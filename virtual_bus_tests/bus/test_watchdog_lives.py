@@ -336,7 +336,9 @@ def test_a_safety_relay_stays_open_until_the_bus_takes_frames(rig: Rig) -> None:
 
 
 # bus-off before this life ── the kernel takes frames, no toggle ── the carrier is back, a frame comes ── toggled
-def test_a_safety_relay_stays_open_while_the_controller_is_bus_off(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_safety_relay_stays_open_while_the_controller_is_bus_off(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     relay, asked, off = Toggled(), threading.Event(), [True]
     monkeypatch.setattr(watchdog_bus_port, "is_without_carrier", lambda _: off[0])
     alone = {"interface": "virtual", "channel": "off"}
@@ -349,11 +351,33 @@ def test_a_safety_relay_stays_open_while_the_controller_is_bus_off(rig: Rig, mon
         other.send(can.Message(arbitration_id=0x77F, data=b"\5", is_extended_id=False))  # the driver, on this computer
         time.sleep(0.2)
         assert (relay.times, bus.health.takes_frames) == (0, True)
+        assert [record.message for record in caplog.records].count(loop.OFF_BEFORE) == 1
         off[0] = False
         other.send(can.Message(arbitration_id=0x701, data=b"\5", is_extended_id=False))
         rig.robot.wait_for(lambda: relay.times > 3, LONG_S)
         asked.set()
         thread.join(timeout=LONG_S)
+
+
+# a full bus: no frame can be sent, 200 come in ── one tick: the file of the carrier is not read for each of them
+@pytest.mark.parametrize("trouble", ["sending", "reading", "passive"])
+def test_the_carrier_is_not_read_for_frames_that_come_while_the_controller_is_not_bus_off(
+    monkeypatch: pytest.MonkeyPatch, trouble: str
+) -> None:
+    looks: list[bool] = []
+    monkeypatch.setattr(watchdog_bus_port, "is_without_carrier", lambda _: bool(looks.append(True)))
+    with BusPort({"interface": "virtual", "channel": "full"}) as bus, VirtualBus("full") as other:
+        looks.clear()
+        if trouble == "sending":
+            bus.health.on_send_error(1.0)
+        elif trouble == "reading":
+            bus.health.on_receive_error(1.0)
+        else:
+            bus.health.on_error_frame(0x004, b"\x00\x20", 1.0)
+        for _ in range(200):
+            other.send(can.Message(arbitration_id=0x181, data=bytes(6), is_extended_id=False))
+        assert len(list(bus.receive(time.monotonic()))) == 200
+        assert looks == []
 
 
 def test_an_adapter_that_is_gone_may_refuse_to_be_closed(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:

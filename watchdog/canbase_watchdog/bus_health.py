@@ -24,6 +24,8 @@ class BusHealth:
     def __init__(self) -> None:
         """It works until it is seen to fail."""
         self._unsent_since = self._broken_since = math.inf
+        self.is_off = False
+        """The controller has taken itself off the bus, and nothing has shown since that it is back."""
         self.send_errors = 0
         self.receive_errors = 0
         self.error_frames = 0
@@ -67,15 +69,22 @@ class BusHealth:
         says that it is back."""
         self._broken_since = min(self._broken_since, now_s)
 
+    def on_bus_off(self, now_s: float) -> None:
+        """The controller has taken itself off the bus. It takes no frames, whatever the kernel takes."""
+        self.is_off = True
+        self.on_trouble(now_s)
+
     def on_data(self) -> None:
         """A frame of somebody else came: controller and cable work."""
-        self._broken_since = math.inf
+        self._broken_since, self.is_off = math.inf, False
 
     def on_error_frame(self, error_class: int, data: bytes, now_s: float) -> None:
         """What the controller reports. Bus errors and lost arbitrations are only counted: each may be the last one."""
         self.error_frames += 1
         detail = data[1] if error_class & CONTROLLER and len(data) > 1 else 0
-        if error_class & (BUS_OFF | TX_TIMEOUT) or detail & PASSIVE:
+        if error_class & BUS_OFF:
+            self.on_bus_off(now_s)
+        elif error_class & TX_TIMEOUT or detail & PASSIVE:
             self.on_trouble(now_s)
         elif error_class & RESTARTED or detail & ACTIVE:
-            self._broken_since = math.inf
+            self.on_data()

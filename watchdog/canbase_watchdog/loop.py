@@ -37,6 +37,11 @@ NO_REQUESTS = (
     "computer fails"
 )
 
+OFF_BEFORE = (
+    "the CAN controller was bus-off before this start: check cable, termination and bit rate, and set restart-ms of "
+    "the interface (docs/install.md). No drive gets power, and the relay stays open, until a frame comes"
+)
+
 _log = logging.getLogger("canbase.watchdog")
 
 
@@ -72,6 +77,8 @@ class Loop:
         self._bus_has_fd = bus.fileno() is not None
         self._lost = not bus.health.works
         """The bus failed before this life, and has not worked since."""
+        if bus.health.is_off:
+            _log.warning(OFF_BEFORE)
         self._due = self._sent_at = self._collected_at = time.monotonic()
         self._suspended_s = suspended_s()
         self._acted_at = self._due

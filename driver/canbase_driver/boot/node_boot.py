@@ -210,8 +210,11 @@ class NodeBoot:
         self._step = None
 
     def may_confirm(self, at: bytes) -> bool:
-        """Whether an answer that confirms a write to this address may be one to a request of this boot."""
-        return self._client.may_confirm(at)
+        """Whether an answer that confirms a write to this address may be one to a request of this boot.
+
+        None may when it has ended well: then it has all its answers, however long it waits to be started.
+        """
+        return self.report is None and self._client.may_confirm(at)
 
     def has_requested(self, at: bytes) -> bool:
         """Whether it has dealt with the object that has this address."""

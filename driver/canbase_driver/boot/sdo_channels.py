@@ -42,7 +42,8 @@ def close_sdo_channels(node: NodeAccess, kind: Profile) -> Steps[None]:
 
 
 def _requests(node: NodeAccess, index: int) -> Steps[int | None]:
-    """None: there is no such channel, or the drive refuses to show it; then it is closed blindly, or noted."""
+    """None: there is no such channel, or the drive neither shows nor closes it, which is noted. One that it closes
+    without showing it counts as closed, and the next one is looked for."""
     try:
         return unsigned((yield Read(index, REQUESTS)))
     except SdoAborted as refused:
@@ -50,7 +51,7 @@ def _requests(node: NodeAccess, index: int) -> Steps[int | None]:
             return None
         may_exist = refused.code != GENERAL_ERROR  # which many drives answer for what they do not have
         if may_exist and (yield from node.tries(Write(index, REQUESTS, CLOSED, 4))):
-            return None
+            return CLOSED
         tool = "where it has a second SDO channel, close it with the maker's tool: nobody sees what comes by it"
         node.notes.append(f"{index:04X}h:{REQUESTS} cannot be read: {refused.text}{see(index, REQUESTS)}; {tool}")
         return None

@@ -325,6 +325,20 @@ def test_without_ros_the_words_for_it_keep_no_watchdog_from_starting(monkeypatch
     assert len(started) == 1
 
 
+def test_a_ros_that_cannot_be_loaded_keeps_no_watchdog_from_starting(monkeypatch: pytest.MonkeyPatch) -> None:
+    """rclpy is found, and a library of it is not: after an update in part, or without its environment."""
+    started: list[Any] = []
+    monkeypatch.setattr(os, "execve", lambda *arguments: started.append(arguments))
+
+    def broken(name: str) -> None:
+        raise ImportError(f"{name}: librcl_action.so: cannot open shared object file")
+
+    monkeypatch.setattr("canbase_cli.options.import_module", broken)
+
+    assert CliRunner().invoke(app, ["watchdog", "--ros-args", "-r", "__ns:=/robot"]).exit_code == 0
+    assert len(started) == 1
+
+
 def test_a_parameter_of_another_type_than_its_node_declares_is_a_wrong_command_line_too() -> None:
     def begin() -> None:
         from rclpy.exceptions import InvalidParameterTypeException

@@ -453,7 +453,16 @@ def test_the_last_write_of_a_boot_hides_no_foreign_one_though_it_was_requested_t
     assert written_anew(story).endswith("is configured anew: another client has written its 1801h:1")
 
 
-# the same, and the drive refuses 1000h ── the same, and it answers nothing more: the boot has failed
+# the last write of the boot is requested and confirmed once ── 5 s: another drive boots ── foreign write of that object
+def test_while_a_node_waits_for_the_boots_of_the_others_its_own_last_write_hides_no_foreign_one() -> None:
+    story = waiting_for_the_others(FakeDrive())
+    assert [frame.data[1:4] for frame in story.sent if frame.cob_id == 0x601][-1] == LAST
+    story.wait(5.0)
+    story.node.on_sdo(Frame(0x581, b"\x60" + LAST + bytes(4)), story.now_s)
+    assert written_anew(story).endswith("is configured anew: another client has written its 1801h:1")
+
+
+# requested twice, and the drive refuses 1000h ── the same, and it answers nothing more: the boot has failed
 @pytest.mark.parametrize("silent", [False, True])
 def test_a_refusal_of_that_one_more_object_is_an_answer_and_silence_is_none(silent: bool) -> None:
     class Odd(Forgetful):

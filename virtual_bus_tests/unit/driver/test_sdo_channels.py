@@ -160,3 +160,11 @@ def test_what_cannot_be_read_is_closed_all_the_same_or_noted(code: int, takes: b
     else:
         key = "where the drive does not have it, `options.sdo_channels: no` in its drive profile"
         assert notes[0].startswith(f"1201h:1 cannot be read: {shown}; {key}; where it has a second SDO channel, close")
+
+
+@pytest.mark.parametrize("code", [WRITE_ONLY, DEVICE_STATE])
+def test_behind_a_channel_that_is_closed_without_being_read_the_next_one_is_closed_too(code: int) -> None:
+    second = {(0x1202, 1): u32(0x6A2), (0x1202, 2): u32(0x6C2)}
+    drive = with_channels(OPEN | second, refuse_read={(0x1201, 1): code})
+    assert notes_of(booted(drive)) == (f"1202h: a second SDO channel, requests by 6A2h, {CLOSED}",)
+    assert [drive.number(index, 1) for index in (0x1201, 0x1202)] == [CLOSED_ID, 0x8000_06A2]

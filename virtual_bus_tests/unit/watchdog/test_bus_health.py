@@ -101,12 +101,27 @@ def test_reading_that_fails() -> None:
 def test_a_bus_in_trouble_takes_frames_and_does_not_work_until_somebody_else_is_heard() -> None:
     health = BusHealth()
     assert health.works
-    health.on_trouble(1.0)
+    health.on_bus_off(1.0)
     health.on_trouble(2.0)
     health.on_sent()
     assert (health.failed_since, health.takes_frames, health.works) == (1.0, True, False)
     health.on_data()
     assert health.works
+
+
+@pytest.mark.parametrize("over", [(0x100, NONE), (0x004, ACTIVE), None])
+def test_only_bus_off_is_off_until_the_controller_or_a_frame_shows_that_it_is_back(
+    over: tuple[int, bytes] | None,
+) -> None:
+    assert not told((0x004, TX_PASSIVE), (0x001, NONE)).is_off
+    health = told((0x040, NONE))
+    health.on_sent()
+    assert (health.is_off, health.works) == (True, False)
+    if over is None:
+        health.on_data()
+    else:
+        health.on_error_frame(*over, 2.0)
+    assert (health.is_off, health.works) == (False, True)
 
 
 def test_of_two_troubles_the_older_one_counts_and_both_must_end() -> None:
