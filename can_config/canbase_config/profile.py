@@ -326,7 +326,10 @@ class Profile(Section):
         ):
             for position, write in enumerate(writes):
                 if write.index in SDO_SERVERS:
-                    message = f"{write.index:04X}h is an SDO channel: the boot closes all but the default one"
+                    message = (
+                        f"{write.index:04X}h is an SDO channel: take this entry out; the boot closes all but the "
+                        "default one"
+                    )
                     raise MisfitError(message, ("writes", name, position, "index"))
         return self
 

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
+from unittest.mock import Mock
 
 import can
 import pytest
@@ -196,6 +197,7 @@ def test_a_controller_that_was_bus_off_before_is_a_problem_until_something_is_he
 ) -> None:
     """Its error frame came when nobody listened, and the kernel takes every frame and drops it."""
     off = [begins_so]
+    monkeypatch.setattr(bus_port, "CARRIER_S", 0.0)
     monkeypatch.setattr(bus_port, "is_without_carrier", lambda _: off[0])
     port = BusPort(arguments)
     if not begins_so:
@@ -214,6 +216,22 @@ def test_a_controller_that_was_bus_off_before_is_a_problem_until_something_is_he
     other.send(can.Message(arbitration_id=0x701, data=b"\5", is_extended_id=False))
     assert port.receive(0.1) == Frame(0x701, b"\5")
     assert (port.problem, port.report.controller, port.report.failures) == ("", ControllerState.ERROR_ACTIVE, 1)
+    port.close()
+
+
+def test_the_carrier_is_not_looked_at_for_each_frame(
+    arguments: dict[str, Any], other: VirtualBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    look = Mock(return_value=True)
+    monkeypatch.setattr(bus_port, "CARRIER_S", 30.0)
+    monkeypatch.setattr(bus_port, "is_without_carrier", look)
+    port = BusPort(arguments)
+    reopened(port)
+    before = look.call_count
+    for _ in range(20):
+        other.send(can.Message(arbitration_id=0x77E, data=b"\5", is_extended_id=False))
+        assert port.receive(1.0) is not None
+    assert look.call_count == before + 1
     port.close()
 
 

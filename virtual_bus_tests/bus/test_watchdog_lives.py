@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
+from unittest.mock import Mock
 
 import can
 import pytest
@@ -364,10 +365,10 @@ def test_a_safety_relay_stays_open_while_the_controller_is_bus_off(
 def test_the_carrier_is_not_read_for_frames_that_come_while_the_controller_is_not_bus_off(
     monkeypatch: pytest.MonkeyPatch, trouble: str
 ) -> None:
-    looks: list[bool] = []
-    monkeypatch.setattr(watchdog_bus_port, "is_without_carrier", lambda _: bool(looks.append(True)))
+    look = Mock(return_value=False)
+    monkeypatch.setattr(watchdog_bus_port, "is_without_carrier", look)
     with BusPort({"interface": "virtual", "channel": "full"}) as bus, VirtualBus("full") as other:
-        looks.clear()
+        look.reset_mock()
         if trouble == "sending":
             bus.health.on_send_error(1.0)
         elif trouble == "reading":
@@ -377,7 +378,7 @@ def test_the_carrier_is_not_read_for_frames_that_come_while_the_controller_is_no
         for _ in range(200):
             other.send(can.Message(arbitration_id=0x181, data=bytes(6), is_extended_id=False))
         assert len(list(bus.receive(time.monotonic()))) == 200
-        assert looks == []
+        look.assert_not_called()
 
 
 def test_an_adapter_that_is_gone_may_refuse_to_be_closed(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:

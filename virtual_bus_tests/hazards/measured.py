@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from canbase_hazards.catalogue import Row
@@ -31,16 +31,14 @@ class LongestStop:
 
 
 def longest_stop(row: Row, stops: Mapping[Key, Cells]) -> LongestStop | None:
-    """Of all failures of `row`; None: none was measured. Where there are runs in virtual time they count, because they
-    are many; else the one run of real processes does."""
-    measured = [stop for name in faults_of(row) if (stop := _stop(name, stops)) is not None]
+    """Of all failures of `row`, in virtual time and in the one run of real processes; None: none was measured."""
+    measured = [stop for name in faults_of(row) for stop in _stops(name, stops)]
     return max(measured, key=lambda stop: stop.time_s, default=None)
 
 
-def _stop(name: str, stops: Mapping[Key, Cells]) -> LongestStop | None:
+def _stops(name: str, stops: Mapping[Key, Cells]) -> Iterator[LongestStop]:
     cells = stops.get(tuple(name.split(": ", 1)), {})
     if (longest := cells.get(MAX, NOTHING)) != NOTHING:
-        return LongestStop(longest, name, f"{cells[RUNS]} runs")
+        yield LongestStop(longest, name, f"{cells[RUNS]} runs")
     if (once := cells.get(REAL_RUN, NOTHING)) != NOTHING:
-        return LongestStop(once, name, "one real run")
-    return None
+        yield LongestStop(once, name, "one real run")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -16,6 +17,8 @@ from canbase_watchdog.frames import Frame
 
 SEND_TIMEOUT_S = 0.001
 """What the bus does not take within this time is dropped: each turn of the loop repeats what still matters."""
+CARRIER_S = 0.05
+"""Between two looks at the carrier of an interface that is bus-off [s]."""
 REQUESTED_BYTES = 1
 """Of the answer to a guard request: a remote frame has the length of what it requests (ISO 11898-1)."""
 BATCH = 256
@@ -42,6 +45,7 @@ class BusPort:
                 "Check `bus` in robot.yaml, and that the interface is up (ip -details link show)."
             ) from error
         self._arguments = arguments
+        self._carrier_due = -math.inf
         self._waiting: Received | None = None
         self._received_until = time.monotonic()
         self.health = BusHealth()
@@ -89,20 +93,25 @@ class BusPort:
             elif can_id > MAX_COB_ID and can_id & ERROR:
                 self.health.on_error_frame(can_id & ERROR_CLASS, data, time.monotonic())
             else:
-                self._on_data()
+                self._on_data(now_s)
                 if can_id <= MAX_COB_ID:
                     at_s = wall_s - behind_s
                     self._received_until = at_s if self._received_until <= at_s <= now_s else now_s
                     yield can_id, data, self._received_until
 
-    def _on_data(self) -> None:
+    def _on_data(self, now_s: float) -> None:
         """While it is bus-off, some interfaces (slcan) still bring the driver's frames to this process.
 
-        Only then is the carrier read: a read takes 30 us and the kernel's lock for all interfaces (rtnl_mutex), and
-        while no frame can be sent, a full bus brings 8000 frames per second.
+        Only then is the carrier read, and not for each frame: a read takes 30 us, and newer kernels take their lock for
+        all interfaces (rtnl_mutex) for it.
         """
-        if not (self.health.is_off and is_without_carrier(self._arguments)):
-            self.health.on_data()
+        if self.health.is_off:
+            if now_s < self._carrier_due:
+                return
+            self._carrier_due = now_s + CARRIER_S
+            if is_without_carrier(self._arguments):
+                return
+        self.health.on_data()
 
     def send(self, frame: Frame) -> None:
         """Send now or never: a frame that the bus does not take at once is counted and dropped."""

@@ -315,9 +315,9 @@ def _foreign_master(view: View, config: WatchdogConfig, now_s: float) -> Verdict
 _OF_A_SIGN = {
     None: "another master is on the bus: {}",
     False: (
-        "another master is on the bus, or frames are sent again: {}. They are no copies of our frames: find the other "
-        "master (canbase scan) and stop it. If there is none, take out the gateway, the bridge or the second interface "
-        "that sends frames again"
+        "another master is on the bus, or frames are sent again: {}. Our frames have no copies within 2 ms: find the "
+        "other master (canbase scan) and stop it. If there is none, take out the gateway, the bridge or the second "
+        "interface that sends frames again"
     ),
     True: (
         "frames come twice, or another master is on the bus: {}. SYNCs and other frames of ours come again "

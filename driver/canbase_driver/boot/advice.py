@@ -5,6 +5,7 @@ Words alone: which steps lead to them is in `steps.py`, `settings.py` and `pdo_m
 
 from __future__ import annotations
 
+from canbase_config.profile import SDO_SERVERS
 from canbase_driver.cia301.sdo_client import (
     DEVICE_STATE,
     GENERAL_ERROR,
@@ -25,7 +26,7 @@ PROFILE_KEYS: tuple[tuple[range, str], ...] = (
     (range(0x1017, 0x1018), "timeouts.drive_heartbeat_s of robot.yaml: a third of it is the period"),
     (range(0x1019, 0x101A), "options.sync_counter"),
     (range(0x1029, 0x102A), "self_stop.error_behaviour"),
-    (range(0x1201, 0x1280), "options.sdo_channels"),
+    (SDO_SERVERS[1:], "options.sdo_channels"),
     (range(0x1600, 0x1800), "layout"),
     (range(0x1A00, 0x1C00), "layout"),
     (range(0x6007, 0x6008), "self_stop.abort_connection"),
@@ -121,7 +122,7 @@ def may_pass(error: SdoError) -> bool:
 def hint(error: SdoError) -> str:
     """What to try about a transfer that failed after all its tries."""
     if isinstance(error, SdoTimeout):
-        return UNANSWERED
+        return f"{UNANSWERED}{_spared(error.index, error.sub)}"
     code = error.code if isinstance(error, SdoAborted) else 0
     key, index = profile_key(error.index, error.sub), _first_axis(error.index)
     if code == DEVICE_STATE:
@@ -149,11 +150,13 @@ def hint(error: SdoError) -> str:
 
 def see(index: int, sub: int) -> str:
     """The key that spares the boot the question, where the drive has no such object at all."""
+    return _spared(index, sub) or UNREAD.get(index, "")
+
+
+def _spared(index: int, sub: int) -> str:
     key = profile_key(index, sub)
     lacks = LACKS.get(key, "no") if key.startswith(("options.", "self_stop.")) else ""
-    if not lacks:
-        return UNREAD.get(index, "")
-    return f"; where the drive does not have it, `{key}: {lacks}` in its drive profile"
+    return f"; where the drive does not have it, `{key}: {lacks}` in its drive profile" if lacks else ""
 
 
 def in_digits(step: Write) -> str:

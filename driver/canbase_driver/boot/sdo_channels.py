@@ -52,7 +52,10 @@ def _requests(node: NodeAccess, index: int) -> Steps[int | None]:
         may_exist = refused.code != GENERAL_ERROR  # which many drives answer for what they do not have
         if may_exist and (yield from node.tries(Write(index, REQUESTS, CLOSED, 4))):
             return CLOSED
-        tool = "where it has a second SDO channel, close it with the maker's tool: nobody sees what comes by it"
+        tool = (
+            "where it has a second SDO channel, close it with the maker's tool and store that (1010h): nobody sees "
+            "what comes by it"
+        )
         node.notes.append(f"{index:04X}h:{REQUESTS} cannot be read: {refused.text}{see(index, REQUESTS)}; {tool}")
         return None
 
@@ -68,8 +71,9 @@ def _close(node: NodeAccess, index: int, requests: int) -> Steps[None]:
         refusal = yield from _refusal(off)
         if refusal is None and ((yield from node.read_if_present(index, sub)) or 0) & CLOSED:
             node.note_change(off, f"{before:08X}h")
-            how = f"a second SDO channel, requests by {requests & _IDENTIFIER:03X}h, was open and is closed"
-            node.notes.append(f"{index:04X}h: {how}: a panel or a tool that uses it gets no answer")
+            if requests & _IDENTIFIER:
+                how = f"a second SDO channel, requests by {requests & _IDENTIFIER:03X}h, was open and is closed"
+                node.notes.append(f"{index:04X}h: {how}: a panel or a tool that uses it gets no answer")
             return
         refusals.append(refusal)
     if requests & _IDENTIFIER:  # 000h is NMT: no request can come by it
@@ -80,7 +84,10 @@ def _stays_open(node: NodeAccess, index: int, requests: int, refusals: list[SdoA
     why = f" ({refusals[0].text})" if refusals else ""
     channel = f"a second SDO channel takes requests by {requests & _IDENTIFIER:03X}h"
     problem = f"{index:04X}h:{REQUESTS} stays at {requests:08X}h{why}: {channel}, where nobody sees what they change"
-    tool = f"Close it with the maker's tool (bit 31 of {index:04X}h:{REQUESTS}); {ELSE_UNUSABLE}"
+    tool = (
+        f"Close it with the maker's tool (bit 31 of {index:04X}h:{REQUESTS}) and store that (1010h), because the boot "
+        f"resets the drive; {ELSE_UNUSABLE}"
+    )
     codes = [refused.code for refused in refusals]
     return BootError.refused(node.node_id, problem, DEVICE_STATE if DEVICE_STATE in codes else 0, tool)
 

@@ -162,8 +162,7 @@ def _configure_ramps(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None
         needed, has = getattr(robot.limits, key), kept.mps2
         if has is None:
             value = AxisUnits(drive, robot.base).acceleration_raw(needed)
-            at = kept.what or f" in {write_at(drive, index, 0)}"
-            least = f"{needed:g} m/s² (limits.{key}), a value of {value}{at}"
+            least = f"{needed:g} m/s² (limits.{key}), a value of {value}{kept.what}"
             node.notes.append(
                 f"how hard {drive.joint} brakes is unknown: it must be at least {least}; set it with the maker's tool"
             )
@@ -186,7 +185,7 @@ def _set_ramp(node: NodeAccess, drive: Drive, robot: Robot, index: int, mps2: fl
         return None
     raw = yield from node.read_if_present(write.index, write.sub)
     if raw is None:
-        return KeptRamp()
+        return KeptRamp(" in the unit of its profile")
     return KeptRamp(f"{write.index:04X}h:{write.sub} stays at {raw}", units.acceleration_mps2(raw))
 
 

@@ -39,6 +39,10 @@ START_TIMEOUT_S = 1.0
 """From NMT start to a heartbeat "operational" and a status of every axis."""
 HOLD_S = 0.2
 """After the last NMT "enter pre-operational" it is left alone this long [s]; the watchdog repeats it every 0.05 s."""
+HELD = (
+    "NMT commands keep it pre-operational: the watchdog's while it stops drives that still turn, or those of another "
+    "master (canbase scan), which must end"
+)
 RETRY_S = 1.0
 """Between two boots of a node that failed."""
 UNHEARD_S = 1.0
@@ -197,7 +201,9 @@ class CanopenNode:
                 f"a drive that needs so long: timeouts.boot_s of robot.yaml{'; ' * bool(slow)}{slow}"
             )
         why = self.boot_error or self._why_gone
-        if self._is_unheard(now_s) or not self.boot_error:
+        if now_s < self._held_until:
+            why = HELD
+        elif self._is_unheard(now_s) or not self.boot_error:
             why = f"{why.removesuffix('.')}; {self._signs.what_to_check(now_s)}"
         return f"{self.name} is missing since {since_s:.0f} s: {why}"
 

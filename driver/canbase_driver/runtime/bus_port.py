@@ -38,6 +38,8 @@ IGNORED_AT_ONCE = 100
 """This many frames that are not ours are passed over in one reception: more than a bus brings in one cycle."""
 REQUESTED_BYTES = 1
 """Of the answer to a guard request: a remote frame has the length of what it requests (ISO 11898-1)."""
+CARRIER_S = 0.05
+"""Between two looks at the carrier of an interface that is bus-off [s]."""
 OPENS_AT_ONCE_S = 0.002
 """Most adapters are open by then; a serial one (slcan) takes 2 s, and the control cycle does not wait for it."""
 BUS_OFF = "the CAN controller is bus-off after too many errors: check cable, termination and bit rate"
@@ -67,9 +69,11 @@ def _is_guard_request(can_id: int) -> bool:
 class _Opening(threading.Thread):
     """Opens a bus while the control thread goes on."""
 
-    def __init__(self, open_: Callable[[], FrameSocket]) -> None:
+    def __init__(self, open_: Callable[[], FrameSocket], arguments: dict[str, Any]) -> None:
         super().__init__(name="opening", daemon=True)
         self.bus: FrameSocket | None = None
+        self.without_carrier = False
+        self._arguments = arguments
         self.error: BusError | None = None
         self._open = open_
         self._lock, self._abandoned = threading.Lock(), False
@@ -81,6 +85,7 @@ class _Opening(threading.Thread):
         except BusError as error:
             self.error = error
             return
+        self.without_carrier = is_without_carrier(self._arguments)
         with self._lock:
             self.bus = bus
             if self._abandoned:
@@ -114,9 +119,11 @@ class BusPort:
         """When the kernel received the last frame, by the wall clock; 0.0: unknown."""
         self._send_failures = self._receive_failures = self._passed_over = 0
         self._retry_at = 0.0
+        self._carrier_due = -math.inf
         self._opening: _Opening | None = None
         self._bus: FrameSocket | None = self._open()
-        if self._is_bus_off():
+        if is_without_carrier(arguments):
+            self._on_bus_off_before()
             self._fail(BUS_OFF)
 
     def receive(self, timeout_s: float) -> Frame | None:
@@ -215,17 +222,18 @@ class BusPort:
         if self.report.is_bus_off and not before.is_bus_off:
             self._fail(BUS_OFF)
 
-    def _is_bus_off(self) -> bool:
-        """The controller was bus-off before the bus was opened: it will not say so again, and the report has it now."""
-        without_carrier = is_without_carrier(self._arguments)
-        if without_carrier:
-            self.report = replace(self.report, controller=ControllerState.BUS_OFF)
-        return without_carrier
+    def _on_bus_off_before(self) -> None:
+        """The controller was bus-off before the bus was opened, and will not say so again."""
+        self.report = replace(self.report, controller=ControllerState.BUS_OFF)
 
     def _on_received(self) -> None:
         """The bus works. While it is bus-off, some interfaces (slcan) still bring this computer's own frames."""
         self._receive_failures = 0
         if self.report.is_bus_off:
+            now_s = time.monotonic()
+            if now_s < self._carrier_due:
+                return
+            self._carrier_due = now_s + CARRIER_S
             if is_without_carrier(self._arguments):
                 return
             self.report = replace(self.report, controller=BusReport().controller)
@@ -293,7 +301,7 @@ class BusPort:
         if self._opening is None:
             if time.monotonic() < self._retry_at:
                 return
-            self._opening = _Opening(self._open)
+            self._opening = _Opening(self._open, self._arguments)
             self._opening.start()
             self._opening.join(OPENS_AT_ONCE_S)
         if self._opening.is_alive():
@@ -305,5 +313,6 @@ class BusPort:
             self._retry_at = time.monotonic() + RETRY_S
             return
         self._send_failures = self._receive_failures = 0
-        if self._is_bus_off():
+        if opening.without_carrier:
+            self._on_bus_off_before()
             self.problem = BUS_OFF

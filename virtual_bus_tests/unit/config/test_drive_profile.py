@@ -244,5 +244,7 @@ def test_a_write_at_the_end_of_the_boot_cannot_undo_what_makes_the_drive_stop(
 def test_a_write_of_the_profile_opens_no_further_sdo_channel(tmp_path: Path, when: str) -> None:
     file = tmp_path / "own.yaml"
     file.write_text(f"title: own\nwrites: {{{when}: [{{index: 0x1201, sub: 1, value: 0x641, bits: 32}}]}}\n")
-    with pytest.raises(ConfigError, match="1201h is an SDO channel: the boot closes all but the default one"):
+    with pytest.raises(
+        ConfigError, match="1201h is an SDO channel: take this entry out; the boot closes all but the default one"
+    ):
         load_profile(str(file))

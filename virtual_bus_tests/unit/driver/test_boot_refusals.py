@@ -82,12 +82,12 @@ def test_a_missing_option_is_a_note(index: int, sub: int, note: str) -> None:
         (
             0x6084,
             "how hard left brakes is unknown: it must be at least 0.5 m/s² (limits.deceleration_mps2), a value of 955 "
-            "in 6084h:0; set it with the maker's tool",
+            "in the unit of its profile; set it with the maker's tool",
         ),
         (
             0x6085,
             "how hard left brakes is unknown: it must be at least 1.5 m/s² (limits.emergency_deceleration_mps2), a "
-            "value of 2865 in 6085h:0; set it with the maker's tool",
+            "value of 2865 in the unit of its profile; set it with the maker's tool",
         ),
     ],
 )

@@ -10,8 +10,10 @@ import pytest
 from canbase_config.profile_file import load_profile
 from canbase_config.robot import Robot
 from canbase_driver.boot.node_boot import NodeBoot
+from canbase_driver.cia301.frame import Frame
 from support.fake_drive import (
     DEVICE_STATE,
+    NO_OBJECT,
     READ_ONLY,
     WRITE_ONLY,
     Bench,
@@ -168,3 +170,16 @@ def test_behind_a_channel_that_is_closed_without_being_read_the_next_one_is_clos
     drive = with_channels(OPEN | second, refuse_read={(0x1201, 1): code})
     assert notes_of(booted(drive)) == (f"1202h: a second SDO channel, requests by 6A2h, {CLOSED}",)
     assert [drive.number(index, 1) for index in (0x1201, 0x1202)] == [CLOSED_ID, 0x8000_06A2]
+
+
+class Mute(FakeDrive):
+    """It answers no request for an object that it lacks, against CiA 301."""
+
+    def on_frame(self, frame: Frame) -> list[Frame]:
+        return [answer for answer in super().on_frame(frame) if answer.data[4:] != u32(NO_OBJECT)]
+
+
+def test_a_drive_that_does_not_answer_for_the_channels_that_it_lacks_is_told_the_key_that_spares_the_question() -> None:
+    told = error_of(booted(Mute()))
+    assert told.startswith("node 1: 1201h:1: no answer to 3 requests")
+    assert told.endswith("where the drive does not have it, `options.sdo_channels: no` in its drive profile.")

@@ -11,7 +11,7 @@ import pytest
 
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import NmtState
-from canbase_driver.drives.canopen_node import CanopenNode, Presence
+from canbase_driver.drives.canopen_node import HELD, CanopenNode, Presence
 from canbase_driver.drives.signs_of_life import SignsOfLife
 from support.chain_world import bench_robot
 from support.fake_drive import DEVICE_STATE, FakeDrive, u32
@@ -161,3 +161,18 @@ def test_a_boot_up_message_that_the_driver_has_caused_begins_no_new_start(of_res
         signs.on_heartbeat(PRE_OPERATIONAL, float(second), of_reset=False)
     signs.on_heartbeat(BOOT_UP, 100.0, of_reset=of_reset)
     assert bool(signs.may_be_starting(101.0)) is starts
+
+
+# 0 s ── another master keeps it pre-operational, so nothing is booted ── 60 s ── nobody is sent to drive or cable
+def test_of_a_node_that_nmt_commands_keep_pre_operational_the_master_is_named() -> None:
+    story = Story(Starting())
+    hold = Frame(0x000, b"\x80\x01")
+    story.node.on_nmt(hold, 0.0)
+    story.run(0.01)
+    story.now_s = 60.0
+    story.hear(0x701, "7F")
+    story.node.on_nmt(hold, story.now_s)
+    told = story.node.missing(story.now_s + 0.1)
+    assert told == f"node 1 (left_wheel) is missing since 60 s: {HELD}"
+    assert WIRING not in told
+    assert HELD not in story.node.missing(story.now_s + 0.3)
