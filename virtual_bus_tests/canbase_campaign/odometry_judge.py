@@ -49,6 +49,9 @@ class OdometryJudge:
 
     def step(self, now_s: float) -> str:
         """What is wrong now, or an empty text."""
+        if not self._shown.tells_truth:  # also while the driver hangs: it reads the counts of that time later
+            self._lies_until = now_s + self._late_s
+            self._origins = None
         driver = self._world.driver
         snapshot = driver.snapshot
         if snapshot is None or snapshot.time_s <= self._seen_at:
@@ -56,8 +59,6 @@ class OdometryJudge:
         self._seen_at = snapshot.time_s
         if driver.core is not self._core:
             self._core, self._last, self._origins = driver.core, None, None
-        if not self._shown.tells_truth:
-            self._lies_until = now_s + self._late_s
         if now_s <= self._lies_until:
             self._origins = None
         if snapshot.odometry.travel_losses != self._losses:
