@@ -14,6 +14,7 @@ from campaign.safeguard_needs import NEEDS, Need
 from campaign.teeth import look_at
 from canbase_campaign.faults import FAULTS
 from canbase_campaign.plan import MOST_FAULTS, draw_plan
+from canbase_campaign.robots import robot_of
 from canbase_campaign.runner import run
 from canbase_campaign.scenario import Result, Start
 from canbase_hazards.catalogue import load
@@ -46,6 +47,13 @@ def test_the_same_seed_gives_the_same_scenario() -> None:
     assert draw_plan(17) == plan
     assert start.fork(plan) == start.fork(plan)
     assert start.fork(draw_plan(18)) != start.fork(plan)
+
+
+# 0.58 s the driver hangs ── 0.77 s an encoder counts nothing ── 1.47 s it counts again ── 1.57 s the driver goes on
+def test_an_encoder_that_lies_while_the_driver_hangs_is_no_defect_of_its_odometry() -> None:
+    plan = draw_plan(6112)
+    assert {each.name for each in plan.faults} == {"driver_hangs", "encoder_lost"}
+    assert list(Start(robot_of(6112)).fork(plan).violations) == []
 
 
 def test_every_row_of_the_teeth_names_safeguards_and_faults_that_exist() -> None:
