@@ -1,10 +1,10 @@
 """Values of a drive that a robot wants published: `values` below each drive, and the spare TPDOs that carry them.
 
 One motor uses TPDO1 and TPDO2 of its node; TPDO3 and TPDO4 are spare. The feedback of two motors has the identifiers of
-all four, however many TPDOs the drive has. Bytes that a feedback TPDO leaves empty stay empty: driver and watchdog tell
-by its length what it carries, and two bytes more behind 606Ch would be read as a torque, behind 6064h as a velocity.
-CiA 301: eight bytes a PDO. Nothing that stops the robot depends on them: a value that a drive does not map is reported,
-and not published.
+all four, however many TPDOs the drive has. Bytes that a feedback TPDO does not use must stay unused: driver and
+watchdog recognize by its length what it carries, and two bytes more behind 606Ch would be read as a torque, behind
+6064h as a velocity. CiA 301: eight bytes a PDO. Nothing that stops the robot depends on values: one that a drive does
+not map is reported, and not published.
 """
 
 from __future__ import annotations

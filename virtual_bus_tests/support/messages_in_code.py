@@ -72,7 +72,7 @@ def help_texts() -> Iterator[Text]:
 
 def page_texts() -> Iterator[Text]:
     """Every line of README and docs/, without what `make docs` generates, and without decisions and changelog: those
-    tell what was right on their day."""
+    describe the state of their date."""
     for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))):
         if not {"decisions", "generated"} & set(path.parts) and path.name != "changelog.md":
             for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):

@@ -1,7 +1,8 @@
 """Whether a CAN interface has a carrier: a controller that is bus-off has none.
 
-The kernel takes what is sent on such an interface, drops it, and reports no error. Its error frame came once, at the
-moment of bus-off: who opens the interface later is told nothing (linux: can_bus_off, net/sched noop_qdisc).
+The kernel takes what is sent on such an interface, drops it, and reports no error. It reports bus-off once, by an
+error frame at that moment: a process that opens the interface later receives no report (linux: can_bus_off, net/sched
+noop_qdisc).
 
 A second copy, on purpose, of what canbase_driver.runtime.carrier does for the driver; a test compares both.
 """
@@ -16,9 +17,9 @@ INTERFACES = Path("/sys/class/net")
 
 
 def is_without_carrier(arguments: Mapping[str, Any], interfaces: Path = INTERFACES) -> bool:
-    """Whether the kernel says so of the interface of a bus with these arguments of `can.Bus`.
+    """Whether the kernel reports it of the interface of a bus with these arguments of `can.Bus`.
 
-    False where it does not tell: no SocketCAN, or the interface is down, and then sending fails.
+    False where the kernel reports nothing: without SocketCAN; and while the interface is down, when sending fails.
     """
     if arguments.get("interface") != "socketcan":
         return False

@@ -182,9 +182,11 @@ class SdoClient:
         self._answered: bytes | None = None
         """Address of the transfer that ended last, with the first answer to its only request."""
         self._addresses: set[bytes] = set()
+        """Of all requests; `_requests` leaves out those that the watchdog makes too."""
         self._unconfirmed: set[bytes] = set()
         """Addresses that were written, and whose last confirmation may not have come yet."""
         self._repeated = False
+        """The last transfer took more than one request."""
         self._timeout_s = timeout_s
         self._attempts = attempts
         self._transfer: Transfer | None = None

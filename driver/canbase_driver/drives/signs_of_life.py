@@ -19,7 +19,6 @@ STARTING_S = 30.0
 As long as the longest NMT reset that the boot learns."""
 PAUSE_S = 10.0
 """Without a message for longer, what comes then may be a drive that was switched on [s]."""
-_BOOT_UP, _EMCY = "its boot-up message", "an emergency message"
 _ABORT = 0x80
 """Command byte of an SDO abort (CiA 301)."""
 
@@ -30,37 +29,38 @@ class SignsOfLife:
     def __init__(self) -> None:
         self._at = self._since = -math.inf
         self._what = ""
+        self._comes_once = False
+        """A drive sends such a message once, at its start or at an error: the next one is not due."""
         self._abort_code = 0
 
     def on_heartbeat(self, state: NmtState, now_s: float, *, of_reset: bool) -> None:
         """A heartbeat, an answer to node guarding, or a boot-up message. `of_reset`: the driver has caused it."""
         if state is NmtState.INITIALISING:
             self._since = self._since if of_reset else now_s
-            self._note(_BOOT_UP, now_s)
+            self._note("its boot-up message", now_s, once=True)
         else:
             self._note(f"a heartbeat ({state.text})", now_s)
 
     def on_emcy(self, now_s: float) -> None:
         """An emergency message."""
-        self._note(_EMCY, now_s)
+        self._note("an emergency message", now_s, once=True)
 
     def on_sdo(self, frame: Frame, now_s: float) -> None:
         """An SDO answer, whoever has requested it."""
         self._note("an SDO answer", now_s)
         self._abort_code = int.from_bytes(frame.data[4:8], "little") if frame.data[:1] == bytes((_ABORT,)) else 0
 
-    def _note(self, what: str, now_s: float) -> None:
+    def _note(self, what: str, now_s: float, *, once: bool = False) -> None:
         if now_s - self._at > PAUSE_S:
             self._since = now_s
-        self._what, self._at, self._abort_code = what, now_s, 0
+        self._what, self._at, self._comes_once, self._abort_code = what, now_s, once, 0
 
     def what_to_check(self, now_s: float) -> str:
         """For a node that has answered no request of its boot: what came from it, and what that leaves to look at."""
         age_s = now_s - self._at
         if age_s == math.inf:
             return "no message has come from it: check its power, its cable, its node id and the bit rate"
-        comes_once = self._what in (_BOOT_UP, _EMCY)
-        if age_s > (STARTING_S if comes_once else FRESH_S):
+        if age_s > (STARTING_S if self._comes_once else FRESH_S):
             return f"its last message came {age_s:.0f} s ago ({self._sent}): check its power and its cable"
         sent = f"it sent {self._sent} {age_s:.1f} s ago, so power and cable are right"
         if now_s - self._since <= STARTING_S:
