@@ -61,6 +61,17 @@ class MuxSource(Section):
         return "geometry_msgs/msg/TwistStamped" if self.stamped else "geometry_msgs/msg/Twist"
 
     @model_validator(mode="after")
+    def _one_silence(self) -> MuxSource:
+        """A source that is still active is not absent."""
+        if self.neutral_after_s is not None and self.neutral_after_s < self.timeout_s:
+            message = (
+                f"without a message the source is active for timeout_s ({self.timeout_s:g}); only then is it absent: "
+                f"neutral_after_s ({self.neutral_after_s:g}) must not be less"
+            )
+            raise MisfitError(message, ("neutral_after_s",), ("timeout_s",))
+        return self
+
+    @model_validator(mode="after")
     def _joint_commands(self) -> MuxSource:
         """Hardware of ros2_control publishes zero while nothing is ordered: a zero can be waited for."""
         if self.type == JOINTS and not self.stamped:

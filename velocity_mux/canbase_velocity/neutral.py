@@ -4,7 +4,8 @@ Rules, for each source:
 1. At the start of the mux no source is armed. Only an armed source is followed.
 2. A zero command arms. One that arrives too late does not: what the source wants now is unknown.
 3. With `absent_s` (key neutral_after_s), that long without any message arms too: a program that begins with a velocity.
-   What this process did not watch, because it stood still itself, is no absence.
+   What this process did not watch, because it stood still itself, is no absence. Nor is there an absence while the last
+   command is still fresh: it would be followed, although its sender may have ended before the stop.
 4. Whose last command orders motion while the base is not ready is armed no more, however old that command is. A radio
    gap across a reset changes nothing.
 5. A source that publishes nothing while the base is not ready is disarmed too, unless absence may arm it (rule 3): its
@@ -60,7 +61,7 @@ class Arming:
         stopped = not_ready or (paused if needs_zero else "")
         if stopped and (self._moves or (silent and needs_zero)):
             self.disarm(stopped)
-        if self._absent_s is not None and now_s - self._absent_from >= self._absent_s:
+        if silent and self._absent_s is not None and now_s - self._absent_from >= self._absent_s:
             self.waits_since, self._moves = "", False
 
     def missed(self, now_s: float) -> None:

@@ -204,7 +204,7 @@ def test_who_orders_motion_over_a_reset_counts_from_its_next_zero_on() -> None:
     wishes, forward = Wishes(robot, 0.0), Twist(0.4, 0.0)
     for at in (0.0, 0.05):
         order(wishes, "cmd_vel_joy", forward, at)
-    wishes.on_reset(0.1)
+    wishes.on_stop(0.1)
     order(wishes, "cmd_vel_joy", forward, 0.2)
     assert wishes.greatest_s(0.2) == 0.0
     order(wishes, "cmd_vel_nav", forward, 0.25)
@@ -220,7 +220,7 @@ def test_a_program_that_was_silent_for_its_time_counts_again_a_joystick_does_not
     for topic, counts in (("cmd_vel_nav", True), ("cmd_vel_joy", False)):
         wishes = Wishes(robot, 0.0)
         order(wishes, topic, Twist(0.4, 0.0), 0.0)
-        wishes.on_reset(0.1)
+        wishes.on_stop(0.1)
         order(wishes, topic, Twist(0.4, 0.0), 5.0)
         assert (wishes.greatest_s(5.0) > 0.0) is counts
 
@@ -230,10 +230,10 @@ def test_a_command_that_is_on_its_way_over_a_reset_was_not_held_by_what_anybody_
     wishes = Wishes(campaign_robot(), 0.0)
     for at in (0.0, 0.1, 0.4):
         wishes.take("cmd_vel_nav", Twist(0.4, 0.0), at)
-    wishes.on_reset(0.1)
+    wishes.on_stop(0.1)
     assert wishes.greatest_s(0.4) > 0.0
     wishes.arrive("cmd_vel_nav", Twist(0.4, 0.0), 0.4)
-    wishes.on_reset(0.5)
+    wishes.on_stop(0.5)
     assert wishes.greatest_s(0.5) == 0.0
 
 

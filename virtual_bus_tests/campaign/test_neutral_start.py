@@ -9,7 +9,9 @@ from collections.abc import Callable
 import pytest
 
 from canbase_campaign.outside import Surroundings
+from canbase_campaign.robots import campaign_robot
 from canbase_campaign.world import World
+from canbase_config.robot import Robot
 from canbase_driver.supervision.fault_reset import Outcome
 from canbase_runtime.driver_state import DriverState
 from canbase_velocity.neutral import Arming
@@ -24,8 +26,8 @@ READY_S = 8.0
 class Hand:
     """A person at the joystick. `holds`: what the joystick orders; None: it publishes nothing."""
 
-    def __init__(self, topic: str = "cmd_vel_joy") -> None:
-        self.world = World()
+    def __init__(self, topic: str = "cmd_vel_joy", robot: Robot | None = None) -> None:
+        self.world = World(robot)
         self.around = Surroundings(self.world)
         self.holds: Twist | None = None
         self._topic = topic
@@ -245,6 +247,34 @@ def test_navigation_that_was_idle_starts_with_a_velocity_and_not_while_it_goes_o
     hand.run(2.1)
     hand.holds = FORWARD
     assert hand.run(1.5) > 0.2
+
+
+def slow_pad() -> Robot:
+    """Its joystick is active for 2 s without a message, and absent after 1 s; its emergency stop needs no reset."""
+    robot = campaign_robot()
+    pad = robot.mux.sources["joystick"].model_copy(update={"timeout_s": 2.0, "neutral_after_s": 1.0})
+    mux = robot.mux.model_copy(update={"sources": {**robot.mux.sources, "joystick": pad}})
+    estop = robot.safety.estop.model_copy(update={"latched": False})
+    return robot.model_copy(update={"mux": mux, "safety": robot.safety.model_copy(update={"estop": estop})})
+
+
+# 0.5 m/s ── the joystick's program ends ── 0.1 the stop is pressed ── 0.8 released; `canbase config check` refuses this
+# pair of keys since, and a mux that has it holds all the same
+def test_a_joystick_that_ended_before_an_emergency_stop_moves_nothing_after_it() -> None:
+    hand = Hand(robot=slow_pad())
+    hand.wait_enabled()
+    hand.holds = ZERO
+    hand.run(0.3)
+    hand.holds = Twist(0.5, 0.0)
+    assert hand.run(1.5) > 0.3
+    hand.holds = None
+    hand.run(0.1)
+    hand.around.press(True)
+    hand.run(0.7)
+    hand.around.press(False)
+    hand.run(0.1)
+    assert hand.stays(5.0)
+    assert hand.drives()
 
 
 @pytest.mark.parametrize("event", [driver_restarts, velocity_restarts, stop_service, reset_while_no_scan_comes])

@@ -31,6 +31,7 @@ ADDED = (
     "driver_never_lets_go",
     "scanner_late",
     "setpoints_not_sent",
+    "source_ends_before_stop",
     "stick_tapped",
     "stop_requested",
     "two_on_a_lock",

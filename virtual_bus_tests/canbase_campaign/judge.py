@@ -304,7 +304,7 @@ class Judge:
         if self._gone("watchdog", latched) and not asked:
             self._violate("latched", "the watchdog left TRIPPED without a reset")
         if done > self._resets_done:
-            self._wishes.on_reset(now_s)
+            self._wishes.on_stop(now_s)
             self._rests_since = now_s
         self._fresh, self._resets_done = self._fresh or done > self._resets_done, done
         if (latched or self._latches) and latched.keys() != self._latches.keys():
@@ -366,6 +366,7 @@ class Judge:
             self._unheard_at = now_s
         if now_s > max(self._pressed_at, self._unheard_at) + HEARD_S:
             self._awaits_zero = True
+            self._wishes.on_stop(now_s)
         robot, fastest_mps = self._world.robot, self._reach.fastest_mps
         longest_s = braking_s(robot, robot.limits.linear_mps, robot.limits.angular_radps)
         if coasting:

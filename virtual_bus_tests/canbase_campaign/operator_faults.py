@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from canbase_campaign.world import World
 
 AGAIN_S = 0.05
+RESTS, DIES_AT = 4, 14
+"""Of `end_before_stop`: the joystick is at rest, then deflected, so many times AGAIN_S long."""
 Do = Callable[["World", "Surroundings", Arguments, int], None]
 
 
@@ -66,6 +68,16 @@ def release_button(world: World, around: Surroundings, given: Arguments, number:
     around.press(False)
 
 
+def end_before_stop(world: World, around: Surroundings, given: Arguments, number: int) -> None:
+    """The joystick's program ends while it orders motion; then the stop button is pressed, and released."""
+    if number < DIES_AT:
+        world.topics.publish("cmd_vel_joy", given["twist"] if number >= RESTS else ZERO)
+    elif number == DIES_AT + given["waits"]:
+        around.press(True)
+    elif number == DIES_AT + given["waits"] + given["presses"]:
+        around.press(False)
+
+
 def reset_again(world: World, around: Surroundings, given: Arguments, number: int) -> None:
     """A reset, whether it is time for it or not."""
     around.reset()
@@ -102,7 +114,16 @@ def steady(random: Random) -> Arguments:
     return {"twist": Twist(speed_mps, random.choice((0.0, random.uniform(-2.0, 2.0))))}
 
 
+def steady_until_it_ends(random: Random) -> Arguments:
+    """A motion, and how long after it the stop button is pressed, and for how long, in AGAIN_S."""
+    return {**steady(random), "waits": random.randint(1, 6), "presses": random.randint(2, 16)}
+
+
 PEOPLE: dict[str, Kind] = {
+    "source_ends_before_stop": Kind(
+        "a joystick's program ends in motion, then the stop button is pressed and released", (2.0, 4.0),
+        steady_until_it_ends, *goes_on(end_before_stop, release_button),
+    ),
     "stick_tapped": Kind(
         "a stick is touched for a moment, again and again", (2.0, 4.0), touch,
         *goes_on(tap_stick, release_stick, every_s=0.02),

@@ -12,8 +12,9 @@ RECENT_S = 0.05
 class Wishes:
     """Each source's last command holds for its timeout in robot.yaml.
 
-    One that orders motion while a reset is done does not count from then on, until it orders zero or was absent for its
-    neutral_after_s. By what has arrived: no part knows a command that is still on its way.
+    One that orders motion while the stop button is pressed, or a reset is done, does not count from then on, until it
+    orders zero or was absent for its neutral_after_s. By what has arrived: no part knows a command that is still on its
+    way.
     """
 
     def __init__(self, robot: Robot, now_s: float) -> None:
@@ -43,9 +44,9 @@ class Wishes:
             self._held.discard(topic)
         self._arrived[topic] = self._tau_s(twist), now_s
 
-    def on_reset(self, now_s: float) -> None:
-        """A reset is done: a source that orders motion now was held over it. Its last command tells: of two hands one
-        has shown zero since the motion of the other."""
+    def on_stop(self, now_s: float) -> None:
+        """A reset is done, or the stop button holds: a source that orders motion now was held over it. Its last command
+        tells: of two hands one has shown zero since the motion of the other."""
         self._held = {topic for topic in self._arrived if self._holds_s(topic, self._arrived[topic], now_s) > 0.0}
 
     def greatest_s(self, now_s: float) -> float:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from canbase_config.mux import DEFAULT_SOURCES
+from collections.abc import Mapping
+
+from canbase_config.mux import DEFAULT_SOURCES, MuxSource
 from canbase_runtime.driver_state import DriverState
 from canbase_velocity.mux import Mux, MuxDecision
 from canbase_velocity.twist import ZERO, Twist
@@ -15,8 +17,8 @@ STATUS_S = 0.1
 class Story:
     """A mux at 50 Hz, a driver that publishes its state at 10 Hz, and sources that publish what a test sets."""
 
-    def __init__(self) -> None:
-        self.mux = Mux(DEFAULT_SOURCES)
+    def __init__(self, sources: Mapping[str, MuxSource] = DEFAULT_SOURCES) -> None:
+        self.mux = Mux(sources)
         self.now_s = 100.0
         self.driver: DriverState | None = DriverState.ENABLED
         self.estop_free = True

@@ -170,6 +170,11 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
         ":38: mux.sources.a.neutral_after_s: a joint_command publishes zero while nothing is ordered; only that may "
         "arm it: leave it out",
     ),
+    "a source that is absent while it is active": (
+        {END: "mux:\n  sources:\n    a: {topic: x, priority: 1, timeout_s: 2.0, neutral_after_s: 1.0}"},
+        ":38: mux.sources.a.neutral_after_s: without a message the source is active for timeout_s (2); only then is "
+        "it absent: neutral_after_s (1) must not be less",
+    ),
     "the measured wheel speeds as a source": (
         {END: "mux:\n  sources:\n    a: {topic: /joint_states, type: joint_command, priority: 1, timeout_s: 0.1}"},
         ":38: mux.sources.a.topic: /joint_states is an output of this robot; a source needs another topic",

@@ -290,3 +290,25 @@ def test_a_stick_at_rest_that_goes_on_to_say_so_and_a_program_that_was_just_at_z
     story.sends = {}
     story.run(0.4)
     assert story.followed("navigation", 0.1)
+
+
+# 0.0 a program orders 0.3 m/s, and ends ── 0.1 the stop is pressed ── 0.8 released ── 1.0 absent: its command is still
+# fresh for a second
+@pytest.mark.parametrize("event", [driver_latches, estop_holds])
+@pytest.mark.parametrize("timeout_s", [0.3, 1.0, 2.0])
+def test_a_source_that_ended_before_a_stop_moves_nothing_after_it(
+    event: Callable[[Story], None], timeout_s: float
+) -> None:
+    source = DEFAULT_SOURCES["navigation"].model_copy(update={"timeout_s": timeout_s, "neutral_after_s": 1.0})
+    story = Story({"pad": source})
+    story.run(1.1)
+    assert story.followed("pad")
+    story.sends = {}
+    story.run(0.1)
+    event(story)
+    story.run(0.7)
+    story.driver, story.estop_free = DriverState.ENABLED, True
+    story.ordered.clear()
+    story.run(5.0)
+    assert set(story.ordered) == {ZERO}
+    assert story.followed("pad")  # it was absent: the program starts again with a velocity
