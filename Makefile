@@ -44,6 +44,10 @@ test-real-time: $(VENV)/ready ## tests in real time; WORKERS=2 two robots at a t
 	@echo "about 30 minutes, mostly waiting; half of that with WORKERS=2"
 	pytest --reruns 1 $(if $(WORKERS),--numprocesses $(WORKERS) --dist loadfile) $(addprefix $(TESTS)/,$(or $(ONLY),bus ros))
 
+.PHONY: test-root
+test-root: $(VENV)/ready ## the tests that need root, which every other user's run skips: sudo make test-root
+	PYTHONDONTWRITEBYTECODE=1 pytest -m needs_root -p no:cacheprovider $$(grep -rl --include='test_*.py' mark.needs_root $(TESTS))
+
 # COMPILED=1: campaign, stops and soak run with their hot modules compiled, several times as fast, frame by frame the same.
 WORLD := $(if $(COMPILED),$(CURDIR)/build/compiled:)$(CURDIR)/virtual_bus_tests
 WORLD_READY := $(VENV)/ready $(if $(COMPILED),build/compiled/ready)

@@ -320,7 +320,10 @@ class Toggled:
 def test_a_safety_relay_stays_open_until_the_bus_takes_frames(rig: Rig) -> None:
     relay, asked = Toggled(), threading.Event()
     FlakyBus.down = True
-    with BusPort(rig.config.bus_arguments, after_loss=True) as bus, LeaseSocket(rig.config.lease_socket, 0) as leases:
+    with (
+        BusPort(rig.config.bus_arguments, after_loss=True) as bus,
+        LeaseSocket(rig.config.lease_socket, os.getuid()) as leases,
+    ):
 
         def turn() -> None:
             Loop(Watchdog(rig.config, time.monotonic()), bus, leases, cast(Any, relay)).run(asked.is_set)
@@ -343,7 +346,7 @@ def test_a_safety_relay_stays_open_while_the_controller_is_bus_off(
     relay, asked, off = Toggled(), threading.Event(), [True]
     monkeypatch.setattr(watchdog_bus_port, "is_without_carrier", lambda _: off[0])
     alone = {"interface": "virtual", "channel": "off"}
-    with BusPort(alone) as bus, LeaseSocket(rig.config.lease_socket, 0) as leases, VirtualBus("off") as other:
+    with BusPort(alone) as bus, LeaseSocket(rig.config.lease_socket, os.getuid()) as leases, VirtualBus("off") as other:
         assert (bus.health.takes_frames, bus.health.works) == (True, False)
         watchdog = Watchdog(rig.config, time.monotonic())
         thread = threading.Thread(target=lambda: Loop(watchdog, bus, leases, cast(Any, relay)).run(asked.is_set))

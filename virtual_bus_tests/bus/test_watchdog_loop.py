@@ -26,6 +26,7 @@ from support.watchdog_story import config
 
 pytestmark = pytest.mark.bus
 
+ME = os.geteuid()
 QUICK_STOP = Frame(0x501, bytes.fromhex("02 00"))
 
 
@@ -42,7 +43,7 @@ class Rig:
         self.thread = threading.Thread(target=self._run)
 
     def _run(self) -> None:
-        with BusPort(self.config.bus_arguments) as bus, LeaseSocket(self.config.lease_socket, 0) as leases:
+        with BusPort(self.config.bus_arguments) as bus, LeaseSocket(self.config.lease_socket, ME) as leases:
             Loop(self.watchdog, bus, leases).run(self.asked.is_set)
 
 
@@ -147,7 +148,7 @@ class DeadBus(can.BusABC):
 def test_a_bus_that_takes_nothing_for_a_second_ends_the_loop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("can.Bus", lambda **arguments: DeadBus("x"))
     begin = time.monotonic()
-    with BusPort({}) as bus, LeaseSocket(str(tmp_path / "lease"), 0) as leases:
+    with BusPort({}) as bus, LeaseSocket(str(tmp_path / "lease"), ME) as leases:
         dead = Loop(Watchdog(config(), begin), bus, leases)
         with pytest.raises(BusDeadError, match=r"no frame could be sent for 1\.0 s"):
             dead.run(lambda: False)
@@ -205,12 +206,12 @@ def test_error_frames_tell_that_the_bus_fails_and_frames_that_it_works_again() -
 
 def test_the_lease_socket_is_for_its_owner_and_goes_with_the_process(tmp_path: Path) -> None:
     path = tmp_path / "run" / "lease"
-    with LeaseSocket(str(path), 0):
+    with LeaseSocket(str(path), ME):
         assert (path.stat().st_mode & 0o777, path.parent.stat().st_mode & 0o777) == (0o600, 0o700)
     assert not path.exists()
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a socket away")
+@pytest.mark.needs_root("give a socket to another user")
 def test_the_lease_socket_of_another_user_can_be_written_by_it(tmp_path: Path) -> None:
     path = tmp_path / "run" / "lease"
     with LeaseSocket(str(path), 12345):
@@ -228,16 +229,16 @@ def test_without_root_no_socket_is_made_for_another_user(tmp_path: Path, monkeyp
     assert not path.parent.exists()
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root can make a link of another user")
+@pytest.mark.needs_root("give a link to another user")
 def test_a_folder_that_is_a_link_of_another_user_is_refused(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir(0o700)
     link = tmp_path / "run"
     link.symlink_to(tmp_path / "there")
-    with LeaseSocket(str(link / "lease"), 0):
+    with LeaseSocket(str(link / "lease"), ME):
         pass
     os.lchown(link, 12345, -1)
     with pytest.raises(LeaseSocketError, match="is a link of user 12345"):
-        LeaseSocket(str(link / "lease"), 0)
+        LeaseSocket(str(link / "lease"), ME)
 
 
 def test_a_folder_that_others_may_change_is_refused(tmp_path: Path) -> None:
@@ -245,43 +246,43 @@ def test_a_folder_that_others_may_change_is_refused(tmp_path: Path) -> None:
     folder.mkdir()
     folder.chmod(0o777)
     with pytest.raises(LeaseSocketError, match="chmod go-w"):
-        LeaseSocket(str(folder / "lease"), 0)
+        LeaseSocket(str(folder / "lease"), ME)
     folder.chmod(0o1777)  # as /tmp: others cannot remove or rename what is there
-    with LeaseSocket(str(folder / "lease"), 0):
+    with LeaseSocket(str(folder / "lease"), ME):
         pass
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder away")
+@pytest.mark.needs_root("give a folder to another user")
 def test_a_folder_of_another_user_is_refused(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     folder.mkdir(0o755)
     os.chown(folder, 12345, -1)
     with pytest.raises(LeaseSocketError, match="belongs to user 12345"):
-        LeaseSocket(str(folder / "lease"), 0)
+        LeaseSocket(str(folder / "lease"), ME)
 
 
 def test_a_socket_that_a_killed_watchdog_left_is_taken_over(tmp_path: Path) -> None:
     path = tmp_path / "lease"
-    left = LeaseSocket(str(path), 0)
+    left = LeaseSocket(str(path), ME)
     left._socket.close()
-    with LeaseSocket(str(path), 0):
+    with LeaseSocket(str(path), ME):
         assert path.is_socket()
 
 
 def test_a_socket_in_use_and_a_file_are_left_alone(tmp_path: Path) -> None:
     path = tmp_path / "lease"
-    with LeaseSocket(str(path), 0), pytest.raises(LeaseSocketError, match="another watchdog listens"):
-        LeaseSocket(str(path), 0)
+    with LeaseSocket(str(path), ME), pytest.raises(LeaseSocketError, match="another watchdog listens"):
+        LeaseSocket(str(path), ME)
     path.write_text("something")
     with pytest.raises(LeaseSocketError, match="is not a socket"):
-        LeaseSocket(str(path), 0)
+        LeaseSocket(str(path), ME)
     assert path.read_text() == "something"
 
 
 def test_a_path_that_cannot_be_made_says_so(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(LeaseSocketError, match=r"Check lease\.socket"):
-        LeaseSocket(str(tmp_path / "file" / "lease"), 0)
+        LeaseSocket(str(tmp_path / "file" / "lease"), ME)
 
 
 class NoRemoteFrames(can.BusABC):
@@ -308,7 +309,7 @@ def test_an_adapter_without_remote_frames_is_reported_once_and_is_no_failed_bus(
     monkeypatch.setattr("can.Bus", lambda **arguments: adapter)
     plain = config()
     guarded = replace(plain, drives=tuple(replace(drive, guarded=True) for drive in plain.drives))
-    with BusPort({}) as bus, LeaseSocket(str(tmp_path / "lease"), 0) as leases, caplog.at_level(logging.ERROR):
+    with BusPort({}) as bus, LeaseSocket(str(tmp_path / "lease"), ME) as leases, caplog.at_level(logging.ERROR):
         turns = iter(range(200))
         Loop(Watchdog(guarded, time.monotonic()), bus, leases).run(lambda: next(turns, None) is None)
         assert bus.health.failed_since == math.inf

@@ -13,7 +13,9 @@ import pytest
 
 playwright = pytest.importorskip("playwright.sync_api")
 CHROMIUM: Final = shutil.which("chromium") or shutil.which("chromium-browser")
-NEEDS_CHROMIUM: Final = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium: apt-get install chromium")
+NEEDS_CHROMIUM: Final = pytest.mark.skipif(
+    CHROMIUM is None, reason="NOT CHECKED: no chromium here (apt-get install chromium)"
+)
 TOKEN: Final = "the-token-of-this-test"
 
 

@@ -162,7 +162,7 @@ def test_empty_and_relative_entries_of_a_sourced_environment_go_to_no_service(
     assert folders(kept) == ["/opt/a", "/b", "/opt/ws"]
 
 
-@pytest.mark.skipif(ME != ROOT, reason="NOT CHECKED: needs root, to give a file to somebody else")
+@pytest.mark.needs_root("give a file to another user")
 def test_a_python_of_a_user_is_not_run_before_it_is_refused(tmp_path: Path) -> None:
     from typer.testing import CliRunner
 

@@ -145,7 +145,7 @@ def test_what_is_no_record_counts_as_latched_and_is_replaced(
     assert not Kept(part, folder).latched
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a file away")
+@pytest.mark.needs_root("give a file to another user")
 @pytest.mark.parametrize("name", ["", "file"])
 def test_a_record_of_another_user_counts_as_latched(folder: Path, part: str, name: str) -> None:
     os.chown(folder / f"{part}.latch" if name else folder, 12345, -1)

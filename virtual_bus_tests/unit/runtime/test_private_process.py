@@ -60,7 +60,7 @@ def test_only_with_a_key_the_memory_and_the_files_of_a_process_are_closed_to_its
     assert seen == (["root", "environ", "mem"] if open_to_others else [])
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root sees what it is closed to")
+@pytest.mark.needs_root("look into a process that is closed to its user")
 def test_root_still_sees_it() -> None:
     with holder({"ROS_SECURITY_ENABLE": "true"}) as pid:
         assert os.listdir(f"/proc/{pid}/root")

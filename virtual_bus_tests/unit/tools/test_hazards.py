@@ -165,13 +165,38 @@ def test_two_rows_with_one_id_are_refused() -> None:
         Catalogue(rows=(CATALOGUE.rows[0], CATALOGUE.rows[0]))
 
 
-def test_a_skipped_proof_fails(pytester: pytest.Pytester) -> None:
-    pytester.makeconftest("from hazards.skipped import pytest_runtest_makereport as pytest_runtest_makereport")
+HOOKS = """
+from hazards.skipped import pytest_runtest_makereport as pytest_runtest_makereport
+from support.needs_root import pytest_runtest_setup as pytest_runtest_setup
+"""
+SKIPPED = "import pytest\n\n@pytest.mark.skip(reason='no time')\ndef test_it() -> None: ...\n"
+NEEDS_ROOT = "import pytest\n\n@pytest.mark.needs_root('give a file away')\ndef test_it() -> None:\n    pass\n"
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnknownMarkWarning")
+@pytest.mark.parametrize(
+    ("text", "user", "outcomes"),
+    [
+        pytest.param(SKIPPED, 0, {"errors": 1, "skipped": 1}, id="skipped: fails"),
+        pytest.param(SKIPPED, 1000, {"errors": 1, "skipped": 1}, id="skipped for a user: fails too"),
+        pytest.param(NEEDS_ROOT, 0, {"passed": 2}, id="needs root: runs as root"),
+        pytest.param(NEEDS_ROOT, 1000, {"skipped": 2}, id="needs root: skipped for a user"),
+        pytest.param(NEEDS_ROOT + "    pytest.skip('')\n", 0, {"failed": 1, "skipped": 1}, id="skipped as root: fails"),
+    ],
+)
+def test_a_skipped_proof_fails_unless_it_waits_for_root(
+    text: str, user: int, outcomes: dict[str, int], pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A proof, and beside it a test that is none."""
+    monkeypatch.setattr("os.geteuid", lambda: user)
+    pytester.makeconftest(HOOKS)
     name = next(
         name for name in sorted(proofs.pytest_names(CATALOGUE)) if name.startswith("unit/") and "::" not in name
     )
     path = pytester.path / name
     path.parent.mkdir(parents=True)
-    path.write_text("import pytest\n\n@pytest.mark.skip(reason='no time')\ndef test_it() -> None: ...\n")
-    path.with_name("test_other.py").write_text("import pytest\n\n@pytest.mark.skip\ndef test_it() -> None: ...\n")
-    pytester.runpytest_inprocess("-p", "no:cacheprovider").assert_outcomes(errors=1, skipped=1)
+    path.write_text(text)
+    path.with_name("test_other.py").write_text(text)
+    result = pytester.runpytest_inprocess("-p", "no:cacheprovider", "-rs")
+    result.assert_outcomes(**outcomes)
+    assert ("NOT CHECKED: needs root, to give a file away" in result.stdout.str()) == (text is NEEDS_ROOT and user != 0)
