@@ -141,7 +141,7 @@ class _Replayer:
             "scan": self._scan,
             "points": lambda at_s, topic, points: self._seen(topic, safety.on_points, points, None, at_s),
             "unplaced": lambda at_s, topic, why: self._seen(topic, safety.on_unplaced_scan, why),
-            "scanners": lambda at_s, topic, nodes: self._seen(topic, safety.on_scan_publishers, nodes, at_s),
+            "scanners": lambda at_s, topic, *who: self._seen(topic, safety.on_scan_publishers, *who, at_s),
             "speed_limit": lambda at_s, v, w, by: safety.on_speed_limit(SpeedLimit(v, w), by),
             "reset": lambda at_s, moving: safety.reset(moving, at_s),
             "record": self._record,

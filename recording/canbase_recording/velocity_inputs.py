@@ -177,7 +177,7 @@ _READ: Final[Mapping[str, Callable[..., Call]]] = {
     "scan": _scan,
     "points": _points,
     "unplaced": lambda topic, why: (str(topic), str(why)),
-    "scanners": lambda topic, nodes: (str(topic), _names(nodes)),
+    "scanners": lambda topic, nodes, keys=None: (str(topic), _names(nodes), _names(nodes if keys is None else keys)),
     "speed_limit": lambda v, w, by: (float(v), float(w), str(by)),
     "reset": lambda moving: (_names(moving),),
     "record": lambda record, problem: (None if record is None else dict(record), str(problem)),

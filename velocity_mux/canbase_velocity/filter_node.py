@@ -225,10 +225,11 @@ class FilterNode(Node):
         """Into the ROS graph: a message does not contain its publisher."""
         now_s = time.monotonic()
         for scan in self._robot.safety.scans:
-            found = publishers(self, self.resolve_topic_name(scan.topic))
-            nodes = [each.node or "a node without a name" for each in found if each.kind == SCAN_KIND]
-            self._note("scanners", now_s, scan.topic, nodes)
-            self._filter.on_scan_publishers(scan.topic, nodes, now_s)
+            there = publishers(self, self.resolve_topic_name(scan.topic))
+            scanners = [each for each in there if each.kind == SCAN_KIND]
+            nodes, keys = [each.node or "a node without a name" for each in scanners], [each.key for each in scanners]
+            self._note("scanners", now_s, scan.topic, nodes, keys)
+            self._filter.on_scan_publishers(scan.topic, nodes, keys, now_s)
 
     def _on_tf_static(self, message: messages.TFMessage) -> None:
         self._transforms.update(messages.transforms_of(message))

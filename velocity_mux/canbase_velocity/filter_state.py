@@ -193,11 +193,11 @@ class SafetyFilter:
         self._motion.advance(now_s)
         self._scanners[topic].receive(scan, placement, now_s, moves=not self._motion.moving.twist.is_zero)
 
-    def on_scan_publishers(self, topic: str, nodes: Sequence[str], now_s: float) -> None:
-        """Takes the publishers on the topic of a scanner: a node's name for each. Raises KeyError for another
+    def on_scan_publishers(self, topic: str, nodes: Sequence[str], keys: Sequence[str], now_s: float) -> None:
+        """Takes the publishers on the topic of a scanner: a node's name and a key for each. Raises KeyError for another
         topic.
         """
-        self._scanners[topic].sole.look(nodes, now_s)
+        self._scanners[topic].sole.look(nodes, keys, now_s)
 
     def on_unplaced_scan(self, topic: str, problem: str) -> None:
         """A scan came whose scanner cannot be placed. Raises KeyError for another topic."""

@@ -30,6 +30,7 @@ ADDED = (
     "driver_dies_torn",
     "driver_never_lets_go",
     "scanner_late",
+    "scanner_restarts",
     "setpoints_not_sent",
     "source_ends_before_stop",
     "stick_tapped",

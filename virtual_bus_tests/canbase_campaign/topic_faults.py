@@ -80,6 +80,20 @@ def one_on_a_lock(world: World, around: Surroundings, given: Arguments, number: 
     world.locked_at = math.inf
 
 
+def _restarts(world: World, around: Surroundings, given: Arguments, number: int) -> None:
+    """Each second a scanner's driver dies and starts again. The graph keeps the dead ones for longer than this lasts."""
+    starts, since = divmod(number, 2 * LOOK)
+    around.scans = since >= given["starts_in"]
+    if number % LOOK == 0:
+        world.topics.publish("publishers", ("scan", tuple(f"scanner {start}" for start in range(starts + 2))))
+
+
+def _restarted(world: World, around: Surroundings, given: Arguments, number: int) -> None:
+    """The graph has forgotten all but the last one."""
+    around.scans = True
+    world.topics.publish("publishers", ("scan", ("scanner last",)))
+
+
 def _strange_twist(random: Random) -> Arguments:
     """Mostly a motion, sometimes nonsense."""
     nonsense = Twist(math.nan, math.inf)
@@ -91,6 +105,10 @@ TOPIC_FAULTS: dict[str, Kind] = {
     "two_on_a_lock": Kind(
         "two nodes publish on one lock: one of them says locked, and the other one not", (1.0, 2.5), nothing,
         *goes_on(two_on_a_lock, one_on_a_lock),
+    ),
+    "scanner_restarts": Kind(
+        "a scanner's driver crashes and starts again, each second", (1.0, 3.5),
+        lambda r: {"starts_in": r.randint(1, 6)}, *goes_on(_restarts, _restarted),
     ),
     "straight_to_cmd_vel": Kind(
         "somebody publishes to cmd_vel",

@@ -158,6 +158,10 @@ class VelocityProcess(Process):
 
     def _on_publishers(self, found: tuple[str, tuple[str, ...]]) -> None:
         """A look into the ROS graph: a topic, and the nodes that publish on it."""
+        if found[0] == self._robot.safety.scan.topic:
+            self.note("scanners", self.clock.now_s, found[0], list(found[1]), list(found[1]))
+            self.filter.on_scan_publishers(found[0], found[1], found[1], self.clock.now_s)
+            return
         self.note("publishers", self.clock.now_s, found[0], list(found[1]), list(found[1]))
         self.mux.on_publishers(*found)
 

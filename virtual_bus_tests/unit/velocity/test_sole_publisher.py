@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -24,25 +25,36 @@ PLACE = Placement(0.0, 0.0, (1.0, 0.0), (0.0, 1.0))
 @pytest.mark.parametrize(("together_s", "latched"), [(0.0, False), (LATCHED_S - 0.5, False), (LATCHED_S, True)])
 def test_two_that_were_together_for_long_are_two_scanners(together_s: float, latched: bool) -> None:
     sole = SolePublisher()
-    sole.look(ONE, 9.5)
+    sole.look(ONE, ONE, 9.5)
     assert sole.problem == ""
     for step in range(round(together_s / 0.5) + 1):
-        sole.look(TWO, 10.0 + 0.5 * step)
+        sole.look(TWO, TWO, 10.0 + 0.5 * step)
         assert sole.problem.startswith("2 publishers (/front, /rear): give each scanner a topic")
     assert ("until the next start" in sole.problem) is latched
-    sole.look(ONE, 10.5 + together_s)
+    sole.look(ONE, ONE, 10.5 + together_s)
     assert bool(sole.problem) is latched
-    sole.look((), 11.0 + together_s)
+    sole.look((), (), 11.0 + together_s)
     assert bool(sole.problem) is latched
 
 
-def test_a_driver_that_is_started_again_and_again_is_one_scanner() -> None:
+def graph(now_s: float, starts_s: tuple[float, ...], kept_s: float = 20.0) -> list[str]:
+    """The publishers of one driver that is killed and started again at these times: DDS keeps a dead one `kept_s`."""
+    ends_s = (*starts_s[1:], math.inf)
+    lives = zip(starts_s, ends_s, strict=True)
+    return [f"{start_s:g}" for start_s, end_s in lives if start_s <= now_s < end_s + kept_s]
+
+
+@pytest.mark.parametrize(
+    "starts_s", [(0.0, 8.0, 16.0, 24.0, 32.0), (0.0, 29.0, 30.0, 49.0, 60.0), (0.0, 0.5, 1.0, 30.5)]
+)
+def test_a_driver_that_is_started_again_and_again_is_one_scanner(starts_s: tuple[float, ...]) -> None:
     sole = SolePublisher()
-    for start in range(10):
-        for step in range(40):
-            sole.look(TWO, 30.0 * start + 0.5 * step)
-        sole.look(ONE, 30.0 * start + 20.0)
-        assert sole.problem == ""
+    for step in range(240):
+        now_s = 0.5 * step
+        keys = graph(now_s, starts_s)
+        sole.look(["/front"] * len(keys), keys, now_s)
+        assert bool(sole.problem) is (len(keys) > 1)
+    assert sole.problem == ""
 
 
 class Base:
@@ -61,7 +73,7 @@ class Base:
             self.cycle += 1
             now_s = 10.0 + 0.05 * self.cycle
             if self.cycle % 10 == 0:
-                self.filter.on_scan_publishers(self.topic, in_graph, now_s)
+                self.filter.on_scan_publishers(self.topic, in_graph, in_graph, now_s)
             number = self.cycle % 2
             if number in alive:
                 scan = dataclasses.replace(self.scanners[number].scan(FAR), stamp_ns=round(now_s * 1e9))
@@ -91,3 +103,12 @@ def test_a_driver_that_was_killed_is_replaced_when_the_graph_has_forgotten_it() 
     assert base.run(19.0, (0,), TWO) == {(Action.STOP, StopCause.SCAN_INVALID)}
     base.run(0.6, (0,), ONE)
     assert base.run(1.0, (0,), ONE) == {(Action.PASS, StopCause.NONE)}
+
+
+# a scanner's driver that crashes every 8 s, five times ── 20 s after the last crash the graph has one publisher again
+def test_a_driver_that_was_restarted_five_times_in_forty_seconds_counts_again() -> None:
+    base, starts_s = Base(), (0.0, 8.0, 16.0, 24.0, 32.0, 40.0)
+    for step in range(120):
+        decisions = base.run(0.5, (0,), tuple(graph(0.5 * step, starts_s)))
+        assert (decisions == {(Action.STOP, StopCause.SCAN_INVALID)}) is (8.0 < 0.5 * step < 60.0)
+    assert base.run(2.0, (0,), ("40",)) == {(Action.PASS, StopCause.NONE)}
