@@ -81,7 +81,7 @@ def one_on_a_lock(world: World, around: Surroundings, given: Arguments, number: 
 
 
 def _restarts(world: World, around: Surroundings, given: Arguments, number: int) -> None:
-    """Each second a scanner's driver dies and starts again. The graph keeps the dead ones for longer than this lasts."""
+    """Each second a scanner's driver dies and starts again. The graph keeps dead ones for longer than this."""
     starts, since = divmod(number, 2 * LOOK)
     around.scans = since >= given["starts_in"]
     if number % LOOK == 0:

@@ -111,4 +111,5 @@ def test_a_driver_that_was_restarted_five_times_in_forty_seconds_counts_again() 
     for step in range(120):
         decisions = base.run(0.5, (0,), tuple(graph(0.5 * step, starts_s)))
         assert (decisions == {(Action.STOP, StopCause.SCAN_INVALID)}) is (8.0 < 0.5 * step < 60.0)
+    base.run(1.0, (0,), ("40",))
     assert base.run(2.0, (0,), ("40",)) == {(Action.PASS, StopCause.NONE)}
